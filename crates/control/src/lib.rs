@@ -1,0 +1,3 @@
+//! Everything that decides torque for the Barrett WAM: model, estimation, controllers, limits, supervisor.
+#![no_std]
+#![forbid(unsafe_code)]

@@ -1,0 +1,3 @@
+//! The arm image.
+#![no_std]
+#![no_main]

@@ -1,0 +1,2 @@
+//! The arm image.
+#![no_std]

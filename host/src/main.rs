@@ -1,0 +1,3 @@
+//! The `tactus` command.
+
+fn main() {}
