@@ -1,3 +1,55 @@
-//! Dynamic movement primitives that feel: no_std, no allocation, f32, f64 or fixed point.
 #![no_std]
 #![forbid(unsafe_code)]
+#![allow(
+    clippy::neg_cmp_op_on_partial_ord,
+    reason = "`!(x > 0)` also refuses NaN, which `x <= 0` would let through"
+)]
+#![doc = include_str!("../README.md")]
+
+#[cfg(feature = "std")]
+extern crate std;
+
+mod chart;
+mod expectation;
+mod feedback;
+mod forcing;
+mod group;
+mod orientation;
+mod pace;
+mod phase;
+mod primitive;
+mod quaternion;
+mod reference;
+mod rollout;
+mod scalar;
+mod table;
+mod transformation;
+mod turn;
+mod vector;
+
+#[cfg(feature = "std")]
+pub mod fit;
+
+pub use chart::RotationChart;
+pub use expectation::{EXPECTED_CAPACITY, ExpectedWrench};
+pub use feedback::{
+    COUPLED_ROWS, Coupling, Feedback, GAIN_CAPACITY, GainSchedule, Limits, SENSORS, SensorMap,
+    Stiffness,
+};
+pub use forcing::{Activations, Basis, ForcingTerm};
+pub use orientation::{
+    OrientationError, OrientationInput, OrientationState, OrientationSystem, orientation_error,
+};
+pub use phase::{CanonicalSystem, Phase};
+pub use primitive::{
+    CONTROL_PERIOD, Configuration, HAND_ROWS, Hemisphere, ORIENTATION_ROWS, POSITION_ROWS,
+    POSTURE_ROWS, Primitive, PrimitiveError, PrimitiveTables, ROWS, Row, Velocity,
+};
+pub use quaternion::Quaternion;
+pub use reference::{OrientationReference, Reference, StartState, Trajectory};
+pub use rollout::{Rollout, RolloutError};
+#[cfg(feature = "fixed")]
+pub use scalar::FixedPoint;
+pub use scalar::Scalar;
+pub use table::{PhaseTable, TableError};
+pub use transformation::{GainError, PointInput, PointState, TransformationSystem};

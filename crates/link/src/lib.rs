@@ -1,3 +1,31 @@
 //! Host and device of Tactus: framing, messages and the primitive image.
+//!
+//! The only types both sides share. Everything is raw (`f32` arrays in SI units, plain codes): what
+//! the numbers mean to the arm is decided in `control`, which this crate does not know.
+//!
+//! - [`message`]: [`Request`] (host to device) and [`Reply`] (device to host), append-only.
+//! - [`frame`]: one message to bytes and back: postcard, CRC-32, COBS, terminated by a zero byte.
+//! - [`image`]: [`PrimitiveImage`], a movement primitive as it is uploaded and stored.
+//! - [`SCHEMA_HASH`]: a number that changes with every change of any of these layouts.
+//!
+//! The bytes are described in `docs/protocol.md` and `docs/image-format.md`.
+//!
+//! Conventions: quaternions are Hamilton, order (w, x, y, z); wrenches are those of the environment
+//! on the robot; arrays of seven follow the joints from base to wrist.
 #![no_std]
 #![forbid(unsafe_code)]
+
+pub mod frame;
+pub mod image;
+pub mod message;
+pub mod name;
+pub mod refusal;
+pub mod report;
+mod schema;
+
+pub use image::{ImageError, PrimitiveImage};
+pub use message::{DeviceHello, Goal, HostHello, Reply, Request, RunOptions};
+pub use name::{Name, NameError, Text};
+pub use refusal::Refusal;
+pub use report::{Event, EventKind, LinkCounters, Listing, Statistics, Status, Telemetry};
+pub use schema::{LINK_VERSION, SCHEMA_HASH};

@@ -1,3 +1,28 @@
-//! Barrett's CAN protocol for the WAM arm: codecs over embedded_can::Frame, no I/O.
+#![doc = include_str!("../README.md")]
 #![no_std]
 #![forbid(unsafe_code)]
+
+pub mod can;
+pub mod device;
+pub mod force_torque;
+pub mod hand;
+pub mod message;
+pub mod position;
+pub mod property;
+pub mod reply;
+pub mod safety;
+pub mod state;
+pub mod tactile;
+pub mod transmission;
+pub mod units;
+
+pub use can::{CanFrame, CanId, Destination, Group, Node};
+pub use device::{Action, Request, RequestError};
+pub use force_torque::{GaugeStatus, RawWrench};
+pub use message::{get, packed_torques, set, set_short, zero_torques};
+pub use property::{Property, PropertyId, PropertyTable, UnknownFirmware};
+pub use reply::{Reply, ReplyError};
+pub use safety::{PendantState, SafetyMode};
+pub use state::{MotorMode, Role, Status};
+pub use transmission::{Drives, Ratios, Transmission, TransmissionError};
+pub use units::{Counts, NotFinite, PuckTorque, Real};

@@ -1,1 +1,39 @@
-//! The other side of the WAM's bus, simulated.
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod boot;
+mod bus;
+mod chain;
+mod force_torque;
+mod inbox;
+mod link_wire;
+pub mod lockstep;
+mod motors;
+mod noise;
+mod operator;
+pub mod person;
+mod plant;
+mod puck_model;
+#[cfg(feature = "render")]
+pub mod render;
+mod rotation;
+mod safety;
+mod speed;
+mod steady_hand;
+mod time;
+mod trace;
+pub mod wire;
+pub mod world;
+
+pub use bus::{Bus, Passage};
+pub use force_torque::ForceTorqueConfig;
+pub use link_wire::{BYTE_TICKS, CHUNK};
+pub use lockstep::{Lockstep, LockstepError, Served};
+pub use noise::Noise;
+pub use operator::{OperatorConfig, PendantAction};
+pub use plant::{Event, Plant, PlantConfig, PlantError, STEPS_PER_SECOND};
+pub use puck_model::PuckConfig;
+pub use safety::SafetyConfig;
+pub use time::*;
+pub use trace::{BusTrace, FrameClass};
+pub use world::{FreeJoints, HOME, Pose, World};

@@ -1,0 +1,77 @@
+//! One control tick of a whole primitive: 3 positions, quaternion, 7 posture rows and 4 fingers on one phase.
+
+use divan::{Bencher, black_box};
+use dmp::{
+    Configuration, Coupling, Hemisphere, OrientationError, Primitive, PrimitiveTables, Quaternion,
+    ROWS, Rollout, Scalar, StartState, Velocity,
+};
+
+fn main() {
+    divan::main();
+}
+
+fn primitive<T: Scalar, const N: usize>(kernels: usize) -> Primitive<T, N> {
+    let f = T::from_f64;
+    let weights: Vec<T> = (0..ROWS * kernels)
+        .map(|i| f(0.3 * (0.37 * i as f64).sin()))
+        .collect();
+    let configuration = |x: f64, q: Quaternion<T>| Configuration {
+        position: [f(x); 3],
+        orientation: q,
+        posture: [f(x); 7],
+        hand: [f(x); 4],
+    };
+    let turned = Quaternion::from_rotation_vector(&[f(0.4), f(-0.8), f(0.3)]);
+    Primitive::new(&PrimitiveTables {
+        duration: f(5.0),
+        alpha: f(4.605),
+        activation: f(0.7),
+        kernel_count: kernels,
+        weights: &weights,
+        stiffness: [f(200.0); 4],
+        damping: [f(28.28), f(20.0), f(28.28), f(28.28)],
+        orientation_error: OrientationError::Quaternion,
+        hemisphere: Hemisphere::Nearest,
+        start: configuration(0.0, Quaternion::IDENTITY),
+        goal: configuration(0.5, turned),
+        start_velocity: Velocity::ZERO,
+        feedback: None,
+        expected: None,
+    })
+    .unwrap()
+}
+
+/// A whole movement of 1500 ticks; the time per tick is a 1500th of it.
+fn movement<T: Scalar, const N: usize>(bencher: Bencher<'_, '_>) {
+    let primitive = primitive::<T, N>(N);
+    let dt = T::from_f64(1.0 / 300.0);
+    let start = StartState::at_rest(*primitive.start());
+    bencher
+        .counter(divan::counter::ItemsCount::new(1500_usize))
+        .bench_local(|| {
+            let mut rollout = Rollout::start(&primitive, &start).unwrap();
+            for _ in 0..1500 {
+                black_box(rollout.step(black_box(&primitive), dt, &Coupling::NONE));
+            }
+        });
+}
+
+#[divan::bench]
+fn f64_50_kernels(bencher: Bencher<'_, '_>) {
+    movement::<f64, 50>(bencher);
+}
+
+#[divan::bench]
+fn f32_50_kernels(bencher: Bencher<'_, '_>) {
+    movement::<f32, 50>(bencher);
+}
+
+#[divan::bench]
+fn f32_100_kernels(bencher: Bencher<'_, '_>) {
+    movement::<f32, 100>(bencher);
+}
+
+#[divan::bench]
+fn fixed_50_kernels(bencher: Bencher<'_, '_>) {
+    movement::<dmp::FixedPoint, 50>(bencher);
+}

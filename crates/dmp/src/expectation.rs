@@ -1,0 +1,77 @@
+//! `ExpectedWrench`: what the sensors should feel at each phase (`F_des` of Eqs. 8 and 12).
+//!
+//! Recorded during a successful execution without feedback. F is the wrench of the ENVIRONMENT ON THE ROBOT. Force
+//! rows are in the world frame: in the sensor frame a hand that is tilted by 20 degrees would fake newtons. Torque
+//! rows are in the body frame at the controlled point, finger rows are torques of the environment on each finger.
+
+use crate::{PhaseTable, SENSORS, Scalar, TableError};
+
+/// Most samples an expectation can hold.
+pub const EXPECTED_CAPACITY: usize = 128;
+
+/// Expected sensor values by phase.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExpectedWrench<T> {
+    table: PhaseTable<T, SENSORS, EXPECTED_CAPACITY>,
+    recorded_duration: T,
+}
+
+impl<T: Scalar> ExpectedWrench<T> {
+    /// Full feedback while the duration is within this fraction of the recorded one.
+    const TRUSTED_DEVIATION: f64 = 0.1;
+    /// No feedback from this fraction on.
+    const USELESS_DEVIATION: f64 = 0.5;
+
+    /// From samples (force N world, torque N m body, fingers N m) evenly spaced in progress from 0 to 1, recorded at
+    /// the duration `recorded_duration` (s).
+    ///
+    /// # Errors
+    /// [`TableError`], with [`TableError::Duration`] for a duration that is not a positive number.
+    pub fn new(samples: &[[T; SENSORS]], recorded_duration: T) -> Result<Self, TableError> {
+        if !(recorded_duration > T::ZERO && recorded_duration.is_finite()) {
+            return Err(TableError::Duration);
+        }
+        let table = PhaseTable::new(samples)?;
+        Ok(Self {
+            table,
+            recorded_duration,
+        })
+    }
+
+    /// Expected values at progress `u`; beyond the ends the end values hold.
+    #[inline]
+    pub fn at(&self, u: T) -> [T; SENSORS] {
+        self.table.at(u)
+    }
+
+    /// The samples.
+    pub fn samples(&self) -> &[[T; SENSORS]] {
+        self.table.samples()
+    }
+
+    /// Duration at which the expectation was recorded, s.
+    pub fn recorded_duration(&self) -> T {
+        self.recorded_duration
+    }
+
+    /// How far the expectation can be believed at another speed, 1 to 0.
+    ///
+    /// The inertial part of the record scales with `1/tau^2`; how large that part is, the record does not tell. Up
+    /// to 10 % deviation of the duration it is used in full, from 50 % on not at all, linearly in between.
+    /// `relative_speed` = recorded duration / present duration.
+    pub fn trust(&self, relative_speed: T) -> T {
+        let (full, none) = (
+            T::from_f64(Self::TRUSTED_DEVIATION),
+            T::from_f64(Self::USELESS_DEVIATION),
+        );
+        // Deviation of the duration, without dividing by a speed of 0: |1/r - 1| <= k is |1 - r| <= k r.
+        let deviation = (T::ONE - relative_speed).abs();
+        if deviation <= full * relative_speed {
+            T::ONE
+        } else if deviation < none * relative_speed {
+            (none - deviation / relative_speed) / (none - full)
+        } else {
+            T::ZERO
+        }
+    }
+}

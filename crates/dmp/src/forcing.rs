@@ -1,0 +1,210 @@
+//! `Basis` and `ForcingTerm`: Eq. (2), evaluated once per tick for all rows.
+//!
+//! `f(s) = sum_i(psi_i(s) theta_i s) / sum_i psi_i(s)`, `psi_i(s) = exp(-h_i (s - c_i)^2)`,
+//! `c_i = exp(-alpha i/(N-1))`, `h_i = -ln(a)/(c_{i+1} - c_i)^2`, the last width repeated.
+//!
+//! Three things are not in the equation but give the same value: the largest exponent is subtracted before `exp`
+//! (far beyond the last centre the sum would underflow to 0/0), kernels below the rounding error of the sum are left
+//! out, and the quotient is one reciprocal per tick. The exponent is computed as `(sqrt(h_i) (s - c_i))^2`, which
+//! keeps six more digits in fixed point.
+
+use crate::{CanonicalSystem, Scalar};
+
+/// Kernels over the phase: `count` of at most `N`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Basis<T, const N: usize> {
+    count: usize,
+    centres: [T; N],
+    root_widths: [T; N],
+}
+
+impl<T: Scalar, const N: usize> Basis<T, N> {
+    /// Places `count` kernels so that each has the value `activation` at the next centre.
+    ///
+    /// `None` unless `2 <= count <= N` and `0.05 <= activation <= 0.95` (beyond, neighbours are indistinguishable
+    /// and the weights explode, or the kernels leave gaps).
+    pub fn new(canonical: &CanonicalSystem<T>, count: usize, activation: T) -> Option<Self> {
+        let allowed = T::from_f64(0.05)..=T::from_f64(0.95);
+        if count < 2 || count > N || !allowed.contains(&activation) {
+            return None;
+        }
+        let intervals = T::from_index(count - 1);
+        let mut basis = Self {
+            count,
+            centres: [T::ZERO; N],
+            root_widths: [T::ZERO; N],
+        };
+        for (i, centre) in basis.centres.iter_mut().take(count).enumerate() {
+            *centre = canonical.phase_at(T::from_index(i) / intervals);
+        }
+        // h_i = -ln(a)/(c_{i+1} - c_i)^2; neighbours keep a constant ratio, so the difference is c_i (1 - ratio),
+        // which does not cancel.
+        let root_log = T::from_f64(libm::sqrt(-libm::log(activation.to_f64())));
+        let gap = T::ONE - canonical.phase_at(T::ONE / intervals);
+        for i in 0..count {
+            let left = basis.centres[if i + 1 < count { i } else { i - 1 }];
+            basis.root_widths[i] = root_log / (left * gap);
+        }
+        Some(basis)
+    }
+
+    /// Number of kernels in use.
+    #[inline]
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Centre `c_i`; `None` beyond the last kernel.
+    pub fn centre(&self, i: usize) -> Option<T> {
+        self.centres.get(..self.count)?.get(i).copied()
+    }
+
+    /// Width `h_i`; `None` beyond the last kernel.
+    pub fn width(&self, i: usize) -> Option<T> {
+        let root = *self.root_widths.get(..self.count)?.get(i)?;
+        Some(root * root)
+    }
+
+    /// Evaluates all kernels at the phase `s`.
+    pub fn evaluate(&self, s: T) -> Activations<T, N> {
+        let mut kernels = [T::ZERO; N];
+        let count = if self.count < N { self.count } else { N };
+        let (centres, roots) = (&self.centres[..count], &self.root_widths[..count]);
+        let exponent = |i: usize| {
+            let z = roots[i] * (s - centres[i]);
+            z * z
+        };
+        // Centres fall with i, and so do the signed distances in units of the width: the exponents have one minimum,
+        // beside the place where s would be sorted in.
+        let upper = centres.partition_point(|&c| c > s);
+        let nearest = if upper == 0 {
+            0
+        } else if upper == count || exponent(upper - 1) < exponent(upper) {
+            upper - 1
+        } else {
+            upper
+        };
+        let smallest = exponent(nearest);
+        let (mut first, mut last) = (nearest, nearest + 1);
+        kernels[nearest] = T::ZERO;
+        while first > 0 {
+            let e = exponent(first - 1) - smallest;
+            if !(e <= T::NEGLIGIBLE_EXPONENT) {
+                break;
+            }
+            first -= 1;
+            kernels[first] = e;
+        }
+        while last < count {
+            let e = exponent(last) - smallest;
+            if !(e <= T::NEGLIGIBLE_EXPONENT) {
+                break;
+            }
+            kernels[last] = e;
+            last += 1;
+        }
+        let mut sum = T::ZERO;
+        for kernel in &mut kernels[first..last] {
+            *kernel = T::kernel(*kernel);
+        }
+        for kernel in &kernels[first..last] {
+            sum = sum + *kernel;
+        }
+        Activations {
+            first,
+            last,
+            kernels,
+            scale: s / sum,
+        }
+    }
+}
+
+/// All kernels at one phase: what every row of a movement shares during a tick.
+#[derive(Clone, Debug)]
+pub struct Activations<T, const N: usize> {
+    first: usize,
+    last: usize,
+    kernels: [T; N],
+    scale: T,
+}
+
+impl<T: Scalar, const N: usize> Activations<T, N> {
+    /// Kernels that matter at this phase.
+    #[inline]
+    pub fn active(&self) -> core::ops::Range<usize> {
+        self.first..self.last
+    }
+
+    /// `psi_i s / sum psi`: the factor of `theta_i` in Eq. (2).
+    #[inline]
+    pub fn factor(&self, i: usize) -> T {
+        self.kernels
+            .get(i)
+            .map_or(T::ZERO, |kernel| *kernel * self.scale)
+    }
+}
+
+/// Weights of `ROWS` rows over a common basis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForcingTerm<T, const ROWS: usize, const N: usize> {
+    basis: Basis<T, N>,
+    /// Kernel by kernel, so that a tick walks through memory once and all rows advance together.
+    weights: [[T; ROWS]; N],
+}
+
+impl<T: Scalar, const ROWS: usize, const N: usize> ForcingTerm<T, ROWS, N> {
+    /// From weights in row-major order `[ROWS][count]`; `None` if there are not exactly `ROWS * count` finite ones.
+    pub fn new(basis: Basis<T, N>, weights: &[T]) -> Option<Self> {
+        let count = basis.count();
+        if weights.len() != ROWS * count || !weights.iter().all(|w| w.is_finite()) {
+            return None;
+        }
+        let mut by_kernel = [[T::ZERO; ROWS]; N];
+        for (row, weights) in weights.chunks_exact(count).enumerate() {
+            for (kernel, weight) in by_kernel.iter_mut().zip(weights) {
+                kernel[row] = *weight;
+            }
+        }
+        Some(Self {
+            basis,
+            weights: by_kernel,
+        })
+    }
+
+    /// The common basis.
+    #[inline]
+    pub fn basis(&self) -> &Basis<T, N> {
+        &self.basis
+    }
+
+    /// Weight `theta_i` of a row; `None` outside.
+    pub fn weight(&self, row: usize, i: usize) -> Option<T> {
+        self.weights
+            .get(..self.basis.count())?
+            .get(i)?
+            .get(row)
+            .copied()
+    }
+
+    /// `f(s)` of all rows; 0 at s = 0.
+    #[inline]
+    pub fn evaluate(&self, s: T) -> [T; ROWS] {
+        self.combine(&self.basis.evaluate(s))
+    }
+
+    /// `f` of all rows from kernels that are already evaluated.
+    #[inline]
+    pub fn combine(&self, activations: &Activations<T, N>) -> [T; ROWS] {
+        let mut f = [T::ZERO; ROWS];
+        let active = activations.active();
+        for (kernel, weights) in activations.kernels[active.clone()]
+            .iter()
+            .zip(&self.weights[active])
+        {
+            for (f, weight) in f.iter_mut().zip(weights) {
+                *f = *f + *kernel * *weight;
+            }
+        }
+        f.map(|f| f * activations.scale)
+    }
+}

@@ -1,0 +1,78 @@
+//! `Group`: rows of Eq. (9) that share their gains, with start, goal and goal filter.
+
+use crate::vector::all_finite;
+use crate::{PointInput, PointState, RolloutError, Scalar, Trajectory, TransformationSystem};
+
+/// Rows that share their gains.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Group<T, const D: usize> {
+    pub(crate) state: [PointState<T>; D],
+    pub(crate) start: [T; D],
+    pub(crate) goal: [T; D],
+    pub(crate) commanded: [T; D],
+}
+
+/// What one tick has in common for all rows.
+pub(crate) struct Tick<T> {
+    pub(crate) s: T,
+    pub(crate) h: T,
+    pub(crate) rate: T,
+    pub(crate) rate_squared: T,
+    pub(crate) rate_slope: T,
+    /// Part of the way to the commanded goal that the goal filter goes in this tick.
+    pub(crate) goal_fraction: T,
+}
+
+impl<T: Scalar, const D: usize> Group<T, D> {
+    pub(crate) fn new(start: [T; D], velocity: [T; D], duration: T, goal: [T; D]) -> Self {
+        Self {
+            state: core::array::from_fn(|i| PointState::new(start[i], velocity[i] * duration)),
+            start,
+            goal,
+            commanded: goal,
+        }
+    }
+
+    #[inline]
+    pub(crate) fn step(
+        &mut self,
+        system: &TransformationSystem<T>,
+        tick: &Tick<T>,
+        f: &[T; D],
+        zeta: &[T; D],
+    ) -> Trajectory<T, D> {
+        let mut out = Trajectory {
+            x: [T::ZERO; D],
+            v: [T::ZERO; D],
+            a: [T::ZERO; D],
+        };
+        for i in 0..D {
+            let state = &mut self.state[i];
+            let input = PointInput {
+                start: self.start[i],
+                goal: self.goal[i],
+                s: tick.s,
+                f: f[i],
+                zeta: zeta[i],
+            };
+            let rhs = system.right_hand_side(state, &input);
+            out.x[i] = state.x();
+            out.v[i] = state.v() * tick.rate;
+            out.a[i] = rhs * tick.rate_squared + state.v() * tick.rate_slope;
+            state.step(rhs, tick.h);
+            self.goal[i] = self.goal[i] + (self.commanded[i] - self.goal[i]) * tick.goal_fraction;
+        }
+        out
+    }
+
+    pub(crate) fn command(&mut self, goal: [T; D], filtered: bool) -> Result<(), RolloutError> {
+        if !all_finite(&goal) {
+            return Err(RolloutError::NotFinite);
+        }
+        self.commanded = goal;
+        if !filtered {
+            self.goal = goal;
+        }
+        Ok(())
+    }
+}

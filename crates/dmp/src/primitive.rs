@@ -1,0 +1,453 @@
+//! `Primitive`: one movement, checked once, so that the 300 Hz loop needs no checks.
+//!
+//! Holds position (3), orientation (3), posture (7) and hand (4) on one phase. The paper does not say how the posture
+//! is parameterised; one 1-D row per arm joint is our reading.
+
+use core::fmt;
+
+use crate::vector::all_finite;
+use crate::{
+    Basis, CanonicalSystem, ExpectedWrench, Feedback, ForcingTerm, GainError, OrientationError,
+    Quaternion, Scalar, Stiffness, TransformationSystem,
+};
+
+/// Rows of the end-effector position (x, y, z in the world frame, metres).
+pub const POSITION_ROWS: usize = 3;
+/// Rows of the end-effector orientation (body frame).
+pub const ORIENTATION_ROWS: usize = 3;
+/// Rows of the default posture `q_post` (one per arm joint, radians).
+pub const POSTURE_ROWS: usize = 7;
+/// Rows of the hand (spread, F1, F2, F3, radians).
+pub const HAND_ROWS: usize = 4;
+/// All rows of weights in their order: position, orientation, posture, hand.
+pub const ROWS: usize = POSITION_ROWS + ORIENTATION_ROWS + POSTURE_ROWS + HAND_ROWS;
+/// Longest control period, s (300 Hz): the integration is proven stable for it, and [`crate::Rollout::step`] cuts a
+/// longer one to it.
+pub const CONTROL_PERIOD: f64 = 1.0 / 300.0;
+
+/// A full set of values: pose of the end-effector, posture, hand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Configuration<T> {
+    /// Position of the end-effector in the world frame, m.
+    pub position: [T; POSITION_ROWS],
+    /// Orientation of the end-effector, body -> world.
+    pub orientation: Quaternion<T>,
+    /// Default posture, rad.
+    pub posture: [T; POSTURE_ROWS],
+    /// Hand joints (spread, F1, F2, F3), rad.
+    pub hand: [T; HAND_ROWS],
+}
+
+impl<T: Scalar> Configuration<T> {
+    pub(crate) fn is_finite(&self) -> bool {
+        all_finite(&self.position)
+            && all_finite(&self.orientation.to_array())
+            && all_finite(&self.posture)
+            && all_finite(&self.hand)
+    }
+
+    /// With the quaternion made exactly unit; `None` if it is off by more than 1e-3.
+    pub(crate) fn normalised(&self) -> Option<Self> {
+        let orientation = self.orientation.checked_unit(T::from_f64(1e-3))?;
+        Some(Self {
+            orientation,
+            ..*self
+        })
+    }
+}
+
+/// Physical velocities that belong to a [`Configuration`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Velocity<T> {
+    /// Linear velocity in the world frame, m/s.
+    pub position: [T; POSITION_ROWS],
+    /// Angular velocity in the BODY frame, rad/s.
+    pub orientation: [T; ORIENTATION_ROWS],
+    /// Posture velocity, rad/s.
+    pub posture: [T; POSTURE_ROWS],
+    /// Hand velocity, rad/s.
+    pub hand: [T; HAND_ROWS],
+}
+
+impl<T: Scalar> Velocity<T> {
+    /// At rest.
+    pub const ZERO: Self = Self {
+        position: [T::ZERO; POSITION_ROWS],
+        orientation: [T::ZERO; ORIENTATION_ROWS],
+        posture: [T::ZERO; POSTURE_ROWS],
+        hand: [T::ZERO; HAND_ROWS],
+    };
+
+    pub(crate) fn is_finite(&self) -> bool {
+        all_finite(&self.position)
+            && all_finite(&self.orientation)
+            && all_finite(&self.posture)
+            && all_finite(&self.hand)
+    }
+}
+
+/// How the signs of the start and goal quaternions were chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hemisphere {
+    /// Start and goal carry the signs of a sign-continuous demonstration: a run aligns its own to them.
+    Demonstrated,
+    /// There is no demonstration: the goal is taken on the side nearest to the current orientation.
+    Nearest,
+}
+
+/// The plain tables of a primitive, as they come from an image or a file: unchecked input of [`Primitive::new`].
+#[derive(Clone, Copy, Debug)]
+pub struct PrimitiveTables<'a, T> {
+    /// Duration tau of the movement, s.
+    pub duration: T,
+    /// Decay `alpha` of the phase, Eq. (3).
+    pub alpha: T,
+    /// Activation `a` of a kernel at the next centre, Eq. (2).
+    pub activation: T,
+    /// Number of kernels in use, 2..=N.
+    pub kernel_count: usize,
+    /// Weights theta, row-major `[ROWS][kernel_count]`, in the paper's convention (the force is multiplied by K).
+    pub weights: &'a [T],
+    /// Stiffness K of position, orientation, posture, hand.
+    pub stiffness: [T; 4],
+    /// Damping D of position, orientation, posture, hand.
+    pub damping: [T; 4],
+    /// Which orientation error the orientation system uses.
+    pub orientation_error: OrientationError,
+    /// Meaning of the signs of the two quaternions below.
+    pub hemisphere: Hemisphere,
+    /// Start of the demonstration.
+    pub start: Configuration<T>,
+    /// Goal.
+    pub goal: Configuration<T>,
+    /// Velocity at the start of the demonstration (zero if it began at rest).
+    pub start_velocity: Velocity<T>,
+    /// Gains of the sensory feedback, Eq. (8); `None` runs open loop.
+    pub feedback: Option<Feedback<T>>,
+    /// What the sensors should feel, by phase; `None` (not recorded yet) runs open loop.
+    pub expected: Option<ExpectedWrench<T>>,
+}
+
+/// Group of rows with common gains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Row {
+    /// Position rows.
+    Position,
+    /// Orientation rows.
+    Orientation,
+    /// Posture rows.
+    Posture,
+    /// Hand rows.
+    Hand,
+}
+
+impl fmt::Display for Row {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Position => "position",
+            Self::Orientation => "orientation",
+            Self::Posture => "posture",
+            Self::Hand => "hand",
+        })
+    }
+}
+
+/// Why tables are refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum PrimitiveError {
+    /// The duration is not a positive number up to 3600 s.
+    Duration,
+    /// `alpha` lets the phase end outside 1e-6..0.1.
+    Alpha,
+    /// Fewer than two kernels, or more than the capacity.
+    KernelCount,
+    /// The activation at the next centre is outside 0.05..0.95.
+    Activation,
+    /// Not exactly `ROWS * kernel_count` weights.
+    WeightCount,
+    /// A weight is NaN or infinite.
+    Weight,
+    /// Gains of this group are unusable.
+    Gains(Row, GainError),
+    /// The duration is too short for the gains of this group: at 300 Hz the integration would be unstable.
+    Unstable(Row),
+    /// A start value is NaN or infinite.
+    Start,
+    /// A start velocity is NaN or infinite.
+    StartVelocity,
+    /// A goal value is NaN or infinite.
+    Goal,
+    /// The start orientation is not a unit quaternion.
+    StartNotUnit,
+    /// The goal orientation is not a unit quaternion.
+    GoalNotUnit,
+    /// Start and goal are more than 175 degrees apart, where the error of Eq. (4) fails: use
+    /// [`OrientationError::RotationVector`].
+    TurnsTooFar,
+}
+
+impl fmt::Display for PrimitiveError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Duration => f.write_str("the duration is not a positive number up to 3600 s"),
+            Self::Alpha => f.write_str("alpha lets the phase end outside 1e-6..0.1"),
+            Self::KernelCount => f.write_str("fewer than two kernels or more than fit"),
+            Self::Activation => f.write_str("the kernel activation is outside 0.05..0.95"),
+            Self::WeightCount => f.write_str("the number of weights is not rows times kernels"),
+            Self::Weight => f.write_str("a weight is not a number"),
+            Self::Gains(row, error) => write!(f, "{row}: {error}"),
+            Self::Unstable(row) => {
+                write!(f, "{row}: the duration is too short for these gains at 300 Hz")
+            }
+            Self::Start => f.write_str("a start value is not a number"),
+            Self::StartVelocity => f.write_str("a start velocity is not a number"),
+            Self::Goal => f.write_str("a goal value is not a number"),
+            Self::StartNotUnit => f.write_str("the start orientation is not a unit quaternion"),
+            Self::GoalNotUnit => f.write_str("the goal orientation is not a unit quaternion"),
+            Self::TurnsTooFar => f.write_str(
+                "start and goal are more than 175 degrees apart; the rotation-vector error is needed",
+            ),
+        }
+    }
+}
+
+impl core::error::Error for PrimitiveError {}
+
+/// One movement with checked parameters; `N` = kernel capacity.
+///
+/// For f32 and N = 100 about 14 kB: keep it in a static or behind a reference on a small stack.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Primitive<T, const N: usize> {
+    duration: T,
+    rate: T,
+    minimum_duration: T,
+    canonical: CanonicalSystem<T>,
+    forcing: ForcingTerm<T, ROWS, N>,
+    position: TransformationSystem<T>,
+    orientation: TransformationSystem<T>,
+    orientation_error: OrientationError,
+    posture: TransformationSystem<T>,
+    hand: TransformationSystem<T>,
+    hemisphere: Hemisphere,
+    start: Configuration<T>,
+    goal: Configuration<T>,
+    start_velocity: Velocity<T>,
+    feedback: Option<Feedback<T>>,
+    expected: Option<ExpectedWrench<T>>,
+}
+
+impl<T: Scalar, const N: usize> Primitive<T, N> {
+    /// Checks the tables and builds the primitive.
+    ///
+    /// # Errors
+    /// The first [`PrimitiveError`] found.
+    pub fn new(tables: &PrimitiveTables<'_, T>) -> Result<Self, PrimitiveError> {
+        let duration = tables.duration;
+        if !(duration > T::ZERO && duration <= T::from_f64(3600.0)) {
+            return Err(PrimitiveError::Duration);
+        }
+        let canonical = CanonicalSystem::new(tables.alpha).ok_or(PrimitiveError::Alpha)?;
+        if tables.kernel_count < 2 || tables.kernel_count > N {
+            return Err(PrimitiveError::KernelCount);
+        }
+        let basis = Basis::new(&canonical, tables.kernel_count, tables.activation)
+            .ok_or(PrimitiveError::Activation)?;
+        if tables.weights.len() != ROWS * tables.kernel_count {
+            return Err(PrimitiveError::WeightCount);
+        }
+        let forcing = ForcingTerm::new(basis, tables.weights).ok_or(PrimitiveError::Weight)?;
+
+        let [position, orientation, posture, hand] = tables.systems()?;
+        let mut minimum_duration = T::ZERO;
+        for (row, system) in [
+            (Row::Position, &position),
+            (Row::Orientation, &orientation),
+            (Row::Posture, &posture),
+            (Row::Hand, &hand),
+        ] {
+            let shortest = T::from_f64(CONTROL_PERIOD) / system.largest_step();
+            if !(duration > shortest) {
+                return Err(PrimitiveError::Unstable(row));
+            }
+            if shortest > minimum_duration {
+                minimum_duration = shortest;
+            }
+        }
+
+        if !tables.start.is_finite() {
+            return Err(PrimitiveError::Start);
+        }
+        if !tables.goal.is_finite() {
+            return Err(PrimitiveError::Goal);
+        }
+        if !tables.start_velocity.is_finite() {
+            return Err(PrimitiveError::StartVelocity);
+        }
+        let start = tables
+            .start
+            .normalised()
+            .ok_or(PrimitiveError::StartNotUnit)?;
+        let goal = tables
+            .goal
+            .normalised()
+            .ok_or(PrimitiveError::GoalNotUnit)?;
+        // cos(175 degrees / 2); with an undemonstrated goal the sign is free and the angle at most 180 degrees.
+        let cosine = match tables.hemisphere {
+            Hemisphere::Demonstrated => start.orientation.dot(&goal.orientation),
+            Hemisphere::Nearest => start.orientation.dot(&goal.orientation).abs(),
+        };
+        if tables.orientation_error == OrientationError::Quaternion
+            && cosine < T::from_f64(0.043_619)
+        {
+            return Err(PrimitiveError::TurnsTooFar);
+        }
+        Ok(Self {
+            duration,
+            rate: T::ONE / duration,
+            minimum_duration,
+            canonical,
+            forcing,
+            position,
+            orientation,
+            orientation_error: tables.orientation_error,
+            posture,
+            hand,
+            hemisphere: tables.hemisphere,
+            start,
+            goal,
+            start_velocity: tables.start_velocity,
+            feedback: tables.feedback,
+            expected: tables.expected,
+        })
+    }
+
+    /// Duration tau as taught, s.
+    #[inline]
+    pub fn duration(&self) -> T {
+        self.duration
+    }
+
+    /// 1/tau, 1/s.
+    #[inline]
+    pub(crate) fn rate(&self) -> T {
+        self.rate
+    }
+
+    /// Shortest duration at which the integration is stable at 300 Hz, s (0.057 s for the default gains).
+    #[inline]
+    pub fn minimum_duration(&self) -> T {
+        self.minimum_duration
+    }
+
+    /// The clock, Eq. (3).
+    #[inline]
+    pub fn canonical(&self) -> &CanonicalSystem<T> {
+        &self.canonical
+    }
+
+    /// The forcing term of all rows, Eq. (2).
+    #[inline]
+    pub fn forcing(&self) -> &ForcingTerm<T, ROWS, N> {
+        &self.forcing
+    }
+
+    /// Spring and damper of the position rows.
+    #[inline]
+    pub fn position(&self) -> &TransformationSystem<T> {
+        &self.position
+    }
+
+    /// Spring and damper of the orientation rows.
+    #[inline]
+    pub fn orientation(&self) -> &TransformationSystem<T> {
+        &self.orientation
+    }
+
+    /// Coordinates of the orientation rows.
+    #[inline]
+    pub fn orientation_error(&self) -> OrientationError {
+        self.orientation_error
+    }
+
+    /// Spring and damper of the posture rows.
+    #[inline]
+    pub fn posture(&self) -> &TransformationSystem<T> {
+        &self.posture
+    }
+
+    /// Spring and damper of the hand rows.
+    #[inline]
+    pub fn hand(&self) -> &TransformationSystem<T> {
+        &self.hand
+    }
+
+    /// How quaternion signs are chosen.
+    #[inline]
+    pub fn hemisphere(&self) -> Hemisphere {
+        self.hemisphere
+    }
+
+    /// Start of the demonstration.
+    #[inline]
+    pub fn start(&self) -> &Configuration<T> {
+        &self.start
+    }
+
+    /// Velocity at the start of the demonstration.
+    #[inline]
+    pub fn start_velocity(&self) -> &Velocity<T> {
+        &self.start_velocity
+    }
+
+    /// Goal of the demonstration.
+    #[inline]
+    pub fn goal(&self) -> &Configuration<T> {
+        &self.goal
+    }
+
+    /// Gains of the sensory feedback.
+    #[inline]
+    pub fn feedback(&self) -> Option<&Feedback<T>> {
+        self.feedback.as_ref()
+    }
+
+    /// What the sensors should feel.
+    #[inline]
+    pub fn expected(&self) -> Option<&ExpectedWrench<T>> {
+        self.expected.as_ref()
+    }
+
+    /// Replaces the expectation, e.g. after the open-loop run that recorded it; `None` runs open loop.
+    pub fn set_expected(&mut self, expected: Option<ExpectedWrench<T>>) {
+        self.expected = expected;
+    }
+
+    pub(crate) fn stiffness(&self) -> Stiffness<T> {
+        Stiffness {
+            position: self.position.stiffness(),
+            orientation: self.orientation.stiffness(),
+            hand: self.hand.stiffness(),
+            orientation_error: self.orientation_error,
+        }
+    }
+}
+
+impl<T: Scalar> PrimitiveTables<'_, T> {
+    fn gains(&self) -> [(T, T); 4] {
+        core::array::from_fn(|i| (self.stiffness[i], self.damping[i]))
+    }
+
+    fn systems(&self) -> Result<[TransformationSystem<T>; 4], PrimitiveError> {
+        let [position, orientation, posture, hand] = self.gains();
+        let system = |row, (k, d)| {
+            TransformationSystem::new(k, d).map_err(|error| PrimitiveError::Gains(row, error))
+        };
+        Ok([
+            system(Row::Position, position)?,
+            system(Row::Orientation, orientation)?,
+            system(Row::Posture, posture)?,
+            system(Row::Hand, hand)?,
+        ])
+    }
+}

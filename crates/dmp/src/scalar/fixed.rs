@@ -1,0 +1,258 @@
+//! `FixedPoint`: 64-bit fixed point (32 integer, 32 fraction bits) for boards without a floating-point unit.
+//!
+//! Why I32F32 and nothing smaller: the products of the equations span eleven decades. The squared distance to a
+//! kernel, `h (s - c)^2`, and stiffness terms reach 10^5..10^6 (20 integer bits), while one step of phase or velocity
+//! is `dt/tau` = 10^-4..10^-3 and has to be known to 10^-6 of itself (32 fraction bits). With 16 fraction bits the
+//! phase of a 5 s movement would be off by 2 %. A 64-bit product costs four multiplications on a Cortex-M3, which
+//! leaves one movement row with 50 kernels far inside a 300 Hz tick.
+//!
+//! All arithmetic saturates. It never wraps, because a wrapped velocity changes sign, and it never panics.
+
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+use ::fixed::types::I32F32;
+
+use super::Scalar;
+
+/// Saturating fixed-point number, resolution 2^-32 (2.3e-10), range about +-2.1e9.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct FixedPoint(I32F32);
+
+impl FixedPoint {
+    /// Wraps a number of crate `fixed`.
+    #[must_use]
+    pub const fn new(value: I32F32) -> Self {
+        Self(value)
+    }
+
+    /// The number of crate `fixed`.
+    #[must_use]
+    pub const fn get(self) -> I32F32 {
+        self.0
+    }
+
+    const fn from_bits(bits: i64) -> Self {
+        Self(I32F32::from_bits(bits))
+    }
+
+    /// A constant; only for compile-time values inside the range of the type.
+    const fn constant(value: f64) -> Self {
+        Self::from_bits((value * 4_294_967_296.0) as i64)
+    }
+
+    /// Polynomial with the constant term first.
+    fn polynomial(self, coefficients: &[f64]) -> Self {
+        coefficients
+            .iter()
+            .rev()
+            .fold(Self::ZERO, |sum, &c| sum * self + Self::constant(c))
+    }
+
+    /// Nearest integer, with the remainder `self - n * unit` for the given unit and its reciprocal.
+    fn reduce(self, unit: Self, reciprocal: Self) -> (i64, Self) {
+        let n = (self * reciprocal).0.saturating_round();
+        (n.to_bits() >> 32, self - Self(n) * unit)
+    }
+
+    /// atan of a ratio in [0, 1].
+    fn atan_unit(self) -> Self {
+        const TAN_EIGHTH: FixedPoint = FixedPoint::constant(0.414_213_562_373_095_05);
+        const QUARTER: FixedPoint = FixedPoint::constant(core::f64::consts::FRAC_PI_4);
+        // Beyond tan(pi/8) turn by pi/4, so that the series only sees arguments up to 0.414.
+        let (offset, t) = if self > TAN_EIGHTH {
+            (QUARTER, (self - Self::ONE) / (self + Self::ONE))
+        } else {
+            (Self::ZERO, self)
+        };
+        const SERIES: [f64; 11] = [
+            1.0,
+            -1.0 / 3.0,
+            1.0 / 5.0,
+            -1.0 / 7.0,
+            1.0 / 9.0,
+            -1.0 / 11.0,
+            1.0 / 13.0,
+            -1.0 / 15.0,
+            1.0 / 17.0,
+            -1.0 / 19.0,
+            1.0 / 21.0,
+        ];
+        offset + t * (t * t).polynomial(&SERIES)
+    }
+}
+
+impl Add for FixedPoint {
+    type Output = Self;
+    #[inline]
+    fn add(self, other: Self) -> Self {
+        Self(self.0.saturating_add(other.0))
+    }
+}
+
+impl Sub for FixedPoint {
+    type Output = Self;
+    #[inline]
+    fn sub(self, other: Self) -> Self {
+        Self(self.0.saturating_sub(other.0))
+    }
+}
+
+impl Mul for FixedPoint {
+    type Output = Self;
+    #[inline]
+    fn mul(self, other: Self) -> Self {
+        Self(self.0.saturating_mul(other.0))
+    }
+}
+
+impl Div for FixedPoint {
+    type Output = Self;
+    /// Division by zero saturates towards the sign of the numerator; 0/0 = 0.
+    fn div(self, other: Self) -> Self {
+        if other == Self::ZERO {
+            return if self > Self::ZERO {
+                Self::MAX
+            } else if self < Self::ZERO {
+                Self(I32F32::MIN)
+            } else {
+                Self::ZERO
+            };
+        }
+        Self(self.0.saturating_div(other.0))
+    }
+}
+
+impl Neg for FixedPoint {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        Self(self.0.saturating_neg())
+    }
+}
+
+impl Scalar for FixedPoint {
+    const ZERO: Self = Self(I32F32::ZERO);
+    const ONE: Self = Self(I32F32::ONE);
+    const MAX: Self = Self(I32F32::MAX);
+    /// exp(-22.2) is one unit in the last place.
+    const NEGLIGIBLE_EXPONENT: Self = Self::constant(22.0);
+
+    /// NaN becomes 0, values out of range saturate.
+    fn from_f64(value: f64) -> Self {
+        // A float-to-integer cast saturates and maps NaN to 0.
+        Self::from_bits(libm::rint(value * 4_294_967_296.0) as i64)
+    }
+
+    fn to_f64(self) -> f64 {
+        self.0.to_num()
+    }
+
+    fn exp(self) -> Self {
+        const LN_2: FixedPoint = FixedPoint::constant(core::f64::consts::LN_2);
+        const LOG2_E: FixedPoint = FixedPoint::constant(core::f64::consts::LOG2_E);
+        // Taylor to r^9 for |r| <= ln2/2: remainder 7e-12.
+        const SERIES: [f64; 10] = [
+            1.0,
+            1.0,
+            1.0 / 2.0,
+            1.0 / 6.0,
+            1.0 / 24.0,
+            1.0 / 120.0,
+            1.0 / 720.0,
+            1.0 / 5_040.0,
+            1.0 / 40_320.0,
+            1.0 / 362_880.0,
+        ];
+        let (n, r) = self.reduce(LN_2, LOG2_E);
+        let mantissa = r.polynomial(&SERIES).0.to_bits();
+        if n >= 31 {
+            Self::MAX
+        } else if n >= 0 {
+            // The mantissa is below 2^33, so 30 places to the left cannot overflow.
+            Self::from_bits(mantissa << n)
+        } else if n > -34 {
+            // Halves are rounded up: truncation would bias a phase that is multiplied thousands of times.
+            Self::from_bits(((mantissa >> (-n - 1)) + 1) >> 1)
+        } else {
+            Self::ZERO
+        }
+    }
+
+    #[inline]
+    fn kernel(self) -> Self {
+        Scalar::exp(-self)
+    }
+
+    fn sqrt(self) -> Self {
+        self.0.checked_sqrt().map_or(Self::ZERO, Self)
+    }
+
+    fn sin_cos(self) -> (Self, Self) {
+        const HALF_PI: FixedPoint = FixedPoint::constant(core::f64::consts::FRAC_PI_2);
+        const RECIPROCAL: FixedPoint = FixedPoint::constant(core::f64::consts::FRAC_2_PI);
+        const SIN: [f64; 6] = [
+            1.0,
+            -1.0 / 6.0,
+            1.0 / 120.0,
+            -1.0 / 5_040.0,
+            1.0 / 362_880.0,
+            -1.0 / 39_916_800.0,
+        ];
+        const COS: [f64; 7] = [
+            1.0,
+            -1.0 / 2.0,
+            1.0 / 24.0,
+            -1.0 / 720.0,
+            1.0 / 40_320.0,
+            -1.0 / 3_628_800.0,
+            1.0 / 479_001_600.0,
+        ];
+        let (n, r) = self.reduce(HALF_PI, RECIPROCAL);
+        let r2 = r * r;
+        let (sin, cos) = (r * r2.polynomial(&SIN), r2.polynomial(&COS));
+        match n & 3 {
+            0 => (sin, cos),
+            1 => (cos, -sin),
+            2 => (-sin, -cos),
+            _ => (-cos, sin),
+        }
+    }
+
+    fn atan2(self, x: Self) -> Self {
+        const HALF_PI: FixedPoint = FixedPoint::constant(core::f64::consts::FRAC_PI_2);
+        const PI: FixedPoint = FixedPoint::constant(core::f64::consts::PI);
+        let (a, b) = (Scalar::abs(self), Scalar::abs(x));
+        let first_octants = if a == Self::ZERO && b == Self::ZERO {
+            Self::ZERO
+        } else if a <= b {
+            (a / b).atan_unit()
+        } else {
+            HALF_PI - (b / a).atan_unit()
+        };
+        let half_plane = if x < Self::ZERO {
+            PI - first_octants
+        } else {
+            first_octants
+        };
+        if self < Self::ZERO {
+            -half_plane
+        } else {
+            half_plane
+        }
+    }
+
+    #[inline]
+    fn is_finite(self) -> bool {
+        true
+    }
+
+    #[inline]
+    fn to_index(self) -> usize {
+        usize::try_from(self.0.to_bits() >> 32).unwrap_or(0)
+    }
+
+    #[inline]
+    fn from_index(index: usize) -> Self {
+        Self(I32F32::saturating_from_num(index))
+    }
+}

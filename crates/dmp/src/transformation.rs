@@ -1,0 +1,170 @@
+//! `TransformationSystem` and `PointState`: Eqs. (1) and (9), one scalar row.
+//!
+//! `tau vd = K (g - x) - D v - K (g - x0) s + K f(s) + zeta`, `tau xd = v`.
+//!
+//! `v` is scaled by tau: the physical velocity is `v/tau`, the physical acceleration `rhs/tau^2`. With tau in seconds
+//! `K` and `D` are plain numbers, and `rhs` and `zeta` have the unit of `x`. At s = 1 and x = x0 the two spring terms
+//! cancel, so a movement starts softly. Stepped by semi-implicit Euler: `v += h rhs(old state)`, `x += h v(new)`,
+//! `h = dt/tau`, which is stable while `K h^2 + 2 D h < 4` and `D h < 2`.
+
+use core::fmt;
+
+use crate::Scalar;
+
+/// Spring and damper of one group of rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TransformationSystem<T> {
+    stiffness: T,
+    damping: T,
+}
+
+/// Why a pair of gains is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum GainError {
+    /// The stiffness is not a positive number up to 1e6.
+    Stiffness,
+    /// The damping is not a positive number up to 1e6.
+    Damping,
+}
+
+impl fmt::Display for GainError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Stiffness => "stiffness must be a positive number up to 1e6",
+            Self::Damping => "damping must be a positive number up to 1e6",
+        })
+    }
+}
+
+impl core::error::Error for GainError {}
+
+impl<T: Scalar> TransformationSystem<T> {
+    /// Stiffness `K` that suits most movements.
+    pub const DEFAULT_STIFFNESS: f64 = 200.0;
+
+    /// With stiffness `K` and damping `D`.
+    ///
+    /// # Errors
+    /// A gain that is not a positive number up to 1e6.
+    pub fn new(stiffness: T, damping: T) -> Result<Self, GainError> {
+        let largest = T::from_f64(1e6);
+        if !(stiffness > T::ZERO && stiffness <= largest) {
+            return Err(GainError::Stiffness);
+        }
+        if !(damping > T::ZERO && damping <= largest) {
+            return Err(GainError::Damping);
+        }
+        Ok(Self { stiffness, damping })
+    }
+
+    /// Critically damped: `D = 2 sqrt(K)`.
+    ///
+    /// # Errors
+    /// As [`TransformationSystem::new`].
+    pub fn critically_damped(stiffness: T) -> Result<Self, GainError> {
+        if !(stiffness > T::ZERO) {
+            return Err(GainError::Stiffness);
+        }
+        let root = T::sqrt(stiffness);
+        Self::new(stiffness, root + root)
+    }
+
+    /// Stiffness `K`.
+    #[inline]
+    pub fn stiffness(&self) -> T {
+        self.stiffness
+    }
+
+    /// Damping `D`.
+    #[inline]
+    pub fn damping(&self) -> T {
+        self.damping
+    }
+
+    /// Largest step `h = dt/tau` with `K h^2 + 2 D h <= 4` and `D h <= 2`: where the integration stops being stable.
+    pub fn largest_step(&self) -> T {
+        let four = T::from_f64(4.0);
+        let (k, d) = (self.stiffness, self.damping);
+        let spring = (T::sqrt(d * d + four * k) - d) / k;
+        let damper = T::from_f64(2.0) / d;
+        if spring < damper { spring } else { damper }
+    }
+
+    /// Right-hand side of Eq. (9) = `tau vd`.
+    #[inline]
+    pub fn right_hand_side(&self, state: &PointState<T>, input: &PointInput<T>) -> T {
+        let PointInput {
+            start,
+            goal,
+            s,
+            f,
+            zeta,
+        } = *input;
+        self.stiffness * (goal - state.x)
+            - self.damping * state.v
+            - self.stiffness * (goal - start) * s
+            + self.stiffness * f
+            + zeta
+    }
+}
+
+/// What acts on one row during one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointInput<T> {
+    /// Start `x0` of the movement.
+    pub start: T,
+    /// Goal `g`.
+    pub goal: T,
+    /// Phase `s`, Eq. (3).
+    pub s: T,
+    /// Forcing term `f(s)`, Eq. (2).
+    pub f: T,
+    /// Sensory feedback, Eq. (8).
+    pub zeta: T,
+}
+
+/// State of one row.
+///
+/// The value is a compensated sum: near the goal a tick moves the plan by less than the last digit of an f32, and
+/// without the rest that is carried over it would stop there, micrometres short.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointState<T> {
+    x: T,
+    v: T,
+    x_lost: T,
+}
+
+impl<T: Scalar> PointState<T> {
+    /// At the value `x` (m or rad) with the scaled velocity `v = tau xd`.
+    #[inline]
+    pub fn new(x: T, v: T) -> Self {
+        Self {
+            x,
+            v,
+            x_lost: T::ZERO,
+        }
+    }
+
+    /// Value, m or rad.
+    #[inline]
+    pub fn x(&self) -> T {
+        self.x
+    }
+
+    /// Scaled velocity `tau xd`.
+    #[inline]
+    pub fn v(&self) -> T {
+        self.v
+    }
+
+    /// One step of `h = dt/tau` with the right-hand side of the state before the step.
+    #[inline]
+    pub fn step(&mut self, right_hand_side: T, h: T) {
+        self.v = self.v + h * right_hand_side;
+        let step = h * self.v - self.x_lost;
+        let sum = self.x + step;
+        self.x_lost = (sum - self.x) - step;
+        self.x = sum;
+    }
+}

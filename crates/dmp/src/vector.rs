@@ -1,0 +1,76 @@
+//! Small-vector helpers shared by the systems; three components unless said otherwise.
+
+use crate::Scalar;
+
+/// a . b
+#[inline]
+pub(crate) fn dot<T: Scalar, const D: usize>(a: &[T; D], b: &[T; D]) -> T {
+    let mut sum = T::ZERO;
+    for (a, b) in a.iter().zip(b) {
+        sum = sum + *a * *b;
+    }
+    sum
+}
+
+/// a x b
+#[inline]
+pub(crate) fn cross<T: Scalar>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
+    let ([a0, a1, a2], [b0, b1, b2]) = (*a, *b);
+    [a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0]
+}
+
+/// k a
+#[inline]
+pub(crate) fn scale<T: Scalar, const D: usize>(a: &[T; D], k: T) -> [T; D] {
+    a.map(|a| a * k)
+}
+
+/// M a for a row-major 3x3 matrix.
+#[inline]
+pub(crate) fn rotate<T: Scalar>(m: &[[T; 3]; 3], a: &[T; 3]) -> [T; 3] {
+    [dot(&m[0], a), dot(&m[1], a), dot(&m[2], a)]
+}
+
+/// `a` shortened to the norm `limit` if it is longer; 0 if it is not a number.
+pub(crate) fn clamp_norm<T: Scalar>(a: &[T; 3], limit: T) -> [T; 3] {
+    // The largest component first: squares of large values would overflow in f32 and fixed point.
+    let mut largest = T::ZERO;
+    for a in a {
+        if !a.is_finite() {
+            return [T::ZERO; 3];
+        }
+        if a.abs() > largest {
+            largest = a.abs();
+        }
+    }
+    if largest <= T::ZERO {
+        return *a;
+    }
+    let unit = scale(a, T::ONE / largest);
+    let norm = T::sqrt(dot(&unit, &unit));
+    if largest * norm > limit {
+        scale(&unit, limit / norm)
+    } else {
+        *a
+    }
+}
+
+/// `a` limited to [-limit, limit]; 0 if it is not a number.
+#[inline]
+pub(crate) fn clamp<T: Scalar>(a: T, limit: T) -> T {
+    if !a.is_finite() {
+        T::ZERO
+    } else if a > limit {
+        limit
+    } else if a < -limit {
+        -limit
+    } else {
+        a
+    }
+}
+
+/// Whether all components are numbers.
+#[inline]
+pub(crate) fn all_finite<T: Scalar>(values: &[T]) -> bool {
+    values.iter().all(|v| v.is_finite())
+}

@@ -1,0 +1,446 @@
+//! Bad parameters are refused with a reason; no input makes a run panic, jump or leave the numbers.
+
+use crate::common::{ALPHA, DT, ORIGIN, Plan, run};
+use dmp::{
+    Configuration, Coupling, FixedPoint, GainError, Hemisphere, OrientationError, PhaseTable,
+    Primitive, PrimitiveError, PrimitiveTables, Quaternion, ROWS, Rollout, RolloutError, Row,
+    Scalar, StartState, TableError, Velocity,
+};
+use proptest::prelude::*;
+
+fn tables(weights: &[f64]) -> PrimitiveTables<'_, f64> {
+    PrimitiveTables {
+        duration: 5.0,
+        alpha: ALPHA,
+        activation: 0.7,
+        kernel_count: 10,
+        weights,
+        stiffness: [200.0; 4],
+        damping: [28.3, 20.0, 28.3, 28.3],
+        orientation_error: OrientationError::Quaternion,
+        hemisphere: Hemisphere::Demonstrated,
+        start: ORIGIN,
+        goal: ORIGIN,
+        start_velocity: Velocity::ZERO,
+        feedback: None,
+        expected: None,
+    }
+}
+
+fn refused(change: impl Fn(&mut PrimitiveTables<'_, f64>)) -> PrimitiveError {
+    let weights = [0.1; ROWS * 10];
+    let mut tables = tables(&weights);
+    change(&mut tables);
+    let error = Primitive::<f64, 20>::new(&tables).unwrap_err();
+    assert!(!error.to_string().is_empty());
+    error
+}
+
+#[test]
+fn unusable_parameters_are_refused_with_their_reason() {
+    let weights = [0.1; ROWS * 10];
+    assert!(Primitive::<f64, 20>::new(&tables(&weights)).is_ok());
+    for duration in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert_eq!(refused(|t| t.duration = duration), PrimitiveError::Duration);
+    }
+    // alpha = 1 leaves 37 % of the phase at the end.
+    for alpha in [1.0, 20.0, f64::NAN] {
+        assert_eq!(refused(|t| t.alpha = alpha), PrimitiveError::Alpha);
+    }
+    for kernels in [0, 1, 21] {
+        assert_eq!(
+            refused(|t| t.kernel_count = kernels),
+            PrimitiveError::KernelCount
+        );
+    }
+    assert_eq!(
+        refused(|t| t.kernel_count = 11),
+        PrimitiveError::WeightCount
+    );
+    assert_eq!(refused(|t| t.activation = 0.99), PrimitiveError::Activation);
+    assert_eq!(
+        refused(|t| t.weights = &[f64::NAN; ROWS * 10]),
+        PrimitiveError::Weight
+    );
+    assert_eq!(
+        refused(|t| t.stiffness[2] = -1.0),
+        PrimitiveError::Gains(Row::Posture, GainError::Stiffness)
+    );
+    assert_eq!(
+        refused(|t| t.damping[3] = f64::NAN),
+        PrimitiveError::Gains(Row::Hand, GainError::Damping)
+    );
+    // The default gains need tau > 0.057 s at 300 Hz.
+    assert_eq!(
+        refused(|t| t.duration = 0.0565),
+        PrimitiveError::Unstable(Row::Position)
+    );
+    assert_eq!(
+        refused(|t| t.start.posture[6] = f64::NAN),
+        PrimitiveError::Start
+    );
+    assert_eq!(
+        refused(|t| t.goal.hand[0] = f64::INFINITY),
+        PrimitiveError::Goal
+    );
+    assert_eq!(
+        refused(|t| t.start_velocity.hand[0] = f64::NAN),
+        PrimitiveError::StartVelocity
+    );
+    assert_eq!(
+        refused(|t| t.start.orientation.w = 0.9),
+        PrimitiveError::StartNotUnit
+    );
+    assert_eq!(
+        refused(|t| t.goal.orientation.x = 0.1),
+        PrimitiveError::GoalNotUnit
+    );
+    let far = Quaternion::from_rotation_vector(&[0.0, 3.1, 0.0]);
+    assert_eq!(
+        refused(|t| t.goal.orientation = far),
+        PrimitiveError::TurnsTooFar
+    );
+}
+
+#[test]
+fn shortest_accepted_duration_is_stable_and_a_shorter_one_is_not() {
+    let mut plan = Plan::empty();
+    plan.goal.position = [1.0; 3];
+    plan.duration = 0.0575;
+    let primitive = plan.build::<f64>();
+    assert!((primitive.minimum_duration() - 0.0569).abs() < 1e-4);
+    let rows = run(&primitive, 3000, DT, |_, _| Coupling::NONE);
+    assert!((rows[2999].position.x[0] - 1.0).abs() < 1e-6);
+    // Negative control: the same equations with a step just beyond the limit blow up.
+    let mut state = dmp::PointState::new(0.0, 0.0);
+    let h = DT / 0.056;
+    for _ in 0..3000 {
+        let rhs = primitive.position().right_hand_side(
+            &state,
+            &dmp::PointInput {
+                start: 0.0,
+                goal: 1.0,
+                s: 0.0,
+                f: 0.0,
+                zeta: 0.0,
+            },
+        );
+        state.step(rhs, h);
+    }
+    assert!(state.x().is_nan() || state.x().abs() > 1e6);
+}
+
+#[test]
+fn changes_in_flight_are_refused_without_touching_the_run() {
+    let plan = Plan::golden();
+    let primitive = plan.build::<f64>();
+    let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
+    rollout.step(&primitive, DT, &Coupling::NONE);
+    let before = rollout.clone();
+    let nan = f64::NAN;
+    assert_eq!(
+        rollout.set_goal_position([nan; 3]),
+        Err(RolloutError::NotFinite)
+    );
+    assert_eq!(
+        rollout.set_goal_posture([nan; 7]),
+        Err(RolloutError::NotFinite)
+    );
+    assert_eq!(
+        rollout.set_goal_hand([nan; 4]),
+        Err(RolloutError::NotFinite)
+    );
+    let half = Quaternion::new(0.5, 0.0, 0.0, 0.0);
+    assert_eq!(
+        rollout.set_goal_orientation(&primitive, half),
+        Err(RolloutError::NotUnit)
+    );
+    assert_eq!(
+        rollout.set_duration(&primitive, 0.01),
+        Err(RolloutError::TooFast)
+    );
+    assert_eq!(
+        rollout.set_duration(&primitive, 0.0),
+        Err(RolloutError::Negative)
+    );
+    assert_eq!(
+        rollout.set_speed(&primitive, 500.0),
+        Err(RolloutError::TooFast)
+    );
+    assert_eq!(
+        rollout.set_speed(&primitive, -1.0),
+        Err(RolloutError::Negative)
+    );
+    assert_eq!(
+        rollout.set_goal_filter(Some(0.0)),
+        Err(RolloutError::Negative)
+    );
+    assert_eq!(
+        rollout.set_speed_slew(Some(nan)),
+        Err(RolloutError::NotFinite)
+    );
+    assert_eq!(rollout, before);
+}
+
+#[test]
+fn frozen_time_holds_the_plan_and_resumes_on_the_same_path() {
+    let primitive = Plan::golden().build::<f64>();
+    let rows = run(&primitive, 2400, DT, |i, rollout| {
+        match i {
+            500 => rollout.freeze(),
+            800 => {
+                rollout.set_speed_slew(Some(2.0)).unwrap();
+                rollout.resume();
+            }
+            _ => {}
+        }
+        Coupling::NONE
+    });
+    for row in &rows[500..800] {
+        assert_eq!(row.position.x, rows[500].position.x);
+        assert_eq!(row.orientation.quaternion, rows[500].orientation.quaternion);
+        assert_eq!([row.position.v, row.position.a], [[0.0; 3]; 2]);
+        assert_eq!(row.phase, rows[500].phase);
+    }
+    assert!((rows[799].time - 799.0 * DT).abs() < 1e-9);
+    // Velocity comes back without a jump.
+    let faster = rows[801..]
+        .windows(2)
+        .all(|pair| (0..3).all(|i| (pair[1].position.v[i] - pair[0].position.v[i]).abs() < 5e-3));
+    assert!(faster);
+    assert!((rows[2399].position.x[0] - 0.55).abs() < 2e-3);
+}
+
+#[test]
+fn late_or_senseless_ticks_do_not_move_the_plan_too_far() {
+    let primitive = Plan::golden().build::<f64>();
+    let start = StartState::demonstrated(&primitive);
+    let mut normal = Rollout::start(&primitive, &start).unwrap();
+    let mut late = normal.clone();
+    let mut senseless = normal.clone();
+    normal.step(&primitive, DT, &Coupling::NONE);
+    late.step(&primitive, 0.5, &Coupling::NONE);
+    assert_eq!(normal, late);
+    for dt in [0.0, -1.0, f64::NAN] {
+        senseless.step(&primitive, dt, &Coupling::NONE);
+    }
+    let fresh = Rollout::start(&primitive, &start).unwrap();
+    assert_eq!([senseless.progress(), senseless.phase()], [0.0, 1.0]);
+    let (a, b) = (
+        senseless.clone().step(&primitive, DT, &Coupling::NONE),
+        fresh.clone().step(&primitive, DT, &Coupling::NONE),
+    );
+    assert_eq!((a.position, a.time), (b.position, b.time));
+}
+
+#[test]
+fn goal_filter_turns_the_jump_into_a_ramp() {
+    let primitive = Plan::golden().build::<f64>();
+    let turned = Quaternion::from_rotation_vector(&[0.4, -0.5, 1.0]);
+    let jump = |filter: Option<f64>| {
+        let rows = run(&primitive, 6000, DT, |i, rollout| {
+            if i == 900 {
+                rollout.set_goal_filter(filter).unwrap();
+                rollout.set_goal_position([0.65, 0.2, 0.05]).unwrap();
+                rollout.set_goal_orientation(&primitive, turned).unwrap();
+            }
+            Coupling::NONE
+        });
+        let end = rows[5999];
+        assert!((end.position.x[0] - 0.65).abs() < 1e-6);
+        let miss = end
+            .orientation
+            .quaternion
+            .aligned_with(&turned)
+            .conjugate()
+            .product(&turned);
+        assert!(miss.angle() < 1e-4, "{}", miss.angle());
+        (rows[900].position.a[0] - rows[899].position.a[0]).abs()
+    };
+    assert!(jump(None) > 0.5);
+    assert!(jump(Some(12.5)) < 0.05);
+}
+
+#[test]
+fn start_turned_past_a_full_turn_still_goes_the_demonstrated_way() {
+    // Demonstrated: 350 degrees about z. Started 20 degrees further back, in either sign.
+    let mut plan = Plan::empty();
+    plan.orientation_error = OrientationError::RotationVector;
+    plan.hemisphere = Hemisphere::Demonstrated;
+    let about_z =
+        |degrees: f64| Quaternion::from_rotation_vector(&[0.0, 0.0, degrees.to_radians()]);
+    plan.start.orientation = Quaternion::IDENTITY;
+    plan.goal.orientation = about_z(350.0);
+    let primitive = plan.build::<f64>();
+    for from in [about_z(-20.0), about_z(-20.0).negated(), about_z(15.0)] {
+        let start = StartState::at_rest(Configuration {
+            orientation: from,
+            ..ORIGIN
+        });
+        let mut rollout = Rollout::start(&primitive, &start).unwrap();
+        let mut turned = 0.0;
+        let mut last = from;
+        for _ in 0..9000 {
+            let q = rollout
+                .step(&primitive, DT, &Coupling::NONE)
+                .orientation
+                .quaternion;
+            turned += last
+                .conjugate()
+                .product(&q.aligned_with(&last))
+                .rotation_vector()[2];
+            last = q;
+        }
+        let expected = (about_z(350.0).rotation_vector()[2]
+            - from.aligned_with(&Quaternion::IDENTITY).rotation_vector()[2])
+            .to_degrees();
+        assert!(
+            (turned.to_degrees() - expected).abs() < 0.5,
+            "{} {expected}",
+            turned.to_degrees()
+        );
+    }
+}
+
+#[test]
+fn tables_interpolate_and_hold_outside() {
+    let table = PhaseTable::<f64, 1, 4>::new(&[[1.0], [3.0], [2.0]]).unwrap();
+    for (u, value) in [
+        (-1.0, 1.0),
+        (0.0, 1.0),
+        (0.25, 2.0),
+        (0.5, 3.0),
+        (0.75, 2.5),
+        (1.0, 2.0),
+        (9.0, 2.0),
+    ] {
+        assert!((table.at(u)[0] - value).abs() < 1e-12);
+    }
+    assert_eq!(table.at(f64::NAN), [1.0]);
+    assert_eq!(PhaseTable::<f64, 1, 4>::new(&[]), Err(TableError::Empty));
+    assert_eq!(
+        PhaseTable::<f64, 1, 4>::new(&[[0.0]; 5]),
+        Err(TableError::TooMany)
+    );
+    assert_eq!(
+        PhaseTable::<f64, 1, 4>::new(&[[f64::NAN]]),
+        Err(TableError::NotFinite)
+    );
+}
+
+#[test]
+fn recorded_sensor_values_become_an_expectation_by_phase() {
+    let samples: Vec<_> = (0..1500)
+        .map(|k| {
+            let u = k as f64 / 1499.0;
+            (u, std::array::from_fn(|i| (3.0 * u + i as f64).sin()))
+        })
+        .collect();
+    let expected = dmp::fit::expected_wrench(&samples, 101, 5.0).unwrap();
+    for u in [0.0, 0.123, 0.5, 0.871, 1.0] {
+        for (i, value) in expected.at(u).iter().enumerate() {
+            assert!((value - (3.0 * u + i as f64).sin()).abs() < 0.02);
+        }
+    }
+    assert_eq!(
+        dmp::fit::expected_wrench(&[], 101, 5.0),
+        Err(TableError::Empty)
+    );
+}
+
+fn scalar_functions<T: Scalar>(absolute: f64) {
+    let close = |a: T, b: f64, scale: f64| {
+        let a = a.to_f64();
+        assert!((a - b).abs() <= absolute * scale.max(1.0), "{a} {b}");
+    };
+    for i in -400..=400 {
+        let x = f64::from(i) * 0.05;
+        let t = T::from_f64(x);
+        let x = t.to_f64();
+        close(T::exp(t), x.exp(), x.exp() * 20.0);
+        close(T::sin_cos(t).0, x.sin(), 1.0);
+        close(T::sin_cos(t).1, x.cos(), 1.0);
+        if i >= 0 {
+            close(T::sqrt(t), x.sqrt(), x);
+            if x <= T::NEGLIGIBLE_EXPONENT.to_f64() {
+                close(T::kernel(t), (-x).exp(), 1.0);
+            }
+        }
+        for j in [-3.0, -0.4, 0.0, 1e-3, 2.0] {
+            close(
+                T::atan2(t, T::from_f64(j)),
+                x.atan2(T::from_f64(j).to_f64()),
+                1.0,
+            );
+        }
+    }
+}
+
+#[test]
+fn elementary_functions_are_exact_in_every_number_type() {
+    scalar_functions::<f64>(2e-15);
+    scalar_functions::<f32>(4e-7);
+    scalar_functions::<FixedPoint>(2e-9);
+}
+
+#[test]
+fn fixed_point_saturates_and_never_wraps() {
+    let (max, one) = (FixedPoint::MAX, FixedPoint::ONE);
+    assert_eq!(max + one, max);
+    assert_eq!(max * max, max);
+    assert_eq!(one / FixedPoint::ZERO, max);
+    assert!((-max) - max < FixedPoint::ZERO);
+    assert_eq!(FixedPoint::from_f64(1e300), max);
+    assert_eq!(FixedPoint::from_f64(f64::NAN), FixedPoint::ZERO);
+    assert_eq!(Scalar::exp(FixedPoint::from_f64(30.0)), max);
+    assert_eq!(Scalar::exp(-max), FixedPoint::ZERO);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn any_tables_are_refused_or_run(
+        values in prop::collection::vec(prop::num::f64::ANY, 40),
+        weights in prop::collection::vec(-1e6..1e6_f64, ROWS * 3),
+        plausible in any::<bool>(),
+        kernels in 0_usize..6,
+    ) {
+        let v = |i: usize| if plausible { values[i].clamp(-10.0, 10.0) } else { values[i] };
+        let configuration = |at: usize| Configuration {
+            position: [v(at), v(at + 1), v(at + 2)],
+            orientation: if plausible {
+                Quaternion::IDENTITY
+            } else {
+                Quaternion::new(v(at), v(at + 1), v(at + 2), v(at + 3))
+            },
+            posture: [v(at + 4); 7],
+            hand: [v(at + 5); 4],
+        };
+        let tables = PrimitiveTables {
+            duration: if plausible { 3.0 } else { v(30) },
+            alpha: if plausible { 4.6 } else { v(31) },
+            activation: if plausible { 0.7 } else { v(32) },
+            kernel_count: if plausible { 3 } else { kernels },
+            weights: &weights,
+            stiffness: [200.0; 4],
+            damping: [28.0; 4],
+            orientation_error: OrientationError::RotationVector,
+            hemisphere: Hemisphere::Nearest,
+            start: configuration(0),
+            goal: configuration(10),
+            start_velocity: Velocity::ZERO,
+            feedback: None,
+            expected: None,
+        };
+        if let Ok(primitive) = Primitive::<f64, 4>::new(&tables) {
+            let start = StartState::demonstrated(&primitive);
+            let mut rollout = Rollout::start(&primitive, &start).unwrap();
+            for i in 0..200 {
+                let coupling = Coupling { position: [values[i % 40]; 3], ..Coupling::NONE };
+                let row = rollout.step(&primitive, values[(i * 7) % 40], &coupling);
+                prop_assert!(row.phase > 0.0 && row.phase <= 1.0);
+            }
+        }
+    }
+}

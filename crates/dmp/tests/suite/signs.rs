@@ -1,0 +1,377 @@
+//! Checks that a wrong sign, a wrong frame or a forgotten tau cannot pass. Numbers are those of the design's list.
+
+use crate::common::{DT, K, Plan, run};
+use dmp::{
+    Coupling, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, Quaternion, Reference,
+    SENSORS, Scalar, SensorMap, Velocity,
+};
+
+type Row = Reference<f64>;
+
+fn nominal(plan: &Plan, seconds: f64) -> Vec<Row> {
+    let primitive = plan.build::<f64>();
+    run(&primitive, (seconds * 300.0) as usize, DT, |_, _| {
+        Coupling::NONE
+    })
+}
+
+fn path_length<T: Scalar>(rows: &[Reference<T>]) -> f64 {
+    rows.windows(2)
+        .map(|pair| {
+            let (a, b) = (
+                &pair[0].orientation.quaternion,
+                &pair[1].orientation.quaternion,
+            );
+            a.conjugate().product(b).angle().to_f64()
+        })
+        .sum()
+}
+
+#[test]
+fn check_1_first_tick_is_driven_by_the_forcing_term_alone() {
+    // xdd(0) = K f(1)/tau^2; the kick K (g - x0)/tau^2 of a missing start term would be 1.2 m/s^2 here.
+    let plan = Plan::golden();
+    let primitive = plan.build::<f64>();
+    let f = primitive.forcing().evaluate(1.0);
+    let first = &nominal(&plan, 0.1)[0];
+    for i in 0..3 {
+        assert!((first.position.a[i] - K * f[i] / 25.0).abs() < 1e-12);
+        assert!((first.orientation.domega[i] - K * f[3 + i] / 25.0).abs() < 1e-12);
+        assert_eq!(first.position.x[i], plan.start.position[i]);
+    }
+    for i in 0..4 {
+        assert!((first.hand.a[i] - K * f[13 + i] / 25.0).abs() < 1e-12);
+    }
+    let kick = K * (plan.goal.position[0] - plan.start.position[0]) / 25.0;
+    assert!(kick > 10.0 * first.position.a[0].abs());
+}
+
+#[test]
+fn check_2_goal_jump_steps_the_acceleration_by_the_open_fraction() {
+    let plan = Plan::golden();
+    let primitive = plan.build::<f64>();
+    let quiet = nominal(&plan, 5.0);
+    let mut separation = 0.0_f64;
+    for tick in [150, 400, 750, 1400] {
+        let jumped = run(&primitive, 1500, DT, |i, rollout| {
+            if i == tick {
+                rollout.set_goal_position([0.65, 0.2, 0.05]).unwrap();
+            }
+            Coupling::NONE
+        });
+        let jump = jumped[tick].position.a[0] - quiet[tick].position.a[0];
+        let expected = K * 0.1 * (1.0 - quiet[tick].phase) / 25.0;
+        assert!((jump / expected - 1.0).abs() < 1e-9, "{jump} {expected}");
+        // Negative control: with x0 reset to the present value the jump would be another one.
+        let moved = quiet[tick].position.x[0] - plan.start.position[0];
+        let reset = expected + K * moved * quiet[tick].phase / 25.0;
+        separation = separation.max((jump / reset - 1.0).abs());
+    }
+    assert!(separation > 0.02, "{separation}");
+}
+
+#[test]
+fn check_3_path_does_not_depend_on_the_course_of_tau() {
+    let plan = Plan::golden();
+    let primitive = plan.build::<f64>();
+    // A fine step, so that only a wrong law and not the integrator could separate the paths.
+    let dt = DT / 16.0;
+    let ticks = 16 * 1800;
+    let reference = run(&primitive, ticks, dt, |_, _| Coupling::NONE);
+    let varied = run(&primitive, 2 * ticks, dt, |i, rollout| {
+        rollout.set_speed_slew(Some(3.0)).unwrap();
+        match i % 4000 {
+            0 => rollout.set_duration(&primitive, 9.0).unwrap(),
+            1500 => rollout.set_speed(&primitive, 1.3).unwrap(),
+            2500 => rollout.pause(),
+            3000 => rollout.resume(),
+            _ => {}
+        }
+        Coupling::NONE
+    });
+    let mut compared = 0;
+    let mut worst = 0.0_f64;
+    let mut left = 0;
+    for row in varied.iter().filter(|row| row.progress < 1.0) {
+        while reference[left + 1].progress <= row.progress {
+            left += 1;
+        }
+        let (a, b) = (&reference[left], &reference[left + 1]);
+        let w = (row.progress - a.progress) / (b.progress - a.progress);
+        for i in 0..3 {
+            let x = a.position.x[i] + (b.position.x[i] - a.position.x[i]) * w;
+            worst = worst.max((row.position.x[i] - x).abs());
+        }
+        compared += 1;
+    }
+    println!("path over {compared} ticks of varying tau: {worst:.1e} m");
+    assert!(compared > 20_000);
+    // The integrator's own error at this step; rescaling v at a change of tau bends the path by centimetres.
+    assert!(worst < 2e-5);
+    // The phase never runs backwards.
+    assert!(varied.windows(2).all(|pair| pair[1].phase <= pair[0].phase));
+}
+
+#[test]
+fn check_5_antipodal_goal_turns_half_a_radian_and_no_more() {
+    let mut plan = Plan::empty();
+    plan.goal.orientation = Quaternion::from_rotation_vector(&[0.0, 0.0, 0.5]).negated();
+    for error in [
+        OrientationError::Quaternion,
+        OrientationError::RotationVector,
+    ] {
+        plan.orientation_error = error;
+        let rows = nominal(&plan, 20.0);
+        let end = rows.last().unwrap().orientation.quaternion;
+        let target = Quaternion::from_rotation_vector(&[0.0, 0.0, 0.5]);
+        assert!(
+            end.aligned_with(&target)
+                .conjugate()
+                .product(&target)
+                .angle()
+                < 1e-6
+        );
+        assert!((path_length(&rows) - 0.5).abs() < 1e-3, "{error:?}");
+    }
+    // Negative control: told that the far sign was demonstrated, it goes the long way round.
+    plan.orientation_error = OrientationError::RotationVector;
+    plan.hemisphere = Hemisphere::Demonstrated;
+    assert!(path_length(&nominal(&plan, 20.0)) > 5.0);
+}
+
+#[test]
+fn check_6_constant_feedback_settles_where_it_should() {
+    let mut plan = Plan::empty();
+    plan.goal.position = [0.1, 0.0, 0.0];
+    let primitive = plan.build::<f64>();
+    let coupling = Coupling {
+        position: [10.0, -5.0, 2.0],
+        orientation: [20.0, 0.0, 0.0],
+        hand: [0.0, 4.0, 4.0, 4.0],
+    };
+    let rows = run(&primitive, 9000, DT, |_, _| coupling);
+    let end = rows.last().unwrap();
+    for (i, zeta) in coupling.position.iter().enumerate() {
+        let settled = plan.goal.position[i] + zeta / K;
+        assert!((end.position.x[i] - settled).abs() < 1e-9);
+    }
+    assert!((end.hand.x[1] - 4.0 / K).abs() < 1e-9);
+    let turned = end.orientation.quaternion.rotation_vector();
+    assert!(
+        (turned[0] - 2.0 * (20.0_f64 / K).asin()).abs() < 1e-9,
+        "{turned:?}"
+    );
+    // Negative control: 20/K, the answer for a position row, is half of it.
+    assert!((turned[0] - 20.0 / K).abs() > 0.05);
+    // No memory: the plan returns when the force vanishes.
+    let rows = run(&primitive, 12_000, DT, |i, _| {
+        if i < 3000 { coupling } else { Coupling::NONE }
+    });
+    assert!((rows.last().unwrap().position.x[0] - 0.1).abs() < 1e-9);
+
+    // In rotation-vector coordinates the angle is zeta/K itself.
+    plan.orientation_error = OrientationError::RotationVector;
+    let primitive = plan.build::<f64>();
+    let rows = run(&primitive, 9000, DT, |_, _| coupling);
+    let turned = rows
+        .last()
+        .unwrap()
+        .orientation
+        .quaternion
+        .rotation_vector();
+    assert!((turned[0] - 0.1).abs() < 1e-9);
+}
+
+#[test]
+fn pushes_of_the_environment_move_the_plan_along_and_are_clamped() {
+    let feedback = Feedback::<f64>::new(
+        GainSchedule::constant([3.0, 3.0, 2.0, 20.0, 20.0, 15.0, 9.0, 40.0, 40.0, 40.0]).unwrap(),
+        GainSchedule::constant([1.0; SENSORS]).unwrap(),
+        Limits {
+            displacement: 0.23,
+            rotation: 0.4,
+            hand: 0.3,
+        },
+    )
+    .unwrap();
+    let mut plan = Plan::empty();
+    plan.goal.position = [0.1, 0.0, 0.0];
+    let mut primitive = plan.build_with(Some(feedback));
+    let push = [4.0, 0.0, 0.0, 0.0, 0.0, 0.3, 0.5, 0.0, 0.0];
+    let rollout = |primitive: &_| {
+        dmp::Rollout::<f64, 100>::start(primitive, &dmp::StartState::demonstrated(primitive))
+            .unwrap()
+    };
+    // Without an expectation there is nothing to compare with: open loop.
+    let open = rollout(&primitive).coupling(&primitive, &push, &SensorMap::IDENTITY);
+    assert_eq!(open, Coupling::NONE);
+    let expected = dmp::ExpectedWrench::new(&[[0.0; SENSORS], [1.0; SENSORS]], 5.0).unwrap();
+    primitive.set_expected(Some(expected));
+    let run = rollout(&primitive);
+    let zeta = run.coupling(&primitive, &push, &SensorMap::IDENTITY);
+    assert_eq!(zeta.position, [12.0, 0.0, 0.0]);
+    assert_eq!(zeta.orientation, [0.0, 0.0, 4.5]);
+    // The spread has no gauge.
+    assert_eq!(zeta.hand, [0.0, 20.0, 0.0, 0.0]);
+    // A blow, an infinite and an undefined value stay bounded.
+    for blow in [1e6, -1e30, f64::INFINITY, f64::NAN] {
+        let zeta = run.coupling(&primitive, &[blow; SENSORS], &SensorMap::IDENTITY);
+        let norm = |a: &[f64]| a.iter().map(|a| a * a).sum::<f64>().sqrt();
+        assert!(norm(&zeta.position) <= K * 0.23 * (1.0 + 1e-12));
+        assert!(norm(&zeta.orientation) <= K * 0.2_f64.sin() * (1.0 + 1e-12));
+        assert!(zeta.hand.iter().all(|z| z.abs() <= K * 0.3));
+    }
+}
+
+#[test]
+fn sensor_map_turns_and_shifts_a_wrench() {
+    // Sensor turned by 90 degrees about z, controlled point 0.1 m along its z axis.
+    let r = Quaternion::<f64>::from_rotation_vector(&[0.0, 0.0, std::f64::consts::FRAC_PI_2]);
+    let map = SensorMap {
+        force: r.rotation_matrix(),
+        torque: r.rotation_matrix(),
+        lever: [0.0, 0.0, 0.1],
+    };
+    let [px, py, pz, rx, ry, rz, spread, f1, ..] =
+        map.to_task(&[2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0]);
+    assert!((py - 2.0).abs() < 1e-12 && px.abs() < 1e-12 && pz == 0.0);
+    // tau - lever x F = -(0.1 z) x (2 x) = -0.2 y, turned to +0.2 x.
+    assert!((rx - 0.2).abs() < 1e-12 && ry.abs() < 1e-12 && rz == 0.0);
+    assert_eq!([spread, f1], [0.0, 0.3]);
+}
+
+#[test]
+fn feedback_fades_when_the_speed_differs_from_the_recording() {
+    let expected = dmp::ExpectedWrench::new(&[[0.0_f64; SENSORS]], 5.0).unwrap();
+    assert_eq!(expected.trust(1.0), 1.0);
+    assert_eq!(expected.trust(1.0 / 1.05), 1.0);
+    assert!((expected.trust(1.0 / 1.3) - 0.5).abs() < 1e-9);
+    for speed in [0.0, 0.5, 3.0] {
+        assert_eq!(expected.trust(speed), 0.0);
+    }
+}
+
+fn norm_after_a_million_ticks<T: Scalar>(error: OrientationError) -> f64 {
+    let mut plan = Plan::golden();
+    plan.orientation_error = error;
+    plan.duration = 3000.0;
+    let primitive = plan.build::<T>();
+    let mut rollout =
+        dmp::Rollout::start(&primitive, &dmp::StartState::demonstrated(&primitive)).unwrap();
+    let dt = T::from_f64(DT);
+    // A feedback beyond the equilibrium keeps the orientation spinning all the time.
+    let spin = Coupling {
+        orientation: [300_000.0, 200_000.0, -100_000.0].map(T::from_f64),
+        ..Coupling::NONE
+    };
+    let mut worst = 0.0_f64;
+    for _ in 0..1_000_000 {
+        let q = rollout.step(&primitive, dt, &spin).orientation.quaternion;
+        worst = worst.max((q.dot(&q).to_f64().sqrt() - 1.0).abs());
+    }
+    worst
+}
+
+#[test]
+fn check_9_quaternion_stays_unit_over_a_million_ticks() {
+    let (double, single) = (
+        norm_after_a_million_ticks::<f64>(OrientationError::Quaternion),
+        norm_after_a_million_ticks::<f32>(OrientationError::Quaternion),
+    );
+    println!("norm after 1e6 ticks: f64 {double:.1e}, f32 {single:.1e}");
+    assert!(double < 1e-14);
+    assert!(single < 2e-7);
+}
+
+#[test]
+fn check_10_reported_rates_are_the_derivatives_of_the_reported_path() {
+    // tau = 2.7 and varying, both orientation systems, everything moving.
+    for error in [
+        OrientationError::Quaternion,
+        OrientationError::RotationVector,
+    ] {
+        let mut plan = Plan::golden();
+        plan.duration = 2.7;
+        plan.orientation_error = error;
+        plan.start_velocity = Velocity {
+            position: [0.1, -0.05, 0.02],
+            orientation: [0.2, 0.1, -0.3],
+            ..Velocity::ZERO
+        };
+        let primitive = plan.build::<f64>();
+        let dt = DT / 64.0;
+        let rows = run(&primitive, 64 * 900, dt, |i, rollout| {
+            rollout.set_speed_slew(Some(0.5)).unwrap();
+            if i == 64 * 200 {
+                rollout.set_duration(&primitive, 4.0).unwrap();
+            }
+            Coupling::NONE
+        });
+        assert_eq!(rows[0].position.v, plan.start_velocity.position);
+        for i in 0..3 {
+            let w = rows[0].orientation.omega[i] - plan.start_velocity.orientation[i];
+            assert!(w.abs() < 1e-12, "{error:?}: {w}");
+        }
+        let (mut v, mut a, mut w, mut dw) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+        for k in 1..rows.len() - 1 {
+            let (before, now, after) = (&rows[k - 1], &rows[k], &rows[k + 1]);
+            // Where the slewing of the speed begins or ends the velocity has a corner and no derivative.
+            if (after.rate - 2.0 * now.rate + before.rate).abs() > 1e-12 {
+                continue;
+            }
+            for i in 0..3 {
+                let x = |row: &Row| row.position.x[i];
+                let rate = |row: &Row| row.position.v[i];
+                v = v.max(((x(after) - x(before)) / (2.0 * dt) - rate(now)).abs());
+                a = a.max(((rate(after) - rate(before)) / (2.0 * dt) - now.position.a[i]).abs());
+                let omega = |row: &Row| row.orientation.omega[i];
+                dw = dw.max(
+                    ((omega(after) - omega(before)) / (2.0 * dt) - now.orientation.domega[i]).abs(),
+                );
+            }
+            let (q0, q1) = (before.orientation.quaternion, after.orientation.quaternion);
+            let turn = q0.conjugate().product(&q1).rotation_vector();
+            for (turn, omega) in turn.iter().zip(&now.orientation.omega) {
+                w = w.max((turn / (2.0 * dt) - omega).abs());
+            }
+        }
+        println!(
+            "{error:?}: dx {v:.1e} m/s, dv {a:.1e} m/s^2, dq {w:.1e} rad/s, domega {dw:.1e} rad/s^2"
+        );
+        assert!(v < 2e-4 && w < 5e-4);
+        assert!(a < 0.02 && dw < 0.02, "{a} {dw}");
+    }
+}
+
+#[test]
+fn world_rates_turn_with_the_hand() {
+    let rows = nominal(&Plan::golden(), 4.0);
+    let dt = DT;
+    for k in (100..1000).step_by(50) {
+        let (a, b) = (
+            &rows[k - 1].orientation.quaternion,
+            &rows[k + 1].orientation.quaternion,
+        );
+        // World rates from q(t): log(b (x) conj(a)).
+        let world = b
+            .product(&a.conjugate())
+            .rotation_vector()
+            .map(|r| r / (2.0 * dt));
+        let reported = rows[k].orientation.omega_world();
+        for i in 0..3 {
+            assert!(
+                (world[i] - reported[i]).abs() < 5e-3,
+                "{world:?} {reported:?}"
+            );
+        }
+    }
+    // Negative control: the body rates are another vector.
+    let row = &rows[600].orientation;
+    let difference: f64 = row
+        .omega
+        .iter()
+        .zip(row.omega_world())
+        .map(|(a, b)| (a - b).abs())
+        .sum();
+    assert!(difference > 0.05);
+}

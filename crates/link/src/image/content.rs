@@ -1,0 +1,120 @@
+//! What an image holds: plain numbers with their units, not yet judged.
+
+/// Which orientation error the orientation system uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum OrientationErrorKind {
+    /// Eq (4): the vector part of the quaternion difference.
+    #[default]
+    QuaternionDifference,
+    /// Twice the logarithm, for movements that turn beyond 180 degrees.
+    RotationVector,
+}
+
+/// What the signs of the start and goal quaternions mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum HemisphereKind {
+    /// They come from a sign-continuous demonstration.
+    #[default]
+    Demonstrated,
+    /// They were chosen freely: the near way round is meant.
+    Nearest,
+}
+
+/// Pose, posture and hand of one moment, or their velocities' bases.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Waypoint {
+    /// Grasp point in the world frame, m.
+    pub position: [f32; 3],
+    /// Hand to world, unit quaternion (w, x, y, z).
+    pub orientation: [f32; 4],
+    /// Joint angles, rad.
+    pub posture: [f32; 7],
+    /// Spread and three fingers, rad.
+    pub hand: [f32; 4],
+}
+
+/// Velocities at the start of the demonstration.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct WaypointVelocity {
+    /// World frame, m/s.
+    pub position: [f32; 3],
+    /// Body frame, rad/s.
+    pub orientation: [f32; 3],
+    /// rad/s.
+    pub posture: [f32; 7],
+    /// rad/s.
+    pub hand: [f32; 4],
+}
+
+/// Largest displacement of the plan by feedback at rest, Eq (8).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FeedbackClamps {
+    /// Position, m.
+    pub position: f32,
+    /// Orientation, rad.
+    pub orientation: f32,
+    /// Hand joints, rad.
+    pub hand: f32,
+}
+
+/// How the expected wrench was recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ExpectationMarks {
+    /// Duration of the recorded runs, s. The inertial part of a wrench goes with its square.
+    pub recorded_duration: f32,
+    /// Mass carried while recording, beyond the hand, kg.
+    pub payload_mass: f32,
+    /// Centre of that mass in the hand frame, m.
+    pub payload_centre: [f32; 3],
+    /// Cut-off of the filter on the recorded wrench, Hz; the live one must have the same.
+    pub filter_cutoff: f32,
+    /// Runs that were averaged.
+    pub trials: f32,
+    /// Relative spread below which no sensor is trusted more, sigma_min / sigma.
+    pub spread_floor: f32,
+}
+
+/// Everything an image holds, with tables of reals of type `F`: slices to write one, [`Reals`] when read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImageContent<F> {
+    /// Hash of the robot model the primitive was learned with.
+    pub model_hash: u32,
+    /// Duration as taught, s.
+    pub duration: f32,
+    /// Decay of the phase, Eq (3).
+    pub alpha: f32,
+    /// Activation of a kernel at the next centre, Eq (2). Centres: exp(-alpha i / (kernels - 1)).
+    pub activation: f32,
+    /// K of position, orientation, posture, hand.
+    pub stiffness: [f32; 4],
+    /// D of position, orientation, posture, hand.
+    pub damping: [f32; 4],
+    /// Orientation error.
+    pub orientation_error: OrientationErrorKind,
+    /// Signs of the quaternions.
+    pub hemisphere: HemisphereKind,
+    /// Start of the demonstration.
+    pub start: Waypoint,
+    /// Velocity there.
+    pub start_velocity: WaypointVelocity,
+    /// Goal of the demonstration.
+    pub goal: Waypoint,
+    /// Clamps of the feedback.
+    pub clamps: FeedbackClamps,
+    /// How the expectation was recorded; all zero without one.
+    pub marks: ExpectationMarks,
+    /// Kernels of each row.
+    pub kernels: usize,
+    /// K1 of Eq (8) by phase: points x [`COUPLED_ROWS`], point after point, first at the start. Empty: no
+    /// feedback. One point: constant.
+    pub k1: F,
+    /// K2 of Eq (8) by phase: points x [`SENSOR_ROWS`].
+    pub k2: F,
+    /// Weights, [`WEIGHT_ROWS`] x kernels, row after row.
+    pub weights: F,
+    /// Expected sensor values by phase: points x [`SENSOR_ROWS`], environment on robot. Force N in world axes,
+    /// torque N m in hand axes at the grasp point, fingers N m. May be empty.
+    pub expected_mean: F,
+    /// Their standard deviations, same shape.
+    pub expected_spread: F,
+}

@@ -1,0 +1,111 @@
+//! Sizes, limits and flags of the image layout.
+
+use super::ImageError;
+
+/// Version of this layout. An image of another version is refused with both versions named.
+pub const IMAGE_SCHEMA: u16 = 1;
+
+/// First bytes of every image.
+pub const MAGIC: [u8; 4] = *b"TACP";
+
+/// Rows of weights: 3 position, 3 orientation, 7 posture, 4 hand.
+pub const WEIGHT_ROWS: usize = 17;
+
+/// Rows that sensory feedback can bend: 3 position, 3 orientation, 4 hand.
+pub const COUPLED_ROWS: usize = 10;
+
+/// Sensor rows: wrist force 3 (world axes), wrist torque 3, one strain gauge of each finger.
+pub const SENSOR_ROWS: usize = 9;
+
+/// Most kernels of each row.
+pub const KERNEL_LIMIT: usize = 100;
+
+/// Most points of a gain table.
+pub const GAIN_POINTS_LIMIT: usize = 32;
+
+/// Most points of the expectation.
+pub const EXPECTATION_POINTS_LIMIT: usize = 128;
+
+pub(super) const HEADER_BYTES: usize = 56;
+pub(super) const CRC_BYTES: usize = 4;
+pub(super) const REAL_BYTES: usize = 4;
+
+/// Reals between header and tables: timing 3, gains 8, start 18, start velocity 17, goal 18, clamps 3,
+/// expectation marks 8.
+const FIXED_REALS: usize = 3 + 8 + 18 + 17 + 18 + 3 + EXPECTATION_MARKS;
+
+/// Reals that describe how an expectation was recorded: duration, payload mass, payload centre 3, filter
+/// cut-off, number of trials, smallest spread that counts.
+const EXPECTATION_MARKS: usize = 8;
+
+pub(super) const FLAG_ROTATION_VECTOR: u16 = 1 << 0;
+pub(super) const FLAG_NEAREST_HEMISPHERE: u16 = 1 << 1;
+pub(super) const KNOWN_FLAGS: u16 = FLAG_ROTATION_VECTOR | FLAG_NEAREST_HEMISPHERE;
+
+/// Bytes of an image with these counts.
+#[must_use]
+pub const fn image_bytes(
+    kernels: usize,
+    k1_points: usize,
+    k2_points: usize,
+    expectation_points: usize,
+) -> usize {
+    let reals = FIXED_REALS
+        + COUPLED_ROWS * k1_points
+        + SENSOR_ROWS * k2_points
+        + WEIGHT_ROWS * kernels
+        + 2 * SENSOR_ROWS * expectation_points;
+    HEADER_BYTES + REAL_BYTES * reals + CRC_BYTES
+}
+
+/// Bytes of the largest image there can be.
+pub const IMAGE_BYTES_LIMIT: usize = image_bytes(
+    KERNEL_LIMIT,
+    GAIN_POINTS_LIMIT,
+    GAIN_POINTS_LIMIT,
+    EXPECTATION_POINTS_LIMIT,
+);
+
+/// The four numbers that fix the length of an image.
+#[derive(Clone, Copy)]
+pub(super) struct Counts {
+    pub(super) kernels: usize,
+    pub(super) k1_points: usize,
+    pub(super) k2_points: usize,
+    pub(super) expectation_points: usize,
+}
+
+impl Counts {
+    pub(super) fn check(self) -> Result<(), ImageError> {
+        if self.kernels < 2 || self.kernels > KERNEL_LIMIT {
+            return Err(ImageError::Kernels {
+                found: clip(self.kernels),
+            });
+        }
+        let gain_points = self.k1_points.max(self.k2_points);
+        if gain_points > GAIN_POINTS_LIMIT || (self.k1_points == 0) != (self.k2_points == 0) {
+            return Err(ImageError::GainPoints {
+                found: clip(gain_points),
+            });
+        }
+        if self.expectation_points > EXPECTATION_POINTS_LIMIT {
+            return Err(ImageError::ExpectationPoints {
+                found: clip(self.expectation_points),
+            });
+        }
+        Ok(())
+    }
+
+    pub(super) const fn bytes(self) -> usize {
+        image_bytes(
+            self.kernels,
+            self.k1_points,
+            self.k2_points,
+            self.expectation_points,
+        )
+    }
+}
+
+pub(super) fn clip(value: usize) -> u32 {
+    u32::try_from(value).unwrap_or(u32::MAX)
+}

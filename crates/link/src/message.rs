@@ -1,0 +1,371 @@
+//! What host and device say to each other.
+//!
+//! Both enums are **append-only**: postcard numbers variants and fields by position, so a variant or
+//! field that moved would be read as another one. Never change or remove, only add at the end, and raise
+//! `LINK_VERSION`. The first variant of each enum ([`Request::Hello`], [`Reply::Hello`]) and
+//! [`Reply::Refused`] with the first refusals are frozen for ever: they are how two versions find out
+//! that they do not fit.
+//!
+//! Units: SI. Joint arrays run from base to wrist. Quaternions (w, x, y, z).
+
+use serde::{Deserialize, Serialize};
+
+use crate::name::{Name, Text};
+use crate::refusal::Refusal;
+use crate::report::{Event, Listing, Statistics, Status, Telemetry};
+
+/// Most bytes of an image in one [`Request::UploadChunk`] or [`Reply::Chunk`].
+///
+/// 192 bytes make a frame of about 210: 2.3 ms on a serial line of 921 600 baud, so a chunk never delays
+/// a stop request by more than one control cycle.
+pub const CHUNK_BYTES: usize = 192;
+
+/// The bytes of one chunk.
+pub type ChunkData = heapless::Vec<u8, CHUNK_BYTES>;
+
+/// A host's first words on a connection.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HostHello {
+    /// [`crate::LINK_VERSION`] of the host.
+    pub link_version: u16,
+    /// [`crate::SCHEMA_HASH`] of the host.
+    pub schema_hash: u32,
+    /// Hash of the robot model the host computes with (`control::MODEL_HASH`).
+    pub model_hash: u32,
+    /// Who is asking, for the refusal a second host gets, e.g. "anna@lab3".
+    pub owner: Text,
+}
+
+/// The device's answer to a matching [`HostHello`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DeviceHello {
+    /// [`crate::LINK_VERSION`] of the device.
+    pub link_version: u16,
+    /// [`crate::SCHEMA_HASH`] of the device.
+    pub schema_hash: u32,
+    /// Hash of the robot model in the firmware (`control::MODEL_HASH`).
+    pub model_hash: u32,
+    /// [`crate::image::IMAGE_SCHEMA`] the device stores.
+    pub image_schema: u16,
+    /// Most kernels of a primitive the device can hold.
+    pub maximum_kernels: u16,
+    /// Number of primitives the store can hold.
+    pub slots: u8,
+    /// Most bytes of one image.
+    pub slot_bytes: u32,
+    /// Control cycles per second, 300.
+    pub cycles_per_second: u16,
+    /// Unit of every `*_ticks` of the statistics: ticks per second.
+    pub ticks_per_second: u32,
+    /// A device that must not be mistaken for an arm: `true` under QEMU and in-process.
+    pub simulated: bool,
+    /// Firmware version and git revision, e.g. "0.1.0 (1a2b3c4)".
+    pub firmware: Text,
+    /// Board, e.g. "mps2-an500".
+    pub board: Text,
+    /// Serial number of the device.
+    pub serial: Text,
+}
+
+/// Where a movement shall end, where it differs from the taught goal. `None` keeps the present one.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Goal {
+    /// Grasp point in the world frame, m.
+    pub position: Option<[f32; 3]>,
+    /// Hand orientation, unit quaternion (w, x, y, z), hand to world.
+    pub orientation: Option<[f32; 4]>,
+}
+
+/// Which pose closes the position loop of Eq (11).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum PoseFeedback {
+    /// The measured pose: no steady-state error.
+    #[default]
+    Measured,
+    /// The pose of the desired joint angles: a contact is not wound up.
+    Planned,
+}
+
+/// Where the desired joint acceleration of Eq (10) comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum AccelerationSource {
+    /// Computed from the plan's acceleration.
+    #[default]
+    Analytic,
+    /// The filtered derivative of the desired joint velocity.
+    Differentiated,
+}
+
+/// How a primitive shall be run. The default is the first run of a new primitive: as taught, open loop.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RunOptions {
+    /// Goals that replace the taught ones.
+    pub goal: Goal,
+    /// Speed relative to the taught one: 1 as taught, 0.5 takes twice as long.
+    pub speed: f32,
+    /// The difference between felt and expected wrench bends the plan (Eqs 8, 9).
+    pub feedback: bool,
+    /// The force controller of Eq (12) adds its torque.
+    pub force_control: bool,
+    /// Pose used in Eq (11).
+    pub pose_feedback: PoseFeedback,
+    /// Acceleration used in Eq (10).
+    pub acceleration: AccelerationSource,
+}
+
+impl Default for RunOptions {
+    fn default() -> Self {
+        Self {
+            goal: Goal::default(),
+            speed: 1.0,
+            feedback: false,
+            force_control: false,
+            pose_feedback: PoseFeedback::Measured,
+            acceleration: AccelerationSource::Analytic,
+        }
+    }
+}
+
+/// Host to device. Every request is answered by exactly one [`Reply`] that carries its sequence number.
+///
+/// Repeating a request with the same sequence number is safe: the device answers again but acts once.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Request {
+    /// Opens a session; nothing else is answered before it. Answer: [`Reply::Hello`]. Frozen.
+    Hello(HostHello),
+    /// Closes the session, so that another host need not wait for the time-out.
+    Goodbye,
+    /// Keeps the session alive while the arm moves; does nothing else.
+    Ping,
+    /// Asks for [`Reply::Status`].
+    Status,
+    /// Asks for [`Reply::Statistics`].
+    Statistics,
+    /// Asks for [`Reply::Listing`] of one place in the store.
+    List {
+        /// 0 to `slots - 1`.
+        index: u8,
+    },
+    /// Tells the device where the arm stands: the motor encoders count from there.
+    Zero {
+        /// Joint angles of the present pose, rad.
+        home: [f32; 7],
+    },
+    /// Compensates gravity so that a person can lead the arm.
+    Gravity,
+    /// Holds the present pose.
+    Hold,
+    /// Moves the joints smoothly to a pose.
+    Approach {
+        /// Joint angles to reach, rad.
+        q: [f32; 7],
+        /// Time for it, s; 0 lets the device choose.
+        duration: f32,
+    },
+    /// Runs a stored primitive.
+    Run {
+        /// Which.
+        name: Name,
+        /// How.
+        options: RunOptions,
+    },
+    /// Ends any motion: soft stop. Accepted in every state.
+    Stop,
+    /// Clears a latched fault whose cause is gone.
+    ClearFault,
+    /// Moves the goal of the running primitive.
+    SetGoal(Goal),
+    /// Changes the speed of the running primitive.
+    SetSpeed {
+        /// Relative to the taught speed.
+        factor: f32,
+    },
+    /// Switches the stream of [`Reply::Telemetry`].
+    Telemetry {
+        /// One message every so many cycles: 1 is 300 Hz, 0 is off.
+        every: u8,
+    },
+    /// Starts an upload; one that was under way is forgotten.
+    UploadBegin {
+        /// Name in the store. An image of that name is replaced only by the commit.
+        name: Name,
+        /// Bytes of the image.
+        length: u32,
+        /// Check sum of the image, [`crate::image::stored_crc`].
+        crc: u32,
+    },
+    /// The next bytes of the image, in order.
+    UploadChunk {
+        /// Position of the first byte.
+        offset: u32,
+        /// The bytes.
+        data: ChunkData,
+    },
+    /// Checks the image and puts it into the store.
+    UploadCommit,
+    /// Forgets the upload; the store is as before.
+    UploadAbort,
+    /// Removes a primitive from the store.
+    Delete {
+        /// Which.
+        name: Name,
+    },
+    /// Reads a stored image back. Answer: [`Reply::Chunk`].
+    Read {
+        /// Which.
+        name: Name,
+        /// Position of the first byte.
+        offset: u32,
+    },
+    /// Gives up torque: zero-torque frames, then none. An arm that is not braked sinks.
+    Release,
+    /// Takes the present wrench as zero.
+    Tare,
+}
+
+impl Request {
+    /// Whether the request can set the arm in motion or change a motion. Such a request is refused when it
+    /// is older than [`crate::frame::REQUEST_AGE_LIMIT_MS`], so that a host that was suspended does not
+    /// move an arm somebody now stands beside.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        match self {
+            Self::Zero { .. }
+            | Self::Gravity
+            | Self::Hold
+            | Self::Approach { .. }
+            | Self::Run { .. }
+            | Self::ClearFault
+            | Self::SetGoal(_)
+            | Self::SetSpeed { .. }
+            | Self::Release
+            | Self::Tare => true,
+            Self::Hello(_)
+            | Self::Goodbye
+            | Self::Ping
+            | Self::Status
+            | Self::Statistics
+            | Self::List { .. }
+            | Self::Stop
+            | Self::Telemetry { .. }
+            | Self::UploadBegin { .. }
+            | Self::UploadChunk { .. }
+            | Self::UploadCommit
+            | Self::UploadAbort
+            | Self::Delete { .. }
+            | Self::Read { .. } => false,
+        }
+    }
+
+    /// The word for the request in messages to people.
+    #[must_use]
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Hello(_) => "hello",
+            Self::Goodbye => "goodbye",
+            Self::Ping => "ping",
+            Self::Status => "status",
+            Self::Statistics => "statistics",
+            Self::List { .. } => "list",
+            Self::Zero { .. } => "zero",
+            Self::Gravity => "gravity",
+            Self::Hold => "hold",
+            Self::Approach { .. } => "approach",
+            Self::Run { .. } => "run",
+            Self::Stop => "stop",
+            Self::ClearFault => "clear fault",
+            Self::SetGoal(_) => "set goal",
+            Self::SetSpeed { .. } => "set speed",
+            Self::Telemetry { .. } => "telemetry",
+            Self::UploadBegin { .. } => "upload begin",
+            Self::UploadChunk { .. } => "upload chunk",
+            Self::UploadCommit => "upload commit",
+            Self::UploadAbort => "upload abort",
+            Self::Delete { .. } => "delete",
+            Self::Read { .. } => "read",
+            Self::Release => "release",
+            Self::Tare => "tare",
+        }
+    }
+}
+
+/// Device to host. `of` is the sequence number of the request that is answered.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "no allocation on the device, so the largest message sets the size; boxing is not to be had"
+)]
+pub enum Reply {
+    /// Session open. Frozen.
+    Hello {
+        /// Request answered.
+        of: u16,
+        /// Who the device is.
+        hello: DeviceHello,
+    },
+    /// Request carried out, or handed to the control cycle.
+    Accepted {
+        /// Request answered.
+        of: u16,
+    },
+    /// Request not carried out; nothing changed. Frozen.
+    Refused {
+        /// Request answered.
+        of: u16,
+        /// Why.
+        reason: Refusal,
+        /// Numbers that belong to the reason, see [`Refusal`]; 0 where it has none.
+        detail: [u32; 2],
+    },
+    /// Answer to [`Request::Status`].
+    Status {
+        /// Request answered.
+        of: u16,
+        /// The state of the device.
+        status: Status,
+    },
+    /// Answer to [`Request::Statistics`].
+    Statistics {
+        /// Request answered.
+        of: u16,
+        /// Counters since start-up.
+        statistics: Statistics,
+    },
+    /// Answer to [`Request::List`].
+    Listing {
+        /// Request answered.
+        of: u16,
+        /// What is stored there; `None` if the place is empty.
+        listing: Option<Listing>,
+    },
+    /// Answer to [`Request::Read`].
+    Chunk {
+        /// Request answered.
+        of: u16,
+        /// Position of the first byte.
+        offset: u32,
+        /// The bytes; fewer than asked for, or none, at the end of the image.
+        data: ChunkData,
+    },
+    /// One control cycle, unasked, while the stream is on.
+    Telemetry(Telemetry),
+    /// Something happened, unasked.
+    Event(Event),
+}
+
+impl Reply {
+    /// Sequence number of the request this answers; `None` for what the device sends unasked.
+    #[must_use]
+    pub fn answers(&self) -> Option<u16> {
+        match self {
+            Self::Hello { of, .. }
+            | Self::Accepted { of }
+            | Self::Refused { of, .. }
+            | Self::Status { of, .. }
+            | Self::Statistics { of, .. }
+            | Self::Listing { of, .. }
+            | Self::Chunk { of, .. } => Some(*of),
+            Self::Telemetry(_) | Self::Event(_) => None,
+        }
+    }
+}

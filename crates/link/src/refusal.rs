@@ -1,0 +1,235 @@
+//! Reasons for which the device refuses a request, each with an explanation and a remedy.
+//!
+//! Append-only and part of the wire format. The texts live beside the codes so that a host of the same
+//! version can never show a bare number.
+
+use core::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// Why a request was refused. `detail` in the comments are the two numbers of `Reply::Refused`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Refusal {
+    /// `detail` = link version of host, of device. Frozen.
+    LinkVersion,
+    /// `detail` = schema hash of host, of device. Frozen.
+    Schema,
+    /// `detail` = model hash of host, of device. Frozen.
+    Model,
+    /// No session: the first request must be a hello. Frozen.
+    NoSession,
+    /// Another host has the session. `detail` = its session number, ms until it may be taken over. Frozen.
+    Busy,
+    /// The request was older than the limit when it came. `detail` = age, limit, ms.
+    Stale,
+    /// A number in the request is not finite or outside its range. `detail` = position of the first such.
+    BadValue,
+    /// The arm must be zeroed first.
+    NotZeroed,
+    /// The bus start-up has not finished. `detail` = stage.
+    NotReady,
+    /// The safety module is not in the mode the request needs. `detail` = its mode.
+    SafetyMode,
+    /// A fault is latched. `detail` = fault code.
+    Faulted,
+    /// Not possible in this state. `detail` = state code.
+    State,
+    /// The control cycle has not taken the previous command yet.
+    CommandQueueFull,
+    /// No primitive of that name (or at that place) in the store.
+    NoSuchPrimitive,
+    /// All places of the store are taken. `detail` = places.
+    StoreFull,
+    /// The image is larger than a place. `detail` = its bytes, bytes of a place.
+    ImageTooLarge,
+    /// No upload under way.
+    NoUpload,
+    /// A chunk out of order. `detail` = offset expected, offset given.
+    UploadOrder,
+    /// The upload is not complete. `detail` = bytes received, bytes announced.
+    UploadIncomplete,
+    /// The check sum of the upload differs from the announced one. `detail` = computed, announced.
+    UploadCrc,
+    /// The image is not a valid primitive image. `detail` = code of the image error, its first number.
+    ImageInvalid,
+    /// The image was made for another robot model. `detail` = model of image, of device.
+    ImageModel,
+    /// The name inside the image differs from the name of the upload.
+    ImageName,
+    /// Too many kernels. `detail` = kernels of the image, most the device holds.
+    TooManyKernels,
+    /// The primitive's content is outside what the controller accepts. `detail` = code, row or joint.
+    PrimitiveInvalid,
+    /// The primitive is being used by the control cycle.
+    InUse,
+    /// The arm is farther from the taught start than the controller accepts.
+    FarFromStart,
+    /// The storage failed. `detail` = code of the store.
+    StoreFailed,
+    /// Not all joint positions have been measured.
+    PositionsMissing,
+    /// The target lies outside the soft joint limits.
+    OutsideJointLimits,
+    /// The goal lies outside the workspace.
+    OutsideWorkspace,
+    /// The arm still moves, or the cause of the stop is still there.
+    CauseRemains,
+    /// The arm moves too fast for this.
+    Moving,
+    /// No wrench is measured and the request needs one.
+    WrenchMissing,
+    /// The control cycle did not answer in time. `detail` = ms waited.
+    NoAnswer,
+    /// Zeroing needs a resting arm whose safety module is idle.
+    ZeroNeedsIdle,
+}
+
+impl Refusal {
+    /// Every refusal, in the order of its code.
+    pub const ALL: [Self; 36] = [
+        Self::LinkVersion,
+        Self::Schema,
+        Self::Model,
+        Self::NoSession,
+        Self::Busy,
+        Self::Stale,
+        Self::BadValue,
+        Self::NotZeroed,
+        Self::NotReady,
+        Self::SafetyMode,
+        Self::Faulted,
+        Self::State,
+        Self::CommandQueueFull,
+        Self::NoSuchPrimitive,
+        Self::StoreFull,
+        Self::ImageTooLarge,
+        Self::NoUpload,
+        Self::UploadOrder,
+        Self::UploadIncomplete,
+        Self::UploadCrc,
+        Self::ImageInvalid,
+        Self::ImageModel,
+        Self::ImageName,
+        Self::TooManyKernels,
+        Self::PrimitiveInvalid,
+        Self::InUse,
+        Self::FarFromStart,
+        Self::StoreFailed,
+        Self::PositionsMissing,
+        Self::OutsideJointLimits,
+        Self::OutsideWorkspace,
+        Self::CauseRemains,
+        Self::Moving,
+        Self::WrenchMissing,
+        Self::NoAnswer,
+        Self::ZeroNeedsIdle,
+    ];
+
+    /// Number on the wire.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// What is wrong, in one sentence without full stop.
+    #[must_use]
+    pub const fn explanation(self) -> &'static str {
+        match self {
+            Self::LinkVersion => "host and device speak different versions of the link",
+            Self::Schema => "host and device lay out their messages differently",
+            Self::Model => "host and device compute with different models of the robot",
+            Self::NoSession => "the device has no session with this host",
+            Self::Busy => "another host is connected to the device",
+            Self::Stale => "the request was too old when it arrived",
+            Self::BadValue => "a number in the request is not finite or out of range",
+            Self::NotZeroed => "the arm is not zeroed, so its joint angles are unknown",
+            Self::NotReady => "the device is still starting up the arm's bus",
+            Self::SafetyMode => "the safety module does not allow torque",
+            Self::Faulted => "a fault is latched",
+            Self::State => "the device is in a state that does not allow this",
+            Self::CommandQueueFull => "the control cycle has not taken the previous command yet",
+            Self::NoSuchPrimitive => "the device stores no primitive of that name",
+            Self::StoreFull => "the device has no room for another primitive",
+            Self::ImageTooLarge => "the image is larger than the device can store",
+            Self::NoUpload => "there is no upload under way",
+            Self::UploadOrder => "a part of the image arrived out of order",
+            Self::UploadIncomplete => "parts of the image are missing",
+            Self::UploadCrc => "the image arrived damaged",
+            Self::ImageInvalid => "the image is not a valid primitive image",
+            Self::ImageModel => "the primitive was made for another robot model",
+            Self::ImageName => "the image carries another name than the upload",
+            Self::TooManyKernels => "the primitive has more kernels than the device can hold",
+            Self::PrimitiveInvalid => "the primitive is outside what the controller accepts",
+            Self::InUse => "the primitive is in use by the control cycle",
+            Self::FarFromStart => "the arm is not near the start of the primitive",
+            Self::StoreFailed => "the device could not write its storage",
+            Self::PositionsMissing => "not all joint positions are measured",
+            Self::OutsideJointLimits => "the target lies outside the joint limits",
+            Self::OutsideWorkspace => "the goal lies outside the arm's workspace",
+            Self::CauseRemains => "the cause of the stop is still present",
+            Self::Moving => "the arm moves too fast for this",
+            Self::WrenchMissing => "no wrench is measured",
+            Self::NoAnswer => "the control cycle did not answer",
+            Self::ZeroNeedsIdle => {
+                "the arm can only be zeroed at rest, while the safety module is idle"
+            }
+        }
+    }
+
+    /// What the user can do about it, as an instruction.
+    #[must_use]
+    pub const fn remedy(self) -> &'static str {
+        match self {
+            Self::LinkVersion | Self::Schema => {
+                "flash the firmware that belongs to this tool, or use the tool that belongs to the firmware"
+            }
+            Self::Model => "build tool and firmware from the same model file",
+            Self::NoSession => "connect again",
+            Self::Busy => {
+                "end the other program, or wait until it has been silent for half a second"
+            }
+            Self::Stale => "send the request again",
+            Self::BadValue => "correct the value",
+            Self::NotZeroed => "put the arm into its home pose and zero it",
+            Self::NotReady => {
+                "wait for the start-up to finish; `tactus sim` and `tactus list` show its stage"
+            }
+            Self::SafetyMode => "press Shift+Activate on the pendant",
+            Self::Faulted => "remove the cause, then clear the fault with `tactus stop --clear`",
+            Self::State => "stop the present motion first: `tactus stop`",
+            Self::CommandQueueFull => "send the request again",
+            Self::NoSuchPrimitive => "`tactus list` shows what is stored; `tactus upload` adds one",
+            Self::StoreFull => "delete a primitive that is no longer needed",
+            Self::ImageTooLarge => {
+                "learn the primitive with fewer kernels, or leave out its expectation"
+            }
+            Self::NoUpload | Self::UploadOrder | Self::UploadIncomplete | Self::UploadCrc => {
+                "start the upload again"
+            }
+            Self::ImageInvalid | Self::ImageName => "make the image again with `tactus upload`",
+            Self::ImageModel => "learn the primitive again with the present model",
+            Self::TooManyKernels => "learn the primitive with fewer kernels",
+            Self::PrimitiveInvalid => "`tactus check` names what is outside the limits",
+            Self::InUse => "stop the motion, then try again",
+            Self::FarFromStart => "approach the start first, or run it from the present pose",
+            Self::StoreFailed => "try again; if it persists the storage is worn out",
+            Self::PositionsMissing => "check the CAN wiring and the pucks",
+            Self::OutsideJointLimits | Self::OutsideWorkspace => {
+                "choose a target the arm can reach"
+            }
+            Self::CauseRemains => "remove the cause and let the arm come to rest",
+            Self::Moving => "let the arm come to rest",
+            Self::WrenchMissing => "check the force sensor and its cable",
+            Self::NoAnswer => "send the request again; if it persists restart the device",
+            Self::ZeroNeedsIdle => "press Shift+Idle on the pendant, then zero the arm",
+        }
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.explanation())
+    }
+}
+
+impl core::error::Error for Refusal {}

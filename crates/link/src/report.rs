@@ -1,0 +1,190 @@
+//! What the device reports about itself: status, statistics, listing, telemetry, events.
+//!
+//! Codes (`state`, `fault`, start-up stage) are numbers of `control` and `device`, which name and explain
+//! them; this crate only carries them.
+
+use serde::{Deserialize, Serialize};
+
+use crate::name::Name;
+
+/// The state of the device at one moment.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Status {
+    /// Control cycles since start-up.
+    pub cycle: u32,
+    /// Code of the supervisor's state (`control::State`).
+    pub state: u8,
+    /// Code of the latched fault (`control::Fault`), 0 for none.
+    pub fault: u8,
+    /// Stage of the bus start-up (`device`), the last one when the arm is ready.
+    pub startup_stage: u8,
+    /// Why the start-up cannot go on, as `device` encodes it; `None` if it can.
+    pub blocked: Option<[u32; 2]>,
+    /// The encoders count from a known pose.
+    pub zeroed: bool,
+    /// Mode of the safety module: 0 E-stop, 1 idle, 2 active; `None` before it first answered.
+    pub safety_mode: Option<u8>,
+    /// Pendant word of the safety module, as read from the bus; `None` before it was read.
+    pub pendant: Option<u32>,
+    /// Name of the primitive in the control cycle.
+    pub loaded: Option<Name>,
+    /// Phase s of the running primitive: 1 at the start, about 0.01 at the end.
+    pub phase: f32,
+    /// Measured joint angles, rad.
+    pub q: [f32; 7],
+    /// Temperature of each arm puck, degree Celsius; `None` before it was read.
+    pub temperatures: [Option<i16>; 7],
+    /// Telemetry is sent every so many cycles, 0 for off.
+    pub telemetry_every: u8,
+    /// Bytes of the upload under way that have arrived.
+    pub upload_received: Option<u32>,
+}
+
+/// What the receiving end of a link counted. Every byte that arrived is accounted for in one of these.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct LinkCounters {
+    /// Frames that were good.
+    pub accepted: u32,
+    /// Frames dropped: the byte stuffing is broken.
+    pub bad_cobs: u32,
+    /// Frames dropped: wrong check sum, or too short to hold one.
+    pub bad_crc: u32,
+    /// Frames dropped: longer than any message.
+    pub too_long: u32,
+    /// Frames dropped: right check sum but not a message of this version.
+    pub undecodable: u32,
+    /// Good frames dropped because those before them were not answered yet.
+    pub overrun: u32,
+}
+
+/// Counters since start-up. They wrap at 2^32.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Statistics {
+    /// Control cycles.
+    pub cycles: u32,
+    /// Cycles whose torque frames were not queued in time.
+    pub missed_deadlines: u32,
+    /// Longest control computation, ticks.
+    pub cost_worst_ticks: u32,
+    /// Mean control computation, ticks.
+    pub cost_mean_ticks: u32,
+    /// Longest delay from the timer to the control task, ticks.
+    pub latency_worst_ticks: u32,
+    /// Replies that did not come in their cycle.
+    pub lost_replies: u32,
+    /// Replies that came after their cycle.
+    pub late_replies: u32,
+    /// Bus frames that were no valid answer to anything asked.
+    pub rejected_frames: u32,
+    /// Bus frames sent.
+    pub frames_sent: u32,
+    /// Bus frames received.
+    pub frames_received: u32,
+    /// Bus frames the controller could not send or take.
+    pub frames_dropped: u32,
+    /// Cycles in which only one of the two torque frames could be sent.
+    pub torque_mismatches: u32,
+    /// Errors of the bus that its controller reported.
+    pub bus_errors: u32,
+    /// Times the bus start-up began anew.
+    pub bus_restarts: u32,
+    /// Cycles in which the torque limiter was at work, among those whose records reached the link.
+    pub limited_cycles: u32,
+    /// Telemetry messages left out because the line was full.
+    pub telemetry_dropped: u32,
+    /// Events left out because the queue was full.
+    pub events_dropped: u32,
+    /// Motions stopped because the host fell silent.
+    pub link_timeouts: u32,
+    /// What the device's end of the link counted.
+    pub link: LinkCounters,
+    /// Stack never used so far, bytes; 0 where it is not measured.
+    pub stack_free: u32,
+    /// Size of the stack, bytes; 0 where it is not measured.
+    pub stack_size: u32,
+}
+
+/// One primitive in the store.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Listing {
+    /// Its place in the store.
+    pub index: u8,
+    /// Its name.
+    pub name: Name,
+    /// Bytes of the image.
+    pub length: u32,
+    /// Check sum of the image, [`crate::image::stored_crc`]: two images with the same length and CRC are the same.
+    pub crc: u32,
+    /// Duration as taught, s.
+    pub duration: f32,
+    /// Kernels of each row.
+    pub kernels: u16,
+    /// It has a table of the wrench to expect.
+    pub expectation: bool,
+    /// It is the one in the control cycle.
+    pub loaded: bool,
+}
+
+/// One control cycle as the device saw it.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Telemetry {
+    /// Control cycle, 300 a second. A step of more than the asked decimation is a gap.
+    pub cycle: u32,
+    /// Code of the supervisor's state.
+    pub state: u8,
+    /// Code of the latched fault, 0 for none.
+    pub fault: u8,
+    /// Flag bits of the cycle record (`control`).
+    pub flags: u16,
+    /// Phase s of the primitive.
+    pub phase: f32,
+    /// Measured joint angles, rad.
+    pub q: [f32; 7],
+    /// Estimated joint velocities, rad/s.
+    pub dq: [f32; 7],
+    /// Joint torques sent, after the limiter, N m.
+    pub tau: [f32; 7],
+    /// Desired pose of the grasp point in the world: x, y, z (m), quaternion w, x, y, z.
+    pub pose_d: [f32; 7],
+    /// Wrench of the environment on the robot at the grasp point: force in world axes (N), torque in
+    /// hand axes (N m).
+    pub wrench: [f32; 6],
+    /// Replies missing in this cycle.
+    pub lost_replies: u8,
+    /// Control computation of this cycle, ticks.
+    pub cost_ticks: u32,
+}
+
+/// What kind of thing happened. Append-only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum EventKind {
+    /// The supervisor entered a state: `code` is the state, `detail` the fault that led there, 0 for none.
+    State,
+    /// The movement ended and the arm holds the goal.
+    Arrived,
+    /// The bus start-up reached a stage: `code` is the stage.
+    Startup,
+    /// The safety module changed mode: `code` is the new mode.
+    SafetyMode,
+    /// The host fell silent during a motion and the device stops it: `detail` is the silence in ms.
+    LinkTimeout,
+    /// The store changed: `code` is the place.
+    Store,
+    /// The control cycle refused a command nobody waits for any more: `code` is `control`'s reason.
+    CommandRefused,
+    /// The bus start-up cannot go on: `code` and `detail` as `Status::blocked`.
+    Blocked,
+}
+
+/// Something happened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Event {
+    /// Control cycle in which it happened.
+    pub cycle: u32,
+    /// What.
+    pub kind: EventKind,
+    /// See [`EventKind`].
+    pub code: u16,
+    /// See [`EventKind`].
+    pub detail: u32,
+}

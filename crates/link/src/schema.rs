@@ -1,0 +1,26 @@
+//! The numbers by which host and device recognise that they fit together.
+
+/// Version of the link. Raised whenever a message is added; messages are never changed or removed.
+pub const LINK_VERSION: u16 = 1;
+
+/// Every message with its encoding, and the image with its layout, as text.
+///
+/// `tests/golden.rs` encodes each message and compares it with its line here. So a layout cannot change
+/// without this file changing, and this file cannot change without [`SCHEMA_HASH`] changing.
+const SCHEMA: &str = include_str!("schema.txt");
+
+/// FNV-1a (32 bit) of the schema text: equal on two sides exactly if all their layouts are.
+pub const SCHEMA_HASH: u32 = fnv1a(SCHEMA.as_bytes());
+
+/// FNV-1a, 32 bit. Carriage returns are left out: a checkout that converts line ends keeps its hash.
+const fn fnv1a(bytes: &[u8]) -> u32 {
+    let mut hash: u32 = 0x811c_9dc5;
+    let mut index = 0;
+    while index < bytes.len() {
+        if bytes[index] != b'\r' {
+            hash = (hash ^ bytes[index] as u32).wrapping_mul(0x0100_0193);
+        }
+        index += 1;
+    }
+    hash
+}

@@ -1,0 +1,192 @@
+//! The bytes of every message and of an image, pinned in `src/schema.txt`, and thereby the schema hash.
+
+use std::fmt::Write as _;
+
+use crate::samples::{
+    EVENT_KINDS, Tables, event_index, replies, reply_index, request_index, requests,
+};
+use link::frame::{self, Envelope, FRAME_BYTES};
+use link::image::{HemisphereKind, IMAGE_SCHEMA, PrimitiveImage, image_bytes};
+use link::message::{AccelerationSource, PoseFeedback};
+use link::{LINK_VERSION, Refusal, SCHEMA_HASH};
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        write!(text, "{byte:02x}").unwrap();
+        text
+    })
+}
+
+fn encoded<T: serde::Serialize>(value: &T) -> String {
+    let mut buffer = [0; 512];
+    hex(postcard::to_slice(value, &mut buffer).unwrap())
+}
+
+/// First word of the debug text: the variant.
+fn variant(value: &impl std::fmt::Debug) -> String {
+    let text = format!("{value:?}");
+    text.split(|c: char| !c.is_alphanumeric())
+        .next()
+        .unwrap_or_default()
+        .to_owned()
+}
+
+/// The text that `src/schema.txt` must be.
+fn schema() -> String {
+    let mut text = String::new();
+    let mut line = |words: String| {
+        text.push_str(&words);
+        text.push('\n');
+    };
+    line("# Every layout of the link with its bytes. Written by tests/golden.rs, hashed into SCHEMA_HASH.".into());
+    line(format!("link {LINK_VERSION}"));
+    line(
+        "payload session:u16 sequence:u16 time_ms:u32 message:postcard crc32_iscsi:u32 in COBS, 00"
+            .into(),
+    );
+    for request in requests() {
+        line(format!(
+            "request {:2} {} {}",
+            request_index(&request),
+            variant(&request),
+            encoded(&request)
+        ));
+    }
+    for reply in replies() {
+        line(format!(
+            "reply {:2} {} {}",
+            reply_index(&reply),
+            variant(&reply),
+            encoded(&reply)
+        ));
+    }
+    for refusal in Refusal::ALL {
+        line(format!(
+            "refusal {:2} {refusal:?} {}",
+            refusal.code(),
+            encoded(&refusal)
+        ));
+    }
+    for kind in EVENT_KINDS {
+        line(format!(
+            "event {} {kind:?} {}",
+            event_index(kind),
+            encoded(&kind)
+        ));
+    }
+    for choice in [PoseFeedback::Measured, PoseFeedback::Planned] {
+        line(format!("pose_feedback {choice:?} {}", encoded(&choice)));
+    }
+    for choice in [
+        AccelerationSource::Analytic,
+        AccelerationSource::Differentiated,
+    ] {
+        line(format!("acceleration {choice:?} {}", encoded(&choice)));
+    }
+    line(format!(
+        "image {IMAGE_SCHEMA} kernels 2 gain points 1 expectation points 2"
+    ));
+    for part in Tables::new(2, 1, 2).image().chunks(32) {
+        line(hex(part));
+    }
+    text
+}
+
+#[test]
+fn every_layout_is_the_one_in_the_schema_text() {
+    let expected = schema();
+    let written = include_str!("../../src/schema.txt").replace('\r', "");
+    if expected != written {
+        let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("schema.txt");
+        std::fs::write(&path, &expected).unwrap();
+        let difference = expected
+            .lines()
+            .zip(written.lines())
+            .find(|(new, old)| new != old);
+        panic!(
+            "a layout changed: {difference:?}\nIf that is meant: raise LINK_VERSION or IMAGE_SCHEMA, then copy {} \
+             over crates/link/src/schema.txt and pin the new SCHEMA_HASH in this file",
+            path.display()
+        );
+    }
+}
+
+#[test]
+fn schema_hash_is_pinned() {
+    assert_eq!(
+        SCHEMA_HASH, 0x0240_b2ec,
+        "{SCHEMA_HASH:#010x}: the layouts changed, or their text did"
+    );
+}
+
+#[test]
+fn samples_cover_every_variant_in_order() {
+    assert!(requests().iter().map(request_index).eq(0..24));
+    assert!(replies().iter().map(reply_index).eq(0..9));
+    assert!(EVENT_KINDS.iter().map(|kind| event_index(*kind)).eq(0..8));
+    assert!(
+        Refusal::ALL
+            .iter()
+            .map(|refusal| usize::from(refusal.code()))
+            .eq(0..Refusal::ALL.len())
+    );
+}
+
+#[test]
+fn every_refusal_explains_itself_and_names_a_remedy() {
+    for refusal in Refusal::ALL {
+        assert!(
+            refusal.explanation().len() > 10 && !refusal.explanation().ends_with('.'),
+            "{refusal:?}"
+        );
+        assert!(
+            refusal.remedy().len() > 10 && !refusal.remedy().ends_with('.'),
+            "{refusal:?}"
+        );
+    }
+}
+
+/// The worked example of `docs/protocol.md`; run with `--nocapture` to print it.
+#[test]
+fn worked_example_of_the_protocol_document() {
+    let mut buffer = [0; FRAME_BYTES];
+    let envelope = Envelope {
+        session: 0x2A17,
+        sequence: 5,
+        time_ms: 1200,
+    };
+    let length = frame::encode(envelope, &link::Request::List { index: 0 }, &mut buffer).unwrap();
+    let frame = hex(&buffer[..length]);
+    println!("request List {{ index: 0 }}: {frame}");
+    let document = include_str!("../../../../docs/protocol.md");
+    assert!(
+        document.contains(&frame),
+        "the document should show {frame}"
+    );
+    assert!(
+        document.contains(&format!("{SCHEMA_HASH:#010x}")),
+        "the document should show {SCHEMA_HASH:#010x}"
+    );
+}
+
+/// The worked example of `docs/image-format.md`.
+#[test]
+fn worked_example_of_the_image_document() {
+    let image = Tables::new(2, 1, 2).image();
+    assert_eq!(image.len(), image_bytes(2, 1, 1, 2));
+    let parsed = PrimitiveImage::parse(&image).unwrap();
+    assert_eq!(parsed.content().hemisphere, HemisphereKind::Demonstrated);
+    let document = include_str!("../../../../docs/image-format.md");
+    for (offset, row) in image.chunks(16).enumerate().filter(|(index, _)| *index < 6) {
+        let line = format!("{:04x}  {}", 16 * offset, hex(row));
+        println!("{line}");
+        assert!(document.contains(&line), "the document should show {line}");
+    }
+    let last = format!(
+        "{:04x}  {}",
+        image.len() - 4,
+        hex(&image[image.len() - 4..])
+    );
+    println!("{last}");
+    assert!(document.contains(&last), "the document should show {last}");
+}

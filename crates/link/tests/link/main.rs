@@ -1,0 +1,6 @@
+//! Tests of the link in one binary, because they share their samples.
+
+mod framing;
+mod golden;
+mod image;
+mod samples;

@@ -1,0 +1,358 @@
+//! One sample of every message and one image, with different values in all fields.
+
+use link::image::{
+    ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint,
+    WaypointVelocity,
+};
+use link::message::{AccelerationSource, ChunkData, PoseFeedback};
+use link::{
+    DeviceHello, Event, EventKind, Goal, HostHello, LinkCounters, Listing, Name, Refusal, Reply,
+    Request, RunOptions, Statistics, Status, Telemetry, Text,
+};
+
+fn name() -> Name {
+    Name::new("side-grasp").unwrap()
+}
+
+fn ramp<const N: usize>(first: f32) -> [f32; N] {
+    core::array::from_fn(|index| first + 0.25 * index as f32)
+}
+
+fn data() -> ChunkData {
+    ChunkData::from_slice(&[0, 1, 0, 0xFF, 0x7F]).unwrap()
+}
+
+/// Every request, in the order of the enum.
+pub(crate) fn requests() -> Vec<Request> {
+    let goal = Goal {
+        position: Some(ramp(1.0)),
+        orientation: Some([1.0, 0.0, 0.0, 0.0]),
+    };
+    let options = RunOptions {
+        goal: Goal {
+            position: None,
+            ..goal
+        },
+        speed: 0.5,
+        feedback: true,
+        force_control: false,
+        pose_feedback: PoseFeedback::Planned,
+        acceleration: AccelerationSource::Differentiated,
+    };
+    let hello = HostHello {
+        link_version: 1,
+        schema_hash: 0x1234_5678,
+        model_hash: 0x9ABC_DEF0,
+        owner: Text::new("anna@lab3"),
+    };
+    vec![
+        Request::Hello(hello),
+        Request::Goodbye,
+        Request::Ping,
+        Request::Status,
+        Request::Statistics,
+        Request::List { index: 3 },
+        Request::Zero { home: ramp(-1.0) },
+        Request::Gravity,
+        Request::Hold,
+        Request::Approach {
+            q: ramp(-0.5),
+            duration: 2.5,
+        },
+        Request::Run {
+            name: name(),
+            options,
+        },
+        Request::Stop,
+        Request::ClearFault,
+        Request::SetGoal(goal),
+        Request::SetSpeed { factor: 1.5 },
+        Request::Telemetry { every: 3 },
+        Request::UploadBegin {
+            name: name(),
+            length: 4321,
+            crc: 0xCAFE_F00D,
+        },
+        Request::UploadChunk {
+            offset: 192,
+            data: data(),
+        },
+        Request::UploadCommit,
+        Request::UploadAbort,
+        Request::Delete { name: name() },
+        Request::Read {
+            name: name(),
+            offset: 384,
+        },
+        Request::Release,
+        Request::Tare,
+    ]
+}
+
+/// Place of a request in the enum. A new variant does not compile here, and so cannot be forgotten above.
+pub(crate) fn request_index(request: &Request) -> usize {
+    match request {
+        Request::Hello(_) => 0,
+        Request::Goodbye => 1,
+        Request::Ping => 2,
+        Request::Status => 3,
+        Request::Statistics => 4,
+        Request::List { .. } => 5,
+        Request::Zero { .. } => 6,
+        Request::Gravity => 7,
+        Request::Hold => 8,
+        Request::Approach { .. } => 9,
+        Request::Run { .. } => 10,
+        Request::Stop => 11,
+        Request::ClearFault => 12,
+        Request::SetGoal(_) => 13,
+        Request::SetSpeed { .. } => 14,
+        Request::Telemetry { .. } => 15,
+        Request::UploadBegin { .. } => 16,
+        Request::UploadChunk { .. } => 17,
+        Request::UploadCommit => 18,
+        Request::UploadAbort => 19,
+        Request::Delete { .. } => 20,
+        Request::Read { .. } => 21,
+        Request::Release => 22,
+        Request::Tare => 23,
+    }
+}
+
+/// Every reply, in the order of the enum.
+pub(crate) fn replies() -> Vec<Reply> {
+    let hello = DeviceHello {
+        link_version: 1,
+        schema_hash: 0x1234_5678,
+        model_hash: 0x9ABC_DEF0,
+        image_schema: 1,
+        maximum_kernels: 100,
+        slots: 8,
+        slot_bytes: 16_384,
+        cycles_per_second: 300,
+        ticks_per_second: 25_000_000,
+        simulated: true,
+        firmware: Text::new("0.1.0 (1a2b3c4)"),
+        board: Text::new("mps2-an500"),
+        serial: Text::new("SIM-7"),
+    };
+    let status = Status {
+        cycle: 301,
+        state: 4,
+        fault: 2,
+        startup_stage: 7,
+        blocked: Some([3, 260]),
+        zeroed: true,
+        safety_mode: Some(2),
+        pendant: Some(0x0F3F_1249),
+        loaded: Some(name()),
+        phase: 0.75,
+        q: ramp(-1.5),
+        temperatures: [None, Some(-1), Some(64), None, None, None, Some(2)],
+        telemetry_every: 3,
+        upload_received: Some(576),
+    };
+    let statistics = Statistics {
+        cycles: 1,
+        missed_deadlines: 2,
+        cost_worst_ticks: 3,
+        cost_mean_ticks: 4,
+        latency_worst_ticks: 5,
+        lost_replies: 6,
+        late_replies: 7,
+        rejected_frames: 8,
+        frames_sent: 9,
+        frames_received: 10,
+        frames_dropped: 11,
+        torque_mismatches: 23,
+        bus_errors: 24,
+        bus_restarts: 25,
+        limited_cycles: 12,
+        telemetry_dropped: 13,
+        events_dropped: 14,
+        link_timeouts: 15,
+        link: LinkCounters {
+            accepted: 16,
+            bad_cobs: 17,
+            bad_crc: 18,
+            too_long: 19,
+            undecodable: 20,
+            overrun: 22,
+        },
+        stack_free: 21,
+        stack_size: 300,
+    };
+    let listing = Listing {
+        index: 2,
+        name: name(),
+        length: 4321,
+        crc: 0xCAFE_F00D,
+        duration: 5.0,
+        kernels: 50,
+        expectation: true,
+        loaded: false,
+    };
+    let telemetry = Telemetry {
+        cycle: 70_000,
+        state: 4,
+        fault: 0,
+        flags: 0x1081,
+        phase: 0.5,
+        q: ramp(0.0),
+        dq: ramp(-2.0),
+        tau: ramp(3.0),
+        pose_d: ramp(0.125),
+        wrench: ramp(-9.0),
+        lost_replies: 1,
+        cost_ticks: 9_876,
+    };
+    vec![
+        Reply::Hello { of: 1, hello },
+        Reply::Accepted { of: 300 },
+        Reply::Refused {
+            of: 3,
+            reason: Refusal::LinkVersion,
+            detail: [2, 1],
+        },
+        Reply::Status { of: 4, status },
+        Reply::Statistics { of: 5, statistics },
+        Reply::Listing {
+            of: 6,
+            listing: Some(listing),
+        },
+        Reply::Chunk {
+            of: 7,
+            offset: 192,
+            data: data(),
+        },
+        Reply::Telemetry(telemetry),
+        Reply::Event(Event {
+            cycle: 300,
+            kind: EventKind::LinkTimeout,
+            code: 1,
+            detail: 500,
+        }),
+    ]
+}
+
+/// Place of a reply in the enum.
+pub(crate) fn reply_index(reply: &Reply) -> usize {
+    match reply {
+        Reply::Hello { .. } => 0,
+        Reply::Accepted { .. } => 1,
+        Reply::Refused { .. } => 2,
+        Reply::Status { .. } => 3,
+        Reply::Statistics { .. } => 4,
+        Reply::Listing { .. } => 5,
+        Reply::Chunk { .. } => 6,
+        Reply::Telemetry(_) => 7,
+        Reply::Event(_) => 8,
+    }
+}
+
+/// Every kind of event, in the order of the enum.
+pub(crate) const EVENT_KINDS: [EventKind; 8] = [
+    EventKind::State,
+    EventKind::Arrived,
+    EventKind::Startup,
+    EventKind::SafetyMode,
+    EventKind::LinkTimeout,
+    EventKind::Store,
+    EventKind::CommandRefused,
+    EventKind::Blocked,
+];
+
+/// Place of an event kind in the enum.
+pub(crate) fn event_index(kind: EventKind) -> usize {
+    match kind {
+        EventKind::State => 0,
+        EventKind::Arrived => 1,
+        EventKind::Startup => 2,
+        EventKind::SafetyMode => 3,
+        EventKind::LinkTimeout => 4,
+        EventKind::Store => 5,
+        EventKind::CommandRefused => 6,
+        EventKind::Blocked => 7,
+    }
+}
+
+/// The tables of the sample image, kept apart because the content borrows them.
+pub(crate) struct Tables {
+    k1: Vec<f32>,
+    k2: Vec<f32>,
+    weights: Vec<f32>,
+    mean: Vec<f32>,
+    spread: Vec<f32>,
+    kernels: usize,
+}
+
+impl Tables {
+    /// Tables with so many kernels and points.
+    pub(crate) fn new(kernels: usize, gain_points: usize, expectation_points: usize) -> Self {
+        let series =
+            |count: usize, step: f32| (0..count).map(|index| step * index as f32 - 1.0).collect();
+        Self {
+            k1: series(10 * gain_points, 0.5),
+            k2: series(9 * gain_points, 0.25),
+            weights: series(17 * kernels, 0.125),
+            mean: series(9 * expectation_points, 2.0),
+            spread: series(9 * expectation_points, 4.0),
+            kernels,
+        }
+    }
+
+    /// A content with these tables.
+    pub(crate) fn content(&self) -> ImageContent<&[f32]> {
+        let waypoint = |shift: f32| Waypoint {
+            position: ramp(shift),
+            orientation: [0.5, -0.5, 0.5, shift],
+            posture: ramp(shift + 1.0),
+            hand: ramp(shift + 2.0),
+        };
+        ImageContent {
+            model_hash: 0x9ABC_DEF0,
+            duration: 5.0,
+            alpha: 4.605,
+            activation: 0.7,
+            stiffness: [200.0, 201.0, 202.0, 203.0],
+            damping: [28.0, 20.0, 29.0, 30.0],
+            orientation_error: OrientationErrorKind::RotationVector,
+            hemisphere: HemisphereKind::Demonstrated,
+            start: waypoint(0.5),
+            start_velocity: WaypointVelocity {
+                position: ramp(0.0),
+                orientation: ramp(1.0),
+                posture: ramp(2.0),
+                hand: ramp(3.0),
+            },
+            goal: waypoint(-0.5),
+            clamps: FeedbackClamps {
+                position: 0.23,
+                orientation: 0.5,
+                hand: 0.25,
+            },
+            marks: ExpectationMarks {
+                recorded_duration: 5.5,
+                payload_mass: 0.75,
+                payload_centre: [0.01, 0.02, 0.03],
+                filter_cutoff: 7.5,
+                trials: 3.0,
+                spread_floor: 0.1,
+            },
+            kernels: self.kernels,
+            k1: &self.k1,
+            k2: &self.k2,
+            weights: &self.weights,
+            expected_mean: &self.mean,
+            expected_spread: &self.spread,
+        }
+    }
+
+    /// The image of these tables.
+    pub(crate) fn image(&self) -> Vec<u8> {
+        let mut bytes = vec![0; link::image::IMAGE_BYTES_LIMIT];
+        let length = self.content().encode(&name(), &mut bytes).unwrap();
+        bytes.truncate(length);
+        bytes
+    }
+}

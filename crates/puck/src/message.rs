@@ -1,0 +1,61 @@
+//! What the master sends: GET, SET and packed torques.
+//!
+//! There is no acknowledgement to a SET. A puck that gets several without a GET in between may drop some, and the safety
+//! module wants 10 ms between two: see the start-up in `device`.
+
+use crate::can::{CanFrame, CanId, Destination, Group, Node};
+use crate::property::PropertyId;
+use crate::units::PuckTorque;
+
+/// Bit 7 of byte 0: this frame sets (or replies) rather than asks.
+pub(crate) const SET_BIT: u8 = 0x80;
+
+/// Ask one puck, or every member of a group, for a property. DLC 1.
+pub fn get(to: impl Into<Destination>, property: PropertyId) -> CanFrame {
+    CanFrame::with_payload(CanId::encode(Node::HOST, to), [property.number()])
+}
+
+/// Set a property, as Barrett's library does it: always DLC 6, whatever the width of the property.
+pub fn set(to: impl Into<Destination>, property: PropertyId, value: i32) -> CanFrame {
+    wide(CanId::encode(Node::HOST, to), property, value)
+}
+
+/// Set a 16-bit property with DLC 4, as Barrett's wiki and other drivers do it. Pucks accept both forms.
+pub fn set_short(to: impl Into<Destination>, property: PropertyId, value: i16) -> CanFrame {
+    short(CanId::encode(Node::HOST, to), property, value)
+}
+
+/// SET bit and property, 0, then 32 bits little-endian: the same bytes serve SETs and replies.
+pub(crate) fn wide(id: CanId, property: PropertyId, value: i32) -> CanFrame {
+    let [a, b, c, d] = value.to_le_bytes();
+    CanFrame::with_payload(id, [SET_BIT | property.number(), 0, a, b, c, d])
+}
+
+/// SET bit and property, 0, then 16 bits little-endian.
+pub(crate) fn short(id: CanId, property: PropertyId, value: i16) -> CanFrame {
+    let [low, high] = value.to_le_bytes();
+    CanFrame::with_payload(id, [SET_BIT | property.number(), 0, low, high])
+}
+
+/// Torques for up to four pucks of a group in one frame, in the order of their PIDX 1..=4. Always DLC 8.
+///
+/// Bytes 1..=7 are one big-endian integer `A<<42 | B<<28 | C<<14 | D` of four 14-bit fields. `property` is T of the
+/// group's firmware ([`PropertyId::TORQUE`] from 61 on). Only `control::actuation` may call this with torques other than
+/// zero: everything else could put an unlimited torque on the bus.
+pub fn packed_torques(group: Group, property: PropertyId, torques: [PuckTorque; 4]) -> CanFrame {
+    let fields = torques
+        .iter()
+        .fold(0_u64, |packed, torque| packed << 14 | torque.bits());
+    let [_, b1, b2, b3, b4, b5, b6, b7] = fields.to_be_bytes();
+    CanFrame::with_payload(
+        CanId::encode(Node::HOST, group),
+        [SET_BIT | property.number(), b1, b2, b3, b4, b5, b6, b7],
+    )
+}
+
+/// Explicit zero torque for all seven motors. A puck is believed to keep its last torque until told otherwise, so every
+/// way out sends these. Anybody may: no torque can do no harm that a torque left standing would not do first.
+pub fn zero_torques() -> [CanFrame; 2] {
+    [Group::ARM_TORQUES, Group::WRIST_TORQUES]
+        .map(|group| packed_torques(group, PropertyId::TORQUE, [PuckTorque::ZERO; 4]))
+}

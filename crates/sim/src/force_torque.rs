@@ -1,0 +1,214 @@
+//! The wrist force/torque sensor (node 8): GET FT answers with a force frame and a torque frame.
+//!
+//! The wrench is that of the environment (hand and payload) **on** the sensor, sensor frame, minus what it was at the last
+//! tare, plus seeded noise, quantised and saturated to 16 bits. After an overload the torque frame carries a status byte
+//! until the next tare. The sensor boots like a motor puck and loses power with them (wam-can 7, inferred).
+
+use crate::boot::{Boot, Presence};
+use crate::inbox::{Inbox, SET_TIME};
+use crate::noise::Noise;
+use crate::time::Ticks;
+use puck::device::{acceleration_frame, force_frame, quantise, reply16, torque_frame};
+use puck::force_torque::{NEWTON_METRE_PER_COUNT, NEWTON_PER_COUNT};
+use puck::{
+    Action, CanFrame, Destination, GaugeStatus, Node, Property, PropertyTable, Request, Role,
+    Status,
+};
+
+/// How the sensor is set up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForceTorqueConfig {
+    /// Whether the arm has the sensor at all; without it node 8 never answers.
+    pub fitted: bool,
+    /// Standard deviation of each force axis, N.
+    pub force_noise: f64,
+    /// Standard deviation of each torque axis, N m.
+    pub torque_noise: f64,
+}
+
+impl Default for ForceTorqueConfig {
+    /// Fitted; 50 mN and 1.5 mN m, the resolution of the sensor's data sheet.
+    fn default() -> Self {
+        Self {
+            fitted: true,
+            force_noise: 0.05,
+            torque_noise: 0.0015,
+        }
+    }
+}
+
+/// Load at which a gauge saturates: forces N, torques N m (`wam7.toml` `[ft_sensor]` ranges).
+const RANGE: [f64; 6] = [80.0, 80.0, 135.0, 2.75, 2.75, 2.75];
+
+/// Monitor and main firmware version. Drivers do not read them (trap T16).
+const VERSIONS: (i16, i16) = (16, 200);
+
+/// The sensor.
+#[derive(Clone, Debug)]
+pub(crate) struct ForceTorque {
+    config: ForceTorqueConfig,
+    boot: Boot,
+    inbox: Inbox,
+    noise: Noise,
+    tare: [f64; 6],
+    /// Gauges that have saturated since the last tare. Which axis strains which gauge is not documented: one each.
+    saturated: u8,
+}
+
+impl ForceTorque {
+    /// A sensor without power.
+    pub(crate) fn new(config: ForceTorqueConfig, boot_noise: Noise, sensor_noise: Noise) -> Self {
+        Self {
+            config,
+            boot: Boot::new(boot_noise),
+            inbox: Inbox::new(SET_TIME),
+            noise: sensor_noise,
+            tare: [0.0; 6],
+            saturated: 0,
+        }
+    }
+
+    /// Motor power comes.
+    pub(crate) fn power_on(&mut self, now: Ticks) {
+        if self.config.fitted {
+            self.boot.start(now);
+        }
+    }
+
+    /// Motor power goes: the tare is lost.
+    pub(crate) fn power_off(&mut self) {
+        self.boot.cut();
+        self.forget();
+    }
+
+    /// A request on the bus at time `at`. Its group membership is unknown, so it listens to its own node number alone.
+    pub(crate) fn receive(&mut self, at: Ticks, request: &Request) {
+        let is_mine = request.to == Destination::Node(Node::FORCE_TORQUE);
+        if is_mine && self.boot.presence(at) != Presence::Absent {
+            self.inbox.receive(at, request.action);
+        }
+    }
+
+    /// When the next request will be done.
+    pub(crate) fn next_time(&self) -> Option<Ticks> {
+        self.inbox.next_time()
+    }
+
+    /// Carries out one request that is done by `now` under the true `wrench` (N, N m); the frames to send.
+    pub(crate) fn step(&mut self, now: Ticks, wrench: &[f64; 6]) -> Vec<CanFrame> {
+        let Some(action) = self.inbox.take(now) else {
+            return Vec::new();
+        };
+        let presence = self.boot.presence(now);
+        let table = match presence {
+            Presence::Absent => return Vec::new(),
+            Presence::Monitor => PropertyTable::monitor(),
+            Presence::Ready => PropertyTable::force_torque(),
+        };
+        match action {
+            Action::Get { property: id } => match table.property(id) {
+                Some(Property::Ft) => self.sample(wrench),
+                // At rest the sensor feels no acceleration that a consumer of this simulator would use.
+                Some(Property::A) => vec![acceleration_frame([0; 3])],
+                Some(property) => small_property(property, presence)
+                    .map(|value| reply16(Node::FORCE_TORQUE, id, value))
+                    .into_iter()
+                    .collect(),
+                None => Vec::new(),
+            },
+            Action::Set {
+                property: id,
+                value,
+            } => {
+                match table.property(id) {
+                    Some(Property::Ft) if value == 0 => self.tare(wrench),
+                    Some(Property::Stat) => self.set_status(now, presence, value),
+                    _ => {}
+                }
+                Vec::new()
+            }
+            Action::PackedTorques { .. } => Vec::new(),
+        }
+    }
+
+    fn sample(&mut self, wrench: &[f64; 6]) -> Vec<CanFrame> {
+        let overloaded = gauges_beyond_range(wrench);
+        self.saturated |= overloaded;
+        let felt = self.felt(wrench);
+        let [fx, fy, fz, tx, ty, tz] = std::array::from_fn(|axis| felt[axis] - self.tare[axis]);
+        let status = (self.saturated != 0).then(|| {
+            let bad = if overloaded != 0 { 0x40 } else { 0 };
+            GaugeStatus(0x80 | bad | self.saturated)
+        });
+        vec![
+            force_frame([fx, fy, fz].map(|force: f64| quantise(force, NEWTON_PER_COUNT))),
+            torque_frame(
+                [tx, ty, tz].map(|torque: f64| quantise(torque, NEWTON_METRE_PER_COUNT)),
+                status,
+            ),
+        ]
+    }
+
+    fn tare(&mut self, wrench: &[f64; 6]) {
+        self.tare = self.felt(wrench);
+        self.saturated = gauges_beyond_range(wrench);
+    }
+
+    /// The wrench with this sample's noise.
+    fn felt(&mut self, wrench: &[f64; 6]) -> [f64; 6] {
+        let [force, torque] = [self.config.force_noise, self.config.torque_noise];
+        let sigma = [force, force, force, torque, torque, torque];
+        std::array::from_fn(|axis| wrench[axis] + self.noise.gaussian(sigma[axis]))
+    }
+
+    fn set_status(&mut self, now: Ticks, presence: Presence, value: i32) {
+        if presence == Presence::Monitor && value == Status::Ready.value() {
+            self.boot.wake(now);
+            self.forget();
+        } else if presence == Presence::Ready && value == Status::Reset.value() {
+            self.boot.start(now);
+            self.forget();
+        }
+    }
+
+    fn forget(&mut self) {
+        self.inbox.clear();
+        self.tare = [0.0; 6];
+        self.saturated = 0;
+    }
+}
+
+/// Properties that are constants.
+fn small_property(property: Property, presence: Presence) -> Option<i16> {
+    let is_ready = presence == Presence::Ready;
+    match property {
+        Property::Vers => Some(if is_ready { VERSIONS.1 } else { VERSIONS.0 }),
+        Property::Role => Some(Role::FORCE_TORQUE as i16),
+        Property::Stat => Some(
+            if is_ready {
+                Status::Ready
+            } else {
+                Status::Reset
+            }
+            .value() as i16,
+        ),
+        Property::Id => Some(Node::FORCE_TORQUE.number().into()),
+        Property::Sn | Property::Error => Some(0),
+        _ => None,
+    }
+}
+
+/// One bit per axis beyond its range.
+fn gauges_beyond_range(wrench: &[f64; 6]) -> u8 {
+    wrench
+        .iter()
+        .zip(RANGE)
+        .enumerate()
+        .fold(0, |bits, (axis, (load, range))| {
+            if load.abs() > range {
+                bits | 1 << axis
+            } else {
+                bits
+            }
+        })
+}

@@ -1,0 +1,416 @@
+//! Everything at the other end of the co-controller's two wires, in virtual time.
+//!
+//! ```text
+//! co-controller --submit--> bus --> pucks 1..7, F/T 8, safety module 10 <-- operator
+//!               <--event---  |         | torques        ^ angles at the latch
+//!               <--link--> host        +----> world, one step every half slot
+//! ```
+//!
+//! Time moves only when the co-controller says how far it has come ([`Plant::advance`], [`Plant::submit`], [`Plant::event`]).
+//! Everything due until then happens in order of time; at equal times physics first, then the end of a frame, the devices,
+//! the safety module, the operator, and arbitration last, when all who compete have spoken. Nothing here looks at a
+//! clock of the computer, and no order depends on a hash: equal calls give equal runs.
+
+use crate::bus::{Bus, Passage};
+use crate::force_torque::{ForceTorque, ForceTorqueConfig};
+use crate::link_wire::LinkWire;
+use crate::motors::Motors;
+use crate::noise::Noise;
+use crate::operator::{Operator, OperatorConfig, PendantAction};
+use crate::puck_model::{Puck, PuckConfig};
+use crate::safety::{SafetyConfig, SafetyModule};
+use crate::speed::SpeedMonitor;
+use crate::time::{STEP_TICKS, TICKS_PER_SECOND, Ticks};
+use crate::trace::BusTrace;
+use crate::world::World;
+use puck::{
+    CanFrame, Drives, Node, PendantState, Ratios, Request, SafetyMode, Transmission,
+    TransmissionError, UnknownFirmware,
+};
+use std::collections::VecDeque;
+
+/// How a plant is set up. The default is a healthy seven-joint arm with a sensor and an obliging operator.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlantConfig {
+    /// Seed of everything random: wake delays and sensor noise.
+    pub seed: u64,
+    /// Gear ratios of the arm.
+    pub ratios: Ratios,
+    /// The motor pucks.
+    pub pucks: PuckConfig,
+    /// The safety module.
+    pub safety: SafetyConfig,
+    /// The force/torque sensor.
+    pub force_torque: ForceTorqueConfig,
+    /// The person at the pendant.
+    pub operator: OperatorConfig,
+}
+
+impl Default for PlantConfig {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            ratios: Ratios::WAM7,
+            pucks: PuckConfig::default(),
+            safety: SafetyConfig::default(),
+            force_torque: ForceTorqueConfig::default(),
+            operator: OperatorConfig::default(),
+        }
+    }
+}
+
+/// A configuration that describes no arm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PlantError {
+    /// Ratio, CTS or IPNM is not positive.
+    #[error("the arm's drives: {0}")]
+    Drives(TransmissionError),
+    /// No property table for a firmware version.
+    #[error("the arm's firmware: {0}")]
+    Firmware(UnknownFirmware),
+}
+
+impl From<TransmissionError> for PlantError {
+    fn from(error: TransmissionError) -> Self {
+        Self::Drives(error)
+    }
+}
+
+impl From<UnknownFirmware> for PlantError {
+    fn from(error: UnknownFirmware) -> Self {
+        Self::Firmware(error)
+    }
+}
+
+/// What the co-controller's interrupt finds at one event.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Event {
+    /// A frame from another node.
+    pub received: Option<CanFrame>,
+    /// A frame of the co-controller has left the wire.
+    pub transmitted: bool,
+    /// Bytes of the host link that have arrived, at most [`CHUNK`](crate::CHUNK).
+    pub link: Vec<u8>,
+}
+
+/// Something that awaits the co-controller's next event.
+#[derive(Clone, Copy, Debug)]
+struct Delivery {
+    at: Ticks,
+    /// `None`: its own frame is out.
+    received: Option<CanFrame>,
+}
+
+/// Bus, pucks 1 to 7, safety module, force/torque sensor, operator, world, and the wire of the host link.
+pub struct Plant {
+    now: Ticks,
+    bus: Bus,
+    pucks: [Puck; 7],
+    motors: Motors,
+    safety: SafetyModule,
+    force_torque: ForceTorque,
+    operator: Operator,
+    link: LinkWire,
+    deliveries: VecDeque<Delivery>,
+    world: Box<dyn World>,
+}
+
+impl Plant {
+    /// A plant at time 0 with the E-stop pressed: only the safety module has power.
+    ///
+    /// # Panics
+    /// If the configuration describes no arm; see [`Plant::try_new`] for configurations that come from outside.
+    #[must_use]
+    pub fn new(config: PlantConfig, world: Box<dyn World>) -> Self {
+        match Self::try_new(config, world) {
+            Ok(plant) => plant,
+            Err(error) => panic!("invalid plant configuration: {error}"),
+        }
+    }
+
+    /// As [`Plant::new`].
+    ///
+    /// # Errors
+    /// [`PlantError`] if the configuration describes no arm.
+    pub fn try_new(config: PlantConfig, world: Box<dyn World>) -> Result<Self, PlantError> {
+        // One stream of noise per source: 0 is the sensor, the node numbers are the wake delays.
+        let stream = |node: Node| Noise::new(config.seed, node.number().into());
+        let transmission = Transmission::new(&config.ratios)?;
+        let drives = Drives::new(
+            [config.pucks.counts_per_revolution; 7],
+            config.pucks.units_per_newton_metre.map(i32::from),
+        )?;
+        let [a, b, c, d, e, f, g] =
+            std::array::from_fn(|index| Puck::new(index, &config.pucks, stream(Node::ARM[index])));
+        let boot_noise = stream(Node::FORCE_TORQUE);
+        Ok(Self {
+            now: 0,
+            bus: Bus::default(),
+            pucks: [a?, b?, c?, d?, e?, f?, g?],
+            motors: Motors::new(
+                transmission,
+                &drives,
+                &*world,
+                config.operator.holds_until_active_for,
+            ),
+            safety: SafetyModule::new(config.safety, SpeedMonitor::new(transmission, drives))?,
+            force_torque: ForceTorque::new(config.force_torque, boot_noise, stream(Node::HOST)),
+            operator: Operator::new(config.operator),
+            link: LinkWire::default(),
+            deliveries: VecDeque::new(),
+            world,
+        })
+    }
+
+    /// The co-controller hands a frame to its CAN controller at time `t`.
+    ///
+    /// A `t` before the time already reached counts as that time: the past is decided.
+    pub fn submit(&mut self, t: Ticks, frame: CanFrame) {
+        self.run_to(t);
+        self.bus.queue(self.now, Node::HOST, frame);
+        self.bus.arbitrate(self.now);
+    }
+
+    /// When the co-controller has to call [`Plant::event`] next, as far as can be known before it gets there.
+    ///
+    /// A time that has passed means: at once. `None` means never, unless it submits something.
+    #[must_use]
+    pub fn next_event(&self) -> Option<Ticks> {
+        let waiting = self.deliveries.front().map(|delivery| delivery.at);
+        // While a frame is on the wire nothing else can change what the co-controller will see next.
+        let on_bus = if self.bus.is_busy() {
+            self.bus.next_time()
+        } else {
+            self.next_happening()
+        };
+        [waiting, on_bus, self.link.next_time()]
+            .into_iter()
+            .flatten()
+            .min()
+    }
+
+    /// What the co-controller finds at time `t`. One frame at a time: ask [`Plant::next_event`] again afterwards.
+    pub fn event(&mut self, t: Ticks) -> Event {
+        self.run_to(t);
+        let delivery = self.deliveries.pop_front();
+        Event {
+            received: delivery.and_then(|delivery| delivery.received),
+            transmitted: delivery.is_some_and(|delivery| delivery.received.is_none()),
+            link: self.link.take_to_device(self.now),
+        }
+    }
+
+    /// "The co-controller has reached time `t`": everything due until then happens.
+    pub fn advance(&mut self, t: Ticks) {
+        self.run_to(t);
+    }
+
+    /// The time the co-controller has reached.
+    #[must_use]
+    pub fn now(&self) -> Ticks {
+        self.now
+    }
+
+    /// The co-controller hands bytes to its UART at time `t`.
+    pub fn link_from_device(&mut self, t: Ticks, bytes: &[u8]) {
+        self.run_to(t);
+        self.link.send_from_device(self.now, bytes);
+    }
+
+    /// Bytes for the host whose time on the line has passed.
+    pub fn take_from_device(&mut self) -> Vec<u8> {
+        self.link.take_from_device(self.now)
+    }
+
+    /// Bytes from the device that are still on their way: how far its UART is behind.
+    #[must_use]
+    pub fn link_backlog(&self) -> usize {
+        self.link.backlog_from_device(self.now)
+    }
+
+    /// The host sends bytes; they leave at the time reached, or when the line is free.
+    pub fn link_to_device(&mut self, bytes: &[u8]) {
+        self.link.send_to_device(self.now, bytes);
+    }
+
+    /// Somebody other than the scripted operator does something at the pendant, now.
+    pub fn press(&mut self, action: PendantAction) {
+        self.operator.observe(action);
+        self.safety.press(self.now, action);
+        self.settle_power();
+        self.bus.arbitrate(self.now);
+    }
+
+    /// Mode of the safety module.
+    #[must_use]
+    pub fn safety_mode(&self) -> SafetyMode {
+        self.safety.mode()
+    }
+
+    /// Both pendants.
+    #[must_use]
+    pub fn pendant(&self) -> PendantState {
+        self.safety.pendant()
+    }
+
+    /// Requests that pucks lost because they came too fast.
+    #[must_use]
+    pub fn lost_requests(&self) -> u64 {
+        self.pucks.iter().map(Puck::lost_requests).sum()
+    }
+
+    /// What went over the bus so far.
+    #[must_use]
+    pub fn trace(&self) -> BusTrace {
+        self.bus.trace().clone()
+    }
+
+    /// Keeps every frame from now on.
+    pub fn record_bus(&mut self) {
+        self.bus.record();
+    }
+
+    /// The frames kept since [`Plant::record_bus`].
+    #[must_use]
+    pub fn recorded(&self) -> &[Passage] {
+        self.bus.recorded()
+    }
+
+    /// The physical world.
+    pub fn world(&mut self) -> &mut dyn World {
+        &mut *self.world
+    }
+
+    fn run_to(&mut self, t: Ticks) {
+        while let Some(next) = self.next_moment()
+            && next <= t
+        {
+            self.move_clock(next);
+            self.happen();
+        }
+        self.move_clock(t);
+    }
+
+    /// Moves the clock and charges the interval to the motors as they are driven now.
+    fn move_clock(&mut self, t: Ticks) {
+        if t > self.now {
+            let drives = std::array::from_fn(|motor| self.pucks[motor].drive(self.now));
+            self.motors.drive(&drives, t - self.now);
+            self.now = t;
+        }
+    }
+
+    /// The next time at which anything happens, physics included.
+    fn next_moment(&self) -> Option<Ticks> {
+        [Some(self.motors.next_step()), self.next_happening()]
+            .into_iter()
+            .flatten()
+            .min()
+    }
+
+    /// The next time at which something happens that can put a frame on the bus or take it off.
+    fn next_happening(&self) -> Option<Ticks> {
+        let pucks = self.pucks.iter().filter_map(Puck::next_time).min();
+        [
+            self.bus.next_time(),
+            pucks,
+            self.force_torque.next_time(),
+            self.safety.next_time(),
+            self.operator.next_time(&self.safety.view()),
+        ]
+        .into_iter()
+        .flatten()
+        .min()
+    }
+
+    /// Everything that is due now, in the order the head of this file gives.
+    fn happen(&mut self) {
+        let now = self.now;
+        if self.motors.next_step() <= now {
+            self.motors.step(&mut *self.world);
+        }
+        if let Some(passage) = self.bus.finish(now) {
+            self.deliver(&passage);
+        }
+        if self
+            .pucks
+            .iter()
+            .any(|puck| puck.next_time().is_some_and(|at| at <= now))
+        {
+            // All pucks latch at the same request, hence at the same angles.
+            let angles = self.motors.angles(now);
+            for (index, puck) in self.pucks.iter_mut().enumerate() {
+                while puck.next_time().is_some_and(|at| at <= now) {
+                    if let Some(reply) = puck.step(now, angles[index]) {
+                        self.bus.queue(now, Node::ARM[index], reply);
+                    }
+                }
+            }
+        }
+        while self.force_torque.next_time().is_some_and(|at| at <= now) {
+            for reply in self.force_torque.step(now, &self.world.wrist_wrench()) {
+                self.bus.queue(now, Node::FORCE_TORQUE, reply);
+            }
+        }
+        while self.safety.next_time().is_some_and(|at| at <= now) {
+            self.safety.step(now);
+        }
+        self.settle_power();
+        while let Some(action) = self.operator.act(now, &self.safety.view()) {
+            self.safety.press(now, action);
+            self.settle_power();
+        }
+        self.bus.arbitrate(now);
+    }
+
+    fn deliver(&mut self, passage: &Passage) {
+        let received = (passage.sender != Node::HOST).then_some(passage.frame);
+        self.deliveries.push_back(Delivery {
+            at: passage.end,
+            received,
+        });
+        let at = passage.received_at();
+        if let Ok(request) = Request::decode(&passage.frame)
+            // What a puck says is a request to nobody; the safety module is the only device that gives orders.
+            && matches!(request.sender, Node::HOST | Node::SAFETY_MODULE)
+        {
+            for puck in &mut self.pucks {
+                puck.receive(at, &request);
+            }
+            self.force_torque.receive(at, &request);
+        }
+        self.safety.hear(at, &passage.frame);
+    }
+
+    /// Sends what the safety module has to say, and lets motor power follow its mode.
+    fn settle_power(&mut self) {
+        for frame in self.safety.take_outgoing() {
+            self.bus.queue(self.now, Node::SAFETY_MODULE, frame);
+        }
+        if self.safety.mode() == SafetyMode::Active {
+            self.motors.see_active(self.now);
+        }
+        let should_be_powered = self.safety.mode() != SafetyMode::EStop;
+        if should_be_powered == self.motors.are_powered() {
+            return;
+        }
+        self.motors.set_powered(should_be_powered);
+        for (puck, node) in self.pucks.iter_mut().zip(Node::ARM) {
+            if should_be_powered {
+                puck.power_on(self.now);
+            } else {
+                puck.power_off();
+                self.bus.withdraw(node);
+            }
+        }
+        if should_be_powered {
+            self.force_torque.power_on(self.now);
+        } else {
+            self.force_torque.power_off();
+            self.bus.withdraw(Node::FORCE_TORQUE);
+        }
+    }
+}
+
+/// Steps of physics per second of virtual time, for those who report speed.
+pub const STEPS_PER_SECOND: f64 = TICKS_PER_SECOND as f64 / STEP_TICKS as f64;

@@ -1,0 +1,320 @@
+//! A small pure-Rust world: the WAM with its true statics and seven decoupled joints.
+//!
+//! Simplified on purpose, so that unit tests and runs without MuJoCo need no physics engine. **True**: kinematics, the
+//! gravity torque of every link and of the hand, the torque of a push at the grasp point, joint stops, viscous and
+//! Coulomb friction. **Simplified**: the mass matrix is a constant diagonal (reflected rotor inertia plus the mean of the
+//! link inertia over the arm's work space), hence no coupling and no Coriolis torque; the hand is rigid and the wrist
+//! wrench is quasi-static; there is nothing to touch. Do not judge a controller's tracking by it.
+//!
+//! `v = (I v + h tau) / (I + h b)`, then Coulomb friction takes at most `h c / (I + h b)` from `|v|` and never turns its sign,
+//! so that a joint at rest stays at rest whatever the step: `I` inertia, `b` viscous, `c` Coulomb friction, `h` step.
+
+use super::{Pose, World};
+use crate::chain::{self, Frame, Vector, add, dot, subtract};
+use crate::rotation::cross;
+use crate::time::STEP_SECONDS;
+
+/// Gravity, m/s^2, world frame (the value of the golden vectors).
+const GRAVITY: Vector = [0.0, 0.0, -9.81];
+
+/// Mass (kg) and centre of mass in frame j (m) of each link, `wam7.toml` `[[arm.link]]`.
+const LINKS: [(f64, Vector); 7] = [
+    (10.7677, [-0.00443, 0.12189, -0.00066]),
+    (3.8749, [-0.00237, 0.03106, 0.01542]),
+    (1.8023, [-0.03826, 0.20751, 3e-05]),
+    (2.17266212, [0.00553408, 6.822e-05, 0.11927695]),
+    (0.35655692, [5.483e-05, 0.02886286, 0.00148493]),
+    (0.40915886, [-5.923e-05, -0.01686123, 0.02419052]),
+    (0.0754827, [0.00014836, 7.252e-05, -0.00335185]),
+];
+
+/// Force/torque sensor and hand together: mass (kg), centre of mass in frame 7 (m), `[payload.wam7_bh280_ft]`.
+const PAYLOAD: (f64, Vector) = (
+    1.337308,
+    [
+        -6.029705722242e-05,
+        -0.009027260457134806,
+        0.0673508537777823,
+    ],
+);
+
+/// What the sensor carries: the hand alone, mass (kg), centre of mass in frame 7 (m) = hand frame turned by pi, 12 mm out.
+const HAND: (f64, Vector) = (
+    1.201308,
+    [
+        -6.71232831213989e-05,
+        -0.010049236022244114,
+        0.074296379915774,
+    ],
+);
+
+/// Where the sensor measures, frame 7, m (`[ft_sensor] origin_in_frame7`); its axes are those of frame 7.
+const SENSOR_ORIGIN: Vector = [0.0, 0.0, 0.006];
+
+/// Rotor inertia reflected to the joints, kg m^2 (`reflected_diag`), plus the mean diagonal of the link mass matrix with
+/// sensor and hand over the 100 states of `tests/vectors/dyn_wam7_bh280_ft.csv`.
+const INERTIA: [f64; 7] = [
+    0.20517084 + MEAN_LINK_INERTIA[0],
+    0.18883754875 + MEAN_LINK_INERTIA[1],
+    0.066906917344 + MEAN_LINK_INERTIA[2],
+    0.03462264 + MEAN_LINK_INERTIA[3],
+    0.003227287 + MEAN_LINK_INERTIA[4],
+    0.003227287 + MEAN_LINK_INERTIA[5],
+    0.000316524958 + MEAN_LINK_INERTIA[6],
+];
+const MEAN_LINK_INERTIA: [f64; 7] = [1.4071, 2.1873, 0.1938, 0.3301, 0.0158, 0.0269, 0.003];
+
+/// Viscous friction, N m s/rad, `[arm.friction]`.
+const VISCOUS: [f64; 7] = [
+    1.27163, 1.15061, 0.407672, 0.233564, 0.0159914, 0.0159914, 0.00267989,
+];
+/// Coulomb friction, N m, `[arm.friction]` (an estimate there).
+const COULOMB: [f64; 7] = [1.5, 2.0, 1.0, 0.8, 0.2, 0.2, 0.1];
+
+/// Stop of the folded elbow, rad: two decimals in the model file, not the circle's constant.
+const ELBOW_STOP: f64 = 314.0 / 100.0;
+
+/// Joint stops, rad, `q_min` and `q_max`.
+const STOPS: [(f64, f64); 7] = [
+    (-2.6, 2.6),
+    (-2.0, 2.0),
+    (-2.8, 2.8),
+    (-0.9, ELBOW_STOP),
+    (-4.76, 1.24),
+    (-1.57, 1.57),
+    (-3.0, 3.0),
+];
+
+/// The WAM's home, rad (`[arm] home`): on the stop of joint 2, elbow folded.
+pub const HOME: [f64; 7] = [0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0];
+
+/// Seven decoupled joints with the WAM's statics.
+#[derive(Clone, Debug)]
+pub struct FreeJoints {
+    q: [f64; 7],
+    dq: [f64; 7],
+    gravity: Vector,
+    coulomb: [f64; 7],
+    push_force: Vector,
+    push_torque: Vector,
+}
+
+impl FreeJoints {
+    /// The arm at rest at `q` (rad; brought inside the joint stops), with gravity and friction.
+    #[must_use]
+    pub fn new(q: [f64; 7]) -> Self {
+        let inside = std::array::from_fn(|joint| q[joint].clamp(STOPS[joint].0, STOPS[joint].1));
+        Self {
+            q: inside,
+            dq: [0.0; 7],
+            gravity: GRAVITY,
+            coulomb: COULOMB,
+            push_force: [0.0; 3],
+            push_torque: [0.0; 3],
+        }
+    }
+
+    /// The arm at rest without gravity and without Coulomb friction: every torque shows at once.
+    #[must_use]
+    pub fn weightless(q: [f64; 7]) -> Self {
+        Self {
+            gravity: [0.0; 3],
+            coulomb: [0.0; 7],
+            ..Self::new(q)
+        }
+    }
+
+    /// Torque of gravity and of the push on each joint, N m, by the principle of virtual work.
+    fn external_torques(&self, frames: &[Frame; 8]) -> [f64; 7] {
+        let mut forces: Vec<(usize, Vector, Vector)> = LINKS
+            .iter()
+            .enumerate()
+            .map(|(link, (mass, centre))| {
+                (
+                    link,
+                    frames[link + 1].point(*centre),
+                    self.gravity.map(|g| g * mass),
+                )
+            })
+            .collect();
+        forces.push((
+            6,
+            frames[7].point(PAYLOAD.1),
+            self.gravity.map(|g| g * PAYLOAD.0),
+        ));
+        forces.push((6, chain::grasp_frame(&frames[7]).origin, self.push_force));
+        std::array::from_fn(|joint| {
+            let (axis, origin) = (frames[joint].axes[2], frames[joint].origin);
+            let moments = forces
+                .iter()
+                .filter(|(link, _, _)| *link >= joint)
+                .map(|(_, point, force)| dot(axis, cross(subtract(*point, origin), *force)));
+            moments.sum::<f64>() + dot(axis, self.push_torque)
+        })
+    }
+}
+
+impl World for FreeJoints {
+    fn joint_positions(&self) -> [f64; 7] {
+        self.q
+    }
+
+    fn joint_velocities(&self) -> [f64; 7] {
+        self.dq
+    }
+
+    fn step(&mut self, torques: &[f64; 7]) {
+        let external = self.external_torques(&chain::frames(&self.q));
+        for joint in 0..7 {
+            let inertia = INERTIA[joint] + STEP_SECONDS * VISCOUS[joint];
+            let driven = (INERTIA[joint] * self.dq[joint]
+                + STEP_SECONDS * (torques[joint] + external[joint]))
+                / inertia;
+            let rubbed = STEP_SECONDS * self.coulomb[joint] / inertia;
+            let velocity = driven.signum() * (driven.abs() - rubbed).max(0.0);
+            let position = self.q[joint] + STEP_SECONDS * velocity;
+            let (low, high) = STOPS[joint];
+            // Stops are inelastic: the joint rests against them until a torque takes it away.
+            self.q[joint] = position.clamp(low, high);
+            self.dq[joint] = if self.q[joint] == position {
+                velocity
+            } else {
+                0.0
+            };
+        }
+    }
+
+    fn wrist_wrench(&self) -> [f64; 6] {
+        let plate = chain::frames(&self.q)[7];
+        let sensor = plate.point(SENSOR_ORIGIN);
+        let weight = self.gravity.map(|g| g * HAND.0);
+        let force = add(weight, self.push_force);
+        let moments = [
+            cross(subtract(plate.point(HAND.1), sensor), weight),
+            cross(
+                subtract(chain::grasp_frame(&plate).origin, sensor),
+                self.push_force,
+            ),
+            self.push_torque,
+        ];
+        let torque = moments.into_iter().fold([0.0; 3], add);
+        let ([fx, fy, fz], [tx, ty, tz]) = (plate.turn_back(force), plate.turn_back(torque));
+        [fx, fy, fz, tx, ty, tz]
+    }
+
+    fn grasp_pose(&self) -> Pose {
+        let grasp = chain::grasp_frame(&chain::frames(&self.q)[7]);
+        Pose {
+            position: grasp.origin,
+            quaternion: grasp.quaternion(),
+        }
+    }
+
+    fn push(&mut self, force: [f64; 3], torque: [f64; 3]) {
+        self.push_force = force;
+        self.push_torque = torque;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn golden_rows() -> Vec<(Vec<String>, Vec<f64>)> {
+        let text = include_str!(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../tests/vectors/dyn_wam7_bh280_ft.csv"
+        ));
+        let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+        let names: Vec<String> = lines.next().unwrap().split(',').map(String::from).collect();
+        let numbers = |line: &str| {
+            line.split(',')
+                .map(|value| value.parse().unwrap())
+                .collect()
+        };
+        lines.map(|line| (names.clone(), numbers(line))).collect()
+    }
+
+    fn column(row: &(Vec<String>, Vec<f64>), name: &str) -> f64 {
+        row.1[row.0.iter().position(|other| other == name).unwrap()]
+    }
+
+    #[test]
+    fn gravity_pulls_with_the_golden_torque() {
+        for row in golden_rows() {
+            let q = std::array::from_fn(|joint| column(&row, &format!("q{}", joint + 1)));
+            let torques = FreeJoints::new(HOME).external_torques(&chain::frames(&q));
+            for (joint, torque) in torques.iter().enumerate() {
+                // g is what holds the arm; gravity pulls the other way.
+                let held = column(&row, &format!("g{}", joint + 1));
+                assert!(
+                    (torque + held).abs() < 1e-9,
+                    "joint {joint}: {torque} and {held}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn mean_inertia_is_that_of_the_golden_states() {
+        let rows = golden_rows();
+        for (joint, inertia) in MEAN_LINK_INERTIA.iter().enumerate() {
+            let name = format!("M{0}{0}", joint + 1);
+            let mean = rows.iter().map(|row| column(row, &name)).sum::<f64>() / rows.len() as f64;
+            assert!((mean - inertia).abs() < 1e-4, "{name}: {mean}");
+        }
+    }
+
+    #[test]
+    fn friction_holds_a_joint_until_the_torque_exceeds_it() {
+        let turned = |torque: f64| {
+            let mut world = FreeJoints {
+                gravity: [0.0; 3],
+                ..FreeJoints::new([0.0; 7])
+            };
+            for _ in 0..1000 {
+                world.step(&[torque, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+            }
+            world.q[0]
+        };
+        assert_eq!(turned(1.49), 0.0);
+        assert_eq!(turned(-1.49), 0.0);
+        assert!(turned(1.6) > 0.001 && turned(-1.6) < -0.001);
+    }
+
+    #[test]
+    fn a_joint_stops_at_its_stop_and_comes_away_again() {
+        let mut world = FreeJoints::weightless([0.0; 7]);
+        for _ in 0..3000 {
+            world.step(&[40.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        }
+        assert_eq!((world.q[0], world.dq[0]), (STOPS[0].1, 0.0));
+        for _ in 0..100 {
+            world.step(&[-40.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        }
+        assert!(world.q[0] < STOPS[0].1);
+    }
+
+    #[test]
+    fn a_push_turns_the_base_the_way_the_hand_is_pushed() {
+        // Arm stretched out along x: a push along +y turns joint 1 to the left, that is positive about z.
+        let mut q = [0.0; 7];
+        q[1] = std::f64::consts::FRAC_PI_2;
+        let mut world = FreeJoints::weightless(q);
+        assert!(world.grasp_pose().position[0] > 1.0);
+        world.push([0.0, 20.0, 0.0], [0.0; 3]);
+        for _ in 0..100 {
+            world.step(&[0.0; 7]);
+        }
+        assert!(world.dq[0] > 0.1, "{}", world.dq[0]);
+    }
+
+    #[test]
+    fn the_sensor_feels_weight_downwards_and_its_moment_about_the_sensor() {
+        // Arm straight up: the sensor's z is the world's; the weight pulls along -z and has no lever but the hand's offset.
+        let wrench = FreeJoints::new([0.0; 7]).wrist_wrench();
+        assert!((wrench[2] + HAND.0 * 9.81).abs() < 1e-9);
+        assert!((wrench[3] - HAND.1[1] * wrench[2]).abs() < 1e-9);
+        assert!((wrench[4] + HAND.1[0] * wrench[2]).abs() < 1e-9);
+    }
+}
