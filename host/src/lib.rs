@@ -1,1 +1,17 @@
 //! Host side of Tactus.
+
+pub mod arm;
+pub mod check;
+pub mod client;
+pub mod cmd;
+pub mod demonstration;
+pub mod device;
+pub mod error;
+pub mod learn;
+pub mod plan;
+pub mod plot;
+pub mod primitive_file;
+pub mod procedure;
+pub mod simulation;
+pub mod tracking;
+pub mod transport;

@@ -1,3 +1,9 @@
 //! The `tactus` command.
 
-fn main() {}
+use std::process::ExitCode;
+
+use clap::Parser;
+
+fn main() -> ExitCode {
+    tactus::cmd::run(tactus::cmd::Cli::parse())
+}

@@ -1,3 +1,73 @@
-//! Set-up and chores.
+//! Set-up and chores of Tactus: `cargo xtask <verb>`. Says what it does, asks nothing.
 
-fn main() {}
+mod budget;
+mod build;
+mod ci;
+mod demo;
+mod elf;
+mod qemu;
+mod setup;
+mod shell;
+mod test;
+
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+
+const HELP: &str = "\
+cargo xtask <verb>
+
+  setup    install what is missing: QEMU, Cortex-M target, MuJoCo library, EGL
+  build    build everything: host tools with the MuJoCo world, the image for the board
+  demo     teach, learn, check, upload and run a movement on the simulated arm
+  test     every test, whole-system tests under QEMU included
+  ci       what a change must pass: format, lints, builds, tests, budgets
+  budget   instructions per control cycle, interrupt latency, stack, flash and RAM of the image
+  size     flash and RAM of the image by section
+  qemu     run an image by itself: cargo xtask qemu [IMAGE]
+  doc      documentation of all crates
+
+Every verb does the set-up it needs. Environment:
+  TACTUS_TOOLCHAIN=rustup|debian   force one of the two ways to compile for Cortex-M";
+
+fn main() -> ExitCode {
+    shell::start_clock();
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match dispatch(&words) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            shell::step(&format!("failed: {error:#}"));
+            shell::note(&format!("to repeat all: cargo xtask {}", words.join(" ")));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn dispatch(words: &[&str]) -> Result<()> {
+    match words {
+        ["setup"] => setup::all().map(drop)?,
+        ["build"] => {
+            let machine = setup::all()?;
+            build::host()?;
+            build::image(&machine)?;
+        }
+        ["demo", rest @ ..] => demo::run(rest)?,
+        ["test"] => test::run(&setup::all()?)?,
+        ["ci"] => ci::run()?,
+        ["budget"] => budget::run(&setup::all()?)?,
+        ["size"] => {
+            let image = build::image(&setup::all()?)?;
+            print!("{}", elf::Sizes::of(&image)?);
+        }
+        ["qemu", rest @ ..] => qemu::run(rest)?,
+        ["doc"] => build::documentation()?,
+        [] | ["help" | "--help" | "-h"] => {
+            println!("{HELP}");
+            return Ok(());
+        }
+        other => bail!("unknown: '{}'\n{HELP}", other.join(" ")),
+    }
+    shell::step("done");
+    Ok(())
+}

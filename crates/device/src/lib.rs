@@ -1,3 +1,26 @@
-//! The co-controller without its hardware: bus start-up, bus rounds, link session, primitive store.
+#![doc = include_str!("../README.md")]
 #![no_std]
 #![forbid(unsafe_code)]
+
+mod bus;
+pub mod command;
+pub mod core;
+pub mod event;
+pub mod health;
+mod round;
+mod slow;
+pub mod startup;
+
+pub use self::core::{Core, CoreIo, Slot};
+pub use command::{Command, Refusal};
+pub use event::{Event, EventKind};
+pub use health::{Counters, Health};
+pub use startup::{Stage, StartupError};
+
+mod port;
+mod session;
+mod store;
+
+pub use port::{QueueFull, SessionPort, StoredPrimitive, TimedRecord, Timing};
+pub use session::{Identity, PrimitiveTrouble, Session, StartupTrouble};
+pub use store::{RamStore, STORE_SLOT_BYTES, STORE_SLOTS, Store, StoreError};

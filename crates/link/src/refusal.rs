@@ -192,10 +192,10 @@ impl Refusal {
             Self::BadValue => "correct the value",
             Self::NotZeroed => "put the arm into its home pose and zero it",
             Self::NotReady => {
-                "wait for the start-up to finish; `tactus sim` and `tactus list` show its stage"
+                "wait for the start-up to finish; if it does not, look at pendant and cables"
             }
             Self::SafetyMode => "press Shift+Activate on the pendant",
-            Self::Faulted => "remove the cause, then clear the fault with `tactus stop --clear`",
+            Self::Faulted => "remove the cause, then clear the fault",
             Self::State => "stop the present motion first: `tactus stop`",
             Self::CommandQueueFull => "send the request again",
             Self::NoSuchPrimitive => "`tactus list` shows what is stored; `tactus upload` adds one",

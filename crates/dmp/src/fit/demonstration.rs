@@ -167,6 +167,28 @@ impl Demonstration {
         position.chain(posture).chain(hand)
     }
 
+    /// Whether the tool is at rest at the end: its last speed, linear and angular, is at most `share` of its highest one.
+    pub(super) fn ends_at_rest(&self, share: f64) -> bool {
+        let speed = |step: &dyn Fn(usize) -> f64| {
+            let steps = (1..self.len()).map(step);
+            (step(self.len() - 1), steps.fold(0.0, f64::max))
+        };
+        let (last, highest) = speed(&|i| {
+            let square = |axis: usize| {
+                let step = self.position[i][axis] - self.position[i - 1][axis];
+                step * step
+            };
+            libm::sqrt(square(0) + square(1) + square(2))
+        });
+        // The sine of half the angle: as good a measure as the angle for steps this small.
+        let (last_turn, highest_turn) = speed(&|i| {
+            let [x, y, z] =
+                crate::orientation_error(&self.orientation[i - 1], &self.orientation[i]);
+            libm::sqrt(x * x + y * y + z * z)
+        });
+        last <= share * highest && last_turn <= share * highest_turn
+    }
+
     /// Without noise; the same demonstration if there is no filter.
     pub(super) fn smoothed(&self, filter: Option<&ZeroPhaseFilter>) -> Self {
         let Some(filter) = filter else {

@@ -535,3 +535,38 @@ fn unusable_demonstrations_are_refused_with_the_sample() {
     };
     assert_eq!(fit(&demonstration, &cutoff), Err(FitError::Cutoff));
 }
+
+/// A hand that trembles while it comes to rest: where f is small, noise makes the last weights large.
+#[test]
+fn the_plan_of_a_demonstration_that_ends_at_rest_stays_at_its_goal() {
+    let samples = 1501;
+    let period = 1.0 / 300.0;
+    let mut position = minimum_jerk([0.1, -0.3, 0.2], [0.5, 0.1, -0.1], samples);
+    for (k, x) in position.iter_mut().enumerate() {
+        let t = k as f64 * period;
+        for (axis, x) in x.iter_mut().enumerate() {
+            *x += 3e-4 * (2.0 * core::f64::consts::PI * 2.7 * t + axis as f64).sin();
+        }
+    }
+    let turn = minimum_jerk([0.0], [0.8], samples);
+    let orientation = turn
+        .iter()
+        .map(|[angle]| Quaternion::from_rotation_vector(&[0.2 * angle, 0.7 * angle, -0.3 * angle]))
+        .collect();
+    let posture = std::vec![[0.2; 7]; samples];
+    let hand = std::vec![[0.0; 4]; samples];
+    let demonstration = Demonstration::new(period, position, orientation, posture, hand).unwrap();
+    let learned = fit(&demonstration, &FitOptions::default()).unwrap();
+    let primitive: dmp::Primitive<f64, 50> = learned.primitive().unwrap();
+    let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
+    let mut worst = 0.0_f64;
+    for k in 0..3 * samples {
+        let reference = rollout.step(&primitive, period, &Coupling::NONE);
+        if k >= samples {
+            for axis in 0..3 {
+                worst = worst.max((reference.position.x[axis] - learned.goal.position[axis]).abs());
+            }
+        }
+    }
+    assert!(worst < 2e-3, "the plan leaves its goal by {worst} m");
+}

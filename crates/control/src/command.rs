@@ -1,0 +1,187 @@
+//! What a person may ask of the arm: commands, the options of a run, and the reasons a command is refused.
+//!
+//! Commands carry plain `f32` in SI units, as they arrive over the link; they are checked when the cycle takes them up.
+
+use core::fmt;
+
+/// Which tool pose stands in the position feedback `K_x (x_d - x)` of Eq (11).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PoseFeedback {
+    /// The measured pose: integral action through `q_d`, removes the steady-state error of friction and model.
+    Measured,
+    /// `FK(q_d)`: no integral action, so that a contact is not wound up; the joint gains alone set the stiffness.
+    Planned,
+}
+
+/// How the desired joint acceleration of Eq (10) is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AccelerationSource {
+    /// `J^+ (ddx_d + K_x (dx_d - dx) - dJ dq)`, where `dx` is the velocity of the pose named by [`PoseFeedback`].
+    Analytic,
+    /// The low-passed numerical derivative of `dq_d`.
+    Differentiated,
+}
+
+/// A new goal of the tool, in world axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Goal {
+    /// Tool position (m); `None` keeps the present goal.
+    pub position: Option<[f32; 3]>,
+    /// Tool orientation as a unit quaternion (w, x, y, z), tool to world; `None` keeps the present goal.
+    pub orientation: Option<[f32; 4]>,
+}
+
+impl Goal {
+    /// The goal stored in the primitive, unchanged.
+    pub const STORED: Goal = Goal {
+        position: None,
+        orientation: None,
+    };
+}
+
+/// The options of one run of the loaded primitive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RunOptions {
+    /// Goal of this run.
+    pub goal: Goal,
+    /// Speed factor on the stored duration: 1 as stored, 0.5 half as fast. Refused outside 0.1 to 2.
+    pub speed: f32,
+    /// Whether the felt wrench bends the plan (Eqs 8, 9). Off while an expectation is recorded.
+    pub feedback: bool,
+    /// Whether the force controller of Eq (12) adds its torque.
+    pub force_control: bool,
+    /// Pose used in Eq (11).
+    pub pose_feedback: PoseFeedback,
+    /// Acceleration used in Eq (10).
+    pub acceleration: AccelerationSource,
+}
+
+impl Default for RunOptions {
+    /// The first, open-loop run of a primitive: stored goal and speed, no feedback, no force control.
+    fn default() -> Self {
+        RunOptions {
+            goal: Goal::STORED,
+            speed: 1.0,
+            feedback: false,
+            force_control: false,
+            pose_feedback: PoseFeedback::Measured,
+            acceleration: AccelerationSource::Analytic,
+        }
+    }
+}
+
+/// A person's command, taken up at the start of a cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Command {
+    /// Float: gravity compensation only, for teaching by hand.
+    Gravity,
+    /// Hold the present posture.
+    Hold,
+    /// Move in joint space to `q` (rad) along a minimum-jerk path.
+    Approach {
+        /// Target posture (rad).
+        q: [f32; 7],
+        /// Requested duration (s); lengthened where the speed limits ask for it. 0 asks for the shortest.
+        duration: f32,
+    },
+    /// Run the loaded primitive.
+    Run(RunOptions),
+    /// Stop softly: gravity compensation and damping.
+    Stop,
+    /// Give up torque; the pucks are sent zero torque and then nothing.
+    Release,
+    /// Leave a soft stop or a fault, once its cause is gone.
+    ClearFault,
+    /// Change the goal of the present run.
+    SetGoal(Goal),
+    /// Change the speed factor of the present run.
+    SetSpeed {
+        /// Speed factor on the stored duration.
+        factor: f32,
+    },
+    /// Take the present filtered wrench as zero.
+    Tare,
+}
+
+/// Why a command was refused. The codes travel over the link and are never renumbered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Refusal {
+    /// The state the arm is in does not allow this command.
+    WrongState = 1,
+    /// The safety module does not report ACTIVE.
+    SafetyNotActive = 2,
+    /// Not all joint positions have been measured in this cycle.
+    PositionsMissing = 3,
+    /// No primitive is loaded.
+    NoPrimitive = 4,
+    /// The arm is farther than 50 mrad from the start posture of the primitive in at least one joint.
+    StartTooFar = 5,
+    /// A number in the command is not finite or outside its range.
+    OutOfRange = 6,
+    /// A target posture lies outside the soft joint limits.
+    OutsideJointLimits = 7,
+    /// A goal lies outside the workspace.
+    OutsideWorkspace = 8,
+    /// The arm still moves, or the cause of the stop is still present.
+    CauseRemains = 9,
+    /// The arm moves too fast for this command.
+    Moving = 10,
+    /// No wrench has been measured, and the command needs one.
+    WrenchMissing = 11,
+    /// A fault is latched and has not been cleared.
+    FaultLatched = 12,
+}
+
+impl Refusal {
+    /// Every reason, for tables and documents.
+    pub const ALL: [Refusal; 12] = [
+        Refusal::WrongState,
+        Refusal::SafetyNotActive,
+        Refusal::PositionsMissing,
+        Refusal::NoPrimitive,
+        Refusal::StartTooFar,
+        Refusal::OutOfRange,
+        Refusal::OutsideJointLimits,
+        Refusal::OutsideWorkspace,
+        Refusal::CauseRemains,
+        Refusal::Moving,
+        Refusal::WrenchMissing,
+        Refusal::FaultLatched,
+    ];
+
+    /// The stable number of this reason.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// The reason with this number, if there is one.
+    pub fn from_code(code: u8) -> Option<Refusal> {
+        Refusal::ALL
+            .into_iter()
+            .find(|reason| reason.code() == code)
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Refusal::WrongState => "the arm is in a state that does not allow this command",
+            Refusal::SafetyNotActive => "the safety module does not report ACTIVE",
+            Refusal::PositionsMissing => "not all joint positions are measured",
+            Refusal::NoPrimitive => "no primitive is loaded",
+            Refusal::StartTooFar => {
+                "a joint is more than 50 mrad away from the start posture of the primitive"
+            }
+            Refusal::OutOfRange => "a number in the command is not finite or outside its range",
+            Refusal::OutsideJointLimits => "the target lies outside the soft joint limits",
+            Refusal::OutsideWorkspace => "the goal lies outside the workspace of the arm",
+            Refusal::CauseRemains => "the cause of the stop is still present",
+            Refusal::Moving => "the arm moves too fast for this command",
+            Refusal::WrenchMissing => "no wrench is measured",
+            Refusal::FaultLatched => "a fault is latched, clear it first",
+        })
+    }
+}
+
+impl core::error::Error for Refusal {}

@@ -1,0 +1,167 @@
+//! Commands: their conditions, and what they start.
+
+use crate::approach::{Approach, LONGEST};
+use crate::command::{Command, Refusal};
+use crate::cycle::{Cycle, Measured, WRENCH_AGE};
+use crate::fault::Fault;
+use crate::real::Real;
+use crate::run::Run;
+use crate::supervisor::{State, Trigger};
+use crate::units::JointPositions;
+
+/// Below this joint speed (rad/s) the arm counts as standing, for leaving a stop.
+const STANDING: f64 = 0.05;
+
+/// Below this joint speed (rad/s) a movement may begin.
+const CALM: f64 = 0.2;
+
+impl<R: Real, const N: usize> Cycle<R, N> {
+    /// Commands before any position is known.
+    pub(super) fn command_blind(&mut self, command: Command) -> Result<(), Refusal> {
+        match command {
+            Command::Stop | Command::Release | Command::ClearFault => {
+                let trigger = if command == Command::ClearFault {
+                    Trigger::Clear
+                } else {
+                    Trigger::Release
+                };
+                self.supervisor.take(trigger, Fault::None).map(|_| ())
+            }
+            Command::Tare => self.tare(),
+            _ => Err(Refusal::PositionsMissing),
+        }
+    }
+
+    fn tare(&mut self) -> Result<(), Refusal> {
+        if self.supervisor.law() == State::Run {
+            return Err(Refusal::WrongState);
+        }
+        if self.wrench.tare() {
+            Ok(())
+        } else {
+            Err(Refusal::WrenchMissing)
+        }
+    }
+
+    pub(super) fn command(
+        &mut self,
+        command: Command,
+        measured: &Measured<'_, R>,
+    ) -> Result<(), Refusal> {
+        let q = &measured.state.q;
+        match command {
+            Command::Stop => self.change(Trigger::Stop, measured),
+            Command::Release => self.change(Trigger::Release, measured),
+            Command::ClearFault => {
+                let waits = matches!(self.supervisor.state(), State::SoftStop | State::Fault);
+                let moving = self.fastest(measured) > R::of(STANDING);
+                if waits && (self.outside_fault || measured.state.missing > 0 || moving) {
+                    return Err(Refusal::CauseRemains);
+                }
+                self.change(Trigger::Clear, measured)
+            }
+            Command::Tare => self.tare(),
+            Command::Gravity => {
+                self.may_begin(measured)?;
+                self.change(Trigger::Gravity, measured)
+            }
+            Command::Hold => {
+                self.may_begin(measured)?;
+                self.change(Trigger::Hold, measured)
+            }
+            Command::Approach {
+                q: target,
+                duration,
+            } => {
+                self.may_begin(measured)?;
+                self.supervisor.allows(Trigger::Approach)?;
+                if !(duration >= 0.0 && f64::from(duration) <= LONGEST)
+                    || target.iter().any(|q| !q.is_finite())
+                {
+                    return Err(Refusal::OutOfRange);
+                }
+                let target = JointPositions::from_f32(target);
+                if !self.model.within_soft_limits(&target) {
+                    return Err(Refusal::OutsideJointLimits);
+                }
+                self.may_move(measured)?;
+                // From the posture that is held, so that the torque against friction stays.
+                let from = if self.supervisor.law() == State::Hold {
+                    self.hold
+                } else {
+                    *q
+                };
+                self.approach = Some(Approach::new(
+                    &self.model,
+                    &from,
+                    &target,
+                    R::of(f64::from(duration)),
+                ));
+                self.change(Trigger::Approach, measured)
+            }
+            Command::Run(options) => {
+                self.may_begin(measured)?;
+                self.supervisor.allows(Trigger::Run)?;
+                self.may_move(measured)?;
+                let primitive = self.primitive.as_ref().ok_or(Refusal::NoPrimitive)?;
+                if (options.feedback || options.force_control)
+                    && self.wrench.age().is_none_or(|age| age > WRENCH_AGE)
+                {
+                    return Err(Refusal::WrenchMissing);
+                }
+                self.run = Some(Run::start(primitive, q, &measured.pose, options)?);
+                self.change(Trigger::Run, measured)
+            }
+            Command::SetGoal(goal) => match (&mut self.run, &self.primitive) {
+                (Some(run), Some(primitive)) => run.set_goal(primitive, &goal),
+                _ => Err(Refusal::WrongState),
+            },
+            Command::SetSpeed { factor } => match (&mut self.run, &self.primitive) {
+                (Some(run), Some(primitive)) => run.set_speed(primitive, factor),
+                _ => Err(Refusal::WrongState),
+            },
+        }
+    }
+
+    /// Conditions of every command that keeps or raises torque.
+    fn may_begin(&self, measured: &Measured<'_, R>) -> Result<(), Refusal> {
+        if !self.is_active() {
+            return Err(Refusal::SafetyNotActive);
+        }
+        if self.outside_fault {
+            return Err(Refusal::CauseRemains);
+        }
+        if measured.state.missing > 0 {
+            return Err(Refusal::PositionsMissing);
+        }
+        let latched = !matches!(self.supervisor.fault(), Fault::None | Fault::SafetyDropped);
+        if latched {
+            return Err(Refusal::FaultLatched);
+        }
+        if self.supervisor.state() == State::SoftStop && self.fastest(measured) > R::of(STANDING) {
+            return Err(Refusal::Moving);
+        }
+        Ok(())
+    }
+
+    fn may_move(&self, measured: &Measured<'_, R>) -> Result<(), Refusal> {
+        if self.fastest(measured) > R::of(CALM) {
+            Err(Refusal::Moving)
+        } else {
+            Ok(())
+        }
+    }
+
+    fn fastest(&self, measured: &Measured<'_, R>) -> R {
+        measured.state.dq.0.amax()
+    }
+
+    /// Takes a person's trigger.
+    fn change(&mut self, trigger: Trigger, measured: &Measured<'_, R>) -> Result<(), Refusal> {
+        let from = self.supervisor.law();
+        if self.supervisor.take(trigger, Fault::None)? {
+            self.entered(from, Some(measured));
+        }
+        Ok(())
+    }
+}

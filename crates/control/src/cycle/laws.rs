@@ -1,0 +1,160 @@
+//! The laws of the states: from what is measured to the torque that is wanted.
+
+use crate::controller::{ForceController, JointReference, TaskReference};
+use crate::cycle::{Cycle, Measured, PERIOD, STOP_RAMP};
+use crate::kinematics::Frames;
+use crate::real::Real;
+use crate::record::flags;
+use crate::supervisor::State;
+use crate::units::{JointPositions, JointTorques, Pose, Vector7};
+
+/// Length of the damping that carries the arm while gravity torque builds up after arming (control periods): 0.5 s.
+const ARMING: u16 = 150;
+
+/// What the law of a state asks for, besides the torque.
+pub(super) struct Demand<R: Real> {
+    pub(super) torque: JointTorques<R>,
+    pub(super) q_d: JointPositions<R>,
+    pub(super) pose_d: Pose<R>,
+    pub(super) phase: R,
+    pub(super) flags: u16,
+}
+
+impl<R: Real, const N: usize> Cycle<R, N> {
+    /// The law of the present state; `None` where no torque is sent.
+    pub(super) fn demand(&mut self, measured: &Measured<'_, R>) -> Option<Demand<R>> {
+        let repulsion = self.bounds.repulsion(&measured.state.q, &measured.state.dq);
+        let near = if repulsion.0.amax() > R::of(0.0) {
+            flags::NEAR_LIMIT
+        } else {
+            0
+        };
+        let mut demand = match self.supervisor.law() {
+            State::Idle | State::Fault | State::Coast => return None,
+            State::Gravity => self.float(measured),
+            State::Hold => self.track(measured, JointReference::at_rest(self.hold)),
+            State::Approach => {
+                let reference = match &mut self.approach {
+                    Some(approach) => approach.step(),
+                    None => JointReference::at_rest(self.hold),
+                };
+                self.hold = reference.q;
+                self.track(measured, reference)
+            }
+            State::Run => self.run_primitive(measured),
+            State::SoftStop => self.stop(measured),
+        };
+        demand.torque.0 += repulsion.0;
+        demand.flags |= near;
+        Some(demand)
+    }
+
+    fn plain(&self, measured: &Measured<'_, R>, torque: Vector7<R>) -> Demand<R> {
+        Demand {
+            torque: JointTorques(torque),
+            q_d: measured.state.q,
+            pose_d: measured.pose,
+            phase: R::of(0.0),
+            flags: 0,
+        }
+    }
+
+    /// Gravity compensation; damped while it builds up after arming.
+    fn float(&self, measured: &Measured<'_, R>) -> Demand<R> {
+        let mut torque = self.model.gravity_torque(measured.frames).0;
+        if self.armed_for < ARMING {
+            let share = R::from_counts(i32::from(ARMING - self.armed_for))
+                / R::from_counts(i32::from(ARMING));
+            torque -= self.gains.stop_damping.component_mul(&measured.state.dq.0) * share;
+        }
+        self.plain(measured, torque)
+    }
+
+    /// Gravity compensation and damping; what else was there is ramped away.
+    fn stop(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
+        let (rest, left) = self.rest;
+        self.rest.1 = left.saturating_sub(1);
+        let share = R::from_counts(i32::from(left)) / R::from_counts(i32::from(STOP_RAMP));
+        let gravity = self.model.gravity_torque(measured.frames).0;
+        let damping = self.gains.stop_damping.component_mul(&measured.state.dq.0);
+        self.plain(measured, gravity + rest * share - damping)
+    }
+
+    /// Eq (10) along a joint reference.
+    fn track(&mut self, measured: &Measured<'_, R>, reference: JointReference<R>) -> Demand<R> {
+        let frozen = measured.state.missing > 0;
+        let torque = self.joint_controller.torque(
+            &self.model,
+            &self.gains,
+            measured.frames,
+            measured.state,
+            &reference,
+            frozen,
+        );
+        let pose_d = Frames::new(&self.model, &reference.q).tool_pose();
+        Demand {
+            torque,
+            q_d: reference.q,
+            pose_d,
+            phase: R::of(0.0),
+            flags: 0,
+        }
+    }
+
+    /// Eqs (8), (9), (11), (10), (12), (13).
+    fn run_primitive(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
+        let (Some(run), Some(primitive)) = (&mut self.run, &self.primitive) else {
+            // The state machine enters `Run` only with both; without them the arm floats.
+            return self.float(measured);
+        };
+        let frozen = measured.state.missing > 0;
+        let options = run.options;
+        let error = run.force_error(primitive, &measured.wrench);
+        let plan = run.step(
+            primitive,
+            &measured.wrench,
+            frozen || self.wrench.age() != Some(0),
+        );
+        let task = TaskReference::from_plan(&plan);
+        let reference = self.operational.step(
+            &self.model,
+            &self.gains,
+            measured.frames,
+            measured.state,
+            &task,
+            (options.pose_feedback, options.acceleration),
+        );
+        let mut torque = self.joint_controller.torque(
+            &self.model,
+            &self.gains,
+            measured.frames,
+            measured.state,
+            &reference,
+            frozen,
+        );
+        let mut set = if options.feedback { flags::FEEDBACK } else { 0 };
+        if let Some(error) = error.filter(|_| options.force_control) {
+            let command = self.force.command(
+                &error.in_world(measured.frames.tool_to_world()),
+                self.gains.force_proportional,
+                self.gains.force_integral,
+                R::of(PERIOD),
+                self.saturated || frozen,
+            );
+            torque.0 += ForceController::torque(&measured.frames.jacobian(), &command).0;
+            set |= flags::FORCE_CONTROL;
+        }
+        if self.operational.is_clamped() {
+            set |= flags::CLAMPED;
+        }
+        let offset = task.pose.position - measured.pose.position;
+        self.tracking = offset.dot(&offset).square_root();
+        Demand {
+            torque,
+            q_d: reference.q,
+            pose_d: task.pose,
+            phase: plan.phase,
+            flags: set,
+        }
+    }
+}

@@ -1,0 +1,468 @@
+//! `Cycle`: one control period, the only entry that yields torque.
+//!
+//! ```text
+//! replies -> JointEstimator, WrenchEstimator -> Monitor, command -> Supervisor
+//!   -> the law of the state: gravity | hold | approach | run (Eqs 9, 11, 10, 12, 13) | soft stop
+//!   -> TorqueLimiter -> Actuation (two frames) ; everything -> CycleRecord
+//! ```
+
+mod commands;
+mod laws;
+
+use dmp::Primitive;
+use puck::SafetyMode;
+
+use crate::actuation::Actuation;
+use crate::approach::Approach;
+use crate::arm::ArmModel;
+use crate::calibration::Calibration;
+use crate::command::Refusal;
+use crate::controller::{
+    ForceController, Gains, JointBounds, JointController, OperationalController,
+};
+use crate::estimate::{JointEstimator, JointState};
+use crate::fault::Fault;
+use crate::kinematics::Frames;
+use crate::limit::{LimitReport, TorqueLimiter};
+use crate::load::{self, LoadRefusal};
+use crate::monitor::{Monitor, Observation};
+use crate::real::Real;
+use crate::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
+use crate::run::Run;
+use crate::supervisor::{State, Supervisor, Trigger};
+use crate::units::{JointPositions, Pose, Vector7, Wrench};
+use crate::wrench::WrenchEstimator;
+
+/// Control period (s).
+pub const PERIOD: f64 = 1.0 / 300.0;
+
+/// Control rate (Hz).
+pub const RATE: f64 = 300.0;
+
+/// Kernels per row that a stored primitive may have.
+pub const MAX_KERNELS: usize = 100;
+
+/// Cycles of zero torque after torque went off: one lost frame must not leave a motor pulling.
+const ZERO_CYCLES: u8 = 3;
+
+/// Age at which the mode of the safety module is no longer believed (control periods): 1 s.
+const SAFETY_AGE: u16 = 300;
+
+/// Age at which a wrench no longer carries a run that depends on it (control periods).
+const WRENCH_AGE: u8 = 5;
+
+/// Length of the ramp that takes all but gravity and damping away in a soft stop (control periods): 100 ms.
+const STOP_RAMP: u16 = 30;
+
+/// The control code of one arm. `N` is the number of kernels per row that its primitive may have.
+pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
+    calibration: Calibration<R>,
+    model: ArmModel<R>,
+    gains: Gains<R>,
+    supervisor: Supervisor,
+    monitor: Monitor<R>,
+    joints: JointEstimator<R>,
+    wrench: WrenchEstimator<R>,
+    limiter: TorqueLimiter<R>,
+    bounds: JointBounds<R>,
+    joint_controller: JointController<R>,
+    operational: OperationalController<R>,
+    force: ForceController<R>,
+    primitive: Option<Primitive<R, N>>,
+    run: Option<Run<R, N>>,
+    approach: Option<Approach<R>>,
+    /// Desired posture of `Hold` (rad).
+    hold: JointPositions<R>,
+    /// Torque beyond gravity when a soft stop began (N m), and the control periods left of its ramp.
+    rest: (Vector7<R>, u16),
+    safety: Option<(SafetyMode, u16)>,
+    /// Control periods since torque came on, saturating.
+    armed_for: u16,
+    zero_cycles: u8,
+    saturated: bool,
+    tracking: R,
+    pending: Option<Event>,
+    /// Whether the caller reports a fault of its own in this cycle.
+    outside_fault: bool,
+}
+
+/// What is measured in one cycle.
+struct Measured<'a, R: Real> {
+    state: &'a JointState<R>,
+    frames: &'a Frames<R>,
+    pose: Pose<R>,
+    wrench: Wrench<R>,
+}
+
+impl<R: Real, const N: usize> Cycle<R, N> {
+    /// A cycle in `Idle`, with the tuned gains and without a primitive.
+    pub fn new(calibration: Calibration<R>) -> Self {
+        Cycle::with_gains(calibration, Gains::tuned())
+    }
+
+    /// A cycle in `Idle` with other gains.
+    pub fn with_gains(calibration: Calibration<R>, gains: Gains<R>) -> Self {
+        let model = ArmModel::new(calibration.payload);
+        let home = JointPositions::zero();
+        Cycle {
+            bounds: JointBounds::around(&model, &home),
+            supervisor: Supervisor::new(),
+            monitor: Monitor::new(),
+            joints: JointEstimator::new(&calibration),
+            wrench: WrenchEstimator::new(),
+            limiter: TorqueLimiter::new(&calibration),
+            joint_controller: JointController::new(),
+            operational: OperationalController::new(home),
+            force: ForceController::new(gains.force_window),
+            primitive: None,
+            run: None,
+            approach: None,
+            hold: home,
+            rest: (Vector7::zeros(), 0),
+            safety: None,
+            armed_for: 0,
+            zero_cycles: 0,
+            saturated: false,
+            tracking: R::of(0.0),
+            pending: None,
+            outside_fault: false,
+            calibration,
+            model,
+            gains,
+        }
+    }
+
+    /// The present state.
+    pub fn state(&self) -> State {
+        self.supervisor.state()
+    }
+
+    /// The latched fault.
+    pub fn fault(&self) -> Fault {
+        self.supervisor.fault()
+    }
+
+    /// The arm this cycle controls.
+    pub fn model(&self) -> &ArmModel<R> {
+        &self.model
+    }
+
+    /// The primitive that `Run` would run.
+    pub fn primitive(&self) -> Option<&Primitive<R, N>> {
+        self.primitive.as_ref()
+    }
+
+    /// Takes the scales read from the pucks. Positions are learned anew.
+    ///
+    /// # Errors
+    /// [`Refusal::WrongState`] while torque is on.
+    pub fn calibrate(&mut self, calibration: Calibration<R>) -> Result<(), Refusal> {
+        if self.supervisor.state().has_torque() {
+            return Err(Refusal::WrongState);
+        }
+        self.joints = JointEstimator::new(&calibration);
+        self.limiter = TorqueLimiter::new(&calibration);
+        self.model = ArmModel::new(calibration.payload);
+        self.calibration = calibration;
+        Ok(())
+    }
+
+    /// Forgets positions and the mode of the safety module: the pucks were off. Ends in `Idle`.
+    pub fn reset(&mut self) {
+        self.joints.reset();
+        self.wrench = WrenchEstimator::new();
+        self.safety = None;
+        // Every state allows this trigger, so there is nothing to refuse.
+        let _ = self
+            .supervisor
+            .take(Trigger::SafetyDropped, Fault::SafetyDropped);
+        self.leave_torque();
+    }
+
+    /// Takes a primitive for the next run, after checking it against this arm. A refused one leaves the old in place.
+    ///
+    /// # Errors
+    /// [`LoadRefusal`] while a run is in progress, or with the reason why this arm cannot run it.
+    pub fn load(&mut self, primitive: &Primitive<R, N>) -> Result<(), LoadRefusal> {
+        if self.supervisor.law() == State::Run {
+            return Err(LoadRefusal::Running);
+        }
+        load::check(&self.model, primitive).map_err(LoadRefusal::Unfit)?;
+        self.primitive = Some(primitive.clone());
+        Ok(())
+    }
+
+    /// Forgets the primitive. Ignored while it runs.
+    pub fn unload(&mut self) {
+        if self.supervisor.law() != State::Run {
+            self.primitive = None;
+        }
+    }
+
+    /// Advances one control period (1/300 s).
+    pub fn step(&mut self, input: &CycleInput) -> CycleOutput {
+        // A bridged reply is no news: the law stays.
+        let before = (self.supervisor.law(), self.supervisor.fault());
+        self.watch_safety(input.sample.safety);
+        self.outside_fault = input.external_fault.is_some();
+        if let Some(fault) = input.external_fault {
+            let trigger = if fault == Fault::Overrun {
+                Trigger::SoftFault
+            } else {
+                Trigger::HardFault
+            };
+            self.trigger(trigger, fault, None);
+        }
+        let torque_on = self.supervisor.state().has_torque();
+        let state = self.joints.update(&input.sample.positions, torque_on);
+        self.wrench.update(input.sample.wrench.as_ref());
+
+        let mut record = CycleRecord {
+            cycle: input.cycle,
+            ..CycleRecord::EMPTY
+        };
+        let mut answer = None;
+        let actuation = match state {
+            None => {
+                answer = input.command.map(|command| self.command_blind(command));
+                record.lost_replies = input
+                    .sample
+                    .positions
+                    .iter()
+                    .filter(|reply| reply.is_none())
+                    .count() as u8;
+                self.actuate_without_torque()
+            }
+            Some(state) => {
+                let frames = Frames::new(&self.model, &state.q);
+                let measured = Measured {
+                    state: &state,
+                    frames: &frames,
+                    pose: frames.tool_pose(),
+                    wrench: self.wrench.wrench(&frames),
+                };
+                self.monitor(&measured);
+                answer = input
+                    .command
+                    .map(|command| self.command(command, &measured))
+                    .or(answer);
+                self.act(&measured, &mut record)
+            }
+        };
+
+        record.state = self.supervisor.state();
+        record.fault = self.supervisor.fault();
+        record.flags |= self.standing_flags();
+        let now = (self.supervisor.law(), record.fault);
+        // A run's last transition is told as `Arrived` by `act`; every other change is told here.
+        if now != before && self.pending.is_none() {
+            self.pending = Some(Event::Entered(now.0, record.fault));
+        }
+        let event = match answer {
+            Some(Ok(())) => Some(Event::Accepted),
+            Some(Err(reason)) => Some(Event::Refused(reason)),
+            None => self.pending.take(),
+        };
+        CycleOutput {
+            actuation,
+            record,
+            event,
+        }
+    }
+
+    fn watch_safety(&mut self, polled: Option<SafetyMode>) {
+        self.safety = match (polled, self.safety) {
+            (Some(mode), _) => Some((mode, 0)),
+            (None, Some((mode, age))) if age < SAFETY_AGE => Some((mode, age + 1)),
+            (None, _) => None,
+        };
+        if !self.is_active() {
+            self.trigger(Trigger::SafetyDropped, Fault::SafetyDropped, None);
+        }
+    }
+
+    fn is_active(&self) -> bool {
+        matches!(self.safety, Some((SafetyMode::Active, _)))
+    }
+
+    fn monitor(&mut self, measured: &Measured<'_, R>) {
+        if !self.supervisor.state().has_torque() {
+            return;
+        }
+        self.bounds.tighten(&self.model, &measured.state.q);
+        let depends = self
+            .run
+            .as_ref()
+            .is_some_and(|run| run.options.feedback || run.options.force_control);
+        let seen = Observation {
+            frames: measured.frames,
+            bounds: &self.bounds,
+            force: self.wrench.raw_force(),
+            tracking: self.tracking,
+            wrench_lost: depends && self.wrench.age().is_none_or(|age| age > WRENCH_AGE),
+        };
+        if let Some((trigger, fault)) =
+            self.monitor
+                .check(self.supervisor.law(), measured.state, &seen)
+        {
+            self.trigger(trigger, fault, Some(measured));
+        }
+    }
+
+    /// Takes a trigger that no person caused.
+    fn trigger(&mut self, trigger: Trigger, fault: Fault, measured: Option<&Measured<'_, R>>) {
+        let from = self.supervisor.law();
+        // Only commands can be refused.
+        if let Ok(true) = self.supervisor.take(trigger, fault) {
+            self.entered(from, measured);
+        }
+    }
+
+    /// Prepares the law of the state that was just entered.
+    fn entered(&mut self, from: State, measured: Option<&Measured<'_, R>>) {
+        let law = self.supervisor.law();
+        let Some(measured) = measured.filter(|_| law.has_torque()) else {
+            // Without a measurement there is nothing to hold or to stop with: only states without torque can follow, or a
+            // soft stop whose ramp has nothing to take away.
+            self.rest = (Vector7::zeros(), 0);
+            if !law.has_torque() {
+                self.leave_torque();
+            }
+            return;
+        };
+        let q = measured.state.q;
+        if !from.has_torque() {
+            self.bounds = JointBounds::around(&self.model, &q);
+            self.limiter.reset();
+            self.armed_for = 0;
+        }
+        match law {
+            State::Hold => {
+                self.hold = match from {
+                    State::Run => *self.operational.q_d(),
+                    State::Approach => self.hold,
+                    _ => q,
+                };
+            }
+            State::Run => {
+                let start = if from == State::Hold { self.hold } else { q };
+                self.operational = OperationalController::new(start);
+                self.force.reset();
+                self.tracking = R::of(0.0);
+            }
+            State::SoftStop => {
+                let gravity = self.model.gravity_torque(measured.frames);
+                self.rest = (self.limiter.last().torques().0 - gravity.0, STOP_RAMP);
+            }
+            _ => {}
+        }
+        if law != State::Run {
+            self.run = None;
+        }
+        if law != State::Approach {
+            self.approach = None;
+        }
+        self.joint_controller.reset();
+    }
+
+    fn leave_torque(&mut self) {
+        self.limiter.reset();
+        self.joint_controller.reset();
+        self.force.reset();
+        self.run = None;
+        self.approach = None;
+        self.rest = (Vector7::zeros(), 0);
+        self.tracking = R::of(0.0);
+        self.saturated = false;
+        self.zero_cycles = ZERO_CYCLES;
+    }
+
+    /// Computes the torque of the state and sends it, or nothing; fills in the record.
+    fn act(&mut self, measured: &Measured<'_, R>, record: &mut CycleRecord) -> Actuation {
+        record.q = measured.state.q.to_f32();
+        record.dq = measured.state.dq.to_f32();
+        record.q_d = record.q;
+        record.pose = measured.pose.to_f32();
+        record.pose_d = record.pose;
+        record.wrench = measured.wrench.to_f32();
+        record.lost_replies = measured.state.missing;
+        record.flags |= flags::POSITIONS_KNOWN;
+        let Some(demand) = self.demand(measured) else {
+            return self.actuate_without_torque();
+        };
+        let (torques, report) = self.limiter.limit(&demand.torque);
+        self.saturated = report.joint || report.motor;
+        self.armed_for = self.armed_for.saturating_add(1);
+        record.q_d = demand.q_d.to_f32();
+        record.pose_d = demand.pose_d.to_f32();
+        record.phase = demand.phase.single();
+        record.flags |= demand.flags | limit_flags(report);
+        if report.not_finite {
+            // A soft stop computes with less; if that is not finite either, nothing is left but zero.
+            let stopping = self.supervisor.law() == State::SoftStop;
+            let trigger = if stopping {
+                Trigger::HardFault
+            } else {
+                Trigger::SoftFault
+            };
+            self.trigger(trigger, Fault::NotFinite, Some(measured));
+            if !self.supervisor.state().has_torque() {
+                return self.actuate_without_torque();
+            }
+        }
+        record.tau = torques.torques().to_f32();
+        if self.is_over() {
+            self.trigger(Trigger::Arrived, Fault::None, Some(measured));
+            record.flags |= flags::ARRIVED;
+            self.pending = Some(Event::Arrived);
+        }
+        Actuation::torque(&torques, &self.calibration)
+    }
+
+    fn is_over(&self) -> bool {
+        match self.supervisor.state() {
+            State::Run => self.run.as_ref().is_some_and(Run::is_over),
+            State::Approach => self.approach.as_ref().is_some_and(Approach::is_finished),
+            _ => false,
+        }
+    }
+
+    fn actuate_without_torque(&mut self) -> Actuation {
+        self.limiter.reset();
+        if self.zero_cycles > 0 {
+            self.zero_cycles -= 1;
+            return Actuation::zero();
+        }
+        match self.supervisor.state() {
+            // An ACTIVE puck applies the last torque it was sent, whoever sent it: keep it at zero.
+            State::Idle if self.is_active() => Actuation::zero(),
+            State::Fault if self.is_active() => Actuation::zero().requesting_idle(),
+            _ => Actuation::silent(),
+        }
+    }
+
+    fn standing_flags(&self) -> u16 {
+        let mut set = 0;
+        if self.supervisor.state() == State::Coast {
+            set |= flags::COASTING;
+        }
+        if self.wrench.age() != Some(0) {
+            set |= flags::WRENCH_STALE;
+        }
+        if self.wrench.is_tared() {
+            set |= flags::TARED;
+        }
+        if self.is_active() {
+            set |= flags::SAFETY_ACTIVE;
+        }
+        set
+    }
+}
+
+fn limit_flags(report: LimitReport) -> u16 {
+    let bit = |set: bool, flag: u16| if set { flag } else { 0 };
+    bit(report.joint, flags::JOINT_LIMITED)
+        | bit(report.motor, flags::MOTOR_LIMITED)
+        | bit(report.rate, flags::RATE_LIMITED)
+        | bit(report.not_finite, flags::NOT_FINITE)
+}

@@ -1,0 +1,123 @@
+//! Faults: reasons for which the arm took torque authority away by itself.
+//!
+//! A fault is a latched state, not an error value: it is shown until a person clears it. The codes are part of the wire
+//! format, they are appended to and never renumbered.
+
+use core::fmt;
+
+/// Why the arm stopped by itself. `None` is code 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Fault {
+    /// No fault.
+    #[default]
+    None = 0,
+    /// Six cycles in a row without all position replies.
+    RepliesLost = 1,
+    /// Replies stayed away for 200 ms after the soft stop began.
+    RepliesLostForLong = 2,
+    /// A joint position left its soft limits.
+    JointLimit = 3,
+    /// A joint velocity exceeded its limit.
+    JointSpeed = 4,
+    /// The elbow, or the point 0.35 m beyond it, moved faster than allowed.
+    TipSpeed = 5,
+    /// A torque, reference or state was not finite.
+    NotFinite = 6,
+    /// Position counts jumped farther than the arm can move, six cycles in a row.
+    ImplausiblePosition = 7,
+    /// The plan went farther from the arm than the tracking bound.
+    TrackingError = 8,
+    /// The measured wrench exceeded the stop threshold.
+    ContactForce = 9,
+    /// The safety module went to IDLE or E-STOP while torque was on.
+    SafetyDropped = 10,
+    /// The wrench sensor fell silent while the run depends on it.
+    WrenchLost = 11,
+    /// The device found a fault of the bus or a puck (bus-off, puck reset) and asked for zero torque.
+    BusFault = 12,
+    /// The control cycle missed its deadline too often.
+    Overrun = 13,
+}
+
+impl Fault {
+    /// Every fault, in the order of the codes.
+    pub const ALL: [Fault; 14] = [
+        Fault::None,
+        Fault::RepliesLost,
+        Fault::RepliesLostForLong,
+        Fault::JointLimit,
+        Fault::JointSpeed,
+        Fault::TipSpeed,
+        Fault::NotFinite,
+        Fault::ImplausiblePosition,
+        Fault::TrackingError,
+        Fault::ContactForce,
+        Fault::SafetyDropped,
+        Fault::WrenchLost,
+        Fault::BusFault,
+        Fault::Overrun,
+    ];
+
+    /// The stable number of this fault.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// The fault with this number, if there is one.
+    pub fn from_code(code: u8) -> Option<Fault> {
+        Fault::ALL.into_iter().find(|fault| fault.code() == code)
+    }
+
+    /// What happened and what to do, in one sentence for a person.
+    pub const fn explanation(self) -> &'static str {
+        match self {
+            Fault::None => "no fault",
+            Fault::RepliesLost => {
+                "six cycles without all joint positions; check the CAN wiring and the pucks, then clear"
+            }
+            Fault::RepliesLostForLong => {
+                "joint positions stayed away for 200 ms, torque was taken off; the arm may have sunk, support it before clearing"
+            }
+            Fault::JointLimit => {
+                "a joint left its soft limits; move it back by hand in gravity mode after clearing"
+            }
+            Fault::JointSpeed => {
+                "a joint moved faster than its limit; check the primitive's duration and the payload"
+            }
+            Fault::TipSpeed => {
+                "elbow or forearm moved faster than allowed; run the primitive more slowly or choose a longer approach"
+            }
+            Fault::NotFinite => {
+                "a number in the control cycle was not finite; this is a defect, keep the record"
+            }
+            Fault::ImplausiblePosition => {
+                "position counts jumped farther than the arm can move; check the encoder cable, then zero the arm again"
+            }
+            Fault::TrackingError => {
+                "the arm stayed far behind the plan; look for an obstacle or a wrong payload"
+            }
+            Fault::ContactForce => {
+                "the contact force passed the stop threshold; look for an obstacle"
+            }
+            Fault::SafetyDropped => {
+                "the safety module took torque away; see the pendant, activate again, then clear"
+            }
+            Fault::WrenchLost => {
+                "the force sensor fell silent during a run that depends on it; check its cable"
+            }
+            Fault::BusFault => {
+                "the CAN bus or a puck failed; torque was taken off, see the device log"
+            }
+            Fault::Overrun => {
+                "the control cycle missed its deadline too often; this is a defect, keep the record"
+            }
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.explanation())
+    }
+}

@@ -1,0 +1,191 @@
+//! The wrench with its sign and frames, and what the plan and the force controller do with it.
+
+use control::command::{Command, RunOptions};
+use control::{Fault, Real, State, flags};
+
+use crate::primitives::{Design, GOAL, START, configuration, primitive};
+use crate::rig::Rig;
+
+/// A rig that holds `q`, tared.
+fn holding<R: Real>(q: [f64; 7]) -> Rig<R> {
+    let mut rig = Rig::<R>::new(q, 1);
+    rig.command(Command::Hold);
+    rig.run_for(2.0);
+    rig.command(Command::Tare);
+    rig
+}
+
+#[test]
+fn a_push_reads_as_the_wrench_of_the_environment_on_the_robot_at_the_grasp_point() {
+    // Without the weight of the hand, which shifts in the sensor as the arm gives way by some milliradians.
+    let mut rig = Rig::<f32>::new(GOAL, 1);
+    rig.plant.hand_weight = 0.0;
+    rig.command(Command::Hold);
+    rig.run_for(2.0);
+    rig.command(Command::Tare);
+    let push = [6.0, -4.0, 5.0, 0.3, -0.2, 0.1];
+    rig.plant.push = push;
+    rig.run_for(0.5);
+    let wrench = rig.last.expect("ran").record.wrench.map(f64::from);
+    for axis in 0..3 {
+        assert!((wrench[axis] - push[axis]).abs() < 0.1, "{wrench:?}");
+    }
+    // The torque row is in tool axes, about the grasp point: no lever of the force is left in it.
+    let to_world = *rig.plant.frames().tool_to_world();
+    let torque = to_world.transpose() * nalgebra::Vector3::new(push[3], push[4], push[5]);
+    for axis in 0..3 {
+        assert!(
+            (wrench[3 + axis] - torque[axis]).abs() < 0.02,
+            "{wrench:?} {torque:?}"
+        );
+    }
+}
+
+/// Largest displacement of the plan against the same run without a push, along x.
+fn displacement(feedback: bool, push: f64) -> f64 {
+    let end = |push: f64| {
+        let mut rig = holding::<f32>(START);
+        let design = Design {
+            expected: Some([0.0; 6]),
+            ..Design::default()
+        };
+        rig.cycle.load(&primitive(&design)).expect("loads");
+        rig.command(Command::Run(RunOptions {
+            feedback,
+            ..RunOptions::default()
+        }));
+        rig.run_for(1.0);
+        rig.plant.push[0] = push;
+        rig.run_for(1.5);
+        f64::from(rig.last.expect("ran").record.pose_d[0])
+    };
+    end(push) - end(0.0)
+}
+
+#[test]
+fn an_unexpected_push_along_x_moves_the_plan_along_x_only_with_feedback() {
+    // K1/K = 4/200 m/N: 3 N ask for 6 cm in the end; the weight of the tilting hand cancels in the difference.
+    let moved = displacement(true, 3.0);
+    assert!(moved > 0.01, "{moved}");
+    let moved = displacement(true, -3.0);
+    assert!(moved < -0.01, "{moved}");
+    assert_eq!(displacement(false, 3.0), 0.0);
+}
+
+#[test]
+fn force_control_presses_towards_the_expected_force_and_position_control_alone_does_not() {
+    let contact = |force_control: bool| {
+        let mut rig = holding::<f32>(START);
+        // The environment should push back with 10 N along -x: the arm presses along +x.
+        let design = Design {
+            expected: Some([-10.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+            duration: 3.0,
+            goal: START,
+            bent: false,
+            ..Design::default()
+        };
+        rig.cycle.load(&primitive(&design)).expect("loads");
+        let surface = rig.plant.frames().tool_pose().position.x + 0.002;
+        rig.plant.wall = Some((surface, 800.0));
+        let options = RunOptions {
+            force_control,
+            pose_feedback: control::PoseFeedback::Planned,
+            ..RunOptions::default()
+        };
+        rig.command(Command::Run(options));
+        rig.run_for(2.5);
+        let record = rig.last.expect("ran").record;
+        assert_eq!(record.state, State::Run);
+        assert_eq!(record.flags & flags::FORCE_CONTROL != 0, force_control);
+        f64::from(record.wrench[0])
+    };
+    let (with, without) = (contact(true), contact(false));
+    println!("force along x: {with} with, {without} without");
+    assert!(with < -2.0, "presses: {with}");
+    assert!(without.abs() < 1.0, "does not reach the wall: {without}");
+}
+
+#[test]
+fn b3_a_force_above_the_threshold_stops_the_movement_within_two_cycles() {
+    let mut rig = holding::<f32>(GOAL);
+    rig.plant.push = [-70.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    rig.tick(None);
+    rig.tick(None);
+    rig.tick(None);
+    assert_eq!(
+        (rig.cycle.state(), rig.cycle.fault()),
+        (State::SoftStop, Fault::ContactForce)
+    );
+}
+
+#[test]
+fn b2_one_outlier_of_the_force_sensor_moves_the_plan_by_less_than_a_millimetre() {
+    let path = |outlier: bool| {
+        let mut rig = holding::<f32>(START);
+        let design = Design {
+            expected: Some([0.0; 6]),
+            ..Design::default()
+        };
+        rig.cycle.load(&primitive(&design)).expect("loads");
+        rig.command(Command::Run(RunOptions {
+            feedback: true,
+            ..RunOptions::default()
+        }));
+        rig.run_for(1.0);
+        rig.plant.glitch = if outlier { 100.0 } else { 0.0 };
+        rig.tick(None);
+        rig.plant.glitch = 0.0;
+        let mut positions = Vec::new();
+        for _ in 0..150 {
+            positions.push(f64::from(rig.tick(None).record.pose_d[0]));
+        }
+        positions
+    };
+    let worst = path(true)
+        .iter()
+        .zip(&path(false))
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
+    assert!(worst < 1e-3, "{worst}");
+}
+
+#[test]
+fn a_run_that_needs_the_wrench_is_refused_or_stopped_without_it() {
+    let mut rig = holding::<f32>(START);
+    let design = Design {
+        expected: Some([0.0; 6]),
+        ..Design::default()
+    };
+    rig.cycle.load(&primitive(&design)).expect("loads");
+    rig.command(Command::Run(RunOptions {
+        feedback: true,
+        ..RunOptions::default()
+    }));
+    rig.run_for(0.5);
+    for _ in 0..10 {
+        let sample = control::BusSample {
+            positions: rig.plant.counts(),
+            wrench: None,
+            safety: Some(puck::SafetyMode::Active),
+        };
+        let output = rig.cycle.step(&control::CycleInput {
+            sample,
+            ..Default::default()
+        });
+        rig.plant.receive(output.actuation.frames());
+        rig.plant.advance();
+    }
+    assert_eq!(
+        (rig.cycle.state(), rig.cycle.fault()),
+        (State::SoftStop, Fault::WrenchLost)
+    );
+}
+
+#[test]
+fn the_goal_configuration_belongs_to_its_posture() {
+    let goal = configuration::<f64>(GOAL);
+    assert!(
+        (goal.position[0] - 0.75).abs() < 0.05 && (goal.position[1] - 0.20).abs() < 0.05,
+        "{goal:?}"
+    );
+}

@@ -1,0 +1,8 @@
+//! The whole control cycle against a simulated arm.
+
+mod authority;
+mod contact;
+mod losses;
+mod primitives;
+mod rig;
+mod tracking;

@@ -1,0 +1,127 @@
+//! Movements for the tests: between two postures, with a bent path.
+
+use control::Real;
+use control::arm::ArmModel;
+use control::kinematics::Frames;
+use control::units::JointPositions;
+use control::{Payload, load};
+use dmp::{
+    Configuration, ExpectedWrench, Feedback, GainSchedule, Hemisphere, Limits, OrientationError,
+    Primitive, PrimitiveTables, Quaternion, Velocity,
+};
+
+use crate::rig::KERNELS;
+
+/// A posture beside a table, hand level, and the posture of a side grasp.
+pub(crate) const START: [f64; 7] = [-0.20, 1.30, 1.20, 2.10, -0.30, -0.50, 1.40];
+pub(crate) const GOAL: [f64; 7] = [-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75];
+
+/// The pose and posture of the arm at `q`.
+pub(crate) fn configuration<R: Real>(q: [f64; 7]) -> Configuration<R> {
+    let model = ArmModel::<f64>::new(Payload::SensorAndHand);
+    let pose = Frames::new(&model, &JointPositions::from_array(q)).tool_pose();
+    let [w, x, y, z] = pose.orientation.0.map(R::of);
+    Configuration {
+        position: [0, 1, 2].map(|axis| R::of(pose.position[axis])),
+        orientation: Quaternion::new(w, x, y, z),
+        posture: q.map(R::of),
+        hand: [0.0, 0.25, 0.25, 0.25].map(R::of),
+    }
+}
+
+/// Weights that bend the position path by a few centimetres and the orientation by some degrees.
+fn weights<R: Real>() -> Vec<R> {
+    (0..dmp::ROWS)
+        .flat_map(|row| {
+            (0..KERNELS).map(move |kernel| {
+                let place = (kernel as f64 + 0.5) / KERNELS as f64;
+                let bump = (std::f64::consts::PI * place).sin().powi(2);
+                let amplitude = match row {
+                    0..3 => 0.15,
+                    3..6 => 0.2,
+                    _ => 0.0,
+                };
+                R::of(amplitude * bump * (0.25 * kernel as f64 + row as f64).sin())
+            })
+        })
+        .collect()
+}
+
+/// Options of a test primitive.
+pub(crate) struct Design {
+    pub(crate) duration: f64,
+    pub(crate) start: [f64; 7],
+    pub(crate) goal: [f64; 7],
+    /// Expected wrench (six rows), constant; with it the primitive has feedback gains.
+    pub(crate) expected: Option<[f64; 6]>,
+    pub(crate) bent: bool,
+}
+
+impl Default for Design {
+    fn default() -> Self {
+        Design {
+            duration: 5.0,
+            start: START,
+            goal: GOAL,
+            expected: None,
+            bent: true,
+        }
+    }
+}
+
+/// The primitive, checked as the device checks it.
+pub(crate) fn primitive<R: Real>(design: &Design) -> Primitive<R, KERNELS> {
+    let zero = R::of(0.0);
+    let stiffness = R::of(200.0);
+    let critical = R::of(2.0 * 200f64.sqrt());
+    let weights = if design.bent {
+        weights()
+    } else {
+        vec![zero; dmp::ROWS * KERNELS]
+    };
+    let feedback = design.expected.map(|_| {
+        Feedback::new(
+            GainSchedule::constant(
+                [4.0, 4.0, 4.0, 20.0, 20.0, 20.0, 0.0, 0.0, 0.0, 0.0].map(R::of),
+            )
+            .expect("gains"),
+            GainSchedule::constant([R::of(1.0); dmp::SENSORS]).expect("gains"),
+            Limits {
+                displacement: R::of(0.1),
+                rotation: R::of(0.4),
+                hand: zero,
+            },
+        )
+        .expect("gains")
+    });
+    let expected = design.expected.map(|wrench| {
+        let mut row = [zero; dmp::SENSORS];
+        for (entry, value) in row.iter_mut().zip(wrench) {
+            *entry = R::of(value);
+        }
+        ExpectedWrench::new(&[row, row], R::of(design.duration)).expect("an expectation")
+    });
+    let tables = PrimitiveTables {
+        duration: R::of(design.duration),
+        alpha: R::of(-(0.01f64).ln()),
+        activation: R::of(0.7),
+        kernel_count: KERNELS,
+        weights: &weights,
+        stiffness: [stiffness; 4],
+        damping: [critical, R::of(20.0), critical, critical],
+        orientation_error: OrientationError::Quaternion,
+        hemisphere: Hemisphere::Nearest,
+        start: configuration(design.start),
+        goal: configuration(design.goal),
+        start_velocity: Velocity {
+            position: [zero; 3],
+            orientation: [zero; 3],
+            posture: [zero; 7],
+            hand: [zero; 4],
+        },
+        feedback,
+        expected,
+    };
+    load::primitive(&ArmModel::new(Payload::SensorAndHand), &tables)
+        .expect("a movement this arm can run")
+}

@@ -1,0 +1,250 @@
+//! A rigid-body arm in f64 behind the real interface: counts in, torque frames out.
+//!
+//! The plant is built from the crate's own dynamics, which `golden_dynamics` proves against an independent library; what it
+//! adds is what the controller does not have: dry friction with true sticking, encoder quantisation and delay. The whole
+//! path through counts, frames and 14-bit torques is part of every test.
+
+use std::collections::VecDeque;
+
+use control::arm::ArmModel;
+use control::command::Command;
+use control::kinematics::Frames;
+use control::units::{JointPositions, JointVelocities, Vector7};
+use control::{
+    BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, Payload, Real, State, model,
+};
+use nalgebra::{SMatrix, Vector3};
+use puck::{Action, CanFrame, Counts, Group, RawWrench, Request, SafetyMode};
+
+pub(crate) const KERNELS: usize = 50;
+const SUBSTEPS: usize = 8;
+
+pub(crate) struct Plant {
+    pub(crate) model: ArmModel<f64>,
+    pub(crate) q: Vector7<f64>,
+    pub(crate) dq: Vector7<f64>,
+    pub(crate) coulomb: Vector7<f64>,
+    pub(crate) viscous: Vector7<f64>,
+    /// World-frame force and torque of the environment on the tool.
+    pub(crate) push: [f64; 6],
+    /// A compliant plane: position of its surface on the x axis (m) and stiffness (N/m).
+    pub(crate) wall: Option<(f64, f64)>,
+    pub(crate) torque: Vector7<f64>,
+    /// Weight of the hand that the wrist sensor carries (N).
+    pub(crate) hand_weight: f64,
+    /// Force that the sensor alone reports, along its x axis (N).
+    pub(crate) glitch: f64,
+    queue: VecDeque<Vector7<f64>>,
+    calibration: Calibration<f64>,
+}
+
+impl Plant {
+    pub(crate) fn new(q: [f64; 7], delay: usize) -> Self {
+        Plant {
+            model: ArmModel::new(Payload::SensorAndHand),
+            q: Vector7::from(q),
+            dq: Vector7::zeros(),
+            coulomb: Vector7::from(model::FRICTION_COULOMB),
+            viscous: Vector7::from(model::FRICTION_VISCOUS),
+            push: [0.0; 6],
+            wall: None,
+            torque: Vector7::zeros(),
+            hand_weight: 1.2013 * 9.81,
+            glitch: 0.0,
+            queue: (0..delay).map(|_| Vector7::zeros()).collect(),
+            calibration: Calibration::nominal(Payload::SensorAndHand),
+        }
+    }
+
+    pub(crate) fn frames(&self) -> Frames<f64> {
+        Frames::new(&self.model, &JointPositions(self.q))
+    }
+
+    /// Counts that the pucks report, rounded down and wrapped to 22 bits.
+    pub(crate) fn counts(&self) -> [Option<Counts>; 7] {
+        let motor = self
+            .calibration
+            .transmission()
+            .motor_from_joint(&self.q.into());
+        self.calibration
+            .drives()
+            .counts(&motor)
+            .expect("finite")
+            .map(|counts| Some(counts.wrapped()))
+    }
+
+    /// What the environment does to the tool right now (world axes).
+    pub(crate) fn environment(&self) -> [f64; 6] {
+        let mut wrench = self.push;
+        if let Some((surface, stiffness)) = self.wall {
+            let depth = self.frames().tool_pose().position.x - surface;
+            wrench[0] -= stiffness * depth.max(0.0);
+        }
+        wrench
+    }
+
+    /// The wrist sensor: environment and weight of the hand, in sensor axes.
+    pub(crate) fn wrench(&self) -> RawWrench {
+        let frames = self.frames();
+        let [fx, fy, fz, nx, ny, nz] = self.environment();
+        let force = Vector3::new(fx, fy, fz) + Vector3::new(0.0, 0.0, -self.hand_weight);
+        let torque =
+            Vector3::new(nx, ny, nz) - frames.tool_to_sensor().cross(&Vector3::new(fx, fy, fz));
+        let to_sensor = frames.sensor_to_world().transpose();
+        let counts =
+            |v: Vector3<f64>, scale: f64| [0, 1, 2].map(|axis| (v[axis] * scale).floor() as i16);
+        RawWrench {
+            force: counts(
+                to_sensor * force + Vector3::new(self.glitch, 0.0, 0.0),
+                256.0,
+            ),
+            torque: counts(to_sensor * torque, 4096.0),
+            status: None,
+        }
+    }
+
+    /// The frames of one cycle arrive; `None` leaves the last torque in the pucks.
+    pub(crate) fn receive(&mut self, frames: Option<[CanFrame; 2]>) {
+        let mut torque = self.queue.back().copied().unwrap_or(self.torque);
+        if let Some(frames) = frames {
+            let mut motors = [0.0; 7];
+            for (frame, (group, offset)) in frames
+                .iter()
+                .zip([(Group::ARM_TORQUES, 0), (Group::WRIST_TORQUES, 4)])
+            {
+                let request = Request::decode(frame).expect("a valid frame");
+                assert_eq!(request.to, group.into());
+                let Action::PackedTorques { torques, .. } = request.action else {
+                    panic!("{request:?}")
+                };
+                for (slot, units) in torques.iter().enumerate() {
+                    if offset + slot < 7 {
+                        assert!(
+                            units.units().abs() < 4731,
+                            "above the safety module's warning: {units:?}"
+                        );
+                        motors[offset + slot] =
+                            f64::from(units.units()) / model::TORQUE_COUNTS[offset + slot];
+                    }
+                }
+            }
+            torque = Vector7::from(
+                self.calibration
+                    .transmission()
+                    .joint_torques_from_motor(&motors),
+            );
+        }
+        self.queue.push_back(torque);
+        self.torque = self.queue.pop_front().expect("just pushed");
+    }
+
+    /// One control period of physics.
+    pub(crate) fn advance(&mut self) {
+        let dt = control::PERIOD / SUBSTEPS as f64;
+        for _ in 0..SUBSTEPS {
+            let frames = self.frames();
+            let mass = self.model.mass_matrix(&frames);
+            let bias = self
+                .model
+                .coriolis_torque(&frames, &JointVelocities(self.dq))
+                .0
+                + self.model.gravity_torque(&frames).0;
+            let environment = nalgebra::Vector6::from(self.environment());
+            let external = frames.jacobian().transpose_times(&environment);
+            let damped = mass + SMatrix::<f64, 7, 7>::from_diagonal(&(self.viscous * dt));
+            let inverse = damped.try_inverse().expect("a mass matrix");
+            let free = inverse * (mass * self.dq + (self.torque - bias + external) * dt);
+            // Dry friction: impulses that stop each joint, or as much of that as friction can give.
+            let mut impulse = Vector7::zeros();
+            let mut velocity = free;
+            for _ in 0..30 {
+                for joint in 0..7 {
+                    let bound = self.coulomb[joint] * dt;
+                    let wanted = impulse[joint] - velocity[joint] / inverse[(joint, joint)];
+                    let next = f64::clamp(wanted, -bound, bound);
+                    velocity += inverse.column(joint) * (next - impulse[joint]);
+                    impulse[joint] = next;
+                }
+            }
+            self.dq = velocity;
+            self.q += self.dq * dt;
+        }
+    }
+}
+
+/// The controller and the plant, joined.
+pub(crate) struct Rig<R: Real> {
+    pub(crate) cycle: Cycle<R, KERNELS>,
+    pub(crate) plant: Plant,
+    pub(crate) safety: SafetyMode,
+    pub(crate) number: u64,
+    /// Replies to leave out in the next cycle.
+    pub(crate) lose: [bool; 7],
+    pub(crate) last: Option<CycleOutput>,
+}
+
+impl<R: Real> Rig<R> {
+    pub(crate) fn new(q: [f64; 7], delay: usize) -> Self {
+        Rig {
+            cycle: Cycle::new(Calibration::nominal(Payload::SensorAndHand)),
+            plant: Plant::new(q, delay),
+            safety: SafetyMode::Active,
+            number: 0,
+            lose: [false; 7],
+            last: None,
+        }
+    }
+
+    pub(crate) fn tick(&mut self, command: Option<Command>) -> CycleOutput {
+        let mut positions = self.plant.counts();
+        for (position, lose) in positions.iter_mut().zip(self.lose) {
+            if lose {
+                *position = None;
+            }
+        }
+        let sample = BusSample {
+            positions,
+            wrench: Some(self.plant.wrench()),
+            safety: Some(self.safety),
+        };
+        let input = CycleInput {
+            cycle: self.number,
+            sample,
+            command,
+            external_fault: None,
+        };
+        let output = self.cycle.step(&input);
+        self.plant.receive(output.actuation.frames());
+        self.plant.advance();
+        self.number += 1;
+        self.last = Some(output);
+        output
+    }
+
+    pub(crate) fn command(&mut self, command: Command) -> CycleOutput {
+        let output = self.tick(Some(command));
+        assert_eq!(
+            output.event,
+            Some(Event::Accepted),
+            "{command:?} in {:?}",
+            output.record.state
+        );
+        output
+    }
+
+    pub(crate) fn run_for(&mut self, seconds: f64) {
+        for _ in 0..(seconds * 300.0).round() as usize {
+            self.tick(None);
+        }
+    }
+
+    /// Runs until the state is left; fails after `seconds`.
+    pub(crate) fn until(&mut self, state: State, seconds: f64) {
+        for _ in 0..(seconds * 300.0) as usize {
+            if self.tick(None).record.state == state {
+                return;
+            }
+        }
+        panic!("{state:?} not reached within {seconds} s: {:?}", self.last);
+    }
+}

@@ -1,0 +1,422 @@
+//! B1, E4: whatever comes in, every emitted torque is finite and within limits, and nothing panics.
+
+use control::arm::ArmModel;
+use control::command::{AccelerationSource, Command, Goal, PoseFeedback, RunOptions};
+use control::limit::STEP_LIMIT;
+use control::load::{self, End, LoadError};
+use control::{
+    BusSample, Calibration, Cycle, CycleInput, Event, Fault, Payload, Refusal, State, flags,
+};
+use dmp::{Configuration, Hemisphere, OrientationError, PrimitiveTables, Quaternion, Velocity};
+use proptest::prelude::*;
+use puck::{Counts, GaugeStatus, RawWrench, SafetyMode};
+
+const KERNELS: usize = 10;
+const POSTURE: [f64; 7] = [-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75];
+
+fn counts(q: [f64; 7]) -> [Option<Counts>; 7] {
+    let calibration = Calibration::<f64>::nominal(Payload::SensorAndHand);
+    let motor = calibration.transmission().motor_from_joint(&q);
+    calibration
+        .drives()
+        .counts(&motor)
+        .expect("finite")
+        .map(Some)
+}
+
+fn configuration(q: [f64; 7]) -> Configuration<f32> {
+    let model = ArmModel::<f64>::new(Payload::SensorAndHand);
+    let pose =
+        control::kinematics::Frames::new(&model, &control::units::JointPositions::from_array(q))
+            .tool_pose();
+    let [w, x, y, z] = pose.orientation.0.map(|value| value as f32);
+    Configuration {
+        position: [0, 1, 2].map(|axis| pose.position[axis] as f32),
+        orientation: Quaternion::new(w, x, y, z),
+        posture: q.map(|q| q as f32),
+        hand: [0.0; 4],
+    }
+}
+
+const WEIGHTS: [f32; dmp::ROWS * KERNELS] = [0.0; dmp::ROWS * KERNELS];
+
+fn tables() -> PrimitiveTables<'static, f32> {
+    PrimitiveTables {
+        duration: 4.0,
+        alpha: 4.6052,
+        activation: 0.7,
+        kernel_count: KERNELS,
+        weights: &WEIGHTS,
+        stiffness: [200.0; 4],
+        damping: [28.28, 20.0, 28.28, 28.28],
+        orientation_error: OrientationError::Quaternion,
+        hemisphere: Hemisphere::Nearest,
+        start: configuration(POSTURE),
+        goal: configuration([-0.3, 1.4, 1.3, 2.0, -0.2, -0.5, 1.6]),
+        start_velocity: Velocity {
+            position: [0.0; 3],
+            orientation: [0.0; 3],
+            posture: [0.0; 7],
+            hand: [0.0; 4],
+        },
+        feedback: None,
+        expected: None,
+    }
+}
+
+fn sample(positions: [Option<Counts>; 7]) -> CycleInput {
+    CycleInput {
+        sample: BusSample {
+            positions,
+            wrench: Some(RawWrench::default()),
+            safety: Some(SafetyMode::Active),
+        },
+        ..CycleInput::default()
+    }
+}
+
+/// A cycle in the given state, at rest at [`POSTURE`].
+fn cycle_in(state: State) -> Cycle<f32, KERNELS> {
+    let mut cycle = Cycle::new(Calibration::nominal(Payload::SensorAndHand));
+    let model = ArmModel::new(Payload::SensorAndHand);
+    cycle
+        .load(&load::primitive(&model, &tables()).expect("a good primitive"))
+        .expect("loads");
+    let mut feed = |command: Option<Command>, cycles: usize| {
+        for index in 0..cycles {
+            let command = command.filter(|_| index == 0);
+            cycle.step(&CycleInput {
+                command,
+                ..sample(counts(POSTURE))
+            });
+        }
+    };
+    feed(None, 3);
+    match state {
+        State::Idle => {}
+        State::Gravity => feed(Some(Command::Gravity), 50),
+        _ => feed(Some(Command::Hold), 50),
+    }
+    match state {
+        State::Approach => feed(
+            Some(Command::Approach {
+                q: [0.0, 1.0, 1.0, 1.5, 0.0, 0.0, 0.0],
+                duration: 3.0,
+            }),
+            20,
+        ),
+        State::Run => feed(
+            Some(Command::Run(RunOptions {
+                force_control: true,
+                ..RunOptions::default()
+            })),
+            20,
+        ),
+        State::SoftStop => feed(Some(Command::Stop), 5),
+        _ => {}
+    }
+    assert_eq!(cycle.state(), state);
+    cycle
+}
+
+fn any_counts() -> impl Strategy<Value = Option<Counts>> {
+    prop_oneof![
+        Just(None),
+        any::<i32>().prop_map(|raw| Some(Counts(raw))),
+        (-2_000_000i32..2_000_000).prop_map(|raw| Some(Counts(raw))),
+    ]
+}
+
+/// Replies of a cycle: each motor either near the truth, or anything.
+fn any_positions() -> impl Strategy<Value = [Option<Counts>; 7]> {
+    let truth = counts(POSTURE);
+    prop::array::uniform7((0..4u8, -150i32..150, any_counts())).prop_map(move |motors| {
+        core::array::from_fn(|motor| {
+            let (kind, jitter, wild) = motors[motor];
+            if kind > 0 {
+                truth[motor].map(|counts| Counts(counts.0 + jitter))
+            } else {
+                wild
+            }
+        })
+    })
+}
+
+fn any_wrench() -> impl Strategy<Value = Option<RawWrench>> {
+    prop::option::of(
+        (
+            prop::array::uniform3(any::<i16>()),
+            prop::array::uniform3(any::<i16>()),
+            prop::option::of(any::<u8>()),
+        )
+            .prop_map(|(force, torque, status)| RawWrench {
+                force,
+                torque,
+                status: status.map(GaugeStatus),
+            }),
+    )
+}
+
+fn any_goal() -> impl Strategy<Value = Goal> {
+    (
+        prop::option::of(prop::array::uniform3(prop::num::f32::ANY)),
+        prop::option::of(prop::array::uniform4(prop::num::f32::ANY)),
+    )
+        .prop_map(|(position, orientation)| Goal {
+            position,
+            orientation,
+        })
+}
+
+fn any_command() -> impl Strategy<Value = Command> {
+    prop_oneof![
+        Just(Command::Gravity),
+        Just(Command::Hold),
+        (
+            prop::array::uniform7(prop::num::f32::ANY),
+            prop::num::f32::ANY
+        )
+            .prop_map(|(q, duration)| Command::Approach { q, duration }),
+        (prop::array::uniform7(-0.5f32..2.0), 0.0f32..5.0)
+            .prop_map(|(q, duration)| Command::Approach { q, duration }),
+        (any_goal(), prop::num::f32::ANY, any::<[bool; 4]>()).prop_map(
+            |(goal, speed, [a, b, c, d])| {
+                Command::Run(RunOptions {
+                    goal: if d { goal } else { Goal::STORED },
+                    speed: if d { speed } else { 1.0 },
+                    feedback: a,
+                    force_control: b,
+                    pose_feedback: if c {
+                        PoseFeedback::Measured
+                    } else {
+                        PoseFeedback::Planned
+                    },
+                    acceleration: if a {
+                        AccelerationSource::Analytic
+                    } else {
+                        AccelerationSource::Differentiated
+                    },
+                })
+            }
+        ),
+        Just(Command::Stop),
+        Just(Command::Release),
+        Just(Command::ClearFault),
+        any_goal().prop_map(Command::SetGoal),
+        prop::num::f32::ANY.prop_map(|factor| Command::SetSpeed { factor }),
+        Just(Command::Tare),
+    ]
+}
+
+fn any_input() -> impl Strategy<Value = CycleInput> {
+    let safety = prop_oneof![
+        6 => Just(Some(SafetyMode::Active)),
+        2 => Just(None),
+        1 => Just(Some(SafetyMode::Idle)),
+        1 => Just(Some(SafetyMode::EStop)),
+    ];
+    let fault = prop_oneof![30 => Just(None), 1 => Just(Some(Fault::BusFault)), 1 => Just(Some(Fault::Overrun))];
+    (
+        any_positions(),
+        any_wrench(),
+        safety,
+        prop::option::weighted(0.2, any_command()),
+        fault,
+        any::<u64>(),
+    )
+        .prop_map(
+            |(positions, wrench, safety, command, external_fault, cycle)| CycleInput {
+                cycle,
+                sample: BusSample {
+                    positions,
+                    wrench,
+                    safety,
+                },
+                command,
+                external_fault,
+            },
+        )
+}
+
+fn any_state() -> impl Strategy<Value = State> {
+    prop::sample::select(vec![
+        State::Idle,
+        State::Gravity,
+        State::Hold,
+        State::Approach,
+        State::Run,
+        State::SoftStop,
+    ])
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 4_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn b1_any_input_in_any_state_gives_finite_torques_within_limits(
+        state in any_state(),
+        inputs in prop::collection::vec(any_input(), 1..60),
+    ) {
+        let mut cycle = cycle_in(state);
+        let mut last = [f32::NAN; 7];
+        for input in inputs {
+            let active = input.sample.safety;
+            let output = cycle.step(&input);
+            let record = output.record;
+            for joint in 0..7 {
+                prop_assert!(record.tau[joint].is_finite() && record.tau[joint].abs() <= 61.6);
+                prop_assert!(record.q[joint].is_finite() && record.dq[joint].is_finite() && record.q_d[joint].is_finite());
+                if last[joint].is_finite() && record.state.has_torque() {
+                    prop_assert!((record.tau[joint] - last[joint]).abs() <= STEP_LIMIT[joint] as f32 * 1.0001);
+                }
+            }
+            prop_assert!(record.pose_d.iter().chain(&record.pose).chain(&record.wrench).all(|value| value.is_finite()));
+            prop_assert_eq!(record.flags & flags::NOT_FINITE, 0);
+            if matches!(active, Some(SafetyMode::Idle | SafetyMode::EStop)) {
+                prop_assert!(!record.state.has_torque());
+            }
+            if !record.state.has_torque() {
+                prop_assert_eq!(record.tau, [0.0; 7]);
+            }
+            last = record.tau;
+        }
+    }
+}
+
+#[test]
+fn e4_commands_out_of_range_are_refused_with_a_reason_and_change_nothing() {
+    let refused = |state: State, command: Command| {
+        let mut cycle = cycle_in(state);
+        let output = cycle.step(&CycleInput {
+            command: Some(command),
+            ..sample(counts(POSTURE))
+        });
+        assert_eq!(cycle.state(), state, "{command:?}");
+        match output.event {
+            Some(Event::Refused(reason)) => reason,
+            other => panic!("{command:?}: {other:?}"),
+        }
+    };
+    let far = [0.0, 0.0, 0.0, 0.0, 0.0, 1.9, 0.0];
+    assert_eq!(
+        refused(
+            State::Hold,
+            Command::Approach {
+                q: far,
+                duration: 1.0
+            }
+        ),
+        Refusal::OutsideJointLimits
+    );
+    for duration in [-1.0, f32::NAN, f32::INFINITY, 1e6] {
+        assert_eq!(
+            refused(
+                State::Hold,
+                Command::Approach {
+                    q: [0.0; 7],
+                    duration
+                }
+            ),
+            Refusal::OutOfRange
+        );
+    }
+    let mut q = [0.0; 7];
+    q[2] = f32::NAN;
+    assert_eq!(
+        refused(State::Hold, Command::Approach { q, duration: 1.0 }),
+        Refusal::OutOfRange
+    );
+    for factor in [0.0, -1.0, 10.0, f32::NAN] {
+        assert_eq!(
+            refused(State::Run, Command::SetSpeed { factor }),
+            Refusal::OutOfRange
+        );
+    }
+    let goal = |position, orientation| {
+        Command::SetGoal(Goal {
+            position,
+            orientation,
+        })
+    };
+    assert_eq!(
+        refused(State::Run, goal(Some([f32::NAN, 0.0, 0.0]), None)),
+        Refusal::OutOfRange
+    );
+    assert_eq!(
+        refused(State::Run, goal(Some([1.0, 1.0, 0.0]), None)),
+        Refusal::OutsideWorkspace
+    );
+    assert_eq!(
+        refused(State::Run, goal(None, Some([0.5, 0.0, 0.0, 0.0]))),
+        Refusal::OutOfRange
+    );
+    assert_eq!(refused(State::Hold, goal(None, None)), Refusal::WrongState);
+    assert_eq!(refused(State::Run, Command::Tare), Refusal::WrongState);
+}
+
+#[test]
+fn e4_a_primitive_that_this_arm_cannot_run_is_refused_at_load() {
+    let model = ArmModel::<f32>::new(Payload::SensorAndHand);
+    let reason = |change: &dyn Fn(&mut PrimitiveTables<'static, f32>)| {
+        let mut tables = tables();
+        change(&mut tables);
+        load::primitive::<f32, KERNELS>(&model, &tables).expect_err("refused")
+    };
+    assert!(load::primitive::<f32, KERNELS>(&model, &tables()).is_ok());
+    assert_eq!(reason(&|tables| tables.duration = 0.3), LoadError::Duration);
+    assert_eq!(
+        reason(&|tables| tables.duration = 500.0),
+        LoadError::Duration
+    );
+    assert!(matches!(
+        reason(&|tables| tables.duration = 0.0),
+        LoadError::Primitive(_)
+    ));
+    assert!(matches!(
+        reason(&|tables| tables.duration = f32::NAN),
+        LoadError::Primitive(_)
+    ));
+    assert!(matches!(
+        reason(&|tables| tables.kernel_count = 0),
+        LoadError::Primitive(_)
+    ));
+    assert!(matches!(
+        reason(&|tables| tables.goal.posture[1] = f32::NAN),
+        LoadError::Primitive(_)
+    ));
+    assert!(matches!(
+        reason(&|tables| tables.start.orientation.w = 2.0),
+        LoadError::Primitive(_)
+    ));
+    assert_eq!(
+        reason(&|tables| tables.goal.posture[5] = 1.55),
+        LoadError::Posture(End::Goal, 5)
+    );
+    assert_eq!(
+        reason(&|tables| tables.start.posture[0] = -2.6),
+        LoadError::Posture(End::Start, 0)
+    );
+    assert_eq!(
+        reason(&|tables| tables.goal.position = [1.2, 0.0, 0.0]),
+        LoadError::OutOfReach(End::Goal)
+    );
+    assert_eq!(
+        reason(&|tables| tables.goal.position[2] += 0.1),
+        LoadError::Inconsistent(End::Goal)
+    );
+    assert_eq!(
+        reason(&|tables| tables.start.posture[6] += 0.4),
+        LoadError::Inconsistent(End::Start)
+    );
+}
+
+#[test]
+fn a_primitive_is_not_exchanged_while_it_runs() {
+    let model = ArmModel::new(Payload::SensorAndHand);
+    let primitive = load::primitive(&model, &tables()).expect("good");
+    assert_eq!(
+        cycle_in(State::Run).load(&primitive),
+        Err(control::LoadRefusal::Running)
+    );
+    assert_eq!(cycle_in(State::Hold).load(&primitive), Ok(()));
+}

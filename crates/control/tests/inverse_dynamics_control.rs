@@ -1,0 +1,55 @@
+//! Eq (10) is the printed sum, with the rotors in its mass matrix.
+
+use control::arm::ArmModel;
+use control::controller::{Gains, JointController, JointReference};
+use control::estimate::JointState;
+use control::kinematics::Frames;
+use control::units::{JointAccelerations, JointPositions, JointVelocities, Vector7};
+use control::{Payload, model};
+
+#[test]
+fn the_torque_is_inertia_bias_feedback_and_friction() {
+    let arm = ArmModel::<f64>::new(Payload::SensorAndHand);
+    let gains = Gains::<f64>::tuned();
+    let state = JointState {
+        q: JointPositions::from_array([-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75]),
+        dq: JointVelocities::from_array([0.2, -0.1, 0.3, 0.4, -0.5, 0.6, -0.2]),
+        missing: 0,
+        age: 0,
+        implausible: false,
+    };
+    let reference = JointReference {
+        q: JointPositions(state.q.0 + Vector7::from([0.01, -0.02, 0.01, 0.02, -0.03, 0.01, 0.02])),
+        dq: JointVelocities::from_array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]),
+        ddq: JointAccelerations::from_array([1.0, -2.0, 0.5, 3.0, -4.0, 2.0, 5.0]),
+    };
+    let frames = Frames::new(&arm, &state.q);
+    let mut controller = JointController::new();
+    let torque = controller
+        .torque(&arm, &gains, &frames, &state, &reference, false)
+        .0;
+
+    let friction = Vector7::from_fn(|joint, _| {
+        let rate = reference.dq.0[joint];
+        // At 1 rad/s the smoothed sign is 1/1.01.
+        model::FRICTION_VISCOUS[joint] * rate + 0.8 * model::FRICTION_COULOMB[joint] * rate / 1.01
+    });
+    let feedback = gains.stiffness.component_mul(&(reference.q.0 - state.q.0))
+        + gains.damping.component_mul(&(reference.dq.0 - state.dq.0));
+    let expected = arm.mass_matrix(&frames) * reference.ddq.0
+        + arm.coriolis_torque(&frames, &state.dq).0
+        + arm.gravity_torque(&frames).0
+        + feedback
+        + friction;
+    assert!((torque - expected).amax() < 1e-10, "{torque} {expected}");
+
+    // Frozen, the feedback of the last good cycle stays, whatever the extrapolated state is.
+    let elsewhere = JointState {
+        q: JointPositions(state.q.0 * 1.1),
+        ..state
+    };
+    let frozen = controller
+        .torque(&arm, &gains, &frames, &elsewhere, &reference, true)
+        .0;
+    assert!((frozen - torque).amax() < 1e-10);
+}

@@ -1,0 +1,134 @@
+//! Torque limits leave room for what the arm weighs, and nothing finite or not gets past them.
+
+use control::arm::ArmModel;
+use control::kinematics::Frames;
+use control::limit::{LimitReport, MOTOR_COUNTS_LIMIT, STEP_LIMIT, TorqueLimiter, WORST_GRAVITY};
+use control::units::{JointPositions, JointTorques};
+use control::{Calibration, Payload, model};
+use proptest::prelude::*;
+
+/// Largest gravity torque per joint over a grid of postures within the mechanical stops (J1 does not matter).
+fn worst_gravity() -> [f64; 7] {
+    let arm = ArmModel::<f64>::new(Payload::SensorAndHand);
+    let mut worst = [0.0f64; 7];
+    let steps = |joint: usize, count: usize| {
+        let (min, max) = (model::POSITION_MIN[joint], model::POSITION_MAX[joint]);
+        (0..=count).map(move |step| min + (max - min) * step as f64 / count as f64)
+    };
+    for q2 in steps(1, 16) {
+        for q3 in steps(2, 14) {
+            for q4 in steps(3, 20) {
+                for q5 in steps(4, 12) {
+                    for q6 in steps(5, 10) {
+                        let q = JointPositions::from_array([0.0, q2, q3, q4, q5, q6, 0.5]);
+                        let gravity = arm.gravity_torque(&Frames::new(&arm, &q));
+                        for (worst, torque) in worst.iter_mut().zip(gravity.0.iter()) {
+                            *worst = worst.max(torque.abs());
+                        }
+                    }
+                }
+            }
+        }
+    }
+    worst
+}
+
+#[test]
+fn the_worst_gravity_torque_is_the_one_the_limits_are_made_for() {
+    let worst = worst_gravity();
+    println!("worst gravity torque: {worst:.2?} N m");
+    for joint in 0..7 {
+        let stated = WORST_GRAVITY[joint];
+        assert!(
+            worst[joint] <= stated + 1e-9 && stated <= worst[joint] + 0.5,
+            "J{}: {} {stated}",
+            joint + 1,
+            worst[joint]
+        );
+    }
+}
+
+fn limiter() -> TorqueLimiter<f64> {
+    TorqueLimiter::new(&Calibration::nominal(Payload::SensorAndHand))
+}
+
+#[test]
+fn every_posture_can_be_held_with_room_for_control() {
+    let mut limiter = limiter();
+    let arm = ArmModel::<f64>::new(Payload::SensorAndHand);
+    // Outstretched forwards: the heaviest posture of J2.
+    let q = JointPositions::from_array([0.0, 1.57, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let mut wanted = arm.gravity_torque(&Frames::new(&arm, &q));
+    for (torque, extra) in wanted.0.iter_mut().zip(model::CONTROL_SIGNAL_LIMIT) {
+        *torque += torque.signum() * extra * 0.4;
+    }
+    let mut report = LimitReport::default();
+    for _ in 0..200 {
+        report = limiter.limit(&wanted).1;
+    }
+    assert_eq!(report, LimitReport::default());
+    assert!((limiter.last().torques().0 - wanted.0).amax() < 1e-9);
+}
+
+#[test]
+fn motors_stay_below_the_warning_of_the_safety_module_in_every_corner() {
+    let calibration = Calibration::<f64>::nominal(Payload::SensorAndHand);
+    for corner in 0..128u32 {
+        let mut limiter = TorqueLimiter::new(&calibration);
+        let wanted = JointTorques::from_array(core::array::from_fn(|joint| {
+            if corner >> joint & 1 == 0 { 1e6 } else { -1e6 }
+        }));
+        for _ in 0..400 {
+            limiter.limit(&wanted);
+        }
+        let motors = calibration
+            .transmission()
+            .motor_torques_from_joint(&limiter.last().torques().0.into());
+        for (motor, torque) in motors.iter().enumerate() {
+            let counts = torque.abs() * model::TORQUE_COUNTS[motor];
+            assert!(
+                counts <= MOTOR_COUNTS_LIMIT + 1e-6,
+                "M{}: {counts}",
+                motor + 1
+            );
+            assert!(torque.abs() <= model::MOTOR_TORQUE_MAX[motor] + 1e-12);
+        }
+    }
+}
+
+#[test]
+fn a_torque_that_is_not_finite_keeps_the_last_one() {
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut limiter = limiter();
+        limiter.limit(&JointTorques::from_array([1.0; 7]));
+        let last = limiter.last();
+        let mut wanted = JointTorques::from_array([1.2; 7]);
+        wanted.0[3] = bad;
+        let (torques, report) = limiter.limit(&wanted);
+        assert!(report.not_finite);
+        assert_eq!(torques, last);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Any sequence of wanted torques: always finite, within joint and motor limits, and no step above the rate.
+    #[test]
+    fn limits_hold_for_any_sequence(wanted in prop::collection::vec(prop::array::uniform7(prop::num::f32::ANY), 1..12)) {
+        let calibration = Calibration::<f32>::nominal(Payload::SensorAndHand);
+        let mut limiter = TorqueLimiter::new(&calibration);
+        let mut last = [0.0f32; 7];
+        for wanted in wanted {
+            let torques: [f32; 7] = limiter.limit(&JointTorques::from_array(wanted)).0.torques().0.into();
+            let motors = calibration.transmission().motor_torques_from_joint(&torques);
+            for joint in 0..7 {
+                prop_assert!(torques[joint].is_finite());
+                prop_assert!(torques[joint].abs() <= limiter.joint_limits()[joint]);
+                prop_assert!(motors[joint].abs() <= limiter.motor_limits()[joint] * 1.00001);
+                prop_assert!((torques[joint] - last[joint]).abs() <= STEP_LIMIT[joint] as f32 * 1.00001);
+            }
+            last = torques;
+        }
+    }
+}

@@ -1,0 +1,288 @@
+//! E1: every trigger in every state.
+
+use control::supervisor::{Supervisor, Transition, Trigger, transition};
+use control::{Fault, Refusal, State};
+
+/// How much may happen in a state: nothing, floating or stopping, moving.
+fn authority(state: State) -> u8 {
+    match state {
+        State::Idle | State::Fault => 0,
+        // A bridge carries on what was there.
+        State::SoftStop | State::Gravity | State::Coast => 1,
+        State::Hold | State::Approach | State::Run => 2,
+    }
+}
+
+#[test]
+fn e1_nothing_but_a_person_raises_authority() {
+    for state in State::ALL {
+        for trigger in Trigger::ALL {
+            let Transition::Enter(next) = transition(state, trigger) else {
+                continue;
+            };
+            if !trigger.is_command() {
+                assert!(
+                    authority(next) <= authority(state),
+                    "{state:?} {trigger:?} {next:?}"
+                );
+                assert!(!(state == State::Idle && next.has_torque()), "{trigger:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn e1_the_whole_table_is_as_documented() {
+    use State::*;
+    use Transition::{Enter, Refuse, Resume, Stay};
+    // One row per state, one column per trigger in the order of Trigger::ALL:
+    // Gravity Hold Approach Run Stop Release Clear | Missing Back SoftFault HardFault Dropped Arrived
+    let table: [(State, [Transition; 13]); 8] = [
+        (
+            Idle,
+            [
+                Enter(Gravity),
+                Enter(Hold),
+                Refuse,
+                Refuse,
+                Stay,
+                Stay,
+                Stay,
+                Stay,
+                Stay,
+                Stay,
+                Stay,
+                Stay,
+                Stay,
+            ],
+        ),
+        (
+            Gravity,
+            [
+                Stay,
+                Enter(Hold),
+                Enter(Approach),
+                Enter(Run),
+                Enter(SoftStop),
+                Enter(Idle),
+                Refuse,
+                Enter(Coast),
+                Stay,
+                Enter(SoftStop),
+                Enter(Fault),
+                Enter(Idle),
+                Stay,
+            ],
+        ),
+        (
+            Hold,
+            [
+                Enter(Gravity),
+                Stay,
+                Enter(Approach),
+                Enter(Run),
+                Enter(SoftStop),
+                Enter(Idle),
+                Refuse,
+                Enter(Coast),
+                Stay,
+                Enter(SoftStop),
+                Enter(Fault),
+                Enter(Idle),
+                Stay,
+            ],
+        ),
+        (
+            Approach,
+            [
+                Enter(Gravity),
+                Enter(Hold),
+                Refuse,
+                Refuse,
+                Enter(SoftStop),
+                Enter(Idle),
+                Refuse,
+                Enter(Coast),
+                Stay,
+                Enter(SoftStop),
+                Enter(Fault),
+                Enter(Idle),
+                Enter(Hold),
+            ],
+        ),
+        (
+            Run,
+            [
+                Enter(Gravity),
+                Enter(Hold),
+                Refuse,
+                Refuse,
+                Enter(SoftStop),
+                Enter(Idle),
+                Refuse,
+                Enter(Coast),
+                Stay,
+                Enter(SoftStop),
+                Enter(Fault),
+                Enter(Idle),
+                Enter(Hold),
+            ],
+        ),
+        (
+            Coast,
+            [
+                Refuse,
+                Refuse,
+                Refuse,
+                Refuse,
+                Enter(SoftStop),
+                Enter(Idle),
+                Refuse,
+                Stay,
+                Resume,
+                Enter(SoftStop),
+                Enter(Fault),
+                Enter(Idle),
+                Stay,
+            ],
+        ),
+        (
+            SoftStop,
+            [
+                Enter(Gravity),
+                Enter(Hold),
+                Refuse,
+                Refuse,
+                Stay,
+                Enter(Idle),
+                Enter(Gravity),
+                Stay,
+                Stay,
+                Stay,
+                Enter(Fault),
+                Enter(Idle),
+                Stay,
+            ],
+        ),
+        (
+            Fault,
+            [
+                Refuse,
+                Refuse,
+                Refuse,
+                Refuse,
+                Stay,
+                Stay,
+                Enter(Idle),
+                Stay,
+                Stay,
+                Stay,
+                Stay,
+                Stay,
+                Stay,
+            ],
+        ),
+    ];
+    for (state, row) in table {
+        for (trigger, expected) in Trigger::ALL.into_iter().zip(row) {
+            assert_eq!(
+                transition(state, trigger),
+                expected,
+                "{state:?} {trigger:?}"
+            );
+        }
+    }
+}
+
+/// A supervisor driven into a state by triggers alone.
+fn in_state(state: State) -> Supervisor {
+    let path: &[Trigger] = match state {
+        State::Idle => &[],
+        State::Gravity => &[Trigger::Gravity],
+        State::Hold => &[Trigger::Hold],
+        State::Approach => &[Trigger::Hold, Trigger::Approach],
+        State::Run => &[Trigger::Hold, Trigger::Run],
+        State::Coast => &[Trigger::Hold, Trigger::Run, Trigger::RepliesMissing],
+        State::SoftStop => &[Trigger::Hold, Trigger::SoftFault],
+        State::Fault => &[Trigger::Hold, Trigger::HardFault],
+    };
+    let mut supervisor = Supervisor::new();
+    for trigger in path {
+        let fault = match trigger {
+            Trigger::SoftFault => Fault::JointLimit,
+            Trigger::HardFault => Fault::BusFault,
+            _ => Fault::None,
+        };
+        supervisor.take(*trigger, fault).expect("allowed");
+    }
+    assert_eq!(supervisor.state(), state);
+    supervisor
+}
+
+#[test]
+fn e1_every_pair_does_what_the_table_says_and_latches_its_fault() {
+    for state in State::ALL {
+        for trigger in Trigger::ALL {
+            let mut supervisor = in_state(state);
+            let before = supervisor.fault();
+            let result = supervisor.take(trigger, Fault::TipSpeed);
+            match transition(state, trigger) {
+                Transition::Refuse => {
+                    assert_eq!(result, Err(Refusal::WrongState));
+                    assert_eq!((supervisor.state(), supervisor.fault()), (state, before));
+                }
+                Transition::Stay => assert_eq!((result, supervisor.state()), (Ok(false), state)),
+                Transition::Resume => {
+                    assert_eq!((result, supervisor.state()), (Ok(false), State::Run))
+                }
+                Transition::Enter(State::Coast) => {
+                    assert_eq!(
+                        (supervisor.state(), supervisor.law()),
+                        (State::Coast, state)
+                    );
+                    assert_eq!(supervisor.fault(), before, "a bridge is no fault");
+                }
+                Transition::Enter(next) => {
+                    assert_eq!(supervisor.state(), next);
+                    if matches!(
+                        trigger,
+                        Trigger::SoftFault | Trigger::HardFault | Trigger::SafetyDropped
+                    ) {
+                        assert_eq!(supervisor.fault(), Fault::TipSpeed, "{state:?} {trigger:?}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn codes_are_stable_and_unique() {
+    assert_eq!(State::ALL.map(State::code), [0, 1, 2, 3, 4, 5, 6, 7]);
+    assert_eq!(
+        Fault::ALL.map(Fault::code),
+        [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13]
+    );
+    assert_eq!(
+        Refusal::ALL.map(Refusal::code),
+        [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]
+    );
+    for state in State::ALL {
+        assert_eq!(State::from_code(state.code()), Some(state));
+    }
+    for fault in Fault::ALL {
+        assert_eq!(Fault::from_code(fault.code()), Some(fault));
+        assert!(fault.explanation().len() > 5);
+    }
+    for refusal in Refusal::ALL {
+        assert_eq!(Refusal::from_code(refusal.code()), Some(refusal));
+    }
+    assert_eq!(
+        (
+            State::from_code(8),
+            Fault::from_code(14),
+            Refusal::from_code(0)
+        ),
+        (None, None, None)
+    );
+}

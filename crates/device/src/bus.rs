@@ -1,0 +1,50 @@
+//! The way out to the bus: counts every frame and, in the start-up, keeps the pauses.
+
+use puck::CanFrame;
+
+use crate::core::CoreIo;
+use crate::health::Counters;
+use crate::startup::Pacer;
+
+/// Where a frame is sent, at a moment of device time.
+pub(crate) trait Outlet {
+    /// Device time of this slot, us.
+    fn now_us(&self) -> u64;
+    /// Sends the frame, unless a pause is not over or the controller has no room. Whether it was sent.
+    fn send(&mut self, frame: CanFrame) -> bool;
+}
+
+/// The outlet of one slot.
+pub(crate) struct SlotOutlet<'a, I: CoreIo> {
+    pub(crate) io: &'a mut I,
+    pub(crate) counters: &'a mut Counters,
+    pub(crate) pacer: &'a mut Pacer,
+    pub(crate) now_us: u64,
+    /// The cyclic loop sends several frames per slot; there only the pauses of the safety module hold.
+    pub(crate) cyclic: bool,
+}
+
+impl<I: CoreIo> Outlet for SlotOutlet<'_, I> {
+    fn now_us(&self) -> u64 {
+        self.now_us
+    }
+
+    fn send(&mut self, frame: CanFrame) -> bool {
+        let permitted = if self.cyclic {
+            self.pacer.permits_in_cycle(&frame, self.now_us)
+        } else {
+            self.pacer.permits(&frame, self.now_us)
+        };
+        if !permitted {
+            return false;
+        }
+        let sent = self.io.transmit(frame);
+        if sent {
+            self.pacer.note(&frame, self.now_us);
+            Counters::count(&mut self.counters.frames_sent);
+        } else {
+            Counters::count(&mut self.counters.frames_refused);
+        }
+        sent
+    }
+}

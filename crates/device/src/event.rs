@@ -1,0 +1,46 @@
+//! What the control half tells a person, unasked or in answer to a command.
+
+use control::{Fault, State};
+use puck::SafetyMode;
+
+use crate::command::Refusal;
+use crate::startup::{Stage, StartupError};
+
+/// Something happened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// Control cycle in which it happened.
+    pub cycle: u64,
+    /// What.
+    pub kind: EventKind,
+}
+
+/// What happened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum EventKind {
+    /// The oldest unanswered command was taken up.
+    Accepted,
+    /// The oldest unanswered command was refused.
+    Refused(Refusal),
+    /// The supervisor entered a state, for this reason or for none.
+    Entered(State, Fault),
+    /// The movement ended and the arm holds its goal.
+    Arrived,
+    /// The bus start-up reached a stage.
+    Startup(Stage),
+    /// The bus start-up cannot go on, for this reason. It tries again by itself; told once per reason.
+    Blocked(StartupError),
+    /// The safety module reports another mode than before.
+    Safety(SafetyMode),
+}
+
+impl From<control::Event> for EventKind {
+    fn from(event: control::Event) -> EventKind {
+        match event {
+            control::Event::Accepted => EventKind::Accepted,
+            control::Event::Refused(reason) => EventKind::Refused(Refusal::Control(reason)),
+            control::Event::Entered(state, fault) => EventKind::Entered(state, fault),
+            control::Event::Arrived => EventKind::Arrived,
+        }
+    }
+}

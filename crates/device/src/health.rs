@@ -1,0 +1,67 @@
+//! Counters and states that tell how well the bus and the arm are, for the statistics of the link.
+
+use control::State;
+use puck::SafetyMode;
+
+use crate::startup::{Stage, StartupError};
+
+/// Counters since power-up. They wrap at 2^32: a day of lost frames at 300 Hz is 2.6e7.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Control cycles.
+    pub cycles: u32,
+    /// Control cycles that the board began late, see [`crate::Core::note_overrun`].
+    pub overruns: u32,
+    /// Position and wrench replies that had not come when the cycle needed them.
+    pub lost_replies: u32,
+    /// Replies that came after their cycle, or twice, and were discarded.
+    pub late_replies: u32,
+    /// Frames that are malformed, or no reply.
+    pub malformed_frames: u32,
+    /// Well-formed replies that nobody had asked for: wrong node or wrong property.
+    pub foreign_frames: u32,
+    /// Unsolicited broadcasts of the safety module (0x540), ignored.
+    pub broadcasts: u32,
+    /// Frames given to the CAN controller.
+    pub frames_sent: u32,
+    /// Frames taken from the CAN controller.
+    pub frames_received: u32,
+    /// Frames the CAN controller had no room for.
+    pub frames_refused: u32,
+    /// Cycles in which only one of the two torque frames could be sent.
+    pub torque_mismatches: u32,
+    /// Bus errors the board reported, see [`crate::Core::note_bus_error`].
+    pub bus_errors: u32,
+    /// Times the start-up began anew.
+    pub restarts: u32,
+}
+
+impl Counters {
+    /// Add one, wrapping.
+    pub(crate) fn count(counter: &mut u32) {
+        *counter = counter.wrapping_add(1);
+    }
+}
+
+/// The state of the control half at one moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Health {
+    /// Number of the latest control cycle.
+    pub cycle: u64,
+    /// How far the bus start-up has come.
+    pub stage: Stage,
+    /// Why it cannot go on, if it cannot.
+    pub blocked: Option<StartupError>,
+    /// State of the supervisor.
+    pub state: State,
+    /// The encoders count from a known pose, by the word of the safety module.
+    pub zeroed: bool,
+    /// Latest mode of the safety module; `None` before it answered.
+    pub safety_mode: Option<SafetyMode>,
+    /// Latest pendant word; `None` before it answered. Decode with [`puck::PendantState::from_value`].
+    pub pendant: Option<i32>,
+    /// Latest temperature of each arm puck, degree Celsius.
+    pub temperatures: [Option<i16>; 7],
+    /// Counters.
+    pub counters: Counters,
+}

@@ -1,0 +1,110 @@
+//! What the store holds, by name: read once at start-up, kept up to date by the session.
+//!
+//! Checking an image costs a check sum over all its bytes; looking a name up must not.
+
+use link::{Listing, Name, PrimitiveImage};
+
+use crate::store::Store;
+
+/// Most places of a store the session can look after.
+pub(crate) const PLACES: usize = 16;
+
+/// One stored image.
+#[derive(Debug, Clone)]
+pub(crate) struct Entry {
+    pub(crate) name: Name,
+    pub(crate) length: u32,
+    pub(crate) crc: u32,
+    duration: f32,
+    kernels: u16,
+    expectation: bool,
+}
+
+impl Entry {
+    /// Describes a checked image.
+    pub(crate) fn of(image: &PrimitiveImage<'_>) -> Self {
+        let content = image.content();
+        Self {
+            name: image.name().clone(),
+            length: u32::try_from(image.bytes().len()).unwrap_or(u32::MAX),
+            crc: image.crc(),
+            duration: content.duration,
+            kernels: u16::try_from(content.kernels).unwrap_or(u16::MAX),
+            expectation: image.has_expectation(),
+        }
+    }
+
+    /// Whether both are the same image, byte for byte.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        (&self.name, self.length, self.crc) == (&other.name, other.length, other.crc)
+    }
+
+    /// The entry as it goes over the link.
+    pub(crate) fn listing(&self, index: u8, loaded: bool) -> Listing {
+        Listing {
+            index,
+            name: self.name.clone(),
+            length: self.length,
+            crc: self.crc,
+            duration: self.duration,
+            kernels: self.kernels,
+            expectation: self.expectation,
+            loaded,
+        }
+    }
+}
+
+/// The entries of all places.
+#[derive(Debug)]
+pub(crate) struct Directory {
+    entries: [Option<Entry>; PLACES],
+    places: u8,
+}
+
+impl Directory {
+    /// Reads a store. An image that is not sound is as good as none: its place is free.
+    pub(crate) fn read(store: &impl Store) -> Self {
+        let mut directory = Self {
+            entries: [const { None }; PLACES],
+            places: store.slots().min(u8::try_from(PLACES).unwrap_or(0)),
+        };
+        for (slot, entry) in (0..directory.places).zip(directory.entries.iter_mut()) {
+            let image = store
+                .image(slot)
+                .and_then(|bytes| PrimitiveImage::parse(bytes).ok());
+            *entry = image.as_ref().map(Entry::of);
+        }
+        directory
+    }
+
+    /// Number of places.
+    pub(crate) fn places(&self) -> u8 {
+        self.places
+    }
+
+    /// The entry of a place.
+    pub(crate) fn get(&self, slot: u8) -> Option<&Entry> {
+        self.entries.get(usize::from(slot))?.as_ref()
+    }
+
+    /// Place and entry of a name.
+    pub(crate) fn find(&self, name: &Name) -> Option<(u8, &Entry)> {
+        (0..self.places).find_map(|slot| {
+            self.get(slot)
+                .filter(|entry| entry.name == *name)
+                .map(|entry| (slot, entry))
+        })
+    }
+
+    /// A place to put an image of a new name: a free one. Its store may still hold an unsound image there.
+    pub(crate) fn free(&self) -> Option<u8> {
+        (0..self.places).find(|slot| self.get(*slot).is_none())
+    }
+
+    /// Notes what is at a place now.
+    pub(crate) fn set(&mut self, slot: u8, entry: Option<Entry>) {
+        if let Some(place) = self.entries.get_mut(usize::from(slot)) {
+            *place = entry;
+        }
+    }
+}

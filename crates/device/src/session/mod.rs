@@ -1,0 +1,373 @@
+//! `Session`: the low-priority half of the co-controller, which talks with the host.
+//!
+//! Sans-I/O: bytes go in by [`Session::receive`], everything else happens in [`Session::poll`] through a
+//! [`SessionPort`]. The rules are those of `docs/protocol.md`:
+//!
+//! - nothing is answered before a matching hello; one host at a time;
+//! - every request is answered once, and acted on once however often it is repeated;
+//! - a request for the control half is answered when that half has taken or refused it;
+//! - an arm that moves is stopped when the host has been silent for half a second;
+//! - an image replaces another only when it is complete, undamaged and fit for this arm.
+
+mod directory;
+mod owner;
+mod pending;
+mod primitive;
+mod request;
+mod upload;
+mod wire;
+
+use control::State;
+use control::arm::ArmModel;
+use heapless::Deque;
+use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame, LINK_TIMEOUT_MS};
+use link::image::{KERNEL_LIMIT, WEIGHT_ROWS};
+use link::{Event, EventKind, Refusal, Reply, Request, Statistics};
+
+use crate::event::EventKind as CoreEvent;
+use crate::port::{SessionPort, TimedRecord};
+use crate::store::Store;
+use directory::{Directory, Entry};
+use owner::Owner;
+use pending::Pending;
+use primitive::WeightRoom;
+use upload::Upload;
+
+pub use wire::{PrimitiveTrouble, StartupTrouble};
+
+/// Requests that have arrived and are not handled yet. A host waits for its answers, so two would do.
+const INBOX: usize = 4;
+
+/// Room the session keeps free on the line for an answer before it sends telemetry.
+const ANSWER_ROOM: usize = FRAME_BYTES;
+
+/// Who the device is, for its hello.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Identity {
+    /// Firmware version and git revision.
+    pub firmware: &'static str,
+    /// Board.
+    pub board: &'static str,
+    /// Serial number.
+    pub serial: &'static str,
+    /// Under QEMU or in-process.
+    pub simulated: bool,
+    /// Unit of all `*_ticks`: ticks per second.
+    pub ticks_per_second: u32,
+}
+
+/// The device's end of the link.
+///
+/// About 12 kB beside the store; [`crate::RamStore`] should be a static of its own, lent as `&mut`.
+#[derive(Debug)]
+pub struct Session<S> {
+    identity: Identity,
+    model: ArmModel<f32>,
+    store: S,
+    directory: Directory,
+    decoder: Decoder<FRAME_BYTES>,
+    inbox: Deque<Frame<Request>, INBOX>,
+    overrun: u32,
+    sequence: u16,
+    owner: Option<Owner>,
+    pending: Pending,
+    upload: Option<Upload>,
+    loaded: Option<Entry>,
+    telemetry_every: u8,
+    latest: Option<TimedRecord>,
+    limited_cycles: u32,
+    telemetry_dropped: u32,
+    events_dropped: u32,
+    link_timeouts: u32,
+    room: WeightRoom,
+}
+
+impl<S: Store> Session<S> {
+    /// A session without a host. Reads the store. `model` is the arm primitives are checked against.
+    pub fn new(identity: Identity, model: ArmModel<f32>, store: S) -> Self {
+        let directory = Directory::read(&store);
+        Self {
+            identity,
+            model,
+            store,
+            directory,
+            decoder: Decoder::new(),
+            inbox: Deque::new(),
+            overrun: 0,
+            sequence: 0,
+            owner: None,
+            pending: Pending::default(),
+            upload: None,
+            loaded: None,
+            telemetry_every: 0,
+            latest: None,
+            limited_cycles: 0,
+            telemetry_dropped: 0,
+            events_dropped: 0,
+            link_timeouts: 0,
+            room: [0.0; WEIGHT_ROWS * KERNEL_LIMIT],
+        }
+    }
+
+    /// The store, for inspection.
+    pub fn store(&self) -> &S {
+        &self.store
+    }
+
+    /// Takes bytes from the line. Never acts on them; [`Session::poll`] does.
+    pub fn receive(&mut self, mut bytes: &[u8]) {
+        while let Some(frame) = self.decoder.next::<Request>(&mut bytes) {
+            if self.inbox.is_full() {
+                self.overrun = self.overrun.wrapping_add(1);
+                // The host repeats what was not answered. A stop must not wait for that: the oldest gives way.
+                if frame.message != Request::Stop {
+                    continue;
+                }
+                self.inbox.pop_front();
+            }
+            // There is room now: it was made above.
+            let _ = self.inbox.push_back(frame);
+        }
+    }
+
+    /// Does everything that is due: answers, events, requests, telemetry, time-outs. Call it at least every
+    /// millisecond or two; `now_us` is the device's time.
+    pub fn poll(&mut self, now_us: u64, port: &mut impl SessionPort) {
+        let now_ms = milliseconds(now_us);
+        self.forward_events(now_ms, port);
+        self.drop_unanswered(now_ms, port);
+        while port.room() >= 2 * ANSWER_ROOM {
+            let Some(frame) = self.inbox.pop_front() else {
+                break;
+            };
+            self.handle(now_ms, frame, port);
+        }
+        self.forward_records(now_ms, port);
+        self.watch_host(now_ms, port);
+    }
+
+    /// Events of the control half: answers to commands, and news.
+    fn forward_events(&mut self, now_ms: u32, port: &mut impl SessionPort) {
+        while let Some(event) = port.event() {
+            let answer = match event.kind {
+                CoreEvent::Accepted => Some(Ok(())),
+                CoreEvent::Refused(reason) => {
+                    let fault = self.latest.map_or(0, |timed| timed.record.fault.code());
+                    Some(Err(wire::refusal(reason, &port.health(), fault)))
+                }
+                _ => None,
+            };
+            let Some(answer) = answer else {
+                if let Some(event) = wire::event(event) {
+                    self.tell(now_ms, event, port);
+                }
+                continue;
+            };
+            match (self.pending.answered(), answer) {
+                (Some(asker), answer) => {
+                    let Some(of) = self.waiting(asker) else {
+                        continue;
+                    };
+                    let reply = match answer {
+                        Ok(()) => Reply::Accepted { of },
+                        Err((reason, detail)) => Reply::Refused { of, reason, detail },
+                    };
+                    self.answer(now_ms, reply, port);
+                }
+                (None, Ok(())) => {}
+                (None, Err((reason, [detail, _]))) => {
+                    let (cycle, code) = (wire::cycle(event.cycle), reason.code().into());
+                    self.tell(
+                        now_ms,
+                        Event {
+                            cycle,
+                            kind: EventKind::CommandRefused,
+                            code,
+                            detail,
+                        },
+                        port,
+                    );
+                }
+            }
+        }
+    }
+
+    /// Commands the control half has not answered for too long.
+    fn drop_unanswered(&mut self, now_ms: u32, port: &mut impl SessionPort) {
+        while let Some((asker, waited)) = self.pending.expired(now_ms) {
+            if let Some(of) = self.waiting(asker) {
+                self.answer(
+                    now_ms,
+                    Reply::Refused {
+                        of,
+                        reason: Refusal::NoAnswer,
+                        detail: [waited, 0],
+                    },
+                    port,
+                );
+            }
+        }
+    }
+
+    /// The number of the request, if it is the present host that asked.
+    fn waiting(&self, asker: Option<(u16, u16)>) -> Option<u16> {
+        let (session, of) = asker?;
+        self.owner
+            .as_ref()
+            .filter(|owner| owner.session() == session)
+            .map(|_| of)
+    }
+
+    /// Cycle records: the latest is kept, every so many go out as telemetry if the line has room.
+    fn forward_records(&mut self, now_ms: u32, port: &mut impl SessionPort) {
+        const LIMITED: u16 = control::flags::JOINT_LIMITED
+            | control::flags::MOTOR_LIMITED
+            | control::flags::RATE_LIMITED;
+        while let Some(timed) = port.record() {
+            self.latest = Some(timed);
+            if timed.record.flags & LIMITED != 0 {
+                self.limited_cycles = self.limited_cycles.wrapping_add(1);
+            }
+            let due = self.owner.is_some()
+                && timed.record.cycle.checked_rem(self.telemetry_every.into()) == Some(0);
+            if !due {
+                continue;
+            }
+            if port.room() >= FRAME_BYTES + ANSWER_ROOM {
+                self.send(now_ms, &Reply::Telemetry(wire::telemetry(&timed)), port);
+            } else {
+                self.telemetry_dropped = self.telemetry_dropped.wrapping_add(1);
+            }
+        }
+    }
+
+    /// Stops a motion whose host has fallen silent or gone, and ends its session: what it says next may be stale.
+    fn watch_host(&mut self, now_ms: u32, port: &mut impl SessionPort) {
+        let silence = self.owner.as_ref().map(|owner| owner.silence(now_ms));
+        if silence.is_some_and(|silence| silence < LINK_TIMEOUT_MS) {
+            return;
+        }
+        let health = port.health();
+        let moving = matches!(
+            health.state,
+            State::Gravity | State::Approach | State::Run | State::Coast
+        );
+        // Without a host the stop may be on its way already.
+        if !moving || (silence.is_none() && !self.pending.is_empty()) {
+            return;
+        }
+        if port.command(control::Command::Stop.into()).is_err() {
+            // Tried again in the next poll: the session stays open until the stop is on its way.
+            return;
+        }
+        self.pending.push(None, now_ms);
+        self.link_timeouts = self.link_timeouts.wrapping_add(1);
+        let (cycle, detail) = (wire::cycle(health.cycle), silence.unwrap_or(0));
+        self.tell(
+            now_ms,
+            Event {
+                cycle,
+                kind: EventKind::LinkTimeout,
+                code: 0,
+                detail,
+            },
+            port,
+        );
+        self.close();
+    }
+
+    /// Ends the session of the present host.
+    fn close(&mut self) {
+        self.owner = None;
+        self.telemetry_every = 0;
+        self.upload = None;
+        self.store.abort();
+    }
+
+    /// Sends an answer and keeps it for a repetition of its request.
+    fn answer(&mut self, now_ms: u32, reply: Reply, port: &mut impl SessionPort) {
+        if port.room() >= FRAME_BYTES {
+            self.send(now_ms, &reply, port);
+        }
+        if let Some(owner) = &mut self.owner {
+            owner.remember(reply);
+        }
+    }
+
+    /// Sends an event if anybody listens and the line has room.
+    fn tell(&mut self, now_ms: u32, event: Event, port: &mut impl SessionPort) {
+        if self.owner.is_none() {
+            return;
+        }
+        if port.room() >= FRAME_BYTES {
+            self.send(now_ms, &Reply::Event(event), port);
+        } else {
+            self.events_dropped = self.events_dropped.wrapping_add(1);
+        }
+    }
+
+    /// Sends a message to the host that has the session.
+    fn send(&mut self, now_ms: u32, reply: &Reply, port: &mut impl SessionPort) {
+        let session = self.owner.as_ref().map_or(0, Owner::session);
+        self.send_to(session, now_ms, reply, port);
+    }
+
+    /// Sends a message to a host, be it the one that has the session or not.
+    fn send_to(&mut self, session: u16, now_ms: u32, reply: &Reply, port: &mut impl SessionPort) {
+        let mut buffer = [0; FRAME_BYTES];
+        let envelope = Envelope {
+            session,
+            sequence: self.sequence,
+            time_ms: now_ms,
+        };
+        if let Some(frame) = frame::encode(envelope, reply, &mut buffer)
+            .ok()
+            .and_then(|length| buffer.get(..length))
+        {
+            self.sequence = self.sequence.wrapping_add(1);
+            port.send(frame);
+        }
+    }
+
+    /// All counters: those of the control half, of the board, and its own.
+    fn statistics(&self, port: &mut impl SessionPort) -> Statistics {
+        let counters = port.health().counters;
+        let timing = port.timing();
+        let mut link = self.decoder.counters();
+        link.overrun = self.overrun;
+        Statistics {
+            cycles: counters.cycles,
+            missed_deadlines: counters.overruns,
+            cost_worst_ticks: timing.cost_worst_ticks,
+            cost_mean_ticks: timing.cost_mean_ticks,
+            latency_worst_ticks: timing.latency_worst_ticks,
+            lost_replies: counters.lost_replies,
+            late_replies: counters.late_replies,
+            rejected_frames: counters
+                .malformed_frames
+                .wrapping_add(counters.foreign_frames),
+            frames_sent: counters.frames_sent,
+            frames_received: counters.frames_received,
+            frames_dropped: counters.frames_refused,
+            torque_mismatches: counters.torque_mismatches,
+            bus_errors: counters.bus_errors,
+            bus_restarts: counters.restarts,
+            limited_cycles: self.limited_cycles,
+            telemetry_dropped: self.telemetry_dropped,
+            events_dropped: self.events_dropped,
+            link_timeouts: self.link_timeouts,
+            link,
+            stack_free: timing.stack_free,
+            stack_size: timing.stack_size,
+        }
+    }
+}
+
+/// The device's time as it stands in envelopes, where it wraps after 49 days.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "wrapping is the documented meaning"
+)]
+const fn milliseconds(now_us: u64) -> u32 {
+    (now_us / 1000) as u32
+}

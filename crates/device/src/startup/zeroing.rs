@@ -1,0 +1,149 @@
+//! The second half of the start-up: a person says where the arm stands, the pucks and the safety module are told.
+
+use puck::{Group, Node, PropertyId, SafetyMode, get, set};
+
+use super::home::home_counts;
+use super::sequence::{Next, POLL_US, Startup, Step, ZeroRequest, after};
+use super::stage::StartupError;
+use crate::bus::Outlet;
+use crate::command::Refusal;
+
+/// How long the seven replies to one position request may take, us.
+const POSITIONS_US: u64 = 10_000;
+/// How far a puck may stand from the position just written, counts (0.3 rad of a motor, 7 mrad of J1): a braked arm sinks a
+/// little between the write and the read.
+const ZERO_TOLERANCE: i32 = 200;
+
+impl Startup {
+    /// The arm stands at `home` (rad): write the positions. The answer follows in [`Startup::zero_answer`].
+    pub(crate) fn zero(&mut self, home: &[f32; 7]) {
+        self.zero_request = match self.accept_zero(home) {
+            Ok(()) => ZeroRequest::Pending,
+            Err(reason) => ZeroRequest::Answered(Err(reason)),
+        };
+    }
+
+    fn accept_zero(&mut self, home: &[f32; 7]) -> Result<(), Refusal> {
+        let (Some(calibration), Step::AwaitZero { .. } | Step::Done) =
+            (&self.calibration, self.step)
+        else {
+            return Err(Refusal::NotReady(self.stage()));
+        };
+        self.targets = home_counts(calibration, home)?;
+        self.exchange.abandon();
+        self.step = Step::ConfirmIdle;
+        Ok(())
+    }
+
+    /// Whether a command to zero the arm has no answer yet.
+    pub(crate) fn is_zero_pending(&self) -> bool {
+        self.zero_request == ZeroRequest::Pending
+    }
+
+    /// The answer to a command to zero the arm, once.
+    pub(crate) fn zero_answer(&mut self) -> Option<Result<(), Refusal>> {
+        let ZeroRequest::Answered(answer) = self.zero_request else {
+            return None;
+        };
+        self.zero_request = ZeroRequest::None;
+        Some(answer)
+    }
+
+    /// The latest word of the safety module before positions are rewritten.
+    pub(super) fn confirm_idle(&mut self, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
+        let Some(mode) = self.ask_safety(PropertyId::MODE, outlet)? else {
+            return Ok(Next::Stay);
+        };
+        if SafetyMode::from_value(mode) == Some(SafetyMode::Idle) {
+            self.zero_request = ZeroRequest::Answered(Ok(()));
+            self.zeroed = false;
+            return Ok(Next::Go(Step::IgnoreFaults));
+        }
+        self.zero_request = ZeroRequest::Answered(Err(Refusal::ZeroNeedsIdle));
+        // Back to where the command came in: toward the loop if the arm is zeroed, else to the person.
+        let next_us = outlet.now_us() + POLL_US;
+        Ok(Next::Go(if self.zeroed {
+            Step::AskZero
+        } else {
+            Step::AwaitZero { next_us }
+        }))
+    }
+
+    pub(super) fn await_zero(
+        &mut self,
+        next_us: u64,
+        outlet: &mut impl Outlet,
+    ) -> Result<Next, StartupError> {
+        if outlet.now_us() < next_us {
+            return Ok(Next::Stay);
+        }
+        let Some(mode) = self.ask_safety(PropertyId::MODE, outlet)? else {
+            return Ok(Next::Stay);
+        };
+        if SafetyMode::from_value(mode) == Some(SafetyMode::EStop) {
+            // The pucks have lost power, and with it everything read and written.
+            *self = Startup::new();
+            return Ok(Next::Stay);
+        }
+        Ok(Next::Go(Step::AwaitZero {
+            next_us: outlet.now_us() + POLL_US,
+        }))
+    }
+
+    pub(super) fn write_position(&mut self, joint: u8, outlet: &mut impl Outlet) -> Next {
+        let index = usize::from(joint);
+        match (Node::ARM.get(index), self.targets.get(index)) {
+            (Some(node), Some(target)) => {
+                let frame = set(*node, PropertyId::POSITION, target.0);
+                after(outlet.send(frame), Step::WritePosition { joint: joint + 1 })
+            }
+            _ => Next::Go(Step::CheckPositions { until_us: None }),
+        }
+    }
+
+    pub(super) fn check_positions(
+        &mut self,
+        until_us: Option<u64>,
+        outlet: &mut impl Outlet,
+    ) -> Result<Next, StartupError> {
+        let next = self.read_positions(until_us, Step::TellZero, outlet, |until_us| {
+            Step::CheckPositions { until_us }
+        })?;
+        if matches!(next, Next::Go(Step::TellZero)) {
+            for ((node, position), target) in
+                Node::ARM.into_iter().zip(self.positions).zip(self.targets)
+            {
+                let near = position
+                    .is_some_and(|position| (position.0 - target.0).abs() <= ZERO_TOLERANCE);
+                if !near {
+                    return Err(StartupError::ZeroNotTaken(node));
+                }
+            }
+        }
+        Ok(next)
+    }
+
+    /// One position request to the arm; goes on to `done` when all seven have answered.
+    pub(super) fn read_positions(
+        &mut self,
+        until_us: Option<u64>,
+        done: Step,
+        outlet: &mut impl Outlet,
+        waiting: impl Fn(Option<u64>) -> Step,
+    ) -> Result<Next, StartupError> {
+        let Some(until_us) = until_us else {
+            self.positions = [None; 7];
+            let sent = outlet.send(get(Group::ARM, PropertyId::POSITION));
+            return Ok(after(sent, waiting(Some(outlet.now_us() + POSITIONS_US))));
+        };
+        match Node::ARM
+            .into_iter()
+            .zip(self.positions)
+            .find(|(_, position)| position.is_none())
+        {
+            None => Ok(Next::Go(done)),
+            Some((node, _)) if outlet.now_us() >= until_us => Err(StartupError::NoAnswer(node)),
+            Some(_) => Ok(Next::Stay),
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! Where primitives are kept: places for whole images, and a spare one in which an upload grows.
+//!
+//! Invariants every [`Store`] keeps: an image is either wholly there or not at all; until [`Store::commit`] returns,
+//! reading gives what it gave before the upload began, even if power fails in between (for a store that outlives
+//! power); names are the session's business, not the store's.
+
+use core::fmt;
+
+/// Places of the store of a device without flash of its own.
+pub const STORE_SLOTS: usize = 8;
+
+/// Bytes of a place: the largest image there can be.
+pub const STORE_SLOT_BYTES: usize = link::image::IMAGE_BYTES_LIMIT;
+
+/// Why the store did not do it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StoreError {
+    /// The image is larger than a place.
+    TooLarge,
+    /// No image is being written, or bytes outside the announced length.
+    NotOpen,
+    /// There is no such place, or nothing in it.
+    NoPlace,
+    /// The medium failed.
+    Medium,
+}
+
+impl StoreError {
+    /// Number of the error in the detail of a refusal; never renumbered.
+    #[must_use]
+    pub const fn code(self) -> u32 {
+        match self {
+            Self::TooLarge => 1,
+            Self::NotOpen => 2,
+            Self::NoPlace => 3,
+            Self::Medium => 4,
+        }
+    }
+}
+
+impl fmt::Display for StoreError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::TooLarge => "the image is larger than a place of the store",
+            Self::NotOpen => "no image is being written",
+            Self::NoPlace => "there is no image at that place",
+            Self::Medium => "the storage failed",
+        })
+    }
+}
+
+impl core::error::Error for StoreError {}
+
+/// Places for images.
+pub trait Store {
+    /// Number of places.
+    fn slots(&self) -> u8;
+
+    /// Most bytes of one image.
+    fn slot_bytes(&self) -> usize;
+
+    /// The image at a place.
+    fn image(&self, slot: u8) -> Option<&[u8]>;
+
+    /// Opens the spare place for an image of `length` bytes; forgets one that was being written.
+    ///
+    /// # Errors
+    /// [`StoreError::TooLarge`], [`StoreError::Medium`]
+    fn begin(&mut self, length: usize) -> Result<(), StoreError>;
+
+    /// Writes a part of the image.
+    ///
+    /// # Errors
+    /// [`StoreError::NotOpen`] outside the length announced, [`StoreError::Medium`]
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), StoreError>;
+
+    /// The image being written, all of its announced length.
+    fn staged(&self) -> Option<&[u8]>;
+
+    /// Makes the image being written the one at place `slot`, whatever was there.
+    ///
+    /// # Errors
+    /// [`StoreError::NotOpen`], [`StoreError::NoPlace`], [`StoreError::Medium`]. The store is then as before.
+    fn commit(&mut self, slot: u8) -> Result<(), StoreError>;
+
+    /// Forgets the image being written.
+    fn abort(&mut self);
+
+    /// Empties a place.
+    ///
+    /// # Errors
+    /// [`StoreError::NoPlace`], [`StoreError::Medium`]
+    fn delete(&mut self, slot: u8) -> Result<(), StoreError>;
+}
+
+impl<S: Store + ?Sized> Store for &mut S {
+    fn slots(&self) -> u8 {
+        (**self).slots()
+    }
+
+    fn slot_bytes(&self) -> usize {
+        (**self).slot_bytes()
+    }
+
+    fn image(&self, slot: u8) -> Option<&[u8]> {
+        (**self).image(slot)
+    }
+
+    fn begin(&mut self, length: usize) -> Result<(), StoreError> {
+        (**self).begin(length)
+    }
+
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), StoreError> {
+        (**self).write(offset, bytes)
+    }
+
+    fn staged(&self) -> Option<&[u8]> {
+        (**self).staged()
+    }
+
+    fn commit(&mut self, slot: u8) -> Result<(), StoreError> {
+        (**self).commit(slot)
+    }
+
+    fn abort(&mut self) {
+        (**self).abort();
+    }
+
+    fn delete(&mut self, slot: u8) -> Result<(), StoreError> {
+        (**self).delete(slot)
+    }
+}
+
+/// One place in memory; empty while `length` is 0.
+#[derive(Debug, Clone, Copy)]
+struct Area<const BYTES: usize> {
+    length: usize,
+    bytes: [u8; BYTES],
+}
+
+impl<const BYTES: usize> Area<BYTES> {
+    const EMPTY: Self = Self {
+        length: 0,
+        bytes: [0; BYTES],
+    };
+
+    fn image(&self) -> Option<&[u8]> {
+        if self.length == 0 {
+            None
+        } else {
+            self.bytes.get(..self.length)
+        }
+    }
+}
+
+/// A store in memory: gone when the power is. Takes `(SLOTS + 1) * BYTES` bytes; put it into a static.
+#[derive(Debug, Clone)]
+pub struct RamStore<const SLOTS: usize, const BYTES: usize> {
+    areas: [Area<BYTES>; SLOTS],
+    spare: Area<BYTES>,
+}
+
+impl<const SLOTS: usize, const BYTES: usize> RamStore<SLOTS, BYTES> {
+    /// An empty store.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            areas: [Area::EMPTY; SLOTS],
+            spare: Area::EMPTY,
+        }
+    }
+}
+
+impl<const SLOTS: usize, const BYTES: usize> Default for RamStore<SLOTS, BYTES> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const SLOTS: usize, const BYTES: usize> Store for RamStore<SLOTS, BYTES> {
+    fn slots(&self) -> u8 {
+        u8::try_from(SLOTS).unwrap_or(u8::MAX)
+    }
+
+    fn slot_bytes(&self) -> usize {
+        BYTES
+    }
+
+    fn image(&self, slot: u8) -> Option<&[u8]> {
+        self.areas.get(usize::from(slot))?.image()
+    }
+
+    fn begin(&mut self, length: usize) -> Result<(), StoreError> {
+        self.abort();
+        if length == 0 || length > BYTES {
+            return Err(StoreError::TooLarge);
+        }
+        self.spare.length = length;
+        Ok(())
+    }
+
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), StoreError> {
+        let end = offset.checked_add(bytes.len()).ok_or(StoreError::NotOpen)?;
+        if end > self.spare.length {
+            return Err(StoreError::NotOpen);
+        }
+        self.spare
+            .bytes
+            .get_mut(offset..end)
+            .ok_or(StoreError::NotOpen)?
+            .copy_from_slice(bytes);
+        Ok(())
+    }
+
+    fn staged(&self) -> Option<&[u8]> {
+        self.spare.image()
+    }
+
+    fn commit(&mut self, slot: u8) -> Result<(), StoreError> {
+        if self.spare.length == 0 {
+            return Err(StoreError::NotOpen);
+        }
+        let area = self
+            .areas
+            .get_mut(usize::from(slot))
+            .ok_or(StoreError::NoPlace)?;
+        core::mem::swap(area, &mut self.spare);
+        self.abort();
+        Ok(())
+    }
+
+    fn abort(&mut self) {
+        self.spare.length = 0;
+    }
+
+    fn delete(&mut self, slot: u8) -> Result<(), StoreError> {
+        let area = self
+            .areas
+            .get_mut(usize::from(slot))
+            .ok_or(StoreError::NoPlace)?;
+        if core::mem::take(&mut area.length) == 0 {
+            Err(StoreError::NoPlace)
+        } else {
+            Ok(())
+        }
+    }
+}

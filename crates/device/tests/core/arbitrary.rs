@@ -1,0 +1,145 @@
+//! A6, C2: whatever comes over the bus and from people, in whatever order, the core neither panics nor sends torque early.
+
+use control::Command as Control;
+use device::{Command, Core, Stage};
+use proptest::prelude::*;
+use puck::{CanFrame, CanId, Counts, Node, PuckTorque, SafetyMode};
+
+use crate::double::{Bus, HOME};
+
+/// Something that happens to the device.
+#[derive(Clone, Debug)]
+enum Happening {
+    Frame(CanFrame),
+    Position(usize, i32),
+    Lost(usize, u32),
+    Late(usize, u64),
+    Person(Person),
+    Idle,
+    Activate,
+    EmergencyStop,
+    PuckResets(usize),
+    NoRoom(u32),
+    Overrun,
+    BusError(bool),
+    Time(usize),
+}
+
+#[derive(Clone, Debug)]
+enum Person {
+    Zero([f32; 7]),
+    Control(u8, [f32; 7]),
+}
+
+impl Person {
+    fn command(&self) -> Command {
+        match self {
+            Person::Zero(home) => Command::Zero { home: *home },
+            Person::Control(kind, q) => Command::Control(match kind % 8 {
+                0 => Control::Gravity,
+                1 => Control::Hold,
+                2 => Control::Approach {
+                    q: *q,
+                    duration: q[0],
+                },
+                3 => Control::Run(control::RunOptions {
+                    speed: q[1],
+                    ..Default::default()
+                }),
+                4 => Control::Stop,
+                5 => Control::ClearFault,
+                6 => Control::SetSpeed { factor: q[2] },
+                _ => Control::Tare,
+            }),
+        }
+    }
+}
+
+fn happening() -> impl Strategy<Value = Happening> {
+    let frame =
+        (0..=0x7FF_u16, prop::collection::vec(any::<u8>(), 0..=8)).prop_map(|(id, data)| {
+            CanFrame::from_slice(CanId::new(id).expect("eleven bits"), &data)
+                .expect("at most eight bytes")
+        });
+    // Frames of the right kind from the right nodes reach further than random ones.
+    let reply = (
+        prop::sample::select(vec![0x426_u16, 0x546, 0x423, 0x4E3, 0x50A, 0x50B, 0x540]),
+        any::<[u8; 4]>(),
+    )
+        .prop_map(|(id, data)| {
+            CanFrame::from_slice(CanId::new(id).expect("eleven bits"), &data).expect("four bytes")
+        });
+    let angles = prop::array::uniform7(
+        prop_oneof![8 => -3.0_f32..3.0, 1 => Just(f32::NAN), 1 => Just(f32::INFINITY)],
+    );
+    prop_oneof![
+        4 => frame.prop_map(Happening::Frame),
+        4 => reply.prop_map(Happening::Frame),
+        2 => (0..7_usize, any::<i32>()).prop_map(|(joint, counts)| Happening::Position(joint, counts)),
+        2 => (0..7_usize, 0..8_u32).prop_map(|(joint, count)| Happening::Lost(joint, count)),
+        1 => (0..7_usize, 0..8_000_u64).prop_map(|(joint, delay)| Happening::Late(joint, delay)),
+        2 => prop_oneof![Just(HOME), angles.clone()].prop_map(|home| Happening::Person(Person::Zero(home))),
+        6 => (any::<u8>(), angles).prop_map(|(kind, q)| Happening::Person(Person::Control(kind, q))),
+        1 => Just(Happening::Idle),
+        2 => Just(Happening::Activate),
+        1 => Just(Happening::EmergencyStop),
+        1 => (0..7_usize).prop_map(Happening::PuckResets),
+        1 => (0..30_u32).prop_map(Happening::NoRoom),
+        1 => Just(Happening::Overrun),
+        1 => any::<bool>().prop_map(Happening::BusError),
+        8 => (1..2_000_usize).prop_map(Happening::Time),
+    ]
+}
+
+fn happen(core: &mut Core, bus: &mut Bus, happening: &Happening) {
+    match happening {
+        Happening::Frame(frame) => bus.inject(*frame),
+        Happening::Position(joint, counts) => bus.pucks[*joint].position = Counts(*counts),
+        Happening::Lost(joint, count) => bus.pucks[*joint].lose = *count,
+        Happening::Late(joint, delay_us) => bus.pucks[*joint].delay_us = *delay_us,
+        Happening::Person(person) => bus.commands.push_back(person.command()),
+        Happening::Idle => bus.press_idle(),
+        Happening::Activate => {
+            // The pendant raises IDLE to ACTIVE, never E-STOP.
+            if bus.safety_mode == SafetyMode::Idle {
+                bus.press_activate();
+            }
+        }
+        Happening::EmergencyStop => bus.press_emergency_stop(),
+        Happening::PuckResets(joint) => bus.pucks[*joint].awake_at = None,
+        Happening::NoRoom(frames) => bus.refuse = *frames,
+        Happening::Overrun => core.note_overrun(),
+        Happening::BusError(bus_off) => core.note_bus_error(*bus_off),
+        Happening::Time(slots) => bus.run_slots(core, *slots),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// The double panics on any request that no master may send (setting TORQUE, pulling the emergency stop, zeroing under
+    /// torque, malformed frames), so this is a test of both directions.
+    #[test]
+    fn c2_torque_needs_a_whole_start_up_and_a_command(story in prop::collection::vec(happening(), 1..60)) {
+        let (mut core, mut bus) = (Core::new(), Bus::idle());
+        let mut may_move = false;
+        for happening in &story {
+            let before = bus.log.len();
+            happen(&mut core, &mut bus, happening);
+            bus.run_slots(&mut core, 1);
+            may_move |= core.health().zeroed && core.stage() >= Stage::WaitingForActive;
+            let torque = bus.torques_since(before).any(|torque| torque != PuckTorque::ZERO);
+            prop_assert!(!torque || may_move, "torque in {:?} after {happening:?}", core.stage());
+        }
+        // Whatever happened, an emergency stop ends it, and the device finds its way back.
+        bus.refuse = 0;
+        bus.commands.clear();
+        bus.press_emergency_stop();
+        bus.run(&mut core, 3.0);
+        let settled = bus.log.len();
+        bus.press_idle();
+        bus.run_until(&mut core, Stage::WaitingForZero);
+        prop_assert!(bus.torques_since(settled).all(|torque| torque == PuckTorque::ZERO));
+        prop_assert!(bus.pucks.iter().zip(Node::ARM).all(|(puck, _)| puck.awake_at.is_some()));
+    }
+}

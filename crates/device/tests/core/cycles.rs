@@ -1,0 +1,370 @@
+//! The cyclic loop: rounds, torque authority, and every way in which it ends.
+
+use control::{Command, Fault, State};
+use device::{Core, EventKind, Slot, Stage};
+use puck::device::{position_frame, reply16};
+use puck::{CanFrame, CanId, Counts, Destination, GaugeStatus, Node, PropertyId, PuckTorque};
+
+use crate::double::{ARM, Bus, floating, started};
+
+/// Slots of one control cycle.
+const CYCLE: usize = 3;
+
+fn has_torque(bus: &Bus, since: usize) -> bool {
+    bus.torques_since(since)
+        .any(|torque| torque != PuckTorque::ZERO)
+}
+
+fn lost(core: &Core) -> u32 {
+    core.health().counters.lost_replies
+}
+
+#[test]
+fn torque_needs_an_active_arm_and_a_command() {
+    let (mut core, mut bus) = started();
+    bus.run(&mut core, 0.5);
+    bus.commands.push_back(Command::Gravity.into());
+    bus.run(&mut core, 0.5);
+    assert!(
+        bus.events
+            .iter()
+            .any(|event| matches!(event, EventKind::Refused(_))),
+        "not active: {:?}",
+        bus.events
+    );
+    bus.press_activate();
+    bus.run(&mut core, 1.0);
+    assert_eq!(core.stage(), Stage::Ready);
+    assert!(
+        !has_torque(&bus, 0),
+        "active, but nobody has commanded anything"
+    );
+    // Both zero frames of every cycle were sent all the same: a puck keeps its last torque until it hears another.
+    let cycles = core.health().counters.cycles as usize;
+    assert_eq!(bus.torques_since(0).count(), cycles * 8);
+
+    let (_, bus) = floating();
+    assert!(has_torque(&bus, 0), "and with a command there is torque");
+}
+
+#[test]
+fn every_cycle_asks_once_and_sends_both_torque_frames() {
+    let (mut core, mut bus) = floating();
+    bus.run_to(&mut core, Slot::Request);
+    let begin = bus.log.len();
+    bus.run_slots(&mut core, 300 * CYCLE);
+    let count = |id: u16| {
+        bus.log[begin..]
+            .iter()
+            .filter(|(_, frame)| frame.can_id().raw() == id)
+            .count()
+    };
+    assert_eq!(
+        [count(0x404), count(0x008), count(0x401), count(0x402)],
+        [300; 4]
+    );
+    assert!(
+        count(10) >= 150,
+        "{} questions to the safety module in a second",
+        count(10)
+    );
+    assert_eq!(core.health().counters.torque_mismatches, 0);
+    assert_eq!(
+        core.health()
+            .temperatures
+            .map(|degrees| degrees.unwrap_or(0)),
+        [30, 31, 32, 33, 34, 35, 36]
+    );
+    assert_eq!(core.health().pendant, Some(0x0F3F_1249));
+}
+
+#[test]
+fn a_lost_reply_is_missing_for_its_joint_alone() {
+    let (mut core, mut bus) = floating();
+    bus.run_to(&mut core, Slot::Request);
+    let before = lost(&core);
+    bus.pucks[2].lose = 1;
+    bus.run_slots(&mut core, CYCLE);
+    let record = bus.records.last().expect("a record");
+    assert_eq!((lost(&core) - before, record.lost_replies), (1, 1));
+    assert_eq!(record.state, State::Coast);
+    bus.run_slots(&mut core, CYCLE);
+    let record = bus.records.last().expect("a record");
+    assert_eq!(
+        (record.lost_replies, record.state),
+        (0, State::Gravity),
+        "and the next cycle is whole again"
+    );
+    assert_eq!(core.health().counters.restarts, 0);
+}
+
+/// A5: a reply that comes in the next cycle must not be taken for an answer to that cycle's request.
+#[test]
+fn a5_a_late_reply_never_reaches_the_next_cycle() {
+    for delay_us in [1_500, 2_500, 3_300, 3_400] {
+        let (mut core, mut bus) = floating();
+        bus.run_to(&mut core, Slot::Request);
+        let still = bus.records.last().expect("a record").q;
+        // The late reply carries a position 20 counts away; the arm itself has not moved when the next cycle asks.
+        let truth = bus.pucks[0].position;
+        bus.pucks[0].position = Counts(truth.0 + 20);
+        bus.pucks[0].delay_us = delay_us;
+        bus.run_slots(&mut core, 1);
+        bus.pucks[0].position = truth;
+        bus.run_slots(&mut core, CYCLE - 1);
+        assert_eq!(
+            bus.records.last().expect("a record").lost_replies,
+            1,
+            "{delay_us} us late"
+        );
+        // A reply so late that it meets the next one makes both worthless; the cycle after that is whole.
+        for _ in 0..2 {
+            bus.run_slots(&mut core, CYCLE);
+            let record = bus.records.last().expect("a record");
+            assert!(
+                (record.q[0] - still[0]).abs() < 1e-4,
+                "{delay_us} us late: {} is not {}",
+                record.q[0],
+                still[0]
+            );
+        }
+        let record = bus.records.last().expect("a record");
+        assert_eq!(record.lost_replies, 0, "{delay_us} us late");
+        assert!(
+            (record.q[0] - still[0]).abs() < 1e-4,
+            "{delay_us} us late: {} is not {}",
+            record.q[0],
+            still[0]
+        );
+        assert_eq!(core.health().counters.late_replies, 1, "{delay_us} us late");
+    }
+}
+
+/// A6: what does not belong on the bus is counted by reason and changes nothing.
+#[test]
+fn a6_foreign_frames_are_counted_and_change_nothing() {
+    let (mut core, mut bus) = floating();
+    bus.run_to(&mut core, Slot::Request);
+    let before = core.health().counters;
+    let raw = |id: u16, data: &[u8]| {
+        CanFrame::from_slice(CanId::new(id).expect("an id"), data).expect("a frame")
+    };
+    let node = |number| Node::new(number).expect("a node");
+    for frame in [
+        raw(0x423, &[0x80, 0, 0, 0]),              // position of a wrong length
+        raw(0x546, &[0x08, 0, 2, 0]),              // SET bit clear
+        raw(0x546, &[0x88, 1, 2, 0]),              // byte 1 not zero
+        raw(0x43F, &[1]),                          // unknown group
+        raw(0x000, &[0; 8]),                       // a babbling node
+        position_frame(node(20), Counts(5), None), // nobody on this arm
+        reply16(node(3), PropertyId::MODE, 0),     // not asked
+        raw(0x540, &[0x88, 0, 0, 0]),              // broadcast of the safety module
+    ] {
+        bus.inject(frame);
+    }
+    bus.run_slots(&mut core, CYCLE);
+    let after = core.health().counters;
+    assert_eq!(after.malformed_frames - before.malformed_frames, 5);
+    assert_eq!(after.foreign_frames - before.foreign_frames, 2);
+    assert_eq!(after.broadcasts - before.broadcasts, 1);
+    assert_eq!(after.lost_replies, before.lost_replies);
+    assert_eq!(core.health().state, State::Gravity);
+}
+
+/// A15: IDLE on the pendant takes the torque off within three cycles, and it does not come back by itself.
+#[test]
+fn a15_idle_ends_torque_within_three_cycles() {
+    let (mut core, mut bus) = floating();
+    for _ in 0..CYCLE {
+        bus.run_slots(&mut core, 1);
+        bus.press_idle();
+        let begin = bus.log.len();
+        bus.run_slots(&mut core, 3 * CYCLE);
+        assert_ne!(core.health().state, State::Gravity);
+        let settled = bus.log.len();
+        bus.press_activate();
+        bus.run(&mut core, 0.5);
+        assert!(
+            !has_torque(&bus, settled),
+            "no torque without a new command"
+        );
+        assert!(settled > begin);
+        bus.commands.push_back(Command::ClearFault.into());
+        bus.run(&mut core, 0.1);
+        bus.commands.push_back(Command::Gravity.into());
+        bus.run(&mut core, 0.5);
+        assert_eq!(core.health().state, State::Gravity, "{:?}", bus.events);
+    }
+}
+
+#[test]
+fn braking_pucks_under_an_active_safety_module_count_as_idle() {
+    let (mut core, mut bus) = floating();
+    bus.pucks[0].mode = puck::MotorMode::Idle;
+    bus.run(&mut core, 0.4);
+    assert_ne!(core.health().state, State::Gravity);
+    assert!(!core.health().state.has_torque());
+}
+
+#[test]
+fn an_emergency_stop_leads_back_to_the_start_up_without_torque() {
+    let (mut core, mut bus) = floating();
+    bus.press_emergency_stop();
+    bus.run_slots(&mut core, 3 * CYCLE);
+    let settled = bus.log.len();
+    bus.run(&mut core, 0.3);
+    assert_eq!(
+        core.stage(),
+        Stage::WaitingForIdle,
+        "at once, not after the silence of all pucks"
+    );
+    bus.run(&mut core, 1.0);
+    assert!(!has_torque(&bus, settled));
+    assert_eq!(core.health().counters.restarts, 1);
+    assert!(!core.health().zeroed, "the pucks have lost their positions");
+    bus.press_idle();
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    assert!(!has_torque(&bus, settled));
+}
+
+/// A14: a puck that has reset is found within 20 ms, torque is taken off, and the bus is started anew.
+#[test]
+fn a14_a_puck_that_resets_ends_torque_within_20_ms() {
+    let (mut core, mut bus) = floating();
+    bus.pucks[5].awake_at = None;
+    let begin = bus.now_us;
+    while core.health().state != State::Fault {
+        bus.run_slots(&mut core, 1);
+        assert!(
+            bus.now_us - begin <= 20_000 + 1_200,
+            "still {:?} after 20 ms",
+            core.health().state
+        );
+    }
+    let entered = bus
+        .events
+        .iter()
+        .rev()
+        .find(|event| matches!(event, EventKind::Entered(..)));
+    assert_eq!(
+        entered,
+        Some(&EventKind::Entered(State::Fault, Fault::BusFault))
+    );
+    let settled = bus.log.len();
+    bus.run(&mut core, 0.1);
+    assert!(!has_torque(&bus, settled));
+    assert_eq!(core.health().counters.restarts, 1);
+    assert!(bus.sets().any(|(time, to, property, value)| {
+        time > begin && (to, property, value) == (ARM, PropertyId::MODE, 0)
+    }));
+}
+
+#[test]
+fn after_a_fault_the_safety_module_is_asked_to_go_idle() {
+    let (mut core, mut bus) = floating();
+    bus.pucks[5].awake_at = None;
+    bus.run(&mut core, 0.1);
+    let asked = bus.sets().filter(|(_, to, property, value)| {
+        (*to, *property, *value) == (Destination::Node(Node::SAFETY_MODULE), PropertyId::MODE, 1)
+    });
+    assert_eq!(asked.count(), 1);
+    assert_eq!(bus.safety_mode, puck::SafetyMode::Idle);
+}
+
+/// A12: a controller without room is counted, never waited for, and ends in a fault after six cycles.
+#[test]
+fn a12_torque_frames_that_cannot_leave_end_in_a_fault() {
+    let (mut core, mut bus) = floating();
+    bus.refuse = 10;
+    bus.run_slots(&mut core, CYCLE);
+    assert_eq!(
+        core.health().state,
+        State::Gravity,
+        "a single cycle is survived"
+    );
+    bus.refuse = 1_000;
+    bus.run_slots(&mut core, 8 * CYCLE);
+    assert_eq!(core.health().state, State::Fault);
+    assert!(core.health().counters.frames_refused > 20);
+    bus.refuse = 0;
+    let begin = bus.log.len();
+    bus.run(&mut core, 0.5);
+    assert!(
+        !has_torque(&bus, begin),
+        "the bus recovers by itself, motion does not"
+    );
+}
+
+#[test]
+fn a10_bus_off_is_a_fault_at_once() {
+    let (mut core, mut bus) = floating();
+    bus.run_to(&mut core, Slot::Control);
+    core.note_bus_error(true);
+    let begin = bus.log.len();
+    bus.run_slots(&mut core, 1);
+    assert_eq!(core.health().state, State::Fault);
+    assert!(
+        !has_torque(&bus, begin),
+        "the very next torque frames are zero"
+    );
+    assert_eq!(core.health().counters.bus_errors, 1);
+}
+
+#[test]
+fn a_silent_safety_module_is_a_fault_within_150_ms() {
+    let (mut core, mut bus) = floating();
+    bus.safety_present = false;
+    bus.run(&mut core, 0.15);
+    assert!(
+        !core.health().state.has_torque(),
+        "{:?}",
+        core.health().state
+    );
+}
+
+#[test]
+fn overruns_are_counted_and_too_many_stop_the_arm() {
+    let (mut core, mut bus) = floating();
+    core.note_overrun();
+    bus.run(&mut core, 1.0);
+    assert_eq!(
+        core.health().state,
+        State::Gravity,
+        "one overrun is survived"
+    );
+    for _ in 0..6 {
+        core.note_overrun();
+    }
+    bus.run_slots(&mut core, CYCLE);
+    assert_eq!(core.health().counters.overruns, 7);
+    assert_eq!(core.health().state, State::SoftStop);
+    assert_eq!(
+        bus.records.last().map(|record| record.fault),
+        Some(Fault::Overrun)
+    );
+}
+
+#[test]
+fn a_bad_or_halved_wrench_is_no_wrench() {
+    let (mut core, mut bus) = floating();
+    let stale =
+        |bus: &Bus| bus.records.last().expect("a record").flags & control::flags::WRENCH_STALE != 0;
+    assert!(!stale(&bus));
+    bus.sensor.status = Some(GaugeStatus(0x40));
+    bus.run_slots(&mut core, 2 * CYCLE);
+    assert!(stale(&bus), "the sensor itself calls the sample bad");
+    bus.sensor.status = Some(GaugeStatus(0x01));
+    bus.run_slots(&mut core, 2 * CYCLE);
+    assert!(
+        !stale(&bus),
+        "a gauge that saturated once is only a warning"
+    );
+}
+
+#[test]
+fn the_first_wrench_after_the_tare_is_thrown_away() {
+    let (mut core, mut bus) = started();
+    bus.run_slots(&mut core, CYCLE + 1);
+    let first = bus.records.first().expect("a record");
+    assert!(first.flags & control::flags::WRENCH_STALE != 0);
+}

@@ -1,0 +1,556 @@
+//! A small double of the arm's bus: seven pucks, a force/torque sensor and a safety module, spoken to in frames.
+//!
+//! It answers as the reference says devices answer, through the device side of the `puck` crate, and logs every frame with
+//! its time. There is no arbitration and no physics: an arm of this double stands still.
+
+use std::collections::VecDeque;
+
+use control::CycleRecord;
+use device::{Command, Core, CoreIo, Event, EventKind, Slot, Stage};
+use puck::device::{force_frame, position_frame, reply16, reply32, safety_broadcast, torque_frame};
+use puck::{
+    Action, CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId,
+    PropertyTable, PuckTorque, RawWrench, Request, SafetyMode, Status,
+};
+
+/// From the last bit of a request to the first of its answer, us.
+const LATENCY_US: u64 = 200;
+/// From the wake to the first answer, us.
+const BOOT_US: u64 = 500_000;
+/// VERS of the boot loader: deliberately one that would choose wrong property numbers.
+const MONITOR_VERSION: i32 = 90;
+
+/// A motor puck.
+#[derive(Clone, Debug)]
+pub(crate) struct Puck {
+    pub(crate) present: bool,
+    pub(crate) never_wakes: bool,
+    pub(crate) ignores_position_writes: bool,
+    pub(crate) awake_at: Option<u64>,
+    pub(crate) version: i32,
+    pub(crate) position: Counts,
+    pub(crate) mode: MotorMode,
+    pub(crate) torque: PuckTorque,
+    pub(crate) groups: [i32; 3],
+    pub(crate) place: i32,
+    pub(crate) torque_limit: i32,
+    pub(crate) poles: i32,
+    pub(crate) torque_counts: i32,
+    /// Answers to position requests that are lost from now on.
+    pub(crate) lose: u32,
+    /// The next answer to a position request comes this much later, us.
+    pub(crate) delay_us: u64,
+    /// Ordinary answers that are lost from now on.
+    pub(crate) lose_properties: u32,
+}
+
+impl Puck {
+    fn new(joint: usize) -> Puck {
+        let wrist = joint >= 4;
+        Puck {
+            present: true,
+            never_wakes: false,
+            ignores_position_writes: false,
+            awake_at: None,
+            version: 200,
+            position: Counts(100 + joint as i32),
+            mode: MotorMode::Idle,
+            torque: PuckTorque::ZERO,
+            groups: [0, if wrist { 2 } else { 1 }, 4],
+            place: if wrist {
+                joint as i32 - 3
+            } else {
+                joint as i32 + 1
+            },
+            torque_limit: [4860, 4860, 4860, 4320, 3900, 3900, 1600][joint],
+            poles: [12, 12, 12, 12, 8, 8, 6][joint],
+            torque_counts: [2472, 2472, 2472, 2472, 6105, 6105, 21400][joint],
+            lose: 0,
+            delay_us: 0,
+            lose_properties: 0,
+        }
+    }
+}
+
+/// The bus with everything on it.
+pub(crate) struct Bus {
+    pub(crate) now_us: u64,
+    pub(crate) slot: Slot,
+    /// Every frame the core sent, with its time.
+    pub(crate) log: Vec<(u64, CanFrame)>,
+    pub(crate) events: Vec<EventKind>,
+    pub(crate) records: Vec<CycleRecord>,
+    pub(crate) commands: VecDeque<Command>,
+    pub(crate) pucks: [Puck; 7],
+    pub(crate) powered: bool,
+    pub(crate) safety_present: bool,
+    pub(crate) safety_mode: SafetyMode,
+    pub(crate) safety_version: i32,
+    pub(crate) safety_zero: bool,
+    pub(crate) sensor_present: bool,
+    pub(crate) sensor_awake_at: Option<u64>,
+    pub(crate) sensor: RawWrench,
+    /// The controller has no room for this many more frames.
+    pub(crate) refuse: u32,
+    /// When a button of the pendant was pressed last.
+    pressed_us: u64,
+    ticks: u64,
+    on_the_wire: Vec<(u64, CanFrame)>,
+    received: VecDeque<CanFrame>,
+}
+
+impl Bus {
+    /// An arm in E-STOP that has just got power.
+    pub(crate) fn in_emergency_stop() -> Bus {
+        Bus {
+            now_us: 0,
+            slot: Slot::Request,
+            log: Vec::new(),
+            events: Vec::new(),
+            records: Vec::new(),
+            commands: VecDeque::new(),
+            pucks: std::array::from_fn(Puck::new),
+            powered: false,
+            safety_present: true,
+            safety_mode: SafetyMode::EStop,
+            safety_version: 197,
+            safety_zero: false,
+            sensor_present: true,
+            sensor_awake_at: None,
+            sensor: RawWrench {
+                force: [256, 0, 0],
+                torque: [0, 0, 0],
+                status: None,
+            },
+            refuse: 0,
+            pressed_us: 0,
+            ticks: 0,
+            on_the_wire: Vec::new(),
+            received: VecDeque::new(),
+        }
+    }
+
+    /// An arm that a person has released and set to IDLE; its pucks sleep.
+    pub(crate) fn idle() -> Bus {
+        let mut bus = Bus::in_emergency_stop();
+        bus.press_idle();
+        bus
+    }
+
+    /// An arm that had been started and zeroed before the device was reset.
+    pub(crate) fn already_zeroed() -> Bus {
+        let mut bus = Bus::idle();
+        bus.safety_zero = true;
+        bus.sensor_awake_at = Some(0);
+        for puck in &mut bus.pucks {
+            puck.awake_at = Some(0);
+        }
+        bus
+    }
+
+    /// The emergency stop is released and Shift-Idle pressed.
+    pub(crate) fn press_idle(&mut self) {
+        if !self.powered {
+            self.powered = true;
+            self.safety_zero = false;
+            self.sensor_awake_at = None;
+            for puck in &mut self.pucks {
+                puck.awake_at = None;
+            }
+        }
+        self.set_modes(SafetyMode::Idle, MotorMode::Idle);
+    }
+
+    /// Shift-Activate is pressed.
+    pub(crate) fn press_activate(&mut self) {
+        self.set_modes(SafetyMode::Active, MotorMode::Torque);
+    }
+
+    /// The emergency stop is pressed: the pucks lose power.
+    pub(crate) fn press_emergency_stop(&mut self) {
+        self.safety_mode = SafetyMode::EStop;
+        self.powered = false;
+    }
+
+    /// The safety module sets the pucks' mode and says so on 0x540.
+    fn set_modes(&mut self, safety: SafetyMode, motors: MotorMode) {
+        self.safety_mode = safety;
+        self.pressed_us = self.now_us;
+        for puck in &mut self.pucks {
+            puck.mode = motors;
+            puck.torque = PuckTorque::ZERO;
+        }
+        self.inject(safety_broadcast(motors));
+    }
+
+    /// A frame that appears on the bus by itself.
+    pub(crate) fn inject(&mut self, frame: CanFrame) {
+        self.on_the_wire.push((self.now_us, frame));
+    }
+
+    /// Runs the core for some slots of 1/900 s.
+    pub(crate) fn run_slots(&mut self, core: &mut Core, slots: usize) {
+        for _ in 0..slots {
+            self.now_us = self.ticks * 1_000_000 / 900;
+            self.on_the_wire.sort_by_key(|(due, _)| *due);
+            let due = self
+                .on_the_wire
+                .partition_point(|(due, _)| *due <= self.now_us);
+            self.received
+                .extend(self.on_the_wire.drain(..due).map(|(_, frame)| frame));
+            let slot = self.slot;
+            core.slot(slot, self.now_us, self);
+            self.slot = slot.next();
+            self.ticks += 1;
+        }
+    }
+
+    /// Runs the core for this long, s.
+    pub(crate) fn run(&mut self, core: &mut Core, seconds: f64) {
+        self.run_slots(core, (seconds * 900.0) as usize);
+    }
+
+    /// Runs until the core has reached a stage; panics after ten seconds.
+    pub(crate) fn run_until(&mut self, core: &mut Core, stage: Stage) {
+        for _ in 0..9_000 {
+            if core.stage() == stage {
+                return;
+            }
+            self.run_slots(core, 1);
+        }
+        panic!(
+            "stuck in {:?}, {:?}; events {:?}",
+            core.stage(),
+            core.health().blocked,
+            self.events
+        );
+    }
+
+    /// Runs until the next slot is this one.
+    pub(crate) fn run_to(&mut self, core: &mut Core, slot: Slot) {
+        while self.slot != slot {
+            self.run_slots(core, 1);
+        }
+    }
+
+    /// All torques that were sent since the frame with this index of the log.
+    pub(crate) fn torques_since(&self, index: usize) -> impl Iterator<Item = PuckTorque> + '_ {
+        self.log[index..].iter().flat_map(|(_, frame)| {
+            match Request::decode(frame).map(|request| request.action) {
+                Ok(Action::PackedTorques { torques, .. }) => torques.to_vec(),
+                _ => Vec::new(),
+            }
+        })
+    }
+
+    /// All SETs that were sent, with their time.
+    pub(crate) fn sets(&self) -> impl Iterator<Item = (u64, Destination, PropertyId, i32)> + '_ {
+        self.log
+            .iter()
+            .filter_map(|(time, frame)| match Request::decode(frame) {
+                Ok(Request {
+                    to,
+                    action: Action::Set { property, value },
+                    ..
+                }) => Some((*time, to, property, value)),
+                _ => None,
+            })
+    }
+
+    fn answer(&mut self, delay_us: u64, frame: CanFrame) {
+        self.on_the_wire
+            .push((self.now_us + LATENCY_US + delay_us, frame));
+    }
+
+    fn answer_value(&mut self, node: Node, property: PropertyId, value: i32, wide: bool) {
+        let frame = if wide {
+            reply32(node, property, value)
+        } else {
+            reply16(node, property, value as i16)
+        };
+        self.answer(0, frame);
+    }
+
+    /// What the devices do with a frame of the core.
+    fn serve(&mut self, frame: CanFrame) {
+        let request = Request::decode(&frame).expect("every frame of the core is a valid request");
+        assert_eq!(request.sender, Node::HOST);
+        if self.safety_present && request.to == Destination::Node(Node::SAFETY_MODULE) {
+            self.serve_safety(request.action);
+        }
+        if !self.powered {
+            return;
+        }
+        for (joint, node) in Node::ARM.into_iter().enumerate() {
+            let member = match request.to {
+                Destination::Node(to) => to == node,
+                Destination::Group(group) => self.pucks[joint]
+                    .groups
+                    .contains(&i32::from(group.number())),
+            };
+            if member && self.pucks[joint].present {
+                self.serve_puck(joint, node, request.action);
+            }
+        }
+        if self.sensor_present && request.to == Destination::Node(Node::FORCE_TORQUE) {
+            self.serve_sensor(request.action);
+        }
+    }
+
+    fn serve_safety(&mut self, action: Action) {
+        let table = PropertyTable::safety(self.safety_version.clamp(1, 255)).expect("in range");
+        let node = Node::SAFETY_MODULE;
+        match action {
+            Action::Get { property } => {
+                let value = match table.property(property) {
+                    Some(Property::Stat) => Status::Ready.value(),
+                    Some(Property::Role) => 2,
+                    Some(Property::Vers) => self.safety_version,
+                    Some(Property::Mode) => self.safety_mode.value(),
+                    Some(Property::Zero) => i32::from(self.safety_zero),
+                    Some(Property::Pen) => 0x0F3F_1249,
+                    other => panic!("the core asked the safety module for {other:?}"),
+                };
+                self.answer_value(
+                    node,
+                    property,
+                    value,
+                    table.property(property) == Some(Property::Pen),
+                );
+            }
+            Action::Set { property, value } => match table.property(property) {
+                Some(Property::Zero) => self.safety_zero = value == 1,
+                Some(Property::Mode) => {
+                    if value < self.safety_mode.value() {
+                        assert_eq!(
+                            value,
+                            SafetyMode::Idle.value(),
+                            "the core pulled the emergency stop"
+                        );
+                        self.press_idle();
+                    }
+                }
+                Some(Property::Def | Property::Load | Property::Ifault) => {}
+                other => panic!("the core wrote {other:?} of the safety module"),
+            },
+            Action::PackedTorques { .. } => panic!("torques to the safety module"),
+        }
+    }
+
+    fn serve_puck(&mut self, joint: usize, node: Node, action: Action) {
+        let now_us = self.now_us;
+        let puck = &mut self.pucks[joint];
+        let awake = match puck.awake_at {
+            // Silent while it boots.
+            Some(at) if now_us < at => return,
+            Some(_) => true,
+            None => false,
+        };
+        let table = if awake {
+            PropertyTable::motor(puck.version).ok()
+        } else {
+            Some(PropertyTable::monitor())
+        };
+        // An unknown firmware still answers the properties that never move.
+        let table = table.unwrap_or(PropertyTable::monitor());
+        match action {
+            Action::Get {
+                property: PropertyId::POSITION,
+            } if awake => {
+                if puck.lose > 0 {
+                    puck.lose -= 1;
+                    return;
+                }
+                let delay_us = std::mem::take(&mut puck.delay_us) + 75 * joint as u64;
+                let frame = position_frame(node, puck.position, None);
+                self.answer(delay_us, frame);
+            }
+            Action::Get { property } => {
+                // An unknown property has no answer.
+                let Some(name) = table.property(property) else {
+                    return;
+                };
+                if puck.lose_properties > 0 {
+                    puck.lose_properties -= 1;
+                    return;
+                }
+                let value = match name {
+                    Property::Stat => {
+                        if awake {
+                            Status::Ready.value()
+                        } else {
+                            Status::Reset.value()
+                        }
+                    }
+                    Property::Role => 0,
+                    Property::Vers => {
+                        if awake {
+                            puck.version
+                        } else {
+                            MONITOR_VERSION
+                        }
+                    }
+                    Property::Cts => 4096,
+                    Property::Ipnm => puck.torque_counts,
+                    Property::Pidx => puck.place,
+                    Property::Grpa => puck.groups[0],
+                    Property::Grpb => puck.groups[1],
+                    Property::Grpc => puck.groups[2],
+                    Property::Mt => puck.torque_limit,
+                    Property::Poles => puck.poles,
+                    Property::Mode => puck.mode.value(),
+                    Property::Temp => 30 + joint as i32,
+                    // A puck that has reset under the slow polls: the number means something else to its monitor.
+                    _ if !awake => return,
+                    other => panic!("the core asked puck {} for {other:?}", joint + 1),
+                };
+                self.answer_value(node, property, value, name.is_wide());
+            }
+            Action::Set {
+                property: PropertyId::STAT,
+                value,
+            } => {
+                assert_eq!(value, Status::Ready.value(), "the core reset a puck");
+                if !awake && !puck.never_wakes {
+                    puck.awake_at = Some(now_us + BOOT_US);
+                }
+            }
+            // The monitor knows nothing but STAT.
+            Action::Set { .. } if !awake => {}
+            Action::Set {
+                property: PropertyId::MODE,
+                value,
+            } => {
+                assert_eq!(
+                    value,
+                    MotorMode::Idle.value(),
+                    "only the safety module may set TORQUE"
+                );
+                puck.mode = MotorMode::Idle;
+            }
+            Action::Set {
+                property: PropertyId::POSITION,
+                value,
+            } => {
+                // A person may activate between the question and the write; nobody can prevent that.
+                let active = puck.mode != MotorMode::Idle && now_us > self.pressed_us + 100_000;
+                assert!(!active, "zeroed under torque");
+                if !puck.ignores_position_writes {
+                    puck.position = Counts(value);
+                }
+            }
+            Action::Set { property, value } => {
+                panic!("the core set {property:?} of puck {} to {value}", joint + 1)
+            }
+            Action::PackedTorques { property, .. } if awake => {
+                assert_eq!(property, PropertyId::TORQUE);
+                if let (MotorMode::Torque, Some(torque)) =
+                    (puck.mode, action.torque_for(puck.place as u8))
+                {
+                    puck.torque = torque;
+                }
+            }
+            Action::PackedTorques { .. } => {}
+        }
+    }
+
+    fn serve_sensor(&mut self, action: Action) {
+        let awake = match self.sensor_awake_at {
+            Some(at) if self.now_us < at => return,
+            Some(_) => true,
+            None => false,
+        };
+        match action {
+            Action::Get {
+                property: PropertyId::STAT,
+            } => {
+                let status = if awake { Status::Ready } else { Status::Reset };
+                self.answer_value(Node::FORCE_TORQUE, PropertyId::STAT, status.value(), false);
+            }
+            Action::Get {
+                property: PropertyId::FORCE_TORQUE,
+            } if awake => {
+                self.answer(0, force_frame(self.sensor.force));
+                self.answer(0, torque_frame(self.sensor.torque, self.sensor.status));
+            }
+            Action::Set {
+                property: PropertyId::STAT,
+                ..
+            } if !awake => {
+                self.sensor_awake_at = Some(self.now_us + BOOT_US);
+            }
+            Action::Set {
+                property: PropertyId::FORCE_TORQUE,
+                value: 0,
+            } => {}
+            // The monitor knows nothing but STAT.
+            _ if !awake => {}
+            other => panic!("the core asked the sensor for {other:?}"),
+        }
+    }
+}
+
+impl CoreIo for Bus {
+    fn receive(&mut self) -> Option<CanFrame> {
+        self.received.pop_front()
+    }
+
+    fn transmit(&mut self, frame: CanFrame) -> bool {
+        if self.refuse > 0 {
+            self.refuse -= 1;
+            return false;
+        }
+        self.log.push((self.now_us, frame));
+        self.serve(frame);
+        true
+    }
+
+    fn command(&mut self) -> Option<Command> {
+        self.commands.pop_front()
+    }
+
+    fn record(&mut self, record: CycleRecord) {
+        self.records.push(record);
+    }
+
+    fn event(&mut self, event: Event) {
+        self.events.push(event.kind);
+    }
+}
+
+/// Home of the arm, rad.
+pub(crate) const HOME: [f32; 7] = [0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0];
+
+/// A core and its bus, started, zeroed at home and waiting for Shift-Activate.
+pub(crate) fn started() -> (Core, Bus) {
+    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    (core, bus)
+}
+
+/// The same, activated and floating under gravity compensation away from the joint limits.
+pub(crate) fn floating() -> (Core, Bus) {
+    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero {
+        home: [0.1, 0.5, 0.1, 1.5, 0.1, 0.2, 0.1],
+    });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    bus.press_activate();
+    bus.run_until(&mut core, Stage::Ready);
+    bus.run(&mut core, 0.1);
+    bus.commands.push_back(control::Command::Gravity.into());
+    bus.run(&mut core, 1.0);
+    assert_eq!(
+        core.health().state,
+        control::State::Gravity,
+        "{:?}",
+        bus.events
+    );
+    (core, bus)
+}
+
+/// Whether the group's members are the whole arm.
+pub(crate) const ARM: Destination = Destination::Group(Group::ARM);

@@ -1,0 +1,109 @@
+//! The edge between the application and a board: what a board must offer, and the board this image is for.
+//!
+//! A board is one module below this one. It provides `Board` (made once, at start-up), the module `device` for RTIC
+//! (interrupts named by their *role*: `SLOT_TIMER`, `CAN_RECEIVE`, `CAN_TRANSMIT` and two lines for software tasks),
+//! a defmt logger, and [`Edge::stop`] for the end. The binaries name nothing else.
+
+use embedded_can::nb;
+use puck::CanFrame;
+
+mod mps2;
+pub use mps2::{Board, device};
+
+/// Everything a board offers at start-up.
+pub trait Edge: Sized {
+    /// See [`Clock`].
+    type Clock: Clock;
+    /// See [`SlotTimer`].
+    type SlotTimer: SlotTimer;
+    /// The controller of the arm's bus. Its interrupts are `CAN_RECEIVE` (a frame arrived) and `CAN_TRANSMIT` (there is
+    /// room for another frame).
+    type Can: nb::Can<Frame = CanFrame> + CanStatus;
+    /// See [`LinkPort`].
+    type LinkPort: LinkPort;
+
+    /// Name for people, e.g. "mps2-an500".
+    const NAME: &'static str;
+    /// A board that is only simulated must not be mistaken for an arm.
+    const SIMULATED: bool;
+
+    /// Sets up clocks and peripherals. Call once, with interrupts masked; nothing fires before they are unmasked.
+    fn start(core: cortex_m::Peripherals) -> Self;
+
+    /// What tells this board from others of its kind.
+    fn serial(&self) -> &'static str;
+
+    /// The peripherals, for the tasks that own them.
+    fn split(self) -> (Self::Clock, Self::SlotTimer, Self::Can, Self::LinkPort);
+
+    /// The end: sends these frames, waits until they are on the bus as far as the bus allows, says why, and stops or
+    /// restarts the processor. Called with interrupts masked, from anywhere, perhaps with peripherals in mid-sentence.
+    fn stop(frames: &[CanFrame], reason: core::fmt::Arguments<'_>) -> !;
+}
+
+/// Time since start-up.
+pub trait Clock: Copy {
+    /// Ticks per second.
+    const HZ: u32;
+
+    /// Ticks since start-up.
+    fn ticks(self) -> u64;
+
+    /// Ticks since start-up, modulo 2^32: one register read, to measure short spans in the control task.
+    fn short_ticks(self) -> u32;
+
+    /// Microseconds since start-up.
+    fn now_us(self) -> u64 {
+        // Multiplying first keeps the fraction; 64 bits overflow after 23 000 years at 25 MHz.
+        self.ticks() * 1_000_000 / u64::from(Self::HZ)
+    }
+}
+
+/// The 900 Hz timer that makes three slots of a control cycle. Its interrupt is `SLOT_TIMER`.
+pub trait SlotTimer {
+    /// Starts the timer: the first slot comes one period from now.
+    fn start(&mut self);
+
+    /// Takes the interrupt back and returns how long ago the slot began, ticks of [`Clock`].
+    fn acknowledge(&mut self) -> u32;
+
+    /// Whether the next slot has already begun.
+    fn is_due(&self) -> bool;
+}
+
+/// What a CAN controller knows about its frames.
+pub trait CanStatus {
+    /// Frames handed over that have not been on the wire yet.
+    fn waiting(&self) -> usize;
+
+    /// Received frames lost because nobody fetched them in time, since start-up.
+    fn overruns(&self) -> u32;
+}
+
+/// The byte stream to the host.
+pub trait LinkPort {
+    /// Moves received bytes into `buffer`, and returns how many. Bytes for which the board had no room are missing: the
+    /// message they belong to fails its check sum, and the host repeats it.
+    fn read(&mut self, buffer: &mut [u8]) -> usize;
+
+    /// Sends bytes in order, at most [`Self::room`].
+    fn write(&mut self, bytes: &[u8]);
+
+    /// Bytes that can be sent now.
+    fn room(&self) -> usize;
+}
+
+/// Stack of the image: painted at start-up, so that its deepest use can be seen later.
+pub mod stack {
+    /// Bytes reserved for the stack.
+    #[must_use]
+    pub fn size() -> u32 {
+        cortex_m_stack::stack_size()
+    }
+
+    /// Bytes never used so far. Reads all of the free stack: costs two instructions a word, at low priority only.
+    #[must_use]
+    pub fn never_used() -> u32 {
+        cortex_m_stack::stack_painted()
+    }
+}

@@ -1,0 +1,62 @@
+//! QEMU's `mps2-an500` (Cortex-M7) with a CAN controller and a host link that live in the simulator.
+//!
+//! The machine has no CAN controller. What would be silicon on a real board is here an interrupt above all others
+//! (`can`), which exchanges frames with the simulator in lock step by semihosting (`lockstep`): virtual time stands still
+//! while the simulator computes, and frames arrive at exact virtual times. The address map and the lines of the
+//! peripherals are those of Arm's application notes AN385 and AN500, as QEMU models them.
+
+mod can;
+mod clock;
+pub mod device;
+mod link;
+mod lockstep;
+mod logger;
+mod slot_timer;
+
+use semihosting::io::Write;
+
+use puck::CanFrame;
+use semihosting::process::ExitCode;
+
+/// The board.
+pub struct Board(());
+
+impl super::Edge for Board {
+    type Clock = clock::Clock;
+    type SlotTimer = slot_timer::SlotTimer;
+    type Can = can::Can;
+    type LinkPort = link::Port;
+
+    const NAME: &'static str = "mps2-an500";
+    const SIMULATED: bool = true;
+
+    fn start(mut core: cortex_m::Peripherals) -> Self {
+        clock::start();
+        logger::start();
+        can::start(&mut core.NVIC);
+        Self(())
+    }
+
+    fn serial(&self) -> &'static str {
+        "qemu"
+    }
+
+    fn split(self) -> (Self::Clock, Self::SlotTimer, Self::Can, Self::LinkPort) {
+        (
+            clock::Clock,
+            slot_timer::SlotTimer,
+            can::Can,
+            link::Port::new(),
+        )
+    }
+
+    fn stop(frames: &[CanFrame], reason: core::fmt::Arguments<'_>) -> ! {
+        // Frames first: words can wait, motors cannot.
+        can::send_last(frames);
+        if let Ok(mut words) = semihosting::io::stderr() {
+            // Plain text between the binary log frames; nothing is left to do if stderr is gone.
+            let _ = writeln!(words, "\n{reason}");
+        }
+        ExitCode::FAILURE.exit_process()
+    }
+}

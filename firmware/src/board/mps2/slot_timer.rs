@@ -1,0 +1,32 @@
+//! Timer 0 at 900 Hz.
+
+use super::device::{PERIPHERAL_HZ, TIMER0, Timer};
+
+/// Slots per second.
+const SLOT_HZ: u32 = 900;
+
+/// Ticks of one slot, rounded to the nearest: 27 778, so a control cycle takes 83 334 ticks = 3.333 36 ms (299.998 Hz).
+const PERIOD: u32 = (PERIPHERAL_HZ + SLOT_HZ / 2) / SLOT_HZ;
+
+/// The timer that makes slots.
+pub struct SlotTimer;
+
+impl crate::board::SlotTimer for SlotTimer {
+    fn start(&mut self) {
+        TIMER0.control.write(Timer::STOP);
+        TIMER0.reload.write(PERIOD - 1);
+        TIMER0.value.write(PERIOD - 1);
+        TIMER0.interrupt.write(1);
+        TIMER0.control.write(Timer::RUN);
+    }
+
+    fn acknowledge(&mut self) -> u32 {
+        TIMER0.interrupt.write(1);
+        // The counter started again from PERIOD - 1 when the slot began.
+        (PERIOD - 1).saturating_sub(TIMER0.value.read())
+    }
+
+    fn is_due(&self) -> bool {
+        TIMER0.interrupt.read() & 1 != 0
+    }
+}

@@ -1,0 +1,35 @@
+//! What the image does when it cannot go on: interrupts off, zero torque, arm to idle, a reason, the end.
+//!
+//! The pucks hold the last torque they were sent until their watchdog or the safety module stops them, so the zero
+//! torques go first. The panic may have come from anywhere: nothing here depends on the state of the application.
+
+use core::panic::PanicInfo;
+
+use cortex_m_rt::{ExceptionFrame, exception};
+use puck::{CanFrame, Group, MotorMode, PropertyId, set, zero_torques};
+
+use crate::board::{Board, Edge};
+
+fn last_frames() -> [CanFrame; 3] {
+    let [arm, wrist] = zero_torques();
+    [
+        arm,
+        wrist,
+        set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value()),
+    ]
+}
+
+#[panic_handler]
+fn panicked(information: &PanicInfo<'_>) -> ! {
+    cortex_m::interrupt::disable();
+    Board::stop(&last_frames(), format_args!("{information}"))
+}
+
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    cortex_m::interrupt::disable();
+    Board::stop(
+        &last_frames(),
+        format_args!("hard fault at {:#010x}: {frame:?}", frame.pc()),
+    )
+}

@@ -1,0 +1,161 @@
+//! The primitive played by the control code itself on an ideal arm: every margin that counts before motion.
+
+use control::calibration::Calibration;
+use control::units::{JointVelocities, Vector7};
+use control::{
+    BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, RunOptions, State, flags,
+};
+use puck::SafetyMode;
+
+use super::plant::Plant;
+use crate::arm;
+use crate::plan::PERIOD;
+use crate::primitive_file::HostPrimitive;
+
+/// Cycles in which the arm is taken up and comes to rest before the run begins: 1.5 s.
+const SETTLING: u64 = 450;
+
+/// Cycles that a run may take beyond its duration: the cycle settles for 1 s and gives up at 1.5 durations.
+const OVERTIME: f64 = 1.5;
+
+/// One cycle of the run.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sample {
+    /// Time since the run began, s.
+    pub(super) time: f64,
+    /// Joint positions of the arm, rad.
+    pub(super) q: [f64; 7],
+    /// Joint velocities, rad/s.
+    pub(super) dq: [f64; 7],
+    /// Speeds of elbow and forearm, as the safety module watches them, m/s.
+    pub(super) elbow_speeds: [f64; 2],
+    /// Speed of the tool frame, m/s.
+    pub(super) tool_speed: f64,
+    /// Tool position, m.
+    pub(super) position: [f64; 3],
+    /// Tool orientation.
+    pub(super) orientation: [f64; 4],
+    /// What the cycle recorded.
+    pub(super) record: CycleRecord,
+}
+
+/// How the run ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Ending {
+    /// The arm holds the goal.
+    Arrived,
+    /// The control code refused to begin.
+    Refused(control::Refusal),
+    /// The control code refused to load the primitive.
+    Unfit(control::LoadRefusal),
+    /// The control code stopped the run by itself.
+    Stopped(State, Fault),
+    /// The run did not end in time.
+    Endless,
+    /// The arm's state became infinite.
+    Diverged,
+}
+
+/// A whole run.
+pub(super) struct ClosedLoop {
+    pub(super) samples: Vec<Sample>,
+    pub(super) ending: Ending,
+}
+
+impl ClosedLoop {
+    /// Plays the primitive at `speed` times its taught speed; `progress` hears the fraction done now and then.
+    pub(super) fn play(
+        primitive: &HostPrimitive,
+        speed: f64,
+        mut progress: impl FnMut(f64),
+    ) -> ClosedLoop {
+        let mut run = ClosedLoop {
+            samples: Vec::new(),
+            ending: Ending::Endless,
+        };
+        let mut cycle: Cycle<f64> = Cycle::new(Calibration::nominal(arm::PAYLOAD));
+        if let Err(refusal) = cycle.load(primitive) {
+            run.ending = Ending::Unfit(refusal);
+            return run;
+        }
+        let mut plant = Plant::at(primitive.start().posture);
+        let expected = (primitive.duration() / speed / PERIOD).ceil();
+        let last = SETTLING + (expected * (1.0 + OVERTIME)) as u64 + 900;
+        for number in 0..last {
+            let Some(counts) = plant.counts() else {
+                run.ending = Ending::Diverged;
+                return run;
+            };
+            let command = match number {
+                1 => Some(Command::Hold),
+                SETTLING => Some(Command::Run(RunOptions {
+                    speed: speed as f32,
+                    ..RunOptions::default()
+                })),
+                _ => None,
+            };
+            let output = cycle.step(&CycleInput {
+                cycle: number,
+                sample: BusSample {
+                    positions: counts.map(Some),
+                    wrench: None,
+                    safety: Some(SafetyMode::Active),
+                },
+                command,
+                external_fault: None,
+            });
+            if let (Some(Event::Refused(reason)), SETTLING) = (output.event, number) {
+                run.ending = Ending::Refused(reason);
+                return run;
+            }
+            let record = output.record;
+            if number >= SETTLING {
+                match record.state {
+                    State::Run | State::Coast => {
+                        let time = (number - SETTLING) as f64 * PERIOD;
+                        run.samples.push(sample(&plant, time, record));
+                        if number % 100 == 0 {
+                            progress((time * speed / primitive.duration()).min(1.0));
+                        }
+                    }
+                    State::Hold => {
+                        run.ending = Ending::Arrived;
+                        return run;
+                    }
+                    other => {
+                        run.ending = Ending::Stopped(other, record.fault);
+                        return run;
+                    }
+                }
+            }
+            plant.step(&Vector7::from(record.tau.map(f64::from)));
+        }
+        run
+    }
+
+    /// Cycles in which the limiter cut a torque.
+    pub(super) fn limited_cycles(&self) -> usize {
+        let cut = flags::JOINT_LIMITED | flags::MOTOR_LIMITED | flags::NOT_FINITE;
+        self.samples
+            .iter()
+            .filter(|sample| sample.record.flags & cut != 0)
+            .count()
+    }
+}
+
+fn sample(plant: &Plant, time: f64, record: CycleRecord) -> Sample {
+    let frames = plant.frames();
+    let dq = JointVelocities(plant.dq);
+    let pose = frames.tool_pose();
+    let twist = frames.jacobian().twist(&plant.dq);
+    Sample {
+        time,
+        q: plant.q.into(),
+        dq: plant.dq.into(),
+        elbow_speeds: frames.elbow_speeds(&dq, control::approach::TIP_REACH),
+        tool_speed: twist.fixed_rows::<3>(0).norm(),
+        position: pose.position.into(),
+        orientation: pose.orientation.0,
+        record,
+    }
+}

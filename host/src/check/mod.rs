@@ -1,0 +1,416 @@
+//! Validation before motion: is this primitive whole, does it belong to this arm, and can the arm follow it?
+//!
+//! First the plan alone (finite, goal reached, within reach), then the plan played by the *same* control code that
+//! runs on the device, in double precision, on an ideal arm with the model's friction. Every limit is reported with
+//! its worst margin and the time at which it occurs; a negative margin is a violation.
+
+mod closed_loop;
+mod plant;
+
+use control::load::{REACH, within_reach};
+use control::model::{SOFT_MAX, SOFT_MIN, VELOCITY_MAX};
+use serde::Serialize;
+
+use crate::arm::TORQUE_LIMITS;
+use crate::cmd::Table;
+use crate::demonstration::angle_between;
+use crate::plan;
+use crate::primitive_file::{PrimitiveFile, PrimitiveFileError};
+use closed_loop::{ClosedLoop, Ending, Sample};
+
+/// Largest distance of the arm from the goal when the run is over, m.
+pub const GOAL_DISTANCE: f64 = 3e-3;
+/// Largest angle from the goal when the run is over, rad: 1 degree.
+pub const GOAL_ANGLE: f64 = std::f64::consts::PI / 180.0;
+/// Speed of elbow and forearm at which the control code stops the arm, m/s. (`control` keeps its own copy to itself;
+/// the closed loop proves that this one is not the larger.)
+pub const TIP_SPEED_LIMIT: f64 = 0.8;
+
+/// Which limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Limit {
+    /// Distance of a joint to its nearer soft limit, rad.
+    JointPosition,
+    /// Joint speed, rad/s.
+    JointVelocity,
+    /// Joint torque, N m.
+    JointTorque,
+    /// Speed of elbow and forearm, m/s.
+    TipSpeed,
+    /// Distance of the planned tool position from the shoulder, m.
+    Reach,
+    /// Distance from the goal at the end of the run, m.
+    GoalPosition,
+    /// Angle from the goal at the end of the run, rad.
+    GoalOrientation,
+}
+
+impl Limit {
+    /// What a person calls it, and its unit.
+    pub const fn name(self) -> (&'static str, &'static str) {
+        match self {
+            Limit::JointPosition => ("soft limit", "rad"),
+            Limit::JointVelocity => ("velocity", "rad/s"),
+            Limit::JointTorque => ("torque", "N m"),
+            Limit::TipSpeed => ("elbow/forearm speed", "m/s"),
+            Limit::Reach => ("reach", "m"),
+            Limit::GoalPosition => ("goal distance", "m"),
+            Limit::GoalOrientation => ("goal angle", "rad"),
+        }
+    }
+}
+
+/// The worst moment with respect to one limit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Margin {
+    /// The limit.
+    pub limit: Limit,
+    /// The joint it concerns, 1 to 7.
+    pub joint: Option<u8>,
+    /// The value at the worst moment.
+    pub value: f64,
+    /// The bound it is compared with.
+    pub bound: f64,
+    /// What is left: negative is a violation.
+    pub margin: f64,
+    /// When, s since the start of the movement.
+    pub time_s: f64,
+}
+
+/// The result of a check.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CheckReport {
+    /// Name of the primitive.
+    pub name: String,
+    /// Check sum of its content.
+    pub checksum: String,
+    /// Hash of the robot model.
+    pub model_hash: String,
+    /// Bytes of its image and check sum of that image.
+    pub image: (usize, String),
+    /// Kernels of each row.
+    pub kernels: usize,
+    /// Duration as taught, s.
+    pub duration_s: f64,
+    /// Speed factor of the check.
+    pub speed: f64,
+    /// Duration of the checked run until the arm rests at the goal, s.
+    pub run_duration_s: f64,
+    /// Worst margins.
+    pub margins: Vec<Margin>,
+    /// Largest distance of the tool from the plan, m, over the run.
+    pub tracking_max_m: f64,
+    /// Largest speed of the tool, m/s.
+    pub tool_speed_max_m_s: f64,
+    /// Cycles in which the torque limiter cut.
+    pub limited_cycles: usize,
+    /// What is wrong; empty if the primitive may move an arm.
+    pub violations: Vec<String>,
+}
+
+impl CheckReport {
+    /// Whether nothing is wrong.
+    pub fn passed(&self) -> bool {
+        self.violations.is_empty()
+    }
+
+    /// The report as text for a terminal.
+    pub fn to_text(&self) -> String {
+        let mut text = format!(
+            "{}: content {}, model {}, image {} bytes {}, {} kernels, {:.3} s at speed {}\n\n",
+            self.name,
+            self.checksum,
+            self.model_hash,
+            self.image.0,
+            self.image.1,
+            self.kernels,
+            self.duration_s,
+            self.speed
+        );
+        let mut table = Table::new(["limit", "joint", "value", "bound", "margin", "unit", "at"]);
+        for margin in &self.margins {
+            let (name, unit) = margin.limit.name();
+            table.row([
+                name.to_owned(),
+                margin
+                    .joint
+                    .map_or_else(|| "-".to_owned(), |joint| format!("J{joint}")),
+                format!("{:.4}", margin.value),
+                format!("{:.4}", margin.bound),
+                format!(
+                    "{:.4}{}",
+                    margin.margin,
+                    if margin.margin < 0.0 { " !" } else { "" }
+                ),
+                unit.to_owned(),
+                format!("{:.3} s", margin.time_s),
+            ]);
+        }
+        text += &table.to_string();
+        text += &format!(
+            "\narm at rest after {:.3} s; tracking error at most {:.2} mm; tool speed at most {:.3} m/s; torque cut in {} cycles\n",
+            self.run_duration_s,
+            self.tracking_max_m * 1e3,
+            self.tool_speed_max_m_s,
+            self.limited_cycles
+        );
+        if self.passed() {
+            text += "passed\n";
+        } else {
+            text += &format!(
+                "{} violation{}:\n",
+                self.violations.len(),
+                if self.violations.len() == 1 { "" } else { "s" }
+            );
+            for violation in &self.violations {
+                text += &format!("  - {violation}\n");
+            }
+        }
+        text
+    }
+}
+
+/// Checks a primitive that was read from its file at `speed` times the taught speed; `progress` hears the fraction
+/// done now and then.
+///
+/// # Errors
+/// The file cannot be turned into a primitive or an image at all, or belongs to another model of the arm. Everything
+/// that can be measured is in the report instead.
+pub fn check(
+    file: &PrimitiveFile,
+    speed: f64,
+    progress: impl FnMut(f64),
+) -> Result<CheckReport, PrimitiveFileError> {
+    file.require_model(control::MODEL_HASH)?;
+    let image = file.to_image()?;
+    let primitive = file.to_primitive()?;
+    let mut report = CheckReport {
+        name: file.name.clone(),
+        checksum: format!("0x{:08x}", file.checksum()),
+        model_hash: format!("0x{:08x}", file.model_hash),
+        image: (
+            image.len(),
+            format!(
+                "0x{:08x}",
+                crate::demonstration::recording::checksum(&image)
+            ),
+        ),
+        kernels: file.kernels(),
+        duration_s: file.duration,
+        speed,
+        run_duration_s: 0.0,
+        margins: Vec::new(),
+        tracking_max_m: 0.0,
+        tool_speed_max_m_s: 0.0,
+        limited_cycles: 0,
+        violations: Vec::new(),
+    };
+    check_plan(&primitive, &mut report);
+    let run = ClosedLoop::play(&primitive, speed, progress);
+    check_run(file, &run, &mut report);
+    for margin in &report.margins {
+        // A NaN is no margin either.
+        if margin.margin.is_nan() || margin.margin < 0.0 {
+            let (name, unit) = margin.limit.name();
+            let joint = margin
+                .joint
+                .map_or_else(String::new, |joint| format!("J{joint} "));
+            report.violations.push(format!(
+                "{joint}{name}: {:.4} {unit} against {:.4} {unit} at {:.3} s",
+                margin.value, margin.bound, margin.time_s
+            ));
+        }
+    }
+    Ok(report)
+}
+
+/// The plan alone: finite everywhere, within reach, ending at its goal.
+fn check_plan(primitive: &crate::primitive_file::HostPrimitive, report: &mut CheckReport) {
+    let references = match plan::roll_out(primitive) {
+        Ok(references) => references,
+        Err(error) => {
+            report
+                .violations
+                .push(format!("the plan cannot start: {error}"));
+            return;
+        }
+    };
+    let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
+    let broken = references.iter().find(|reference| {
+        !(finite(&reference.position.x)
+            && finite(&reference.position.a)
+            && finite(&plan::orientation(reference))
+            && finite(&reference.orientation.domega)
+            && finite(&reference.posture.x)
+            && finite(&reference.posture.a)
+            && finite(&reference.hand.x))
+    });
+    if let Some(reference) = broken {
+        report
+            .violations
+            .push(format!("the plan is not finite at {:.3} s", reference.time));
+        return;
+    }
+    let farthest = references.iter().map(|reference| {
+        let distance = reference
+            .position
+            .x
+            .iter()
+            .map(|x| x * x)
+            .sum::<f64>()
+            .sqrt();
+        (reference.time, distance)
+    });
+    if let Some((time_s, distance)) = farthest.max_by(|a, b| a.1.total_cmp(&b.1)) {
+        report.margins.push(Margin {
+            limit: Limit::Reach,
+            joint: None,
+            value: distance,
+            bound: REACH,
+            margin: REACH - distance,
+            time_s,
+        });
+        debug_assert_eq!(
+            within_reach(&nalgebra::Vector3::new(distance, 0.0, 0.0)),
+            distance <= REACH
+        );
+    }
+}
+
+/// The plan as the arm follows it.
+fn check_run(file: &PrimitiveFile, run: &ClosedLoop, report: &mut CheckReport) {
+    match run.ending {
+        Ending::Arrived => {}
+        Ending::Unfit(reason) => report
+            .violations
+            .push(format!("the control code refuses the primitive: {reason}")),
+        Ending::Refused(reason) => report
+            .violations
+            .push(format!("the control code refuses the run: {reason}")),
+        Ending::Stopped(state, fault) => {
+            let time = run.samples.last().map_or(0.0, |sample| sample.time);
+            report.violations.push(format!(
+                "the control code stops the run at {time:.3} s: {fault} (state {})",
+                state.name()
+            ));
+        }
+        Ending::Endless => report
+            .violations
+            .push("the run does not come to its end".to_owned()),
+        Ending::Diverged => report
+            .violations
+            .push("the arm's state becomes infinite".to_owned()),
+    }
+    let Some(last) = run.samples.last() else {
+        return;
+    };
+    report.run_duration_s = last.time;
+    for joint in 0..7 {
+        report
+            .margins
+            .push(worst(run, Limit::JointPosition, Some(joint), |sample| {
+                let q = sample.q[joint];
+                let bound = if q - SOFT_MIN[joint] < SOFT_MAX[joint] - q {
+                    SOFT_MIN[joint]
+                } else {
+                    SOFT_MAX[joint]
+                };
+                let margin = if bound == SOFT_MIN[joint] {
+                    q - bound
+                } else {
+                    bound - q
+                };
+                (q, bound, margin)
+            }));
+    }
+    for (joint, bound) in VELOCITY_MAX.into_iter().enumerate() {
+        report
+            .margins
+            .push(worst(run, Limit::JointVelocity, Some(joint), |sample| {
+                (sample.dq[joint], bound, bound - sample.dq[joint].abs())
+            }));
+    }
+    for joint in 0..7 {
+        report
+            .margins
+            .push(worst(run, Limit::JointTorque, Some(joint), |sample| {
+                let (value, bound) = (f64::from(sample.record.tau[joint]), TORQUE_LIMITS[joint]);
+                (value, bound, bound - value.abs())
+            }));
+    }
+    report
+        .margins
+        .push(worst(run, Limit::TipSpeed, None, |sample| {
+            let speed = sample.elbow_speeds[0].max(sample.elbow_speeds[1]);
+            (speed, TIP_SPEED_LIMIT, TIP_SPEED_LIMIT - speed)
+        }));
+    report.limited_cycles = run.limited_cycles();
+    if report.limited_cycles > 0 {
+        report.violations.push(format!(
+            "the torque limiter cuts in {} of {} cycles: the arm cannot follow the plan",
+            report.limited_cycles,
+            run.samples.len()
+        ));
+    }
+    let maximum = |pick: &dyn Fn(&Sample) -> f64| run.samples.iter().map(pick).fold(0.0, f64::max);
+    report.tool_speed_max_m_s = maximum(&|sample| sample.tool_speed);
+    report.tracking_max_m = maximum(&|sample| distance(&sample.position, &sample.record.pose_d));
+    if run.ending == Ending::Arrived {
+        let away = (0..3)
+            .map(|axis| (last.position[axis] - file.goal.position[axis]).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        let turned = angle_between(&last.orientation, &file.goal.orientation);
+        for (limit, value, bound) in [
+            (Limit::GoalPosition, away, GOAL_DISTANCE),
+            (Limit::GoalOrientation, turned, GOAL_ANGLE),
+        ] {
+            report.margins.push(Margin {
+                limit,
+                joint: None,
+                value,
+                bound,
+                margin: bound - value,
+                time_s: last.time,
+            });
+        }
+    }
+}
+
+fn distance(position: &[f64; 3], pose_d: &[f32; 7]) -> f64 {
+    (0..3)
+        .map(|axis| (position[axis] - f64::from(pose_d[axis])).powi(2))
+        .sum::<f64>()
+        .sqrt()
+}
+
+/// The moment of the smallest margin; `look` gives value, bound and margin.
+fn worst(
+    run: &ClosedLoop,
+    limit: Limit,
+    joint: Option<usize>,
+    look: impl Fn(&Sample) -> (f64, f64, f64),
+) -> Margin {
+    let mut worst = Margin {
+        limit,
+        joint: joint.map(|joint| joint as u8 + 1),
+        value: 0.0,
+        bound: 0.0,
+        margin: f64::INFINITY,
+        time_s: 0.0,
+    };
+    for sample in &run.samples {
+        let (value, bound, margin) = look(sample);
+        if margin.is_nan() || margin < worst.margin {
+            worst = Margin {
+                value,
+                bound,
+                margin,
+                time_s: sample.time,
+                ..worst
+            };
+        }
+    }
+    worst
+}

@@ -1,0 +1,509 @@
+//! `Client`: a conversation with a device.
+//!
+//! Opening one compares versions and hashes; nothing else is sent to a device that does not fit. After that every
+//! request is answered or fails within [`ANSWER_TIMEOUT`] of the device's time; a lost answer is asked for again
+//! with the same number, which the device acts on once. As long as somebody waits in [`Client::next`] or in a
+//! request the device hears from this host often enough not to stop the arm; when nobody does, it stops it.
+
+mod interrupt;
+mod motion;
+mod telemetry;
+mod upload;
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
+use link::message::{DeviceHello, HostHello};
+use link::{
+    Event, LINK_VERSION, LinkCounters, Listing, Refusal, Reply, Request, SCHEMA_HASH, Statistics,
+    Status, Telemetry, Text,
+};
+
+use crate::error::HostError;
+use crate::transport::Transport;
+
+pub use interrupt::Interrupt;
+pub use telemetry::{Gaps, TelemetryStream};
+pub use upload::{UploadOutcome, UploadPhase};
+
+/// How long an answer may take, the repetitions of its request included.
+pub const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// A request without an answer is repeated after this time. Longer than any answer takes on a good line: the
+/// slowest is the commit of an upload, some tens of milliseconds.
+const REPEAT_AFTER: Duration = Duration::from_millis(250);
+
+/// The device hears from this host at least so often while it waits for telemetry; it stops the arm after 500 ms.
+const KEEP_ALIVE: Duration = Duration::from_millis(100);
+
+/// A request that can move the arm is preceded by a ping if the device was heard longer ago than this: the
+/// device refuses such a request when it is older than 500 ms.
+const FRESH: Duration = Duration::from_millis(200);
+
+/// How long to wait for another host to be gone. A killed one keeps its session for half a second.
+const BUSY_PATIENCE: Duration = Duration::from_millis(1500);
+
+/// Something the device sent unasked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Incoming {
+    /// One control cycle.
+    Telemetry(Telemetry),
+    /// Something happened.
+    Event(Event),
+}
+
+/// Round trips of requests, in the device's time.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RoundTrips {
+    /// Requests answered.
+    pub count: u32,
+    /// Requests sent again because no answer came.
+    pub repeated: u32,
+    /// Longest time from request to answer.
+    pub worst: Duration,
+    /// Sum of all these times.
+    pub total: Duration,
+}
+
+/// A conversation with a device.
+pub struct Client<T: Transport> {
+    transport: T,
+    decoder: Decoder<FRAME_BYTES>,
+    hello: DeviceHello,
+    session: u16,
+    sequence: u16,
+    device_ms: u32,
+    heard: Duration,
+    sent: Duration,
+    incoming: VecDeque<Incoming>,
+    answers: VecDeque<Reply>,
+    gaps: Gaps,
+    round_trips: RoundTrips,
+    moving: bool,
+    open: bool,
+    timeout: Duration,
+    interrupt: Interrupt,
+    received: Vec<u8>,
+}
+
+impl<T: Transport> Client<T> {
+    /// Opens a conversation. `owner` is shown to others that find the device busy, e.g. "anna@lab3".
+    ///
+    /// # Errors
+    /// [`HostError::Incompatible`] with both versions, [`HostError::NoAnswer`] within two seconds,
+    /// [`HostError::Refused`] with [`Refusal::Busy`] if another host is using the device.
+    pub fn connect(transport: T, owner: &str) -> Result<Self, HostError> {
+        Self::connect_as(transport, owner, LINK_VERSION, SCHEMA_HASH)
+    }
+
+    /// Opens a conversation pretending to be of a given version: to test how devices refuse.
+    ///
+    /// # Errors
+    /// As [`Client::connect`].
+    pub fn connect_as(
+        transport: T,
+        owner: &str,
+        link_version: u16,
+        schema_hash: u32,
+    ) -> Result<Self, HostError> {
+        let now = transport.now();
+        let mut client = Self {
+            session: session_number(transport.is_virtual()),
+            transport,
+            decoder: Decoder::new(),
+            hello: nobody(),
+            sequence: 0,
+            device_ms: 0,
+            heard: now,
+            sent: now,
+            incoming: VecDeque::new(),
+            answers: VecDeque::new(),
+            gaps: Gaps::default(),
+            round_trips: RoundTrips::default(),
+            moving: false,
+            open: false,
+            timeout: ANSWER_TIMEOUT,
+            interrupt: Interrupt::never(),
+            received: Vec::new(),
+        };
+        // Ends whatever half a frame an earlier host may have left on the line.
+        client.transport.send(&[0])?;
+        let hello = HostHello {
+            link_version,
+            schema_hash,
+            model_hash: control::MODEL_HASH,
+            owner: Text::new(owner),
+        };
+        client.hello = client.greet(&hello)?;
+        client.open = true;
+        Ok(client)
+    }
+
+    fn greet(&mut self, hello: &HostHello) -> Result<DeviceHello, HostError> {
+        let started = self.transport.now();
+        loop {
+            match self.exchange(&Request::Hello(hello.clone())) {
+                Ok(Reply::Hello { hello: device, .. }) => {
+                    // The device has compared; comparing here too catches a device that does not.
+                    differs(
+                        Refusal::LinkVersion,
+                        hello.link_version,
+                        device.link_version,
+                    )?;
+                    differs_hash(Refusal::Schema, hello.schema_hash, device.schema_hash)?;
+                    differs_hash(Refusal::Model, hello.model_hash, device.model_hash)?;
+                    return Ok(device);
+                }
+                Ok(_) => return Err(HostError::WrongAnswer { request: "hello" }),
+                Err(HostError::Refused {
+                    reason: Refusal::LinkVersion,
+                    detail: [host, device],
+                    ..
+                }) => {
+                    differs(Refusal::LinkVersion, host, device)?;
+                    return Err(HostError::WrongAnswer { request: "hello" });
+                }
+                Err(HostError::Refused {
+                    reason: reason @ (Refusal::Schema | Refusal::Model),
+                    detail,
+                    ..
+                }) => {
+                    differs_hash(reason, detail[0], detail[1])?;
+                    return Err(HostError::WrongAnswer { request: "hello" });
+                }
+                Err(HostError::Refused {
+                    reason: Refusal::Busy,
+                    detail: [_, wait],
+                    ..
+                }) if self.transport.now().saturating_sub(started) < BUSY_PATIENCE => {
+                    let until = self.transport.now()
+                        + Duration::from_millis(u64::from(wait.clamp(10, 600)));
+                    while self.transport.now() < until {
+                        self.pump(until.saturating_sub(self.transport.now()))?;
+                    }
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// Who the device is.
+    pub fn hello(&self) -> &DeviceHello {
+        &self.hello
+    }
+
+    /// Ends waiting, and stops the arm, when the user interrupts.
+    pub fn set_interrupt(&mut self, interrupt: Interrupt) {
+        self.interrupt = interrupt;
+    }
+
+    /// Longest wait for an answer.
+    pub fn set_timeout(&mut self, timeout: Duration) {
+        self.timeout = timeout;
+    }
+
+    /// The transport, e.g. to reach into a simulated world. Bytes belong to the client.
+    pub fn transport(&mut self) -> &mut T {
+        &mut self.transport
+    }
+
+    /// Time of the transport's clock.
+    pub fn now(&self) -> Duration {
+        self.transport.now()
+    }
+
+    /// What this end of the link counted.
+    pub fn counters(&self) -> LinkCounters {
+        self.decoder.counters()
+    }
+
+    /// Messages and telemetry that did not arrive.
+    pub fn gaps(&self) -> Gaps {
+        self.gaps
+    }
+
+    /// How quickly the device answered.
+    pub fn round_trips(&self) -> RoundTrips {
+        self.round_trips
+    }
+
+    /// Sends a request and waits for its answer.
+    ///
+    /// # Errors
+    /// [`HostError::Refused`], [`HostError::NoAnswer`] after the time-out, [`HostError::Transport`].
+    pub fn request(&mut self, request: &Request) -> Result<Reply, HostError> {
+        if request.moves() && self.transport.now().saturating_sub(self.heard) > FRESH {
+            self.exchange(&Request::Ping)?;
+        }
+        let reply = self.exchange(request)?;
+        match request {
+            Request::Gravity | Request::Approach { .. } | Request::Run { .. } => self.moving = true,
+            Request::Stop | Request::Hold | Request::Release => self.moving = false,
+            _ => {}
+        }
+        Ok(reply)
+    }
+
+    /// A request that is answered by a plain yes.
+    fn order(&mut self, request: &Request) -> Result<(), HostError> {
+        match self.request(request)? {
+            Reply::Accepted { .. } => Ok(()),
+            _ => Err(HostError::WrongAnswer {
+                request: request.word(),
+            }),
+        }
+    }
+
+    fn exchange(&mut self, request: &Request) -> Result<Reply, HostError> {
+        self.sequence = self.sequence.wrapping_add(1);
+        let of = self.sequence;
+        let started = self.transport.now();
+        // The age of a request counts from here: a repetition is not younger than the first attempt.
+        let envelope = Envelope {
+            session: self.session,
+            sequence: of,
+            time_ms: self.device_ms,
+        };
+        self.send(envelope, request)?;
+        let mut repeat_at = started + REPEAT_AFTER;
+        loop {
+            if let Some(reply) = self.take_answer(of) {
+                let took = self.transport.now().saturating_sub(started);
+                self.round_trips.count += 1;
+                self.round_trips.worst = self.round_trips.worst.max(took);
+                self.round_trips.total += took;
+                return match reply {
+                    Reply::Refused { reason, detail, .. } => Err(HostError::Refused {
+                        request: request.word(),
+                        reason,
+                        detail,
+                    }),
+                    reply => Ok(reply),
+                };
+            }
+            let now = self.transport.now();
+            let deadline = started + self.timeout;
+            if now >= deadline {
+                return Err(HostError::NoAnswer {
+                    request: request.word(),
+                    after: self.timeout,
+                });
+            }
+            if now >= repeat_at {
+                self.round_trips.repeated += 1;
+                self.send(envelope, request)?;
+                repeat_at = now + REPEAT_AFTER;
+            }
+            self.pump(repeat_at.min(deadline).saturating_sub(now))?;
+        }
+    }
+
+    fn take_answer(&mut self, of: u16) -> Option<Reply> {
+        // Answers to pings, and to requests that were given up, are not waited for.
+        while let Some(reply) = self.answers.pop_front() {
+            if reply.answers() == Some(of) {
+                return Some(reply);
+            }
+        }
+        None
+    }
+
+    fn send(&mut self, envelope: Envelope, request: &Request) -> Result<(), HostError> {
+        let mut buffer = [0; FRAME_BYTES];
+        // No request is longer than a frame; `the_largest_messages_fit` in `link` proves it.
+        let length = frame::encode(envelope, request, &mut buffer)
+            .map_err(|error| crate::transport::TransportError::other(error.to_string()))?;
+        self.sent = self.transport.now();
+        Ok(self.transport.send(&buffer[..length])?)
+    }
+
+    /// Waits for bytes and sorts what they carry.
+    fn pump(&mut self, timeout: Duration) -> Result<(), HostError> {
+        let mut bytes = std::mem::take(&mut self.received);
+        bytes.clear();
+        // A wait shorter than the step of a virtual clock would not let its time pass at all.
+        let received = self
+            .transport
+            .receive(timeout.max(Duration::from_micros(10)), &mut bytes);
+        let mut rest = bytes.as_slice();
+        while let Some(frame) = self.decoder.next::<Reply>(&mut rest) {
+            if frame.envelope.session == self.session {
+                self.sort(frame);
+            }
+        }
+        self.received = bytes;
+        Ok(received?)
+    }
+
+    fn sort(&mut self, frame: frame::Frame<Reply>) {
+        self.heard = self.transport.now();
+        self.device_ms = frame.envelope.time_ms;
+        self.gaps.message(frame.envelope.sequence);
+        match frame.message {
+            Reply::Telemetry(telemetry) => {
+                self.gaps.telemetry(telemetry.cycle);
+                self.incoming.push_back(Incoming::Telemetry(telemetry));
+            }
+            Reply::Event(event) => self.incoming.push_back(Incoming::Event(event)),
+            answer => self.answers.push_back(answer),
+        }
+    }
+
+    /// The next thing the device sends unasked; `None` if nothing came within `timeout`. Keeps the session alive.
+    ///
+    /// # Errors
+    /// [`HostError::Interrupted`] after the arm has been stopped, [`HostError::NoAnswer`] if the device has fallen
+    /// silent, [`HostError::Transport`].
+    pub fn next(&mut self, timeout: Duration) -> Result<Option<Incoming>, HostError> {
+        let deadline = self.transport.now() + timeout;
+        loop {
+            if self.interrupt.is_raised() {
+                return Err(self.interrupted());
+            }
+            if let Some(incoming) = self.incoming.pop_front() {
+                return Ok(Some(incoming));
+            }
+            let now = self.transport.now();
+            if now >= deadline {
+                return Ok(None);
+            }
+            // Answers to pings come many times within this; without them the line is dead.
+            let silence = now.saturating_sub(self.heard);
+            if silence >= self.timeout {
+                return Err(HostError::NoAnswer {
+                    request: "ping",
+                    after: silence,
+                });
+            }
+            if now.saturating_sub(self.sent) >= KEEP_ALIVE {
+                self.sequence = self.sequence.wrapping_add(1);
+                let envelope = Envelope {
+                    session: self.session,
+                    sequence: self.sequence,
+                    time_ms: self.device_ms,
+                };
+                self.send(envelope, &Request::Ping)?;
+            }
+            let ping_due = (self.sent + KEEP_ALIVE).saturating_sub(now);
+            self.pump(deadline.saturating_sub(now).min(ping_due))?;
+            self.answers.clear();
+        }
+    }
+
+    /// The state of the device.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn status(&mut self) -> Result<Status, HostError> {
+        match self.request(&Request::Status)? {
+            Reply::Status { status, .. } => Ok(status),
+            _ => Err(HostError::WrongAnswer { request: "status" }),
+        }
+    }
+
+    /// The counters of the device.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn statistics(&mut self) -> Result<Statistics, HostError> {
+        match self.request(&Request::Statistics)? {
+            Reply::Statistics { statistics, .. } => Ok(statistics),
+            _ => Err(HostError::WrongAnswer {
+                request: "statistics",
+            }),
+        }
+    }
+
+    /// The primitives the device stores.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn list(&mut self) -> Result<Vec<Listing>, HostError> {
+        let mut stored = Vec::new();
+        for index in 0..self.hello.slots {
+            match self.request(&Request::List { index })? {
+                Reply::Listing { listing, .. } => stored.extend(listing),
+                _ => return Err(HostError::WrongAnswer { request: "list" }),
+            }
+        }
+        Ok(stored)
+    }
+}
+
+impl<T: Transport> Drop for Client<T> {
+    /// Stops an arm this host has set in motion, and frees the device. Does not wait: errors find nobody here,
+    /// and the device stops the arm by itself when it hears nothing more.
+    fn drop(&mut self) {
+        if !self.open {
+            return;
+        }
+        let farewell = [Request::Stop, Request::Goodbye];
+        for request in farewell.iter().skip(usize::from(!self.moving)) {
+            self.sequence = self.sequence.wrapping_add(1);
+            let envelope = Envelope {
+                session: self.session,
+                sequence: self.sequence,
+                time_ms: self.device_ms,
+            };
+            if self.send(envelope, request).is_err() {
+                return;
+            }
+        }
+    }
+}
+
+/// What stands for the device's hello until it has come.
+fn nobody() -> DeviceHello {
+    DeviceHello {
+        link_version: 0,
+        schema_hash: 0,
+        model_hash: 0,
+        image_schema: 0,
+        maximum_kernels: 0,
+        slots: 0,
+        slot_bytes: 0,
+        cycles_per_second: 0,
+        ticks_per_second: 0,
+        simulated: false,
+        firmware: Text::default(),
+        board: Text::default(),
+        serial: Text::default(),
+    }
+}
+
+fn differs(what: Refusal, host: impl Into<u32>, device: impl Into<u32>) -> Result<(), HostError> {
+    let (host, device) = (host.into(), device.into());
+    if host == device {
+        return Ok(());
+    }
+    Err(HostError::Incompatible {
+        what,
+        host: format!("version {host}"),
+        device: format!("version {device}"),
+    })
+}
+
+fn differs_hash(what: Refusal, host: u32, device: u32) -> Result<(), HostError> {
+    if host == device {
+        return Ok(());
+    }
+    Err(HostError::Incompatible {
+        what,
+        host: format!("{host:#010x}"),
+        device: format!("{device:#010x}"),
+    })
+}
+
+/// A number that no other host on this line is likely to have. A simulated device has no other hosts, and its
+/// runs must not differ.
+fn session_number(is_virtual: bool) -> u16 {
+    use std::hash::{BuildHasher, Hasher};
+    if is_virtual {
+        return 1;
+    }
+    let random = std::collections::hash_map::RandomState::new()
+        .build_hasher()
+        .finish();
+    (random % 0xFFFF) as u16 + 1
+}

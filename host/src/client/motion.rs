@@ -1,0 +1,141 @@
+//! Requests that move the arm, and the ways to bring it to rest.
+
+use std::time::Duration;
+
+use control::State;
+use link::{Goal, Name, Request, RunOptions};
+
+use super::Client;
+use crate::error::HostError;
+use crate::transport::Transport;
+
+/// How long the arm may take to leave its motion after a stop was accepted. The soft stop begins in the cycle
+/// after the command; this leaves room for a slow line.
+const STOP_TIMEOUT: Duration = Duration::from_millis(200);
+
+impl<T: Transport> Client<T> {
+    /// Tells the device at which joint angles (rad) the arm stands now.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn zero(&mut self, home: [f32; 7]) -> Result<(), HostError> {
+        self.order(&Request::Zero { home })
+    }
+
+    /// Compensates gravity, so that a person can lead the arm.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn gravity(&mut self) -> Result<(), HostError> {
+        self.order(&Request::Gravity)
+    }
+
+    /// Holds the present pose.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn hold(&mut self) -> Result<(), HostError> {
+        self.order(&Request::Hold)
+    }
+
+    /// Moves the joints to `q` (rad) in `duration` (s); 0 lets the device choose.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn approach(&mut self, q: [f32; 7], duration: f32) -> Result<(), HostError> {
+        self.order(&Request::Approach { q, duration })
+    }
+
+    /// Starts a stored primitive.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn run(&mut self, name: &Name, options: RunOptions) -> Result<(), HostError> {
+        self.order(&Request::Run {
+            name: name.clone(),
+            options,
+        })
+    }
+
+    /// Moves the goal of the running primitive.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn set_goal(&mut self, goal: Goal) -> Result<(), HostError> {
+        self.order(&Request::SetGoal(goal))
+    }
+
+    /// Changes the speed of the running primitive; 1 is as taught.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn set_speed(&mut self, factor: f32) -> Result<(), HostError> {
+        self.order(&Request::SetSpeed { factor })
+    }
+
+    /// Takes the present wrench as zero.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn tare(&mut self) -> Result<(), HostError> {
+        self.order(&Request::Tare)
+    }
+
+    /// Clears a fault whose cause is gone.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn clear_fault(&mut self) -> Result<(), HostError> {
+        self.order(&Request::ClearFault)
+    }
+
+    /// Gives up torque. An arm that is not braked sinks.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn release(&mut self) -> Result<(), HostError> {
+        self.order(&Request::Release)
+    }
+
+    /// Stops any motion and waits until the arm has left it.
+    ///
+    /// # Errors
+    /// As [`Client::request`]; [`HostError::NotStopped`] if the motion goes on after 200 ms.
+    pub fn stop(&mut self) -> Result<(), HostError> {
+        self.order(&Request::Stop)?;
+        let started = self.now();
+        loop {
+            let status = self.status()?;
+            if !is_moving(status.state) {
+                return Ok(());
+            }
+            let after = self.now().saturating_sub(started);
+            if after > STOP_TIMEOUT {
+                return Err(HostError::NotStopped { after });
+            }
+        }
+    }
+
+    /// Stops the arm because the user asked to; the error to end with.
+    pub(super) fn interrupted(&mut self) -> HostError {
+        if !self.moving {
+            return HostError::Interrupted;
+        }
+        // Stopping waits for answers, and must not be interrupted by the wish to stop.
+        let interrupt = std::mem::take(&mut self.interrupt);
+        let stopped = self.stop();
+        self.interrupt = interrupt;
+        match stopped {
+            Ok(()) => HostError::Interrupted,
+            Err(error) => error,
+        }
+    }
+}
+
+/// Whether a state is one of those the device would end when this host fell silent.
+fn is_moving(state: u8) -> bool {
+    matches!(
+        State::from_code(state),
+        Some(State::Gravity | State::Approach | State::Run | State::Coast)
+    )
+}

@@ -1,0 +1,147 @@
+//! Putting a primitive into the device: sent in parts, checked and committed there, read back here.
+
+use link::image::stored_crc;
+use link::message::{CHUNK_BYTES, ChunkData};
+use link::{Listing, Name, PrimitiveImage, Reply, Request};
+
+use super::Client;
+use crate::error::HostError;
+use crate::transport::Transport;
+
+/// What an upload is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UploadPhase {
+    /// Bytes are sent.
+    Send,
+    /// The device checks the image and puts it into its place.
+    Commit,
+    /// The stored bytes are read back and compared.
+    Verify,
+}
+
+/// How an upload ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum UploadOutcome {
+    /// The image was sent, stored and read back.
+    Stored(Listing),
+    /// The very same image was there already; nothing was sent.
+    AlreadyThere(Listing),
+}
+
+impl<T: Transport> Client<T> {
+    /// Uploads an image. `progress` hears the phase, the bytes done and the bytes in all.
+    ///
+    /// Whatever fails, the device keeps what it had under that name until the moment the new image is complete.
+    ///
+    /// # Errors
+    /// [`HostError::Image`] for bytes that are no image (nothing is sent), [`HostError::ReadBack`], and as
+    /// [`Client::request`].
+    pub fn upload(
+        &mut self,
+        image: &[u8],
+        mut progress: impl FnMut(UploadPhase, usize, usize),
+    ) -> Result<UploadOutcome, HostError> {
+        let parsed = PrimitiveImage::parse(image)?;
+        let name = parsed.name().clone();
+        if let Some(there) = self.find(&name)?.filter(|there| is_same(there, image)) {
+            return Ok(UploadOutcome::AlreadyThere(there));
+        }
+        if let Err(error) = self.send_image(&name, image, &mut progress) {
+            // Best effort: the device forgets the parts anyway when the session ends.
+            let _ = self.request(&Request::UploadAbort);
+            return Err(error);
+        }
+        let stored = self.read_image(&name, |done| {
+            progress(UploadPhase::Verify, done, image.len())
+        })?;
+        if stored != image {
+            let same = stored
+                .iter()
+                .zip(image)
+                .take_while(|(there, here)| there == here)
+                .count();
+            return Err(HostError::ReadBack { offset: same });
+        }
+        match self.find(&name)? {
+            Some(listing) if is_same(&listing, image) => Ok(UploadOutcome::Stored(listing)),
+            _ => Err(HostError::ReadBack { offset: 0 }),
+        }
+    }
+
+    fn send_image(
+        &mut self,
+        name: &Name,
+        image: &[u8],
+        progress: &mut impl FnMut(UploadPhase, usize, usize),
+    ) -> Result<(), HostError> {
+        let length = u32::try_from(image.len()).unwrap_or(u32::MAX);
+        self.order(&Request::UploadBegin {
+            name: name.clone(),
+            length,
+            crc: stored_crc(image),
+        })?;
+        let mut done = 0;
+        progress(UploadPhase::Send, done, image.len());
+        for part in image.chunks(CHUNK_BYTES) {
+            let data = ChunkData::from_slice(part).unwrap_or_default();
+            let offset = u32::try_from(done).unwrap_or(u32::MAX);
+            self.order(&Request::UploadChunk { offset, data })?;
+            done += part.len();
+            progress(UploadPhase::Send, done, image.len());
+        }
+        progress(UploadPhase::Commit, 0, 1);
+        self.order(&Request::UploadCommit)?;
+        progress(UploadPhase::Commit, 1, 1);
+        Ok(())
+    }
+
+    /// What the device stores under a name.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn find(&mut self, name: &Name) -> Result<Option<Listing>, HostError> {
+        Ok(self
+            .list()?
+            .into_iter()
+            .find(|listing| listing.name == *name))
+    }
+
+    /// Reads a stored image; `progress` hears the bytes done.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn read_image(
+        &mut self,
+        name: &Name,
+        mut progress: impl FnMut(usize),
+    ) -> Result<Vec<u8>, HostError> {
+        let mut image = Vec::new();
+        loop {
+            let offset = u32::try_from(image.len()).unwrap_or(u32::MAX);
+            match self.request(&Request::Read {
+                name: name.clone(),
+                offset,
+            })? {
+                Reply::Chunk { data, .. } if data.is_empty() => return Ok(image),
+                Reply::Chunk {
+                    offset: at, data, ..
+                } if at == offset => image.extend_from_slice(&data),
+                _ => return Err(HostError::WrongAnswer { request: "read" }),
+            }
+            progress(image.len());
+        }
+    }
+
+    /// Removes a primitive.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn delete(&mut self, name: &Name) -> Result<(), HostError> {
+        self.order(&Request::Delete { name: name.clone() })
+    }
+}
+
+/// Whether a listing is that of this very image.
+fn is_same(listing: &Listing, image: &[u8]) -> bool {
+    usize::try_from(listing.length) == Ok(image.len()) && listing.crc == stored_crc(image)
+}

@@ -1,0 +1,126 @@
+//! From the options of the command line to a conversation with a device.
+
+use std::sync::Arc;
+
+use device::Stage;
+
+use super::{Exit, Failure, Global, Output};
+use crate::client::{Client, Interrupt};
+use crate::device::{Device, OpenError};
+use crate::error::HostError;
+use crate::procedure::{self, ProcedureError};
+use crate::simulation::{SimulationError, SimulationOptions};
+use crate::transport::Address;
+
+/// Opens the device that the options name and says hello. Ctrl-C then stops the arm and ends the command.
+///
+/// # Errors
+/// No device is named, it is not there, does not answer, or does not fit this tool.
+pub(super) fn open(
+    global: &Global,
+    doing: &str,
+    adjust: impl FnOnce(&mut SimulationOptions),
+) -> Result<Client<Device>, Failure> {
+    let Some(text) = &global.device else {
+        return Err(Failure::new(Exit::Usage, "E202", doing, "no device is named")
+            .help("add `--device sim:` for a simulated arm, or `--device serial:/dev/ttyACM0`, or set TACTUS_DEVICE"));
+    };
+    let address: Address = text.parse().map_err(|error| HostError::Address(error).into_failure(doing))?;
+    let device = Device::open(&address, adjust).map_err(|error| match error {
+        OpenError::Transport(error) => HostError::Transport(error).into_failure(doing),
+        OpenError::Simulation(error) => simulation_failure(error, doing),
+    })?;
+    let mut client = Client::connect(device, &owner()).map_err(|error| error.into_failure(doing))?;
+    client.set_timeout(global.timeout);
+    client.set_interrupt(interrupt());
+    Ok(client)
+}
+
+/// Makes the arm ready and says what happens and what a person must do.
+///
+/// # Errors
+/// The start-up does not get to its end.
+pub(super) fn ready(client: &mut Client<Device>, at_home: bool, output: Output, doing: &str) -> Result<(), Failure> {
+    let simulated = client.hello().simulated;
+    let spinner = output.spinner("starting up");
+    let result = procedure::make_ready(client, at_home, |stage| {
+        spinner.set_message(stage.explanation());
+        // People at a simulated pendant need no telling; at a real one the words must stay on the screen.
+        if !simulated && matches!(stage, Stage::WaitingForIdle | Stage::WaitingForZero | Stage::WaitingForActive) {
+            spinner.suspend(|| output.say(stage.explanation()));
+        }
+    });
+    spinner.finish_and_clear();
+    result.map_err(|error| failure(error, doing))?;
+    let hello = client.hello();
+    let kind = if simulated { "simulated " } else { "" };
+    output.say(format!("{kind}arm ready on {} ({})", hello.board.as_str(), hello.firmware.as_str()));
+    Ok(())
+}
+
+/// The failure of a procedure.
+pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
+    let (exit, code, help) = match error {
+        ProcedureError::Host(error) => return error.into_failure(doing),
+        ProcedureError::NotReady(_) => (Exit::Refused, "E590", "check the pendant and the cables, then try again"),
+        ProcedureError::NotZeroed => {
+            (Exit::Refused, "E591", "bring the arm to its home pose by hand and add `--at-home`")
+        }
+        ProcedureError::Stopped(_) => (Exit::Refused, "E592", "find the cause; `tactus stop` brings the arm to rest"),
+        ProcedureError::Diverted(_) => (Exit::Refused, "E593", "try again"),
+        ProcedureError::TooLong { .. } => (Exit::Refused, "E594", "look what holds the arm"),
+        ProcedureError::Recording(_) => (Exit::Internal, "E121", "check the disk and the rights of the folder"),
+    };
+    Failure::new(exit, code, doing, error).help(help)
+}
+
+fn simulation_failure(error: SimulationError, doing: &str) -> Failure {
+    let (exit, code, help) = match &error {
+        SimulationError::UnknownWorld(_) => (Exit::Usage, "E203", "for example `--device sim:world=mujoco`"),
+        SimulationError::WithoutMujoco => (Exit::NoDevice, "E310", "`cargo xtask build`, or `--device sil:world=simple`"),
+        SimulationError::NoImage(_) => (Exit::NoDevice, "E311", "`cargo xtask build`"),
+        SimulationError::NoQemu(_) => (Exit::NoDevice, "E312", "`cargo xtask setup`"),
+        _ => (Exit::Internal, "E110", "`cargo xtask setup` repairs the set-up of the simulator"),
+    };
+    Failure::new(exit, code, doing, error).help(help)
+}
+
+/// Who this is, for people who find the device busy.
+fn owner() -> String {
+    let user = std::env::var("USER").unwrap_or_else(|_| "somebody".to_owned());
+    format!("{user} (process {})", std::process::id())
+}
+
+/// Raised by the first Ctrl-C. A second one ends the process at once.
+fn interrupt() -> Interrupt {
+    let interrupt = Interrupt::never();
+    let flag = interrupt.flag();
+    // Registered first, acts last: ends the process only if the flag was already raised.
+    let registered = signal_hook::flag::register_conditional_shutdown(
+        signal_hook::consts::SIGINT,
+        Exit::Interrupted as i32,
+        Arc::clone(&flag),
+    )
+    .and_then(|_| signal_hook::flag::register(signal_hook::consts::SIGINT, flag));
+    if let Err(cause) = registered {
+        eprintln!("warning: Ctrl-C will not stop the arm before the program ends ({cause})");
+    }
+    interrupt
+}
+
+/// Opens a simulated device without a conversation, together with the flag that Ctrl-C raises.
+///
+/// # Errors
+/// The address is not that of a simulated device, or the simulation cannot be started.
+pub(super) fn simulated(text: &str, doing: &str) -> Result<(Device, Interrupt), Failure> {
+    let address: Address = text.parse().map_err(|error| HostError::Address(error).into_failure(doing))?;
+    if !matches!(address, Address::Simulated(..)) {
+        return Err(Failure::new(Exit::Usage, "E204", doing, format!("'{text}' is not a simulated device"))
+            .help("`--device sim:` or `--device sil:`"));
+    }
+    let device = Device::open(&address, |_| {}).map_err(|error| match error {
+        OpenError::Transport(error) => HostError::Transport(error).into_failure(doing),
+        OpenError::Simulation(error) => simulation_failure(error, doing),
+    })?;
+    Ok((device, interrupt()))
+}

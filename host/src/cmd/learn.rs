@@ -1,0 +1,161 @@
+//! `tactus learn`: a primitive from a demonstration.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::{Exit, Failure, Global};
+use crate::demonstration::{Preparation, Recording};
+use crate::learn::hand::HandMotion;
+use crate::learn::{self, LearnError, LearnOptions};
+use crate::primitive_file::OrientationErrorKind;
+
+/// Options of `learn`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// The demonstration, CSV with a header of names and units
+    #[arg(value_name = "DEMO")]
+    pub demonstration: PathBuf,
+    /// Where to write the primitive [default: DEMO with the ending .toml]
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Name of the primitive on the device [default: name of the output file]
+    #[arg(long)]
+    pub name: Option<String>,
+    /// Kernels of each row
+    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u16).range(2..=100))]
+    pub kernels: u16,
+    /// Cut-off of the zero-phase filter on the demonstration, Hz
+    #[arg(long, default_value_t = 7.5, value_name = "HZ")]
+    pub cutoff: f64,
+    /// Use the rotation vector as orientation error: for movements that turn more than 150 degrees
+    #[arg(long)]
+    pub rotation_vector: bool,
+    /// Speed below which the arm counts as still before and behind the movement, m/s
+    #[arg(long, default_value_t = 0.005, value_name = "M_PER_S")]
+    pub still_speed: f64,
+    /// Learn the whole recording, with the time in which the arm stands still
+    #[arg(long)]
+    pub no_trim: bool,
+    /// Hand at the start: spread and fingers 1 to 3, rad
+    #[arg(long, value_name = "S,F1,F2,F3", default_value = "0,0,0,0", value_parser = numbers::<4>, allow_hyphen_values = true)]
+    pub hand_start: [f64; 4],
+    /// Hand at the end: spread and fingers 1 to 3, rad
+    #[arg(long, value_name = "S,F1,F2,F3", default_value = "0,0,0,0", value_parser = numbers::<4>, allow_hyphen_values = true)]
+    pub hand_goal: [f64; 4],
+    /// Fractions of the duration between which the fingers move
+    #[arg(long, value_name = "BEGIN,END", default_value = "0.6,1", value_parser = numbers::<2>)]
+    pub hand_window: [f64; 2],
+}
+
+/// Learns and writes the primitive.
+///
+/// # Errors
+/// The demonstration or an option is wrong, or the file cannot be written.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    let output = global.output();
+    let file = command
+        .output
+        .clone()
+        .unwrap_or_else(|| command.demonstration.with_extension("toml"));
+    let name = match &command.name {
+        Some(name) => name.clone(),
+        None => file
+            .file_stem()
+            .map(|stem| stem.to_string_lossy().into_owned())
+            .unwrap_or_default(),
+    };
+    if let Err(error) = link::Name::new(&name) {
+        return Err(Failure::new(
+            Exit::Usage,
+            "E220",
+            format!("learn: the name `{name}`"),
+            error,
+        )
+        .help("give a name with `--name NAME`"));
+    }
+    let options = LearnOptions {
+        name,
+        kernels: usize::from(command.kernels),
+        cutoff: command.cutoff,
+        preparation: Preparation {
+            still_speed: (!command.no_trim).then_some(command.still_speed),
+        },
+        orientation_error: if command.rotation_vector {
+            OrientationErrorKind::RotationVector
+        } else {
+            OrientationErrorKind::Quaternion
+        },
+        hand: HandMotion {
+            start: command.hand_start,
+            goal: command.hand_goal,
+            window: command.hand_window.into(),
+        },
+    };
+    let spinner = output.spinner("learning");
+    let recording = Recording::read(&command.demonstration)
+        .map_err(|cause| Failure::new(Exit::Invalid, "E620", "learn refused", cause))?;
+    let learned =
+        learn::learn(&recording, &file, &options).map_err(|error| failure(error, command))?;
+    learned.primitive.write(&file).map_err(|cause| {
+        Failure::new(
+            Exit::Internal,
+            "E120",
+            "learn: the primitive cannot be written",
+            cause,
+        )
+    })?;
+    spinner.finish_and_clear();
+    for warning in &learned.report.warnings {
+        output.warn(warning);
+    }
+    output.say(format!("wrote {}", file.display()));
+    output.result(
+        &json!({ "file": file, "checksum": format!("0x{:08x}", learned.primitive.checksum()), "fit": learned.report }),
+        learned.report.to_text(),
+    )
+}
+
+fn failure(error: LearnError, command: &Cmd) -> Failure {
+    let demonstration = command.demonstration.display();
+    let help = match &error {
+        LearnError::TurnsTooFar {
+            rotation_vector_helps: true,
+            ..
+        } => Some(format!("tactus learn --rotation-vector {demonstration}")),
+        LearnError::Demonstration(crate::demonstration::DemonstrationError::Still { .. }) => {
+            Some(format!("tactus learn --no-trim {demonstration}"))
+        }
+        _ => None,
+    };
+    let (exit, code) = match &error {
+        LearnError::Option { .. } => (Exit::Usage, "E221"),
+        LearnError::Demonstration(_) => (Exit::Invalid, "E621"),
+        LearnError::TurnsTooFar { .. } => (Exit::Invalid, "E622"),
+        LearnError::Fit { .. } => (Exit::Invalid, "E623"),
+        LearnError::Primitive(_) => (Exit::Invalid, "E624"),
+    };
+    let failure = Failure::new(exit, code, "learn refused", error);
+    match help {
+        Some(help) => failure.help(help),
+        None => failure,
+    }
+}
+
+/// Numbers separated by commas.
+pub(super) fn numbers<const COUNT: usize>(text: &str) -> Result<[f64; COUNT], String> {
+    let values: Result<Vec<f64>, _> = text
+        .split(',')
+        .map(|part| part.trim().parse::<f64>())
+        .collect();
+    let values =
+        values.map_err(|_| format!("`{text}` is not a list of numbers separated by commas"))?;
+    if values.iter().any(|value| !value.is_finite()) {
+        return Err("every number must be finite".to_owned());
+    }
+    let found = values.len();
+    values
+        .try_into()
+        .map_err(|_| format!("{COUNT} numbers are expected, {found} are given"))
+}

@@ -1,0 +1,46 @@
+//! `tactus list`: the primitives a device stores.
+
+use clap::Args;
+use serde_json::json;
+
+use super::{Failure, Global, Table, connection};
+
+/// Options of `list`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {}
+
+/// Lists what is stored.
+///
+/// # Errors
+/// The device cannot be reached.
+pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "list";
+    let mut client = connection::open(global, DOING, |_| {})?;
+    let stored = client.list().map_err(|error| error.into_failure(DOING))?;
+    let mut table = Table::new(["name", "duration", "kernels", "bytes", "CRC", "expectation"]);
+    for listing in &stored {
+        table.row([
+            listing.name.as_str().to_owned(),
+            format!("{:.2} s", listing.duration),
+            listing.kernels.to_string(),
+            listing.length.to_string(),
+            format!("0x{:08x}", listing.crc),
+            if listing.expectation { "yes" } else { "no" }.to_owned(),
+        ]);
+    }
+    let data: Vec<_> = stored
+        .iter()
+        .map(|listing| {
+            json!({
+                "name": listing.name.as_str(), "place": listing.index, "duration_s": listing.duration,
+                "kernels": listing.kernels, "bytes": listing.length, "crc": format!("0x{:08x}", listing.crc),
+                "expectation": listing.expectation, "loaded": listing.loaded,
+            })
+        })
+        .collect();
+    let slots = client.hello().slots;
+    global.output().result(
+        &json!({ "primitives": data, "places": slots }),
+        format!("{table}{} of {slots} places taken", stored.len()),
+    )
+}

@@ -1,0 +1,143 @@
+//! The command line: one subcommand a file, each with a `Cmd` (its options) and a `run`.
+
+pub mod check;
+mod connection;
+pub mod failure;
+pub mod learn;
+pub mod list;
+pub mod output;
+pub mod plot;
+pub mod record;
+pub mod run;
+pub mod sim;
+pub mod stop;
+pub mod teach;
+pub mod upload;
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::{Args, Parser, Subcommand};
+
+pub use failure::{Exit, Failure};
+pub use output::{Output, Table};
+
+/// Teach, learn, check, upload, run and watch movement primitives on a Barrett WAM.
+///
+/// Data goes to stdout, words and progress to stderr. Exit codes: 0 success, 1 internal error, 2 usage,
+/// 3 device not found, 4 incompatible versions, 5 device refused or faulted, 6 validation failed, 7 link lost,
+/// 130 interrupted after a confirmed stop.
+#[derive(Debug, Parser)]
+#[command(name = "tactus", version, propagate_version = true)]
+pub struct Cli {
+    /// Options of every command.
+    #[command(flatten)]
+    pub global: Global,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// Options that every command has.
+#[derive(Debug, Clone, Args)]
+pub struct Global {
+    /// Write data as JSON: one object, or one a line for streams.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Say nothing but results, warnings and errors.
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+    /// Never ask; what would be asked is refused.
+    #[arg(long, global = true)]
+    pub non_interactive: bool,
+    /// The device: `sim:`, `sil:`, `serial:PATH`, `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, global = true, env = "TACTUS_DEVICE", value_name = "DEVICE")]
+    pub device: Option<String>,
+    /// Longest wait for an answer of the device, s.
+    #[arg(long, global = true, env = "TACTUS_TIMEOUT", default_value = "2", value_parser = seconds, value_name = "SECONDS")]
+    pub timeout: Duration,
+}
+
+impl Global {
+    /// Where output goes.
+    pub fn output(&self) -> Output {
+        Output {
+            json: self.json,
+            quiet: self.quiet,
+        }
+    }
+}
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Serve a simulated arm to other terminals
+    Sim(sim::Cmd),
+    /// Make the arm weightless and record what a person shows
+    Teach(teach::Cmd),
+    /// Make a primitive from a demonstration
+    Learn(learn::Cmd),
+    /// Validate a primitive before it moves an arm
+    Check(check::Cmd),
+    /// Put a primitive into the device
+    Upload(upload::Cmd),
+    /// List the primitives in the device
+    List(list::Cmd),
+    /// Play a primitive on the arm
+    Run(run::Cmd),
+    /// Bring the arm to rest
+    Stop(stop::Cmd),
+    /// Write down what the arm does
+    Record(record::Cmd),
+    /// Draw demonstration, plan and execution
+    Plot(plot::Cmd),
+}
+
+/// Runs what the command line asks for and reports failures; gives the exit code of the process.
+pub fn run(cli: Cli) -> ExitCode {
+    let global = cli.global;
+    let result = match cli.command {
+        Command::Sim(command) => sim::run(&command, &global),
+        Command::Teach(command) => teach::run(&command, &global),
+        Command::Upload(command) => upload::run(&command, &global),
+        Command::List(command) => list::run(&command, &global),
+        Command::Run(command) => run::run(&command, &global),
+        Command::Stop(command) => stop::run(&command, &global),
+        Command::Record(command) => record::run(&command, &global),
+        Command::Learn(command) => learn::run(&command, &global),
+        Command::Check(command) => check::run(&command, &global),
+        Command::Plot(command) => plot::run(&command, &global),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            if global.json {
+                println!("{}", failure.to_json());
+            }
+            eprintln!("{failure}");
+            ExitCode::from(failure.exit as u8)
+        }
+    }
+}
+
+/// A positive time in seconds.
+fn seconds(text: &str) -> Result<Duration, String> {
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
+    if value > 0.0 && value <= 86_400.0 {
+        Ok(Duration::from_secs_f64(value))
+    } else {
+        Err("a time between 0 and 86400 s is expected".to_owned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::Cli;
+
+    #[test]
+    fn command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+}

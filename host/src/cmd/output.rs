@@ -1,0 +1,139 @@
+//! What a command shows: data on stdout, words and progress on stderr, JSON when asked.
+
+use std::borrow::Cow;
+use std::io::Write;
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use super::{Exit, Failure};
+
+/// Where the output of one command goes.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Output {
+    /// Data as JSON instead of text.
+    pub json: bool,
+    /// No words and no progress; data and errors still appear.
+    pub quiet: bool,
+}
+
+impl Output {
+    /// Says something to a person.
+    pub fn say(&self, words: impl AsRef<str>) {
+        if !self.quiet {
+            eprintln!("{}", words.as_ref());
+        }
+    }
+
+    /// Warns, also when quiet.
+    pub fn warn(&self, words: impl AsRef<str>) {
+        eprintln!("warning: {}", words.as_ref());
+    }
+
+    /// Writes the result: `data` as one line of JSON, or `text`.
+    ///
+    /// # Errors
+    /// The output was closed, or the data cannot be expressed in JSON.
+    pub fn result(&self, data: &impl Serialize, text: impl AsRef<str>) -> Result<(), Failure> {
+        let broken = |cause: Box<dyn std::error::Error + Send + Sync>| {
+            Failure::new(Exit::Internal, "E101", "writing the result", cause)
+        };
+        let line: Cow<'_, str> = if self.json {
+            serde_json::to_string(data)
+                .map_err(|cause| broken(cause.into()))?
+                .into()
+        } else {
+            text.as_ref().trim_end().into()
+        };
+        let mut stdout = std::io::stdout().lock();
+        writeln!(stdout, "{line}")
+            .and_then(|()| stdout.flush())
+            .map_err(|cause| broken(cause.into()))
+    }
+
+    /// A bar for work of `steps` steps; it hides itself when stderr is no terminal.
+    pub fn bar(&self, steps: u64, doing: impl Into<Cow<'static, str>>) -> ProgressBar {
+        if self.quiet {
+            return ProgressBar::hidden();
+        }
+        let style = ProgressStyle::with_template(
+            "{msg:24} [{bar:32}] {pos}/{len} {elapsed} (about {eta} left)",
+        )
+        .unwrap_or_else(|_| ProgressStyle::default_bar())
+        .progress_chars("=> ");
+        ProgressBar::new(steps)
+            .with_style(style)
+            .with_message(doing)
+    }
+
+    /// A sign of life for work of unknown length.
+    pub fn spinner(&self, doing: impl Into<Cow<'static, str>>) -> ProgressBar {
+        if self.quiet {
+            return ProgressBar::hidden();
+        }
+        let spinner = ProgressBar::new_spinner().with_message(doing);
+        spinner.enable_steady_tick(Duration::from_millis(120));
+        spinner
+    }
+}
+
+/// A table for a terminal: the first column to the left, the others to the right, two blanks between.
+#[derive(Debug, Clone, Default)]
+pub struct Table {
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// With the heads of its columns.
+    pub fn new<Head: Into<String>>(head: impl IntoIterator<Item = Head>) -> Table {
+        Table {
+            rows: vec![head.into_iter().map(Into::into).collect()],
+        }
+    }
+
+    /// Adds a line.
+    pub fn row<Cell: Into<String>>(&mut self, cells: impl IntoIterator<Item = Cell>) -> &mut Table {
+        self.rows.push(cells.into_iter().map(Into::into).collect());
+        self
+    }
+}
+
+impl std::fmt::Display for Table {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let width = |column: usize| {
+            let cells = self.rows.iter().filter_map(|row| row.get(column));
+            cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+        };
+        let widths: Vec<usize> = (0..columns).map(width).collect();
+        for row in &self.rows {
+            let mut line = String::new();
+            for (column, cell) in row.iter().enumerate() {
+                let pad = " ".repeat(widths[column] - cell.chars().count());
+                if column == 0 {
+                    line += &format!("{cell}{pad}");
+                } else {
+                    line += &format!("  {pad}{cell}");
+                }
+            }
+            writeln!(formatter, "{}", line.trim_end())?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn table_aligns_numbers_to_the_right() {
+        let mut table = Table::new(["joint", "margin"]);
+        table.row(["J1", "0.5 rad"]).row(["elbow", "12 rad"]);
+        assert_eq!(
+            table.to_string(),
+            "joint   margin\nJ1     0.5 rad\nelbow   12 rad\n"
+        );
+    }
+}

@@ -1,0 +1,55 @@
+//! `tactus record`: writes down what the arm does, without asking it to do anything.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::{Failure, Global, connection, teach};
+use crate::procedure::{ProcedureError, Recorder};
+
+/// Options of `record`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// Where the recording goes, CSV (see docs/recording-format.md)
+    #[arg(long, short, value_name = "FILE", default_value = "recording.csv")]
+    pub output: PathBuf,
+    /// How long, s
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = teach::duration)]
+    pub duration: f64,
+}
+
+/// Records telemetry at 300 Hz.
+///
+/// # Errors
+/// The device cannot be reached, or the file cannot be written.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "record";
+    let output = global.output();
+    let mut client = connection::open(global, DOING, |_| {})?;
+    // A simulated device has just been switched on: without this there would be nothing to see.
+    if client.hello().simulated {
+        connection::ready(&mut client, false, output, DOING)?;
+    }
+    let failed = |error| connection::failure(error, DOING);
+    let file = File::create(&command.output).map_err(|cause| failed(ProcedureError::Recording(cause)))?;
+    let wanted = (command.duration * crate::demonstration::RATE).round() as usize;
+    let bar = output.bar(wanted as u64, "recording");
+    let mut recorder =
+        Recorder::start(&mut client, BufWriter::new(file), "Tactus recording, 300 Hz").map_err(failed)?;
+    while recorder.rows() < wanted {
+        recorder.take(&mut client).map_err(failed)?;
+        bar.set_position(recorder.rows() as u64);
+    }
+    bar.finish_and_clear();
+    let rows = recorder.rows();
+    recorder.finish(&mut client).map_err(failed)?;
+    let gaps = client.gaps().telemetry;
+    output.say(format!("wrote {}", command.output.display()));
+    output.result(
+        &json!({ "file": command.output, "samples": rows, "gaps": gaps }),
+        format!("{rows} samples, {gaps} lost"),
+    )
+}

@@ -1,0 +1,153 @@
+//! `tactus sim`: a simulated arm that stays, for other terminals to connect to.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::TcpListener;
+use std::os::unix::net::UnixListener;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+
+use super::{Exit, Failure, Global, connection};
+use crate::client::Interrupt;
+use crate::device::Device;
+use crate::transport::{Address, Transport, TransportError};
+
+/// Virtual time simulated between two looks at the socket: a human does not notice, a link time-out neither.
+const STRIDE: Duration = Duration::from_millis(5);
+
+/// Options of `sim`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// Where to listen: `unix:PATH` or `tcp:HOST:PORT`
+    #[arg(long, value_name = "ADDRESS", default_value = "unix:tactus.sock")]
+    pub listen: String,
+    /// End after this much virtual time, s
+    #[arg(long, value_name = "SECONDS", value_parser = super::teach::duration)]
+    pub duration: Option<f64>,
+    /// Do not wait for the wall clock: run as fast as this machine can
+    #[arg(long)]
+    pub fast: bool,
+}
+
+/// A connection that can be read without waiting.
+trait Peer: Read + Write {}
+impl<T: Read + Write> Peer for T {}
+
+enum Listener {
+    Unix(UnixListener, PathBuf),
+    Tcp(TcpListener),
+}
+
+/// Serves a simulated arm until it is interrupted.
+///
+/// Bytes arrive when the wall clock brings them, so runs over a socket are not reproducible; `--device sim:` is.
+///
+/// # Errors
+/// The simulation cannot be started, or the address cannot be listened on.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "sim";
+    let output = global.output();
+    let device = global.device.clone().unwrap_or_else(|| "sim:".to_owned());
+    let (mut device, interrupt) = connection::simulated(&device, DOING)?;
+    let listener = listen(&command.listen)
+        .map_err(|cause| Failure::new(Exit::NoDevice, "E320", format!("sim: cannot listen on {}", command.listen), cause)
+            .help("choose another address with `--listen`"))?;
+    output.say(format!("a simulated arm listens; in another terminal: `tactus --device {} list`", command.listen));
+    let served = serve(command, &mut device, &listener, &interrupt);
+    if let Listener::Unix(_, path) = &listener {
+        // Left behind it would only confuse the next one.
+        let _ = std::fs::remove_file(path);
+    }
+    served.map_err(|error| crate::error::HostError::Transport(error).into_failure(DOING))?;
+    let seconds = device.now().as_secs_f64();
+    output.result(&serde_json::json!({ "simulated_s": seconds }), format!("{seconds:.1} s simulated"))
+}
+
+fn listen(text: &str) -> Result<Listener, Box<dyn std::error::Error + Send + Sync>> {
+    match text.parse::<Address>()? {
+        Address::Unix(path) => {
+            let listener = match UnixListener::bind(&path) {
+                // A socket nobody answers on is the left-over of one that was killed.
+                Err(error)
+                    if error.kind() == ErrorKind::AddrInUse
+                        && std::os::unix::net::UnixStream::connect(&path).is_err() =>
+                {
+                    std::fs::remove_file(&path)?;
+                    UnixListener::bind(&path)?
+                }
+                other => other?,
+            };
+            listener.set_nonblocking(true)?;
+            Ok(Listener::Unix(listener, path))
+        }
+        Address::Tcp(address) => {
+            let listener = TcpListener::bind(address)?;
+            listener.set_nonblocking(true)?;
+            Ok(Listener::Tcp(listener))
+        }
+        _ => Err("listen on unix:PATH or tcp:HOST:PORT".into()),
+    }
+}
+
+fn accept(listener: &Listener) -> std::io::Result<Option<Box<dyn Peer>>> {
+    let accepted: std::io::Result<Box<dyn Peer>> = match listener {
+        Listener::Unix(listener, _) => listener.accept().and_then(|(stream, _)| {
+            stream.set_nonblocking(true)?;
+            Ok(Box::new(stream) as Box<dyn Peer>)
+        }),
+        Listener::Tcp(listener) => listener.accept().and_then(|(stream, _)| {
+            stream.set_nonblocking(true)?;
+            stream.set_nodelay(true)?;
+            Ok(Box::new(stream) as Box<dyn Peer>)
+        }),
+    };
+    match accepted {
+        Ok(peer) => Ok(Some(peer)),
+        Err(error) if error.kind() == ErrorKind::WouldBlock => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+fn serve(
+    command: &Cmd,
+    device: &mut Device,
+    listener: &Listener,
+    interrupt: &Interrupt,
+) -> Result<(), TransportError> {
+    let started = Instant::now();
+    let mut peer: Option<Box<dyn Peer>> = None;
+    let mut buffer = [0; 4096];
+    let mut bytes = Vec::new();
+    while !interrupt.is_raised() {
+        if command.duration.is_some_and(|limit| device.now().as_secs_f64() >= limit) {
+            break;
+        }
+        if peer.is_none() {
+            peer = accept(listener).map_err(TransportError::Io)?;
+        }
+        if let Some(stream) = &mut peer {
+            match stream.read(&mut buffer) {
+                Ok(0) => peer = None,
+                Ok(count) => device.send(&buffer[..count])?,
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+                Err(_) => peer = None,
+            }
+        }
+        let target = device.now() + STRIDE;
+        while device.now() < target {
+            bytes.clear();
+            device.receive(target.saturating_sub(device.now()), &mut bytes)?;
+            // A host that does not read loses bytes, as on a serial line.
+            if let Some(stream) = &mut peer
+                && stream.write_all(&bytes).is_err_and(|error| error.kind() != ErrorKind::WouldBlock)
+            {
+                peer = None;
+            }
+        }
+        if !command.fast {
+            std::thread::sleep(device.now().saturating_sub(started.elapsed()));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,209 @@
+//! `tactus teach`: the arm becomes weightless, a person shows a movement, and it is recorded.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::PathBuf;
+
+use clap::Args;
+use control::State;
+use serde_json::json;
+
+use super::{Failure, Global, connection};
+use crate::client::Client;
+use crate::device::Device;
+use crate::procedure::{self, ProcedureError, Recorder, Take};
+use crate::simulation::DEFAULT_SEED;
+
+/// Rest that is recorded after a simulated person has let go, s.
+const AFTERGLOW: f64 = 0.5;
+
+/// Longest demonstration, s.
+const LONGEST: f64 = 120.0;
+
+/// Options of `teach`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// Where the recording goes, CSV (see docs/recording-format.md)
+    #[arg(long, short, value_name = "FILE", default_value = "demonstration.csv")]
+    pub output: PathBuf,
+    /// Posture the arm moves to before it becomes weightless: seven joint angles, rad. A simulated arm has a default
+    #[arg(long, value_name = "Q1,...,Q7", value_parser = posture, allow_hyphen_values = true)]
+    pub from: Option<Posture>,
+    /// How long to record, s. Without it: until Enter is pressed, or until the simulated person has let go
+    #[arg(long, value_name = "SECONDS", value_parser = duration)]
+    pub duration: Option<f64>,
+    /// I have brought the arm to its home pose: zero it there if need be
+    #[arg(long)]
+    pub at_home: bool,
+    /// Seed of the simulated person's hand
+    #[arg(long, default_value_t = DEFAULT_SEED)]
+    pub person: u64,
+}
+
+/// Seven joint angles, rad.
+pub type Posture = [f32; 7];
+
+/// Records a demonstration.
+///
+/// # Errors
+/// The device fails or refuses, or the file cannot be written.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "teach";
+    let output = global.output();
+    let mut client = connection::open(global, DOING, |options| options.person = Some(command.person))?;
+    connection::ready(&mut client, command.at_home, output, DOING)?;
+    let failed = |error| connection::failure(error, DOING);
+
+    if let Some(posture) = command.from.or_else(|| default_posture(&mut client)) {
+        let spinner = output.spinner("moving to the start");
+        let travelled = procedure::travel(&mut client, posture, |passed| {
+            spinner.set_message(format!("moving to the start, {passed:.0} s"));
+        });
+        spinner.finish_and_clear();
+        travelled.map_err(failed)?;
+    }
+
+    let file = File::create(&command.output).map_err(|cause| failed(ProcedureError::Recording(cause)))?;
+    let notes = format!(
+        "Tactus recording of a demonstration by hand, 300 Hz, from {} {}",
+        client.hello().board.as_str(),
+        if client.hello().simulated { "(simulated arm, simulated person)" } else { "" }
+    );
+    client.gravity().map_err(|error| failed(error.into()))?;
+    let recorder = Recorder::start(&mut client, BufWriter::new(file), notes.trim_end()).map_err(failed)?;
+    let recorded = record(command, global, &mut client, recorder);
+    // Whatever happened, nobody holds the arm any more: let it hold itself.
+    let held = client.hold();
+    let (rows, gaps) = recorded.map_err(failed)?;
+    held.map_err(|error| failed(error.into()))?;
+    output.say(format!("wrote {}", command.output.display()));
+    output.result(
+        &json!({ "file": command.output, "samples": rows, "duration_s": rows as f64 / 300.0, "gaps": gaps }),
+        format!("{rows} samples, {:.1} s, {gaps} lost", rows as f64 / 300.0),
+    )
+}
+
+/// Records until the person is done; gives the number of samples and of those lost on the link.
+fn record(
+    command: &Cmd,
+    global: &Global,
+    client: &mut Client<Device>,
+    mut recorder: Recorder<BufWriter<File>>,
+) -> Result<(usize, u32), ProcedureError> {
+    let output = global.output();
+    let guided = begin_guiding(client);
+    let enter = (!guided && command.duration.is_none()).then(wait_for_enter);
+    if guided {
+        output.say("a simulated person guides the hand");
+    } else if enter.is_some() {
+        output.say("guide the arm; press Enter when the movement is shown");
+    }
+    let spinner = output.spinner("recording");
+    let mut done_at = None;
+    loop {
+        let Take::Cycle(telemetry) = recorder.take(client)? else { continue };
+        if State::from_code(telemetry.state) != Some(State::Gravity) {
+            let fault = control::Fault::from_code(telemetry.fault).unwrap_or(control::Fault::None);
+            return Err(ProcedureError::Stopped(fault));
+        }
+        let seconds = recorder.rows() as f64 / 300.0;
+        spinner.set_message(format!("recording, {seconds:.1} s"));
+        let person_done = guided && guiding_is_over(client);
+        let entered = enter.as_ref().is_some_and(|enter| enter.is_finished());
+        if done_at.is_none() && (person_done || entered) {
+            done_at = Some(seconds + if guided { AFTERGLOW } else { 0.0 });
+        }
+        let limit = command.duration.unwrap_or(LONGEST);
+        if seconds >= done_at.unwrap_or(limit).min(limit) {
+            break;
+        }
+    }
+    spinner.finish_and_clear();
+    let rows = recorder.rows();
+    recorder.finish(client)?;
+    Ok((rows, client.gaps().telemetry))
+}
+
+/// A thread that ends when Enter is pressed.
+fn wait_for_enter() -> std::thread::JoinHandle<()> {
+    std::thread::spawn(|| {
+        let mut line = String::new();
+        // End of input counts as Enter: nobody is there to press it.
+        let _ = std::io::stdin().read_line(&mut line);
+    })
+}
+
+#[cfg(feature = "mujoco")]
+mod person {
+    use std::any::Any;
+
+    use sim::person::{GuidedWorld, Stage};
+    use sim::world::mujoco::MujocoWorld;
+
+    use crate::client::Client;
+    use crate::device::Device;
+
+    type Guided = GuidedWorld<MujocoWorld>;
+
+    fn guided(client: &mut Client<Device>) -> Option<&mut Guided> {
+        let world: &mut dyn Any = client.transport().simulation()?.world();
+        world.downcast_mut()
+    }
+
+    /// Tells the simulated person to begin; `false` if there is none.
+    pub(super) fn begin_guiding(client: &mut Client<Device>) -> bool {
+        let Some(world) = guided(client) else { return false };
+        world.person_mut().begin();
+        true
+    }
+
+    pub(super) fn guiding_is_over(client: &mut Client<Device>) -> bool {
+        guided(client).is_some_and(|world| world.person().stage() == Stage::Done)
+    }
+
+    /// Where the simulated person's path begins.
+    pub(super) fn default_posture(client: &mut Client<Device>) -> Option<super::Posture> {
+        guided(client)?;
+        Some(sim::person::DEMONSTRATION_START.map(|angle| angle as f32))
+    }
+}
+
+/// Without MuJoCo nobody stands beside the arm.
+#[cfg(not(feature = "mujoco"))]
+mod person {
+    use crate::client::Client;
+    use crate::device::Device;
+
+    pub(super) fn begin_guiding(_client: &mut Client<Device>) -> bool {
+        false
+    }
+
+    pub(super) fn guiding_is_over(_client: &mut Client<Device>) -> bool {
+        false
+    }
+
+    pub(super) fn default_posture(_client: &mut Client<Device>) -> Option<super::Posture> {
+        None
+    }
+}
+
+use person::{begin_guiding, default_posture, guiding_is_over};
+
+/// Seven numbers separated by commas.
+pub(super) fn posture(text: &str) -> Result<Posture, String> {
+    let values: Result<Vec<f32>, _> = text.split(',').map(|part| part.trim().parse::<f32>()).collect();
+    let values = values.map_err(|_| format!("`{text}` is not a list of numbers separated by commas"))?;
+    if values.iter().any(|value| !value.is_finite()) {
+        return Err("every angle must be finite".to_owned());
+    }
+    let found = values.len();
+    values.try_into().map_err(|_| format!("7 joint angles are expected, {found} are given"))
+}
+
+/// A time worth recording, s.
+pub(super) fn duration(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds > 0.0 && seconds <= 3600.0 => Ok(seconds),
+        _ => Err("a time between 0 and 3600 s is expected".to_owned()),
+    }
+}

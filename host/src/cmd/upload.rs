@@ -1,0 +1,88 @@
+//! `tactus upload`: puts a primitive into the device, checked on both sides and read back.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::json;
+
+use super::{Exit, Failure, Global, Output, connection};
+use crate::check;
+use crate::client::{Client, UploadOutcome, UploadPhase};
+use crate::device::Device;
+use crate::primitive_file::PrimitiveFile;
+
+/// Options of `upload`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// The primitive, TOML
+    #[arg(value_name = "PRIMITIVE")]
+    pub primitive: PathBuf,
+}
+
+/// Uploads a primitive.
+///
+/// # Errors
+/// The file is wrong, the device refuses it or cannot be reached.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "upload";
+    let output = global.output();
+    let file = read(&command.primitive, DOING)?;
+    let mut client = connection::open(global, DOING, |_| {})?;
+    let outcome = send(&mut client, &file, output, DOING)?;
+    let (sent, listing) = match outcome {
+        UploadOutcome::Stored(listing) => (true, listing),
+        UploadOutcome::AlreadyThere(listing) => (false, listing),
+    };
+    if client.hello().simulated && client.transport().simulation().is_some() {
+        output.say("this simulated device ends with the command; one that stays: `tactus sim`");
+    }
+    let data = json!({
+        "name": listing.name.as_str(), "sent": sent, "bytes": listing.length, "crc": format!("0x{:08x}", listing.crc),
+        "place": listing.index, "kernels": listing.kernels, "duration_s": listing.duration,
+    });
+    let word = if sent { "stored" } else { "already there, nothing sent" };
+    output.result(&data, format!("{}: {word} ({} bytes, CRC 0x{:08x})", listing.name.as_str(), listing.length, listing.crc))
+}
+
+/// Reads a primitive that fits this arm.
+pub(super) fn read(path: &Path, doing: &str) -> Result<PrimitiveFile, Failure> {
+    let refused = |cause| super::check::failure(cause, path, doing);
+    let file = PrimitiveFile::read(path).map_err(refused)?;
+    file.require_model(control::MODEL_HASH).map_err(refused)?;
+    Ok(file)
+}
+
+/// Plays the primitive on the host first, and refuses what would break a limit of the arm.
+pub(super) fn precheck(file: &PrimitiveFile, speed: f64, output: Output, doing: &str) -> Result<(), Failure> {
+    let bar = output.bar(100, "checking");
+    let report = check::check(file, speed, |fraction| bar.set_position((fraction * 100.0) as u64))
+        .map_err(|cause| super::check::failure(cause, &file.file, doing))?;
+    bar.finish_and_clear();
+    match report.violations.first() {
+        None => Ok(()),
+        Some(first) => Err(Failure::new(Exit::Invalid, "E631", format!("{doing} refused: the check failed"), first.to_string())
+            .help(format!("tactus check {}", file.file.display()))),
+    }
+}
+
+/// Sends the primitive with a progress bar.
+pub(super) fn send(
+    client: &mut Client<Device>,
+    file: &PrimitiveFile,
+    output: Output,
+    doing: &str,
+) -> Result<UploadOutcome, Failure> {
+    let image = file.to_image().map_err(|cause| super::check::failure(cause, &file.file, doing))?;
+    let bar = output.bar(image.len() as u64, "sending");
+    let outcome = client.upload(&image, |phase, done, all| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+        bar.set_message(match phase {
+            UploadPhase::Send => "sending",
+            UploadPhase::Commit => "storing",
+            UploadPhase::Verify => "reading back",
+        });
+    });
+    bar.finish_and_clear();
+    outcome.map_err(|error| error.into_failure(doing))
+}

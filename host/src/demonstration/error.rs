@@ -1,0 +1,183 @@
+//! What can be wrong with a recording, always with the file and, where there is one, the line and the column.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// A place in a recording: file, line and column, all as a person counts them (from 1).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// The file as it was named on the command line.
+    pub file: PathBuf,
+    /// Line in the file, counted from 1, notes and header included.
+    pub line: u64,
+    /// Field in the line, counted from 1.
+    pub column: usize,
+    /// Name of the column in the header; empty when the line has more fields than the header.
+    pub name: String,
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            formatter,
+            "{}: line {}, column {}",
+            self.file.display(),
+            self.line,
+            self.column
+        )?;
+        if self.name.is_empty() {
+            Ok(())
+        } else {
+            write!(formatter, " ({})", self.name)
+        }
+    }
+}
+
+/// Why a file is not a recording that Tactus can use.
+#[derive(Debug, Error)]
+pub enum RecordingError {
+    /// The file cannot be opened or read.
+    #[error("{file}: cannot be read: {cause}", file = file.display())]
+    Unreadable {
+        /// The file.
+        file: PathBuf,
+        /// What the operating system says.
+        #[source]
+        cause: std::io::Error,
+    },
+    /// The file has no header line.
+    #[error("{file}: line 1, column 1: the file is empty, a header with names and units is expected", file = file.display())]
+    Empty {
+        /// The file.
+        file: PathBuf,
+    },
+    /// The header names the same column twice.
+    #[error("{place}: the column appears a second time")]
+    DuplicateColumn {
+        /// Where the second one stands.
+        place: Place,
+    },
+    /// A known quantity with another unit than the layout's.
+    #[error("{place}: the unit is not understood, expected `{expected}`")]
+    WrongUnit {
+        /// Where.
+        place: Place,
+        /// The column name the layout uses.
+        expected: String,
+    },
+    /// A column that the layout needs is not in the header.
+    #[error("{file}: line {line}, column {column}: missing column{plural} {missing}", file = file.display(), plural = if missing.contains(',') { "s" } else { "" })]
+    MissingColumns {
+        /// The file.
+        file: PathBuf,
+        /// Line of the header.
+        line: u64,
+        /// The first column behind the header's last one: where they could be added.
+        column: usize,
+        /// Names of the missing columns.
+        missing: String,
+    },
+    /// A line has more or fewer fields than the header.
+    #[error("{place}: the line has {found} fields, the header has {expected}")]
+    Ragged {
+        /// The first field that is missing or too many.
+        place: Place,
+        /// Fields in the line.
+        found: usize,
+        /// Fields in the header.
+        expected: usize,
+    },
+    /// A field that must be a number is not one.
+    #[error("{place}: `{text}` is not a number")]
+    NotANumber {
+        /// Where.
+        place: Place,
+        /// What stands there.
+        text: String,
+    },
+    /// A field is NaN or infinite.
+    #[error("{place}: the value {value} is not finite")]
+    NotFinite {
+        /// Where.
+        place: Place,
+        /// What was read.
+        value: f64,
+    },
+    /// Time does not increase from one line to the next.
+    #[error("{place}: time runs backwards: {time} s after {before} s")]
+    TimeRunsBackwards {
+        /// Where.
+        place: Place,
+        /// Time of this line, s.
+        time: f64,
+        /// Time of the line before, s.
+        before: f64,
+    },
+    /// A quaternion whose norm is too far from one.
+    #[error("{place}: the quaternion has norm {norm:.4}, a unit quaternion is expected")]
+    NotAUnitQuaternion {
+        /// First component of the quaternion.
+        place: Place,
+        /// Its norm.
+        norm: f64,
+    },
+    /// The file has too few lines of data.
+    #[error("{file}: line {line}, column 1: the file ends after {found} samples, at least {needed} are needed", file = file.display())]
+    TooFewSamples {
+        /// The file.
+        file: PathBuf,
+        /// Last line of the file.
+        line: u64,
+        /// Samples found.
+        found: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+    /// Two neighbouring samples are so far apart that interpolation would invent the movement between them.
+    #[error(
+        "{place}: {gap:.3} s are missing before this line, at most {longest:.3} s can be bridged"
+    )]
+    GapTooLong {
+        /// The line behind the gap.
+        place: Place,
+        /// Length of the gap, s.
+        gap: f64,
+        /// The longest gap that is bridged, s.
+        longest: f64,
+    },
+}
+
+/// Why a valid recording is no demonstration of a movement.
+#[derive(Debug, Error)]
+pub enum DemonstrationError {
+    /// The file itself is at fault.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// Neither joint angles nor a pose were recorded.
+    #[error("{file}: line {line}, column {column}: the header names neither joint angles (q1_rad..q7_rad) nor a pose (x_m..qz)", file = file.display())]
+    NoPose {
+        /// The file.
+        file: PathBuf,
+        /// Line of the header.
+        line: u64,
+        /// The first column behind the header's last one.
+        column: usize,
+    },
+    /// Nothing is left once the still head and tail are cut off.
+    #[error("{file}: lines {first_line} to {last_line}: the arm moves for only {moving:.3} s (threshold {threshold} m/s), at least {needed:.3} s are needed", file = file.display())]
+    Still {
+        /// The file.
+        file: PathBuf,
+        /// First line of data.
+        first_line: u64,
+        /// Last line of data.
+        last_line: u64,
+        /// Time during which the arm moved, s.
+        moving: f64,
+        /// Time that is needed, s.
+        needed: f64,
+        /// Speed below which the arm counts as still, m/s.
+        threshold: f64,
+    },
+}

@@ -1,0 +1,255 @@
+//! Demonstrations: recordings of a movement that a person showed, made ready to be learned from.
+//!
+//! [`Recording`] is what stands in a file, checked value by value; [`Demonstration`] is the movement in it: a pose
+//! at each instant, 300 times a second, without the time in which the arm stood still before and after.
+//! The layout of the files is described in `docs/recording-format.md`.
+
+pub mod error;
+pub mod layout;
+pub mod recording;
+pub mod resample;
+pub mod writer;
+
+pub use error::{DemonstrationError, Place, RecordingError};
+pub use recording::{FEWEST_SAMPLES, Recording};
+pub use writer::{RecordingRow, RecordingWriter};
+
+use crate::arm;
+
+/// Rate at which a primitive is learned and played, Hz. Another value would change what 7.5 Hz means to the filter.
+pub const RATE: f64 = 300.0;
+
+/// Longest gap that is bridged by a straight line, s. A hand can change direction within a tenth of a second; what
+/// happened in a longer gap is not known.
+pub const LONGEST_GAP: f64 = 0.1;
+
+/// How a recording becomes a demonstration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Preparation {
+    /// Speed of the tool frame below which the arm counts as still, m/s; turning counts with [`TURN_RADIUS`].
+    /// `None` keeps the whole recording.
+    pub still_speed: Option<f64>,
+}
+
+impl Default for Preparation {
+    fn default() -> Preparation {
+        Preparation {
+            still_speed: Some(0.005),
+        }
+    }
+}
+
+/// Radius at which a rotation of the tool frame counts as speed, m: about the reach of the fingers beyond the grasp
+/// point, so that a movement of the wrist alone is not cut off.
+pub const TURN_RADIUS: f64 = 0.1;
+
+/// Rest that is kept before and behind the movement, samples (0.3 s).
+///
+/// A primitive begins and ends at rest. Cut at the first and last movement, the demonstration ends with a few mm/s, the
+/// forcing term is fitted to that, and behind the end the plan coasts on: 8 mm beyond a goal that the fit itself meets
+/// to 0.01 mm, coming back only over several seconds.
+const REST: usize = 90;
+
+/// Samples on either side over which the speed is averaged: encoder steps and tremor of one sample are not movement.
+const SPEED_HALF_WINDOW: usize = 15;
+
+/// A movement on a uniform grid of [`RATE`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Demonstration {
+    /// Time since its beginning, s.
+    pub time: Vec<f64>,
+    /// Position of the tool frame, world, m.
+    pub position: Vec<[f64; 3]>,
+    /// Orientation of the tool frame, unit quaternion (w, x, y, z), sign-continuous.
+    pub orientation: Vec<[f64; 4]>,
+    /// Joint angles, rad, if they were recorded.
+    pub q: Option<Vec<[f64; layout::JOINTS]>>,
+    /// Wrench of the environment on the robot, if it was recorded: N (world), N m.
+    pub wrench: Option<Vec<[f64; 6]>>,
+    /// Time that was cut off at the beginning and at the end, s.
+    pub trimmed: (f64, f64),
+    /// Where the pose comes from.
+    pub pose_source: PoseSource,
+}
+
+/// Where the pose of a demonstration comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PoseSource {
+    /// Computed from the recorded joint angles by the forward kinematics of the arm's model.
+    JointAngles,
+    /// Taken from the pose columns as they are.
+    PoseColumns,
+}
+
+impl Demonstration {
+    /// Resamples, finds the pose and trims.
+    ///
+    /// Joint angles count more than pose columns: they are what the arm measured, and the pose that the controller
+    /// will see is the one its own kinematics makes of them.
+    ///
+    /// # Errors
+    /// The recording has no pose, has a gap longer than [`LONGEST_GAP`], or the arm hardly moves in it.
+    pub fn prepare(
+        recording: &Recording,
+        preparation: &Preparation,
+    ) -> Result<Demonstration, DemonstrationError> {
+        let (gap, behind) = recording.longest_gap;
+        if gap > LONGEST_GAP {
+            let column = 1 + usize::from(recording.cycle.is_some());
+            return Err(RecordingError::GapTooLong {
+                place: recording.place(behind, column, layout::TIME),
+                gap,
+                longest: LONGEST_GAP,
+            }
+            .into());
+        }
+        let grid = resample::grid(&recording.time, 1.0 / RATE);
+        let q = recording
+            .q
+            .as_ref()
+            .map(|values| resample::vectors(&recording.time, values, &grid));
+        let (position, orientation, pose_source) =
+            match (&q, &recording.position, &recording.orientation) {
+                (Some(q), _, _) => {
+                    let (position, mut orientation): (Vec<_>, Vec<_>) =
+                        q.iter().map(arm::tool_pose).unzip();
+                    recording::make_sign_continuous(&mut orientation);
+                    (position, orientation, PoseSource::JointAngles)
+                }
+                (None, Some(position), Some(orientation)) => (
+                    resample::vectors(&recording.time, position, &grid),
+                    resample::quaternions(&recording.time, orientation, &grid),
+                    PoseSource::PoseColumns,
+                ),
+                _ => {
+                    return Err(DemonstrationError::NoPose {
+                        file: recording.file.clone(),
+                        line: recording.header_line,
+                        column: recording.columns + 1,
+                    });
+                }
+            };
+        let wrench = recording
+            .wrench
+            .as_ref()
+            .map(|values| resample::vectors(&recording.time, values, &grid));
+        let whole = Demonstration {
+            time: grid.iter().map(|t| t - grid[0]).collect(),
+            position,
+            orientation,
+            q,
+            wrench,
+            trimmed: (0.0, 0.0),
+            pose_source,
+        };
+        whole.trim(recording, preparation)
+    }
+
+    fn trim(
+        self,
+        recording: &Recording,
+        preparation: &Preparation,
+    ) -> Result<Demonstration, DemonstrationError> {
+        let Some(threshold) = preparation.still_speed else {
+            return Ok(self);
+        };
+        let speed = self.speed();
+        let first = speed.iter().position(|speed| *speed > threshold);
+        let last = speed.iter().rposition(|speed| *speed > threshold);
+        let (first, last) = match (first, last) {
+            (Some(first), Some(last)) => (first, last),
+            _ => (0, 0),
+        };
+        if last - first + 1 < FEWEST_SAMPLES {
+            return Err(DemonstrationError::Still {
+                file: recording.file.clone(),
+                first_line: recording.lines.first().copied().unwrap_or_default(),
+                last_line: recording.lines.last().copied().unwrap_or_default(),
+                moving: (last - first) as f64 / RATE,
+                needed: FEWEST_SAMPLES as f64 / RATE,
+                threshold,
+            });
+        }
+        let (first, last) = (
+            first.saturating_sub(REST),
+            (last + REST).min(speed.len() - 1),
+        );
+        let trimmed = (
+            self.time[first],
+            self.time[self.time.len() - 1] - self.time[last],
+        );
+        let range = first..=last;
+        Ok(Demonstration {
+            time: (0..=last - first)
+                .map(|index| index as f64 / RATE)
+                .collect(),
+            position: self.position[range.clone()].to_vec(),
+            orientation: self.orientation[range.clone()].to_vec(),
+            q: self.q.map(|values| values[range.clone()].to_vec()),
+            wrench: self.wrench.map(|values| values[range.clone()].to_vec()),
+            trimmed,
+            pose_source: self.pose_source,
+        })
+    }
+
+    /// Speed of the tool frame at each sample, m/s, turning included at [`TURN_RADIUS`].
+    pub fn speed(&self) -> Vec<f64> {
+        let last = self.time.len() - 1;
+        (0..=last)
+            .map(|index| {
+                let before = index.saturating_sub(SPEED_HALF_WINDOW);
+                let after = (index + SPEED_HALF_WINDOW).min(last);
+                let period = self.time[after] - self.time[before];
+                let moved: f64 = (0..3)
+                    .map(|axis| (self.position[after][axis] - self.position[before][axis]).powi(2))
+                    .sum::<f64>()
+                    .sqrt();
+                let turned = angle_between(&self.orientation[before], &self.orientation[after]);
+                (moved + TURN_RADIUS * turned) / period
+            })
+            .collect()
+    }
+
+    /// Length of the movement, s.
+    pub fn duration(&self) -> f64 {
+        self.time.last().copied().unwrap_or(0.0)
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.time.len()
+    }
+
+    /// Whether there are no samples; a demonstration that was prepared is never empty.
+    pub fn is_empty(&self) -> bool {
+        self.time.is_empty()
+    }
+
+    /// Largest extent of the position along any axis, m.
+    pub fn extent(&self) -> f64 {
+        (0..3)
+            .map(|axis| {
+                let values = self.position.iter().map(|position| position[axis]);
+                let (low, high) = values
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                        (low.min(value), high.max(value))
+                    });
+                high - low
+            })
+            .fold(0.0, f64::max)
+    }
+}
+
+/// Angle of the rotation between two orientations, rad, 0 to pi.
+pub fn angle_between(a: &[f64; 4], b: &[f64; 4]) -> f64 {
+    let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+    let sign = if dot < 0.0 { -1.0 } else { 1.0 };
+    // The distance keeps its digits where the cosine has none left: at small angles.
+    let distance = a
+        .iter()
+        .zip(b)
+        .map(|(a, b)| (a - sign * b).powi(2))
+        .sum::<f64>()
+        .sqrt();
+    4.0 * (distance / 2.0).min(1.0).asin()
+}

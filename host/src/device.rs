@@ -1,0 +1,84 @@
+//! The device behind an address, opened: one type for simulated and real ones.
+
+use std::time::Duration;
+
+use crate::simulation::{Simulation, SimulationError, SimulationOptions};
+use crate::transport::{Address, SerialTransport, StreamTransport, Transport, TransportError};
+
+/// A way to a device that is simulated here, or reached over a line.
+pub enum Device {
+    /// Simulated in or below this process, in virtual time.
+    Simulated(Box<Simulation>),
+    /// At the other end of a socket.
+    Stream(StreamTransport),
+    /// At the other end of a serial line.
+    Serial(SerialTransport),
+}
+
+/// Why a device cannot be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// The line cannot be opened.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+    /// The simulation cannot be started.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+}
+
+impl Device {
+    /// Opens the device at `address`. A simulated one boots; `adjust` may change how it is set up before.
+    ///
+    /// # Errors
+    /// [`OpenError`]
+    pub fn open(address: &Address, adjust: impl FnOnce(&mut SimulationOptions)) -> Result<Self, OpenError> {
+        Ok(match address {
+            Address::Simulated(kind, options) => {
+                let mut options = SimulationOptions::from_address(*kind, options)?;
+                adjust(&mut options);
+                Self::Simulated(Box::new(Simulation::start(&options)?))
+            }
+            Address::Tcp(address) => Self::Stream(StreamTransport::tcp(address)?),
+            Address::Unix(path) => Self::Stream(StreamTransport::unix(path)?),
+            Address::Serial { port, baud } => Self::Serial(SerialTransport::open(port, *baud)?),
+        })
+    }
+
+    /// The simulation, if it is one.
+    pub fn simulation(&mut self) -> Option<&mut Simulation> {
+        match self {
+            Self::Simulated(simulation) => Some(simulation),
+            Self::Stream(_) | Self::Serial(_) => None,
+        }
+    }
+}
+
+impl Transport for Device {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
+        match self {
+            Self::Simulated(device) => device.send(bytes),
+            Self::Stream(device) => device.send(bytes),
+            Self::Serial(device) => device.send(bytes),
+        }
+    }
+
+    fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
+        match self {
+            Self::Simulated(device) => device.receive(timeout, out),
+            Self::Stream(device) => device.receive(timeout, out),
+            Self::Serial(device) => device.receive(timeout, out),
+        }
+    }
+
+    fn now(&self) -> Duration {
+        match self {
+            Self::Simulated(device) => device.now(),
+            Self::Stream(device) => device.now(),
+            Self::Serial(device) => device.now(),
+        }
+    }
+
+    fn is_virtual(&self) -> bool {
+        matches!(self, Self::Simulated(_))
+    }
+}

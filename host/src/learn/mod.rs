@@ -1,0 +1,407 @@
+//! From a demonstration to a primitive: filter, fit, roll out, compare.
+//!
+//! The fit itself (derivatives, zero-phase filter, ridge regression of Eq (2) on the inverted Eqs (1) and (6)) is
+//! `dmp::fit`. Here the rows are gathered: position and orientation of the tool frame, the posture from the joint
+//! angles, the fingers from a generated movement. What is reported is not the residual of the regression but the
+//! error of the primitive that was made, rolled out from the demonstration's start and compared sample by sample.
+
+mod fit;
+pub mod hand;
+pub mod report;
+
+use std::path::{Path, PathBuf};
+
+use dmp::fit::{LARGEST_ANGLE, LARGEST_ROTATION_VECTOR, WARNING_ANGLE};
+use thiserror::Error;
+
+use crate::demonstration::{
+    Demonstration, DemonstrationError, PoseSource, Preparation, Recording, angle_between,
+};
+use crate::plan;
+use crate::plot::movement::rotation_vectors;
+use crate::primitive_file::{OrientationErrorKind, PrimitiveFile, PrimitiveFileError, Provenance};
+use hand::HandMotion;
+use report::{FitReport, row_error, wrench_statistics};
+
+/// Speed of the tool (turning counted, m/s) above which a demonstration does not begin or end at rest.
+const MOVING_END: f64 = 0.01;
+
+/// Arm posture for recordings without joint angles, rad: the middle of every joint's range but the elbow bent by a
+/// right angle, far from every limit and every singularity.
+pub const DEFAULT_POSTURE: [f64; 7] = [0.0, 0.0, 0.0, std::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0];
+
+/// How a primitive is learned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LearnOptions {
+    /// Name of the primitive.
+    pub name: String,
+    /// Kernels of each row.
+    pub kernels: usize,
+    /// Cut-off of the zero-phase filter on the demonstration, Hz.
+    pub cutoff: f64,
+    /// Trimming.
+    pub preparation: Preparation,
+    /// Orientation error.
+    pub orientation_error: OrientationErrorKind,
+    /// Movement of the fingers.
+    pub hand: HandMotion,
+}
+
+impl LearnOptions {
+    /// The recommended values: 50 kernels, 7.5 Hz, quaternion error, an open hand.
+    pub fn named(name: impl Into<String>) -> LearnOptions {
+        LearnOptions {
+            name: name.into(),
+            kernels: 50,
+            cutoff: 7.5,
+            preparation: Preparation::default(),
+            orientation_error: OrientationErrorKind::Quaternion,
+            hand: HandMotion::default(),
+        }
+    }
+}
+
+/// Why nothing was learned.
+#[derive(Debug, Error)]
+pub enum LearnError {
+    /// The recording is no demonstration.
+    #[error(transparent)]
+    Demonstration(#[from] DemonstrationError),
+    /// The movement turns too far from its goal for the orientation error that was chosen.
+    #[error("{file}: line {line}: the movement turns {degrees:.1} degrees away from its goal, at most {limit:.0} can be followed", file = file.display())]
+    TurnsTooFar {
+        /// The recording.
+        file: PathBuf,
+        /// Line near which the angle is largest.
+        line: u64,
+        /// Largest angle, degrees.
+        degrees: f64,
+        /// Largest angle that can be followed, degrees.
+        limit: f64,
+        /// Whether the rotation vector would follow it.
+        rotation_vector_helps: bool,
+    },
+    /// An option is out of range.
+    #[error("{option}: {reason}")]
+    Option {
+        /// Name of the option.
+        option: &'static str,
+        /// What is wrong with its value.
+        reason: String,
+    },
+    /// The regression failed.
+    #[error("{file}: cannot be fitted: {reason}", file = file.display())]
+    Fit {
+        /// The recording.
+        file: PathBuf,
+        /// What `dmp::fit` says.
+        reason: String,
+    },
+    /// The fitted primitive is no valid primitive.
+    #[error(transparent)]
+    Primitive(#[from] PrimitiveFileError),
+}
+
+/// A primitive and how well it fits.
+#[derive(Debug, Clone)]
+pub struct Learned {
+    /// The primitive.
+    pub primitive: PrimitiveFile,
+    /// The report.
+    pub report: FitReport,
+    /// The demonstration it was fitted to.
+    pub demonstration: Demonstration,
+}
+
+/// Learns a primitive from a recording; `file` is where the primitive will be written.
+///
+/// # Errors
+/// [`LearnError`].
+pub fn learn(
+    recording: &Recording,
+    file: &Path,
+    options: &LearnOptions,
+) -> Result<Learned, LearnError> {
+    if !options.hand.is_valid() {
+        return Err(LearnError::Option {
+            option: "--hand-window",
+            reason: "two fractions of the duration in order, between 0 and 1, are expected"
+                .to_owned(),
+        });
+    }
+    let demonstration = Demonstration::prepare(recording, &options.preparation)?;
+    let mut warnings = Vec::new();
+    let largest_angle = check_angle(recording, &demonstration, options, &mut warnings)?;
+    let posture = match &demonstration.q {
+        Some(q) => q.clone(),
+        None => {
+            warnings.push(
+                "the recording has no joint angles: the posture rows hold a bent elbow, `tactus check` tells whether the arm can follow"
+                    .to_owned(),
+            );
+            vec![DEFAULT_POSTURE; demonstration.len()]
+        }
+    };
+    let speed = demonstration.speed();
+    for (end, speed) in [("begins", speed.first()), ("ends", speed.last())] {
+        if let Some(speed) = speed.filter(|speed| **speed > MOVING_END) {
+            warnings.push(format!(
+                "the demonstration {end} in motion, at {speed:.3} m/s: a run starts and ends at rest, hold the arm still for half a second before and after"
+            ));
+        }
+    }
+    if demonstration.pose_source == PoseSource::JointAngles && recording.position.is_some() {
+        check_pose_columns(recording, &mut warnings);
+    }
+    let hand = options.hand.samples(demonstration.len());
+    let fitted =
+        fit::fit(&demonstration, &posture, &hand, options).map_err(|reason| LearnError::Fit {
+            file: recording.file.clone(),
+            reason,
+        })?;
+    let mut primitive = PrimitiveFile {
+        file: file.to_owned(),
+        name: options.name.clone(),
+        model_hash: control::MODEL_HASH,
+        provenance: None,
+        ..fitted
+    };
+    let report = compare(
+        &primitive,
+        recording,
+        &demonstration,
+        &posture,
+        &hand,
+        largest_angle,
+        warnings,
+    )?;
+    primitive.provenance = Some(Provenance {
+        demonstration: recording
+            .file
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned())
+            .unwrap_or_default(),
+        demonstration_checksum: recording.checksum,
+        samples: demonstration.len(),
+        trimmed: demonstration.trimmed.into(),
+        largest_angle,
+        position_error: [report.position_max_m, report.position_rms_m],
+        orientation_error: [report.orientation_max_rad, report.orientation_rms_rad],
+        posture_error: group_error(&report, 6..13),
+        tool: format!("tactus {}", env!("CARGO_PKG_VERSION")),
+    });
+    Ok(Learned {
+        primitive,
+        report,
+        demonstration,
+    })
+}
+
+/// Largest angle to the goal along the way that was shown, rad, or why it is too large.
+fn check_angle(
+    recording: &Recording,
+    demonstration: &Demonstration,
+    options: &LearnOptions,
+    warnings: &mut Vec<String>,
+) -> Result<f64, LearnError> {
+    let goal = demonstration.orientation[demonstration.len() - 1];
+    let angles = rotation_vectors(&goal, &demonstration.orientation)
+        .into_iter()
+        .map(|vector| vector.iter().map(|part| part * part).sum::<f64>().sqrt());
+    let (worst, angle) = angles.enumerate().fold((0, 0.0), |worst, (index, angle)| {
+        if angle > worst.1 {
+            (index, angle)
+        } else {
+            worst
+        }
+    });
+    let limit = match options.orientation_error {
+        OrientationErrorKind::Quaternion => LARGEST_ANGLE,
+        OrientationErrorKind::RotationVector => LARGEST_ROTATION_VECTOR,
+    };
+    if angle > limit {
+        // The demonstration was resampled and trimmed: find the recorded line at the same time.
+        let time = recording.time[0] + demonstration.trimmed.0 + demonstration.time[worst];
+        let sample = recording
+            .time
+            .partition_point(|t| *t < time)
+            .min(recording.len() - 1);
+        return Err(LearnError::TurnsTooFar {
+            file: recording.file.clone(),
+            line: recording.lines[sample],
+            degrees: angle.to_degrees(),
+            limit: limit.to_degrees(),
+            rotation_vector_helps: options.orientation_error == OrientationErrorKind::Quaternion
+                && angle <= LARGEST_ROTATION_VECTOR,
+        });
+    }
+    if angle > WARNING_ANGLE && options.orientation_error == OrientationErrorKind::Quaternion {
+        warnings.push(format!(
+            "the movement turns {:.1} degrees away from its goal: beyond 150 degrees the spring of the quaternion error grows weak, consider --rotation-vector",
+            angle.to_degrees()
+        ));
+    }
+    Ok(angle)
+}
+
+/// Warns if pose columns contradict the joint angles: another tool frame, or another model of the arm.
+fn check_pose_columns(recording: &Recording, warnings: &mut Vec<String>) {
+    let (Some(q), Some(position), Some(orientation)) =
+        (&recording.q, &recording.position, &recording.orientation)
+    else {
+        return;
+    };
+    let mut worst = (0.0_f64, 0.0_f64);
+    for ((q, x), orientation) in q.iter().zip(position).zip(orientation) {
+        let (computed, turned) = crate::arm::tool_pose(q);
+        let distance = (0..3)
+            .map(|axis| (computed[axis] - x[axis]).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        worst = (
+            worst.0.max(distance),
+            worst.1.max(angle_between(&turned, orientation)),
+        );
+    }
+    if worst.0 > 1e-3 || worst.1 > 0.5_f64.to_radians() {
+        warnings.push(format!(
+            "the pose columns differ from the kinematics of the joint angles by up to {:.1} mm and {:.2} degrees; the joint angles were used",
+            worst.0 * 1e3,
+            worst.1.to_degrees()
+        ));
+    }
+}
+
+/// Rolls the primitive out and compares it with what was shown.
+fn compare(
+    file: &PrimitiveFile,
+    recording: &Recording,
+    demonstration: &Demonstration,
+    posture: &[[f64; 7]],
+    hand: &[[f64; 4]],
+    largest_angle: f64,
+    warnings: Vec<String>,
+) -> Result<FitReport, LearnError> {
+    let primitive = file.to_primitive()?;
+    let references = plan::roll_out(&primitive).map_err(|error| LearnError::Fit {
+        file: recording.file.clone(),
+        reason: error.to_string(),
+    })?;
+    let count = references.len().min(demonstration.len());
+    let references = &references[..count];
+    let orientation: Vec<[f64; 4]> = references.iter().map(plan::orientation).collect();
+    let mut rows = Vec::with_capacity(dmp::ROWS);
+    let mut add = |errors: Vec<f64>, shown: Vec<f64>| {
+        rows.push(row_error(rows.len(), &errors, &shown));
+    };
+    for axis in 0..3 {
+        let shown: Vec<f64> = demonstration.position[..count]
+            .iter()
+            .map(|x| x[axis])
+            .collect();
+        let errors = references
+            .iter()
+            .zip(&shown)
+            .map(|(reference, x)| reference.position.x[axis] - x);
+        add(errors.collect(), shown);
+    }
+    let goal = demonstration.orientation[demonstration.len() - 1];
+    let shown_vectors = rotation_vectors(&goal, &demonstration.orientation);
+    let error_vectors: Vec<[f64; 3]> = demonstration
+        .orientation
+        .iter()
+        .zip(&orientation)
+        .map(|(shown, planned)| rotation_vectors(shown, &[*planned])[0])
+        .collect();
+    for axis in 0..3 {
+        add(
+            error_vectors.iter().map(|vector| vector[axis]).collect(),
+            shown_vectors[..count]
+                .iter()
+                .map(|vector| vector[axis])
+                .collect(),
+        );
+    }
+    for joint in 0..7 {
+        let shown: Vec<f64> = posture[..count].iter().map(|q| q[joint]).collect();
+        let errors = references
+            .iter()
+            .zip(&shown)
+            .map(|(reference, q)| reference.posture.x[joint] - q);
+        add(errors.collect(), shown);
+    }
+    for joint in 0..4 {
+        let shown: Vec<f64> = hand[..count].iter().map(|q| q[joint]).collect();
+        let errors = references
+            .iter()
+            .zip(&shown)
+            .map(|(reference, q)| reference.hand.x[joint] - q);
+        add(errors.collect(), shown);
+    }
+    let distances: Vec<f64> = references
+        .iter()
+        .zip(&demonstration.position)
+        .map(|(reference, x)| {
+            (0..3)
+                .map(|axis| (reference.position.x[axis] - x[axis]).powi(2))
+                .sum::<f64>()
+                .sqrt()
+        })
+        .collect();
+    let angles: Vec<f64> = orientation
+        .iter()
+        .zip(&demonstration.orientation)
+        .map(|(planned, shown)| angle_between(planned, shown))
+        .collect();
+    let path = |orientations: &[[f64; 4]]| -> f64 {
+        orientations
+            .windows(2)
+            .map(|pair| angle_between(&pair[0], &pair[1]))
+            .sum()
+    };
+    let shown_path = path(&demonstration.orientation[..count]);
+    let position_rms = root_mean_square(&distances);
+    Ok(FitReport {
+        name: file.name.clone(),
+        kernels: file.kernels(),
+        samples: demonstration.len(),
+        duration_s: file.duration,
+        trimmed_s: demonstration.trimmed,
+        gaps: (recording.gaps, recording.missing_samples),
+        phase: (1.0, (-file.alpha).exp()),
+        largest_angle_rad: largest_angle,
+        position_max_m: largest(&distances),
+        position_rms_m: position_rms,
+        position_relative: position_rms / demonstration.extent().max(1e-9),
+        orientation_max_rad: largest(&angles),
+        orientation_rms_rad: root_mean_square(&angles),
+        // Below a hundredth of a radian the path is noise: a ratio to it says nothing.
+        orientation_path_ratio: if shown_path > 0.01 {
+            path(&orientation) / shown_path
+        } else {
+            1.0
+        },
+        rows,
+        wrench: demonstration
+            .wrench
+            .as_deref()
+            .map(wrench_statistics)
+            .unwrap_or_default(),
+        warnings,
+    })
+}
+
+fn group_error(report: &FitReport, rows: std::ops::Range<usize>) -> [f64; 2] {
+    let rows = &report.rows[rows];
+    let max = rows.iter().fold(0.0_f64, |max, row| max.max(row.max));
+    let mean_square = rows.iter().map(|row| row.rms * row.rms).sum::<f64>() / rows.len() as f64;
+    [max, mean_square.sqrt()]
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().copied().fold(0.0, f64::max)
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}

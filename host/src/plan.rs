@@ -1,0 +1,45 @@
+//! The plan of a primitive: its rollout at 300 Hz without feedback, from the start of its demonstration.
+
+use dmp::{Coupling, Reference, Rollout, RolloutError, StartState};
+
+use crate::demonstration::RATE;
+use crate::plot::movement::PosePath;
+use crate::primitive_file::HostPrimitive;
+
+/// Control period, s.
+pub const PERIOD: f64 = 1.0 / RATE;
+
+/// The references of every cycle from the first to the one at the end of the movement.
+///
+/// # Errors
+/// The stored start is no valid start ([`RolloutError`]).
+pub fn roll_out(primitive: &HostPrimitive) -> Result<Vec<Reference<f64>>, RolloutError> {
+    let mut rollout = Rollout::start(primitive, &StartState::demonstrated(primitive))?;
+    let cycles = cycles(primitive.duration());
+    Ok((0..cycles)
+        .map(|_| rollout.step(primitive, PERIOD, &Coupling::NONE))
+        .collect())
+}
+
+/// Cycles of a movement of `duration` s, both ends included.
+pub fn cycles(duration: f64) -> usize {
+    (duration * RATE).round() as usize + 1
+}
+
+/// The poses of a plan, for a figure.
+pub fn pose_path(references: &[Reference<f64>]) -> PosePath {
+    PosePath {
+        time: references.iter().map(|reference| reference.time).collect(),
+        position: references
+            .iter()
+            .map(|reference| reference.position.x)
+            .collect(),
+        orientation: references.iter().map(orientation).collect(),
+    }
+}
+
+/// Orientation of a reference as (w, x, y, z).
+pub fn orientation(reference: &Reference<f64>) -> [f64; 4] {
+    let q = &reference.orientation.quaternion;
+    [q.w, q.x, q.y, q.z]
+}

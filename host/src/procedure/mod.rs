@@ -1,0 +1,54 @@
+//! What an operator does step by step, done by the host: make the arm ready, bring it to a posture, record what it does.
+
+mod ready;
+mod recorder;
+mod travel;
+
+pub use ready::make_ready;
+pub use recorder::{Recorder, Take};
+pub use travel::{TravelEnd, after, travel, wait_for};
+
+use control::Fault;
+
+use crate::error::HostError;
+
+/// Why a procedure ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum ProcedureError {
+    /// The conversation with the device failed.
+    #[error(transparent)]
+    Host(#[from] HostError),
+    /// The bus start-up does not get further.
+    #[error("the arm does not get ready: {0}")]
+    NotReady(String),
+    /// The arm was not zeroed, and only a person can say where it stands.
+    #[error("the arm does not know where it stands")]
+    NotZeroed,
+    /// The arm stopped by itself.
+    #[error("the arm stopped: {}", explain(*.0))]
+    Stopped(Fault),
+    /// The arm left its motion for a state that was not asked for.
+    #[error("the arm went to state '{0}' instead")]
+    Diverted(&'static str),
+    /// It took too long.
+    #[error("{what} did not end within {seconds} s")]
+    TooLong {
+        /// What was waited for.
+        what: &'static str,
+        /// How long, s.
+        seconds: u64,
+    },
+    /// The recording cannot be written.
+    #[error("the recording cannot be written: {0}")]
+    Recording(#[from] std::io::Error),
+}
+
+impl From<crate::transport::TransportError> for ProcedureError {
+    fn from(error: crate::transport::TransportError) -> Self {
+        Self::Host(error.into())
+    }
+}
+
+fn explain(fault: Fault) -> String {
+    format!("{fault}: {}", fault.explanation())
+}

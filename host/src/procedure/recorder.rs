@@ -1,0 +1,97 @@
+//! Records what the arm does: every cycle that comes over the link becomes one line of a file.
+
+use std::io::Write;
+use std::time::Duration;
+
+use control::State;
+use link::{Event, Telemetry};
+
+use super::ProcedureError;
+use crate::arm;
+use crate::client::{Client, Incoming};
+use crate::demonstration::RATE;
+use crate::demonstration::writer::{RecordingRow, RecordingWriter};
+use crate::device::Device;
+
+/// Silence on the stream after which the device counts as lost.
+const SILENCE: Duration = Duration::from_secs(1);
+
+/// One thing a recorder came by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Take {
+    /// A cycle; it is in the file.
+    Cycle(Telemetry),
+    /// An event; events are not recorded.
+    Event(Event),
+}
+
+/// A recording that is being made.
+pub struct Recorder<W: Write> {
+    writer: RecordingWriter<W>,
+    first: Option<u32>,
+}
+
+impl<W: Write> Recorder<W> {
+    /// Switches the stream on at 300 Hz and writes the head of the file.
+    ///
+    /// # Errors
+    /// The device refuses, or the output does.
+    pub fn start(client: &mut Client<Device>, output: W, notes: &str) -> Result<Self, ProcedureError> {
+        let writer = RecordingWriter::new(output, notes)?;
+        client.set_telemetry(1)?;
+        Ok(Self { writer, first: None })
+    }
+
+    /// Waits for the next cycle or event, and writes a cycle down.
+    ///
+    /// # Errors
+    /// [`crate::error::HostError::NoAnswer`] after a second without either, and as [`Client::next`].
+    pub fn take(&mut self, client: &mut Client<Device>) -> Result<Take, ProcedureError> {
+        match client.next(SILENCE)? {
+            Some(Incoming::Telemetry(telemetry)) => {
+                self.write(&telemetry)?;
+                Ok(Take::Cycle(telemetry))
+            }
+            Some(Incoming::Event(event)) => Ok(Take::Event(event)),
+            None => Err(crate::error::HostError::NoAnswer { request: "telemetry", after: SILENCE }.into()),
+        }
+    }
+
+    fn write(&mut self, telemetry: &Telemetry) -> std::io::Result<()> {
+        let first = *self.first.get_or_insert(telemetry.cycle);
+        let (position, orientation) = arm::tool_pose(&telemetry.q.map(f64::from));
+        let mut pose = [0.0; 7];
+        pose[..3].copy_from_slice(&position);
+        pose[3..].copy_from_slice(&orientation);
+        self.writer.write(&RecordingRow {
+            cycle: telemetry.cycle,
+            time: f64::from(telemetry.cycle.wrapping_sub(first)) / RATE,
+            state: State::from_code(telemetry.state).map_or("unknown", State::name),
+            fault: telemetry.fault,
+            flags: telemetry.flags,
+            phase: telemetry.phase,
+            q: telemetry.q,
+            dq: telemetry.dq,
+            tau: telemetry.tau,
+            pose,
+            pose_d: telemetry.pose_d,
+            wrench: telemetry.wrench,
+            lost_replies: telemetry.lost_replies,
+            cost_ticks: telemetry.cost_ticks,
+        })
+    }
+
+    /// Cycles written so far.
+    pub fn rows(&self) -> usize {
+        self.writer.rows()
+    }
+
+    /// Switches the stream off and closes the file.
+    ///
+    /// # Errors
+    /// The device or the output refuses.
+    pub fn finish(self, client: &mut Client<Device>) -> Result<W, ProcedureError> {
+        client.set_telemetry(0)?;
+        Ok(self.writer.finish()?)
+    }
+}

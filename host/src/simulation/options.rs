@@ -1,0 +1,114 @@
+//! What a simulated device is made of: engine, seed, world, person.
+
+use std::path::{Path, PathBuf};
+
+use sim::world::HOME;
+use sim::{FreeJoints, World};
+
+use super::SimulationError;
+use crate::transport::{SimulatorKind, SimulatorOptions};
+
+/// Environment variable that names the firmware image for QEMU.
+pub const IMAGE_VARIABLE: &str = "TACTUS_IMAGE";
+
+/// Seed of a simulation that was given none.
+pub const DEFAULT_SEED: u64 = 1;
+
+/// What executes the co-controller's application.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Engine {
+    /// The application in this process.
+    InProcess,
+    /// The firmware image under QEMU.
+    Qemu {
+        /// The image, an ELF file.
+        image: PathBuf,
+    },
+}
+
+/// Which physics.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WorldKind {
+    /// Decoupled joints in pure Rust: for tests and speed, not for tracking figures.
+    Simple,
+    /// MuJoCo with the whole arm, a table and a flashlight.
+    Mujoco,
+}
+
+/// How a simulated device is set up.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SimulationOptions {
+    /// What executes the application.
+    pub engine: Engine,
+    /// Seed of everything random: sensor noise, wake delays, the person's tremor.
+    pub seed: u64,
+    /// Which physics.
+    pub world: WorldKind,
+    /// Seed of the person who teaches; `None`: nobody stands beside the arm.
+    pub person: Option<u64>,
+    /// Where the firmware's log goes, raw defmt frames; `None` drops it.
+    pub firmware_log: Option<PathBuf>,
+}
+
+impl SimulationOptions {
+    /// Reads the options of an address such as `sim:seed=7,world=simple`.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for a world that is unknown or was not built in, and for a missing image.
+    pub fn from_address(kind: SimulatorKind, options: &SimulatorOptions) -> Result<Self, SimulationError> {
+        let engine = match kind {
+            SimulatorKind::InProcess => Engine::InProcess,
+            SimulatorKind::Qemu => Engine::Qemu { image: find_image()? },
+        };
+        let world = match options.world.as_deref() {
+            Some("simple") => WorldKind::Simple,
+            Some("mujoco") => WorldKind::Mujoco,
+            Some(other) => return Err(SimulationError::UnknownWorld(other.to_owned())),
+            None if cfg!(feature = "mujoco") => WorldKind::Mujoco,
+            None => WorldKind::Simple,
+        };
+        if world == WorldKind::Mujoco && !cfg!(feature = "mujoco") {
+            return Err(SimulationError::WithoutMujoco);
+        }
+        Ok(Self { engine, seed: options.seed.unwrap_or(DEFAULT_SEED), world, person: None, firmware_log: None })
+    }
+
+    /// The world at its start, the arm at home.
+    pub(super) fn build_world(&self) -> Result<Box<dyn World>, SimulationError> {
+        match self.world {
+            WorldKind::Simple => Ok(Box::new(FreeJoints::new(HOME))),
+            #[cfg(feature = "mujoco")]
+            WorldKind::Mujoco => {
+                use sim::person::{GuidedWorld, Person, PersonConfig, side_grasp_path};
+                use sim::world::mujoco::{MujocoOptions, MujocoWorld};
+                let world = MujocoWorld::new(&MujocoOptions::default())?;
+                Ok(match self.person {
+                    None => Box::new(world),
+                    Some(seed) => {
+                        let person = Person::new(PersonConfig { seed, ..PersonConfig::default() }, side_grasp_path());
+                        Box::new(GuidedWorld::new(world, person))
+                    }
+                })
+            }
+            #[cfg(not(feature = "mujoco"))]
+            WorldKind::Mujoco => Err(SimulationError::WithoutMujoco),
+        }
+    }
+}
+
+/// The firmware image: named by the environment, or where `cargo xtask build` leaves it.
+///
+/// The build folder is found from the place of this program (`target/release/tactus`, `target/debug/deps/...`), so that it
+/// does not matter where it is called from.
+fn find_image() -> Result<PathBuf, SimulationError> {
+    if let Some(path) = std::env::var_os(IMAGE_VARIABLE) {
+        let path = PathBuf::from(path);
+        return if path.is_file() { Ok(path) } else { Err(SimulationError::NoImage(path)) };
+    }
+    let program = std::env::current_exe().unwrap_or_default();
+    let candidates = program.ancestors().skip(1).take(4).map(|folder| folder.join("images").join("arm.elf"));
+    candidates
+        .into_iter()
+        .find(|path| path.is_file())
+        .ok_or_else(|| SimulationError::NoImage(Path::new("target/images/arm.elf").to_owned()))
+}

@@ -1,0 +1,112 @@
+//! The engine of `sim:`: the firmware image under QEMU, in lock step with the plant.
+
+use std::fs::File;
+use std::io::{BufReader, Read, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+
+use sim::{Lockstep, Plant, Ticks};
+
+use super::{Execute, SimulationError};
+
+/// The machine the image is built for, with everything QEMU would add by itself switched off.
+///
+/// `shift=3`: one instruction takes 8 ns of virtual time (125 million a second). `sleep=off`: virtual time never waits for the wall
+/// clock. Together they make a run a function of the image and of what the simulator answers.
+const MACHINE: &[&str] = &[
+    "-machine", "mps2-an500", "-nodefaults", "-nic", "none", "-display", "none", "-serial", "none", "-monitor", "none",
+    "-semihosting-config", "enable=on,target=native", "-icount", "shift=3,sleep=off", "-kernel",
+];
+
+/// Bytes of the firmware's log that are kept for its last words.
+const LAST_WORDS: usize = 4096;
+
+/// A running QEMU and the streams to it.
+pub(super) struct Qemu {
+    child: Child,
+    lockstep: Lockstep<BufReader<ChildStdout>, ChildStdin>,
+    log: Option<JoinHandle<()>>,
+    words: Arc<Mutex<Vec<u8>>>,
+}
+
+impl Qemu {
+    /// Boots `image`; the firmware's log goes to the file `log`.
+    pub(super) fn spawn(image: &Path, log: Option<&Path>) -> Result<Self, SimulationError> {
+        let mut file = log.map(File::create).transpose().map_err(SimulationError::Log)?;
+        let mut child = Command::new("qemu-system-arm")
+            .args(MACHINE)
+            .arg(image)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(SimulationError::NoQemu)?;
+        let (Some(to), Some(from), Some(mut stderr)) = (child.stdin.take(), child.stdout.take(), child.stderr.take())
+        else {
+            unreachable!("all three streams were asked for as pipes")
+        };
+        let words = Arc::new(Mutex::new(Vec::new()));
+        let kept = Arc::clone(&words);
+        // The log must be drained while the firmware runs, or it would block on a full pipe, and with it virtual time.
+        let log = std::thread::spawn(move || {
+            let mut buffer = [0; 1024];
+            while let Ok(count @ 1..) = stderr.read(&mut buffer) {
+                if let Some(file) = &mut file {
+                    // A full disk must not stop the arm; the log is then short.
+                    let _ = file.write_all(&buffer[..count]);
+                }
+                let mut words = kept.lock().unwrap_or_else(PoisonError::into_inner);
+                words.extend_from_slice(&buffer[..count]);
+                let surplus = words.len().saturating_sub(LAST_WORDS);
+                words.drain(..surplus);
+            }
+        });
+        Ok(Self { child, lockstep: Lockstep::new(BufReader::new(from), to), log: Some(log), words })
+    }
+
+    /// Why the firmware fell silent.
+    fn ended(&mut self) -> SimulationError {
+        let status = match self.child.wait() {
+            Ok(status) => format!(" ({status})"),
+            Err(_) => String::new(),
+        };
+        if let Some(log) = self.log.take() {
+            let _ = log.join();
+        }
+        let words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
+        SimulationError::Ended { status, words: printable(&words) }
+    }
+}
+
+impl Execute for Qemu {
+    fn advance(&mut self, plant: &mut Plant, _limit: Ticks) -> Result<Ticks, SimulationError> {
+        // One exchange; the firmware itself decides how far it comes. It speaks at least once a slot, so a limit is
+        // overrun by less than 1.2 ms of virtual time.
+        match self.lockstep.serve_one(plant) {
+            Ok(served) if !served.is_last() => Ok(plant.now()),
+            Ok(_) => Err(self.ended()),
+            Err(sim::LockstepError::Truncated { .. }) => Err(self.ended()),
+            Err(error) => Err(error.into()),
+        }
+    }
+}
+
+impl Drop for Qemu {
+    fn drop(&mut self) {
+        // While it waits for an answer QEMU ignores SIGTERM; `kill` sends SIGKILL.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        if let Some(log) = self.log.take() {
+            let _ = log.join();
+        }
+    }
+}
+
+/// The text in a log of binary frames: runs of at least four printable characters.
+fn printable(bytes: &[u8]) -> String {
+    let runs = bytes.split(|byte| !(b' '..=b'~').contains(byte)).filter(|run| run.len() >= 4);
+    let text: Vec<_> = runs.map(|run| String::from_utf8_lossy(run).into_owned()).collect();
+    if text.is_empty() { "none".to_owned() } else { text.join(" ") }
+}

@@ -1,0 +1,82 @@
+//! What a change must pass, in the order in which failures are cheapest.
+
+use anyhow::Result;
+
+use crate::setup::{self, ARM, JOINT, Machine};
+use crate::{budget, build, shell, test};
+
+/// Runs every check; the first failure ends it.
+pub(crate) fn run() -> Result<()> {
+    setup::lints()?;
+    shell::step("format");
+    shell::run(shell::cargo().args(["fmt", "--all", "--check"]))?;
+    let machine = setup::all()?;
+    lint_host()?;
+    lint_firmware(&machine)?;
+    libraries_without_std(&machine)?;
+    plain_root()?;
+    test::run(&machine)?;
+    build::documentation()?;
+    budget::run(&machine)
+}
+
+fn lint_host() -> Result<()> {
+    shell::step("lints of the host packages");
+    let clippy = |features: &[&str]| {
+        shell::run(
+            shell::cargo()
+                .args([
+                    "clippy",
+                    "--release",
+                    "--workspace",
+                    "--exclude",
+                    "firmware",
+                    "--all-targets",
+                ])
+                .args(features)
+                .args(["--", "-D", "warnings"]),
+        )
+    };
+    clippy(&[])?;
+    clippy(&["--features", build::WORLD])
+}
+
+fn lint_firmware(machine: &Machine) -> Result<()> {
+    if !machine.toolchain.has_clippy() {
+        shell::note("lints of the image skipped: clippy cannot read Debian's library");
+        return Ok(());
+    }
+    shell::step("lints of the image");
+    for features in [&[][..], &["--no-default-features"]] {
+        let mut clippy = machine.toolchain.cargo("clippy", ARM)?;
+        clippy
+            .args(["--package", "firmware", "--profile", "firmware"])
+            .args(features)
+            .args(["--", "-D", "warnings"]);
+        shell::run(&mut clippy)?;
+    }
+    Ok(())
+}
+
+/// The movement primitives must stay usable on any Cortex-M, with and without floating point, by strangers.
+fn libraries_without_std(machine: &Machine) -> Result<()> {
+    shell::step("crates/dmp without std on Cortex-M4F and Cortex-M3");
+    for target in [ARM, JOINT] {
+        for features in [&[][..], &["--features", "fixed"]] {
+            let mut check = machine.toolchain.cargo("check", target)?;
+            check
+                .args(["--package", "dmp", "--no-default-features"])
+                .args(features);
+            shell::run(&mut check)?;
+        }
+    }
+    Ok(())
+}
+
+/// `cargo build` and `cargo test` at the root, as a newcomer types them: no cross target, no MuJoCo, with the
+/// overflow checks of the development profile.
+fn plain_root() -> Result<()> {
+    shell::step("cargo build and cargo test at the root, without features");
+    shell::run(shell::cargo().arg("build"))?;
+    shell::run(shell::cargo().args(["test", "--quiet"]))
+}

@@ -1,0 +1,40 @@
+//! Set-up of a machine that has cargo, python3 and apt: installs what is missing, says so, asks nothing.
+//!
+//! Every part is idempotent and costs milliseconds when there is nothing to do. Where a part cannot be installed
+//! (no root, no apt, no network), the error names the exact command or program and the program stops.
+
+mod apt;
+mod mujoco;
+mod pictures;
+mod qemu;
+mod toolchain;
+
+use anyhow::Result;
+
+pub(crate) use qemu::Qemu;
+pub(crate) use toolchain::{ARM, JOINT, Toolchain};
+
+use crate::shell;
+
+/// What a prepared machine offers.
+pub(crate) struct Machine {
+    /// The emulator the images run on.
+    pub(crate) qemu: Qemu,
+    /// How Cortex-M code is compiled here.
+    pub(crate) toolchain: Toolchain,
+}
+
+/// Makes sure that everything needed to build, run and test is there.
+pub(crate) fn all() -> Result<Machine> {
+    shell::step("set-up: what is missing is installed");
+    let qemu = qemu::ensure()?;
+    let toolchain = toolchain::ensure()?;
+    mujoco::ensure()?;
+    pictures::ensure()?;
+    Ok(Machine { qemu, toolchain })
+}
+
+/// Makes sure that `cargo fmt` and `cargo clippy` exist: minimal Rust installations lack them.
+pub(crate) fn lints() -> Result<()> {
+    toolchain::ensure_lints()
+}

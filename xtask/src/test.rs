@@ -1,0 +1,19 @@
+//! Every test: unit and property tests, golden vectors, the MuJoCo world, whole systems under QEMU.
+
+use anyhow::Result;
+
+use crate::setup::Machine;
+use crate::{build, shell};
+
+/// Builds what the tests need and runs all of them.
+pub(crate) fn run(machine: &Machine) -> Result<()> {
+    build::image(machine)?;
+    build::host()?;
+    shell::step("tests of all packages, whole-system tests included");
+    // Optimised: physics and the emulator's peer are several times faster, and the demo needs the same build.
+    shell::run(
+        shell::cargo()
+            .args(["test", "--release", "--workspace", "--exclude", "firmware"])
+            .args(["--features", build::WORLD]),
+    )
+}
