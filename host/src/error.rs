@@ -7,7 +7,7 @@ use std::time::Duration;
 use device::{PrimitiveTrouble, StartupTrouble};
 use link::{ImageError, Refusal};
 
-use crate::cmd::{Exit, Failure};
+use crate::failure::{Exit, Failure};
 use crate::transport::{AddressError, TransportError};
 
 /// Why a conversation with a device failed.

@@ -12,10 +12,10 @@ use control::model::{SOFT_MAX, SOFT_MIN, VELOCITY_MAX};
 use serde::Serialize;
 
 use crate::arm::TORQUE_LIMITS;
-use crate::cmd::Table;
 use crate::demonstration::angle_between;
 use crate::plan;
 use crate::primitive_file::{PrimitiveFile, PrimitiveFileError};
+use crate::table::Table;
 use closed_loop::{ClosedLoop, Ending, Sample};
 
 /// Largest distance of the arm from the goal when the run is over, m.

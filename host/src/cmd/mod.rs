@@ -2,7 +2,6 @@
 
 pub mod check;
 mod connection;
-pub mod failure;
 pub mod learn;
 pub mod list;
 pub mod output;
@@ -19,8 +18,10 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 
-pub use failure::{Exit, Failure};
-pub use output::{Output, Table};
+pub use output::Output;
+
+use crate::failure::{Exit, Failure};
+use crate::table::Table;
 
 /// Teach, learn, check, upload, run and watch movement primitives on a Barrett WAM.
 ///
@@ -122,7 +123,9 @@ pub fn run(cli: Cli) -> ExitCode {
 
 /// A positive time in seconds.
 fn seconds(text: &str) -> Result<Duration, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
+    let value: f64 = text
+        .parse()
+        .map_err(|_| format!("`{text}` is not a number of seconds"))?;
     if value > 0.0 && value <= 86_400.0 {
         Ok(Duration::from_secs_f64(value))
     } else {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::cmd::Table;
+use crate::table::Table;
 
 /// Names of the 17 rows with the unit of their error.
 pub const ROW_NAMES: [(&str, &str); dmp::ROWS] = [

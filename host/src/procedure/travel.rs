@@ -55,7 +55,9 @@ pub fn wait_for(
             return Err(ProcedureError::TooLong { what, seconds });
         }
         progress(passed.as_secs_f64());
-        let Some(Incoming::Event(event)) = client.next(Duration::from_millis(100))? else { continue };
+        let Some(Incoming::Event(event)) = client.next(Duration::from_millis(100))? else {
+            continue;
+        };
         match event.kind {
             EventKind::Arrived => return Ok(TravelEnd::Arrived),
             EventKind::State => after(event.code, event.detail)?,
@@ -67,7 +69,10 @@ pub fn wait_for(
 /// Whether a state entered during a motion ends it.
 pub fn after(code: u16, detail: u32) -> Result<(), ProcedureError> {
     let state = u8::try_from(code).ok().and_then(State::from_code);
-    let fault = u8::try_from(detail).ok().and_then(Fault::from_code).unwrap_or(Fault::None);
+    let fault = u8::try_from(detail)
+        .ok()
+        .and_then(Fault::from_code)
+        .unwrap_or(Fault::None);
     match state {
         Some(State::Idle | State::SoftStop | State::Fault) if fault != Fault::None => {
             Err(ProcedureError::Stopped(fault))

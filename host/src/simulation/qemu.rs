@@ -16,8 +16,22 @@ use super::{Execute, SimulationError};
 /// `shift=3`: one instruction takes 8 ns of virtual time (125 million a second). `sleep=off`: virtual time never waits for the wall
 /// clock. Together they make a run a function of the image and of what the simulator answers.
 const MACHINE: &[&str] = &[
-    "-machine", "mps2-an500", "-nodefaults", "-nic", "none", "-display", "none", "-serial", "none", "-monitor", "none",
-    "-semihosting-config", "enable=on,target=native", "-icount", "shift=3,sleep=off", "-kernel",
+    "-machine",
+    "mps2-an500",
+    "-nodefaults",
+    "-nic",
+    "none",
+    "-display",
+    "none",
+    "-serial",
+    "none",
+    "-monitor",
+    "none",
+    "-semihosting-config",
+    "enable=on,target=native",
+    "-icount",
+    "shift=3,sleep=off",
+    "-kernel",
 ];
 
 /// Bytes of the firmware's log that are kept for its last words.
@@ -34,7 +48,10 @@ pub(super) struct Qemu {
 impl Qemu {
     /// Boots `image`; the firmware's log goes to the file `log`.
     pub(super) fn spawn(image: &Path, log: Option<&Path>) -> Result<Self, SimulationError> {
-        let mut file = log.map(File::create).transpose().map_err(SimulationError::Log)?;
+        let mut file = log
+            .map(File::create)
+            .transpose()
+            .map_err(SimulationError::Log)?;
         let mut child = Command::new("qemu-system-arm")
             .args(MACHINE)
             .arg(image)
@@ -43,7 +60,8 @@ impl Qemu {
             .stderr(Stdio::piped())
             .spawn()
             .map_err(SimulationError::NoQemu)?;
-        let (Some(to), Some(from), Some(mut stderr)) = (child.stdin.take(), child.stdout.take(), child.stderr.take())
+        let (Some(to), Some(from), Some(mut stderr)) =
+            (child.stdin.take(), child.stdout.take(), child.stderr.take())
         else {
             unreachable!("all three streams were asked for as pipes")
         };
@@ -63,7 +81,12 @@ impl Qemu {
                 words.drain(..surplus);
             }
         });
-        Ok(Self { child, lockstep: Lockstep::new(BufReader::new(from), to), log: Some(log), words })
+        Ok(Self {
+            child,
+            lockstep: Lockstep::new(BufReader::new(from), to),
+            log: Some(log),
+            words,
+        })
     }
 
     /// Why the firmware fell silent.
@@ -76,7 +99,10 @@ impl Qemu {
             let _ = log.join();
         }
         let words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
-        SimulationError::Ended { status, words: printable(&words) }
+        SimulationError::Ended {
+            status,
+            words: printable(&words),
+        }
     }
 }
 
@@ -106,7 +132,15 @@ impl Drop for Qemu {
 
 /// The text in a log of binary frames: runs of at least four printable characters.
 fn printable(bytes: &[u8]) -> String {
-    let runs = bytes.split(|byte| !(b' '..=b'~').contains(byte)).filter(|run| run.len() >= 4);
-    let text: Vec<_> = runs.map(|run| String::from_utf8_lossy(run).into_owned()).collect();
-    if text.is_empty() { "none".to_owned() } else { text.join(" ") }
+    let runs = bytes
+        .split(|byte| !(b' '..=b'~').contains(byte))
+        .filter(|run| run.len() >= 4);
+    let text: Vec<_> = runs
+        .map(|run| String::from_utf8_lossy(run).into_owned())
+        .collect();
+    if text.is_empty() {
+        "none".to_owned()
+    } else {
+        text.join(" ")
+    }
 }
