@@ -7,35 +7,20 @@ use std::path::PathBuf;
 use std::process::Command;
 
 /// Interrupts of the board, by the role they have: a handler that nobody defines is the default handler.
-const INTERRUPTS: [&str; 6] = [
-    "SLOT_TIMER",
-    "BUS_WIRE",
-    "CAN_RECEIVE",
-    "CAN_TRANSMIT",
-    "DISPATCH_SESSION",
-    "DISPATCH_LOG",
-];
+const INTERRUPTS: [&str; 6] =
+    ["SLOT_TIMER", "BUS_WIRE", "CAN_RECEIVE", "CAN_TRANSMIT", "DISPATCH_SESSION", "DISPATCH_LOG"];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let out = PathBuf::from(env::var("OUT_DIR")?);
     let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?).join("..");
     fs::copy(root.join("memory.x"), out.join("memory.x"))?;
-    let device: String = INTERRUPTS
-        .iter()
-        .map(|name| format!("PROVIDE({name} = DefaultHandler);\n"))
-        .collect();
+    let device: String = INTERRUPTS.iter().map(|name| format!("PROVIDE({name} = DefaultHandler);\n")).collect();
     fs::write(out.join("device.x"), device)?;
     println!("cargo::rustc-link-search={}", out.display());
     println!("cargo::rustc-env=TACTUS_REVISION={}", revision());
     println!("cargo::rerun-if-changed=build.rs");
-    println!(
-        "cargo::rerun-if-changed={}",
-        root.join("memory.x").display()
-    );
-    println!(
-        "cargo::rerun-if-changed={}",
-        root.join(".git/HEAD").display()
-    );
+    println!("cargo::rerun-if-changed={}", root.join("memory.x").display());
+    println!("cargo::rerun-if-changed={}", root.join(".git/HEAD").display());
     Ok(())
 }
 

@@ -36,45 +36,19 @@ fn main() {
         "[f64; 3]",
         &list(&table(&model, "world")["gravity"]),
     );
-    constant(
-        &mut out,
-        "HOME",
-        "Posture of the arm while it is zeroed (rad).",
-        "[f64; 7]",
-        &list(&arm["home"]),
-    );
+    constant(&mut out, "HOME", "Posture of the arm while it is zeroed (rad).", "[f64; 7]", &list(&arm["home"]));
     let column = |key: &str| -> String {
         let values: Vec<f64> = joints.iter().map(|joint| number(&joint[key])).collect();
         format!("{values:?}")
     };
-    let dh = |key: &str| -> Vec<f64> {
-        joints
-            .iter()
-            .map(|joint| number(&joint["dh"][key]))
-            .collect()
-    };
-    assert!(
-        dh("theta_offset").iter().all(|offset| *offset == 0.0),
-        "the kinematics know no joint offset"
-    );
+    let dh = |key: &str| -> Vec<f64> { joints.iter().map(|joint| number(&joint["dh"][key])).collect() };
+    assert!(dh("theta_offset").iter().all(|offset| *offset == 0.0), "the kinematics know no joint offset");
     // Twists of the WAM are quarter turns; cos(pi/2) = 6e-17 in f64 is snapped to 0 so that frames stay exact.
     let snap = |value: f64| if value.abs() < 1e-15 { 0.0 } else { value };
     let cosines: Vec<f64> = dh("alpha").iter().map(|alpha| snap(alpha.cos())).collect();
     let sines: Vec<f64> = dh("alpha").iter().map(|alpha| snap(alpha.sin())).collect();
-    constant(
-        &mut out,
-        "DH_A",
-        "Denavit-Hartenberg link lengths a (m).",
-        "[f64; 7]",
-        &format!("{:?}", dh("a")),
-    );
-    constant(
-        &mut out,
-        "DH_D",
-        "Denavit-Hartenberg offsets d (m).",
-        "[f64; 7]",
-        &format!("{:?}", dh("d")),
-    );
+    constant(&mut out, "DH_A", "Denavit-Hartenberg link lengths a (m).", "[f64; 7]", &format!("{:?}", dh("a")));
+    constant(&mut out, "DH_D", "Denavit-Hartenberg offsets d (m).", "[f64; 7]", &format!("{:?}", dh("d")));
     constant(
         &mut out,
         "DH_COSINE",
@@ -82,53 +56,28 @@ fn main() {
         "[f64; 7]",
         &format!("{cosines:?}"),
     );
-    constant(
-        &mut out,
-        "DH_SINE",
-        "Sines of the Denavit-Hartenberg twists alpha.",
-        "[f64; 7]",
-        &format!("{sines:?}"),
-    );
+    constant(&mut out, "DH_SINE", "Sines of the Denavit-Hartenberg twists alpha.", "[f64; 7]", &format!("{sines:?}"));
     for (name, key, text) in [
         ("POSITION_MIN", "q_min", "Lower mechanical stops (rad)."),
         ("POSITION_MAX", "q_max", "Upper mechanical stops (rad)."),
         ("SOFT_MIN", "soft_min", "Lower soft limits (rad)."),
         ("SOFT_MAX", "soft_max", "Upper soft limits (rad)."),
         ("VELOCITY_MAX", "qd_max", "Speed limits (rad/s)."),
-        (
-            "TORQUE_MAX",
-            "tau_max",
-            "Torque each joint can give alone with its motors at their current cap (N m).",
-        ),
+        ("TORQUE_MAX", "tau_max", "Torque each joint can give alone with its motors at their current cap (N m)."),
     ] {
         constant(&mut out, name, text, "[f64; 7]", &column(key));
     }
 
     for (name, key, text) in [
-        (
-            "LINKS",
-            "link",
-            "Rigid links without rotors, in the link frames.",
-        ),
+        ("LINKS", "link", "Rigid links without rotors, in the link frames."),
         (
             "LINKS_AC02",
             "link_ac02",
             "The links by the manufacturer's older public sheet, which splits the wrist differently.",
         ),
     ] {
-        let bodies: Vec<String> = arm[key]
-            .as_array()
-            .expect("links")
-            .iter()
-            .map(body)
-            .collect();
-        constant(
-            &mut out,
-            name,
-            text,
-            "[BodyTable; 7]",
-            &format!("[{}]", bodies.join(", ")),
-        );
+        let bodies: Vec<String> = arm[key].as_array().expect("links").iter().map(body).collect();
+        constant(&mut out, name, text, "[BodyTable; 7]", &format!("[{}]", bodies.join(", ")));
     }
 
     constant(
@@ -139,21 +88,9 @@ fn main() {
         &rows(&drive["j2m"]),
     );
     for (name, key, text) in [
-        (
-            "ROTOR_INERTIA",
-            "rotor_inertia",
-            "Drive inertia at each rotor (kg m^2).",
-        ),
-        (
-            "REFLECTED_INERTIA",
-            "reflected_diag",
-            "Rotor inertia seen at the joints (kg m^2).",
-        ),
-        (
-            "MOTOR_TORQUE_MAX",
-            "motor_torque_max",
-            "Motor torque at the pucks' current cap (N m at the motor).",
-        ),
+        ("ROTOR_INERTIA", "rotor_inertia", "Drive inertia at each rotor (kg m^2)."),
+        ("REFLECTED_INERTIA", "reflected_diag", "Rotor inertia seen at the joints (kg m^2)."),
+        ("MOTOR_TORQUE_MAX", "motor_torque_max", "Motor torque at the pucks' current cap (N m at the motor)."),
         (
             "CONTROL_SIGNAL_LIMIT",
             "control_signal_limit",
@@ -205,38 +142,18 @@ fn main() {
         "[f64; 3]",
         &list(&sensor["origin_in_frame7"]),
     );
-    assert_eq!(
-        sensor["axes_in_frame7"].as_str(),
-        Some("aligned"),
-        "the sensor is assumed aligned with frame 7"
-    );
+    assert_eq!(sensor["axes_in_frame7"].as_str(), Some("aligned"), "the sensor is assumed aligned with frame 7");
     for (name, key, text) in [
-        (
-            "SENSOR_FORCE_RANGE",
-            "force_range",
-            "Full scale of the sensor's forces (N).",
-        ),
-        (
-            "SENSOR_TORQUE_RANGE",
-            "torque_range",
-            "Full scale of the sensor's torques (N m).",
-        ),
+        ("SENSOR_FORCE_RANGE", "force_range", "Full scale of the sensor's forces (N)."),
+        ("SENSOR_TORQUE_RANGE", "torque_range", "Full scale of the sensor's torques (N m)."),
     ] {
         constant(&mut out, name, text, "[f64; 3]", &list(&sensor[key]));
     }
 
     let payloads = table(&model, "payload");
     for (name, key, text) in [
-        (
-            "PAYLOAD_NONE",
-            "wam7",
-            "The bare arm; the tool frame is the tool plate.",
-        ),
-        (
-            "PAYLOAD_HAND",
-            "wam7_bh280_ft",
-            "Force/torque sensor and hand; the tool frame is the grasp point.",
-        ),
+        ("PAYLOAD_NONE", "wam7", "The bare arm; the tool frame is the tool plate."),
+        ("PAYLOAD_HAND", "wam7_bh280_ft", "Force/torque sensor and hand; the tool frame is the grasp point."),
     ] {
         let payload = &payloads[key];
         let tool = &payload["tool_in_frame7"];
@@ -257,10 +174,7 @@ fn main() {
 }
 
 fn table<'a>(parent: &'a Table, key: &str) -> &'a Table {
-    parent
-        .get(key)
-        .and_then(Value::as_table)
-        .unwrap_or_else(|| panic!("{MODEL}: no table {key}"))
+    parent.get(key).and_then(Value::as_table).unwrap_or_else(|| panic!("{MODEL}: no table {key}"))
 }
 
 fn number(value: &Value) -> f64 {
@@ -272,12 +186,7 @@ fn number(value: &Value) -> f64 {
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
-    value
-        .as_array()
-        .unwrap_or_else(|| panic!("{MODEL}: {value} is not an array"))
-        .iter()
-        .map(number)
-        .collect()
+    value.as_array().unwrap_or_else(|| panic!("{MODEL}: {value} is not an array")).iter().map(number).collect()
 }
 
 fn list(value: &Value) -> String {
@@ -285,12 +194,7 @@ fn list(value: &Value) -> String {
 }
 
 fn rows(value: &Value) -> String {
-    let rows: Vec<Vec<f64>> = value
-        .as_array()
-        .expect("a matrix")
-        .iter()
-        .map(numbers)
-        .collect();
+    let rows: Vec<Vec<f64>> = value.as_array().expect("a matrix").iter().map(numbers).collect();
     format!("{rows:?}")
 }
 

@@ -12,11 +12,7 @@ use crate::board::{Board, Edge};
 
 fn last_frames() -> [CanFrame; 3] {
     let [arm, wrist] = zero_torques();
-    [
-        arm,
-        wrist,
-        set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value()),
-    ]
+    [arm, wrist, set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value())]
 }
 
 #[panic_handler]
@@ -28,8 +24,5 @@ fn panicked(information: &PanicInfo<'_>) -> ! {
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     cortex_m::interrupt::disable();
-    Board::stop(
-        &last_frames(),
-        format_args!("hard fault at {:#010x}: {frame:?}", frame.pc()),
-    )
+    Board::stop(&last_frames(), format_args!("hard fault at {:#010x}: {frame:?}", frame.pc()))
 }

@@ -38,11 +38,7 @@ impl Meters {
         let first = self.cost_worst.fetch_max(cost, Ordering::Relaxed) == 0;
         let scaled = cost << MEAN_FRACTION;
         let mean = self.cost_mean.load(Ordering::Relaxed);
-        let mean = if first {
-            scaled
-        } else {
-            mean - (mean >> MEAN_SHIFT) + (scaled >> MEAN_SHIFT)
-        };
+        let mean = if first { scaled } else { mean - (mean >> MEAN_SHIFT) + (scaled >> MEAN_SHIFT) };
         self.cost_mean.store(mean, Ordering::Relaxed);
     }
 

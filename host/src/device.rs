@@ -31,10 +31,7 @@ impl Device {
     ///
     /// # Errors
     /// [`OpenError`]
-    pub fn open(
-        address: &Address,
-        adjust: impl FnOnce(&mut SimulationOptions),
-    ) -> Result<Self, OpenError> {
+    pub fn open(address: &Address, adjust: impl FnOnce(&mut SimulationOptions)) -> Result<Self, OpenError> {
         Ok(match address {
             Address::Simulated(kind, options) => {
                 let mut options = SimulationOptions::from_address(*kind, options)?;

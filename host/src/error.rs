@@ -122,9 +122,9 @@ pub fn explain_blocked(numbers: [u32; 2]) -> String {
 
 /// Numbers of the refusals, by their code.
 const REFUSAL_CODES: [&str; Refusal::ALL.len()] = [
-    "E500", "E501", "E502", "E503", "E504", "E505", "E506", "E507", "E508", "E509", "E510", "E511",
-    "E512", "E513", "E514", "E515", "E516", "E517", "E518", "E519", "E520", "E521", "E522", "E523",
-    "E524", "E525", "E526", "E527", "E528", "E529", "E530", "E531", "E532", "E533", "E534", "E535",
+    "E500", "E501", "E502", "E503", "E504", "E505", "E506", "E507", "E508", "E509", "E510", "E511", "E512", "E513",
+    "E514", "E515", "E516", "E517", "E518", "E519", "E520", "E521", "E522", "E523", "E524", "E525", "E526", "E527",
+    "E528", "E529", "E530", "E531", "E532", "E533", "E534", "E535",
 ];
 
 impl HostError {
@@ -133,9 +133,7 @@ impl HostError {
     pub fn exit(&self) -> Exit {
         match self {
             Self::Address(_) => Exit::Usage,
-            Self::Transport(
-                TransportError::NotFound { .. } | TransportError::Permission { .. },
-            ) => Exit::NoDevice,
+            Self::Transport(TransportError::NotFound { .. } | TransportError::Permission { .. }) => Exit::NoDevice,
             Self::Transport(TransportError::Other(_)) => Exit::Internal,
             Self::Transport(TransportError::Closed | TransportError::Io(_))
             | Self::NoAnswer { .. }
@@ -157,19 +155,10 @@ impl HostError {
             Self::Address(_) => "E201",
             Self::Transport(TransportError::NotFound { .. }) => "E301",
             Self::Transport(TransportError::Permission { .. }) => "E302",
-            Self::Incompatible {
-                what: Refusal::Schema,
-                ..
-            } => "E402",
-            Self::Incompatible {
-                what: Refusal::Model,
-                ..
-            } => "E403",
+            Self::Incompatible { what: Refusal::Schema, .. } => "E402",
+            Self::Incompatible { what: Refusal::Model, .. } => "E403",
             Self::Incompatible { .. } => "E401",
-            Self::Refused { reason, .. } => REFUSAL_CODES
-                .get(usize::from(reason.code()))
-                .copied()
-                .unwrap_or("E500"),
+            Self::Refused { reason, .. } => REFUSAL_CODES.get(usize::from(reason.code())).copied().unwrap_or("E500"),
             Self::Image(_) => "E651",
             Self::ReadBack { .. } => "E652",
             Self::Transport(TransportError::Closed | TransportError::Io(_)) => "E701",
@@ -193,18 +182,12 @@ impl HostError {
             Self::Transport(TransportError::Closed | TransportError::Io(_)) => {
                 "check the cable; the device stops the arm by itself after half a second"
             }
-            Self::Transport(TransportError::Other(_))
-            | Self::WrongAnswer { .. }
-            | Self::Interrupted => return None,
+            Self::Transport(TransportError::Other(_)) | Self::WrongAnswer { .. } | Self::Interrupted => return None,
             Self::Incompatible { what, .. } => what.remedy(),
-            Self::NoAnswer { .. } => {
-                "check that the device has power and that its firmware runs; then try again"
-            }
+            Self::NoAnswer { .. } => "check that the device has power and that its firmware runs; then try again",
             Self::Refused { reason, .. } => reason.remedy(),
             Self::Image(_) => "make the primitive again with `tactus learn`",
-            Self::ReadBack { .. } => {
-                "upload again; if it persists the device's storage is worn out"
-            }
+            Self::ReadBack { .. } => "upload again; if it persists the device's storage is worn out",
             Self::NotStopped { .. } => "press the emergency stop",
         };
         Some(help.to_owned())
@@ -229,57 +212,26 @@ mod tests {
     #[test]
     fn every_refusal_has_a_number_of_its_own_in_order() {
         for reason in Refusal::ALL {
-            let error = HostError::Refused {
-                request: "run",
-                reason,
-                detail: [0, 0],
-            };
+            let error = HostError::Refused { request: "run", reason, detail: [0, 0] };
             assert_eq!(error.code(), format!("E{}", 500 + u16::from(reason.code())));
-            assert!(
-                error.help().is_some()
-                    && error.to_string().starts_with("the device refused 'run': ")
-            );
+            assert!(error.help().is_some() && error.to_string().starts_with("the device refused 'run': "));
         }
     }
 
     #[test]
     fn the_hundreds_of_a_number_are_its_exit_code() {
         let closed = HostError::from(TransportError::Closed);
-        let silent = HostError::NoAnswer {
-            request: "status",
-            after: Duration::from_secs(2),
-        };
-        let differs = HostError::Incompatible {
-            what: Refusal::Schema,
-            host: "1".into(),
-            device: "2".into(),
-        };
-        for error in [
-            closed,
-            silent,
-            differs,
-            ImageError::Magic.into(),
-            HostError::ReadBack { offset: 3 },
-        ] {
-            assert_eq!(
-                error.code().as_bytes()[1] - b'0',
-                error.exit() as u8,
-                "{error}"
-            );
+        let silent = HostError::NoAnswer { request: "status", after: Duration::from_secs(2) };
+        let differs = HostError::Incompatible { what: Refusal::Schema, host: "1".into(), device: "2".into() };
+        for error in [closed, silent, differs, ImageError::Magic.into(), HostError::ReadBack { offset: 3 }] {
+            assert_eq!(error.code().as_bytes()[1] - b'0', error.exit() as u8, "{error}");
         }
         assert_eq!(HostError::Interrupted.exit() as u8, 130);
     }
 
     #[test]
     fn a_refusal_names_the_state_and_the_fault_behind_its_numbers() {
-        let text = |reason, detail| {
-            HostError::Refused {
-                request: "run",
-                reason,
-                detail,
-            }
-            .to_string()
-        };
+        let text = |reason, detail| HostError::Refused { request: "run", reason, detail }.to_string();
         assert!(text(Refusal::State, [6, 0]).contains("soft stop"));
         assert!(text(Refusal::Faulted, [3, 0]).contains("soft limits"));
         assert!(text(Refusal::TooManyKernels, [142, 100]).contains("142, at most 100"));

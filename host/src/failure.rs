@@ -52,14 +52,7 @@ impl Failure {
         doing: impl Into<String>,
         cause: impl Into<Box<dyn Error + Send + Sync>>,
     ) -> Failure {
-        Failure {
-            exit,
-            code,
-            doing: doing.into(),
-            cause: cause.into(),
-            help: None,
-            data: None,
-        }
+        Failure { exit, code, doing: doing.into(), cause: cause.into(), help: None, data: None }
     }
 
     /// The same with a hint.

@@ -16,9 +16,7 @@ pub const PERIOD: f64 = 1.0 / RATE;
 pub fn roll_out(primitive: &HostPrimitive) -> Result<Vec<Reference<f64>>, RolloutError> {
     let mut rollout = Rollout::start(primitive, &StartState::demonstrated(primitive))?;
     let cycles = cycles(primitive.duration());
-    Ok((0..cycles)
-        .map(|_| rollout.step(primitive, PERIOD, &Coupling::NONE))
-        .collect())
+    Ok((0..cycles).map(|_| rollout.step(primitive, PERIOD, &Coupling::NONE)).collect())
 }
 
 /// Cycles of a movement of `duration` s, both ends included.
@@ -30,10 +28,7 @@ pub fn cycles(duration: f64) -> usize {
 pub fn pose_path(references: &[Reference<f64>]) -> PosePath {
     PosePath {
         time: references.iter().map(|reference| reference.time).collect(),
-        position: references
-            .iter()
-            .map(|reference| reference.position.x)
-            .collect(),
+        position: references.iter().map(|reference| reference.position.x).collect(),
         orientation: references.iter().map(orientation).collect(),
     }
 }

@@ -9,9 +9,7 @@ pub struct Table {
 impl Table {
     /// With the heads of its columns.
     pub fn new<Head: Into<String>>(head: impl IntoIterator<Item = Head>) -> Table {
-        Table {
-            rows: vec![head.into_iter().map(Into::into).collect()],
-        }
+        Table { rows: vec![head.into_iter().map(Into::into).collect()] }
     }
 
     /// Adds a line.
@@ -53,9 +51,6 @@ mod tests {
     fn table_aligns_numbers_to_the_right() {
         let mut table = Table::new(["joint", "margin"]);
         table.row(["J1", "0.5 rad"]).row(["elbow", "12 rad"]);
-        assert_eq!(
-            table.to_string(),
-            "joint   margin\nJ1     0.5 rad\nelbow   12 rad\n"
-        );
+        assert_eq!(table.to_string(), "joint   margin\nJ1     0.5 rad\nelbow   12 rad\n");
     }
 }

@@ -48,17 +48,12 @@ impl Tracking {
     /// [`TrackingError`].
     pub fn of_run(recording: &Recording) -> Result<Tracking, TrackingError> {
         let run = recording.running();
-        let errors = errors(&run).ok_or_else(|| TrackingError::Columns {
-            file: recording.file.clone(),
-        })?;
+        let errors = errors(&run).ok_or_else(|| TrackingError::Columns { file: recording.file.clone() })?;
         let (Some(last), count) = (errors.last(), errors.len() as f64) else {
-            return Err(TrackingError::NoRun {
-                file: recording.file.clone(),
-            });
+            return Err(TrackingError::NoRun { file: recording.file.clone() });
         };
-        let square = |pick: fn(&(f64, f64)) -> f64| {
-            (errors.iter().map(|error| pick(error).powi(2)).sum::<f64>() / count).sqrt()
-        };
+        let square =
+            |pick: fn(&(f64, f64)) -> f64| (errors.iter().map(|error| pick(error).powi(2)).sum::<f64>() / count).sqrt();
         let largest = |pick: fn(&(f64, f64)) -> f64| errors.iter().map(pick).fold(0.0, f64::max);
         Ok(Tracking {
             samples: errors.len(),
@@ -75,19 +70,12 @@ impl Tracking {
 /// Distance (m) and angle (rad) between measured and desired pose at each sample; `None` without those columns.
 pub fn errors(run: &Recording) -> Option<Vec<(f64, f64)>> {
     let position = run.position.as_ref()?.iter().zip(run.position_d.as_ref()?);
-    let orientation = run
-        .orientation
-        .as_ref()?
-        .iter()
-        .zip(run.orientation_d.as_ref()?);
+    let orientation = run.orientation.as_ref()?.iter().zip(run.orientation_d.as_ref()?);
     Some(
         position
             .zip(orientation)
             .map(|((x, x_d), (q, q_d))| {
-                let distance = (0..3)
-                    .map(|axis| (x[axis] - x_d[axis]).powi(2))
-                    .sum::<f64>()
-                    .sqrt();
+                let distance = (0..3).map(|axis| (x[axis] - x_d[axis]).powi(2)).sum::<f64>().sqrt();
                 (distance, angle_between(q, q_d))
             })
             .collect(),

@@ -12,13 +12,7 @@ use tactus::primitive_file::{PrimitiveFile, PrimitiveFileError};
 fn reach(duration: f64) -> PrimitiveFile {
     let text = common::text(&common::rows(duration));
     let recording = Recording::parse(Path::new("demo.csv"), text.as_bytes()).unwrap();
-    learn(
-        &recording,
-        Path::new("reach.toml"),
-        &LearnOptions::named("reach"),
-    )
-    .unwrap()
-    .primitive
+    learn(&recording, Path::new("reach.toml"), &LearnOptions::named("reach")).unwrap().primitive
 }
 
 fn checked(primitive: &PrimitiveFile) -> CheckReport {
@@ -34,10 +28,7 @@ fn a_calm_movement_passes_with_every_margin_reported() {
     assert_eq!(report.limited_cycles, 0);
     assert!(report.tracking_max_m < 5e-3, "{}", report.tracking_max_m);
     for margin in &report.margins {
-        assert!(
-            margin.margin.is_finite() && margin.margin > 0.0,
-            "{margin:?}"
-        );
+        assert!(margin.margin.is_finite() && margin.margin > 0.0, "{margin:?}");
         assert!(margin.time_s >= 0.0 && margin.time_s <= report.run_duration_s);
     }
     assert!(heard.len() > 3 && heard.is_sorted());
@@ -46,11 +37,8 @@ fn a_calm_movement_passes_with_every_margin_reported() {
 #[test]
 fn the_position_margin_is_the_distance_to_the_nearer_soft_limit() {
     let report = checked(&reach(5.0));
-    let j4 = report
-        .margins
-        .iter()
-        .find(|margin| margin.limit == Limit::JointPosition && margin.joint == Some(4))
-        .unwrap();
+    let j4 =
+        report.margins.iter().find(|margin| margin.limit == Limit::JointPosition && margin.joint == Some(4)).unwrap();
     // The elbow moves between 1.5 and 1.9 rad (and 2 % beyond by the ripples) within -0.82 to 3.09.
     assert!((j4.margin - (3.09 - 1.9)).abs() < 0.05, "{j4:?}");
     assert!(j4.time_s < 1.5);
@@ -63,10 +51,7 @@ fn a_movement_that_is_too_fast_is_refused() {
     let report = checked(&primitive);
     assert!(!report.passed(), "{}", report.to_text());
     assert!(
-        report
-            .violations
-            .iter()
-            .any(|text| text.contains("speed") || text.contains("limiter")),
+        report.violations.iter().any(|text| text.contains("speed") || text.contains("limiter")),
         "{:?}",
         report.violations
     );
@@ -86,11 +71,7 @@ fn a_start_posture_outside_the_soft_limits_is_refused() {
     let mut primitive = reach(3.0);
     primitive.start.posture[3] = 3.12;
     let report = checked(&primitive);
-    assert!(
-        report.violations.iter().any(|text| text.contains("J4")),
-        "{:?}",
-        report.violations
-    );
+    assert!(report.violations.iter().any(|text| text.contains("J4")), "{:?}", report.violations);
 }
 
 #[test]
@@ -98,14 +79,7 @@ fn a_pose_that_is_not_that_of_its_posture_is_refused() {
     let mut primitive = reach(3.0);
     primitive.start.position[0] += 0.2;
     let report = checked(&primitive);
-    assert!(
-        report
-            .violations
-            .iter()
-            .any(|text| text.contains("posture")),
-        "{:?}",
-        report.violations
-    );
+    assert!(report.violations.iter().any(|text| text.contains("posture")), "{:?}", report.violations);
 }
 
 #[test]
@@ -116,11 +90,7 @@ fn a_plan_that_leaves_the_workspace_is_refused() {
         *weight += 40.0;
     }
     let report = checked(&primitive);
-    let far = report
-        .margins
-        .iter()
-        .find(|margin| margin.limit == Limit::Reach)
-        .unwrap();
+    let far = report.margins.iter().find(|margin| margin.limit == Limit::Reach).unwrap();
     assert!(far.margin < 0.0 && far.time_s > 0.2, "{far:?}");
     assert!(!report.passed());
 }
@@ -138,8 +108,5 @@ fn a_duration_that_the_integration_cannot_follow_is_refused() {
     let mut primitive = reach(3.0);
     primitive.duration = 0.05;
     let error = check(&primitive, 1.0, |_| {}).unwrap_err();
-    assert!(
-        matches!(error, PrimitiveFileError::Invalid { .. }),
-        "{error}"
-    );
+    assert!(matches!(error, PrimitiveFileError::Invalid { .. }), "{error}");
 }

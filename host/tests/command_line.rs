@@ -9,11 +9,7 @@ use assert_cmd::assert::Assert;
 use serde_json::Value;
 
 fn tactus(folder: &Path, arguments: &[&str]) -> Assert {
-    Command::new(env!("CARGO_BIN_EXE_tactus"))
-        .current_dir(folder)
-        .env_remove("TACTUS_DEVICE")
-        .args(arguments)
-        .assert()
+    Command::new(env!("CARGO_BIN_EXE_tactus")).current_dir(folder).env_remove("TACTUS_DEVICE").args(arguments).assert()
 }
 
 fn stdout(assert: &Assert) -> String {
@@ -37,58 +33,29 @@ fn learn_check_plot_work_one_after_the_other() {
     let learned = tactus(folder.path(), &["learn", "demo.csv", "-o", "reach.toml"]).success();
     let text = stdout(&learned);
     assert!(text.starts_with("reach: 50 kernels, "), "{text}");
-    assert!(
-        text.contains("posture J7") && text.contains("force z"),
-        "{text}"
-    );
+    assert!(text.contains("posture J7") && text.contains("force z"), "{text}");
     assert_eq!(stderr(&learned), "wrote reach.toml\n");
 
     let checked = tactus(folder.path(), &["check", "reach.toml"]).success();
-    assert!(
-        stdout(&checked).ends_with("passed\n"),
-        "{}",
-        stdout(&checked)
-    );
+    assert!(stdout(&checked).ends_with("passed\n"), "{}", stdout(&checked));
     assert_eq!(stderr(&checked), "");
 
-    let plotted = tactus(
-        folder.path(),
-        &[
-            "plot",
-            "-d",
-            "demo.csv",
-            "-p",
-            "reach.toml",
-            "-o",
-            "figure.png",
-            "-o",
-            "figure.svg",
-        ],
-    )
-    .success();
+    let plotted =
+        tactus(folder.path(), &["plot", "-d", "demo.csv", "-p", "reach.toml", "-o", "figure.png", "-o", "figure.svg"])
+            .success();
     assert_eq!(stdout(&plotted), "figure.png\nfigure.svg\n");
     let png = std::fs::read(folder.path().join("figure.png")).unwrap();
     assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
     assert_eq!(u32::from_be_bytes(png[16..20].try_into().unwrap()), 1600);
     let svg = std::fs::read_to_string(folder.path().join("figure.svg")).unwrap();
-    assert!(
-        svg.contains("<svg")
-            && svg.contains("Position x")
-            && svg.contains("demonstration and plan")
-    );
+    assert!(svg.contains("<svg") && svg.contains("Position x") && svg.contains("demonstration and plan"));
 }
 
 #[test]
 fn json_is_one_object_on_stdout_with_what_the_text_says() {
     let folder = tempfile::tempdir().unwrap();
     common::demonstration(folder.path(), 3.0);
-    let learned = json(
-        &tactus(
-            folder.path(),
-            &["--json", "learn", "demo.csv", "--name", "a"],
-        )
-        .success(),
-    );
+    let learned = json(&tactus(folder.path(), &["--json", "learn", "demo.csv", "--name", "a"]).success());
     assert_eq!(learned["file"], "demo.toml");
     assert_eq!(learned["fit"]["rows"].as_array().unwrap().len(), 17);
     assert!(learned["fit"]["position_rms_m"].as_f64().unwrap() < 1e-3);
@@ -107,11 +74,7 @@ fn the_same_input_gives_the_same_bytes() {
             let learned = tactus(folder.path(), &["learn", "demo.csv", "--json"]).success();
             let checked = tactus(folder.path(), &["check", "demo.toml", "--json"]).success();
             let file = std::fs::read(folder.path().join("demo.toml")).unwrap();
-            (
-                learned.get_output().stdout.clone(),
-                checked.get_output().stdout.clone(),
-                file,
-            )
+            (learned.get_output().stdout.clone(), checked.get_output().stdout.clone(), file)
         })
         .collect();
     assert_eq!(twice[0], twice[1]);
@@ -128,20 +91,14 @@ fn a_bad_demonstration_ends_with_6_and_names_file_line_and_column() {
     fields[8] = "NaN".to_owned();
     lines[99] = fields.join(",");
     std::fs::write(&file, lines.join("\n")).unwrap();
-    let failed = tactus(folder.path(), &["learn", "demo.csv"])
-        .failure()
-        .code(6);
+    let failed = tactus(folder.path(), &["learn", "demo.csv"]).failure().code(6);
     assert_eq!(
         stderr(&failed),
         "error[E620]: learn refused: demo.csv: line 100, column 9 (q3_rad): the value NaN is not finite\n"
     );
     assert_eq!(stdout(&failed), "");
     assert!(!folder.path().join("demo.toml").exists());
-    let failed = json(
-        &tactus(folder.path(), &["learn", "demo.csv", "--json"])
-            .failure()
-            .code(6),
-    );
+    let failed = json(&tactus(folder.path(), &["learn", "demo.csv", "--json"]).failure().code(6));
     assert_eq!(failed["error"]["code"], "E620");
     assert_eq!(failed["error"]["exit"], 6);
 }
@@ -149,32 +106,18 @@ fn a_bad_demonstration_ends_with_6_and_names_file_line_and_column() {
 #[test]
 fn a_missing_file_ends_with_6_and_the_reason() {
     let folder = tempfile::tempdir().unwrap();
-    let failed = tactus(folder.path(), &["learn", "nothing.csv"])
-        .failure()
-        .code(6);
-    assert!(
-        stderr(&failed).contains("nothing.csv: cannot be read: No such file"),
-        "{}",
-        stderr(&failed)
-    );
+    let failed = tactus(folder.path(), &["learn", "nothing.csv"]).failure().code(6);
+    assert!(stderr(&failed).contains("nothing.csv: cannot be read: No such file"), "{}", stderr(&failed));
 }
 
 #[test]
 fn a_turn_too_far_ends_with_6_and_the_command_that_helps() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("turn.csv"), common::foreign(4.5)).unwrap();
-    let failed = tactus(folder.path(), &["learn", "turn.csv"])
-        .failure()
-        .code(6);
+    let failed = tactus(folder.path(), &["learn", "turn.csv"]).failure().code(6);
     let text = stderr(&failed);
-    assert!(
-        text.starts_with("error[E622]: learn refused: turn.csv: line "),
-        "{text}"
-    );
-    assert!(
-        text.ends_with("help: tactus learn --rotation-vector turn.csv\n"),
-        "{text}"
-    );
+    assert!(text.starts_with("error[E622]: learn refused: turn.csv: line "), "{text}");
+    assert!(text.ends_with("help: tactus learn --rotation-vector turn.csv\n"), "{text}");
     let learned = tactus(folder.path(), &["learn", "--rotation-vector", "turn.csv"]).success();
     assert!(stderr(&learned).contains("warning: the recording has no joint angles"));
 }
@@ -187,26 +130,14 @@ fn a_changed_primitive_ends_with_6_and_another_model_with_4() {
     let file = folder.path().join("demo.toml");
     let text = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&file, text.replacen("alpha = 4.6", "alpha = 4.7", 1)).unwrap();
-    let failed = tactus(folder.path(), &["check", "demo.toml"])
-        .failure()
-        .code(6);
-    assert!(
-        stderr(&failed).starts_with("error[E632]"),
-        "{}",
-        stderr(&failed)
-    );
+    let failed = tactus(folder.path(), &["check", "demo.toml"]).failure().code(6);
+    assert!(stderr(&failed).starts_with("error[E632]"), "{}", stderr(&failed));
     let hash = format!("0x{:08x}", control::MODEL_HASH);
     let mut other = tactus::primitive_file::PrimitiveFile::parse(&file, &text).unwrap();
     other.model_hash ^= 0xff;
     other.write(&file).unwrap();
-    let failed = tactus(folder.path(), &["check", "demo.toml"])
-        .failure()
-        .code(4);
-    assert!(
-        stderr(&failed).starts_with("error[E430]") && stderr(&failed).contains(&hash),
-        "{}",
-        stderr(&failed)
-    );
+    let failed = tactus(folder.path(), &["check", "demo.toml"]).failure().code(4);
+    assert!(stderr(&failed).starts_with("error[E430]") && stderr(&failed).contains(&hash), "{}", stderr(&failed));
 }
 
 #[test]
@@ -214,29 +145,11 @@ fn a_violation_ends_with_6_and_the_report_is_still_given() {
     let folder = tempfile::tempdir().unwrap();
     common::demonstration(folder.path(), 1.0);
     tactus(folder.path(), &["learn", "demo.csv"]).success();
-    let failed = tactus(folder.path(), &["check", "demo.toml", "--speed", "2"])
-        .failure()
-        .code(6);
+    let failed = tactus(folder.path(), &["check", "demo.toml", "--speed", "2"]).failure().code(6);
     assert!(stdout(&failed).contains("violation"), "{}", stdout(&failed));
-    assert!(
-        stderr(&failed).contains("error[E631]") && stderr(&failed).contains("--speed 0.5"),
-        "{}",
-        stderr(&failed)
-    );
-    let failed = json(
-        &tactus(
-            folder.path(),
-            &["check", "demo.toml", "--speed", "2", "--json"],
-        )
-        .failure()
-        .code(6),
-    );
-    assert!(
-        !failed["result"]["violations"]
-            .as_array()
-            .unwrap()
-            .is_empty()
-    );
+    assert!(stderr(&failed).contains("error[E631]") && stderr(&failed).contains("--speed 0.5"), "{}", stderr(&failed));
+    let failed = json(&tactus(folder.path(), &["check", "demo.toml", "--speed", "2", "--json"]).failure().code(6));
+    assert!(!failed["result"]["violations"].as_array().unwrap().is_empty());
 }
 
 #[test]
@@ -255,12 +168,7 @@ fn a_wrong_command_line_ends_with_2() {
         tactus(folder.path(), arguments).failure().code(2);
     }
     common::demonstration(folder.path(), 2.0);
-    tactus(
-        folder.path(),
-        &["plot", "-d", "demo.csv", "-o", "figure.gif"],
-    )
-    .failure()
-    .code(2);
+    tactus(folder.path(), &["plot", "-d", "demo.csv", "-o", "figure.gif"]).failure().code(2);
 }
 
 #[test]

@@ -7,12 +7,10 @@ use std::time::{Duration, Instant};
 use control::arm::ArmModel;
 use control::{CycleRecord, LoadRefusal, Payload, State};
 use device::{
-    Command, Counters, Event, EventKind, Health, Identity, QueueFull, RamStore, Session,
-    SessionPort, Stage, StoredPrimitive, TimedRecord, Timing,
+    Command, Counters, Event, EventKind, Health, Identity, QueueFull, RamStore, Session, SessionPort, Stage,
+    StoredPrimitive, TimedRecord, Timing,
 };
-use link::image::{
-    FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity,
-};
+use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
 use link::{LINK_VERSION, Name, Refusal, Request, SCHEMA_HASH};
 use tactus::client::{Client, Incoming, Interrupt, UploadOutcome, UploadPhase};
 use tactus::error::HostError;
@@ -45,10 +43,7 @@ impl SessionPort for Half {
                 _ => State::Hold,
             };
         }
-        self.events.push_back(Event {
-            cycle: 0,
-            kind: EventKind::Accepted,
-        });
+        self.events.push_back(Event { cycle: 0, kind: EventKind::Accepted });
         Ok(())
     }
 
@@ -102,19 +97,10 @@ struct Device {
 
 impl Device {
     fn new() -> Self {
-        let identity = Identity {
-            firmware: "1.2.3",
-            board: "test",
-            serial: "T-1",
-            simulated: true,
-            ticks_per_second: 25_000_000,
-        };
+        let identity =
+            Identity { firmware: "1.2.3", board: "test", serial: "T-1", simulated: true, ticks_per_second: 25_000_000 };
         Self {
-            session: Session::new(
-                identity,
-                ArmModel::new(Payload::SensorAndHand),
-                RamStore::new(),
-            ),
+            session: Session::new(identity, ArmModel::new(Payload::SensorAndHand), RamStore::new()),
             half: Half {
                 state: State::Hold,
                 commands: Vec::new(),
@@ -136,19 +122,11 @@ impl Device {
         self.steps += 1;
         if self.steps.is_multiple_of(3) {
             let cycle = u64::from(self.steps / 3);
-            let record = CycleRecord {
-                cycle,
-                state: self.half.state,
-                ..CycleRecord::EMPTY
-            };
-            self.half.records.push_back(TimedRecord {
-                record,
-                cost_ticks: 7,
-            });
+            let record = CycleRecord { cycle, state: self.half.state, ..CycleRecord::EMPTY };
+            self.half.records.push_back(TimedRecord { record, cost_ticks: 7 });
         }
         if !self.dead {
-            self.session
-                .poll((STEP * self.steps).as_micros() as u64, &mut self.half);
+            self.session.poll((STEP * self.steps).as_micros() as u64, &mut self.half);
         }
     }
 }
@@ -199,15 +177,8 @@ fn image(name: &str, duration: f32) -> Vec<u8> {
     let posture = [0.0, 0.5, 0.0, 1.5, 0.0, 0.5, 0.0];
     let model = ArmModel::<f32>::new(Payload::SensorAndHand);
     let q = control::units::JointPositions::from_array(posture);
-    let [x, y, z, w, i, j, k] = control::kinematics::Frames::new(&model, &q)
-        .tool_pose()
-        .to_f32();
-    let there = Waypoint {
-        position: [x, y, z],
-        orientation: [w, i, j, k],
-        posture,
-        hand: [0.0; 4],
-    };
+    let [x, y, z, w, i, j, k] = control::kinematics::Frames::new(&model, &q).tool_pose().to_f32();
+    let there = Waypoint { position: [x, y, z], orientation: [w, i, j, k], posture, hand: [0.0; 4] };
     let content: ImageContent<&[f32]> = ImageContent {
         model_hash: control::MODEL_HASH,
         duration,
@@ -220,11 +191,7 @@ fn image(name: &str, duration: f32) -> Vec<u8> {
         start: there,
         start_velocity: WaypointVelocity::default(),
         goal: there,
-        clamps: FeedbackClamps {
-            position: 0.2,
-            orientation: 0.5,
-            hand: 0.5,
-        },
+        clamps: FeedbackClamps { position: 0.2, orientation: 0.5, hand: 0.5 },
         marks: Default::default(),
         kernels: 20,
         k1: &[],
@@ -234,9 +201,7 @@ fn image(name: &str, duration: f32) -> Vec<u8> {
         expected_spread: &[],
     };
     let mut bytes = vec![0; 4096];
-    let length = content
-        .encode(&Name::new(name).unwrap(), &mut bytes)
-        .unwrap();
+    let length = content.encode(&Name::new(name).unwrap(), &mut bytes).unwrap();
     bytes.truncate(length);
     bytes
 }
@@ -244,35 +209,21 @@ fn image(name: &str, duration: f32) -> Vec<u8> {
 #[test]
 fn connecting_compares_versions_within_200_ms() {
     let client = connected();
-    assert!(
-        client.now() < Duration::from_millis(200),
-        "{:?}",
-        client.now()
-    );
+    assert!(client.now() < Duration::from_millis(200), "{:?}", client.now());
     assert_eq!(client.hello().serial.as_str(), "T-1");
 }
 
 #[test]
 fn c7_versions_that_differ_are_named_on_both_sides_and_nothing_else_is_sent() {
-    let Err(error) = Client::connect_as(Device::new(), "test", 99, SCHEMA_HASH) else {
-        panic!()
-    };
+    let Err(error) = Client::connect_as(Device::new(), "test", 99, SCHEMA_HASH) else { panic!() };
     let text = error.to_string();
-    assert!(
-        text.contains("version 99") && text.contains(&format!("version {LINK_VERSION}")),
-        "{text}"
-    );
+    assert!(text.contains("version 99") && text.contains(&format!("version {LINK_VERSION}")), "{text}");
     assert_eq!((error.exit() as u8, error.code()), (4, "E401"));
     assert!(error.help().unwrap().contains("flash"));
 
-    let Err(error) = Client::connect_as(Device::new(), "test", LINK_VERSION, 0xBAD) else {
-        panic!()
-    };
+    let Err(error) = Client::connect_as(Device::new(), "test", LINK_VERSION, 0xBAD) else { panic!() };
     let text = error.to_string();
-    assert!(
-        text.contains("0x00000bad") && text.contains(&format!("{SCHEMA_HASH:#010x}")),
-        "{text}"
-    );
+    assert!(text.contains("0x00000bad") && text.contains(&format!("{SCHEMA_HASH:#010x}")), "{text}");
     assert_eq!(error.code(), "E402");
 }
 
@@ -280,36 +231,16 @@ fn c7_versions_that_differ_are_named_on_both_sides_and_nothing_else_is_sent() {
 fn a_device_that_does_not_answer_is_given_up_after_two_seconds() {
     let mut device = Device::new();
     device.dead = true;
-    let Err(error) = Client::connect(device, "test") else {
-        panic!()
-    };
-    assert!(
-        matches!(
-            error,
-            HostError::NoAnswer {
-                request: "hello",
-                ..
-            }
-        ),
-        "{error}"
-    );
+    let Err(error) = Client::connect(device, "test") else { panic!() };
+    assert!(matches!(error, HostError::NoAnswer { request: "hello", .. }), "{error}");
     assert_eq!(error.exit() as u8, 7);
 
     let mut client = connected();
     let started = client.now();
     client.transport().dead = true;
-    assert!(matches!(
-        client.status(),
-        Err(HostError::NoAnswer {
-            request: "status",
-            ..
-        })
-    ));
+    assert!(matches!(client.status(), Err(HostError::NoAnswer { request: "status", .. })));
     let waited = client.now() - started;
-    assert!(
-        waited >= Duration::from_secs(2) && waited < Duration::from_millis(2100),
-        "{waited:?}"
-    );
+    assert!(waited >= Duration::from_secs(2) && waited < Duration::from_millis(2100), "{waited:?}");
 }
 
 #[test]
@@ -320,10 +251,7 @@ fn a_socket_behind_which_nobody_answers_is_given_up_in_two_seconds_of_wall_time(
     let result = Client::connect(StreamTransport::tcp(&address).unwrap(), "test");
     let waited = started.elapsed();
     assert!(matches!(result.err(), Some(HostError::NoAnswer { .. })));
-    assert!(
-        waited > Duration::from_millis(1900) && waited < Duration::from_millis(2500),
-        "{waited:?}"
-    );
+    assert!(waited > Duration::from_millis(1900) && waited < Duration::from_millis(2500), "{waited:?}");
 }
 
 #[test]
@@ -348,9 +276,7 @@ fn a_unix_socket_carries_bytes_both_ways() {
     let (mut other, _) = listener.accept().unwrap();
     std::fs::remove_file(&path).unwrap();
     let mut out = Vec::new();
-    transport
-        .receive(Duration::from_millis(5), &mut out)
-        .unwrap();
+    transport.receive(Duration::from_millis(5), &mut out).unwrap();
     assert!(out.is_empty(), "a time-out is no error");
     other.write_all(&[1, 0, 2]).unwrap();
     transport.receive(Duration::from_secs(1), &mut out).unwrap();
@@ -377,11 +303,7 @@ fn lost_requests_and_answers_are_repeated_and_done_once() {
 #[test]
 fn noise_between_the_frames_is_counted_and_harmless() {
     let mut client = connected();
-    client
-        .transport()
-        .half
-        .line
-        .extend_from_slice(&[7, 7, 7, 0, 3, 9, 0]);
+    client.transport().half.line.extend_from_slice(&[7, 7, 7, 0, 3, 9, 0]);
     client.status().unwrap();
     let counters = client.counters();
     assert_eq!(counters.bad_cobs + counters.bad_crc, 2);
@@ -392,22 +314,12 @@ fn telemetry_arrives_whole_and_keeps_the_session_alive() {
     let mut client = connected();
     client.gravity().unwrap();
     let mut stream = client.telemetry(1).unwrap();
-    let cycles: Vec<u32> = (0..900)
-        .map(|_| stream.next().unwrap().unwrap().cycle)
-        .collect();
+    let cycles: Vec<u32> = (0..900).map(|_| stream.next().unwrap().unwrap().cycle).collect();
     assert!(cycles.windows(2).all(|pair| pair[1] == pair[0] + 1));
     drop(stream);
     assert_eq!((client.gaps().telemetry, client.gaps().messages), (0, 0));
-    assert_eq!(
-        client.transport().half.state,
-        State::Gravity,
-        "three seconds without a time-out"
-    );
-    assert_eq!(
-        client.next(Duration::from_millis(50)).unwrap(),
-        None,
-        "the stream was switched off"
-    );
+    assert_eq!(client.transport().half.state, State::Gravity, "three seconds without a time-out");
+    assert_eq!(client.next(Duration::from_millis(50)).unwrap(), None, "the stream was switched off");
 }
 
 #[test]
@@ -435,13 +347,7 @@ fn a_host_that_stops_listening_lets_the_device_stop_the_arm() {
     assert_eq!(device.half.state, State::SoftStop, "600 ms of silence");
     let refused = client.gravity();
     assert!(
-        matches!(
-            refused,
-            Err(HostError::Refused {
-                reason: Refusal::NoSession,
-                ..
-            })
-        ),
+        matches!(refused, Err(HostError::Refused { reason: Refusal::NoSession, .. })),
         "a host that was suspended does not start where it left: {refused:?}"
     );
 }
@@ -486,9 +392,8 @@ fn dropping_a_client_that_moved_the_arm_says_stop() {
     drop(client);
     let mut decoder = link::frame::Decoder::<{ link::frame::FRAME_BYTES }>::new();
     let mut bytes = seen.as_slice();
-    let sent: Vec<Request> = std::iter::from_fn(|| decoder.next::<Request>(&mut bytes))
-        .map(|frame| frame.message)
-        .collect();
+    let sent: Vec<Request> =
+        std::iter::from_fn(|| decoder.next::<Request>(&mut bytes)).map(|frame| frame.message).collect();
     assert_eq!(sent[sent.len() - 2..], [Request::Stop, Request::Goodbye]);
 }
 
@@ -505,24 +410,12 @@ fn an_upload_is_sent_checked_stored_and_read_back() {
             }
         })
         .unwrap();
-    assert!(
-        matches!(outcome, UploadOutcome::Stored(ref listing) if listing.name.as_str() == "reach")
-    );
-    assert_eq!(
-        phases,
-        [UploadPhase::Send, UploadPhase::Commit, UploadPhase::Verify]
-    );
-    assert_eq!(
-        client
-            .read_image(&Name::new("reach").unwrap(), |_| {})
-            .unwrap(),
-        image
-    );
+    assert!(matches!(outcome, UploadOutcome::Stored(ref listing) if listing.name.as_str() == "reach"));
+    assert_eq!(phases, [UploadPhase::Send, UploadPhase::Commit, UploadPhase::Verify]);
+    assert_eq!(client.read_image(&Name::new("reach").unwrap(), |_| {}).unwrap(), image);
     assert_eq!(client.list().unwrap().len(), 1);
 
-    let again = client
-        .upload(&image, |_, _, _| panic!("nothing should be sent"))
-        .unwrap();
+    let again = client.upload(&image, |_, _, _| panic!("nothing should be sent")).unwrap();
     assert!(matches!(again, UploadOutcome::AlreadyThere(_)));
     client.delete(&Name::new("reach").unwrap()).unwrap();
     assert!(client.list().unwrap().is_empty());
@@ -547,21 +440,10 @@ fn c4_a_cable_pulled_at_any_chunk_leaves_the_old_primitive() {
         let mut parts = 0;
         let name = Name::new("reach").unwrap();
         let crc = link::image::stored_crc(&new);
-        client
-            .request(&Request::UploadBegin {
-                name,
-                length: new.len() as u32,
-                crc,
-            })
-            .unwrap();
+        client.request(&Request::UploadBegin { name, length: new.len() as u32, crc }).unwrap();
         for part in new.chunks(192).take(cut) {
             let data = link::message::ChunkData::from_slice(part).unwrap();
-            client
-                .request(&Request::UploadChunk {
-                    offset: parts,
-                    data,
-                })
-                .unwrap();
+            client.request(&Request::UploadChunk { offset: parts, data }).unwrap();
             parts += part.len() as u32;
         }
         client.transport().unplugged = true;
@@ -569,11 +451,7 @@ fn c4_a_cable_pulled_at_any_chunk_leaves_the_old_primitive() {
         assert_eq!(error.code(), "E701");
         let device = client.transport();
         (0..600).for_each(|_| device.step());
-        assert_eq!(
-            device::Store::image(device.session.store(), 0),
-            Some(old.as_slice()),
-            "after {cut} chunks"
-        );
+        assert_eq!(device::Store::image(device.session.store(), 0), Some(old.as_slice()), "after {cut} chunks");
     }
 }
 
@@ -593,10 +471,7 @@ fn a_refusal_names_request_reason_and_remedy() {
     let mut client = connected();
     let run = client.run(&Name::new("nothing").unwrap(), link::RunOptions::default());
     let error = run.unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "the device refused 'run': the device stores no primitive of that name"
-    );
+    assert_eq!(error.to_string(), "the device refused 'run': the device stores no primitive of that name");
     assert_eq!((error.exit() as u8, error.code()), (5, "E513"));
     let failure = error.into_failure("run refused").to_string();
     assert!(failure.contains("help: `tactus list`"), "{failure}");
@@ -613,18 +488,11 @@ fn a_second_client_waits_for_the_first_to_be_gone() {
         model_hash: control::MODEL_HASH,
         owner: link::Text::new("killed"),
     };
-    let envelope = link::frame::Envelope {
-        session: 999,
-        sequence: 1,
-        time_ms: 0,
-    };
+    let envelope = link::frame::Envelope { session: 999, sequence: 1, time_ms: 0 };
     let length = link::frame::encode(envelope, &Request::Hello(hello), &mut buffer).unwrap();
     device.session.receive(&buffer[..length]);
     device.step();
     let client = Client::connect(device, "test").unwrap();
     let waited = client.now();
-    assert!(
-        waited > Duration::from_millis(490) && waited < Duration::from_millis(800),
-        "{waited:?}"
-    );
+    assert!(waited > Duration::from_millis(490) && waited < Duration::from_millis(800), "{waited:?}");
 }

@@ -29,21 +29,9 @@ fn a_taught_movement_is_reproduced() {
     let learned = learned(&recording, &LearnOptions::named("reach")).unwrap();
     let report = &learned.report;
     assert!(report.position_rms_m < 5e-4, "{} m", report.position_rms_m);
-    assert!(
-        report.position_relative < 2e-3,
-        "{}",
-        report.position_relative
-    );
-    assert!(
-        report.orientation_rms_rad.to_degrees() < 0.1,
-        "{}",
-        report.orientation_rms_rad.to_degrees()
-    );
-    assert!(
-        (report.orientation_path_ratio - 1.0).abs() < 0.01,
-        "{}",
-        report.orientation_path_ratio
-    );
+    assert!(report.position_relative < 2e-3, "{}", report.position_relative);
+    assert!(report.orientation_rms_rad.to_degrees() < 0.1, "{}", report.orientation_rms_rad.to_degrees());
+    assert!((report.orientation_path_ratio - 1.0).abs() < 0.01, "{}", report.orientation_path_ratio);
     for row in &report.rows[6..13] {
         assert!(row.rms < 1e-3, "{row:?}");
     }
@@ -64,8 +52,7 @@ fn a_taught_movement_is_reproduced() {
 fn the_plan_stays_at_its_goal_behind_the_end_of_the_movement() {
     let learned = learned(&taught(5.0), &LearnOptions::named("reach")).unwrap();
     let primitive = learned.primitive.to_primitive().unwrap();
-    let mut rollout =
-        dmp::Rollout::start(&primitive, &dmp::StartState::demonstrated(&primitive)).unwrap();
+    let mut rollout = dmp::Rollout::start(&primitive, &dmp::StartState::demonstrated(&primitive)).unwrap();
     for cycle in 0..3600 {
         let plan = rollout.step(&primitive, 1.0 / 300.0, &dmp::Coupling::NONE);
         if f64::from(cycle) / 300.0 > primitive.duration() {
@@ -73,11 +60,7 @@ fn the_plan_stays_at_its_goal_behind_the_end_of_the_movement() {
                 .map(|axis| (plan.position.x[axis] - learned.primitive.goal.position[axis]).powi(2))
                 .sum::<f64>()
                 .sqrt();
-            assert!(
-                away < tactus::check::GOAL_DISTANCE,
-                "{away} m at {} s",
-                plan.time
-            );
+            assert!(away < tactus::check::GOAL_DISTANCE, "{away} m at {} s", plan.time);
         }
     }
 }
@@ -86,10 +69,7 @@ fn the_plan_stays_at_its_goal_behind_the_end_of_the_movement() {
 fn more_kernels_fit_better() {
     let recording = taught(5.0);
     let error = |kernels| {
-        let options = LearnOptions {
-            kernels,
-            ..LearnOptions::named("reach")
-        };
+        let options = LearnOptions { kernels, ..LearnOptions::named("reach") };
         learned(&recording, &options).unwrap().report.position_rms_m
     };
     assert!(error(50) < 0.3 * error(15));
@@ -110,87 +90,38 @@ fn poses_alone_can_be_learned_and_a_wide_turn_is_followed_in_every_axis() {
     let turn = 2.5; // 143 degrees
     let learned = learned(&foreign(turn), &LearnOptions::named("turn")).unwrap();
     let report = &learned.report;
-    assert!(
-        (report.largest_angle_rad - turn).abs() < 0.2,
-        "{}",
-        report.largest_angle_rad
-    );
-    assert!(
-        report.orientation_rms_rad.to_degrees() < 0.1,
-        "{}",
-        report.orientation_rms_rad.to_degrees()
-    );
-    assert!(
-        (report.orientation_path_ratio - 1.0).abs() < 0.01,
-        "{}",
-        report.orientation_path_ratio
-    );
-    assert!(
-        report
-            .warnings
-            .iter()
-            .any(|warning| warning.contains("no joint angles"))
-    );
+    assert!((report.largest_angle_rad - turn).abs() < 0.2, "{}", report.largest_angle_rad);
+    assert!(report.orientation_rms_rad.to_degrees() < 0.1, "{}", report.orientation_rms_rad.to_degrees());
+    assert!((report.orientation_path_ratio - 1.0).abs() < 0.01, "{}", report.orientation_path_ratio);
+    assert!(report.warnings.iter().any(|warning| warning.contains("no joint angles")));
 }
 
 #[test]
 fn a_turn_beyond_150_degrees_is_warned_of_and_beyond_175_refused_with_its_line() {
     let recording = foreign(2.75); // 158 degrees, a little more with the ripples
-    let report = learned(&recording, &LearnOptions::named("turn"))
-        .unwrap()
-        .report;
-    assert!(
-        report
-            .warnings
-            .iter()
-            .any(|warning| warning.contains("rotation-vector")),
-        "{:?}",
-        report.warnings
-    );
+    let report = learned(&recording, &LearnOptions::named("turn")).unwrap().report;
+    assert!(report.warnings.iter().any(|warning| warning.contains("rotation-vector")), "{:?}", report.warnings);
 
     let recording = foreign(3.3); // 189 degrees
     let error = learned(&recording, &LearnOptions::named("turn")).unwrap_err();
-    assert!(
-        matches!(
-            error,
-            LearnError::TurnsTooFar {
-                rotation_vector_helps: true,
-                ..
-            }
-        ),
-        "{error}"
-    );
+    assert!(matches!(error, LearnError::TurnsTooFar { rotation_vector_helps: true, .. }), "{error}");
     assert!(error.to_string().contains("other.csv: line "), "{error}");
 }
 
 #[test]
 fn with_the_rotation_vector_a_turn_of_more_than_half_a_revolution_is_followed() {
-    let options = LearnOptions {
-        orientation_error: OrientationErrorKind::RotationVector,
-        ..LearnOptions::named("turn")
-    };
+    let options =
+        LearnOptions { orientation_error: OrientationErrorKind::RotationVector, ..LearnOptions::named("turn") };
     let learned = learned(&foreign(5.0), &options).unwrap();
     let report = &learned.report;
-    assert!(
-        report.orientation_max_rad.to_degrees() < 0.5,
-        "{}",
-        report.orientation_max_rad.to_degrees()
-    );
-    assert!(
-        (report.orientation_path_ratio - 1.0).abs() < 0.01,
-        "{}",
-        report.orientation_path_ratio
-    );
+    assert!(report.orientation_max_rad.to_degrees() < 0.5, "{}", report.orientation_max_rad.to_degrees());
+    assert!((report.orientation_path_ratio - 1.0).abs() < 0.01, "{}", report.orientation_path_ratio);
 }
 
 #[test]
 fn fingers_follow_their_generated_movement() {
     let options = LearnOptions {
-        hand: HandMotion {
-            start: [0.0; 4],
-            goal: [0.0, 2.1, 2.1, 2.1],
-            window: (0.5, 1.0),
-        },
+        hand: HandMotion { start: [0.0; 4], goal: [0.0, 2.1, 2.1, 2.1], window: (0.5, 1.0) },
         ..LearnOptions::named("grasp")
     };
     let learned = learned(&taught(4.0), &options).unwrap();
@@ -198,17 +129,8 @@ fn fingers_follow_their_generated_movement() {
         assert!(row.rms < 5e-3, "{row:?}");
     }
     assert!((learned.primitive.goal.hand[2] - 2.1).abs() < 1e-3);
-    let options = LearnOptions {
-        hand: HandMotion {
-            window: (0.8, 0.2),
-            ..options.hand
-        },
-        ..options
-    };
-    assert!(matches!(
-        learn(&taught(4.0), Path::new("x.toml"), &options).unwrap_err(),
-        LearnError::Option { .. }
-    ));
+    let options = LearnOptions { hand: HandMotion { window: (0.8, 0.2), ..options.hand }, ..options };
+    assert!(matches!(learn(&taught(4.0), Path::new("x.toml"), &options).unwrap_err(), LearnError::Option { .. }));
 }
 
 #[test]
@@ -217,47 +139,27 @@ fn a_recording_cut_out_of_a_motion_keeps_its_initial_velocity() {
     rows.drain(..500);
     let text = common::text(&rows);
     let recording = Recording::parse(Path::new("cut.csv"), text.as_bytes()).unwrap();
-    let options = LearnOptions {
-        preparation: Preparation { still_speed: None },
-        ..LearnOptions::named("cut")
-    };
+    let options = LearnOptions { preparation: Preparation { still_speed: None }, ..LearnOptions::named("cut") };
     let learned = learned(&recording, &options).unwrap();
     let velocity = learned.primitive.start_velocity.posture;
     let expected = rows[0].dq;
     for joint in 0..7 {
-        assert!(
-            (velocity[joint] - f64::from(expected[joint])).abs() < 0.02,
-            "{velocity:?} {expected:?}"
-        );
+        assert!((velocity[joint] - f64::from(expected[joint])).abs() < 0.02, "{velocity:?} {expected:?}");
     }
-    assert!(
-        learned.report.position_relative < 0.015,
-        "{}",
-        learned.report.position_relative
-    );
-    assert!(
-        learned.report.warnings[0].contains("begins in motion"),
-        "{:?}",
-        learned.report.warnings
-    );
+    assert!(learned.report.position_relative < 0.015, "{}", learned.report.position_relative);
+    assert!(learned.report.warnings[0].contains("begins in motion"), "{:?}", learned.report.warnings);
 }
 
 /// A primitive with everything a file can hold.
 fn full() -> PrimitiveFile {
-    let mut primitive = learned(&taught(3.0), &LearnOptions::named("full.1"))
-        .unwrap()
-        .primitive;
+    let mut primitive = learned(&taught(3.0), &LearnOptions::named("full.1")).unwrap().primitive;
     let row = |seed: usize, size: usize| -> Vec<f64> {
-        (0..size)
-            .map(|index| ((seed * 31 + index) as f64 * 0.7).sin() / 3.0)
-            .collect()
+        (0..size).map(|index| ((seed * 31 + index) as f64 * 0.7).sin() / 3.0).collect()
     };
     primitive.feedback = Some(FeedbackTables {
         clamps: [0.23, 0.35, 0.1],
         k1: vec![row(1, 10).iter().map(|value| value.abs()).collect()],
-        k2: (0..3)
-            .map(|point| row(point, 9).iter().map(|value| value.abs()).collect())
-            .collect(),
+        k2: (0..3).map(|point| row(point, 9).iter().map(|value| value.abs()).collect()).collect(),
     });
     primitive.expectation = Some(ExpectationTable {
         recorded_duration: 3.1,
@@ -267,9 +169,7 @@ fn full() -> PrimitiveFile {
         trials: 4,
         spread_floor: 0.05,
         mean: (0..50).map(|point| row(point, 9)).collect(),
-        spread: (0..50)
-            .map(|point| row(point + 7, 9).iter().map(|value| value.abs()).collect())
-            .collect(),
+        spread: (0..50).map(|point| row(point + 7, 9).iter().map(|value| value.abs()).collect()).collect(),
     });
     primitive
 }
@@ -286,12 +186,7 @@ fn a_file_reads_back_bit_for_bit() {
     let again = PrimitiveFile::read(&file).unwrap();
     primitive.file = file;
     assert_eq!(primitive, again);
-    for (a, b) in primitive
-        .weights
-        .concat()
-        .iter()
-        .zip(again.weights.concat())
-    {
+    for (a, b) in primitive.weights.concat().iter().zip(again.weights.concat()) {
         assert_eq!(a.to_bits(), b.to_bits());
     }
 }
@@ -300,23 +195,14 @@ fn a_file_reads_back_bit_for_bit() {
 fn comments_may_be_changed_but_a_number_may_not() {
     let text = full().to_text();
     let parse = |text: &str| PrimitiveFile::parse(Path::new("reach.toml"), text);
-    let commented = text.replace(
-        "# Movement primitive of Tactus.",
-        "# My reach.\n# With a note.",
-    );
+    let commented = text.replace("# Movement primitive of Tactus.", "# My reach.\n# With a note.");
     assert!(parse(&commented).is_ok());
     let position = text.find("stiffness = 200.0").unwrap();
     let mut changed = text.clone();
     changed.replace_range(position..position + 17, "stiffness = 200.1");
-    assert!(matches!(
-        parse(&changed).unwrap_err(),
-        PrimitiveFileError::Checksum { .. }
-    ));
+    assert!(matches!(parse(&changed).unwrap_err(), PrimitiveFileError::Checksum { .. }));
     let renamed = text.replace("name = \"full.1\"", "name = \"other\"");
-    assert!(matches!(
-        parse(&renamed).unwrap_err(),
-        PrimitiveFileError::Checksum { .. }
-    ));
+    assert!(matches!(parse(&renamed).unwrap_err(), PrimitiveFileError::Checksum { .. }));
 }
 
 #[test]
@@ -327,38 +213,17 @@ fn a_wrong_file_is_refused_with_the_reason() {
         assert!(text.contains(from), "{from}");
         refused(&text.replacen(from, to, 1))
     };
-    assert!(matches!(
-        replaced("tactus-primitive/1", "tactus-primitive/9"),
-        PrimitiveFileError::Schema { .. }
-    ));
-    assert!(matches!(
-        replaced("kernels = 50", "kernels = 40"),
-        PrimitiveFileError::Shape { .. }
-    ));
-    assert!(matches!(
-        replaced("clamp_hand_rad = 0.1", "clamp_hand_rad = nan"),
-        PrimitiveFileError::NotFinite { .. }
-    ));
-    assert!(matches!(
-        replaced("\"demonstrated\"", "\"far\""),
-        PrimitiveFileError::Word { .. }
-    ));
-    assert!(matches!(
-        replaced("\"full.1\"", "\"a name\""),
-        PrimitiveFileError::Word { .. }
-    ));
+    assert!(matches!(replaced("tactus-primitive/1", "tactus-primitive/9"), PrimitiveFileError::Schema { .. }));
+    assert!(matches!(replaced("kernels = 50", "kernels = 40"), PrimitiveFileError::Shape { .. }));
+    assert!(matches!(replaced("clamp_hand_rad = 0.1", "clamp_hand_rad = nan"), PrimitiveFileError::NotFinite { .. }));
+    assert!(matches!(replaced("\"demonstrated\"", "\"far\""), PrimitiveFileError::Word { .. }));
+    assert!(matches!(replaced("\"full.1\"", "\"a name\""), PrimitiveFileError::Word { .. }));
     let error = replaced("duration_s = ", "duration_s = ten # ");
     assert!(matches!(error, PrimitiveFileError::Syntax { .. }));
     assert!(error.to_string().contains("line 9"), "{error}");
     let error = replaced("[goal]", "[target]").to_string();
-    assert!(
-        error.contains("target") || error.contains("goal"),
-        "{error}"
-    );
-    assert!(matches!(
-        refused(&text[..text.len() / 2]),
-        PrimitiveFileError::Syntax { .. }
-    ));
+    assert!(error.contains("target") || error.contains("goal"), "{error}");
+    assert!(matches!(refused(&text[..text.len() / 2]), PrimitiveFileError::Syntax { .. }));
     assert!(matches!(refused(""), PrimitiveFileError::Syntax { .. }));
 }
 
@@ -369,12 +234,7 @@ fn what_is_not_finite_is_not_written() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("reach.toml");
     let error = primitive.write(&file).unwrap_err();
-    assert!(
-        error
-            .to_string()
-            .contains("weights.orientation, row 2: entry 4"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("weights.orientation, row 2: entry 4"), "{error}");
     assert!(!file.exists());
 }
 
@@ -388,10 +248,7 @@ fn the_image_holds_the_same_primitive_in_single_precision() {
     assert_eq!(content.model_hash, control::MODEL_HASH);
     assert_eq!(content.kernels, 50);
     assert_eq!(content.duration, primitive.duration as f32);
-    assert_eq!(
-        content.goal.orientation,
-        primitive.goal.orientation.map(|value| value as f32)
-    );
+    assert_eq!(content.goal.orientation, primitive.goal.orientation.map(|value| value as f32));
     for (index, weight) in primitive.weights.concat().iter().enumerate() {
         assert_eq!(content.weights.get(index), Some(*weight as f32));
     }
@@ -405,12 +262,6 @@ fn more_kernels_than_a_device_holds_are_refused() {
     for row in &mut primitive.weights {
         row.resize(101, 0.0);
     }
-    assert!(matches!(
-        primitive.to_image().unwrap_err(),
-        PrimitiveFileError::Image { .. }
-    ));
-    assert!(matches!(
-        primitive.to_primitive().unwrap_err(),
-        PrimitiveFileError::Invalid { .. }
-    ));
+    assert!(matches!(primitive.to_image().unwrap_err(), PrimitiveFileError::Image { .. }));
+    assert!(matches!(primitive.to_primitive().unwrap_err(), PrimitiveFileError::Invalid { .. }));
 }

@@ -4,9 +4,7 @@ mod common;
 
 use std::path::Path;
 
-use tactus::demonstration::{
-    Demonstration, DemonstrationError, Preparation, Recording, RecordingError, layout,
-};
+use tactus::demonstration::{Demonstration, DemonstrationError, Preparation, Recording, RecordingError, layout};
 
 const FILE: &str = "folder/demo.csv";
 
@@ -16,17 +14,11 @@ fn parse(text: &str) -> Result<Recording, RecordingError> {
 
 /// The lines of a good recording; line numbers in the tests count from 1, the header is line 2.
 fn good() -> Vec<String> {
-    common::text(&common::rows(2.0))
-        .lines()
-        .map(String::from)
-        .collect()
+    common::text(&common::rows(2.0)).lines().map(String::from).collect()
 }
 
 fn column(name: &str) -> usize {
-    layout::header()
-        .iter()
-        .position(|known| known == name)
-        .expect("a column of the layout")
+    layout::header().iter().position(|known| known == name).expect("a column of the layout")
 }
 
 /// Replaces one field; `line` and the column as people count them.
@@ -42,10 +34,7 @@ fn with_field(line: usize, name: &str, value: &str) -> String {
 fn names(error: &impl std::fmt::Display, line: u64, column: usize) {
     let text = error.to_string();
     assert!(text.contains(FILE), "{text}");
-    assert!(
-        text.contains(&format!("line {line}, column {column}")),
-        "{text}"
-    );
+    assert!(text.contains(&format!("line {line}, column {column}")), "{text}");
 }
 
 #[test]
@@ -66,10 +55,7 @@ fn infinity_is_refused_with_its_place() {
 #[test]
 fn text_in_a_number_is_refused_with_its_place() {
     let error = parse(&with_field(7, "x_m", "0.3m")).unwrap_err();
-    assert!(
-        matches!(error, RecordingError::NotANumber { .. }),
-        "{error}"
-    );
+    assert!(matches!(error, RecordingError::NotANumber { .. }), "{error}");
     names(&error, 7, column("x_m") + 1);
     let error = parse(&with_field(8, "tau2_Nm", "")).unwrap_err();
     names(&error, 8, column("tau2_Nm") + 1);
@@ -80,10 +66,7 @@ fn time_that_runs_backwards_or_stands_still_is_refused_with_its_place() {
     for time in ["0.01", "0.16"] {
         // Line 52 is sample 49 at 0.1633 s; line 51 is at 0.16 s.
         let error = parse(&with_field(52, "t_s", time)).unwrap_err();
-        assert!(
-            matches!(error, RecordingError::TimeRunsBackwards { .. }),
-            "{error}"
-        );
+        assert!(matches!(error, RecordingError::TimeRunsBackwards { .. }), "{error}");
         names(&error, 52, column("t_s") + 1);
     }
 }
@@ -102,10 +85,7 @@ fn missing_columns_are_named() {
         })
         .collect();
     let error = parse(&text.join("\n")).unwrap_err();
-    assert!(
-        matches!(error, RecordingError::MissingColumns { .. }),
-        "{error}"
-    );
+    assert!(matches!(error, RecordingError::MissingColumns { .. }), "{error}");
     assert!(error.to_string().contains("q4_rad"), "{error}");
     names(&error, 2, layout::header().len());
     let error = parse("x_m,y_m,z_m\n0,0,0\n").unwrap_err().to_string();
@@ -127,20 +107,14 @@ fn a_known_quantity_in_another_unit_is_refused() {
 fn a_column_given_twice_is_refused() {
     let text = good().join("\n").replacen("dq1_rad_s", "q1_rad", 1);
     let error = parse(&text).unwrap_err();
-    assert!(
-        matches!(error, RecordingError::DuplicateColumn { .. }),
-        "{error}"
-    );
+    assert!(matches!(error, RecordingError::DuplicateColumn { .. }), "{error}");
     names(&error, 2, column("dq1_rad_s") + 1);
 }
 
 #[test]
 fn a_quaternion_that_is_no_unit_is_refused_with_its_place() {
     let error = parse(&with_field(90, "qw", "1.2")).unwrap_err();
-    assert!(
-        matches!(error, RecordingError::NotAUnitQuaternion { .. }),
-        "{error}"
-    );
+    assert!(matches!(error, RecordingError::NotAUnitQuaternion { .. }), "{error}");
     names(&error, 90, column("qw") + 1);
     let error = parse(&with_field(91, "qw_d", "-0.9")).unwrap_err();
     names(&error, 91, column("qw_d") + 1);
@@ -164,16 +138,10 @@ fn ragged_lines_are_refused_with_their_place() {
 fn too_few_samples_are_refused() {
     let text = good()[..50].join("\n");
     let error = parse(&text).unwrap_err();
-    assert!(
-        matches!(error, RecordingError::TooFewSamples { found: 48, .. }),
-        "{error}"
-    );
+    assert!(matches!(error, RecordingError::TooFewSamples { found: 48, .. }), "{error}");
     names(&error, 50, 1);
     let error = parse(&good()[..2].join("\n")).unwrap_err();
-    assert!(
-        matches!(error, RecordingError::TooFewSamples { found: 0, .. }),
-        "{error}"
-    );
+    assert!(matches!(error, RecordingError::TooFewSamples { found: 0, .. }), "{error}");
 }
 
 #[test]
@@ -184,10 +152,7 @@ fn empty_files_and_folders_are_refused() {
         names(&error, 1, 1);
     }
     let error = Recording::read(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap_err();
-    assert!(
-        matches!(error, RecordingError::Unreadable { .. }),
-        "{error}"
-    );
+    assert!(matches!(error, RecordingError::Unreadable { .. }), "{error}");
 }
 
 #[test]
@@ -214,17 +179,9 @@ fn notes_and_blank_lines_do_not_shift_line_numbers() {
     let mut fields: Vec<&str> = lines[41].split(',').collect();
     fields[column("q1_rad")] = "x";
     lines[41] = fields.join(",");
-    names(
-        &parse(&lines.join("\n")).unwrap_err(),
-        42,
-        column("q1_rad") + 1,
-    );
+    names(&parse(&lines.join("\n")).unwrap_err(), 42, column("q1_rad") + 1);
     // Line ends of another system.
-    names(
-        &parse(&lines.join("\r\n")).unwrap_err(),
-        42,
-        column("q1_rad") + 1,
-    );
+    names(&parse(&lines.join("\r\n")).unwrap_err(), 42, column("q1_rad") + 1);
 }
 
 #[test]
@@ -237,22 +194,10 @@ fn what_was_written_is_read() {
         assert_eq!(recording.time[index], row.time);
         assert_eq!(recording.cycle.as_ref().unwrap()[index], row.cycle);
         assert_eq!(recording.state.as_ref().unwrap()[index], row.state);
-        assert_eq!(
-            recording.q.as_ref().unwrap()[index].map(|value| value as f32),
-            row.q
-        );
-        assert_eq!(
-            recording.dq.as_ref().unwrap()[index].map(|value| value as f32),
-            row.dq
-        );
-        assert_eq!(
-            recording.tau.as_ref().unwrap()[index].map(|value| value as f32),
-            row.tau
-        );
-        assert_eq!(
-            recording.wrench.as_ref().unwrap()[index].map(|value| value as f32),
-            row.wrench
-        );
+        assert_eq!(recording.q.as_ref().unwrap()[index].map(|value| value as f32), row.q);
+        assert_eq!(recording.dq.as_ref().unwrap()[index].map(|value| value as f32), row.dq);
+        assert_eq!(recording.tau.as_ref().unwrap()[index].map(|value| value as f32), row.tau);
+        assert_eq!(recording.wrench.as_ref().unwrap()[index].map(|value| value as f32), row.wrench);
         assert_eq!(recording.position.as_ref().unwrap()[index], row.pose[..3]);
         assert_eq!(recording.lines[index], index as u64 + 3);
     }
@@ -279,13 +224,7 @@ fn a_gap_that_hides_movement_is_refused_with_its_place() {
     rows.drain(100..140);
     let recording = parse(&common::text(&rows)).unwrap();
     let error = Demonstration::prepare(&recording, &Preparation::default()).unwrap_err();
-    assert!(
-        matches!(
-            error,
-            DemonstrationError::Recording(RecordingError::GapTooLong { .. })
-        ),
-        "{error}"
-    );
+    assert!(matches!(error, DemonstrationError::Recording(RecordingError::GapTooLong { .. })), "{error}");
     names(&error, 103, column("t_s") + 1);
 }
 
@@ -294,10 +233,7 @@ fn rest_before_and_behind_the_movement_is_cut_off() {
     let recording = parse(&common::text(&common::rows(3.0))).unwrap();
     let trimmed = Demonstration::prepare(&recording, &Preparation::default()).unwrap();
     let (before, behind) = trimmed.trimmed;
-    assert!(
-        (0.2..0.6).contains(&before) && (0.2..0.6).contains(&behind),
-        "{before} {behind}"
-    );
+    assert!((0.2..0.6).contains(&before) && (0.2..0.6).contains(&behind), "{before} {behind}");
     assert!((before + behind + trimmed.duration() - 4.0).abs() < 1e-9);
     let whole = Demonstration::prepare(&recording, &Preparation { still_speed: None }).unwrap();
     assert_eq!(whole.len(), recording.len());
@@ -313,17 +249,13 @@ fn an_arm_that_does_not_move_is_no_demonstration() {
     let recording = parse(&common::text(&rows)).unwrap();
     let error = Demonstration::prepare(&recording, &Preparation::default()).unwrap_err();
     assert!(matches!(error, DemonstrationError::Still { .. }), "{error}");
-    assert!(
-        error.to_string().contains(FILE) && error.to_string().contains("lines 3 to"),
-        "{error}"
-    );
+    assert!(error.to_string().contains(FILE) && error.to_string().contains("lines 3 to"), "{error}");
 }
 
 #[test]
 fn the_pose_comes_from_the_joint_angles_where_there_are_any() {
     let recording = parse(&common::text(&common::rows(2.0))).unwrap();
-    let demonstration =
-        Demonstration::prepare(&recording, &Preparation { still_speed: None }).unwrap();
+    let demonstration = Demonstration::prepare(&recording, &Preparation { still_speed: None }).unwrap();
     let index = 200;
     let (position, _) = tactus::arm::tool_pose(&recording.q.as_ref().unwrap()[index]);
     for (computed, expected) in demonstration.position[index].iter().zip(position) {
@@ -335,13 +267,9 @@ fn the_pose_comes_from_the_joint_angles_where_there_are_any() {
 fn other_rates_are_resampled_to_300_hz() {
     let text = common::foreign(1.0);
     // Every third sample: 100 Hz.
-    let (head, samples): (Vec<_>, Vec<_>) =
-        text.lines().enumerate().partition(|(index, _)| *index < 2);
-    let thinned: Vec<&str> = head
-        .iter()
-        .map(|(_, line)| *line)
-        .chain(samples.iter().step_by(3).map(|(_, line)| *line))
-        .collect();
+    let (head, samples): (Vec<_>, Vec<_>) = text.lines().enumerate().partition(|(index, _)| *index < 2);
+    let thinned: Vec<&str> =
+        head.iter().map(|(_, line)| *line).chain(samples.iter().step_by(3).map(|(_, line)| *line)).collect();
     let full = parse(&text).unwrap();
     let recording = parse(&thinned.join("\n")).unwrap();
     let preparation = Preparation { still_speed: None };
@@ -389,9 +317,7 @@ fn the_document_names_every_column_in_its_order() {
     for name in layout::header() {
         let quoted = format!("`{name}`");
         // q1_rad..q7_rad are documented as one line each group.
-        let found = rest
-            .find(&quoted)
-            .unwrap_or_else(|| panic!("{quoted} is missing or out of order"));
+        let found = rest.find(&quoted).unwrap_or_else(|| panic!("{quoted} is missing or out of order"));
         rest = &rest[found..];
     }
 }

@@ -28,9 +28,7 @@ pub(crate) fn run(machine: &Machine) -> Result<()> {
     let folder = demo::largest(&tactus)?;
     shell::step("budget: the movement with 100 kernels, measured by the image itself");
     let json = shell::capture(
-        Command::new(&tactus)
-            .args(["--json", "--device", "sim:", "run", demo::LARGEST])
-            .current_dir(folder),
+        Command::new(&tactus).args(["--json", "--device", "sim:", "run", demo::LARGEST]).current_dir(folder),
     )?;
     let report = report(&json).context("the run reported no costs")?;
     let number = |name: &str| -> Result<f64> {
@@ -40,53 +38,32 @@ pub(crate) fn run(machine: &Machine) -> Result<()> {
     let worst = number("worst_instructions")?;
     let missed = number("missed_deadlines")?;
     let sizes = elf::Sizes::of(&image)?;
-    println!(
-        "control cycle, worst     {worst:>8} instructions  (bound {CYCLE_BOUND}, aim {CYCLE_AIM})"
-    );
-    println!(
-        "control cycle, mean      {:>8} instructions",
-        number("mean_instructions")?
-    );
+    println!("control cycle, worst     {worst:>8} instructions  (bound {CYCLE_BOUND}, aim {CYCLE_AIM})");
+    println!("control cycle, mean      {:>8} instructions", number("mean_instructions")?);
     println!("control cycles           {:>8}", number("cycles")?);
     println!("missed deadlines         {missed:>8}");
-    println!(
-        "interrupt latency, worst {:>8} us",
-        number("worst_latency_us")?
-    );
+    println!("interrupt latency, worst {:>8} us", number("worst_latency_us")?);
     println!("stack, deepest use       {:>8} B", number("stack_used")?);
     println!("flash                    {:>8} B", sizes.flash());
     println!("RAM without stack        {:>8} B", sizes.ram());
     anyhow::ensure!(worst > 0.0, "the image did not measure its control cycle");
-    anyhow::ensure!(
-        missed == 0.0,
-        "{missed} control cycles missed their deadline"
-    );
-    anyhow::ensure!(
-        worst <= CYCLE_BOUND,
-        "the control cycle takes {worst} instructions, more than {CYCLE_BOUND}"
-    );
+    anyhow::ensure!(missed == 0.0, "{missed} control cycles missed their deadline");
+    anyhow::ensure!(worst <= CYCLE_BOUND, "the control cycle takes {worst} instructions, more than {CYCLE_BOUND}");
     Ok(())
 }
 
 /// The object with the costs of the run, wherever the last line that has one holds it.
 fn report(json: &str) -> Option<Value> {
-    let lines = json
-        .lines()
-        .filter_map(|line| serde_json::from_str(line).ok());
+    let lines = json.lines().filter_map(|line| serde_json::from_str(line).ok());
     let whole = serde_json::from_str(json).ok();
-    lines
-        .chain(whole)
-        .filter_map(|value| holder(value, "worst_instructions"))
-        .next_back()
+    lines.chain(whole).filter_map(|value| holder(value, "worst_instructions")).next_back()
 }
 
 /// The innermost object that has a member of this name.
 fn holder(value: Value, name: &str) -> Option<Value> {
     match value {
         Value::Object(members) if members.contains_key(name) => Some(Value::Object(members)),
-        Value::Object(members) => members
-            .into_iter()
-            .find_map(|(_, value)| holder(value, name)),
+        Value::Object(members) => members.into_iter().find_map(|(_, value)| holder(value, name)),
         Value::Array(items) => items.into_iter().find_map(|value| holder(value, name)),
         _ => None,
     }

@@ -14,14 +14,7 @@ pub(crate) const WORLD: &str = "tactus/mujoco,sim/mujoco,sim/render";
 /// Builds the `tactus` command with the MuJoCo world, optimised; returns its path.
 pub(crate) fn host() -> Result<PathBuf> {
     shell::step("building the tactus command");
-    shell::run(shell::cargo().args([
-        "build",
-        "--release",
-        "--package",
-        "tactus",
-        "--features",
-        "tactus/mujoco",
-    ]))?;
+    shell::run(shell::cargo().args(["build", "--release", "--package", "tactus", "--features", "tactus/mujoco"]))?;
     Ok(shell::target_dir().join("release").join("tactus"))
 }
 
@@ -29,14 +22,7 @@ pub(crate) fn host() -> Result<PathBuf> {
 pub(crate) fn image(machine: &Machine) -> Result<PathBuf> {
     shell::step("building the arm image for QEMU's mps2-an500");
     let mut cargo = machine.toolchain.cargo("build", ARM)?;
-    cargo.args([
-        "--package",
-        "firmware",
-        "--bin",
-        "arm",
-        "--profile",
-        "firmware",
-    ]);
+    cargo.args(["--package", "firmware", "--bin", "arm", "--profile", "firmware"]);
     if !machine.qemu.may_sleep() {
         cargo.arg("--no-default-features");
     }

@@ -25,14 +25,7 @@ fn lint_host() -> Result<()> {
     let clippy = |features: &[&str]| {
         shell::run(
             shell::cargo()
-                .args([
-                    "clippy",
-                    "--release",
-                    "--workspace",
-                    "--exclude",
-                    "firmware",
-                    "--all-targets",
-                ])
+                .args(["clippy", "--release", "--workspace", "--exclude", "firmware", "--all-targets"])
                 .args(features)
                 .args(["--", "-D", "warnings"]),
         )
@@ -49,10 +42,7 @@ fn lint_firmware(machine: &Machine) -> Result<()> {
     shell::step("lints of the image");
     for features in [&[][..], &["--no-default-features"]] {
         let mut clippy = machine.toolchain.cargo("clippy", ARM)?;
-        clippy
-            .args(["--package", "firmware", "--profile", "firmware"])
-            .args(features)
-            .args(["--", "-D", "warnings"]);
+        clippy.args(["--package", "firmware", "--profile", "firmware"]).args(features).args(["--", "-D", "warnings"]);
         shell::run(&mut clippy)?;
     }
     Ok(())
@@ -64,9 +54,7 @@ fn libraries_without_std(machine: &Machine) -> Result<()> {
     for target in [ARM, JOINT] {
         for features in [&[][..], &["--features", "fixed"]] {
             let mut check = machine.toolchain.cargo("check", target)?;
-            check
-                .args(["--package", "dmp", "--no-default-features"])
-                .args(features);
+            check.args(["--package", "dmp", "--no-default-features"]).args(features);
             shell::run(&mut check)?;
         }
     }

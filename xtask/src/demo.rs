@@ -26,20 +26,10 @@ const PLAY: &[Step] = &[
         sentence: "learn: the recording becomes a movement primitive",
         words: &["learn", "grasp.csv", "--output", "grasp.toml"],
     },
-    Step {
-        sentence: "check: the primitive against the limits of the arm",
-        words: &["check", "grasp.toml"],
-    },
+    Step { sentence: "check: the primitive against the limits of the arm", words: &["check", "grasp.toml"] },
     Step {
         sentence: "run: the image under QEMU takes the primitive and plays it on the simulated arm",
-        words: &[
-            "--device",
-            "sim:",
-            "run",
-            "grasp.toml",
-            "--record",
-            "run.csv",
-        ],
+        words: &["--device", "sim:", "run", "grasp.toml", "--record", "run.csv"],
     },
     Step {
         sentence: "plot: demonstration, plan and execution",
@@ -65,14 +55,7 @@ pub(crate) const LARGEST: &str = "largest.toml";
 /// The same movement with the most kernels a device holds, for the budget.
 const LEARN_LARGEST: Step = Step {
     sentence: "learn: the same movement with 100 kernels",
-    words: &[
-        "learn",
-        "grasp.csv",
-        "--kernels",
-        "100",
-        "--output",
-        LARGEST,
-    ],
+    words: &["learn", "grasp.csv", "--kernels", "100", "--output", LARGEST],
 };
 
 /// Prepares the machine, builds, and runs every step; takes no further words.

@@ -40,20 +40,12 @@ impl Sizes {
 
     /// Bytes of flash: code, constants and the initial values of data.
     pub(crate) fn flash(&self) -> u32 {
-        self.sections
-            .iter()
-            .filter(|section| section.in_flash)
-            .map(|section| section.bytes)
-            .sum()
+        self.sections.iter().filter(|section| section.in_flash).map(|section| section.bytes).sum()
     }
 
     /// Bytes of RAM without the stack.
     pub(crate) fn ram(&self) -> u32 {
-        self.sections
-            .iter()
-            .filter(|section| section.in_ram)
-            .map(|section| section.bytes)
-            .sum()
+        self.sections.iter().filter(|section| section.in_ram).map(|section| section.bytes).sum()
     }
 }
 
@@ -84,11 +76,7 @@ fn parse(file: &[u8]) -> Option<Sizes> {
     let mut sections = Vec::new();
     for index in 0..count {
         let at = table + entry * index;
-        let (kind, flags, bytes) = (
-            word(file, at + 4)?,
-            word(file, at + 8)?,
-            word(file, at + 20)?,
-        );
+        let (kind, flags, bytes) = (word(file, at + 4)?, word(file, at + 8)?, word(file, at + 20)?);
         if flags & ALLOCATED == 0 || bytes == 0 {
             continue;
         }

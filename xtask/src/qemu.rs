@@ -36,10 +36,5 @@ pub(crate) fn run(rest: &[&str]) -> Result<()> {
         [image, more @ ..] => (PathBuf::from(image), more),
         [] => (build::image(&setup::all()?)?, &[][..]),
     };
-    shell::run(
-        Command::new("qemu-system-arm")
-            .args(MACHINE)
-            .arg(image)
-            .args(more),
-    )
+    shell::run(Command::new("qemu-system-arm").args(MACHINE).arg(image).args(more))
 }

@@ -84,18 +84,13 @@ fn quoted(word: &OsStr) -> String {
 
 /// Runs a command with our own terminal; an unsuccessful end is an error that says how to repeat it.
 pub(crate) fn run(command: &mut Command) -> Result<()> {
-    let status = command
-        .status()
-        .with_context(|| format!("cannot start: {}", line(command)))?;
+    let status = command.status().with_context(|| format!("cannot start: {}", line(command)))?;
     check(command, status)
 }
 
 /// Runs a command without showing its output, and returns its stdout.
 pub(crate) fn capture(command: &mut Command) -> Result<String> {
-    let output = command
-        .stdin(Stdio::null())
-        .output()
-        .with_context(|| format!("cannot start: {}", line(command)))?;
+    let output = command.stdin(Stdio::null()).output().with_context(|| format!("cannot start: {}", line(command)))?;
     if !output.status.success() {
         eprint!("{}", String::from_utf8_lossy(&output.stderr));
     }

@@ -19,44 +19,26 @@ pub struct Actuation {
 impl Actuation {
     /// Sends nothing.
     pub(crate) const fn silent() -> Actuation {
-        Actuation {
-            frames: None,
-            requests_idle: false,
-        }
+        Actuation { frames: None, requests_idle: false }
     }
 
     /// Sends zero torque: a puck keeps its last torque until another one comes.
     pub(crate) fn zero() -> Actuation {
-        Actuation {
-            frames: Some(frames([PuckTorque::ZERO; 7])),
-            requests_idle: false,
-        }
+        Actuation { frames: Some(frames([PuckTorque::ZERO; 7])), requests_idle: false }
     }
 
     /// Sends these torques.
-    pub(crate) fn torque<R: Real>(
-        torques: &LimitedTorques<R>,
-        calibration: &Calibration<R>,
-    ) -> Actuation {
+    pub(crate) fn torque<R: Real>(torques: &LimitedTorques<R>, calibration: &Calibration<R>) -> Actuation {
         let joints = torques.torques().0.into();
         let motors = calibration.transmission.motor_torques_from_joint(&joints);
         // The limiter lets nothing through that is not finite; should it ever, zero torque is what remains.
-        let counts = calibration
-            .drives
-            .torques(&motors)
-            .unwrap_or([PuckTorque::ZERO; 7]);
-        Actuation {
-            frames: Some(frames(counts)),
-            requests_idle: false,
-        }
+        let counts = calibration.drives.torques(&motors).unwrap_or([PuckTorque::ZERO; 7]);
+        Actuation { frames: Some(frames(counts)), requests_idle: false }
     }
 
     /// The same, with the wish that the safety module goes to IDLE.
     pub(crate) const fn requesting_idle(self) -> Actuation {
-        Actuation {
-            frames: self.frames,
-            requests_idle: true,
-        }
+        Actuation { frames: self.frames, requests_idle: true }
     }
 
     /// The torque frames of M1..M4 and M5..M7, to be sent in this order in the same cycle; `None` sends nothing.
@@ -73,10 +55,6 @@ impl Actuation {
 fn frames([m1, m2, m3, m4, m5, m6, m7]: [PuckTorque; 7]) -> [CanFrame; 2] {
     [
         packed_torques(Group::ARM_TORQUES, PropertyId::TORQUE, [m1, m2, m3, m4]),
-        packed_torques(
-            Group::WRIST_TORQUES,
-            PropertyId::TORQUE,
-            [m5, m6, m7, PuckTorque::ZERO],
-        ),
+        packed_torques(Group::WRIST_TORQUES, PropertyId::TORQUE, [m5, m6, m7, PuckTorque::ZERO]),
     ]
 }

@@ -47,19 +47,13 @@ pub struct Approach<R: Real> {
 
 impl<R: Real> Approach<R> {
     /// A move from `start` to `goal` in `duration` (s) or, where the speed limits ask for it, longer.
-    pub fn new(
-        model: &ArmModel<R>,
-        start: &JointPositions<R>,
-        goal: &JointPositions<R>,
-        duration: R,
-    ) -> Self {
+    pub fn new(model: &ArmModel<R>, start: &JointPositions<R>, goal: &JointPositions<R>, duration: R) -> Self {
         let way = goal.0 - start.0;
         let mut needed = crate::arm::at_least(duration, R::of(SHORTEST));
         for (way, limit) in way.iter().zip(&model::VELOCITY_MAX) {
             // The peak speed of a minimum jerk is 1.875 times the mean.
             let magnitude = if *way < R::of(0.0) { -*way } else { *way };
-            needed =
-                crate::arm::at_least(needed, magnitude * R::of(1.875 / (SPEED_FRACTION * limit)));
+            needed = crate::arm::at_least(needed, magnitude * R::of(1.875 / (SPEED_FRACTION * limit)));
         }
         for sample in 0..SAMPLES {
             let u = (sample as f64 + 0.5) / SAMPLES as f64;
@@ -72,13 +66,7 @@ impl<R: Real> Approach<R> {
         let longest = R::of(LONGEST);
         let needed = crate::arm::at_most(needed, longest);
         let length = (needed * R::of(RATE)).whole_below().to_whole() + 1;
-        Approach {
-            start: start.0,
-            way,
-            length,
-            passed: 0,
-            rate: R::of(RATE) / R::from_counts(length),
-        }
+        Approach { start: start.0, way, length, passed: 0, rate: R::of(RATE) / R::from_counts(length) }
     }
 
     /// Duration of the move (s).

@@ -61,20 +61,11 @@ impl<R: Real> ArmModel<R> {
             table.mass *= scale;
             table.inertia = table.inertia.map(|value| value * scale);
         }
-        let extra = BodyTable {
-            mass: extra_mass,
-            centre: [0.0, 0.0, mounted.tool_z],
-            inertia: [0.0; 6],
-        };
+        let extra = BodyTable { mass: extra_mass, centre: [0.0, 0.0, mounted.tool_z], inertia: [0.0; 6] };
         let [first, second, third, fourth, fifth, sixth, last] = tables;
         let last = merged(merged(last, mounted.body), extra);
         let real = |values: [f64; JOINTS]| values.map(R::of);
-        let PayloadTable {
-            tool_z,
-            tool_cosine,
-            tool_sine,
-            ..
-        } = mounted;
+        let PayloadTable { tool_z, tool_cosine, tool_sine, .. } = mounted;
         ArmModel {
             link_length: real(model::DH_A),
             link_offset: real(model::DH_D),
@@ -95,9 +86,7 @@ impl<R: Real> ArmModel<R> {
 
     /// Whether every joint lies within its soft limits. False for a NaN.
     pub fn within_soft_limits(&self, q: &JointPositions<R>) -> bool {
-        q.0.iter()
-            .zip(self.soft_min.iter().zip(&self.soft_max))
-            .all(|(q, (min, max))| q >= min && q <= max)
+        q.0.iter().zip(self.soft_min.iter().zip(&self.soft_max)).all(|(q, (min, max))| q >= min && q <= max)
     }
 }
 
@@ -134,23 +123,12 @@ fn merged(one: BodyTable, other: BodyTable) -> BodyTable {
         let [x, y, z] = part.centre;
         let [cx, cy, cz] = centre;
         let (x, y, z) = (x - cx, y - cy, z - cz);
-        let shift = [
-            y * y + z * z,
-            x * x + z * z,
-            x * x + y * y,
-            -x * y,
-            -x * z,
-            -y * z,
-        ];
+        let shift = [y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z];
         for (sum, (own, shift)) in inertia.iter_mut().zip(part.inertia.iter().zip(shift)) {
             *sum += own + part.mass * shift;
         }
     }
-    BodyTable {
-        mass,
-        centre,
-        inertia,
-    }
+    BodyTable { mass, centre, inertia }
 }
 
 fn body<R: Real>(table: BodyTable) -> Body<R> {

@@ -39,18 +39,10 @@ impl fmt::Display for CalibrationError {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             CalibrationError::CountsPerRevolution(motor) => {
-                write!(
-                    formatter,
-                    "puck {}: counts per revolution are not in 256..=65536",
-                    motor + 1
-                )
+                write!(formatter, "puck {}: counts per revolution are not in 256..=65536", motor + 1)
             }
             CalibrationError::TorqueCounts(motor) => {
-                write!(
-                    formatter,
-                    "puck {}: torque counts per N m are not in 500..=50000",
-                    motor + 1
-                )
+                write!(formatter, "puck {}: torque counts per N m are not in 500..=50000", motor + 1)
             }
             CalibrationError::Transmission(error) => error.fmt(formatter),
         }
@@ -71,9 +63,7 @@ impl<R: Real> Calibration<R> {
         torque_counts: [i32; 7],
         payload: Payload,
     ) -> Result<Calibration<R>, CalibrationError> {
-        for (motor, (counts, torque)) in
-            (0u8..).zip(counts_per_revolution.iter().zip(&torque_counts))
-        {
+        for (motor, (counts, torque)) in (0u8..).zip(counts_per_revolution.iter().zip(&torque_counts)) {
             if !(256..=65_536).contains(counts) {
                 return Err(CalibrationError::CountsPerRevolution(motor));
             }
@@ -82,22 +72,16 @@ impl<R: Real> Calibration<R> {
             }
         }
         Ok(Calibration {
-            transmission: Transmission::new(&Ratios::WAM7)
-                .map_err(CalibrationError::Transmission)?,
-            drives: Drives::new(counts_per_revolution, torque_counts)
-                .map_err(CalibrationError::Transmission)?,
+            transmission: Transmission::new(&Ratios::WAM7).map_err(CalibrationError::Transmission)?,
+            drives: Drives::new(counts_per_revolution, torque_counts).map_err(CalibrationError::Transmission)?,
             payload,
         })
     }
 
     /// The nominal scales of the model file, for tests and until an arm has been asked for its own.
     pub fn nominal(payload: Payload) -> Calibration<R> {
-        Calibration::new(
-            [model::ENCODER_COUNTS as i32; 7],
-            model::TORQUE_COUNTS.map(|counts| counts as i32),
-            payload,
-        )
-        .expect("the scales of the model file are valid, which a test proves")
+        Calibration::new([model::ENCODER_COUNTS as i32; 7], model::TORQUE_COUNTS.map(|counts| counts as i32), payload)
+            .expect("the scales of the model file are valid, which a test proves")
     }
 
     /// Joint and motor space.

@@ -33,10 +33,7 @@ pub struct Goal {
 
 impl Goal {
     /// The goal stored in the primitive, unchanged.
-    pub const STORED: Goal = Goal {
-        position: None,
-        orientation: None,
-    };
+    pub const STORED: Goal = Goal { position: None, orientation: None };
 }
 
 /// The options of one run of the loaded primitive.
@@ -157,9 +154,7 @@ impl Refusal {
 
     /// The reason with this number, if there is one.
     pub fn from_code(code: u8) -> Option<Refusal> {
-        Refusal::ALL
-            .into_iter()
-            .find(|reason| reason.code() == code)
+        Refusal::ALL.into_iter().find(|reason| reason.code() == code)
     }
 }
 
@@ -170,9 +165,7 @@ impl fmt::Display for Refusal {
             Refusal::SafetyNotActive => "the safety module does not report ACTIVE",
             Refusal::PositionsMissing => "not all joint positions are measured",
             Refusal::NoPrimitive => "no primitive is loaded",
-            Refusal::StartTooFar => {
-                "a joint is more than 50 mrad away from the start posture of the primitive"
-            }
+            Refusal::StartTooFar => "a joint is more than 50 mrad away from the start posture of the primitive",
             Refusal::OutOfRange => "a number in the command is not finite or outside its range",
             Refusal::OutsideJointLimits => "the target lies outside the soft joint limits",
             Refusal::OutsideWorkspace => "the goal lies outside the workspace of the arm",

@@ -15,12 +15,7 @@ use crate::units::{JOINTS, JointAccelerations, JointTorques, JointVelocities, Ve
 impl<R: Real> ArmModel<R> {
     /// Torque that holds the arm still: `g(q)` (N m).
     pub fn gravity_torque(&self, frames: &Frames<R>) -> JointTorques<R> {
-        JointTorques(self.newton_euler::<false>(
-            frames,
-            &Vector7::zeros(),
-            &Vector7::zeros(),
-            self.base_acceleration,
-        ))
+        JointTorques(self.newton_euler::<false>(frames, &Vector7::zeros(), &Vector7::zeros(), self.base_acceleration))
     }
 
     /// Coriolis and centrifugal torque: `c(q, dq)` (N m).
@@ -41,11 +36,7 @@ impl<R: Real> ArmModel<R> {
     /// Torque that accelerates the rotors of the drives, seen at the joints (N m).
     pub fn rotor_torque(&self, ddq: &JointAccelerations<R>) -> JointTorques<R> {
         let mut torque = Vector7::zeros();
-        for ((torque, inertia), ddq) in torque
-            .iter_mut()
-            .zip(&self.reflected_inertia)
-            .zip(ddq.0.iter())
-        {
+        for ((torque, inertia), ddq) in torque.iter_mut().zip(&self.reflected_inertia).zip(ddq.0.iter()) {
             *torque = *inertia * *ddq;
         }
         torque[4] += self.reflected_inertia_j5_j6 * ddq.0[5];
@@ -59,8 +50,7 @@ impl<R: Real> ArmModel<R> {
         for joint in 0..JOINTS {
             let mut unit = Vector7::zeros();
             unit[joint] = R::of(1.0);
-            let column =
-                self.newton_euler::<false>(frames, &Vector7::zeros(), &unit, Vector3::zeros());
+            let column = self.newton_euler::<false>(frames, &Vector7::zeros(), &unit, Vector3::zeros());
             matrix.set_column(joint, &column);
         }
         matrix
@@ -104,8 +94,7 @@ impl<R: Real> ArmModel<R> {
             alpha.z += ddq[joint];
             alpha = self.outward(frames, joint, &alpha);
             let arm = self.link_vector(joint);
-            acceleration = self.outward(frames, joint, &acceleration)
-                + self.swing::<MOVING>(&omega, &alpha, &arm);
+            acceleration = self.outward(frames, joint, &acceleration) + self.swing::<MOVING>(&omega, &alpha, &arm);
             let at_centre = acceleration + self.swing::<MOVING>(&omega, &alpha, &body.centre);
             let force = at_centre * body.mass;
             let mut moment = body.inertia * alpha;
@@ -132,29 +121,16 @@ impl<R: Real> ArmModel<R> {
 
     /// Acceleration of a point at `arm` on a turning body, relative to its origin.
     #[inline]
-    fn swing<const MOVING: bool>(
-        &self,
-        omega: &Vector3<R>,
-        alpha: &Vector3<R>,
-        arm: &Vector3<R>,
-    ) -> Vector3<R> {
+    fn swing<const MOVING: bool>(&self, omega: &Vector3<R>, alpha: &Vector3<R>, arm: &Vector3<R>) -> Vector3<R> {
         let tangential = alpha.cross(arm);
-        if MOVING {
-            tangential + omega.cross(&omega.cross(arm))
-        } else {
-            tangential
-        }
+        if MOVING { tangential + omega.cross(&omega.cross(arm)) } else { tangential }
     }
 
     /// From the origin of frame j-1 to that of frame j, in axes of frame j (m).
     #[inline]
     fn link_vector(&self, joint: usize) -> Vector3<R> {
         let offset = self.link_offset[joint];
-        Vector3::new(
-            self.link_length[joint],
-            offset * self.twist_sine[joint],
-            offset * self.twist_cosine[joint],
-        )
+        Vector3::new(self.link_length[joint], offset * self.twist_sine[joint], offset * self.twist_cosine[joint])
     }
 
     /// A vector given in frame j-1, in frame j.

@@ -82,8 +82,7 @@ impl<R: Real> JointEstimator<R> {
                 .zip(&model::VELOCITY_MAX)
                 .map(|(ratio, limit)| (if *ratio < 0.0 { -ratio } else { *ratio }) * limit)
                 .sum();
-            gate[motor] =
-                (PLAUSIBLE_SPEED * fastest * PERIOD * counts / core::f64::consts::TAU) as i32 + 1;
+            gate[motor] = (PLAUSIBLE_SPEED * fastest * PERIOD * counts / core::f64::consts::TAU) as i32 + 1;
         }
         JointEstimator {
             transmission: calibration.transmission,
@@ -107,11 +106,7 @@ impl<R: Real> JointEstimator<R> {
     ///
     /// Where `torque_on` is false, a motor that was silent for long or jumped is taken up again after two replies that
     /// agree with each other; with torque on it never is, because a wrong position means a wrong torque.
-    pub fn update(
-        &mut self,
-        replies: &[Option<Counts>; JOINTS],
-        torque_on: bool,
-    ) -> Option<JointState<R>> {
+    pub fn update(&mut self, replies: &[Option<Counts>; JOINTS], torque_on: bool) -> Option<JointState<R>> {
         let Some(motors) = &mut self.motors else {
             return self.begin(replies);
         };
@@ -122,32 +117,22 @@ impl<R: Real> JointEstimator<R> {
         let mut rates = Vector7::zeros();
         for (index, (motor, reply)) in motors.iter_mut().zip(replies).enumerate() {
             let elapsed = motor.age.saturating_add(1);
-            let accepted = reply
-                .map(|raw| raw.unwrapped_near(motor.counts))
-                .and_then(|counts| {
-                    let moved = counts.0.wrapping_sub(motor.counts.0);
-                    let reach = self.gate[index] * i32::from(elapsed.min(COAST_CYCLES + 1));
-                    if moved.unsigned_abs() <= reach.unsigned_abs() {
-                        return Some((
-                            counts,
-                            R::from_counts(moved) / R::from_counts(i32::from(elapsed)),
-                        ));
-                    }
-                    implausible = true;
-                    let agrees = motor.doubtful.is_some_and(|before| {
-                        counts.0.wrapping_sub(before.0).unsigned_abs()
-                            <= self.gate[index].unsigned_abs()
-                    });
-                    motor.doubtful = Some(counts);
-                    (agrees && !torque_on).then_some((counts, R::of(0.0)))
+            let accepted = reply.map(|raw| raw.unwrapped_near(motor.counts)).and_then(|counts| {
+                let moved = counts.0.wrapping_sub(motor.counts.0);
+                let reach = self.gate[index] * i32::from(elapsed.min(COAST_CYCLES + 1));
+                if moved.unsigned_abs() <= reach.unsigned_abs() {
+                    return Some((counts, R::from_counts(moved) / R::from_counts(i32::from(elapsed))));
+                }
+                implausible = true;
+                let agrees = motor.doubtful.is_some_and(|before| {
+                    counts.0.wrapping_sub(before.0).unsigned_abs() <= self.gate[index].unsigned_abs()
                 });
+                motor.doubtful = Some(counts);
+                (agrees && !torque_on).then_some((counts, R::of(0.0)))
+            });
             let carried = match accepted {
                 Some((counts, rate)) => {
-                    *motor = Motor {
-                        counts,
-                        age: 0,
-                        doubtful: None,
-                    };
+                    *motor = Motor { counts, age: 0, doubtful: None };
                     rates[index] = rate;
                     R::of(0.0)
                 }
@@ -155,43 +140,26 @@ impl<R: Real> JointEstimator<R> {
                     motor.age = elapsed;
                     missing += 1;
                     let bridged = elapsed.min(COAST_CYCLES);
-                    rates[index] = if elapsed > COAST_CYCLES {
-                        R::of(0.0)
-                    } else {
-                        self.rates[index]
-                    };
+                    rates[index] = if elapsed > COAST_CYCLES { R::of(0.0) } else { self.rates[index] };
                     self.rates[index] * R::from_counts(i32::from(bridged))
                 }
             };
             age = age.max(motor.age);
-            angles[index] =
-                (R::from_counts(motor.counts.0) + carried) * self.radians_per_count[index];
+            angles[index] = (R::from_counts(motor.counts.0) + carried) * self.radians_per_count[index];
         }
         let q = self.transmission.joint_from_motor(&angles.into());
         let speeds = rates.component_mul(&self.radians_per_count) * R::of(RATE);
-        let dq = self.filter.step(&Vector7::from(
-            self.transmission.joint_from_motor(&speeds.into()),
-        ));
+        let dq = self.filter.step(&Vector7::from(self.transmission.joint_from_motor(&speeds.into())));
         if missing == 0 {
             let motor_speeds = Vector7::from(self.transmission.motor_from_joint(&dq.into()));
             self.rates = motor_speeds.component_mul(&self.counts_per_radian) * R::of(PERIOD);
         }
-        Some(JointState {
-            q: JointPositions::from_array(q),
-            dq: JointVelocities(dq),
-            missing,
-            age,
-            implausible,
-        })
+        Some(JointState { q: JointPositions::from_array(q), dq: JointVelocities(dq), missing, age, implausible })
     }
 
     /// The first complete set of replies.
     fn begin(&mut self, replies: &[Option<Counts>; JOINTS]) -> Option<JointState<R>> {
-        let mut motors = [Motor {
-            counts: Counts(0),
-            age: 0,
-            doubtful: None,
-        }; JOINTS];
+        let mut motors = [Motor { counts: Counts(0), age: 0, doubtful: None }; JOINTS];
         let mut angles = Vector7::zeros();
         for (index, (motor, reply)) in motors.iter_mut().zip(replies).enumerate() {
             motor.counts = (*reply)?.wrapped();

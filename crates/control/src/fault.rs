@@ -79,39 +79,21 @@ impl Fault {
             Fault::RepliesLostForLong => {
                 "joint positions stayed away for 200 ms, torque was taken off; the arm may have sunk, support it before clearing"
             }
-            Fault::JointLimit => {
-                "a joint left its soft limits; move it back by hand in gravity mode after clearing"
-            }
-            Fault::JointSpeed => {
-                "a joint moved faster than its limit; check the primitive's duration and the payload"
-            }
+            Fault::JointLimit => "a joint left its soft limits; move it back by hand in gravity mode after clearing",
+            Fault::JointSpeed => "a joint moved faster than its limit; check the primitive's duration and the payload",
             Fault::TipSpeed => {
                 "elbow or forearm moved faster than allowed; run the primitive more slowly or choose a longer approach"
             }
-            Fault::NotFinite => {
-                "a number in the control cycle was not finite; this is a defect, keep the record"
-            }
+            Fault::NotFinite => "a number in the control cycle was not finite; this is a defect, keep the record",
             Fault::ImplausiblePosition => {
                 "position counts jumped farther than the arm can move; check the encoder cable, then zero the arm again"
             }
-            Fault::TrackingError => {
-                "the arm stayed far behind the plan; look for an obstacle or a wrong payload"
-            }
-            Fault::ContactForce => {
-                "the contact force passed the stop threshold; look for an obstacle"
-            }
-            Fault::SafetyDropped => {
-                "the safety module took torque away; see the pendant, activate again, then clear"
-            }
-            Fault::WrenchLost => {
-                "the force sensor fell silent during a run that depends on it; check its cable"
-            }
-            Fault::BusFault => {
-                "the CAN bus or a puck failed; torque was taken off, see the device log"
-            }
-            Fault::Overrun => {
-                "the control cycle missed its deadline too often; this is a defect, keep the record"
-            }
+            Fault::TrackingError => "the arm stayed far behind the plan; look for an obstacle or a wrong payload",
+            Fault::ContactForce => "the contact force passed the stop threshold; look for an obstacle",
+            Fault::SafetyDropped => "the safety module took torque away; see the pendant, activate again, then clear",
+            Fault::WrenchLost => "the force sensor fell silent during a run that depends on it; check its cable",
+            Fault::BusFault => "the CAN bus or a puck failed; torque was taken off, see the device log",
+            Fault::Overrun => "the control cycle missed its deadline too often; this is a defect, keep the record",
         }
     }
 }

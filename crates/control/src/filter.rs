@@ -42,12 +42,7 @@ pub struct LowPass<R: Real, const D: usize> {
 impl<R: Real, const D: usize> LowPass<R, D> {
     /// At rest at zero.
     pub fn new(filter: Butterworth<R>) -> Self {
-        LowPass {
-            filter,
-            first: SVector::zeros(),
-            second: SVector::zeros(),
-            output: SVector::zeros(),
-        }
+        LowPass { filter, first: SVector::zeros(), second: SVector::zeros(), output: SVector::zeros() }
     }
 
     /// Takes one sample and returns the filtered value.

@@ -8,9 +8,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use crate::arm::{ArmModel, at_least};
 use crate::real::Real;
-use crate::units::{
-    JOINTS, JointPositions, JointVelocities, Orientation, Pose, Twist, Vector6, Vector7,
-};
+use crate::units::{JOINTS, JointPositions, JointVelocities, Orientation, Pose, Twist, Vector6, Vector7};
 
 /// The geometric Jacobian: 6 rows (linear, angular; world axes), one column per joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,10 +51,7 @@ impl<R: Real> Jacobian<R> {
         for (index, row) in gram.iter_mut().enumerate() {
             row[index] += damping;
         }
-        DampedInverse {
-            jacobian: self,
-            factor: Factor::new(gram, damping),
-        }
+        DampedInverse { jacobian: self, factor: Factor::new(gram, damping) }
     }
 }
 
@@ -79,21 +74,13 @@ impl<R: Real> Factor<R> {
             let below = matrix.map(|row| row[column]);
             for (row, entries) in matrix.iter_mut().enumerate().skip(column + 1) {
                 let scaled = below[row] * inverse;
-                for (entry, value) in entries
-                    .iter_mut()
-                    .zip(&below)
-                    .take(row + 1)
-                    .skip(column + 1)
-                {
+                for (entry, value) in entries.iter_mut().zip(&below).take(row + 1).skip(column + 1) {
                     *entry -= scaled * *value;
                 }
                 entries[column] = scaled;
             }
         }
-        Factor {
-            lower: matrix,
-            pivot_inverse,
-        }
+        Factor { lower: matrix, pivot_inverse }
     }
 
     fn solve(&self, right: &Vector6<R>) -> Vector6<R> {
@@ -127,9 +114,7 @@ impl<R: Real> DampedInverse<'_, R> {
     /// `J^+ task + (I - J^+ J) bias`: the joint vector that does the task and comes as near to `bias` as the task allows.
     pub fn resolve(&self, task: &Vector6<R>, bias: &Vector7<R>) -> Vector7<R> {
         let remaining = task - self.jacobian.twist(bias);
-        bias + self
-            .jacobian
-            .transpose_times(&self.factor.solve(&remaining))
+        bias + self.jacobian.transpose_times(&self.factor.solve(&remaining))
     }
 }
 
@@ -194,10 +179,7 @@ impl<R: Real> Frames<R> {
 
     /// Pose of the tool frame.
     pub fn tool_pose(&self) -> Pose<R> {
-        Pose {
-            position: self.tool,
-            orientation: Orientation::from_matrix(&self.tool_to_world),
-        }
+        Pose { position: self.tool, orientation: Orientation::from_matrix(&self.tool_to_world) }
     }
 
     /// Rotation matrix of the tool, tool to world.
@@ -222,10 +204,7 @@ impl<R: Real> Frames<R> {
 
     fn jacobian_at(&self, point: &Vector3<R>) -> Jacobian<R> {
         let mut jacobian = SMatrix::<R, 6, JOINTS>::zeros();
-        for (mut column, (axis, origin)) in jacobian
-            .column_iter_mut()
-            .zip(self.axes.iter().zip(&self.origins))
-        {
+        for (mut column, (axis, origin)) in jacobian.column_iter_mut().zip(self.axes.iter().zip(&self.origins)) {
             let linear = axis.cross(&(point - origin));
             column[0] = linear.x;
             column[1] = linear.y;
@@ -247,11 +226,7 @@ impl<R: Real> Frames<R> {
             angular += omega.cross(&spin);
             omega += spin;
             // The next origin, and at last the tool, rides on the link that this joint turns.
-            let end = if joint + 1 < JOINTS {
-                self.origins[joint + 1]
-            } else {
-                self.tool
-            };
+            let end = if joint + 1 < JOINTS { self.origins[joint + 1] } else { self.tool };
             let arm = end - self.origins[joint];
             linear += angular.cross(&arm) + omega.cross(&omega.cross(&arm));
         }

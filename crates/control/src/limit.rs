@@ -20,15 +20,7 @@ use crate::units::{JOINTS, JointTorques, Vector7};
 pub const WORST_GRAVITY: [f64; JOINTS] = [0.0, 41.5, 13.0, 11.0, 1.9, 1.9, 0.2];
 
 /// Largest change of torque (N m per control period): the manufacturer's full scale in 50 ms.
-pub const STEP_LIMIT: [f64; JOINTS] = [
-    25.0 / 15.0,
-    20.0 / 15.0,
-    1.0,
-    1.0,
-    5.0 / 15.0,
-    5.0 / 15.0,
-    5.0 / 15.0,
-];
+pub const STEP_LIMIT: [f64; JOINTS] = [25.0 / 15.0, 20.0 / 15.0, 1.0, 1.0, 5.0 / 15.0, 5.0 / 15.0, 5.0 / 15.0];
 
 /// Largest torque of a puck (counts of its torque unit): below the safety module's warning of 4731 and its limit of 5204.
 pub const MOTOR_COUNTS_LIMIT: f64 = 4600.0;
@@ -79,8 +71,7 @@ impl<R: Real> TorqueLimiter<R> {
             let wanted = WORST_GRAVITY[joint] + model::CONTROL_SIGNAL_LIMIT[joint];
             joint_limit[joint] = R::of(wanted.min(model::TORQUE_MAX[joint]));
             let units = f64::from(calibration.drives.units_per_newton_metre()[joint]);
-            motor_limit[joint] =
-                R::of(model::MOTOR_TORQUE_MAX[joint].min(MOTOR_COUNTS_LIMIT / units));
+            motor_limit[joint] = R::of(model::MOTOR_TORQUE_MAX[joint].min(MOTOR_COUNTS_LIMIT / units));
         }
         TorqueLimiter {
             transmission: calibration.transmission,
@@ -132,9 +123,7 @@ impl<R: Real> TorqueLimiter<R> {
 
     /// Scales each group until its motors are within their caps; true if it had to.
     fn scale_to_motors(&self, torques: &mut Vector7<R>) -> bool {
-        let motors = self
-            .transmission
-            .motor_torques_from_joint(&(*torques).into());
+        let motors = self.transmission.motor_torques_from_joint(&(*torques).into());
         let mut scaled = false;
         for group in GROUPS {
             let mut factor = R::of(1.0);

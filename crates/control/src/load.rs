@@ -60,23 +60,13 @@ impl fmt::Display for LoadError {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             LoadError::Primitive(error) => error.fmt(formatter),
-            LoadError::Duration => write!(
-                formatter,
-                "the duration is outside {SHORTEST} to {LONGEST} s"
-            ),
+            LoadError::Duration => write!(formatter, "the duration is outside {SHORTEST} to {LONGEST} s"),
             LoadError::Posture(end, joint) => {
-                write!(
-                    formatter,
-                    "J{} of the {end} posture lies outside its soft limits",
-                    joint + 1
-                )
+                write!(formatter, "J{} of the {end} posture lies outside its soft limits", joint + 1)
             }
             LoadError::OutOfReach(end) => write!(formatter, "the {end} position is out of reach"),
             LoadError::Inconsistent(end) => {
-                write!(
-                    formatter,
-                    "the {end} pose does not belong to the {end} posture on this arm"
-                )
+                write!(formatter, "the {end} pose does not belong to the {end} posture on this arm")
             }
         }
     }
@@ -101,10 +91,7 @@ pub fn primitive<R: Real, const N: usize>(
 ///
 /// # Errors
 /// As [`primitive`].
-pub fn check<R: Real, const N: usize>(
-    model: &ArmModel<R>,
-    primitive: &Primitive<R, N>,
-) -> Result<(), LoadError> {
+pub fn check<R: Real, const N: usize>(model: &ArmModel<R>, primitive: &Primitive<R, N>) -> Result<(), LoadError> {
     let duration = primitive.duration();
     if !(duration >= R::of(SHORTEST) && duration <= R::of(LONGEST)) {
         return Err(LoadError::Duration);
@@ -113,11 +100,7 @@ pub fn check<R: Real, const N: usize>(
     check_end(model, End::Goal, primitive.goal())
 }
 
-fn check_end<R: Real>(
-    model: &ArmModel<R>,
-    end: End,
-    configuration: &Configuration<R>,
-) -> Result<(), LoadError> {
+fn check_end<R: Real>(model: &ArmModel<R>, end: End, configuration: &Configuration<R>) -> Result<(), LoadError> {
     let limits = model.soft_min.iter().zip(&model.soft_max);
     for (joint, (q, (min, max))) in (0u8..).zip(configuration.posture.iter().zip(limits)) {
         if !(q >= min && q <= max) {
@@ -130,17 +113,10 @@ fn check_end<R: Real>(
     }
     let pose = Frames::new(model, &JointPositions::from_array(configuration.posture)).tool_pose();
     let orientation = Orientation(configuration.orientation.to_array());
-    let (offset, turn) = (
-        pose.position - position,
-        pose.orientation.error_to(&orientation),
-    );
+    let (offset, turn) = (pose.position - position, pose.orientation.error_to(&orientation));
     let near = offset.dot(&offset) <= R::of(POSE_MISMATCH * POSE_MISMATCH);
     let aligned = turn.dot(&turn) <= R::of(TURN_MISMATCH * TURN_MISMATCH);
-    if near && aligned {
-        Ok(())
-    } else {
-        Err(LoadError::Inconsistent(end))
-    }
+    if near && aligned { Ok(()) } else { Err(LoadError::Inconsistent(end)) }
 }
 
 /// Whether a tool position can be reached at all. False for a NaN.

@@ -49,10 +49,7 @@ pub(crate) struct Observation<'a, R: Real> {
 
 impl<R: Real> Monitor<R> {
     pub(crate) fn new() -> Self {
-        Monitor {
-            speed_limit: model::VELOCITY_MAX.map(|limit| R::of(limit * SPEED_MARGIN)),
-            pressed: 0,
-        }
+        Monitor { speed_limit: model::VELOCITY_MAX.map(|limit| R::of(limit * SPEED_MARGIN)), pressed: 0 }
     }
 
     /// The most severe finding of this cycle in a state with torque.
@@ -66,19 +63,11 @@ impl<R: Real> Monitor<R> {
             return Some((Trigger::HardFault, Fault::RepliesLostForLong));
         }
         if state.age > COAST_CYCLES {
-            let fault = if state.implausible {
-                Fault::ImplausiblePosition
-            } else {
-                Fault::RepliesLost
-            };
+            let fault = if state.implausible { Fault::ImplausiblePosition } else { Fault::RepliesLost };
             return Some((Trigger::SoftFault, fault));
         }
         let pressed = seen.force > R::of(FORCE_LIMIT);
-        self.pressed = if pressed {
-            self.pressed.saturating_add(1)
-        } else {
-            0
-        };
+        self.pressed = if pressed { self.pressed.saturating_add(1) } else { 0 };
         let moving_by_itself = matches!(law, State::Hold | State::Approach | State::Run);
         let finding = if moving_by_itself && self.pressed >= FORCE_CYCLES {
             Some(Fault::ContactForce)
@@ -88,13 +77,7 @@ impl<R: Real> Monitor<R> {
             Some(Fault::WrenchLost)
         } else if law == State::Run && seen.tracking > R::of(TRACKING_LIMIT) {
             Some(Fault::TrackingError)
-        } else if state
-            .dq
-            .0
-            .iter()
-            .zip(&self.speed_limit)
-            .any(|(dq, limit)| *dq > *limit || *dq < -*limit)
-        {
+        } else if state.dq.0.iter().zip(&self.speed_limit).any(|(dq, limit)| *dq > *limit || *dq < -*limit) {
             Some(Fault::JointSpeed)
         } else {
             let [elbow, tip] = seen.frames.elbow_speeds(&state.dq, R::of(TIP_REACH));
@@ -104,11 +87,7 @@ impl<R: Real> Monitor<R> {
         if let Some(fault) = finding {
             return Some((Trigger::SoftFault, fault));
         }
-        let trigger = if state.missing > 0 {
-            Trigger::RepliesMissing
-        } else {
-            Trigger::RepliesBack
-        };
+        let trigger = if state.missing > 0 { Trigger::RepliesMissing } else { Trigger::RepliesBack };
         Some((trigger, Fault::None))
     }
 }

@@ -58,8 +58,7 @@ impl Real for f32 {
         let r = (self - n * 1.570_796_4) - n * -4.371_139e-8;
         let z = r * r;
         let sine = ((-1.951_529_6e-4 * z + 8.332_161e-3) * z - 1.666_665_5e-1) * z * r + r;
-        let cosine =
-            ((2.443_315_7e-5 * z - 1.388_731_6e-3) * z + 4.166_664_6e-2) * z * z - 0.5 * z + 1.0;
+        let cosine = ((2.443_315_7e-5 * z - 1.388_731_6e-3) * z + 4.166_664_6e-2) * z * z - 0.5 * z + 1.0;
         match quadrant & 3 {
             0 => (sine, cosine),
             1 => (cosine, -sine),

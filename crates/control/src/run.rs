@@ -1,8 +1,7 @@
 //! `Run`: the loaded primitive in motion: its rollout, the options of this run, and the decision that it is over.
 
 use dmp::{
-    Configuration, Coupling, Primitive, Quaternion, Reference, Rollout, RolloutError, SENSORS,
-    SensorMap, StartState,
+    Configuration, Coupling, Primitive, Quaternion, Reference, Rollout, RolloutError, SENSORS, SensorMap, StartState,
 };
 use nalgebra::Vector3;
 
@@ -61,29 +60,18 @@ impl<R: Real, const N: usize> Run<R, N> {
             hand: taught.hand,
         });
         let rollout = Rollout::start(primitive, &start).map_err(reason)?;
-        let mut run = Run {
-            rollout,
-            options,
-            coupling: Coupling::NONE,
-            rested: 0,
-        };
+        let mut run = Run { rollout, options, coupling: Coupling::NONE, rested: 0 };
         // The first speed acts at once; later ones are approached at the rollout's slew rate.
         run.rollout.set_speed_slew(None).map_err(reason)?;
         run.set_speed(primitive, options.speed)?;
         run.rollout.step(primitive, R::of(0.0), &Coupling::NONE);
-        run.rollout
-            .set_speed_slew(Some(R::of(2.0)))
-            .map_err(reason)?;
+        run.rollout.set_speed_slew(Some(R::of(2.0))).map_err(reason)?;
         run.set_goal(primitive, &options.goal)?;
         Ok(run)
     }
 
     /// Takes a new goal, or leaves everything as it was.
-    pub(crate) fn set_goal(
-        &mut self,
-        primitive: &Primitive<R, N>,
-        goal: &Goal,
-    ) -> Result<(), Refusal> {
+    pub(crate) fn set_goal(&mut self, primitive: &Primitive<R, N>, goal: &Goal) -> Result<(), Refusal> {
         let mut next = self.rollout.clone();
         if let Some(position) = goal.position {
             if position.iter().any(|value| !value.is_finite()) {
@@ -97,8 +85,7 @@ impl<R: Real, const N: usize> Run<R, N> {
         }
         if let Some(orientation) = goal.orientation {
             let [w, x, y, z] = orientation.map(|value| R::of(f64::from(value)));
-            next.set_goal_orientation(primitive, Quaternion::new(w, x, y, z))
-                .map_err(reason)?;
+            next.set_goal_orientation(primitive, Quaternion::new(w, x, y, z)).map_err(reason)?;
         }
         self.rollout = next;
         self.rested = 0;
@@ -106,49 +93,29 @@ impl<R: Real, const N: usize> Run<R, N> {
     }
 
     /// Takes a new speed factor.
-    pub(crate) fn set_speed(
-        &mut self,
-        primitive: &Primitive<R, N>,
-        factor: f32,
-    ) -> Result<(), Refusal> {
+    pub(crate) fn set_speed(&mut self, primitive: &Primitive<R, N>, factor: f32) -> Result<(), Refusal> {
         if !(factor >= SPEEDS.0 && factor <= SPEEDS.1) {
             return Err(Refusal::OutOfRange);
         }
-        self.rollout
-            .set_speed(primitive, R::of(f64::from(factor)))
-            .map_err(reason)
+        self.rollout.set_speed(primitive, R::of(f64::from(factor))).map_err(reason)
     }
 
     /// The plan of this tick. With `frozen` feedback (the wrench or a position is missing) the last coupling stays.
-    pub(crate) fn step(
-        &mut self,
-        primitive: &Primitive<R, N>,
-        wrench: &Wrench<R>,
-        frozen: bool,
-    ) -> Reference<R> {
+    pub(crate) fn step(&mut self, primitive: &Primitive<R, N>, wrench: &Wrench<R>, frozen: bool) -> Reference<R> {
         if !self.options.feedback {
             self.coupling = Coupling::NONE;
         } else if !frozen {
             let measured = self.sensors(primitive, wrench);
-            self.coupling = self
-                .rollout
-                .coupling(primitive, &measured, &SensorMap::IDENTITY);
+            self.coupling = self.rollout.coupling(primitive, &measured, &SensorMap::IDENTITY);
         }
         let plan = self.rollout.step(primitive, R::of(PERIOD), &self.coupling);
-        let slow = |speeds: &[R], limit: f64| {
-            speeds
-                .iter()
-                .all(|speed| *speed < R::of(limit) && *speed > R::of(-limit))
-        };
+        let slow =
+            |speeds: &[R], limit: f64| speeds.iter().all(|speed| *speed < R::of(limit) && *speed > R::of(-limit));
         let resting = self.rollout.is_finished()
             && slow(&plan.position.v, REST.0)
             && slow(&plan.orientation.omega, REST.1)
             && slow(&plan.posture.v, REST.1);
-        self.rested = if resting {
-            self.rested.saturating_add(1)
-        } else {
-            0
-        };
+        self.rested = if resting { self.rested.saturating_add(1) } else { 0 };
         plan
     }
 
@@ -159,11 +126,7 @@ impl<R: Real, const N: usize> Run<R, N> {
 
     /// Error of the force controller, `F_expected - F` (N, N m, force world axes, torque tool axes); `None` without an
     /// expectation.
-    pub(crate) fn force_error(
-        &self,
-        primitive: &Primitive<R, N>,
-        wrench: &Wrench<R>,
-    ) -> Option<Wrench<R>> {
+    pub(crate) fn force_error(&self, primitive: &Primitive<R, N>, wrench: &Wrench<R>) -> Option<Wrench<R>> {
         let [fx, fy, fz, nx, ny, nz, ..] = primitive.expected()?.at(self.rollout.progress());
         Some(Wrench {
             force: Vector3::new(fx, fy, fz) - wrench.force,

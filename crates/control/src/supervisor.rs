@@ -174,9 +174,7 @@ pub const fn transition(state: State, trigger: Trigger) -> Transition {
         (State::Idle | State::Fault | State::SoftStop, Trigger::SoftFault) => Stay,
         (_, Trigger::SoftFault) => Enter(State::SoftStop),
 
-        (State::Gravity | State::Hold | State::Approach | State::Run, Trigger::RepliesMissing) => {
-            Enter(State::Coast)
-        }
+        (State::Gravity | State::Hold | State::Approach | State::Run, Trigger::RepliesMissing) => Enter(State::Coast),
         (_, Trigger::RepliesMissing) => Stay,
         (State::Coast, Trigger::RepliesBack) => Resume,
         (_, Trigger::RepliesBack) => Stay,
@@ -195,15 +193,13 @@ pub const fn transition(state: State, trigger: Trigger) -> Transition {
         (_, Trigger::Clear) => Refuse,
 
         (State::Gravity, Trigger::Gravity) => Stay,
-        (
-            State::Idle | State::Hold | State::Approach | State::Run | State::SoftStop,
-            Trigger::Gravity,
-        ) => Enter(State::Gravity),
+        (State::Idle | State::Hold | State::Approach | State::Run | State::SoftStop, Trigger::Gravity) => {
+            Enter(State::Gravity)
+        }
         (State::Hold, Trigger::Hold) => Stay,
-        (
-            State::Idle | State::Gravity | State::Approach | State::Run | State::SoftStop,
-            Trigger::Hold,
-        ) => Enter(State::Hold),
+        (State::Idle | State::Gravity | State::Approach | State::Run | State::SoftStop, Trigger::Hold) => {
+            Enter(State::Hold)
+        }
         (State::Gravity | State::Hold, Trigger::Approach) => Enter(State::Approach),
         (State::Gravity | State::Hold, Trigger::Run) => Enter(State::Run),
         (_, Trigger::Gravity | Trigger::Hold | Trigger::Approach | Trigger::Run) => Refuse,
@@ -221,11 +217,7 @@ pub struct Supervisor {
 impl Supervisor {
     /// Idle, without a fault.
     pub const fn new() -> Self {
-        Supervisor {
-            state: State::Idle,
-            bridged: State::Idle,
-            fault: Fault::None,
-        }
+        Supervisor { state: State::Idle, bridged: State::Idle, fault: Fault::None }
     }
 
     /// The present state.

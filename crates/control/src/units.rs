@@ -111,12 +111,7 @@ impl<R: Real> Orientation<R> {
         let one = R::of(1.0);
         let (m00, m11, m22) = (rotation[(0, 0)], rotation[(1, 1)], rotation[(2, 2)]);
         // Four times the squares of w, x, y, z.
-        let squares = [
-            one + m00 + m11 + m22,
-            one + m00 - m11 - m22,
-            one - m00 + m11 - m22,
-            one - m00 - m11 + m22,
-        ];
+        let squares = [one + m00 + m11 + m22, one + m00 - m11 - m22, one - m00 + m11 - m22, one - m00 - m11 + m22];
         // Four times the products of the components.
         let wx = rotation[(2, 1)] - rotation[(1, 2)];
         let wy = rotation[(0, 2)] - rotation[(2, 0)];
@@ -183,14 +178,7 @@ pub struct Twist<R: Real> {
 impl<R: Real> Twist<R> {
     /// Linear part first.
     pub fn to_vector(&self) -> Vector6<R> {
-        Vector6::new(
-            self.linear.x,
-            self.linear.y,
-            self.linear.z,
-            self.angular.x,
-            self.angular.y,
-            self.angular.z,
-        )
+        Vector6::new(self.linear.x, self.linear.y, self.linear.z, self.angular.x, self.angular.y, self.angular.z)
     }
 }
 
@@ -206,10 +194,7 @@ pub struct Wrench<R: Real> {
 impl<R: Real> Wrench<R> {
     /// No force, no torque.
     pub fn zero() -> Self {
-        Wrench {
-            force: Vector3::zeros(),
-            torque: Vector3::zeros(),
-        }
+        Wrench { force: Vector3::zeros(), torque: Vector3::zeros() }
     }
 
     /// Force (world axes, N), then torque (tool axes, N m), as plain `f32`.
@@ -227,13 +212,6 @@ impl<R: Real> Wrench<R> {
     /// The same wrench with the torque turned into world axes, as the rows of the Jacobian need it.
     pub fn in_world(&self, tool_to_world: &Matrix3<R>) -> Vector6<R> {
         let torque = tool_to_world * self.torque;
-        Vector6::new(
-            self.force.x,
-            self.force.y,
-            self.force.z,
-            torque.x,
-            torque.y,
-            torque.z,
-        )
+        Vector6::new(self.force.x, self.force.y, self.force.z, torque.x, torque.y, torque.z)
     }
 }

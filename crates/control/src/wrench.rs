@@ -115,12 +115,8 @@ impl<R: Real> WrenchEstimator<R> {
         let felt = self.filter.output() - self.tare;
         let to_world = frames.sensor_to_world();
         let force = to_world * Vector3::new(felt[0], felt[1], felt[2]);
-        let torque = to_world * Vector3::new(felt[3], felt[4], felt[5])
-            + frames.tool_to_sensor().cross(&force);
-        Wrench {
-            force,
-            torque: frames.tool_to_world().tr_mul(&torque),
-        }
+        let torque = to_world * Vector3::new(felt[3], felt[4], felt[5]) + frames.tool_to_sensor().cross(&force);
+        Wrench { force, torque: frames.tool_to_world().tr_mul(&torque) }
     }
 }
 

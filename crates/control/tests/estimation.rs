@@ -11,11 +11,7 @@ type Replies = [Option<Counts>; 7];
 
 fn replies(calibration: &Calibration<f64>, q: [f64; 7]) -> Replies {
     let motor = calibration.transmission().motor_from_joint(&q);
-    calibration
-        .drives()
-        .counts(&motor)
-        .expect("finite")
-        .map(|counts| Some(counts.wrapped()))
+    calibration.drives().counts(&motor).expect("finite").map(|counts| Some(counts.wrapped()))
 }
 
 fn nominal<R: Real>() -> Calibration<R> {
@@ -63,14 +59,9 @@ fn positions_are_those_of_the_counts() {
     let q = [0.3, -1.2, 0.7, 2.1, -3.0, 0.4, -2.2];
     let calibration = nominal::<f64>();
     let mut estimator = JointEstimator::<f32>::new(&nominal());
-    let state = estimator
-        .update(&replies(&calibration, q), false)
-        .expect("complete");
+    let state = estimator.update(&replies(&calibration, q), false).expect("complete");
     for (estimate, true_angle) in state.q.0.iter().zip(q) {
-        assert!(
-            (f64::from(*estimate) - true_angle).abs() < 2e-4,
-            "{state:?}"
-        );
+        assert!((f64::from(*estimate) - true_angle).abs() < 2e-4, "{state:?}");
     }
     assert_eq!(state.dq.0, Vector7::zeros());
 }
@@ -83,11 +74,7 @@ fn nothing_is_known_before_all_seven_answer_together() {
     partial[6] = None;
     assert!(estimator.update(&partial, false).is_none());
     assert!(estimator.update(&[None; 7], false).is_none());
-    assert!(
-        estimator
-            .update(&replies(&calibration, [0.1; 7]), false)
-            .is_some()
-    );
+    assert!(estimator.update(&replies(&calibration, [0.1; 7]), false).is_some());
 }
 
 #[test]
@@ -117,9 +104,7 @@ fn constant_speed_is_estimated_without_bias_and_with_little_noise() {
     let (mut sum, mut square, mut count) = ([0.0f64; 7], [0.0f64; 7], 0.0);
     for cycle in 0..400 {
         let q = speed.map(|speed| 0.2 + speed * cycle as f64 / RATE);
-        let state = estimator
-            .update(&replies(&calibration, q), true)
-            .expect("complete");
+        let state = estimator.update(&replies(&calibration, q), true).expect("complete");
         if cycle > 60 {
             for joint in 0..7 {
                 let error = f64::from(state.dq.0[joint]) - speed[joint];
@@ -131,11 +116,7 @@ fn constant_speed_is_estimated_without_bias_and_with_little_noise() {
     }
     for joint in 0..7 {
         let (mean, rms) = (sum[joint] / count, (square[joint] / count).sqrt());
-        assert!(
-            mean.abs() < 2e-3 && rms < 6e-3,
-            "J{}: mean {mean}, rms {rms} rad/s",
-            joint + 1
-        );
+        assert!(mean.abs() < 2e-3 && rms < 6e-3, "J{}: mean {mean}, rms {rms} rad/s", joint + 1);
     }
 }
 
@@ -160,17 +141,10 @@ fn a1_a_lost_reply_changes_position_and_velocity_by_little() {
     };
     let nominal_states = run(0..0);
     for length in 1..=5 {
-        for (cycle, (a, b)) in run(100..100 + length)
-            .iter()
-            .zip(&nominal_states)
-            .enumerate()
-        {
+        for (cycle, (a, b)) in run(100..100 + length).iter().zip(&nominal_states).enumerate() {
             let dq = (a.q.0 - b.q.0).amax();
             let ddq = (a.dq.0 - b.dq.0).amax();
-            assert!(
-                dq < 5e-4 && ddq < 0.03,
-                "{length} lost, cycle {cycle}: {dq} rad, {ddq} rad/s"
-            );
+            assert!(dq < 5e-4 && ddq < 0.03, "{length} lost, cycle {cycle}: {dq} rad, {ddq} rad/s");
             let lost = cycle >= 100 && cycle < 100 + length as usize;
             assert_eq!(a.missing, if lost { 2 } else { 0 });
         }
@@ -189,10 +163,7 @@ fn a7_a_jump_of_counts_is_rejected_and_never_believed_while_torque_is_on() {
             let state = estimator.update(&sample, true).expect("known");
             // The gate opens with the time since the last reply, up to six cycles.
             if jump > 6 * 300 {
-                assert!(
-                    state.implausible && state.age == cycle,
-                    "jump {jump}: {state:?}"
-                );
+                assert!(state.implausible && state.age == cycle, "jump {jump}: {state:?}");
                 assert!((state.q.0 - before.q.0).amax() < 1e-3);
             }
         }
@@ -208,10 +179,7 @@ fn after_the_bridge_the_estimate_stands_still() {
     let calibration = nominal::<f64>();
     let mut estimator = JointEstimator::<f64>::new(&nominal());
     for cycle in 0..100 {
-        estimator.update(
-            &replies(&calibration, [0.5 * f64::from(cycle) / RATE; 7]),
-            true,
-        );
+        estimator.update(&replies(&calibration, [0.5 * f64::from(cycle) / RATE; 7]), true);
     }
     let mut last = JointPositions::<f64>::zero();
     for cycle in 0..60 {

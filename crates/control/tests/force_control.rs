@@ -11,21 +11,10 @@ fn deviation<R: Real>() -> (f64, f64)
 where
     f64: From<R>,
 {
-    let path = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../tests/vectors/dmp_force_pi.csv"
-    );
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .from_path(path)
-        .expect("golden vectors exist");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/vectors/dmp_force_pi.csv");
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(path).expect("golden vectors exist");
     let header = reader.headers().expect("a header").clone();
-    let column = |name: String| {
-        header
-            .iter()
-            .position(|field| field == name)
-            .expect("a column")
-    };
+    let column = |name: String| header.iter().position(|field| field == name).expect("a column");
     let columns = |prefix: &str| AXES.map(|axis| column(format!("{prefix}_{axis}")));
     let (expected, felt, command) = (columns("Fdes"), columns("F"), columns("u"));
     let torque = [0, 1, 2, 3, 4, 5, 6].map(|joint| column(format!("tau{joint}")));
@@ -40,8 +29,7 @@ where
     for record in reader.records() {
         let record = record.expect("a row");
         let number = |index: usize| record[index].parse::<f64>().expect("a number");
-        let error =
-            Vector6::from_fn(|axis, _| R::of(number(expected[axis])) - R::of(number(felt[axis])));
+        let error = Vector6::from_fn(|axis, _| R::of(number(expected[axis])) - R::of(number(felt[axis])));
         let u = controller.command(&error, R::of(1.0), R::of(2.0), R::of(PERIOD), false);
         let tau = ForceController::torque(&jacobian, &u);
         let mut compare = |which: usize, computed: f64, golden: f64| {

@@ -11,9 +11,7 @@ use nalgebra::SMatrix;
 fn postures() -> Vec<[f64; 7]> {
     let mut seed = 1u64;
     let mut random = || {
-        seed = seed
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (seed >> 33) as f64 / (1u64 << 31) as f64
     };
     let mut postures = vec![[0.0; 7], model::HOME];
@@ -50,11 +48,7 @@ fn the_anti_windup_clamp_leaves_more_torque_than_friction() {
     let gains = Gains::<f64>::tuned();
     for joint in 0..7 {
         let push = gains.clamp[joint] * gains.stiffness[joint];
-        assert!(
-            push > 2.0 * model::FRICTION_COULOMB[joint],
-            "J{}: {push} N m",
-            joint + 1
-        );
+        assert!(push > 2.0 * model::FRICTION_COULOMB[joint], "J{}: {push} N m", joint + 1);
     }
 }
 

@@ -15,16 +15,8 @@ impl Row {
 
 fn rows(file: &str) -> Vec<Row> {
     let path = format!("{}/../../tests/vectors/{file}", env!("CARGO_MANIFEST_DIR"));
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .from_path(path)
-        .expect("golden vectors exist");
-    let header: Vec<String> = reader
-        .headers()
-        .expect("a header")
-        .iter()
-        .map(str::to_owned)
-        .collect();
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(path).expect("golden vectors exist");
+    let header: Vec<String> = reader.headers().expect("a header").iter().map(str::to_owned).collect();
     // The columns are read by position below; these anchors pin the layout.
     for (index, name) in [
         (1, "q1"),
@@ -43,13 +35,7 @@ fn rows(file: &str) -> Vec<Row> {
     }
     let rows: Vec<Row> = reader
         .records()
-        .map(|record| {
-            Row(record
-                .expect("a row")
-                .iter()
-                .map(|field| field.parse().expect("a number"))
-                .collect())
-        })
+        .map(|record| Row(record.expect("a row").iter().map(|field| field.parse().expect("a number")).collect()))
         .collect();
     assert_eq!(rows.len(), 100, "{file}");
     rows
@@ -86,11 +72,7 @@ where
         let frames = Frames::new(&model, &q);
         let pose = frames.tool_pose();
         for axis in 0..3 {
-            grow(
-                &mut worst.position,
-                pose.position[axis].into(),
-                row.0[22 + axis],
-            );
+            grow(&mut worst.position, pose.position[axis].into(), row.0[22 + axis]);
         }
         let sign = if f64::from(pose.orientation.0[0]) * row.0[25]
             + f64::from(pose.orientation.0[1]) * row.0[26]
@@ -103,20 +85,12 @@ where
             1.0
         };
         for component in 0..4 {
-            grow(
-                &mut worst.rotation,
-                sign * f64::from(pose.orientation.0[component]),
-                row.0[25 + component],
-            );
+            grow(&mut worst.rotation, sign * f64::from(pose.orientation.0[component]), row.0[25 + component]);
         }
         let jacobian = frames.jacobian();
         for r in 0..6 {
             for c in 0..7 {
-                grow(
-                    &mut worst.jacobian,
-                    jacobian.0[(r, c)].into(),
-                    row.0[29 + 7 * r + c],
-                );
+                grow(&mut worst.jacobian, jacobian.0[(r, c)].into(), row.0[29 + 7 * r + c]);
             }
         }
         let mass = model.link_mass_matrix(&frames);
@@ -129,53 +103,29 @@ where
         let gravity = model.gravity_torque(&frames);
         let torque = model.inverse_dynamics(&frames, &dq, &ddq);
         for joint in 0..7 {
-            grow(
-                &mut worst.torque,
-                coriolis.0[joint].into(),
-                row.0[120 + joint],
-            );
-            grow(
-                &mut worst.torque,
-                gravity.0[joint].into(),
-                row.0[127 + joint],
-            );
-            grow(
-                &mut worst.torque,
-                torque.0[joint].into(),
-                row.0[134 + joint],
-            );
+            grow(&mut worst.torque, coriolis.0[joint].into(), row.0[120 + joint]);
+            grow(&mut worst.torque, gravity.0[joint].into(), row.0[127 + joint]);
+            grow(&mut worst.torque, torque.0[joint].into(), row.0[134 + joint]);
         }
         let product = frames.velocity_product(&dq).to_vector();
         for axis in 0..6 {
-            grow(
-                &mut worst.velocity_product,
-                product[axis].into(),
-                row.0[141 + axis],
-            );
+            grow(&mut worst.velocity_product, product[axis].into(), row.0[141 + axis]);
         }
     }
     println!("{file}: {worst:?}");
     worst
 }
 
-const FILES: [(&str, Payload); 2] = [
-    ("dyn_wam7.csv", Payload::None),
-    ("dyn_wam7_bh280_ft.csv", Payload::SensorAndHand),
-];
+const FILES: [(&str, Payload); 2] =
+    [("dyn_wam7.csv", Payload::None), ("dyn_wam7_bh280_ft.csv", Payload::SensorAndHand)];
 
 #[test]
 fn double_precision_equals_the_golden_dynamics() {
     for (file, payload) in FILES {
         let worst = compare::<f64>(file, payload);
         let bound = 1e-10;
-        assert!(
-            worst.position <= bound && worst.rotation <= bound && worst.jacobian <= bound,
-            "{worst:?}"
-        );
-        assert!(
-            worst.mass <= bound && worst.torque <= bound && worst.velocity_product <= bound,
-            "{worst:?}"
-        );
+        assert!(worst.position <= bound && worst.rotation <= bound && worst.jacobian <= bound, "{worst:?}");
+        assert!(worst.mass <= bound && worst.torque <= bound && worst.velocity_product <= bound, "{worst:?}");
     }
 }
 
@@ -184,10 +134,7 @@ fn single_precision_stays_within_the_stated_bounds() {
     for (file, payload) in FILES {
         let worst = compare::<f32>(file, payload);
         assert!(worst.position <= 2e-6, "{worst:?}");
-        assert!(
-            worst.rotation <= 1e-5 && worst.jacobian <= 1e-5,
-            "{worst:?}"
-        );
+        assert!(worst.rotation <= 1e-5 && worst.jacobian <= 1e-5, "{worst:?}");
         assert!(worst.torque <= 1e-4, "{worst:?}");
     }
 }
@@ -208,11 +155,7 @@ fn reflected_rotor_inertia_is_added_with_its_cross_term() {
                         * control::model::JOINT_TO_MOTOR[motor][c]
                 })
                 .sum();
-            assert!(
-                (rotors[(r, c)] - reflected).abs() < 1e-12,
-                "({r}, {c}): {} {reflected}",
-                rotors[(r, c)]
-            );
+            assert!((rotors[(r, c)] - reflected).abs() < 1e-12, "({r}, {c}): {} {reflected}", rotors[(r, c)]);
         }
     }
     let ddq = JointAccelerations::from_array([1.0, -2.0, 3.0, 0.5, 4.0, -3.0, 2.0]);

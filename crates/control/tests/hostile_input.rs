@@ -4,9 +4,7 @@ use control::arm::ArmModel;
 use control::command::{AccelerationSource, Command, Goal, PoseFeedback, RunOptions};
 use control::limit::STEP_LIMIT;
 use control::load::{self, End, LoadError};
-use control::{
-    BusSample, Calibration, Cycle, CycleInput, Event, Fault, Payload, Refusal, State, flags,
-};
+use control::{BusSample, Calibration, Cycle, CycleInput, Event, Fault, Payload, Refusal, State, flags};
 use dmp::{Configuration, Hemisphere, OrientationError, PrimitiveTables, Quaternion, Velocity};
 use proptest::prelude::*;
 use puck::{Counts, GaugeStatus, RawWrench, SafetyMode};
@@ -17,18 +15,12 @@ const POSTURE: [f64; 7] = [-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75];
 fn counts(q: [f64; 7]) -> [Option<Counts>; 7] {
     let calibration = Calibration::<f64>::nominal(Payload::SensorAndHand);
     let motor = calibration.transmission().motor_from_joint(&q);
-    calibration
-        .drives()
-        .counts(&motor)
-        .expect("finite")
-        .map(Some)
+    calibration.drives().counts(&motor).expect("finite").map(Some)
 }
 
 fn configuration(q: [f64; 7]) -> Configuration<f32> {
     let model = ArmModel::<f64>::new(Payload::SensorAndHand);
-    let pose =
-        control::kinematics::Frames::new(&model, &control::units::JointPositions::from_array(q))
-            .tool_pose();
+    let pose = control::kinematics::Frames::new(&model, &control::units::JointPositions::from_array(q)).tool_pose();
     let [w, x, y, z] = pose.orientation.0.map(|value| value as f32);
     Configuration {
         position: [0, 1, 2].map(|axis| pose.position[axis] as f32),
@@ -53,12 +45,7 @@ fn tables() -> PrimitiveTables<'static, f32> {
         hemisphere: Hemisphere::Nearest,
         start: configuration(POSTURE),
         goal: configuration([-0.3, 1.4, 1.3, 2.0, -0.2, -0.5, 1.6]),
-        start_velocity: Velocity {
-            position: [0.0; 3],
-            orientation: [0.0; 3],
-            posture: [0.0; 7],
-            hand: [0.0; 4],
-        },
+        start_velocity: Velocity { position: [0.0; 3], orientation: [0.0; 3], posture: [0.0; 7], hand: [0.0; 4] },
         feedback: None,
         expected: None,
     }
@@ -66,11 +53,7 @@ fn tables() -> PrimitiveTables<'static, f32> {
 
 fn sample(positions: [Option<Counts>; 7]) -> CycleInput {
     CycleInput {
-        sample: BusSample {
-            positions,
-            wrench: Some(RawWrench::default()),
-            safety: Some(SafetyMode::Active),
-        },
+        sample: BusSample { positions, wrench: Some(RawWrench::default()), safety: Some(SafetyMode::Active) },
         ..CycleInput::default()
     }
 }
@@ -79,16 +62,11 @@ fn sample(positions: [Option<Counts>; 7]) -> CycleInput {
 fn cycle_in(state: State) -> Cycle<f32, KERNELS> {
     let mut cycle = Cycle::new(Calibration::nominal(Payload::SensorAndHand));
     let model = ArmModel::new(Payload::SensorAndHand);
-    cycle
-        .load(&load::primitive(&model, &tables()).expect("a good primitive"))
-        .expect("loads");
+    cycle.load(&load::primitive(&model, &tables()).expect("a good primitive")).expect("loads");
     let mut feed = |command: Option<Command>, cycles: usize| {
         for index in 0..cycles {
             let command = command.filter(|_| index == 0);
-            cycle.step(&CycleInput {
-                command,
-                ..sample(counts(POSTURE))
-            });
+            cycle.step(&CycleInput { command, ..sample(counts(POSTURE)) });
         }
     };
     feed(None, 3);
@@ -98,20 +76,8 @@ fn cycle_in(state: State) -> Cycle<f32, KERNELS> {
         _ => feed(Some(Command::Hold), 50),
     }
     match state {
-        State::Approach => feed(
-            Some(Command::Approach {
-                q: [0.0, 1.0, 1.0, 1.5, 0.0, 0.0, 0.0],
-                duration: 3.0,
-            }),
-            20,
-        ),
-        State::Run => feed(
-            Some(Command::Run(RunOptions {
-                force_control: true,
-                ..RunOptions::default()
-            })),
-            20,
-        ),
+        State::Approach => feed(Some(Command::Approach { q: [0.0, 1.0, 1.0, 1.5, 0.0, 0.0, 0.0], duration: 3.0 }), 20),
+        State::Run => feed(Some(Command::Run(RunOptions { force_control: true, ..RunOptions::default() })), 20),
         State::SoftStop => feed(Some(Command::Stop), 5),
         _ => {}
     }
@@ -133,27 +99,15 @@ fn any_positions() -> impl Strategy<Value = [Option<Counts>; 7]> {
     prop::array::uniform7((0..4u8, -150i32..150, any_counts())).prop_map(move |motors| {
         core::array::from_fn(|motor| {
             let (kind, jitter, wild) = motors[motor];
-            if kind > 0 {
-                truth[motor].map(|counts| Counts(counts.0 + jitter))
-            } else {
-                wild
-            }
+            if kind > 0 { truth[motor].map(|counts| Counts(counts.0 + jitter)) } else { wild }
         })
     })
 }
 
 fn any_wrench() -> impl Strategy<Value = Option<RawWrench>> {
     prop::option::of(
-        (
-            prop::array::uniform3(any::<i16>()),
-            prop::array::uniform3(any::<i16>()),
-            prop::option::of(any::<u8>()),
-        )
-            .prop_map(|(force, torque, status)| RawWrench {
-                force,
-                torque,
-                status: status.map(GaugeStatus),
-            }),
+        (prop::array::uniform3(any::<i16>()), prop::array::uniform3(any::<i16>()), prop::option::of(any::<u8>()))
+            .prop_map(|(force, torque, status)| RawWrench { force, torque, status: status.map(GaugeStatus) }),
     )
 }
 
@@ -162,43 +116,26 @@ fn any_goal() -> impl Strategy<Value = Goal> {
         prop::option::of(prop::array::uniform3(prop::num::f32::ANY)),
         prop::option::of(prop::array::uniform4(prop::num::f32::ANY)),
     )
-        .prop_map(|(position, orientation)| Goal {
-            position,
-            orientation,
-        })
+        .prop_map(|(position, orientation)| Goal { position, orientation })
 }
 
 fn any_command() -> impl Strategy<Value = Command> {
     prop_oneof![
         Just(Command::Gravity),
         Just(Command::Hold),
-        (
-            prop::array::uniform7(prop::num::f32::ANY),
-            prop::num::f32::ANY
-        )
+        (prop::array::uniform7(prop::num::f32::ANY), prop::num::f32::ANY)
             .prop_map(|(q, duration)| Command::Approach { q, duration }),
-        (prop::array::uniform7(-0.5f32..2.0), 0.0f32..5.0)
-            .prop_map(|(q, duration)| Command::Approach { q, duration }),
-        (any_goal(), prop::num::f32::ANY, any::<[bool; 4]>()).prop_map(
-            |(goal, speed, [a, b, c, d])| {
-                Command::Run(RunOptions {
-                    goal: if d { goal } else { Goal::STORED },
-                    speed: if d { speed } else { 1.0 },
-                    feedback: a,
-                    force_control: b,
-                    pose_feedback: if c {
-                        PoseFeedback::Measured
-                    } else {
-                        PoseFeedback::Planned
-                    },
-                    acceleration: if a {
-                        AccelerationSource::Analytic
-                    } else {
-                        AccelerationSource::Differentiated
-                    },
-                })
-            }
-        ),
+        (prop::array::uniform7(-0.5f32..2.0), 0.0f32..5.0).prop_map(|(q, duration)| Command::Approach { q, duration }),
+        (any_goal(), prop::num::f32::ANY, any::<[bool; 4]>()).prop_map(|(goal, speed, [a, b, c, d])| {
+            Command::Run(RunOptions {
+                goal: if d { goal } else { Goal::STORED },
+                speed: if d { speed } else { 1.0 },
+                feedback: a,
+                force_control: b,
+                pose_feedback: if c { PoseFeedback::Measured } else { PoseFeedback::Planned },
+                acceleration: if a { AccelerationSource::Analytic } else { AccelerationSource::Differentiated },
+            })
+        }),
         Just(Command::Stop),
         Just(Command::Release),
         Just(Command::ClearFault),
@@ -216,37 +153,18 @@ fn any_input() -> impl Strategy<Value = CycleInput> {
         1 => Just(Some(SafetyMode::EStop)),
     ];
     let fault = prop_oneof![30 => Just(None), 1 => Just(Some(Fault::BusFault)), 1 => Just(Some(Fault::Overrun))];
-    (
-        any_positions(),
-        any_wrench(),
-        safety,
-        prop::option::weighted(0.2, any_command()),
-        fault,
-        any::<u64>(),
+    (any_positions(), any_wrench(), safety, prop::option::weighted(0.2, any_command()), fault, any::<u64>()).prop_map(
+        |(positions, wrench, safety, command, external_fault, cycle)| CycleInput {
+            cycle,
+            sample: BusSample { positions, wrench, safety },
+            command,
+            external_fault,
+        },
     )
-        .prop_map(
-            |(positions, wrench, safety, command, external_fault, cycle)| CycleInput {
-                cycle,
-                sample: BusSample {
-                    positions,
-                    wrench,
-                    safety,
-                },
-                command,
-                external_fault,
-            },
-        )
 }
 
 fn any_state() -> impl Strategy<Value = State> {
-    prop::sample::select(vec![
-        State::Idle,
-        State::Gravity,
-        State::Hold,
-        State::Approach,
-        State::Run,
-        State::SoftStop,
-    ])
+    prop::sample::select(vec![State::Idle, State::Gravity, State::Hold, State::Approach, State::Run, State::SoftStop])
 }
 
 proptest! {
@@ -287,10 +205,7 @@ proptest! {
 fn e4_commands_out_of_range_are_refused_with_a_reason_and_change_nothing() {
     let refused = |state: State, command: Command| {
         let mut cycle = cycle_in(state);
-        let output = cycle.step(&CycleInput {
-            command: Some(command),
-            ..sample(counts(POSTURE))
-        });
+        let output = cycle.step(&CycleInput { command: Some(command), ..sample(counts(POSTURE)) });
         assert_eq!(cycle.state(), state, "{command:?}");
         match output.event {
             Some(Event::Refused(reason)) => reason,
@@ -298,58 +213,20 @@ fn e4_commands_out_of_range_are_refused_with_a_reason_and_change_nothing() {
         }
     };
     let far = [0.0, 0.0, 0.0, 0.0, 0.0, 1.9, 0.0];
-    assert_eq!(
-        refused(
-            State::Hold,
-            Command::Approach {
-                q: far,
-                duration: 1.0
-            }
-        ),
-        Refusal::OutsideJointLimits
-    );
+    assert_eq!(refused(State::Hold, Command::Approach { q: far, duration: 1.0 }), Refusal::OutsideJointLimits);
     for duration in [-1.0, f32::NAN, f32::INFINITY, 1e6] {
-        assert_eq!(
-            refused(
-                State::Hold,
-                Command::Approach {
-                    q: [0.0; 7],
-                    duration
-                }
-            ),
-            Refusal::OutOfRange
-        );
+        assert_eq!(refused(State::Hold, Command::Approach { q: [0.0; 7], duration }), Refusal::OutOfRange);
     }
     let mut q = [0.0; 7];
     q[2] = f32::NAN;
-    assert_eq!(
-        refused(State::Hold, Command::Approach { q, duration: 1.0 }),
-        Refusal::OutOfRange
-    );
+    assert_eq!(refused(State::Hold, Command::Approach { q, duration: 1.0 }), Refusal::OutOfRange);
     for factor in [0.0, -1.0, 10.0, f32::NAN] {
-        assert_eq!(
-            refused(State::Run, Command::SetSpeed { factor }),
-            Refusal::OutOfRange
-        );
+        assert_eq!(refused(State::Run, Command::SetSpeed { factor }), Refusal::OutOfRange);
     }
-    let goal = |position, orientation| {
-        Command::SetGoal(Goal {
-            position,
-            orientation,
-        })
-    };
-    assert_eq!(
-        refused(State::Run, goal(Some([f32::NAN, 0.0, 0.0]), None)),
-        Refusal::OutOfRange
-    );
-    assert_eq!(
-        refused(State::Run, goal(Some([1.0, 1.0, 0.0]), None)),
-        Refusal::OutsideWorkspace
-    );
-    assert_eq!(
-        refused(State::Run, goal(None, Some([0.5, 0.0, 0.0, 0.0]))),
-        Refusal::OutOfRange
-    );
+    let goal = |position, orientation| Command::SetGoal(Goal { position, orientation });
+    assert_eq!(refused(State::Run, goal(Some([f32::NAN, 0.0, 0.0]), None)), Refusal::OutOfRange);
+    assert_eq!(refused(State::Run, goal(Some([1.0, 1.0, 0.0]), None)), Refusal::OutsideWorkspace);
+    assert_eq!(refused(State::Run, goal(None, Some([0.5, 0.0, 0.0, 0.0]))), Refusal::OutOfRange);
     assert_eq!(refused(State::Hold, goal(None, None)), Refusal::WrongState);
     assert_eq!(refused(State::Run, Command::Tare), Refusal::WrongState);
 }
@@ -364,59 +241,23 @@ fn e4_a_primitive_that_this_arm_cannot_run_is_refused_at_load() {
     };
     assert!(load::primitive::<f32, KERNELS>(&model, &tables()).is_ok());
     assert_eq!(reason(&|tables| tables.duration = 0.3), LoadError::Duration);
-    assert_eq!(
-        reason(&|tables| tables.duration = 500.0),
-        LoadError::Duration
-    );
-    assert!(matches!(
-        reason(&|tables| tables.duration = 0.0),
-        LoadError::Primitive(_)
-    ));
-    assert!(matches!(
-        reason(&|tables| tables.duration = f32::NAN),
-        LoadError::Primitive(_)
-    ));
-    assert!(matches!(
-        reason(&|tables| tables.kernel_count = 0),
-        LoadError::Primitive(_)
-    ));
-    assert!(matches!(
-        reason(&|tables| tables.goal.posture[1] = f32::NAN),
-        LoadError::Primitive(_)
-    ));
-    assert!(matches!(
-        reason(&|tables| tables.start.orientation.w = 2.0),
-        LoadError::Primitive(_)
-    ));
-    assert_eq!(
-        reason(&|tables| tables.goal.posture[5] = 1.55),
-        LoadError::Posture(End::Goal, 5)
-    );
-    assert_eq!(
-        reason(&|tables| tables.start.posture[0] = -2.6),
-        LoadError::Posture(End::Start, 0)
-    );
-    assert_eq!(
-        reason(&|tables| tables.goal.position = [1.2, 0.0, 0.0]),
-        LoadError::OutOfReach(End::Goal)
-    );
-    assert_eq!(
-        reason(&|tables| tables.goal.position[2] += 0.1),
-        LoadError::Inconsistent(End::Goal)
-    );
-    assert_eq!(
-        reason(&|tables| tables.start.posture[6] += 0.4),
-        LoadError::Inconsistent(End::Start)
-    );
+    assert_eq!(reason(&|tables| tables.duration = 500.0), LoadError::Duration);
+    assert!(matches!(reason(&|tables| tables.duration = 0.0), LoadError::Primitive(_)));
+    assert!(matches!(reason(&|tables| tables.duration = f32::NAN), LoadError::Primitive(_)));
+    assert!(matches!(reason(&|tables| tables.kernel_count = 0), LoadError::Primitive(_)));
+    assert!(matches!(reason(&|tables| tables.goal.posture[1] = f32::NAN), LoadError::Primitive(_)));
+    assert!(matches!(reason(&|tables| tables.start.orientation.w = 2.0), LoadError::Primitive(_)));
+    assert_eq!(reason(&|tables| tables.goal.posture[5] = 1.55), LoadError::Posture(End::Goal, 5));
+    assert_eq!(reason(&|tables| tables.start.posture[0] = -2.6), LoadError::Posture(End::Start, 0));
+    assert_eq!(reason(&|tables| tables.goal.position = [1.2, 0.0, 0.0]), LoadError::OutOfReach(End::Goal));
+    assert_eq!(reason(&|tables| tables.goal.position[2] += 0.1), LoadError::Inconsistent(End::Goal));
+    assert_eq!(reason(&|tables| tables.start.posture[6] += 0.4), LoadError::Inconsistent(End::Start));
 }
 
 #[test]
 fn a_primitive_is_not_exchanged_while_it_runs() {
     let model = ArmModel::new(Payload::SensorAndHand);
     let primitive = load::primitive(&model, &tables()).expect("good");
-    assert_eq!(
-        cycle_in(State::Run).load(&primitive),
-        Err(control::LoadRefusal::Running)
-    );
+    assert_eq!(cycle_in(State::Run).load(&primitive), Err(control::LoadRefusal::Running));
     assert_eq!(cycle_in(State::Hold).load(&primitive), Ok(()));
 }

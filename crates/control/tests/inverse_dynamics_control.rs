@@ -25,9 +25,7 @@ fn the_torque_is_inertia_bias_feedback_and_friction() {
     };
     let frames = Frames::new(&arm, &state.q);
     let mut controller = JointController::new();
-    let torque = controller
-        .torque(&arm, &gains, &frames, &state, &reference, false)
-        .0;
+    let torque = controller.torque(&arm, &gains, &frames, &state, &reference, false).0;
 
     let friction = Vector7::from_fn(|joint, _| {
         let rate = reference.dq.0[joint];
@@ -44,12 +42,7 @@ fn the_torque_is_inertia_bias_feedback_and_friction() {
     assert!((torque - expected).amax() < 1e-10, "{torque} {expected}");
 
     // Frozen, the feedback of the last good cycle stays, whatever the extrapolated state is.
-    let elsewhere = JointState {
-        q: JointPositions(state.q.0 * 1.1),
-        ..state
-    };
-    let frozen = controller
-        .torque(&arm, &gains, &frames, &elsewhere, &reference, true)
-        .0;
+    let elsewhere = JointState { q: JointPositions(state.q.0 * 1.1), ..state };
+    let frozen = controller.torque(&arm, &gains, &frames, &elsewhere, &reference, true).0;
     assert!((frozen - torque).amax() < 1e-10);
 }

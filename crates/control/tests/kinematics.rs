@@ -25,22 +25,14 @@ fn the_jacobian_is_the_derivative_of_the_pose_in_world_axes() {
     let dq = Vector7::from([0.3, -0.5, 0.7, 0.2, -0.9, 0.4, 0.6]);
     for q in POSTURES {
         let step = 1e-6;
-        let (before, after) = [-step, step]
-            .map(|h| frames((Vector7::from(q) + dq * h).into()).tool_pose())
-            .into();
+        let (before, after) = [-step, step].map(|h| frames((Vector7::from(q) + dq * h).into()).tool_pose()).into();
         let before: control::units::Pose<f64> = before;
         let linear = (after.position - before.position) / (2.0 * step);
         // 2 vec(q1 (x) conj(q0)) is a rotation in world axes.
         let angular = before.orientation.error_to(&after.orientation) / (2.0 * step);
         let twist = frames(q).jacobian().twist(&dq);
-        assert!(
-            (twist.fixed_rows::<3>(0) - linear).norm() < 1e-7,
-            "{twist} {linear}"
-        );
-        assert!(
-            (twist.fixed_rows::<3>(3) - angular).norm() < 1e-7,
-            "{twist} {angular}"
-        );
+        assert!((twist.fixed_rows::<3>(0) - linear).norm() < 1e-7, "{twist} {linear}");
+        assert!((twist.fixed_rows::<3>(3) - angular).norm() < 1e-7, "{twist} {angular}");
         // The same velocity in body axes is something else: the check can tell the frames apart.
         let body = frames(q).tool_to_world().transpose() * angular;
         assert!((twist.fixed_rows::<3>(3) - body).norm() > 0.1);
@@ -71,8 +63,7 @@ fn the_pseudo_inverse_does_the_task_and_the_rest_does_not_disturb_it() {
         }
         // Against the definition, with damping.
         let lambda = 0.01;
-        let gram = jacobian.0 * jacobian.0.transpose()
-            + nalgebra::SMatrix::<f64, 6, 6>::identity() * lambda;
+        let gram = jacobian.0 * jacobian.0.transpose() + nalgebra::SMatrix::<f64, 6, 6>::identity() * lambda;
         let direct = jacobian.0.transpose() * gram.try_inverse().expect("damped");
         let expected = direct * task + posture - direct * (jacobian.0 * posture);
         assert!((jacobian.damped(lambda).resolve(&task, &posture) - expected).norm() < 1e-12);
@@ -85,30 +76,17 @@ fn the_pseudo_inverse_does_the_task_and_the_rest_does_not_disturb_it() {
 #[test]
 fn b8_the_damped_inverse_is_finite_in_a_singular_posture_even_in_single_precision() {
     let model = ArmModel::<f32>::new(Payload::SensorAndHand);
-    for q in [
-        [0.0f32; 7],
-        [0.0, 1.57, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [0.3, 0.0, 0.5, 0.0, 0.2, 0.0, 0.1],
-    ] {
+    for q in [[0.0f32; 7], [0.0, 1.57, 0.0, 0.0, 0.0, 0.0, 0.0], [0.3, 0.0, 0.5, 0.0, 0.2, 0.0, 0.1]] {
         let jacobian = Frames::new(&model, &JointPositions::from_array(q)).jacobian();
-        let dq = jacobian.damped(4e-4).resolve(
-            &Vector6::new(0.1, 0.1, 0.1, 0.5, 0.5, 0.5),
-            &Vector7::zeros(),
-        );
+        let dq = jacobian.damped(4e-4).resolve(&Vector6::new(0.1, 0.1, 0.1, 0.5, 0.5, 0.5), &Vector7::zeros());
         // |J^+| <= 1/(2 sqrt(lambda)) = 25.
-        assert!(
-            dq.iter().all(|rate| rate.is_finite_number()) && dq.norm() < 25.0,
-            "{dq}"
-        );
+        assert!(dq.iter().all(|rate| rate.is_finite_number()) && dq.norm() < 25.0, "{dq}");
     }
 }
 
 #[test]
 fn the_orientation_error_turns_towards_the_goal_in_world_axes_on_the_short_way() {
-    for (axis, angle) in [
-        (Vector3::new(0.2, -0.5, 0.8), 0.3f64),
-        (Vector3::new(1.0, 0.4, -0.2), -0.2),
-    ] {
+    for (axis, angle) in [(Vector3::new(0.2, -0.5, 0.8), 0.3f64), (Vector3::new(1.0, 0.4, -0.2), -0.2)] {
         let axis = axis.normalize();
         let start = Rotation3::from_euler_angles(0.4, -0.7, 1.1);
         let goal = Rotation3::from_axis_angle(&nalgebra::Unit::new_unchecked(axis), angle) * start;
@@ -123,14 +101,8 @@ fn the_orientation_error_turns_towards_the_goal_in_world_axes_on_the_short_way()
 
 #[test]
 fn quaternions_and_matrices_agree_for_every_branch() {
-    for euler in [
-        [0.1, 0.2, 0.3],
-        [3.0, 0.1, 0.2],
-        [0.1, 3.0, 0.2],
-        [0.1, 0.2, 3.1],
-        [1.5, 1.5, 1.5],
-        [3.0, 0.0, 3.0],
-    ] {
+    for euler in [[0.1, 0.2, 0.3], [3.0, 0.1, 0.2], [0.1, 3.0, 0.2], [0.1, 0.2, 3.1], [1.5, 1.5, 1.5], [3.0, 0.0, 3.0]]
+    {
         let matrix = *Rotation3::from_euler_angles(euler[0], euler[1], euler[2]).matrix();
         let orientation = Orientation::from_matrix(&matrix);
         assert!((orientation.to_matrix() - matrix).amax() < 1e-12);
@@ -147,8 +119,7 @@ fn elbow_speeds_are_derivatives_of_points_on_the_arm() {
             let turn = |axis: Vector3<f64>, angle: f64| {
                 Rotation3::from_axis_angle(&nalgebra::Unit::new_unchecked(axis), angle)
             };
-            let rotation =
-                turn(Vector3::z(), q[0]) * turn(Vector3::y(), q[1]) * turn(Vector3::z(), q[2]);
+            let rotation = turn(Vector3::z(), q[0]) * turn(Vector3::y(), q[1]) * turn(Vector3::z(), q[2]);
             rotation * Vector3::new(0.045, 0.0, 0.55)
         };
         let h = 1e-6;
@@ -168,9 +139,7 @@ fn single_precision_sine_and_cosine_are_those_of_the_library() {
         for step in -100_000..=100_000 {
             let x = (range * f64::from(step) / 1e5) as f32;
             let (s, c) = x.sine_cosine();
-            let deviation = (f64::from(s) - f64::from(x).sin())
-                .abs()
-                .max((f64::from(c) - f64::from(x).cos()).abs());
+            let deviation = (f64::from(s) - f64::from(x).sin()).abs().max((f64::from(c) - f64::from(x).cos()).abs());
             worst = worst.max(deviation);
         }
         println!("within {range}: {worst:e}");

@@ -75,22 +75,15 @@ fn motors_stay_below_the_warning_of_the_safety_module_in_every_corner() {
     let calibration = Calibration::<f64>::nominal(Payload::SensorAndHand);
     for corner in 0..128u32 {
         let mut limiter = TorqueLimiter::new(&calibration);
-        let wanted = JointTorques::from_array(core::array::from_fn(|joint| {
-            if corner >> joint & 1 == 0 { 1e6 } else { -1e6 }
-        }));
+        let wanted =
+            JointTorques::from_array(core::array::from_fn(|joint| if corner >> joint & 1 == 0 { 1e6 } else { -1e6 }));
         for _ in 0..400 {
             limiter.limit(&wanted);
         }
-        let motors = calibration
-            .transmission()
-            .motor_torques_from_joint(&limiter.last().torques().0.into());
+        let motors = calibration.transmission().motor_torques_from_joint(&limiter.last().torques().0.into());
         for (motor, torque) in motors.iter().enumerate() {
             let counts = torque.abs() * model::TORQUE_COUNTS[motor];
-            assert!(
-                counts <= MOTOR_COUNTS_LIMIT + 1e-6,
-                "M{}: {counts}",
-                motor + 1
-            );
+            assert!(counts <= MOTOR_COUNTS_LIMIT + 1e-6, "M{}: {counts}", motor + 1);
             assert!(torque.abs() <= model::MOTOR_TORQUE_MAX[motor] + 1e-12);
         }
     }

@@ -21,10 +21,7 @@ fn e1_nothing_but_a_person_raises_authority() {
                 continue;
             };
             if !trigger.is_command() {
-                assert!(
-                    authority(next) <= authority(state),
-                    "{state:?} {trigger:?} {next:?}"
-                );
+                assert!(authority(next) <= authority(state), "{state:?} {trigger:?} {next:?}");
                 assert!(!(state == State::Idle && next.has_torque()), "{trigger:?}");
             }
         }
@@ -38,24 +35,7 @@ fn e1_the_whole_table_is_as_documented() {
     // One row per state, one column per trigger in the order of Trigger::ALL:
     // Gravity Hold Approach Run Stop Release Clear | Missing Back SoftFault HardFault Dropped Arrived
     let table: [(State, [Transition; 13]); 8] = [
-        (
-            Idle,
-            [
-                Enter(Gravity),
-                Enter(Hold),
-                Refuse,
-                Refuse,
-                Stay,
-                Stay,
-                Stay,
-                Stay,
-                Stay,
-                Stay,
-                Stay,
-                Stay,
-                Stay,
-            ],
-        ),
+        (Idle, [Enter(Gravity), Enter(Hold), Refuse, Refuse, Stay, Stay, Stay, Stay, Stay, Stay, Stay, Stay, Stay]),
         (
             Gravity,
             [
@@ -164,32 +144,11 @@ fn e1_the_whole_table_is_as_documented() {
                 Stay,
             ],
         ),
-        (
-            Fault,
-            [
-                Refuse,
-                Refuse,
-                Refuse,
-                Refuse,
-                Stay,
-                Stay,
-                Enter(Idle),
-                Stay,
-                Stay,
-                Stay,
-                Stay,
-                Stay,
-                Stay,
-            ],
-        ),
+        (Fault, [Refuse, Refuse, Refuse, Refuse, Stay, Stay, Enter(Idle), Stay, Stay, Stay, Stay, Stay, Stay]),
     ];
     for (state, row) in table {
         for (trigger, expected) in Trigger::ALL.into_iter().zip(row) {
-            assert_eq!(
-                transition(state, trigger),
-                expected,
-                "{state:?} {trigger:?}"
-            );
+            assert_eq!(transition(state, trigger), expected, "{state:?} {trigger:?}");
         }
     }
 }
@@ -236,18 +195,12 @@ fn e1_every_pair_does_what_the_table_says_and_latches_its_fault() {
                     assert_eq!((result, supervisor.state()), (Ok(false), State::Run))
                 }
                 Transition::Enter(State::Coast) => {
-                    assert_eq!(
-                        (supervisor.state(), supervisor.law()),
-                        (State::Coast, state)
-                    );
+                    assert_eq!((supervisor.state(), supervisor.law()), (State::Coast, state));
                     assert_eq!(supervisor.fault(), before, "a bridge is no fault");
                 }
                 Transition::Enter(next) => {
                     assert_eq!(supervisor.state(), next);
-                    if matches!(
-                        trigger,
-                        Trigger::SoftFault | Trigger::HardFault | Trigger::SafetyDropped
-                    ) {
+                    if matches!(trigger, Trigger::SoftFault | Trigger::HardFault | Trigger::SafetyDropped) {
                         assert_eq!(supervisor.fault(), Fault::TipSpeed, "{state:?} {trigger:?}");
                     }
                 }
@@ -259,14 +212,8 @@ fn e1_every_pair_does_what_the_table_says_and_latches_its_fault() {
 #[test]
 fn codes_are_stable_and_unique() {
     assert_eq!(State::ALL.map(State::code), [0, 1, 2, 3, 4, 5, 6, 7]);
-    assert_eq!(
-        Fault::ALL.map(Fault::code),
-        [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13]
-    );
-    assert_eq!(
-        Refusal::ALL.map(Refusal::code),
-        [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]
-    );
+    assert_eq!(Fault::ALL.map(Fault::code), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13]);
+    assert_eq!(Refusal::ALL.map(Refusal::code), [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]);
     for state in State::ALL {
         assert_eq!(State::from_code(state.code()), Some(state));
     }
@@ -277,12 +224,5 @@ fn codes_are_stable_and_unique() {
     for refusal in Refusal::ALL {
         assert_eq!(Refusal::from_code(refusal.code()), Some(refusal));
     }
-    assert_eq!(
-        (
-            State::from_code(8),
-            Fault::from_code(14),
-            Refusal::from_code(0)
-        ),
-        (None, None, None)
-    );
+    assert_eq!((State::from_code(8), Fault::from_code(14), Refusal::from_code(0)), (None, None, None));
 }

@@ -46,14 +46,11 @@ impl fmt::Display for Refusal {
             Refusal::NotReady(stage) => {
                 write!(formatter, "the bus start-up is still busy: {stage}")
             }
-            Refusal::ZeroNeedsIdle => formatter
-                .write_str("the arm can only be zeroed at rest, while the safety module is idle"),
+            Refusal::ZeroNeedsIdle => {
+                formatter.write_str("the arm can only be zeroed at rest, while the safety module is idle")
+            }
             Refusal::HomeOutOfRange { joint } => {
-                write!(
-                    formatter,
-                    "the home angle of joint {} is outside what the joint can reach",
-                    joint + 1
-                )
+                write!(formatter, "the home angle of joint {} is outside what the joint can reach", joint + 1)
             }
         }
     }

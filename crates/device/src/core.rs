@@ -228,14 +228,8 @@ impl Core {
     fn take(&mut self, reply: &Reply, io: &mut impl CoreIo) -> bool {
         if self.slow.is_none() {
             let expected = self.startup.receive(reply);
-            if let (
-                true,
-                Reply::Property {
-                    node: Node::SAFETY_MODULE,
-                    property: PropertyId::MODE,
-                    value,
-                },
-            ) = (expected, *reply)
+            if let (true, Reply::Property { node: Node::SAFETY_MODULE, property: PropertyId::MODE, value }) =
+                (expected, *reply)
             {
                 self.hear_safety(value, io);
             }
@@ -244,19 +238,10 @@ impl Core {
         if self.round.take(reply, &mut self.counters) == Taken::Yes {
             return true;
         }
-        let Reply::Property {
-            node,
-            property,
-            value,
-        } = *reply
-        else {
+        let Reply::Property { node, property, value } = *reply else {
             return false;
         };
-        let Some(told) = self
-            .slow
-            .as_mut()
-            .and_then(|slow| slow.take(node, property, value))
-        else {
+        let Some(told) = self.slow.as_mut().and_then(|slow| slow.take(node, property, value)) else {
             return false;
         };
         match told {
@@ -264,11 +249,7 @@ impl Core {
             Told::PuckMode(value) => {
                 let braking = MotorMode::from_value(value) == Some(MotorMode::Idle);
                 let active = self.safety_mode == Some(SafetyMode::Active);
-                self.braking = if braking && active {
-                    self.braking.saturating_add(1)
-                } else {
-                    0
-                };
+                self.braking = if braking && active { self.braking.saturating_add(1) } else { 0 };
             }
             Told::Pendant(value) => self.pendant = Some(value),
             Told::Temperature(joint, value) => {
@@ -314,13 +295,7 @@ impl Core {
                 None => {}
             }
         }
-        let mut outlet = SlotOutlet {
-            io,
-            counters: &mut self.counters,
-            pacer: &mut self.pacer,
-            now_us,
-            cyclic: false,
-        };
+        let mut outlet = SlotOutlet { io, counters: &mut self.counters, pacer: &mut self.pacer, now_us, cyclic: false };
         if self.startup.advance(&mut outlet) {
             self.begin_cycles();
         }
@@ -328,9 +303,7 @@ impl Core {
 
     /// The start-up is over: the next request slot begins the cyclic loop.
     fn begin_cycles(&mut self) {
-        let (Some(calibration), Some(safety)) =
-            (self.startup.calibration(), self.startup.safety_properties())
-        else {
+        let (Some(calibration), Some(safety)) = (self.startup.calibration(), self.startup.safety_properties()) else {
             return;
         };
         self.cycle.reset();
@@ -375,9 +348,7 @@ impl Core {
         let gathered = self.round.close(&mut self.counters);
         self.number += 1;
         Counters::count(&mut self.counters.cycles);
-        if self
-            .slow
-            .is_some_and(|slow| slow.safety_silence() >= SAFETY_SILENCE)
+        if self.slow.is_some_and(|slow| slow.safety_silence() >= SAFETY_SILENCE)
             || self.round.longest_silence() >= SILENT_CYCLES
         {
             self.fail();
@@ -410,11 +381,7 @@ impl Core {
     /// What the cycle hears of the safety module: its own word, unless a braking puck contradicts.
     fn safety_of_cycle(&mut self) -> Option<SafetyMode> {
         let told = self.fresh_safety.take();
-        if self.braking >= BRAKING_ANSWERS {
-            Some(SafetyMode::Idle)
-        } else {
-            told
-        }
+        if self.braking >= BRAKING_ANSWERS { Some(SafetyMode::Idle) } else { told }
     }
 
     /// The command for the control cycle; those for the start-up are answered here.
@@ -472,20 +439,11 @@ impl Core {
 
     fn ask_slowly(&mut self, now_us: u64, io: &mut impl CoreIo) {
         self.idle_request_in = self.idle_request_in.saturating_sub(1);
-        let writable = self
-            .startup
-            .safety_properties()
-            .is_some_and(|safety| safety.mode_is_writable);
-        let lower = self.wants_idle
-            && writable
-            && self.idle_request_in == 0
-            && self.safety_mode == Some(SafetyMode::Active);
+        let writable = self.startup.safety_properties().is_some_and(|safety| safety.mode_is_writable);
+        let lower =
+            self.wants_idle && writable && self.idle_request_in == 0 && self.safety_mode == Some(SafetyMode::Active);
         if lower {
-            let frame = set(
-                Node::SAFETY_MODULE,
-                PropertyId::MODE,
-                SafetyMode::Idle.value(),
-            );
+            let frame = set(Node::SAFETY_MODULE, PropertyId::MODE, SafetyMode::Idle.value());
             if self.outlet(now_us, io).send(frame) {
                 self.idle_request_in = IDLE_REQUEST_SLOTS;
             }
@@ -498,13 +456,7 @@ impl Core {
     }
 
     fn outlet<'a, I: CoreIo>(&'a mut self, now_us: u64, io: &'a mut I) -> SlotOutlet<'a, I> {
-        SlotOutlet {
-            io,
-            counters: &mut self.counters,
-            pacer: &mut self.pacer,
-            now_us,
-            cyclic: true,
-        }
+        SlotOutlet { io, counters: &mut self.counters, pacer: &mut self.pacer, now_us, cyclic: true }
     }
 
     /// Tells a change of the stage, and a new reason for which the start-up cannot go on.
@@ -513,10 +465,7 @@ impl Core {
         let error = self.startup.error();
         if error.is_some() && error != self.blocked {
             self.blocked = error;
-            self.tell(
-                EventKind::Blocked(error.unwrap_or(StartupError::NoSafetyModule)),
-                io,
-            );
+            self.tell(EventKind::Blocked(error.unwrap_or(StartupError::NoSafetyModule)), io);
         } else if error.is_none() {
             self.blocked = None;
         }
@@ -527,10 +476,7 @@ impl Core {
     }
 
     fn tell(&self, kind: EventKind, io: &mut impl CoreIo) {
-        io.event(Event {
-            cycle: self.number,
-            kind,
-        });
+        io.event(Event { cycle: self.number, kind });
     }
 }
 

@@ -5,9 +5,7 @@
 //! that one of them is late; as nothing tells which, both are discarded. A queue per identifier, as in Barrett's library,
 //! would answer each request with the reply to the one before, for ever.
 
-use puck::{
-    CanFrame, Counts, GaugeStatus, Group, Node, PropertyId, RawWrench, Reply, force_torque, get,
-};
+use puck::{CanFrame, Counts, GaugeStatus, Group, Node, PropertyId, RawWrench, Reply, force_torque, get};
 
 use crate::health::Counters;
 
@@ -80,11 +78,7 @@ pub(crate) enum Taken {
 impl Round {
     /// The rounds of an arm with or without a force/torque sensor, which has just been tared: its first sample is void.
     pub(crate) fn new(has_sensor: bool) -> Round {
-        Round {
-            has_sensor,
-            discard_wrench: true,
-            ..Round::default()
-        }
+        Round { has_sensor, discard_wrench: true, ..Round::default() }
     }
 
     /// Empties the slots and opens the round. Returns what to ask.
@@ -93,10 +87,7 @@ impl Round {
         self.force = Mailbox::Empty;
         self.torque = Mailbox::Empty;
         self.open = true;
-        (
-            get(Group::ARM, PropertyId::POSITION),
-            self.has_sensor.then(force_torque::get_wrench),
-        )
+        (get(Group::ARM, PropertyId::POSITION), self.has_sensor.then(force_torque::get_wrench))
     }
 
     /// Whether requests have left and no cycle has taken the replies.
@@ -108,24 +99,15 @@ impl Round {
     pub(crate) fn take(&mut self, reply: &Reply, counters: &mut Counters) -> Taken {
         let repeats = match *reply {
             Reply::Position { node, primary, .. } => {
-                let Some(slot) = node
-                    .arm_index()
-                    .and_then(|joint| self.positions.get_mut(joint))
-                else {
+                let Some(slot) = node.arm_index().and_then(|joint| self.positions.get_mut(joint)) else {
                     return Taken::No;
                 };
                 self.open && slot.put(primary)
             }
-            Reply::Force {
-                node: Node::FORCE_TORQUE,
-                counts,
-                status,
-            } => self.open && self.force.put((counts, status)),
-            Reply::Torque {
-                node: Node::FORCE_TORQUE,
-                counts,
-                status,
-            } => self.open && self.torque.put((counts, status)),
+            Reply::Force { node: Node::FORCE_TORQUE, counts, status } => self.open && self.force.put((counts, status)),
+            Reply::Torque { node: Node::FORCE_TORQUE, counts, status } => {
+                self.open && self.torque.put((counts, status))
+            }
             _ => return Taken::No,
         };
         if repeats || !self.open {
@@ -146,16 +128,12 @@ impl Round {
                 Counters::count(&mut counters.lost_replies);
             }
         }
-        Gathered {
-            positions,
-            wrench: self.wrench(counters),
-        }
+        Gathered { positions, wrench: self.wrench(counters) }
     }
 
     /// Both halves of one sample, or nothing: force of one sample and torque of another are no wrench.
     fn wrench(&mut self, counters: &mut Counters) -> Option<RawWrench> {
-        let (Some((force, _)), Some((torque, status))) = (self.force.reply(), self.torque.reply())
-        else {
+        let (Some((force, _)), Some((torque, status))) = (self.force.reply(), self.torque.reply()) else {
             if self.has_sensor {
                 Counters::count(&mut counters.lost_replies);
             }
@@ -164,19 +142,12 @@ impl Round {
         if core::mem::take(&mut self.discard_wrench) || status.is_some_and(GaugeStatus::is_bad) {
             return None;
         }
-        Some(RawWrench {
-            force,
-            torque,
-            status,
-        })
+        Some(RawWrench { force, torque, status })
     }
 
     /// The first puck that has been silent long enough to be suspected.
     pub(crate) fn suspect(&self) -> Option<Node> {
-        let (node, _) = Node::ARM
-            .into_iter()
-            .zip(self.missed)
-            .find(|(_, missed)| *missed >= SUSPECT_ROUNDS)?;
+        let (node, _) = Node::ARM.into_iter().zip(self.missed).find(|(_, missed)| *missed >= SUSPECT_ROUNDS)?;
         Some(node)
     }
 
@@ -191,11 +162,7 @@ mod tests {
     use super::*;
 
     fn position(joint: usize, counts: i32) -> Reply {
-        Reply::Position {
-            node: Node::ARM[joint],
-            primary: Counts(counts),
-            secondary: None,
-        }
+        Reply::Position { node: Node::ARM[joint], primary: Counts(counts), secondary: None }
     }
 
     #[test]
@@ -221,26 +188,14 @@ mod tests {
         assert_eq!(counters.late_replies, 3);
         round.open();
         round.take(&position(0, 9), &mut counters);
-        assert_eq!(
-            round.close(&mut counters).positions[0],
-            Some(Counts(9)),
-            "the next round begins empty"
-        );
+        assert_eq!(round.close(&mut counters).positions[0], Some(Counts(9)), "the next round begins empty");
     }
 
     #[test]
     fn force_of_one_sample_and_torque_of_another_are_no_wrench() {
         let (mut round, mut counters) = (Round::new(true), Counters::default());
-        let force = |x| Reply::Force {
-            node: Node::FORCE_TORQUE,
-            counts: [x, 0, 0],
-            status: None,
-        };
-        let torque = |x| Reply::Torque {
-            node: Node::FORCE_TORQUE,
-            counts: [x, 0, 0],
-            status: None,
-        };
+        let force = |x| Reply::Force { node: Node::FORCE_TORQUE, counts: [x, 0, 0], status: None };
+        let torque = |x| Reply::Torque { node: Node::FORCE_TORQUE, counts: [x, 0, 0], status: None };
         let mut round_of = |replies: &[Reply]| {
             round.open();
             for reply in replies {
@@ -248,38 +203,16 @@ mod tests {
             }
             round.close(&mut counters).wrench
         };
-        assert_eq!(
-            round_of(&[force(1), torque(1)]),
-            None,
-            "the first sample after the tare"
-        );
-        let wrench = RawWrench {
-            force: [2, 0, 0],
-            torque: [3, 0, 0],
-            status: None,
-        };
+        assert_eq!(round_of(&[force(1), torque(1)]), None, "the first sample after the tare");
+        let wrench = RawWrench { force: [2, 0, 0], torque: [3, 0, 0], status: None };
         assert_eq!(round_of(&[force(2), torque(3)]), Some(wrench));
         assert_eq!(round_of(&[force(2)]), None);
-        assert_eq!(
-            round_of(&[torque(3)]),
-            None,
-            "the force of the round before is gone"
-        );
+        assert_eq!(round_of(&[torque(3)]), None, "the force of the round before is gone");
         assert_eq!(round_of(&[force(2), torque(3), torque(4)]), None);
-        let judged = |status| Reply::Torque {
-            node: Node::FORCE_TORQUE,
-            counts: [3, 0, 0],
-            status: Some(GaugeStatus(status)),
-        };
-        assert_eq!(
-            round_of(&[force(2), judged(0x40)]),
-            None,
-            "the sensor itself calls the sample bad"
-        );
-        assert!(
-            round_of(&[force(2), judged(0x81)]).is_some(),
-            "saturated once, and a tare suggested: a warning only"
-        );
+        let judged =
+            |status| Reply::Torque { node: Node::FORCE_TORQUE, counts: [3, 0, 0], status: Some(GaugeStatus(status)) };
+        assert_eq!(round_of(&[force(2), judged(0x40)]), None, "the sensor itself calls the sample bad");
+        assert!(round_of(&[force(2), judged(0x81)]).is_some(), "saturated once, and a tare suggested: a warning only");
     }
 
     #[test]
@@ -295,10 +228,7 @@ mod tests {
         turn(&mut round, 0..6);
         assert_eq!(round.suspect(), None);
         turn(&mut round, 0..6);
-        assert_eq!(
-            (round.suspect(), round.longest_silence()),
-            (Some(Node::ARM[6]), 2)
-        );
+        assert_eq!((round.suspect(), round.longest_silence()), (Some(Node::ARM[6]), 2));
         turn(&mut round, 0..7);
         assert_eq!((round.suspect(), round.longest_silence()), (None, 0));
     }

@@ -56,20 +56,12 @@ pub(crate) struct SlowPoll {
 impl SlowPoll {
     /// The polls of a bus whose safety module has these properties.
     pub(crate) fn new(safety: &SafetyProperties) -> SlowPoll {
-        SlowPoll {
-            tick: 0,
-            asked: None,
-            pendant: safety.pendant,
-            safety_silence: 0,
-        }
+        SlowPoll { tick: 0, asked: None, pendant: safety.pendant, safety_silence: 0 }
     }
 
     /// The question of this slot, if there is one.
     pub(crate) fn next(&mut self, suspect: Option<Node>) -> Option<CanFrame> {
-        if self
-            .asked
-            .is_some_and(|(node, _)| node == Node::SAFETY_MODULE)
-        {
+        if self.asked.is_some_and(|(node, _)| node == Node::SAFETY_MODULE) {
             self.safety_silence = self.safety_silence.saturating_add(1);
         }
         let tick = self.tick;
@@ -101,9 +93,7 @@ impl SlowPoll {
         self.asked = None;
         Some(match property {
             PropertyId::STAT => Told::Status(node, value),
-            TEMPERATURE if node != Node::SAFETY_MODULE => {
-                Told::Temperature(node.arm_index()?, value)
-            }
+            TEMPERATURE if node != Node::SAFETY_MODULE => Told::Temperature(node.arm_index()?, value),
             PropertyId::MODE if node != Node::SAFETY_MODULE => Told::PuckMode(value),
             PropertyId::MODE => {
                 self.safety_silence = 0;
@@ -138,15 +128,9 @@ mod tests {
         for _ in 0..300 * seconds {
             if let Some(frame) = slow.next(None) {
                 let request = Request::decode(&frame).expect("a request");
-                let puck::Destination::Node(node) = request.to else {
-                    panic!("a poll to a group")
-                };
-                let puck::Action::Get { property } = request.action else {
-                    panic!("a poll that sets")
-                };
-                *counts
-                    .entry((node.number(), property.number()))
-                    .or_default() += 1;
+                let puck::Destination::Node(node) = request.to else { panic!("a poll to a group") };
+                let puck::Action::Get { property } = request.action else { panic!("a poll that sets") };
+                *counts.entry((node.number(), property.number())).or_default() += 1;
                 slow.take(node, property, 0);
             }
         }
@@ -156,29 +140,19 @@ mod tests {
     #[test]
     fn every_quantity_is_polled_often_enough() {
         let counts = polls(10);
-        let rate = |node: u8, property: u8| {
-            counts.get(&(node, property)).copied().unwrap_or(0) as f64 / 10.0
-        };
+        let rate = |node: u8, property: u8| counts.get(&(node, property)).copied().unwrap_or(0) as f64 / 10.0;
         assert!(rate(10, 8) >= 100.0, "safety MODE");
         assert!(rate(1, 8) >= 10.0, "MODE of puck 1");
         assert!(rate(10, 43) >= 5.0, "PEN");
         for node in 1..=7 {
-            assert!(
-                rate(node, 9) >= 1.0,
-                "TEMP of puck {node}: {}",
-                rate(node, 9)
-            );
+            assert!(rate(node, 9) >= 1.0, "TEMP of puck {node}: {}", rate(node, 9));
         }
     }
 
     #[test]
     fn the_number_of_temperature_holds_for_all_supported_firmware() {
         let numbers: Vec<_> = (61..=255)
-            .map(|version| {
-                PropertyTable::motor(version)
-                    .expect("known")
-                    .id(Property::Temp)
-            })
+            .map(|version| PropertyTable::motor(version).expect("known").id(Property::Temp))
             .filter(|id| *id != Some(TEMPERATURE))
             .collect();
         assert!(numbers.is_empty());
@@ -190,14 +164,7 @@ mod tests {
         assert_eq!(slow.take(Node::SAFETY_MODULE, PropertyId::MODE, 2), None);
         slow.next(None);
         assert_eq!(slow.take(Node::SAFETY_MODULE, PropertyId::STAT, 2), None);
-        assert_eq!(
-            slow.take(Node::SAFETY_MODULE, PropertyId::MODE, 2),
-            Some(Told::SafetyMode(2))
-        );
-        assert_eq!(
-            slow.take(Node::SAFETY_MODULE, PropertyId::MODE, 2),
-            None,
-            "a duplicate"
-        );
+        assert_eq!(slow.take(Node::SAFETY_MODULE, PropertyId::MODE, 2), Some(Told::SafetyMode(2)));
+        assert_eq!(slow.take(Node::SAFETY_MODULE, PropertyId::MODE, 2), None, "a duplicate");
     }
 }

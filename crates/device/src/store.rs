@@ -139,17 +139,10 @@ struct Area<const BYTES: usize> {
 }
 
 impl<const BYTES: usize> Area<BYTES> {
-    const EMPTY: Self = Self {
-        length: 0,
-        bytes: [0; BYTES],
-    };
+    const EMPTY: Self = Self { length: 0, bytes: [0; BYTES] };
 
     fn image(&self) -> Option<&[u8]> {
-        if self.length == 0 {
-            None
-        } else {
-            self.bytes.get(..self.length)
-        }
+        if self.length == 0 { None } else { self.bytes.get(..self.length) }
     }
 }
 
@@ -164,10 +157,7 @@ impl<const SLOTS: usize, const BYTES: usize> RamStore<SLOTS, BYTES> {
     /// An empty store.
     #[must_use]
     pub const fn new() -> Self {
-        Self {
-            areas: [Area::EMPTY; SLOTS],
-            spare: Area::EMPTY,
-        }
+        Self { areas: [Area::EMPTY; SLOTS], spare: Area::EMPTY }
     }
 }
 
@@ -204,11 +194,7 @@ impl<const SLOTS: usize, const BYTES: usize> Store for RamStore<SLOTS, BYTES> {
         if end > self.spare.length {
             return Err(StoreError::NotOpen);
         }
-        self.spare
-            .bytes
-            .get_mut(offset..end)
-            .ok_or(StoreError::NotOpen)?
-            .copy_from_slice(bytes);
+        self.spare.bytes.get_mut(offset..end).ok_or(StoreError::NotOpen)?.copy_from_slice(bytes);
         Ok(())
     }
 
@@ -220,10 +206,7 @@ impl<const SLOTS: usize, const BYTES: usize> Store for RamStore<SLOTS, BYTES> {
         if self.spare.length == 0 {
             return Err(StoreError::NotOpen);
         }
-        let area = self
-            .areas
-            .get_mut(usize::from(slot))
-            .ok_or(StoreError::NoPlace)?;
+        let area = self.areas.get_mut(usize::from(slot)).ok_or(StoreError::NoPlace)?;
         core::mem::swap(area, &mut self.spare);
         self.abort();
         Ok(())
@@ -234,14 +217,7 @@ impl<const SLOTS: usize, const BYTES: usize> Store for RamStore<SLOTS, BYTES> {
     }
 
     fn delete(&mut self, slot: u8) -> Result<(), StoreError> {
-        let area = self
-            .areas
-            .get_mut(usize::from(slot))
-            .ok_or(StoreError::NoPlace)?;
-        if core::mem::take(&mut area.length) == 0 {
-            Err(StoreError::NoPlace)
-        } else {
-            Ok(())
-        }
+        let area = self.areas.get_mut(usize::from(slot)).ok_or(StoreError::NoPlace)?;
+        if core::mem::take(&mut area.length) == 0 { Err(StoreError::NoPlace) } else { Ok(()) }
     }
 }

@@ -15,22 +15,10 @@ fn demonstration() -> Demonstration {
         u * u * (3.0 - 2.0 * u) + 0.1 * (9.0 * u + i as f64).sin()
     };
     fn rows<const D: usize>(value: impl Fn(usize, usize) -> f64) -> Vec<[f64; D]> {
-        (0..1501)
-            .map(|k| std::array::from_fn(|i| value(k, i)))
-            .collect()
+        (0..1501).map(|k| std::array::from_fn(|i| value(k, i))).collect()
     }
-    let orientation = rows::<3>(value)
-        .iter()
-        .map(Quaternion::from_rotation_vector)
-        .collect();
-    Demonstration::new(
-        1.0 / 300.0,
-        rows(value),
-        orientation,
-        rows(value),
-        rows(value),
-    )
-    .unwrap()
+    let orientation = rows::<3>(value).iter().map(Quaternion::from_rotation_vector).collect();
+    Demonstration::new(1.0 / 300.0, rows(value), orientation, rows(value), rows(value)).unwrap()
 }
 
 #[divan::bench]

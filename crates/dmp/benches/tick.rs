@@ -2,8 +2,8 @@
 
 use divan::{Bencher, black_box};
 use dmp::{
-    Configuration, Coupling, Hemisphere, OrientationError, Primitive, PrimitiveTables, Quaternion,
-    ROWS, Rollout, Scalar, StartState, Velocity,
+    Configuration, Coupling, Hemisphere, OrientationError, Primitive, PrimitiveTables, Quaternion, ROWS, Rollout,
+    Scalar, StartState, Velocity,
 };
 
 fn main() {
@@ -12,9 +12,7 @@ fn main() {
 
 fn primitive<T: Scalar, const N: usize>(kernels: usize) -> Primitive<T, N> {
     let f = T::from_f64;
-    let weights: Vec<T> = (0..ROWS * kernels)
-        .map(|i| f(0.3 * (0.37 * i as f64).sin()))
-        .collect();
+    let weights: Vec<T> = (0..ROWS * kernels).map(|i| f(0.3 * (0.37 * i as f64).sin())).collect();
     let configuration = |x: f64, q: Quaternion<T>| Configuration {
         position: [f(x); 3],
         orientation: q,
@@ -46,14 +44,12 @@ fn movement<T: Scalar, const N: usize>(bencher: Bencher<'_, '_>) {
     let primitive = primitive::<T, N>(N);
     let dt = T::from_f64(1.0 / 300.0);
     let start = StartState::at_rest(*primitive.start());
-    bencher
-        .counter(divan::counter::ItemsCount::new(1500_usize))
-        .bench_local(|| {
-            let mut rollout = Rollout::start(&primitive, &start).unwrap();
-            for _ in 0..1500 {
-                black_box(rollout.step(black_box(&primitive), dt, &Coupling::NONE));
-            }
-        });
+    bencher.counter(divan::counter::ItemsCount::new(1500_usize)).bench_local(|| {
+        let mut rollout = Rollout::start(&primitive, &start).unwrap();
+        for _ in 0..1500 {
+            black_box(rollout.step(black_box(&primitive), dt, &Coupling::NONE));
+        }
+    });
 }
 
 #[divan::bench]

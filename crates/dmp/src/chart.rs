@@ -32,22 +32,10 @@ impl<T: Scalar> Coefficients<T> {
         let f = T::from_f64;
         if x < f(0.25) {
             // Power series in n^2; the first omitted terms are below 1e-14 at n = 1/2.
-            const B: [f64; 6] = [
-                1.0 / 2.0,
-                -1.0 / 24.0,
-                1.0 / 720.0,
-                -1.0 / 40_320.0,
-                1.0 / 3_628_800.0,
-                -1.0 / 479_001_600.0,
-            ];
-            const C: [f64; 6] = [
-                1.0 / 6.0,
-                -1.0 / 120.0,
-                1.0 / 5_040.0,
-                -1.0 / 362_880.0,
-                1.0 / 39_916_800.0,
-                -1.0 / 6_227_020_800.0,
-            ];
+            const B: [f64; 6] =
+                [1.0 / 2.0, -1.0 / 24.0, 1.0 / 720.0, -1.0 / 40_320.0, 1.0 / 3_628_800.0, -1.0 / 479_001_600.0];
+            const C: [f64; 6] =
+                [1.0 / 6.0, -1.0 / 120.0, 1.0 / 5_040.0, -1.0 / 362_880.0, 1.0 / 39_916_800.0, -1.0 / 6_227_020_800.0];
             // Value and derivative by n^2 (Horner); d/dn / n = 2 d/d(n^2).
             let series = |coefficients: &[f64; 6]| {
                 let (mut value, mut slope) = (T::ZERO, T::ZERO);
@@ -58,12 +46,7 @@ impl<T: Scalar> Coefficients<T> {
                 (value, slope + slope)
             };
             let ((b, b_slope), (c, c_slope)) = (series(&B), series(&C));
-            return Self {
-                b,
-                c,
-                b_slope,
-                c_slope,
-            };
+            return Self { b, c, b_slope, c_slope };
         }
         let n = T::sqrt(x);
         let (sin, cos) = T::sin_cos(n);
@@ -71,12 +54,7 @@ impl<T: Scalar> Coefficients<T> {
         let sinc = sin / n;
         let b = (T::ONE - cos) * by_x;
         let c = (T::ONE - sinc) * by_x;
-        Self {
-            b,
-            c,
-            b_slope: (sinc - b - b) * by_x,
-            c_slope: (b - f(3.0) * c) * by_x,
-        }
+        Self { b, c, b_slope: (sinc - b - b) * by_x, c_slope: (b - f(3.0) * c) * by_x }
     }
 }
 
@@ -86,10 +64,7 @@ impl<T: Scalar> RotationChart<T> {
     pub fn between(start: &Quaternion<T>, goal: &Quaternion<T>) -> Self {
         let whole = goal.conjugate().product(start).rotation_vector();
         let half = scale(&whole, T::from_f64(0.5));
-        Self {
-            centre: goal.product(&Quaternion::from_rotation_vector(&half)),
-            half,
-        }
+        Self { centre: goal.product(&Quaternion::from_rotation_vector(&half)), half }
     }
 
     /// Coordinates of the demonstrated start.
@@ -128,9 +103,7 @@ impl<T: Scalar> RotationChart<T> {
     /// Orientation at the coordinates `y`.
     #[inline]
     pub fn orientation(&self, y: &[T; 3]) -> Quaternion<T> {
-        self.centre
-            .product(&Quaternion::from_rotation_vector(y))
-            .renormalised()
+        self.centre.product(&Quaternion::from_rotation_vector(y)).renormalised()
     }
 
     /// Body-frame angular velocity `J_r(y) dy`.
@@ -149,9 +122,7 @@ impl<T: Scalar> RotationChart<T> {
         (
             apply(&k, y, dy),
             core::array::from_fn(|i| {
-                domega[i] - k.b_slope * along * across[i]
-                    + k.c_slope * along * twice[i]
-                    + k.c * bent[i]
+                domega[i] - k.b_slope * along * across[i] + k.c_slope * along * twice[i] + k.c * bent[i]
             }),
         )
     }
@@ -161,8 +132,7 @@ impl<T: Scalar> RotationChart<T> {
         let x = dot(y, y);
         let d = if x < T::from_f64(1e-2) {
             // Remainder x^3/1.2e6.
-            T::from_f64(1.0 / 12.0)
-                + x * (T::from_f64(1.0 / 720.0) + x * T::from_f64(1.0 / 30_240.0))
+            T::from_f64(1.0 / 12.0) + x * (T::from_f64(1.0 / 720.0) + x * T::from_f64(1.0 / 30_240.0))
         } else {
             let k = Coefficients::at(y);
             let sinc = T::ONE - k.c * x;

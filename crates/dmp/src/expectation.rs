@@ -32,10 +32,7 @@ impl<T: Scalar> ExpectedWrench<T> {
             return Err(TableError::Duration);
         }
         let table = PhaseTable::new(samples)?;
-        Ok(Self {
-            table,
-            recorded_duration,
-        })
+        Ok(Self { table, recorded_duration })
     }
 
     /// Expected values at progress `u`; beyond the ends the end values hold.
@@ -60,10 +57,7 @@ impl<T: Scalar> ExpectedWrench<T> {
     /// to 10 % deviation of the duration it is used in full, from 50 % on not at all, linearly in between.
     /// `relative_speed` = recorded duration / present duration.
     pub fn trust(&self, relative_speed: T) -> T {
-        let (full, none) = (
-            T::from_f64(Self::TRUSTED_DEVIATION),
-            T::from_f64(Self::USELESS_DEVIATION),
-        );
+        let (full, none) = (T::from_f64(Self::TRUSTED_DEVIATION), T::from_f64(Self::USELESS_DEVIATION));
         // Deviation of the duration, without dividing by a speed of 0: |1/r - 1| <= k is |1 - r| <= k r.
         let deviation = (T::ONE - relative_speed).abs();
         if deviation <= full * relative_speed {

@@ -50,11 +50,7 @@ pub struct Coupling<T> {
 
 impl<T: Scalar> Coupling<T> {
     /// No feedback: the plan runs open loop.
-    pub const NONE: Self = Self {
-        position: [T::ZERO; 3],
-        orientation: [T::ZERO; 3],
-        hand: [T::ZERO; 4],
-    };
+    pub const NONE: Self = Self { position: [T::ZERO; 3], orientation: [T::ZERO; 3], hand: [T::ZERO; 4] };
 }
 
 /// `J_sensor^T` for a wrist sensor and finger gauges: where the sensor sits relative to the controlled point.
@@ -74,18 +70,10 @@ pub struct SensorMap<T> {
 }
 
 impl<T: Scalar> SensorMap<T> {
-    const UNIT: [[T; 3]; 3] = [
-        [T::ONE, T::ZERO, T::ZERO],
-        [T::ZERO, T::ONE, T::ZERO],
-        [T::ZERO, T::ZERO, T::ONE],
-    ];
+    const UNIT: [[T; 3]; 3] = [[T::ONE, T::ZERO, T::ZERO], [T::ZERO, T::ONE, T::ZERO], [T::ZERO, T::ZERO, T::ONE]];
 
     /// Sensor values are already in the frames of the task.
-    pub const IDENTITY: Self = Self {
-        force: Self::UNIT,
-        torque: Self::UNIT,
-        lever: [T::ZERO; 3],
-    };
+    pub const IDENTITY: Self = Self { force: Self::UNIT, torque: Self::UNIT, lever: [T::ZERO; 3] };
 
     /// `J_sensor^T e`: generalised force on the ten task rows.
     #[inline]
@@ -124,11 +112,7 @@ impl<T: Scalar> Feedback<T> {
         weight: GainSchedule<T, SENSORS>,
         limits: Limits<T>,
     ) -> Result<Self, TableError> {
-        let Limits {
-            displacement,
-            rotation,
-            hand,
-        } = limits;
+        let Limits { displacement, rotation, hand } = limits;
         if !(displacement.is_finite() && rotation.is_finite() && hand.is_finite()) {
             return Err(TableError::NotFinite);
         }
@@ -141,11 +125,7 @@ impl<T: Scalar> Feedback<T> {
         {
             return Err(TableError::Negative);
         }
-        Ok(Self {
-            sensitivity,
-            weight,
-            limits,
-        })
+        Ok(Self { sensitivity, weight, limits })
     }
 
     /// Sensitivity `K1` over the phase.
@@ -164,13 +144,7 @@ impl<T: Scalar> Feedback<T> {
     }
 
     /// `zeta` at progress `u` for the error `F - F_expected`, clamped. A value that is not a number counts as 0.
-    pub fn coupling(
-        &self,
-        u: T,
-        error: &[T; SENSORS],
-        map: &SensorMap<T>,
-        stiffness: &Stiffness<T>,
-    ) -> Coupling<T> {
+    pub fn coupling(&self, u: T, error: &[T; SENSORS], map: &SensorMap<T>, stiffness: &Stiffness<T>) -> Coupling<T> {
         let (k1, k2) = (self.sensitivity.at(u), self.weight.at(u));
         let task = map.to_task(&core::array::from_fn(|i| k2[i] * error[i]));
         let zeta: [T; COUPLED_ROWS] = core::array::from_fn(|i| k1[i] * task[i]);

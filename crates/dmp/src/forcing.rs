@@ -29,11 +29,7 @@ impl<T: Scalar, const N: usize> Basis<T, N> {
             return None;
         }
         let intervals = T::from_index(count - 1);
-        let mut basis = Self {
-            count,
-            centres: [T::ZERO; N],
-            root_widths: [T::ZERO; N],
-        };
+        let mut basis = Self { count, centres: [T::ZERO; N], root_widths: [T::ZERO; N] };
         for (i, centre) in basis.centres.iter_mut().take(count).enumerate() {
             *centre = canonical.phase_at(T::from_index(i) / intervals);
         }
@@ -110,12 +106,7 @@ impl<T: Scalar, const N: usize> Basis<T, N> {
         for kernel in &kernels[first..last] {
             sum = sum + *kernel;
         }
-        Activations {
-            first,
-            last,
-            kernels,
-            scale: s / sum,
-        }
+        Activations { first, last, kernels, scale: s / sum }
     }
 }
 
@@ -138,9 +129,7 @@ impl<T: Scalar, const N: usize> Activations<T, N> {
     /// `psi_i s / sum psi`: the factor of `theta_i` in Eq. (2).
     #[inline]
     pub fn factor(&self, i: usize) -> T {
-        self.kernels
-            .get(i)
-            .map_or(T::ZERO, |kernel| *kernel * self.scale)
+        self.kernels.get(i).map_or(T::ZERO, |kernel| *kernel * self.scale)
     }
 }
 
@@ -165,10 +154,7 @@ impl<T: Scalar, const ROWS: usize, const N: usize> ForcingTerm<T, ROWS, N> {
                 kernel[row] = *weight;
             }
         }
-        Some(Self {
-            basis,
-            weights: by_kernel,
-        })
+        Some(Self { basis, weights: by_kernel })
     }
 
     /// The common basis.
@@ -179,11 +165,7 @@ impl<T: Scalar, const ROWS: usize, const N: usize> ForcingTerm<T, ROWS, N> {
 
     /// Weight `theta_i` of a row; `None` outside.
     pub fn weight(&self, row: usize, i: usize) -> Option<T> {
-        self.weights
-            .get(..self.basis.count())?
-            .get(i)?
-            .get(row)
-            .copied()
+        self.weights.get(..self.basis.count())?.get(i)?.get(row).copied()
     }
 
     /// `f(s)` of all rows; 0 at s = 0.
@@ -197,10 +179,7 @@ impl<T: Scalar, const ROWS: usize, const N: usize> ForcingTerm<T, ROWS, N> {
     pub fn combine(&self, activations: &Activations<T, N>) -> [T; ROWS] {
         let mut f = [T::ZERO; ROWS];
         let active = activations.active();
-        for (kernel, weights) in activations.kernels[active.clone()]
-            .iter()
-            .zip(&self.weights[active])
-        {
+        for (kernel, weights) in activations.kernels[active.clone()].iter().zip(&self.weights[active]) {
             for (f, weight) in f.iter_mut().zip(weights) {
                 *f = *f + *kernel * *weight;
             }

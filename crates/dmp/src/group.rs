@@ -41,20 +41,10 @@ impl<T: Scalar, const D: usize> Group<T, D> {
         f: &[T; D],
         zeta: &[T; D],
     ) -> Trajectory<T, D> {
-        let mut out = Trajectory {
-            x: [T::ZERO; D],
-            v: [T::ZERO; D],
-            a: [T::ZERO; D],
-        };
+        let mut out = Trajectory { x: [T::ZERO; D], v: [T::ZERO; D], a: [T::ZERO; D] };
         for i in 0..D {
             let state = &mut self.state[i];
-            let input = PointInput {
-                start: self.start[i],
-                goal: self.goal[i],
-                s: tick.s,
-                f: f[i],
-                zeta: zeta[i],
-            };
+            let input = PointInput { start: self.start[i], goal: self.goal[i], s: tick.s, f: f[i], zeta: zeta[i] };
             let rhs = system.right_hand_side(state, &input);
             out.x[i] = state.x();
             out.v[i] = state.v() * tick.rate;

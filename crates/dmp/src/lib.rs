@@ -1,9 +1,6 @@
 #![no_std]
 #![forbid(unsafe_code)]
-#![allow(
-    clippy::neg_cmp_op_on_partial_ord,
-    reason = "`!(x > 0)` also refuses NaN, which `x <= 0` would let through"
-)]
+#![allow(clippy::neg_cmp_op_on_partial_ord, reason = "`!(x > 0)` also refuses NaN, which `x <= 0` would let through")]
 #![doc = include_str!("../README.md")]
 
 #[cfg(feature = "std")]
@@ -33,17 +30,14 @@ pub mod fit;
 pub use chart::RotationChart;
 pub use expectation::{EXPECTED_CAPACITY, ExpectedWrench};
 pub use feedback::{
-    COUPLED_ROWS, Coupling, Feedback, GAIN_CAPACITY, GainSchedule, Limits, SENSORS, SensorMap,
-    Stiffness,
+    COUPLED_ROWS, Coupling, Feedback, GAIN_CAPACITY, GainSchedule, Limits, SENSORS, SensorMap, Stiffness,
 };
 pub use forcing::{Activations, Basis, ForcingTerm};
-pub use orientation::{
-    OrientationError, OrientationInput, OrientationState, OrientationSystem, orientation_error,
-};
+pub use orientation::{OrientationError, OrientationInput, OrientationState, OrientationSystem, orientation_error};
 pub use phase::{CanonicalSystem, Phase};
 pub use primitive::{
-    CONTROL_PERIOD, Configuration, HAND_ROWS, Hemisphere, ORIENTATION_ROWS, POSITION_ROWS,
-    POSTURE_ROWS, Primitive, PrimitiveError, PrimitiveTables, ROWS, Row, Velocity,
+    CONTROL_PERIOD, Configuration, HAND_ROWS, Hemisphere, ORIENTATION_ROWS, POSITION_ROWS, POSTURE_ROWS, Primitive,
+    PrimitiveError, PrimitiveTables, ROWS, Row, Velocity,
 };
 pub use quaternion::Quaternion;
 pub use reference::{OrientationReference, Reference, StartState, Trajectory};

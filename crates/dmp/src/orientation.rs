@@ -87,17 +87,11 @@ impl<T: Scalar> OrientationSystem<T> {
 
     /// Right-hand side of Eq. (6) with feedback = `tau omegad`, body frame.
     #[inline]
-    pub fn right_hand_side(
-        &self,
-        state: &OrientationState<T>,
-        input: &OrientationInput<T>,
-    ) -> [T; 3] {
+    pub fn right_hand_side(&self, state: &OrientationState<T>, input: &OrientationInput<T>) -> [T; 3] {
         let (k, d) = (self.gains.stiffness(), self.gains.damping());
         let e = orientation_error(&input.goal, &state.q);
         let e0 = orientation_error(&input.goal, &input.start);
-        core::array::from_fn(|i| {
-            -k * e[i] - d * state.omega[i] + k * e0[i] * input.s + k * input.f[i] + input.zeta[i]
-        })
+        core::array::from_fn(|i| -k * e[i] - d * state.omega[i] + k * e0[i] * input.s + k * input.f[i] + input.zeta[i])
     }
 }
 

@@ -28,12 +28,7 @@ impl<T: Scalar> Pace<T> {
     /// Takes over a new wish. Without a slew rate the speed jumps between two ticks, and the jump is not reported as
     /// an acceleration.
     pub(crate) fn update(&mut self, target: T, stopped: bool, slew: Option<T>) {
-        *self = Self {
-            speed: self.speed,
-            target,
-            stopped,
-            slew,
-        };
+        *self = Self { speed: self.speed, target, stopped, slew };
         if slew.is_none() {
             self.speed = self.wanted();
         }

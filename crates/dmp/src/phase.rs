@@ -56,13 +56,7 @@ pub struct Phase<T> {
 
 impl<T: Scalar> Phase<T> {
     /// Start of a movement: s = 1, u = 0.
-    pub const START: Self = Self {
-        s: T::ONE,
-        u: T::ZERO,
-        u_lost: T::ZERO,
-        cached_h: T::ZERO,
-        cached_factor: T::ONE,
-    };
+    pub const START: Self = Self { s: T::ONE, u: T::ZERO, u_lost: T::ZERO, cached_h: T::ZERO, cached_factor: T::ONE };
 
     /// Phase `s`, 1 at the start, decaying towards 0.
     #[inline]

@@ -7,8 +7,8 @@ use core::fmt;
 
 use crate::vector::all_finite;
 use crate::{
-    Basis, CanonicalSystem, ExpectedWrench, Feedback, ForcingTerm, GainError, OrientationError,
-    Quaternion, Scalar, Stiffness, TransformationSystem,
+    Basis, CanonicalSystem, ExpectedWrench, Feedback, ForcingTerm, GainError, OrientationError, Quaternion, Scalar,
+    Stiffness, TransformationSystem,
 };
 
 /// Rows of the end-effector position (x, y, z in the world frame, metres).
@@ -49,10 +49,7 @@ impl<T: Scalar> Configuration<T> {
     /// With the quaternion made exactly unit; `None` if it is off by more than 1e-3.
     pub(crate) fn normalised(&self) -> Option<Self> {
         let orientation = self.orientation.checked_unit(T::from_f64(1e-3))?;
-        Some(Self {
-            orientation,
-            ..*self
-        })
+        Some(Self { orientation, ..*self })
     }
 }
 
@@ -205,9 +202,9 @@ impl fmt::Display for PrimitiveError {
             Self::Goal => f.write_str("a goal value is not a number"),
             Self::StartNotUnit => f.write_str("the start orientation is not a unit quaternion"),
             Self::GoalNotUnit => f.write_str("the goal orientation is not a unit quaternion"),
-            Self::TurnsTooFar => f.write_str(
-                "start and goal are more than 175 degrees apart; the rotation-vector error is needed",
-            ),
+            Self::TurnsTooFar => {
+                f.write_str("start and goal are more than 175 degrees apart; the rotation-vector error is needed")
+            }
         }
     }
 }
@@ -251,8 +248,7 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
         if tables.kernel_count < 2 || tables.kernel_count > N {
             return Err(PrimitiveError::KernelCount);
         }
-        let basis = Basis::new(&canonical, tables.kernel_count, tables.activation)
-            .ok_or(PrimitiveError::Activation)?;
+        let basis = Basis::new(&canonical, tables.kernel_count, tables.activation).ok_or(PrimitiveError::Activation)?;
         if tables.weights.len() != ROWS * tables.kernel_count {
             return Err(PrimitiveError::WeightCount);
         }
@@ -260,12 +256,9 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
 
         let [position, orientation, posture, hand] = tables.systems()?;
         let mut minimum_duration = T::ZERO;
-        for (row, system) in [
-            (Row::Position, &position),
-            (Row::Orientation, &orientation),
-            (Row::Posture, &posture),
-            (Row::Hand, &hand),
-        ] {
+        for (row, system) in
+            [(Row::Position, &position), (Row::Orientation, &orientation), (Row::Posture, &posture), (Row::Hand, &hand)]
+        {
             let shortest = T::from_f64(CONTROL_PERIOD) / system.largest_step();
             if !(duration > shortest) {
                 return Err(PrimitiveError::Unstable(row));
@@ -284,22 +277,14 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
         if !tables.start_velocity.is_finite() {
             return Err(PrimitiveError::StartVelocity);
         }
-        let start = tables
-            .start
-            .normalised()
-            .ok_or(PrimitiveError::StartNotUnit)?;
-        let goal = tables
-            .goal
-            .normalised()
-            .ok_or(PrimitiveError::GoalNotUnit)?;
+        let start = tables.start.normalised().ok_or(PrimitiveError::StartNotUnit)?;
+        let goal = tables.goal.normalised().ok_or(PrimitiveError::GoalNotUnit)?;
         // cos(175 degrees / 2); with an undemonstrated goal the sign is free and the angle at most 180 degrees.
         let cosine = match tables.hemisphere {
             Hemisphere::Demonstrated => start.orientation.dot(&goal.orientation),
             Hemisphere::Nearest => start.orientation.dot(&goal.orientation).abs(),
         };
-        if tables.orientation_error == OrientationError::Quaternion
-            && cosine < T::from_f64(0.043_619)
-        {
+        if tables.orientation_error == OrientationError::Quaternion && cosine < T::from_f64(0.043_619) {
             return Err(PrimitiveError::TurnsTooFar);
         }
         Ok(Self {
@@ -440,9 +425,7 @@ impl<T: Scalar> PrimitiveTables<'_, T> {
 
     fn systems(&self) -> Result<[TransformationSystem<T>; 4], PrimitiveError> {
         let [position, orientation, posture, hand] = self.gains();
-        let system = |row, (k, d)| {
-            TransformationSystem::new(k, d).map_err(|error| PrimitiveError::Gains(row, error))
-        };
+        let system = |row, (k, d)| TransformationSystem::new(k, d).map_err(|error| PrimitiveError::Gains(row, error));
         Ok([
             system(Row::Position, position)?,
             system(Row::Orientation, orientation)?,

@@ -21,12 +21,7 @@ pub struct Quaternion<T> {
 
 impl<T: Scalar> Quaternion<T> {
     /// No rotation.
-    pub const IDENTITY: Self = Self {
-        w: T::ONE,
-        x: T::ZERO,
-        y: T::ZERO,
-        z: T::ZERO,
-    };
+    pub const IDENTITY: Self = Self { w: T::ONE, x: T::ZERO, y: T::ZERO, z: T::ZERO };
 
     /// From the components in the order (w, x, y, z).
     #[inline]
@@ -90,11 +85,7 @@ impl<T: Scalar> Quaternion<T> {
         let v = self.vector();
         let t = cross(&v, a).map(|t| t + t);
         let u = cross(&v, &t);
-        [
-            a[0] + self.w * t[0] + u[0],
-            a[1] + self.w * t[1] + u[1],
-            a[2] + self.w * t[2] + u[2],
-        ]
+        [a[0] + self.w * t[0] + u[0], a[1] + self.w * t[1] + u[1], a[2] + self.w * t[2] + u[2]]
     }
 
     /// `R(q)` row by row.
@@ -108,11 +99,7 @@ impl<T: Scalar> Quaternion<T> {
     /// Whichever of `q` and `-q` lies in the hemisphere of `reference`.
     #[inline]
     pub fn aligned_with(&self, reference: &Self) -> Self {
-        if self.dot(reference) < T::ZERO {
-            self.negated()
-        } else {
-            *self
-        }
+        if self.dot(reference) < T::ZERO { self.negated() } else { *self }
     }
 
     /// Rotation by the rotation vector `r` (radians).
@@ -124,12 +111,9 @@ impl<T: Scalar> Quaternion<T> {
         // neither square root nor division. At n = 1/4 the first omitted terms are 3e-16 and 2e-17.
         if n2 <= f(0.0625) {
             let y = n2 * f(0.25);
-            let cos = T::ONE
-                - y * (f(1.0 / 2.0)
-                    - y * (f(1.0 / 24.0) - y * (f(1.0 / 720.0) - y * f(1.0 / 40_320.0))));
-            let half_sinc = f(0.5)
-                - y * (f(1.0 / 12.0)
-                    - y * (f(1.0 / 240.0) - y * (f(1.0 / 10_080.0) - y * f(1.0 / 725_760.0))));
+            let cos = T::ONE - y * (f(1.0 / 2.0) - y * (f(1.0 / 24.0) - y * (f(1.0 / 720.0) - y * f(1.0 / 40_320.0))));
+            let half_sinc =
+                f(0.5) - y * (f(1.0 / 12.0) - y * (f(1.0 / 240.0) - y * (f(1.0 / 10_080.0) - y * f(1.0 / 725_760.0))));
             return Self::from_parts(cos, scale(r, half_sinc));
         }
         let n = T::sqrt(n2);

@@ -1,8 +1,6 @@
 //! `Reference` and `StartState`: what a run reports at each tick and what it starts from, in physical units.
 
-use crate::{
-    Configuration, HAND_ROWS, POSITION_ROWS, POSTURE_ROWS, Primitive, Quaternion, Scalar, Velocity,
-};
+use crate::{Configuration, HAND_ROWS, POSITION_ROWS, POSTURE_ROWS, Primitive, Quaternion, Scalar, Velocity};
 
 /// Where a run begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,18 +14,12 @@ pub struct StartState<T> {
 impl<T: Scalar> StartState<T> {
     /// At rest in this configuration.
     pub fn at_rest(configuration: Configuration<T>) -> Self {
-        Self {
-            configuration,
-            velocity: Velocity::ZERO,
-        }
+        Self { configuration, velocity: Velocity::ZERO }
     }
 
     /// As the demonstration started, with its initial velocity: replays a recording that was cut out of a motion.
     pub fn demonstrated<const N: usize>(primitive: &Primitive<T, N>) -> Self {
-        Self {
-            configuration: *primitive.start(),
-            velocity: *primitive.start_velocity(),
-        }
+        Self { configuration: *primitive.start(), velocity: *primitive.start_velocity() }
     }
 }
 

@@ -13,8 +13,8 @@ use crate::pace::Pace;
 use crate::turn::Turn;
 use crate::vector::all_finite;
 use crate::{
-    CONTROL_PERIOD, Coupling, HAND_ROWS, POSITION_ROWS, POSTURE_ROWS, Phase, Primitive, Quaternion,
-    Reference, SENSORS, Scalar, SensorMap, StartState,
+    CONTROL_PERIOD, Coupling, HAND_ROWS, POSITION_ROWS, POSTURE_ROWS, Phase, Primitive, Quaternion, Reference, SENSORS,
+    Scalar, SensorMap, StartState,
 };
 
 /// Why a start or a change in flight is refused; the run goes on unchanged.
@@ -71,10 +71,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// # Errors
     /// [`RolloutError::NotFinite`], [`RolloutError::NotUnit`].
     pub fn start(primitive: &Primitive<T, N>, start: &StartState<T>) -> Result<Self, RolloutError> {
-        let StartState {
-            configuration,
-            velocity,
-        } = start;
+        let StartState { configuration, velocity } = start;
         if !(configuration.is_finite() && velocity.is_finite()) {
             return Err(RolloutError::NotFinite);
         }
@@ -85,12 +82,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
             phase: Phase::START,
             time: T::ZERO,
             time_lost: T::ZERO,
-            pace: Pace {
-                speed: T::ONE,
-                target: T::ONE,
-                stopped: false,
-                slew: Some(T::from_f64(Self::DEFAULT_SLEW)),
-            },
+            pace: Pace { speed: T::ONE, target: T::ONE, stopped: false, slew: Some(T::from_f64(Self::DEFAULT_SLEW)) },
             position: Group::new(from.position, velocity.position, tau, to.position),
             posture: Group::new(from.posture, velocity.posture, tau, to.posture),
             hand: Group::new(from.hand, velocity.hand, tau, to.hand),
@@ -106,12 +98,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// the start state. `coupling` is the feedback of the same instant. A `dt` above [`CONTROL_PERIOD`] is cut to it
     /// (a late tick slows the plan down instead of making it unstable); one that is not positive advances nothing.
     #[inline]
-    pub fn step(
-        &mut self,
-        primitive: &Primitive<T, N>,
-        dt: T,
-        coupling: &Coupling<T>,
-    ) -> Reference<T> {
+    pub fn step(&mut self, primitive: &Primitive<T, N>, dt: T, coupling: &Coupling<T>) -> Reference<T> {
         let longest = T::from_f64(CONTROL_PERIOD);
         let dt = if !(dt > T::ZERO) {
             T::ZERO
@@ -129,56 +116,18 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
             h,
             rate,
             rate_squared: rate * rate,
-            rate_slope: if change == T::ZERO || dt == T::ZERO {
-                T::ZERO
-            } else {
-                change * primitive.rate() / dt
-            },
+            rate_slope: if change == T::ZERO || dt == T::ZERO { T::ZERO } else { change * primitive.rate() / dt },
             goal_fraction: self.goal_fraction(h),
         };
         let progress = self.phase.progress();
         let time = self.time;
 
-        let [
-            f0,
-            f1,
-            f2,
-            r0,
-            r1,
-            r2,
-            p0,
-            p1,
-            p2,
-            p3,
-            p4,
-            p5,
-            p6,
-            h0,
-            h1,
-            h2,
-            h3,
-        ] = f;
-        let position = self.position.step(
-            primitive.position(),
-            &tick,
-            &[f0, f1, f2],
-            &coupling.position,
-        );
-        let orientation = self.orientation.step(
-            primitive.orientation(),
-            &tick,
-            &[r0, r1, r2],
-            &coupling.orientation,
-        );
-        let posture = self.posture.step(
-            primitive.posture(),
-            &tick,
-            &[p0, p1, p2, p3, p4, p5, p6],
-            &[T::ZERO; POSTURE_ROWS],
-        );
-        let hand = self
-            .hand
-            .step(primitive.hand(), &tick, &[h0, h1, h2, h3], &coupling.hand);
+        let [f0, f1, f2, r0, r1, r2, p0, p1, p2, p3, p4, p5, p6, h0, h1, h2, h3] = f;
+        let position = self.position.step(primitive.position(), &tick, &[f0, f1, f2], &coupling.position);
+        let orientation = self.orientation.step(primitive.orientation(), &tick, &[r0, r1, r2], &coupling.orientation);
+        let posture =
+            self.posture.step(primitive.posture(), &tick, &[p0, p1, p2, p3, p4, p5, p6], &[T::ZERO; POSTURE_ROWS]);
+        let hand = self.hand.step(primitive.hand(), &tick, &[h0, h1, h2, h3], &coupling.hand);
 
         self.phase.step(primitive.canonical(), h);
         self.pace.speed = self.pace.speed + change;
@@ -187,16 +136,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
         self.time_lost = (sum - self.time) - step;
         self.time = sum;
 
-        Reference {
-            phase: tick.s,
-            progress,
-            time,
-            rate,
-            position,
-            orientation,
-            posture,
-            hand,
-        }
+        Reference { phase: tick.s, progress, time, rate, position, orientation, posture, hand }
     }
 
     /// `1 - exp(-a_g h)`: exact step of the goal filter, computed anew only when `h` changes.
@@ -216,12 +156,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     ///
     /// Loses effect when the speed differs from the one of the recording, see
     /// [`ExpectedWrench::trust`](crate::ExpectedWrench::trust).
-    pub fn coupling(
-        &self,
-        primitive: &Primitive<T, N>,
-        measured: &[T; SENSORS],
-        map: &SensorMap<T>,
-    ) -> Coupling<T> {
+    pub fn coupling(&self, primitive: &Primitive<T, N>, measured: &[T; SENSORS], map: &SensorMap<T>) -> Coupling<T> {
         let (Some(feedback), Some(expected)) = (primitive.feedback(), primitive.expected()) else {
             return Coupling::NONE;
         };
@@ -255,11 +190,8 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
         if !all_finite(&goal.to_array()) {
             return Err(RolloutError::NotFinite);
         }
-        let goal = goal
-            .checked_unit(T::from_f64(1e-3))
-            .ok_or(RolloutError::NotUnit)?;
-        self.orientation
-            .command(primitive, &goal, self.goal_filter.is_some());
+        let goal = goal.checked_unit(T::from_f64(1e-3)).ok_or(RolloutError::NotUnit)?;
+        self.orientation.command(primitive, &goal, self.goal_filter.is_some());
         Ok(())
     }
 
@@ -308,11 +240,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     ///
     /// # Errors
     /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`].
-    pub fn set_duration(
-        &mut self,
-        primitive: &Primitive<T, N>,
-        duration: T,
-    ) -> Result<(), RolloutError> {
+    pub fn set_duration(&mut self, primitive: &Primitive<T, N>, duration: T) -> Result<(), RolloutError> {
         if !duration.is_finite() {
             return Err(RolloutError::NotFinite);
         }

@@ -62,10 +62,7 @@ impl<T: Scalar, const COLUMNS: usize, const CAPACITY: usize> PhaseTable<T, COLUM
         if samples.is_empty() {
             return Err(TableError::Empty);
         }
-        let mut table = Self {
-            count: samples.len(),
-            samples: [[T::ZERO; COLUMNS]; CAPACITY],
-        };
+        let mut table = Self { count: samples.len(), samples: [[T::ZERO; COLUMNS]; CAPACITY] };
         let Some(target) = table.samples.get_mut(..samples.len()) else {
             return Err(TableError::TooMany);
         };

@@ -94,16 +94,8 @@ impl<T: Scalar> TransformationSystem<T> {
     /// Right-hand side of Eq. (9) = `tau vd`.
     #[inline]
     pub fn right_hand_side(&self, state: &PointState<T>, input: &PointInput<T>) -> T {
-        let PointInput {
-            start,
-            goal,
-            s,
-            f,
-            zeta,
-        } = *input;
-        self.stiffness * (goal - state.x)
-            - self.damping * state.v
-            - self.stiffness * (goal - start) * s
+        let PointInput { start, goal, s, f, zeta } = *input;
+        self.stiffness * (goal - state.x) - self.damping * state.v - self.stiffness * (goal - start) * s
             + self.stiffness * f
             + zeta
     }
@@ -139,11 +131,7 @@ impl<T: Scalar> PointState<T> {
     /// At the value `x` (m or rad) with the scaled velocity `v = tau xd`.
     #[inline]
     pub fn new(x: T, v: T) -> Self {
-        Self {
-            x,
-            v,
-            x_lost: T::ZERO,
-        }
+        Self { x, v, x_lost: T::ZERO }
     }
 
     /// Value, m or rad.

@@ -5,26 +5,17 @@
 use crate::group::{Group, Tick};
 use crate::vector::scale;
 use crate::{
-    Hemisphere, ORIENTATION_ROWS, OrientationError, OrientationInput, OrientationReference,
-    OrientationState, OrientationSystem, Primitive, Quaternion, RotationChart, Scalar,
-    TransformationSystem,
+    Hemisphere, ORIENTATION_ROWS, OrientationError, OrientationInput, OrientationReference, OrientationState,
+    OrientationSystem, Primitive, Quaternion, RotationChart, Scalar, TransformationSystem,
 };
 
 /// The orientation in the coordinates that the primitive chose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Turn<T> {
     /// Eqs. (4), (6), (7).
-    Quaternion {
-        state: OrientationState<T>,
-        start: Quaternion<T>,
-        goal: Quaternion<T>,
-        commanded: Quaternion<T>,
-    },
+    Quaternion { state: OrientationState<T>, start: Quaternion<T>, goal: Quaternion<T>, commanded: Quaternion<T> },
     /// Eq. (1) on rotation vectors.
-    Vector {
-        chart: RotationChart<T>,
-        group: Group<T, ORIENTATION_ROWS>,
-    },
+    Vector { chart: RotationChart<T>, group: Group<T, ORIENTATION_ROWS> },
 }
 
 impl<T: Scalar> Turn<T> {
@@ -37,29 +28,16 @@ impl<T: Scalar> Turn<T> {
         let tau = primitive.duration();
         let nearest = primitive.hemisphere() == Hemisphere::Nearest;
         if primitive.orientation_error() == OrientationError::RotationVector {
-            let goal = if nearest {
-                goal.aligned_with(&demonstrated)
-            } else {
-                goal
-            };
+            let goal = if nearest { goal.aligned_with(&demonstrated) } else { goal };
             let chart = RotationChart::between(&demonstrated, &goal);
             let y = chart.vector(from, &chart.start());
             let dy = chart.velocity(&y, omega);
-            return Self::Vector {
-                chart,
-                group: Group::new(y, dy, tau, chart.goal()),
-            };
+            return Self::Vector { chart, group: Group::new(y, dy, tau, chart.goal()) };
         }
-        let (start, goal) = if nearest {
-            (*from, goal.aligned_with(from))
-        } else {
-            (from.aligned_with(&demonstrated), goal)
-        };
+        let (start, goal) =
+            if nearest { (*from, goal.aligned_with(from)) } else { (from.aligned_with(&demonstrated), goal) };
         Self::Quaternion {
-            state: OrientationState {
-                q: start,
-                omega: scale(omega, tau),
-            },
+            state: OrientationState { q: start, omega: scale(omega, tau) },
             start,
             goal,
             commanded: goal,
@@ -75,26 +53,13 @@ impl<T: Scalar> Turn<T> {
         zeta: &[T; ORIENTATION_ROWS],
     ) -> OrientationReference<T> {
         match self {
-            Self::Quaternion {
-                state,
-                start,
-                goal,
-                commanded,
-            } => {
-                let input = OrientationInput {
-                    start: *start,
-                    goal: *goal,
-                    s: tick.s,
-                    f: *f,
-                    zeta: *zeta,
-                };
+            Self::Quaternion { state, start, goal, commanded } => {
+                let input = OrientationInput { start: *start, goal: *goal, s: tick.s, f: *f, zeta: *zeta };
                 let rhs = OrientationSystem::new(*gains).right_hand_side(state, &input);
                 let out = OrientationReference {
                     quaternion: state.q,
                     omega: scale(&state.omega, tick.rate),
-                    domega: core::array::from_fn(|i| {
-                        rhs[i] * tick.rate_squared + state.omega[i] * tick.rate_slope
-                    }),
+                    domega: core::array::from_fn(|i| rhs[i] * tick.rate_squared + state.omega[i] * tick.rate_slope),
                 };
                 state.step(&rhs, tick.h);
                 if tick.goal_fraction > T::ZERO {
@@ -109,28 +74,14 @@ impl<T: Scalar> Turn<T> {
                 let zeta = chart.generalised(&y, zeta);
                 let row = group.step(gains, tick, f, &zeta);
                 let (omega, domega) = chart.rates(&row.x, &row.v, &row.a);
-                OrientationReference {
-                    quaternion: chart.orientation(&row.x),
-                    omega,
-                    domega,
-                }
+                OrientationReference { quaternion: chart.orientation(&row.x), omega, domega }
             }
         }
     }
 
-    pub(crate) fn command<const N: usize>(
-        &mut self,
-        primitive: &Primitive<T, N>,
-        new: &Quaternion<T>,
-        filtered: bool,
-    ) {
+    pub(crate) fn command<const N: usize>(&mut self, primitive: &Primitive<T, N>, new: &Quaternion<T>, filtered: bool) {
         match self {
-            Self::Quaternion {
-                state,
-                goal,
-                commanded,
-                ..
-            } => {
+            Self::Quaternion { state, goal, commanded, .. } => {
                 *commanded = match primitive.hemisphere() {
                     Hemisphere::Demonstrated => new.aligned_with(&primitive.goal().orientation),
                     Hemisphere::Nearest => new.aligned_with(&state.q),
@@ -150,9 +101,7 @@ impl<T: Scalar> Turn<T> {
 
     pub(crate) fn arrive(&mut self) {
         match self {
-            Self::Quaternion {
-                goal, commanded, ..
-            } => *goal = *commanded,
+            Self::Quaternion { goal, commanded, .. } => *goal = *commanded,
             Self::Vector { group, .. } => group.goal = group.commanded,
         }
     }

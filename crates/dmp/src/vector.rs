@@ -48,11 +48,7 @@ pub(crate) fn clamp_norm<T: Scalar>(a: &[T; 3], limit: T) -> [T; 3] {
     }
     let unit = scale(a, T::ONE / largest);
     let norm = T::sqrt(dot(&unit, &unit));
-    if largest * norm > limit {
-        scale(&unit, limit / norm)
-    } else {
-        *a
-    }
+    if largest * norm > limit { scale(&unit, limit / norm) } else { *a }
 }
 
 /// `a` limited to [-limit, limit]; 0 if it is not a number.

@@ -60,16 +60,7 @@ impl Envelope {
         let session = self.session.to_le_bytes();
         let sequence = self.sequence.to_le_bytes();
         let time = self.time_ms.to_le_bytes();
-        [
-            session[0],
-            session[1],
-            sequence[0],
-            sequence[1],
-            time[0],
-            time[1],
-            time[2],
-            time[3],
-        ]
+        [session[0], session[1], sequence[0], sequence[1], time[0], time[1], time[2], time[3]]
     }
 
     fn from_bytes(bytes: [u8; ENVELOPE_BYTES]) -> Self {
@@ -134,29 +125,19 @@ impl core::error::Error for EncodeError {}
 ///
 /// # Errors
 /// [`EncodeError::BufferTooSmall`] if `out` is too short; never with [`FRAME_BYTES`] of room.
-pub fn encode<M: Message>(
-    envelope: Envelope,
-    message: &M,
-    out: &mut [u8],
-) -> Result<usize, EncodeError> {
+pub fn encode<M: Message>(envelope: Envelope, message: &M, out: &mut [u8]) -> Result<usize, EncodeError> {
     let mut payload = [0_u8; PAYLOAD_BYTES];
     let (head, body) = payload.split_at_mut(ENVELOPE_BYTES);
     head.copy_from_slice(&envelope.to_bytes());
-    let room = body
-        .get_mut(..MESSAGE_BYTES)
-        .ok_or(EncodeError::MessageTooLong)?;
-    let length = postcard::to_slice(message, room)
-        .map_err(|_| EncodeError::MessageTooLong)?
-        .len();
+    let room = body.get_mut(..MESSAGE_BYTES).ok_or(EncodeError::MessageTooLong)?;
+    let length = postcard::to_slice(message, room).map_err(|_| EncodeError::MessageTooLong)?.len();
     let covered = ENVELOPE_BYTES + length;
     let crc = CRC.checksum(payload.get(..covered).ok_or(EncodeError::MessageTooLong)?);
     payload
         .get_mut(covered..covered + CRC_BYTES)
         .ok_or(EncodeError::MessageTooLong)?
         .copy_from_slice(&crc.to_le_bytes());
-    let payload = payload
-        .get(..covered + CRC_BYTES)
-        .ok_or(EncodeError::MessageTooLong)?;
+    let payload = payload.get(..covered + CRC_BYTES).ok_or(EncodeError::MessageTooLong)?;
     let stuffed = cobs::try_encode(payload, out).map_err(|_| EncodeError::BufferTooSmall)?;
     *out.get_mut(stuffed).ok_or(EncodeError::BufferTooSmall)? = 0;
     Ok(stuffed + 1)
@@ -193,14 +174,7 @@ impl<const N: usize> Decoder<N> {
             buffer: [0; N],
             length: 0,
             overflow: false,
-            counters: LinkCounters {
-                accepted: 0,
-                bad_cobs: 0,
-                bad_crc: 0,
-                too_long: 0,
-                undecodable: 0,
-                overrun: 0,
-            },
+            counters: LinkCounters { accepted: 0, bad_cobs: 0, bad_crc: 0, too_long: 0, undecodable: 0, overrun: 0 },
         }
     }
 
@@ -260,18 +234,12 @@ impl<const N: usize> Decoder<N> {
         if CRC.checksum(covered) != u32::from_le_bytes(*crc) {
             return Err(Drop::Crc);
         }
-        let (envelope, body) = covered
-            .split_first_chunk::<ENVELOPE_BYTES>()
-            .ok_or(Drop::Undecodable)?;
-        let (message, rest) =
-            postcard::take_from_bytes::<M>(body).map_err(|_| Drop::Undecodable)?;
+        let (envelope, body) = covered.split_first_chunk::<ENVELOPE_BYTES>().ok_or(Drop::Undecodable)?;
+        let (message, rest) = postcard::take_from_bytes::<M>(body).map_err(|_| Drop::Undecodable)?;
         if !rest.is_empty() && !message.tolerates_more() {
             return Err(Drop::Undecodable);
         }
-        Ok(Frame {
-            envelope: Envelope::from_bytes(*envelope),
-            message,
-        })
+        Ok(Frame { envelope: Envelope::from_bytes(*envelope), message })
     }
 }
 

@@ -55,15 +55,10 @@ impl Name {
         if text.starts_with(['-', '.']) {
             return Err(NameError::BadCharacter);
         }
-        if !text
-            .bytes()
-            .all(|b| b.is_ascii_alphanumeric() || matches!(b, b'-' | b'_' | b'.'))
-        {
+        if !text.bytes().all(|b| b.is_ascii_alphanumeric() || matches!(b, b'-' | b'_' | b'.')) {
             return Err(NameError::BadCharacter);
         }
-        heapless::String::try_from(text)
-            .map(Self)
-            .map_err(|_| NameError::TooLong)
+        heapless::String::try_from(text).map(Self).map_err(|_| NameError::TooLong)
     }
 
     /// The name as text.

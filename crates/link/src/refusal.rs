@@ -170,9 +170,7 @@ impl Refusal {
             Self::Moving => "the arm moves too fast for this",
             Self::WrenchMissing => "no wrench is measured",
             Self::NoAnswer => "the control cycle did not answer",
-            Self::ZeroNeedsIdle => {
-                "the arm can only be zeroed at rest, while the safety module is idle"
-            }
+            Self::ZeroNeedsIdle => "the arm can only be zeroed at rest, while the safety module is idle",
         }
     }
 
@@ -185,27 +183,19 @@ impl Refusal {
             }
             Self::Model => "build tool and firmware from the same model file",
             Self::NoSession => "connect again",
-            Self::Busy => {
-                "end the other program, or wait until it has been silent for half a second"
-            }
+            Self::Busy => "end the other program, or wait until it has been silent for half a second",
             Self::Stale => "send the request again",
             Self::BadValue => "correct the value",
             Self::NotZeroed => "put the arm into its home pose and zero it",
-            Self::NotReady => {
-                "wait for the start-up to finish; if it does not, look at pendant and cables"
-            }
+            Self::NotReady => "wait for the start-up to finish; if it does not, look at pendant and cables",
             Self::SafetyMode => "press Shift+Activate on the pendant",
             Self::Faulted => "remove the cause, then clear the fault",
             Self::State => "stop the present motion first: `tactus stop`",
             Self::CommandQueueFull => "send the request again",
             Self::NoSuchPrimitive => "`tactus list` shows what is stored; `tactus upload` adds one",
             Self::StoreFull => "delete a primitive that is no longer needed",
-            Self::ImageTooLarge => {
-                "learn the primitive with fewer kernels, or leave out its expectation"
-            }
-            Self::NoUpload | Self::UploadOrder | Self::UploadIncomplete | Self::UploadCrc => {
-                "start the upload again"
-            }
+            Self::ImageTooLarge => "learn the primitive with fewer kernels, or leave out its expectation",
+            Self::NoUpload | Self::UploadOrder | Self::UploadIncomplete | Self::UploadCrc => "start the upload again",
             Self::ImageInvalid | Self::ImageName => "make the image again with `tactus upload`",
             Self::ImageModel => "learn the primitive again with the present model",
             Self::TooManyKernels => "learn the primitive with fewer kernels",
@@ -214,9 +204,7 @@ impl Refusal {
             Self::FarFromStart => "approach the start first, or run it from the present pose",
             Self::StoreFailed => "try again; if it persists the storage is worn out",
             Self::PositionsMissing => "check the CAN wiring and the pucks",
-            Self::OutsideJointLimits | Self::OutsideWorkspace => {
-                "choose a target the arm can reach"
-            }
+            Self::OutsideJointLimits | Self::OutsideWorkspace => "choose a target the arm can reach",
             Self::CauseRemains => "remove the cause and let the arm come to rest",
             Self::Moving => "let the arm come to rest",
             Self::WrenchMissing => "check the force sensor and its cable",

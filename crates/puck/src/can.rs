@@ -29,25 +29,13 @@ impl Node {
     /// The spread of the hand (F4).
     pub const SPREAD: Node = Node(14);
     /// The motor pucks of the seven-joint arm, M1 first.
-    pub const ARM: [Node; 7] = [
-        Node(1),
-        Node(2),
-        Node(3),
-        Node(4),
-        Node(5),
-        Node(6),
-        Node(7),
-    ];
+    pub const ARM: [Node; 7] = [Node(1), Node(2), Node(3), Node(4), Node(5), Node(6), Node(7)];
     /// The four pucks of the hand: fingers, then spread.
     pub const HAND: [Node; 4] = [Node(11), Node(12), Node(13), Node(14)];
 
     /// A node by number; `None` above 31.
     pub const fn new(number: u8) -> Option<Node> {
-        if number as u16 <= ADDRESS_MASK {
-            Some(Node(number))
-        } else {
-            None
-        }
+        if number as u16 <= ADDRESS_MASK { Some(Node(number)) } else { None }
     }
 
     /// The number, 0..=31.
@@ -57,20 +45,12 @@ impl Node {
 
     /// Index 0..=6 of an arm motor puck; `None` for every other node.
     pub const fn arm_index(self) -> Option<usize> {
-        if self.0 >= 1 && self.0 <= 7 {
-            Some(self.0 as usize - 1)
-        } else {
-            None
-        }
+        if self.0 >= 1 && self.0 <= 7 { Some(self.0 as usize - 1) } else { None }
     }
 
     /// Index 0..=3 of a hand puck; `None` for every other node.
     pub const fn hand_index(self) -> Option<usize> {
-        if self.0 >= 11 && self.0 <= 14 {
-            Some(self.0 as usize - 11)
-        } else {
-            None
-        }
+        if self.0 >= 11 && self.0 <= 14 { Some(self.0 as usize - 11) } else { None }
     }
 }
 
@@ -108,11 +88,7 @@ impl Group {
 
     /// A group by number; `None` above 31.
     pub const fn new(number: u8) -> Option<Group> {
-        if number as u16 <= ADDRESS_MASK {
-            Some(Group(number))
-        } else {
-            None
-        }
+        if number as u16 <= ADDRESS_MASK { Some(Group(number)) } else { None }
     }
 
     /// The number, 0..=31.
@@ -179,11 +155,7 @@ impl CanId {
     /// The node or group the frame is for.
     pub const fn destination(self) -> Destination {
         let address = (self.0 & ADDRESS_MASK) as u8;
-        if self.0 & GROUP_BIT != 0 {
-            Destination::Group(Group(address))
-        } else {
-            Destination::Node(Node(address))
-        }
+        if self.0 & GROUP_BIT != 0 { Destination::Group(Group(address)) } else { Destination::Node(Node(address)) }
     }
 }
 
@@ -224,22 +196,14 @@ impl CanFrame {
             data[index] = payload[index];
             index += 1;
         }
-        CanFrame {
-            id,
-            length: N as u8,
-            data,
-        }
+        CanFrame { id, length: N as u8, data }
     }
 
     /// A frame with a payload of run-time length; `None` if it is longer than eight bytes.
     pub fn from_slice(id: CanId, payload: &[u8]) -> Option<CanFrame> {
         let mut data = [0; 8];
         data.get_mut(..payload.len())?.copy_from_slice(payload);
-        Some(CanFrame {
-            id,
-            length: payload.len() as u8,
-            data,
-        })
+        Some(CanFrame { id, length: payload.len() as u8, data })
     }
 
     /// Our copy of any driver's frame; `None` for extended and remote frames and for more than eight bytes.

@@ -56,9 +56,7 @@ impl Action {
     /// The value for the puck with this PIDX (1..=4) in a packed frame; `None` otherwise.
     pub fn torque_for(&self, place: u8) -> Option<PuckTorque> {
         match self {
-            Action::PackedTorques { torques, .. } => {
-                torques.get(usize::from(place).checked_sub(1)?).copied()
-            }
+            Action::PackedTorques { torques, .. } => torques.get(usize::from(place).checked_sub(1)?).copied(),
             _ => None,
         }
     }
@@ -108,9 +106,7 @@ impl Request {
             return Err(RequestError::ReplyGroup);
         }
         let action = match *frame.data() {
-            [header] if header & SET_BIT == 0 => Action::Get {
-                property: PropertyId::of_byte(header),
-            },
+            [header] if header & SET_BIT == 0 => Action::Get { property: PropertyId::of_byte(header) },
             [_] => return Err(RequestError::Header),
             [header, b1, b2, b3, b4, b5, b6, b7] => {
                 if header & SET_BIT == 0 {
@@ -132,11 +128,7 @@ impl Request {
                 Err(_) => return Err(RequestError::Header),
             },
         };
-        Ok(Request {
-            sender: id.sender(),
-            to,
-            action,
-        })
+        Ok(Request { sender: id.sender(), to, action })
     }
 }
 
@@ -144,9 +136,5 @@ impl Request {
 ///
 /// The best reading of undocumented frames: SET MODE to all motor pucks.
 pub fn safety_broadcast(mode: MotorMode) -> CanFrame {
-    short(
-        CanId::encode(Node::SAFETY_MODULE, Group::ALL_MOTORS),
-        PropertyId::MODE,
-        mode.value() as i16,
-    )
+    short(CanId::encode(Node::SAFETY_MODULE, Group::ALL_MOTORS), PropertyId::MODE, mode.value() as i16)
 }

@@ -94,11 +94,7 @@ pub(crate) fn decode(payload: &[u8]) -> Option<([i16; 3], Option<GaugeStatus>)> 
         _ => return None,
     };
     let &[x0, x1, y0, y1, z0, z1] = payload.first_chunk::<6>()?;
-    let counts = [
-        i16::from_le_bytes([x0, x1]),
-        i16::from_le_bytes([y0, y1]),
-        i16::from_le_bytes([z0, z1]),
-    ];
+    let counts = [i16::from_le_bytes([x0, x1]), i16::from_le_bytes([y0, y1]), i16::from_le_bytes([z0, z1])];
     Some((counts, status))
 }
 

@@ -26,12 +26,7 @@ const RADIAN_PER_COUNT: f64 = core::f64::consts::TAU / COUNTS_PER_REVOLUTION;
 /// Commands of velocity are in counts per millisecond.
 const MILLISECONDS_PER_SECOND: f64 = 1000.0;
 /// Motor revolutions per joint revolution in the order of [`Node::HAND`].
-const RATIOS: [f64; 4] = [
-    INNER_LINK_RATIO,
-    INNER_LINK_RATIO,
-    INNER_LINK_RATIO,
-    SPREAD_RATIO,
-];
+const RATIOS: [f64; 4] = [INNER_LINK_RATIO, INNER_LINK_RATIO, INNER_LINK_RATIO, SPREAD_RATIO];
 
 /// Values of CMD.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,13 +98,10 @@ pub fn angles<R: Real>(primary: &[Counts; 4], secondary: &[Option<Counts>; 3]) -
     let scale = |counts: Counts, factor: f64| R::from_i32(counts.0) * R::from_f64(factor);
     let mut inner = [R::from_f64(0.0); 3];
     let mut outer = inner;
-    for (((inner, outer), motor), worm) in
-        inner.iter_mut().zip(&mut outer).zip(primary).zip(secondary)
-    {
+    for (((inner, outer), motor), worm) in inner.iter_mut().zip(&mut outer).zip(primary).zip(secondary) {
         match worm {
             Some(worm) => {
-                let both_links =
-                    RADIAN_PER_COUNT * (1.0 / INNER_LINK_RATIO + 1.0 / OUTER_LINK_RATIO);
+                let both_links = RADIAN_PER_COUNT * (1.0 / INNER_LINK_RATIO + 1.0 / OUTER_LINK_RATIO);
                 *inner = scale(*worm, RADIAN_PER_COUNT / SECONDARY_RATIO);
                 *outer = scale(*motor, both_links) - *inner;
             }
@@ -120,22 +112,12 @@ pub fn angles<R: Real>(primary: &[Counts; 4], secondary: &[Option<Counts>; 3]) -
         }
     }
     let [_, _, _, spread] = *primary;
-    HandAngles {
-        inner,
-        outer,
-        spread: scale(spread, RADIAN_PER_COUNT / SPREAD_RATIO),
-    }
+    HandAngles { inner, outer, spread: scale(spread, RADIAN_PER_COUNT / SPREAD_RATIO) }
 }
 
 /// Device side: counts of motor and secondary encoder of a finger before breakaway at this inner angle, rounded down.
 pub fn finger_counts<R: Real>(inner: R) -> (Counts, Counts) {
-    let counts = |ratio: f64| {
-        Counts(
-            (inner * R::from_f64(ratio / RADIAN_PER_COUNT))
-                .floor()
-                .to_i32(),
-        )
-    };
+    let counts = |ratio: f64| Counts((inner * R::from_f64(ratio / RADIAN_PER_COUNT)).floor().to_i32());
     (counts(INNER_LINK_RATIO), counts(SECONDARY_RATIO))
 }
 
@@ -152,11 +134,7 @@ impl core::fmt::Display for HandError {
     fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             HandError::NotFinite => NotFinite.fmt(formatter),
-            HandError::Property(property) => write!(
-                formatter,
-                "the hand has no property {}",
-                property.mnemonic()
-            ),
+            HandError::Property(property) => write!(formatter, "the hand has no property {}", property.mnemonic()),
         }
     }
 }
@@ -242,18 +220,9 @@ impl HandCommander {
     ///
     /// # Errors
     /// [`HandError::NotFinite`].
-    pub fn torques<R: Real>(
-        &self,
-        torque: &[R; 4],
-        units_per_newton_metre: &[i32; 4],
-    ) -> Result<CanFrame, HandError> {
+    pub fn torques<R: Real>(&self, torque: &[R; 4], units_per_newton_metre: &[i32; 4]) -> Result<CanFrame, HandError> {
         let mut units = [PuckTorque::ZERO; 4];
-        for (((units, torque), ipnm), ratio) in units
-            .iter_mut()
-            .zip(torque)
-            .zip(units_per_newton_metre)
-            .zip(RATIOS)
-        {
+        for (((units, torque), ipnm), ratio) in units.iter_mut().zip(torque).zip(units_per_newton_metre).zip(RATIOS) {
             *units = PuckTorque::from_units(*torque * R::from_i32(*ipnm) / R::from_f64(ratio))?;
         }
         Ok(packed_torques(Group::HAND, self.torque, units))
@@ -270,19 +239,10 @@ fn joint_counts<R: Real>(angles: &[R; 4]) -> Result<[i32; 4], NotFinite> {
 }
 
 fn finite<R: Real>(value: R) -> Result<R, NotFinite> {
-    if value.is_finite() {
-        Ok(value)
-    } else {
-        Err(NotFinite)
-    }
+    if value.is_finite() { Ok(value) } else { Err(NotFinite) }
 }
 
 fn each_digit(property: PropertyId, [a, b, c, d]: &[i32; 4]) -> [CanFrame; 4] {
     let [f1, f2, f3, spread] = Node::HAND;
-    [
-        set(f1, property, *a),
-        set(f2, property, *b),
-        set(f3, property, *c),
-        set(spread, property, *d),
-    ]
+    [set(f1, property, *a), set(f2, property, *b), set(f3, property, *c), set(spread, property, *d)]
 }

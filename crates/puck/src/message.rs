@@ -43,14 +43,9 @@ pub(crate) fn short(id: CanId, property: PropertyId, value: i16) -> CanFrame {
 /// group's firmware ([`PropertyId::TORQUE`] from 61 on). Only `control::actuation` may call this with torques other than
 /// zero: everything else could put an unlimited torque on the bus.
 pub fn packed_torques(group: Group, property: PropertyId, torques: [PuckTorque; 4]) -> CanFrame {
-    let fields = torques
-        .iter()
-        .fold(0_u64, |packed, torque| packed << 14 | torque.bits());
+    let fields = torques.iter().fold(0_u64, |packed, torque| packed << 14 | torque.bits());
     let [_, b1, b2, b3, b4, b5, b6, b7] = fields.to_be_bytes();
-    CanFrame::with_payload(
-        CanId::encode(Node::HOST, group),
-        [SET_BIT | property.number(), b1, b2, b3, b4, b5, b6, b7],
-    )
+    CanFrame::with_payload(CanId::encode(Node::HOST, group), [SET_BIT | property.number(), b1, b2, b3, b4, b5, b6, b7])
 }
 
 /// Explicit zero torque for all seven motors. A puck is believed to keep its last torque until told otherwise, so every

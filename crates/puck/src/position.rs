@@ -27,10 +27,9 @@ const fn pack(position: Counts) -> [u8; 3] {
 pub(crate) fn decode(payload: &[u8]) -> Option<(Counts, Option<Counts>)> {
     match *payload {
         [high, middle, low] => Some((unpack(high, middle, low), None)),
-        [high, middle, low, high2, middle2, low2] => Some((
-            unpack(high, middle, low),
-            Some(unpack(high2, middle2, low2)),
-        )),
+        [high, middle, low, high2, middle2, low2] => {
+            Some((unpack(high, middle, low), Some(unpack(high2, middle2, low2))))
+        }
         _ => None,
     }
 }
@@ -58,8 +57,5 @@ pub fn position_frame(node: Node, primary: Counts, secondary: Option<Counts>) ->
 
 /// Device side: the reply to GET JP, the secondary position alone.
 pub fn secondary_position_frame(node: Node, secondary: Counts) -> CanFrame {
-    CanFrame::with_payload(
-        CanId::encode(node, Group::SECONDARY_POSITION_REPLIES),
-        pack(secondary),
-    )
+    CanFrame::with_payload(CanId::encode(node, Group::SECONDARY_POSITION_REPLIES), pack(secondary))
 }

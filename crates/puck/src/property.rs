@@ -30,11 +30,7 @@ impl PropertyId {
 
     /// A property by number; `None` above 127.
     pub const fn new(number: u8) -> Option<PropertyId> {
-        if number <= 127 {
-            Some(PropertyId(number))
-        } else {
-            None
-        }
+        if number <= 127 { Some(PropertyId(number)) } else { None }
     }
 
     /// The low seven bits of a first payload byte.
@@ -62,14 +58,7 @@ struct Row {
 }
 
 /// A row that no list contains: the base each row of the table fills in.
-const NOWHERE: Row = Row {
-    mnemonic: "",
-    is_wide: false,
-    monitor: &[],
-    safety: &[],
-    motor: &[],
-    force_torque: &[],
-};
+const NOWHERE: Row = Row { mnemonic: "", is_wide: false, monitor: &[], safety: &[], motor: &[], force_torque: &[] };
 
 macro_rules! properties {
     ($($(#[$doc:meta])* $name:ident $mnemonic:literal $width:ident { $($list:ident: [$($change:expr),*]),* })*) => {
@@ -146,11 +135,7 @@ pub struct UnknownFirmware {
 
 impl fmt::Display for UnknownFirmware {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            formatter,
-            "no property table for firmware version {}",
-            self.version
-        )
+        write!(formatter, "no property table for firmware version {}", self.version)
     }
 }
 
@@ -159,10 +144,7 @@ impl core::error::Error for UnknownFirmware {}
 impl PropertyTable {
     /// The table of any puck in STAT 0.
     pub const fn monitor() -> PropertyTable {
-        PropertyTable {
-            list: List::Monitor,
-            version: 0,
-        }
+        PropertyTable { list: List::Monitor, version: 0 }
     }
 
     /// The table of a motor puck (arm or hand) in STAT 2 with this VERS.
@@ -183,10 +165,7 @@ impl PropertyTable {
 
     /// The table of a force/torque sensor. There is one: some sensors report no usable VERS or ROLE, so choose it by node 8.
     pub const fn force_torque() -> PropertyTable {
-        PropertyTable {
-            list: List::ForceTorque,
-            version: 0,
-        }
+        PropertyTable { list: List::ForceTorque, version: 0 }
     }
 
     const fn versioned(list: List, version: i32) -> Result<PropertyTable, UnknownFirmware> {
@@ -194,10 +173,7 @@ impl PropertyTable {
         if version < 1 || version > NEWEST_FIRMWARE as i32 {
             return Err(UnknownFirmware { version });
         }
-        Ok(PropertyTable {
-            list,
-            version: version as u8,
-        })
+        Ok(PropertyTable { list, version: version as u8 })
     }
 
     /// The number of a property on this puck; `None` if it has no such property.
@@ -209,19 +185,13 @@ impl PropertyTable {
             List::Motor => row.motor,
             List::ForceTorque => row.force_torque,
         };
-        let (_, number) = changes
-            .iter()
-            .rev()
-            .find(|(since, _)| *since <= self.version)?;
+        let (_, number) = changes.iter().rev().find(|(since, _)| *since <= self.version)?;
         // ABSENT is above 127 and therefore no PropertyId.
         PropertyId::new(*number)
     }
 
     /// The property that has this number on this puck; `None` if there is none.
     pub fn property(&self, id: PropertyId) -> Option<Property> {
-        Property::ALL
-            .iter()
-            .copied()
-            .find(|property| self.id(*property) == Some(id))
+        Property::ALL.iter().copied().find(|property| self.id(*property) == Some(id))
     }
 }

@@ -144,44 +144,26 @@ impl Reply {
         let wrench = || force_torque::decode(payload).ok_or(ReplyError::Length);
         match group {
             Group::POSITION_REPLIES => position::decode(payload)
-                .map(|(primary, secondary)| Reply::Position {
-                    node,
-                    primary,
-                    secondary,
-                })
+                .map(|(primary, secondary)| Reply::Position { node, primary, secondary })
                 .ok_or(ReplyError::Length),
             Group::PROPERTY_REPLIES => {
-                decode_property(payload).map(|(property, value)| Reply::Property {
-                    node,
-                    property,
-                    value,
-                })
+                decode_property(payload).map(|(property, value)| Reply::Property { node, property, value })
             }
             Group::SECONDARY_POSITION_REPLIES => position::decode_secondary(payload)
                 .map(|secondary| Reply::SecondaryPosition { node, secondary })
                 .ok_or(ReplyError::Length),
-            Group::FORCE_REPLIES => wrench().map(|(counts, status)| Reply::Force {
-                node,
-                counts,
-                status,
-            }),
-            Group::TORQUE_REPLIES => wrench().map(|(counts, status)| Reply::Torque {
-                node,
-                counts,
-                status,
-            }),
-            Group::ACCELERATION_REPLIES => wrench().map(|(counts, status)| Reply::Acceleration {
-                node,
-                counts,
-                status,
-            }),
+            Group::FORCE_REPLIES => wrench().map(|(counts, status)| Reply::Force { node, counts, status }),
+            Group::TORQUE_REPLIES => wrench().map(|(counts, status)| Reply::Torque { node, counts, status }),
+            Group::ACCELERATION_REPLIES => {
+                wrench().map(|(counts, status)| Reply::Acceleration { node, counts, status })
+            }
             Group::TACTILE_FULL_REPLIES if payload.len() != 8 => Err(ReplyError::Length),
             Group::TACTILE_FULL_REPLIES => TactileBlock::decode(payload)
                 .map(|block| Reply::TactileFull { node, block })
                 .ok_or(ReplyError::Sequence),
-            Group::TACTILE_TOP_REPLIES => TactileTop::decode(payload)
-                .map(|top| Reply::TactileTop { node, top })
-                .ok_or(ReplyError::Length),
+            Group::TACTILE_TOP_REPLIES => {
+                TactileTop::decode(payload).map(|top| Reply::TactileTop { node, top }).ok_or(ReplyError::Length)
+            }
             Group::ALL_MOTORS if node == Node::SAFETY_MODULE => Ok(Reply::SafetyBroadcast),
             _ => Err(ReplyError::UnknownGroup),
         }
@@ -203,18 +185,10 @@ pub(crate) fn decode_property(payload: &[u8]) -> Result<(PropertyId, i32), Reply
 
 /// Device side: an ordinary reply of 16 bits.
 pub fn reply16(node: Node, property: PropertyId, value: i16) -> CanFrame {
-    short(
-        CanId::encode(node, Group::PROPERTY_REPLIES),
-        property,
-        value,
-    )
+    short(CanId::encode(node, Group::PROPERTY_REPLIES), property, value)
 }
 
 /// Device side: an ordinary reply of 32 bits.
 pub fn reply32(node: Node, property: PropertyId, value: i32) -> CanFrame {
-    wide(
-        CanId::encode(node, Group::PROPERTY_REPLIES),
-        property,
-        value,
-    )
+    wide(CanId::encode(node, Group::PROPERTY_REPLIES), property, value)
 }

@@ -190,13 +190,7 @@ impl PendantState {
 
     /// The five supervised quantities, velocity first.
     pub const fn health(&self) -> [Health; 5] {
-        [
-            self.velocity,
-            self.torque,
-            self.voltage,
-            self.heartbeat,
-            self.other,
-        ]
+        [self.velocity, self.torque, self.voltage, self.heartbeat, self.other]
     }
 
     /// Neither warning nor fault anywhere.
@@ -232,9 +226,7 @@ impl fmt::Display for LimitError {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
             LimitError::NotFinite => "limit is NaN or infinite",
-            LimitError::NotPositive => {
-                "fault limit is zero or negative: that would switch the supervision off"
-            }
+            LimitError::NotPositive => "fault limit is zero or negative: that would switch the supervision off",
             LimitError::Order => "warning limit is negative or above the fault limit",
             LimitError::Range => "limit does not fit into 16 bits",
             LimitError::Property => "the safety module has no such property",
@@ -254,11 +246,7 @@ impl From<NotFinite> for LimitError {
 ///
 /// # Errors
 /// [`LimitError`]. A fault limit of 0 means "never fault" to the module; it is refused.
-pub fn velocity_limits<R: Real>(
-    table: &PropertyTable,
-    fault: R,
-    warning: R,
-) -> Result<[CanFrame; 2], LimitError> {
+pub fn velocity_limits<R: Real>(table: &PropertyTable, fault: R, warning: R) -> Result<[CanFrame; 2], LimitError> {
     let scale = R::from_f64(VELOCITY_UNITS_PER_METRE_PER_SECOND);
     limits(table, [Property::Vl2, Property::Vl1], fault, warning, scale)
 }
@@ -275,13 +263,7 @@ pub fn torque_limits<R: Real>(
     warning: R,
     units_per_newton_metre: i32,
 ) -> Result<[CanFrame; 2], LimitError> {
-    limits(
-        table,
-        [Property::Tl2, Property::Tl1],
-        fault,
-        warning,
-        R::from_i32(units_per_newton_metre),
-    )
+    limits(table, [Property::Tl2, Property::Tl1], fault, warning, R::from_i32(units_per_newton_metre))
 }
 
 /// Both limits in bus units, truncated as the library does, fault first.
@@ -307,10 +289,7 @@ fn limits<R: Real>(
     }
     let fault_id = table.id(fault_property).ok_or(LimitError::Property)?;
     let warning_id = table.id(warning_property).ok_or(LimitError::Property)?;
-    Ok([
-        set(Node::SAFETY_MODULE, fault_id, fault),
-        set(Node::SAFETY_MODULE, warning_id, warning),
-    ])
+    Ok([set(Node::SAFETY_MODULE, fault_id, fault), set(Node::SAFETY_MODULE, warning_id, warning)])
 }
 
 /// Ignore the next `count` velocity faults: before positions are rewritten, and before the first poll after a pause.

@@ -45,9 +45,7 @@ impl TactileBlock {
 
     /// The pressures in N/cm^2.
     pub fn pressures<R: Real>(&self) -> [R; 5] {
-        self.cells.map(|cell| {
-            R::from_i32(cell as i32) * R::from_f64(NEWTON_PER_SQUARE_CENTIMETRE_PER_COUNT)
-        })
+        self.cells.map(|cell| R::from_i32(cell as i32) * R::from_f64(NEWTON_PER_SQUARE_CENTIMETRE_PER_COUNT))
     }
 
     /// `NNNN AAAAAAAAAAAA BBBBBBBBBBBB ...` as one big-endian integer; `None` for another length or a sequence above 4.
@@ -55,24 +53,14 @@ impl TactileBlock {
         let bits = u64::from_be_bytes(payload.try_into().ok()?);
         let sequence = (bits >> 60) as u8;
         let cell = |index: u64| (bits >> (48 - 12 * index)) as u16 & 0xFFF;
-        (sequence <= 4).then(|| TactileBlock {
-            sequence,
-            cells: [cell(0), cell(1), cell(2), cell(3), cell(4)],
-        })
+        (sequence <= 4).then(|| TactileBlock { sequence, cells: [cell(0), cell(1), cell(2), cell(3), cell(4)] })
     }
 
     /// Device side: the frame. Sequence and cells are cut to four and twelve bits.
     pub fn frame(&self, node: Node) -> CanFrame {
-        let bits = self
-            .cells
-            .iter()
-            .fold((self.sequence & 0xF) as u64, |bits, cell| {
-                bits << 12 | (*cell & 0xFFF) as u64
-            });
-        CanFrame::with_payload(
-            CanId::encode(node, Group::TACTILE_FULL_REPLIES),
-            bits.to_be_bytes(),
-        )
+        let bits =
+            self.cells.iter().fold((self.sequence & 0xF) as u64, |bits, cell| bits << 12 | (*cell & 0xFFF) as u64);
+        CanFrame::with_payload(CanId::encode(node, Group::TACTILE_FULL_REPLIES), bits.to_be_bytes())
     }
 }
 
@@ -96,22 +84,13 @@ impl TactileTop {
         for (value, shift) in values.iter_mut().rev().zip((0_u32..).step_by(4)) {
             *value = (bits >> shift) as u8 & 0xF;
         }
-        Some(TactileTop {
-            map: (bits >> 40) as u32,
-            values,
-        })
+        Some(TactileTop { map: (bits >> 40) as u32, values })
     }
 
     /// Device side: the frame. Map and values are cut to 24 and four bits.
     pub fn frame(&self, node: Node) -> CanFrame {
         let map = (self.map & 0xFF_FFFF) as u64;
-        let bits = self
-            .values
-            .iter()
-            .fold(map, |bits, value| bits << 4 | (*value & 0xF) as u64);
-        CanFrame::with_payload(
-            CanId::encode(node, Group::TACTILE_TOP_REPLIES),
-            bits.to_be_bytes(),
-        )
+        let bits = self.values.iter().fold(map, |bits, value| bits << 4 | (*value & 0xF) as u64);
+        CanFrame::with_payload(CanId::encode(node, Group::TACTILE_TOP_REPLIES), bits.to_be_bytes())
     }
 }

@@ -25,28 +25,12 @@ pub struct Ratios {
 
 impl Ratios {
     /// Barrett's configuration of 2018 for the seven-joint WAM. It rounds N3/n3 = 28.25/1.68 to four decimals.
-    pub const WAM7: Ratios = Ratios {
-        coefficients: [42.0, 28.25, 16.8155, 18.0, 9.7, 9.7, 14.93],
-    };
+    pub const WAM7: Ratios = Ratios { coefficients: [42.0, 28.25, 16.8155, 18.0, 9.7, 9.7, 14.93] };
 
     /// From N1..N7 and the ratios of the two differentials, as Barrett's manual lists them.
-    pub const fn from_gears(
-        gears: [f64; JOINTS],
-        shoulder_differential: f64,
-        wrist_differential: f64,
-    ) -> Ratios {
+    pub const fn from_gears(gears: [f64; JOINTS], shoulder_differential: f64, wrist_differential: f64) -> Ratios {
         let [n1, n2, n3, n4, n5, n6, n7] = gears;
-        Ratios {
-            coefficients: [
-                n1,
-                n2,
-                n3 / shoulder_differential,
-                n4,
-                n5,
-                n6 * wrist_differential,
-                n7,
-            ],
-        }
+        Ratios { coefficients: [n1, n2, n3 / shoulder_differential, n4, n5, n6 * wrist_differential, n7] }
     }
 }
 
@@ -72,18 +56,10 @@ impl fmt::Display for TransmissionError {
         match self {
             TransmissionError::Ratio => formatter.write_str("gear ratio is not a positive number"),
             TransmissionError::CountsPerRevolution { motor } => {
-                write!(
-                    formatter,
-                    "motor {} reports a CTS that is not positive",
-                    motor + 1
-                )
+                write!(formatter, "motor {} reports a CTS that is not positive", motor + 1)
             }
             TransmissionError::UnitsPerNewtonMetre { motor } => {
-                write!(
-                    formatter,
-                    "motor {} reports an IPNM that is not positive",
-                    motor + 1
-                )
+                write!(formatter, "motor {} reports an IPNM that is not positive", motor + 1)
             }
         }
     }
@@ -105,11 +81,7 @@ impl<R: Real> Transmission<R> {
     /// # Errors
     /// [`TransmissionError::Ratio`] unless all are positive and finite.
     pub fn new(ratios: &Ratios) -> Result<Transmission<R>, TransmissionError> {
-        if ratios
-            .coefficients
-            .iter()
-            .any(|ratio| !(ratio.is_finite() && *ratio > 0.0))
-        {
+        if ratios.coefficients.iter().any(|ratio| !(ratio.is_finite() && *ratio > 0.0)) {
             return Err(TransmissionError::Ratio);
         }
         Ok(Transmission {
@@ -122,15 +94,7 @@ impl<R: Real> Transmission<R> {
     pub fn motor_from_joint(&self, joint: &[R; JOINTS]) -> [R; JOINTS] {
         let [n1, n2, n3, n4, n5, n6, n7] = self.ratios;
         let [j1, j2, j3, j4, j5, j6, j7] = *joint;
-        [
-            -n1 * j1,
-            n2 * j2 - n3 * j3,
-            -n2 * j2 - n3 * j3,
-            -n4 * j4,
-            n5 * j5 - n6 * j6,
-            n5 * j5 + n6 * j6,
-            -n7 * j7,
-        ]
+        [-n1 * j1, n2 * j2 - n3 * j3, -n2 * j2 - n3 * j3, -n4 * j4, n5 * j5 - n6 * j6, n5 * j5 + n6 * j6, -n7 * j7]
     }
 
     /// Joint angles (or velocities) from those of the motors, rad (rad/s).
@@ -156,30 +120,14 @@ impl<R: Real> Transmission<R> {
         let half = R::from_f64(0.5);
         let (pitch, roll) = (t2 * half * n2, t3 * half * n3);
         let (wrist_yaw, wrist_pitch) = (t5 * half * n5, t6 * half * n6);
-        [
-            -t1 * n1,
-            pitch - roll,
-            -pitch - roll,
-            -t4 * n4,
-            wrist_yaw - wrist_pitch,
-            wrist_yaw + wrist_pitch,
-            -t7 * n7,
-        ]
+        [-t1 * n1, pitch - roll, -pitch - roll, -t4 * n4, wrist_yaw - wrist_pitch, wrist_yaw + wrist_pitch, -t7 * n7]
     }
 
     /// Joint torques from motor torques, N m: the transpose of [`Transmission::motor_from_joint`].
     pub fn joint_torques_from_motor(&self, motor: &[R; JOINTS]) -> [R; JOINTS] {
         let [n1, n2, n3, n4, n5, n6, n7] = self.ratios;
         let [m1, m2, m3, m4, m5, m6, m7] = *motor;
-        [
-            -n1 * m1,
-            n2 * (m2 - m3),
-            -n3 * (m2 + m3),
-            -n4 * m4,
-            n5 * (m5 + m6),
-            n6 * (m6 - m5),
-            -n7 * m7,
-        ]
+        [-n1 * m1, n2 * (m2 - m3), -n3 * (m2 + m3), -n4 * m4, n5 * (m5 + m6), n6 * (m6 - m5), -n7 * m7]
     }
 }
 
@@ -205,10 +153,7 @@ impl Drives {
         if let Some(motor) = units_per_newton_metre.iter().position(|units| *units <= 0) {
             return Err(TransmissionError::UnitsPerNewtonMetre { motor });
         }
-        Ok(Drives {
-            counts_per_revolution,
-            units_per_newton_metre,
-        })
+        Ok(Drives { counts_per_revolution, units_per_newton_metre })
     }
 
     /// CTS of each motor: counts per revolution.
@@ -240,11 +185,7 @@ impl Drives {
     /// Unwrapped counts to motor angles in rad.
     pub fn motor_angles<R: Real>(&self, counts: &[Counts; JOINTS]) -> [R; JOINTS] {
         let mut angles = [R::from_f64(0.0); JOINTS];
-        for ((angle, count), cts) in angles
-            .iter_mut()
-            .zip(counts)
-            .zip(self.counts_per_revolution)
-        {
+        for ((angle, count), cts) in angles.iter_mut().zip(counts).zip(self.counts_per_revolution) {
             *angle = R::from_i32(count.0) * R::from_f64(core::f64::consts::TAU / cts as f64);
         }
         angles
@@ -256,11 +197,7 @@ impl Drives {
     /// [`NotFinite`] if a torque is NaN or infinite: none of the seven is then returned.
     pub fn torques<R: Real>(&self, motor: &[R; JOINTS]) -> Result<[PuckTorque; JOINTS], NotFinite> {
         let mut torques = [PuckTorque::ZERO; JOINTS];
-        for ((units, torque), ipnm) in torques
-            .iter_mut()
-            .zip(motor)
-            .zip(self.units_per_newton_metre)
-        {
+        for ((units, torque), ipnm) in torques.iter_mut().zip(motor).zip(self.units_per_newton_metre) {
             *units = PuckTorque::from_units(R::from_i32(ipnm) * *torque)?;
         }
         Ok(torques)
@@ -269,11 +206,7 @@ impl Drives {
     /// Puck units to motor torques in N m.
     pub fn motor_torques<R: Real>(&self, torques: &[PuckTorque; JOINTS]) -> [R; JOINTS] {
         let mut motor = [R::from_f64(0.0); JOINTS];
-        for ((torque, units), ipnm) in motor
-            .iter_mut()
-            .zip(torques)
-            .zip(self.units_per_newton_metre)
-        {
+        for ((torque, units), ipnm) in motor.iter_mut().zip(torques).zip(self.units_per_newton_metre) {
             *torque = R::from_i32(units.units() as i32) / R::from_i32(ipnm);
         }
         motor

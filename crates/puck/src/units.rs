@@ -38,11 +38,7 @@ impl PuckTorque {
 
     /// A torque from its integer value; `None` if it does not fit into 14 bits.
     pub const fn new(units: i16) -> Option<PuckTorque> {
-        if units >= -PACKED_TORQUE_LIMIT - 1 && units <= PACKED_TORQUE_LIMIT {
-            Some(PuckTorque(units))
-        } else {
-            None
-        }
+        if units >= -PACKED_TORQUE_LIMIT - 1 && units <= PACKED_TORQUE_LIMIT { Some(PuckTorque(units)) } else { None }
     }
 
     /// Barrett's rounding: saturate to +-8191, then toward minus infinity (-0.1 becomes -1).

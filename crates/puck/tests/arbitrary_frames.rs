@@ -6,15 +6,13 @@ use puck::device::{position_frame, quantise, reply16, reply32, torque_frame};
 use puck::force_torque::NEWTON_PER_COUNT;
 use puck::tactile::{TactileBlock, TactileTop};
 use puck::{
-    Action, CanFrame, CanId, Counts, Destination, GaugeStatus, Group, Node, PendantState,
-    PropertyId, PuckTorque, Reply, ReplyError, Request, RequestError, get, packed_torques, set,
-    set_short,
+    Action, CanFrame, CanId, Counts, Destination, GaugeStatus, Group, Node, PendantState, PropertyId, PuckTorque,
+    Reply, ReplyError, Request, RequestError, get, packed_torques, set, set_short,
 };
 
 fn any_frame() -> impl Strategy<Value = CanFrame> {
-    (0..=0x7FF_u16, prop::collection::vec(any::<u8>(), 0..=8)).prop_map(|(id, data)| {
-        CanFrame::from_slice(CanId::new(id).expect("eleven bits"), &data).expect("a frame")
-    })
+    (0..=0x7FF_u16, prop::collection::vec(any::<u8>(), 0..=8))
+        .prop_map(|(id, data)| CanFrame::from_slice(CanId::new(id).expect("eleven bits"), &data).expect("a frame"))
 }
 
 fn any_node() -> impl Strategy<Value = Node> {
@@ -42,18 +40,10 @@ struct Foreign {
 
 impl Frame for Foreign {
     fn new(id: impl Into<Id>, data: &[u8]) -> Option<Foreign> {
-        (data.len() <= 8).then(|| Foreign {
-            id: id.into(),
-            remote: false,
-            data: data.to_vec(),
-        })
+        (data.len() <= 8).then(|| Foreign { id: id.into(), remote: false, data: data.to_vec() })
     }
     fn new_remote(id: impl Into<Id>, _dlc: usize) -> Option<Foreign> {
-        Some(Foreign {
-            id: id.into(),
-            remote: true,
-            data: Vec::new(),
-        })
+        Some(Foreign { id: id.into(), remote: true, data: Vec::new() })
     }
     fn is_extended(&self) -> bool {
         matches!(self.id, Id::Extended(_))
@@ -74,8 +64,7 @@ impl Frame for Foreign {
 
 #[test]
 fn extended_and_remote_frames_are_refused() {
-    let extended =
-        Foreign::new(ExtendedId::new(0x426).expect("fits"), &[0x88, 0, 2, 0]).expect("a frame");
+    let extended = Foreign::new(ExtendedId::new(0x426).expect("fits"), &[0x88, 0, 2, 0]).expect("a frame");
     assert_eq!(Reply::decode(&extended), Err(ReplyError::NotClassic));
     assert_eq!(Request::decode(&extended), Err(RequestError::NotClassic));
     assert_eq!(CanFrame::copy_of(&extended), None);
@@ -83,18 +72,9 @@ fn extended_and_remote_frames_are_refused() {
     assert_eq!(Reply::decode(&remote), Err(ReplyError::NotClassic));
     assert_eq!(Request::decode(&remote), Err(RequestError::NotClassic));
     assert_eq!(CanFrame::copy_of(&remote), None);
-    assert_eq!(
-        <CanFrame as Frame>::new_remote(CanId::new(1).expect("fits"), 1),
-        None
-    );
-    assert_eq!(
-        <CanFrame as Frame>::new(ExtendedId::new(1).expect("fits"), &[]),
-        None
-    );
-    assert_eq!(
-        CanFrame::from_slice(CanId::new(1).expect("fits"), &[0; 9]),
-        None
-    );
+    assert_eq!(<CanFrame as Frame>::new_remote(CanId::new(1).expect("fits"), 1), None);
+    assert_eq!(<CanFrame as Frame>::new(ExtendedId::new(1).expect("fits"), &[]), None);
+    assert_eq!(CanFrame::from_slice(CanId::new(1).expect("fits"), &[0; 9]), None);
 }
 
 #[test]

@@ -3,10 +3,7 @@
 //! `cargo run --release -p sim --example speed`
 
 use puck::{CanFrame, Group, Node, PropertyId, PuckTorque, force_torque, get, packed_torques, set};
-use sim::{
-    FrameClass, FreeJoints, HOME, Plant, PlantConfig, SLOT_TICKS, TICKS_PER_MILLISECOND, Ticks,
-    seconds,
-};
+use sim::{FrameClass, FreeJoints, HOME, Plant, PlantConfig, SLOT_TICKS, TICKS_PER_MILLISECOND, Ticks, seconds};
 use std::time::Instant;
 
 /// Lets virtual time pass as a co-controller does that has nothing to do: from event to event.
@@ -37,12 +34,8 @@ fn main() {
     let mut events = 0;
     let zero = [PuckTorque::ZERO; 4];
     let slots: [[CanFrame; 2]; 2] = [
-        [
-            get(Group::ARM, PropertyId::POSITION),
-            force_torque::get_wrench(),
-        ],
-        [Group::ARM_TORQUES, Group::WRIST_TORQUES]
-            .map(|group| packed_torques(group, PropertyId::TORQUE, zero)),
+        [get(Group::ARM, PropertyId::POSITION), force_torque::get_wrench()],
+        [Group::ARM_TORQUES, Group::WRIST_TORQUES].map(|group| packed_torques(group, PropertyId::TORQUE, zero)),
     ];
     for cycle in 0..cycles {
         for (slot, frames) in slots.iter().enumerate() {
@@ -53,19 +46,10 @@ fn main() {
     }
     events += wait(&mut plant, begun + 3 * cycles * SLOT_TICKS);
 
-    let (virtual_time, wall) = (
-        seconds(plant.now() - begun),
-        started.elapsed().as_secs_f64(),
-    );
+    let (virtual_time, wall) = (seconds(plant.now() - begun), started.elapsed().as_secs_f64());
     let trace = plant.trace();
-    println!(
-        "{virtual_time:.1} s virtual in {wall:.3} s: {:.0} times real time, {events} events",
-        virtual_time / wall
-    );
-    println!(
-        "bus load {:.1} %",
-        100.0 * seconds(trace.busy - busy_before) / virtual_time
-    );
+    println!("{virtual_time:.1} s virtual in {wall:.3} s: {:.0} times real time, {events} events", virtual_time / wall);
+    println!("bus load {:.1} %", 100.0 * seconds(trace.busy - busy_before) / virtual_time);
     for class in FrameClass::ALL {
         println!("{:>8} {class}", trace.count(class));
     }

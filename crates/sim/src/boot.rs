@@ -46,10 +46,7 @@ pub(crate) struct Boot {
 impl Boot {
     /// A puck without power; `noise` decides how long it takes to wake.
     pub(crate) fn new(noise: Noise) -> Self {
-        Self {
-            phase: Phase::Off,
-            noise,
-        }
+        Self { phase: Phase::Off, noise }
     }
 
     /// What answers at time `now`.
@@ -66,9 +63,7 @@ impl Boot {
 
     /// Motor power comes, or the puck is told to return to its monitor.
     pub(crate) fn start(&mut self, now: Ticks) {
-        self.phase = Phase::Starting {
-            until: now + START_TIME,
-        };
+        self.phase = Phase::Starting { until: now + START_TIME };
     }
 
     /// Motor power goes.

@@ -58,12 +58,7 @@ impl Bus {
     /// Puts a frame into the transmit queue of `sender`; it competes for the bus from `ready` on.
     pub fn queue(&mut self, ready: Ticks, sender: Node, frame: CanFrame) {
         self.submissions += 1;
-        self.waiting.push(Waiting {
-            ready,
-            sequence: self.submissions,
-            sender,
-            frame,
-        });
+        self.waiting.push(Waiting { ready, sequence: self.submissions, sender, frame });
     }
 
     /// Takes back everything a node has not yet begun to send: it has lost its power or left the bus.
@@ -76,10 +71,7 @@ impl Bus {
     pub fn next_time(&self) -> Option<Ticks> {
         match self.on_wire {
             Some(passage) => Some(passage.end),
-            None => self
-                .heads()
-                .map(|waiting| waiting.ready.max(self.free_at))
-                .min(),
+            None => self.heads().map(|waiting| waiting.ready.max(self.free_at)).min(),
         }
     }
 
@@ -103,15 +95,9 @@ impl Bus {
             .min_by_key(|waiting| (waiting.frame.can_id().raw(), waiting.sequence))
             .copied();
         let Some(winner) = winner else { return false };
-        self.waiting
-            .retain(|waiting| waiting.sequence != winner.sequence);
+        self.waiting.retain(|waiting| waiting.sequence != winner.sequence);
         let end = now + frame_ticks(&winner.frame);
-        let passage = Passage {
-            start: now,
-            end,
-            sender: winner.sender,
-            frame: winner.frame,
-        };
+        let passage = Passage { start: now, end, sender: winner.sender, frame: winner.frame };
         self.trace.note(&passage);
         if let Some(log) = &mut self.log {
             log.push(passage);
@@ -146,9 +132,7 @@ impl Bus {
     /// The first unsent frame of each node: only these compete.
     fn heads(&self) -> impl Iterator<Item = &Waiting> {
         self.waiting.iter().filter(|candidate| {
-            !self.waiting.iter().any(|other| {
-                other.sender == candidate.sender && other.sequence < candidate.sequence
-            })
+            !self.waiting.iter().any(|other| other.sender == candidate.sender && other.sequence < candidate.sequence)
         })
     }
 }

@@ -33,10 +33,7 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    const WORLD: Frame = Frame {
-        origin: [0.0; 3],
-        axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-    };
+    const WORLD: Frame = Frame { origin: [0.0; 3], axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
 
     /// Turns a vector of this frame into world axes.
     pub(crate) fn turn(&self, vector: Vector) -> Vector {
@@ -108,25 +105,14 @@ mod tests {
     /// Columns k, q1..7, qd1..7, qdd1..7, px, py, pz, qw, qx, qy, qz of the golden vectors.
     #[test]
     fn grasp_frame_agrees_with_the_golden_kinematics() {
-        let text = include_str!(concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../../tests/vectors/dyn_wam7_bh280_ft.csv"
-        ));
+        let text = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/vectors/dyn_wam7_bh280_ft.csv"));
         let mut rows = 0;
         for line in text.lines().filter(|line| !line.starts_with('#')).skip(1) {
-            let values: Vec<f64> = line
-                .split(',')
-                .map(|value| value.parse().unwrap())
-                .collect();
+            let values: Vec<f64> = line.split(',').map(|value| value.parse().unwrap()).collect();
             let q: [f64; 7] = values[1..8].try_into().unwrap();
             let grasp = grasp_frame(&frames(&q)[7]);
             assert!(norm(subtract(grasp.origin, values[22..25].try_into().unwrap())) < 1e-10);
-            let aligned: f64 = grasp
-                .quaternion()
-                .iter()
-                .zip(&values[25..29])
-                .map(|(a, b)| a * b)
-                .sum();
+            let aligned: f64 = grasp.quaternion().iter().zip(&values[25..29]).map(|(a, b)| a * b).sum();
             assert!((aligned.abs() - 1.0).abs() < 1e-10, "row {}", values[0]);
             rows += 1;
         }

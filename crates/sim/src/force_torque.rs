@@ -10,10 +10,7 @@ use crate::noise::Noise;
 use crate::time::Ticks;
 use puck::device::{acceleration_frame, force_frame, quantise, reply16, torque_frame};
 use puck::force_torque::{NEWTON_METRE_PER_COUNT, NEWTON_PER_COUNT};
-use puck::{
-    Action, CanFrame, Destination, GaugeStatus, Node, Property, PropertyTable, Request, Role,
-    Status,
-};
+use puck::{Action, CanFrame, Destination, GaugeStatus, Node, Property, PropertyTable, Request, Role, Status};
 
 /// How the sensor is set up.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,11 +26,7 @@ pub struct ForceTorqueConfig {
 impl Default for ForceTorqueConfig {
     /// Fitted; 50 mN and 1.5 mN m, the resolution of the sensor's data sheet.
     fn default() -> Self {
-        Self {
-            fitted: true,
-            force_noise: 0.05,
-            torque_noise: 0.0015,
-        }
+        Self { fitted: true, force_noise: 0.05, torque_noise: 0.0015 }
     }
 }
 
@@ -116,10 +109,7 @@ impl ForceTorque {
                     .collect(),
                 None => Vec::new(),
             },
-            Action::Set {
-                property: id,
-                value,
-            } => {
+            Action::Set { property: id, value } => {
                 match table.property(id) {
                     Some(Property::Ft) if value == 0 => self.tare(wrench),
                     Some(Property::Stat) => self.set_status(now, presence, value),
@@ -142,10 +132,7 @@ impl ForceTorque {
         });
         vec![
             force_frame([fx, fy, fz].map(|force: f64| quantise(force, NEWTON_PER_COUNT))),
-            torque_frame(
-                [tx, ty, tz].map(|torque: f64| quantise(torque, NEWTON_METRE_PER_COUNT)),
-                status,
-            ),
+            torque_frame([tx, ty, tz].map(|torque: f64| quantise(torque, NEWTON_METRE_PER_COUNT)), status),
         ]
     }
 
@@ -184,14 +171,7 @@ fn small_property(property: Property, presence: Presence) -> Option<i16> {
     match property {
         Property::Vers => Some(if is_ready { VERSIONS.1 } else { VERSIONS.0 }),
         Property::Role => Some(Role::FORCE_TORQUE as i16),
-        Property::Stat => Some(
-            if is_ready {
-                Status::Ready
-            } else {
-                Status::Reset
-            }
-            .value() as i16,
-        ),
+        Property::Stat => Some(if is_ready { Status::Ready } else { Status::Reset }.value() as i16),
         Property::Id => Some(Node::FORCE_TORQUE.number().into()),
         Property::Sn | Property::Error => Some(0),
         _ => None,
@@ -200,15 +180,10 @@ fn small_property(property: Property, presence: Presence) -> Option<i16> {
 
 /// One bit per axis beyond its range.
 fn gauges_beyond_range(wrench: &[f64; 6]) -> u8 {
-    wrench
-        .iter()
-        .zip(RANGE)
-        .enumerate()
-        .fold(0, |bits, (axis, (load, range))| {
-            if load.abs() > range {
-                bits | 1 << axis
-            } else {
-                bits
-            }
-        })
+    wrench.iter().zip(RANGE).enumerate().fold(
+        0,
+        |bits, (axis, (load, range))| {
+            if load.abs() > range { bits | 1 << axis } else { bits }
+        },
+    )
 }

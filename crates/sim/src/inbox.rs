@@ -29,12 +29,7 @@ pub(crate) struct Inbox {
 impl Inbox {
     /// An empty buffer of a device that takes `set_time` for each SET.
     pub(crate) fn new(set_time: Ticks) -> Self {
-        Self {
-            waiting: VecDeque::new(),
-            set_time,
-            busy_until: 0,
-            lost: 0,
-        }
+        Self { waiting: VecDeque::new(), set_time, busy_until: 0, lost: 0 }
     }
 
     /// A request arrives. If the buffer is full it is lost without a trace on the bus.

@@ -29,12 +29,7 @@ impl LinkWire {
 
     /// The device sends bytes.
     pub(crate) fn send_from_device(&mut self, now: Ticks, bytes: &[u8]) {
-        transmit(
-            &mut self.from_device,
-            &mut self.from_device_free,
-            now,
-            bytes,
-        );
+        transmit(&mut self.from_device, &mut self.from_device_free, now, bytes);
     }
 
     /// When the next chunk towards the device is complete.
@@ -64,10 +59,7 @@ impl LinkWire {
 
     /// Bytes that the device has handed over and that have not left yet.
     pub(crate) fn backlog_from_device(&self, now: Ticks) -> usize {
-        self.from_device
-            .iter()
-            .filter(|(due, _)| *due > now)
-            .count()
+        self.from_device.iter().filter(|(due, _)| *due > now).count()
     }
 }
 

@@ -34,9 +34,7 @@ pub enum LockstepError {
         expected: usize,
     },
     /// The first byte names no request. Usually something else has written to the firmware's standard output.
-    #[error(
-        "unknown kind of request {kind:#04x}: does anything but the lock step write to the firmware's stdout?"
-    )]
+    #[error("unknown kind of request {kind:#04x}: does anything but the lock step write to the firmware's stdout?")]
     Kind {
         /// The byte.
         kind: u8,
@@ -97,11 +95,7 @@ pub struct Lockstep<R, W> {
 impl<R: Read, W: Write> Lockstep<R, W> {
     /// A lock step over the firmware's standard output and input.
     pub fn new(from_firmware: R, to_firmware: W) -> Self {
-        Self {
-            from_firmware,
-            to_firmware,
-            exchanges: 0,
-        }
+        Self { from_firmware, to_firmware, exchanges: 0 }
     }
 
     /// Waits for one request, lets the plant follow to its time, and answers.
@@ -130,8 +124,7 @@ impl<R: Read, W: Write> Lockstep<R, W> {
             }
         };
         self.exchanges += 1;
-        self.to_firmware
-            .write_all(&encode_reply(&event, plant.next_event()))?;
+        self.to_firmware.write_all(&encode_reply(&event, plant.next_event()))?;
         self.to_firmware.flush()?;
         Ok(served)
     }
@@ -149,31 +142,10 @@ impl<R: Read, W: Write> Lockstep<R, W> {
             0 => return Ok(None),
             REQUEST_LENGTH => {}
             received => {
-                return Err(LockstepError::Truncated {
-                    received,
-                    expected: REQUEST_LENGTH,
-                });
+                return Err(LockstepError::Truncated { received, expected: REQUEST_LENGTH });
             }
         }
-        let [
-            kind,
-            length,
-            id0,
-            id1,
-            r0,
-            r1,
-            r2,
-            r3,
-            t0,
-            t1,
-            t2,
-            t3,
-            t4,
-            t5,
-            t6,
-            t7,
-            data @ ..,
-        ] = header;
+        let [kind, length, id0, id1, r0, r1, r2, r3, t0, t1, t2, t3, t4, t5, t6, t7, data @ ..] = header;
         if [r0, r1, r2, r3] != [0; 4] {
             return Err(LockstepError::Reserved);
         }
@@ -182,8 +154,7 @@ impl<R: Read, W: Write> Lockstep<R, W> {
             1 => {
                 let id = u16::from_le_bytes([id0, id1]);
                 let payload = data.get(..usize::from(length));
-                let frame =
-                    payload.and_then(|payload| CanFrame::from_slice(CanId::new(id)?, payload));
+                let frame = payload.and_then(|payload| CanFrame::from_slice(CanId::new(id)?, payload));
                 Request::Send(frame.ok_or(LockstepError::Frame { id, length })?)
             }
             2 => Request::Event,
@@ -193,10 +164,7 @@ impl<R: Read, W: Write> Lockstep<R, W> {
                 let received = fill(&mut self.from_firmware, &mut bytes)?;
                 if received < bytes.len() {
                     let expected = REQUEST_LENGTH + bytes.len();
-                    return Err(LockstepError::Truncated {
-                        received: REQUEST_LENGTH + received,
-                        expected,
-                    });
+                    return Err(LockstepError::Truncated { received: REQUEST_LENGTH + received, expected });
                 }
                 Request::Link(bytes)
             }
@@ -210,9 +178,7 @@ impl<R: Read, W: Write> Lockstep<R, W> {
 fn encode_reply(event: &Event, next: Option<Ticks>) -> Vec<u8> {
     let link = &event.link[..event.link.len().min(CHUNK)];
     let mut reply = vec![0; REPLY_LENGTH];
-    reply[0] = u8::from(event.received.is_some())
-        | u8::from(event.transmitted) << 1
-        | u8::from(!link.is_empty()) << 2;
+    reply[0] = u8::from(event.received.is_some()) | u8::from(event.transmitted) << 1 | u8::from(!link.is_empty()) << 2;
     if let Some(frame) = event.received {
         let payload = frame.payload();
         reply[1] = payload.len() as u8;

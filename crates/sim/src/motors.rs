@@ -15,9 +15,7 @@ use crate::world::World;
 use puck::{Drives, Transmission};
 
 /// Inertia of drive and rotor at each motor, kg m^2 (`wam7.toml` `rotor_inertia`).
-const ROTOR_INERTIA: [f64; 7] = [
-    0.00011631, 0.00011831, 0.00011831, 0.00010686, 1.685e-05, 1.745e-05, 1.42e-06,
-];
+const ROTOR_INERTIA: [f64; 7] = [0.00011631, 0.00011831, 0.00011831, 0.00010686, 1.685e-05, 1.745e-05, 1.42e-06];
 
 /// Time constant of a shorted motor that drives nothing but its own inertia, s. Assumed.
 const BRAKE_TIME_CONSTANT: f64 = 0.002;
@@ -101,8 +99,7 @@ impl Motors {
             let damping = ROTOR_INERTIA[motor] / BRAKE_TIME_CONSTANT;
             let braking = self.braked[motor] as f64 / STEP_TICKS as f64;
             let units = self.impulse[motor] as f64 / STEP_TICKS as f64;
-            units / f64::from(self.units_per_newton_metre[motor])
-                - damping * speeds[motor] * braking
+            units / f64::from(self.units_per_newton_metre[motor]) - damping * speeds[motor] * braking
         });
         let driven = self.transmission.joint_torques_from_motor(&torques);
         let held = self.hand.torques(self.next_step(), &self.q, &self.dq);
@@ -117,9 +114,6 @@ impl Motors {
     /// Motor angles at time `t` in the present step, rad.
     pub(crate) fn angles(&self, t: Ticks) -> [f64; 7] {
         let ahead = seconds(t - self.stepped_at);
-        self.transmission
-            .motor_from_joint(&std::array::from_fn(|joint| {
-                self.q[joint] + self.dq[joint] * ahead
-            }))
+        self.transmission.motor_from_joint(&std::array::from_fn(|joint| self.q[joint] + self.dq[joint] * ahead))
     }
 }

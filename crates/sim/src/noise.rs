@@ -17,9 +17,7 @@ impl Noise {
     /// The stream number `stream` of the run with this seed.
     #[must_use]
     pub fn new(seed: u64, stream: u64) -> Self {
-        Self {
-            generator: Rand64::new(u128::from(seed) << 64 | u128::from(stream)),
-        }
+        Self { generator: Rand64::new(u128::from(seed) << 64 | u128::from(stream)) }
     }
 
     /// Uniform in `low..high`.

@@ -72,29 +72,20 @@ impl Operator {
     /// An operator who has done nothing yet.
     #[must_use]
     pub(crate) fn new(config: OperatorConfig) -> Self {
-        let own = config.idle_at.into_iter().flat_map(|at| {
-            [
-                (at, PendantAction::ReleaseEStop),
-                (at, PendantAction::ShiftIdle),
-            ]
-        });
+        let own = config
+            .idle_at
+            .into_iter()
+            .flat_map(|at| [(at, PendantAction::ReleaseEStop), (at, PendantAction::ShiftIdle)]);
         let mut script: Vec<_> = own.chain(config.script).collect();
         script.sort_by_key(|(at, _)| *at); // stable: equal times keep their order
-        Self {
-            script,
-            activate_after: config.activate_after,
-            means_to_activate: false,
-        }
+        Self { script, activate_after: config.activate_after, means_to_activate: false }
     }
 
     /// When he acts next, as far as he knows now.
     #[must_use]
     pub(crate) fn next_time(&self, view: &PendantView) -> Option<Ticks> {
         let scripted = self.script.first().map(|(at, _)| *at);
-        [scripted, self.activation_time(view)]
-            .into_iter()
-            .flatten()
-            .min()
+        [scripted, self.activation_time(view)].into_iter().flatten().min()
     }
 
     /// The action that is due at `now`, if any. Call again until there is none.

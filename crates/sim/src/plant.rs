@@ -24,8 +24,7 @@ use crate::time::{STEP_TICKS, TICKS_PER_SECOND, Ticks};
 use crate::trace::BusTrace;
 use crate::world::World;
 use puck::{
-    CanFrame, Drives, Node, PendantState, Ratios, Request, SafetyMode, Transmission,
-    TransmissionError, UnknownFirmware,
+    CanFrame, Drives, Node, PendantState, Ratios, Request, SafetyMode, Transmission, TransmissionError, UnknownFirmware,
 };
 use std::collections::VecDeque;
 
@@ -136,10 +135,8 @@ impl Plant {
         // One stream of noise per source: 0 is the sensor, the node numbers are the wake delays.
         let stream = |node: Node| Noise::new(config.seed, node.number().into());
         let transmission = Transmission::new(&config.ratios)?;
-        let drives = Drives::new(
-            [config.pucks.counts_per_revolution; 7],
-            config.pucks.units_per_newton_metre.map(i32::from),
-        )?;
+        let drives =
+            Drives::new([config.pucks.counts_per_revolution; 7], config.pucks.units_per_newton_metre.map(i32::from))?;
         let [a, b, c, d, e, f, g] =
             std::array::from_fn(|index| Puck::new(index, &config.pucks, stream(Node::ARM[index])));
         let boot_noise = stream(Node::FORCE_TORQUE);
@@ -147,12 +144,7 @@ impl Plant {
             now: 0,
             bus: Bus::default(),
             pucks: [a?, b?, c?, d?, e?, f?, g?],
-            motors: Motors::new(
-                transmission,
-                &drives,
-                &*world,
-                config.operator.holds_until_active_for,
-            ),
+            motors: Motors::new(transmission, &drives, &*world, config.operator.holds_until_active_for),
             safety: SafetyModule::new(config.safety, SpeedMonitor::new(transmission, drives))?,
             force_torque: ForceTorque::new(config.force_torque, boot_noise, stream(Node::HOST)),
             operator: Operator::new(config.operator),
@@ -178,15 +170,8 @@ impl Plant {
     pub fn next_event(&self) -> Option<Ticks> {
         let waiting = self.deliveries.front().map(|delivery| delivery.at);
         // While a frame is on the wire nothing else can change what the co-controller will see next.
-        let on_bus = if self.bus.is_busy() {
-            self.bus.next_time()
-        } else {
-            self.next_happening()
-        };
-        [waiting, on_bus, self.link.next_time()]
-            .into_iter()
-            .flatten()
-            .min()
+        let on_bus = if self.bus.is_busy() { self.bus.next_time() } else { self.next_happening() };
+        [waiting, on_bus, self.link.next_time()].into_iter().flatten().min()
     }
 
     /// What the co-controller finds at time `t`. One frame at a time: ask [`Plant::next_event`] again afterwards.
@@ -302,10 +287,7 @@ impl Plant {
 
     /// The next time at which anything happens, physics included.
     fn next_moment(&self) -> Option<Ticks> {
-        [Some(self.motors.next_step()), self.next_happening()]
-            .into_iter()
-            .flatten()
-            .min()
+        [Some(self.motors.next_step()), self.next_happening()].into_iter().flatten().min()
     }
 
     /// The next time at which something happens that can put a frame on the bus or take it off.
@@ -332,11 +314,7 @@ impl Plant {
         if let Some(passage) = self.bus.finish(now) {
             self.deliver(&passage);
         }
-        if self
-            .pucks
-            .iter()
-            .any(|puck| puck.next_time().is_some_and(|at| at <= now))
-        {
+        if self.pucks.iter().any(|puck| puck.next_time().is_some_and(|at| at <= now)) {
             // All pucks latch at the same request, hence at the same angles.
             let angles = self.motors.angles(now);
             for (index, puck) in self.pucks.iter_mut().enumerate() {
@@ -365,10 +343,7 @@ impl Plant {
 
     fn deliver(&mut self, passage: &Passage) {
         let received = (passage.sender != Node::HOST).then_some(passage.frame);
-        self.deliveries.push_back(Delivery {
-            at: passage.end,
-            received,
-        });
+        self.deliveries.push_back(Delivery { at: passage.end, received });
         let at = passage.received_at();
         if let Ok(request) = Request::decode(&passage.frame)
             // What a puck says is a request to nobody; the safety module is the only device that gives orders.

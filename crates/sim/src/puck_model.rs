@@ -10,8 +10,8 @@ use crate::noise::Noise;
 use crate::time::Ticks;
 use puck::device::{position_frame, reply16, reply32};
 use puck::{
-    Action, CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId,
-    PropertyTable, Request, Role, Status, UnknownFirmware,
+    Action, CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId, PropertyTable, Request, Role,
+    Status, UnknownFirmware,
 };
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -92,17 +92,9 @@ pub(crate) struct Puck {
 
 impl Puck {
     /// Motor `index` (0..=6), without power.
-    pub(crate) fn new(
-        index: usize,
-        config: &PuckConfig,
-        noise: Noise,
-    ) -> Result<Self, UnknownFirmware> {
+    pub(crate) fn new(index: usize, config: &PuckConfig, noise: Noise) -> Result<Self, UnknownFirmware> {
         let node = Node::ARM[index];
-        let torque_group = if index < 4 {
-            Group::ARM_TORQUES
-        } else {
-            Group::WRIST_TORQUES
-        };
+        let torque_group = if index < 4 { Group::ARM_TORQUES } else { Group::WRIST_TORQUES };
         let factory: BTreeMap<_, _> = [
             (Property::Vers, i32::from(config.version)),
             (Property::Role, i32::from(Role::MOTOR)),
@@ -121,10 +113,7 @@ impl Puck {
             (Property::Cts, config.counts_per_revolution),
             (Property::Pidx, PLACES[index]),
             (Property::Jidx, i32::from(node.number())),
-            (
-                Property::Ipnm,
-                i32::from(config.units_per_newton_metre[index]),
-            ),
+            (Property::Ipnm, i32::from(config.units_per_newton_metre[index])),
             (Property::Poles, POLES[index]),
             (Property::Ecmax, 0),
             (Property::Ecmin, 0),
@@ -162,10 +151,7 @@ impl Puck {
         }
         match request.action {
             Action::PackedTorques { property, .. } => {
-                let place = self
-                    .values
-                    .get(&Property::Pidx)
-                    .and_then(|place| u8::try_from(*place).ok());
+                let place = self.values.get(&Property::Pidx).and_then(|place| u8::try_from(*place).ok());
                 let torque = place.and_then(|place| request.action.torque_for(place));
                 if presence == Presence::Ready
                     && self.table.property(property) == Some(Property::T)
@@ -193,10 +179,7 @@ impl Puck {
         };
         match action {
             Action::Get { property: id } => self.reply(table.property(id)?, id, presence, angle),
-            Action::Set {
-                property: id,
-                value,
-            } => {
+            Action::Set { property: id, value } => {
                 self.set(now, table.property(id)?, value, presence, angle);
                 None
             }
@@ -207,9 +190,7 @@ impl Puck {
     /// What the puck does to its motor at `now`.
     pub(crate) fn drive(&self, now: Ticks) -> Drive {
         let value = |property| self.values.get(&property).copied().unwrap_or(0);
-        if self.boot.presence(now) != Presence::Ready
-            || value(Property::Mode) != MotorMode::Torque.value()
-        {
+        if self.boot.presence(now) != Presence::Ready || value(Property::Mode) != MotorMode::Torque.value() {
             return Drive::Brake;
         }
         let limit = value(Property::Mt).max(0);
@@ -230,13 +211,7 @@ impl Puck {
         }
     }
 
-    fn reply(
-        &self,
-        property: Property,
-        id: PropertyId,
-        presence: Presence,
-        angle: f64,
-    ) -> Option<CanFrame> {
+    fn reply(&self, property: Property, id: PropertyId, presence: Presence, angle: f64) -> Option<CanFrame> {
         let value = match property {
             Property::P => return Some(position_frame(self.node, self.position(angle), None)),
             Property::Stat if presence == Presence::Ready => Status::Ready.value(),
@@ -247,19 +222,11 @@ impl Puck {
             other => *self.values.get(&other)?,
         };
         // 16-bit values were truncated when they were stored, so the cast keeps them.
-        Some(if property.is_wide() {
-            reply32(self.node, id, value)
-        } else {
-            reply16(self.node, id, value as i16)
-        })
+        Some(if property.is_wide() { reply32(self.node, id, value) } else { reply16(self.node, id, value as i16) })
     }
 
     fn set(&mut self, now: Ticks, property: Property, value: i32, presence: Presence, angle: f64) {
-        let value = if property.is_wide() || property == Property::P {
-            value
-        } else {
-            i32::from(value as i16)
-        };
+        let value = if property.is_wide() || property == Property::P { value } else { i32::from(value as i16) };
         match property {
             Property::Stat if presence == Presence::Monitor && value == Status::Ready.value() => {
                 self.boot.wake(now);
@@ -300,11 +267,7 @@ impl Puck {
     }
 
     fn counts_per_revolution(&self) -> i64 {
-        self.values
-            .get(&Property::Cts)
-            .copied()
-            .unwrap_or(4096)
-            .into()
+        self.values.get(&Property::Cts).copied().unwrap_or(4096).into()
     }
 
     /// Encoder counts before the offset: quantised toward minus infinity, as Barrett's library rounds.

@@ -37,12 +37,7 @@ pub struct Camera {
 impl Default for Camera {
     /// From the front left: the whole arm from the side, the way of the hand to the flashlight unobstructed.
     fn default() -> Self {
-        Self {
-            look_at: [0.44, 0.0, 0.02],
-            distance: 2.4,
-            azimuth: -138.0,
-            elevation: -20.0,
-        }
+        Self { look_at: [0.44, 0.0, 0.02], distance: 2.4, azimuth: -138.0, elevation: -20.0 }
     }
 }
 
@@ -75,13 +70,7 @@ pub struct RenderOptions {
 impl Default for RenderOptions {
     /// 1280 x 800 pixels from the default camera, without additions.
     fn default() -> Self {
-        Self {
-            width: 1280,
-            height: 800,
-            camera: Camera::default(),
-            trails: Vec::new(),
-            ghosts: Vec::new(),
-        }
+        Self { width: 1280, height: 800, camera: Camera::default(), trails: Vec::new(), ghosts: Vec::new() }
     }
 }
 
@@ -95,9 +84,7 @@ impl Scene {
     /// The world as it is now.
     #[must_use]
     pub fn of(world: &MujocoWorld) -> Self {
-        Self {
-            configuration: world.configuration().to_vec(),
-        }
+        Self { configuration: world.configuration().to_vec() }
     }
 
     /// The world as it is set up by `options`.
@@ -132,9 +119,7 @@ pub enum RenderError {
     #[error("the picture's model does not load: {0}")]
     Model(String),
     /// No off-screen graphics.
-    #[error(
-        "no off-screen graphics ({0}); on Debian: apt install libegl1 libegl-mesa0 libgl1-mesa-dri"
-    )]
+    #[error("no off-screen graphics ({0}); on Debian: apt install libegl1 libegl-mesa0 libgl1-mesa-dri")]
     Graphics(#[from] RendererError),
     /// The file cannot be written.
     #[error("cannot write the picture: {0}")]
@@ -163,21 +148,10 @@ pub fn render_png(scene: &Scene, path: &Path, options: &RenderOptions) -> Result
 ///
 /// # Errors
 /// [`RenderError`] if there is no EGL, the size is not possible, or the file cannot be written.
-pub fn render_strip(
-    scenes: &[Scene],
-    path: &Path,
-    options: &RenderOptions,
-) -> Result<(), RenderError> {
+pub fn render_strip(scenes: &[Scene], path: &Path, options: &RenderOptions) -> Result<(), RenderError> {
     let (width, height) = (options.width, options.height);
-    let impossible = RenderError::Size {
-        width,
-        height,
-        scenes: scenes.len(),
-    };
-    let panel = u32::try_from(scenes.len())
-        .ok()
-        .and_then(|n| width.checked_div(n))
-        .unwrap_or(0);
+    let impossible = RenderError::Size { width, height, scenes: scenes.len() };
+    let panel = u32::try_from(scenes.len()).ok().and_then(|n| width.checked_div(n)).unwrap_or(0);
     if panel == 0 || height == 0 || width > 2560 || height > 1600 {
         return Err(impossible);
     }
@@ -186,28 +160,15 @@ pub fn render_strip(
     let mut camera = MjvCamera::new_free(&model);
     let c = &options.camera;
     let distance = c.distance * (FULL_ASPECT * f64::from(height) / f64::from(panel)).max(1.0);
-    (
-        camera.lookat,
-        camera.distance,
-        camera.azimuth,
-        camera.elevation,
-    ) = (c.look_at, distance, c.azimuth, c.elevation);
-    let mut renderer = MjRenderer::builder()
-        .width(panel)
-        .height(height)
-        .camera(camera)
-        .build(&model)?;
+    (camera.lookat, camera.distance, camera.azimuth, camera.elevation) = (c.look_at, distance, c.azimuth, c.elevation);
+    let mut renderer = MjRenderer::builder().width(panel).height(height).camera(camera).build(&model)?;
     let mut picture = Picture::new(panel * scenes.len() as u32, height);
     for (i, scene) in scenes.iter().enumerate() {
         data.qpos_mut().copy_from_slice(&scene.configuration);
         data.forward();
         renderer.sync_data(&mut data)?;
         renderer.render()?;
-        picture.put(
-            i as u32 * panel,
-            panel,
-            renderer.rgb_flat().ok_or(RendererError::RgbDisabled)?,
-        );
+        picture.put(i as u32 * panel, panel, renderer.rgb_flat().ok_or(RendererError::RgbDisabled)?);
     }
     picture.save(path)?;
     Ok(())
@@ -215,19 +176,13 @@ pub fn render_strip(
 
 /// The model with ghosts and trails as geoms that touch nothing.
 fn picture_model(scenes: &[Scene], options: &RenderOptions) -> Result<MjModel, RenderError> {
-    let load =
-        |text: &str| MjModel::from_xml_string(text).map_err(|e| RenderError::Model(e.to_string()));
+    let load = |text: &str| MjModel::from_xml_string(text).map_err(|e| RenderError::Model(e.to_string()));
     let mut additions = String::new();
     if let Some(scene) = scenes.first().filter(|_| !options.ghosts.is_empty()) {
         let plain = load(MODEL)?;
         for (i, posture) in options.ghosts.iter().enumerate() {
             let opacity = 0.08 + 0.22 * (i + 1) as f64 / options.ghosts.len() as f64;
-            ghost(
-                &plain,
-                &scene.clone().with_posture(posture),
-                opacity,
-                &mut additions,
-            );
+            ghost(&plain, &scene.clone().with_posture(posture), opacity, &mut additions);
         }
     }
     for trail in &options.trails {
@@ -249,21 +204,12 @@ fn picture_model(scenes: &[Scene], options: &RenderOptions) -> Result<MjModel, R
 
 /// Writes the looks of the arm in another posture as fixed, transparent geoms.
 fn ghost(model: &MjModel, scene: &Scene, opacity: f64, text: &mut String) {
-    const SHAPES: [&str; 7] = [
-        "plane",
-        "hfield",
-        "sphere",
-        "capsule",
-        "ellipsoid",
-        "cylinder",
-        "box",
-    ];
+    const SHAPES: [&str; 7] = ["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box"];
     let mut data = MjData::new(model);
     data.qpos_mut().copy_from_slice(&scene.configuration);
     data.kinematics();
     // The pedestal and the base joint's drum look the same in every posture; drawn twice they would flicker.
-    let unmoved =
-        ["flashlight", "base", "link1"].map(|name| model.name_to_id(MjtObjBase::mjOBJ_BODY, name));
+    let unmoved = ["flashlight", "base", "link1"].map(|name| model.name_to_id(MjtObjBase::mjOBJ_BODY, name));
     for (i, &group) in model.geom_group().iter().enumerate() {
         let body = model.geom_bodyid()[i] as usize;
         // Body 0 is the world: table and floor have no ghosts.
@@ -273,8 +219,7 @@ fn ghost(model: &MjModel, scene: &Scene, opacity: f64, text: &mut String) {
         let Some(shape) = SHAPES.get(model.geom_type()[i] as usize) else {
             continue;
         };
-        let colour = usize::try_from(model.geom_matid()[i])
-            .map_or(model.geom_rgba()[i], |m| model.mat_rgba()[m]);
+        let colour = usize::try_from(model.geom_matid()[i]).map_or(model.geom_rgba()[i], |m| model.mat_rgba()[m]);
         // Paler and bluer than the arm itself: a dark, half transparent part would look like a stain.
         let colour = [0, 1, 2].map(|k| 0.45 * colour[k] + 0.55 * GHOST_TINT[k]);
         let [x, y, z] = data.geom_xpos()[i];
@@ -297,11 +242,7 @@ struct Picture {
 
 impl Picture {
     fn new(width: u32, height: u32) -> Self {
-        Self {
-            width,
-            height,
-            pixels: vec![255; 3 * width as usize * height as usize],
-        }
+        Self { width, height, pixels: vec![255; 3 * width as usize * height as usize] }
     }
 
     /// Copies a panel of full height to the column `left`.
@@ -313,14 +254,11 @@ impl Picture {
     }
 
     fn save(&self, path: &Path) -> io::Result<()> {
-        let mut encoder =
-            png::Encoder::new(BufWriter::new(File::create(path)?), self.width, self.height);
+        let mut encoder = png::Encoder::new(BufWriter::new(File::create(path)?), self.width, self.height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_compression(png::Compression::Balanced);
         let mut writer = encoder.write_header().map_err(io::Error::other)?;
-        writer
-            .write_image_data(&self.pixels)
-            .map_err(io::Error::other)
+        writer.write_image_data(&self.pixels).map_err(io::Error::other)
     }
 }

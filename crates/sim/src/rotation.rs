@@ -21,17 +21,8 @@ pub(crate) fn conjugate(q: [f64; 4]) -> [f64; 4] {
 pub(crate) fn exponential(v: [f64; 3]) -> [f64; 4] {
     let angle = norm(v);
     // sin(x/2)/x tends to 1/2; the switch keeps 0/0 out.
-    let scale = if angle < 1e-12 {
-        0.5
-    } else {
-        (0.5 * angle).sin() / angle
-    };
-    [
-        (0.5 * angle).cos(),
-        scale * v[0],
-        scale * v[1],
-        scale * v[2],
-    ]
+    let scale = if angle < 1e-12 { 0.5 } else { (0.5 * angle).sin() / angle };
+    [(0.5 * angle).cos(), scale * v[0], scale * v[1], scale * v[2]]
 }
 
 /// Rotation vector of a unit quaternion, the short way round: |v| <= pi.
@@ -39,11 +30,7 @@ pub(crate) fn logarithm(q: [f64; 4]) -> [f64; 3] {
     let sign = if q[0] < 0.0 { -1.0 } else { 1.0 };
     let vector = [sign * q[1], sign * q[2], sign * q[3]];
     let sine = norm(vector);
-    let scale = if sine < 1e-12 {
-        2.0
-    } else {
-        2.0 * sine.atan2(sign * q[0]) / sine
-    };
+    let scale = if sine < 1e-12 { 2.0 } else { 2.0 * sine.atan2(sign * q[0]) / sine };
     [scale * vector[0], scale * vector[1], scale * vector[2]]
 }
 
@@ -51,43 +38,16 @@ pub(crate) fn logarithm(q: [f64; 4]) -> [f64; 3] {
 pub(crate) fn from_matrix(m: &[f64; 9]) -> [f64; 4] {
     let trace = m[0] + m[4] + m[8];
     let squares = [trace, m[0], m[4], m[8]];
-    let largest = (1..4).fold(
-        0,
-        |best, i| if squares[i] > squares[best] { i } else { best },
-    );
+    let largest = (1..4).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });
     // 4 w^2 = 1 + trace and 4 x_i^2 = 1 + 2 m_ii - trace.
-    let twice = if largest == 0 {
-        1.0 + trace
-    } else {
-        1.0 + 2.0 * squares[largest] - trace
-    };
+    let twice = if largest == 0 { 1.0 + trace } else { 1.0 + 2.0 * squares[largest] - trace };
     let twice = twice.max(0.0).sqrt();
     let (half, rest) = (0.5 * twice, 0.5 / twice);
     match largest {
-        0 => [
-            half,
-            (m[7] - m[5]) * rest,
-            (m[2] - m[6]) * rest,
-            (m[3] - m[1]) * rest,
-        ],
-        1 => [
-            (m[7] - m[5]) * rest,
-            half,
-            (m[1] + m[3]) * rest,
-            (m[2] + m[6]) * rest,
-        ],
-        2 => [
-            (m[2] - m[6]) * rest,
-            (m[1] + m[3]) * rest,
-            half,
-            (m[5] + m[7]) * rest,
-        ],
-        _ => [
-            (m[3] - m[1]) * rest,
-            (m[2] + m[6]) * rest,
-            (m[5] + m[7]) * rest,
-            half,
-        ],
+        0 => [half, (m[7] - m[5]) * rest, (m[2] - m[6]) * rest, (m[3] - m[1]) * rest],
+        1 => [(m[7] - m[5]) * rest, half, (m[1] + m[3]) * rest, (m[2] + m[6]) * rest],
+        2 => [(m[2] - m[6]) * rest, (m[1] + m[3]) * rest, half, (m[5] + m[7]) * rest],
+        _ => [(m[3] - m[1]) * rest, (m[2] + m[6]) * rest, (m[5] + m[7]) * rest, half],
     }
 }
 
@@ -104,29 +64,17 @@ pub(crate) fn norm(v: [f64; 3]) -> f64 {
 /// The vector, shortened to `limit` if it is longer.
 pub(crate) fn shortened(v: [f64; 3], limit: f64) -> [f64; 3] {
     let length = norm(v);
-    if length > limit {
-        v.map(|x| x * limit / length)
-    } else {
-        v
-    }
+    if length > limit { v.map(|x| x * limit / length) } else { v }
 }
 
 /// Element by element: `a + scale b`.
 pub(crate) fn add_scaled(a: [f64; 3], scale: f64, b: [f64; 3]) -> [f64; 3] {
-    [
-        a[0] + scale * b[0],
-        a[1] + scale * b[1],
-        a[2] + scale * b[2],
-    ]
+    [a[0] + scale * b[0], a[1] + scale * b[1], a[2] + scale * b[2]]
 }
 
 /// Vector product.
 pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]
@@ -135,19 +83,11 @@ mod tests {
 
     #[test]
     fn logarithm_inverts_the_exponential_on_both_hemispheres() {
-        for v in [
-            [0.3, -0.7, 1.1],
-            [0.0, 0.0, 0.0],
-            [1e-14, 0.0, 0.0],
-            [0.0, 3.1, 0.1],
-        ] {
+        for v in [[0.3, -0.7, 1.1], [0.0, 0.0, 0.0], [1e-14, 0.0, 0.0], [0.0, 3.1, 0.1]] {
             let q = exponential(v);
             for sign in [1.0, -1.0] {
                 let back = logarithm(q.map(|x| sign * x));
-                assert!(
-                    norm(add_scaled(back, -1.0, v)) < 1e-12,
-                    "{v:?} came back as {back:?}"
-                );
+                assert!(norm(add_scaled(back, -1.0, v)) < 1e-12, "{v:?} came back as {back:?}");
             }
         }
     }
@@ -163,12 +103,7 @@ mod tests {
     #[cfg(feature = "mujoco")]
     #[test]
     fn a_matrix_becomes_its_quaternion_whichever_component_is_largest() {
-        for v in [
-            [0.1, 0.2, 0.3],
-            [3.0, 0.2, 0.1],
-            [0.2, 3.0, -0.1],
-            [-0.2, 0.1, 3.0],
-        ] {
+        for v in [[0.1, 0.2, 0.3], [3.0, 0.2, 0.1], [0.2, 3.0, -0.1], [-0.2, 0.1, 3.0]] {
             let [w, x, y, z] = exponential(v);
             let m = [
                 1.0 - 2.0 * (y * y + z * z),

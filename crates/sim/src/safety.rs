@@ -11,8 +11,8 @@ use crate::time::{TICKS_PER_MILLISECOND, Ticks};
 use puck::device::{reply16, reply32, safety_broadcast};
 use puck::safety::{Button, Health};
 use puck::{
-    Action, CanFrame, Counts, Destination, Group, MotorMode, Node, PendantState, Property,
-    PropertyTable, Reply, Request, Role, SafetyMode, Status, UnknownFirmware,
+    Action, CanFrame, Counts, Destination, Group, MotorMode, Node, PendantState, Property, PropertyTable, Reply,
+    Request, Role, SafetyMode, Status, UnknownFirmware,
 };
 use std::collections::BTreeMap;
 
@@ -28,10 +28,7 @@ pub struct SafetyConfig {
 
 impl Default for SafetyConfig {
     fn default() -> Self {
-        Self {
-            version: 200,
-            heartbeat: Some(100 * TICKS_PER_MILLISECOND),
-        }
+        Self { version: 200, heartbeat: Some(100 * TICKS_PER_MILLISECOND) }
     }
 }
 
@@ -132,20 +129,12 @@ impl SafetyModule {
             velocity,
             torque: self.torque,
             voltage: Health::Safe,
-            heartbeat: if self.heartbeat_fault {
-                Health::Fault
-            } else {
-                Health::Safe
-            },
+            heartbeat: if self.heartbeat_fault { Health::Fault } else { Health::Safe },
             other: Health::Safe,
             segments: DISPLAY_ZERO,
             idle_light: self.mode == SafetyMode::Idle,
             activate_light: self.mode == SafetyMode::Active,
-            button: if self.button_latched {
-                Button::EmergencyStop
-            } else {
-                Button::None
-            },
+            button: if self.button_latched { Button::EmergencyStop } else { Button::None },
         }
     }
 
@@ -164,9 +153,7 @@ impl SafetyModule {
                 self.heartbeat_fault = false;
                 self.idle();
             }
-            PendantAction::ShiftActivate
-                if self.mode == SafetyMode::Idle && !self.pendant().has_faults() =>
-            {
+            PendantAction::ShiftActivate if self.mode == SafetyMode::Idle && !self.pendant().has_faults() => {
                 self.mode = SafetyMode::Active;
                 self.heartbeat_due = self.config.heartbeat.map(|longest| now + longest);
                 self.outgoing.push(safety_broadcast(MotorMode::Torque));
@@ -186,15 +173,10 @@ impl SafetyModule {
 
     /// When the module acts next by itself.
     pub(crate) fn next_time(&self) -> Option<Ticks> {
-        [
-            self.inbox.next_time(),
-            self.heartbeat_due,
-            self.positions_stale_at(),
-            self.second_look,
-        ]
-        .into_iter()
-        .flatten()
-        .min()
+        [self.inbox.next_time(), self.heartbeat_due, self.positions_stale_at(), self.second_look]
+            .into_iter()
+            .flatten()
+            .min()
     }
 
     /// Does one thing that is due by `now`.
@@ -226,11 +208,7 @@ impl SafetyModule {
     }
 
     fn hear_position(&mut self, at: Ticks, node: Node, counts: Counts) {
-        if self.mode == SafetyMode::EStop
-            || !self
-                .speed
-                .hear(at, node, counts, self.zeroed_since.is_some())
-        {
+        if self.mode == SafetyMode::EStop || !self.speed.hear(at, node, counts, self.zeroed_since.is_some()) {
             return;
         }
         let since = self.positions.map_or(at, |(since, _)| since);
@@ -253,22 +231,13 @@ impl SafetyModule {
     }
 
     fn hear_request(&mut self, at: Ticks, request: &Request) {
-        let is_arm_torque = matches!(
-            request.to,
-            Destination::Group(Group::ARM_TORQUES | Group::WRIST_TORQUES)
-        );
+        let is_arm_torque = matches!(request.to, Destination::Group(Group::ARM_TORQUES | Group::WRIST_TORQUES));
         match request.action {
             Action::PackedTorques { torques, .. } if is_arm_torque => {
-                let largest = torques
-                    .iter()
-                    .map(|torque| i32::from(torque.units()).abs())
-                    .max()
-                    .unwrap_or(0);
+                let largest = torques.iter().map(|torque| i32::from(torque.units()).abs()).max().unwrap_or(0);
                 self.judge_torque(largest);
             }
-            action if request.to == Destination::Node(Node::SAFETY_MODULE) => {
-                self.inbox.receive(at, action)
-            }
+            action if request.to == Destination::Node(Node::SAFETY_MODULE) => self.inbox.receive(at, action),
             _ => {}
         }
     }
@@ -302,16 +271,9 @@ impl SafetyModule {
                 let node = Node::SAFETY_MODULE;
                 // PEN needs 28 bits although no second number is reserved for it.
                 let is_wide = property.is_wide() || property == Property::Pen;
-                self.outgoing.push(if is_wide {
-                    reply32(node, id, value)
-                } else {
-                    reply16(node, id, value as i16)
-                });
+                self.outgoing.push(if is_wide { reply32(node, id, value) } else { reply16(node, id, value as i16) });
             }
-            Action::Set {
-                property: id,
-                value,
-            } => {
+            Action::Set { property: id, value } => {
                 if let Some(property) = self.table.property(id) {
                     self.set(now, property, i32::from(value as i16));
                 }
@@ -347,14 +309,9 @@ impl SafetyModule {
             Property::Ifault => self.ignored_faults = value.max(0),
             // The value of LOAD names a property; the library sends DEF with the same value just before.
             Property::Load => {
-                let named = u8::try_from(value)
-                    .ok()
-                    .and_then(puck::PropertyId::new)
-                    .and_then(|id| self.table.property(id));
-                if let Some((property, default)) = FACTORY
-                    .iter()
-                    .find(|(property, _)| Some(*property) == named)
-                {
+                let named =
+                    u8::try_from(value).ok().and_then(puck::PropertyId::new).and_then(|id| self.table.property(id));
+                if let Some((property, default)) = FACTORY.iter().find(|(property, _)| Some(*property) == named) {
                     self.limits.insert(*property, *default);
                 }
             }

@@ -43,14 +43,7 @@ pub(crate) struct SpeedMonitor {
 impl SpeedMonitor {
     /// A monitor for an arm with this transmission and these encoders.
     pub(crate) fn new(transmission: Transmission<f64>, drives: Drives) -> Self {
-        Self {
-            transmission,
-            drives,
-            arriving: [None; 7],
-            history: VecDeque::new(),
-            last_complete: 0,
-            latest: None,
-        }
+        Self { transmission, drives, arriving: [None; 7], history: VecDeque::new(), last_complete: 0, latest: None }
     }
 
     /// Takes one position reply; `true` if it completes a full set and the speed was judged anew.
@@ -63,16 +56,7 @@ impl SpeedMonitor {
             self.arriving = [None; 7];
         }
         self.arriving[motor] = Some(counts);
-        let [
-            Some(a),
-            Some(b),
-            Some(c),
-            Some(d),
-            Some(e),
-            Some(f),
-            Some(g),
-        ] = self.arriving
-        else {
+        let [Some(a), Some(b), Some(c), Some(d), Some(e), Some(f), Some(g)] = self.arriving else {
             return false;
         };
         self.arriving = [None; 7];
@@ -100,10 +84,7 @@ impl SpeedMonitor {
 
     fn judge(&mut self, at: Ticks, q: [f64; 7], is_zeroed: bool) {
         let pause = (at - self.last_complete).min(LONGEST_PAUSE);
-        let reckoned = self
-            .history
-            .back()
-            .map_or(0, |sample| sample.reckoned + pause);
+        let reckoned = self.history.back().map_or(0, |sample| sample.reckoned + pause);
         self.last_complete = at;
         self.history.push_back(Sample { reckoned, q });
         if self.history.len() > HISTORY {
@@ -114,11 +95,7 @@ impl SpeedMonitor {
         };
         let elapsed = seconds(last.reckoned - first.reckoned);
         if elapsed > 0.0 {
-            let moved = if is_zeroed {
-                tip_travel(&first.q, &last.q)
-            } else {
-                joint_travel(&first.q, &last.q)
-            };
+            let moved = if is_zeroed { tip_travel(&first.q, &last.q) } else { joint_travel(&first.q, &last.q) };
             self.latest = Some(moved / elapsed);
         }
     }
@@ -127,19 +104,12 @@ impl SpeedMonitor {
 /// The farther of the two supervised points' straight ways, m.
 fn tip_travel(from: &[f64; 7], to: &[f64; 7]) -> f64 {
     let (from, to) = (supervised_points(from), supervised_points(to));
-    from.iter()
-        .zip(to)
-        .map(|(a, b)| norm(subtract(b, *a)))
-        .fold(0.0, f64::max)
+    from.iter().zip(to).map(|(a, b)| norm(subtract(b, *a))).fold(0.0, f64::max)
 }
 
 /// The largest turn of joints 1..4, rad.
 fn joint_travel(from: &[f64; 7], to: &[f64; 7]) -> f64 {
-    from.iter()
-        .zip(to)
-        .take(4)
-        .map(|(a, b)| (b - a).abs())
-        .fold(0.0, f64::max)
+    from.iter().zip(to).take(4).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
 }
 
 /// Elbow and the point beyond it, m.

@@ -34,19 +34,12 @@ pub(crate) struct SteadyHand {
 impl SteadyHand {
     /// Hands at the arm in pose `home`, rad, that let go `patience` after ACTIVE; `None`: nobody holds the arm.
     pub(crate) fn new(home: [f64; 7], patience: Option<Ticks>) -> Self {
-        Self {
-            home,
-            error_sum: [0.0; 7],
-            patience,
-            lets_go_at: None,
-        }
+        Self { home, error_sum: [0.0; 7], patience, lets_go_at: None }
     }
 
     /// The arm has become active.
     pub(crate) fn see_active(&mut self, now: Ticks) {
-        self.lets_go_at = self
-            .lets_go_at
-            .or(self.patience.map(|patience| now + patience));
+        self.lets_go_at = self.lets_go_at.or(self.patience.map(|patience| now + patience));
     }
 
     /// Torque of the hands on each joint for the step that ends at `now`, N m.

@@ -51,18 +51,14 @@ impl FrameClass {
         match frame.can_id().destination() {
             Destination::Node(_) if from_host => Self::Directed,
             Destination::Node(_) => Self::Other,
-            Destination::Group(Group::ARM_TORQUES | Group::WRIST_TORQUES) if from_host => {
-                Self::PackedTorque
-            }
+            Destination::Group(Group::ARM_TORQUES | Group::WRIST_TORQUES) if from_host => Self::PackedTorque,
             Destination::Group(_) if from_host => Self::GroupRequest,
             Destination::Group(Group::POSITION_REPLIES) => Self::Position,
             Destination::Group(Group::PROPERTY_REPLIES) => Self::PropertyReply,
-            Destination::Group(
-                Group::FORCE_REPLIES | Group::TORQUE_REPLIES | Group::ACCELERATION_REPLIES,
-            ) => Self::ForceTorque,
-            Destination::Group(Group::ALL_MOTORS)
-                if frame.can_id().sender() == Node::SAFETY_MODULE =>
-            {
+            Destination::Group(Group::FORCE_REPLIES | Group::TORQUE_REPLIES | Group::ACCELERATION_REPLIES) => {
+                Self::ForceTorque
+            }
+            Destination::Group(Group::ALL_MOTORS) if frame.can_id().sender() == Node::SAFETY_MODULE => {
                 Self::SafetyBroadcast
             }
             Destination::Group(_) => Self::Other,
@@ -102,13 +98,7 @@ pub struct BusTrace {
 
 impl Default for BusTrace {
     fn default() -> Self {
-        Self {
-            hash: FNV_OFFSET,
-            frames: [0; FrameClass::ALL.len()],
-            invalid: 0,
-            invalid_examples: Vec::new(),
-            busy: 0,
-        }
+        Self { hash: FNV_OFFSET, frames: [0; FrameClass::ALL.len()], invalid: 0, invalid_examples: Vec::new(), busy: 0 }
     }
 }
 
@@ -131,11 +121,7 @@ impl BusTrace {
     /// Part of `elapsed` during which the bus was busy, 0..=1; 0 for no time at all.
     #[must_use]
     pub fn load(&self, elapsed: Ticks) -> f64 {
-        if elapsed == 0 {
-            0.0
-        } else {
-            seconds(self.busy) / seconds(elapsed)
-        }
+        if elapsed == 0 { 0.0 } else { seconds(self.busy) / seconds(elapsed) }
     }
 
     /// Adds a frame at its start.

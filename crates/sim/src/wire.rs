@@ -46,20 +46,13 @@ fn crc15(bits: &[bool]) -> u16 {
     bits.iter().fold(0, |register: u16, &bit| {
         let feedback = bit != (register >> 14 & 1 == 1);
         let shifted = register << 1 & 0x7FFF;
-        if feedback {
-            shifted ^ CRC_POLYNOMIAL
-        } else {
-            shifted
-        }
+        if feedback { shifted ^ CRC_POLYNOMIAL } else { shifted }
     })
 }
 
 /// SOF to CRC of a frame, not yet stuffed.
 fn stuffed_region(frame: &CanFrame) -> BitString {
-    let mut region = BitString {
-        bits: [false; STUFFED_REGION_MAX],
-        length: 0,
-    };
+    let mut region = BitString { bits: [false; STUFFED_REGION_MAX], length: 0 };
     region.push(0, 1); // start of frame
     region.push(frame.can_id().raw().into(), 11);
     region.push(0, 3); // RTR, IDE and the reserved bit: data frame, base format

@@ -52,11 +52,7 @@ fn equal_identifiers_go_by_order_of_submission() {
     }
     bus.record();
     run(&mut bus);
-    let first_bytes: Vec<u8> = bus
-        .recorded()
-        .iter()
-        .map(|passage| passage.frame.payload()[0])
-        .collect();
+    let first_bytes: Vec<u8> = bus.recorded().iter().map(|passage| passage.frame.payload()[0]).collect();
     assert_eq!(first_bytes, [0, 1, 2]);
 }
 
@@ -71,10 +67,7 @@ fn frames_follow_each_other_without_gap_and_without_overlap() {
     let mut free: Ticks = 40;
     for passage in bus.recorded() {
         assert_eq!(passage.start, free);
-        assert_eq!(
-            passage.end - passage.start,
-            wire::frame_ticks(&passage.frame)
-        );
+        assert_eq!(passage.end - passage.start, wire::frame_ticks(&passage.frame));
         free = passage.end;
     }
     assert_eq!(bus.trace().busy, free - 40);
@@ -93,8 +86,7 @@ fn a_node_without_power_sends_nothing_more() {
 #[test]
 fn frames_outside_the_protocol_are_counted_as_invalid() {
     let mut bus = Bus::default();
-    let node_to_node =
-        CanFrame::with_payload(CanId::encode(Node::ARM[0], Node::HOST), [0x80, 0, 1, 0]);
+    let node_to_node = CanFrame::with_payload(CanId::encode(Node::ARM[0], Node::HOST), [0x80, 0, 1, 0]);
     let short_set = CanFrame::with_payload(CanId::encode(Node::HOST, Node::ARM[0]), [0x88, 0]);
     let good = CanFrame::with_payload(CanId::encode(Node::HOST, Node::ARM[0]), [0x05]);
     for bad in [node_to_node, short_set, good] {

@@ -2,25 +2,12 @@
 
 use puck::SafetyMode;
 use sim::lockstep::{NEVER, REPLY_LENGTH};
-use sim::{
-    BYTE_TICKS, FreeJoints, HOME, Lockstep, LockstepError, OperatorConfig, Plant, PlantConfig,
-    Served,
-};
+use sim::{BYTE_TICKS, FreeJoints, HOME, Lockstep, LockstepError, OperatorConfig, Plant, PlantConfig, Served};
 
 /// An arm nobody switches on: only the safety module speaks, and nothing happens by itself.
 fn quiet_plant() -> Plant {
-    let operator = OperatorConfig {
-        idle_at: None,
-        activate_after: None,
-        ..OperatorConfig::default()
-    };
-    Plant::new(
-        PlantConfig {
-            operator,
-            ..PlantConfig::default()
-        },
-        Box::new(FreeJoints::new(HOME)),
-    )
+    let operator = OperatorConfig { idle_at: None, activate_after: None, ..OperatorConfig::default() };
+    Plant::new(PlantConfig { operator, ..PlantConfig::default() }, Box::new(FreeJoints::new(HOME)))
 }
 
 fn request(kind: u8, length: u8, id: u16, t: u64, data: &[u8]) -> Vec<u8> {
@@ -69,27 +56,17 @@ fn a_get_travels_out_and_its_reply_comes_back() {
     let (_, done, _) = serve(&mut plant, &request(2, 0, 0, end, &[]));
     assert_eq!(done[0], 0b010, "transmitted");
     let latch = next_event(&done);
-    assert_eq!(
-        latch,
-        end - 3 * 25 + 75 * 25,
-        "the reply wants the bus 75 us after the request was received"
-    );
+    assert_eq!(latch, end - 3 * 25 + 75 * 25, "the reply wants the bus 75 us after the request was received");
 
     let (_, started, _) = serve(&mut plant, &request(2, 0, 0, latch, &[]));
-    assert_eq!(
-        started[0], 0,
-        "the bus has become busy, nothing has arrived"
-    );
+    assert_eq!(started[0], 0, "the bus has become busy, nothing has arrived");
     let arrival = next_event(&started);
 
     let (_, arrived, _) = serve(&mut plant, &request(2, 0, 0, arrival, &[]));
     assert_eq!(arrived[0], 0b001, "received");
     assert_eq!(arrived[1], 4);
     assert_eq!(arrived[2..4], [0x46, 0x05], "0x546: node 10 to group 6");
-    assert_eq!(
-        arrived[16..24],
-        [0x88, 0, SafetyMode::EStop.value() as u8, 0, 0, 0, 0, 0]
-    );
+    assert_eq!(arrived[16..24], [0x88, 0, SafetyMode::EStop.value() as u8, 0, 0, 0, 0, 0]);
     assert_eq!(arrived[24..32], [0; 8]);
     assert_eq!(next_event(&arrived), NEVER);
 }
@@ -141,16 +118,10 @@ fn link_bytes_cross_in_both_directions_at_the_speed_of_the_line() {
     let (_, early, _) = serve(&mut plant, &request(2, 0, 0, now, &[]));
     assert_eq!((early[0], next_event(&early)), (0, now + 64 * BYTE_TICKS));
     let (_, first, _) = serve(&mut plant, &request(2, 0, 0, now + 64 * BYTE_TICKS, &[]));
-    assert_eq!(
-        (first[0], first[4], first.len()),
-        (0b100, 64, REPLY_LENGTH + 64)
-    );
+    assert_eq!((first[0], first[4], first.len()), (0b100, 64, REPLY_LENGTH + 64));
     assert_eq!(next_event(&first), now + 100 * BYTE_TICKS);
     let (_, second, _) = serve(&mut plant, &request(2, 0, 0, now + 100 * BYTE_TICKS, &[]));
-    assert_eq!(
-        (second[0], second[4], &second[REPLY_LENGTH..]),
-        (0b100, 36, &[7; 36][..])
-    );
+    assert_eq!((second[0], second[4], &second[REPLY_LENGTH..]), (0b100, 36, &[7; 36][..]));
     assert_eq!(next_event(&second), NEVER);
 }
 
@@ -171,23 +142,11 @@ fn the_end_of_the_stream_is_told_from_a_death_in_the_middle_of_a_request() {
     assert_eq!(served, [Served::EndOfStream]);
     assert!(error.is_none());
     let (_, _, error) = serve(&mut plant, &request(2, 0, 0, 5, &[])[..10]);
-    assert!(matches!(
-        error,
-        Some(LockstepError::Truncated {
-            received: 10,
-            expected: 24
-        })
-    ));
+    assert!(matches!(error, Some(LockstepError::Truncated { received: 10, expected: 24 })));
     let mut cut = request(4, 9, 0, 5, &[]);
     cut.extend([1, 2, 3]);
     let (_, _, error) = serve(&mut plant, &cut);
-    assert!(matches!(
-        error,
-        Some(LockstepError::Truncated {
-            received: 27,
-            expected: 33
-        })
-    ));
+    assert!(matches!(error, Some(LockstepError::Truncated { received: 27, expected: 33 })));
 }
 
 #[test]
@@ -206,20 +165,8 @@ fn words_on_standard_output_are_recognised_as_such() {
 fn frames_that_no_controller_could_send_are_refused() {
     let mut plant = quiet_plant();
     let (_, _, error) = serve(&mut plant, &request(1, 9, 0x00A, 5, &[]));
-    assert!(matches!(
-        error,
-        Some(LockstepError::Frame {
-            id: 0x00A,
-            length: 9
-        })
-    ));
+    assert!(matches!(error, Some(LockstepError::Frame { id: 0x00A, length: 9 })));
     let (_, _, error) = serve(&mut plant, &request(1, 1, 0x800, 5, &[]));
-    assert!(matches!(
-        error,
-        Some(LockstepError::Frame {
-            id: 0x800,
-            length: 1
-        })
-    ));
+    assert!(matches!(error, Some(LockstepError::Frame { id: 0x800, length: 1 })));
     assert_eq!(plant.trace().total(), 0);
 }

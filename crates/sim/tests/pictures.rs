@@ -13,30 +13,18 @@ fn file(name: &str) -> PathBuf {
 }
 
 fn scene(posture: [f64; 7]) -> Scene {
-    Scene::set_up(&MujocoOptions {
-        posture,
-        ..MujocoOptions::default()
-    })
-    .expect("the scene loads")
+    Scene::set_up(&MujocoOptions { posture, ..MujocoOptions::default() }).expect("the scene loads")
 }
 
 /// The run of the demonstration as ghosts and a trail.
 fn with_history() -> RenderOptions {
     let path = side_grasp_path();
-    let points = (0..=60)
-        .map(|i| path.pose(path.duration() * f64::from(i) / 60.0).position)
-        .collect();
+    let points = (0..=60).map(|i| path.pose(path.duration() * f64::from(i) / 60.0).position).collect();
     let between = |share: f64| -> [f64; 7] {
-        std::array::from_fn(|i| {
-            DEMONSTRATION_START[i] + share * (DEMONSTRATION_GOAL[i] - DEMONSTRATION_START[i])
-        })
+        std::array::from_fn(|i| DEMONSTRATION_START[i] + share * (DEMONSTRATION_GOAL[i] - DEMONSTRATION_START[i]))
     };
     RenderOptions {
-        trails: vec![Trail {
-            points,
-            colour: [0.85, 0.12, 0.15, 1.0],
-            radius: 0.008,
-        }],
+        trails: vec![Trail { points, colour: [0.85, 0.12, 0.15, 1.0], radius: 0.008 }],
         ghosts: vec![between(0.0), between(0.5)],
         ..RenderOptions::default()
     }
@@ -45,85 +33,47 @@ fn with_history() -> RenderOptions {
 #[test]
 fn a_picture_is_a_png_of_the_size_asked_for() {
     let path = file("grasp.png");
-    render_png(&scene(DEMONSTRATION_GOAL), &path, &with_history())
-        .expect("a picture without a display");
+    render_png(&scene(DEMONSTRATION_GOAL), &path, &with_history()).expect("a picture without a display");
     let bytes = std::fs::read(&path).expect("the picture exists");
     assert_eq!(&bytes[..8], b"\x89PNG\r\n\x1a\n");
     assert_eq!(&bytes[16..24], &[0, 0, 5, 0, 0, 0, 3, 32], "1280 x 800");
-    assert!(
-        bytes.len() > 40_000,
-        "{} bytes are an empty picture",
-        bytes.len()
-    );
+    assert!(bytes.len() > 40_000, "{} bytes are an empty picture", bytes.len());
 }
 
 #[test]
 fn another_posture_and_a_ghost_and_a_trail_each_change_the_picture() {
-    let small = RenderOptions {
-        width: 320,
-        height: 200,
-        ..RenderOptions::default()
-    };
+    let small = RenderOptions { width: 320, height: 200, ..RenderOptions::default() };
     let history = with_history();
     let take = |name: &str, posture, options: &RenderOptions| {
         render_png(&scene(posture), &file(name), options).expect("a picture without a display");
         std::fs::read(file(name)).expect("the picture exists")
     };
     let plain = take("plain.png", DEMONSTRATION_GOAL, &small);
-    assert_eq!(
-        plain,
-        take("again.png", DEMONSTRATION_GOAL, &small),
-        "the same scene, another picture"
-    );
+    assert_eq!(plain, take("again.png", DEMONSTRATION_GOAL, &small), "the same scene, another picture");
     assert_ne!(plain, take("home.png", HOME, &small));
-    let trails = RenderOptions {
-        trails: history.trails,
-        ..small.clone()
-    };
+    let trails = RenderOptions { trails: history.trails, ..small.clone() };
     assert_ne!(plain, take("trail.png", DEMONSTRATION_GOAL, &trails));
-    let ghosts = RenderOptions {
-        ghosts: history.ghosts,
-        ..small
-    };
+    let ghosts = RenderOptions { ghosts: history.ghosts, ..small };
     assert_ne!(plain, take("ghost.png", DEMONSTRATION_GOAL, &ghosts));
 }
 
 #[test]
 fn a_film_strip_has_a_panel_for_each_scene() {
     let path = file("strip.png");
-    let options = RenderOptions {
-        width: 1800,
-        height: 480,
-        ..RenderOptions::default()
-    };
+    let options = RenderOptions { width: 1800, height: 480, ..RenderOptions::default() };
     let scenes = [HOME, DEMONSTRATION_START, DEMONSTRATION_GOAL].map(scene);
     render_strip(&scenes, &path, &options).expect("a picture without a display");
-    assert_eq!(
-        &std::fs::read(&path).expect("the picture exists")[16..24],
-        &[0, 0, 7, 8, 0, 0, 1, 224]
-    );
+    assert_eq!(&std::fs::read(&path).expect("the picture exists")[16..24], &[0, 0, 7, 8, 0, 0, 1, 224]);
 }
 
 #[test]
 fn an_impossible_size_and_an_impossible_file_are_refused() {
-    let options = |width| RenderOptions {
-        width,
-        ..RenderOptions::default()
-    };
+    let options = |width| RenderOptions { width, ..RenderOptions::default() };
     let scene = scene(HOME);
     for width in [0, 2561] {
-        assert!(matches!(
-            render_png(&scene, &file("no.png"), &options(width)),
-            Err(RenderError::Size { .. })
-        ));
+        assert!(matches!(render_png(&scene, &file("no.png"), &options(width)), Err(RenderError::Size { .. })));
     }
-    assert!(matches!(
-        render_strip(&[], &file("no.png"), &options(640)),
-        Err(RenderError::Size { .. })
-    ));
+    assert!(matches!(render_strip(&[], &file("no.png"), &options(640)), Err(RenderError::Size { .. })));
     let nowhere = file("no such folder").join("no.png");
-    assert!(matches!(
-        render_png(&scene, &nowhere, &options(320)),
-        Err(RenderError::File(_))
-    ));
+    assert!(matches!(render_png(&scene, &nowhere, &options(320)), Err(RenderError::File(_))));
 }

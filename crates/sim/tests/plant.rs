@@ -11,11 +11,7 @@ use std::any::Any;
 /// Torques that change from cycle to cycle.
 fn torques(slot: u32) -> CanFrame {
     let torque = |phase: u32| PuckTorque::new((slot * 37 + phase * 91) as i16 % 400).unwrap();
-    packed_torques(
-        Group::ARM_TORQUES,
-        PropertyId::TORQUE,
-        [torque(0), torque(1), torque(2), torque(3)],
-    )
+    packed_torques(Group::ARM_TORQUES, PropertyId::TORQUE, [torque(0), torque(1), torque(2), torque(3)])
 }
 
 /// Two seconds of start-up and polling during which somebody looks at the given moments in each slot.
@@ -62,18 +58,10 @@ fn next_event_never_announces_a_frame_too_late() {
     master.wake();
     master.heard.clear();
     master.poll(100);
-    let ends: Vec<Ticks> = master
-        .plant
-        .recorded()
-        .iter()
-        .map(|passage| passage.end)
-        .collect();
+    let ends: Vec<Ticks> = master.plant.recorded().iter().map(|passage| passage.end).collect();
     assert!(master.heard.len() > 200);
     for (at, frame) in &master.heard {
-        assert!(
-            ends.contains(at),
-            "{frame:?} came at {at}, which is no frame's end"
-        );
+        assert!(ends.contains(at), "{frame:?} came at {at}, which is no frame's end");
     }
 }
 
@@ -88,12 +76,7 @@ fn a_frame_submitted_while_the_bus_waits_for_a_puck_goes_first() {
     // The puck's answer wants the bus 75 us after the request; the host is there before it.
     master.send(get(Node::ARM[1], PropertyId::STAT));
     master.wait_ms(2);
-    let ids: Vec<u16> = master
-        .plant
-        .recorded()
-        .iter()
-        .map(|passage| passage.frame.can_id().raw())
-        .collect();
+    let ids: Vec<u16> = master.plant.recorded().iter().map(|passage| passage.frame.can_id().raw()).collect();
     assert_eq!(ids, [0x001, 0x002, 0x426, 0x446]);
 }
 
@@ -101,9 +84,7 @@ fn a_frame_submitted_while_the_bus_waits_for_a_puck_goes_first() {
 fn the_owner_gets_its_own_world_back() {
     let mut plant = Plant::new(PlantConfig::default(), Box::new(FreeJoints::new(HOME)));
     let any: &mut dyn Any = plant.world();
-    let world = any
-        .downcast_mut::<FreeJoints>()
-        .expect("the world that was put in");
+    let world = any.downcast_mut::<FreeJoints>().expect("the world that was put in");
     assert_eq!(world.joint_positions(), HOME);
 }
 
@@ -112,21 +93,11 @@ fn a_configuration_that_describes_no_arm_is_refused() {
     let plant = |config| Plant::try_new(config, Box::new(FreeJoints::new(HOME))).map(|_| ());
     let mut config = PlantConfig::default();
     config.ratios.coefficients[3] = 0.0;
-    assert!(
-        plant(config)
-            .unwrap_err()
-            .to_string()
-            .contains("gear ratio")
-    );
+    assert!(plant(config).unwrap_err().to_string().contains("gear ratio"));
     let mut config = PlantConfig::default();
     config.pucks.units_per_newton_metre[6] = 0;
     assert!(plant(config).unwrap_err().to_string().contains("motor 7"));
     let mut config = PlantConfig::default();
     config.pucks.version = 0;
-    assert!(
-        plant(config)
-            .unwrap_err()
-            .to_string()
-            .contains("firmware version 0")
-    );
+    assert!(plant(config).unwrap_err().to_string().contains("firmware version 0"));
 }

@@ -4,12 +4,12 @@ mod common;
 
 use common::{Master, home_counts, motor_id, safety_id};
 use puck::{
-    CanFrame, CanId, Counts, Destination, Group, Node, Property, PropertyId, PuckTorque, Reply,
-    SafetyMode, force_torque, get, packed_torques, set, set_short,
+    CanFrame, CanId, Counts, Destination, Group, Node, Property, PropertyId, PuckTorque, Reply, SafetyMode,
+    force_torque, get, packed_torques, set, set_short,
 };
 use sim::{
-    FreeJoints, HOME, OperatorConfig, PendantAction, PlantConfig, SafetyConfig,
-    TICKS_PER_MICROSECOND, TICKS_PER_MILLISECOND,
+    FreeJoints, HOME, OperatorConfig, PendantAction, PlantConfig, SafetyConfig, TICKS_PER_MICROSECOND,
+    TICKS_PER_MILLISECOND,
 };
 
 fn awake() -> Master {
@@ -20,43 +20,21 @@ fn awake() -> Master {
 
 /// An arm that floats straight up at q = 0, watched by a module without heartbeat.
 fn weightless() -> Master {
-    let safety = SafetyConfig {
-        heartbeat: None,
-        ..SafetyConfig::default()
-    };
-    let operator = OperatorConfig {
-        holds_until_active_for: None,
-        ..OperatorConfig::default()
-    };
-    Master::with_world(
-        PlantConfig {
-            safety,
-            operator,
-            ..PlantConfig::default()
-        },
-        FreeJoints::weightless([0.0; 7]),
-    )
+    let safety = SafetyConfig { heartbeat: None, ..SafetyConfig::default() };
+    let operator = OperatorConfig { holds_until_active_for: None, ..OperatorConfig::default() };
+    Master::with_world(PlantConfig { safety, operator, ..PlantConfig::default() }, FreeJoints::weightless([0.0; 7]))
 }
 
 fn torques(first: i16) -> CanFrame {
     let zero = PuckTorque::ZERO;
-    packed_torques(
-        Group::ARM_TORQUES,
-        PropertyId::TORQUE,
-        [PuckTorque::new(first).unwrap(), zero, zero, zero],
-    )
+    packed_torques(Group::ARM_TORQUES, PropertyId::TORQUE, [PuckTorque::new(first).unwrap(), zero, zero, zero])
 }
 
 #[test]
 fn only_the_safety_module_answers_before_the_operator_comes() {
     let mut master = Master::new(PlantConfig::default());
-    let answering: Vec<u8> = (1..=31)
-        .filter(|number| {
-            master
-                .value(Node::new(*number).unwrap(), PropertyId::STAT)
-                .is_some()
-        })
-        .collect();
+    let answering: Vec<u8> =
+        (1..=31).filter(|number| master.value(Node::new(*number).unwrap(), PropertyId::STAT).is_some()).collect();
     // 31 x 2 ms: the operator releases the E-stop at 50 ms, the pucks need 20 ms more.
     assert_eq!(answering, [10]);
 }
@@ -79,28 +57,16 @@ fn a_waking_puck_lingers_then_falls_silent_then_runs_another_version() {
     let node = Node::ARM[4];
     master.send(set(node, PropertyId::STAT, 2));
     master.wait_ms(5);
-    assert_eq!(
-        master.value(node, PropertyId::STAT),
-        Some(0),
-        "it leaves the bus only after 10 ms"
-    );
+    assert_eq!(master.value(node, PropertyId::STAT), Some(0), "it leaves the bus only after 10 ms");
     master.wait_ms(10);
     for _ in 0..28 {
-        assert_eq!(
-            master.value(node, PropertyId::STAT),
-            None,
-            "no puck wakes within 0.3 s"
-        );
+        assert_eq!(master.value(node, PropertyId::STAT), None, "no puck wakes within 0.3 s");
         master.wait_ms(8);
     }
     master.wait_ms(720);
     assert_eq!(master.value(node, PropertyId::STAT), Some(2));
     assert_eq!(master.value(node, PropertyId::VERS), Some(200));
-    assert_eq!(
-        master.value(Node::ARM[5], PropertyId::STAT),
-        Some(0),
-        "its neighbour was not asked to wake"
-    );
+    assert_eq!(master.value(Node::ARM[5], PropertyId::STAT), Some(0), "its neighbour was not asked to wake");
 }
 
 #[test]
@@ -109,22 +75,12 @@ fn properties_of_the_drive_are_those_of_the_configuration() {
     for (index, node) in Node::ARM.into_iter().enumerate() {
         let config = PlantConfig::default().pucks;
         assert_eq!(master.motor_value(node, Property::Cts), Some(4096));
-        assert_eq!(
-            master.motor_value(node, Property::Ipnm),
-            Some(config.units_per_newton_metre[index].into())
-        );
-        assert_eq!(
-            master.motor_value(node, Property::Mt),
-            Some(config.torque_limit[index].into())
-        );
+        assert_eq!(master.motor_value(node, Property::Ipnm), Some(config.units_per_newton_metre[index].into()));
+        assert_eq!(master.motor_value(node, Property::Mt), Some(config.torque_limit[index].into()));
         assert_eq!(master.motor_value(node, Property::Grpc), Some(4));
         assert_eq!(master.motor_value(node, Property::Ecmax), Some(0));
     }
-    assert_eq!(
-        master.motor_value(Node::ARM[6], Property::Poles),
-        Some(6),
-        "a wrist, no gimbals"
-    );
+    assert_eq!(master.motor_value(Node::ARM[6], Property::Poles), Some(6), "a wrist, no gimbals");
     assert_eq!(master.motor_value(Node::ARM[6], Property::Pidx), Some(3));
 }
 
@@ -149,17 +105,8 @@ fn the_first_reply_starts_75_us_after_the_request() {
     master.positions();
     let passages = master.plant.recorded();
     let (request, first) = (passages[0], passages[1]);
-    assert_eq!(
-        first.start - request.received_at(),
-        75 * TICKS_PER_MICROSECOND
-    );
-    assert!(
-        passages
-            .windows(2)
-            .skip(1)
-            .all(|pair| pair[1].start == pair[0].end),
-        "replies follow without a gap"
-    );
+    assert_eq!(first.start - request.received_at(), 75 * TICKS_PER_MICROSECOND);
+    assert!(passages.windows(2).skip(1).all(|pair| pair[1].start == pair[0].end), "replies follow without a gap");
 }
 
 #[test]
@@ -169,22 +116,13 @@ fn all_pucks_latch_at_the_same_instant() {
     master.activate_unzeroed();
     let torque = PuckTorque::new(-500).unwrap();
     let zero = PuckTorque::ZERO;
-    master.send(packed_torques(
-        Group::ARM_TORQUES,
-        PropertyId::TORQUE,
-        [zero, torque, torque, zero],
-    ));
+    master.send(packed_torques(Group::ARM_TORQUES, PropertyId::TORQUE, [zero, torque, torque, zero]));
     master.wait_ms(250);
     let speed = master.plant.world().joint_velocities()[2];
-    assert!(
-        speed > 5.0,
-        "the joint must move fast enough to tell: {speed} rad/s"
-    );
+    assert!(speed > 5.0, "the joint must move fast enough to tell: {speed} rad/s");
     let mut largest = 0;
     for _ in 0..20 {
-        let [_, Some(second), Some(third), ..] = master.positions() else {
-            panic!("pucks 2 and 3 answer")
-        };
+        let [_, Some(second), Some(third), ..] = master.positions() else { panic!("pucks 2 and 3 answer") };
         largest = largest.max((second.0 - third.0).abs());
         master.wait_ms(1);
     }
@@ -205,16 +143,11 @@ fn the_encoder_moves_between_two_steps_of_physics() {
         master.send(get(Node::ARM[0], PropertyId::POSITION));
         master.wait(250 * TICKS_PER_MICROSECOND);
         let (_, frame) = master.heard.last().expect("the puck answers within 250 us");
-        let Ok(Reply::Position { primary, .. }) = Reply::decode(frame) else {
-            panic!("{frame:?}")
-        };
+        let Ok(Reply::Position { primary, .. }) = Reply::decode(frame) else { panic!("{frame:?}") };
         counts.push(primary.0);
     }
     // Sampled every 250 us, while physics steps every 556 us: without extrapolation it would stand still, then jump.
-    let steps: Vec<i32> = counts
-        .windows(2)
-        .map(|pair| (pair[1] - pair[0]).abs())
-        .collect();
+    let steps: Vec<i32> = counts.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     let (least, most) = (steps.iter().min().unwrap(), steps.iter().max().unwrap());
     assert!(*least > 3 && most - least <= 2, "{steps:?}");
 }
@@ -267,10 +200,7 @@ fn a_flood_of_sets_is_lost_in_part_and_a_patient_master_loses_none() {
 #[test]
 fn an_unknown_property_is_not_answered() {
     let mut master = awake();
-    assert_eq!(
-        master.value(Node::ARM[0], PropertyId::new(127).unwrap()),
-        None
-    );
+    assert_eq!(master.value(Node::ARM[0], PropertyId::new(127).unwrap()), None);
 }
 
 #[test]
@@ -279,15 +209,9 @@ fn replies_and_foreign_senders_are_no_orders() {
     let before = master.motor_value(Node::ARM[0], Property::Mt);
     let id = motor_id(Property::Mt).number() | 0x80;
     // A SET that claims to come from puck 3, to puck 1 and to the arm's group; and the reply format on its own.
-    for destination in [
-        Destination::Node(Node::ARM[0]),
-        Destination::Group(Group::ARM),
-        Group::PROPERTY_REPLIES.into(),
-    ] {
-        master.send(CanFrame::with_payload(
-            CanId::encode(Node::ARM[2], destination),
-            [id, 0, 1, 0],
-        ));
+    for destination in [Destination::Node(Node::ARM[0]), Destination::Group(Group::ARM), Group::PROPERTY_REPLIES.into()]
+    {
+        master.send(CanFrame::with_payload(CanId::encode(Node::ARM[2], destination), [id, 0, 1, 0]));
         master.wait_ms(2);
     }
     assert_eq!(master.motor_value(Node::ARM[0], Property::Mt), before);
@@ -315,10 +239,7 @@ fn torque_has_the_sign_of_the_transmission_and_persists() {
     let late = master.plant.world().joint_velocities()[0];
     // 100/2472 N m x 42 = 1.70 N m on about 1.61 kg m^2.
     assert!((early - 0.105).abs() < 0.01, "{early} rad/s after 0.1 s");
-    assert!(
-        late > 1.7 * early,
-        "the torque persists: {early} then {late} rad/s"
-    );
+    assert!(late > 1.7 * early, "the torque persists: {early} then {late} rad/s");
     assert_eq!(master.motor_value(Node::ARM[0], Property::T), Some(-100));
 }
 
@@ -358,23 +279,13 @@ fn an_idle_motor_brakes() {
 #[test]
 fn the_sensor_answers_force_then_torque_with_the_weight_of_the_hand() {
     let mut master = awake();
-    let [
-        Reply::Force {
-            counts: force,
-            status: None,
-            ..
-        },
-        Reply::Torque { status: None, .. },
-    ] = master.ask(force_torque::get_wrench())[..]
+    let [Reply::Force { counts: force, status: None, .. }, Reply::Torque { status: None, .. }] =
+        master.ask(force_torque::get_wrench())[..]
     else {
         panic!("force, then torque")
     };
     let newtons = force.map(|counts| f64::from(counts) / 256.0);
-    let weight = newtons
-        .iter()
-        .map(|force| force * force)
-        .sum::<f64>()
-        .sqrt();
+    let weight = newtons.iter().map(|force| force * force).sum::<f64>().sqrt();
     assert!((weight - 1.2013 * 9.81).abs() < 0.3, "{weight} N");
 }
 
@@ -383,13 +294,8 @@ fn tare_makes_the_load_of_that_moment_zero() {
     let mut master = awake();
     master.ask(force_torque::tare());
     master.wait_ms(5);
-    let [Reply::Force { counts, .. }, _] = master.ask(force_torque::get_wrench())[..] else {
-        panic!()
-    };
-    assert!(
-        counts.iter().all(|counts| counts.abs() < 80),
-        "{counts:?}: under 0.3 N"
-    );
+    let [Reply::Force { counts, .. }, _] = master.ask(force_torque::get_wrench())[..] else { panic!() };
+    assert!(counts.iter().all(|counts| counts.abs() < 80), "{counts:?}: under 0.3 N");
 }
 
 #[test]
@@ -401,9 +307,7 @@ fn a_pull_on_the_hand_is_felt_with_the_sign_of_the_environment_on_the_robot() {
     // compare the length and, through the grasp pose, the direction.
     for pull in [[6.0, 0.0, 0.0], [0.0, 6.0, 0.0], [0.0, 0.0, 6.0]] {
         master.plant.world().push(pull, [0.0; 3]);
-        let [Reply::Force { counts, .. }, _] = master.ask(force_torque::get_wrench())[..] else {
-            panic!()
-        };
+        let [Reply::Force { counts, .. }, _] = master.ask(force_torque::get_wrench())[..] else { panic!() };
         let [x, y, z] = counts.map(|counts| f64::from(counts) / 256.0);
         // The grasp frame is the sensor frame turned by pi about z.
         let felt = rotate(master.plant.world().grasp_pose().quaternion, [-x, -y, z]);
@@ -434,31 +338,14 @@ fn an_overload_adds_a_status_byte_until_the_next_tare() {
 #[test]
 fn force_saturates_at_16_bits() {
     let mut master = awake();
-    master
-        .plant
-        .world()
-        .push([4000.0, 4000.0, 4000.0], [0.0; 3]);
-    let [
-        Reply::Force { counts, .. },
-        Reply::Torque {
-            counts: moments, ..
-        },
-    ] = master.ask(force_torque::get_wrench())[..]
+    master.plant.world().push([4000.0, 4000.0, 4000.0], [0.0; 3]);
+    let [Reply::Force { counts, .. }, Reply::Torque { counts: moments, .. }] =
+        master.ask(force_torque::get_wrench())[..]
     else {
         panic!()
     };
-    assert!(
-        counts
-            .iter()
-            .all(|counts| *counts == i16::MAX || *counts == i16::MIN),
-        "{counts:?}"
-    );
-    assert!(
-        moments
-            .iter()
-            .any(|counts| *counts == i16::MAX || *counts == i16::MIN),
-        "{moments:?}"
-    );
+    assert!(counts.iter().all(|counts| *counts == i16::MAX || *counts == i16::MIN), "{counts:?}");
+    assert!(moments.iter().any(|counts| *counts == i16::MAX || *counts == i16::MIN), "{moments:?}");
 }
 
 #[test]
@@ -467,36 +354,17 @@ fn an_emergency_stop_takes_the_pucks_off_the_bus_and_loses_their_positions() {
     master.zero();
     master.plant.press(PendantAction::PressEStop);
     assert_eq!(master.positions(), [None; 7]);
-    assert!(
-        master.ask(force_torque::get_wrench()).is_empty(),
-        "the sensor has lost its power too"
-    );
-    assert_eq!(
-        master.safety_value(Property::Mode),
-        SafetyMode::EStop.value()
-    );
+    assert!(master.ask(force_torque::get_wrench()).is_empty(), "the sensor has lost its power too");
+    assert_eq!(master.safety_value(Property::Mode), SafetyMode::EStop.value());
     master.plant.press(PendantAction::ReleaseEStop);
     master.plant.press(PendantAction::ShiftIdle);
     master.wait_ms(50);
-    assert_eq!(
-        master.value(Node::ARM[0], PropertyId::STAT),
-        Some(0),
-        "back in the monitor"
-    );
-    assert_eq!(
-        master.value(Node::SAFETY_MODULE, safety_id(Property::Zero)),
-        Some(0)
-    );
+    assert_eq!(master.value(Node::ARM[0], PropertyId::STAT), Some(0), "back in the monitor");
+    assert_eq!(master.value(Node::SAFETY_MODULE, safety_id(Property::Zero)), Some(0));
     master.wake();
     let positions = master.positions().map(|counts| counts.expect("awake").0);
-    assert!(
-        positions[..4].iter().all(|counts| counts.abs() <= 1),
-        "{positions:?}: counters start anew"
-    );
-    assert!(
-        home_counts()[1].0 < -36_000,
-        "and that is not where the arm is"
-    );
+    assert!(positions[..4].iter().all(|counts| counts.abs() <= 1), "{positions:?}: counters start anew");
+    assert!(home_counts()[1].0 < -36_000, "and that is not where the arm is");
 }
 
 #[test]
@@ -508,22 +376,13 @@ fn replies_that_were_queued_at_an_emergency_stop_never_come() {
     master.plant.press(PendantAction::PressEStop);
     master.wait(10 * TICKS_PER_MILLISECOND);
     // The frame on the wire at that moment still completes in this model; the rest is gone.
-    assert!(
-        (1..=3).contains(&master.heard.len()),
-        "{}",
-        master.heard.len()
-    );
+    assert!((1..=3).contains(&master.heard.len()), "{}", master.heard.len());
 }
 
 fn rotate([w, x, y, z]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     let axis = [x, y, z];
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
-    };
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let inner = cross(axis, v);
     let outer = cross(axis, std::array::from_fn(|i| inner[i] + w * v[i]));
     std::array::from_fn(|i| v[i] + 2.0 * outer[i])
@@ -533,10 +392,7 @@ fn rotate([w, x, y, z]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
 fn assert_near(positions: [Option<Counts>; 7], expected: [Counts; 7]) {
     for (position, expected) in positions.into_iter().zip(expected) {
         let position = position.expect("every puck answers");
-        assert!(
-            (position.0 - expected.0).abs() <= 1,
-            "{position:?} instead of {expected:?}"
-        );
+        assert!((position.0 - expected.0).abs() <= 1, "{position:?} instead of {expected:?}");
     }
 }
 
@@ -545,8 +401,5 @@ fn home_is_where_the_arm_rests() {
     let mut master = awake();
     let q = master.plant.world().joint_positions();
     // The operator holds it; two counts of its motor are 2e-4 rad at joint 7.
-    assert!(
-        q.iter().zip(HOME).all(|(q, home)| (q - home).abs() < 2e-4),
-        "{q:?}"
-    );
+    assert!(q.iter().zip(HOME).all(|(q, home)| (q - home).abs() < 2e-4), "{q:?}");
 }

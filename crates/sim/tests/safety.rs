@@ -5,8 +5,7 @@ mod common;
 use common::{Master, home_counts, motor_id, safety_id};
 use puck::safety::Health;
 use puck::{
-    CanFrame, Group, Node, PendantState, Property, PropertyId, PuckTorque, SafetyMode, get,
-    packed_torques, set,
+    CanFrame, Group, Node, PendantState, Property, PropertyId, PuckTorque, SafetyMode, get, packed_torques, set,
 };
 use sim::{OperatorConfig, PendantAction, PlantConfig, TICKS_PER_MILLISECOND};
 
@@ -18,11 +17,7 @@ fn active() -> Master {
 
 fn torques(largest: i16) -> CanFrame {
     let torque = |units| PuckTorque::new(units).unwrap();
-    packed_torques(
-        Group::WRIST_TORQUES,
-        PropertyId::TORQUE,
-        [torque(0), torque(largest), torque(0), torque(0)],
-    )
+    packed_torques(Group::WRIST_TORQUES, PropertyId::TORQUE, [torque(0), torque(largest), torque(0), torque(0)])
 }
 
 fn pendant(master: &mut Master) -> PendantState {
@@ -31,13 +26,8 @@ fn pendant(master: &mut Master) -> PendantState {
 
 /// Payloads of the frames heard from node 10 to group 0.
 fn broadcasts(master: &Master) -> Vec<Vec<u8>> {
-    let from_module = master
-        .heard
-        .iter()
-        .filter(|(_, frame)| frame.can_id().raw() == 0x540);
-    from_module
-        .map(|(_, frame)| frame.payload().to_vec())
-        .collect()
+    let from_module = master.heard.iter().filter(|(_, frame)| frame.can_id().raw() == 0x540);
+    from_module.map(|(_, frame)| frame.payload().to_vec()).collect()
 }
 
 #[test]
@@ -62,18 +52,10 @@ fn the_operator_waits_for_a_zeroed_arm_and_flowing_positions() {
     let mut master = Master::new(PlantConfig::default());
     master.wake();
     master.poll(500);
-    assert_eq!(
-        master.plant.safety_mode(),
-        SafetyMode::Idle,
-        "positions flow, but the arm is not zeroed"
-    );
+    assert_eq!(master.plant.safety_mode(), SafetyMode::Idle, "positions flow, but the arm is not zeroed");
     master.zero();
     master.wait_ms(500);
-    assert_eq!(
-        master.plant.safety_mode(),
-        SafetyMode::Idle,
-        "zeroed, but no positions"
-    );
+    assert_eq!(master.plant.safety_mode(), SafetyMode::Idle, "zeroed, but no positions");
     master.set(Node::SAFETY_MODULE, safety_id(Property::Ifault), 5);
     master.poll(280);
     assert_eq!(master.plant.safety_mode(), SafetyMode::Idle);
@@ -90,11 +72,7 @@ fn software_can_only_lower_the_mode() {
     assert_eq!(master.safety_value(Property::Mode), 1);
     master.send(set(Node::SAFETY_MODULE, mode, 2));
     master.poll(10);
-    assert_eq!(
-        master.safety_value(Property::Mode),
-        1,
-        "ACTIVE is for the person to give"
-    );
+    assert_eq!(master.safety_value(Property::Mode), 1, "ACTIVE is for the person to give");
     master.send(set(Node::SAFETY_MODULE, mode, 0));
     master.wait_ms(10);
     assert_eq!(master.safety_value(Property::Mode), 0);
@@ -106,12 +84,7 @@ fn software_can_only_lower_the_mode() {
 #[test]
 fn limits_are_those_of_the_documents_and_revert_on_load() {
     let mut master = Master::new(PlantConfig::default());
-    let limits = [
-        (Property::Vl1, 2048),
-        (Property::Vl2, 4096),
-        (Property::Tl1, 4731),
-        (Property::Tl2, 5204),
-    ];
+    let limits = [(Property::Vl1, 2048), (Property::Vl2, 4096), (Property::Tl1, 4731), (Property::Tl2, 5204)];
     for (property, default) in limits {
         assert_eq!(master.safety_value(property), default);
         master.set(Node::SAFETY_MODULE, safety_id(property), 100);
@@ -169,17 +142,10 @@ fn a_latched_fault_blocks_activation_until_the_operator_presses_idle() {
     let before = master.positions();
     master.plant.press(PendantAction::ShiftIdle);
     master.poll(400);
-    assert_eq!(
-        master.plant.safety_mode(),
-        SafetyMode::Idle,
-        "nobody activates it unasked"
-    );
+    assert_eq!(master.plant.safety_mode(), SafetyMode::Idle, "nobody activates it unasked");
     master.plant.press(PendantAction::ShiftActivate);
     assert_eq!(master.plant.safety_mode(), SafetyMode::Active);
-    assert!(
-        (before[1].unwrap().0 - home_counts()[1].0).abs() <= 1,
-        "the counts survived"
-    );
+    assert!((before[1].unwrap().0 - home_counts()[1].0).abs() <= 1, "the counts survived");
 }
 
 #[test]
@@ -237,11 +203,7 @@ fn positions_that_are_rewritten_without_warning_are_a_velocity_fault() {
         pendant(&mut master).velocity
     };
     assert_eq!(jump(None), Health::Fault);
-    assert_eq!(
-        jump(Some(1)),
-        Health::Fault,
-        "one is not enough: the history is five sets long"
-    );
+    assert_eq!(jump(Some(1)), Health::Fault, "one is not enough: the history is five sets long");
     assert_eq!(jump(Some(5)), Health::Safe);
 }
 
@@ -267,22 +229,13 @@ fn a_missing_puck_is_no_heartbeat() {
 #[test]
 fn a_script_presses_the_emergency_stop_at_its_time() {
     let at = 70 * TICKS_PER_MILLISECOND;
-    let operator = OperatorConfig {
-        script: vec![(at, PendantAction::PressEStop)],
-        ..OperatorConfig::default()
-    };
-    let mut master = Master::new(PlantConfig {
-        operator,
-        ..PlantConfig::default()
-    });
+    let operator = OperatorConfig { script: vec![(at, PendantAction::PressEStop)], ..OperatorConfig::default() };
+    let mut master = Master::new(PlantConfig { operator, ..PlantConfig::default() });
     master.wait(at - 1);
     assert_eq!(master.plant.safety_mode(), SafetyMode::Idle);
     master.wait(1);
     assert_eq!(master.plant.safety_mode(), SafetyMode::EStop);
     master.wait_ms(5);
-    assert_eq!(
-        master.plant.pendant().button,
-        puck::safety::Button::EmergencyStop
-    );
+    assert_eq!(master.plant.pendant().button, puck::safety::Button::EmergencyStop);
     assert!(master.ask(get(Group::ARM, PropertyId::STAT)).is_empty());
 }

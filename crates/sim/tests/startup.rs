@@ -3,10 +3,7 @@
 mod common;
 
 use common::{Master, home_counts, safety_id};
-use puck::{
-    Group, Node, Property, PropertyId, PuckTorque, Reply, SafetyMode, force_torque, get,
-    packed_torques, set,
-};
+use puck::{Group, Node, Property, PropertyId, PuckTorque, Reply, SafetyMode, force_torque, get, packed_torques, set};
 use sim::{BusTrace, FrameClass, PlantConfig};
 
 /// Steps 2 to 16; returns what the arm said about itself on the way.
@@ -17,10 +14,7 @@ fn start_up(master: &mut Master) -> (Vec<u8>, [(i32, i32); 7]) {
     }
     master.wait_ms(50);
     let nodes: Vec<Node> = (1..=31).filter_map(Node::new).collect();
-    let present: Vec<Node> = nodes
-        .into_iter()
-        .filter(|node| master.value(*node, PropertyId::STAT).is_some())
-        .collect();
+    let present: Vec<Node> = nodes.into_iter().filter(|node| master.value(*node, PropertyId::STAT).is_some()).collect();
     let monitor_version = master.value(Node::ARM[0], PropertyId::VERS);
     // Wake one by one, 10 ms apart, then 1 s of silence.
     for node in present.iter().filter(|node| **node != Node::SAFETY_MODULE) {
@@ -31,10 +25,7 @@ fn start_up(master: &mut Master) -> (Vec<u8>, [(i32, i32); 7]) {
     for node in &present {
         assert_eq!(master.value(*node, PropertyId::STAT), Some(2), "{node:?}");
     }
-    assert_ne!(
-        master.value(Node::ARM[0], PropertyId::VERS),
-        monitor_version
-    );
+    assert_ne!(master.value(Node::ARM[0], PropertyId::VERS), monitor_version);
     let drives = Node::ARM.map(|node| {
         let cts = master.motor_value(node, Property::Cts).expect("CTS");
         (cts, master.motor_value(node, Property::Ipnm).expect("IPNM"))
@@ -58,18 +49,11 @@ fn cycle(master: &mut Master) -> usize {
         master.send(packed_torques(group, PropertyId::TORQUE, zero));
     }
     master.wait(sim::SLOT_TICKS + sim::SLOT_TICKS / 2);
-    master
-        .heard
-        .iter()
-        .filter(|(_, frame)| !matches!(Reply::decode(frame), Ok(Reply::SafetyBroadcast)))
-        .count()
+    master.heard.iter().filter(|(_, frame)| !matches!(Reply::decode(frame), Ok(Reply::SafetyBroadcast))).count()
 }
 
 fn run(seed: u64) -> BusTrace {
-    let mut master = Master::new(PlantConfig {
-        seed,
-        ..PlantConfig::default()
-    });
+    let mut master = Master::new(PlantConfig { seed, ..PlantConfig::default() });
     start_up(&mut master);
     for _ in 0..150 {
         cycle(&mut master);
@@ -84,26 +68,16 @@ fn a_cold_arm_becomes_active() {
     let (nodes, drives) = start_up(&mut master);
     assert_eq!(nodes, [1, 2, 3, 4, 5, 6, 7, 8, 10]);
     assert_eq!(drives.map(|(cts, _)| cts), [4096; 7]);
-    assert_eq!(
-        drives.map(|(_, ipnm)| ipnm),
-        [2472, 2472, 2472, 2472, 6105, 6105, 21400]
-    );
+    assert_eq!(drives.map(|(_, ipnm)| ipnm), [2472, 2472, 2472, 2472, 6105, 6105, 21400]);
     for (position, home) in master.positions().into_iter().zip(home_counts()) {
         assert!((position.expect("awake").0 - home.0).abs() <= 1);
     }
     for number in 0..150 {
-        assert_eq!(
-            cycle(&mut master),
-            9,
-            "seven positions, force, torque in cycle {number}"
-        );
+        assert_eq!(cycle(&mut master), 9, "seven positions, force, torque in cycle {number}");
     }
     assert_eq!(master.plant.safety_mode(), SafetyMode::Active);
     assert_eq!(master.motor_value(Node::ARM[6], Property::Mode), Some(2));
-    assert_eq!(
-        master.value(Node::SAFETY_MODULE, safety_id(Property::Zero)),
-        Some(1)
-    );
+    assert_eq!(master.value(Node::SAFETY_MODULE, safety_id(Property::Zero)), Some(1));
     assert_eq!(master.plant.lost_requests(), 0);
     let trace = master.plant.trace();
     assert_eq!(trace.invalid, 0, "{:?}", trace.invalid_examples);
@@ -137,15 +111,6 @@ fn waking_all_at_once_by_the_group_works_too() {
     master.wait_ms(100);
     master.send(set(Group::ALL_MOTORS, PropertyId::STAT, 2));
     master.wait_ms(1050);
-    assert!(
-        Node::ARM
-            .into_iter()
-            .all(|node| master.value(node, PropertyId::STAT) == Some(2))
-    );
-    assert!(
-        master
-            .positions()
-            .iter()
-            .all(|position| position.is_some_and(|counts| counts.0.abs() <= 20))
-    );
+    assert!(Node::ARM.into_iter().all(|node| master.value(node, PropertyId::STAT) == Some(2)));
+    assert!(master.positions().iter().all(|position| position.is_some_and(|counts| counts.0.abs() <= 20)));
 }

@@ -1,10 +1,7 @@
 //! A person teaches the simulated arm: the path is reachable, and guiding the arm under gravity compensation works.
 #![cfg(feature = "mujoco")]
 
-use sim::person::{
-    DEMONSTRATION_GOAL, DEMONSTRATION_START, GuidedWorld, Person, PersonConfig, Stage,
-    side_grasp_path,
-};
+use sim::person::{DEMONSTRATION_GOAL, DEMONSTRATION_START, GuidedWorld, Person, PersonConfig, Stage, side_grasp_path};
 use sim::world::mujoco::{Kinematics, MujocoOptions, MujocoWorld};
 use sim::{HOME, Pose, STEP_SECONDS, World};
 
@@ -17,24 +14,14 @@ fn kinematics() -> Kinematics {
 
 /// Distance (m) and turn (rad) between two poses.
 fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
-    let distance = (0..3)
-        .map(|i| (a.position[i] - b.position[i]).powi(2))
-        .sum::<f64>()
-        .sqrt();
-    let cosine = (0..4)
-        .map(|i| a.quaternion[i] * b.quaternion[i])
-        .sum::<f64>()
-        .abs()
-        .min(1.0);
+    let distance = (0..3).map(|i| (a.position[i] - b.position[i]).powi(2)).sum::<f64>().sqrt();
+    let cosine = (0..4).map(|i| a.quaternion[i] * b.quaternion[i]).sum::<f64>().abs().min(1.0);
     (distance, 2.0 * cosine.acos())
 }
 
 /// Smallest distance to a mechanical stop, rad.
 fn margin(q: &[f64; 7], ranges: &[[f64; 2]; 7]) -> f64 {
-    q.iter()
-        .zip(ranges)
-        .map(|(q, [low, high])| (q - low).min(high - q))
-        .fold(f64::INFINITY, f64::min)
+    q.iter().zip(ranges).map(|(q, [low, high])| (q - low).min(high - q)).fold(f64::INFINITY, f64::min)
 }
 
 /// Smallest singular value of a 6 x 7 matrix: the root of the smallest eigenvalue of J J^T, by Jacobi rotations.
@@ -69,9 +56,7 @@ fn postures_along_the_path(kinematics: &mut Kinematics) -> Vec<[f64; 7]> {
     (0..=STATIONS)
         .map(|i| {
             let time = path.duration() * (STATIONS - i) as f64 / STATIONS as f64;
-            kinematics
-                .inverse(&path.pose(time), &DEMONSTRATION_GOAL)
-                .expect("every pose of the path is reachable")
+            kinematics.inverse(&path.pose(time), &DEMONSTRATION_GOAL).expect("every pose of the path is reachable")
         })
         .collect()
 }
@@ -81,29 +66,16 @@ fn the_demonstration_postures_reach_the_ends_of_the_path() {
     let mut kinematics = kinematics();
     let path = side_grasp_path();
     // The way the constants were found: a posture for the goal, then for the start as near to it as possible.
-    let goal = kinematics
-        .inverse(&path.goal(), &DEMONSTRATION_GOAL)
-        .expect("the goal is reachable");
-    let start = kinematics
-        .inverse(&path.start(), &DEMONSTRATION_GOAL)
-        .expect("the start is reachable");
+    let goal = kinematics.inverse(&path.goal(), &DEMONSTRATION_GOAL).expect("the goal is reachable");
+    let start = kinematics.inverse(&path.start(), &DEMONSTRATION_GOAL).expect("the start is reachable");
     println!("goal {goal:.4?}\nstart {start:.4?}");
-    for (constant, pose) in [
-        (DEMONSTRATION_START, path.start()),
-        (DEMONSTRATION_GOAL, path.goal()),
-    ] {
+    for (constant, pose) in [(DEMONSTRATION_START, path.start()), (DEMONSTRATION_GOAL, path.goal())] {
         let (distance, turn) = apart(&kinematics.grasp_pose(&constant), &pose);
-        assert!(
-            distance < 2e-4 && turn < 2e-4,
-            "{constant:?} misses by {distance} m, {turn} rad"
-        );
+        assert!(distance < 2e-4 && turn < 2e-4, "{constant:?} misses by {distance} m, {turn} rad");
     }
     for (found, constant) in [(goal, DEMONSTRATION_GOAL), (start, DEMONSTRATION_START)] {
         for i in 0..7 {
-            assert!(
-                (found[i] - constant[i]).abs() < 1e-3,
-                "{found:?} is not {constant:?}"
-            );
+            assert!((found[i] - constant[i]).abs() < 1e-3, "{found:?} is not {constant:?}");
         }
     }
 }
@@ -114,11 +86,7 @@ fn the_path_is_a_real_movement_in_position_and_about_several_axes() {
     assert!((0.35..0.45).contains(&path.length()), "{} m", path.length());
     assert!((6.0..=8.0).contains(&path.duration()));
     let (_, turn) = apart(&path.start(), &path.goal());
-    assert!(
-        (30.0..60.0).contains(&turn.to_degrees()),
-        "{} degrees",
-        turn.to_degrees()
-    );
+    assert!((30.0..60.0).contains(&turn.to_degrees()), "{} degrees", turn.to_degrees());
     // Start and goal differ by a turn with a share about each axis of the hand.
     let (a, b) = (path.goal().quaternion, path.start().quaternion);
     let vector = [
@@ -127,26 +95,14 @@ fn the_path_is_a_real_movement_in_position_and_about_several_axes() {
         a[0] * b[3] - a[1] * b[2] + a[2] * b[1] - a[3] * b[0],
     ];
     for x in vector {
-        assert!(
-            2.0 * x.abs() > 0.2,
-            "the turn {vector:?} is about two axes only"
-        );
+        assert!(2.0 * x.abs() > 0.2, "the turn {vector:?} is about two axes only");
     }
     // At rest at the ends, continuous between: no step longer than the peak speed of the minimum jerk allows.
     for i in 0..700 {
-        let (distance, turn) = apart(
-            &path.pose(f64::from(i) * 0.01),
-            &path.pose(f64::from(i + 1) * 0.01),
-        );
-        assert!(
-            distance < 0.002 && turn < 0.005,
-            "jumps by {distance} m, {turn} rad at {i}"
-        );
+        let (distance, turn) = apart(&path.pose(f64::from(i) * 0.01), &path.pose(f64::from(i + 1) * 0.01));
+        assert!(distance < 0.002 && turn < 0.005, "jumps by {distance} m, {turn} rad at {i}");
     }
-    assert!(
-        apart(&path.pose(-1.0), &path.start()).0 == 0.0
-            && apart(&path.pose(9.0), &path.goal()).0 < 1e-12
-    );
+    assert!(apart(&path.pose(-1.0), &path.start()).0 == 0.0 && apart(&path.pose(9.0), &path.goal()).0 < 1e-12);
 }
 
 #[test]
@@ -155,20 +111,9 @@ fn the_path_keeps_away_from_singularities_stops_and_obstacles() {
     let ranges = kinematics.joint_ranges();
     for q in postures_along_the_path(&mut kinematics) {
         let singular = smallest_singular_value(&kinematics.jacobian(&q));
-        assert!(
-            singular >= 0.12,
-            "smallest singular value {singular} at {q:?}"
-        );
-        assert!(
-            margin(&q, &ranges) >= 0.25,
-            "{} rad from a stop at {q:?}",
-            margin(&q, &ranges)
-        );
-        assert_eq!(
-            kinematics.robot_contacts(&q),
-            0,
-            "the arm touches something at {q:?}"
-        );
+        assert!(singular >= 0.12, "smallest singular value {singular} at {q:?}");
+        assert!(margin(&q, &ranges) >= 0.25, "{} rad from a stop at {q:?}", margin(&q, &ranges));
+        assert_eq!(kinematics.robot_contacts(&q), 0, "the arm touches something at {q:?}");
     }
 }
 
@@ -177,13 +122,8 @@ fn the_straight_way_from_home_to_the_start_touches_nothing() {
     let mut kinematics = kinematics();
     for i in 0..=400 {
         let share = f64::from(i) / 400.0;
-        let q: [f64; 7] =
-            std::array::from_fn(|j| HOME[j] + share * (DEMONSTRATION_START[j] - HOME[j]));
-        assert_eq!(
-            kinematics.robot_contacts(&q),
-            0,
-            "the arm touches something at {q:?}"
-        );
+        let q: [f64; 7] = std::array::from_fn(|j| HOME[j] + share * (DEMONSTRATION_START[j] - HOME[j]));
+        assert_eq!(kinematics.robot_contacts(&q), 0, "the arm touches something at {q:?}");
     }
 }
 
@@ -207,19 +147,10 @@ struct Demonstration {
 
 /// Guides the arm along the path under ideal gravity compensation.
 fn demonstrate(seed: u64) -> Demonstration {
-    let options = MujocoOptions {
-        posture: DEMONSTRATION_START,
-        ..MujocoOptions::default()
-    };
+    let options = MujocoOptions { posture: DEMONSTRATION_START, ..MujocoOptions::default() };
     let world = MujocoWorld::new(&options).expect("the scene loads");
     let flashlight = world.flashlight_pose().position;
-    let person = Person::new(
-        PersonConfig {
-            seed,
-            ..PersonConfig::default()
-        },
-        side_grasp_path(),
-    );
+    let person = Person::new(PersonConfig { seed, ..PersonConfig::default() }, side_grasp_path());
     let mut guided = GuidedWorld::new(world, person);
     let mut mechanism = kinematics();
     let ranges = mechanism.joint_ranges();
@@ -253,18 +184,11 @@ fn demonstrate(seed: u64) -> Demonstration {
         d.contacts += guided.world().robot_contacts();
         let q = guided.joint_positions();
         d.margin = d.margin.min(margin(&q, &ranges));
-        d.speed = guided
-            .joint_velocities()
-            .iter()
-            .fold(d.speed, |a, x| a.max(x.abs()));
+        d.speed = guided.joint_velocities().iter().fold(d.speed, |a, x| a.max(x.abs()));
         if steps.is_multiple_of(180) {
-            d.singular = d
-                .singular
-                .min(smallest_singular_value(&mechanism.jacobian(&q)));
+            d.singular = d.singular.min(smallest_singular_value(&mechanism.jacobian(&q)));
             let time = f64::from(steps) * STEP_SECONDS - 1.5;
-            d.departure = d
-                .departure
-                .max(apart(&guided.grasp_pose(), &side_grasp_path().pose(time)).0);
+            d.departure = d.departure.max(apart(&guided.grasp_pose(), &side_grasp_path().pose(time)).0);
         }
         assert!(steps < 40_000, "the person never lets go");
     }
@@ -335,24 +259,14 @@ fn a_person_pulls_harder_at_what_stays_wrong_but_only_after_their_reaction_time(
     }
     // 0.05 s to forget the jump of 5 mm in the felt speed; the reaction time is 0.2 s.
     let at = |seconds: f64| pulls[(seconds / STEP_SECONDS) as usize];
-    assert!(
-        (at(0.1) - spring).abs() < 0.05 && (at(0.19) - spring).abs() < 0.05,
-        "{} {}",
-        at(0.1),
-        at(0.19)
-    );
+    assert!((at(0.1) - spring).abs() < 0.05 && (at(0.19) - spring).abs() < 0.05, "{} {}", at(0.1), at(0.19));
     assert!(at(1.5) > 1.5 * spring, "{} N after 1.5 s", at(1.5));
 }
 
 #[test]
 fn a_person_pulls_towards_the_path_and_never_beyond_their_strength() {
-    let config = PersonConfig {
-        tremor_force: 0.0,
-        tremor_torque: 0.0,
-        drift: 0.0,
-        rotation_drift: 0.0,
-        ..Default::default()
-    };
+    let config =
+        PersonConfig { tremor_force: 0.0, tremor_torque: 0.0, drift: 0.0, rotation_drift: 0.0, ..Default::default() };
     let mut person = Person::new(config, side_grasp_path());
     person.begin();
     // The hand is held back 20 cm below the start and turned by 1 rad about the vertical.
@@ -361,12 +275,7 @@ fn a_person_pulls_towards_the_path_and_never_beyond_their_strength() {
     hand.position[2] -= 0.2;
     let (s, c) = 0.5_f64.sin_cos();
     let q = start.quaternion;
-    hand.quaternion = [
-        c * q[0] - s * q[3],
-        c * q[1] - s * q[2],
-        c * q[2] + s * q[1],
-        c * q[3] + s * q[0],
-    ];
+    hand.quaternion = [c * q[0] - s * q[3], c * q[1] - s * q[2], c * q[2] + s * q[1], c * q[3] + s * q[0]];
     let mut last = ([0.0; 3], [0.0; 3]);
     for _ in 0..2600 {
         last = person.pull(&hand);

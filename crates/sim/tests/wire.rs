@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use puck::{
-    CanFrame, CanId, Drives, Group, Node, PropertyId, PuckTorque, Ratios, Transmission, device,
-    force_torque, get, packed_torques,
+    CanFrame, CanId, Drives, Group, Node, PropertyId, PuckTorque, Ratios, Transmission, device, force_torque, get,
+    packed_torques,
 };
 use sim::Noise;
 use sim::wire::{frame_bits, frame_crc};
@@ -36,11 +36,7 @@ fn checksum_and_length_equal_an_independent_computation() {
     ];
     for (id, data, crc, bits) in cases {
         let frame = frame(id, data);
-        assert_eq!(
-            (frame_crc(&frame), frame_bits(&frame)),
-            (crc, bits),
-            "{frame:?}"
-        );
+        assert_eq!((frame_crc(&frame), frame_bits(&frame)), (crc, bits), "{frame:?}");
     }
 }
 
@@ -62,15 +58,7 @@ proptest! {
 fn mean_cycle(with_sensor: bool) -> f64 {
     let transmission = Transmission::new(&Ratios::WAM7).unwrap();
     let drives = Drives::new([4096; 7], [2700, 2700, 2700, 2700, 6500, 6500, 17474]).unwrap();
-    let limits = [
-        (-2.6, 2.6),
-        (-2.0, 2.0),
-        (-2.8, 2.8),
-        (-0.9, 3.1),
-        (-4.76, 1.24),
-        (-1.6, 1.6),
-        (-3.0, 3.0),
-    ];
+    let limits = [(-2.6, 2.6), (-2.0, 2.0), (-2.8, 2.8), (-0.9, 3.1), (-4.76, 1.24), (-1.6, 1.6), (-3.0, 3.0)];
     let mut noise = Noise::new(7, 0);
     let cycles = 2000;
     let mut bits = frame_bits(&get(Group::ARM, PropertyId::POSITION)) * cycles;
@@ -79,30 +67,16 @@ fn mean_cycle(with_sensor: bool) -> f64 {
     }
     for _ in 0..cycles {
         let joints = limits.map(|(low, high)| noise.uniform(low, high));
-        let counts = drives
-            .counts(&transmission.motor_from_joint(&joints))
-            .unwrap();
+        let counts = drives.counts(&transmission.motor_from_joint(&joints)).unwrap();
         for (node, counts) in Node::ARM.into_iter().zip(counts) {
             bits += frame_bits(&device::position_frame(node, counts, None));
         }
-        let torques =
-            [25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0].map(|limit| noise.uniform(-limit, limit));
-        let [a, b, c, d, e, f, g] = drives
-            .torques(&transmission.motor_torques_from_joint(&torques))
-            .unwrap();
-        bits += frame_bits(&packed_torques(
-            Group::ARM_TORQUES,
-            PropertyId::TORQUE,
-            [a, b, c, d],
-        ));
-        bits += frame_bits(&packed_torques(
-            Group::WRIST_TORQUES,
-            PropertyId::TORQUE,
-            [e, f, g, PuckTorque::ZERO],
-        ));
+        let torques = [25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0].map(|limit| noise.uniform(-limit, limit));
+        let [a, b, c, d, e, f, g] = drives.torques(&transmission.motor_torques_from_joint(&torques)).unwrap();
+        bits += frame_bits(&packed_torques(Group::ARM_TORQUES, PropertyId::TORQUE, [a, b, c, d]));
+        bits += frame_bits(&packed_torques(Group::WRIST_TORQUES, PropertyId::TORQUE, [e, f, g, PuckTorque::ZERO]));
         if with_sensor {
-            let mut counts =
-                |limit: f64| std::array::from_fn(|_| noise.uniform(-limit, limit) as i16);
+            let mut counts = |limit: f64| std::array::from_fn(|_| noise.uniform(-limit, limit) as i16);
             bits += frame_bits(&device::force_frame(counts(20.0 * 256.0)));
             bits += frame_bits(&device::torque_frame(counts(4096.0), None));
         }
@@ -113,14 +87,6 @@ fn mean_cycle(with_sensor: bool) -> f64 {
 #[test]
 fn the_mean_cycle_has_the_documented_length() {
     // Table 6.2: 811 us for the arm, 1068 us with the sensor; what "random" meant there may shift it by a bit or three.
-    assert!(
-        (mean_cycle(false) - 811.0).abs() < 5.0,
-        "{}",
-        mean_cycle(false)
-    );
-    assert!(
-        (mean_cycle(true) - 1068.0).abs() < 6.0,
-        "{}",
-        mean_cycle(true)
-    );
+    assert!((mean_cycle(false) - 811.0).abs() < 5.0, "{}", mean_cycle(false));
+    assert!((mean_cycle(true) - 1068.0).abs() < 6.0, "{}", mean_cycle(true));
 }

@@ -19,8 +19,8 @@ mod app {
     use control::arm::ArmModel;
     use control::{CycleRecord, LoadRefusal, Payload};
     use device::{
-        Command, Core, CoreIo, Event, Health, Identity, QueueFull, RamStore, Session, SessionPort,
-        Slot, StoredPrimitive, TimedRecord, Timing,
+        Command, Core, CoreIo, Event, Health, Identity, QueueFull, RamStore, Session, SessionPort, Slot,
+        StoredPrimitive, TimedRecord, Timing,
     };
     use embedded_can::nb::Can as _;
     use firmware::board::device::Interrupt;
@@ -83,12 +83,7 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let board = Board::start(cx.core);
         let identity = Identity {
-            firmware: concat!(
-                env!("CARGO_PKG_VERSION"),
-                " (",
-                env!("TACTUS_REVISION"),
-                ")"
-            ),
+            firmware: concat!(env!("CARGO_PKG_VERSION"), " (", env!("TACTUS_REVISION"), ")"),
             board: Board::NAME,
             serial: board.serial(),
             simulated: Board::SIMULATED,
@@ -101,43 +96,20 @@ mod app {
         let (records, from_core) = cx.local.records_queue.split();
         let (events, news) = cx.local.events_queue.split();
         let (to_log, to_tell) = cx.local.log_queue.split();
-        defmt::info!(
-            "tactus arm {=str} on {=str}",
-            identity.firmware,
-            identity.board
-        );
+        defmt::info!("tactus arm {=str} on {=str}", identity.firmware, identity.board);
         slot_timer.start();
         (
-            Shared {
-                core: Core::new(),
-                can,
-            },
+            Shared { core: Core::new(), can },
             Local {
                 clock,
                 slot_timer,
                 slot: Slot::Request,
-                queues: SlotQueues {
-                    from_bus,
-                    to_bus,
-                    commands,
-                    records,
-                    events,
-                },
+                queues: SlotQueues { from_bus, to_bus, commands, records, events },
                 lost_frames: 0,
                 outgoing,
                 incoming,
-                session: Session::new(
-                    identity,
-                    ArmModel::new(Payload::SensorAndHand),
-                    cx.local.store,
-                ),
-                session_queues: SessionQueues {
-                    port,
-                    to_core,
-                    from_core,
-                    news,
-                    to_log,
-                },
+                session: Session::new(identity, ArmModel::new(Payload::SensorAndHand), cx.local.store),
+                session_queues: SessionQueues { port, to_core, from_core, news, to_log },
                 session_clock: clock,
                 to_tell,
                 told_dropped: 0,
@@ -203,14 +175,7 @@ mod app {
         local = [clock, slot_timer, slot, queues, lost_frames]
     )]
     fn slot(mut cx: slot::Context) {
-        let slot::LocalResources {
-            clock,
-            slot_timer,
-            slot,
-            queues,
-            lost_frames,
-            ..
-        } = cx.local;
+        let slot::LocalResources { clock, slot_timer, slot, queues, lost_frames, .. } = cx.local;
         METERS.slot(slot_timer.acknowledge());
         let begin = clock.short_ticks();
         let now = clock.now_us();
@@ -222,10 +187,7 @@ mod app {
             lost = overruns != *lost_frames;
             *lost_frames = overruns;
         }
-        let mut io = SlotIo {
-            queues,
-            record: None,
-        };
+        let mut io = SlotIo { queues, record: None };
         cx.shared.core.lock(|core| {
             if late {
                 core.note_overrun();
@@ -334,12 +296,7 @@ mod app {
     /// Talks with the host; runs once per slot.
     #[task(priority = 2, shared = [core], local = [session, session_queues, session_clock])]
     async fn session(cx: session::Context) {
-        let session::LocalResources {
-            session,
-            session_queues: queues,
-            session_clock,
-            ..
-        } = cx.local;
+        let session::LocalResources { session, session_queues: queues, session_clock, .. } = cx.local;
         let mut bytes = [0; LINK_CHUNK];
         loop {
             let count = queues.port.read(&mut bytes);
@@ -348,10 +305,7 @@ mod app {
                 break;
             }
         }
-        let mut edge = SessionEdge {
-            queues,
-            core: cx.shared.core,
-        };
+        let mut edge = SessionEdge { queues, core: cx.shared.core };
         session.poll(session_clock.now_us(), &mut edge);
         if !edge.queues.to_log.is_empty() {
             // Fails while the log is being written: it takes all there is.
@@ -363,11 +317,7 @@ mod app {
     #[task(priority = 1, local = [to_tell, told_dropped])]
     async fn log(cx: log::Context) {
         while let Some(event) = cx.local.to_tell.dequeue() {
-            defmt::info!(
-                "cycle {=u64}: {}",
-                event.cycle,
-                defmt::Debug2Format(&event.kind)
-            );
+            defmt::info!("cycle {=u64}: {}", event.cycle, defmt::Debug2Format(&event.kind));
         }
         let dropped = METERS.dropped();
         if dropped != *cx.local.told_dropped {

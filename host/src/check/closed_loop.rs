@@ -2,9 +2,7 @@
 
 use control::calibration::Calibration;
 use control::units::{JointVelocities, Vector7};
-use control::{
-    BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, RunOptions, State, flags,
-};
+use control::{BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, RunOptions, State, flags};
 use puck::SafetyMode;
 
 use super::plant::Plant;
@@ -64,15 +62,8 @@ pub(super) struct ClosedLoop {
 
 impl ClosedLoop {
     /// Plays the primitive at `speed` times its taught speed; `progress` hears the fraction done now and then.
-    pub(super) fn play(
-        primitive: &HostPrimitive,
-        speed: f64,
-        mut progress: impl FnMut(f64),
-    ) -> ClosedLoop {
-        let mut run = ClosedLoop {
-            samples: Vec::new(),
-            ending: Ending::Endless,
-        };
+    pub(super) fn play(primitive: &HostPrimitive, speed: f64, mut progress: impl FnMut(f64)) -> ClosedLoop {
+        let mut run = ClosedLoop { samples: Vec::new(), ending: Ending::Endless };
         let mut cycle: Cycle<f64> = Cycle::new(Calibration::nominal(arm::PAYLOAD));
         if let Err(refusal) = cycle.load(primitive) {
             run.ending = Ending::Unfit(refusal);
@@ -88,19 +79,12 @@ impl ClosedLoop {
             };
             let command = match number {
                 1 => Some(Command::Hold),
-                SETTLING => Some(Command::Run(RunOptions {
-                    speed: speed as f32,
-                    ..RunOptions::default()
-                })),
+                SETTLING => Some(Command::Run(RunOptions { speed: speed as f32, ..RunOptions::default() })),
                 _ => None,
             };
             let output = cycle.step(&CycleInput {
                 cycle: number,
-                sample: BusSample {
-                    positions: counts.map(Some),
-                    wrench: None,
-                    safety: Some(SafetyMode::Active),
-                },
+                sample: BusSample { positions: counts.map(Some), wrench: None, safety: Some(SafetyMode::Active) },
                 command,
                 external_fault: None,
             });
@@ -136,10 +120,7 @@ impl ClosedLoop {
     /// Cycles in which the limiter cut a torque.
     pub(super) fn limited_cycles(&self) -> usize {
         let cut = flags::JOINT_LIMITED | flags::MOTOR_LIMITED | flags::NOT_FINITE;
-        self.samples
-            .iter()
-            .filter(|sample| sample.record.flags & cut != 0)
-            .count()
+        self.samples.iter().filter(|sample| sample.record.flags & cut != 0).count()
     }
 }
 

@@ -133,16 +133,10 @@ impl CheckReport {
             let (name, unit) = margin.limit.name();
             table.row([
                 name.to_owned(),
-                margin
-                    .joint
-                    .map_or_else(|| "-".to_owned(), |joint| format!("J{joint}")),
+                margin.joint.map_or_else(|| "-".to_owned(), |joint| format!("J{joint}")),
                 format!("{:.4}", margin.value),
                 format!("{:.4}", margin.bound),
-                format!(
-                    "{:.4}{}",
-                    margin.margin,
-                    if margin.margin < 0.0 { " !" } else { "" }
-                ),
+                format!("{:.4}{}", margin.margin, if margin.margin < 0.0 { " !" } else { "" }),
                 unit.to_owned(),
                 format!("{:.3} s", margin.time_s),
             ]);
@@ -158,11 +152,8 @@ impl CheckReport {
         if self.passed() {
             text += "passed\n";
         } else {
-            text += &format!(
-                "{} violation{}:\n",
-                self.violations.len(),
-                if self.violations.len() == 1 { "" } else { "s" }
-            );
+            text +=
+                &format!("{} violation{}:\n", self.violations.len(), if self.violations.len() == 1 { "" } else { "s" });
             for violation in &self.violations {
                 text += &format!("  - {violation}\n");
             }
@@ -177,11 +168,7 @@ impl CheckReport {
 /// # Errors
 /// The file cannot be turned into a primitive or an image at all, or belongs to another model of the arm. Everything
 /// that can be measured is in the report instead.
-pub fn check(
-    file: &PrimitiveFile,
-    speed: f64,
-    progress: impl FnMut(f64),
-) -> Result<CheckReport, PrimitiveFileError> {
+pub fn check(file: &PrimitiveFile, speed: f64, progress: impl FnMut(f64)) -> Result<CheckReport, PrimitiveFileError> {
     file.require_model(control::MODEL_HASH)?;
     let image = file.to_image()?;
     let primitive = file.to_primitive()?;
@@ -189,13 +176,7 @@ pub fn check(
         name: file.name.clone(),
         checksum: format!("0x{:08x}", file.checksum()),
         model_hash: format!("0x{:08x}", file.model_hash),
-        image: (
-            image.len(),
-            format!(
-                "0x{:08x}",
-                crate::demonstration::recording::checksum(&image)
-            ),
-        ),
+        image: (image.len(), format!("0x{:08x}", crate::demonstration::recording::checksum(&image))),
         kernels: file.kernels(),
         duration_s: file.duration,
         speed,
@@ -213,9 +194,7 @@ pub fn check(
         // A NaN is no margin either.
         if margin.margin.is_nan() || margin.margin < 0.0 {
             let (name, unit) = margin.limit.name();
-            let joint = margin
-                .joint
-                .map_or_else(String::new, |joint| format!("J{joint} "));
+            let joint = margin.joint.map_or_else(String::new, |joint| format!("J{joint} "));
             report.violations.push(format!(
                 "{joint}{name}: {:.4} {unit} against {:.4} {unit} at {:.3} s",
                 margin.value, margin.bound, margin.time_s
@@ -230,9 +209,7 @@ fn check_plan(primitive: &crate::primitive_file::HostPrimitive, report: &mut Che
     let references = match plan::roll_out(primitive) {
         Ok(references) => references,
         Err(error) => {
-            report
-                .violations
-                .push(format!("the plan cannot start: {error}"));
+            report.violations.push(format!("the plan cannot start: {error}"));
             return;
         }
     };
@@ -247,19 +224,11 @@ fn check_plan(primitive: &crate::primitive_file::HostPrimitive, report: &mut Che
             && finite(&reference.hand.x))
     });
     if let Some(reference) = broken {
-        report
-            .violations
-            .push(format!("the plan is not finite at {:.3} s", reference.time));
+        report.violations.push(format!("the plan is not finite at {:.3} s", reference.time));
         return;
     }
     let farthest = references.iter().map(|reference| {
-        let distance = reference
-            .position
-            .x
-            .iter()
-            .map(|x| x * x)
-            .sum::<f64>()
-            .sqrt();
+        let distance = reference.position.x.iter().map(|x| x * x).sum::<f64>().sqrt();
         (reference.time, distance)
     });
     if let Some((time_s, distance)) = farthest.max_by(|a, b| a.1.total_cmp(&b.1)) {
@@ -271,10 +240,7 @@ fn check_plan(primitive: &crate::primitive_file::HostPrimitive, report: &mut Che
             margin: REACH - distance,
             time_s,
         });
-        debug_assert_eq!(
-            within_reach(&nalgebra::Vector3::new(distance, 0.0, 0.0)),
-            distance <= REACH
-        );
+        debug_assert_eq!(within_reach(&nalgebra::Vector3::new(distance, 0.0, 0.0)), distance <= REACH);
     }
 }
 
@@ -282,69 +248,44 @@ fn check_plan(primitive: &crate::primitive_file::HostPrimitive, report: &mut Che
 fn check_run(file: &PrimitiveFile, run: &ClosedLoop, report: &mut CheckReport) {
     match run.ending {
         Ending::Arrived => {}
-        Ending::Unfit(reason) => report
-            .violations
-            .push(format!("the control code refuses the primitive: {reason}")),
-        Ending::Refused(reason) => report
-            .violations
-            .push(format!("the control code refuses the run: {reason}")),
+        Ending::Unfit(reason) => report.violations.push(format!("the control code refuses the primitive: {reason}")),
+        Ending::Refused(reason) => report.violations.push(format!("the control code refuses the run: {reason}")),
         Ending::Stopped(state, fault) => {
             let time = run.samples.last().map_or(0.0, |sample| sample.time);
-            report.violations.push(format!(
-                "the control code stops the run at {time:.3} s: {fault} (state {})",
-                state.name()
-            ));
+            report
+                .violations
+                .push(format!("the control code stops the run at {time:.3} s: {fault} (state {})", state.name()));
         }
-        Ending::Endless => report
-            .violations
-            .push("the run does not come to its end".to_owned()),
-        Ending::Diverged => report
-            .violations
-            .push("the arm's state becomes infinite".to_owned()),
+        Ending::Endless => report.violations.push("the run does not come to its end".to_owned()),
+        Ending::Diverged => report.violations.push("the arm's state becomes infinite".to_owned()),
     }
     let Some(last) = run.samples.last() else {
         return;
     };
     report.run_duration_s = last.time;
     for joint in 0..7 {
-        report
-            .margins
-            .push(worst(run, Limit::JointPosition, Some(joint), |sample| {
-                let q = sample.q[joint];
-                let bound = if q - SOFT_MIN[joint] < SOFT_MAX[joint] - q {
-                    SOFT_MIN[joint]
-                } else {
-                    SOFT_MAX[joint]
-                };
-                let margin = if bound == SOFT_MIN[joint] {
-                    q - bound
-                } else {
-                    bound - q
-                };
-                (q, bound, margin)
-            }));
+        report.margins.push(worst(run, Limit::JointPosition, Some(joint), |sample| {
+            let q = sample.q[joint];
+            let bound = if q - SOFT_MIN[joint] < SOFT_MAX[joint] - q { SOFT_MIN[joint] } else { SOFT_MAX[joint] };
+            let margin = if bound == SOFT_MIN[joint] { q - bound } else { bound - q };
+            (q, bound, margin)
+        }));
     }
     for (joint, bound) in VELOCITY_MAX.into_iter().enumerate() {
-        report
-            .margins
-            .push(worst(run, Limit::JointVelocity, Some(joint), |sample| {
-                (sample.dq[joint], bound, bound - sample.dq[joint].abs())
-            }));
+        report.margins.push(worst(run, Limit::JointVelocity, Some(joint), |sample| {
+            (sample.dq[joint], bound, bound - sample.dq[joint].abs())
+        }));
     }
     for joint in 0..7 {
-        report
-            .margins
-            .push(worst(run, Limit::JointTorque, Some(joint), |sample| {
-                let (value, bound) = (f64::from(sample.record.tau[joint]), TORQUE_LIMITS[joint]);
-                (value, bound, bound - value.abs())
-            }));
-    }
-    report
-        .margins
-        .push(worst(run, Limit::TipSpeed, None, |sample| {
-            let speed = sample.elbow_speeds[0].max(sample.elbow_speeds[1]);
-            (speed, TIP_SPEED_LIMIT, TIP_SPEED_LIMIT - speed)
+        report.margins.push(worst(run, Limit::JointTorque, Some(joint), |sample| {
+            let (value, bound) = (f64::from(sample.record.tau[joint]), TORQUE_LIMITS[joint]);
+            (value, bound, bound - value.abs())
         }));
+    }
+    report.margins.push(worst(run, Limit::TipSpeed, None, |sample| {
+        let speed = sample.elbow_speeds[0].max(sample.elbow_speeds[1]);
+        (speed, TIP_SPEED_LIMIT, TIP_SPEED_LIMIT - speed)
+    }));
     report.limited_cycles = run.limited_cycles();
     if report.limited_cycles > 0 {
         report.violations.push(format!(
@@ -357,41 +298,22 @@ fn check_run(file: &PrimitiveFile, run: &ClosedLoop, report: &mut CheckReport) {
     report.tool_speed_max_m_s = maximum(&|sample| sample.tool_speed);
     report.tracking_max_m = maximum(&|sample| distance(&sample.position, &sample.record.pose_d));
     if run.ending == Ending::Arrived {
-        let away = (0..3)
-            .map(|axis| (last.position[axis] - file.goal.position[axis]).powi(2))
-            .sum::<f64>()
-            .sqrt();
+        let away = (0..3).map(|axis| (last.position[axis] - file.goal.position[axis]).powi(2)).sum::<f64>().sqrt();
         let turned = angle_between(&last.orientation, &file.goal.orientation);
-        for (limit, value, bound) in [
-            (Limit::GoalPosition, away, GOAL_DISTANCE),
-            (Limit::GoalOrientation, turned, GOAL_ANGLE),
-        ] {
-            report.margins.push(Margin {
-                limit,
-                joint: None,
-                value,
-                bound,
-                margin: bound - value,
-                time_s: last.time,
-            });
+        for (limit, value, bound) in
+            [(Limit::GoalPosition, away, GOAL_DISTANCE), (Limit::GoalOrientation, turned, GOAL_ANGLE)]
+        {
+            report.margins.push(Margin { limit, joint: None, value, bound, margin: bound - value, time_s: last.time });
         }
     }
 }
 
 fn distance(position: &[f64; 3], pose_d: &[f32; 7]) -> f64 {
-    (0..3)
-        .map(|axis| (position[axis] - f64::from(pose_d[axis])).powi(2))
-        .sum::<f64>()
-        .sqrt()
+    (0..3).map(|axis| (position[axis] - f64::from(pose_d[axis])).powi(2)).sum::<f64>().sqrt()
 }
 
 /// The moment of the smallest margin; `look` gives value, bound and margin.
-fn worst(
-    run: &ClosedLoop,
-    limit: Limit,
-    joint: Option<usize>,
-    look: impl Fn(&Sample) -> (f64, f64, f64),
-) -> Margin {
+fn worst(run: &ClosedLoop, limit: Limit, joint: Option<usize>, look: impl Fn(&Sample) -> (f64, f64, f64)) -> Margin {
     let mut worst = Margin {
         limit,
         joint: joint.map(|joint| joint as u8 + 1),
@@ -403,13 +325,7 @@ fn worst(
     for sample in &run.samples {
         let (value, bound, margin) = look(sample);
         if margin.is_nan() || margin < worst.margin {
-            worst = Margin {
-                value,
-                bound,
-                margin,
-                time_s: sample.time,
-                ..worst
-            };
+            worst = Margin { value, bound, margin, time_s: sample.time, ..worst };
         }
     }
     worst

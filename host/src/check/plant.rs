@@ -29,19 +29,12 @@ pub(super) struct Plant {
 impl Plant {
     /// At rest at `q` (rad).
     pub(super) fn at(q: [f64; 7]) -> Plant {
-        Plant {
-            calibration: Calibration::nominal(arm::PAYLOAD),
-            q: Vector7::from(q),
-            dq: Vector7::zeros(),
-        }
+        Plant { calibration: Calibration::nominal(arm::PAYLOAD), q: Vector7::from(q), dq: Vector7::zeros() }
     }
 
     /// What the pucks report; `None` if the position is not finite any more.
     pub(super) fn counts(&self) -> Option<[Counts; 7]> {
-        let motors = self
-            .calibration
-            .transmission()
-            .motor_from_joint(&self.q.into());
+        let motors = self.calibration.transmission().motor_from_joint(&self.q.into());
         self.calibration.drives().counts(&motors).ok()
     }
 
@@ -57,20 +50,14 @@ impl Plant {
         for _ in 0..SUB_STEPS {
             let frames = self.frames();
             let still = JointAccelerations(Vector7::zeros());
-            let bias = model
-                .inverse_dynamics(&frames, &JointVelocities(self.dq), &still)
-                .0;
+            let bias = model.inverse_dynamics(&frames, &JointVelocities(self.dq), &still).0;
             let friction = Vector7::from_fn(|joint, _| {
                 let dq = self.dq[joint];
-                model::FRICTION_COULOMB[joint] * (dq / FRICTION_SPEED).tanh()
-                    + model::FRICTION_VISCOUS[joint] * dq
+                model::FRICTION_COULOMB[joint] * (dq / FRICTION_SPEED).tanh() + model::FRICTION_VISCOUS[joint] * dq
             });
             let force = torque - bias - friction;
             // A mass matrix is positive definite; should rounding ever deny it, the arm stands still for a sub-step.
-            let ddq = model
-                .mass_matrix(&frames)
-                .cholesky()
-                .map_or_else(Vector7::zeros, |factor| factor.solve(&force));
+            let ddq = model.mass_matrix(&frames).cholesky().map_or_else(Vector7::zeros, |factor| factor.solve(&force));
             self.dq += ddq * period;
             self.q += self.dq * period;
         }

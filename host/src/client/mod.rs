@@ -16,8 +16,8 @@ use std::time::Duration;
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
 use link::message::{DeviceHello, HostHello};
 use link::{
-    Event, LINK_VERSION, LinkCounters, Listing, Refusal, Reply, Request, SCHEMA_HASH, Statistics,
-    Status, Telemetry, Text,
+    Event, LINK_VERSION, LinkCounters, Listing, Refusal, Reply, Request, SCHEMA_HASH, Statistics, Status, Telemetry,
+    Text,
 };
 
 use crate::error::HostError;
@@ -101,12 +101,7 @@ impl<T: Transport> Client<T> {
     ///
     /// # Errors
     /// As [`Client::connect`].
-    pub fn connect_as(
-        transport: T,
-        owner: &str,
-        link_version: u16,
-        schema_hash: u32,
-    ) -> Result<Self, HostError> {
+    pub fn connect_as(transport: T, owner: &str, link_version: u16, schema_hash: u32) -> Result<Self, HostError> {
         let now = transport.now();
         let mut client = Self {
             session: session_number(transport.is_virtual()),
@@ -129,12 +124,7 @@ impl<T: Transport> Client<T> {
         };
         // Ends whatever half a frame an earlier host may have left on the line.
         client.transport.send(&[0])?;
-        let hello = HostHello {
-            link_version,
-            schema_hash,
-            model_hash: control::MODEL_HASH,
-            owner: Text::new(owner),
-        };
+        let hello = HostHello { link_version, schema_hash, model_hash: control::MODEL_HASH, owner: Text::new(owner) };
         client.hello = client.greet(&hello)?;
         client.open = true;
         Ok(client)
@@ -146,39 +136,24 @@ impl<T: Transport> Client<T> {
             match self.exchange(&Request::Hello(hello.clone())) {
                 Ok(Reply::Hello { hello: device, .. }) => {
                     // The device has compared; comparing here too catches a device that does not.
-                    differs(
-                        Refusal::LinkVersion,
-                        hello.link_version,
-                        device.link_version,
-                    )?;
+                    differs(Refusal::LinkVersion, hello.link_version, device.link_version)?;
                     differs_hash(Refusal::Schema, hello.schema_hash, device.schema_hash)?;
                     differs_hash(Refusal::Model, hello.model_hash, device.model_hash)?;
                     return Ok(device);
                 }
                 Ok(_) => return Err(HostError::WrongAnswer { request: "hello" }),
-                Err(HostError::Refused {
-                    reason: Refusal::LinkVersion,
-                    detail: [host, device],
-                    ..
-                }) => {
+                Err(HostError::Refused { reason: Refusal::LinkVersion, detail: [host, device], .. }) => {
                     differs(Refusal::LinkVersion, host, device)?;
                     return Err(HostError::WrongAnswer { request: "hello" });
                 }
-                Err(HostError::Refused {
-                    reason: reason @ (Refusal::Schema | Refusal::Model),
-                    detail,
-                    ..
-                }) => {
+                Err(HostError::Refused { reason: reason @ (Refusal::Schema | Refusal::Model), detail, .. }) => {
                     differs_hash(reason, detail[0], detail[1])?;
                     return Err(HostError::WrongAnswer { request: "hello" });
                 }
-                Err(HostError::Refused {
-                    reason: Refusal::Busy,
-                    detail: [_, wait],
-                    ..
-                }) if self.transport.now().saturating_sub(started) < BUSY_PATIENCE => {
-                    let until = self.transport.now()
-                        + Duration::from_millis(u64::from(wait.clamp(10, 600)));
+                Err(HostError::Refused { reason: Refusal::Busy, detail: [_, wait], .. })
+                    if self.transport.now().saturating_sub(started) < BUSY_PATIENCE =>
+                {
+                    let until = self.transport.now() + Duration::from_millis(u64::from(wait.clamp(10, 600)));
                     while self.transport.now() < until {
                         self.pump(until.saturating_sub(self.transport.now()))?;
                     }
@@ -249,9 +224,7 @@ impl<T: Transport> Client<T> {
     fn order(&mut self, request: &Request) -> Result<(), HostError> {
         match self.request(request)? {
             Reply::Accepted { .. } => Ok(()),
-            _ => Err(HostError::WrongAnswer {
-                request: request.word(),
-            }),
+            _ => Err(HostError::WrongAnswer { request: request.word() }),
         }
     }
 
@@ -260,11 +233,7 @@ impl<T: Transport> Client<T> {
         let of = self.sequence;
         let started = self.transport.now();
         // The age of a request counts from here: a repetition is not younger than the first attempt.
-        let envelope = Envelope {
-            session: self.session,
-            sequence: of,
-            time_ms: self.device_ms,
-        };
+        let envelope = Envelope { session: self.session, sequence: of, time_ms: self.device_ms };
         self.send(envelope, request)?;
         let mut repeat_at = started + REPEAT_AFTER;
         loop {
@@ -274,21 +243,16 @@ impl<T: Transport> Client<T> {
                 self.round_trips.worst = self.round_trips.worst.max(took);
                 self.round_trips.total += took;
                 return match reply {
-                    Reply::Refused { reason, detail, .. } => Err(HostError::Refused {
-                        request: request.word(),
-                        reason,
-                        detail,
-                    }),
+                    Reply::Refused { reason, detail, .. } => {
+                        Err(HostError::Refused { request: request.word(), reason, detail })
+                    }
                     reply => Ok(reply),
                 };
             }
             let now = self.transport.now();
             let deadline = started + self.timeout;
             if now >= deadline {
-                return Err(HostError::NoAnswer {
-                    request: request.word(),
-                    after: self.timeout,
-                });
+                return Err(HostError::NoAnswer { request: request.word(), after: self.timeout });
             }
             if now >= repeat_at {
                 self.round_trips.repeated += 1;
@@ -323,9 +287,7 @@ impl<T: Transport> Client<T> {
         let mut bytes = std::mem::take(&mut self.received);
         bytes.clear();
         // A wait shorter than the step of a virtual clock would not let its time pass at all.
-        let received = self
-            .transport
-            .receive(timeout.max(Duration::from_micros(10)), &mut bytes);
+        let received = self.transport.receive(timeout.max(Duration::from_micros(10)), &mut bytes);
         let mut rest = bytes.as_slice();
         while let Some(frame) = self.decoder.next::<Reply>(&mut rest) {
             if frame.envelope.session == self.session {
@@ -371,18 +333,11 @@ impl<T: Transport> Client<T> {
             // Answers to pings come many times within this; without them the line is dead.
             let silence = now.saturating_sub(self.heard);
             if silence >= self.timeout {
-                return Err(HostError::NoAnswer {
-                    request: "ping",
-                    after: silence,
-                });
+                return Err(HostError::NoAnswer { request: "ping", after: silence });
             }
             if now.saturating_sub(self.sent) >= KEEP_ALIVE {
                 self.sequence = self.sequence.wrapping_add(1);
-                let envelope = Envelope {
-                    session: self.session,
-                    sequence: self.sequence,
-                    time_ms: self.device_ms,
-                };
+                let envelope = Envelope { session: self.session, sequence: self.sequence, time_ms: self.device_ms };
                 self.send(envelope, &Request::Ping)?;
             }
             let ping_due = (self.sent + KEEP_ALIVE).saturating_sub(now);
@@ -409,9 +364,7 @@ impl<T: Transport> Client<T> {
     pub fn statistics(&mut self) -> Result<Statistics, HostError> {
         match self.request(&Request::Statistics)? {
             Reply::Statistics { statistics, .. } => Ok(statistics),
-            _ => Err(HostError::WrongAnswer {
-                request: "statistics",
-            }),
+            _ => Err(HostError::WrongAnswer { request: "statistics" }),
         }
     }
 
@@ -441,11 +394,7 @@ impl<T: Transport> Drop for Client<T> {
         let farewell = [Request::Stop, Request::Goodbye];
         for request in farewell.iter().skip(usize::from(!self.moving)) {
             self.sequence = self.sequence.wrapping_add(1);
-            let envelope = Envelope {
-                session: self.session,
-                sequence: self.sequence,
-                time_ms: self.device_ms,
-            };
+            let envelope = Envelope { session: self.session, sequence: self.sequence, time_ms: self.device_ms };
             if self.send(envelope, request).is_err() {
                 return;
             }
@@ -477,22 +426,14 @@ fn differs(what: Refusal, host: impl Into<u32>, device: impl Into<u32>) -> Resul
     if host == device {
         return Ok(());
     }
-    Err(HostError::Incompatible {
-        what,
-        host: format!("version {host}"),
-        device: format!("version {device}"),
-    })
+    Err(HostError::Incompatible { what, host: format!("version {host}"), device: format!("version {device}") })
 }
 
 fn differs_hash(what: Refusal, host: u32, device: u32) -> Result<(), HostError> {
     if host == device {
         return Ok(());
     }
-    Err(HostError::Incompatible {
-        what,
-        host: format!("{host:#010x}"),
-        device: format!("{device:#010x}"),
-    })
+    Err(HostError::Incompatible { what, host: format!("{host:#010x}"), device: format!("{device:#010x}") })
 }
 
 /// A number that no other host on this line is likely to have. A simulated device has no other hosts, and its
@@ -502,8 +443,6 @@ fn session_number(is_virtual: bool) -> u16 {
     if is_virtual {
         return 1;
     }
-    let random = std::collections::hash_map::RandomState::new()
-        .build_hasher()
-        .finish();
+    let random = std::collections::hash_map::RandomState::new().build_hasher().finish();
     (random % 0xFFFF) as u16 + 1
 }

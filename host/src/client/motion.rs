@@ -51,10 +51,7 @@ impl<T: Transport> Client<T> {
     /// # Errors
     /// As [`Client::request`].
     pub fn run(&mut self, name: &Name, options: RunOptions) -> Result<(), HostError> {
-        self.order(&Request::Run {
-            name: name.clone(),
-            options,
-        })
+        self.order(&Request::Run { name: name.clone(), options })
     }
 
     /// Moves the goal of the running primitive.
@@ -134,8 +131,5 @@ impl<T: Transport> Client<T> {
 
 /// Whether a state is one of those the device would end when this host fell silent.
 fn is_moving(state: u8) -> bool {
-    matches!(
-        State::from_code(state),
-        Some(State::Gravity | State::Approach | State::Run | State::Coast)
-    )
+    matches!(State::from_code(state), Some(State::Gravity | State::Approach | State::Run | State::Coast))
 }

@@ -54,8 +54,7 @@ impl<T: Transport> Client<T> {
     /// As [`Client::request`].
     pub fn set_telemetry(&mut self, every: u8) -> Result<(), HostError> {
         self.order(&Request::Telemetry { every })?;
-        self.incoming
-            .retain(|incoming| matches!(incoming, Incoming::Event(_)));
+        self.incoming.retain(|incoming| matches!(incoming, Incoming::Event(_)));
         self.gaps.restart(every);
         Ok(())
     }
@@ -79,11 +78,7 @@ impl<T: Transport> Client<T> {
     /// As [`Client::request`].
     pub fn telemetry(&mut self, every: u8) -> Result<TelemetryStream<'_, T>, HostError> {
         self.set_telemetry(every)?;
-        Ok(TelemetryStream {
-            client: self,
-            events: Vec::new(),
-            silence: Duration::from_secs(1),
-        })
+        Ok(TelemetryStream { client: self, events: Vec::new(), silence: Duration::from_secs(1) })
     }
 }
 
@@ -118,10 +113,7 @@ impl<T: Transport> Iterator for TelemetryStream<'_, T> {
                     self.events.push(event);
                     continue;
                 }
-                Ok(None) => Err(HostError::NoAnswer {
-                    request: "telemetry",
-                    after: self.silence,
-                }),
+                Ok(None) => Err(HostError::NoAnswer { request: "telemetry", after: self.silence }),
                 Err(error) => Err(error),
             });
         }
@@ -143,23 +135,17 @@ mod tests {
     fn gaps_are_counted_in_messages_not_cycles() {
         let mut gaps = Gaps::default();
         gaps.restart(3);
-        [300, 303, 306, 315, 318]
-            .into_iter()
-            .for_each(|cycle| gaps.telemetry(cycle));
+        [300, 303, 306, 315, 318].into_iter().for_each(|cycle| gaps.telemetry(cycle));
         assert_eq!((gaps.telemetry, gaps.longest), (2, 2));
         gaps.restart(1);
-        [500, 501, 503]
-            .into_iter()
-            .for_each(|cycle| gaps.telemetry(cycle));
+        [500, 501, 503].into_iter().for_each(|cycle| gaps.telemetry(cycle));
         assert_eq!((gaps.telemetry, gaps.longest), (3, 2));
     }
 
     #[test]
     fn a_number_that_wraps_is_no_gap() {
         let mut gaps = Gaps::default();
-        [0xFFFE, 0xFFFF, 0, 2]
-            .into_iter()
-            .for_each(|sequence| gaps.message(sequence));
+        [0xFFFE, 0xFFFF, 0, 2].into_iter().for_each(|sequence| gaps.message(sequence));
         assert_eq!(gaps.messages, 1);
     }
 }

@@ -51,15 +51,9 @@ impl<T: Transport> Client<T> {
             let _ = self.request(&Request::UploadAbort);
             return Err(error);
         }
-        let stored = self.read_image(&name, |done| {
-            progress(UploadPhase::Verify, done, image.len())
-        })?;
+        let stored = self.read_image(&name, |done| progress(UploadPhase::Verify, done, image.len()))?;
         if stored != image {
-            let same = stored
-                .iter()
-                .zip(image)
-                .take_while(|(there, here)| there == here)
-                .count();
+            let same = stored.iter().zip(image).take_while(|(there, here)| there == here).count();
             return Err(HostError::ReadBack { offset: same });
         }
         match self.find(&name)? {
@@ -75,11 +69,7 @@ impl<T: Transport> Client<T> {
         progress: &mut impl FnMut(UploadPhase, usize, usize),
     ) -> Result<(), HostError> {
         let length = u32::try_from(image.len()).unwrap_or(u32::MAX);
-        self.order(&Request::UploadBegin {
-            name: name.clone(),
-            length,
-            crc: stored_crc(image),
-        })?;
+        self.order(&Request::UploadBegin { name: name.clone(), length, crc: stored_crc(image) })?;
         let mut done = 0;
         progress(UploadPhase::Send, done, image.len());
         for part in image.chunks(CHUNK_BYTES) {
@@ -100,32 +90,20 @@ impl<T: Transport> Client<T> {
     /// # Errors
     /// As [`Client::request`].
     pub fn find(&mut self, name: &Name) -> Result<Option<Listing>, HostError> {
-        Ok(self
-            .list()?
-            .into_iter()
-            .find(|listing| listing.name == *name))
+        Ok(self.list()?.into_iter().find(|listing| listing.name == *name))
     }
 
     /// Reads a stored image; `progress` hears the bytes done.
     ///
     /// # Errors
     /// As [`Client::request`].
-    pub fn read_image(
-        &mut self,
-        name: &Name,
-        mut progress: impl FnMut(usize),
-    ) -> Result<Vec<u8>, HostError> {
+    pub fn read_image(&mut self, name: &Name, mut progress: impl FnMut(usize)) -> Result<Vec<u8>, HostError> {
         let mut image = Vec::new();
         loop {
             let offset = u32::try_from(image.len()).unwrap_or(u32::MAX);
-            match self.request(&Request::Read {
-                name: name.clone(),
-                offset,
-            })? {
+            match self.request(&Request::Read { name: name.clone(), offset })? {
                 Reply::Chunk { data, .. } if data.is_empty() => return Ok(image),
-                Reply::Chunk {
-                    offset: at, data, ..
-                } if at == offset => image.extend_from_slice(&data),
+                Reply::Chunk { offset: at, data, .. } if at == offset => image.extend_from_slice(&data),
                 _ => return Err(HostError::WrongAnswer { request: "read" }),
             }
             progress(image.len());

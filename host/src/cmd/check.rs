@@ -25,22 +25,15 @@ pub struct Cmd {
 /// The file is wrong, or the check found a violation.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
-    let file = PrimitiveFile::read(&command.primitive)
-        .map_err(|cause| failure(cause, &command.primitive, "check"))?;
+    let file = PrimitiveFile::read(&command.primitive).map_err(|cause| failure(cause, &command.primitive, "check"))?;
     let bar = output.bar(100, "playing the plan");
-    let report = check::check(&file, command.speed, |fraction| {
-        bar.set_position((fraction * 100.0) as u64)
-    })
-    .map_err(|cause| failure(cause, &command.primitive, "check"))?;
+    let report = check::check(&file, command.speed, |fraction| bar.set_position((fraction * 100.0) as u64))
+        .map_err(|cause| failure(cause, &command.primitive, "check"))?;
     bar.finish_and_clear();
     if report.passed() {
         return output.result(&report, report.to_text());
     }
-    let reason = format!(
-        "{} violation(s), the first: {}",
-        report.violations.len(),
-        report.violations[0]
-    );
+    let reason = format!("{} violation(s), the first: {}", report.violations.len(), report.violations[0]);
     if !global.json {
         output.result(&report, report.to_text())?;
     }
@@ -55,39 +48,19 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 /// The failure of a command that was `doing` something with a primitive file.
 pub(super) fn failure(cause: PrimitiveFileError, path: &Path, doing: &str) -> Failure {
     let (exit, code, help) = match &cause {
-        PrimitiveFileError::Model { .. } => (
-            Exit::Incompatible,
-            "E430",
-            "learn the primitive again with this version",
-        ),
-        PrimitiveFileError::Schema { .. } => (
-            Exit::Incompatible,
-            "E431",
-            "learn the primitive again with this version",
-        ),
-        PrimitiveFileError::Checksum { .. } => (
-            Exit::Invalid,
-            "E632",
-            "the file was changed or damaged: learn the primitive again from its demonstration",
-        ),
-        PrimitiveFileError::Image { .. } | PrimitiveFileError::Invalid { .. } => (
-            Exit::Invalid,
-            "E633",
-            "learn the primitive again, see `tactus learn --help`",
-        ),
-        _ => (
-            Exit::Invalid,
-            "E630",
-            "`tactus learn DEMO -o FILE` writes a primitive",
-        ),
+        PrimitiveFileError::Model { .. } => (Exit::Incompatible, "E430", "learn the primitive again with this version"),
+        PrimitiveFileError::Schema { .. } => {
+            (Exit::Incompatible, "E431", "learn the primitive again with this version")
+        }
+        PrimitiveFileError::Checksum { .. } => {
+            (Exit::Invalid, "E632", "the file was changed or damaged: learn the primitive again from its demonstration")
+        }
+        PrimitiveFileError::Image { .. } | PrimitiveFileError::Invalid { .. } => {
+            (Exit::Invalid, "E633", "learn the primitive again, see `tactus learn --help`")
+        }
+        _ => (Exit::Invalid, "E630", "`tactus learn DEMO -o FILE` writes a primitive"),
     };
-    Failure::new(
-        exit,
-        code,
-        format!("{doing} refused {}", path.display()),
-        cause,
-    )
-    .help(help)
+    Failure::new(exit, code, format!("{doing} refused {}", path.display()), cause).help(help)
 }
 
 /// A speed factor the device takes.

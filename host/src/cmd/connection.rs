@@ -25,15 +25,12 @@ pub(super) fn open(
         return Err(Failure::new(Exit::Usage, "E202", doing, "no device is named")
             .help("add `--device sim:` for a simulated arm, or `--device serial:/dev/ttyACM0`, or set TACTUS_DEVICE"));
     };
-    let address: Address = text
-        .parse()
-        .map_err(|error| HostError::Address(error).into_failure(doing))?;
+    let address: Address = text.parse().map_err(|error| HostError::Address(error).into_failure(doing))?;
     let device = Device::open(&address, adjust).map_err(|error| match error {
         OpenError::Transport(error) => HostError::Transport(error).into_failure(doing),
         OpenError::Simulation(error) => simulation_failure(error, doing),
     })?;
-    let mut client =
-        Client::connect(device, &owner()).map_err(|error| error.into_failure(doing))?;
+    let mut client = Client::connect(device, &owner()).map_err(|error| error.into_failure(doing))?;
     client.set_timeout(global.timeout);
     client.set_interrupt(interrupt());
     Ok(client)
@@ -43,23 +40,13 @@ pub(super) fn open(
 ///
 /// # Errors
 /// The start-up does not get to its end.
-pub(super) fn ready(
-    client: &mut Client<Device>,
-    at_home: bool,
-    output: Output,
-    doing: &str,
-) -> Result<(), Failure> {
+pub(super) fn ready(client: &mut Client<Device>, at_home: bool, output: Output, doing: &str) -> Result<(), Failure> {
     let simulated = client.hello().simulated;
     let spinner = output.spinner("starting up");
     let result = procedure::make_ready(client, at_home, |stage| {
         spinner.set_message(stage.explanation());
         // People at a simulated pendant need no telling; at a real one the words must stay on the screen.
-        if !simulated
-            && matches!(
-                stage,
-                Stage::WaitingForIdle | Stage::WaitingForZero | Stage::WaitingForActive
-            )
-        {
+        if !simulated && matches!(stage, Stage::WaitingForIdle | Stage::WaitingForZero | Stage::WaitingForActive) {
             spinner.suspend(|| output.say(stage.explanation()));
         }
     });
@@ -67,11 +54,7 @@ pub(super) fn ready(
     result.map_err(|error| failure(error, doing))?;
     let hello = client.hello();
     let kind = if simulated { "simulated " } else { "" };
-    output.say(format!(
-        "{kind}arm ready on {} ({})",
-        hello.board.as_str(),
-        hello.firmware.as_str()
-    ));
+    output.say(format!("{kind}arm ready on {} ({})", hello.board.as_str(), hello.firmware.as_str()));
     Ok(())
 }
 
@@ -79,51 +62,27 @@ pub(super) fn ready(
 pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
     let (exit, code, help) = match error {
         ProcedureError::Host(error) => return error.into_failure(doing),
-        ProcedureError::NotReady(_) => (
-            Exit::Refused,
-            "E590",
-            "check the pendant and the cables, then try again",
-        ),
-        ProcedureError::NotZeroed => (
-            Exit::Refused,
-            "E591",
-            "bring the arm to its home pose by hand and add `--at-home`",
-        ),
-        ProcedureError::Stopped(_) => (
-            Exit::Refused,
-            "E592",
-            "find the cause; `tactus stop` brings the arm to rest",
-        ),
+        ProcedureError::NotReady(_) => (Exit::Refused, "E590", "check the pendant and the cables, then try again"),
+        ProcedureError::NotZeroed => {
+            (Exit::Refused, "E591", "bring the arm to its home pose by hand and add `--at-home`")
+        }
+        ProcedureError::Stopped(_) => (Exit::Refused, "E592", "find the cause; `tactus stop` brings the arm to rest"),
         ProcedureError::Diverted(_) => (Exit::Refused, "E593", "try again"),
         ProcedureError::TooLong { .. } => (Exit::Refused, "E594", "look what holds the arm"),
-        ProcedureError::Recording(_) => (
-            Exit::Internal,
-            "E121",
-            "check the disk and the rights of the folder",
-        ),
+        ProcedureError::Recording(_) => (Exit::Internal, "E121", "check the disk and the rights of the folder"),
     };
     Failure::new(exit, code, doing, error).help(help)
 }
 
 fn simulation_failure(error: SimulationError, doing: &str) -> Failure {
     let (exit, code, help) = match &error {
-        SimulationError::UnknownWorld(_) => (
-            Exit::Usage,
-            "E203",
-            "for example `--device sim:world=mujoco`",
-        ),
-        SimulationError::WithoutMujoco => (
-            Exit::NoDevice,
-            "E310",
-            "`cargo xtask build`, or `--device sil:world=simple`",
-        ),
+        SimulationError::UnknownWorld(_) => (Exit::Usage, "E203", "for example `--device sim:world=mujoco`"),
+        SimulationError::WithoutMujoco => {
+            (Exit::NoDevice, "E310", "`cargo xtask build`, or `--device sil:world=simple`")
+        }
         SimulationError::NoImage(_) => (Exit::NoDevice, "E311", "`cargo xtask build`"),
         SimulationError::NoQemu(_) => (Exit::NoDevice, "E312", "`cargo xtask setup`"),
-        _ => (
-            Exit::Internal,
-            "E110",
-            "`cargo xtask setup` repairs the set-up of the simulator",
-        ),
+        _ => (Exit::Internal, "E110", "`cargo xtask setup` repairs the set-up of the simulator"),
     };
     Failure::new(exit, code, doing, error).help(help)
 }
@@ -156,17 +115,10 @@ fn interrupt() -> Interrupt {
 /// # Errors
 /// The address is not that of a simulated device, or the simulation cannot be started.
 pub(super) fn simulated(text: &str, doing: &str) -> Result<(Device, Interrupt), Failure> {
-    let address: Address = text
-        .parse()
-        .map_err(|error| HostError::Address(error).into_failure(doing))?;
+    let address: Address = text.parse().map_err(|error| HostError::Address(error).into_failure(doing))?;
     if !matches!(address, Address::Simulated(..)) {
-        return Err(Failure::new(
-            Exit::Usage,
-            "E204",
-            doing,
-            format!("'{text}' is not a simulated device"),
-        )
-        .help("`--device sim:` or `--device sil:`"));
+        return Err(Failure::new(Exit::Usage, "E204", doing, format!("'{text}' is not a simulated device"))
+            .help("`--device sim:` or `--device sil:`"));
     }
     let device = Device::open(&address, |_| {}).map_err(|error| match error {
         OpenError::Transport(error) => HostError::Transport(error).into_failure(doing),

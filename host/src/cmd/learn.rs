@@ -55,57 +55,35 @@ pub struct Cmd {
 /// The demonstration or an option is wrong, or the file cannot be written.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
-    let file = command
-        .output
-        .clone()
-        .unwrap_or_else(|| command.demonstration.with_extension("toml"));
+    let file = command.output.clone().unwrap_or_else(|| command.demonstration.with_extension("toml"));
     let name = match &command.name {
         Some(name) => name.clone(),
-        None => file
-            .file_stem()
-            .map(|stem| stem.to_string_lossy().into_owned())
-            .unwrap_or_default(),
+        None => file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
     };
     if let Err(error) = link::Name::new(&name) {
-        return Err(Failure::new(
-            Exit::Usage,
-            "E220",
-            format!("learn: the name `{name}`"),
-            error,
-        )
-        .help("give a name with `--name NAME`"));
+        return Err(Failure::new(Exit::Usage, "E220", format!("learn: the name `{name}`"), error)
+            .help("give a name with `--name NAME`"));
     }
     let options = LearnOptions {
         name,
         kernels: usize::from(command.kernels),
         cutoff: command.cutoff,
-        preparation: Preparation {
-            still_speed: (!command.no_trim).then_some(command.still_speed),
-        },
+        preparation: Preparation { still_speed: (!command.no_trim).then_some(command.still_speed) },
         orientation_error: if command.rotation_vector {
             OrientationErrorKind::RotationVector
         } else {
             OrientationErrorKind::Quaternion
         },
-        hand: HandMotion {
-            start: command.hand_start,
-            goal: command.hand_goal,
-            window: command.hand_window.into(),
-        },
+        hand: HandMotion { start: command.hand_start, goal: command.hand_goal, window: command.hand_window.into() },
     };
     let spinner = output.spinner("learning");
     let recording = Recording::read(&command.demonstration)
         .map_err(|cause| Failure::new(Exit::Invalid, "E620", "learn refused", cause))?;
-    let learned =
-        learn::learn(&recording, &file, &options).map_err(|error| failure(error, command))?;
-    learned.primitive.write(&file).map_err(|cause| {
-        Failure::new(
-            Exit::Internal,
-            "E120",
-            "learn: the primitive cannot be written",
-            cause,
-        )
-    })?;
+    let learned = learn::learn(&recording, &file, &options).map_err(|error| failure(error, command))?;
+    learned
+        .primitive
+        .write(&file)
+        .map_err(|cause| Failure::new(Exit::Internal, "E120", "learn: the primitive cannot be written", cause))?;
     spinner.finish_and_clear();
     for warning in &learned.report.warnings {
         output.warn(warning);
@@ -120,10 +98,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 fn failure(error: LearnError, command: &Cmd) -> Failure {
     let demonstration = command.demonstration.display();
     let help = match &error {
-        LearnError::TurnsTooFar {
-            rotation_vector_helps: true,
-            ..
-        } => Some(format!("tactus learn --rotation-vector {demonstration}")),
+        LearnError::TurnsTooFar { rotation_vector_helps: true, .. } => {
+            Some(format!("tactus learn --rotation-vector {demonstration}"))
+        }
         LearnError::Demonstration(crate::demonstration::DemonstrationError::Still { .. }) => {
             Some(format!("tactus learn --no-trim {demonstration}"))
         }
@@ -145,17 +122,11 @@ fn failure(error: LearnError, command: &Cmd) -> Failure {
 
 /// Numbers separated by commas.
 pub(super) fn numbers<const COUNT: usize>(text: &str) -> Result<[f64; COUNT], String> {
-    let values: Result<Vec<f64>, _> = text
-        .split(',')
-        .map(|part| part.trim().parse::<f64>())
-        .collect();
-    let values =
-        values.map_err(|_| format!("`{text}` is not a list of numbers separated by commas"))?;
+    let values: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse::<f64>()).collect();
+    let values = values.map_err(|_| format!("`{text}` is not a list of numbers separated by commas"))?;
     if values.iter().any(|value| !value.is_finite()) {
         return Err("every number must be finite".to_owned());
     }
     let found = values.len();
-    values
-        .try_into()
-        .map_err(|_| format!("{COUNT} numbers are expected, {found} are given"))
+    values.try_into().map_err(|_| format!("{COUNT} numbers are expected, {found} are given"))
 }

@@ -62,10 +62,7 @@ pub struct Global {
 impl Global {
     /// Where output goes.
     pub fn output(&self) -> Output {
-        Output {
-            json: self.json,
-            quiet: self.quiet,
-        }
+        Output { json: self.json, quiet: self.quiet }
     }
 }
 
@@ -123,9 +120,7 @@ pub fn run(cli: Cli) -> ExitCode {
 
 /// A positive time in seconds.
 fn seconds(text: &str) -> Result<Duration, String> {
-    let value: f64 = text
-        .parse()
-        .map_err(|_| format!("`{text}` is not a number of seconds"))?;
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
     if value > 0.0 && value <= 86_400.0 {
         Ok(Duration::from_secs_f64(value))
     } else {

@@ -40,16 +40,12 @@ impl Output {
             Failure::new(Exit::Internal, "E101", "writing the result", cause)
         };
         let line: Cow<'_, str> = if self.json {
-            serde_json::to_string(data)
-                .map_err(|cause| broken(cause.into()))?
-                .into()
+            serde_json::to_string(data).map_err(|cause| broken(cause.into()))?.into()
         } else {
             text.as_ref().trim_end().into()
         };
         let mut stdout = std::io::stdout().lock();
-        writeln!(stdout, "{line}")
-            .and_then(|()| stdout.flush())
-            .map_err(|cause| broken(cause.into()))
+        writeln!(stdout, "{line}").and_then(|()| stdout.flush()).map_err(|cause| broken(cause.into()))
     }
 
     /// A bar for work of `steps` steps; it hides itself when stderr is no terminal.
@@ -57,14 +53,10 @@ impl Output {
         if self.quiet {
             return ProgressBar::hidden();
         }
-        let style = ProgressStyle::with_template(
-            "{msg:24} [{bar:32}] {pos}/{len} {elapsed} (about {eta} left)",
-        )
-        .unwrap_or_else(|_| ProgressStyle::default_bar())
-        .progress_chars("=> ");
-        ProgressBar::new(steps)
-            .with_style(style)
-            .with_message(doing)
+        let style = ProgressStyle::with_template("{msg:24} [{bar:32}] {pos}/{len} {elapsed} (about {eta} left)")
+            .unwrap_or_else(|_| ProgressStyle::default_bar())
+            .progress_chars("=> ");
+        ProgressBar::new(steps).with_style(style).with_message(doing)
     }
 
     /// A sign of life for work of unknown length.

@@ -42,50 +42,29 @@ pub struct Cmd {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let doing = "plot";
-    let invalid = |cause: Box<dyn std::error::Error + Send + Sync>| {
-        Failure::new(Exit::Invalid, "E610", doing, cause)
-    };
+    let invalid = |cause: Box<dyn std::error::Error + Send + Sync>| Failure::new(Exit::Invalid, "E610", doing, cause);
     let demonstration = match &command.demonstration {
         None => None,
         Some(file) => {
-            let preparation = if command.no_trim {
-                Preparation { still_speed: None }
-            } else {
-                Preparation::default()
-            };
+            let preparation = if command.no_trim { Preparation { still_speed: None } } else { Preparation::default() };
             let recording = Recording::read(file).map_err(|cause| invalid(cause.into()))?;
-            Some(
-                Demonstration::prepare(&recording, &preparation)
-                    .map_err(|cause| invalid(cause.into()))?,
-            )
+            Some(Demonstration::prepare(&recording, &preparation).map_err(|cause| invalid(cause.into()))?)
         }
     };
-    let primitive = command
-        .primitive
-        .as_deref()
-        .map(PrimitiveFile::read)
-        .transpose()
-        .map_err(|cause| invalid(cause.into()))?;
+    let primitive =
+        command.primitive.as_deref().map(PrimitiveFile::read).transpose().map_err(|cause| invalid(cause.into()))?;
     let plan = match &primitive {
         None => None,
         Some(file) => {
             let primitive = file.to_primitive().map_err(|cause| invalid(cause.into()))?;
-            let references =
-                plan::roll_out(&primitive).map_err(|cause| invalid(cause.to_string().into()))?;
+            let references = plan::roll_out(&primitive).map_err(|cause| invalid(cause.to_string().into()))?;
             Some(plan::pose_path(&references))
         }
     };
-    let execution = command
-        .run
-        .as_deref()
-        .map(Recording::read)
-        .transpose()
-        .map_err(|cause| invalid(cause.into()))?;
+    let execution = command.run.as_deref().map(Recording::read).transpose().map_err(|cause| invalid(cause.into()))?;
     let tracking = match &execution {
         None => None,
-        Some(recording) => {
-            Some(Tracking::of_run(recording).map_err(|cause| invalid(cause.into()))?)
-        }
+        Some(recording) => Some(Tracking::of_run(recording).map_err(|cause| invalid(cause.into()))?),
     };
     let name = command
         .title
@@ -109,23 +88,12 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let spinner = output.spinner("drawing");
     for file in &command.output {
         plot::write(&page, file).map_err(|cause| {
-            let exit = if matches!(cause, plot::PlotError::Format { .. }) {
-                Exit::Usage
-            } else {
-                Exit::Internal
-            };
+            let exit = if matches!(cause, plot::PlotError::Format { .. }) { Exit::Usage } else { Exit::Internal };
             let code = if exit == Exit::Usage { "E211" } else { "E111" };
             Failure::new(exit, code, doing, cause)
         })?;
     }
     spinner.finish_and_clear();
-    let text: Vec<String> = command
-        .output
-        .iter()
-        .map(|file| file.display().to_string())
-        .collect();
-    output.result(
-        &json!({ "figures": command.output, "tracking": tracking }),
-        text.join("\n"),
-    )
+    let text: Vec<String> = command.output.iter().map(|file| file.display().to_string()).collect();
+    output.result(&json!({ "figures": command.output, "tracking": tracking }), text.join("\n"))
 }

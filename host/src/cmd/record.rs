@@ -34,16 +34,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         connection::ready(&mut client, false, output, DOING)?;
     }
     let failed = |error| connection::failure(error, DOING);
-    let file =
-        File::create(&command.output).map_err(|cause| failed(ProcedureError::Recording(cause)))?;
+    let file = File::create(&command.output).map_err(|cause| failed(ProcedureError::Recording(cause)))?;
     let wanted = (command.duration * crate::demonstration::RATE).round() as usize;
     let bar = output.bar(wanted as u64, "recording");
-    let mut recorder = Recorder::start(
-        &mut client,
-        BufWriter::new(file),
-        "Tactus recording, 300 Hz",
-    )
-    .map_err(failed)?;
+    let mut recorder =
+        Recorder::start(&mut client, BufWriter::new(file), "Tactus recording, 300 Hz").map_err(failed)?;
     while recorder.rows() < wanted {
         recorder.take(&mut client).map_err(failed)?;
         bar.set_position(recorder.rows() as u64);

@@ -122,10 +122,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     upload::send(&mut client, &file, output, DOING)?;
     output.say(format!("'{}' is in the device", file.name));
     if command.dry_run {
-        return output.result(
-            &serde_json::json!({ "name": file.name, "dry_run": true }),
-            "ready to run; nothing moved",
-        );
+        return output
+            .result(&serde_json::json!({ "name": file.name, "dry_run": true }), "ready to run; nothing moved");
     }
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let result = play(command, &mut client, &file, output);
@@ -152,20 +150,10 @@ fn play(
     go_to_start(client, file, output)?;
     let mut recorder = Recorder::start(client, Vec::new(), &notes(client, file))?;
     client.take_events();
-    let name = link::Name::new(&file.name)
-        .map_err(|error| crate::transport::TransportError::other(error.to_string()))?;
-    let goal = Goal {
-        position: command.goal.map(|goal| goal.map(|value| value as f32)),
-        orientation: None,
-    };
-    client.run(
-        &name,
-        RunOptions {
-            goal,
-            speed: command.speed as f32,
-            ..RunOptions::default()
-        },
-    )?;
+    let name =
+        link::Name::new(&file.name).map_err(|error| crate::transport::TransportError::other(error.to_string()))?;
+    let goal = Goal { position: command.goal.map(|goal| goal.map(|value| value as f32)), orientation: None };
+    client.run(&name, RunOptions { goal, speed: command.speed as f32, ..RunOptions::default() })?;
 
     let planned = file.duration / command.speed;
     let bar = output.bar((planned * RATE) as u64, "running");
@@ -190,10 +178,7 @@ fn play(
         }
         if rows as f64 > (planned + PATIENCE) * RATE && arrived.is_none() {
             client.stop()?;
-            return Err(ProcedureError::TooLong {
-                what: "the movement",
-                seconds: (planned + PATIENCE) as u64,
-            });
+            return Err(ProcedureError::TooLong { what: "the movement", seconds: (planned + PATIENCE) as u64 });
         }
     }
     bar.finish_and_clear();
@@ -207,18 +192,10 @@ fn play(
 }
 
 /// Brings the arm to the posture in which the primitive begins.
-fn go_to_start(
-    client: &mut Client<Device>,
-    file: &PrimitiveFile,
-    output: Output,
-) -> Result<(), ProcedureError> {
+fn go_to_start(client: &mut Client<Device>, file: &PrimitiveFile, output: Output) -> Result<(), ProcedureError> {
     let status = client.status()?;
     let start = file.start.posture;
-    let far = status
-        .q
-        .iter()
-        .zip(&start)
-        .any(|(q, start)| (f64::from(*q) - start).abs() > START_TOLERANCE);
+    let far = status.q.iter().zip(&start).any(|(q, start)| (f64::from(*q) - start).abs() > START_TOLERANCE);
     let standing = State::from_code(status.state) == Some(State::Hold);
     if far || !standing {
         let spinner = output.spinner("moving to the start");
@@ -232,16 +209,8 @@ fn go_to_start(
 }
 
 fn notes(client: &Client<Device>, file: &PrimitiveFile) -> String {
-    let simulated = if client.hello().simulated {
-        " (simulated arm)"
-    } else {
-        ""
-    };
-    format!(
-        "Tactus recording of a run of '{}', 300 Hz, on {}{simulated}",
-        file.name,
-        client.hello().board.as_str()
-    )
+    let simulated = if client.hello().simulated { " (simulated arm)" } else { "" };
+    format!("Tactus recording of a run of '{}', 300 Hz, on {}{simulated}", file.name, client.hello().board.as_str())
 }
 
 fn report(
@@ -251,20 +220,13 @@ fn report(
     (rows, limited_samples): (usize, usize),
     statistics: &Statistics,
 ) -> Result<Report, ProcedureError> {
-    let unreadable = |error: &dyn std::fmt::Display| {
-        std::io::Error::other(format!("it reads back wrong: {error}"))
-    };
-    let recording =
-        Recording::parse(Path::new("run"), bytes).map_err(|error| unreadable(&error))?;
+    let unreadable = |error: &dyn std::fmt::Display| std::io::Error::other(format!("it reads back wrong: {error}"));
+    let recording = Recording::parse(Path::new("run"), bytes).map_err(|error| unreadable(&error))?;
     let tracking = Tracking::of_run(&recording).map_err(|error| unreadable(&error))?;
     let ticks_per_second = client.hello().ticks_per_second;
     let counts_instructions = client.hello().board.as_str().starts_with("mps2");
     let instructions = |ticks: u32| {
-        if counts_instructions {
-            ticks * INSTRUCTIONS_PER_TICK
-        } else {
-            0
-        }
+        if counts_instructions { ticks * INSTRUCTIONS_PER_TICK } else { 0 }
     };
     let gaps = client.gaps().telemetry;
     let bus = client.transport().simulation().map(|simulation| {
@@ -289,8 +251,7 @@ fn report(
         lost_replies: statistics.lost_replies,
         worst_instructions: instructions(statistics.cost_worst_ticks),
         mean_instructions: instructions(statistics.cost_mean_ticks),
-        worst_latency_us: f64::from(statistics.latency_worst_ticks) * 1e6
-            / f64::from(ticks_per_second.max(1)),
+        worst_latency_us: f64::from(statistics.latency_worst_ticks) * 1e6 / f64::from(ticks_per_second.max(1)),
         stack_used: statistics.stack_size.saturating_sub(statistics.stack_free),
         telemetry_dropped: statistics.telemetry_dropped,
         bus,
@@ -308,60 +269,30 @@ impl Report {
         row("duration", format!("{:.2} s", self.duration_s));
         row(
             "tracking, RMS",
-            format!(
-                "{:.2} mm  {:.2} deg",
-                tracking.position_rms_m * 1e3,
-                tracking.orientation_rms_rad.to_degrees()
-            ),
+            format!("{:.2} mm  {:.2} deg", tracking.position_rms_m * 1e3, tracking.orientation_rms_rad.to_degrees()),
         );
         row(
             "tracking, worst",
-            format!(
-                "{:.2} mm  {:.2} deg",
-                tracking.position_max_m * 1e3,
-                tracking.orientation_max_rad.to_degrees()
-            ),
+            format!("{:.2} mm  {:.2} deg", tracking.position_max_m * 1e3, tracking.orientation_max_rad.to_degrees()),
         );
         row(
             "error at the goal",
-            format!(
-                "{:.2} mm  {:.2} deg",
-                tracking.position_end_m * 1e3,
-                tracking.orientation_end_rad.to_degrees()
-            ),
+            format!("{:.2} mm  {:.2} deg", tracking.position_end_m * 1e3, tracking.orientation_end_rad.to_degrees()),
         );
         row("cycles since power-up", self.cycles.to_string());
         row("missed deadlines", self.missed_deadlines.to_string());
         row("lost replies", self.lost_replies.to_string());
-        row(
-            "samples, lost on the link",
-            format!("{}, {}", self.samples, self.gaps),
-        );
-        row(
-            "samples with limited torque",
-            self.limited_samples.to_string(),
-        );
+        row("samples, lost on the link", format!("{}, {}", self.samples, self.gaps));
+        row("samples with limited torque", self.limited_samples.to_string());
         if self.worst_instructions > 0 {
-            row(
-                "control cycle, worst",
-                format!("{} instructions", self.worst_instructions),
-            );
-            row(
-                "control cycle, mean",
-                format!("{} instructions", self.mean_instructions),
-            );
-            row(
-                "timer latency, worst",
-                format!("{:.1} us", self.worst_latency_us),
-            );
+            row("control cycle, worst", format!("{} instructions", self.worst_instructions));
+            row("control cycle, mean", format!("{} instructions", self.mean_instructions));
+            row("timer latency, worst", format!("{:.1} us", self.worst_latency_us));
             row("stack used", format!("{} bytes", self.stack_used));
         }
         if let Some(bus) = &self.bus {
             row("bus load", format!("{:.1} %", bus.load * 100.0));
-            row(
-                "bus frames, invalid",
-                format!("{}, {}", bus.frames, bus.invalid_frames),
-            );
+            row("bus frames, invalid", format!("{}, {}", bus.frames, bus.invalid_frames));
             row("bus hash", bus.hash.clone());
         }
         table.to_string()
@@ -371,9 +302,7 @@ impl Report {
 /// Every frame of the simulated bus as a line `(seconds) can0 ID#DATA`.
 fn write_bus_log(client: &mut Client<Device>, path: &Path) -> std::io::Result<()> {
     let Some(simulation) = client.transport().simulation() else {
-        return Err(std::io::Error::other(
-            "only a simulated bus can be written down",
-        ));
+        return Err(std::io::Error::other("only a simulated bus can be written down"));
     };
     let mut file = BufWriter::new(File::create(path)?);
     for passage in simulation.plant().recorded() {

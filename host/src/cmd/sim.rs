@@ -51,18 +51,10 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let device = global.device.clone().unwrap_or_else(|| "sim:".to_owned());
     let (mut device, interrupt) = connection::simulated(&device, DOING)?;
     let listener = listen(&command.listen).map_err(|cause| {
-        Failure::new(
-            Exit::NoDevice,
-            "E320",
-            format!("sim: cannot listen on {}", command.listen),
-            cause,
-        )
-        .help("choose another address with `--listen`")
+        Failure::new(Exit::NoDevice, "E320", format!("sim: cannot listen on {}", command.listen), cause)
+            .help("choose another address with `--listen`")
     })?;
-    output.say(format!(
-        "a simulated arm listens; in another terminal: `tactus --device {} list`",
-        command.listen
-    ));
+    output.say(format!("a simulated arm listens; in another terminal: `tactus --device {} list`", command.listen));
     let served = serve(command, &mut device, &listener, &interrupt);
     if let Listener::Unix(_, path) = &listener {
         // Left behind it would only confuse the next one.
@@ -70,10 +62,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     served.map_err(|error| crate::error::HostError::Transport(error).into_failure(DOING))?;
     let seconds = device.now().as_secs_f64();
-    output.result(
-        &serde_json::json!({ "simulated_s": seconds }),
-        format!("{seconds:.1} s simulated"),
-    )
+    output.result(&serde_json::json!({ "simulated_s": seconds }), format!("{seconds:.1} s simulated"))
 }
 
 fn listen(text: &str) -> Result<Listener, Box<dyn std::error::Error + Send + Sync>> {
@@ -121,21 +110,13 @@ fn accept(listener: &Listener) -> std::io::Result<Option<Box<dyn Peer>>> {
     }
 }
 
-fn serve(
-    command: &Cmd,
-    device: &mut Device,
-    listener: &Listener,
-    interrupt: &Interrupt,
-) -> Result<(), TransportError> {
+fn serve(command: &Cmd, device: &mut Device, listener: &Listener, interrupt: &Interrupt) -> Result<(), TransportError> {
     let started = Instant::now();
     let mut peer: Option<Box<dyn Peer>> = None;
     let mut buffer = [0; 4096];
     let mut bytes = Vec::new();
     while !interrupt.is_raised() {
-        if command
-            .duration
-            .is_some_and(|limit| device.now().as_secs_f64() >= limit)
-        {
+        if command.duration.is_some_and(|limit| device.now().as_secs_f64() >= limit) {
             break;
         }
         if peer.is_none() {
@@ -155,9 +136,7 @@ fn serve(
             device.receive(target.saturating_sub(device.now()), &mut bytes)?;
             // A host that does not read loses bytes, as on a serial line.
             if let Some(stream) = &mut peer
-                && stream
-                    .write_all(&bytes)
-                    .is_err_and(|error| error.kind() != ErrorKind::WouldBlock)
+                && stream.write_all(&bytes).is_err_and(|error| error.kind() != ErrorKind::WouldBlock)
             {
                 peer = None;
             }

@@ -19,8 +19,5 @@ pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
     client.stop().map_err(|error| error.into_failure(DOING))?;
     let status = client.status().map_err(|error| error.into_failure(DOING))?;
     let state = control::State::from_code(status.state).map_or("unknown", control::State::name);
-    global.output().result(
-        &json!({ "state": state }),
-        format!("stopped; state: {state}"),
-    )
+    global.output().result(&json!({ "state": state }), format!("stopped; state: {state}"))
 }

@@ -50,9 +50,7 @@ pub type Posture = [f32; 7];
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "teach";
     let output = global.output();
-    let mut client = connection::open(global, DOING, |options| {
-        options.person = Some(command.person)
-    })?;
+    let mut client = connection::open(global, DOING, |options| options.person = Some(command.person))?;
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let failed = |error| connection::failure(error, DOING);
 
@@ -65,20 +63,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         travelled.map_err(failed)?;
     }
 
-    let file =
-        File::create(&command.output).map_err(|cause| failed(ProcedureError::Recording(cause)))?;
+    let file = File::create(&command.output).map_err(|cause| failed(ProcedureError::Recording(cause)))?;
     let notes = format!(
         "Tactus recording of a demonstration by hand, 300 Hz, from {} {}",
         client.hello().board.as_str(),
-        if client.hello().simulated {
-            "(simulated arm, simulated person)"
-        } else {
-            ""
-        }
+        if client.hello().simulated { "(simulated arm, simulated person)" } else { "" }
     );
     client.gravity().map_err(|error| failed(error.into()))?;
-    let recorder =
-        Recorder::start(&mut client, BufWriter::new(file), notes.trim_end()).map_err(failed)?;
+    let recorder = Recorder::start(&mut client, BufWriter::new(file), notes.trim_end()).map_err(failed)?;
     let recorded = record(command, global, &mut client, recorder);
     // Whatever happened, nobody holds the arm any more: let it hold itself.
     let held = client.hold();
@@ -203,19 +195,13 @@ use person::{begin_guiding, default_posture, guiding_is_over};
 
 /// Seven numbers separated by commas.
 pub(super) fn posture(text: &str) -> Result<Posture, String> {
-    let values: Result<Vec<f32>, _> = text
-        .split(',')
-        .map(|part| part.trim().parse::<f32>())
-        .collect();
-    let values =
-        values.map_err(|_| format!("`{text}` is not a list of numbers separated by commas"))?;
+    let values: Result<Vec<f32>, _> = text.split(',').map(|part| part.trim().parse::<f32>()).collect();
+    let values = values.map_err(|_| format!("`{text}` is not a list of numbers separated by commas"))?;
     if values.iter().any(|value| !value.is_finite()) {
         return Err("every angle must be finite".to_owned());
     }
     let found = values.len();
-    values
-        .try_into()
-        .map_err(|_| format!("7 joint angles are expected, {found} are given"))
+    values.try_into().map_err(|_| format!("7 joint angles are expected, {found} are given"))
 }
 
 /// A time worth recording, s.

@@ -40,19 +40,10 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         "name": listing.name.as_str(), "sent": sent, "bytes": listing.length, "crc": format!("0x{:08x}", listing.crc),
         "place": listing.index, "kernels": listing.kernels, "duration_s": listing.duration,
     });
-    let word = if sent {
-        "stored"
-    } else {
-        "already there, nothing sent"
-    };
+    let word = if sent { "stored" } else { "already there, nothing sent" };
     output.result(
         &data,
-        format!(
-            "{}: {word} ({} bytes, CRC 0x{:08x})",
-            listing.name.as_str(),
-            listing.length,
-            listing.crc
-        ),
+        format!("{}: {word} ({} bytes, CRC 0x{:08x})", listing.name.as_str(), listing.length, listing.crc),
     )
 }
 
@@ -65,27 +56,17 @@ pub(super) fn read(path: &Path, doing: &str) -> Result<PrimitiveFile, Failure> {
 }
 
 /// Plays the primitive on the host first, and refuses what would break a limit of the arm.
-pub(super) fn precheck(
-    file: &PrimitiveFile,
-    speed: f64,
-    output: Output,
-    doing: &str,
-) -> Result<(), Failure> {
+pub(super) fn precheck(file: &PrimitiveFile, speed: f64, output: Output, doing: &str) -> Result<(), Failure> {
     let bar = output.bar(100, "checking");
-    let report = check::check(file, speed, |fraction| {
-        bar.set_position((fraction * 100.0) as u64)
-    })
-    .map_err(|cause| super::check::failure(cause, &file.file, doing))?;
+    let report = check::check(file, speed, |fraction| bar.set_position((fraction * 100.0) as u64))
+        .map_err(|cause| super::check::failure(cause, &file.file, doing))?;
     bar.finish_and_clear();
     match report.violations.first() {
         None => Ok(()),
-        Some(first) => Err(Failure::new(
-            Exit::Invalid,
-            "E631",
-            format!("{doing} refused: the check failed"),
-            first.to_string(),
-        )
-        .help(format!("tactus check {}", file.file.display()))),
+        Some(first) => {
+            Err(Failure::new(Exit::Invalid, "E631", format!("{doing} refused: the check failed"), first.to_string())
+                .help(format!("tactus check {}", file.file.display())))
+        }
     }
 }
 
@@ -96,9 +77,7 @@ pub(super) fn send(
     output: Output,
     doing: &str,
 ) -> Result<UploadOutcome, Failure> {
-    let image = file
-        .to_image()
-        .map_err(|cause| super::check::failure(cause, &file.file, doing))?;
+    let image = file.to_image().map_err(|cause| super::check::failure(cause, &file.file, doing))?;
     let bar = output.bar(image.len() as u64, "sending");
     let outcome = client.upload(&image, |phase, done, all| {
         bar.set_length(all as u64);

@@ -19,18 +19,8 @@ pub struct Place {
 
 impl std::fmt::Display for Place {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            formatter,
-            "{}: line {}, column {}",
-            self.file.display(),
-            self.line,
-            self.column
-        )?;
-        if self.name.is_empty() {
-            Ok(())
-        } else {
-            write!(formatter, " ({})", self.name)
-        }
+        write!(formatter, "{}: line {}, column {}", self.file.display(), self.line, self.column)?;
+        if self.name.is_empty() { Ok(()) } else { write!(formatter, " ({})", self.name) }
     }
 }
 
@@ -135,9 +125,7 @@ pub enum RecordingError {
         needed: usize,
     },
     /// Two neighbouring samples are so far apart that interpolation would invent the movement between them.
-    #[error(
-        "{place}: {gap:.3} s are missing before this line, at most {longest:.3} s can be bridged"
-    )]
+    #[error("{place}: {gap:.3} s are missing before this line, at most {longest:.3} s can be bridged")]
     GapTooLong {
         /// The line behind the gap.
         place: Place,

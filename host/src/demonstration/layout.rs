@@ -48,9 +48,7 @@ pub fn joint_torques() -> [String; JOINTS] {
 
 /// Every column of our own layout in its order.
 pub fn header() -> Vec<String> {
-    let mut names: Vec<String> = [CYCLE, TIME, STATE, "fault", "flags", PHASE]
-        .map(String::from)
-        .to_vec();
+    let mut names: Vec<String> = [CYCLE, TIME, STATE, "fault", "flags", PHASE].map(String::from).to_vec();
     names.extend(joint_positions());
     names.extend(joint_velocities());
     names.extend(joint_torques());
@@ -72,11 +70,7 @@ pub fn intended(name: &str) -> Option<String> {
     let stem = |text: &str| text.split('_').next().unwrap_or_default().to_owned();
     for candidate in known {
         let desired = candidate.contains("_d_") || candidate.ends_with("_d");
-        if !desired
-            && candidate != name
-            && candidate.contains('_')
-            && stem(name) == stem(&candidate)
-        {
+        if !desired && candidate != name && candidate.contains('_') && stem(name) == stem(&candidate) {
             // `x_d_m` shares its stem with `x_m` but is a column of its own, `x_extra` is nobody's.
             let unit = &name[stem(name).len()..];
             let is_unit = matches!(

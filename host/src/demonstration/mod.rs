@@ -33,9 +33,7 @@ pub struct Preparation {
 
 impl Default for Preparation {
     fn default() -> Preparation {
-        Preparation {
-            still_speed: Some(0.005),
-        }
+        Preparation { still_speed: Some(0.005) }
     }
 }
 
@@ -89,10 +87,7 @@ impl Demonstration {
     ///
     /// # Errors
     /// The recording has no pose, has a gap longer than [`LONGEST_GAP`], or the arm hardly moves in it.
-    pub fn prepare(
-        recording: &Recording,
-        preparation: &Preparation,
-    ) -> Result<Demonstration, DemonstrationError> {
+    pub fn prepare(recording: &Recording, preparation: &Preparation) -> Result<Demonstration, DemonstrationError> {
         let (gap, behind) = recording.longest_gap;
         if gap > LONGEST_GAP {
             let column = 1 + usize::from(recording.cycle.is_some());
@@ -104,35 +99,27 @@ impl Demonstration {
             .into());
         }
         let grid = resample::grid(&recording.time, 1.0 / RATE);
-        let q = recording
-            .q
-            .as_ref()
-            .map(|values| resample::vectors(&recording.time, values, &grid));
-        let (position, orientation, pose_source) =
-            match (&q, &recording.position, &recording.orientation) {
-                (Some(q), _, _) => {
-                    let (position, mut orientation): (Vec<_>, Vec<_>) =
-                        q.iter().map(arm::tool_pose).unzip();
-                    recording::make_sign_continuous(&mut orientation);
-                    (position, orientation, PoseSource::JointAngles)
-                }
-                (None, Some(position), Some(orientation)) => (
-                    resample::vectors(&recording.time, position, &grid),
-                    resample::quaternions(&recording.time, orientation, &grid),
-                    PoseSource::PoseColumns,
-                ),
-                _ => {
-                    return Err(DemonstrationError::NoPose {
-                        file: recording.file.clone(),
-                        line: recording.header_line,
-                        column: recording.columns + 1,
-                    });
-                }
-            };
-        let wrench = recording
-            .wrench
-            .as_ref()
-            .map(|values| resample::vectors(&recording.time, values, &grid));
+        let q = recording.q.as_ref().map(|values| resample::vectors(&recording.time, values, &grid));
+        let (position, orientation, pose_source) = match (&q, &recording.position, &recording.orientation) {
+            (Some(q), _, _) => {
+                let (position, mut orientation): (Vec<_>, Vec<_>) = q.iter().map(arm::tool_pose).unzip();
+                recording::make_sign_continuous(&mut orientation);
+                (position, orientation, PoseSource::JointAngles)
+            }
+            (None, Some(position), Some(orientation)) => (
+                resample::vectors(&recording.time, position, &grid),
+                resample::quaternions(&recording.time, orientation, &grid),
+                PoseSource::PoseColumns,
+            ),
+            _ => {
+                return Err(DemonstrationError::NoPose {
+                    file: recording.file.clone(),
+                    line: recording.header_line,
+                    column: recording.columns + 1,
+                });
+            }
+        };
+        let wrench = recording.wrench.as_ref().map(|values| resample::vectors(&recording.time, values, &grid));
         let whole = Demonstration {
             time: grid.iter().map(|t| t - grid[0]).collect(),
             position,
@@ -145,11 +132,7 @@ impl Demonstration {
         whole.trim(recording, preparation)
     }
 
-    fn trim(
-        self,
-        recording: &Recording,
-        preparation: &Preparation,
-    ) -> Result<Demonstration, DemonstrationError> {
+    fn trim(self, recording: &Recording, preparation: &Preparation) -> Result<Demonstration, DemonstrationError> {
         let Some(threshold) = preparation.still_speed else {
             return Ok(self);
         };
@@ -170,19 +153,11 @@ impl Demonstration {
                 threshold,
             });
         }
-        let (first, last) = (
-            first.saturating_sub(REST),
-            (last + REST).min(speed.len() - 1),
-        );
-        let trimmed = (
-            self.time[first],
-            self.time[self.time.len() - 1] - self.time[last],
-        );
+        let (first, last) = (first.saturating_sub(REST), (last + REST).min(speed.len() - 1));
+        let trimmed = (self.time[first], self.time[self.time.len() - 1] - self.time[last]);
         let range = first..=last;
         Ok(Demonstration {
-            time: (0..=last - first)
-                .map(|index| index as f64 / RATE)
-                .collect(),
+            time: (0..=last - first).map(|index| index as f64 / RATE).collect(),
             position: self.position[range.clone()].to_vec(),
             orientation: self.orientation[range.clone()].to_vec(),
             q: self.q.map(|values| values[range.clone()].to_vec()),
@@ -231,9 +206,7 @@ impl Demonstration {
             .map(|axis| {
                 let values = self.position.iter().map(|position| position[axis]);
                 let (low, high) = values
-                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-                        (low.min(value), high.max(value))
-                    });
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
                 high - low
             })
             .fold(0.0, f64::max)
@@ -245,11 +218,6 @@ pub fn angle_between(a: &[f64; 4], b: &[f64; 4]) -> f64 {
     let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
     let sign = if dot < 0.0 { -1.0 } else { 1.0 };
     // The distance keeps its digits where the cosine has none left: at small angles.
-    let distance = a
-        .iter()
-        .zip(b)
-        .map(|(a, b)| (a - sign * b).powi(2))
-        .sum::<f64>()
-        .sqrt();
+    let distance = a.iter().zip(b).map(|(a, b)| (a - sign * b).powi(2)).sum::<f64>().sqrt();
     4.0 * (distance / 2.0).min(1.0).asin()
 }

@@ -70,10 +70,7 @@ impl Recording {
     /// # Errors
     /// The first thing that is wrong, with its line and column.
     pub fn read(file: &Path) -> Result<Recording, RecordingError> {
-        let bytes = std::fs::read(file).map_err(|cause| RecordingError::Unreadable {
-            file: file.to_owned(),
-            cause,
-        })?;
+        let bytes = std::fs::read(file).map_err(|cause| RecordingError::Unreadable { file: file.to_owned(), cause })?;
         Recording::parse(file, &bytes)
     }
 
@@ -91,10 +88,7 @@ impl Recording {
         let q = table.group(&layout::joint_positions(), &mut missing);
         let dq = table.group(&layout::joint_velocities(), &mut missing);
         let tau = table.group(&layout::joint_torques(), &mut missing);
-        let position_names = if layout::POSITION_ALIAS
-            .iter()
-            .any(|name| table.column(name).is_some())
-        {
+        let position_names = if layout::POSITION_ALIAS.iter().any(|name| table.column(name).is_some()) {
             layout::POSITION_ALIAS
         } else {
             layout::POSITION
@@ -144,21 +138,15 @@ impl Recording {
             None => None,
             Some(column) => Some(table.whole_numbers(column)?),
         };
-        let orientation = orientation
-            .map(|columns| table.quaternions(columns))
-            .transpose()?;
-        let orientation_d = orientation_d
-            .map(|columns| table.quaternions(columns))
-            .transpose()?;
+        let orientation = orientation.map(|columns| table.quaternions(columns)).transpose()?;
+        let orientation_d = orientation_d.map(|columns| table.quaternions(columns)).transpose()?;
         let (gaps, missing_samples, longest_gap) = count_gaps(&time, cycle.as_deref());
         Ok(Recording {
             file: file.to_owned(),
             checksum: checksum(bytes),
             header_line: table.header_line,
             columns: table.names.len(),
-            phase: table
-                .column(layout::PHASE)
-                .map(|column| table.rows.iter().map(|row| row[column]).collect()),
+            phase: table.column(layout::PHASE).map(|column| table.rows.iter().map(|row| row[column]).collect()),
             q: q.map(|columns| table.vectors(columns)),
             dq: dq.map(|columns| table.vectors(columns)),
             tau: tau.map(|columns| table.vectors(columns)),
@@ -197,9 +185,7 @@ impl Recording {
             return self.clone();
         };
         let names = [control::State::Run.name(), control::State::Coast.name()];
-        let keep: Vec<usize> = (0..self.len())
-            .filter(|index| names.contains(&states[*index].as_str()))
-            .collect();
+        let keep: Vec<usize> = (0..self.len()).filter(|index| names.contains(&states[*index].as_str())).collect();
         self.select(&keep)
     }
 
@@ -268,16 +254,12 @@ fn count_gaps(time: &[f64], cycle: Option<&[u32]>) -> (usize, usize, (f64, usize
     let mut sorted = steps.clone();
     sorted.sort_by(f64::total_cmp);
     let typical = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
-    let longest = steps
-        .iter()
-        .enumerate()
-        .fold((0.0, 0), |best, (index, step)| {
-            if *step > best.0 {
-                (*step, index + 1)
-            } else {
-                best
-            }
-        });
+    let longest = steps.iter().enumerate().fold(
+        (0.0, 0),
+        |best, (index, step)| {
+            if *step > best.0 { (*step, index + 1) } else { best }
+        },
+    );
     let lost = |index: usize| -> usize {
         match cycle {
             // The counter knows exactly what is missing; time only lets one guess.
@@ -288,10 +270,7 @@ fn count_gaps(time: &[f64], cycle: Option<&[u32]>) -> (usize, usize, (f64, usize
             None => 0,
         }
     };
-    let losses: Vec<usize> = (0..steps.len())
-        .map(lost)
-        .filter(|count| *count > 0)
-        .collect();
+    let losses: Vec<usize> = (0..steps.len()).map(lost).filter(|count| *count > 0).collect();
     (losses.len(), losses.iter().sum(), longest)
 }
 
@@ -313,14 +292,8 @@ impl<'a> Table<'a> {
             .has_headers(false)
             .trim(csv::Trim::All)
             .from_reader(bytes);
-        let mut table = Table {
-            file,
-            header_line: 0,
-            names: Vec::new(),
-            lines: Vec::new(),
-            rows: Vec::new(),
-            states: None,
-        };
+        let mut table =
+            Table { file, header_line: 0, names: Vec::new(), lines: Vec::new(), rows: Vec::new(), states: None };
         let mut record = csv::ByteRecord::new();
         let mut newlines = Newlines::new(bytes);
         loop {
@@ -328,10 +301,7 @@ impl<'a> Table<'a> {
                 Ok(true) => {}
                 Ok(false) => break,
                 Err(cause) => {
-                    return Err(RecordingError::Unreadable {
-                        file: file.to_owned(),
-                        cause: cause.into(),
-                    });
+                    return Err(RecordingError::Unreadable { file: file.to_owned(), cause: cause.into() });
                 }
             }
             // The reader's own line is that of the last byte it skipped, notes included: count from the offset.
@@ -344,9 +314,7 @@ impl<'a> Table<'a> {
             }
         }
         if table.names.is_empty() {
-            return Err(RecordingError::Empty {
-                file: file.to_owned(),
-            });
+            return Err(RecordingError::Empty { file: file.to_owned() });
         }
         Ok(table)
     }
@@ -354,15 +322,8 @@ impl<'a> Table<'a> {
     fn read_header(&mut self, line: u64, record: &csv::ByteRecord) -> Result<(), RecordingError> {
         self.header_line = line;
         for (index, field) in record.iter().enumerate() {
-            let name = String::from_utf8_lossy(field)
-                .trim_start_matches('\u{feff}')
-                .to_owned();
-            let place = Place {
-                file: self.file.to_owned(),
-                line,
-                column: index + 1,
-                name: name.clone(),
-            };
+            let name = String::from_utf8_lossy(field).trim_start_matches('\u{feff}').to_owned();
+            let place = Place { file: self.file.to_owned(), line, column: index + 1, name: name.clone() };
             if self.names.contains(&name) {
                 return Err(RecordingError::DuplicateColumn { place });
             }
@@ -406,10 +367,7 @@ impl<'a> Table<'a> {
                 text: text.chars().take(40).collect(),
             })?;
             if !value.is_finite() {
-                return Err(RecordingError::NotFinite {
-                    place: place(column, &self.names),
-                    value,
-                });
+                return Err(RecordingError::NotFinite { place: place(column, &self.names), value });
             }
             row.push(value);
         }
@@ -428,10 +386,7 @@ impl<'a> Table<'a> {
         names: &[impl AsRef<str>; SIZE],
         missing: &mut Vec<String>,
     ) -> Option<[usize; SIZE]> {
-        let found: Vec<Option<usize>> = names
-            .iter()
-            .map(|name| self.column(name.as_ref()))
-            .collect();
+        let found: Vec<Option<usize>> = names.iter().map(|name| self.column(name.as_ref())).collect();
         if found.iter().all(Option::is_none) {
             return None;
         }
@@ -445,10 +400,7 @@ impl<'a> Table<'a> {
     }
 
     fn vectors<const SIZE: usize>(&self, columns: [usize; SIZE]) -> Vec<[f64; SIZE]> {
-        self.rows
-            .iter()
-            .map(|row| columns.map(|column| row[column]))
-            .collect()
+        self.rows.iter().map(|row| columns.map(|column| row[column])).collect()
     }
 
     fn quaternions(&self, columns: [usize; 4]) -> Result<Vec<[f64; 4]>, RecordingError> {
@@ -456,10 +408,7 @@ impl<'a> Table<'a> {
         for (index, value) in values.iter_mut().enumerate() {
             let norm = value.iter().map(|part| part * part).sum::<f64>().sqrt();
             if (norm - 1.0).abs() > QUATERNION_NORM_TOLERANCE {
-                return Err(RecordingError::NotAUnitQuaternion {
-                    place: self.place(index, columns[0]),
-                    norm,
-                });
+                return Err(RecordingError::NotAUnitQuaternion { place: self.place(index, columns[0]), norm });
             }
             for part in value {
                 *part /= norm;
@@ -478,10 +427,7 @@ impl<'a> Table<'a> {
                 if value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value) {
                     Ok(value as u32)
                 } else {
-                    Err(RecordingError::NotANumber {
-                        place: self.place(index, column),
-                        text: format!("{value}"),
-                    })
+                    Err(RecordingError::NotANumber { place: self.place(index, column), text: format!("{value}") })
                 }
             })
             .collect()
@@ -502,11 +448,7 @@ impl<'a> Table<'a> {
 pub fn make_sign_continuous(quaternions: &mut [[f64; 4]]) {
     for index in 1..quaternions.len() {
         let before = quaternions[index - 1];
-        let dot: f64 = before
-            .iter()
-            .zip(&quaternions[index])
-            .map(|(a, b)| a * b)
-            .sum();
+        let dot: f64 = before.iter().zip(&quaternions[index]).map(|(a, b)| a * b).sum();
         if dot < 0.0 {
             quaternions[index] = quaternions[index].map(|part| -part);
         }
@@ -522,11 +464,7 @@ struct Newlines<'a> {
 
 impl<'a> Newlines<'a> {
     fn new(bytes: &'a [u8]) -> Newlines<'a> {
-        Newlines {
-            bytes,
-            offset: 0,
-            line: 1,
-        }
+        Newlines { bytes, offset: 0, line: 1 }
     }
 
     /// The line of the record that starts at or behind `offset`: notes and blank lines before it are passed over.

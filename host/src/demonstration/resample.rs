@@ -10,27 +10,19 @@ pub fn grid(time: &[f64], period: f64) -> Vec<f64> {
     };
     // A recorded time stamp of few digits may end a little before its grid point: do not lose that sample.
     let count = ((last - first) / period + 1e-2).floor() as usize + 1;
-    (0..count)
-        .map(|index| first + index as f64 * period)
-        .collect()
+    (0..count).map(|index| first + index as f64 * period).collect()
 }
 
 /// Index of the sample before `t` and the fraction of the way to the next.
 fn locate(time: &[f64], t: f64) -> (usize, f64) {
-    let after = time
-        .partition_point(|sample| *sample <= t)
-        .clamp(1, time.len() - 1);
+    let after = time.partition_point(|sample| *sample <= t).clamp(1, time.len() - 1);
     let (before, next) = (time[after - 1], time[after]);
     (after - 1, ((t - before) / (next - before)).clamp(0.0, 1.0))
 }
 
 /// Linear interpolation of vectors. At 300 Hz the chord lies `a dt^2 / 8` = 1.4 um off an arc of 1 m/s^2, far below
 /// the noise that the filter behind it removes.
-pub fn vectors<const SIZE: usize>(
-    time: &[f64],
-    values: &[[f64; SIZE]],
-    grid: &[f64],
-) -> Vec<[f64; SIZE]> {
+pub fn vectors<const SIZE: usize>(time: &[f64], values: &[[f64; SIZE]], grid: &[f64]) -> Vec<[f64; SIZE]> {
     grid.iter()
         .map(|t| {
             let (index, fraction) = locate(time, *t);

@@ -65,11 +65,7 @@ impl<W: Write> RecordingWriter<W> {
     /// What the output says.
     pub fn write(&mut self, row: &RecordingRow) -> io::Result<()> {
         let output = &mut self.output;
-        write!(
-            output,
-            "{},{},{},{},{},{}",
-            row.cycle, row.time, row.state, row.fault, row.flags, row.phase
-        )?;
+        write!(output, "{},{},{},{},{},{}", row.cycle, row.time, row.state, row.fault, row.flags, row.phase)?;
         for value in row.q.iter().chain(&row.dq).chain(&row.tau) {
             write!(output, ",{value}")?;
         }

@@ -5,9 +5,7 @@ use dmp::{Configuration, OrientationError, Quaternion};
 
 use super::LearnOptions;
 use crate::demonstration::{Demonstration, RATE};
-use crate::primitive_file::{
-    Gain, HemisphereKind, OrientationErrorKind, PrimitiveFile, Waypoint, WaypointVelocity,
-};
+use crate::primitive_file::{Gain, HemisphereKind, OrientationErrorKind, PrimitiveFile, Waypoint, WaypointVelocity};
 
 /// The fitted primitive, without name and provenance.
 pub(super) fn fit(
@@ -16,19 +14,10 @@ pub(super) fn fit(
     hand: &[[f64; 4]],
     options: &LearnOptions,
 ) -> Result<PrimitiveFile, String> {
-    let orientation = demonstration
-        .orientation
-        .iter()
-        .map(|[w, x, y, z]| Quaternion::new(*w, *x, *y, *z))
-        .collect();
-    let samples = Samples::new(
-        1.0 / RATE,
-        demonstration.position.clone(),
-        orientation,
-        posture.to_vec(),
-        hand.to_vec(),
-    )
-    .map_err(|error| error.to_string())?;
+    let orientation = demonstration.orientation.iter().map(|[w, x, y, z]| Quaternion::new(*w, *x, *y, *z)).collect();
+    let samples =
+        Samples::new(1.0 / RATE, demonstration.position.clone(), orientation, posture.to_vec(), hand.to_vec())
+            .map_err(|error| error.to_string())?;
     let learned = dmp::fit::fit(
         &samples,
         &FitOptions {
@@ -64,11 +53,7 @@ pub(super) fn fit(
             hand: learned.start_velocity.hand,
         },
         goal: waypoint(&learned.goal),
-        weights: learned
-            .weights
-            .chunks(learned.options.kernel_count)
-            .map(<[f64]>::to_vec)
-            .collect(),
+        weights: learned.weights.chunks(learned.options.kernel_count).map(<[f64]>::to_vec).collect(),
         feedback: None,
         expectation: None,
         provenance: None,

@@ -17,11 +17,7 @@ pub struct HandMotion {
 impl Default for HandMotion {
     /// An open hand that stays open.
     fn default() -> HandMotion {
-        HandMotion {
-            start: [0.0; 4],
-            goal: [0.0; 4],
-            window: (0.6, 1.0),
-        }
+        HandMotion { start: [0.0; 4], goal: [0.0; 4], window: (0.6, 1.0) }
     }
 }
 
@@ -29,10 +25,7 @@ impl HandMotion {
     /// Whether numbers are finite and the window lies in order within the movement.
     pub fn is_valid(&self) -> bool {
         let (begin, end) = self.window;
-        self.start
-            .iter()
-            .chain(&self.goal)
-            .all(|value| value.is_finite())
+        self.start.iter().chain(&self.goal).all(|value| value.is_finite())
             && (0.0..1.0).contains(&begin)
             && begin < end
             && end <= 1.0
@@ -46,9 +39,7 @@ impl HandMotion {
                 let fraction = index as f64 / (samples.max(2) - 1) as f64;
                 let r = ((fraction - begin) / (end - begin)).clamp(0.0, 1.0);
                 let blend = r * r * r * (10.0 + r * (6.0 * r - 15.0));
-                std::array::from_fn(|joint| {
-                    self.start[joint] + blend * (self.goal[joint] - self.start[joint])
-                })
+                std::array::from_fn(|joint| self.start[joint] + blend * (self.goal[joint] - self.start[joint]))
             })
             .collect()
     }
@@ -60,19 +51,12 @@ mod tests {
 
     #[test]
     fn fingers_move_within_their_window_only_and_at_most_at_the_minimum_jerk_speed() {
-        let motion = HandMotion {
-            start: [0.0, 0.1, 0.1, 0.1],
-            goal: [0.0, 2.1, 2.1, 2.1],
-            window: (0.5, 0.9),
-        };
+        let motion = HandMotion { start: [0.0, 0.1, 0.1, 0.1], goal: [0.0, 2.1, 2.1, 2.1], window: (0.5, 0.9) };
         let samples = motion.samples(1001);
         assert_eq!(samples[500], motion.start);
         assert_eq!(samples[900], motion.goal);
         assert_eq!(samples[1000], motion.goal);
-        let fastest = samples
-            .windows(2)
-            .map(|pair| pair[1][1] - pair[0][1])
-            .fold(0.0, f64::max);
+        let fastest = samples.windows(2).map(|pair| pair[1][1] - pair[0][1]).fold(0.0, f64::max);
         // Peak speed of a minimum jerk: 1.875 times the mean speed, here 2 rad in 400 steps.
         assert!((fastest - 1.875 * 2.0 / 400.0).abs() < 1e-5, "{fastest}");
     }

@@ -14,9 +14,7 @@ use std::path::{Path, PathBuf};
 use dmp::fit::{LARGEST_ANGLE, LARGEST_ROTATION_VECTOR, WARNING_ANGLE};
 use thiserror::Error;
 
-use crate::demonstration::{
-    Demonstration, DemonstrationError, PoseSource, Preparation, Recording, angle_between,
-};
+use crate::demonstration::{Demonstration, DemonstrationError, PoseSource, Preparation, Recording, angle_between};
 use crate::plan;
 use crate::plot::movement::rotation_vectors;
 use crate::primitive_file::{OrientationErrorKind, PrimitiveFile, PrimitiveFileError, Provenance};
@@ -117,16 +115,11 @@ pub struct Learned {
 ///
 /// # Errors
 /// [`LearnError`].
-pub fn learn(
-    recording: &Recording,
-    file: &Path,
-    options: &LearnOptions,
-) -> Result<Learned, LearnError> {
+pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Result<Learned, LearnError> {
     if !options.hand.is_valid() {
         return Err(LearnError::Option {
             option: "--hand-window",
-            reason: "two fractions of the duration in order, between 0 and 1, are expected"
-                .to_owned(),
+            reason: "two fractions of the duration in order, between 0 and 1, are expected".to_owned(),
         });
     }
     let demonstration = Demonstration::prepare(recording, &options.preparation)?;
@@ -154,11 +147,8 @@ pub fn learn(
         check_pose_columns(recording, &mut warnings);
     }
     let hand = options.hand.samples(demonstration.len());
-    let fitted =
-        fit::fit(&demonstration, &posture, &hand, options).map_err(|reason| LearnError::Fit {
-            file: recording.file.clone(),
-            reason,
-        })?;
+    let fitted = fit::fit(&demonstration, &posture, &hand, options)
+        .map_err(|reason| LearnError::Fit { file: recording.file.clone(), reason })?;
     let mut primitive = PrimitiveFile {
         file: file.to_owned(),
         name: options.name.clone(),
@@ -166,21 +156,9 @@ pub fn learn(
         provenance: None,
         ..fitted
     };
-    let report = compare(
-        &primitive,
-        recording,
-        &demonstration,
-        &posture,
-        &hand,
-        largest_angle,
-        warnings,
-    )?;
+    let report = compare(&primitive, recording, &demonstration, &posture, &hand, largest_angle, warnings)?;
     primitive.provenance = Some(Provenance {
-        demonstration: recording
-            .file
-            .file_name()
-            .map(|name| name.to_string_lossy().into_owned())
-            .unwrap_or_default(),
+        demonstration: recording.file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
         demonstration_checksum: recording.checksum,
         samples: demonstration.len(),
         trimmed: demonstration.trimmed.into(),
@@ -190,11 +168,7 @@ pub fn learn(
         posture_error: group_error(&report, 6..13),
         tool: format!("tactus {}", env!("CARGO_PKG_VERSION")),
     });
-    Ok(Learned {
-        primitive,
-        report,
-        demonstration,
-    })
+    Ok(Learned { primitive, report, demonstration })
 }
 
 /// Largest angle to the goal along the way that was shown, rad, or why it is too large.
@@ -208,13 +182,8 @@ fn check_angle(
     let angles = rotation_vectors(&goal, &demonstration.orientation)
         .into_iter()
         .map(|vector| vector.iter().map(|part| part * part).sum::<f64>().sqrt());
-    let (worst, angle) = angles.enumerate().fold((0, 0.0), |worst, (index, angle)| {
-        if angle > worst.1 {
-            (index, angle)
-        } else {
-            worst
-        }
-    });
+    let (worst, angle) =
+        angles.enumerate().fold((0, 0.0), |worst, (index, angle)| if angle > worst.1 { (index, angle) } else { worst });
     let limit = match options.orientation_error {
         OrientationErrorKind::Quaternion => LARGEST_ANGLE,
         OrientationErrorKind::RotationVector => LARGEST_ROTATION_VECTOR,
@@ -222,10 +191,7 @@ fn check_angle(
     if angle > limit {
         // The demonstration was resampled and trimmed: find the recorded line at the same time.
         let time = recording.time[0] + demonstration.trimmed.0 + demonstration.time[worst];
-        let sample = recording
-            .time
-            .partition_point(|t| *t < time)
-            .min(recording.len() - 1);
+        let sample = recording.time.partition_point(|t| *t < time).min(recording.len() - 1);
         return Err(LearnError::TurnsTooFar {
             file: recording.file.clone(),
             line: recording.lines[sample],
@@ -246,22 +212,15 @@ fn check_angle(
 
 /// Warns if pose columns contradict the joint angles: another tool frame, or another model of the arm.
 fn check_pose_columns(recording: &Recording, warnings: &mut Vec<String>) {
-    let (Some(q), Some(position), Some(orientation)) =
-        (&recording.q, &recording.position, &recording.orientation)
+    let (Some(q), Some(position), Some(orientation)) = (&recording.q, &recording.position, &recording.orientation)
     else {
         return;
     };
     let mut worst = (0.0_f64, 0.0_f64);
     for ((q, x), orientation) in q.iter().zip(position).zip(orientation) {
         let (computed, turned) = crate::arm::tool_pose(q);
-        let distance = (0..3)
-            .map(|axis| (computed[axis] - x[axis]).powi(2))
-            .sum::<f64>()
-            .sqrt();
-        worst = (
-            worst.0.max(distance),
-            worst.1.max(angle_between(&turned, orientation)),
-        );
+        let distance = (0..3).map(|axis| (computed[axis] - x[axis]).powi(2)).sum::<f64>().sqrt();
+        worst = (worst.0.max(distance), worst.1.max(angle_between(&turned, orientation)));
     }
     if worst.0 > 1e-3 || worst.1 > 0.5_f64.to_radians() {
         warnings.push(format!(
@@ -283,10 +242,8 @@ fn compare(
     warnings: Vec<String>,
 ) -> Result<FitReport, LearnError> {
     let primitive = file.to_primitive()?;
-    let references = plan::roll_out(&primitive).map_err(|error| LearnError::Fit {
-        file: recording.file.clone(),
-        reason: error.to_string(),
-    })?;
+    let references = plan::roll_out(&primitive)
+        .map_err(|error| LearnError::Fit { file: recording.file.clone(), reason: error.to_string() })?;
     let count = references.len().min(demonstration.len());
     let references = &references[..count];
     let orientation: Vec<[f64; 4]> = references.iter().map(plan::orientation).collect();
@@ -295,14 +252,8 @@ fn compare(
         rows.push(row_error(rows.len(), &errors, &shown));
     };
     for axis in 0..3 {
-        let shown: Vec<f64> = demonstration.position[..count]
-            .iter()
-            .map(|x| x[axis])
-            .collect();
-        let errors = references
-            .iter()
-            .zip(&shown)
-            .map(|(reference, x)| reference.position.x[axis] - x);
+        let shown: Vec<f64> = demonstration.position[..count].iter().map(|x| x[axis]).collect();
+        let errors = references.iter().zip(&shown).map(|(reference, x)| reference.position.x[axis] - x);
         add(errors.collect(), shown);
     }
     let goal = demonstration.orientation[demonstration.len() - 1];
@@ -316,37 +267,23 @@ fn compare(
     for axis in 0..3 {
         add(
             error_vectors.iter().map(|vector| vector[axis]).collect(),
-            shown_vectors[..count]
-                .iter()
-                .map(|vector| vector[axis])
-                .collect(),
+            shown_vectors[..count].iter().map(|vector| vector[axis]).collect(),
         );
     }
     for joint in 0..7 {
         let shown: Vec<f64> = posture[..count].iter().map(|q| q[joint]).collect();
-        let errors = references
-            .iter()
-            .zip(&shown)
-            .map(|(reference, q)| reference.posture.x[joint] - q);
+        let errors = references.iter().zip(&shown).map(|(reference, q)| reference.posture.x[joint] - q);
         add(errors.collect(), shown);
     }
     for joint in 0..4 {
         let shown: Vec<f64> = hand[..count].iter().map(|q| q[joint]).collect();
-        let errors = references
-            .iter()
-            .zip(&shown)
-            .map(|(reference, q)| reference.hand.x[joint] - q);
+        let errors = references.iter().zip(&shown).map(|(reference, q)| reference.hand.x[joint] - q);
         add(errors.collect(), shown);
     }
     let distances: Vec<f64> = references
         .iter()
         .zip(&demonstration.position)
-        .map(|(reference, x)| {
-            (0..3)
-                .map(|axis| (reference.position.x[axis] - x[axis]).powi(2))
-                .sum::<f64>()
-                .sqrt()
-        })
+        .map(|(reference, x)| (0..3).map(|axis| (reference.position.x[axis] - x[axis]).powi(2)).sum::<f64>().sqrt())
         .collect();
     let angles: Vec<f64> = orientation
         .iter()
@@ -354,10 +291,7 @@ fn compare(
         .map(|(planned, shown)| angle_between(planned, shown))
         .collect();
     let path = |orientations: &[[f64; 4]]| -> f64 {
-        orientations
-            .windows(2)
-            .map(|pair| angle_between(&pair[0], &pair[1]))
-            .sum()
+        orientations.windows(2).map(|pair| angle_between(&pair[0], &pair[1])).sum()
     };
     let shown_path = path(&demonstration.orientation[..count]);
     let position_rms = root_mean_square(&distances);
@@ -376,17 +310,9 @@ fn compare(
         orientation_max_rad: largest(&angles),
         orientation_rms_rad: root_mean_square(&angles),
         // Below a hundredth of a radian the path is noise: a ratio to it says nothing.
-        orientation_path_ratio: if shown_path > 0.01 {
-            path(&orientation) / shown_path
-        } else {
-            1.0
-        },
+        orientation_path_ratio: if shown_path > 0.01 { path(&orientation) / shown_path } else { 1.0 },
         rows,
-        wrench: demonstration
-            .wrench
-            .as_deref()
-            .map(wrench_statistics)
-            .unwrap_or_default(),
+        wrench: demonstration.wrench.as_deref().map(wrench_statistics).unwrap_or_default(),
         warnings,
     })
 }

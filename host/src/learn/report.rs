@@ -139,10 +139,7 @@ impl FitReport {
                 format!("{:.6}", row.max),
                 format!("{:.6}", row.rms),
                 row.unit.to_owned(),
-                row.relative.map_or_else(
-                    || "-".to_owned(),
-                    |relative| format!("{:.3} %", relative * 100.0),
-                ),
+                row.relative.map_or_else(|| "-".to_owned(), |relative| format!("{:.3} %", relative * 100.0)),
             ]);
         }
         text += &rows.to_string();
@@ -177,8 +174,7 @@ pub fn wrench_statistics(wrench: &[[f64; 6]]) -> Vec<WrenchStatistics> {
                 axis,
                 unit,
                 mean,
-                deviation: (values().map(|value| (value - mean).powi(2)).sum::<f64>() / count)
-                    .sqrt(),
+                deviation: (values().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt(),
                 min: values().fold(f64::INFINITY, f64::min),
                 max: values().fold(f64::NEG_INFINITY, f64::max),
             }
@@ -189,20 +185,11 @@ pub fn wrench_statistics(wrench: &[[f64; 6]]) -> Vec<WrenchStatistics> {
 /// Largest and RMS value of errors, and the latter relative to the extent of `shown`.
 pub fn row_error(index: usize, errors: &[f64], shown: &[f64]) -> RowError {
     let (row, unit) = ROW_NAMES[index];
-    let max = errors
-        .iter()
-        .fold(0.0_f64, |max, error| max.max(error.abs()));
-    let rms =
-        (errors.iter().map(|error| error * error).sum::<f64>() / errors.len().max(1) as f64).sqrt();
+    let max = errors.iter().fold(0.0_f64, |max, error| max.max(error.abs()));
+    let rms = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len().max(1) as f64).sqrt();
     let low = shown.iter().copied().fold(f64::INFINITY, f64::min);
     let high = shown.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     // A row that moves less than this (1 um, 1 urad) stands still: a ratio to it says nothing.
     let extent = high - low;
-    RowError {
-        row,
-        unit,
-        max,
-        rms,
-        relative: (extent > 1e-6).then(|| rms / extent),
-    }
+    RowError { row, unit, max, rms, relative: (extent > 1e-6).then(|| rms / extent) }
 }

@@ -131,9 +131,7 @@ pub struct Page {
 impl Page {
     /// The page as SVG with its font inside.
     pub fn to_svg(&self) -> String {
-        SvgBackend::new()
-            .with_embedded_font(true)
-            .render_scene(&self.scene())
+        SvgBackend::new().with_embedded_font(true).render_scene(&self.scene())
     }
 
     /// The page as PNG of [`PAGE_WIDTH`] times `scale` pixels.
@@ -141,9 +139,7 @@ impl Page {
     /// # Errors
     /// What the encoder says.
     pub fn to_png(&self, scale: f32) -> Result<Vec<u8>, String> {
-        RasterBackend::new()
-            .with_scale(scale)
-            .render_scene(&self.scene())
+        RasterBackend::new().with_scale(scale).render_scene(&self.scene())
     }
 
     fn scene(&self) -> Scene {
@@ -177,11 +173,8 @@ impl Page {
     /// One line below the panels, outside the data. (The plotting crate's own shared legend stacks its entries.)
     fn draw_legend(&self, scene: &mut Scene) {
         let text_width = |label: &str| label.chars().count() as f64 * 0.56 * f64::from(LEGEND_SIZE);
-        let widths: Vec<f64> = self
-            .legend
-            .iter()
-            .map(|(_, label)| LEGEND_LINE + 10.0 + text_width(label) + LEGEND_GAP)
-            .collect();
+        let widths: Vec<f64> =
+            self.legend.iter().map(|(_, label)| LEGEND_LINE + 10.0 + text_width(label) + LEGEND_GAP).collect();
         let mut x = (scene.width - widths.iter().sum::<f64>() + LEGEND_GAP) / 2.0;
         let y = scene.height + LEGEND_HEIGHT / 2.0 - 8.0;
         for ((ink, label), width) in self.legend.iter().zip(&widths) {
@@ -218,12 +211,7 @@ impl Page {
             (ROW_HEIGHT - MARGINS.1) / (high - low).max(f64::MIN_POSITIVE),
         );
         let line = |ink: Ink, points: Vec<(f64, f64)>| {
-            Plot::Line(
-                LinePlot::new()
-                    .with_data(points)
-                    .with_color(ink.colour())
-                    .with_stroke_width(ink.width()),
-            )
+            Plot::Line(LinePlot::new().with_data(points).with_color(ink.colour()).with_stroke_width(ink.width()))
         };
         panel
             .curves
@@ -232,10 +220,9 @@ impl Page {
                 let points = thin(&curve.points);
                 match curve.ink.dashes() {
                     None => vec![line(curve.ink, points)],
-                    Some(pattern) => dashes(&points, pattern, scale)
-                        .into_iter()
-                        .map(|dash| line(curve.ink, dash))
-                        .collect(),
+                    Some(pattern) => {
+                        dashes(&points, pattern, scale).into_iter().map(|dash| line(curve.ink, dash)).collect()
+                    }
                 }
             })
             .collect()
@@ -277,9 +264,8 @@ impl Panel {
             .iter()
             .flat_map(|curve| curve.points.iter().map(|point| point.1))
             .filter(|value| value.is_finite());
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-            (low.min(value), high.max(value))
-        });
+        let (low, high) =
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
         if low > high {
             return (0.0, self.least_height.max(1e-9));
         }
@@ -353,11 +339,7 @@ fn dashes(points: &[(f64, f64)], pattern: (f64, f64), scale: (f64, f64)) -> Vec<
 fn plain_number(value: f64) -> String {
     let text = format!("{value:.6}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" {
-        "0".to_owned()
-    } else {
-        text.to_owned()
-    }
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
 #[cfg(test)]

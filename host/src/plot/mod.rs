@@ -46,23 +46,13 @@ pub enum PlotError {
 /// # Errors
 /// [`PlotError`] other than [`PlotError::Nothing`].
 pub fn write(page: &Page, file: &Path) -> Result<(), PlotError> {
-    let extension = file
-        .extension()
-        .map(|extension| extension.to_string_lossy().to_lowercase());
+    let extension = file.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     let bytes = match extension.as_deref() {
         Some("svg") => page.to_svg().into_bytes(),
-        Some("png") => page.to_png(1.0).map_err(|reason| PlotError::Encode {
-            file: file.to_owned(),
-            reason,
-        })?,
+        Some("png") => page.to_png(1.0).map_err(|reason| PlotError::Encode { file: file.to_owned(), reason })?,
         _ => {
-            return Err(PlotError::Format {
-                file: file.to_owned(),
-            });
+            return Err(PlotError::Format { file: file.to_owned() });
         }
     };
-    std::fs::write(file, bytes).map_err(|cause| PlotError::Write {
-        file: file.to_owned(),
-        cause,
-    })
+    std::fs::write(file, bytes).map_err(|cause| PlotError::Write { file: file.to_owned(), cause })
 }

@@ -70,15 +70,12 @@ impl Movement {
             .and_then(|path| path.orientation.last())
             .ok_or(PlotError::Nothing)?;
         let mut rows = vec![position_panels(&paths), orientation_panels(&paths, goal)];
-        let mut legend: Vec<(Ink, String)> = [
-            (Ink::Demonstration, "demonstration"),
-            (Ink::Plan, "plan"),
-            (Ink::Execution, "execution"),
-        ]
-        .into_iter()
-        .filter(|(ink, _)| paths.iter().any(|(drawn, _)| drawn == ink))
-        .map(|(ink, label)| (ink, label.to_owned()))
-        .collect();
+        let mut legend: Vec<(Ink, String)> =
+            [(Ink::Demonstration, "demonstration"), (Ink::Plan, "plan"), (Ink::Execution, "execution")]
+                .into_iter()
+                .filter(|(ink, _)| paths.iter().any(|(drawn, _)| drawn == ink))
+                .map(|(ink, label)| (ink, label.to_owned()))
+                .collect();
         if let Some(run) = &self.execution {
             let panels = error_panels(run);
             if !panels.is_empty() {
@@ -89,20 +86,12 @@ impl Movement {
                 legend.push((Ink::Limit, "torque limit of the joint".to_owned()));
             }
             if run.wrench.is_some() {
-                for (ink, label) in [
-                    (Ink::First, "force x"),
-                    (Ink::Second, "force y"),
-                    (Ink::Third, "force z"),
-                ] {
+                for (ink, label) in [(Ink::First, "force x"), (Ink::Second, "force y"), (Ink::Third, "force z")] {
                     legend.push((ink, label.to_owned()));
                 }
             }
         }
-        let end = paths
-            .iter()
-            .filter_map(|(_, path)| path.time.last())
-            .copied()
-            .fold(0.1, f64::max);
+        let end = paths.iter().filter_map(|(_, path)| path.time.last()).copied().fold(0.1, f64::max);
         let shown: Vec<&str> = legend
             .iter()
             .filter(|(ink, _)| matches!(ink, Ink::Demonstration | Ink::Plan | Ink::Execution))
@@ -129,11 +118,7 @@ fn relative_time(run: &Recording) -> Vec<f64> {
 }
 
 fn execution_path(run: &Recording) -> Option<PosePath> {
-    Some(PosePath {
-        time: relative_time(run),
-        position: run.position.clone()?,
-        orientation: run.orientation.clone()?,
-    })
+    Some(PosePath { time: relative_time(run), position: run.position.clone()?, orientation: run.orientation.clone()? })
 }
 
 fn desired_path(run: &Recording) -> Option<PosePath> {
@@ -145,10 +130,7 @@ fn desired_path(run: &Recording) -> Option<PosePath> {
 }
 
 fn curve(ink: Ink, time: &[f64], values: impl Iterator<Item = f64>) -> Curve {
-    Curve {
-        ink,
-        points: time.iter().copied().zip(values).collect(),
-    }
+    Curve { ink, points: time.iter().copied().zip(values).collect() }
 }
 
 fn position_panels(paths: &[(Ink, &PosePath)]) -> Vec<Panel> {
@@ -169,10 +151,7 @@ fn position_panels(paths: &[(Ink, &PosePath)]) -> Vec<Panel> {
 }
 
 fn orientation_panels(paths: &[(Ink, &PosePath)], goal: &[f64; 4]) -> Vec<Panel> {
-    let vectors: Vec<Vec<[f64; 3]>> = paths
-        .iter()
-        .map(|(_, path)| rotation_vectors(goal, &path.orientation))
-        .collect();
+    let vectors: Vec<Vec<[f64; 3]>> = paths.iter().map(|(_, path)| rotation_vectors(goal, &path.orientation)).collect();
     ["x", "y", "z"]
         .iter()
         .enumerate()
@@ -182,13 +161,7 @@ fn orientation_panels(paths: &[(Ink, &PosePath)], goal: &[f64; 4]) -> Vec<Panel>
             curves: paths
                 .iter()
                 .zip(&vectors)
-                .map(|((ink, path), vectors)| {
-                    curve(
-                        *ink,
-                        &path.time,
-                        vectors.iter().map(|r| r[axis].to_degrees()),
-                    )
-                })
+                .map(|((ink, path), vectors)| curve(*ink, &path.time, vectors.iter().map(|r| r[axis].to_degrees())))
                 .collect(),
             least_height: 4.0,
             from_zero: false,
@@ -207,11 +180,7 @@ fn error_panels(run: &Recording) -> Vec<Panel> {
                 tracking.position_end_m * 1e3
             ),
             y_label: "distance to plan (mm)".to_owned(),
-            curves: vec![curve(
-                Ink::Execution,
-                &time,
-                errors.iter().map(|error| error.0 * 1e3),
-            )],
+            curves: vec![curve(Ink::Execution, &time, errors.iter().map(|error| error.0 * 1e3))],
             least_height: 1.0,
             from_zero: true,
         });
@@ -222,11 +191,7 @@ fn error_panels(run: &Recording) -> Vec<Panel> {
                 tracking.orientation_end_rad.to_degrees()
             ),
             y_label: "angle to plan (deg)".to_owned(),
-            curves: vec![curve(
-                Ink::Execution,
-                &time,
-                errors.iter().map(|error| error.1.to_degrees()),
-            )],
+            curves: vec![curve(Ink::Execution, &time, errors.iter().map(|error| error.1.to_degrees()))],
             least_height: 0.2,
             from_zero: true,
         });
@@ -258,23 +223,14 @@ fn torque_panels(run: &Recording) -> Vec<Vec<Panel>> {
     let limits = *crate::arm::TORQUE_LIMITS;
     let panel = |joint: usize| {
         let torque: Vec<f64> = tau.iter().map(|tau| tau[joint]).collect();
-        let peak = torque
-            .iter()
-            .fold(0.0_f64, |peak, value| peak.max(value.abs()));
+        let peak = torque.iter().fold(0.0_f64, |peak, value| peak.max(value.abs()));
         let limit = limits[joint];
         let mut curves = vec![curve(Ink::Execution, &time, torque.into_iter())];
         for side in [-limit, limit] {
-            curves.push(Curve {
-                ink: Ink::Limit,
-                points: vec![(0.0, side), (end, side)],
-            });
+            curves.push(Curve { ink: Ink::Limit, points: vec![(0.0, side), (end, side)] });
         }
         Panel {
-            title: format!(
-                "Torque J{}: peak {:.0} % of limit",
-                joint + 1,
-                100.0 * peak / limit
-            ),
+            title: format!("Torque J{}: peak {:.0} % of limit", joint + 1, 100.0 * peak / limit),
             y_label: "torque (N m)".to_owned(),
             curves,
             least_height: 0.1,
@@ -289,26 +245,15 @@ fn torque_panels(run: &Recording) -> Vec<Vec<Panel>> {
                 Ink::Execution,
                 &time,
                 tau.iter().map(|tau| {
-                    100.0
-                        * tau
-                            .iter()
-                            .zip(&limits)
-                            .map(|(tau, limit)| tau.abs() / limit)
-                            .fold(0.0, f64::max)
+                    100.0 * tau.iter().zip(&limits).map(|(tau, limit)| tau.abs() / limit).fold(0.0, f64::max)
                 }),
             ),
-            Curve {
-                ink: Ink::Limit,
-                points: vec![(0.0, 100.0), (end, 100.0)],
-            },
+            Curve { ink: Ink::Limit, points: vec![(0.0, 100.0), (end, 100.0)] },
         ],
         least_height: 100.0,
         from_zero: true,
     };
-    vec![
-        (0..4).map(panel).collect(),
-        (4..7).map(panel).chain([share]).collect(),
-    ]
+    vec![(0..4).map(panel).collect(), (4..7).map(panel).chain([share]).collect()]
 }
 
 /// Rotation vectors from `goal`, body axes, rad, continuous over a path: beyond 180 degrees the vector goes on
@@ -369,9 +314,8 @@ mod tests {
     #[test]
     fn a_turn_beyond_half_a_revolution_does_not_jump() {
         let goal = [1.0, 0.0, 0.0, 0.0];
-        let path: Vec<[f64; 4]> = (0..=100)
-            .map(|k| about([0.0, 1.0, 0.0], 5.0 * (1.0 - f64::from(k) / 100.0)))
-            .collect();
+        let path: Vec<[f64; 4]> =
+            (0..=100).map(|k| about([0.0, 1.0, 0.0], 5.0 * (1.0 - f64::from(k) / 100.0))).collect();
         let vectors = rotation_vectors(&goal, &path);
         assert!((vectors[0][1] - 5.0).abs() < 1e-9);
         for pair in vectors.windows(2) {

@@ -1,17 +1,12 @@
 //! From the file to what a controller runs: `dmp::Primitive` on the host, the image for a device.
 
 use dmp::{
-    Configuration, ExpectedWrench, Feedback, GainSchedule, Hemisphere, Limits, OrientationError,
-    Primitive, PrimitiveTables, Quaternion, TableError, Velocity,
+    Configuration, ExpectedWrench, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, Primitive,
+    PrimitiveTables, Quaternion, TableError, Velocity,
 };
-use link::image::{
-    ExpectationMarks, FeedbackClamps, IMAGE_BYTES_LIMIT, ImageContent, PrimitiveImage,
-};
+use link::image::{ExpectationMarks, FeedbackClamps, IMAGE_BYTES_LIMIT, ImageContent, PrimitiveImage};
 
-use super::{
-    HemisphereKind, OrientationErrorKind, PrimitiveFile, PrimitiveFileError, Waypoint,
-    WaypointVelocity,
-};
+use super::{HemisphereKind, OrientationErrorKind, PrimitiveFile, PrimitiveFileError, Waypoint, WaypointVelocity};
 
 /// Most kernels of a row, the same as on a device.
 pub const KERNEL_CAPACITY: usize = control::MAX_KERNELS;
@@ -25,10 +20,7 @@ impl PrimitiveFile {
     /// # Errors
     /// [`PrimitiveFileError::Invalid`] with the reason that `dmp` gives.
     pub fn to_primitive(&self) -> Result<HostPrimitive, PrimitiveFileError> {
-        let refused = |reason: String| PrimitiveFileError::Invalid {
-            file: self.file.clone(),
-            reason,
-        };
+        let refused = |reason: String| PrimitiveFileError::Invalid { file: self.file.clone(), reason };
         let weights = self.weights.concat();
         let feedback = self
             .feedback
@@ -37,11 +29,7 @@ impl PrimitiveFile {
                 Feedback::new(
                     GainSchedule::new(&points(&tables.k1))?,
                     GainSchedule::new(&points(&tables.k2))?,
-                    Limits {
-                        displacement: tables.clamps[0],
-                        rotation: tables.clamps[1],
-                        hand: tables.clamps[2],
-                    },
+                    Limits { displacement: tables.clamps[0], rotation: tables.clamps[1], hand: tables.clamps[2] },
                 )
             })
             .transpose()
@@ -82,30 +70,13 @@ impl PrimitiveFile {
     /// # Errors
     /// [`PrimitiveFileError::Image`], for example for more kernels than an image can hold.
     pub fn to_image(&self) -> Result<Vec<u8>, PrimitiveFileError> {
-        let refused = |cause| PrimitiveFileError::Image {
-            file: self.file.clone(),
-            cause,
-        };
-        let single = |rows: &[Vec<f64>]| -> Vec<f32> {
-            rows.iter().flatten().map(|value| *value as f32).collect()
-        };
+        let refused = |cause| PrimitiveFileError::Image { file: self.file.clone(), cause };
+        let single = |rows: &[Vec<f64>]| -> Vec<f32> { rows.iter().flatten().map(|value| *value as f32).collect() };
         let weights = single(&self.weights);
-        let k1 = self
-            .feedback
-            .as_ref()
-            .map_or_else(Vec::new, |tables| single(&tables.k1));
-        let k2 = self
-            .feedback
-            .as_ref()
-            .map_or_else(Vec::new, |tables| single(&tables.k2));
-        let mean = self
-            .expectation
-            .as_ref()
-            .map_or_else(Vec::new, |table| single(&table.mean));
-        let spread = self
-            .expectation
-            .as_ref()
-            .map_or_else(Vec::new, |table| single(&table.spread));
+        let k1 = self.feedback.as_ref().map_or_else(Vec::new, |tables| single(&tables.k1));
+        let k2 = self.feedback.as_ref().map_or_else(Vec::new, |tables| single(&tables.k2));
+        let mean = self.expectation.as_ref().map_or_else(Vec::new, |table| single(&table.mean));
+        let spread = self.expectation.as_ref().map_or_else(Vec::new, |table| single(&table.spread));
         let content = ImageContent::<&[f32]> {
             model_hash: self.model_hash,
             duration: self.duration as f32,
@@ -114,12 +85,8 @@ impl PrimitiveFile {
             stiffness: self.gains.map(|gain| gain.stiffness as f32),
             damping: self.gains.map(|gain| gain.damping as f32),
             orientation_error: match self.orientation_error {
-                OrientationErrorKind::Quaternion => {
-                    link::image::OrientationErrorKind::QuaternionDifference
-                }
-                OrientationErrorKind::RotationVector => {
-                    link::image::OrientationErrorKind::RotationVector
-                }
+                OrientationErrorKind::Quaternion => link::image::OrientationErrorKind::QuaternionDifference,
+                OrientationErrorKind::RotationVector => link::image::OrientationErrorKind::RotationVector,
             },
             hemisphere: match self.hemisphere {
                 HemisphereKind::Demonstrated => link::image::HemisphereKind::Demonstrated,
@@ -133,25 +100,19 @@ impl PrimitiveFile {
                 hand: self.start_velocity.hand.map(|value| value as f32),
             },
             goal: image_waypoint(&self.goal),
-            clamps: self
-                .feedback
-                .as_ref()
-                .map_or_else(FeedbackClamps::default, |tables| FeedbackClamps {
-                    position: tables.clamps[0] as f32,
-                    orientation: tables.clamps[1] as f32,
-                    hand: tables.clamps[2] as f32,
-                }),
-            marks: self
-                .expectation
-                .as_ref()
-                .map_or_else(ExpectationMarks::default, |table| ExpectationMarks {
-                    recorded_duration: table.recorded_duration as f32,
-                    payload_mass: table.payload_mass as f32,
-                    payload_centre: table.payload_centre.map(|value| value as f32),
-                    filter_cutoff: table.filter_cutoff as f32,
-                    trials: table.trials as f32,
-                    spread_floor: table.spread_floor as f32,
-                }),
+            clamps: self.feedback.as_ref().map_or_else(FeedbackClamps::default, |tables| FeedbackClamps {
+                position: tables.clamps[0] as f32,
+                orientation: tables.clamps[1] as f32,
+                hand: tables.clamps[2] as f32,
+            }),
+            marks: self.expectation.as_ref().map_or_else(ExpectationMarks::default, |table| ExpectationMarks {
+                recorded_duration: table.recorded_duration as f32,
+                payload_mass: table.payload_mass as f32,
+                payload_centre: table.payload_centre.map(|value| value as f32),
+                filter_cutoff: table.filter_cutoff as f32,
+                trials: table.trials as f32,
+                spread_floor: table.spread_floor as f32,
+            }),
             kernels: self.kernels(),
             k1: &k1,
             k2: &k2,
@@ -170,9 +131,7 @@ impl PrimitiveFile {
 
 /// Rows of a table as arrays; shapes were checked when the file was read.
 fn points<const SIZE: usize>(rows: &[Vec<f64>]) -> Vec<[f64; SIZE]> {
-    rows.iter()
-        .map(|row| std::array::from_fn(|index| row.get(index).copied().unwrap_or(f64::NAN)))
-        .collect()
+    rows.iter().map(|row| std::array::from_fn(|index| row.get(index).copied().unwrap_or(f64::NAN))).collect()
 }
 
 fn configuration(waypoint: &Waypoint) -> Configuration<f64> {

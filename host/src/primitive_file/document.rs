@@ -5,8 +5,8 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::{
-    ExpectationTable, FeedbackTables, Gain, HemisphereKind, OrientationErrorKind, PrimitiveFile,
-    PrimitiveFileError, Provenance, SCHEMA, Waypoint, WaypointVelocity,
+    ExpectationTable, FeedbackTables, Gain, HemisphereKind, OrientationErrorKind, PrimitiveFile, PrimitiveFileError,
+    Provenance, SCHEMA, Waypoint, WaypointVelocity,
 };
 
 #[derive(Deserialize)]
@@ -62,10 +62,7 @@ struct GainSection {
 
 impl From<GainSection> for Gain {
     fn from(section: GainSection) -> Gain {
-        Gain {
-            stiffness: section.stiffness,
-            damping: section.damping,
-        }
+        Gain { stiffness: section.stiffness, damping: section.damping }
     }
 }
 
@@ -152,24 +149,19 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<(PrimitiveFile, u32), Pri
     };
     let schema: SchemaOnly = toml::from_str(text).map_err(syntax)?;
     if schema.schema != SCHEMA {
-        return Err(PrimitiveFileError::Schema {
-            file: file.to_owned(),
-            found: schema.schema,
-            expected: SCHEMA,
-        });
+        return Err(PrimitiveFileError::Schema { file: file.to_owned(), found: schema.schema, expected: SCHEMA });
     }
     let document: Document = toml::from_str(text).map_err(syntax)?;
     debug_assert_eq!(document.schema, SCHEMA);
     let hexadecimal = |key: &'static str, found: &str| {
-        found
-            .strip_prefix("0x")
-            .and_then(|digits| u32::from_str_radix(digits, 16).ok())
-            .ok_or_else(|| PrimitiveFileError::Word {
+        found.strip_prefix("0x").and_then(|digits| u32::from_str_radix(digits, 16).ok()).ok_or_else(|| {
+            PrimitiveFileError::Word {
                 file: file.to_owned(),
                 key,
                 found: found.to_owned(),
                 expected: "a hexadecimal number of up to 8 digits, as in \"0x1234abcd\"",
-            })
+            }
+        })
     };
     let movement = &document.movement;
     let orientation_error = match movement.orientation_error.as_str() {
@@ -211,12 +203,7 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<(PrimitiveFile, u32), Pri
         });
     }
     let weights = &document.weights;
-    let groups = [
-        &weights.position,
-        &weights.orientation,
-        &weights.posture,
-        &weights.hand,
-    ];
+    let groups = [&weights.position, &weights.orientation, &weights.posture, &weights.hand];
     for ((group, rows), found) in super::GROUPS.iter().zip(groups) {
         if found.len() != *rows {
             return Err(PrimitiveFileError::Shape {
@@ -241,10 +228,7 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<(PrimitiveFile, u32), Pri
         .provenance
         .map(|section| -> Result<Provenance, PrimitiveFileError> {
             Ok(Provenance {
-                demonstration_checksum: hexadecimal(
-                    "provenance.demonstration_crc32",
-                    &section.demonstration_crc32,
-                )?,
+                demonstration_checksum: hexadecimal("provenance.demonstration_crc32", &section.demonstration_crc32)?,
                 demonstration: section.demonstration,
                 samples: section.samples,
                 trimmed: section.trimmed_s,
@@ -267,12 +251,7 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<(PrimitiveFile, u32), Pri
         activation: movement.activation,
         orientation_error,
         hemisphere,
-        gains: [
-            gains.position.into(),
-            gains.orientation.into(),
-            gains.posture.into(),
-            gains.hand.into(),
-        ],
+        gains: [gains.position.into(), gains.orientation.into(), gains.posture.into(), gains.hand.into()],
         start: document.start.into(),
         start_velocity: WaypointVelocity {
             position: velocity.position_m_s,
@@ -283,11 +262,7 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<(PrimitiveFile, u32), Pri
         goal: document.goal.into(),
         weights: groups.into_iter().flatten().cloned().collect(),
         feedback: document.feedback.map(|section| FeedbackTables {
-            clamps: [
-                section.clamp_position_m,
-                section.clamp_orientation_rad,
-                section.clamp_hand_rad,
-            ],
+            clamps: [section.clamp_position_m, section.clamp_orientation_rad, section.clamp_hand_rad],
             k1: section.k1,
             k2: section.k2,
         }),

@@ -180,10 +180,8 @@ impl PrimitiveFile {
     /// # Errors
     /// The first thing that is wrong.
     pub fn read(file: &Path) -> Result<PrimitiveFile, PrimitiveFileError> {
-        let text = std::fs::read_to_string(file).map_err(|cause| PrimitiveFileError::Io {
-            file: file.to_owned(),
-            cause,
-        })?;
+        let text =
+            std::fs::read_to_string(file).map_err(|cause| PrimitiveFileError::Io { file: file.to_owned(), cause })?;
         PrimitiveFile::parse(file, &text)
     }
 
@@ -198,11 +196,7 @@ impl PrimitiveFile {
         if computed == stored {
             Ok(primitive)
         } else {
-            Err(PrimitiveFileError::Checksum {
-                file: file.to_owned(),
-                computed,
-                stored,
-            })
+            Err(PrimitiveFileError::Checksum { file: file.to_owned(), computed, stored })
         }
     }
 
@@ -212,10 +206,7 @@ impl PrimitiveFile {
     /// A number is not finite, a table has the wrong size, or the operating system refuses.
     pub fn write(&self, file: &Path) -> Result<(), PrimitiveFileError> {
         self.check_values()?;
-        let failed = |cause| PrimitiveFileError::Io {
-            file: file.to_owned(),
-            cause,
-        };
+        let failed = |cause| PrimitiveFileError::Io { file: file.to_owned(), cause };
         let mut half_written = file.as_os_str().to_owned();
         half_written.push(".part");
         let half_written = PathBuf::from(half_written);
@@ -237,11 +228,7 @@ impl PrimitiveFile {
         if self.model_hash == expected {
             Ok(())
         } else {
-            Err(PrimitiveFileError::Model {
-                file: self.file.clone(),
-                found: self.model_hash,
-                expected,
-            })
+            Err(PrimitiveFileError::Model { file: self.file.clone(), found: self.model_hash, expected })
         }
     }
 
@@ -269,35 +256,20 @@ impl PrimitiveFile {
 
     /// Every table of numbers with its key in the file.
     fn tables(&self) -> Vec<(String, Vec<f64>)> {
-        let mut tables = vec![(
-            "movement".to_owned(),
-            vec![self.duration, self.alpha, self.activation],
-        )];
+        let mut tables = vec![("movement".to_owned(), vec![self.duration, self.alpha, self.activation])];
         for ((group, _), gain) in GROUPS.iter().zip(&self.gains) {
             tables.push((format!("gains.{group}"), vec![gain.stiffness, gain.damping]));
         }
         for (key, waypoint) in [("start", &self.start), ("goal", &self.goal)] {
             tables.push((format!("{key}.position_m"), waypoint.position.to_vec()));
-            tables.push((
-                format!("{key}.orientation_wxyz"),
-                waypoint.orientation.to_vec(),
-            ));
+            tables.push((format!("{key}.orientation_wxyz"), waypoint.orientation.to_vec()));
             tables.push((format!("{key}.posture_rad"), waypoint.posture.to_vec()));
             tables.push((format!("{key}.hand_rad"), waypoint.hand.to_vec()));
         }
         let velocity = &self.start_velocity;
-        tables.push((
-            "start_velocity.position_m_s".into(),
-            velocity.position.to_vec(),
-        ));
-        tables.push((
-            "start_velocity.orientation_rad_s".into(),
-            velocity.orientation.to_vec(),
-        ));
-        tables.push((
-            "start_velocity.posture_rad_s".into(),
-            velocity.posture.to_vec(),
-        ));
+        tables.push(("start_velocity.position_m_s".into(), velocity.position.to_vec()));
+        tables.push(("start_velocity.orientation_rad_s".into(), velocity.orientation.to_vec()));
+        tables.push(("start_velocity.posture_rad_s".into(), velocity.posture.to_vec()));
         tables.push(("start_velocity.hand_rad_s".into(), velocity.hand.to_vec()));
         let mut row = 0;
         for (group, size) in GROUPS {
@@ -315,11 +287,7 @@ impl PrimitiveFile {
         if let Some(expectation) = &self.expectation {
             let mut marks = vec![expectation.recorded_duration, expectation.payload_mass];
             marks.extend(expectation.payload_centre);
-            marks.extend([
-                expectation.filter_cutoff,
-                f64::from(expectation.trials),
-                expectation.spread_floor,
-            ]);
+            marks.extend([expectation.filter_cutoff, f64::from(expectation.trials), expectation.spread_floor]);
             tables.push(("expectation".into(), marks));
             tables.push(("expectation.mean".into(), expectation.mean.concat()));
             tables.push(("expectation.spread".into(), expectation.spread.concat()));
@@ -332,12 +300,7 @@ impl PrimitiveFile {
             if found == expected {
                 Ok(())
             } else {
-                Err(PrimitiveFileError::Shape {
-                    file: self.file.clone(),
-                    key: key.to_owned(),
-                    found,
-                    expected,
-                })
+                Err(PrimitiveFileError::Shape { file: self.file.clone(), key: key.to_owned(), found, expected })
             }
         };
         shape("weights", self.weights.len(), dmp::ROWS)?;
@@ -346,11 +309,7 @@ impl PrimitiveFile {
                 shape(&key, values.len(), self.kernels())?;
             }
             if let Some(entry) = values.iter().position(|value| !value.is_finite()) {
-                return Err(PrimitiveFileError::NotFinite {
-                    file: self.file.clone(),
-                    key,
-                    entry: entry + 1,
-                });
+                return Err(PrimitiveFileError::NotFinite { file: self.file.clone(), key, entry: entry + 1 });
             }
         }
         if let Some(feedback) = &self.feedback {
@@ -362,11 +321,7 @@ impl PrimitiveFile {
             }
         }
         if let Some(expectation) = &self.expectation {
-            shape(
-                "expectation.spread",
-                expectation.spread.len(),
-                expectation.mean.len(),
-            )?;
+            shape("expectation.spread", expectation.spread.len(), expectation.mean.len())?;
             for point in expectation.mean.iter().chain(&expectation.spread) {
                 shape("expectation", point.len(), link::image::SENSOR_ROWS)?;
             }

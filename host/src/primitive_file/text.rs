@@ -22,25 +22,13 @@ fn write_all(text: &mut String, primitive: &PrimitiveFile) -> std::fmt::Result {
     )?;
     writeln!(text, "schema = \"{SCHEMA}\"")?;
     writeln!(text, "name = {}", quoted(&primitive.name))?;
-    writeln!(
-        text,
-        "model_hash = \"0x{:08x}\"      # model of the arm it was learned with",
-        primitive.model_hash
-    )?;
+    writeln!(text, "model_hash = \"0x{:08x}\"      # model of the arm it was learned with", primitive.model_hash)?;
     writeln!(text, "content_crc32 = \"0x{:08x}\"", primitive.checksum())?;
 
     writeln!(text, "\n[movement]")?;
     writeln!(text, "duration_s = {:?}", primitive.duration)?;
-    writeln!(
-        text,
-        "alpha = {:?}      # decay of the phase: s(duration) = exp(-alpha)",
-        primitive.alpha
-    )?;
-    writeln!(
-        text,
-        "activation = {:?}      # of a kernel at the centre of the next",
-        primitive.activation
-    )?;
+    writeln!(text, "alpha = {:?}      # decay of the phase: s(duration) = exp(-alpha)", primitive.alpha)?;
+    writeln!(text, "activation = {:?}      # of a kernel at the centre of the next", primitive.activation)?;
     writeln!(text, "kernels = {}", primitive.kernels())?;
     let error = match primitive.orientation_error {
         OrientationErrorKind::Quaternion => "quaternion",
@@ -53,24 +41,14 @@ fn write_all(text: &mut String, primitive: &PrimitiveFile) -> std::fmt::Result {
     };
     writeln!(text, "hemisphere = \"{hemisphere}\"")?;
 
-    writeln!(
-        text,
-        "\n[gains]      # spring K and damper D of the transformation systems, dimensionless"
-    )?;
+    writeln!(text, "\n[gains]      # spring K and damper D of the transformation systems, dimensionless")?;
     for ((group, _), gain) in GROUPS.iter().zip(&primitive.gains) {
-        writeln!(
-            text,
-            "{group} = {{ stiffness = {:?}, damping = {:?} }}",
-            gain.stiffness, gain.damping
-        )?;
+        writeln!(text, "{group} = {{ stiffness = {:?}, damping = {:?} }}", gain.stiffness, gain.damping)?;
     }
 
     writeln!(text, "\n[start]      # of the demonstration")?;
     write_waypoint(text, &primitive.start)?;
-    writeln!(
-        text,
-        "\n[start_velocity]      # angular velocity in the body frame"
-    )?;
+    writeln!(text, "\n[start_velocity]      # angular velocity in the body frame")?;
     let velocity = &primitive.start_velocity;
     write_numbers(text, "position_m_s", &velocity.position)?;
     write_numbers(text, "orientation_rad_s", &velocity.orientation)?;
@@ -105,11 +83,7 @@ fn write_all(text: &mut String, primitive: &PrimitiveFile) -> std::fmt::Result {
             text,
             "\n[expectation]      # wrench of the environment on the robot by phase: force N (world), torque N m, gauges N m"
         )?;
-        writeln!(
-            text,
-            "recorded_duration_s = {:?}",
-            expectation.recorded_duration
-        )?;
+        writeln!(text, "recorded_duration_s = {:?}", expectation.recorded_duration)?;
         writeln!(text, "payload_mass_kg = {:?}", expectation.payload_mass)?;
         write_numbers(text, "payload_centre_m", &expectation.payload_centre)?;
         writeln!(text, "filter_cutoff_hz = {:?}", expectation.filter_cutoff)?;
@@ -119,20 +93,9 @@ fn write_all(text: &mut String, primitive: &PrimitiveFile) -> std::fmt::Result {
         write_rows(text, "spread", &expectation.spread)?;
     }
     if let Some(provenance) = &primitive.provenance {
-        writeln!(
-            text,
-            "\n[provenance]      # where it comes from; errors are [maximum, RMS] of the reproduction"
-        )?;
-        writeln!(
-            text,
-            "demonstration = {}",
-            quoted(&provenance.demonstration)
-        )?;
-        writeln!(
-            text,
-            "demonstration_crc32 = \"0x{:08x}\"",
-            provenance.demonstration_checksum
-        )?;
+        writeln!(text, "\n[provenance]      # where it comes from; errors are [maximum, RMS] of the reproduction")?;
+        writeln!(text, "demonstration = {}", quoted(&provenance.demonstration))?;
+        writeln!(text, "demonstration_crc32 = \"0x{:08x}\"", provenance.demonstration_checksum)?;
         writeln!(text, "samples = {}", provenance.samples)?;
         write_numbers(text, "trimmed_s", &provenance.trimmed)?;
         writeln!(text, "largest_angle_rad = {:?}", provenance.largest_angle)?;

@@ -32,11 +32,7 @@ pub fn make_ready(
     mut tell: impl FnMut(Stage),
 ) -> Result<(), ProcedureError> {
     let simulated = client.hello().simulated;
-    let seconds = if simulated {
-        SIMULATED_PATIENCE
-    } else {
-        PATIENCE
-    };
+    let seconds = if simulated { SIMULATED_PATIENCE } else { PATIENCE };
     let deadline = client.now() + Duration::from_secs(seconds);
     let mut told = None;
     let mut blocked = None;
@@ -55,9 +51,7 @@ pub fn make_ready(
         }
         if client.now() > deadline {
             let stage = told.map_or("unknown stage", Stage::explanation);
-            return Err(ProcedureError::NotReady(
-                blocked.unwrap_or_else(|| stage.to_owned()),
-            ));
+            return Err(ProcedureError::NotReady(blocked.unwrap_or_else(|| stage.to_owned())));
         }
         if let Some(Incoming::Event(event)) = client.next(LOOK)?
             && event.kind == EventKind::Startup

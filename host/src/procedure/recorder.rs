@@ -36,17 +36,10 @@ impl<W: Write> Recorder<W> {
     ///
     /// # Errors
     /// The device refuses, or the output does.
-    pub fn start(
-        client: &mut Client<Device>,
-        output: W,
-        notes: &str,
-    ) -> Result<Self, ProcedureError> {
+    pub fn start(client: &mut Client<Device>, output: W, notes: &str) -> Result<Self, ProcedureError> {
         let writer = RecordingWriter::new(output, notes)?;
         client.set_telemetry(1)?;
-        Ok(Self {
-            writer,
-            first: None,
-        })
+        Ok(Self { writer, first: None })
     }
 
     /// Waits for the next cycle or event, and writes a cycle down.
@@ -60,11 +53,7 @@ impl<W: Write> Recorder<W> {
                 Ok(Take::Cycle(telemetry))
             }
             Some(Incoming::Event(event)) => Ok(Take::Event(event)),
-            None => Err(crate::error::HostError::NoAnswer {
-                request: "telemetry",
-                after: SILENCE,
-            }
-            .into()),
+            None => Err(crate::error::HostError::NoAnswer { request: "telemetry", after: SILENCE }.into()),
         }
     }
 

@@ -69,10 +69,7 @@ pub fn wait_for(
 /// Whether a state entered during a motion ends it.
 pub fn after(code: u16, detail: u32) -> Result<(), ProcedureError> {
     let state = u8::try_from(code).ok().and_then(State::from_code);
-    let fault = u8::try_from(detail)
-        .ok()
-        .and_then(Fault::from_code)
-        .unwrap_or(Fault::None);
+    let fault = u8::try_from(detail).ok().and_then(Fault::from_code).unwrap_or(Fault::None);
     match state {
         Some(State::Idle | State::SoftStop | State::Fault) if fault != Fault::None => {
             Err(ProcedureError::Stopped(fault))

@@ -10,9 +10,7 @@ pub enum SimulationError {
     #[error("there is no world '{0}'; there are world=mujoco and world=simple")]
     UnknownWorld(String),
     /// This program was built without the feature `mujoco`.
-    #[error(
-        "this tactus was built without the MuJoCo world; `cargo xtask build` makes one that has it"
-    )]
+    #[error("this tactus was built without the MuJoCo world; `cargo xtask build` makes one that has it")]
     WithoutMujoco,
     /// MuJoCo cannot load the model.
     #[cfg(feature = "mujoco")]

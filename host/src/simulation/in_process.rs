@@ -8,8 +8,8 @@ use std::collections::VecDeque;
 use control::arm::ArmModel;
 use control::{CycleRecord, LoadRefusal, Payload};
 use device::{
-    Command, Core, CoreIo, Event, Health, Identity, QueueFull, RamStore, Session, SessionPort,
-    Slot, StoredPrimitive, TimedRecord, Timing,
+    Command, Core, CoreIo, Event, Health, Identity, QueueFull, RamStore, Session, SessionPort, Slot, StoredPrimitive,
+    TimedRecord, Timing,
 };
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
@@ -58,10 +58,7 @@ impl CoreIo for Queues {
         if self.records.len() == RECORDS {
             self.records.pop_front();
         }
-        self.records.push_back(TimedRecord {
-            record,
-            cost_ticks: 0,
-        });
+        self.records.push_back(TimedRecord { record, cost_ticks: 0 });
     }
 
     fn event(&mut self, event: Event) {
@@ -138,11 +135,7 @@ impl InProcess {
         };
         Self {
             core: Core::new(),
-            session: Session::new(
-                identity,
-                ArmModel::new(Payload::SensorAndHand),
-                RamStore::new(),
-            ),
+            session: Session::new(identity, ArmModel::new(Payload::SensorAndHand), RamStore::new()),
             queues: Queues::default(),
             slot: Slot::Request,
             next_slot: SLOT_TICKS,
@@ -159,12 +152,7 @@ impl InProcess {
             plant.submit(now, frame);
         }
         let room = LINE_ROOM.saturating_sub(plant.link_backlog());
-        let mut port = Port {
-            queues: &mut self.queues,
-            core: &mut self.core,
-            line: &mut self.line,
-            room,
-        };
+        let mut port = Port { queues: &mut self.queues, core: &mut self.core, line: &mut self.line, room };
         self.session.poll(now_us, &mut port);
         if !self.line.is_empty() {
             plant.link_from_device(now, &self.line);

@@ -42,24 +42,12 @@ impl Simulation {
     /// The world or the engine named in `options` cannot be started here; the message names the command that sets it up.
     pub fn start(options: &SimulationOptions) -> Result<Self, SimulationError> {
         let world = options.build_world()?;
-        let plant = Plant::new(
-            PlantConfig {
-                seed: options.seed,
-                ..PlantConfig::default()
-            },
-            world,
-        );
+        let plant = Plant::new(PlantConfig { seed: options.seed, ..PlantConfig::default() }, world);
         let engine: Box<dyn Execute> = match &options.engine {
             Engine::InProcess => Box::new(InProcess::new()),
-            Engine::Qemu { image } => {
-                Box::new(Qemu::spawn(image, options.firmware_log.as_deref())?)
-            }
+            Engine::Qemu { image } => Box::new(Qemu::spawn(image, options.firmware_log.as_deref())?),
         };
-        Ok(Self {
-            plant,
-            engine,
-            now: 0,
-        })
+        Ok(Self { plant, engine, now: 0 })
     }
 
     /// The simulated bus and everything on it.
@@ -95,10 +83,7 @@ impl Transport for Simulation {
             if self.now >= limit {
                 return Ok(());
             }
-            self.now = self
-                .engine
-                .advance(&mut self.plant, limit)
-                .map_err(TransportError::other)?;
+            self.now = self.engine.advance(&mut self.plant, limit).map_err(TransportError::other)?;
         }
     }
 

@@ -55,15 +55,10 @@ impl SimulationOptions {
     ///
     /// # Errors
     /// [`SimulationError`] for a world that is unknown or was not built in, and for a missing image.
-    pub fn from_address(
-        kind: SimulatorKind,
-        options: &SimulatorOptions,
-    ) -> Result<Self, SimulationError> {
+    pub fn from_address(kind: SimulatorKind, options: &SimulatorOptions) -> Result<Self, SimulationError> {
         let engine = match kind {
             SimulatorKind::InProcess => Engine::InProcess,
-            SimulatorKind::Qemu => Engine::Qemu {
-                image: find_image()?,
-            },
+            SimulatorKind::Qemu => Engine::Qemu { image: find_image()? },
         };
         let world = match options.world.as_deref() {
             Some("simple") => WorldKind::Simple,
@@ -75,13 +70,7 @@ impl SimulationOptions {
         if world == WorldKind::Mujoco && !cfg!(feature = "mujoco") {
             return Err(SimulationError::WithoutMujoco);
         }
-        Ok(Self {
-            engine,
-            seed: options.seed.unwrap_or(DEFAULT_SEED),
-            world,
-            person: None,
-            firmware_log: None,
-        })
+        Ok(Self { engine, seed: options.seed.unwrap_or(DEFAULT_SEED), world, person: None, firmware_log: None })
     }
 
     /// The world at its start, the arm at home.
@@ -96,13 +85,7 @@ impl SimulationOptions {
                 Ok(match self.person {
                     None => Box::new(world),
                     Some(seed) => {
-                        let person = Person::new(
-                            PersonConfig {
-                                seed,
-                                ..PersonConfig::default()
-                            },
-                            side_grasp_path(),
-                        );
+                        let person = Person::new(PersonConfig { seed, ..PersonConfig::default() }, side_grasp_path());
                         Box::new(GuidedWorld::new(world, person))
                     }
                 })
@@ -120,18 +103,10 @@ impl SimulationOptions {
 fn find_image() -> Result<PathBuf, SimulationError> {
     if let Some(path) = std::env::var_os(IMAGE_VARIABLE) {
         let path = PathBuf::from(path);
-        return if path.is_file() {
-            Ok(path)
-        } else {
-            Err(SimulationError::NoImage(path))
-        };
+        return if path.is_file() { Ok(path) } else { Err(SimulationError::NoImage(path)) };
     }
     let program = std::env::current_exe().unwrap_or_default();
-    let candidates = program
-        .ancestors()
-        .skip(1)
-        .take(4)
-        .map(|folder| folder.join("images").join("arm.elf"));
+    let candidates = program.ancestors().skip(1).take(4).map(|folder| folder.join("images").join("arm.elf"));
     candidates
         .into_iter()
         .find(|path| path.is_file())

@@ -48,10 +48,7 @@ pub(super) struct Qemu {
 impl Qemu {
     /// Boots `image`; the firmware's log goes to the file `log`.
     pub(super) fn spawn(image: &Path, log: Option<&Path>) -> Result<Self, SimulationError> {
-        let mut file = log
-            .map(File::create)
-            .transpose()
-            .map_err(SimulationError::Log)?;
+        let mut file = log.map(File::create).transpose().map_err(SimulationError::Log)?;
         let mut child = Command::new("qemu-system-arm")
             .args(MACHINE)
             .arg(image)
@@ -60,8 +57,7 @@ impl Qemu {
             .stderr(Stdio::piped())
             .spawn()
             .map_err(SimulationError::NoQemu)?;
-        let (Some(to), Some(from), Some(mut stderr)) =
-            (child.stdin.take(), child.stdout.take(), child.stderr.take())
+        let (Some(to), Some(from), Some(mut stderr)) = (child.stdin.take(), child.stdout.take(), child.stderr.take())
         else {
             unreachable!("all three streams were asked for as pipes")
         };
@@ -81,12 +77,7 @@ impl Qemu {
                 words.drain(..surplus);
             }
         });
-        Ok(Self {
-            child,
-            lockstep: Lockstep::new(BufReader::new(from), to),
-            log: Some(log),
-            words,
-        })
+        Ok(Self { child, lockstep: Lockstep::new(BufReader::new(from), to), log: Some(log), words })
     }
 
     /// Why the firmware fell silent.
@@ -99,10 +90,7 @@ impl Qemu {
             let _ = log.join();
         }
         let words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
-        SimulationError::Ended {
-            status,
-            words: printable(&words),
-        }
+        SimulationError::Ended { status, words: printable(&words) }
     }
 }
 
@@ -132,15 +120,7 @@ impl Drop for Qemu {
 
 /// The text in a log of binary frames: runs of at least four printable characters.
 fn printable(bytes: &[u8]) -> String {
-    let runs = bytes
-        .split(|byte| !(b' '..=b'~').contains(byte))
-        .filter(|run| run.len() >= 4);
-    let text: Vec<_> = runs
-        .map(|run| String::from_utf8_lossy(run).into_owned())
-        .collect();
-    if text.is_empty() {
-        "none".to_owned()
-    } else {
-        text.join(" ")
-    }
+    let runs = bytes.split(|byte| !(b' '..=b'~').contains(byte)).filter(|run| run.len() >= 4);
+    let text: Vec<_> = runs.map(|run| String::from_utf8_lossy(run).into_owned()).collect();
+    if text.is_empty() { "none".to_owned() } else { text.join(" ") }
 }

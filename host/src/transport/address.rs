@@ -55,9 +55,7 @@ pub enum Address {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AddressError {
     /// The part before the colon names no kind of device.
-    #[error(
-        "'{0}' names no kind of device; there are sim:, sil:, tcp:HOST:PORT, unix:PATH and serial:PORT[@BAUD]"
-    )]
+    #[error("'{0}' names no kind of device; there are sim:, sil:, tcp:HOST:PORT, unix:PATH and serial:PORT[@BAUD]")]
     Kind(String),
     /// Something is missing behind the colon.
     #[error("'{0}' is incomplete; it should look like {1}")]
@@ -74,9 +72,7 @@ impl FromStr for Address {
     type Err = AddressError;
 
     fn from_str(text: &str) -> Result<Self, AddressError> {
-        let (kind, rest) = text
-            .split_once(':')
-            .ok_or_else(|| AddressError::Kind(text.to_owned()))?;
+        let (kind, rest) = text.split_once(':').ok_or_else(|| AddressError::Kind(text.to_owned()))?;
         match kind {
             "sim" => Ok(Self::Simulated(SimulatorKind::Qemu, options(rest)?)),
             "sil" => Ok(Self::Simulated(SimulatorKind::InProcess, options(rest)?)),
@@ -85,35 +81,19 @@ impl FromStr for Address {
                     Ok(_) => Ok(Self::Tcp(rest.to_owned())),
                     Err(_) => Err(AddressError::Number(port.to_owned())),
                 },
-                _ => Err(AddressError::Incomplete(
-                    text.to_owned(),
-                    "tcp:localhost:3333",
-                )),
+                _ => Err(AddressError::Incomplete(text.to_owned(), "tcp:localhost:3333")),
             },
-            "unix" if rest.is_empty() => Err(AddressError::Incomplete(
-                text.to_owned(),
-                "unix:/run/tactus.sock",
-            )),
+            "unix" if rest.is_empty() => Err(AddressError::Incomplete(text.to_owned(), "unix:/run/tactus.sock")),
             "unix" => Ok(Self::Unix(PathBuf::from(rest))),
             "serial" => {
                 let (port, baud) = match rest.rsplit_once('@') {
-                    Some((port, baud)) => (
-                        port,
-                        baud.parse()
-                            .map_err(|_| AddressError::Number(baud.to_owned()))?,
-                    ),
+                    Some((port, baud)) => (port, baud.parse().map_err(|_| AddressError::Number(baud.to_owned()))?),
                     None => (rest, DEFAULT_BAUD),
                 };
                 if port.is_empty() || baud == 0 {
-                    return Err(AddressError::Incomplete(
-                        text.to_owned(),
-                        "serial:/dev/ttyACM0",
-                    ));
+                    return Err(AddressError::Incomplete(text.to_owned(), "serial:/dev/ttyACM0"));
                 }
-                Ok(Self::Serial {
-                    port: port.to_owned(),
-                    baud,
-                })
+                Ok(Self::Serial { port: port.to_owned(), baud })
             }
             _ => Err(AddressError::Kind(text.to_owned())),
         }
@@ -125,11 +105,7 @@ fn options(text: &str) -> Result<SimulatorOptions, AddressError> {
     for part in text.split(',').filter(|part| !part.is_empty()) {
         match part.split_once('=') {
             Some(("seed", value)) => {
-                options.seed = Some(
-                    value
-                        .parse()
-                        .map_err(|_| AddressError::Number(value.to_owned()))?,
-                );
+                options.seed = Some(value.parse().map_err(|_| AddressError::Number(value.to_owned()))?);
             }
             Some(("world", value)) if !value.is_empty() => options.world = Some(value.to_owned()),
             _ => return Err(AddressError::Option(part.to_owned())),
@@ -153,10 +129,7 @@ impl fmt::Display for Address {
             }
             Self::Tcp(address) => write!(f, "tcp:{address}"),
             Self::Unix(path) => write!(f, "unix:{}", path.display()),
-            Self::Serial {
-                port,
-                baud: DEFAULT_BAUD,
-            } => write!(f, "serial:{port}"),
+            Self::Serial { port, baud: DEFAULT_BAUD } => write!(f, "serial:{port}"),
             Self::Serial { port, baud } => write!(f, "serial:{port}@{baud}"),
         }
     }
@@ -186,51 +159,21 @@ mod tests {
             assert_eq!(parse(text).unwrap().to_string(), text);
         }
         let port = "COM3".to_owned();
-        assert_eq!(
-            parse("serial:COM3"),
-            Ok(Address::Serial {
-                port,
-                baud: 921_600
-            })
-        );
+        assert_eq!(parse("serial:COM3"), Ok(Address::Serial { port, baud: 921_600 }));
     }
 
     #[test]
     fn bad_addresses_say_what_is_wrong() {
-        assert_eq!(
-            parse("/dev/ttyACM0"),
-            Err(AddressError::Kind("/dev/ttyACM0".into()))
-        );
+        assert_eq!(parse("/dev/ttyACM0"), Err(AddressError::Kind("/dev/ttyACM0".into())));
         assert_eq!(parse("usb:1"), Err(AddressError::Kind("usb:1".into())));
-        assert!(matches!(
-            parse("tcp:localhost"),
-            Err(AddressError::Incomplete(..))
-        ));
-        assert!(matches!(
-            parse("tcp::80"),
-            Err(AddressError::Incomplete(..))
-        ));
-        assert_eq!(
-            parse("tcp:localhost:http"),
-            Err(AddressError::Number("http".into()))
-        );
+        assert!(matches!(parse("tcp:localhost"), Err(AddressError::Incomplete(..))));
+        assert!(matches!(parse("tcp::80"), Err(AddressError::Incomplete(..))));
+        assert_eq!(parse("tcp:localhost:http"), Err(AddressError::Number("http".into())));
         assert!(matches!(parse("unix:"), Err(AddressError::Incomplete(..))));
-        assert!(matches!(
-            parse("serial:"),
-            Err(AddressError::Incomplete(..))
-        ));
-        assert_eq!(
-            parse("serial:COM3@fast"),
-            Err(AddressError::Number("fast".into()))
-        );
-        assert_eq!(
-            parse("sim:speed=2"),
-            Err(AddressError::Option("speed=2".into()))
-        );
-        assert_eq!(
-            parse("sim:world="),
-            Err(AddressError::Option("world=".into()))
-        );
+        assert!(matches!(parse("serial:"), Err(AddressError::Incomplete(..))));
+        assert_eq!(parse("serial:COM3@fast"), Err(AddressError::Number("fast".into())));
+        assert_eq!(parse("sim:speed=2"), Err(AddressError::Option("speed=2".into())));
+        assert_eq!(parse("sim:world="), Err(AddressError::Option("world=".into())));
         assert_eq!(parse("sim:seed=-1"), Err(AddressError::Number("-1".into())));
     }
 }

@@ -23,13 +23,8 @@ impl SerialTransport {
         let port = serialport::new(path, baud)
             .timeout(Duration::from_millis(10))
             .open()
-            .map_err(|error| {
-                TransportError::opening(&format!("serial:{path}"), std::io::Error::from(error))
-            })?;
-        Ok(Self {
-            port,
-            opened: Instant::now(),
-        })
+            .map_err(|error| TransportError::opening(&format!("serial:{path}"), std::io::Error::from(error)))?;
+        Ok(Self { port, opened: Instant::now() })
     }
 }
 
@@ -37,17 +32,13 @@ impl Transport for SerialTransport {
     fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
         use std::io::Write as _;
         // The port's time-out holds for writing too; the last reading may have left a very short one.
-        self.port
-            .set_timeout(Duration::from_secs(1))
-            .map_err(|error| TransportError::open(error.into()))?;
+        self.port.set_timeout(Duration::from_secs(1)).map_err(|error| TransportError::open(error.into()))?;
         self.port.write_all(bytes).map_err(TransportError::open)
     }
 
     fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
         let timeout = timeout.max(Duration::from_millis(1));
-        self.port
-            .set_timeout(timeout)
-            .map_err(|error| TransportError::open(error.into()))?;
+        self.port.set_timeout(timeout).map_err(|error| TransportError::open(error.into()))?;
         read_some(&mut self.port, out)
     }
 

@@ -50,13 +50,8 @@ impl StreamTransport {
                 Ok(socket) => {
                     // A stop request must not wait for more bytes to fill a packet.
                     socket.set_nodelay(true).map_err(failed)?;
-                    socket
-                        .set_write_timeout(Some(SEND_TIMEOUT))
-                        .map_err(failed)?;
-                    return Ok(Self {
-                        socket: Box::new(socket),
-                        opened: Instant::now(),
-                    });
+                    socket.set_write_timeout(Some(SEND_TIMEOUT)).map_err(failed)?;
+                    return Ok(Self { socket: Box::new(socket), opened: Instant::now() });
                 }
                 Err(error) => last = error,
             }
@@ -72,13 +67,8 @@ impl StreamTransport {
     pub fn unix(path: &std::path::Path) -> Result<Self, TransportError> {
         let failed = |cause| TransportError::opening(&format!("unix:{}", path.display()), cause);
         let socket = std::os::unix::net::UnixStream::connect(path).map_err(failed)?;
-        socket
-            .set_write_timeout(Some(SEND_TIMEOUT))
-            .map_err(failed)?;
-        Ok(Self {
-            socket: Box::new(socket),
-            opened: Instant::now(),
-        })
+        socket.set_write_timeout(Some(SEND_TIMEOUT)).map_err(failed)?;
+        Ok(Self { socket: Box::new(socket), opened: Instant::now() })
     }
 
     /// Unix sockets do not exist on this system.
@@ -88,25 +78,17 @@ impl StreamTransport {
     #[cfg(not(unix))]
     pub fn unix(path: &std::path::Path) -> Result<Self, TransportError> {
         let cause = std::io::Error::from(ErrorKind::Unsupported);
-        Err(TransportError::opening(
-            &format!("unix:{}", path.display()),
-            cause,
-        ))
+        Err(TransportError::opening(&format!("unix:{}", path.display()), cause))
     }
 }
 
 impl Transport for StreamTransport {
     fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
-        self.socket
-            .write_all(bytes)
-            .and_then(|()| self.socket.flush())
-            .map_err(TransportError::open)
+        self.socket.write_all(bytes).and_then(|()| self.socket.flush()).map_err(TransportError::open)
     }
 
     fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
-        self.socket
-            .set_timeout(timeout.max(Duration::from_millis(1)))
-            .map_err(TransportError::open)?;
+        self.socket.set_timeout(timeout.max(Duration::from_millis(1))).map_err(TransportError::open)?;
         read_some(&mut self.socket, out)
     }
 
@@ -124,12 +106,7 @@ pub(super) fn read_some(source: &mut dyn Read, out: &mut Vec<u8>) -> Result<(), 
             out.extend_from_slice(&buffer[..count]);
             Ok(())
         }
-        Err(error)
-            if matches!(
-                error.kind(),
-                ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted
-            ) =>
-        {
+        Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) => {
             Ok(())
         }
         Err(error) => Err(TransportError::open(error)),

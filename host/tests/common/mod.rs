@@ -1,9 +1,6 @@
 //! A demonstration that no arm gave: a smooth movement of the joints, written as the recorder would write it.
 
-#![allow(
-    dead_code,
-    reason = "each test program uses its own part of these helpers"
-)]
+#![allow(dead_code, reason = "each test program uses its own part of these helpers")]
 
 use std::path::{Path, PathBuf};
 
@@ -38,15 +35,8 @@ pub(crate) fn rows(duration: f64) -> Vec<RecordingRow> {
             let q = posture((time - 0.5) / duration);
             let ahead = posture((time + 1e-4 - 0.5) / duration);
             let (position, orientation) = arm::tool_pose(&q);
-            let pose = [
-                position[0],
-                position[1],
-                position[2],
-                orientation[0],
-                orientation[1],
-                orientation[2],
-                orientation[3],
-            ];
+            let pose =
+                [position[0], position[1], position[2], orientation[0], orientation[1], orientation[2], orientation[3]];
             RecordingRow {
                 cycle: 1000 + cycle,
                 time,
@@ -69,8 +59,7 @@ pub(crate) fn rows(duration: f64) -> Vec<RecordingRow> {
 
 /// The recording as text.
 pub(crate) fn text(rows: &[RecordingRow]) -> String {
-    let mut writer =
-        RecordingWriter::new(Vec::new(), "Recorded by nobody, for tests.").expect("in memory");
+    let mut writer = RecordingWriter::new(Vec::new(), "Recorded by nobody, for tests.").expect("in memory");
     for row in rows {
         writer.write(row).expect("in memory");
     }
@@ -86,24 +75,15 @@ pub(crate) fn demonstration(folder: &Path, duration: f64) -> PathBuf {
 
 /// A recording of poses alone, as other laboratories write it: `turn` rad about a wandering axis in 4 s.
 pub(crate) fn foreign(turn: f64) -> String {
-    let mut text = String::from(
-        "# poses of somebody's arm\nt_s,px_m,py_m,pz_m,qw,qx,qy,qz,fx_N,fy_N,fz_N,tx_Nm,ty_Nm,tz_Nm\n",
-    );
+    let mut text =
+        String::from("# poses of somebody's arm\nt_s,px_m,py_m,pz_m,qw,qx,qy,qz,fx_N,fy_N,fz_N,tx_Nm,ty_Nm,tz_Nm\n");
     for k in 0..=1200 {
         let r = f64::from(k) / 1200.0;
         let b = blend(r);
         let angle = turn * b;
         let axis = [(0.4 * b).cos(), (0.4 * b).sin(), 0.0];
         let (s, c) = (angle / 2.0).sin_cos();
-        let pose = [
-            0.5 + 0.1 * b,
-            -0.1 + 0.2 * b,
-            0.3 - 0.05 * b,
-            c,
-            s * axis[0],
-            s * axis[1],
-            s * axis[2],
-        ];
+        let pose = [0.5 + 0.1 * b, -0.1 + 0.2 * b, 0.3 - 0.05 * b, c, s * axis[0], s * axis[1], s * axis[2]];
         text += &format!("{}", 4.0 * r);
         for value in pose {
             text += &format!(",{value}");

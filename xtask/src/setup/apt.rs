@@ -23,16 +23,9 @@ pub(super) fn is_installed(package: &str) -> bool {
 
 /// Version that `install` would bring, by the package lists of this machine.
 pub(super) fn candidate(package: &str) -> Option<String> {
-    let output = Command::new("apt-cache")
-        .args(["policy", package])
-        .env("LC_ALL", "C")
-        .output()
-        .ok()?;
+    let output = Command::new("apt-cache").args(["policy", package]).env("LC_ALL", "C").output().ok()?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let version = text
-        .lines()
-        .find_map(|line| line.trim().strip_prefix("Candidate:"))?
-        .trim();
+    let version = text.lines().find_map(|line| line.trim().strip_prefix("Candidate:"))?.trim();
     (version != "(none)").then(|| version.to_owned())
 }
 
@@ -42,10 +35,7 @@ pub(super) fn candidate(package: &str) -> Option<String> {
 /// If there is no apt, no right to install, or apt fails: the message holds the command to type.
 pub(super) fn install(packages: &[&str], reason: &str) -> Result<()> {
     if !is_present() {
-        bail!(
-            "{reason}: this machine has no apt; install by hand what Debian calls {}",
-            packages.join(" ")
-        );
+        bail!("{reason}: this machine has no apt; install by hand what Debian calls {}", packages.join(" "));
     }
     require_right(packages)?;
     shell::note(&format!("installing {} ({reason})", packages.join(" ")));
@@ -82,16 +72,7 @@ pub(super) fn install_from_backports(package: &str) -> Result<()> {
         .with_context(|| format!("cannot write {}", list.display()))?;
     let source = format!("Dir::Etc::SourceList={}", list.display());
     run(&["-o", &source, "update"])?;
-    run(&[
-        "-o",
-        &source,
-        "install",
-        "-y",
-        "--no-install-recommends",
-        "-t",
-        &release,
-        package,
-    ])
+    run(&["-o", &source, "install", "-y", "--no-install-recommends", "-t", &release, package])
 }
 
 /// Mirror and code name of this Debian release, as the machine's own sources give them.
@@ -103,11 +84,7 @@ fn mirror() -> Result<(String, String)> {
         .context("/etc/os-release names no release")?
         .trim_matches('"')
         .to_owned();
-    let targets = shell::capture(Command::new("apt-get").args([
-        "indextargets",
-        "--format",
-        "$(SITE) $(RELEASE)",
-    ]))?;
+    let targets = shell::capture(Command::new("apt-get").args(["indextargets", "--format", "$(SITE) $(RELEASE)"]))?;
     targets
         .lines()
         .filter_map(|line| line.split_once(' '))
@@ -124,10 +101,7 @@ fn run(arguments: &[&str]) -> Result<()> {
         sudo.args(["env", "DEBIAN_FRONTEND=noninteractive", "apt-get"]);
         sudo
     };
-    command
-        .env("DEBIAN_FRONTEND", "noninteractive")
-        .args(["-q", "-o", "DPkg::Lock::Timeout=300"])
-        .args(arguments);
+    command.env("DEBIAN_FRONTEND", "noninteractive").args(["-q", "-o", "DPkg::Lock::Timeout=300"]).args(arguments);
     // apt's stdout is chatter to us: data go to stdout, words to stderr.
     command.stdout(std::io::stderr());
     shell::run(&mut command)
@@ -135,10 +109,7 @@ fn run(arguments: &[&str]) -> Result<()> {
 
 /// Fails, with the command to type, where we may not install these packages.
 pub(super) fn require_right(packages: &[&str]) -> Result<()> {
-    if is_root()
-        || shell::succeeds(Command::new("sudo").args(["-n", "true"]))
-        || has_terminal_sudo()
-    {
+    if is_root() || shell::succeeds(Command::new("sudo").args(["-n", "true"])) || has_terminal_sudo() {
         return Ok(());
     }
     bail!(

@@ -67,20 +67,14 @@ fn unpacked(folder: &Path) -> Result<()> {
     shell::note(&format!("fetching MuJoCo {VERSION} (26 MB, hash-checked)"));
     let download = folder.join("download");
     let _ = fs::remove_dir_all(folder);
-    fs::create_dir_all(&download)
-        .with_context(|| format!("cannot create {}", download.display()))?;
+    fs::create_dir_all(&download).with_context(|| format!("cannot create {}", download.display()))?;
     fetch(&download).context("cannot fetch the MuJoCo wheel")?;
     let wheel = fs::read_dir(&download)?
         .filter_map(|entry| Some(entry.ok()?.path()))
         .find(|path| path.extension().is_some_and(|extension| extension == "whl"))
         .context("pip downloaded no wheel")?;
-    shell::run(
-        Command::new("python3")
-            .args(["-c", UNPACK])
-            .arg(&wheel)
-            .arg(folder),
-    )
-    .context("cannot unpack the MuJoCo wheel")?;
+    shell::run(Command::new("python3").args(["-c", UNPACK]).arg(&wheel).arg(folder))
+        .context("cannot unpack the MuJoCo wheel")?;
     std::os::unix::fs::symlink(format!("libmujoco.so.{VERSION}"), &library)
         .with_context(|| format!("cannot make the link {}", library.display()))?;
     fs::remove_dir_all(&download)?;
@@ -92,29 +86,15 @@ fn unpacked(folder: &Path) -> Result<()> {
 /// Lets pip fetch the one wheel with the one hash.
 fn fetch(download: &Path) -> Result<()> {
     let requirements = download.join("requirements.txt");
-    fs::write(
-        &requirements,
-        format!("mujoco=={VERSION} --hash=sha256:{WHEEL_HASH}\n"),
-    )?;
+    fs::write(&requirements, format!("mujoco=={VERSION} --hash=sha256:{WHEEL_HASH}\n"))?;
     let mut pip = pip()?;
-    pip.args([
-        "download",
-        "--quiet",
-        "--disable-pip-version-check",
-        "--no-deps",
-    ])
-    .args(["--only-binary=:all:", "--platform", "manylinux_2_28_x86_64"])
-    .args([
-        "--python-version",
-        "3.11",
-        "--implementation",
-        "cp",
-        "--require-hashes",
-    ])
-    .arg("--requirement")
-    .arg(&requirements)
-    .arg("--dest")
-    .arg(download);
+    pip.args(["download", "--quiet", "--disable-pip-version-check", "--no-deps"])
+        .args(["--only-binary=:all:", "--platform", "manylinux_2_28_x86_64"])
+        .args(["--python-version", "3.11", "--implementation", "cp", "--require-hashes"])
+        .arg("--requirement")
+        .arg(&requirements)
+        .arg("--dest")
+        .arg(download);
     shell::run(&mut pip)
 }
 

@@ -13,10 +13,7 @@ pub(super) fn ensure() -> Result<()> {
     if !apt::is_present() {
         return Ok(());
     }
-    let missing: Vec<&str> = PACKAGES
-        .into_iter()
-        .filter(|package| !apt::is_installed(package))
-        .collect();
+    let missing: Vec<&str> = PACKAGES.into_iter().filter(|package| !apt::is_installed(package)).collect();
     if missing.is_empty() {
         return Ok(());
     }

@@ -39,16 +39,9 @@ pub(super) fn ensure() -> Result<Qemu> {
     let major = version().with_context(|| {
         format!("{PROGRAM} is missing: install QEMU {SLEEPING_VERSION} or newer with its ARM system emulator")
     })?;
-    anyhow::ensure!(
-        major >= OLDEST_VERSION,
-        "{PROGRAM} {major} is too old: {SLEEPING_VERSION} or newer is needed"
-    );
+    anyhow::ensure!(major >= OLDEST_VERSION, "{PROGRAM} {major} is too old: {SLEEPING_VERSION} or newer is needed");
     let qemu = Qemu { major };
-    let idle = if qemu.may_sleep() {
-        "sleeps"
-    } else {
-        "spins: slower"
-    };
+    let idle = if qemu.may_sleep() { "sleeps" } else { "spins: slower" };
     shell::note(&format!("{PROGRAM} {major} (idle loop {idle})"));
     Ok(qemu)
 }

@@ -45,10 +45,7 @@ impl Toolchain {
         command.args([verb, "--target", target]);
         command.env("CARGO_TARGET_DIR", self.folder());
         if self == Self::Debian {
-            command
-                .args(["-Z", "build-std=core"])
-                .env("RUSTC", DEBIAN_RUSTC)
-                .env("RUSTC_BOOTSTRAP", "1");
+            command.args(["-Z", "build-std=core"]).env("RUSTC", DEBIAN_RUSTC).env("RUSTC_BOOTSTRAP", "1");
             let linker = linker()?;
             let mut path = linker.into_os_string();
             path.push(":");
@@ -113,36 +110,25 @@ pub(super) fn ensure_lints() -> Result<()> {
 
 fn sysroot() -> Result<PathBuf> {
     let mut rustc = Command::new("rustc");
-    let path = shell::capture(
-        rustc
-            .args(["--print", "sysroot"])
-            .current_dir(shell::root()),
-    )?;
+    let path = shell::capture(rustc.args(["--print", "sysroot"]).current_dir(shell::root()))?;
     Ok(PathBuf::from(path.trim()))
 }
 
 fn has_targets() -> bool {
     let Ok(sysroot) = sysroot() else { return false };
     let library = sysroot.join("lib").join("rustlib");
-    [ARM, JOINT]
-        .iter()
-        .all(|target| library.join(target).join("lib").is_dir())
+    [ARM, JOINT].iter().all(|target| library.join(target).join("lib").is_dir())
 }
 
 fn add_targets() -> bool {
     shell::note(&format!("rustup target add {ARM} {JOINT}"));
     let mut command = Command::new("rustup");
-    command
-        .args(["target", "add", ARM, JOINT])
-        .current_dir(shell::root());
+    command.args(["target", "add", ARM, JOINT]).current_dir(shell::root());
     shell::succeeds_within(&mut command, RUSTUP_LIMIT) && has_targets()
 }
 
 fn debian() -> Result<Toolchain> {
-    let missing: Vec<&str> = DEBIAN_PACKAGES
-        .into_iter()
-        .filter(|package| !apt::is_installed(package))
-        .collect();
+    let missing: Vec<&str> = DEBIAN_PACKAGES.into_iter().filter(|package| !apt::is_installed(package)).collect();
     if !missing.is_empty() {
         apt::install(&missing, "compiler for Cortex-M")?;
     }
@@ -169,10 +155,8 @@ fn is_recent(version: &str) -> bool {
 
 /// Folder of `rust-lld`, which Debian's compiler does not bring along.
 fn linker() -> Result<PathBuf> {
-    let folder = sysroot()?
-        .join("lib/rustlib")
-        .join(format!("{}-unknown-linux-gnu", std::env::consts::ARCH))
-        .join("bin");
+    let folder =
+        sysroot()?.join("lib/rustlib").join(format!("{}-unknown-linux-gnu", std::env::consts::ARCH)).join("bin");
     anyhow::ensure!(
         folder.join("rust-lld").exists(),
         "the active Rust toolchain has no rust-lld in {}",
@@ -187,9 +171,7 @@ mod tests {
 
     #[test]
     fn an_old_or_unreadable_compiler_is_not_recent() {
-        assert!(is_recent(
-            "rustc 1.96.0 (ac68faa20 2026-05-25) (built from a source tarball)"
-        ));
+        assert!(is_recent("rustc 1.96.0 (ac68faa20 2026-05-25) (built from a source tarball)"));
         assert!(is_recent("rustc 2.0.0"));
         assert!(!is_recent("rustc 1.85.0"));
         assert!(!is_recent("something else"));

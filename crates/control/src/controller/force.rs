@@ -47,14 +47,7 @@ impl<R: Real> ForceController<R> {
     /// The command `-(P e + K_i dt sum e)` in the axes of the error (N, N m), world axes for [`ForceController::torque`].
     ///
     /// `frozen` (a torque saturates) keeps the window as it is. The error of this tick belongs to the window.
-    pub fn command(
-        &mut self,
-        error: &Vector6<R>,
-        proportional: R,
-        integral: R,
-        period: R,
-        frozen: bool,
-    ) -> Vector6<R> {
+    pub fn command(&mut self, error: &Vector6<R>, proportional: R, integral: R, period: R, frozen: bool) -> Vector6<R> {
         if !frozen {
             if let Some(slot) = self.errors.get_mut(self.next) {
                 self.sum += error - *slot;

@@ -29,11 +29,7 @@ pub struct JointReference<R: Real> {
 impl<R: Real> JointReference<R> {
     /// To stand still at `q`.
     pub fn at_rest(q: JointPositions<R>) -> Self {
-        JointReference {
-            q,
-            dq: JointVelocities::zero(),
-            ddq: JointAccelerations::zero(),
-        }
+        JointReference { q, dq: JointVelocities::zero(), ddq: JointAccelerations::zero() }
     }
 }
 
@@ -47,9 +43,7 @@ pub struct JointController<R: Real> {
 impl<R: Real> JointController<R> {
     /// A controller without history.
     pub fn new() -> Self {
-        JointController {
-            feedback: Vector7::zeros(),
-        }
+        JointController { feedback: Vector7::zeros() }
     }
 
     /// Forgets the feedback of the last cycle.
@@ -87,11 +81,7 @@ impl<R: Real> Default for JointController<R> {
 /// Friction expected at the desired velocity (N m).
 fn friction<R: Real>(gains: &Gains<R>, dq_d: &JointVelocities<R>) -> Vector7<R> {
     let mut torque = gains.viscous.component_mul(&dq_d.0);
-    for ((torque, coulomb), rate) in torque
-        .iter_mut()
-        .zip(gains.coulomb.iter())
-        .zip(dq_d.0.iter())
-    {
+    for ((torque, coulomb), rate) in torque.iter_mut().zip(gains.coulomb.iter()).zip(dq_d.0.iter()) {
         let magnitude = if *rate < R::of(0.0) { -*rate } else { *rate };
         *torque += *coulomb * *rate / (magnitude + R::of(FRICTION_SPEED));
     }

@@ -29,10 +29,7 @@ pub struct JointBounds<R: Real> {
 impl<R: Real> JointBounds<R> {
     /// The soft limits, widened to the posture `q` the arm is armed in.
     pub fn around(model: &ArmModel<R>, q: &JointPositions<R>) -> Self {
-        let mut bounds = JointBounds {
-            min: model.soft_min,
-            max: model.soft_max,
-        };
+        let mut bounds = JointBounds { min: model.soft_min, max: model.soft_max };
         for joint in 0..JOINTS {
             bounds.min[joint] = at_most(q.0[joint] - R::of(SLACK), bounds.min[joint]);
             bounds.max[joint] = at_least(q.0[joint] + R::of(SLACK), bounds.max[joint]);
@@ -52,9 +49,7 @@ impl<R: Real> JointBounds<R> {
     /// Whether a joint is beyond its bound by more than [`STOP_DISTANCE`].
     pub fn violated(&self, q: &JointPositions<R>) -> bool {
         let distance = R::of(STOP_DISTANCE);
-        (0..JOINTS).any(|joint| {
-            q.0[joint] > self.max[joint] + distance || q.0[joint] < self.min[joint] - distance
-        })
+        (0..JOINTS).any(|joint| q.0[joint] > self.max[joint] + distance || q.0[joint] < self.min[joint] - distance)
     }
 
     /// Torque that pushes joints back inside; zero within the bounds.
@@ -65,11 +60,9 @@ impl<R: Real> JointBounds<R> {
             let above = at_least(q.0[joint] - self.max[joint], zero);
             let below = at_least(self.min[joint] - q.0[joint], zero);
             if above > zero {
-                torque[joint] = -above * R::of(STIFFNESS[joint])
-                    - at_least(dq.0[joint], zero) * R::of(DAMPING[joint]);
+                torque[joint] = -above * R::of(STIFFNESS[joint]) - at_least(dq.0[joint], zero) * R::of(DAMPING[joint]);
             } else if below > zero {
-                torque[joint] = below * R::of(STIFFNESS[joint])
-                    - at_most(dq.0[joint], zero) * R::of(DAMPING[joint]);
+                torque[joint] = below * R::of(STIFFNESS[joint]) - at_most(dq.0[joint], zero) * R::of(DAMPING[joint]);
             }
         }
         JointTorques(torque)

@@ -16,10 +16,7 @@ use crate::estimate::JointState;
 use crate::filter::{Butterworth, LowPass};
 use crate::kinematics::Frames;
 use crate::real::Real;
-use crate::units::{
-    JOINTS, JointAccelerations, JointPositions, JointVelocities, Orientation, Pose, Vector6,
-    Vector7,
-};
+use crate::units::{JOINTS, JointAccelerations, JointPositions, JointVelocities, Orientation, Pose, Vector6, Vector7};
 
 /// Cut-off of the differentiated acceleration (Hz).
 const ACCELERATION_CUT_OFF: f64 = 15.0;
@@ -92,15 +89,10 @@ impl<R: Real> OperationalController<R> {
         let pose = frames.tool_pose();
         let gain = |linear: Vector3<R>, angular: Vector3<R>| {
             let (linear, angular) = (linear * gains.position, angular * gains.orientation);
-            Vector6::new(
-                linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
-            )
+            Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
         };
 
-        let correction = gain(
-            task.pose.position - pose.position,
-            pose.orientation.error_to(&task.pose.orientation),
-        );
+        let correction = gain(task.pose.position - pose.position, pose.orientation.error_to(&task.pose.orientation));
         // The posture term uses the measured q in either case, so that the null space does not integrate blindly.
         let preferred = (task.posture - state.q.0) * gains.posture;
         let dq_d = inverse.resolve(&(task.velocity + correction), &preferred);
@@ -108,37 +100,23 @@ impl<R: Real> OperationalController<R> {
         let ddq_d = match acceleration {
             AccelerationSource::Analytic => {
                 let rate = task.velocity - jacobian.twist(&dq.0);
-                let damping = gain(
-                    rate.fixed_rows::<3>(0).into(),
-                    rate.fixed_rows::<3>(3).into(),
-                );
+                let damping = gain(rate.fixed_rows::<3>(0).into(), rate.fixed_rows::<3>(3).into());
                 let wanted = task.acceleration + damping - frames.velocity_product(dq).to_vector();
-                inverse.resolve(
-                    &wanted,
-                    &((task.posture_velocity - state.dq.0) * gains.posture),
-                )
+                inverse.resolve(&wanted, &((task.posture_velocity - state.dq.0) * gains.posture))
             }
-            AccelerationSource::Differentiated => {
-                self.derivative.step(&((dq_d - self.dq_d.0) * R::of(RATE)))
-            }
+            AccelerationSource::Differentiated => self.derivative.step(&((dq_d - self.dq_d.0) * R::of(RATE))),
         };
 
         self.dq_d = JointVelocities(dq_d);
         self.clamped = false;
         let mut q_d = self.q_d.0 + dq_d * R::of(PERIOD);
-        for ((desired, measured), clamp) in
-            q_d.iter_mut().zip(state.q.0.iter()).zip(gains.clamp.iter())
-        {
+        for ((desired, measured), clamp) in q_d.iter_mut().zip(state.q.0.iter()).zip(gains.clamp.iter()) {
             let kept = at_most(at_least(*desired, *measured - *clamp), *measured + *clamp);
             self.clamped |= kept != *desired;
             *desired = kept;
         }
         self.q_d = JointPositions(q_d);
-        JointReference {
-            q: self.q_d,
-            dq: self.dq_d,
-            ddq: JointAccelerations(ddq_d),
-        }
+        JointReference { q: self.q_d, dq: self.dq_d, ddq: JointAccelerations(ddq_d) }
     }
 }
 

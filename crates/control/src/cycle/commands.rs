@@ -20,11 +20,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     pub(super) fn command_blind(&mut self, command: Command) -> Result<(), Refusal> {
         match command {
             Command::Stop | Command::Release | Command::ClearFault => {
-                let trigger = if command == Command::ClearFault {
-                    Trigger::Clear
-                } else {
-                    Trigger::Release
-                };
+                let trigger = if command == Command::ClearFault { Trigger::Clear } else { Trigger::Release };
                 self.supervisor.take(trigger, Fault::None).map(|_| ())
             }
             Command::Tare => self.tare(),
@@ -36,18 +32,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if self.supervisor.law() == State::Run {
             return Err(Refusal::WrongState);
         }
-        if self.wrench.tare() {
-            Ok(())
-        } else {
-            Err(Refusal::WrenchMissing)
-        }
+        if self.wrench.tare() { Ok(()) } else { Err(Refusal::WrenchMissing) }
     }
 
-    pub(super) fn command(
-        &mut self,
-        command: Command,
-        measured: &Measured<'_, R>,
-    ) -> Result<(), Refusal> {
+    pub(super) fn command(&mut self, command: Command, measured: &Measured<'_, R>) -> Result<(), Refusal> {
         let q = &measured.state.q;
         match command {
             Command::Stop => self.change(Trigger::Stop, measured),
@@ -69,15 +57,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.may_begin(measured)?;
                 self.change(Trigger::Hold, measured)
             }
-            Command::Approach {
-                q: target,
-                duration,
-            } => {
+            Command::Approach { q: target, duration } => {
                 self.may_begin(measured)?;
                 self.supervisor.allows(Trigger::Approach)?;
-                if !(duration >= 0.0 && f64::from(duration) <= LONGEST)
-                    || target.iter().any(|q| !q.is_finite())
-                {
+                if !(duration >= 0.0 && f64::from(duration) <= LONGEST) || target.iter().any(|q| !q.is_finite()) {
                     return Err(Refusal::OutOfRange);
                 }
                 let target = JointPositions::from_f32(target);
@@ -86,17 +69,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 }
                 self.may_move(measured)?;
                 // From the posture that is held, so that the torque against friction stays.
-                let from = if self.supervisor.law() == State::Hold {
-                    self.hold
-                } else {
-                    *q
-                };
-                self.approach = Some(Approach::new(
-                    &self.model,
-                    &from,
-                    &target,
-                    R::of(f64::from(duration)),
-                ));
+                let from = if self.supervisor.law() == State::Hold { self.hold } else { *q };
+                self.approach = Some(Approach::new(&self.model, &from, &target, R::of(f64::from(duration))));
                 self.change(Trigger::Approach, measured)
             }
             Command::Run(options) => {
@@ -104,9 +78,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.supervisor.allows(Trigger::Run)?;
                 self.may_move(measured)?;
                 let primitive = self.primitive.as_ref().ok_or(Refusal::NoPrimitive)?;
-                if (options.feedback || options.force_control)
-                    && self.wrench.age().is_none_or(|age| age > WRENCH_AGE)
-                {
+                if (options.feedback || options.force_control) && self.wrench.age().is_none_or(|age| age > WRENCH_AGE) {
                     return Err(Refusal::WrenchMissing);
                 }
                 self.run = Some(Run::start(primitive, q, &measured.pose, options)?);
@@ -145,11 +117,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     }
 
     fn may_move(&self, measured: &Measured<'_, R>) -> Result<(), Refusal> {
-        if self.fastest(measured) > R::of(CALM) {
-            Err(Refusal::Moving)
-        } else {
-            Ok(())
-        }
+        if self.fastest(measured) > R::of(CALM) { Err(Refusal::Moving) } else { Ok(()) }
     }
 
     fn fastest(&self, measured: &Measured<'_, R>) -> R {

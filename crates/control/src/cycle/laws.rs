@@ -24,11 +24,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// The law of the present state; `None` where no torque is sent.
     pub(super) fn demand(&mut self, measured: &Measured<'_, R>) -> Option<Demand<R>> {
         let repulsion = self.bounds.repulsion(&measured.state.q, &measured.state.dq);
-        let near = if repulsion.0.amax() > R::of(0.0) {
-            flags::NEAR_LIMIT
-        } else {
-            0
-        };
+        let near = if repulsion.0.amax() > R::of(0.0) { flags::NEAR_LIMIT } else { 0 };
         let mut demand = match self.supervisor.law() {
             State::Idle | State::Fault | State::Coast => return None,
             State::Gravity => self.float(measured),
@@ -63,8 +59,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     fn float(&self, measured: &Measured<'_, R>) -> Demand<R> {
         let mut torque = self.model.gravity_torque(measured.frames).0;
         if self.armed_for < ARMING {
-            let share = R::from_counts(i32::from(ARMING - self.armed_for))
-                / R::from_counts(i32::from(ARMING));
+            let share = R::from_counts(i32::from(ARMING - self.armed_for)) / R::from_counts(i32::from(ARMING));
             torque -= self.gains.stop_damping.component_mul(&measured.state.dq.0) * share;
         }
         self.plain(measured, torque)
@@ -83,22 +78,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// Eq (10) along a joint reference.
     fn track(&mut self, measured: &Measured<'_, R>, reference: JointReference<R>) -> Demand<R> {
         let frozen = measured.state.missing > 0;
-        let torque = self.joint_controller.torque(
-            &self.model,
-            &self.gains,
-            measured.frames,
-            measured.state,
-            &reference,
-            frozen,
-        );
+        let torque =
+            self.joint_controller.torque(&self.model, &self.gains, measured.frames, measured.state, &reference, frozen);
         let pose_d = Frames::new(&self.model, &reference.q).tool_pose();
-        Demand {
-            torque,
-            q_d: reference.q,
-            pose_d,
-            phase: R::of(0.0),
-            flags: 0,
-        }
+        Demand { torque, q_d: reference.q, pose_d, phase: R::of(0.0), flags: 0 }
     }
 
     /// Eqs (8), (9), (11), (10), (12), (13).
@@ -110,11 +93,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let frozen = measured.state.missing > 0;
         let options = run.options;
         let error = run.force_error(primitive, &measured.wrench);
-        let plan = run.step(
-            primitive,
-            &measured.wrench,
-            frozen || self.wrench.age() != Some(0),
-        );
+        let plan = run.step(primitive, &measured.wrench, frozen || self.wrench.age() != Some(0));
         let task = TaskReference::from_plan(&plan);
         let reference = self.operational.step(
             &self.model,
@@ -124,14 +103,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             &task,
             (options.pose_feedback, options.acceleration),
         );
-        let mut torque = self.joint_controller.torque(
-            &self.model,
-            &self.gains,
-            measured.frames,
-            measured.state,
-            &reference,
-            frozen,
-        );
+        let mut torque =
+            self.joint_controller.torque(&self.model, &self.gains, measured.frames, measured.state, &reference, frozen);
         let mut set = if options.feedback { flags::FEEDBACK } else { 0 };
         if let Some(error) = error.filter(|_| options.force_control) {
             let command = self.force.command(
@@ -149,12 +122,6 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         let offset = task.pose.position - measured.pose.position;
         self.tracking = offset.dot(&offset).square_root();
-        Demand {
-            torque,
-            q_d: reference.q,
-            pose_d: task.pose,
-            phase: plan.phase,
-            flags: set,
-        }
+        Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, flags: set }
     }
 }

@@ -17,9 +17,7 @@ use crate::approach::Approach;
 use crate::arm::ArmModel;
 use crate::calibration::Calibration;
 use crate::command::Refusal;
-use crate::controller::{
-    ForceController, Gains, JointBounds, JointController, OperationalController,
-};
+use crate::controller::{ForceController, Gains, JointBounds, JointController, OperationalController};
 use crate::estimate::{JointEstimator, JointState};
 use crate::fault::Fault;
 use crate::kinematics::Frames;
@@ -173,9 +171,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.wrench = WrenchEstimator::new();
         self.safety = None;
         // Every state allows this trigger, so there is nothing to refuse.
-        let _ = self
-            .supervisor
-            .take(Trigger::SafetyDropped, Fault::SafetyDropped);
+        let _ = self.supervisor.take(Trigger::SafetyDropped, Fault::SafetyDropped);
         self.leave_torque();
     }
 
@@ -206,31 +202,19 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.watch_safety(input.sample.safety);
         self.outside_fault = input.external_fault.is_some();
         if let Some(fault) = input.external_fault {
-            let trigger = if fault == Fault::Overrun {
-                Trigger::SoftFault
-            } else {
-                Trigger::HardFault
-            };
+            let trigger = if fault == Fault::Overrun { Trigger::SoftFault } else { Trigger::HardFault };
             self.trigger(trigger, fault, None);
         }
         let torque_on = self.supervisor.state().has_torque();
         let state = self.joints.update(&input.sample.positions, torque_on);
         self.wrench.update(input.sample.wrench.as_ref());
 
-        let mut record = CycleRecord {
-            cycle: input.cycle,
-            ..CycleRecord::EMPTY
-        };
+        let mut record = CycleRecord { cycle: input.cycle, ..CycleRecord::EMPTY };
         let mut answer = None;
         let actuation = match state {
             None => {
                 answer = input.command.map(|command| self.command_blind(command));
-                record.lost_replies = input
-                    .sample
-                    .positions
-                    .iter()
-                    .filter(|reply| reply.is_none())
-                    .count() as u8;
+                record.lost_replies = input.sample.positions.iter().filter(|reply| reply.is_none()).count() as u8;
                 self.actuate_without_torque()
             }
             Some(state) => {
@@ -242,10 +226,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                     wrench: self.wrench.wrench(&frames),
                 };
                 self.monitor(&measured);
-                answer = input
-                    .command
-                    .map(|command| self.command(command, &measured))
-                    .or(answer);
+                answer = input.command.map(|command| self.command(command, &measured)).or(answer);
                 self.act(&measured, &mut record)
             }
         };
@@ -263,11 +244,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Some(Err(reason)) => Some(Event::Refused(reason)),
             None => self.pending.take(),
         };
-        CycleOutput {
-            actuation,
-            record,
-            event,
-        }
+        CycleOutput { actuation, record, event }
     }
 
     fn watch_safety(&mut self, polled: Option<SafetyMode>) {
@@ -290,10 +267,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             return;
         }
         self.bounds.tighten(&self.model, &measured.state.q);
-        let depends = self
-            .run
-            .as_ref()
-            .is_some_and(|run| run.options.feedback || run.options.force_control);
+        let depends = self.run.as_ref().is_some_and(|run| run.options.feedback || run.options.force_control);
         let seen = Observation {
             frames: measured.frames,
             bounds: &self.bounds,
@@ -301,10 +275,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             tracking: self.tracking,
             wrench_lost: depends && self.wrench.age().is_none_or(|age| age > WRENCH_AGE),
         };
-        if let Some((trigger, fault)) =
-            self.monitor
-                .check(self.supervisor.law(), measured.state, &seen)
-        {
+        if let Some((trigger, fault)) = self.monitor.check(self.supervisor.law(), measured.state, &seen) {
             self.trigger(trigger, fault, Some(measured));
         }
     }
@@ -400,11 +371,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if report.not_finite {
             // A soft stop computes with less; if that is not finite either, nothing is left but zero.
             let stopping = self.supervisor.law() == State::SoftStop;
-            let trigger = if stopping {
-                Trigger::HardFault
-            } else {
-                Trigger::SoftFault
-            };
+            let trigger = if stopping { Trigger::HardFault } else { Trigger::SoftFault };
             self.trigger(trigger, Fault::NotFinite, Some(measured));
             if !self.supervisor.state().has_torque() {
                 return self.actuate_without_torque();

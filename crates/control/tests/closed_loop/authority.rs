@@ -29,12 +29,7 @@ fn gravity_mode_holds_the_arm_still_and_lets_a_person_move_it() {
     assert_eq!(rig.cycle.state(), State::Gravity);
     let rest = rig.plant.q;
     rig.run_for(2.0);
-    assert!(
-        (rig.plant.q - rest).amax() < 1e-4,
-        "{} {}",
-        rig.plant.q - rest,
-        rig.plant.dq
-    );
+    assert!((rig.plant.q - rest).amax() < 1e-4, "{} {}", rig.plant.q - rest, rig.plant.dq);
 }
 
 #[test]
@@ -49,43 +44,29 @@ fn gravity_mode_hardly_drifts_without_any_friction() {
     let before = rig.plant.q;
     rig.run_for(0.5);
     // Counts of torque are rounded down, half a count each; that alone may push.
-    assert!(
-        (rig.plant.q - before).amax() < 0.02,
-        "{}",
-        rig.plant.q - before
-    );
+    assert!((rig.plant.q - before).amax() < 0.02, "{}", rig.plant.q - before);
 }
 
 #[test]
 fn the_first_torque_after_arming_is_gravity_with_a_limited_onset() {
     let mut rig = Rig::<f32>::new(GOAL, 0);
     rig.run_for(0.1);
-    let gravity = rig
-        .cycle
-        .model()
-        .gravity_torque(&control::kinematics::Frames::new(
-            rig.cycle.model(),
-            &JointPositions::from_f32(GOAL.map(|q| q as f32)),
-        ));
+    let gravity = rig.cycle.model().gravity_torque(&control::kinematics::Frames::new(
+        rig.cycle.model(),
+        &JointPositions::from_f32(GOAL.map(|q| q as f32)),
+    ));
     let mut last = [0.0f32; 7];
     let mut output = rig.command(Command::Hold);
     for _ in 0..90 {
         for joint in 0..7 {
             let step = (output.record.tau[joint] - last[joint]).abs();
-            assert!(
-                step <= STEP_LIMIT[joint] as f32 * 1.0001,
-                "J{}: {step}",
-                joint + 1
-            );
+            assert!(step <= STEP_LIMIT[joint] as f32 * 1.0001, "J{}: {step}", joint + 1);
         }
         last = output.record.tau;
         output = rig.tick(None);
     }
     // J2 carries most of it.
-    assert!(
-        gravity.0[1].abs() > 15.0 && (last[1] - gravity.0[1]).abs() < 6.0,
-        "{last:?} {gravity:?}"
-    );
+    assert!(gravity.0[1].abs() > 15.0 && (last[1] - gravity.0[1]).abs() < 6.0, "{last:?} {gravity:?}");
 }
 
 #[test]
@@ -93,40 +74,21 @@ fn nothing_is_armed_without_a_person_an_active_safety_module_and_all_positions()
     let mut rig = Rig::<f32>::new(GOAL, 0);
     rig.safety = SafetyMode::Idle;
     rig.run_for(0.1);
-    for command in [
-        Command::Gravity,
-        Command::Hold,
-        Command::Run(RunOptions::default()),
-    ] {
+    for command in [Command::Gravity, Command::Hold, Command::Run(RunOptions::default())] {
         let output = rig.tick(Some(command));
-        assert_eq!(
-            output.event,
-            Some(Event::Refused(Refusal::SafetyNotActive)),
-            "{command:?}"
-        );
+        assert_eq!(output.event, Some(Event::Refused(Refusal::SafetyNotActive)), "{command:?}");
     }
-    assert_eq!(
-        rig.last.expect("ran").actuation.frames(),
-        None,
-        "nothing is sent to idle pucks"
-    );
+    assert_eq!(rig.last.expect("ran").actuation.frames(), None, "nothing is sent to idle pucks");
     rig.safety = SafetyMode::Active;
     rig.run_for(1.0);
     assert_eq!(rig.cycle.state(), State::Idle, "nobody asked");
     assert_eq!(rig.plant.torque, Vector7::zeros());
     rig.lose[3] = true;
-    assert_eq!(
-        rig.tick(Some(Command::Hold)).event,
-        Some(Event::Refused(Refusal::PositionsMissing))
-    );
+    assert_eq!(rig.tick(Some(Command::Hold)).event, Some(Event::Refused(Refusal::PositionsMissing)));
     rig.lose[3] = false;
     rig.tick(None);
     assert_eq!(
-        rig.tick(Some(Command::Approach {
-            q: [0.5; 7],
-            duration: 1.0
-        }))
-        .event,
+        rig.tick(Some(Command::Approach { q: [0.5; 7], duration: 1.0 })).event,
         Some(Event::Refused(Refusal::WrongState))
     );
     rig.command(Command::Hold);
@@ -136,19 +98,14 @@ fn nothing_is_armed_without_a_person_an_active_safety_module_and_all_positions()
 fn a15_safety_dropped_ends_in_idle_and_torque_returns_only_when_asked_for() {
     for mode in [SafetyMode::Idle, SafetyMode::EStop] {
         let mut rig = Rig::<f32>::new(START, 1);
-        rig.cycle
-            .load(&primitive(&Design::default()))
-            .expect("loads");
+        rig.cycle.load(&primitive(&Design::default())).expect("loads");
         rig.command(Command::Hold);
         rig.run_for(2.0);
         rig.command(Command::Run(RunOptions::default()));
         rig.run_for(1.5);
         rig.safety = mode;
         let output = rig.tick(None);
-        assert_eq!(
-            (output.record.state, output.record.fault),
-            (State::Idle, Fault::SafetyDropped)
-        );
+        assert_eq!((output.record.state, output.record.fault), (State::Idle, Fault::SafetyDropped));
         assert_eq!(output.record.tau, [0.0; 7]);
         // Zero torque is said three times, so that no motor keeps pulling; then the bus is left alone.
         for cycle in 0..5 {
@@ -164,10 +121,7 @@ fn a15_safety_dropped_ends_in_idle_and_torque_returns_only_when_asked_for() {
         for (torque, limit) in output.record.tau.iter().zip(STEP_LIMIT) {
             assert!(torque.abs() <= limit as f32 * 1.0001);
         }
-        assert_eq!(
-            rig.tick(Some(Command::SetSpeed { factor: 1.0 })).event,
-            Some(Event::Refused(Refusal::WrongState))
-        );
+        assert_eq!(rig.tick(Some(Command::SetSpeed { factor: 1.0 })).event, Some(Event::Refused(Refusal::WrongState)));
     }
 }
 
@@ -177,15 +131,8 @@ fn a_silent_safety_module_counts_as_dropped() {
     rig.command(Command::Hold);
     let mut cycles = 0;
     while rig.cycle.state() == State::Hold {
-        let sample = control::BusSample {
-            positions: rig.plant.counts(),
-            wrench: None,
-            safety: None,
-        };
-        rig.cycle.step(&control::CycleInput {
-            sample,
-            ..Default::default()
-        });
+        let sample = control::BusSample { positions: rig.plant.counts(), wrench: None, safety: None };
+        rig.cycle.step(&control::CycleInput { sample, ..Default::default() });
         cycles += 1;
     }
     assert!((300..=302).contains(&cycles), "{cycles}");
@@ -199,34 +146,17 @@ fn e2_a_start_too_far_from_the_primitive_is_refused() {
     let mut rig = Rig::<f32>::new(q, 0);
     rig.command(Command::Hold);
     rig.run_for(2.0);
-    assert_eq!(
-        rig.tick(Some(Command::Run(RunOptions::default()))).event,
-        Some(Event::Refused(Refusal::NoPrimitive))
-    );
-    rig.cycle
-        .load(&primitive(&Design::default()))
-        .expect("loads");
-    assert_eq!(
-        rig.tick(Some(Command::Run(RunOptions::default()))).event,
-        Some(Event::Refused(Refusal::StartTooFar))
-    );
+    assert_eq!(rig.tick(Some(Command::Run(RunOptions::default()))).event, Some(Event::Refused(Refusal::NoPrimitive)));
+    rig.cycle.load(&primitive(&Design::default())).expect("loads");
+    assert_eq!(rig.tick(Some(Command::Run(RunOptions::default()))).event, Some(Event::Refused(Refusal::StartTooFar)));
     assert_eq!(rig.cycle.state(), State::Hold);
     for speed in [0.0, -1.0, 10.0, f32::NAN, f32::INFINITY] {
         let mut near = Rig::<f32>::new(START, 0);
-        near.cycle
-            .load(&primitive(&Design::default()))
-            .expect("loads");
+        near.cycle.load(&primitive(&Design::default())).expect("loads");
         near.command(Command::Hold);
         near.run_for(2.0);
-        let command = Command::Run(RunOptions {
-            speed,
-            ..RunOptions::default()
-        });
-        assert_eq!(
-            near.tick(Some(command)).event,
-            Some(Event::Refused(Refusal::OutOfRange)),
-            "{speed}"
-        );
+        let command = Command::Run(RunOptions { speed, ..RunOptions::default() });
+        assert_eq!(near.tick(Some(command)).event, Some(Event::Refused(Refusal::OutOfRange)), "{speed}");
     }
 }
 
@@ -234,9 +164,7 @@ fn e2_a_start_too_far_from_the_primitive_is_refused() {
 fn e5_stop_at_any_phase_comes_to_rest_within_the_torque_rate() {
     for seconds in [0.02, 0.5, 1.0, 2.0, 3.5] {
         let mut rig = Rig::<f32>::new(START, 1);
-        rig.cycle
-            .load(&primitive(&Design::default()))
-            .expect("loads");
+        rig.cycle.load(&primitive(&Design::default())).expect("loads");
         rig.command(Command::Hold);
         rig.run_for(2.0);
         rig.command(Command::Run(RunOptions::default()));
@@ -249,10 +177,7 @@ fn e5_stop_at_any_phase_comes_to_rest_within_the_torque_rate() {
             assert_eq!(record.state, State::SoftStop);
             for joint in 0..7 {
                 // The command cycle and one more lie between.
-                assert!(
-                    (record.tau[joint] - last[joint]).abs()
-                        <= 2.0 * STEP_LIMIT[joint] as f32 * 1.0001
-                );
+                assert!((record.tau[joint] - last[joint]).abs() <= 2.0 * STEP_LIMIT[joint] as f32 * 1.0001);
             }
             last = record.tau;
         }
@@ -274,14 +199,7 @@ fn b8_a_joint_pushed_to_its_limit_is_pushed_back() {
     rig.command(Command::Gravity);
     rig.run_for(1.0);
     // Turn the hand about an axis that bends the wrist towards its stop.
-    let axis = rig
-        .plant
-        .frames()
-        .jacobian()
-        .0
-        .column(5)
-        .fixed_rows::<3>(3)
-        .into_owned();
+    let axis = rig.plant.frames().jacobian().0.column(5).fixed_rows::<3>(3).into_owned();
     let torque = -axis * 0.7;
     rig.plant.push = [0.0, 0.0, 0.0, torque.x, torque.y, torque.z];
     let mut lowest = 0.0f64;
@@ -302,22 +220,12 @@ fn a_joint_that_leaves_its_soft_limits_under_control_is_stopped_with_the_reason(
     rig.run_for(1.0);
     rig.plant.push = [0.0, 0.0, -60.0, 0.0, 0.0, 0.0];
     rig.until(State::SoftStop, 5.0);
-    assert!(
-        matches!(rig.cycle.fault(), Fault::JointLimit | Fault::ContactForce),
-        "{:?}",
-        rig.cycle.fault()
-    );
-    assert_eq!(
-        rig.tick(Some(Command::Hold)).event,
-        Some(Event::Refused(Refusal::FaultLatched))
-    );
+    assert!(matches!(rig.cycle.fault(), Fault::JointLimit | Fault::ContactForce), "{:?}", rig.cycle.fault());
+    assert_eq!(rig.tick(Some(Command::Hold)).event, Some(Event::Refused(Refusal::FaultLatched)));
     rig.plant.push = [0.0; 6];
     rig.run_for(2.0);
     rig.command(Command::ClearFault);
-    assert_eq!(
-        (rig.cycle.state(), rig.cycle.fault()),
-        (State::Gravity, Fault::None)
-    );
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Gravity, Fault::None));
 }
 
 #[test]
@@ -327,19 +235,9 @@ fn an_arm_that_moves_too_fast_is_stopped() {
     rig.run_for(1.0);
     rig.plant.push = [0.0, 60.0, 0.0, 0.0, 0.0, 0.0];
     rig.until(State::SoftStop, 3.0);
-    assert!(
-        matches!(rig.cycle.fault(), Fault::TipSpeed | Fault::JointSpeed),
-        "{:?}",
-        rig.cycle.fault()
-    );
-    let speeds = rig
-        .plant
-        .frames()
-        .elbow_speeds(&control::units::JointVelocities(rig.plant.dq), 0.35);
-    assert!(
-        speeds[0].max(speeds[1]) < 1.0,
-        "before the safety module faults: {speeds:?}"
-    );
+    assert!(matches!(rig.cycle.fault(), Fault::TipSpeed | Fault::JointSpeed), "{:?}", rig.cycle.fault());
+    let speeds = rig.plant.frames().elbow_speeds(&control::units::JointVelocities(rig.plant.dq), 0.35);
+    assert!(speeds[0].max(speeds[1]) < 1.0, "before the safety module faults: {speeds:?}");
 }
 
 #[test]
@@ -347,54 +245,24 @@ fn a_bus_fault_takes_torque_off_and_asks_for_idle() {
     let mut rig = Rig::<f32>::new(GOAL, 1);
     rig.command(Command::Hold);
     rig.run_for(1.0);
-    let sample = control::BusSample {
-        positions: rig.plant.counts(),
-        wrench: None,
-        safety: Some(SafetyMode::Active),
-    };
-    let input = control::CycleInput {
-        cycle: 0,
-        sample,
-        command: None,
-        external_fault: Some(Fault::BusFault),
-    };
+    let sample = control::BusSample { positions: rig.plant.counts(), wrench: None, safety: Some(SafetyMode::Active) };
+    let input = control::CycleInput { cycle: 0, sample, command: None, external_fault: Some(Fault::BusFault) };
     let output = rig.cycle.step(&input);
-    assert_eq!(
-        (output.record.state, output.record.fault),
-        (State::Fault, Fault::BusFault)
-    );
+    assert_eq!((output.record.state, output.record.fault), (State::Fault, Fault::BusFault));
     assert_eq!(output.record.tau, [0.0; 7]);
     assert!(output.actuation.frames().is_some(), "zero torque is said");
     rig.run_for(0.02);
     assert!(rig.last.expect("ran").actuation.requests_idle());
-    assert_eq!(
-        rig.tick(Some(Command::Gravity)).event,
-        Some(Event::Refused(Refusal::FaultLatched))
-    );
+    assert_eq!(rig.tick(Some(Command::Gravity)).event, Some(Event::Refused(Refusal::FaultLatched)));
     // E8: no clearing while the cause is there, none needed twice when it is gone.
-    let clear = control::CycleInput {
-        command: Some(Command::ClearFault),
-        ..input
-    };
-    assert_eq!(
-        rig.cycle.step(&clear).event,
-        Some(Event::Refused(Refusal::CauseRemains))
-    );
+    let clear = control::CycleInput { command: Some(Command::ClearFault), ..input };
+    assert_eq!(rig.cycle.step(&clear).event, Some(Event::Refused(Refusal::CauseRemains)));
     rig.plant.dq = Vector7::zeros();
     rig.plant.coulomb *= 50.0;
     rig.run_for(0.5);
     rig.command(Command::ClearFault);
-    assert_eq!(
-        (rig.cycle.state(), rig.cycle.fault()),
-        (State::Idle, Fault::None)
-    );
-    let hold = control::CycleInput {
-        command: Some(Command::Hold),
-        ..input
-    };
-    assert_eq!(
-        rig.cycle.step(&hold).event,
-        Some(Event::Refused(Refusal::CauseRemains))
-    );
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Idle, Fault::None));
+    let hold = control::CycleInput { command: Some(Command::Hold), ..input };
+    assert_eq!(rig.cycle.step(&hold).event, Some(Event::Refused(Refusal::CauseRemains)));
     rig.command(Command::Hold);
 }

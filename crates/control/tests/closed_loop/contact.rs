@@ -34,10 +34,7 @@ fn a_push_reads_as_the_wrench_of_the_environment_on_the_robot_at_the_grasp_point
     let to_world = *rig.plant.frames().tool_to_world();
     let torque = to_world.transpose() * nalgebra::Vector3::new(push[3], push[4], push[5]);
     for axis in 0..3 {
-        assert!(
-            (wrench[3 + axis] - torque[axis]).abs() < 0.02,
-            "{wrench:?} {torque:?}"
-        );
+        assert!((wrench[3 + axis] - torque[axis]).abs() < 0.02, "{wrench:?} {torque:?}");
     }
 }
 
@@ -45,15 +42,9 @@ fn a_push_reads_as_the_wrench_of_the_environment_on_the_robot_at_the_grasp_point
 fn displacement(feedback: bool, push: f64) -> f64 {
     let end = |push: f64| {
         let mut rig = holding::<f32>(START);
-        let design = Design {
-            expected: Some([0.0; 6]),
-            ..Design::default()
-        };
+        let design = Design { expected: Some([0.0; 6]), ..Design::default() };
         rig.cycle.load(&primitive(&design)).expect("loads");
-        rig.command(Command::Run(RunOptions {
-            feedback,
-            ..RunOptions::default()
-        }));
+        rig.command(Command::Run(RunOptions { feedback, ..RunOptions::default() }));
         rig.run_for(1.0);
         rig.plant.push[0] = push;
         rig.run_for(1.5);
@@ -87,11 +78,8 @@ fn force_control_presses_towards_the_expected_force_and_position_control_alone_d
         rig.cycle.load(&primitive(&design)).expect("loads");
         let surface = rig.plant.frames().tool_pose().position.x + 0.002;
         rig.plant.wall = Some((surface, 800.0));
-        let options = RunOptions {
-            force_control,
-            pose_feedback: control::PoseFeedback::Planned,
-            ..RunOptions::default()
-        };
+        let options =
+            RunOptions { force_control, pose_feedback: control::PoseFeedback::Planned, ..RunOptions::default() };
         rig.command(Command::Run(options));
         rig.run_for(2.5);
         let record = rig.last.expect("ran").record;
@@ -112,25 +100,16 @@ fn b3_a_force_above_the_threshold_stops_the_movement_within_two_cycles() {
     rig.tick(None);
     rig.tick(None);
     rig.tick(None);
-    assert_eq!(
-        (rig.cycle.state(), rig.cycle.fault()),
-        (State::SoftStop, Fault::ContactForce)
-    );
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::SoftStop, Fault::ContactForce));
 }
 
 #[test]
 fn b2_one_outlier_of_the_force_sensor_moves_the_plan_by_less_than_a_millimetre() {
     let path = |outlier: bool| {
         let mut rig = holding::<f32>(START);
-        let design = Design {
-            expected: Some([0.0; 6]),
-            ..Design::default()
-        };
+        let design = Design { expected: Some([0.0; 6]), ..Design::default() };
         rig.cycle.load(&primitive(&design)).expect("loads");
-        rig.command(Command::Run(RunOptions {
-            feedback: true,
-            ..RunOptions::default()
-        }));
+        rig.command(Command::Run(RunOptions { feedback: true, ..RunOptions::default() }));
         rig.run_for(1.0);
         rig.plant.glitch = if outlier { 100.0 } else { 0.0 };
         rig.tick(None);
@@ -141,51 +120,29 @@ fn b2_one_outlier_of_the_force_sensor_moves_the_plan_by_less_than_a_millimetre()
         }
         positions
     };
-    let worst = path(true)
-        .iter()
-        .zip(&path(false))
-        .map(|(a, b)| (a - b).abs())
-        .fold(0.0, f64::max);
+    let worst = path(true).iter().zip(&path(false)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-3, "{worst}");
 }
 
 #[test]
 fn a_run_that_needs_the_wrench_is_refused_or_stopped_without_it() {
     let mut rig = holding::<f32>(START);
-    let design = Design {
-        expected: Some([0.0; 6]),
-        ..Design::default()
-    };
+    let design = Design { expected: Some([0.0; 6]), ..Design::default() };
     rig.cycle.load(&primitive(&design)).expect("loads");
-    rig.command(Command::Run(RunOptions {
-        feedback: true,
-        ..RunOptions::default()
-    }));
+    rig.command(Command::Run(RunOptions { feedback: true, ..RunOptions::default() }));
     rig.run_for(0.5);
     for _ in 0..10 {
-        let sample = control::BusSample {
-            positions: rig.plant.counts(),
-            wrench: None,
-            safety: Some(puck::SafetyMode::Active),
-        };
-        let output = rig.cycle.step(&control::CycleInput {
-            sample,
-            ..Default::default()
-        });
+        let sample =
+            control::BusSample { positions: rig.plant.counts(), wrench: None, safety: Some(puck::SafetyMode::Active) };
+        let output = rig.cycle.step(&control::CycleInput { sample, ..Default::default() });
         rig.plant.receive(output.actuation.frames());
         rig.plant.advance();
     }
-    assert_eq!(
-        (rig.cycle.state(), rig.cycle.fault()),
-        (State::SoftStop, Fault::WrenchLost)
-    );
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::SoftStop, Fault::WrenchLost));
 }
 
 #[test]
 fn the_goal_configuration_belongs_to_its_posture() {
     let goal = configuration::<f64>(GOAL);
-    assert!(
-        (goal.position[0] - 0.75).abs() < 0.05 && (goal.position[1] - 0.20).abs() < 0.05,
-        "{goal:?}"
-    );
+    assert!((goal.position[0] - 0.75).abs() < 0.05 && (goal.position[1] - 0.20).abs() < 0.05, "{goal:?}");
 }

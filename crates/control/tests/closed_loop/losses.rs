@@ -10,12 +10,7 @@ use crate::rig::Rig;
 /// A rig in the middle of a run.
 fn running(seconds: f64) -> Rig<f32> {
     let mut rig = Rig::<f32>::new(START, 1);
-    rig.cycle
-        .load(&primitive(&Design {
-            duration: 3.0,
-            ..Design::default()
-        }))
-        .expect("loads");
+    rig.cycle.load(&primitive(&Design { duration: 3.0, ..Design::default() })).expect("loads");
     rig.command(Command::Hold);
     rig.run_for(2.0);
     rig.command(Command::Run(RunOptions::default()));
@@ -30,19 +25,11 @@ fn with_losses(rig: &mut Rig<f32>, motors: [bool; 7], cycles: usize) -> Vec<[f64
         .map(|cycle| {
             rig.lose = if cycle < cycles { motors } else { [false; 7] };
             let record = rig.tick(None).record;
-            let expected = if cycle < cycles {
-                State::Coast
-            } else {
-                State::Run
-            };
+            let expected = if cycle < cycles { State::Coast } else { State::Run };
             assert_eq!(record.state, expected, "cycle {cycle}");
             for joint in 0..7 {
                 let step = (record.tau[joint] - last[joint]).abs();
-                assert!(
-                    step <= STEP_LIMIT[joint] as f32 * 1.0001,
-                    "J{}: {step}",
-                    joint + 1
-                );
+                assert!(step <= STEP_LIMIT[joint] as f32 * 1.0001, "J{}: {step}", joint + 1);
             }
             last = record.tau;
             rig.plant.q.into()
@@ -51,10 +38,7 @@ fn with_losses(rig: &mut Rig<f32>, motors: [bool; 7], cycles: usize) -> Vec<[f64
 }
 
 fn deviation(a: &[[f64; 7]], b: &[[f64; 7]]) -> f64 {
-    a.iter()
-        .zip(b)
-        .flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()))
-        .fold(0.0, f64::max)
+    a.iter().zip(b).flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs())).fold(0.0, f64::max)
 }
 
 #[test]
@@ -94,11 +78,7 @@ fn a3_six_lost_cycles_stop_the_arm_softly() {
     rig.lose = [true; 7];
     for cycle in 1..=6 {
         rig.tick(None);
-        let expected = if cycle <= 5 {
-            State::Coast
-        } else {
-            State::SoftStop
-        };
+        let expected = if cycle <= 5 { State::Coast } else { State::SoftStop };
         assert_eq!(rig.cycle.state(), expected, "cycle {cycle}");
     }
     assert_eq!(rig.cycle.fault(), Fault::RepliesLost);
@@ -126,16 +106,11 @@ fn a4_random_loss_of_one_percent_does_not_disturb_the_run() {
     let mut last = rig.last.expect("ran").record.tau;
     while rig.cycle.state() != State::Hold {
         for lose in &mut rig.lose {
-            seed = seed
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             *lose = (seed >> 40).is_multiple_of(100);
         }
         let record = rig.tick(None).record;
-        assert!(
-            matches!(record.state, State::Run | State::Coast | State::Hold),
-            "{record:?}"
-        );
+        assert!(matches!(record.state, State::Run | State::Coast | State::Hold), "{record:?}");
         for joint in 0..7 {
             assert!((record.tau[joint] - last[joint]).abs() <= STEP_LIMIT[joint] as f32 * 1.0001);
         }
@@ -159,9 +134,6 @@ fn while_replies_are_missing_the_feedback_is_frozen() {
         let record = rig.tick(None).record;
         assert_eq!(record.state, State::Coast);
         let change = (record.tau[0] - before.tau[0]).abs();
-        assert!(
-            change < 0.02,
-            "{change} N m from a position that nobody measured"
-        );
+        assert!(change < 0.02, "{change} N m from a position that nobody measured");
     }
 }

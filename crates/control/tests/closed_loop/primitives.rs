@@ -6,8 +6,8 @@ use control::kinematics::Frames;
 use control::units::JointPositions;
 use control::{Payload, load};
 use dmp::{
-    Configuration, ExpectedWrench, Feedback, GainSchedule, Hemisphere, Limits, OrientationError,
-    Primitive, PrimitiveTables, Quaternion, Velocity,
+    Configuration, ExpectedWrench, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, Primitive,
+    PrimitiveTables, Quaternion, Velocity,
 };
 
 use crate::rig::KERNELS;
@@ -59,13 +59,7 @@ pub(crate) struct Design {
 
 impl Default for Design {
     fn default() -> Self {
-        Design {
-            duration: 5.0,
-            start: START,
-            goal: GOAL,
-            expected: None,
-            bent: true,
-        }
+        Design { duration: 5.0, start: START, goal: GOAL, expected: None, bent: true }
     }
 }
 
@@ -74,23 +68,12 @@ pub(crate) fn primitive<R: Real>(design: &Design) -> Primitive<R, KERNELS> {
     let zero = R::of(0.0);
     let stiffness = R::of(200.0);
     let critical = R::of(2.0 * 200f64.sqrt());
-    let weights = if design.bent {
-        weights()
-    } else {
-        vec![zero; dmp::ROWS * KERNELS]
-    };
+    let weights = if design.bent { weights() } else { vec![zero; dmp::ROWS * KERNELS] };
     let feedback = design.expected.map(|_| {
         Feedback::new(
-            GainSchedule::constant(
-                [4.0, 4.0, 4.0, 20.0, 20.0, 20.0, 0.0, 0.0, 0.0, 0.0].map(R::of),
-            )
-            .expect("gains"),
+            GainSchedule::constant([4.0, 4.0, 4.0, 20.0, 20.0, 20.0, 0.0, 0.0, 0.0, 0.0].map(R::of)).expect("gains"),
             GainSchedule::constant([R::of(1.0); dmp::SENSORS]).expect("gains"),
-            Limits {
-                displacement: R::of(0.1),
-                rotation: R::of(0.4),
-                hand: zero,
-            },
+            Limits { displacement: R::of(0.1), rotation: R::of(0.4), hand: zero },
         )
         .expect("gains")
     });
@@ -113,15 +96,9 @@ pub(crate) fn primitive<R: Real>(design: &Design) -> Primitive<R, KERNELS> {
         hemisphere: Hemisphere::Nearest,
         start: configuration(design.start),
         goal: configuration(design.goal),
-        start_velocity: Velocity {
-            position: [zero; 3],
-            orientation: [zero; 3],
-            posture: [zero; 7],
-            hand: [zero; 4],
-        },
+        start_velocity: Velocity { position: [zero; 3], orientation: [zero; 3], posture: [zero; 7], hand: [zero; 4] },
         feedback,
         expected,
     };
-    load::primitive(&ArmModel::new(Payload::SensorAndHand), &tables)
-        .expect("a movement this arm can run")
+    load::primitive(&ArmModel::new(Payload::SensorAndHand), &tables).expect("a movement this arm can run")
 }

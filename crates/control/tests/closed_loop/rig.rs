@@ -10,9 +10,7 @@ use control::arm::ArmModel;
 use control::command::Command;
 use control::kinematics::Frames;
 use control::units::{JointPositions, JointVelocities, Vector7};
-use control::{
-    BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, Payload, Real, State, model,
-};
+use control::{BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, Payload, Real, State, model};
 use nalgebra::{SMatrix, Vector3};
 use puck::{Action, CanFrame, Counts, Group, RawWrench, Request, SafetyMode};
 
@@ -62,15 +60,8 @@ impl Plant {
 
     /// Counts that the pucks report, rounded down and wrapped to 22 bits.
     pub(crate) fn counts(&self) -> [Option<Counts>; 7] {
-        let motor = self
-            .calibration
-            .transmission()
-            .motor_from_joint(&self.q.into());
-        self.calibration
-            .drives()
-            .counts(&motor)
-            .expect("finite")
-            .map(|counts| Some(counts.wrapped()))
+        let motor = self.calibration.transmission().motor_from_joint(&self.q.into());
+        self.calibration.drives().counts(&motor).expect("finite").map(|counts| Some(counts.wrapped()))
     }
 
     /// What the environment does to the tool right now (world axes).
@@ -88,16 +79,11 @@ impl Plant {
         let frames = self.frames();
         let [fx, fy, fz, nx, ny, nz] = self.environment();
         let force = Vector3::new(fx, fy, fz) + Vector3::new(0.0, 0.0, -self.hand_weight);
-        let torque =
-            Vector3::new(nx, ny, nz) - frames.tool_to_sensor().cross(&Vector3::new(fx, fy, fz));
+        let torque = Vector3::new(nx, ny, nz) - frames.tool_to_sensor().cross(&Vector3::new(fx, fy, fz));
         let to_sensor = frames.sensor_to_world().transpose();
-        let counts =
-            |v: Vector3<f64>, scale: f64| [0, 1, 2].map(|axis| (v[axis] * scale).floor() as i16);
+        let counts = |v: Vector3<f64>, scale: f64| [0, 1, 2].map(|axis| (v[axis] * scale).floor() as i16);
         RawWrench {
-            force: counts(
-                to_sensor * force + Vector3::new(self.glitch, 0.0, 0.0),
-                256.0,
-            ),
+            force: counts(to_sensor * force + Vector3::new(self.glitch, 0.0, 0.0), 256.0),
             torque: counts(to_sensor * torque, 4096.0),
             status: None,
         }
@@ -108,31 +94,18 @@ impl Plant {
         let mut torque = self.queue.back().copied().unwrap_or(self.torque);
         if let Some(frames) = frames {
             let mut motors = [0.0; 7];
-            for (frame, (group, offset)) in frames
-                .iter()
-                .zip([(Group::ARM_TORQUES, 0), (Group::WRIST_TORQUES, 4)])
-            {
+            for (frame, (group, offset)) in frames.iter().zip([(Group::ARM_TORQUES, 0), (Group::WRIST_TORQUES, 4)]) {
                 let request = Request::decode(frame).expect("a valid frame");
                 assert_eq!(request.to, group.into());
-                let Action::PackedTorques { torques, .. } = request.action else {
-                    panic!("{request:?}")
-                };
+                let Action::PackedTorques { torques, .. } = request.action else { panic!("{request:?}") };
                 for (slot, units) in torques.iter().enumerate() {
                     if offset + slot < 7 {
-                        assert!(
-                            units.units().abs() < 4731,
-                            "above the safety module's warning: {units:?}"
-                        );
-                        motors[offset + slot] =
-                            f64::from(units.units()) / model::TORQUE_COUNTS[offset + slot];
+                        assert!(units.units().abs() < 4731, "above the safety module's warning: {units:?}");
+                        motors[offset + slot] = f64::from(units.units()) / model::TORQUE_COUNTS[offset + slot];
                     }
                 }
             }
-            torque = Vector7::from(
-                self.calibration
-                    .transmission()
-                    .joint_torques_from_motor(&motors),
-            );
+            torque = Vector7::from(self.calibration.transmission().joint_torques_from_motor(&motors));
         }
         self.queue.push_back(torque);
         self.torque = self.queue.pop_front().expect("just pushed");
@@ -144,11 +117,8 @@ impl Plant {
         for _ in 0..SUBSTEPS {
             let frames = self.frames();
             let mass = self.model.mass_matrix(&frames);
-            let bias = self
-                .model
-                .coriolis_torque(&frames, &JointVelocities(self.dq))
-                .0
-                + self.model.gravity_torque(&frames).0;
+            let bias =
+                self.model.coriolis_torque(&frames, &JointVelocities(self.dq)).0 + self.model.gravity_torque(&frames).0;
             let environment = nalgebra::Vector6::from(self.environment());
             let external = frames.jacobian().transpose_times(&environment);
             let damped = mass + SMatrix::<f64, 7, 7>::from_diagonal(&(self.viscous * dt));
@@ -202,17 +172,8 @@ impl<R: Real> Rig<R> {
                 *position = None;
             }
         }
-        let sample = BusSample {
-            positions,
-            wrench: Some(self.plant.wrench()),
-            safety: Some(self.safety),
-        };
-        let input = CycleInput {
-            cycle: self.number,
-            sample,
-            command,
-            external_fault: None,
-        };
+        let sample = BusSample { positions, wrench: Some(self.plant.wrench()), safety: Some(self.safety) };
+        let input = CycleInput { cycle: self.number, sample, command, external_fault: None };
         let output = self.cycle.step(&input);
         self.plant.receive(output.actuation.frames());
         self.plant.advance();
@@ -223,12 +184,7 @@ impl<R: Real> Rig<R> {
 
     pub(crate) fn command(&mut self, command: Command) -> CycleOutput {
         let output = self.tick(Some(command));
-        assert_eq!(
-            output.event,
-            Some(Event::Accepted),
-            "{command:?} in {:?}",
-            output.record.state
-        );
+        assert_eq!(output.event, Some(Event::Accepted), "{command:?} in {:?}", output.record.state);
         output
     }
 

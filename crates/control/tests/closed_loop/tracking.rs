@@ -13,9 +13,7 @@ fn pose_error<R: Real>(rig: &Rig<R>, record: &CycleRecord) -> (f64, f64) {
     let pose = rig.plant.frames().tool_pose();
     let d = record.pose_d.map(f64::from);
     let offset = nalgebra::Vector3::new(d[0], d[1], d[2]) - pose.position;
-    let turn = pose
-        .orientation
-        .error_to(&Orientation([d[3], d[4], d[5], d[6]]));
+    let turn = pose.orientation.error_to(&Orientation([d[3], d[4], d[5], d[6]]));
     (offset.norm(), turn.norm())
 }
 
@@ -37,14 +35,8 @@ fn run<R: Real>(rig: &mut Rig<R>, options: RunOptions) -> Quality {
 }
 
 /// The same, with the plant changed when the run begins: something was picked up.
-fn run_disturbed<R: Real>(
-    rig: &mut Rig<R>,
-    options: RunOptions,
-    change: impl FnOnce(&mut Plant),
-) -> Quality {
-    rig.cycle
-        .load(&primitive(&Design::default()))
-        .expect("loads");
+fn run_disturbed<R: Real>(rig: &mut Rig<R>, options: RunOptions, change: impl FnOnce(&mut Plant)) -> Quality {
+    rig.cycle.load(&primitive(&Design::default())).expect("loads");
     rig.command(Command::Hold);
     rig.run_for(2.0);
     rig.command(Command::Run(options));
@@ -54,10 +46,7 @@ fn run_disturbed<R: Real>(
     let mut last = rig.last.expect("ran").record;
     while rig.cycle.state() != State::Hold {
         let record = rig.tick(None).record;
-        assert!(
-            matches!(record.state, State::Run | State::Hold),
-            "{record:?}"
-        );
+        assert!(matches!(record.state, State::Run | State::Hold), "{record:?}");
         let (distance, angle) = pose_error(rig, &record);
         quality.position_rms += distance * distance;
         quality.angle_rms += angle * angle;
@@ -75,10 +64,7 @@ fn run_disturbed<R: Real>(
     let pose = rig.plant.frames().tool_pose();
     let goal = primitive::<f64>(&Design::default()).goal().to_owned();
     quality.goal_position = (pose.position - nalgebra::Vector3::from(goal.position)).norm();
-    quality.goal_angle = pose
-        .orientation
-        .error_to(&Orientation(goal.orientation.to_array()))
-        .norm();
+    quality.goal_angle = pose.orientation.error_to(&Orientation(goal.orientation.to_array())).norm();
     quality.position_rms = (quality.position_rms / count).sqrt();
     quality.angle_rms = (quality.angle_rms / count).sqrt();
     quality.roughness = quality.roughness.map(|sum| (sum / count).sqrt());
@@ -87,58 +73,32 @@ fn run_disturbed<R: Real>(
 
 /// The bars of the demo, for every delay the loop may have.
 fn assert_tracks(quality: &Quality) {
-    assert!(
-        quality.position_rms <= 5e-3 && quality.angle_rms <= 1.5f64.to_radians(),
-        "{quality:?}"
-    );
-    assert!(
-        quality.goal_position <= 3e-3 && quality.goal_angle <= 1f64.to_radians(),
-        "{quality:?}"
-    );
+    assert!(quality.position_rms <= 5e-3 && quality.angle_rms <= 1.5f64.to_radians(), "{quality:?}");
+    assert!(quality.goal_position <= 3e-3 && quality.goal_angle <= 1f64.to_radians(), "{quality:?}");
     assert_eq!(quality.limited, 0, "{quality:?}");
 }
 
 #[test]
 fn run_tracks_the_plan_with_friction_quantisation_and_up_to_two_cycles_of_delay() {
     for delay in 0..=2 {
-        for acceleration in [
-            AccelerationSource::Analytic,
-            AccelerationSource::Differentiated,
-        ] {
+        for acceleration in [AccelerationSource::Analytic, AccelerationSource::Differentiated] {
             let mut rig = Rig::<f32>::new(START, delay);
-            let quality = run(
-                &mut rig,
-                RunOptions {
-                    acceleration,
-                    ..RunOptions::default()
-                },
-            );
+            let quality = run(&mut rig, RunOptions { acceleration, ..RunOptions::default() });
             println!("delay {delay} {acceleration:?}: {quality:.5?}");
             assert_tracks(&quality);
             // Tighter than the demo: what was tuned here must not be lost unnoticed.
-            assert!(
-                quality.position_rms <= 2e-3 && quality.angle_rms <= 0.6f64.to_radians(),
-                "{quality:?}"
-            );
+            assert!(quality.position_rms <= 2e-3 && quality.angle_rms <= 0.6f64.to_radians(), "{quality:?}");
             // Quantisation must not reach the motors as a rattle.
-            assert!(
-                quality.roughness.iter().all(|step| *step < 0.1),
-                "{quality:?}"
-            );
+            assert!(quality.roughness.iter().all(|step| *step < 0.1), "{quality:?}");
         }
     }
 }
 
 #[test]
 fn e7_run_survives_friction_and_payload_that_differ_from_the_model() {
-    for (friction, mass, scale) in [
-        (0.7, 0.0, 1.0),
-        (1.3, 0.0, 1.0),
-        (1.0, 1.0, 1.0),
-        (1.0, -0.4, 1.0),
-        (1.0, 0.0, 1.2),
-        (1.0, 0.0, 0.8),
-    ] {
+    for (friction, mass, scale) in
+        [(0.7, 0.0, 1.0), (1.3, 0.0, 1.0), (1.0, 1.0, 1.0), (1.0, -0.4, 1.0), (1.0, 0.0, 1.2), (1.0, 0.0, 0.8)]
+    {
         let mut rig = Rig::<f32>::new(START, 1);
         let quality = run_disturbed(&mut rig, RunOptions::default(), |plant| {
             plant.coulomb *= friction;
@@ -146,10 +106,7 @@ fn e7_run_survives_friction_and_payload_that_differ_from_the_model() {
         });
         println!("friction {friction} mass {mass} inertia {scale}: {quality:.5?}");
         assert!(quality.position_rms <= 12e-3, "{quality:?}");
-        assert!(
-            quality.roughness.iter().all(|step| *step < 0.15),
-            "{quality:?}"
-        );
+        assert!(quality.roughness.iter().all(|step| *step < 0.15), "{quality:?}");
     }
 }
 
@@ -171,13 +128,7 @@ fn the_loop_is_stable_on_a_frictionless_arm_with_two_cycles_of_delay() {
 #[test]
 fn x_of_the_planned_joints_tracks_as_well_but_lets_friction_stand() {
     let mut rig = Rig::<f32>::new(START, 1);
-    let quality = run(
-        &mut rig,
-        RunOptions {
-            pose_feedback: PoseFeedback::Planned,
-            ..RunOptions::default()
-        },
-    );
+    let quality = run(&mut rig, RunOptions { pose_feedback: PoseFeedback::Planned, ..RunOptions::default() });
     println!("planned: {quality:.5?}");
     assert!(quality.position_rms <= 6e-3, "{quality:?}");
 }
@@ -188,32 +139,19 @@ fn approach_arrives_slowly_enough_and_holds() {
     let mut rig = Rig::<f32>::new(model::HOME, 1);
     rig.command(Command::Gravity);
     rig.run_for(0.5);
-    rig.command(Command::Approach {
-        q: START.map(|q| q as f32),
-        duration: 0.0,
-    });
+    rig.command(Command::Approach { q: START.map(|q| q as f32), duration: 0.0 });
     let mut fastest = 0.0f64;
     let begin = rig.number;
     while rig.cycle.state() != State::Hold {
         rig.tick(None);
-        assert!(
-            matches!(rig.cycle.state(), State::Approach | State::Hold),
-            "{:?}",
-            rig.last
-        );
-        let speeds = rig
-            .plant
-            .frames()
-            .elbow_speeds(&JointVelocities(rig.plant.dq), 0.35);
+        assert!(matches!(rig.cycle.state(), State::Approach | State::Hold), "{:?}", rig.last);
+        let speeds = rig.plant.frames().elbow_speeds(&JointVelocities(rig.plant.dq), 0.35);
         fastest = fastest.max(speeds[0].max(speeds[1]));
         assert!(rig.number < 300 * 60);
     }
     let seconds = (rig.number - begin) as f64 / 300.0;
     assert!(fastest < 0.36, "{fastest} m/s");
-    assert!(
-        seconds < 25.0,
-        "{seconds} s is longer than the limits ask for"
-    );
+    assert!(seconds < 25.0, "{seconds} s is longer than the limits ask for");
     rig.run_for(1.0);
     let error = (rig.plant.q - Vector7::from(START)).amax();
     assert!(error < 0.03, "{error} rad");
@@ -222,19 +160,14 @@ fn approach_arrives_slowly_enough_and_holds() {
 #[test]
 fn a_goal_set_in_flight_is_reached() {
     let mut rig = Rig::<f32>::new(START, 1);
-    rig.cycle
-        .load(&primitive(&Design::default()))
-        .expect("loads");
+    rig.cycle.load(&primitive(&Design::default())).expect("loads");
     rig.command(Command::Hold);
     rig.run_for(2.0);
     rig.command(Command::Run(RunOptions::default()));
     rig.run_for(1.0);
     let goal = configuration::<f64>(GOAL).position;
     let moved = [goal[0] - 0.05, goal[1] + 0.04, goal[2] + 0.03];
-    rig.command(Command::SetGoal(Goal {
-        position: Some(moved.map(|value| value as f32)),
-        orientation: None,
-    }));
+    rig.command(Command::SetGoal(Goal { position: Some(moved.map(|value| value as f32)), orientation: None }));
     rig.until(State::Hold, 15.0);
     rig.run_for(1.0);
     let error = (rig.plant.frames().tool_pose().position - nalgebra::Vector3::from(moved)).norm();
@@ -245,15 +178,10 @@ fn a_goal_set_in_flight_is_reached() {
 fn half_the_speed_takes_twice_the_time_on_the_same_path() {
     let path = |speed: f32| {
         let mut rig = Rig::<f32>::new(START, 1);
-        rig.cycle
-            .load(&primitive(&Design::default()))
-            .expect("loads");
+        rig.cycle.load(&primitive(&Design::default())).expect("loads");
         rig.command(Command::Hold);
         rig.run_for(2.0);
-        rig.command(Command::Run(RunOptions {
-            speed,
-            ..RunOptions::default()
-        }));
+        rig.command(Command::Run(RunOptions { speed, ..RunOptions::default() }));
         let mut plan = Vec::new();
         while rig.cycle.state() != State::Hold {
             plan.push(rig.tick(None).record);
@@ -261,19 +189,12 @@ fn half_the_speed_takes_twice_the_time_on_the_same_path() {
         plan
     };
     let (full, half) = (path(1.0), path(0.5));
-    let end = |plan: &[CycleRecord]| {
-        plan.iter()
-            .take_while(|record| record.phase > 0.0101)
-            .count()
-    };
+    let end = |plan: &[CycleRecord]| plan.iter().take_while(|record| record.phase > 0.0101).count();
     let ratio = end(&half) as f64 / end(&full) as f64;
     assert!((ratio - 2.0).abs() < 0.01, "{ratio}");
     for index in (0..end(&full)).step_by(50) {
         let (a, b) = (full[index].pose_d, half[2 * index].pose_d);
-        let distance = (0..3)
-            .map(|axis| f64::from(a[axis] - b[axis]).powi(2))
-            .sum::<f64>()
-            .sqrt();
+        let distance = (0..3).map(|axis| f64::from(a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt();
         assert!(distance < 2e-3, "{index}: {distance}");
     }
 }
@@ -282,19 +203,11 @@ fn half_the_speed_takes_twice_the_time_on_the_same_path() {
 fn b11_single_and_double_precision_plan_the_same_joints() {
     fn plan<R: Real>() -> Vec<CycleRecord> {
         let mut rig = Rig::<R>::new(START, 1);
-        rig.cycle
-            .load(&primitive(&Design {
-                duration: 8.0,
-                ..Design::default()
-            }))
-            .expect("loads");
+        rig.cycle.load(&primitive(&Design { duration: 8.0, ..Design::default() })).expect("loads");
         rig.command(Command::Hold);
         rig.run_for(2.0);
         // With x = FK(q_d) the plan of the joints does not depend on the plant but through the posture.
-        rig.command(Command::Run(RunOptions {
-            pose_feedback: PoseFeedback::Planned,
-            ..RunOptions::default()
-        }));
+        rig.command(Command::Run(RunOptions { pose_feedback: PoseFeedback::Planned, ..RunOptions::default() }));
         (0..2400).map(|_| rig.tick(None).record).collect()
     }
     let (single, double) = (plan::<f32>(), plan::<f64>());

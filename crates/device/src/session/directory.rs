@@ -64,14 +64,10 @@ pub(crate) struct Directory {
 impl Directory {
     /// Reads a store. An image that is not sound is as good as none: its place is free.
     pub(crate) fn read(store: &impl Store) -> Self {
-        let mut directory = Self {
-            entries: [const { None }; PLACES],
-            places: store.slots().min(u8::try_from(PLACES).unwrap_or(0)),
-        };
+        let mut directory =
+            Self { entries: [const { None }; PLACES], places: store.slots().min(u8::try_from(PLACES).unwrap_or(0)) };
         for (slot, entry) in (0..directory.places).zip(directory.entries.iter_mut()) {
-            let image = store
-                .image(slot)
-                .and_then(|bytes| PrimitiveImage::parse(bytes).ok());
+            let image = store.image(slot).and_then(|bytes| PrimitiveImage::parse(bytes).ok());
             *entry = image.as_ref().map(Entry::of);
         }
         directory
@@ -89,11 +85,7 @@ impl Directory {
 
     /// Place and entry of a name.
     pub(crate) fn find(&self, name: &Name) -> Option<(u8, &Entry)> {
-        (0..self.places).find_map(|slot| {
-            self.get(slot)
-                .filter(|entry| entry.name == *name)
-                .map(|entry| (slot, entry))
-        })
+        (0..self.places).find_map(|slot| self.get(slot).filter(|entry| entry.name == *name).map(|entry| (slot, entry)))
     }
 
     /// A place to put an image of a new name: a free one. Its store may still hold an unsound image there.

@@ -177,16 +177,7 @@ impl<S: Store> Session<S> {
                 (None, Ok(())) => {}
                 (None, Err((reason, [detail, _]))) => {
                     let (cycle, code) = (wire::cycle(event.cycle), reason.code().into());
-                    self.tell(
-                        now_ms,
-                        Event {
-                            cycle,
-                            kind: EventKind::CommandRefused,
-                            code,
-                            detail,
-                        },
-                        port,
-                    );
+                    self.tell(now_ms, Event { cycle, kind: EventKind::CommandRefused, code, detail }, port);
                 }
             }
         }
@@ -196,15 +187,7 @@ impl<S: Store> Session<S> {
     fn drop_unanswered(&mut self, now_ms: u32, port: &mut impl SessionPort) {
         while let Some((asker, waited)) = self.pending.expired(now_ms) {
             if let Some(of) = self.waiting(asker) {
-                self.answer(
-                    now_ms,
-                    Reply::Refused {
-                        of,
-                        reason: Refusal::NoAnswer,
-                        detail: [waited, 0],
-                    },
-                    port,
-                );
+                self.answer(now_ms, Reply::Refused { of, reason: Refusal::NoAnswer, detail: [waited, 0] }, port);
             }
         }
     }
@@ -212,24 +195,19 @@ impl<S: Store> Session<S> {
     /// The number of the request, if it is the present host that asked.
     fn waiting(&self, asker: Option<(u16, u16)>) -> Option<u16> {
         let (session, of) = asker?;
-        self.owner
-            .as_ref()
-            .filter(|owner| owner.session() == session)
-            .map(|_| of)
+        self.owner.as_ref().filter(|owner| owner.session() == session).map(|_| of)
     }
 
     /// Cycle records: the latest is kept, every so many go out as telemetry if the line has room.
     fn forward_records(&mut self, now_ms: u32, port: &mut impl SessionPort) {
-        const LIMITED: u16 = control::flags::JOINT_LIMITED
-            | control::flags::MOTOR_LIMITED
-            | control::flags::RATE_LIMITED;
+        const LIMITED: u16 =
+            control::flags::JOINT_LIMITED | control::flags::MOTOR_LIMITED | control::flags::RATE_LIMITED;
         while let Some(timed) = port.record() {
             self.latest = Some(timed);
             if timed.record.flags & LIMITED != 0 {
                 self.limited_cycles = self.limited_cycles.wrapping_add(1);
             }
-            let due = self.owner.is_some()
-                && timed.record.cycle.checked_rem(self.telemetry_every.into()) == Some(0);
+            let due = self.owner.is_some() && timed.record.cycle.checked_rem(self.telemetry_every.into()) == Some(0);
             if !due {
                 continue;
             }
@@ -248,10 +226,7 @@ impl<S: Store> Session<S> {
             return;
         }
         let health = port.health();
-        let moving = matches!(
-            health.state,
-            State::Gravity | State::Approach | State::Run | State::Coast
-        );
+        let moving = matches!(health.state, State::Gravity | State::Approach | State::Run | State::Coast);
         // Without a host the stop may be on its way already.
         if !moving || (silence.is_none() && !self.pending.is_empty()) {
             return;
@@ -263,16 +238,7 @@ impl<S: Store> Session<S> {
         self.pending.push(None, now_ms);
         self.link_timeouts = self.link_timeouts.wrapping_add(1);
         let (cycle, detail) = (wire::cycle(health.cycle), silence.unwrap_or(0));
-        self.tell(
-            now_ms,
-            Event {
-                cycle,
-                kind: EventKind::LinkTimeout,
-                code: 0,
-                detail,
-            },
-            port,
-        );
+        self.tell(now_ms, Event { cycle, kind: EventKind::LinkTimeout, code: 0, detail }, port);
         self.close();
     }
 
@@ -315,15 +281,8 @@ impl<S: Store> Session<S> {
     /// Sends a message to a host, be it the one that has the session or not.
     fn send_to(&mut self, session: u16, now_ms: u32, reply: &Reply, port: &mut impl SessionPort) {
         let mut buffer = [0; FRAME_BYTES];
-        let envelope = Envelope {
-            session,
-            sequence: self.sequence,
-            time_ms: now_ms,
-        };
-        if let Some(frame) = frame::encode(envelope, reply, &mut buffer)
-            .ok()
-            .and_then(|length| buffer.get(..length))
-        {
+        let envelope = Envelope { session, sequence: self.sequence, time_ms: now_ms };
+        if let Some(frame) = frame::encode(envelope, reply, &mut buffer).ok().and_then(|length| buffer.get(..length)) {
             self.sequence = self.sequence.wrapping_add(1);
             port.send(frame);
         }
@@ -343,9 +302,7 @@ impl<S: Store> Session<S> {
             latency_worst_ticks: timing.latency_worst_ticks,
             lost_replies: counters.lost_replies,
             late_replies: counters.late_replies,
-            rejected_frames: counters
-                .malformed_frames
-                .wrapping_add(counters.foreign_frames),
+            rejected_frames: counters.malformed_frames.wrapping_add(counters.foreign_frames),
             frames_sent: counters.frames_sent,
             frames_received: counters.frames_received,
             frames_dropped: counters.frames_refused,
@@ -364,10 +321,7 @@ impl<S: Store> Session<S> {
 }
 
 /// The device's time as it stands in envelopes, where it wraps after 49 days.
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "wrapping is the documented meaning"
-)]
+#[allow(clippy::cast_possible_truncation, reason = "wrapping is the documented meaning")]
 const fn milliseconds(now_us: u64) -> u32 {
     (now_us / 1000) as u32
 }

@@ -26,12 +26,7 @@ pub(crate) struct Owner {
 impl Owner {
     /// A host whose hello had this number.
     pub(crate) fn new(session: u16, sequence: u16, now_ms: u32) -> Self {
-        Self {
-            session,
-            heard_ms: now_ms,
-            newest: sequence,
-            answer: None,
-        }
+        Self { session, heard_ms: now_ms, newest: sequence, answer: None }
     }
 
     /// Its session number.
@@ -53,11 +48,7 @@ impl Owner {
     pub(crate) fn turn(&mut self, sequence: u16, now_ms: u32) -> Turn {
         self.heard_ms = now_ms;
         if sequence == self.newest {
-            return if self.answer().is_some() {
-                Turn::Again
-            } else {
-                Turn::Ignore
-            };
+            return if self.answer().is_some() { Turn::Again } else { Turn::Ignore };
         }
         // Numbers wrap: one that is "behind" by less than half the circle is old.
         if sequence.wrapping_sub(self.newest) >= 0x8000 {
@@ -69,9 +60,7 @@ impl Owner {
 
     /// The answer to the newest request, if there was one already.
     pub(crate) fn answer(&self) -> Option<&Reply> {
-        self.answer
-            .as_ref()
-            .filter(|answer| answer.answers() == Some(self.newest))
+        self.answer.as_ref().filter(|answer| answer.answers() == Some(self.newest))
     }
 
     /// Keeps the answer to the newest request.

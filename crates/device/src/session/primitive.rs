@@ -3,12 +3,12 @@
 use control::arm::ArmModel;
 use control::load;
 use dmp::{
-    Configuration, ExpectedWrench, Feedback, GainSchedule, Hemisphere, Limits, OrientationError,
-    PrimitiveTables, Quaternion, SENSORS, Velocity,
+    Configuration, ExpectedWrench, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, PrimitiveTables,
+    Quaternion, SENSORS, Velocity,
 };
 use link::image::{
-    COUPLED_ROWS, EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, HemisphereKind, ImageContent,
-    KERNEL_LIMIT, OrientationErrorKind, Reals, WEIGHT_ROWS, Waypoint,
+    COUPLED_ROWS, EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, HemisphereKind, ImageContent, KERNEL_LIMIT,
+    OrientationErrorKind, Reals, WEIGHT_ROWS, Waypoint,
 };
 
 use super::wire::{PrimitiveTrouble, TROUBLE_EXPECTATION, TROUBLE_FEEDBACK};
@@ -88,26 +88,18 @@ fn feedback(content: &ImageContent<Reals<'_>>) -> Result<Option<Feedback<f32>>, 
         .map_err(|_| TROUBLE_FEEDBACK)
 }
 
-fn expectation(
-    content: &ImageContent<Reals<'_>>,
-) -> Result<Option<ExpectedWrench<f32>>, PrimitiveTrouble> {
+fn expectation(content: &ImageContent<Reals<'_>>) -> Result<Option<ExpectedWrench<f32>>, PrimitiveTrouble> {
     if content.expected_mean.is_empty() {
         return Ok(None);
     }
     let mut mean = [[0.0; SENSORS]; EXPECTATION_POINTS_LIMIT];
-    ExpectedWrench::new(
-        points(content.expected_mean, &mut mean),
-        content.marks.recorded_duration,
-    )
-    .map(Some)
-    .map_err(|_| TROUBLE_EXPECTATION)
+    ExpectedWrench::new(points(content.expected_mean, &mut mean), content.marks.recorded_duration)
+        .map(Some)
+        .map_err(|_| TROUBLE_EXPECTATION)
 }
 
 /// Copies a table, point after point, to the front of `room`.
-fn points<'a, const COLUMNS: usize>(
-    table: Reals<'_>,
-    room: &'a mut [[f32; COLUMNS]],
-) -> &'a [[f32; COLUMNS]] {
+fn points<'a, const COLUMNS: usize>(table: Reals<'_>, room: &'a mut [[f32; COLUMNS]]) -> &'a [[f32; COLUMNS]] {
     let count = (table.len() / COLUMNS).min(room.len());
     let used = room.get_mut(..count).unwrap_or_default();
     for (place, value) in used.as_flattened_mut().iter_mut().zip(table.iter()) {

@@ -4,8 +4,8 @@ use control::{Command as Control, LoadRefusal, RunOptions, State};
 use link::frame::{Frame, REQUEST_AGE_LIMIT_MS};
 use link::message::{AccelerationSource, CHUNK_BYTES, ChunkData, Goal, PoseFeedback};
 use link::{
-    DeviceHello, Event, EventKind, HostHello, LINK_VERSION, Name, PrimitiveImage, Refusal, Reply,
-    Request, SCHEMA_HASH, Status, Text,
+    DeviceHello, Event, EventKind, HostHello, LINK_VERSION, Name, PrimitiveImage, Refusal, Reply, Request, SCHEMA_HASH,
+    Status, Text,
 };
 
 use super::Session;
@@ -19,12 +19,7 @@ use crate::store::Store;
 
 impl<S: Store> Session<S> {
     /// Takes one request: greets, refuses strangers, repeats answers, acts.
-    pub(crate) fn handle(
-        &mut self,
-        now_ms: u32,
-        frame: Frame<Request>,
-        port: &mut impl SessionPort,
-    ) {
+    pub(crate) fn handle(&mut self, now_ms: u32, frame: Frame<Request>, port: &mut impl SessionPort) {
         let Frame { envelope, message } = frame;
         let of = envelope.sequence;
         let turn = match &mut self.owner {
@@ -42,12 +37,7 @@ impl<S: Store> Session<S> {
             Turn::Ignore => return,
         }
         if let Err((reason, detail)) = self.admit(now_ms, envelope.session, of, &message) {
-            return self.send_to(
-                envelope.session,
-                now_ms,
-                &Reply::Refused { of, reason, detail },
-                port,
-            );
+            return self.send_to(envelope.session, now_ms, &Reply::Refused { of, reason, detail }, port);
         }
         let age = now_ms.wrapping_sub(envelope.time_ms);
         let outcome = if message.moves() && age > REQUEST_AGE_LIMIT_MS {
@@ -58,40 +48,21 @@ impl<S: Store> Session<S> {
         match outcome {
             Ok(Some(reply)) => self.answer(now_ms, reply, port),
             Ok(None) => {}
-            Err((reason, detail)) => {
-                self.answer(now_ms, Reply::Refused { of, reason, detail }, port)
-            }
+            Err((reason, detail)) => self.answer(now_ms, Reply::Refused { of, reason, detail }, port),
         }
     }
 
     /// Whether this host may ask anything; a hello that fits makes it the owner of the session.
-    fn admit(
-        &mut self,
-        now_ms: u32,
-        session: u16,
-        of: u16,
-        message: &Request,
-    ) -> Result<(), Refused> {
-        let is_owner = self
-            .owner
-            .as_ref()
-            .is_some_and(|owner| owner.session() == session);
+    fn admit(&mut self, now_ms: u32, session: u16, of: u16, message: &Request) -> Result<(), Refused> {
+        let is_owner = self.owner.as_ref().is_some_and(|owner| owner.session() == session);
         let Request::Hello(hello) = message else {
-            return if is_owner {
-                Ok(())
-            } else {
-                Err((Refusal::NoSession, [0, 0]))
-            };
+            return if is_owner { Ok(()) } else { Err((Refusal::NoSession, [0, 0])) };
         };
         compare(hello)?;
         if session == 0 {
             return Err((Refusal::BadValue, [0, 0]));
         }
-        if let Some(owner) = self
-            .owner
-            .as_ref()
-            .filter(|owner| owner.session() != session)
-        {
+        if let Some(owner) = self.owner.as_ref().filter(|owner| owner.session() != session) {
             let wait = owner.protected_for(now_ms);
             if wait > 0 {
                 return Err((Refusal::Busy, [owner.session().into(), wait]));
@@ -112,10 +83,7 @@ impl<S: Store> Session<S> {
     ) -> Result<Option<Reply>, Refused> {
         let done = Ok(Some(Reply::Accepted { of }));
         match request {
-            Request::Hello(_) => Ok(Some(Reply::Hello {
-                of,
-                hello: self.hello(),
-            })),
+            Request::Hello(_) => Ok(Some(Reply::Hello { of, hello: self.hello() })),
             Request::Goodbye => {
                 // Answered before the session is gone: the answer carries its number.
                 self.answer(now_ms, Reply::Accepted { of }, port);
@@ -123,26 +91,14 @@ impl<S: Store> Session<S> {
                 Ok(None)
             }
             Request::Ping => done,
-            Request::Status => Ok(Some(Reply::Status {
-                of,
-                status: self.status(port),
-            })),
-            Request::Statistics => Ok(Some(Reply::Statistics {
-                of,
-                statistics: self.statistics(port),
-            })),
+            Request::Status => Ok(Some(Reply::Status { of, status: self.status(port) })),
+            Request::Statistics => Ok(Some(Reply::Statistics { of, statistics: self.statistics(port) })),
             Request::List { index } => {
                 if index >= self.directory.places() {
-                    return Err((
-                        Refusal::NoSuchPrimitive,
-                        [self.directory.places().into(), 0],
-                    ));
+                    return Err((Refusal::NoSuchPrimitive, [self.directory.places().into(), 0]));
                 }
                 let listing = self.directory.get(index).map(|entry| {
-                    let loaded = self
-                        .loaded
-                        .as_ref()
-                        .is_some_and(|loaded| loaded.is_same(entry));
+                    let loaded = self.loaded.as_ref().is_some_and(|loaded| loaded.is_same(entry));
                     entry.listing(index, loaded)
                 });
                 Ok(Some(Reply::Listing { of, listing }))
@@ -165,12 +121,7 @@ impl<S: Store> Session<S> {
             }
             Request::Stop => self.command(now_ms, of, Control::Stop.into(), port),
             Request::ClearFault => self.command(now_ms, of, Control::ClearFault.into(), port),
-            Request::SetGoal(goal) => self.command(
-                now_ms,
-                of,
-                Control::SetGoal(control_goal(&goal)?).into(),
-                port,
-            ),
+            Request::SetGoal(goal) => self.command(now_ms, of, Control::SetGoal(control_goal(&goal)?).into(), port),
             Request::SetSpeed { factor } => {
                 finite(&[factor])?;
                 self.command(now_ms, of, Control::SetSpeed { factor }.into(), port)
@@ -204,18 +155,9 @@ impl<S: Store> Session<S> {
                 done
             }
             Request::Read { name, offset } => {
-                let (slot, _) = self
-                    .directory
-                    .find(&name)
-                    .ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
-                let image = self
-                    .store
-                    .image(slot)
-                    .ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
-                let rest = usize::try_from(offset)
-                    .ok()
-                    .and_then(|start| image.get(start..))
-                    .unwrap_or_default();
+                let (slot, _) = self.directory.find(&name).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
+                let image = self.store.image(slot).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
+                let rest = usize::try_from(offset).ok().and_then(|start| image.get(start..)).unwrap_or_default();
                 let part = rest.get(..CHUNK_BYTES.min(rest.len())).unwrap_or_default();
                 let data = ChunkData::from_slice(part).unwrap_or_default();
                 Ok(Some(Reply::Chunk { of, offset, data }))
@@ -232,11 +174,7 @@ impl<S: Store> Session<S> {
         port: &mut impl SessionPort,
     ) -> Result<Option<Reply>, Refused> {
         let stop = matches!(command, Command::Control(Control::Stop));
-        let session = self
-            .owner
-            .as_ref()
-            .map(Owner::session)
-            .ok_or((Refusal::NoSession, [0, 0]))?;
+        let session = self.owner.as_ref().map(Owner::session).ok_or((Refusal::NoSession, [0, 0]))?;
         if !self.pending.has_room(stop) || port.command(command).is_err() {
             return Err((Refusal::CommandQueueFull, [0, 0]));
         }
@@ -246,15 +184,8 @@ impl<S: Store> Session<S> {
 
     /// Makes sure that the control half holds the primitive of this name, as it is in the store now.
     fn load(&mut self, name: &Name, port: &mut impl SessionPort) -> Result<(), Refused> {
-        let (slot, entry) = self
-            .directory
-            .find(name)
-            .ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
-        if self
-            .loaded
-            .as_ref()
-            .is_some_and(|loaded| loaded.is_same(entry))
-        {
+        let (slot, entry) = self.directory.find(name).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
+        if self.loaded.as_ref().is_some_and(|loaded| loaded.is_same(entry)) {
             return Ok(());
         }
         // Not under a running primitive, nor under a command that may start one.
@@ -266,36 +197,25 @@ impl<S: Store> Session<S> {
             return Err((Refusal::CommandQueueFull, [0, 0]));
         }
         let entry = entry.clone();
-        let bytes = self
-            .store
-            .image(slot)
-            .ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
+        let bytes = self.store.image(slot).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
         // Checked again: memory may have been damaged since the upload.
-        let image = PrimitiveImage::parse(bytes)
-            .map_err(|error| (Refusal::ImageInvalid, [error.code(), error.number()]))?;
+        let image =
+            PrimitiveImage::parse(bytes).map_err(|error| (Refusal::ImageInvalid, [error.code(), error.number()]))?;
         let primitive = primitive::build(&self.model, image.content(), &mut self.room)
             .map_err(|trouble| (Refusal::PrimitiveInvalid, trouble.0))?;
         // After a refusal nothing is known to be loaded: a later run loads again rather than run what is left there.
         self.loaded = None;
         port.load(&primitive).map_err(|refusal| match refusal {
             LoadRefusal::Running => (Refusal::State, [State::Run.code().into(), 0]),
-            LoadRefusal::Unfit(error) => {
-                (Refusal::PrimitiveInvalid, PrimitiveTrouble::from(error).0)
-            }
+            LoadRefusal::Unfit(error) => (Refusal::PrimitiveInvalid, PrimitiveTrouble::from(error).0),
         })?;
         self.loaded = Some(entry);
         Ok(())
     }
 
     fn delete(&mut self, name: &Name, port: &mut impl SessionPort) -> Result<u8, Refused> {
-        let (slot, entry) = self
-            .directory
-            .find(name)
-            .ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
-        let loaded = self
-            .loaded
-            .as_ref()
-            .is_some_and(|loaded| loaded.is_same(entry));
+        let (slot, entry) = self.directory.find(name).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
+        let loaded = self.loaded.as_ref().is_some_and(|loaded| loaded.is_same(entry));
         if loaded && matches!(port.health().state, State::Run | State::Coast) {
             return Err((Refusal::InUse, [0, 0]));
         }
@@ -309,16 +229,7 @@ impl<S: Store> Session<S> {
 
     fn store_changed(&mut self, now_ms: u32, slot: u8, port: &mut impl SessionPort) {
         let cycle = wire::cycle(port.health().cycle);
-        self.tell(
-            now_ms,
-            Event {
-                cycle,
-                kind: EventKind::Store,
-                code: slot.into(),
-                detail: 0,
-            },
-            port,
-        );
+        self.tell(now_ms, Event { cycle, kind: EventKind::Store, code: slot.into(), detail: 0 }, port);
     }
 
     fn hello(&self) -> DeviceHello {
@@ -349,9 +260,7 @@ impl<S: Store> Session<S> {
             startup_stage: health.stage.code(),
             blocked: health.blocked.map(|error| StartupTrouble::from(error).0),
             zeroed: health.zeroed,
-            safety_mode: health
-                .safety_mode
-                .and_then(|mode| u8::try_from(mode.value()).ok()),
+            safety_mode: health.safety_mode.and_then(|mode| u8::try_from(mode.value()).ok()),
             pendant: health.pendant.map(i32::cast_unsigned),
             loaded: self.loaded.as_ref().map(|entry| entry.name.clone()),
             phase: record.map_or(0.0, |record| record.phase),
@@ -366,10 +275,7 @@ impl<S: Store> Session<S> {
 /// Refuses a host that does not fit, in the order in which a difference explains the next.
 fn compare(hello: &HostHello) -> Result<(), Refused> {
     if hello.link_version != LINK_VERSION {
-        return Err((
-            Refusal::LinkVersion,
-            [hello.link_version.into(), LINK_VERSION.into()],
-        ));
+        return Err((Refusal::LinkVersion, [hello.link_version.into(), LINK_VERSION.into()]));
     }
     if hello.schema_hash != SCHEMA_HASH {
         return Err((Refusal::Schema, [hello.schema_hash, SCHEMA_HASH]));
@@ -383,29 +289,15 @@ fn compare(hello: &HostHello) -> Result<(), Refused> {
 /// Refuses numbers that are none, naming the first.
 fn finite(values: &[f32]) -> Result<(), Refused> {
     match values.iter().position(|value| !value.is_finite()) {
-        Some(place) => Err((
-            Refusal::BadValue,
-            [u32::try_from(place).unwrap_or(u32::MAX), 0],
-        )),
+        Some(place) => Err((Refusal::BadValue, [u32::try_from(place).unwrap_or(u32::MAX), 0])),
         None => Ok(()),
     }
 }
 
 fn control_goal(goal: &Goal) -> Result<control::Goal, Refused> {
-    finite(
-        goal.position
-            .as_ref()
-            .map_or(&[], |position| position.as_slice()),
-    )?;
-    finite(
-        goal.orientation
-            .as_ref()
-            .map_or(&[], |orientation| orientation.as_slice()),
-    )?;
-    Ok(control::Goal {
-        position: goal.position,
-        orientation: goal.orientation,
-    })
+    finite(goal.position.as_ref().map_or(&[], |position| position.as_slice()))?;
+    finite(goal.orientation.as_ref().map_or(&[], |orientation| orientation.as_slice()))?;
+    Ok(control::Goal { position: goal.position, orientation: goal.orientation })
 }
 
 fn run_options(options: &link::RunOptions) -> Result<RunOptions, Refused> {

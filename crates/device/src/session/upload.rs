@@ -28,12 +28,7 @@ impl From<StoreError> for Refused {
 
 impl<S: Store> Session<S> {
     /// Opens the spare place of the store.
-    pub(crate) fn upload_begin(
-        &mut self,
-        name: Name,
-        length: u32,
-        crc: u32,
-    ) -> Result<(), Refused> {
+    pub(crate) fn upload_begin(&mut self, name: Name, length: u32, crc: u32) -> Result<(), Refused> {
         self.upload_abort();
         let room = u32::try_from(self.store.slot_bytes()).unwrap_or(u32::MAX);
         if length > room {
@@ -43,14 +38,8 @@ impl<S: Store> Session<S> {
         if self.directory.find(&name).is_none() && self.directory.free().is_none() {
             return Err((Refusal::StoreFull, [self.directory.places().into(), 0]));
         }
-        self.store
-            .begin(usize::try_from(length).unwrap_or(usize::MAX))?;
-        self.upload = Some(Upload {
-            name,
-            length,
-            crc,
-            received: 0,
-        });
+        self.store.begin(usize::try_from(length).unwrap_or(usize::MAX))?;
+        self.upload = Some(Upload { name, length, crc, received: 0 });
         Ok(())
     }
 
@@ -60,17 +49,11 @@ impl<S: Store> Session<S> {
         if offset != upload.received {
             return Err((Refusal::UploadOrder, [upload.received, offset]));
         }
-        let end = u32::try_from(data.len())
-            .ok()
-            .and_then(|length| offset.checked_add(length));
+        let end = u32::try_from(data.len()).ok().and_then(|length| offset.checked_add(length));
         let Some(end) = end.filter(|end| *end <= upload.length) else {
-            return Err((
-                Refusal::ImageTooLarge,
-                [offset.saturating_add(192), upload.length],
-            ));
+            return Err((Refusal::ImageTooLarge, [offset.saturating_add(192), upload.length]));
         };
-        self.store
-            .write(usize::try_from(offset).unwrap_or(usize::MAX), data)?;
+        self.store.write(usize::try_from(offset).unwrap_or(usize::MAX), data)?;
         upload.received = end;
         Ok(())
     }
@@ -118,11 +101,7 @@ impl<S: Store> Session<S> {
         primitive::build(&self.model, image.content(), &mut self.room)
             .map_err(|trouble| (Refusal::PrimitiveInvalid, trouble.0))?;
         let entry = Entry::of(&image);
-        let place = self
-            .directory
-            .find(&entry.name)
-            .map(|(slot, _)| slot)
-            .or_else(|| self.directory.free());
+        let place = self.directory.find(&entry.name).map(|(slot, _)| slot).or_else(|| self.directory.free());
         let Some(slot) = place else {
             return Err((Refusal::StoreFull, [self.directory.places().into(), 0]));
         };

@@ -17,10 +17,7 @@ use crate::port::TimedRecord;
 use crate::startup::{Stage, StartupError};
 
 /// A cycle number as it goes over the link, where it wraps after 165 days.
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "wrapping is the documented meaning"
-)]
+#[allow(clippy::cast_possible_truncation, reason = "wrapping is the documented meaning")]
 pub(crate) const fn cycle(number: u64) -> u32 {
     number as u32
 }
@@ -34,18 +31,10 @@ pub(crate) fn refusal(reason: Refusal, health: &Health, fault: u8) -> (LinkRefus
         Refusal::ZeroNeedsIdle => (LinkRefusal::ZeroNeedsIdle, [0, 0]),
         Refusal::HomeOutOfRange { joint } => (LinkRefusal::BadValue, [joint.into(), 0]),
         Refusal::Control(Control::FaultLatched) => (LinkRefusal::Faulted, [fault.into(), 0]),
-        Refusal::Control(Control::WrongState) => {
-            (LinkRefusal::State, [health.state.code().into(), 0])
+        Refusal::Control(Control::WrongState) => (LinkRefusal::State, [health.state.code().into(), 0]),
+        Refusal::Control(Control::SafetyNotActive) => {
+            (LinkRefusal::SafetyMode, [health.safety_mode.map_or(u32::MAX, |mode| mode.value().unsigned_abs()), 0])
         }
-        Refusal::Control(Control::SafetyNotActive) => (
-            LinkRefusal::SafetyMode,
-            [
-                health
-                    .safety_mode
-                    .map_or(u32::MAX, |mode| mode.value().unsigned_abs()),
-                0,
-            ],
-        ),
         Refusal::Control(Control::PositionsMissing) => (LinkRefusal::PositionsMissing, [0, 0]),
         Refusal::Control(Control::NoPrimitive) => (LinkRefusal::NoSuchPrimitive, [0, 0]),
         Refusal::Control(Control::StartTooFar) => (LinkRefusal::FarFromStart, [0, 0]),
@@ -62,31 +51,16 @@ pub(crate) fn refusal(reason: Refusal, health: &Health, fault: u8) -> (LinkRefus
 pub(crate) fn event(event: Event) -> Option<LinkEvent> {
     let (kind, code, detail) = match event.kind {
         EventKind::Accepted | EventKind::Refused(_) => return None,
-        EventKind::Entered(state, fault) => {
-            (LinkKind::State, state.code().into(), fault.code().into())
-        }
+        EventKind::Entered(state, fault) => (LinkKind::State, state.code().into(), fault.code().into()),
         EventKind::Arrived => (LinkKind::Arrived, 0, 0),
         EventKind::Startup(stage) => (LinkKind::Startup, stage.code().into(), 0),
         EventKind::Blocked(error) => {
             let StartupTrouble([code, detail]) = StartupTrouble::from(error);
-            (
-                LinkKind::Blocked,
-                u16::try_from(code).unwrap_or(u16::MAX),
-                detail,
-            )
+            (LinkKind::Blocked, u16::try_from(code).unwrap_or(u16::MAX), detail)
         }
-        EventKind::Safety(mode) => (
-            LinkKind::SafetyMode,
-            u16::try_from(mode.value()).unwrap_or(u16::MAX),
-            0,
-        ),
+        EventKind::Safety(mode) => (LinkKind::SafetyMode, u16::try_from(mode.value()).unwrap_or(u16::MAX), 0),
     };
-    Some(LinkEvent {
-        cycle: cycle(event.cycle),
-        kind,
-        code,
-        detail,
-    })
+    Some(LinkEvent { cycle: cycle(event.cycle), kind, code, detail })
 }
 
 /// A cycle record as telemetry.
@@ -116,9 +90,8 @@ pub struct StartupTrouble(pub [u32; 2]);
 
 impl From<StartupError> for StartupTrouble {
     fn from(error: StartupError) -> Self {
-        let at = |code: u32, node: Node, value: i32| {
-            Self([code, u32::from(node.number()) | value.cast_unsigned() << 8])
-        };
+        let at =
+            |code: u32, node: Node, value: i32| Self([code, u32::from(node.number()) | value.cast_unsigned() << 8]);
         match error {
             StartupError::NoSafetyModule => Self([1, 0]),
             StartupError::MissingPuck(node) => at(2, node, 0),
@@ -130,12 +103,8 @@ impl From<StartupError> for StartupTrouble {
             StartupError::WrongPlace { node, place } => at(8, node, place),
             StartupError::WrongTorqueLimit { node, limit } => at(9, node, limit),
             StartupError::NotAWrist { poles } => at(10, Node::ARM[6], poles),
-            StartupError::Calibration(CalibrationError::CountsPerRevolution(motor)) => {
-                Self([11, motor.into()])
-            }
-            StartupError::Calibration(CalibrationError::TorqueCounts(motor)) => {
-                Self([12, motor.into()])
-            }
+            StartupError::Calibration(CalibrationError::CountsPerRevolution(motor)) => Self([11, motor.into()]),
+            StartupError::Calibration(CalibrationError::TorqueCounts(motor)) => Self([12, motor.into()]),
             StartupError::Calibration(CalibrationError::Transmission(_)) => Self([13, 0]),
             StartupError::ZeroNotTaken(node) => at(14, node, 0),
             StartupError::SafetyNotZeroed => Self([15, 0]),
@@ -155,14 +124,8 @@ impl StartupTrouble {
             2 => StartupError::MissingPuck(node),
             3 => StartupError::NoAnswer(node),
             4 => StartupError::DidNotWake(node),
-            5 => StartupError::WrongRole {
-                node,
-                role: u16::try_from(value & 0xFFFF).ok()?,
-            },
-            6 => StartupError::UnknownFirmware {
-                node,
-                version: value,
-            },
+            5 => StartupError::WrongRole { node, role: u16::try_from(value & 0xFFFF).ok()? },
+            6 => StartupError::UnknownFirmware { node, version: value },
             7 => StartupError::WrongGroups(node),
             8 => StartupError::WrongPlace { node, place: value },
             9 => StartupError::WrongTorqueLimit { node, limit: value },
@@ -180,9 +143,7 @@ impl fmt::Display for StartupTrouble {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.error(), self.0) {
             (Some(error), _) => error.fmt(f),
-            (None, [13, _]) => {
-                f.write_str("the scales of the pucks do not fit the arm's transmission")
-            }
+            (None, [13, _]) => f.write_str("the scales of the pucks do not fit the arm's transmission"),
             (None, [code, detail]) => write!(f, "unknown reason {code} ({detail:#x})"),
         }
     }
@@ -215,10 +176,7 @@ pub(crate) const TROUBLE_FEEDBACK: PrimitiveTrouble = PrimitiveTrouble([8, 0]);
 pub(crate) const TROUBLE_EXPECTATION: PrimitiveTrouble = PrimitiveTrouble([9, 0]);
 
 fn place<T: PartialEq>(list: &[T], item: &T) -> u32 {
-    list.iter()
-        .zip(0..)
-        .find(|(other, _)| *other == item)
-        .map_or(u32::MAX, |(_, index)| index)
+    list.iter().zip(0..).find(|(other, _)| *other == item).map_or(u32::MAX, |(_, index)| index)
 }
 
 fn item<T: Copy>(list: &[T], index: u32) -> Option<T> {
@@ -251,10 +209,7 @@ impl PrimitiveTrouble {
         let end = |bit: u32| if bit == 0 { End::Start } else { End::Goal };
         Some(match code {
             1 => LoadError::Primitive(item(&PLAIN, detail)?),
-            2 => LoadError::Primitive(PrimitiveError::Gains(
-                item(&ROWS, detail / 2)?,
-                item(&GAINS, detail % 2)?,
-            )),
+            2 => LoadError::Primitive(PrimitiveError::Gains(item(&ROWS, detail / 2)?, item(&GAINS, detail % 2)?)),
             3 => LoadError::Primitive(PrimitiveError::Unstable(item(&ROWS, detail)?)),
             4 => LoadError::Duration,
             5 => LoadError::Posture(end(detail >> 8), u8::try_from(detail & 0xFF).ok()?),
@@ -269,12 +224,8 @@ impl fmt::Display for PrimitiveTrouble {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.error(), *self) {
             (Some(error), _) => error.fmt(f),
-            (None, TROUBLE_FEEDBACK) => {
-                f.write_str("a gain or clamp of the feedback is negative or too large")
-            }
-            (None, TROUBLE_EXPECTATION) => {
-                f.write_str("the recorded duration of the expectation is not positive")
-            }
+            (None, TROUBLE_FEEDBACK) => f.write_str("a gain or clamp of the feedback is negative or too large"),
+            (None, TROUBLE_EXPECTATION) => f.write_str("the recorded duration of the expectation is not positive"),
             (None, Self([code, detail])) => write!(f, "unknown reason {code} ({detail:#x})"),
         }
     }

@@ -37,12 +37,7 @@ pub(crate) struct Exchange {
 
 impl Exchange {
     /// Puts the question, or looks how it stands. To be called with the same arguments until it is no longer pending.
-    pub(crate) fn ask(
-        &mut self,
-        node: Node,
-        property: PropertyId,
-        outlet: &mut impl Outlet,
-    ) -> Answer {
+    pub(crate) fn ask(&mut self, node: Node, property: PropertyId, outlet: &mut impl Outlet) -> Answer {
         let deadline_us = outlet.now_us() + PATIENCE_US;
         match &mut self.question {
             Some(question) if question.node == node && question.property == property => {
@@ -65,13 +60,7 @@ impl Exchange {
             // No question, or one that its asker has abandoned.
             _ => {
                 if outlet.send(get(node, property)) {
-                    self.question = Some(Question {
-                        node,
-                        property,
-                        deadline_us,
-                        attempts: 1,
-                        value: None,
-                    });
+                    self.question = Some(Question { node, property, deadline_us, attempts: 1, value: None });
                 }
             }
         }

@@ -28,14 +28,9 @@ fn passed(last: Option<u64>, gap: u64, now_us: u64) -> bool {
 /// Whether a frame is a SET to the safety module, and whether it is a wake.
 fn kind(frame: &CanFrame) -> (bool, bool) {
     match Request::decode(frame) {
-        Ok(Request {
-            to,
-            action: Action::Set { property, .. },
-            ..
-        }) => (
-            to == Destination::Node(Node::SAFETY_MODULE),
-            property == PropertyId::STAT,
-        ),
+        Ok(Request { to, action: Action::Set { property, .. }, .. }) => {
+            (to == Destination::Node(Node::SAFETY_MODULE), property == PropertyId::STAT)
+        }
         _ => (false, false),
     }
 }

@@ -121,10 +121,7 @@ impl Startup {
     /// Begins at the beginning, silently.
     pub(crate) fn new() -> Startup {
         Startup {
-            step: Step::Enumerate {
-                node: *ENUMERATED.start(),
-                powered: false,
-            },
+            step: Step::Enumerate { node: *ENUMERATED.start(), powered: false },
             exchange: Exchange::default(),
             survey: Survey::new(),
             enumerations: 0,
@@ -140,10 +137,7 @@ impl Startup {
 
     /// Begins anew after the cyclic loop: first takes off any torque that may still be applied.
     pub(crate) fn restart(&mut self) {
-        *self = Startup {
-            step: Step::Hush { frame: 0 },
-            ..Startup::new()
-        };
+        *self = Startup { step: Step::Hush { frame: 0 }, ..Startup::new() };
     }
 
     /// How far it has come.
@@ -200,11 +194,7 @@ impl Startup {
     /// A reply has come in; whether it was expected.
     pub(crate) fn receive(&mut self, reply: &Reply) -> bool {
         match *reply {
-            Reply::Property {
-                node,
-                property,
-                value,
-            } => {
+            Reply::Property { node, property, value } => {
                 let enumerating = matches!(self.step, Step::Enumerate { .. } | Step::Listen { .. });
                 if enumerating && property == PropertyId::STAT {
                     self.survey.note_status(node, value);
@@ -215,13 +205,9 @@ impl Startup {
             Reply::Position { node, primary, .. } => {
                 let asked = matches!(
                     self.step,
-                    Step::CheckPositions { until_us: Some(_) }
-                        | Step::FirstPositions { until_us: Some(_) }
+                    Step::CheckPositions { until_us: Some(_) } | Step::FirstPositions { until_us: Some(_) }
                 );
-                match node
-                    .arm_index()
-                    .and_then(|joint| self.positions.get_mut(joint))
-                {
+                match node.arm_index().and_then(|joint| self.positions.get_mut(joint)) {
                     Some(place) if asked => {
                         *place = Some(primary);
                         true
@@ -243,12 +229,9 @@ impl Startup {
                     self.exchange.abandon();
                     self.error = Some(error);
                     if self.is_zero_pending() {
-                        self.zero_request =
-                            ZeroRequest::Answered(Err(Refusal::NotReady(Stage::Blocked)));
+                        self.zero_request = ZeroRequest::Answered(Err(Refusal::NotReady(Stage::Blocked)));
                     }
-                    self.step = Step::Blocked {
-                        until_us: outlet.now_us() + RETRY_US,
-                    };
+                    self.step = Step::Blocked { until_us: outlet.now_us() + RETRY_US };
                     break;
                 }
             }
@@ -291,9 +274,7 @@ impl Startup {
                 None => Next::Stay,
                 Some(0) => {
                     self.error = None;
-                    Next::Go(Step::AwaitZero {
-                        next_us: outlet.now_us() + POLL_US,
-                    })
+                    Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US })
                 }
                 Some(_) => {
                     self.zeroed = true;
@@ -303,11 +284,7 @@ impl Startup {
             Step::AwaitZero { next_us } => self.await_zero(next_us, outlet),
             Step::ConfirmIdle => self.confirm_idle(outlet),
             Step::IgnoreFaults => {
-                let frame = set(
-                    Node::SAFETY_MODULE,
-                    self.safety()?.ignore_faults,
-                    IGNORED_AT_ZERO,
-                );
+                let frame = set(Node::SAFETY_MODULE, self.safety()?.ignore_faults, IGNORED_AT_ZERO);
                 Ok(after(outlet.send(frame), Step::WritePosition { joint: 0 }))
             }
             Step::WritePosition { joint } => Ok(self.write_position(joint, outlet)),
@@ -325,34 +302,19 @@ impl Startup {
                 }
             }),
             Step::Tare if !self.has_sensor() => Ok(Next::Go(Step::IgnoreFirstFaults)),
-            Step::Tare => Ok(after(
-                outlet.send(force_torque::tare()),
-                Step::IgnoreFirstFaults,
-            )),
+            Step::Tare => Ok(after(outlet.send(force_torque::tare()), Step::IgnoreFirstFaults)),
             Step::IgnoreFirstFaults => {
-                let frame = set(
-                    Node::SAFETY_MODULE,
-                    self.safety()?.ignore_faults,
-                    IGNORED_AT_START,
-                );
-                Ok(after(
-                    outlet.send(frame),
-                    Step::FirstPositions { until_us: None },
-                ))
+                let frame = set(Node::SAFETY_MODULE, self.safety()?.ignore_faults, IGNORED_AT_START);
+                Ok(after(outlet.send(frame), Step::FirstPositions { until_us: None }))
             }
             Step::FirstPositions { until_us } => {
-                self.read_positions(until_us, Step::Done, outlet, |until_us| {
-                    Step::FirstPositions { until_us }
-                })
+                self.read_positions(until_us, Step::Done, outlet, |until_us| Step::FirstPositions { until_us })
             }
             Step::Done => Ok(Next::Stay),
             Step::Blocked { until_us } if outlet.now_us() < until_us => Ok(Next::Stay),
             Step::Blocked { .. } => {
                 let error = self.error;
-                *self = Startup {
-                    error,
-                    ..Startup::new()
-                };
+                *self = Startup { error, ..Startup::new() };
                 Ok(Next::Stay)
             }
         }

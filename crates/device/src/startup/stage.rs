@@ -144,14 +144,8 @@ pub enum StartupError {
 impl fmt::Display for StartupError {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            StartupError::NoSafetyModule => {
-                formatter.write_str("no safety module answers at node 10")
-            }
-            StartupError::MissingPuck(node) => write!(
-                formatter,
-                "puck {} of the arm does not answer",
-                node.number()
-            ),
+            StartupError::NoSafetyModule => formatter.write_str("no safety module answers at node 10"),
+            StartupError::MissingPuck(node) => write!(formatter, "puck {} of the arm does not answer", node.number()),
             StartupError::NoAnswer(node) => {
                 write!(formatter, "node {} did not answer a request", node.number())
             }
@@ -159,56 +153,30 @@ impl fmt::Display for StartupError {
                 write!(formatter, "node {} did not wake up", node.number())
             }
             StartupError::WrongRole { node, role } => {
-                write!(
-                    formatter,
-                    "node {} has ROLE {role:#06X}, which does not fit its number",
-                    node.number()
-                )
+                write!(formatter, "node {} has ROLE {role:#06X}, which does not fit its number", node.number())
             }
             StartupError::UnknownFirmware { node, version } => {
-                write!(
-                    formatter,
-                    "node {} runs firmware {version}, which is not supported",
-                    node.number()
-                )
+                write!(formatter, "node {} runs firmware {version}, which is not supported", node.number())
             }
             StartupError::WrongGroups(node) => {
-                write!(
-                    formatter,
-                    "puck {} belongs to the wrong groups (GRPA, GRPB, GRPC)",
-                    node.number()
-                )
+                write!(formatter, "puck {} belongs to the wrong groups (GRPA, GRPB, GRPC)", node.number())
             }
             StartupError::WrongPlace { node, place } => {
-                write!(
-                    formatter,
-                    "puck {} has PIDX {place}, which does not fit its number",
-                    node.number()
-                )
+                write!(formatter, "puck {} has PIDX {place}, which does not fit its number", node.number())
             }
             StartupError::WrongTorqueLimit { node, limit } => {
-                write!(
-                    formatter,
-                    "puck {} has a torque limit MT of {limit}",
-                    node.number()
-                )
+                write!(formatter, "puck {} has a torque limit MT of {limit}", node.number())
             }
             StartupError::NotAWrist { poles } => {
-                write!(
-                    formatter,
-                    "puck 7 drives a motor with {poles} poles, not that of a seven-joint wrist"
-                )
+                write!(formatter, "puck 7 drives a motor with {poles} poles, not that of a seven-joint wrist")
             }
             StartupError::Calibration(error) => error.fmt(formatter),
             StartupError::ZeroNotTaken(node) => {
-                write!(
-                    formatter,
-                    "puck {} did not take the position written to it",
-                    node.number()
-                )
+                write!(formatter, "puck {} did not take the position written to it", node.number())
             }
-            StartupError::SafetyNotZeroed => formatter
-                .write_str("the safety module did not take the word that the arm is zeroed"),
+            StartupError::SafetyNotZeroed => {
+                formatter.write_str("the safety module did not take the word that the arm is zeroed")
+            }
         }
     }
 }

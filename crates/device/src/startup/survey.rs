@@ -90,21 +90,12 @@ pub(crate) struct Survey {
 impl Survey {
     /// Nothing known.
     pub(crate) const fn new() -> Survey {
-        Survey {
-            nodes: [Seen {
-                status: None,
-                version: None,
-            }; NODES],
-            drives: [[0; DRIVE_PROPERTIES.len()]; 7],
-        }
+        Survey { nodes: [Seen { status: None, version: None }; NODES], drives: [[0; DRIVE_PROPERTIES.len()]; 7] }
     }
 
     /// What is known of a node.
     pub(crate) fn seen(&self, node: Node) -> Seen {
-        self.nodes
-            .get(usize::from(node.number()))
-            .copied()
-            .unwrap_or_default()
+        self.nodes.get(usize::from(node.number())).copied().unwrap_or_default()
     }
 
     /// The place to note what a node says.
@@ -136,9 +127,7 @@ impl Survey {
     /// The devices of the arm that answered: pucks 1 to 7, then the force/torque sensor. The pucks of a hand are left
     /// asleep: nothing here moves them, and a sleeping puck ignores broadcasts.
     pub(crate) fn device(&self, index: u8) -> Option<Node> {
-        let sensor = self
-            .is_present(Node::FORCE_TORQUE)
-            .then_some(Node::FORCE_TORQUE);
+        let sensor = self.is_present(Node::FORCE_TORQUE).then_some(Node::FORCE_TORQUE);
         Node::ARM.into_iter().chain(sensor).nth(usize::from(index))
     }
 
@@ -151,48 +140,30 @@ impl Survey {
             Node::SAFETY_MODULE => Role::SAFETY,
             _ => Role::MOTOR,
         };
-        if role.kind() == expected {
-            Ok(())
-        } else {
-            Err(StartupError::WrongRole { node, role: role.0 })
-        }
+        if role.kind() == expected { Ok(()) } else { Err(StartupError::WrongRole { node, role: role.0 }) }
     }
 
     /// The property numbers of the safety module.
     pub(crate) fn safety_properties(&self) -> Result<SafetyProperties, StartupError> {
         let node = Node::SAFETY_MODULE;
-        let version = self
-            .seen(node)
-            .version
-            .ok_or(StartupError::NoAnswer(node))?;
+        let version = self.seen(node).version.ok_or(StartupError::NoAnswer(node))?;
         SafetyProperties::new(version).ok_or(StartupError::UnknownFirmware { node, version })
     }
 
     /// The table of an arm puck that is awake. Firmware whose P and T are not 48 and 42 is refused: group requests and
     /// packed torques carry one number for all pucks.
     pub(crate) fn motor_table(&self, node: Node) -> Result<PropertyTable, StartupError> {
-        let version = self
-            .seen(node)
-            .version
-            .ok_or(StartupError::NoAnswer(node))?;
+        let version = self.seen(node).version.ok_or(StartupError::NoAnswer(node))?;
         let unknown = StartupError::UnknownFirmware { node, version };
         let table = PropertyTable::motor(version).map_err(|_| unknown)?;
-        let same_generation = table.id(Property::T) == Some(PropertyId::TORQUE)
-            && table.id(Property::P) == Some(PropertyId::POSITION);
-        if same_generation {
-            Ok(table)
-        } else {
-            Err(unknown)
-        }
+        let same_generation =
+            table.id(Property::T) == Some(PropertyId::TORQUE) && table.id(Property::P) == Some(PropertyId::POSITION);
+        if same_generation { Ok(table) } else { Err(unknown) }
     }
 
     /// One of [`DRIVE_PROPERTIES`] of an arm puck.
     pub(crate) fn note_drive(&mut self, joint: usize, item: usize, value: i32) {
-        if let Some(place) = self
-            .drives
-            .get_mut(joint)
-            .and_then(|drive| drive.get_mut(item))
-        {
+        if let Some(place) = self.drives.get_mut(joint).and_then(|drive| drive.get_mut(item)) {
             *place = value;
         }
     }
@@ -218,14 +189,9 @@ impl Survey {
                 return Err(StartupError::NotAWrist { poles });
             }
         }
-        let payload = if self.is_present(Node::FORCE_TORQUE) {
-            Payload::SensorAndHand
-        } else {
-            Payload::None
-        };
+        let payload = if self.is_present(Node::FORCE_TORQUE) { Payload::SensorAndHand } else { Payload::None };
         let counts_per_revolution = self.drives.map(|[counts, ..]| counts);
         let torque_counts = self.drives.map(|[_, torque, ..]| torque);
-        Calibration::new(counts_per_revolution, torque_counts, payload)
-            .map_err(StartupError::Calibration)
+        Calibration::new(counts_per_revolution, torque_counts, payload).map_err(StartupError::Calibration)
     }
 }

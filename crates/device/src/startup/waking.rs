@@ -23,34 +23,17 @@ impl Startup {
             1 => (wrist, Step::Hush { frame: 2 }),
             _ => (
                 set(Group::ARM, PropertyId::MODE, puck::MotorMode::Idle.value()),
-                Step::Enumerate {
-                    node: *ENUMERATED.start(),
-                    powered: false,
-                },
+                Step::Enumerate { node: *ENUMERATED.start(), powered: false },
             ),
         };
         after(outlet.send(content), next)
     }
 
-    pub(super) fn enumerate(
-        &mut self,
-        number: u8,
-        powered: bool,
-        outlet: &mut impl Outlet,
-    ) -> Next {
+    pub(super) fn enumerate(&mut self, number: u8, powered: bool, outlet: &mut impl Outlet) -> Next {
         let Some(node) = Node::new(number).filter(|_| ENUMERATED.contains(&number)) else {
-            return Next::Go(Step::Listen {
-                until_us: outlet.now_us() + LISTEN_US,
-                powered,
-            });
+            return Next::Go(Step::Listen { until_us: outlet.now_us() + LISTEN_US, powered });
         };
-        after(
-            outlet.send(get(node, PropertyId::STAT)),
-            Step::Enumerate {
-                node: number + 1,
-                powered,
-            },
-        )
+        after(outlet.send(get(node, PropertyId::STAT)), Step::Enumerate { node: number + 1, powered })
     }
 
     pub(super) fn count_pucks(&mut self) -> Result<Next, StartupError> {
@@ -58,18 +41,11 @@ impl Startup {
         match self.survey.missing_puck() {
             None => Ok(Next::Go(Step::Identify { device: 0 })),
             Some(node) if self.enumerations >= ENUMERATIONS => Err(StartupError::MissingPuck(node)),
-            Some(_) => Ok(Next::Go(Step::Enumerate {
-                node: *ENUMERATED.start(),
-                powered: true,
-            })),
+            Some(_) => Ok(Next::Go(Step::Enumerate { node: *ENUMERATED.start(), powered: true })),
         }
     }
 
-    pub(super) fn identify_safety(
-        &mut self,
-        item: u8,
-        outlet: &mut impl Outlet,
-    ) -> Result<Next, StartupError> {
+    pub(super) fn identify_safety(&mut self, item: u8, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
         let node = Node::SAFETY_MODULE;
         if item == 0 {
             let Some(role) = self.ask_safety(PropertyId::ROLE, outlet)? else {
@@ -89,17 +65,10 @@ impl Startup {
         Ok(Next::Go(Step::LoadLimit { limit: 0, part: 0 }))
     }
 
-    pub(super) fn load_limit(
-        &mut self,
-        limit: u8,
-        part: u8,
-        outlet: &mut impl Outlet,
-    ) -> Result<Next, StartupError> {
+    pub(super) fn load_limit(&mut self, limit: u8, part: u8, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
         let safety = *self.safety()?;
         let Some(property) = safety.limits.get(usize::from(limit)) else {
-            return Ok(Next::Go(Step::AwaitIdle {
-                next_us: outlet.now_us(),
-            }));
+            return Ok(Next::Go(Step::AwaitIdle { next_us: outlet.now_us() }));
         };
         let command = match part {
             0 => safety.default,
@@ -107,30 +76,14 @@ impl Startup {
             // The question after the two SETs gives the module time and proves that it still listens.
             _ => {
                 let answered = self.ask_safety(PropertyId::STAT, outlet)?.is_some();
-                return Ok(after(
-                    answered,
-                    Step::LoadLimit {
-                        limit: limit + 1,
-                        part: 0,
-                    },
-                ));
+                return Ok(after(answered, Step::LoadLimit { limit: limit + 1, part: 0 }));
             }
         };
         let frame = set(Node::SAFETY_MODULE, command, i32::from(property.number()));
-        Ok(after(
-            outlet.send(frame),
-            Step::LoadLimit {
-                limit,
-                part: part + 1,
-            },
-        ))
+        Ok(after(outlet.send(frame), Step::LoadLimit { limit, part: part + 1 }))
     }
 
-    pub(super) fn await_idle(
-        &mut self,
-        next_us: u64,
-        outlet: &mut impl Outlet,
-    ) -> Result<Next, StartupError> {
+    pub(super) fn await_idle(&mut self, next_us: u64, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
         if outlet.now_us() < next_us {
             return Ok(Next::Stay);
         }
@@ -141,29 +94,17 @@ impl Startup {
         if SafetyMode::from_value(mode) == Some(SafetyMode::Idle) {
             self.survey = Survey::new();
             self.enumerations = 0;
-            return Ok(Next::Go(Step::Enumerate {
-                node: *ENUMERATED.start(),
-                powered: true,
-            }));
+            return Ok(Next::Go(Step::Enumerate { node: *ENUMERATED.start(), powered: true }));
         }
         // What went wrong before no longer matters: a person is at work.
         self.error = None;
-        Ok(Next::Go(Step::AwaitIdle {
-            next_us: outlet.now_us() + POLL_US,
-        }))
+        Ok(Next::Go(Step::AwaitIdle { next_us: outlet.now_us() + POLL_US }))
     }
 
-    pub(super) fn identify(
-        &mut self,
-        index: u8,
-        outlet: &mut impl Outlet,
-    ) -> Result<Next, StartupError> {
+    pub(super) fn identify(&mut self, index: u8, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
         let next = Step::Identify { device: index + 1 };
         match self.survey.device(index) {
-            None => Ok(Next::Go(Step::Wake {
-                device: 0,
-                woken: false,
-            })),
+            None => Ok(Next::Go(Step::Wake { device: 0, woken: false })),
             Some(Node::FORCE_TORQUE) => Ok(Next::Go(next)),
             Some(node) => {
                 let Some(role) = self.ask(node, PropertyId::ROLE, outlet)? else {
@@ -178,42 +119,23 @@ impl Startup {
     pub(super) fn wake(&mut self, index: u8, woken: bool, outlet: &mut impl Outlet) -> Next {
         let Some(node) = self.survey.device(index) else {
             return Next::Go(if woken {
-                Step::Silence {
-                    until_us: outlet.now_us() + WAKE_SILENCE_US,
-                }
+                Step::Silence { until_us: outlet.now_us() + WAKE_SILENCE_US }
             } else {
                 Step::Verify { device: 0, item: 0 }
             });
         };
         if self.survey.seen(node).status == Some(Status::Ready.value()) {
-            return Next::Go(Step::Wake {
-                device: index + 1,
-                woken,
-            });
+            return Next::Go(Step::Wake { device: index + 1, woken });
         }
         let frame = set(node, PropertyId::STAT, Status::Ready.value());
-        after(
-            outlet.send(frame),
-            Step::Wake {
-                device: index + 1,
-                woken: true,
-            },
-        )
+        after(outlet.send(frame), Step::Wake { device: index + 1, woken: true })
     }
 
-    pub(super) fn verify(
-        &mut self,
-        index: u8,
-        item: u8,
-        outlet: &mut impl Outlet,
-    ) -> Result<Next, StartupError> {
+    pub(super) fn verify(&mut self, index: u8, item: u8, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
         let Some(node) = self.survey.device(index) else {
             return Ok(Next::Go(Step::Brake));
         };
-        let next = Step::Verify {
-            device: index + 1,
-            item: 0,
-        };
+        let next = Step::Verify { device: index + 1, item: 0 };
         if item == 0 {
             let status = match self.exchange.ask(node, PropertyId::STAT, outlet) {
                 Answer::Pending => return Ok(Next::Stay),
@@ -225,14 +147,7 @@ impl Startup {
             }
             // A sensor may report no usable version; its properties are chosen by its node number.
             let sensor = node == Node::FORCE_TORQUE;
-            return Ok(Next::Go(if sensor {
-                next
-            } else {
-                Step::Verify {
-                    device: index,
-                    item: 1,
-                }
-            }));
+            return Ok(Next::Go(if sensor { next } else { Step::Verify { device: index, item: 1 } }));
         }
         // The version read in the monitor was the monitor's; only this one chooses property numbers.
         let Some(version) = self.ask(node, PropertyId::VERS, outlet)? else {
@@ -243,35 +158,21 @@ impl Startup {
         Ok(Next::Go(next))
     }
 
-    pub(super) fn read(
-        &mut self,
-        joint: u8,
-        item: u8,
-        outlet: &mut impl Outlet,
-    ) -> Result<Next, StartupError> {
+    pub(super) fn read(&mut self, joint: u8, item: u8, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
         let Some(node) = Node::ARM.get(usize::from(joint)).copied() else {
             self.calibration = Some(self.survey.calibration()?);
             return Ok(Next::Go(Step::AskZero));
         };
         let Some(property) = DRIVE_PROPERTIES.get(usize::from(item)).copied() else {
-            return Ok(Next::Go(Step::Read {
-                joint: joint + 1,
-                item: 0,
-            }));
+            return Ok(Next::Go(Step::Read { joint: joint + 1, item: 0 }));
         };
         let table = self.survey.motor_table(node)?;
         let version = self.survey.seen(node).version.unwrap_or_default();
-        let id = table
-            .id(property)
-            .ok_or(StartupError::UnknownFirmware { node, version })?;
+        let id = table.id(property).ok_or(StartupError::UnknownFirmware { node, version })?;
         let Some(value) = self.ask(node, id, outlet)? else {
             return Ok(Next::Stay);
         };
-        self.survey
-            .note_drive(usize::from(joint), usize::from(item), value);
-        Ok(Next::Go(Step::Read {
-            joint,
-            item: item + 1,
-        }))
+        self.survey.note_drive(usize::from(joint), usize::from(item), value);
+        Ok(Next::Go(Step::Read { joint, item: item + 1 }))
     }
 }

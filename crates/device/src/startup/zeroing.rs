@@ -24,9 +24,7 @@ impl Startup {
     }
 
     fn accept_zero(&mut self, home: &[f32; 7]) -> Result<(), Refusal> {
-        let (Some(calibration), Step::AwaitZero { .. } | Step::Done) =
-            (&self.calibration, self.step)
-        else {
+        let (Some(calibration), Step::AwaitZero { .. } | Step::Done) = (&self.calibration, self.step) else {
             return Err(Refusal::NotReady(self.stage()));
         };
         self.targets = home_counts(calibration, home)?;
@@ -62,18 +60,10 @@ impl Startup {
         self.zero_request = ZeroRequest::Answered(Err(Refusal::ZeroNeedsIdle));
         // Back to where the command came in: toward the loop if the arm is zeroed, else to the person.
         let next_us = outlet.now_us() + POLL_US;
-        Ok(Next::Go(if self.zeroed {
-            Step::AskZero
-        } else {
-            Step::AwaitZero { next_us }
-        }))
+        Ok(Next::Go(if self.zeroed { Step::AskZero } else { Step::AwaitZero { next_us } }))
     }
 
-    pub(super) fn await_zero(
-        &mut self,
-        next_us: u64,
-        outlet: &mut impl Outlet,
-    ) -> Result<Next, StartupError> {
+    pub(super) fn await_zero(&mut self, next_us: u64, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
         if outlet.now_us() < next_us {
             return Ok(Next::Stay);
         }
@@ -85,9 +75,7 @@ impl Startup {
             *self = Startup::new();
             return Ok(Next::Stay);
         }
-        Ok(Next::Go(Step::AwaitZero {
-            next_us: outlet.now_us() + POLL_US,
-        }))
+        Ok(Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US }))
     }
 
     pub(super) fn write_position(&mut self, joint: u8, outlet: &mut impl Outlet) -> Next {
@@ -106,15 +94,11 @@ impl Startup {
         until_us: Option<u64>,
         outlet: &mut impl Outlet,
     ) -> Result<Next, StartupError> {
-        let next = self.read_positions(until_us, Step::TellZero, outlet, |until_us| {
-            Step::CheckPositions { until_us }
-        })?;
+        let next =
+            self.read_positions(until_us, Step::TellZero, outlet, |until_us| Step::CheckPositions { until_us })?;
         if matches!(next, Next::Go(Step::TellZero)) {
-            for ((node, position), target) in
-                Node::ARM.into_iter().zip(self.positions).zip(self.targets)
-            {
-                let near = position
-                    .is_some_and(|position| (position.0 - target.0).abs() <= ZERO_TOLERANCE);
+            for ((node, position), target) in Node::ARM.into_iter().zip(self.positions).zip(self.targets) {
+                let near = position.is_some_and(|position| (position.0 - target.0).abs() <= ZERO_TOLERANCE);
                 if !near {
                     return Err(StartupError::ZeroNotTaken(node));
                 }
@@ -136,11 +120,7 @@ impl Startup {
             let sent = outlet.send(get(Group::ARM, PropertyId::POSITION));
             return Ok(after(sent, waiting(Some(outlet.now_us() + POSITIONS_US))));
         };
-        match Node::ARM
-            .into_iter()
-            .zip(self.positions)
-            .find(|(_, position)| position.is_none())
-        {
+        match Node::ARM.into_iter().zip(self.positions).find(|(_, position)| position.is_none()) {
             None => Ok(Next::Go(done)),
             Some((node, _)) if outlet.now_us() >= until_us => Err(StartupError::NoAnswer(node)),
             Some(_) => Ok(Next::Stay),

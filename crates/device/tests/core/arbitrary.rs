@@ -38,14 +38,8 @@ impl Person {
             Person::Control(kind, q) => Command::Control(match kind % 8 {
                 0 => Control::Gravity,
                 1 => Control::Hold,
-                2 => Control::Approach {
-                    q: *q,
-                    duration: q[0],
-                },
-                3 => Control::Run(control::RunOptions {
-                    speed: q[1],
-                    ..Default::default()
-                }),
+                2 => Control::Approach { q: *q, duration: q[0] },
+                3 => Control::Run(control::RunOptions { speed: q[1], ..Default::default() }),
                 4 => Control::Stop,
                 5 => Control::ClearFault,
                 6 => Control::SetSpeed { factor: q[2] },
@@ -56,22 +50,13 @@ impl Person {
 }
 
 fn happening() -> impl Strategy<Value = Happening> {
-    let frame =
-        (0..=0x7FF_u16, prop::collection::vec(any::<u8>(), 0..=8)).prop_map(|(id, data)| {
-            CanFrame::from_slice(CanId::new(id).expect("eleven bits"), &data)
-                .expect("at most eight bytes")
-        });
+    let frame = (0..=0x7FF_u16, prop::collection::vec(any::<u8>(), 0..=8)).prop_map(|(id, data)| {
+        CanFrame::from_slice(CanId::new(id).expect("eleven bits"), &data).expect("at most eight bytes")
+    });
     // Frames of the right kind from the right nodes reach further than random ones.
-    let reply = (
-        prop::sample::select(vec![0x426_u16, 0x546, 0x423, 0x4E3, 0x50A, 0x50B, 0x540]),
-        any::<[u8; 4]>(),
-    )
-        .prop_map(|(id, data)| {
-            CanFrame::from_slice(CanId::new(id).expect("eleven bits"), &data).expect("four bytes")
-        });
-    let angles = prop::array::uniform7(
-        prop_oneof![8 => -3.0_f32..3.0, 1 => Just(f32::NAN), 1 => Just(f32::INFINITY)],
-    );
+    let reply = (prop::sample::select(vec![0x426_u16, 0x546, 0x423, 0x4E3, 0x50A, 0x50B, 0x540]), any::<[u8; 4]>())
+        .prop_map(|(id, data)| CanFrame::from_slice(CanId::new(id).expect("eleven bits"), &data).expect("four bytes"));
+    let angles = prop::array::uniform7(prop_oneof![8 => -3.0_f32..3.0, 1 => Just(f32::NAN), 1 => Just(f32::INFINITY)]);
     prop_oneof![
         4 => frame.prop_map(Happening::Frame),
         4 => reply.prop_map(Happening::Frame),

@@ -11,8 +11,7 @@ use crate::double::{ARM, Bus, floating, started};
 const CYCLE: usize = 3;
 
 fn has_torque(bus: &Bus, since: usize) -> bool {
-    bus.torques_since(since)
-        .any(|torque| torque != PuckTorque::ZERO)
+    bus.torques_since(since).any(|torque| torque != PuckTorque::ZERO)
 }
 
 fn lost(core: &Core) -> u32 {
@@ -25,20 +24,11 @@ fn torque_needs_an_active_arm_and_a_command() {
     bus.run(&mut core, 0.5);
     bus.commands.push_back(Command::Gravity.into());
     bus.run(&mut core, 0.5);
-    assert!(
-        bus.events
-            .iter()
-            .any(|event| matches!(event, EventKind::Refused(_))),
-        "not active: {:?}",
-        bus.events
-    );
+    assert!(bus.events.iter().any(|event| matches!(event, EventKind::Refused(_))), "not active: {:?}", bus.events);
     bus.press_activate();
     bus.run(&mut core, 1.0);
     assert_eq!(core.stage(), Stage::Ready);
-    assert!(
-        !has_torque(&bus, 0),
-        "active, but nobody has commanded anything"
-    );
+    assert!(!has_torque(&bus, 0), "active, but nobody has commanded anything");
     // Both zero frames of every cycle were sent all the same: a puck keeps its last torque until it hears another.
     let cycles = core.health().counters.cycles as usize;
     assert_eq!(bus.torques_since(0).count(), cycles * 8);
@@ -53,28 +43,11 @@ fn every_cycle_asks_once_and_sends_both_torque_frames() {
     bus.run_to(&mut core, Slot::Request);
     let begin = bus.log.len();
     bus.run_slots(&mut core, 300 * CYCLE);
-    let count = |id: u16| {
-        bus.log[begin..]
-            .iter()
-            .filter(|(_, frame)| frame.can_id().raw() == id)
-            .count()
-    };
-    assert_eq!(
-        [count(0x404), count(0x008), count(0x401), count(0x402)],
-        [300; 4]
-    );
-    assert!(
-        count(10) >= 150,
-        "{} questions to the safety module in a second",
-        count(10)
-    );
+    let count = |id: u16| bus.log[begin..].iter().filter(|(_, frame)| frame.can_id().raw() == id).count();
+    assert_eq!([count(0x404), count(0x008), count(0x401), count(0x402)], [300; 4]);
+    assert!(count(10) >= 150, "{} questions to the safety module in a second", count(10));
     assert_eq!(core.health().counters.torque_mismatches, 0);
-    assert_eq!(
-        core.health()
-            .temperatures
-            .map(|degrees| degrees.unwrap_or(0)),
-        [30, 31, 32, 33, 34, 35, 36]
-    );
+    assert_eq!(core.health().temperatures.map(|degrees| degrees.unwrap_or(0)), [30, 31, 32, 33, 34, 35, 36]);
     assert_eq!(core.health().pendant, Some(0x0F3F_1249));
 }
 
@@ -90,11 +63,7 @@ fn a_lost_reply_is_missing_for_its_joint_alone() {
     assert_eq!(record.state, State::Coast);
     bus.run_slots(&mut core, CYCLE);
     let record = bus.records.last().expect("a record");
-    assert_eq!(
-        (record.lost_replies, record.state),
-        (0, State::Gravity),
-        "and the next cycle is whole again"
-    );
+    assert_eq!((record.lost_replies, record.state), (0, State::Gravity), "and the next cycle is whole again");
     assert_eq!(core.health().counters.restarts, 0);
 }
 
@@ -112,30 +81,16 @@ fn a5_a_late_reply_never_reaches_the_next_cycle() {
         bus.run_slots(&mut core, 1);
         bus.pucks[0].position = truth;
         bus.run_slots(&mut core, CYCLE - 1);
-        assert_eq!(
-            bus.records.last().expect("a record").lost_replies,
-            1,
-            "{delay_us} us late"
-        );
+        assert_eq!(bus.records.last().expect("a record").lost_replies, 1, "{delay_us} us late");
         // A reply so late that it meets the next one makes both worthless; the cycle after that is whole.
         for _ in 0..2 {
             bus.run_slots(&mut core, CYCLE);
             let record = bus.records.last().expect("a record");
-            assert!(
-                (record.q[0] - still[0]).abs() < 1e-4,
-                "{delay_us} us late: {} is not {}",
-                record.q[0],
-                still[0]
-            );
+            assert!((record.q[0] - still[0]).abs() < 1e-4, "{delay_us} us late: {} is not {}", record.q[0], still[0]);
         }
         let record = bus.records.last().expect("a record");
         assert_eq!(record.lost_replies, 0, "{delay_us} us late");
-        assert!(
-            (record.q[0] - still[0]).abs() < 1e-4,
-            "{delay_us} us late: {} is not {}",
-            record.q[0],
-            still[0]
-        );
+        assert!((record.q[0] - still[0]).abs() < 1e-4, "{delay_us} us late: {} is not {}", record.q[0], still[0]);
         assert_eq!(core.health().counters.late_replies, 1, "{delay_us} us late");
     }
 }
@@ -146,9 +101,7 @@ fn a6_foreign_frames_are_counted_and_change_nothing() {
     let (mut core, mut bus) = floating();
     bus.run_to(&mut core, Slot::Request);
     let before = core.health().counters;
-    let raw = |id: u16, data: &[u8]| {
-        CanFrame::from_slice(CanId::new(id).expect("an id"), data).expect("a frame")
-    };
+    let raw = |id: u16, data: &[u8]| CanFrame::from_slice(CanId::new(id).expect("an id"), data).expect("a frame");
     let node = |number| Node::new(number).expect("a node");
     for frame in [
         raw(0x423, &[0x80, 0, 0, 0]),              // position of a wrong length
@@ -184,10 +137,7 @@ fn a15_idle_ends_torque_within_three_cycles() {
         let settled = bus.log.len();
         bus.press_activate();
         bus.run(&mut core, 0.5);
-        assert!(
-            !has_torque(&bus, settled),
-            "no torque without a new command"
-        );
+        assert!(!has_torque(&bus, settled), "no torque without a new command");
         assert!(settled > begin);
         bus.commands.push_back(Command::ClearFault.into());
         bus.run(&mut core, 0.1);
@@ -213,11 +163,7 @@ fn an_emergency_stop_leads_back_to_the_start_up_without_torque() {
     bus.run_slots(&mut core, 3 * CYCLE);
     let settled = bus.log.len();
     bus.run(&mut core, 0.3);
-    assert_eq!(
-        core.stage(),
-        Stage::WaitingForIdle,
-        "at once, not after the silence of all pucks"
-    );
+    assert_eq!(core.stage(), Stage::WaitingForIdle, "at once, not after the silence of all pucks");
     bus.run(&mut core, 1.0);
     assert!(!has_torque(&bus, settled));
     assert_eq!(core.health().counters.restarts, 1);
@@ -235,28 +181,18 @@ fn a14_a_puck_that_resets_ends_torque_within_20_ms() {
     let begin = bus.now_us;
     while core.health().state != State::Fault {
         bus.run_slots(&mut core, 1);
-        assert!(
-            bus.now_us - begin <= 20_000 + 1_200,
-            "still {:?} after 20 ms",
-            core.health().state
-        );
+        assert!(bus.now_us - begin <= 20_000 + 1_200, "still {:?} after 20 ms", core.health().state);
     }
-    let entered = bus
-        .events
-        .iter()
-        .rev()
-        .find(|event| matches!(event, EventKind::Entered(..)));
-    assert_eq!(
-        entered,
-        Some(&EventKind::Entered(State::Fault, Fault::BusFault))
-    );
+    let entered = bus.events.iter().rev().find(|event| matches!(event, EventKind::Entered(..)));
+    assert_eq!(entered, Some(&EventKind::Entered(State::Fault, Fault::BusFault)));
     let settled = bus.log.len();
     bus.run(&mut core, 0.1);
     assert!(!has_torque(&bus, settled));
     assert_eq!(core.health().counters.restarts, 1);
-    assert!(bus.sets().any(|(time, to, property, value)| {
-        time > begin && (to, property, value) == (ARM, PropertyId::MODE, 0)
-    }));
+    assert!(
+        bus.sets()
+            .any(|(time, to, property, value)| { time > begin && (to, property, value) == (ARM, PropertyId::MODE, 0) })
+    );
 }
 
 #[test]
@@ -277,11 +213,7 @@ fn a12_torque_frames_that_cannot_leave_end_in_a_fault() {
     let (mut core, mut bus) = floating();
     bus.refuse = 10;
     bus.run_slots(&mut core, CYCLE);
-    assert_eq!(
-        core.health().state,
-        State::Gravity,
-        "a single cycle is survived"
-    );
+    assert_eq!(core.health().state, State::Gravity, "a single cycle is survived");
     bus.refuse = 1_000;
     bus.run_slots(&mut core, 8 * CYCLE);
     assert_eq!(core.health().state, State::Fault);
@@ -289,10 +221,7 @@ fn a12_torque_frames_that_cannot_leave_end_in_a_fault() {
     bus.refuse = 0;
     let begin = bus.log.len();
     bus.run(&mut core, 0.5);
-    assert!(
-        !has_torque(&bus, begin),
-        "the bus recovers by itself, motion does not"
-    );
+    assert!(!has_torque(&bus, begin), "the bus recovers by itself, motion does not");
 }
 
 #[test]
@@ -303,10 +232,7 @@ fn a10_bus_off_is_a_fault_at_once() {
     let begin = bus.log.len();
     bus.run_slots(&mut core, 1);
     assert_eq!(core.health().state, State::Fault);
-    assert!(
-        !has_torque(&bus, begin),
-        "the very next torque frames are zero"
-    );
+    assert!(!has_torque(&bus, begin), "the very next torque frames are zero");
     assert_eq!(core.health().counters.bus_errors, 1);
 }
 
@@ -315,11 +241,7 @@ fn a_silent_safety_module_is_a_fault_within_150_ms() {
     let (mut core, mut bus) = floating();
     bus.safety_present = false;
     bus.run(&mut core, 0.15);
-    assert!(
-        !core.health().state.has_torque(),
-        "{:?}",
-        core.health().state
-    );
+    assert!(!core.health().state.has_torque(), "{:?}", core.health().state);
 }
 
 #[test]
@@ -327,38 +249,27 @@ fn overruns_are_counted_and_too_many_stop_the_arm() {
     let (mut core, mut bus) = floating();
     core.note_overrun();
     bus.run(&mut core, 1.0);
-    assert_eq!(
-        core.health().state,
-        State::Gravity,
-        "one overrun is survived"
-    );
+    assert_eq!(core.health().state, State::Gravity, "one overrun is survived");
     for _ in 0..6 {
         core.note_overrun();
     }
     bus.run_slots(&mut core, CYCLE);
     assert_eq!(core.health().counters.overruns, 7);
     assert_eq!(core.health().state, State::SoftStop);
-    assert_eq!(
-        bus.records.last().map(|record| record.fault),
-        Some(Fault::Overrun)
-    );
+    assert_eq!(bus.records.last().map(|record| record.fault), Some(Fault::Overrun));
 }
 
 #[test]
 fn a_bad_or_halved_wrench_is_no_wrench() {
     let (mut core, mut bus) = floating();
-    let stale =
-        |bus: &Bus| bus.records.last().expect("a record").flags & control::flags::WRENCH_STALE != 0;
+    let stale = |bus: &Bus| bus.records.last().expect("a record").flags & control::flags::WRENCH_STALE != 0;
     assert!(!stale(&bus));
     bus.sensor.status = Some(GaugeStatus(0x40));
     bus.run_slots(&mut core, 2 * CYCLE);
     assert!(stale(&bus), "the sensor itself calls the sample bad");
     bus.sensor.status = Some(GaugeStatus(0x01));
     bus.run_slots(&mut core, 2 * CYCLE);
-    assert!(
-        !stale(&bus),
-        "a gauge that saturated once is only a warning"
-    );
+    assert!(!stale(&bus), "a gauge that saturated once is only a warning");
 }
 
 #[test]

@@ -9,8 +9,8 @@ use control::CycleRecord;
 use device::{Command, Core, CoreIo, Event, EventKind, Slot, Stage};
 use puck::device::{force_frame, position_frame, reply16, reply32, safety_broadcast, torque_frame};
 use puck::{
-    Action, CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId,
-    PropertyTable, PuckTorque, RawWrench, Request, SafetyMode, Status,
+    Action, CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId, PropertyTable, PuckTorque,
+    RawWrench, Request, SafetyMode, Status,
 };
 
 /// From the last bit of a request to the first of its answer, us.
@@ -57,11 +57,7 @@ impl Puck {
             mode: MotorMode::Idle,
             torque: PuckTorque::ZERO,
             groups: [0, if wrist { 2 } else { 1 }, 4],
-            place: if wrist {
-                joint as i32 - 3
-            } else {
-                joint as i32 + 1
-            },
+            place: if wrist { joint as i32 - 3 } else { joint as i32 + 1 },
             torque_limit: [4860, 4860, 4860, 4320, 3900, 3900, 1600][joint],
             poles: [12, 12, 12, 12, 8, 8, 6][joint],
             torque_counts: [2472, 2472, 2472, 2472, 6105, 6105, 21400][joint],
@@ -117,11 +113,7 @@ impl Bus {
             safety_zero: false,
             sensor_present: true,
             sensor_awake_at: None,
-            sensor: RawWrench {
-                force: [256, 0, 0],
-                torque: [0, 0, 0],
-                status: None,
-            },
+            sensor: RawWrench { force: [256, 0, 0], torque: [0, 0, 0], status: None },
             refuse: 0,
             pressed_us: 0,
             ticks: 0,
@@ -193,11 +185,8 @@ impl Bus {
         for _ in 0..slots {
             self.now_us = self.ticks * 1_000_000 / 900;
             self.on_the_wire.sort_by_key(|(due, _)| *due);
-            let due = self
-                .on_the_wire
-                .partition_point(|(due, _)| *due <= self.now_us);
-            self.received
-                .extend(self.on_the_wire.drain(..due).map(|(_, frame)| frame));
+            let due = self.on_the_wire.partition_point(|(due, _)| *due <= self.now_us);
+            self.received.extend(self.on_the_wire.drain(..due).map(|(_, frame)| frame));
             let slot = self.slot;
             core.slot(slot, self.now_us, self);
             self.slot = slot.next();
@@ -218,12 +207,7 @@ impl Bus {
             }
             self.run_slots(core, 1);
         }
-        panic!(
-            "stuck in {:?}, {:?}; events {:?}",
-            core.stage(),
-            core.health().blocked,
-            self.events
-        );
+        panic!("stuck in {:?}, {:?}; events {:?}", core.stage(), core.health().blocked, self.events);
     }
 
     /// Runs until the next slot is this one.
@@ -235,39 +219,26 @@ impl Bus {
 
     /// All torques that were sent since the frame with this index of the log.
     pub(crate) fn torques_since(&self, index: usize) -> impl Iterator<Item = PuckTorque> + '_ {
-        self.log[index..].iter().flat_map(|(_, frame)| {
-            match Request::decode(frame).map(|request| request.action) {
-                Ok(Action::PackedTorques { torques, .. }) => torques.to_vec(),
-                _ => Vec::new(),
-            }
+        self.log[index..].iter().flat_map(|(_, frame)| match Request::decode(frame).map(|request| request.action) {
+            Ok(Action::PackedTorques { torques, .. }) => torques.to_vec(),
+            _ => Vec::new(),
         })
     }
 
     /// All SETs that were sent, with their time.
     pub(crate) fn sets(&self) -> impl Iterator<Item = (u64, Destination, PropertyId, i32)> + '_ {
-        self.log
-            .iter()
-            .filter_map(|(time, frame)| match Request::decode(frame) {
-                Ok(Request {
-                    to,
-                    action: Action::Set { property, value },
-                    ..
-                }) => Some((*time, to, property, value)),
-                _ => None,
-            })
+        self.log.iter().filter_map(|(time, frame)| match Request::decode(frame) {
+            Ok(Request { to, action: Action::Set { property, value }, .. }) => Some((*time, to, property, value)),
+            _ => None,
+        })
     }
 
     fn answer(&mut self, delay_us: u64, frame: CanFrame) {
-        self.on_the_wire
-            .push((self.now_us + LATENCY_US + delay_us, frame));
+        self.on_the_wire.push((self.now_us + LATENCY_US + delay_us, frame));
     }
 
     fn answer_value(&mut self, node: Node, property: PropertyId, value: i32, wide: bool) {
-        let frame = if wide {
-            reply32(node, property, value)
-        } else {
-            reply16(node, property, value as i16)
-        };
+        let frame = if wide { reply32(node, property, value) } else { reply16(node, property, value as i16) };
         self.answer(0, frame);
     }
 
@@ -284,9 +255,7 @@ impl Bus {
         for (joint, node) in Node::ARM.into_iter().enumerate() {
             let member = match request.to {
                 Destination::Node(to) => to == node,
-                Destination::Group(group) => self.pucks[joint]
-                    .groups
-                    .contains(&i32::from(group.number())),
+                Destination::Group(group) => self.pucks[joint].groups.contains(&i32::from(group.number())),
             };
             if member && self.pucks[joint].present {
                 self.serve_puck(joint, node, request.action);
@@ -311,22 +280,13 @@ impl Bus {
                     Some(Property::Pen) => 0x0F3F_1249,
                     other => panic!("the core asked the safety module for {other:?}"),
                 };
-                self.answer_value(
-                    node,
-                    property,
-                    value,
-                    table.property(property) == Some(Property::Pen),
-                );
+                self.answer_value(node, property, value, table.property(property) == Some(Property::Pen));
             }
             Action::Set { property, value } => match table.property(property) {
                 Some(Property::Zero) => self.safety_zero = value == 1,
                 Some(Property::Mode) => {
                     if value < self.safety_mode.value() {
-                        assert_eq!(
-                            value,
-                            SafetyMode::Idle.value(),
-                            "the core pulled the emergency stop"
-                        );
+                        assert_eq!(value, SafetyMode::Idle.value(), "the core pulled the emergency stop");
                         self.press_idle();
                     }
                 }
@@ -346,17 +306,11 @@ impl Bus {
             Some(_) => true,
             None => false,
         };
-        let table = if awake {
-            PropertyTable::motor(puck.version).ok()
-        } else {
-            Some(PropertyTable::monitor())
-        };
+        let table = if awake { PropertyTable::motor(puck.version).ok() } else { Some(PropertyTable::monitor()) };
         // An unknown firmware still answers the properties that never move.
         let table = table.unwrap_or(PropertyTable::monitor());
         match action {
-            Action::Get {
-                property: PropertyId::POSITION,
-            } if awake => {
+            Action::Get { property: PropertyId::POSITION } if awake => {
                 if puck.lose > 0 {
                     puck.lose -= 1;
                     return;
@@ -406,10 +360,7 @@ impl Bus {
                 };
                 self.answer_value(node, property, value, name.is_wide());
             }
-            Action::Set {
-                property: PropertyId::STAT,
-                value,
-            } => {
+            Action::Set { property: PropertyId::STAT, value } => {
                 assert_eq!(value, Status::Ready.value(), "the core reset a puck");
                 if !awake && !puck.never_wakes {
                     puck.awake_at = Some(now_us + BOOT_US);
@@ -417,21 +368,11 @@ impl Bus {
             }
             // The monitor knows nothing but STAT.
             Action::Set { .. } if !awake => {}
-            Action::Set {
-                property: PropertyId::MODE,
-                value,
-            } => {
-                assert_eq!(
-                    value,
-                    MotorMode::Idle.value(),
-                    "only the safety module may set TORQUE"
-                );
+            Action::Set { property: PropertyId::MODE, value } => {
+                assert_eq!(value, MotorMode::Idle.value(), "only the safety module may set TORQUE");
                 puck.mode = MotorMode::Idle;
             }
-            Action::Set {
-                property: PropertyId::POSITION,
-                value,
-            } => {
+            Action::Set { property: PropertyId::POSITION, value } => {
                 // A person may activate between the question and the write; nobody can prevent that.
                 let active = puck.mode != MotorMode::Idle && now_us > self.pressed_us + 100_000;
                 assert!(!active, "zeroed under torque");
@@ -444,9 +385,7 @@ impl Bus {
             }
             Action::PackedTorques { property, .. } if awake => {
                 assert_eq!(property, PropertyId::TORQUE);
-                if let (MotorMode::Torque, Some(torque)) =
-                    (puck.mode, action.torque_for(puck.place as u8))
-                {
+                if let (MotorMode::Torque, Some(torque)) = (puck.mode, action.torque_for(puck.place as u8)) {
                     puck.torque = torque;
                 }
             }
@@ -461,28 +400,18 @@ impl Bus {
             None => false,
         };
         match action {
-            Action::Get {
-                property: PropertyId::STAT,
-            } => {
+            Action::Get { property: PropertyId::STAT } => {
                 let status = if awake { Status::Ready } else { Status::Reset };
                 self.answer_value(Node::FORCE_TORQUE, PropertyId::STAT, status.value(), false);
             }
-            Action::Get {
-                property: PropertyId::FORCE_TORQUE,
-            } if awake => {
+            Action::Get { property: PropertyId::FORCE_TORQUE } if awake => {
                 self.answer(0, force_frame(self.sensor.force));
                 self.answer(0, torque_frame(self.sensor.torque, self.sensor.status));
             }
-            Action::Set {
-                property: PropertyId::STAT,
-                ..
-            } if !awake => {
+            Action::Set { property: PropertyId::STAT, .. } if !awake => {
                 self.sensor_awake_at = Some(self.now_us + BOOT_US);
             }
-            Action::Set {
-                property: PropertyId::FORCE_TORQUE,
-                value: 0,
-            } => {}
+            Action::Set { property: PropertyId::FORCE_TORQUE, value: 0 } => {}
             // The monitor knows nothing but STAT.
             _ if !awake => {}
             other => panic!("the core asked the sensor for {other:?}"),
@@ -534,21 +463,14 @@ pub(crate) fn started() -> (Core, Bus) {
 pub(crate) fn floating() -> (Core, Bus) {
     let (mut core, mut bus) = (Core::new(), Bus::idle());
     bus.run_until(&mut core, Stage::WaitingForZero);
-    bus.commands.push_back(Command::Zero {
-        home: [0.1, 0.5, 0.1, 1.5, 0.1, 0.2, 0.1],
-    });
+    bus.commands.push_back(Command::Zero { home: [0.1, 0.5, 0.1, 1.5, 0.1, 0.2, 0.1] });
     bus.run_until(&mut core, Stage::WaitingForActive);
     bus.press_activate();
     bus.run_until(&mut core, Stage::Ready);
     bus.run(&mut core, 0.1);
     bus.commands.push_back(control::Command::Gravity.into());
     bus.run(&mut core, 1.0);
-    assert_eq!(
-        core.health().state,
-        control::State::Gravity,
-        "{:?}",
-        bus.events
-    );
+    assert_eq!(core.health().state, control::State::Gravity, "{:?}", bus.events);
     (core, bus)
 }
 

@@ -2,8 +2,7 @@
 
 use device::{Command, Core, EventKind, Refusal, Stage, StartupError};
 use puck::{
-    Action, Counts, Destination, Group, Node, Property, PropertyId, PropertyTable, PuckTorque,
-    Request, SafetyMode,
+    Action, Counts, Destination, Group, Node, Property, PropertyId, PropertyTable, PuckTorque, Request, SafetyMode,
 };
 
 use crate::double::{ARM, Bus, HOME, started};
@@ -11,10 +10,7 @@ use crate::double::{ARM, Bus, HOME, started};
 const SAFETY: Destination = Destination::Node(Node::SAFETY_MODULE);
 
 fn safety_property(property: Property) -> PropertyId {
-    PropertyTable::safety(197)
-        .expect("known")
-        .id(property)
-        .expect("a property of the module")
+    PropertyTable::safety(197).expect("known").id(property).expect("a property of the module")
 }
 
 /// The stages that were told, in order.
@@ -35,65 +31,29 @@ fn assert_pauses(bus: &Bus) {
         let begins = |frame: &puck::CanFrame| {
             matches!(
                 Request::decode(frame).expect("a request").action,
-                Action::Get {
-                    property: PropertyId::FORCE_TORQUE
-                } | Action::PackedTorques { .. }
+                Action::Get { property: PropertyId::FORCE_TORQUE } | Action::PackedTorques { .. }
             )
         };
         // The position request of the same slot stands before it.
-        bus.log
-            .iter()
-            .position(|(_, frame)| begins(frame))
-            .expect("a loop")
-            .saturating_sub(1)
+        bus.log.iter().position(|(_, frame)| begins(frame)).expect("a loop").saturating_sub(1)
     });
     let frames = &bus.log[..loop_begins];
-    assert!(
-        frames.len() > 60,
-        "only {} frames before the loop",
-        frames.len()
-    );
+    assert!(frames.len() > 60, "only {} frames before the loop", frames.len());
     for pair in frames.windows(2) {
         let gap = pair[1].0 - pair[0].0;
-        assert!(
-            gap >= 1_000,
-            "{gap} us between {:?} and {:?}",
-            pair[0].1,
-            pair[1].1
-        );
+        assert!(gap >= 1_000, "{gap} us between {:?} and {:?}", pair[0].1, pair[1].1);
     }
     let sets = |wanted: &dyn Fn(Destination, PropertyId) -> bool| {
-        bus.sets()
-            .filter(|(_, to, property, _)| wanted(*to, *property))
-            .map(|(time, ..)| time)
-            .collect::<Vec<_>>()
+        bus.sets().filter(|(_, to, property, _)| wanted(*to, *property)).map(|(time, ..)| time).collect::<Vec<_>>()
     };
     let safety = sets(&|to, _| to == SAFETY);
-    assert!(
-        safety.len() >= 8,
-        "{} SETs to the safety module",
-        safety.len()
-    );
-    assert!(
-        safety.windows(2).all(|pair| pair[1] - pair[0] >= 10_000),
-        "SETs to the safety module: {safety:?}"
-    );
+    assert!(safety.len() >= 8, "{} SETs to the safety module", safety.len());
+    assert!(safety.windows(2).all(|pair| pair[1] - pair[0] >= 10_000), "SETs to the safety module: {safety:?}");
     let wakes = sets(&|_, property| property == PropertyId::STAT);
-    assert!(
-        wakes.windows(2).all(|pair| pair[1] - pair[0] >= 10_000),
-        "wakes: {wakes:?}"
-    );
+    assert!(wakes.windows(2).all(|pair| pair[1] - pair[0] >= 10_000), "wakes: {wakes:?}");
     if let Some(last) = wakes.last() {
-        let next = frames
-            .iter()
-            .map(|(time, _)| *time)
-            .find(|time| time > last)
-            .expect("a frame after the wakes");
-        assert!(
-            next - last >= 1_000_000,
-            "only {} us of silence after waking",
-            next - last
-        );
+        let next = frames.iter().map(|(time, _)| *time).find(|time| time > last).expect("a frame after the wakes");
+        assert!(next - last >= 1_000_000, "only {} us of silence after waking", next - last);
     }
 }
 
@@ -128,36 +88,18 @@ fn from_emergency_stop_to_ready_in_the_documented_order() {
     );
     assert!(bus.events.contains(&EventKind::Accepted));
     assert_pauses(&bus);
-    assert!(
-        bus.torques_since(0)
-            .all(|torque| torque == PuckTorque::ZERO)
-    );
+    assert!(bus.torques_since(0).all(|torque| torque == PuckTorque::ZERO));
     let health = core.health();
-    assert!(
-        health.zeroed && health.blocked.is_none() && health.safety_mode == Some(SafetyMode::Active)
-    );
-    assert_eq!(
-        (
-            health.counters.malformed_frames,
-            health.counters.foreign_frames
-        ),
-        (0, 0),
-        "{health:?}"
-    );
-    assert!(
-        health.counters.broadcasts >= 2,
-        "the broadcasts of the safety module were seen and ignored"
-    );
+    assert!(health.zeroed && health.blocked.is_none() && health.safety_mode == Some(SafetyMode::Active));
+    assert_eq!((health.counters.malformed_frames, health.counters.foreign_frames), (0, 0), "{health:?}");
+    assert!(health.counters.broadcasts >= 2, "the broadcasts of the safety module were seen and ignored");
 }
 
 #[test]
 fn the_frames_of_the_start_up_are_those_of_the_reference() {
     let (mut core, mut bus) = started();
     bus.run(&mut core, 0.1);
-    let sets: Vec<_> = bus
-        .sets()
-        .map(|(_, to, property, value)| (to, property, value))
-        .collect();
+    let sets: Vec<_> = bus.sets().map(|(_, to, property, value)| (to, property, value)).collect();
     let limit = |property| i32::from(safety_property(property).number());
     let mut expected = Vec::new();
     for property in [Property::Vl1, Property::Vl2, Property::Tl1, Property::Tl2] {
@@ -170,10 +112,7 @@ fn the_frames_of_the_start_up_are_those_of_the_reference() {
     expected.push((ARM, PropertyId::MODE, 0));
     expected.push((SAFETY, safety_property(Property::Ifault), 8));
     // The worked example of the reference: floor makes -36833 of the second and +36832 of the third.
-    for (node, counts) in Node::ARM
-        .into_iter()
-        .zip([0, -36833, 36832, -36728, 0, 0, 0])
-    {
+    for (node, counts) in Node::ARM.into_iter().zip([0, -36833, 36832, -36728, 0, 0, 0]) {
         expected.push((node.into(), PropertyId::POSITION, counts));
     }
     expected.push((SAFETY, safety_property(Property::Zero), 1));
@@ -198,18 +137,8 @@ fn an_emergency_stop_is_waited_for_without_end() {
     assert!(bus.records.is_empty(), "no control cycle without pucks");
     let late = bus.log.iter().filter(|(time, _)| *time > 2_000_000);
     let polls: Vec<_> = late.collect();
-    assert!(
-        polls
-            .iter()
-            .all(|(_, frame)| frame.payload() == [8] && frame.can_id().raw() == 10),
-        "only MODE polls"
-    );
-    assert!(
-        polls
-            .windows(2)
-            .all(|pair| pair[1].0 - pair[0].0 >= 250_000),
-        "at most four polls a second"
-    );
+    assert!(polls.iter().all(|(_, frame)| frame.payload() == [8] && frame.can_id().raw() == 10), "only MODE polls");
+    assert!(polls.windows(2).all(|pair| pair[1].0 - pair[0].0 >= 250_000), "at most four polls a second");
 }
 
 #[test]
@@ -227,9 +156,7 @@ fn a_zeroed_arm_keeps_its_counts() {
     let (mut core, mut bus) = (Core::new(), Bus::already_zeroed());
     bus.run_until(&mut core, Stage::WaitingForActive);
     assert!(core.health().zeroed);
-    assert!(bus.sets().all(
-        |(_, _, property, _)| property != PropertyId::POSITION && property != PropertyId::STAT
-    ));
+    assert!(bus.sets().all(|(_, _, property, _)| property != PropertyId::POSITION && property != PropertyId::STAT));
     for (joint, puck) in bus.pucks.iter().enumerate() {
         assert_eq!(puck.position, Counts(100 + joint as i32));
     }
@@ -242,15 +169,8 @@ fn a_puck_that_never_wakes_is_named_and_tried_again() {
     bus.run(&mut core, 8.0);
     let error = StartupError::DidNotWake(Node::ARM[4]);
     assert_eq!(core.health().blocked, Some(error));
-    let told = bus
-        .events
-        .iter()
-        .filter(|event| **event == EventKind::Blocked(error))
-        .count();
-    assert_eq!(
-        told, 1,
-        "one reason is told once, however often it is tried again"
-    );
+    let told = bus.events.iter().filter(|event| **event == EventKind::Blocked(error)).count();
+    assert_eq!(told, 1, "one reason is told once, however often it is tried again");
     bus.pucks[4].never_wakes = false;
     bus.run_until(&mut core, Stage::WaitingForZero);
     assert_eq!(core.health().blocked, None);
@@ -262,63 +182,29 @@ fn refusal(break_something: impl FnOnce(&mut Bus)) -> Option<StartupError> {
     break_something(&mut bus);
     bus.run_until(&mut core, Stage::Blocked);
     assert!(bus.records.is_empty());
-    assert!(
-        bus.sets()
-            .all(|(_, _, property, _)| property != PropertyId::POSITION)
-    );
+    assert!(bus.sets().all(|(_, _, property, _)| property != PropertyId::POSITION));
     core.health().blocked
 }
 
 #[test]
 fn whatever_is_wrong_with_a_device_is_named() {
     let third = Node::ARM[2];
-    assert_eq!(
-        refusal(|bus| bus.pucks[2].present = false),
-        Some(StartupError::MissingPuck(third))
-    );
-    assert_eq!(
-        refusal(|bus| bus.safety_present = false),
-        Some(StartupError::NoSafetyModule)
-    );
+    assert_eq!(refusal(|bus| bus.pucks[2].present = false), Some(StartupError::MissingPuck(third)));
+    assert_eq!(refusal(|bus| bus.safety_present = false), Some(StartupError::NoSafetyModule));
     for version in [0, 60, 256, 1000] {
-        let expected = StartupError::UnknownFirmware {
-            node: third,
-            version,
-        };
-        assert_eq!(
-            refusal(|bus| bus.pucks[2].version = version),
-            Some(expected),
-            "VERS {version}"
-        );
+        let expected = StartupError::UnknownFirmware { node: third, version };
+        assert_eq!(refusal(|bus| bus.pucks[2].version = version), Some(expected), "VERS {version}");
     }
-    let expected = StartupError::UnknownFirmware {
-        node: Node::SAFETY_MODULE,
-        version: 300,
-    };
+    let expected = StartupError::UnknownFirmware { node: Node::SAFETY_MODULE, version: 300 };
     assert_eq!(refusal(|bus| bus.safety_version = 300), Some(expected));
-    assert_eq!(
-        refusal(|bus| bus.pucks[2].groups = [0, 2, 4]),
-        Some(StartupError::WrongGroups(third))
-    );
-    let expected = StartupError::WrongPlace {
-        node: third,
-        place: 2,
-    };
+    assert_eq!(refusal(|bus| bus.pucks[2].groups = [0, 2, 4]), Some(StartupError::WrongGroups(third)));
+    let expected = StartupError::WrongPlace { node: third, place: 2 };
     assert_eq!(refusal(|bus| bus.pucks[2].place = 2), Some(expected));
-    let expected = StartupError::WrongTorqueLimit {
-        node: third,
-        limit: 0,
-    };
+    let expected = StartupError::WrongTorqueLimit { node: third, limit: 0 };
     assert_eq!(refusal(|bus| bus.pucks[2].torque_limit = 0), Some(expected));
-    assert_eq!(
-        refusal(|bus| bus.pucks[6].poles = 8),
-        Some(StartupError::NotAWrist { poles: 8 })
-    );
+    assert_eq!(refusal(|bus| bus.pucks[6].poles = 8), Some(StartupError::NotAWrist { poles: 8 }));
     let expected = StartupError::Calibration(control::CalibrationError::TorqueCounts(2));
-    assert_eq!(
-        refusal(|bus| bus.pucks[2].torque_counts = 0),
-        Some(expected)
-    );
+    assert_eq!(refusal(|bus| bus.pucks[2].torque_counts = 0), Some(expected));
 }
 
 #[test]
@@ -328,10 +214,7 @@ fn a_position_that_was_not_taken_is_noticed_before_the_safety_module_is_told() {
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.commands.push_back(Command::Zero { home: HOME });
     bus.run_until(&mut core, Stage::Blocked);
-    assert_eq!(
-        core.health().blocked,
-        Some(StartupError::ZeroNotTaken(Node::ARM[3]))
-    );
+    assert_eq!(core.health().blocked, Some(StartupError::ZeroNotTaken(Node::ARM[3])));
     assert!(!bus.safety_zero && !core.health().zeroed);
 }
 
@@ -342,11 +225,7 @@ fn lost_answers_are_asked_for_again() {
     bus.pucks[0].lose_properties = 1;
     bus.pucks[5].lose_properties = 2;
     bus.run_until(&mut core, Stage::WaitingForZero);
-    assert!(
-        !bus.events
-            .iter()
-            .any(|event| matches!(event, EventKind::Blocked(_)))
-    );
+    assert!(!bus.events.iter().any(|event| matches!(event, EventKind::Blocked(_))));
 }
 
 #[test]
@@ -357,11 +236,7 @@ fn an_arm_without_a_sensor_starts_too() {
     bus.commands.push_back(Command::Zero { home: HOME });
     bus.run_until(&mut core, Stage::WaitingForActive);
     bus.run(&mut core, 0.5);
-    let asked = bus
-        .log
-        .iter()
-        .filter(|(_, frame)| frame.can_id().raw() == 8 && frame.payload() == [54])
-        .count();
+    let asked = bus.log.iter().filter(|(_, frame)| frame.can_id().raw() == 8 && frame.payload() == [54]).count();
     assert_eq!(asked, 0);
     assert_eq!(core.health().counters.lost_replies, 0);
 }
@@ -379,10 +254,7 @@ fn an_impossible_home_is_refused_by_its_joint() {
         assert_eq!(bus.events.last(), Some(&EventKind::Refused(refusal)));
     }
     assert_eq!(core.stage(), Stage::WaitingForZero);
-    assert!(
-        bus.sets()
-            .all(|(_, _, property, _)| property != PropertyId::POSITION)
-    );
+    assert!(bus.sets().all(|(_, _, property, _)| property != PropertyId::POSITION));
 }
 
 #[test]
@@ -393,14 +265,8 @@ fn the_arm_is_not_zeroed_under_torque() {
     bus.run(&mut core, 0.5);
     bus.commands.push_back(Command::Zero { home: HOME });
     bus.run(&mut core, 0.1);
-    assert_eq!(
-        bus.events.last(),
-        Some(&EventKind::Refused(Refusal::ZeroNeedsIdle))
-    );
-    assert!(
-        bus.sets()
-            .all(|(_, _, property, _)| property != PropertyId::POSITION)
-    );
+    assert_eq!(bus.events.last(), Some(&EventKind::Refused(Refusal::ZeroNeedsIdle)));
+    assert!(bus.sets().all(|(_, _, property, _)| property != PropertyId::POSITION));
 }
 
 #[test]
@@ -427,12 +293,7 @@ fn commands_before_the_end_of_the_start_up_are_refused_with_its_stage() {
     bus.commands.push_back(Command::Zero { home: HOME });
     bus.run(&mut core, 0.1);
     let refusal = EventKind::Refused(Refusal::NotReady(Stage::WaitingForIdle));
-    assert_eq!(
-        bus.events.iter().filter(|event| **event == refusal).count(),
-        2,
-        "{:?}",
-        bus.events
-    );
+    assert_eq!(bus.events.iter().filter(|event| **event == refusal).count(), 2, "{:?}", bus.events);
 }
 
 #[test]
@@ -443,8 +304,5 @@ fn an_emergency_stop_while_zero_is_awaited_starts_from_the_beginning() {
     bus.run_until(&mut core, Stage::WaitingForIdle);
     bus.press_idle();
     bus.run_until(&mut core, Stage::WaitingForZero);
-    assert!(
-        bus.pucks.iter().all(|puck| puck.awake_at.is_some()),
-        "the pucks were woken again"
-    );
+    assert!(bus.pucks.iter().all(|puck| puck.awake_at.is_some()), "the pucks were woken again");
 }

@@ -3,9 +3,7 @@
 use control::{Fault, State};
 use device::{Command, Counters, EventKind, Refusal as Core, Stage};
 use link::message::{AccelerationSource, PoseFeedback};
-use link::{
-    Event, EventKind as LinkKind, Goal, Name, Refusal, Reply, Request, RunOptions, Telemetry,
-};
+use link::{Event, EventKind as LinkKind, Goal, Name, Refusal, Reply, Request, RunOptions, Telemetry};
 use proptest::prelude::*;
 use puck::SafetyMode;
 
@@ -40,32 +38,17 @@ fn each_request_becomes_its_command() {
     use control::Command as Control;
     let mut rig = Rig::greeted();
     let q = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7];
-    let goal = Goal {
-        position: Some([0.1, 0.2, 0.3]),
-        orientation: Some([1.0, 0.0, 0.0, 0.0]),
-    };
-    let control_goal = control::Goal {
-        position: goal.position,
-        orientation: goal.orientation,
-    };
+    let goal = Goal { position: Some([0.1, 0.2, 0.3]), orientation: Some([1.0, 0.0, 0.0, 0.0]) };
+    let control_goal = control::Goal { position: goal.position, orientation: goal.orientation };
     let pairs = [
         (Request::Zero { home: q }, Command::Zero { home: q }),
         (Request::Gravity, Control::Gravity.into()),
         (Request::Hold, Control::Hold.into()),
-        (
-            Request::Approach { q, duration: 2.0 },
-            Control::Approach { q, duration: 2.0 }.into(),
-        ),
+        (Request::Approach { q, duration: 2.0 }, Control::Approach { q, duration: 2.0 }.into()),
         (Request::Stop, Control::Stop.into()),
         (Request::ClearFault, Control::ClearFault.into()),
-        (
-            Request::SetGoal(goal),
-            Control::SetGoal(control_goal).into(),
-        ),
-        (
-            Request::SetSpeed { factor: 0.5 },
-            Control::SetSpeed { factor: 0.5 }.into(),
-        ),
+        (Request::SetGoal(goal), Control::SetGoal(control_goal).into()),
+        (Request::SetSpeed { factor: 0.5 }, Control::SetSpeed { factor: 0.5 }.into()),
         (Request::Release, Control::Release.into()),
         (Request::Tare, Control::Tare.into()),
     ];
@@ -80,49 +63,31 @@ fn run_loads_the_primitive_once_and_passes_every_option() {
     let mut rig = Rig::greeted();
     rig.store("reach", &image("reach", 3.0, 10));
     let options = RunOptions {
-        goal: Goal {
-            position: None,
-            orientation: Some([0.0, 1.0, 0.0, 0.0]),
-        },
+        goal: Goal { position: None, orientation: Some([0.0, 1.0, 0.0, 0.0]) },
         speed: 0.5,
         feedback: true,
         force_control: true,
         pose_feedback: PoseFeedback::Planned,
         acceleration: AccelerationSource::Differentiated,
     };
-    rig.commanded(Request::Run {
-        name: name("reach"),
-        options,
-    });
-    rig.commanded(Request::Run {
-        name: name("reach"),
-        options,
-    });
+    rig.commanded(Request::Run { name: name("reach"), options });
+    rig.commanded(Request::Run { name: name("reach"), options });
     assert_eq!(rig.bench.loaded, [3.0]);
     let expected = control::RunOptions {
-        goal: control::Goal {
-            position: None,
-            orientation: Some([0.0, 1.0, 0.0, 0.0]),
-        },
+        goal: control::Goal { position: None, orientation: Some([0.0, 1.0, 0.0, 0.0]) },
         speed: 0.5,
         feedback: true,
         force_control: true,
         pose_feedback: control::PoseFeedback::Planned,
         acceleration: control::AccelerationSource::Differentiated,
     };
-    assert_eq!(
-        rig.bench.commands[0],
-        Command::Control(control::Command::Run(expected))
-    );
+    assert_eq!(rig.bench.commands[0], Command::Control(control::Command::Run(expected)));
 }
 
 #[test]
 fn a_new_image_of_the_same_name_is_loaded_before_the_next_run() {
     let mut rig = Rig::greeted();
-    let run = Request::Run {
-        name: name("reach"),
-        options: RunOptions::default(),
-    };
+    let run = Request::Run { name: name("reach"), options: RunOptions::default() };
     rig.store("reach", &image("reach", 3.0, 10));
     rig.commanded(run.clone());
     rig.store("reach", &image("reach", 4.0, 10));
@@ -135,16 +100,10 @@ fn no_primitive_is_loaded_under_a_run_or_under_a_command_that_may_start_one() {
     let mut rig = Rig::greeted();
     rig.store("reach", &image("reach", 3.0, 10));
     rig.store("grasp", &image("grasp", 4.0, 10));
-    let run = |text| Request::Run {
-        name: name(text),
-        options: RunOptions::default(),
-    };
+    let run = |text| Request::Run { name: name(text), options: RunOptions::default() };
     rig.commanded(run("reach"));
     rig.bench.state = State::Run;
-    assert_eq!(
-        rig.refused(run("grasp")),
-        (Refusal::State, [State::Run.code().into(), 0])
-    );
+    assert_eq!(rig.refused(run("grasp")), (Refusal::State, [State::Run.code().into(), 0]));
     rig.bench.state = State::Hold;
     assert_eq!(rig.ask(Request::Gravity), None);
     assert_eq!(rig.refused(run("grasp")).0, Refusal::CommandQueueFull);
@@ -156,20 +115,11 @@ fn a_primitive_the_control_half_does_not_take_is_not_run() {
     let mut rig = Rig::greeted();
     rig.store("reach", &image("reach", 3.0, 10));
     rig.store("grasp", &image("grasp", 4.0, 10));
-    let run = |text| Request::Run {
-        name: name(text),
-        options: RunOptions::default(),
-    };
+    let run = |text| Request::Run { name: name(text), options: RunOptions::default() };
     rig.commanded(run("reach"));
-    rig.bench.load = Err(control::LoadRefusal::Unfit(
-        control::load::LoadError::Duration,
-    ));
+    rig.bench.load = Err(control::LoadRefusal::Unfit(control::load::LoadError::Duration));
     assert_eq!(rig.refused(run("grasp")).0, Refusal::PrimitiveInvalid);
-    assert_eq!(
-        rig.bench.commands.len(),
-        1,
-        "the old one would have run under the new name"
-    );
+    assert_eq!(rig.bench.commands.len(), 1, "the old one would have run under the new name");
     rig.bench.load = Ok(());
     rig.commanded(run("grasp"));
     assert_eq!(rig.bench.loaded, [3.0, 4.0]);
@@ -178,10 +128,7 @@ fn a_primitive_the_control_half_does_not_take_is_not_run() {
 #[test]
 fn a_primitive_that_is_not_there_is_not_run() {
     let mut rig = Rig::greeted();
-    let run = Request::Run {
-        name: name("reach"),
-        options: RunOptions::default(),
-    };
+    let run = Request::Run { name: name("reach"), options: RunOptions::default() };
     assert_eq!(rig.refused(run).0, Refusal::NoSuchPrimitive);
     assert!(rig.bench.commands.is_empty());
 }
@@ -192,35 +139,14 @@ fn numbers_that_are_none_never_reach_the_control_half() {
     rig.store("reach", &image("reach", 3.0, 10));
     let mut q = [0.0; 7];
     q[4] = f32::NAN;
-    assert_eq!(
-        rig.refused(Request::Approach { q, duration: 1.0 }),
-        (Refusal::BadValue, [4, 0])
-    );
-    assert_eq!(
-        rig.refused(Request::Zero { home: q }),
-        (Refusal::BadValue, [4, 0])
-    );
+    assert_eq!(rig.refused(Request::Approach { q, duration: 1.0 }), (Refusal::BadValue, [4, 0]));
+    assert_eq!(rig.refused(Request::Zero { home: q }), (Refusal::BadValue, [4, 0]));
     let bad = [
-        Request::Approach {
-            q: [0.0; 7],
-            duration: f32::INFINITY,
-        },
+        Request::Approach { q: [0.0; 7], duration: f32::INFINITY },
         Request::SetSpeed { factor: f32::NAN },
-        Request::SetGoal(Goal {
-            position: Some([0.0, f32::NAN, 0.0]),
-            orientation: None,
-        }),
-        Request::SetGoal(Goal {
-            position: None,
-            orientation: Some([f32::NAN; 4]),
-        }),
-        Request::Run {
-            name: name("reach"),
-            options: RunOptions {
-                speed: f32::NAN,
-                ..RunOptions::default()
-            },
-        },
+        Request::SetGoal(Goal { position: Some([0.0, f32::NAN, 0.0]), orientation: None }),
+        Request::SetGoal(Goal { position: None, orientation: Some([f32::NAN; 4]) }),
+        Request::Run { name: name("reach"), options: RunOptions { speed: f32::NAN, ..RunOptions::default() } },
     ];
     for request in bad {
         assert_eq!(rig.refused(request).0, Refusal::BadValue);
@@ -232,41 +158,13 @@ fn numbers_that_are_none_never_reach_the_control_half() {
 fn every_refusal_of_the_control_half_reaches_the_host() {
     let control = |reason| Core::Control(reason);
     let pairs = [
-        (
-            control(control::Refusal::WrongState),
-            Refusal::State,
-            [State::Hold.code().into(), 0],
-        ),
-        (
-            control(control::Refusal::FaultLatched),
-            Refusal::Faulted,
-            [Fault::JointSpeed.code().into(), 0],
-        ),
-        (
-            control(control::Refusal::SafetyNotActive),
-            Refusal::SafetyMode,
-            [2, 0],
-        ),
-        (
-            control(control::Refusal::StartTooFar),
-            Refusal::FarFromStart,
-            [0, 0],
-        ),
-        (
-            control(control::Refusal::OutsideWorkspace),
-            Refusal::OutsideWorkspace,
-            [0, 0],
-        ),
-        (
-            Core::NotReady(Stage::Waking),
-            Refusal::NotReady,
-            [Stage::Waking.code().into(), 0],
-        ),
-        (
-            Core::NotReady(Stage::WaitingForZero),
-            Refusal::NotZeroed,
-            [0, 0],
-        ),
+        (control(control::Refusal::WrongState), Refusal::State, [State::Hold.code().into(), 0]),
+        (control(control::Refusal::FaultLatched), Refusal::Faulted, [Fault::JointSpeed.code().into(), 0]),
+        (control(control::Refusal::SafetyNotActive), Refusal::SafetyMode, [2, 0]),
+        (control(control::Refusal::StartTooFar), Refusal::FarFromStart, [0, 0]),
+        (control(control::Refusal::OutsideWorkspace), Refusal::OutsideWorkspace, [0, 0]),
+        (Core::NotReady(Stage::Waking), Refusal::NotReady, [Stage::Waking.code().into(), 0]),
+        (Core::NotReady(Stage::WaitingForZero), Refusal::NotZeroed, [0, 0]),
         (Core::ZeroNeedsIdle, Refusal::ZeroNeedsIdle, [0, 0]),
         (Core::HomeOutOfRange { joint: 3 }, Refusal::BadValue, [3, 0]),
     ];
@@ -276,15 +174,7 @@ fn every_refusal_of_the_control_half_reaches_the_host() {
         assert_eq!(rig.ask(Request::Gravity), None);
         rig.event(EventKind::Refused(core));
         let answer = rig.answer();
-        assert_eq!(
-            answer,
-            Some(Reply::Refused {
-                of: rig.sequence,
-                reason,
-                detail
-            }),
-            "{core:?}"
-        );
+        assert_eq!(answer, Some(Reply::Refused { of: rig.sequence, reason, detail }), "{core:?}");
     }
 }
 
@@ -298,11 +188,7 @@ fn answers_find_their_requests_in_order() {
     rig.event(EventKind::Refused(Core::Control(control::Refusal::Moving)));
     rig.event(EventKind::Accepted);
     let answers: Vec<Reply> = rig.sent().into_iter().map(|frame| frame.message).collect();
-    let refused = Reply::Refused {
-        of: first,
-        reason: Refusal::Moving,
-        detail: [0, 0],
-    };
+    let refused = Reply::Refused { of: first, reason: Refusal::Moving, detail: [0, 0] };
     assert_eq!(answers, [refused, Reply::Accepted { of: second }]);
 }
 
@@ -314,17 +200,7 @@ fn a_control_half_that_does_not_answer_is_reported() {
     assert_eq!(rig.answer(), None);
     rig.wait(1);
     let answer = rig.answer();
-    assert!(
-        matches!(
-            answer,
-            Some(Reply::Refused {
-                reason: Refusal::NoAnswer,
-                detail: [100, 0],
-                ..
-            })
-        ),
-        "{answer:?}"
-    );
+    assert!(matches!(answer, Some(Reply::Refused { reason: Refusal::NoAnswer, detail: [100, 0], .. })), "{answer:?}");
 }
 
 #[test]
@@ -336,11 +212,7 @@ fn an_answer_to_a_host_that_is_gone_is_not_given_to_the_next_one() {
     rig.greet();
     assert_eq!(rig.ask(Request::Gravity), None);
     rig.event(EventKind::Refused(Core::Control(control::Refusal::Moving)));
-    assert_eq!(
-        rig.answer(),
-        None,
-        "that was the answer to the hold of the other host"
-    );
+    assert_eq!(rig.answer(), None, "that was the answer to the hold of the other host");
     rig.event(EventKind::Accepted);
     assert_eq!(rig.answer(), Some(Reply::Accepted { of: rig.sequence }));
 }
@@ -356,10 +228,7 @@ fn a_full_queue_refuses_but_keeps_a_place_for_a_stop() {
     }
     assert_eq!(rig.refused(Request::Hold).0, Refusal::CommandQueueFull);
     assert_eq!(rig.ask(Request::Stop), None);
-    assert_eq!(
-        rig.bench.commands.last(),
-        Some(&Command::Control(control::Command::Stop))
-    );
+    assert_eq!(rig.bench.commands.last(), Some(&Command::Control(control::Command::Stop)));
 }
 
 #[test]
@@ -369,18 +238,12 @@ fn telemetry_comes_every_so_many_cycles_and_only_when_asked_for() {
     assert!(telemetry(&mut rig).is_empty());
     rig.done(Request::Telemetry { every: 3 });
     (2..=12).for_each(|number| rig.cycle(number, Fault::None));
-    let cycles: Vec<u32> = telemetry(&mut rig)
-        .iter()
-        .map(|telemetry| telemetry.cycle)
-        .collect();
+    let cycles: Vec<u32> = telemetry(&mut rig).iter().map(|telemetry| telemetry.cycle).collect();
     assert_eq!(cycles, [3, 6, 9, 12]);
     rig.done(Request::Telemetry { every: 1 });
     rig.cycle(13, Fault::TipSpeed);
     let sent = telemetry(&mut rig);
-    assert_eq!(
-        (sent[0].cycle, sent[0].fault, sent[0].cost_ticks),
-        (13, Fault::TipSpeed.code(), 99)
-    );
+    assert_eq!((sent[0].cycle, sent[0].fault, sent[0].cost_ticks), (13, Fault::TipSpeed.code(), 99));
     rig.done(Request::Telemetry { every: 0 });
     rig.cycle(14, Fault::None);
     assert!(telemetry(&mut rig).is_empty());
@@ -392,14 +255,9 @@ fn telemetry_gives_way_and_is_counted_when_the_line_is_full() {
     rig.done(Request::Telemetry { every: 1 });
     rig.bench.room = 400;
     (1..=5).for_each(|number| rig.cycle(number, Fault::None));
-    assert!(
-        telemetry(&mut rig).is_empty(),
-        "the room is kept for an answer"
-    );
+    assert!(telemetry(&mut rig).is_empty(), "the room is kept for an answer");
     rig.bench.room = 4096;
-    let Some(Reply::Statistics { statistics, .. }) = rig.ask(Request::Statistics) else {
-        panic!()
-    };
+    let Some(Reply::Statistics { statistics, .. }) = rig.ask(Request::Statistics) else { panic!() };
     assert_eq!(statistics.telemetry_dropped, 5);
 }
 
@@ -407,37 +265,14 @@ fn telemetry_gives_way_and_is_counted_when_the_line_is_full() {
 fn events_reach_the_host() {
     let mut rig = Rig::greeted();
     let pairs = [
-        (
-            EventKind::Entered(State::SoftStop, Fault::TipSpeed),
-            LinkKind::State,
-            State::SoftStop.code(),
-            5,
-        ),
+        (EventKind::Entered(State::SoftStop, Fault::TipSpeed), LinkKind::State, State::SoftStop.code(), 5),
         (EventKind::Arrived, LinkKind::Arrived, 0, 0),
-        (
-            EventKind::Startup(Stage::Ready),
-            LinkKind::Startup,
-            Stage::Ready.code(),
-            0,
-        ),
-        (
-            EventKind::Safety(SafetyMode::Idle),
-            LinkKind::SafetyMode,
-            1,
-            0,
-        ),
+        (EventKind::Startup(Stage::Ready), LinkKind::Startup, Stage::Ready.code(), 0),
+        (EventKind::Safety(SafetyMode::Idle), LinkKind::SafetyMode, 1, 0),
     ];
     for (kind, told, code, detail) in pairs {
         rig.event(kind);
-        assert_eq!(
-            events(&mut rig),
-            [Event {
-                cycle: 1234,
-                kind: told,
-                code: code.into(),
-                detail
-            }]
-        );
+        assert_eq!(events(&mut rig), [Event { cycle: 1234, kind: told, code: code.into(), detail }]);
     }
     let node = puck::Node::new(3).unwrap();
     rig.event(EventKind::Blocked(device::StartupError::MissingPuck(node)));
@@ -449,37 +284,15 @@ fn events_reach_the_host() {
 #[test]
 fn status_and_statistics_tell_what_the_control_half_knows() {
     let mut rig = Rig::greeted();
-    rig.bench.counters = Counters {
-        cycles: 900,
-        lost_replies: 4,
-        malformed_frames: 1,
-        foreign_frames: 2,
-        ..Counters::default()
-    };
+    rig.bench.counters =
+        Counters { cycles: 900, lost_replies: 4, malformed_frames: 1, foreign_frames: 2, ..Counters::default() };
     rig.cycle(900, Fault::None);
-    let Some(Reply::Status { status, .. }) = rig.ask(Request::Status) else {
-        panic!()
-    };
-    assert_eq!(
-        (status.cycle, status.state, status.startup_stage),
-        (1234, State::Hold.code(), Stage::Ready.code())
-    );
-    assert_eq!(
-        (status.safety_mode, status.pendant, status.zeroed),
-        (Some(2), Some(0x0F3F_1249), true)
-    );
+    let Some(Reply::Status { status, .. }) = rig.ask(Request::Status) else { panic!() };
+    assert_eq!((status.cycle, status.state, status.startup_stage), (1234, State::Hold.code(), Stage::Ready.code()));
+    assert_eq!((status.safety_mode, status.pendant, status.zeroed), (Some(2), Some(0x0F3F_1249), true));
     assert_eq!(status.temperatures[6], Some(35));
-    let Some(Reply::Statistics { statistics, .. }) = rig.ask(Request::Statistics) else {
-        panic!()
-    };
-    assert_eq!(
-        (
-            statistics.cycles,
-            statistics.lost_replies,
-            statistics.rejected_frames
-        ),
-        (900, 4, 3)
-    );
+    let Some(Reply::Statistics { statistics, .. }) = rig.ask(Request::Statistics) else { panic!() };
+    assert_eq!((statistics.cycles, statistics.lost_replies, statistics.rejected_frames), (900, 4, 3));
     assert_eq!(statistics.cost_worst_ticks, 30_000);
 }
 
@@ -499,30 +312,15 @@ fn any_request() -> impl Strategy<Value = Request> {
         Just(Request::UploadAbort),
         any::<u8>().prop_map(|index| Request::List { index }),
         any::<u8>().prop_map(|every| Request::Telemetry { every }),
-        (prop::array::uniform7(real.clone()), real.clone())
-            .prop_map(|(q, duration)| Request::Approach { q, duration }),
+        (prop::array::uniform7(real.clone()), real.clone()).prop_map(|(q, duration)| Request::Approach { q, duration }),
         real.clone().prop_map(|factor| Request::SetSpeed { factor }),
         (name.clone(), real).prop_map(|(name, speed)| {
-            Request::Run {
-                name,
-                options: RunOptions {
-                    speed,
-                    ..RunOptions::default()
-                },
-            }
+            Request::Run { name, options: RunOptions { speed, ..RunOptions::default() } }
         }),
-        (name.clone(), any::<u16>(), any::<u32>()).prop_map(|(name, length, crc)| {
-            Request::UploadBegin {
-                name,
-                length: length.into(),
-                crc,
-            }
-        }),
+        (name.clone(), any::<u16>(), any::<u32>())
+            .prop_map(|(name, length, crc)| { Request::UploadBegin { name, length: length.into(), crc } }),
         (any::<u32>(), prop::collection::vec(any::<u8>(), 0..192)).prop_map(|(offset, data)| {
-            Request::UploadChunk {
-                offset,
-                data: link::message::ChunkData::from_slice(&data).unwrap(),
-            }
+            Request::UploadChunk { offset, data: link::message::ChunkData::from_slice(&data).unwrap() }
         }),
         (name, any::<u32>()).prop_map(|(name, offset)| Request::Read { name, offset }),
     ]

@@ -26,10 +26,7 @@ fn nothing_is_answered_or_done_before_a_hello() {
     }
     rig.cycle(300, control::Fault::None);
     rig.event(EventKind::Arrived);
-    assert!(
-        rig.sent().is_empty(),
-        "telemetry and events have no listener yet"
-    );
+    assert!(rig.sent().is_empty(), "telemetry and events have no listener yet");
     assert!(rig.bench.commands.is_empty());
 }
 
@@ -37,53 +34,19 @@ fn nothing_is_answered_or_done_before_a_hello() {
 fn a_matching_hello_is_answered_with_who_the_device_is() {
     let mut rig = Rig::new();
     let device = rig.greet();
-    assert_eq!(
-        (device.link_version, device.schema_hash),
-        (LINK_VERSION, SCHEMA_HASH)
-    );
+    assert_eq!((device.link_version, device.schema_hash), (LINK_VERSION, SCHEMA_HASH));
     assert_eq!(device.model_hash, control::MODEL_HASH);
-    assert_eq!(
-        (
-            device.board.as_str(),
-            device.serial.as_str(),
-            device.simulated
-        ),
-        ("bench", "B-1", true)
-    );
-    assert_eq!(
-        (device.slots, device.slot_bytes, device.cycles_per_second),
-        (3, 4096, 300)
-    );
+    assert_eq!((device.board.as_str(), device.serial.as_str(), device.simulated), ("bench", "B-1", true));
+    assert_eq!((device.slots, device.slot_bytes, device.cycles_per_second), (3, 4096, 300));
     rig.done(Request::Ping);
 }
 
 #[test]
 fn c7_another_version_is_refused_with_both_named_and_nothing_else_is_answered() {
     let others = [
-        (
-            HostHello {
-                link_version: 9,
-                ..hello()
-            },
-            Refusal::LinkVersion,
-            [9, u32::from(LINK_VERSION)],
-        ),
-        (
-            HostHello {
-                schema_hash: 5,
-                ..hello()
-            },
-            Refusal::Schema,
-            [5, SCHEMA_HASH],
-        ),
-        (
-            HostHello {
-                model_hash: 6,
-                ..hello()
-            },
-            Refusal::Model,
-            [6, control::MODEL_HASH],
-        ),
+        (HostHello { link_version: 9, ..hello() }, Refusal::LinkVersion, [9, u32::from(LINK_VERSION)]),
+        (HostHello { schema_hash: 5, ..hello() }, Refusal::Schema, [5, SCHEMA_HASH]),
+        (HostHello { model_hash: 6, ..hello() }, Refusal::Model, [6, control::MODEL_HASH]),
     ];
     for (other, reason, detail) in others {
         let mut rig = Rig::new();
@@ -101,14 +64,8 @@ fn a_repeated_request_is_answered_again_but_done_once() {
     rig.event(EventKind::Accepted);
     assert!(matches!(rig.answer(), Some(Reply::Accepted { .. })));
     rig.put(rig.sequence, 0, &Request::Gravity);
-    assert!(
-        matches!(rig.answer(), Some(Reply::Accepted { .. })),
-        "the answer was lost: said again"
-    );
-    assert_eq!(
-        rig.bench.commands,
-        [Command::Control(control::Command::Gravity)]
-    );
+    assert!(matches!(rig.answer(), Some(Reply::Accepted { .. })), "the answer was lost: said again");
+    assert_eq!(rig.bench.commands, [Command::Control(control::Command::Gravity)]);
 }
 
 #[test]
@@ -135,19 +92,12 @@ fn c9_a_second_host_is_refused_until_the_first_has_been_silent() {
     let mut rig = Rig::greeted();
     rig.wait(100);
     (rig.number, rig.sequence) = (88, 0);
-    assert_eq!(
-        rig.refused(Request::Hello(hello())),
-        (Refusal::Busy, [77, 400])
-    );
+    assert_eq!(rig.refused(Request::Hello(hello())), (Refusal::Busy, [77, 400]));
     assert_eq!(rig.refused(Request::Status).0, Refusal::NoSession);
     rig.wait(400);
     rig.greet();
     rig.number = 77;
-    assert_eq!(
-        rig.refused(Request::Status).0,
-        Refusal::NoSession,
-        "the first has lost the session"
-    );
+    assert_eq!(rig.refused(Request::Status).0, Refusal::NoSession, "the first has lost the session");
 }
 
 #[test]
@@ -167,27 +117,13 @@ fn c10_a_moving_arm_is_stopped_when_its_host_falls_silent_for_half_a_second() {
         rig.wait(499);
         assert!(rig.bench.commands.is_empty(), "{state:?}");
         rig.wait(1);
-        assert_eq!(
-            rig.bench.commands,
-            [Command::Control(control::Command::Stop)],
-            "{state:?}"
-        );
-        let event = rig
-            .sent()
-            .into_iter()
-            .find_map(|frame| match frame.message {
-                Reply::Event(event) => Some(event),
-                _ => None,
-            });
-        assert_eq!(
-            event.map(|event| (event.kind, event.detail)),
-            Some((LinkKind::LinkTimeout, 500))
-        );
-        assert_eq!(
-            rig.refused(Request::Gravity).0,
-            Refusal::NoSession,
-            "the session is over"
-        );
+        assert_eq!(rig.bench.commands, [Command::Control(control::Command::Stop)], "{state:?}");
+        let event = rig.sent().into_iter().find_map(|frame| match frame.message {
+            Reply::Event(event) => Some(event),
+            _ => None,
+        });
+        assert_eq!(event.map(|event| (event.kind, event.detail)), Some((LinkKind::LinkTimeout, 500)));
+        assert_eq!(rig.refused(Request::Gravity).0, Refusal::NoSession, "the session is over");
     }
 }
 
@@ -199,11 +135,7 @@ fn a_stop_after_silence_is_sent_once_and_tried_again_while_the_queue_is_full() {
     rig.wait(600);
     rig.bench.stuck = false;
     rig.wait(50);
-    assert_eq!(
-        rig.bench.commands.len(),
-        1,
-        "the arm needs a cycle to leave the run"
-    );
+    assert_eq!(rig.bench.commands.len(), 1, "the arm needs a cycle to leave the run");
 }
 
 #[test]
@@ -234,10 +166,7 @@ fn a_motion_whose_host_said_goodbye_is_stopped() {
     rig.bench.state = State::Gravity;
     rig.done(Request::Goodbye);
     rig.wait(3);
-    assert_eq!(
-        rig.bench.commands,
-        [Command::Control(control::Command::Stop)]
-    );
+    assert_eq!(rig.bench.commands, [Command::Control(control::Command::Stop)]);
 }
 
 #[test]
@@ -246,23 +175,10 @@ fn c10_an_old_request_does_not_move_the_arm_but_an_old_stop_stops_it() {
     rig.sequence += 1;
     rig.put(rig.sequence, 501, &Request::Gravity);
     let answer = rig.answer();
-    assert!(
-        matches!(
-            answer,
-            Some(Reply::Refused {
-                reason: Refusal::Stale,
-                detail: [501, 500],
-                ..
-            })
-        ),
-        "{answer:?}"
-    );
+    assert!(matches!(answer, Some(Reply::Refused { reason: Refusal::Stale, detail: [501, 500], .. })), "{answer:?}");
     rig.sequence += 1;
     rig.put(rig.sequence, 60_000, &Request::Stop);
-    assert_eq!(
-        rig.bench.commands,
-        [Command::Control(control::Command::Stop)]
-    );
+    assert_eq!(rig.bench.commands, [Command::Control(control::Command::Stop)]);
 }
 
 #[test]
@@ -285,19 +201,11 @@ fn a_stop_is_heard_even_behind_a_flood() {
     rig.ask(Request::Stop);
     rig.bench.room = 4096;
     rig.poll();
-    assert_eq!(
-        rig.bench.commands,
-        [Command::Control(control::Command::Stop)]
-    );
+    assert_eq!(rig.bench.commands, [Command::Control(control::Command::Stop)]);
     rig.event(EventKind::Accepted);
     rig.sent();
-    let Some(Reply::Statistics { statistics, .. }) = rig.ask(Request::Statistics) else {
-        panic!()
-    };
-    assert_eq!(
-        statistics.link.overrun, 17,
-        "20 requests and a stop into 4 places"
-    );
+    let Some(Reply::Statistics { statistics, .. }) = rig.ask(Request::Statistics) else { panic!() };
+    assert_eq!(statistics.link.overrun, 17, "20 requests and a stop into 4 places");
 }
 
 #[test]
@@ -310,25 +218,18 @@ fn replies_are_numbered_without_gaps_and_carry_the_time() {
     let frames = rig.sent();
     assert_eq!(frames.len(), 2);
     assert_eq!(frames[1].envelope.sequence, frames[0].envelope.sequence + 1);
-    assert_eq!(
-        (frames[1].envelope.session, frames[1].envelope.time_ms),
-        (77, 10_000)
-    );
+    assert_eq!((frames[1].envelope.session, frames[1].envelope.time_ms), (77, 10_000));
 }
 
 #[test]
 fn noise_on_the_line_is_counted_and_changes_nothing() {
     let mut rig = Rig::greeted();
-    let noise: Vec<u8> = (0..20_000_u32)
-        .map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8)
-        .collect();
+    let noise: Vec<u8> = (0..20_000_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
     rig.session.receive(&noise);
     rig.session.receive(&[0]);
     rig.poll();
     assert!(rig.sent().is_empty() && rig.bench.commands.is_empty());
-    let Some(Reply::Statistics { statistics, .. }) = rig.ask(Request::Statistics) else {
-        panic!()
-    };
+    let Some(Reply::Statistics { statistics, .. }) = rig.ask(Request::Statistics) else { panic!() };
     let link = statistics.link;
     assert!(link.bad_cobs + link.bad_crc + link.too_long > 10);
     assert_eq!((link.accepted, link.undecodable), (2, 0));

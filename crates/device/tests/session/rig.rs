@@ -7,13 +7,11 @@ use control::kinematics::Frames;
 use control::units::JointPositions;
 use control::{CycleRecord, Fault, LoadRefusal, Payload, State};
 use device::{
-    Command, Counters, Event, EventKind, Health, Identity, QueueFull, RamStore, Session,
-    SessionPort, Stage, StoredPrimitive, TimedRecord, Timing,
+    Command, Counters, Event, EventKind, Health, Identity, QueueFull, RamStore, Session, SessionPort, Stage,
+    StoredPrimitive, TimedRecord, Timing,
 };
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame};
-use link::image::{
-    FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity,
-};
+use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
 use link::message::{ChunkData, DeviceHello, HostHello};
 use link::{LINK_VERSION, Name, Refusal, Reply, Request, SCHEMA_HASH, Text};
 use puck::SafetyMode;
@@ -52,10 +50,7 @@ pub(crate) struct Bench {
 
 impl SessionPort for Bench {
     fn send(&mut self, bytes: &[u8]) {
-        assert!(
-            bytes.len() <= self.room,
-            "the session sent more than there was room for"
-        );
+        assert!(bytes.len() <= self.room, "the session sent more than there was room for");
         self.line.extend_from_slice(bytes);
     }
 
@@ -72,11 +67,7 @@ impl SessionPort for Bench {
     }
 
     fn load(&mut self, primitive: &StoredPrimitive) -> Result<(), LoadRefusal> {
-        assert_ne!(
-            self.state,
-            State::Run,
-            "a primitive was exchanged under a run"
-        );
+        assert_ne!(self.state, State::Run, "a primitive was exchanged under a run");
         self.load?;
         self.loaded.push(primitive.duration());
         Ok(())
@@ -105,10 +96,7 @@ impl SessionPort for Bench {
     }
 
     fn timing(&mut self) -> Timing {
-        Timing {
-            cost_worst_ticks: 30_000,
-            ..Timing::default()
-        }
+        Timing { cost_worst_ticks: 30_000, ..Timing::default() }
     }
 }
 
@@ -150,14 +138,7 @@ impl Rig {
             counters: Counters::default(),
         };
         let session = Session::new(identity, model(), Store::new());
-        Self {
-            session,
-            bench,
-            now_ms: 10_000,
-            number: 77,
-            sequence: 0,
-            decoder: Decoder::new(),
-        }
+        Self { session, bench, now_ms: 10_000, number: 77, sequence: 0, decoder: Decoder::new() }
     }
 
     /// A session with an open conversation.
@@ -179,11 +160,7 @@ impl Rig {
     pub(crate) fn put(&mut self, sequence: u16, age_ms: u32, request: &Request) {
         let mut buffer = [0; FRAME_BYTES];
         let time_ms = (self.now_ms as u32).wrapping_sub(age_ms);
-        let envelope = Envelope {
-            session: self.number,
-            sequence,
-            time_ms,
-        };
+        let envelope = Envelope { session: self.number, sequence, time_ms };
         let length = frame::encode(envelope, request, &mut buffer).unwrap();
         self.session.receive(&buffer[..length]);
         self.poll();
@@ -199,10 +176,7 @@ impl Rig {
     /// The answer to the last request among what was sent.
     pub(crate) fn answer(&mut self) -> Option<Reply> {
         let of = self.sequence;
-        self.sent()
-            .into_iter()
-            .map(|frame| frame.message)
-            .find(|reply| reply.answers() == Some(of))
+        self.sent().into_iter().map(|frame| frame.message).find(|reply| reply.answers() == Some(of))
     }
 
     /// Asks and expects to be refused.
@@ -223,11 +197,7 @@ impl Rig {
 
     /// Asks for something of the control half, which takes it.
     pub(crate) fn commanded(&mut self, request: Request) {
-        assert_eq!(
-            self.ask(request),
-            None,
-            "answered before the control half had decided"
-        );
+        assert_eq!(self.ask(request), None, "answered before the control half had decided");
         self.event(EventKind::Accepted);
         assert!(matches!(self.answer(), Some(Reply::Accepted { .. })));
     }
@@ -240,16 +210,8 @@ impl Rig {
 
     /// A control cycle ends.
     pub(crate) fn cycle(&mut self, number: u64, fault: Fault) {
-        let record = CycleRecord {
-            cycle: number,
-            state: self.bench.state,
-            fault,
-            ..CycleRecord::EMPTY
-        };
-        self.bench.records.push_back(TimedRecord {
-            record,
-            cost_ticks: 99,
-        });
+        let record = CycleRecord { cycle: number, state: self.bench.state, fault, ..CycleRecord::EMPTY };
+        self.bench.records.push_back(TimedRecord { record, cost_ticks: 99 });
         self.poll();
     }
 
@@ -283,11 +245,7 @@ impl Rig {
     pub(crate) fn store(&mut self, name: &str, image: &[u8]) {
         match self.upload(name, image) {
             Some(Reply::Accepted { .. }) => {}
-            Some(Reply::Refused {
-                reason: Refusal::PrimitiveInvalid,
-                detail,
-                ..
-            }) => {
+            Some(Reply::Refused { reason: Refusal::PrimitiveInvalid, detail, .. }) => {
                 panic!("not taken: {}", device::PrimitiveTrouble(detail))
             }
             other => panic!("not taken but {other:?}"),
@@ -297,16 +255,9 @@ impl Rig {
     /// Uploads all parts of an image.
     pub(crate) fn send_parts(&mut self, name: &str, image: &[u8]) {
         let crc = link::image::stored_crc(image);
-        self.done(Request::UploadBegin {
-            name: Name::new(name).unwrap(),
-            length: image.len() as u32,
-            crc,
-        });
+        self.done(Request::UploadBegin { name: Name::new(name).unwrap(), length: image.len() as u32, crc });
         for (index, part) in image.chunks(192).enumerate() {
-            self.done(Request::UploadChunk {
-                offset: 192 * index as u32,
-                data: ChunkData::from_slice(part).unwrap(),
-            });
+            self.done(Request::UploadChunk { offset: 192 * index as u32, data: ChunkData::from_slice(part).unwrap() });
         }
     }
 
@@ -314,9 +265,7 @@ impl Rig {
     pub(crate) fn names(&mut self) -> Vec<String> {
         (0..SLOTS as u8)
             .filter_map(|index| match self.ask(Request::List { index }) {
-                Some(Reply::Listing { listing, .. }) => {
-                    listing.map(|listing| listing.name.to_string())
-                }
+                Some(Reply::Listing { listing, .. }) => listing.map(|listing| listing.name.to_string()),
                 other => panic!("no listing but {other:?}"),
             })
             .collect()
@@ -363,11 +312,7 @@ pub(crate) fn image_with(
         start: waypoint([0.0, 0.5, 0.0, 1.5, 0.0, 0.5, 0.0]),
         start_velocity: WaypointVelocity::default(),
         goal: waypoint([0.3, 0.7, 0.0, 1.3, 0.0, 0.5, 0.0]),
-        clamps: FeedbackClamps {
-            position: 0.2,
-            orientation: 0.5,
-            hand: 0.5,
-        },
+        clamps: FeedbackClamps { position: 0.2, orientation: 0.5, hand: 0.5 },
         marks: Default::default(),
         kernels,
         k1: &[],
@@ -377,31 +322,16 @@ pub(crate) fn image_with(
         expected_spread: &[],
     };
     // The same rotation has two signs; a demonstration would have kept the one of its start.
-    let dot: f32 = content
-        .start
-        .orientation
-        .iter()
-        .zip(content.goal.orientation)
-        .map(|(a, b)| a * b)
-        .sum();
+    let dot: f32 = content.start.orientation.iter().zip(content.goal.orientation).map(|(a, b)| a * b).sum();
     content.goal.orientation = content.goal.orientation.map(|part| part * dot.signum());
     change(&mut content);
     let mut bytes = vec![0; link::image::IMAGE_BYTES_LIMIT];
-    let length = content
-        .encode(&Name::new(name).unwrap(), &mut bytes)
-        .unwrap();
+    let length = content.encode(&Name::new(name).unwrap(), &mut bytes).unwrap();
     bytes.truncate(length);
     bytes
 }
 
 fn waypoint(posture: [f32; 7]) -> Waypoint {
-    let [x, y, z, w, i, j, k] = Frames::new(&model(), &JointPositions::from_array(posture))
-        .tool_pose()
-        .to_f32();
-    Waypoint {
-        position: [x, y, z],
-        orientation: [w, i, j, k],
-        posture,
-        hand: [0.0; 4],
-    }
+    let [x, y, z, w, i, j, k] = Frames::new(&model(), &JointPositions::from_array(posture)).tool_pose().to_f32();
+    Waypoint { position: [x, y, z], orientation: [w, i, j, k], posture, hand: [0.0; 4] }
 }

@@ -21,10 +21,7 @@ fn listing(rig: &mut Rig, index: u8) -> Option<Listing> {
 fn read_back(rig: &mut Rig, text: &str) -> Vec<u8> {
     let mut image = Vec::new();
     loop {
-        match rig.ask(Request::Read {
-            name: name(text),
-            offset: image.len() as u32,
-        }) {
+        match rig.ask(Request::Read { name: name(text), offset: image.len() as u32 }) {
             Some(Reply::Chunk { data, .. }) if data.is_empty() => return image,
             Some(Reply::Chunk { data, .. }) => image.extend_from_slice(&data),
             other => panic!("no chunk but {other:?}"),
@@ -34,13 +31,9 @@ fn read_back(rig: &mut Rig, text: &str) -> Vec<u8> {
 
 /// What the commit of an upload is refused with, after checking that the old image has survived.
 fn refused(rig: &mut Rig, text: &str, image: &[u8]) -> (Refusal, [u32; 2]) {
-    let before: Vec<_> = (0..3)
-        .map(|slot| rig.session.store().image(slot).map(<[u8]>::to_vec))
-        .collect();
+    let before: Vec<_> = (0..3).map(|slot| rig.session.store().image(slot).map(<[u8]>::to_vec)).collect();
     let answer = rig.upload(text, image);
-    let after: Vec<_> = (0..3)
-        .map(|slot| rig.session.store().image(slot).map(<[u8]>::to_vec))
-        .collect();
+    let after: Vec<_> = (0..3).map(|slot| rig.session.store().image(slot).map(<[u8]>::to_vec)).collect();
     assert_eq!(before, after, "a refused upload changed the store");
     match answer {
         Some(Reply::Refused { reason, detail, .. }) => (reason, detail),
@@ -54,21 +47,12 @@ fn an_upload_is_stored_listed_and_read_back_to_the_last_byte() {
     let image = image("reach", 3.0, 25);
     rig.store("reach", &image);
     let listed = listing(&mut rig, 0).unwrap();
-    assert_eq!(
-        (listed.name.as_str(), listed.length as usize, listed.kernels),
-        ("reach", image.len(), 25)
-    );
-    assert_eq!(
-        (listed.crc, listed.duration),
-        (link::image::stored_crc(&image), 3.0)
-    );
+    assert_eq!((listed.name.as_str(), listed.length as usize, listed.kernels), ("reach", image.len(), 25));
+    assert_eq!((listed.crc, listed.duration), (link::image::stored_crc(&image), 3.0));
     assert!(!listed.loaded && !listed.expectation);
     assert_eq!(read_back(&mut rig, "reach"), image);
     assert_eq!(listing(&mut rig, 1), None);
-    assert_eq!(
-        rig.refused(Request::List { index: 3 }),
-        (Refusal::NoSuchPrimitive, [3, 0])
-    );
+    assert_eq!(rig.refused(Request::List { index: 3 }), (Refusal::NoSuchPrimitive, [3, 0]));
 }
 
 #[test]
@@ -77,13 +61,10 @@ fn an_upload_tells_that_the_store_changed() {
     rig.send_parts("reach", &image("reach", 3.0, 10));
     rig.sequence += 1;
     rig.put(rig.sequence, 0, &Request::UploadCommit);
-    let told = rig
-        .sent()
-        .into_iter()
-        .find_map(|frame| match frame.message {
-            Reply::Event(event) => Some((event.kind, event.code)),
-            _ => None,
-        });
+    let told = rig.sent().into_iter().find_map(|frame| match frame.message {
+        Reply::Event(event) => Some((event.kind, event.code)),
+        _ => None,
+    });
     assert_eq!(told, Some((EventKind::Store, 0)));
 }
 
@@ -106,17 +87,10 @@ fn c4_a_connection_cut_at_any_chunk_leaves_the_old_primitive() {
         let mut rig = Rig::greeted();
         rig.store("reach", &old);
         let crc = link::image::stored_crc(&new);
-        rig.done(Request::UploadBegin {
-            name: name("reach"),
-            length: new.len() as u32,
-            crc,
-        });
+        rig.done(Request::UploadBegin { name: name("reach"), length: new.len() as u32, crc });
         for (index, part) in new.chunks(192).enumerate().take(cut) {
             let data = ChunkData::from_slice(part).unwrap();
-            rig.done(Request::UploadChunk {
-                offset: 192 * index as u32,
-                data,
-            });
+            rig.done(Request::UploadChunk { offset: 192 * index as u32, data });
         }
         // The host is gone; another one comes.
         rig.wait(600);
@@ -147,26 +121,14 @@ fn chunks_must_come_in_order_and_stay_within_the_length() {
         data: ChunkData::from_slice(&vec![7; count]).unwrap(),
     };
     assert_eq!(rig.refused(chunk(0, 10)).0, Refusal::NoUpload);
-    rig.done(Request::UploadBegin {
-        name: name("reach"),
-        length: 300,
-        crc: 0,
-    });
+    rig.done(Request::UploadBegin { name: name("reach"), length: 300, crc: 0 });
     rig.done(chunk(0, 192));
-    assert_eq!(
-        rig.refused(chunk(191, 10)),
-        (Refusal::UploadOrder, [192, 191])
-    );
+    assert_eq!(rig.refused(chunk(191, 10)), (Refusal::UploadOrder, [192, 191]));
     assert_eq!(rig.refused(chunk(0, 192)), (Refusal::UploadOrder, [192, 0]));
     assert_eq!(rig.refused(chunk(192, 109)).0, Refusal::ImageTooLarge);
-    assert_eq!(
-        rig.refused(Request::UploadCommit),
-        (Refusal::UploadIncomplete, [192, 300])
-    );
+    assert_eq!(rig.refused(Request::UploadCommit), (Refusal::UploadIncomplete, [192, 300]));
     rig.done(chunk(192, 108));
-    let Some(Reply::Status { status, .. }) = rig.ask(Request::Status) else {
-        panic!()
-    };
+    let Some(Reply::Status { status, .. }) = rig.ask(Request::Status) else { panic!() };
     assert_eq!(status.upload_received, Some(300));
 }
 
@@ -182,28 +144,19 @@ fn what_is_not_sound_or_not_fit_is_refused_with_its_reason() {
 
     let mut schema = good.clone();
     schema[4] = 9;
-    assert_eq!(
-        refused(&mut rig, "reach", &schema),
-        (Refusal::ImageInvalid, [3, 9])
-    );
+    assert_eq!(refused(&mut rig, "reach", &schema), (Refusal::ImageInvalid, [3, 9]));
 
     assert_eq!(refused(&mut rig, "other", &good).0, Refusal::ImageName);
 
     let foreign = image_with("reach", 3.0, 10, |content| content.model_hash = 5);
-    assert_eq!(
-        refused(&mut rig, "reach", &foreign),
-        (Refusal::ImageModel, [5, control::MODEL_HASH])
-    );
+    assert_eq!(refused(&mut rig, "reach", &foreign), (Refusal::ImageModel, [5, control::MODEL_HASH]));
 
     let mut crowded = good.clone();
     crowded[48..50].copy_from_slice(&142_u16.to_le_bytes());
     let end = crowded.len() - 4;
     let crc = link::image::stored_crc(&crowded).to_le_bytes();
     crowded[end..].copy_from_slice(&crc);
-    assert_eq!(
-        refused(&mut rig, "reach", &crowded),
-        (Refusal::TooManyKernels, [142, 100])
-    );
+    assert_eq!(refused(&mut rig, "reach", &crowded), (Refusal::TooManyKernels, [142, 100]));
 
     assert_eq!(read_back(&mut rig, "reach"), good);
 }
@@ -221,18 +174,12 @@ fn a_primitive_outside_the_limits_of_the_arm_is_refused_in_words() {
     assert!(words(|content| content.goal.position[0] += 0.2).contains("does not belong"));
     assert!(words(|content| content.duration = 0.1).contains("duration"));
     assert!(words(|content| content.stiffness[1] = -1.0).contains("orientation: stiffness"));
-    assert!(
-        words(|content| content.goal.orientation = [2.0, 0.0, 0.0, 0.0])
-            .contains("unit quaternion")
-    );
+    assert!(words(|content| content.goal.orientation = [2.0, 0.0, 0.0, 0.0]).contains("unit quaternion"));
     assert!(words(|content| content.alpha = 1.0).contains("alpha"));
     static NEGATIVE: [f32; 10] = [-1.0; 10];
     static ONE: [f32; 9] = [1.0; 9];
     assert!(words(|content| (content.k1, content.k2) = (&NEGATIVE, &ONE)).contains("feedback"));
-    assert!(
-        words(|content| (content.expected_mean, content.expected_spread) = (&ONE, &ONE))
-            .contains("expectation")
-    );
+    assert!(words(|content| (content.expected_mean, content.expected_spread) = (&ONE, &ONE)).contains("expectation"));
 }
 
 #[test]
@@ -241,25 +188,11 @@ fn a_full_store_refuses_a_new_name_before_anything_is_sent() {
     for text in ["a", "b", "c"] {
         rig.store(text, &image(text, 3.0, 5));
     }
-    let begin = |text| Request::UploadBegin {
-        name: name(text),
-        length: 1000,
-        crc: 0,
-    };
+    let begin = |text| Request::UploadBegin { name: name(text), length: 1000, crc: 0 };
     assert_eq!(rig.refused(begin("d")), (Refusal::StoreFull, [3, 0]));
     rig.done(begin("b"));
-    let large = Request::UploadBegin {
-        name: name("b"),
-        length: SLOT_BYTES as u32 + 1,
-        crc: 0,
-    };
-    assert_eq!(
-        rig.refused(large),
-        (
-            Refusal::ImageTooLarge,
-            [SLOT_BYTES as u32 + 1, SLOT_BYTES as u32]
-        )
-    );
+    let large = Request::UploadBegin { name: name("b"), length: SLOT_BYTES as u32 + 1, crc: 0 };
+    assert_eq!(rig.refused(large), (Refusal::ImageTooLarge, [SLOT_BYTES as u32 + 1, SLOT_BYTES as u32]));
     rig.done(Request::Delete { name: name("b") });
     rig.store("d", &image("d", 3.0, 5));
     assert_eq!(rig.names(), ["a", "d", "c"]);
@@ -269,47 +202,24 @@ fn a_full_store_refuses_a_new_name_before_anything_is_sent() {
 fn c8_an_upload_during_a_run_is_stored_and_the_running_primitive_stays() {
     let mut rig = Rig::greeted();
     rig.store("reach", &image("reach", 3.0, 10));
-    rig.commanded(Request::Run {
-        name: name("reach"),
-        options: RunOptions::default(),
-    });
+    rig.commanded(Request::Run { name: name("reach"), options: RunOptions::default() });
     rig.bench.state = State::Run;
     rig.store("reach", &image("reach", 5.0, 10));
     assert_eq!(rig.bench.loaded, [3.0], "not loaded");
-    assert!(
-        !listing(&mut rig, 0).unwrap().loaded,
-        "what is stored is not what runs"
-    );
+    assert!(!listing(&mut rig, 0).unwrap().loaded, "what is stored is not what runs");
 }
 
 #[test]
 fn a_primitive_in_use_is_not_deleted() {
     let mut rig = Rig::greeted();
     rig.store("reach", &image("reach", 3.0, 10));
-    rig.commanded(Request::Run {
-        name: name("reach"),
-        options: RunOptions::default(),
-    });
+    rig.commanded(Request::Run { name: name("reach"), options: RunOptions::default() });
     assert!(listing(&mut rig, 0).unwrap().loaded);
     rig.bench.state = State::Run;
-    assert_eq!(
-        rig.refused(Request::Delete {
-            name: name("reach")
-        })
-        .0,
-        Refusal::InUse
-    );
+    assert_eq!(rig.refused(Request::Delete { name: name("reach") }).0, Refusal::InUse);
     rig.bench.state = State::Hold;
-    rig.done(Request::Delete {
-        name: name("reach"),
-    });
-    assert_eq!(
-        rig.refused(Request::Delete {
-            name: name("reach")
-        })
-        .0,
-        Refusal::NoSuchPrimitive
-    );
+    rig.done(Request::Delete { name: name("reach") });
+    assert_eq!(rig.refused(Request::Delete { name: name("reach") }).0, Refusal::NoSuchPrimitive);
     assert_eq!(rig.names(), Vec::<String>::new());
 }
 
@@ -321,22 +231,12 @@ fn a_store_keeps_what_is_there_until_the_commit() {
     assert_eq!(store.begin(0), Err(StoreError::TooLarge));
     store.begin(4).unwrap();
     store.write(0, &[1, 2, 3, 4]).unwrap();
-    assert_eq!(
-        (store.image(0), store.staged()),
-        (None, Some([1, 2, 3, 4].as_slice()))
-    );
-    assert_eq!(
-        store.write(3, &[9, 9]),
-        Err(StoreError::NotOpen),
-        "beyond the announced length"
-    );
+    assert_eq!((store.image(0), store.staged()), (None, Some([1, 2, 3, 4].as_slice())));
+    assert_eq!(store.write(3, &[9, 9]), Err(StoreError::NotOpen), "beyond the announced length");
     assert_eq!(store.write(usize::MAX, &[9]), Err(StoreError::NotOpen));
     assert_eq!(store.commit(2), Err(StoreError::NoPlace));
     store.commit(0).unwrap();
-    assert_eq!(
-        (store.image(0), store.staged()),
-        (Some([1, 2, 3, 4].as_slice()), None)
-    );
+    assert_eq!((store.image(0), store.staged()), (Some([1, 2, 3, 4].as_slice()), None));
 
     store.begin(2).unwrap();
     store.write(0, &[7, 8]).unwrap();

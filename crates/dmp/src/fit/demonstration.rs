@@ -51,10 +51,7 @@ impl fmt::Display for DemonstrationError {
         match self {
             Self::Period => f.write_str("the sampling period is not a positive number"),
             Self::TooFew { samples } => {
-                write!(
-                    f,
-                    "{samples} samples are too few, {FEWEST_SAMPLES} are needed"
-                )
+                write!(f, "{samples} samples are too few, {FEWEST_SAMPLES} are needed")
             }
             Self::Lengths => f.write_str("the quantities differ in their number of samples"),
             Self::NotFinite { sample } => {
@@ -100,18 +97,10 @@ impl Demonstration {
             if !finite {
                 return Err(DemonstrationError::NotFinite { sample });
             }
-            *q = q
-                .checked_unit(1e-3)
-                .ok_or(DemonstrationError::NotUnit { sample })?;
+            *q = q.checked_unit(1e-3).ok_or(DemonstrationError::NotUnit { sample })?;
         }
         make_sign_continuous(&mut orientation);
-        Ok(Self {
-            period,
-            position,
-            orientation,
-            posture,
-            hand,
-        })
+        Ok(Self { period, position, orientation, posture, hand })
     }
 
     /// Number of samples.
@@ -182,8 +171,7 @@ impl Demonstration {
         });
         // The sine of half the angle: as good a measure as the angle for steps this small.
         let (last_turn, highest_turn) = speed(&|i| {
-            let [x, y, z] =
-                crate::orientation_error(&self.orientation[i - 1], &self.orientation[i]);
+            let [x, y, z] = crate::orientation_error(&self.orientation[i - 1], &self.orientation[i]);
             libm::sqrt(x * x + y * y + z * z)
         });
         last <= share * highest && last_turn <= share * highest_turn
@@ -201,9 +189,7 @@ impl Demonstration {
             .map(|([w, x, y, z], raw)| {
                 // The mean of unit quaternions is shorter than 1; two opposite ones (impossible after the sign
                 // alignment unless the movement is faster than the filter) leave the raw sample.
-                Quaternion::new(w, x, y, z)
-                    .checked_unit(0.5)
-                    .unwrap_or(*raw)
+                Quaternion::new(w, x, y, z).checked_unit(0.5).unwrap_or(*raw)
             })
             .collect();
         Self {
@@ -222,18 +208,12 @@ fn column<const D: usize>(rows: &[[f64; D]], i: usize) -> Vec<f64> {
 
 fn smooth<const D: usize>(filter: &ZeroPhaseFilter, rows: &[[f64; D]]) -> Vec<[f64; D]> {
     let columns: [Vec<f64>; D] = core::array::from_fn(|i| filter.apply(&column(rows, i)));
-    (0..rows.len())
-        .map(|k| core::array::from_fn(|i| columns[i][k]))
-        .collect()
+    (0..rows.len()).map(|k| core::array::from_fn(|i| columns[i][k])).collect()
 }
 
 /// Minimum-jerk values from `start` to `goal` in `samples` samples: at rest at both ends. The paper generates the finger
 /// trajectories this way.
-pub fn minimum_jerk<const D: usize>(
-    start: [f64; D],
-    goal: [f64; D],
-    samples: usize,
-) -> Vec<[f64; D]> {
+pub fn minimum_jerk<const D: usize>(start: [f64; D], goal: [f64; D], samples: usize) -> Vec<[f64; D]> {
     let intervals = samples.saturating_sub(1).max(1) as f64;
     (0..samples)
         .map(|k| {

@@ -27,24 +27,13 @@ pub fn second_derivative(x: &[f64], period: f64) -> Vec<f64> {
 }
 
 /// `first` and `second` are the stencils of the first two samples; at the other end they are mirrored with `parity`.
-fn apply(
-    x: &[f64],
-    factor: f64,
-    inside: [f64; 5],
-    first: [f64; 5],
-    second: [f64; 5],
-    parity: f64,
-) -> Vec<f64> {
+fn apply(x: &[f64], factor: f64, inside: [f64; 5], first: [f64; 5], second: [f64; 5], parity: f64) -> Vec<f64> {
     let n = x.len();
     if n < 5 {
         return std::vec![0.0; n];
     }
-    let forward = |stencil: &[f64; 5], at: usize| -> f64 {
-        stencil.iter().zip(&x[at..]).map(|(c, x)| c * x).sum()
-    };
-    let backward = |stencil: &[f64; 5]| -> f64 {
-        stencil.iter().zip(x.iter().rev()).map(|(c, x)| c * x).sum()
-    };
+    let forward = |stencil: &[f64; 5], at: usize| -> f64 { stencil.iter().zip(&x[at..]).map(|(c, x)| c * x).sum() };
+    let backward = |stencil: &[f64; 5]| -> f64 { stencil.iter().zip(x.iter().rev()).map(|(c, x)| c * x).sum() };
     let mut out = Vec::with_capacity(n);
     out.push(forward(&first, 0));
     out.push(forward(&second, 0));

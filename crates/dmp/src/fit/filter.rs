@@ -28,10 +28,7 @@ impl ZeroPhaseFilter {
         let b0 = w * w * norm;
         Some(Self {
             b: [b0, 2.0 * b0, b0],
-            a: [
-                2.0 * (w * w - 1.0) * norm,
-                (1.0 - core::f64::consts::SQRT_2 * w + w * w) * norm,
-            ],
+            a: [2.0 * (w * w - 1.0) * norm, (1.0 - core::f64::consts::SQRT_2 * w + w * w) * norm],
             // One period of the cut-off: the transient has decayed by then.
             pad: libm::ceil(1.0 / relative) as usize,
         })

@@ -25,9 +25,9 @@ pub use report::{OrientationReport, Report, RowReport};
 use core::fmt;
 
 use crate::{
-    Basis, CONTROL_PERIOD, CanonicalSystem, Configuration, Hemisphere, ORIENTATION_ROWS,
-    OrientationError, POSITION_ROWS, Primitive, PrimitiveError, PrimitiveTables, Quaternion, ROWS,
-    RotationChart, Scalar, Velocity, orientation_error,
+    Basis, CONTROL_PERIOD, CanonicalSystem, Configuration, Hemisphere, ORIENTATION_ROWS, OrientationError,
+    POSITION_ROWS, Primitive, PrimitiveError, PrimitiveTables, Quaternion, ROWS, RotationChart, Scalar, Velocity,
+    orientation_error,
 };
 use ridge::Ridge;
 
@@ -105,13 +105,10 @@ pub enum FitError {
 impl fmt::Display for FitError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Basis => write!(
-                f,
-                "the number of kernels must be 2..={FIT_CAPACITY}, with a usable phase and activation"
-            ),
-            Self::Cutoff => {
-                f.write_str("the cut-off must lie between 0 and half the sampling rate")
+            Self::Basis => {
+                write!(f, "the number of kernels must be 2..={FIT_CAPACITY}, with a usable phase and activation")
             }
+            Self::Cutoff => f.write_str("the cut-off must lie between 0 and half the sampling rate"),
             Self::Ridge => f.write_str("the ridge must be a positive number"),
             Self::TurnsTooFar { angle } => write!(
                 f,
@@ -169,11 +166,7 @@ impl Learned {
         Primitive::new(&self.tables_with(&weights, T::from_f64))
     }
 
-    fn tables_with<'a, T: Scalar>(
-        &self,
-        weights: &'a [T],
-        number: impl Fn(f64) -> T + Copy,
-    ) -> PrimitiveTables<'a, T> {
+    fn tables_with<'a, T: Scalar>(&self, weights: &'a [T], number: impl Fn(f64) -> T + Copy) -> PrimitiveTables<'a, T> {
         let configuration = |c: &Configuration<f64>| {
             let [w, x, y, z] = c.orientation.to_array().map(number);
             Configuration {
@@ -237,24 +230,13 @@ pub fn fit(demonstration: &Demonstration, options: &FitOptions) -> Result<Learne
     let duration = demonstration.duration();
     let [k_p, k_o, k_q, k_h] = options.stiffness;
     let critical = |k: f64| 2.0 * libm::sqrt(k);
-    let damping = [
-        critical(k_p),
-        options.orientation_error.critical_damping(k_o),
-        critical(k_q),
-        critical(k_h),
-    ];
+    let damping = [critical(k_p), options.orientation_error.critical_damping(k_o), critical(k_q), critical(k_h)];
     let samples = smooth.len();
     // Beyond the last sample nothing ties the last weights down, and they are large, because there f is small: a plan that
     // reproduces its demonstration to a tenth of a millimetre was seen to leave the goal by 24 mm afterwards. So where
     // the demonstration rests at its end, the fit goes on with rest.
-    let rest = if smooth.ends_at_rest(REST_SPEED_SHARE) {
-        (samples as f64 * REST_SHARE) as usize
-    } else {
-        0
-    };
-    let phases: Vec<f64> = (0..samples + rest)
-        .map(|k| canonical.phase_at(k as f64 / (samples - 1) as f64))
-        .collect();
+    let rest = if smooth.ends_at_rest(REST_SPEED_SHARE) { (samples as f64 * REST_SHARE) as usize } else { 0 };
+    let phases: Vec<f64> = (0..samples + rest).map(|k| canonical.phase_at(k as f64 / (samples - 1) as f64)).collect();
     // What f/s must be for the plan to rest at the goal.
     let mut resting = [0.0; ROWS];
 
@@ -301,8 +283,7 @@ pub fn fit(demonstration: &Demonstration, options: &FitOptions) -> Result<Learne
                     let (w, dw) = (omega[i][axis], domega[axis][i]);
                     let w = w - HALF_TICK * dw;
                     target[POSITION_ROWS + axis] =
-                        (duration * duration * dw + damping[1] * duration * w) / k_o + e[axis]
-                            - e0[axis] * phases[i];
+                        (duration * duration * dw + damping[1] * duration * w) / k_o + e[axis] - e0[axis] * phases[i];
                 }
             }
         }
@@ -319,8 +300,7 @@ pub fn fit(demonstration: &Demonstration, options: &FitOptions) -> Result<Learne
             let mut dy = [0.0; 3];
             for axis in 0..ORIENTATION_ROWS {
                 let column: Vec<f64> = path.iter().map(|y| y[axis]).collect();
-                let (force, velocity) =
-                    linear_target(&column, period, duration, (k_o, damping[1]), &phases);
+                let (force, velocity) = linear_target(&column, period, duration, (k_o, damping[1]), &phases);
                 dy[axis] = velocity;
                 resting[POSITION_ROWS + axis] = column[samples - 1] - column[0];
                 for (target, force) in targets.iter_mut().zip(force) {
@@ -332,16 +312,10 @@ pub fn fit(demonstration: &Demonstration, options: &FitOptions) -> Result<Learne
     }
 
     let ridge = Ridge::new(&basis, &phases, options.ridge).ok_or(FitError::Singular)?;
-    targets.extend(
-        phases[samples..]
-            .iter()
-            .map(|s| resting.map(|value| value * s)),
-    );
+    targets.extend(phases[samples..].iter().map(|s| resting.map(|value| value * s)));
     let by_kernel = ridge.solve(&targets);
     let residuals = ridge.residuals(&by_kernel, &targets[..samples]);
-    let weights: Vec<f64> = (0..ROWS)
-        .flat_map(|row| by_kernel.iter().map(move |weights| weights[row]))
-        .collect();
+    let weights: Vec<f64> = (0..ROWS).flat_map(|row| by_kernel.iter().map(move |weights| weights[row])).collect();
 
     let mut learned = Learned {
         duration,
@@ -354,14 +328,7 @@ pub fn fit(demonstration: &Demonstration, options: &FitOptions) -> Result<Learne
         report: Report::default(),
     };
     let primitive = learned.primitive::<f64, FIT_CAPACITY>()?;
-    learned.report = report::replay(
-        demonstration,
-        &smooth,
-        &primitive,
-        &residuals,
-        ridge.condition(),
-        angle,
-    );
+    learned.report = report::replay(demonstration, &smooth, &primitive, &residuals, ridge.condition(), angle);
     Ok(learned)
 }
 
@@ -369,20 +336,12 @@ pub fn fit(demonstration: &Demonstration, options: &FitOptions) -> Result<Learne
 ///
 /// The velocity is taken half a tick early, because semi-implicit Euler damps with the velocity of the step before: this
 /// cancels its first-order error at 300 Hz.
-fn linear_target(
-    x: &[f64],
-    period: f64,
-    tau: f64,
-    (k, d): (f64, f64),
-    phases: &[f64],
-) -> (Vec<f64>, f64) {
+fn linear_target(x: &[f64], period: f64, tau: f64, (k, d): (f64, f64), phases: &[f64]) -> (Vec<f64>, f64) {
     let (dx, ddx) = (first_derivative(x, period), second_derivative(x, period));
     let (x0, goal) = (x[0], x[x.len() - 1]);
     let early = |i: usize| dx[i] - HALF_TICK * ddx[i];
     let force = (0..x.len())
-        .map(|i| {
-            (tau * tau * ddx[i] + d * tau * early(i)) / k - (goal - x[i]) + (goal - x0) * phases[i]
-        })
+        .map(|i| (tau * tau * ddx[i] + d * tau * early(i)) / k - (goal - x[i]) + (goal - x0) * phases[i])
         .collect();
     (force, early(0))
 }

@@ -26,12 +26,7 @@ pub fn angular_velocity(orientation: &[Quaternion<f64>], period: f64) -> Vec<[f6
     if n < 5 {
         return omega;
     }
-    let between = |a: usize, b: usize| {
-        orientation[a]
-            .conjugate()
-            .product(&orientation[b])
-            .rotation_vector()
-    };
+    let between = |a: usize, b: usize| orientation[a].conjugate().product(&orientation[b]).rotation_vector();
     for (k, omega) in omega.iter_mut().enumerate().take(n - 1).skip(1) {
         let near = between(k - 1, k + 1);
         *omega = if k >= 2 && k + 2 < n {
@@ -63,8 +58,7 @@ pub fn largest_angle_to_goal(orientation: &[Quaternion<f64>]) -> f64 {
         let r = goal.conjugate().product(q).rotation_vector();
         let angle = libm::sqrt(r.iter().map(|r| r * r).sum());
         // Passing through a full turn flips the axis and folds the angle: 2 pi + d is read as 2 pi - d.
-        let folded =
-            axis.iter().zip(&r).map(|(a, r)| a * r).sum::<f64>() < 0.0 && previous > 0.75 * turn;
+        let folded = axis.iter().zip(&r).map(|(a, r)| a * r).sum::<f64>() < 0.0 && previous > 0.75 * turn;
         let continued = if folded { 2.0 * turn - angle } else { angle };
         if !folded {
             axis = r;

@@ -76,10 +76,7 @@ pub(super) fn replay(
     condition: f64,
     largest_angle: f64,
 ) -> Report {
-    let mut report = Report {
-        condition,
-        ..Report::default()
-    };
+    let mut report = Report { condition, ..Report::default() };
     for (row, &residual) in report.rows.iter_mut().zip(residuals) {
         row.force_rms = residual;
     }
@@ -88,15 +85,8 @@ pub(super) fn replay(
         let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         report.rows[row].extent = high - low;
     }
-    for ((row, raw), (_, smooth)) in recorded
-        .linear_columns()
-        .zip(demonstration.linear_columns())
-    {
-        let squares: f64 = raw
-            .iter()
-            .zip(&smooth)
-            .map(|(a, b)| (a - b) * (a - b))
-            .sum();
+    for ((row, raw), (_, smooth)) in recorded.linear_columns().zip(demonstration.linear_columns()) {
+        let squares: f64 = raw.iter().zip(&smooth).map(|(a, b)| (a - b) * (a - b)).sum();
         report.rows[row].removed_rms = libm::sqrt(squares / raw.len() as f64);
     }
     // The demonstrated start of a checked primitive is always accepted.
@@ -123,11 +113,8 @@ pub(super) fn replay(
             rows[i].add(distance);
         }
         let q = row.orientation.quaternion;
-        let e = q
-            .aligned_with(&demonstrated.orientation)
-            .conjugate()
-            .product(&demonstrated.orientation)
-            .rotation_vector();
+        let e =
+            q.aligned_with(&demonstrated.orientation).conjugate().product(&demonstrated.orientation).rotation_vector();
         for (i, e) in e.iter().enumerate() {
             rows[3 + i].add(*e);
         }
@@ -139,10 +126,7 @@ pub(super) fn replay(
         row.max = distance.max;
     }
     let path = |orientation: &[crate::Quaternion<f64>]| -> f64 {
-        orientation
-            .windows(2)
-            .map(|pair| pair[0].conjugate().product(&pair[1]).angle())
-            .sum()
+        orientation.windows(2).map(|pair| pair[0].conjugate().product(&pair[1]).angle()).sum()
     };
     report.orientation = OrientationReport {
         rms: turn.rms(count),

@@ -20,11 +20,7 @@ pub(super) struct Ridge {
 }
 
 impl Ridge {
-    pub(super) fn new(
-        basis: &Basis<f64, FIT_CAPACITY>,
-        phases: &[f64],
-        ridge: f64,
-    ) -> Option<Self> {
+    pub(super) fn new(basis: &Basis<f64, FIT_CAPACITY>, phases: &[f64], ridge: f64) -> Option<Self> {
         let count = basis.count();
         let activations: Vec<_> = phases.iter().map(|&s| basis.evaluate(s)).collect();
         let mut gram: Vec<Vec<f64>> = (0..count).map(|i| std::vec![0.0; i + 1]).collect();
@@ -44,12 +40,7 @@ impl Ridge {
             row[i] += lambda;
         }
         let factor = cholesky(&gram)?;
-        Some(Self {
-            count,
-            activations,
-            factor,
-            gram,
-        })
+        Some(Self { count, activations, factor, gram })
     }
 
     /// Weights, kernel by kernel, for targets sample by sample.
@@ -65,11 +56,7 @@ impl Ridge {
     }
 
     /// Root mean square of what the weights leave of the targets, row by row.
-    pub(super) fn residuals(
-        &self,
-        weights: &[[f64; ROWS]],
-        targets: &[[f64; ROWS]],
-    ) -> [f64; ROWS] {
+    pub(super) fn residuals(&self, weights: &[[f64; ROWS]], targets: &[[f64; ROWS]]) -> [f64; ROWS] {
         let mut sum = [0.0; ROWS];
         for (a, target) in self.activations.iter().zip(targets) {
             let mut rest = *target;
@@ -90,9 +77,7 @@ impl Ridge {
         let start = || -> Vec<[f64; 1]> {
             // Alternating signs are far from the smooth eigenvector of the largest value and near that of the smallest;
             // the slope keeps a part of both.
-            (0..self.count)
-                .map(|i| [if i % 2 == 0 { 1.0 } else { -0.9 } + i as f64 * 1e-2])
-                .collect()
+            (0..self.count).map(|i| [if i % 2 == 0 { 1.0 } else { -0.9 } + i as f64 * 1e-2]).collect()
         };
         let norm = |x: &[[f64; 1]]| libm::sqrt(x.iter().map(|[x]| x * x).sum::<f64>());
         let (mut largest, mut x) = (0.0, start());

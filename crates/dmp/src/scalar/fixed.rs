@@ -42,10 +42,7 @@ impl FixedPoint {
 
     /// Polynomial with the constant term first.
     fn polynomial(self, coefficients: &[f64]) -> Self {
-        coefficients
-            .iter()
-            .rev()
-            .fold(Self::ZERO, |sum, &c| sum * self + Self::constant(c))
+        coefficients.iter().rev().fold(Self::ZERO, |sum, &c| sum * self + Self::constant(c))
     }
 
     /// Nearest integer, with the remainder `self - n * unit` for the given unit and its reciprocal.
@@ -59,11 +56,8 @@ impl FixedPoint {
         const TAN_EIGHTH: FixedPoint = FixedPoint::constant(0.414_213_562_373_095_05);
         const QUARTER: FixedPoint = FixedPoint::constant(core::f64::consts::FRAC_PI_4);
         // Beyond tan(pi/8) turn by pi/4, so that the series only sees arguments up to 0.414.
-        let (offset, t) = if self > TAN_EIGHTH {
-            (QUARTER, (self - Self::ONE) / (self + Self::ONE))
-        } else {
-            (Self::ZERO, self)
-        };
+        let (offset, t) =
+            if self > TAN_EIGHTH { (QUARTER, (self - Self::ONE) / (self + Self::ONE)) } else { (Self::ZERO, self) };
         const SERIES: [f64; 11] = [
             1.0,
             -1.0 / 3.0,
@@ -190,23 +184,9 @@ impl Scalar for FixedPoint {
     fn sin_cos(self) -> (Self, Self) {
         const HALF_PI: FixedPoint = FixedPoint::constant(core::f64::consts::FRAC_PI_2);
         const RECIPROCAL: FixedPoint = FixedPoint::constant(core::f64::consts::FRAC_2_PI);
-        const SIN: [f64; 6] = [
-            1.0,
-            -1.0 / 6.0,
-            1.0 / 120.0,
-            -1.0 / 5_040.0,
-            1.0 / 362_880.0,
-            -1.0 / 39_916_800.0,
-        ];
-        const COS: [f64; 7] = [
-            1.0,
-            -1.0 / 2.0,
-            1.0 / 24.0,
-            -1.0 / 720.0,
-            1.0 / 40_320.0,
-            -1.0 / 3_628_800.0,
-            1.0 / 479_001_600.0,
-        ];
+        const SIN: [f64; 6] = [1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5_040.0, 1.0 / 362_880.0, -1.0 / 39_916_800.0];
+        const COS: [f64; 7] =
+            [1.0, -1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40_320.0, -1.0 / 3_628_800.0, 1.0 / 479_001_600.0];
         let (n, r) = self.reduce(HALF_PI, RECIPROCAL);
         let r2 = r * r;
         let (sin, cos) = (r * r2.polynomial(&SIN), r2.polynomial(&COS));
@@ -229,16 +209,8 @@ impl Scalar for FixedPoint {
         } else {
             HALF_PI - (b / a).atan_unit()
         };
-        let half_plane = if x < Self::ZERO {
-            PI - first_octants
-        } else {
-            first_octants
-        };
-        if self < Self::ZERO {
-            -half_plane
-        } else {
-            half_plane
-        }
+        let half_plane = if x < Self::ZERO { PI - first_octants } else { first_octants };
+        if self < Self::ZERO { -half_plane } else { half_plane }
     }
 
     #[inline]

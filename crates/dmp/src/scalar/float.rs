@@ -44,12 +44,10 @@ impl Scalar for f64 {
             + r2 * (1.0 / 2.0
                 + r2 * (1.0 / 24.0
                     + r2 * (1.0 / 720.0
-                        + r2 * (1.0 / 40_320.0
-                            + r2 * (1.0 / 3_628_800.0 + r2 * (1.0 / 479_001_600.0))))));
+                        + r2 * (1.0 / 40_320.0 + r2 * (1.0 / 3_628_800.0 + r2 * (1.0 / 479_001_600.0))))));
         let odd = 1.0
             + r2 * (1.0 / 6.0
-                + r2 * (1.0 / 120.0
-                    + r2 * (1.0 / 5_040.0 + r2 * (1.0 / 362_880.0 + r2 * (1.0 / 39_916_800.0)))));
+                + r2 * (1.0 / 120.0 + r2 * (1.0 / 5_040.0 + r2 * (1.0 / 362_880.0 + r2 * (1.0 / 39_916_800.0)))));
         // 2^n by its exponent bits: the low mantissa bits of `shifted` hold n.
         let scale = f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52);
         (even + r * odd) * scale
@@ -137,12 +135,8 @@ impl Scalar for f32 {
         let n = libm::rintf(self * core::f32::consts::FRAC_2_PI);
         let r = ((self - n * PART_1) - n * PART_2) - n * PART_3;
         let r2 = r * r;
-        let sin = r
-            * (1.0
-                - r2 * (1.0 / 6.0
-                    - r2 * (1.0 / 120.0 - r2 * (1.0 / 5_040.0 - r2 * (1.0 / 362_880.0)))));
-        let cos =
-            1.0 - r2 * (1.0 / 2.0 - r2 * (1.0 / 24.0 - r2 * (1.0 / 720.0 - r2 * (1.0 / 40_320.0))));
+        let sin = r * (1.0 - r2 * (1.0 / 6.0 - r2 * (1.0 / 120.0 - r2 * (1.0 / 5_040.0 - r2 * (1.0 / 362_880.0)))));
+        let cos = 1.0 - r2 * (1.0 / 2.0 - r2 * (1.0 / 24.0 - r2 * (1.0 / 720.0 - r2 * (1.0 / 40_320.0))));
         // NaN and infinity end up here as NaN values with quadrant 0.
         match (n as i32) & 3 {
             0 => (sin, cos),

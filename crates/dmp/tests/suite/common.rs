@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use dmp::{
-    Configuration, Coupling, Feedback, Hemisphere, OrientationError, Primitive, PrimitiveTables,
-    Quaternion, ROWS, Reference, Rollout, Scalar, StartState, Velocity,
+    Configuration, Coupling, Feedback, Hemisphere, OrientationError, Primitive, PrimitiveTables, Quaternion, ROWS,
+    Reference, Rollout, Scalar, StartState, Velocity,
 };
 
 /// Control period of the golden vectors, s.
@@ -24,24 +24,13 @@ pub(crate) struct Table {
 impl Table {
     /// Reads `tests/vectors/<name>.csv`; empty fields become NaN, words too.
     pub(crate) fn load(name: &str) -> Self {
-        let path = format!(
-            concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/vectors/{}.csv"),
-            name
-        );
+        let path = format!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/vectors/{}.csv"), name);
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .from_path(&path)
             .unwrap_or_else(|error| panic!("{path}: {error}"));
-        let header: Vec<String> = reader
-            .headers()
-            .unwrap()
-            .iter()
-            .map(str::to_owned)
-            .collect();
-        let mut columns: HashMap<String, Vec<f64>> = header
-            .iter()
-            .map(|name| (name.clone(), Vec::new()))
-            .collect();
+        let header: Vec<String> = reader.headers().unwrap().iter().map(str::to_owned).collect();
+        let mut columns: HashMap<String, Vec<f64>> = header.iter().map(|name| (name.clone(), Vec::new())).collect();
         for record in reader.records() {
             for (name, field) in header.iter().zip(&record.unwrap()) {
                 let value = field.parse().unwrap_or(f64::NAN);
@@ -53,30 +42,20 @@ impl Table {
 
     /// One column.
     pub(crate) fn column(&self, name: &str) -> &[f64] {
-        self.columns
-            .get(name)
-            .unwrap_or_else(|| panic!("no column {name}"))
+        self.columns.get(name).unwrap_or_else(|| panic!("no column {name}"))
     }
 
     /// Several columns side by side.
     pub(crate) fn columns<const D: usize>(&self, names: [&str; D]) -> Vec<[f64; D]> {
         let columns = names.map(|name| self.column(name));
-        (0..columns[0].len())
-            .map(|row| columns.map(|column| column[row]))
-            .collect()
+        (0..columns[0].len()).map(|row| columns.map(|column| column[row])).collect()
     }
 }
 
 /// Weights of one set of `dmp_theta.csv`, row by row.
 pub(crate) fn theta(set: &str) -> Vec<Vec<f64>> {
-    let path = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../tests/vectors/dmp_theta.csv"
-    );
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .from_path(path)
-        .unwrap();
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/vectors/dmp_theta.csv");
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(path).unwrap();
     let rows: Vec<Vec<f64>> = reader
         .records()
         .map(Result::unwrap)
@@ -101,12 +80,8 @@ pub(crate) struct Plan {
     pub(crate) stiffness: f64,
 }
 
-pub(crate) const ORIGIN: Configuration<f64> = Configuration {
-    position: [0.0; 3],
-    orientation: Quaternion::IDENTITY,
-    posture: [0.0; 7],
-    hand: [0.0; 4],
-};
+pub(crate) const ORIGIN: Configuration<f64> =
+    Configuration { position: [0.0; 3], orientation: Quaternion::IDENTITY, posture: [0.0; 7], hand: [0.0; 4] };
 
 impl Plan {
     /// Unforced, from the origin to the origin in 5 s.

@@ -4,8 +4,7 @@ use std::f64::consts::PI;
 
 use crate::common::DT;
 use dmp::fit::{
-    Demonstration, DemonstrationError, FitError, FitOptions, Learned, RowReport, angular_velocity,
-    fit, minimum_jerk,
+    Demonstration, DemonstrationError, FitError, FitOptions, Learned, RowReport, angular_velocity, fit, minimum_jerk,
 };
 use dmp::{Coupling, OrientationError, Quaternion, Rollout, StartState};
 
@@ -25,16 +24,10 @@ fn rippled(samples: usize) -> Demonstration {
     };
     Demonstration::new(
         5.0 / (samples - 1) as f64,
-        (0..samples)
-            .map(|k| std::array::from_fn(|i| value(k, i as f64)))
-            .collect(),
+        (0..samples).map(|k| std::array::from_fn(|i| value(k, i as f64))).collect(),
         still_orientation(samples),
-        (0..samples)
-            .map(|k| std::array::from_fn(|i| value(k, 0.3 * i as f64)))
-            .collect(),
-        (0..samples)
-            .map(|k| std::array::from_fn(|i| value(k, -0.7 * i as f64)))
-            .collect(),
+        (0..samples).map(|k| std::array::from_fn(|i| value(k, 0.3 * i as f64))).collect(),
+        (0..samples).map(|k| std::array::from_fn(|i| value(k, -0.7 * i as f64))).collect(),
     )
     .unwrap()
 }
@@ -47,16 +40,8 @@ fn turning(samples: usize, angle: f64) -> Demonstration {
             // Three factors about different axes; the last one alone carries the angle to the goal.
             let swing = (PI * b).sin();
             Quaternion::from_rotation_vector(&[0.3, -0.2, 0.4])
-                .product(&Quaternion::from_rotation_vector(&[
-                    0.0,
-                    0.5 * swing,
-                    -0.3 * swing,
-                ]))
-                .product(&Quaternion::from_rotation_vector(&[
-                    0.48 * angle * b,
-                    0.6 * angle * b,
-                    0.64 * angle * b,
-                ]))
+                .product(&Quaternion::from_rotation_vector(&[0.0, 0.5 * swing, -0.3 * swing]))
+                .product(&Quaternion::from_rotation_vector(&[0.48 * angle * b, 0.6 * angle * b, 0.64 * angle * b]))
         })
         .collect();
     Demonstration::new(
@@ -70,19 +55,13 @@ fn turning(samples: usize, angle: f64) -> Demonstration {
 }
 
 fn exact() -> FitOptions {
-    FitOptions {
-        cutoff: None,
-        ..FitOptions::default()
-    }
+    FitOptions { cutoff: None, ..FitOptions::default() }
 }
 
 #[test]
 fn fifty_kernels_reproduce_a_rippled_minimum_jerk() {
     for cutoff in [None, Some(7.5)] {
-        let options = FitOptions {
-            cutoff,
-            ..FitOptions::default()
-        };
+        let options = FitOptions { cutoff, ..FitOptions::default() };
         let learned = fit(&rippled(SAMPLES), &options).unwrap();
         let rows = &learned.report.rows;
         let worst = [0, 1, 2, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16]
@@ -147,10 +126,7 @@ fn replay_with_rows(
     let system = OrientationSystem::<f64>::critically_damped(200.0).unwrap();
     let (k, d) = (200.0, system.gains().damping());
     let (q0, goal) = (q[0], q[q.len() - 1]);
-    let mut state = OrientationState {
-        q: q0,
-        omega: [0.0; 3],
-    };
+    let mut state = OrientationState { q: q0, omega: [0.0; 3] };
     let (mut worst, mut path) = (0.0_f64, 0.0);
     let h = demonstration.period() / tau;
     for i in 0..q.len() - 1 {
@@ -164,27 +140,12 @@ fn replay_with_rows(
         };
         let e = dmp::orientation_error(&goal, &q[i]);
         let e0 = dmp::orientation_error(&goal, &q0);
-        let f =
-            std::array::from_fn(|c| (tau * tau * dw[c] + d * tau * w[c]) / k + e[c] - e0[c] * s);
-        let rhs = system.right_hand_side(
-            &state,
-            &OrientationInput {
-                start: q0,
-                goal,
-                s,
-                f,
-                zeta: [0.0; 3],
-            },
-        );
+        let f = std::array::from_fn(|c| (tau * tau * dw[c] + d * tau * w[c]) / k + e[c] - e0[c] * s);
+        let rhs = system.right_hand_side(&state, &OrientationInput { start: q0, goal, s, f, zeta: [0.0; 3] });
         let before = state.q;
         state.step(&rhs, h);
         path += before.conjugate().product(&state.q).angle();
-        let miss = state
-            .q
-            .aligned_with(&q[i + 1])
-            .conjugate()
-            .product(&q[i + 1])
-            .angle();
+        let miss = state.q.aligned_with(&q[i + 1]).conjugate().product(&q[i + 1]).angle();
         worst = worst.max(miss);
     }
     (worst.to_degrees(), path.to_degrees())
@@ -248,15 +209,9 @@ fn half_circle_is_refused_unless_the_rotation_vector_is_chosen() {
         panic!("a turn of 200 degrees was accepted");
     };
     assert!((angle.to_degrees() - 200.0).abs() < 15.0);
-    let options = FitOptions {
-        orientation_error: OrientationError::RotationVector,
-        ..exact()
-    };
+    let options = FitOptions { orientation_error: OrientationError::RotationVector, ..exact() };
     let report = fit(&demonstration, &options).unwrap().report.orientation;
-    println!(
-        "200 deg by rotation vector: error {:.4} deg",
-        report.max.to_degrees()
-    );
+    println!("200 deg by rotation vector: error {:.4} deg", report.max.to_degrees());
     assert!(report.max.to_degrees() < 0.1);
     assert!(report.wide);
     assert!((report.replayed_path / report.path - 1.0).abs() < 0.01);
@@ -287,18 +242,12 @@ fn noise_is_filtered_before_it_is_differentiated() {
     let mut noise = || {
         let mut sum = 0.0;
         for _ in 0..12 {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             sum += (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
         }
         sum * 2e-4
     };
-    let noisy: Vec<[f64; 3]> = clean
-        .position()
-        .iter()
-        .map(|x| x.map(|x| x + noise()))
-        .collect();
+    let noisy: Vec<[f64; 3]> = clean.position().iter().map(|x| x.map(|x| x + noise())).collect();
     let demonstration = Demonstration::new(
         clean.period(),
         noisy,
@@ -310,8 +259,7 @@ fn noise_is_filtered_before_it_is_differentiated() {
     let error = |options: &FitOptions| {
         let learned = fit(&demonstration, options).unwrap();
         let primitive = learned.primitive::<f64, 50>().unwrap();
-        let mut rollout =
-            Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
+        let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
         let squares: f64 = clean
             .position()
             .iter()
@@ -320,16 +268,11 @@ fn noise_is_filtered_before_it_is_differentiated() {
                 (row.position.x[0] - x[0]).powi(2)
             })
             .sum();
-        (
-            (squares / clean.len() as f64).sqrt(),
-            learned.report.rows[0].force_rms,
-        )
+        ((squares / clean.len() as f64).sqrt(), learned.report.rows[0].force_rms)
     };
     let (filtered, filtered_force) = error(&FitOptions::default());
     let (raw, raw_force) = error(&exact());
-    println!(
-        "noise: replay {filtered:.1e} filtered, {raw:.1e} raw; force rest {filtered_force:.2} / {raw_force:.2}"
-    );
+    println!("noise: replay {filtered:.1e} filtered, {raw:.1e} raw; force rest {filtered_force:.2} / {raw_force:.2}");
     assert!(filtered < 5e-4);
     assert!(raw > 3.0 * filtered);
     assert!(raw_force > 3.0 * filtered_force);
@@ -359,14 +302,8 @@ fn synthetic_recording() -> Vec<(String, Demonstration)> {
                 .product(&Quaternion::from_rotation_vector(&[0.0, 0.0, turn]))
         })
         .collect();
-    let demonstration = Demonstration::new(
-        DT,
-        position,
-        orientation,
-        vec![[0.0; 7]; samples],
-        vec![[0.0; 4]; samples],
-    )
-    .unwrap();
+    let demonstration =
+        Demonstration::new(DT, position, orientation, vec![[0.0; 7]; samples], vec![[0.0; 4]; samples]).unwrap();
     vec![("synthetic".into(), demonstration)]
 }
 
@@ -395,17 +332,12 @@ fn recordings() -> Vec<(String, Demonstration)> {
             let demonstration = Demonstration::new(
                 DT,
                 rows.iter().map(|r| [r[1], r[2], r[3]]).collect(),
-                rows.iter()
-                    .map(|r| Quaternion::new(r[4], r[5], r[6], r[7]))
-                    .collect(),
+                rows.iter().map(|r| Quaternion::new(r[4], r[5], r[6], r[7])).collect(),
                 vec![[0.0; 7]; rows.len()],
                 vec![[0.0; 4]; rows.len()],
             )
             .unwrap();
-            (
-                path.file_name().unwrap().to_string_lossy().into_owned(),
-                demonstration,
-            )
+            (path.file_name().unwrap().to_string_lossy().into_owned(), demonstration)
         })
         .collect()
 }
@@ -414,10 +346,7 @@ fn recordings() -> Vec<(String, Demonstration)> {
 fn recordings_cut_from_a_motion_replay_from_their_own_velocity() {
     for (name, demonstration) in recordings() {
         let refused = fit(&demonstration, &FitOptions::default());
-        assert!(
-            matches!(refused, Err(FitError::TurnsTooFar { .. })),
-            "{name}"
-        );
+        assert!(matches!(refused, Err(FitError::TurnsTooFar { .. })), "{name}");
         for (kernel_count, bar) in [(50, 0.015), (100, 0.003)] {
             let options = FitOptions {
                 kernel_count,
@@ -426,9 +355,8 @@ fn recordings_cut_from_a_motion_replay_from_their_own_velocity() {
             };
             let learned = fit(&demonstration, &options).unwrap();
             let rows = &learned.report.rows[..3];
-            let norm = |f: &dyn Fn(&RowReport) -> f64| -> f64 {
-                rows.iter().map(|row| f(row).powi(2)).sum::<f64>().sqrt()
-            };
+            let norm =
+                |f: &dyn Fn(&RowReport) -> f64| -> f64 { rows.iter().map(|row| f(row).powi(2)).sum::<f64>().sqrt() };
             let extent = norm(&|row| row.extent);
             let worst = norm(&|row| row.rms) / extent;
             let max = norm(&|row| row.max) / extent;
@@ -451,10 +379,7 @@ fn recordings_cut_from_a_motion_replay_from_their_own_velocity() {
             // Fifty kernels are 0.13 s apart and do not resolve how these turn; one hundred do.
             if kernel_count == 100 {
                 assert!(report.max.to_degrees() < 0.5, "{name}");
-                assert!(
-                    (report.replayed_path / report.path - 1.0).abs() < 0.01,
-                    "{name}"
-                );
+                assert!((report.replayed_path / report.path - 1.0).abs() < 0.01, "{name}");
             }
             // Negative control: from rest the replay is worse.
             let primitive = learned.primitive::<f64, 100>().unwrap();
@@ -478,61 +403,28 @@ fn recordings_cut_from_a_motion_replay_from_their_own_velocity() {
 fn unusable_demonstrations_are_refused_with_the_sample() {
     let n = 100;
     let build = |position: Vec<[f64; 3]>, orientation: Vec<Quaternion<f64>>| {
-        Demonstration::new(
-            DT,
-            position,
-            orientation,
-            vec![[0.0; 7]; n],
-            vec![[0.0; 4]; n],
-        )
+        Demonstration::new(DT, position, orientation, vec![[0.0; 7]; n], vec![[0.0; 4]; n])
     };
     let mut position = vec![[0.0; 3]; n];
     position[42][1] = f64::NAN;
-    assert_eq!(
-        build(position, still_orientation(n)),
-        Err(DemonstrationError::NotFinite { sample: 42 })
-    );
+    assert_eq!(build(position, still_orientation(n)), Err(DemonstrationError::NotFinite { sample: 42 }));
     let mut orientation = still_orientation(n);
     orientation[7].w = 0.9;
+    assert_eq!(build(vec![[0.0; 3]; n], orientation), Err(DemonstrationError::NotUnit { sample: 7 }));
+    assert_eq!(build(vec![[0.0; 3]; n - 1], still_orientation(n)), Err(DemonstrationError::Lengths));
     assert_eq!(
-        build(vec![[0.0; 3]; n], orientation),
-        Err(DemonstrationError::NotUnit { sample: 7 })
-    );
-    assert_eq!(
-        build(vec![[0.0; 3]; n - 1], still_orientation(n)),
-        Err(DemonstrationError::Lengths)
-    );
-    assert_eq!(
-        Demonstration::new(
-            DT,
-            vec![[0.0; 3]; 5],
-            still_orientation(5),
-            vec![[0.0; 7]; 5],
-            vec![[0.0; 4]; 5]
-        ),
+        Demonstration::new(DT, vec![[0.0; 3]; 5], still_orientation(5), vec![[0.0; 7]; 5], vec![[0.0; 4]; 5]),
         Err(DemonstrationError::TooFew { samples: 5 })
     );
     let demonstration = rippled(200);
     for options in [
-        FitOptions {
-            kernel_count: 1,
-            ..exact()
-        },
-        FitOptions {
-            kernel_count: 201,
-            ..exact()
-        },
-        FitOptions {
-            alpha: 1.0,
-            ..exact()
-        },
+        FitOptions { kernel_count: 1, ..exact() },
+        FitOptions { kernel_count: 201, ..exact() },
+        FitOptions { alpha: 1.0, ..exact() },
     ] {
         assert_eq!(fit(&demonstration, &options), Err(FitError::Basis));
     }
-    let cutoff = FitOptions {
-        cutoff: Some(1e4),
-        ..exact()
-    };
+    let cutoff = FitOptions { cutoff: Some(1e4), ..exact() };
     assert_eq!(fit(&demonstration, &cutoff), Err(FitError::Cutoff));
 }
 

@@ -3,8 +3,8 @@
 
 use crate::common::{ALPHA, DT, K, N, Plan, Table, largest_difference, run, theta, ticks};
 use dmp::{
-    Basis, CanonicalSystem, Coupling, FixedPoint, ForcingTerm, Phase, PointInput, PointState,
-    Quaternion, Reference, Scalar, TransformationSystem,
+    Basis, CanonicalSystem, Coupling, FixedPoint, ForcingTerm, Phase, PointInput, PointState, Quaternion, Reference,
+    Scalar, TransformationSystem,
 };
 
 const F64: f64 = 1e-10;
@@ -66,11 +66,8 @@ fn forcing_error<T: Scalar>() -> f64 {
 
 #[test]
 fn forcing_term_is_exact_even_beyond_the_last_centre() {
-    let (f64_error, f32_error, fixed_error) = (
-        forcing_error::<f64>(),
-        forcing_error::<f32>(),
-        forcing_error::<FixedPoint>(),
-    );
+    let (f64_error, f32_error, fixed_error) =
+        (forcing_error::<f64>(), forcing_error::<f32>(), forcing_error::<FixedPoint>());
     println!("f(s): f64 {f64_error:.1e}, f32 {f32_error:.1e}, fixed {fixed_error:.1e}");
     assert!(f64_error < 1e-13);
     assert!(f32_error < 1e-6);
@@ -111,16 +108,7 @@ fn single_row<T: Scalar>(
         let h = T::from_f64(DT / per_tick as f64 / tau);
         let rate = T::from_f64(1.0 / tau);
         let [f] = forcing.evaluate(phase.s());
-        let rhs = system.right_hand_side(
-            &state,
-            &PointInput {
-                start: T::ZERO,
-                goal,
-                s: phase.s(),
-                f,
-                zeta: T::ZERO,
-            },
-        );
+        let rhs = system.right_hand_side(&state, &PointInput { start: T::ZERO, goal, s: phase.s(), f, zeta: T::ZERO });
         if i % per_tick == 0 {
             rows.push([state.x(), state.v() * rate, rhs * rate * rate].map(Scalar::to_f64));
         }
@@ -136,11 +124,7 @@ fn check_single_row(name: &str, event: impl Fn(usize, f64) -> (Option<f64>, f64)
     let e = table.columns(["x_e", "xd_e", "xdd_e"]);
     let x_c: Vec<[f64; 1]> = table.columns(["x_c"]);
     let n = ticks(times);
-    fn at<T: Scalar>(
-        n: usize,
-        per_tick: usize,
-        event: &impl Fn(usize, f64) -> (Option<f64>, f64),
-    ) -> Vec<[f64; 3]> {
+    fn at<T: Scalar>(n: usize, per_tick: usize, event: &impl Fn(usize, f64) -> (Option<f64>, f64)) -> Vec<[f64; 3]> {
         single_row::<T>(n, per_tick, |tick, goal, tau| {
             let (new_goal, new_tau) = event(tick, *tau);
             if let Some(new) = new_goal {
@@ -179,42 +163,28 @@ fn one_row_follows_the_nominal_vectors() {
 
 #[test]
 fn one_row_follows_a_goal_change() {
-    check_single_row("dmp_pos1_goal", |tick, tau| {
-        ((tick == 750).then_some(1.5), tau)
-    });
+    check_single_row("dmp_pos1_goal", |tick, tau| ((tick == 750).then_some(1.5), tau));
 }
 
 #[test]
 fn one_row_follows_a_change_of_tau() {
-    check_single_row("dmp_pos1_tau", |tick, tau| {
-        (None, if tick == 600 { 7.5 } else { tau })
-    });
+    check_single_row("dmp_pos1_tau", |tick, tau| (None, if tick == 600 { 7.5 } else { tau }));
 }
 
 fn position_run<T: Scalar>(ticks: usize, per_tick: usize) -> Vec<[[f64; 3]; 3]> {
     let mut plan = Plan::golden();
     plan.goal.orientation = plan.start.orientation;
     let primitive = plan.build::<T>();
-    let rows = run(
-        &primitive,
-        ticks * per_tick,
-        DT / per_tick as f64,
-        |i, rollout| {
-            if i == 750 * per_tick {
-                rollout
-                    .set_goal_position([0.6, 0.12, 0.09].map(T::from_f64))
-                    .unwrap();
-            }
-            if i == 900 * per_tick {
-                rollout.set_duration(&primitive, T::from_f64(6.0)).unwrap();
-            }
-            Coupling::NONE
-        },
-    );
-    rows.iter()
-        .step_by(per_tick)
-        .map(|row| [d3(row.position.x), d3(row.position.v), d3(row.position.a)])
-        .collect()
+    let rows = run(&primitive, ticks * per_tick, DT / per_tick as f64, |i, rollout| {
+        if i == 750 * per_tick {
+            rollout.set_goal_position([0.6, 0.12, 0.09].map(T::from_f64)).unwrap();
+        }
+        if i == 900 * per_tick {
+            rollout.set_duration(&primitive, T::from_f64(6.0)).unwrap();
+        }
+        Coupling::NONE
+    });
+    rows.iter().step_by(per_tick).map(|row| [d3(row.position.x), d3(row.position.v), d3(row.position.a)]).collect()
 }
 
 #[test]
@@ -234,11 +204,8 @@ fn position_follows_goal_and_tau_changes_in_every_number_type() {
         ]
     };
     let rows = position_run::<f64>(n, 1);
-    let (double, single, fixed) = (
-        errors(&rows),
-        errors(&position_run::<f32>(n, 1)),
-        errors(&position_run::<FixedPoint>(n, 1)),
-    );
+    let (double, single, fixed) =
+        (errors(&rows), errors(&position_run::<f32>(n, 1)), errors(&position_run::<FixedPoint>(n, 1)));
     let euler = largest_difference(times, &c, |k| rows[k][0]);
     let halved = position_run::<f64>(n, 2);
     let half = largest_difference(times, &c, |k| halved[k][0]);
@@ -269,39 +236,28 @@ fn orientation_errors<T: Scalar>(
     let table = Table::load(name);
     let times = table.column("t");
     let primitive = plan.build::<T>();
-    let rows = run(
-        &primitive,
-        ticks(times) * per_tick,
-        DT / per_tick as f64,
-        |i, rollout| {
-            if let Some((tick, goal)) = new_goal
-                && i == tick * per_tick
-            {
-                let [w, x, y, z] = goal.map(T::from_f64);
-                let goal = Quaternion::new(w, x, y, z);
-                rollout.set_goal_orientation(&primitive, goal).unwrap();
-            }
-            Coupling::NONE
-        },
-    );
+    let rows = run(&primitive, ticks(times) * per_tick, DT / per_tick as f64, |i, rollout| {
+        if let Some((tick, goal)) = new_goal
+            && i == tick * per_tick
+        {
+            let [w, x, y, z] = goal.map(T::from_f64);
+            let goal = Quaternion::new(w, x, y, z);
+            rollout.set_goal_orientation(&primitive, goal).unwrap();
+        }
+        Coupling::NONE
+    });
     let rows: Vec<_> = rows.into_iter().step_by(per_tick).collect();
     OrientationErrors {
-        quaternion: largest_difference(
-            times,
-            &table.columns(["qw_e", "qx_e", "qy_e", "qz_e"]),
-            |k| quaternion(&rows[k]),
-        ),
-        omega: largest_difference(times, &table.columns(["wx_e", "wy_e", "wz_e"]), |k| {
-            d3(rows[k].orientation.omega)
+        quaternion: largest_difference(times, &table.columns(["qw_e", "qx_e", "qy_e", "qz_e"]), |k| {
+            quaternion(&rows[k])
         }),
+        omega: largest_difference(times, &table.columns(["wx_e", "wy_e", "wz_e"]), |k| d3(rows[k].orientation.omega)),
         domega: largest_difference(times, &table.columns(["dwx_e", "dwy_e", "dwz_e"]), |k| {
             d3(rows[k].orientation.domega)
         }),
-        continuous: largest_difference(
-            times,
-            &table.columns(["qw_c", "qx_c", "qy_c", "qz_c"]),
-            |k| quaternion(&rows[k]),
-        ),
+        continuous: largest_difference(times, &table.columns(["qw_c", "qx_c", "qy_c", "qz_c"]), |k| {
+            quaternion(&rows[k])
+        }),
     }
 }
 
@@ -328,12 +284,7 @@ fn orientation_follows_the_printed_equations() {
 
 #[test]
 fn orientation_goal_on_the_far_hemisphere_is_flipped() {
-    let goal = [
-        -0.606_367_852_664_785_4,
-        -0.301_869_840_623_903,
-        -0.735_469_259_635_399_1,
-        -0.016_661_173_660_779_446,
-    ];
+    let goal = [-0.606_367_852_664_785_4, -0.301_869_840_623_903, -0.735_469_259_635_399_1, -0.016_661_173_660_779_446];
     check_orientation("dmp_quat_body_goal", &Plan::golden(), Some((750, goal)));
 }
 
@@ -371,39 +322,21 @@ fn full_errors<T: Scalar>(
     let primitive = plan.build::<T>();
     let rows = run(&primitive, ticks(times), DT, |i, _| {
         let [px, py, pz, rx, ry, rz, hand @ ..] = zeta(i).map(T::from_f64);
-        Coupling {
-            position: [px, py, pz],
-            orientation: [rx, ry, rz],
-            hand,
-        }
+        Coupling { position: [px, py, pz], orientation: [rx, ry, rz], hand }
     });
     let mut errors = FullErrors {
-        position: largest_difference(times, &table.columns(["px_e", "py_e", "pz_e"]), |k| {
-            d3(rows[k].position.x)
+        position: largest_difference(times, &table.columns(["px_e", "py_e", "pz_e"]), |k| d3(rows[k].position.x)),
+        orientation: largest_difference(times, &table.columns(["qw_e", "qx_e", "qy_e", "qz_e"]), |k| {
+            quaternion(&rows[k])
         }),
-        orientation: largest_difference(
-            times,
-            &table.columns(["qw_e", "qx_e", "qy_e", "qz_e"]),
-            |k| quaternion(&rows[k]),
-        ),
-        continuous: largest_difference(times, &table.columns(["px_c", "py_c", "pz_c"]), |k| {
-            d3(rows[k].position.x)
-        }),
+        continuous: largest_difference(times, &table.columns(["px_c", "py_c", "pz_c"]), |k| d3(rows[k].position.x)),
         ..FullErrors::default()
     };
     let rates = [
-        largest_difference(times, &table.columns(["vx_e", "vy_e", "vz_e"]), |k| {
-            d3(rows[k].position.v)
-        }),
-        largest_difference(times, &table.columns(["ax_e", "ay_e", "az_e"]), |k| {
-            d3(rows[k].position.a)
-        }),
-        largest_difference(times, &table.columns(["wx_e", "wy_e", "wz_e"]), |k| {
-            d3(rows[k].orientation.omega)
-        }),
-        largest_difference(times, &table.columns(["dwx_e", "dwy_e", "dwz_e"]), |k| {
-            d3(rows[k].orientation.domega)
-        }),
+        largest_difference(times, &table.columns(["vx_e", "vy_e", "vz_e"]), |k| d3(rows[k].position.v)),
+        largest_difference(times, &table.columns(["ax_e", "ay_e", "az_e"]), |k| d3(rows[k].position.a)),
+        largest_difference(times, &table.columns(["wx_e", "wy_e", "wz_e"]), |k| d3(rows[k].orientation.omega)),
+        largest_difference(times, &table.columns(["dwx_e", "dwy_e", "dwz_e"]), |k| d3(rows[k].orientation.domega)),
     ];
     errors.rates = rates.into_iter().fold(0.0, f64::max);
     if let Some(&[x, y, z, w]) = hand_columns {
@@ -413,31 +346,19 @@ fn full_errors<T: Scalar>(
             [f1, f2, f3]
         };
         errors.hand = if x.is_empty() {
-            largest_difference(times, &table.columns([y, z, w]), |k| {
-                fingers(rows[k].hand.x)
-            })
+            largest_difference(times, &table.columns([y, z, w]), |k| fingers(rows[k].hand.x))
         } else {
             largest_difference(times, &table.columns([x, y, z, w]), hand)
         };
-        let d = largest_difference(times, &table.columns(["f1_d_e", "f2_d_e", "f3_d_e"]), |k| {
-            fingers(rows[k].hand.v)
-        });
-        let dd = largest_difference(
-            times,
-            &table.columns(["f1_dd_e", "f2_dd_e", "f3_dd_e"]),
-            |k| fingers(rows[k].hand.a),
-        );
+        let d = largest_difference(times, &table.columns(["f1_d_e", "f2_d_e", "f3_d_e"]), |k| fingers(rows[k].hand.v));
+        let dd =
+            largest_difference(times, &table.columns(["f1_dd_e", "f2_dd_e", "f3_dd_e"]), |k| fingers(rows[k].hand.a));
         errors.rates = errors.rates.max(d).max(dd);
     }
     errors
 }
 
-fn check_full(
-    name: &str,
-    plan: &Plan,
-    hand: Option<&[&str; 4]>,
-    zeta: impl Fn(usize) -> [f64; 10] + Copy,
-) {
+fn check_full(name: &str, plan: &Plan, hand: Option<&[&str; 4]>, zeta: impl Fn(usize) -> [f64; 10] + Copy) {
     let double = full_errors::<f64>(name, plan, hand, zeta);
     let single = full_errors::<f32>(name, plan, hand, zeta);
     let fixed = full_errors::<FixedPoint>(name, plan, hand, zeta);
@@ -466,9 +387,7 @@ fn check_full(
 #[test]
 fn whole_primitive_follows_the_uncoupled_vectors() {
     let hand = ["spread_e", "f1_e", "f2_e", "f3_e"];
-    check_full("dmp_nocoupling", &Plan::golden(), Some(&hand), |_| {
-        [0.0; 10]
-    });
+    check_full("dmp_nocoupling", &Plan::golden(), Some(&hand), |_| [0.0; 10]);
 }
 
 #[test]
@@ -477,9 +396,7 @@ fn whole_primitive_bends_as_the_coupled_vectors() {
     let names = ["z0", "z1", "z2", "z3", "z4", "z5", "z6", "z7", "z8", "z9"];
     let zeta = force.columns(names);
     let hand = ["", "f1_e", "f2_e", "f3_e"];
-    check_full("dmp_coupling", &Plan::golden(), Some(&hand), |tick| {
-        zeta[tick.min(zeta.len() - 1)]
-    });
+    check_full("dmp_coupling", &Plan::golden(), Some(&hand), |tick| zeta[tick.min(zeta.len() - 1)]);
 }
 
 #[test]

@@ -2,9 +2,9 @@
 
 use crate::common::{ALPHA, DT, ORIGIN, Plan, run};
 use dmp::{
-    Configuration, Coupling, FixedPoint, GainError, Hemisphere, OrientationError, PhaseTable,
-    Primitive, PrimitiveError, PrimitiveTables, Quaternion, ROWS, Rollout, RolloutError, Row,
-    Scalar, StartState, TableError, Velocity,
+    Configuration, Coupling, FixedPoint, GainError, Hemisphere, OrientationError, PhaseTable, Primitive,
+    PrimitiveError, PrimitiveTables, Quaternion, ROWS, Rollout, RolloutError, Row, Scalar, StartState, TableError,
+    Velocity,
 };
 use proptest::prelude::*;
 
@@ -48,58 +48,22 @@ fn unusable_parameters_are_refused_with_their_reason() {
         assert_eq!(refused(|t| t.alpha = alpha), PrimitiveError::Alpha);
     }
     for kernels in [0, 1, 21] {
-        assert_eq!(
-            refused(|t| t.kernel_count = kernels),
-            PrimitiveError::KernelCount
-        );
+        assert_eq!(refused(|t| t.kernel_count = kernels), PrimitiveError::KernelCount);
     }
-    assert_eq!(
-        refused(|t| t.kernel_count = 11),
-        PrimitiveError::WeightCount
-    );
+    assert_eq!(refused(|t| t.kernel_count = 11), PrimitiveError::WeightCount);
     assert_eq!(refused(|t| t.activation = 0.99), PrimitiveError::Activation);
-    assert_eq!(
-        refused(|t| t.weights = &[f64::NAN; ROWS * 10]),
-        PrimitiveError::Weight
-    );
-    assert_eq!(
-        refused(|t| t.stiffness[2] = -1.0),
-        PrimitiveError::Gains(Row::Posture, GainError::Stiffness)
-    );
-    assert_eq!(
-        refused(|t| t.damping[3] = f64::NAN),
-        PrimitiveError::Gains(Row::Hand, GainError::Damping)
-    );
+    assert_eq!(refused(|t| t.weights = &[f64::NAN; ROWS * 10]), PrimitiveError::Weight);
+    assert_eq!(refused(|t| t.stiffness[2] = -1.0), PrimitiveError::Gains(Row::Posture, GainError::Stiffness));
+    assert_eq!(refused(|t| t.damping[3] = f64::NAN), PrimitiveError::Gains(Row::Hand, GainError::Damping));
     // The default gains need tau > 0.057 s at 300 Hz.
-    assert_eq!(
-        refused(|t| t.duration = 0.0565),
-        PrimitiveError::Unstable(Row::Position)
-    );
-    assert_eq!(
-        refused(|t| t.start.posture[6] = f64::NAN),
-        PrimitiveError::Start
-    );
-    assert_eq!(
-        refused(|t| t.goal.hand[0] = f64::INFINITY),
-        PrimitiveError::Goal
-    );
-    assert_eq!(
-        refused(|t| t.start_velocity.hand[0] = f64::NAN),
-        PrimitiveError::StartVelocity
-    );
-    assert_eq!(
-        refused(|t| t.start.orientation.w = 0.9),
-        PrimitiveError::StartNotUnit
-    );
-    assert_eq!(
-        refused(|t| t.goal.orientation.x = 0.1),
-        PrimitiveError::GoalNotUnit
-    );
+    assert_eq!(refused(|t| t.duration = 0.0565), PrimitiveError::Unstable(Row::Position));
+    assert_eq!(refused(|t| t.start.posture[6] = f64::NAN), PrimitiveError::Start);
+    assert_eq!(refused(|t| t.goal.hand[0] = f64::INFINITY), PrimitiveError::Goal);
+    assert_eq!(refused(|t| t.start_velocity.hand[0] = f64::NAN), PrimitiveError::StartVelocity);
+    assert_eq!(refused(|t| t.start.orientation.w = 0.9), PrimitiveError::StartNotUnit);
+    assert_eq!(refused(|t| t.goal.orientation.x = 0.1), PrimitiveError::GoalNotUnit);
     let far = Quaternion::from_rotation_vector(&[0.0, 3.1, 0.0]);
-    assert_eq!(
-        refused(|t| t.goal.orientation = far),
-        PrimitiveError::TurnsTooFar
-    );
+    assert_eq!(refused(|t| t.goal.orientation = far), PrimitiveError::TurnsTooFar);
 }
 
 #[test]
@@ -115,16 +79,9 @@ fn shortest_accepted_duration_is_stable_and_a_shorter_one_is_not() {
     let mut state = dmp::PointState::new(0.0, 0.0);
     let h = DT / 0.056;
     for _ in 0..3000 {
-        let rhs = primitive.position().right_hand_side(
-            &state,
-            &dmp::PointInput {
-                start: 0.0,
-                goal: 1.0,
-                s: 0.0,
-                f: 0.0,
-                zeta: 0.0,
-            },
-        );
+        let rhs = primitive
+            .position()
+            .right_hand_side(&state, &dmp::PointInput { start: 0.0, goal: 1.0, s: 0.0, f: 0.0, zeta: 0.0 });
         state.step(rhs, h);
     }
     assert!(state.x().is_nan() || state.x().abs() > 1e6);
@@ -138,47 +95,17 @@ fn changes_in_flight_are_refused_without_touching_the_run() {
     rollout.step(&primitive, DT, &Coupling::NONE);
     let before = rollout.clone();
     let nan = f64::NAN;
-    assert_eq!(
-        rollout.set_goal_position([nan; 3]),
-        Err(RolloutError::NotFinite)
-    );
-    assert_eq!(
-        rollout.set_goal_posture([nan; 7]),
-        Err(RolloutError::NotFinite)
-    );
-    assert_eq!(
-        rollout.set_goal_hand([nan; 4]),
-        Err(RolloutError::NotFinite)
-    );
+    assert_eq!(rollout.set_goal_position([nan; 3]), Err(RolloutError::NotFinite));
+    assert_eq!(rollout.set_goal_posture([nan; 7]), Err(RolloutError::NotFinite));
+    assert_eq!(rollout.set_goal_hand([nan; 4]), Err(RolloutError::NotFinite));
     let half = Quaternion::new(0.5, 0.0, 0.0, 0.0);
-    assert_eq!(
-        rollout.set_goal_orientation(&primitive, half),
-        Err(RolloutError::NotUnit)
-    );
-    assert_eq!(
-        rollout.set_duration(&primitive, 0.01),
-        Err(RolloutError::TooFast)
-    );
-    assert_eq!(
-        rollout.set_duration(&primitive, 0.0),
-        Err(RolloutError::Negative)
-    );
-    assert_eq!(
-        rollout.set_speed(&primitive, 500.0),
-        Err(RolloutError::TooFast)
-    );
-    assert_eq!(
-        rollout.set_speed(&primitive, -1.0),
-        Err(RolloutError::Negative)
-    );
-    assert_eq!(
-        rollout.set_goal_filter(Some(0.0)),
-        Err(RolloutError::Negative)
-    );
-    assert_eq!(
-        rollout.set_speed_slew(Some(nan)),
-        Err(RolloutError::NotFinite)
-    );
+    assert_eq!(rollout.set_goal_orientation(&primitive, half), Err(RolloutError::NotUnit));
+    assert_eq!(rollout.set_duration(&primitive, 0.01), Err(RolloutError::TooFast));
+    assert_eq!(rollout.set_duration(&primitive, 0.0), Err(RolloutError::Negative));
+    assert_eq!(rollout.set_speed(&primitive, 500.0), Err(RolloutError::TooFast));
+    assert_eq!(rollout.set_speed(&primitive, -1.0), Err(RolloutError::Negative));
+    assert_eq!(rollout.set_goal_filter(Some(0.0)), Err(RolloutError::Negative));
+    assert_eq!(rollout.set_speed_slew(Some(nan)), Err(RolloutError::NotFinite));
     assert_eq!(rollout, before);
 }
 
@@ -204,9 +131,8 @@ fn frozen_time_holds_the_plan_and_resumes_on_the_same_path() {
     }
     assert!((rows[799].time - 799.0 * DT).abs() < 1e-9);
     // Velocity comes back without a jump.
-    let faster = rows[801..]
-        .windows(2)
-        .all(|pair| (0..3).all(|i| (pair[1].position.v[i] - pair[0].position.v[i]).abs() < 5e-3));
+    let faster =
+        rows[801..].windows(2).all(|pair| (0..3).all(|i| (pair[1].position.v[i] - pair[0].position.v[i]).abs() < 5e-3));
     assert!(faster);
     assert!((rows[2399].position.x[0] - 0.55).abs() < 2e-3);
 }
@@ -226,10 +152,8 @@ fn late_or_senseless_ticks_do_not_move_the_plan_too_far() {
     }
     let fresh = Rollout::start(&primitive, &start).unwrap();
     assert_eq!([senseless.progress(), senseless.phase()], [0.0, 1.0]);
-    let (a, b) = (
-        senseless.clone().step(&primitive, DT, &Coupling::NONE),
-        fresh.clone().step(&primitive, DT, &Coupling::NONE),
-    );
+    let (a, b) =
+        (senseless.clone().step(&primitive, DT, &Coupling::NONE), fresh.clone().step(&primitive, DT, &Coupling::NONE));
     assert_eq!((a.position, a.time), (b.position, b.time));
 }
 
@@ -248,12 +172,7 @@ fn goal_filter_turns_the_jump_into_a_ramp() {
         });
         let end = rows[5999];
         assert!((end.position.x[0] - 0.65).abs() < 1e-6);
-        let miss = end
-            .orientation
-            .quaternion
-            .aligned_with(&turned)
-            .conjugate()
-            .product(&turned);
+        let miss = end.orientation.quaternion.aligned_with(&turned).conjugate().product(&turned);
         assert!(miss.angle() < 1e-4, "{}", miss.angle());
         (rows[900].position.a[0] - rows[899].position.a[0]).abs()
     };
@@ -267,65 +186,37 @@ fn start_turned_past_a_full_turn_still_goes_the_demonstrated_way() {
     let mut plan = Plan::empty();
     plan.orientation_error = OrientationError::RotationVector;
     plan.hemisphere = Hemisphere::Demonstrated;
-    let about_z =
-        |degrees: f64| Quaternion::from_rotation_vector(&[0.0, 0.0, degrees.to_radians()]);
+    let about_z = |degrees: f64| Quaternion::from_rotation_vector(&[0.0, 0.0, degrees.to_radians()]);
     plan.start.orientation = Quaternion::IDENTITY;
     plan.goal.orientation = about_z(350.0);
     let primitive = plan.build::<f64>();
     for from in [about_z(-20.0), about_z(-20.0).negated(), about_z(15.0)] {
-        let start = StartState::at_rest(Configuration {
-            orientation: from,
-            ..ORIGIN
-        });
+        let start = StartState::at_rest(Configuration { orientation: from, ..ORIGIN });
         let mut rollout = Rollout::start(&primitive, &start).unwrap();
         let mut turned = 0.0;
         let mut last = from;
         for _ in 0..9000 {
-            let q = rollout
-                .step(&primitive, DT, &Coupling::NONE)
-                .orientation
-                .quaternion;
-            turned += last
-                .conjugate()
-                .product(&q.aligned_with(&last))
-                .rotation_vector()[2];
+            let q = rollout.step(&primitive, DT, &Coupling::NONE).orientation.quaternion;
+            turned += last.conjugate().product(&q.aligned_with(&last)).rotation_vector()[2];
             last = q;
         }
         let expected = (about_z(350.0).rotation_vector()[2]
             - from.aligned_with(&Quaternion::IDENTITY).rotation_vector()[2])
             .to_degrees();
-        assert!(
-            (turned.to_degrees() - expected).abs() < 0.5,
-            "{} {expected}",
-            turned.to_degrees()
-        );
+        assert!((turned.to_degrees() - expected).abs() < 0.5, "{} {expected}", turned.to_degrees());
     }
 }
 
 #[test]
 fn tables_interpolate_and_hold_outside() {
     let table = PhaseTable::<f64, 1, 4>::new(&[[1.0], [3.0], [2.0]]).unwrap();
-    for (u, value) in [
-        (-1.0, 1.0),
-        (0.0, 1.0),
-        (0.25, 2.0),
-        (0.5, 3.0),
-        (0.75, 2.5),
-        (1.0, 2.0),
-        (9.0, 2.0),
-    ] {
+    for (u, value) in [(-1.0, 1.0), (0.0, 1.0), (0.25, 2.0), (0.5, 3.0), (0.75, 2.5), (1.0, 2.0), (9.0, 2.0)] {
         assert!((table.at(u)[0] - value).abs() < 1e-12);
     }
     assert_eq!(table.at(f64::NAN), [1.0]);
     assert_eq!(PhaseTable::<f64, 1, 4>::new(&[]), Err(TableError::Empty));
-    assert_eq!(
-        PhaseTable::<f64, 1, 4>::new(&[[0.0]; 5]),
-        Err(TableError::TooMany)
-    );
-    assert_eq!(
-        PhaseTable::<f64, 1, 4>::new(&[[f64::NAN]]),
-        Err(TableError::NotFinite)
-    );
+    assert_eq!(PhaseTable::<f64, 1, 4>::new(&[[0.0]; 5]), Err(TableError::TooMany));
+    assert_eq!(PhaseTable::<f64, 1, 4>::new(&[[f64::NAN]]), Err(TableError::NotFinite));
 }
 
 #[test]
@@ -342,10 +233,7 @@ fn recorded_sensor_values_become_an_expectation_by_phase() {
             assert!((value - (3.0 * u + i as f64).sin()).abs() < 0.02);
         }
     }
-    assert_eq!(
-        dmp::fit::expected_wrench(&[], 101, 5.0),
-        Err(TableError::Empty)
-    );
+    assert_eq!(dmp::fit::expected_wrench(&[], 101, 5.0), Err(TableError::Empty));
 }
 
 fn scalar_functions<T: Scalar>(absolute: f64) {
@@ -367,11 +255,7 @@ fn scalar_functions<T: Scalar>(absolute: f64) {
             }
         }
         for j in [-3.0, -0.4, 0.0, 1e-3, 2.0] {
-            close(
-                T::atan2(t, T::from_f64(j)),
-                x.atan2(T::from_f64(j).to_f64()),
-                1.0,
-            );
+            close(T::atan2(t, T::from_f64(j)), x.atan2(T::from_f64(j).to_f64()), 1.0);
         }
     }
 }

@@ -2,26 +2,21 @@
 
 use crate::common::{DT, K, Plan, run};
 use dmp::{
-    Coupling, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, Quaternion, Reference,
-    SENSORS, Scalar, SensorMap, Velocity,
+    Coupling, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, Quaternion, Reference, SENSORS, Scalar,
+    SensorMap, Velocity,
 };
 
 type Row = Reference<f64>;
 
 fn nominal(plan: &Plan, seconds: f64) -> Vec<Row> {
     let primitive = plan.build::<f64>();
-    run(&primitive, (seconds * 300.0) as usize, DT, |_, _| {
-        Coupling::NONE
-    })
+    run(&primitive, (seconds * 300.0) as usize, DT, |_, _| Coupling::NONE)
 }
 
 fn path_length<T: Scalar>(rows: &[Reference<T>]) -> f64 {
     rows.windows(2)
         .map(|pair| {
-            let (a, b) = (
-                &pair[0].orientation.quaternion,
-                &pair[1].orientation.quaternion,
-            );
+            let (a, b) = (&pair[0].orientation.quaternion, &pair[1].orientation.quaternion);
             a.conjugate().product(b).angle().to_f64()
         })
         .sum()
@@ -116,21 +111,12 @@ fn check_3_path_does_not_depend_on_the_course_of_tau() {
 fn check_5_antipodal_goal_turns_half_a_radian_and_no_more() {
     let mut plan = Plan::empty();
     plan.goal.orientation = Quaternion::from_rotation_vector(&[0.0, 0.0, 0.5]).negated();
-    for error in [
-        OrientationError::Quaternion,
-        OrientationError::RotationVector,
-    ] {
+    for error in [OrientationError::Quaternion, OrientationError::RotationVector] {
         plan.orientation_error = error;
         let rows = nominal(&plan, 20.0);
         let end = rows.last().unwrap().orientation.quaternion;
         let target = Quaternion::from_rotation_vector(&[0.0, 0.0, 0.5]);
-        assert!(
-            end.aligned_with(&target)
-                .conjugate()
-                .product(&target)
-                .angle()
-                < 1e-6
-        );
+        assert!(end.aligned_with(&target).conjugate().product(&target).angle() < 1e-6);
         assert!((path_length(&rows) - 0.5).abs() < 1e-3, "{error:?}");
     }
     // Negative control: told that the far sign was demonstrated, it goes the long way round.
@@ -144,11 +130,7 @@ fn check_6_constant_feedback_settles_where_it_should() {
     let mut plan = Plan::empty();
     plan.goal.position = [0.1, 0.0, 0.0];
     let primitive = plan.build::<f64>();
-    let coupling = Coupling {
-        position: [10.0, -5.0, 2.0],
-        orientation: [20.0, 0.0, 0.0],
-        hand: [0.0, 4.0, 4.0, 4.0],
-    };
+    let coupling = Coupling { position: [10.0, -5.0, 2.0], orientation: [20.0, 0.0, 0.0], hand: [0.0, 4.0, 4.0, 4.0] };
     let rows = run(&primitive, 9000, DT, |_, _| coupling);
     let end = rows.last().unwrap();
     for (i, zeta) in coupling.position.iter().enumerate() {
@@ -157,28 +139,18 @@ fn check_6_constant_feedback_settles_where_it_should() {
     }
     assert!((end.hand.x[1] - 4.0 / K).abs() < 1e-9);
     let turned = end.orientation.quaternion.rotation_vector();
-    assert!(
-        (turned[0] - 2.0 * (20.0_f64 / K).asin()).abs() < 1e-9,
-        "{turned:?}"
-    );
+    assert!((turned[0] - 2.0 * (20.0_f64 / K).asin()).abs() < 1e-9, "{turned:?}");
     // Negative control: 20/K, the answer for a position row, is half of it.
     assert!((turned[0] - 20.0 / K).abs() > 0.05);
     // No memory: the plan returns when the force vanishes.
-    let rows = run(&primitive, 12_000, DT, |i, _| {
-        if i < 3000 { coupling } else { Coupling::NONE }
-    });
+    let rows = run(&primitive, 12_000, DT, |i, _| if i < 3000 { coupling } else { Coupling::NONE });
     assert!((rows.last().unwrap().position.x[0] - 0.1).abs() < 1e-9);
 
     // In rotation-vector coordinates the angle is zeta/K itself.
     plan.orientation_error = OrientationError::RotationVector;
     let primitive = plan.build::<f64>();
     let rows = run(&primitive, 9000, DT, |_, _| coupling);
-    let turned = rows
-        .last()
-        .unwrap()
-        .orientation
-        .quaternion
-        .rotation_vector();
+    let turned = rows.last().unwrap().orientation.quaternion.rotation_vector();
     assert!((turned[0] - 0.1).abs() < 1e-9);
 }
 
@@ -187,21 +159,15 @@ fn pushes_of_the_environment_move_the_plan_along_and_are_clamped() {
     let feedback = Feedback::<f64>::new(
         GainSchedule::constant([3.0, 3.0, 2.0, 20.0, 20.0, 15.0, 9.0, 40.0, 40.0, 40.0]).unwrap(),
         GainSchedule::constant([1.0; SENSORS]).unwrap(),
-        Limits {
-            displacement: 0.23,
-            rotation: 0.4,
-            hand: 0.3,
-        },
+        Limits { displacement: 0.23, rotation: 0.4, hand: 0.3 },
     )
     .unwrap();
     let mut plan = Plan::empty();
     plan.goal.position = [0.1, 0.0, 0.0];
     let mut primitive = plan.build_with(Some(feedback));
     let push = [4.0, 0.0, 0.0, 0.0, 0.0, 0.3, 0.5, 0.0, 0.0];
-    let rollout = |primitive: &_| {
-        dmp::Rollout::<f64, 100>::start(primitive, &dmp::StartState::demonstrated(primitive))
-            .unwrap()
-    };
+    let rollout =
+        |primitive: &_| dmp::Rollout::<f64, 100>::start(primitive, &dmp::StartState::demonstrated(primitive)).unwrap();
     // Without an expectation there is nothing to compare with: open loop.
     let open = rollout(&primitive).coupling(&primitive, &push, &SensorMap::IDENTITY);
     assert_eq!(open, Coupling::NONE);
@@ -227,13 +193,8 @@ fn pushes_of_the_environment_move_the_plan_along_and_are_clamped() {
 fn sensor_map_turns_and_shifts_a_wrench() {
     // Sensor turned by 90 degrees about z, controlled point 0.1 m along its z axis.
     let r = Quaternion::<f64>::from_rotation_vector(&[0.0, 0.0, std::f64::consts::FRAC_PI_2]);
-    let map = SensorMap {
-        force: r.rotation_matrix(),
-        torque: r.rotation_matrix(),
-        lever: [0.0, 0.0, 0.1],
-    };
-    let [px, py, pz, rx, ry, rz, spread, f1, ..] =
-        map.to_task(&[2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0]);
+    let map = SensorMap { force: r.rotation_matrix(), torque: r.rotation_matrix(), lever: [0.0, 0.0, 0.1] };
+    let [px, py, pz, rx, ry, rz, spread, f1, ..] = map.to_task(&[2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0]);
     assert!((py - 2.0).abs() < 1e-12 && px.abs() < 1e-12 && pz == 0.0);
     // tau - lever x F = -(0.1 z) x (2 x) = -0.2 y, turned to +0.2 x.
     assert!((rx - 0.2).abs() < 1e-12 && ry.abs() < 1e-12 && rz == 0.0);
@@ -256,14 +217,10 @@ fn norm_after_a_million_ticks<T: Scalar>(error: OrientationError) -> f64 {
     plan.orientation_error = error;
     plan.duration = 3000.0;
     let primitive = plan.build::<T>();
-    let mut rollout =
-        dmp::Rollout::start(&primitive, &dmp::StartState::demonstrated(&primitive)).unwrap();
+    let mut rollout = dmp::Rollout::start(&primitive, &dmp::StartState::demonstrated(&primitive)).unwrap();
     let dt = T::from_f64(DT);
     // A feedback beyond the equilibrium keeps the orientation spinning all the time.
-    let spin = Coupling {
-        orientation: [300_000.0, 200_000.0, -100_000.0].map(T::from_f64),
-        ..Coupling::NONE
-    };
+    let spin = Coupling { orientation: [300_000.0, 200_000.0, -100_000.0].map(T::from_f64), ..Coupling::NONE };
     let mut worst = 0.0_f64;
     for _ in 0..1_000_000 {
         let q = rollout.step(&primitive, dt, &spin).orientation.quaternion;
@@ -286,18 +243,12 @@ fn check_9_quaternion_stays_unit_over_a_million_ticks() {
 #[test]
 fn check_10_reported_rates_are_the_derivatives_of_the_reported_path() {
     // tau = 2.7 and varying, both orientation systems, everything moving.
-    for error in [
-        OrientationError::Quaternion,
-        OrientationError::RotationVector,
-    ] {
+    for error in [OrientationError::Quaternion, OrientationError::RotationVector] {
         let mut plan = Plan::golden();
         plan.duration = 2.7;
         plan.orientation_error = error;
-        plan.start_velocity = Velocity {
-            position: [0.1, -0.05, 0.02],
-            orientation: [0.2, 0.1, -0.3],
-            ..Velocity::ZERO
-        };
+        plan.start_velocity =
+            Velocity { position: [0.1, -0.05, 0.02], orientation: [0.2, 0.1, -0.3], ..Velocity::ZERO };
         let primitive = plan.build::<f64>();
         let dt = DT / 64.0;
         let rows = run(&primitive, 64 * 900, dt, |i, rollout| {
@@ -325,9 +276,7 @@ fn check_10_reported_rates_are_the_derivatives_of_the_reported_path() {
                 v = v.max(((x(after) - x(before)) / (2.0 * dt) - rate(now)).abs());
                 a = a.max(((rate(after) - rate(before)) / (2.0 * dt) - now.position.a[i]).abs());
                 let omega = |row: &Row| row.orientation.omega[i];
-                dw = dw.max(
-                    ((omega(after) - omega(before)) / (2.0 * dt) - now.orientation.domega[i]).abs(),
-                );
+                dw = dw.max(((omega(after) - omega(before)) / (2.0 * dt) - now.orientation.domega[i]).abs());
             }
             let (q0, q1) = (before.orientation.quaternion, after.orientation.quaternion);
             let turn = q0.conjugate().product(&q1).rotation_vector();
@@ -335,9 +284,7 @@ fn check_10_reported_rates_are_the_derivatives_of_the_reported_path() {
                 w = w.max((turn / (2.0 * dt) - omega).abs());
             }
         }
-        println!(
-            "{error:?}: dx {v:.1e} m/s, dv {a:.1e} m/s^2, dq {w:.1e} rad/s, domega {dw:.1e} rad/s^2"
-        );
+        println!("{error:?}: dx {v:.1e} m/s, dv {a:.1e} m/s^2, dq {w:.1e} rad/s, domega {dw:.1e} rad/s^2");
         assert!(v < 2e-4 && w < 5e-4);
         assert!(a < 0.02 && dw < 0.02, "{a} {dw}");
     }
@@ -348,30 +295,16 @@ fn world_rates_turn_with_the_hand() {
     let rows = nominal(&Plan::golden(), 4.0);
     let dt = DT;
     for k in (100..1000).step_by(50) {
-        let (a, b) = (
-            &rows[k - 1].orientation.quaternion,
-            &rows[k + 1].orientation.quaternion,
-        );
+        let (a, b) = (&rows[k - 1].orientation.quaternion, &rows[k + 1].orientation.quaternion);
         // World rates from q(t): log(b (x) conj(a)).
-        let world = b
-            .product(&a.conjugate())
-            .rotation_vector()
-            .map(|r| r / (2.0 * dt));
+        let world = b.product(&a.conjugate()).rotation_vector().map(|r| r / (2.0 * dt));
         let reported = rows[k].orientation.omega_world();
         for i in 0..3 {
-            assert!(
-                (world[i] - reported[i]).abs() < 5e-3,
-                "{world:?} {reported:?}"
-            );
+            assert!((world[i] - reported[i]).abs() < 5e-3, "{world:?} {reported:?}");
         }
     }
     // Negative control: the body rates are another vector.
     let row = &rows[600].orientation;
-    let difference: f64 = row
-        .omega
-        .iter()
-        .zip(row.omega_world())
-        .map(|(a, b)| (a - b).abs())
-        .sum();
+    let difference: f64 = row.omega.iter().zip(row.omega_world()).map(|(a, b)| (a - b).abs()).sum();
     assert!(difference > 0.05);
 }

@@ -107,40 +107,30 @@ impl fmt::Display for ImageError {
             Self::TooShort { length } => write!(f, "{length} bytes are too few for an image"),
             Self::Magic => f.write_str("the bytes are not a primitive image"),
             Self::Schema { found } => {
-                write!(
-                    f,
-                    "the image has layout version {found}, this side knows version {IMAGE_SCHEMA}"
-                )
+                write!(f, "the image has layout version {found}, this side knows version {IMAGE_SCHEMA}")
             }
             Self::Length { expected, found } => {
                 write!(f, "the image should have {expected} bytes, it has {found}")
             }
             Self::Crc { computed, stored } => {
-                write!(
-                    f,
-                    "the image is damaged: check sum {computed:#010x}, stored {stored:#010x}"
-                )
+                write!(f, "the image is damaged: check sum {computed:#010x}, stored {stored:#010x}")
             }
             Self::Name => f.write_str("the name in the image is not a valid name"),
             Self::Flags { found } => write!(f, "the image has unknown flags {found:#06x}"),
             Self::Kernels { found } => {
-                write!(
-                    f,
-                    "the image has {found} kernels, between 2 and {KERNEL_LIMIT} are possible"
-                )
+                write!(f, "the image has {found} kernels, between 2 and {KERNEL_LIMIT} are possible")
             }
             Self::GainPoints { found } => write!(
                 f,
                 "the gain tables have {found} points; at most {GAIN_POINTS_LIMIT} are possible, and both or none"
             ),
-            Self::ExpectationPoints { found } => write!(
-                f,
-                "the expectation has {found} points; at most {EXPECTATION_POINTS_LIMIT} are possible"
-            ),
+            Self::ExpectationPoints { found } => {
+                write!(f, "the expectation has {found} points; at most {EXPECTATION_POINTS_LIMIT} are possible")
+            }
             Self::NotFinite { real } => write!(f, "real number {real} of the image is not finite"),
-            Self::Shape => f.write_str(
-                "a table does not have the shape its counts ask for, or the buffer is too small",
-            ),
+            Self::Shape => {
+                f.write_str("a table does not have the shape its counts ask for, or the buffer is too small")
+            }
         }
     }
 }

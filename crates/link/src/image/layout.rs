@@ -44,12 +44,7 @@ pub(super) const KNOWN_FLAGS: u16 = FLAG_ROTATION_VECTOR | FLAG_NEAREST_HEMISPHE
 
 /// Bytes of an image with these counts.
 #[must_use]
-pub const fn image_bytes(
-    kernels: usize,
-    k1_points: usize,
-    k2_points: usize,
-    expectation_points: usize,
-) -> usize {
+pub const fn image_bytes(kernels: usize, k1_points: usize, k2_points: usize, expectation_points: usize) -> usize {
     let reals = FIXED_REALS
         + COUPLED_ROWS * k1_points
         + SENSOR_ROWS * k2_points
@@ -59,12 +54,8 @@ pub const fn image_bytes(
 }
 
 /// Bytes of the largest image there can be.
-pub const IMAGE_BYTES_LIMIT: usize = image_bytes(
-    KERNEL_LIMIT,
-    GAIN_POINTS_LIMIT,
-    GAIN_POINTS_LIMIT,
-    EXPECTATION_POINTS_LIMIT,
-);
+pub const IMAGE_BYTES_LIMIT: usize =
+    image_bytes(KERNEL_LIMIT, GAIN_POINTS_LIMIT, GAIN_POINTS_LIMIT, EXPECTATION_POINTS_LIMIT);
 
 /// The four numbers that fix the length of an image.
 #[derive(Clone, Copy)]
@@ -78,31 +69,20 @@ pub(super) struct Counts {
 impl Counts {
     pub(super) fn check(self) -> Result<(), ImageError> {
         if self.kernels < 2 || self.kernels > KERNEL_LIMIT {
-            return Err(ImageError::Kernels {
-                found: clip(self.kernels),
-            });
+            return Err(ImageError::Kernels { found: clip(self.kernels) });
         }
         let gain_points = self.k1_points.max(self.k2_points);
         if gain_points > GAIN_POINTS_LIMIT || (self.k1_points == 0) != (self.k2_points == 0) {
-            return Err(ImageError::GainPoints {
-                found: clip(gain_points),
-            });
+            return Err(ImageError::GainPoints { found: clip(gain_points) });
         }
         if self.expectation_points > EXPECTATION_POINTS_LIMIT {
-            return Err(ImageError::ExpectationPoints {
-                found: clip(self.expectation_points),
-            });
+            return Err(ImageError::ExpectationPoints { found: clip(self.expectation_points) });
         }
         Ok(())
     }
 
     pub(super) const fn bytes(self) -> usize {
-        image_bytes(
-            self.kernels,
-            self.k1_points,
-            self.k2_points,
-            self.expectation_points,
-        )
+        image_bytes(self.kernels, self.k1_points, self.k2_points, self.expectation_points)
     }
 }
 

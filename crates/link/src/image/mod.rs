@@ -17,12 +17,11 @@ mod read;
 mod write;
 
 pub use content::{
-    ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint,
-    WaypointVelocity,
+    ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity,
 };
 pub use error::ImageError;
 pub use layout::{
-    COUPLED_ROWS, EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_BYTES_LIMIT, IMAGE_SCHEMA,
-    KERNEL_LIMIT, MAGIC, SENSOR_ROWS, WEIGHT_ROWS, image_bytes,
+    COUPLED_ROWS, EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_BYTES_LIMIT, IMAGE_SCHEMA, KERNEL_LIMIT, MAGIC,
+    SENSOR_ROWS, WEIGHT_ROWS, image_bytes,
 };
 pub use read::{PrimitiveImage, Reals, stored_crc};

@@ -1,13 +1,12 @@
 //! Bytes to a checked [`PrimitiveImage`], without copying the tables.
 
 use super::content::{
-    ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint,
-    WaypointVelocity,
+    ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity,
 };
 use super::error::ImageError;
 use super::layout::{
-    COUPLED_ROWS, CRC_BYTES, Counts, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES,
-    IMAGE_SCHEMA, KNOWN_FLAGS, MAGIC, REAL_BYTES, SENSOR_ROWS, WEIGHT_ROWS, clip,
+    COUPLED_ROWS, CRC_BYTES, Counts, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES, IMAGE_SCHEMA,
+    KNOWN_FLAGS, MAGIC, REAL_BYTES, SENSOR_ROWS, WEIGHT_ROWS, clip,
 };
 use crate::frame::CRC;
 use crate::name::{NAME_BYTES, Name};
@@ -39,11 +38,7 @@ impl<'a> Reals<'a> {
 
     /// All, in order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = f32> + use<'a> {
-        self.0
-            .as_chunks::<REAL_BYTES>()
-            .0
-            .iter()
-            .map(|bytes| f32::from_le_bytes(*bytes))
+        self.0.as_chunks::<REAL_BYTES>().0.iter().map(|bytes| f32::from_le_bytes(*bytes))
     }
 
     /// Copies all to the front of `out` and returns that part; `None` if `out` is too short.
@@ -75,9 +70,7 @@ impl<'a> PrimitiveImage<'a> {
     /// name, finite numbers: an image of another version is named as such, not as damaged.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, ImageError> {
         let mut header = Cursor(bytes);
-        let short = ImageError::TooShort {
-            length: clip(bytes.len()),
-        };
+        let short = ImageError::TooShort { length: clip(bytes.len()) };
         if header.array::<4>().ok_or(short)? != MAGIC {
             return Err(ImageError::Magic);
         }
@@ -88,10 +81,7 @@ impl<'a> PrimitiveImage<'a> {
         let flags = header.u16().ok_or(short)?;
         let length = header.u32().ok_or(short)?;
         if length != clip(bytes.len()) {
-            return Err(ImageError::Length {
-                expected: length,
-                found: clip(bytes.len()),
-            });
+            return Err(ImageError::Length { expected: length, found: clip(bytes.len()) });
         }
         let (covered, stored) = bytes.split_last_chunk::<CRC_BYTES>().ok_or(short)?;
         let (computed, stored) = (CRC.checksum(covered), u32::from_le_bytes(*stored));
@@ -108,10 +98,7 @@ impl<'a> PrimitiveImage<'a> {
         };
         counts.check()?;
         if counts.bytes() != bytes.len() {
-            return Err(ImageError::Length {
-                expected: clip(counts.bytes()),
-                found: clip(bytes.len()),
-            });
+            return Err(ImageError::Length { expected: clip(counts.bytes()), found: clip(bytes.len()) });
         }
         if flags & !KNOWN_FLAGS != 0 {
             return Err(ImageError::Flags { found: flags });
@@ -122,12 +109,7 @@ impl<'a> PrimitiveImage<'a> {
             return Err(ImageError::NotFinite { real: clip(real) });
         }
         let content = read_content(Cursor(body), model_hash, flags, counts).ok_or(short)?;
-        Ok(Self {
-            bytes,
-            name,
-            crc: computed,
-            content,
-        })
+        Ok(Self { bytes, name, crc: computed, content })
     }
 
     /// Its name.
@@ -168,16 +150,11 @@ impl<'a> PrimitiveImage<'a> {
 /// image's last four bytes out and is, for a good image, equal to them.
 #[must_use]
 pub fn stored_crc(image: &[u8]) -> u32 {
-    image
-        .split_last_chunk::<CRC_BYTES>()
-        .map_or(0, |(covered, _)| CRC.checksum(covered))
+    image.split_last_chunk::<CRC_BYTES>().map_or(0, |(covered, _)| CRC.checksum(covered))
 }
 
 fn parse_name(bytes: &[u8; NAME_BYTES]) -> Result<Name, ImageError> {
-    let end = bytes
-        .iter()
-        .position(|byte| *byte == 0)
-        .unwrap_or(NAME_BYTES);
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(NAME_BYTES);
     let (name, padding) = bytes.split_at_checked(end).ok_or(ImageError::Name)?;
     if padding.iter().any(|byte| *byte != 0) {
         return Err(ImageError::Name);
@@ -204,11 +181,7 @@ fn read_content<'a>(
     };
     let goal = body.waypoint()?;
     let [position, orientation, hand] = body.reals()?;
-    let clamps = FeedbackClamps {
-        position,
-        orientation,
-        hand,
-    };
+    let clamps = FeedbackClamps { position, orientation, hand };
     let [recorded_duration, payload_mass] = body.reals()?;
     let payload_centre = body.reals()?;
     let [filter_cutoff, trials, spread_floor] = body.reals()?;

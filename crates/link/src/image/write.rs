@@ -3,8 +3,8 @@
 use super::content::{HemisphereKind, ImageContent, OrientationErrorKind, Waypoint};
 use super::error::ImageError;
 use super::layout::{
-    COUPLED_ROWS, Counts, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES,
-    IMAGE_SCHEMA, MAGIC, REAL_BYTES, SENSOR_ROWS, WEIGHT_ROWS, clip,
+    COUPLED_ROWS, Counts, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES, IMAGE_SCHEMA, MAGIC, REAL_BYTES,
+    SENSOR_ROWS, WEIGHT_ROWS, clip,
 };
 use crate::frame::CRC;
 use crate::name::{NAME_BYTES, Name};
@@ -23,9 +23,7 @@ impl ImageContent<&[f32]> {
             expectation_points: points(self.expected_mean, SENSOR_ROWS)?,
         };
         counts.check()?;
-        if self.weights.len() != WEIGHT_ROWS * self.kernels
-            || self.expected_spread.len() != self.expected_mean.len()
-        {
+        if self.weights.len() != WEIGHT_ROWS * self.kernels || self.expected_spread.len() != self.expected_mean.len() {
             return Err(ImageError::Shape);
         }
         let length = counts.bytes();
@@ -48,17 +46,8 @@ impl ImageContent<&[f32]> {
         writer.bytes(&clip(length).to_le_bytes())?;
         writer.bytes(&self.model_hash.to_le_bytes())?;
         writer.bytes(&padded)?;
-        for count in [
-            counts.kernels,
-            counts.k1_points,
-            counts.k2_points,
-            counts.expectation_points,
-        ] {
-            writer.bytes(
-                &u16::try_from(count)
-                    .map_err(|_| ImageError::Shape)?
-                    .to_le_bytes(),
-            )?;
+        for count in [counts.kernels, counts.k1_points, counts.k2_points, counts.expectation_points] {
+            writer.bytes(&u16::try_from(count).map_err(|_| ImageError::Shape)?.to_le_bytes())?;
         }
         writer.reals(&[self.duration, self.alpha, self.activation])?;
         writer.reals(&self.stiffness)?;
@@ -70,40 +59,24 @@ impl ImageContent<&[f32]> {
         writer.reals(&velocity.posture)?;
         writer.reals(&velocity.hand)?;
         writer.waypoint(&self.goal)?;
-        writer.reals(&[
-            self.clamps.position,
-            self.clamps.orientation,
-            self.clamps.hand,
-        ])?;
+        writer.reals(&[self.clamps.position, self.clamps.orientation, self.clamps.hand])?;
         let marks = &self.marks;
         writer.reals(&[marks.recorded_duration, marks.payload_mass])?;
         writer.reals(&marks.payload_centre)?;
         writer.reals(&[marks.filter_cutoff, marks.trials, marks.spread_floor])?;
-        for table in [
-            self.k1,
-            self.k2,
-            self.weights,
-            self.expected_mean,
-            self.expected_spread,
-        ] {
+        for table in [self.k1, self.k2, self.weights, self.expected_mean, self.expected_spread] {
             writer.reals(table)?;
         }
         let written = writer.position;
         let crc = CRC.checksum(out.get(..written).ok_or(ImageError::Shape)?);
-        out.get_mut(written..)
-            .ok_or(ImageError::Shape)?
-            .copy_from_slice(&crc.to_le_bytes());
+        out.get_mut(written..).ok_or(ImageError::Shape)?.copy_from_slice(&crc.to_le_bytes());
         Ok(length)
     }
 }
 
 /// Number of points of a table with so many rows.
 fn points(table: &[f32], rows: usize) -> Result<usize, ImageError> {
-    if table.len().is_multiple_of(rows) {
-        Ok(table.len() / rows)
-    } else {
-        Err(ImageError::Shape)
-    }
+    if table.len().is_multiple_of(rows) { Ok(table.len() / rows) } else { Err(ImageError::Shape) }
 }
 
 /// Writes to the front of a buffer; refuses reals that could not be read back.
@@ -115,10 +88,7 @@ struct Writer<'a> {
 impl Writer<'_> {
     fn bytes(&mut self, bytes: &[u8]) -> Result<(), ImageError> {
         let end = self.position + bytes.len();
-        self.out
-            .get_mut(self.position..end)
-            .ok_or(ImageError::Shape)?
-            .copy_from_slice(bytes);
+        self.out.get_mut(self.position..end).ok_or(ImageError::Shape)?.copy_from_slice(bytes);
         self.position = end;
         Ok(())
     }

@@ -1,18 +1,12 @@
 //! Frames survive any chunking; garbage is dropped and counted, never taken and never a panic.
 
 use crate::samples::{replies, requests};
-use link::frame::{
-    self, Decoder, EncodeError, Envelope, FRAME_BYTES, MESSAGE_BYTES, Message, PAYLOAD_BYTES,
-};
+use link::frame::{self, Decoder, EncodeError, Envelope, FRAME_BYTES, MESSAGE_BYTES, Message, PAYLOAD_BYTES};
 use link::message::ChunkData;
 use link::{LinkCounters, Name, Reply, Request, Text};
 use proptest::prelude::*;
 
-const ENVELOPE: Envelope = Envelope {
-    session: 0xA0B1,
-    sequence: 0xC2D3,
-    time_ms: 0x0102_0304,
-};
+const ENVELOPE: Envelope = Envelope { session: 0xA0B1, sequence: 0xC2D3, time_ms: 0x0102_0304 };
 
 fn frame_of(message: &impl Message) -> Vec<u8> {
     let mut buffer = [0; FRAME_BYTES];
@@ -26,9 +20,7 @@ fn dropped(counters: LinkCounters) -> u32 {
 
 /// Reads all of `bytes` as requests.
 fn read(decoder: &mut Decoder, mut bytes: &[u8]) -> Vec<Request> {
-    core::iter::from_fn(|| decoder.next::<Request>(&mut bytes))
-        .map(|frame| frame.message)
-        .collect()
+    core::iter::from_fn(|| decoder.next::<Request>(&mut bytes)).map(|frame| frame.message).collect()
 }
 
 /// A small generator of bytes, so that the long tests need no shrinking machinery.
@@ -52,22 +44,14 @@ fn every_message_survives_a_frame() {
     for request in requests() {
         let frame = frame_of(&request);
         let mut input = frame.as_slice();
-        let back = Decoder::<FRAME_BYTES>::new()
-            .next::<Request>(&mut input)
-            .unwrap();
+        let back = Decoder::<FRAME_BYTES>::new().next::<Request>(&mut input).unwrap();
         assert_eq!((back.envelope, back.message), (ENVELOPE, request));
-        assert_eq!(
-            frame.iter().filter(|byte| **byte == 0).count(),
-            1,
-            "a zero byte only at the end"
-        );
+        assert_eq!(frame.iter().filter(|byte| **byte == 0).count(), 1, "a zero byte only at the end");
     }
     for reply in replies() {
         let frame = frame_of(&reply);
         let mut input = frame.as_slice();
-        let back = Decoder::<FRAME_BYTES>::new()
-            .next::<Reply>(&mut input)
-            .unwrap();
+        let back = Decoder::<FRAME_BYTES>::new().next::<Reply>(&mut input).unwrap();
         assert_eq!((back.envelope, back.message), (ENVELOPE, reply));
     }
 }
@@ -75,27 +59,18 @@ fn every_message_survives_a_frame() {
 #[test]
 fn the_largest_messages_fit() {
     let data: ChunkData = (0..=255).take(link::message::CHUNK_BYTES).collect();
-    let chunk = Reply::Chunk {
-        of: u16::MAX,
-        offset: u32::MAX,
-        data,
-    };
+    let chunk = Reply::Chunk { of: u16::MAX, offset: u32::MAX, data };
     assert!(frame_of(&chunk).len() <= FRAME_BYTES);
     let text = Text::new(&"x".repeat(100));
     assert_eq!(text.as_str().len(), link::name::TEXT_BYTES);
     for mut reply in replies() {
         if let Reply::Hello { hello, .. } = &mut reply {
-            (hello.firmware, hello.board, hello.serial) =
-                (text.clone(), text.clone(), text.clone());
+            (hello.firmware, hello.board, hello.serial) = (text.clone(), text.clone(), text.clone());
             (hello.slot_bytes, hello.ticks_per_second) = (u32::MAX, u32::MAX);
         }
         assert!(postcard::to_slice(&reply, &mut [0; MESSAGE_BYTES]).is_ok());
     }
-    assert_eq!(
-        FRAME_BYTES,
-        PAYLOAD_BYTES + 2,
-        "one byte of stuffing up to 254 bytes, and the zero"
-    );
+    assert_eq!(FRAME_BYTES, PAYLOAD_BYTES + 2, "one byte of stuffing up to 254 bytes, and the zero");
 }
 
 #[test]
@@ -103,16 +78,9 @@ fn encoding_into_a_short_buffer_is_refused() {
     let request = &requests()[0];
     let length = frame_of(request).len();
     for room in 0..length {
-        assert_eq!(
-            frame::encode(ENVELOPE, request, &mut vec![0; room]),
-            Err(EncodeError::BufferTooSmall),
-            "{room}"
-        );
+        assert_eq!(frame::encode(ENVELOPE, request, &mut vec![0; room]), Err(EncodeError::BufferTooSmall), "{room}");
     }
-    assert_eq!(
-        frame::encode(ENVELOPE, request, &mut vec![0; length]),
-        Ok(length)
-    );
+    assert_eq!(frame::encode(ENVELOPE, request, &mut vec![0; length]), Ok(length));
 }
 
 #[test]
@@ -120,10 +88,7 @@ fn any_chunking_gives_the_same_messages() {
     let stream: Vec<u8> = requests().iter().flat_map(frame_of).collect();
     for size in 1..300 {
         let mut decoder = Decoder::new();
-        let messages: Vec<Request> = stream
-            .chunks(size)
-            .flat_map(|part| read(&mut decoder, part))
-            .collect();
+        let messages: Vec<Request> = stream.chunks(size).flat_map(|part| read(&mut decoder, part)).collect();
         assert_eq!(messages, requests(), "portions of {size}");
     }
 }
@@ -133,10 +98,7 @@ fn garbage_before_a_frame_costs_no_more_than_one_frame() {
     let mut decoder = Decoder::new();
     assert_eq!(read(&mut decoder, &[1, 2, 3, 4, 5]), []);
     // The garbage runs into the first frame and spoils it; the second one is whole.
-    let messages = read(
-        &mut decoder,
-        &[frame_of(&Request::Ping), frame_of(&Request::Stop)].concat(),
-    );
+    let messages = read(&mut decoder, &[frame_of(&Request::Ping), frame_of(&Request::Stop)].concat());
     assert_eq!(messages, [Request::Stop]);
     assert_eq!(dropped(decoder.counters()), 1);
 }
@@ -158,11 +120,7 @@ fn each_reason_has_its_counter() {
     flipped[3] ^= 0x40;
     read(&mut decoder, &flipped);
     read(&mut decoder, &[2, 7, 0]);
-    assert_eq!(
-        decoder.counters().bad_crc,
-        2,
-        "a wrong check sum, and too few bytes to hold one"
-    );
+    assert_eq!(decoder.counters().bad_crc, 2, "a wrong check sum, and too few bytes to hold one");
 
     read(&mut decoder, &[vec![1; FRAME_BYTES + 1], vec![0]].concat());
     assert_eq!(decoder.counters().too_long, 1);
@@ -172,11 +130,7 @@ fn each_reason_has_its_counter() {
     assert_eq!(decoder.counters().undecodable, 1);
     assert_eq!(decoder.counters().accepted, 0);
 
-    assert_eq!(
-        read(&mut decoder, &frame_of(&Request::Ping)),
-        [Request::Ping],
-        "and it still works"
-    );
+    assert_eq!(read(&mut decoder, &frame_of(&Request::Ping)), [Request::Ping], "and it still works");
 }
 
 #[test]
@@ -195,15 +149,8 @@ fn a_hello_of_a_later_version_with_more_fields_is_still_understood() {
         stuffed
     };
     let mut decoder = Decoder::new();
-    assert_eq!(
-        read(&mut decoder, &longer(&requests()[0])),
-        &requests()[..1]
-    );
-    assert_eq!(
-        read(&mut decoder, &longer(&Request::Ping)),
-        [],
-        "any other message must end where it ends"
-    );
+    assert_eq!(read(&mut decoder, &longer(&requests()[0])), &requests()[..1]);
+    assert_eq!(read(&mut decoder, &longer(&Request::Ping)), [], "any other message must end where it ends");
 }
 
 #[test]
@@ -213,11 +160,7 @@ fn c1_a_single_flipped_bit_anywhere_is_never_accepted() {
         for bit in 0..8 * (frame.len() - 1) {
             let mut damaged = frame.clone();
             damaged[bit / 8] ^= 1 << (bit % 8);
-            assert_eq!(
-                read(&mut Decoder::new(), &damaged),
-                [],
-                "{request:?} bit {bit}"
-            );
+            assert_eq!(read(&mut Decoder::new(), &damaged), [], "{request:?} bit {bit}");
         }
     }
 }
@@ -243,15 +186,9 @@ fn c1_noise_is_dropped_and_every_frame_of_it_counted() {
     let mut open = false;
     while frames < 1_000_000 {
         // Mostly short runs, some longer than any frame.
-        let size = if noise.next().is_multiple_of(512) {
-            400
-        } else {
-            64
-        };
+        let size = if noise.next().is_multiple_of(512) { 400 } else { 64 };
         let mut bytes = noise.bytes(size);
-        bytes
-            .iter_mut()
-            .for_each(|byte| *byte = if *byte < 24 { 0 } else { *byte });
+        bytes.iter_mut().for_each(|byte| *byte = if *byte < 24 { 0 } else { *byte });
         for byte in &bytes {
             frames += u32::from(*byte == 0 && open);
             open = *byte != 0;
@@ -320,16 +257,11 @@ proptest! {
 
 #[test]
 fn a_bad_name_does_not_come_in_over_the_wire() {
-    let mut payload = frame_of(&Request::Delete {
-        name: Name::new("abcdefghij").unwrap(),
-    });
+    let mut payload = frame_of(&Request::Delete { name: Name::new("abcdefghij").unwrap() });
     payload.pop();
     let length = cobs::decode_in_place(&mut payload).unwrap();
     payload.truncate(length - 4);
-    let at = payload
-        .windows(3)
-        .position(|window| window == b"abc")
-        .unwrap();
+    let at = payload.windows(3).position(|window| window == b"abc").unwrap();
     payload[at..at + 3].copy_from_slice(b"../");
     let crc = frame::CRC.checksum(&payload);
     payload.extend(crc.to_le_bytes());

@@ -2,9 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::samples::{
-    EVENT_KINDS, Tables, event_index, replies, reply_index, request_index, requests,
-};
+use crate::samples::{EVENT_KINDS, Tables, event_index, replies, reply_index, request_index, requests};
 use link::frame::{self, Envelope, FRAME_BYTES};
 use link::image::{HemisphereKind, IMAGE_SCHEMA, PrimitiveImage, image_bytes};
 use link::message::{AccelerationSource, PoseFeedback};
@@ -25,10 +23,7 @@ fn encoded<T: serde::Serialize>(value: &T) -> String {
 /// First word of the debug text: the variant.
 fn variant(value: &impl std::fmt::Debug) -> String {
     let text = format!("{value:?}");
-    text.split(|c: char| !c.is_alphanumeric())
-        .next()
-        .unwrap_or_default()
-        .to_owned()
+    text.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default().to_owned()
 }
 
 /// The text that `src/schema.txt` must be.
@@ -40,52 +35,26 @@ fn schema() -> String {
     };
     line("# Every layout of the link with its bytes. Written by tests/golden.rs, hashed into SCHEMA_HASH.".into());
     line(format!("link {LINK_VERSION}"));
-    line(
-        "payload session:u16 sequence:u16 time_ms:u32 message:postcard crc32_iscsi:u32 in COBS, 00"
-            .into(),
-    );
+    line("payload session:u16 sequence:u16 time_ms:u32 message:postcard crc32_iscsi:u32 in COBS, 00".into());
     for request in requests() {
-        line(format!(
-            "request {:2} {} {}",
-            request_index(&request),
-            variant(&request),
-            encoded(&request)
-        ));
+        line(format!("request {:2} {} {}", request_index(&request), variant(&request), encoded(&request)));
     }
     for reply in replies() {
-        line(format!(
-            "reply {:2} {} {}",
-            reply_index(&reply),
-            variant(&reply),
-            encoded(&reply)
-        ));
+        line(format!("reply {:2} {} {}", reply_index(&reply), variant(&reply), encoded(&reply)));
     }
     for refusal in Refusal::ALL {
-        line(format!(
-            "refusal {:2} {refusal:?} {}",
-            refusal.code(),
-            encoded(&refusal)
-        ));
+        line(format!("refusal {:2} {refusal:?} {}", refusal.code(), encoded(&refusal)));
     }
     for kind in EVENT_KINDS {
-        line(format!(
-            "event {} {kind:?} {}",
-            event_index(kind),
-            encoded(&kind)
-        ));
+        line(format!("event {} {kind:?} {}", event_index(kind), encoded(&kind)));
     }
     for choice in [PoseFeedback::Measured, PoseFeedback::Planned] {
         line(format!("pose_feedback {choice:?} {}", encoded(&choice)));
     }
-    for choice in [
-        AccelerationSource::Analytic,
-        AccelerationSource::Differentiated,
-    ] {
+    for choice in [AccelerationSource::Analytic, AccelerationSource::Differentiated] {
         line(format!("acceleration {choice:?} {}", encoded(&choice)));
     }
-    line(format!(
-        "image {IMAGE_SCHEMA} kernels 2 gain points 1 expectation points 2"
-    ));
+    line(format!("image {IMAGE_SCHEMA} kernels 2 gain points 1 expectation points 2"));
     for part in Tables::new(2, 1, 2).image().chunks(32) {
         line(hex(part));
     }
@@ -99,10 +68,7 @@ fn every_layout_is_the_one_in_the_schema_text() {
     if expected != written {
         let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("schema.txt");
         std::fs::write(&path, &expected).unwrap();
-        let difference = expected
-            .lines()
-            .zip(written.lines())
-            .find(|(new, old)| new != old);
+        let difference = expected.lines().zip(written.lines()).find(|(new, old)| new != old);
         panic!(
             "a layout changed: {difference:?}\nIf that is meant: raise LINK_VERSION or IMAGE_SCHEMA, then copy {} \
              over crates/link/src/schema.txt and pin the new SCHEMA_HASH in this file",
@@ -113,10 +79,7 @@ fn every_layout_is_the_one_in_the_schema_text() {
 
 #[test]
 fn schema_hash_is_pinned() {
-    assert_eq!(
-        SCHEMA_HASH, 0x0240_b2ec,
-        "{SCHEMA_HASH:#010x}: the layouts changed, or their text did"
-    );
+    assert_eq!(SCHEMA_HASH, 0x0240_b2ec, "{SCHEMA_HASH:#010x}: the layouts changed, or their text did");
 }
 
 #[test]
@@ -124,25 +87,14 @@ fn samples_cover_every_variant_in_order() {
     assert!(requests().iter().map(request_index).eq(0..24));
     assert!(replies().iter().map(reply_index).eq(0..9));
     assert!(EVENT_KINDS.iter().map(|kind| event_index(*kind)).eq(0..8));
-    assert!(
-        Refusal::ALL
-            .iter()
-            .map(|refusal| usize::from(refusal.code()))
-            .eq(0..Refusal::ALL.len())
-    );
+    assert!(Refusal::ALL.iter().map(|refusal| usize::from(refusal.code())).eq(0..Refusal::ALL.len()));
 }
 
 #[test]
 fn every_refusal_explains_itself_and_names_a_remedy() {
     for refusal in Refusal::ALL {
-        assert!(
-            refusal.explanation().len() > 10 && !refusal.explanation().ends_with('.'),
-            "{refusal:?}"
-        );
-        assert!(
-            refusal.remedy().len() > 10 && !refusal.remedy().ends_with('.'),
-            "{refusal:?}"
-        );
+        assert!(refusal.explanation().len() > 10 && !refusal.explanation().ends_with('.'), "{refusal:?}");
+        assert!(refusal.remedy().len() > 10 && !refusal.remedy().ends_with('.'), "{refusal:?}");
     }
 }
 
@@ -150,23 +102,13 @@ fn every_refusal_explains_itself_and_names_a_remedy() {
 #[test]
 fn worked_example_of_the_protocol_document() {
     let mut buffer = [0; FRAME_BYTES];
-    let envelope = Envelope {
-        session: 0x2A17,
-        sequence: 5,
-        time_ms: 1200,
-    };
+    let envelope = Envelope { session: 0x2A17, sequence: 5, time_ms: 1200 };
     let length = frame::encode(envelope, &link::Request::List { index: 0 }, &mut buffer).unwrap();
     let frame = hex(&buffer[..length]);
     println!("request List {{ index: 0 }}: {frame}");
     let document = include_str!("../../../../docs/protocol.md");
-    assert!(
-        document.contains(&frame),
-        "the document should show {frame}"
-    );
-    assert!(
-        document.contains(&format!("{SCHEMA_HASH:#010x}")),
-        "the document should show {SCHEMA_HASH:#010x}"
-    );
+    assert!(document.contains(&frame), "the document should show {frame}");
+    assert!(document.contains(&format!("{SCHEMA_HASH:#010x}")), "the document should show {SCHEMA_HASH:#010x}");
 }
 
 /// The worked example of `docs/image-format.md`.
@@ -182,11 +124,7 @@ fn worked_example_of_the_image_document() {
         println!("{line}");
         assert!(document.contains(&line), "the document should show {line}");
     }
-    let last = format!(
-        "{:04x}  {}",
-        image.len() - 4,
-        hex(&image[image.len() - 4..])
-    );
+    let last = format!("{:04x}  {}", image.len() - 4, hex(&image[image.len() - 4..]));
     println!("{last}");
     assert!(document.contains(&last), "the document should show {last}");
 }

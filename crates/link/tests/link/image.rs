@@ -2,8 +2,7 @@
 
 use crate::samples::Tables;
 use link::image::{
-    EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_BYTES_LIMIT, KERNEL_LIMIT, Waypoint,
-    image_bytes, stored_crc,
+    EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_BYTES_LIMIT, KERNEL_LIMIT, Waypoint, image_bytes, stored_crc,
 };
 use link::{ImageError, Name, PrimitiveImage};
 use proptest::prelude::*;
@@ -40,25 +39,11 @@ fn what_was_written_is_what_is_read() {
     assert_eq!(read.model_hash, written.model_hash);
     assert_eq!(
         (read.duration, read.alpha, read.activation, read.kernels),
-        (
-            written.duration,
-            written.alpha,
-            written.activation,
-            written.kernels
-        )
+        (written.duration, written.alpha, written.activation, written.kernels)
     );
-    assert_eq!(
-        (read.stiffness, read.damping),
-        (written.stiffness, written.damping)
-    );
-    assert_eq!(
-        (read.orientation_error, read.hemisphere),
-        (written.orientation_error, written.hemisphere)
-    );
-    assert_eq!(
-        (read.start, read.start_velocity, read.goal),
-        (written.start, written.start_velocity, written.goal)
-    );
+    assert_eq!((read.stiffness, read.damping), (written.stiffness, written.damping));
+    assert_eq!((read.orientation_error, read.hemisphere), (written.orientation_error, written.hemisphere));
+    assert_eq!((read.start, read.start_velocity, read.goal), (written.start, written.start_velocity, written.goal));
     assert_eq!((read.clamps, read.marks), (written.clamps, written.marks));
     for (read, written) in [
         (read.k1, written.k1),
@@ -70,10 +55,7 @@ fn what_was_written_is_what_is_read() {
         assert_eq!(read.iter().collect::<Vec<_>>(), written);
         assert_eq!(read.get(1), written.get(1).copied());
         assert_eq!(read.get(written.len()), None);
-        assert_eq!(
-            read.copy_to(&mut vec![0.0; written.len()]).unwrap(),
-            written
-        );
+        assert_eq!(read.copy_to(&mut vec![0.0; written.len()]).unwrap(), written);
         assert_eq!(read.copy_to(&mut vec![0.0; written.len() - 1]), None);
     }
 }
@@ -109,10 +91,7 @@ fn every_shortened_or_lengthened_image_is_refused() {
     for length in 0..image.len() {
         assert!(PrimitiveImage::parse(&image[..length]).is_err(), "{length}");
     }
-    assert!(matches!(
-        refusal(&[image, vec![0]].concat()),
-        ImageError::Length { .. }
-    ));
+    assert!(matches!(refusal(&[image, vec![0]].concat()), ImageError::Length { .. }));
 }
 
 #[test]
@@ -133,10 +112,7 @@ fn a_not_finite_real_is_refused_wherever_it_is() {
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             let mut damaged = image.clone();
             damaged[FIRST_REAL + 4 * real..][..4].copy_from_slice(&bad.to_le_bytes());
-            assert_eq!(
-                refusal(&sealed(damaged)),
-                ImageError::NotFinite { real: real as u32 }
-            );
+            assert_eq!(refusal(&sealed(damaged)), ImageError::NotFinite { real: real as u32 });
         }
     }
 }
@@ -154,37 +130,16 @@ fn counts_beyond_the_limits_are_refused() {
         sealed(image)
     };
     assert!(PrimitiveImage::parse(&with_counts(100, 32, 1, 128)).is_ok());
-    assert_eq!(
-        refusal(&with_counts(101, 0, 0, 0)),
-        ImageError::Kernels { found: 101 }
-    );
-    assert_eq!(
-        refusal(&with_counts(1, 0, 0, 0)),
-        ImageError::Kernels { found: 1 }
-    );
-    assert_eq!(
-        refusal(&with_counts(2, 33, 1, 0)),
-        ImageError::GainPoints { found: 33 }
-    );
-    assert_eq!(
-        refusal(&with_counts(2, 1, 0, 0)),
-        ImageError::GainPoints { found: 1 }
-    );
-    assert_eq!(
-        refusal(&with_counts(2, 0, 0, 129)),
-        ImageError::ExpectationPoints { found: 129 }
-    );
-    assert_eq!(
-        refusal(&with_counts(u16::MAX, 0, 0, 0)),
-        ImageError::Kernels { found: 65_535 }
-    );
+    assert_eq!(refusal(&with_counts(101, 0, 0, 0)), ImageError::Kernels { found: 101 });
+    assert_eq!(refusal(&with_counts(1, 0, 0, 0)), ImageError::Kernels { found: 1 });
+    assert_eq!(refusal(&with_counts(2, 33, 1, 0)), ImageError::GainPoints { found: 33 });
+    assert_eq!(refusal(&with_counts(2, 1, 0, 0)), ImageError::GainPoints { found: 1 });
+    assert_eq!(refusal(&with_counts(2, 0, 0, 129)), ImageError::ExpectationPoints { found: 129 });
+    assert_eq!(refusal(&with_counts(u16::MAX, 0, 0, 0)), ImageError::Kernels { found: 65_535 });
 
     let mut lying = Tables::new(2, 0, 0).image();
     lying[KERNELS] = 3;
-    assert!(
-        matches!(refusal(&sealed(lying)), ImageError::Length { .. }),
-        "counts that ask for another length"
-    );
+    assert!(matches!(refusal(&sealed(lying)), ImageError::Length { .. }), "counts that ask for another length");
 }
 
 #[test]
@@ -198,11 +153,7 @@ fn bad_names_and_unknown_flags_are_refused() {
     }
     let mut hidden = image.clone();
     hidden[NAME + 31] = b'x';
-    assert_eq!(
-        refusal(&sealed(hidden)),
-        ImageError::Name,
-        "text behind the padding"
-    );
+    assert_eq!(refusal(&sealed(hidden)), ImageError::Name, "text behind the padding");
     let mut flags = image;
     flags[FLAGS + 1] = 0x80;
     assert!(matches!(refusal(&sealed(flags)), ImageError::Flags { .. }));
@@ -215,40 +166,19 @@ fn what_could_not_be_read_back_is_not_written() {
     let name = Name::new("a").unwrap();
     let good = tables.content();
     let length = good.encode(&name, &mut out).unwrap();
-    assert_eq!(
-        good.encode(&name, &mut out[..length - 1]),
-        Err(ImageError::Shape)
-    );
+    assert_eq!(good.encode(&name, &mut out[..length - 1]), Err(ImageError::Shape));
 
-    let start = Waypoint {
-        position: [0.0, f32::NAN, 0.0],
-        ..good.start
-    };
+    let start = Waypoint { position: [0.0, f32::NAN, 0.0], ..good.start };
     let bad = link::image::ImageContent { start, ..good };
-    assert_eq!(
-        bad.encode(&name, &mut out),
-        Err(ImageError::NotFinite { real: 12 })
-    );
+    assert_eq!(bad.encode(&name, &mut out), Err(ImageError::NotFinite { real: 12 }));
     let bad = link::image::ImageContent { kernels: 5, ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
-    let bad = link::image::ImageContent {
-        k1: &good.k1[1..],
-        ..good
-    };
+    let bad = link::image::ImageContent { k1: &good.k1[1..], ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
-    let bad = link::image::ImageContent {
-        expected_spread: &good.k1[..0],
-        ..good
-    };
+    let bad = link::image::ImageContent { expected_spread: &good.k1[..0], ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
-    let bad = link::image::ImageContent {
-        k2: &good.k2[..0],
-        ..good
-    };
-    assert_eq!(
-        bad.encode(&name, &mut out),
-        Err(ImageError::GainPoints { found: 1 })
-    );
+    let bad = link::image::ImageContent { k2: &good.k2[..0], ..good };
+    assert_eq!(bad.encode(&name, &mut out), Err(ImageError::GainPoints { found: 1 }));
 }
 
 proptest! {

@@ -1,13 +1,12 @@
 //! One sample of every message and one image, with different values in all fields.
 
 use link::image::{
-    ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint,
-    WaypointVelocity,
+    ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity,
 };
 use link::message::{AccelerationSource, ChunkData, PoseFeedback};
 use link::{
-    DeviceHello, Event, EventKind, Goal, HostHello, LinkCounters, Listing, Name, Refusal, Reply,
-    Request, RunOptions, Statistics, Status, Telemetry, Text,
+    DeviceHello, Event, EventKind, Goal, HostHello, LinkCounters, Listing, Name, Refusal, Reply, Request, RunOptions,
+    Statistics, Status, Telemetry, Text,
 };
 
 fn name() -> Name {
@@ -24,27 +23,17 @@ fn data() -> ChunkData {
 
 /// Every request, in the order of the enum.
 pub(crate) fn requests() -> Vec<Request> {
-    let goal = Goal {
-        position: Some(ramp(1.0)),
-        orientation: Some([1.0, 0.0, 0.0, 0.0]),
-    };
+    let goal = Goal { position: Some(ramp(1.0)), orientation: Some([1.0, 0.0, 0.0, 0.0]) };
     let options = RunOptions {
-        goal: Goal {
-            position: None,
-            ..goal
-        },
+        goal: Goal { position: None, ..goal },
         speed: 0.5,
         feedback: true,
         force_control: false,
         pose_feedback: PoseFeedback::Planned,
         acceleration: AccelerationSource::Differentiated,
     };
-    let hello = HostHello {
-        link_version: 1,
-        schema_hash: 0x1234_5678,
-        model_hash: 0x9ABC_DEF0,
-        owner: Text::new("anna@lab3"),
-    };
+    let hello =
+        HostHello { link_version: 1, schema_hash: 0x1234_5678, model_hash: 0x9ABC_DEF0, owner: Text::new("anna@lab3") };
     vec![
         Request::Hello(hello),
         Request::Goodbye,
@@ -55,35 +44,19 @@ pub(crate) fn requests() -> Vec<Request> {
         Request::Zero { home: ramp(-1.0) },
         Request::Gravity,
         Request::Hold,
-        Request::Approach {
-            q: ramp(-0.5),
-            duration: 2.5,
-        },
-        Request::Run {
-            name: name(),
-            options,
-        },
+        Request::Approach { q: ramp(-0.5), duration: 2.5 },
+        Request::Run { name: name(), options },
         Request::Stop,
         Request::ClearFault,
         Request::SetGoal(goal),
         Request::SetSpeed { factor: 1.5 },
         Request::Telemetry { every: 3 },
-        Request::UploadBegin {
-            name: name(),
-            length: 4321,
-            crc: 0xCAFE_F00D,
-        },
-        Request::UploadChunk {
-            offset: 192,
-            data: data(),
-        },
+        Request::UploadBegin { name: name(), length: 4321, crc: 0xCAFE_F00D },
+        Request::UploadChunk { offset: 192, data: data() },
         Request::UploadCommit,
         Request::UploadAbort,
         Request::Delete { name: name() },
-        Request::Read {
-            name: name(),
-            offset: 384,
-        },
+        Request::Read { name: name(), offset: 384 },
         Request::Release,
         Request::Tare,
     ]
@@ -171,14 +144,7 @@ pub(crate) fn replies() -> Vec<Reply> {
         telemetry_dropped: 13,
         events_dropped: 14,
         link_timeouts: 15,
-        link: LinkCounters {
-            accepted: 16,
-            bad_cobs: 17,
-            bad_crc: 18,
-            too_long: 19,
-            undecodable: 20,
-            overrun: 22,
-        },
+        link: LinkCounters { accepted: 16, bad_cobs: 17, bad_crc: 18, too_long: 19, undecodable: 20, overrun: 22 },
         stack_free: 21,
         stack_size: 300,
     };
@@ -209,29 +175,13 @@ pub(crate) fn replies() -> Vec<Reply> {
     vec![
         Reply::Hello { of: 1, hello },
         Reply::Accepted { of: 300 },
-        Reply::Refused {
-            of: 3,
-            reason: Refusal::LinkVersion,
-            detail: [2, 1],
-        },
+        Reply::Refused { of: 3, reason: Refusal::LinkVersion, detail: [2, 1] },
         Reply::Status { of: 4, status },
         Reply::Statistics { of: 5, statistics },
-        Reply::Listing {
-            of: 6,
-            listing: Some(listing),
-        },
-        Reply::Chunk {
-            of: 7,
-            offset: 192,
-            data: data(),
-        },
+        Reply::Listing { of: 6, listing: Some(listing) },
+        Reply::Chunk { of: 7, offset: 192, data: data() },
         Reply::Telemetry(telemetry),
-        Reply::Event(Event {
-            cycle: 300,
-            kind: EventKind::LinkTimeout,
-            code: 1,
-            detail: 500,
-        }),
+        Reply::Event(Event { cycle: 300, kind: EventKind::LinkTimeout, code: 1, detail: 500 }),
     ]
 }
 
@@ -289,8 +239,7 @@ pub(crate) struct Tables {
 impl Tables {
     /// Tables with so many kernels and points.
     pub(crate) fn new(kernels: usize, gain_points: usize, expectation_points: usize) -> Self {
-        let series =
-            |count: usize, step: f32| (0..count).map(|index| step * index as f32 - 1.0).collect();
+        let series = |count: usize, step: f32| (0..count).map(|index| step * index as f32 - 1.0).collect();
         Self {
             k1: series(10 * gain_points, 0.5),
             k2: series(9 * gain_points, 0.25),
@@ -326,11 +275,7 @@ impl Tables {
                 hand: ramp(3.0),
             },
             goal: waypoint(-0.5),
-            clamps: FeedbackClamps {
-                position: 0.23,
-                orientation: 0.5,
-                hand: 0.25,
-            },
+            clamps: FeedbackClamps { position: 0.23, orientation: 0.5, hand: 0.25 },
             marks: ExpectationMarks {
                 recorded_duration: 5.5,
                 payload_mass: 0.75,

@@ -3,8 +3,7 @@
 use crate::vectors::rows;
 use proptest::prelude::*;
 use puck::{
-    Counts, Drives, Group, NotFinite, PropertyId, PuckTorque, Ratios, Transmission,
-    TransmissionError, packed_torques,
+    Counts, Drives, Group, NotFinite, PropertyId, PuckTorque, Ratios, Transmission, TransmissionError, packed_torques,
 };
 
 /// The example set of the vectors.
@@ -21,40 +20,21 @@ fn the_transformation_equals_the_vectors() {
     let (transmission, drives) = (transmission(), drives());
     for row in rows("wam7_transform") {
         let q: [f64; 7] = row.numbers("q", 1);
-        let counts = drives
-            .counts(&transmission.motor_from_joint(&q))
-            .expect("finite");
-        assert_eq!(
-            counts.map(|count| count.0),
-            row.numbers::<i32, 7>("p", 1),
-            "{}",
-            row.at()
-        );
+        let counts = drives.counts(&transmission.motor_from_joint(&q)).expect("finite");
+        assert_eq!(counts.map(|count| count.0), row.numbers::<i32, 7>("p", 1), "{}", row.at());
 
         let back = transmission.joint_from_motor(&drives.motor_angles(&counts));
         let motor = transmission.motor_torques_from_joint(&row.numbers("t", 1));
         for (got, expected) in back.iter().zip(row.numbers::<f64, 7>("b", 1)) {
-            assert!(
-                (got - expected).abs() <= 1e-12,
-                "{}: {got} is not {expected}",
-                row.at()
-            );
+            assert!((got - expected).abs() <= 1e-12, "{}: {got} is not {expected}", row.at());
         }
         for (got, expected) in motor.iter().zip(row.numbers::<f64, 7>("m", 1)) {
-            assert!(
-                (got - expected).abs() <= 1e-12,
-                "{}: {got} is not {expected}",
-                row.at()
-            );
+            assert!((got - expected).abs() <= 1e-12, "{}: {got} is not {expected}", row.at());
         }
 
         let [t1, t2, t3, t4, t5, t6, t7] = drives.torques(&motor).expect("finite");
         let lower = packed_torques(Group::ARM_TORQUES, PropertyId::TORQUE, [t1, t2, t3, t4]);
-        let wrist = packed_torques(
-            Group::WRIST_TORQUES,
-            PropertyId::TORQUE,
-            [t5, t6, t7, PuckTorque::ZERO],
-        );
+        let wrist = packed_torques(Group::WRIST_TORQUES, PropertyId::TORQUE, [t5, t6, t7, PuckTorque::ZERO]);
         assert_eq!(lower.payload(), row.payload("g1_hex"), "{}", row.at());
         assert_eq!(wrist.payload(), row.payload("g2_hex"), "{}", row.at());
     }
@@ -68,11 +48,7 @@ fn single_precision_stays_within_a_few_counts_of_the_vectors() {
         let back = transmission.joint_from_motor(&drives().motor_angles(&counts));
         for (got, expected) in back.iter().zip(row.numbers::<f64, 7>("b", 1)) {
             // One motor count is 3.7e-5 rad at J1 and more everywhere else: f32 must stay far below it.
-            assert!(
-                (*got as f64 - expected).abs() <= 3e-6,
-                "{}: {got} is not {expected}",
-                row.at()
-            );
+            assert!((*got as f64 - expected).abs() <= 3e-6, "{}: {got} is not {expected}", row.at());
         }
     }
 }
@@ -81,21 +57,12 @@ fn single_precision_stays_within_a_few_counts_of_the_vectors() {
 fn unusable_ratios_and_drives_are_refused() {
     let mut ratios = Ratios::WAM7;
     ratios.coefficients[4] = f64::NAN;
-    assert_eq!(
-        Transmission::<f64>::new(&ratios),
-        Err(TransmissionError::Ratio)
-    );
+    assert_eq!(Transmission::<f64>::new(&ratios), Err(TransmissionError::Ratio));
     let ratios = Ratios::from_gears([42.0, 28.25, 28.25, 18.0, 9.7, 9.7, 14.93], 0.0, 1.0);
-    assert_eq!(
-        Transmission::<f64>::new(&ratios),
-        Err(TransmissionError::Ratio)
-    );
+    assert_eq!(Transmission::<f64>::new(&ratios), Err(TransmissionError::Ratio));
     let mut counts = [4096; 7];
     counts[2] = 0;
-    assert_eq!(
-        Drives::new(counts, [1; 7]),
-        Err(TransmissionError::CountsPerRevolution { motor: 2 })
-    );
+    assert_eq!(Drives::new(counts, [1; 7]), Err(TransmissionError::CountsPerRevolution { motor: 2 }));
     assert_eq!(
         Drives::new([4096; 7], [1, 1, 1, 1, 1, 1, -1]),
         Err(TransmissionError::UnitsPerNewtonMetre { motor: 6 })
@@ -105,14 +72,8 @@ fn unusable_ratios_and_drives_are_refused() {
 #[test]
 fn not_a_number_never_becomes_counts_or_torque() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        assert_eq!(
-            drives().counts(&[0.0, 0.0, bad, 0.0, 0.0, 0.0, 0.0]),
-            Err(NotFinite)
-        );
-        assert_eq!(
-            drives().torques(&[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, bad]),
-            Err(NotFinite)
-        );
+        assert_eq!(drives().counts(&[0.0, 0.0, bad, 0.0, 0.0, 0.0, 0.0]), Err(NotFinite));
+        assert_eq!(drives().torques(&[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, bad]), Err(NotFinite));
         assert_eq!(PuckTorque::from_units(bad), Err(NotFinite));
         assert_eq!(PuckTorque::from_units(bad as f32), Err(NotFinite));
     }
@@ -164,8 +125,5 @@ fn a9_both_ends_of_the_counter_are_exact() {
     assert_eq!(Counts(HALF).wrapped(), Counts(-HALF));
     assert_eq!(Counts(-HALF - 1).wrapped(), Counts(HALF - 1));
     assert_eq!(Counts(-HALF).unwrapped_near(Counts(HALF - 1)), Counts(HALF));
-    assert_eq!(
-        Counts(HALF - 1).unwrapped_near(Counts(-HALF)),
-        Counts(-HALF - 1)
-    );
+    assert_eq!(Counts(HALF - 1).unwrapped_near(Counts(-HALF)), Counts(-HALF - 1));
 }

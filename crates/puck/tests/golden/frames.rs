@@ -2,18 +2,14 @@
 
 use crate::vectors::rows;
 use puck::device::{
-    acceleration_frame, force_frame, position_frame, reply16, reply32, secondary_position_frame,
-    torque_frame,
+    acceleration_frame, force_frame, position_frame, reply16, reply32, secondary_position_frame, torque_frame,
 };
 use puck::force_torque::{ACCELERATION_PER_COUNT, scaled_counts};
-use puck::safety::{
-    Button, Health, LimitError, ignore_velocity_faults, torque_limits, velocity_limits,
-};
+use puck::safety::{Button, Health, LimitError, ignore_velocity_faults, torque_limits, velocity_limits};
 use puck::tactile::TactileBlock;
 use puck::{
-    Action, CanFrame, CanId, Counts, Destination, GaugeStatus, Group, Node, PendantState,
-    PropertyId, PropertyTable, PuckTorque, RawWrench, Reply, ReplyError, Request, get,
-    packed_torques, set,
+    Action, CanFrame, CanId, Counts, Destination, GaugeStatus, Group, Node, PendantState, PropertyId, PropertyTable,
+    PuckTorque, RawWrench, Reply, ReplyError, Request, get, packed_torques, set,
 };
 
 fn node(number: u8) -> Node {
@@ -36,27 +32,13 @@ fn destination(number: u16) -> Destination {
 fn identifiers_equal_the_vectors_in_both_directions() {
     for row in rows("can_id") {
         let to: u16 = row.number("to");
-        let group_bit = if row.number::<u8>("to_is_group") == 1 {
-            1024
-        } else {
-            0
-        };
+        let group_bit = if row.number::<u8>("to_is_group") == 1 { 1024 } else { 0 };
         let id = CanId::encode(node(row.number("from")), destination(to + group_bit));
         assert_eq!(id.raw(), row.number::<u16>("bus_id_dec"), "{}", row.at());
         assert_eq!(id, row.id("bus_id_hex"), "{}", row.at());
-        assert_eq!(
-            id.sender().number(),
-            row.number::<u8>("decoded_from"),
-            "{}",
-            row.at()
-        );
+        assert_eq!(id.sender().number(), row.number::<u8>("decoded_from"), "{}", row.at());
         // The library's decoder drops the group bit.
-        assert_eq!(
-            id.destination(),
-            destination(row.number::<u16>("decoded_to") + group_bit),
-            "{}",
-            row.at()
-        );
+        assert_eq!(id.destination(), destination(row.number::<u16>("decoded_to") + group_bit), "{}", row.at());
     }
 }
 
@@ -70,31 +52,13 @@ fn sets_and_gets_equal_the_vectors_and_a_device_reads_them_back() {
             None => (get(to, property), Action::Get { property }),
         };
         assert_eq!(frame, row.frame("can_id_hex", "data_hex"), "{}", row.at());
-        assert_eq!(
-            frame.payload().len(),
-            row.number::<usize>("dlc"),
-            "{}",
-            row.at()
-        );
+        assert_eq!(frame.payload().len(), row.number::<usize>("dlc"), "{}", row.at());
         match Request::decode(&frame) {
-            Ok(request) => assert_eq!(
-                request,
-                Request {
-                    sender: Node::HOST,
-                    to,
-                    action
-                },
-                "{}",
-                row.at()
-            ),
+            Ok(request) => assert_eq!(request, Request { sender: Node::HOST, to, action }, "{}", row.at()),
             // Some rows address groups that carry only replies; no device may act on those.
             Err(error) => {
                 assert_eq!(error, puck::RequestError::ReplyGroup, "{}", row.at());
-                assert!(
-                    matches!(to, Destination::Group(group) if group.carries_only_replies()),
-                    "{}",
-                    row.at()
-                );
+                assert!(matches!(to, Destination::Group(group) if group.carries_only_replies()), "{}", row.at());
             }
         }
     }
@@ -108,20 +72,8 @@ fn ordinary_replies_are_accepted_and_rejected_as_in_the_vectors() {
         let value = row.optional::<i32>("value");
         assert_eq!(value.is_some(), row.number::<u8>("ret") == 0);
         match (Reply::decode(&frame), value) {
-            (
-                Ok(Reply::Property {
-                    node,
-                    property,
-                    value,
-                }),
-                Some(expected),
-            ) => {
-                assert_eq!(
-                    (node, property, value),
-                    (from, asked, expected),
-                    "{}",
-                    row.at()
-                );
+            (Ok(Reply::Property { node, property, value }), Some(expected)) => {
+                assert_eq!((node, property, value), (from, asked, expected), "{}", row.at());
                 let sent = if frame.payload().len() == 4 {
                     reply16(from, asked, expected as i16)
                 } else {
@@ -145,77 +97,30 @@ fn positions_are_read_as_in_the_vectors_whatever_the_flag_bits() {
     for row in rows("position") {
         let from = node(row.number("id"));
         let data = row.payload("data_hex");
-        let frame = CanFrame::from_slice(CanId::encode(from, Group::POSITION_REPLIES), &data)
-            .expect("a frame");
-        let alone = CanFrame::from_slice(
-            CanId::encode(from, Group::SECONDARY_POSITION_REPLIES),
-            &data,
-        )
-        .expect("a frame");
+        let frame = CanFrame::from_slice(CanId::encode(from, Group::POSITION_REPLIES), &data).expect("a frame");
+        let alone =
+            CanFrame::from_slice(CanId::encode(from, Group::SECONDARY_POSITION_REPLIES), &data).expect("a frame");
         let Some(motor) = row.optional::<i32>("comb0") else {
-            assert_eq!(
-                Reply::decode(&frame),
-                Err(ReplyError::Length),
-                "{}",
-                row.at()
-            );
-            assert_eq!(
-                Reply::decode(&alone),
-                Err(ReplyError::Length),
-                "{}",
-                row.at()
-            );
+            assert_eq!(Reply::decode(&frame), Err(ReplyError::Length), "{}", row.at());
+            assert_eq!(Reply::decode(&alone), Err(ReplyError::Length), "{}", row.at());
             continue;
         };
         if let Some(motor_only) = row.optional::<i32>("motor") {
             assert_eq!(motor, motor_only);
         }
-        let secondary = Some(row.number::<i32>("comb1"))
-            .filter(|counts| *counts != NO_SECONDARY)
-            .map(Counts);
-        let expected = Reply::Position {
-            node: from,
-            primary: Counts(motor),
-            secondary,
-        };
+        let secondary = Some(row.number::<i32>("comb1")).filter(|counts| *counts != NO_SECONDARY).map(Counts);
+        let expected = Reply::Position { node: from, primary: Counts(motor), secondary };
         assert_eq!(Reply::decode(&frame), Ok(expected), "{}", row.at());
-        let sent = position_frame(
-            from,
-            Counts(row.number("sent_p")),
-            row.optional("sent_s").map(Counts),
-        );
-        assert_eq!(
-            Reply::decode(&sent),
-            Ok(expected),
-            "{}: device side",
-            row.at()
-        );
-        assert!(
-            sent.payload()
-                .iter()
-                .step_by(3)
-                .all(|byte| byte & 0xC0 == 0x80),
-            "{}: flags of a device",
-            row.at()
-        );
+        let sent = position_frame(from, Counts(row.number("sent_p")), row.optional("sent_s").map(Counts));
+        assert_eq!(Reply::decode(&sent), Ok(expected), "{}: device side", row.at());
+        assert!(sent.payload().iter().step_by(3).all(|byte| byte & 0xC0 == 0x80), "{}: flags of a device", row.at());
         match row.optional::<i32>("sec") {
             Some(counts) => {
-                let expected = Reply::SecondaryPosition {
-                    node: from,
-                    secondary: Counts(counts),
-                };
+                let expected = Reply::SecondaryPosition { node: from, secondary: Counts(counts) };
                 assert_eq!(Reply::decode(&alone), Ok(expected), "{}", row.at());
-                assert_eq!(
-                    Reply::decode(&secondary_position_frame(from, Counts(counts))),
-                    Ok(expected)
-                );
+                assert_eq!(Reply::decode(&secondary_position_frame(from, Counts(counts))), Ok(expected));
             }
-            None => assert_eq!(
-                Reply::decode(&alone),
-                Err(ReplyError::Length),
-                "{}",
-                row.at()
-            ),
+            None => assert_eq!(Reply::decode(&alone), Err(ReplyError::Length), "{}", row.at()),
         }
     }
 }
@@ -228,27 +133,14 @@ fn packed_torques_saturate_and_round_down_as_in_the_vectors() {
         let mut inputs: [f64; 4] = row.numbers("t", 0);
         inputs[used..].fill(0.0);
         let torques = inputs.map(|input| PuckTorque::from_units(input).expect("finite"));
-        assert_eq!(
-            torques.map(PuckTorque::units),
-            row.numbers("i", 0),
-            "{}",
-            row.at()
-        );
+        assert_eq!(torques.map(PuckTorque::units), row.numbers("i", 0), "{}", row.at());
         let frame = packed_torques(group, PropertyId::TORQUE, torques);
         assert_eq!(frame, row.frame("can_id_hex", "data_hex"), "{}", row.at());
         let request = Request::decode(&frame).expect("a device reads it");
         for (place, torque) in (1..=4).zip(torques) {
-            assert_eq!(
-                request.action.torque_for(place),
-                Some(torque),
-                "{}: PIDX {place}",
-                row.at()
-            );
+            assert_eq!(request.action.torque_for(place), Some(torque), "{}: PIDX {place}", row.at());
         }
-        assert_eq!(
-            (request.action.torque_for(0), request.action.torque_for(5)),
-            (None, None)
-        );
+        assert_eq!((request.action.torque_for(0), request.action.torque_for(5)), (None, None));
     }
 }
 
@@ -260,11 +152,8 @@ fn force_torque_frames_scale_as_in_the_vectors() {
             let id = CanId::encode(Node::FORCE_TORQUE, group);
             Reply::decode(&CanFrame::from_slice(id, &data).expect("a frame"))
         };
-        let replies = [
-            decode(Group::FORCE_REPLIES),
-            decode(Group::TORQUE_REPLIES),
-            decode(Group::ACCELERATION_REPLIES),
-        ];
+        let replies =
+            [decode(Group::FORCE_REPLIES), decode(Group::TORQUE_REPLIES), decode(Group::ACCELERATION_REPLIES)];
         if row.number::<u8>("ret") == 1 {
             assert_eq!(replies, [Err(ReplyError::Length); 3], "{}", row.at());
             continue;
@@ -273,54 +162,20 @@ fn force_torque_frames_scale_as_in_the_vectors() {
         let status = data.get(6).map(|byte| GaugeStatus(*byte));
         let (node, counts) = (Node::FORCE_TORQUE, raw);
         let expected = [
-            Ok(Reply::Force {
-                node,
-                counts,
-                status,
-            }),
-            Ok(Reply::Torque {
-                node,
-                counts,
-                status,
-            }),
-            Ok(Reply::Acceleration {
-                node,
-                counts,
-                status,
-            }),
+            Ok(Reply::Force { node, counts, status }),
+            Ok(Reply::Torque { node, counts, status }),
+            Ok(Reply::Acceleration { node, counts, status }),
         ];
         assert_eq!(replies, expected, "{}", row.at());
-        let wrench = RawWrench {
-            force: raw,
-            torque: raw,
-            status,
-        };
+        let wrench = RawWrench { force: raw, torque: raw, status };
         let force = [row.number("fx"), row.number("fy"), row.number("fz")];
         let torque = [row.number("tx"), row.number("ty"), row.number("tz")];
-        assert_eq!(
-            (wrench.newtons::<f64>(), wrench.newton_metres::<f64>()),
-            (force, torque),
-            "{}",
-            row.at()
-        );
+        assert_eq!((wrench.newtons::<f64>(), wrench.newton_metres::<f64>()), (force, torque), "{}", row.at());
         let single = |values: [f64; 3]| values.map(|value| value as f32);
-        assert_eq!(
-            (wrench.newtons::<f32>(), wrench.newton_metres::<f32>()),
-            (single(force), single(torque))
-        );
+        assert_eq!((wrench.newtons::<f32>(), wrench.newton_metres::<f32>()), (single(force), single(torque)));
         let acceleration: [f64; 3] = scaled_counts(raw, ACCELERATION_PER_COUNT);
-        assert_eq!(
-            acceleration,
-            [row.number("ax"), row.number("ay"), row.number("az")],
-            "{}",
-            row.at()
-        );
-        assert_eq!(
-            torque_frame(raw, status).payload(),
-            data,
-            "{}: device side",
-            row.at()
-        );
+        assert_eq!(acceleration, [row.number("ax"), row.number("ay"), row.number("az")], "{}", row.at());
+        assert_eq!(torque_frame(raw, status).payload(), data, "{}: device side", row.at());
         assert_eq!(force_frame(raw).payload(), &data[..6]);
         assert_eq!(acceleration_frame(raw).payload(), &data[..6]);
     }
@@ -331,59 +186,30 @@ fn tactile_blocks_equal_the_vectors() {
     for row in rows("tactile_full") {
         let data = row.payload("data_hex");
         let spread = Node::SPREAD;
-        let frame = CanFrame::from_slice(CanId::encode(spread, Group::TACTILE_FULL_REPLIES), &data)
-            .expect("a frame");
+        let frame = CanFrame::from_slice(CanId::encode(spread, Group::TACTILE_FULL_REPLIES), &data).expect("a frame");
         let reply = Reply::decode(&frame);
         if row.number::<u8>("ret") == 1 {
             assert_eq!(reply, Err(ReplyError::Sequence), "{}", row.at());
             continue;
         }
-        let Ok(Reply::TactileFull { node, block }) = reply else {
-            panic!("{}: {reply:?}", row.at())
-        };
-        assert_eq!(
-            (node, block.sequence),
-            (spread, row.number("seq")),
-            "{}",
-            row.at()
-        );
+        let Ok(Reply::TactileFull { node, block }) = reply else { panic!("{}: {reply:?}", row.at()) };
+        assert_eq!((node, block.sequence), (spread, row.number("seq")), "{}", row.at());
         let pressures: [f64; 5] = block.pressures();
         let single: [f32; 5] = block.pressures();
         for index in 0..block.cell_count() {
-            assert_eq!(
-                block.cells[index],
-                row.number::<u16>(&format!("c{index}")),
-                "{}",
-                row.at()
-            );
+            assert_eq!(block.cells[index], row.number::<u16>(&format!("c{index}")), "{}", row.at());
             let pressure: f64 = row.number(&format!("p{index}"));
-            assert_eq!(
-                (pressures[index], single[index]),
-                (pressure, pressure as f32),
-                "{}",
-                row.at()
-            );
+            assert_eq!((pressures[index], single[index]), (pressure, pressure as f32), "{}", row.at());
         }
-        assert_eq!(
-            row.optional::<f64>("p4").is_some(),
-            block.cell_count() == 5,
-            "{}",
-            row.at()
-        );
-        assert_eq!(
-            TactileBlock { ..block }.frame(spread),
-            frame,
-            "{}: device side",
-            row.at()
-        );
+        assert_eq!(row.optional::<f64>("p4").is_some(), block.cell_count() == 5, "{}", row.at());
+        assert_eq!(TactileBlock { ..block }.frame(spread), frame, "{}: device side", row.at());
     }
 }
 
 #[test]
 fn pendant_words_are_read_as_in_the_vectors() {
     for row in rows("pendant") {
-        let word = u32::from_str_radix(row.text("pen_hex").trim_start_matches("0x"), 16)
-            .expect("a word") as i32;
+        let word = u32::from_str_radix(row.text("pen_hex").trim_start_matches("0x"), 16).expect("a word") as i32;
         let state = PendantState::from_value(word);
         if row.number::<u8>("ok") == 0 {
             assert!(state.is_err(), "{}", row.at());
@@ -396,33 +222,11 @@ fn pendant_words_are_read_as_in_the_vectors() {
             Button::Idle => "IDLE",
             Button::None => "NONE",
         };
-        assert!(
-            row.text("button").starts_with(button),
-            "{}: {button} is {}",
-            row.at(),
-            row.text("button")
-        );
-        assert_eq!(
-            state.activate_light,
-            row.number::<u8>("activate_light") == 1,
-            "{}",
-            row.at()
-        );
-        assert_eq!(
-            state.idle_light,
-            row.number::<u8>("idle_light") == 1,
-            "{}",
-            row.at()
-        );
-        assert_eq!(
-            format!("0x{:02X}", state.segments),
-            row.text("char_hex"),
-            "{}",
-            row.at()
-        );
-        for (column, health) in ["velocity", "torque", "voltage", "heartbeat", "other"]
-            .into_iter()
-            .zip(state.health())
+        assert!(row.text("button").starts_with(button), "{}: {button} is {}", row.at(), row.text("button"));
+        assert_eq!(state.activate_light, row.number::<u8>("activate_light") == 1, "{}", row.at());
+        assert_eq!(state.idle_light, row.number::<u8>("idle_light") == 1, "{}", row.at());
+        assert_eq!(format!("0x{:02X}", state.segments), row.text("char_hex"), "{}", row.at());
+        for (column, health) in ["velocity", "torque", "voltage", "heartbeat", "other"].into_iter().zip(state.health())
         {
             let name = match health {
                 Health::Safe => "SAFE",
@@ -431,24 +235,9 @@ fn pendant_words_are_read_as_in_the_vectors() {
             };
             assert_eq!(name, row.text(column), "{}: {column}", row.at());
         }
-        assert_eq!(
-            state.all_safe(),
-            row.number::<u8>("all_safe") == 1,
-            "{}",
-            row.at()
-        );
-        assert_eq!(
-            state.has_faults(),
-            row.number::<u8>("has_faults") == 1,
-            "{}",
-            row.at()
-        );
-        assert_eq!(
-            PendantState::from_value(state.value()),
-            Ok(state),
-            "{}: device side",
-            row.at()
-        );
+        assert_eq!(state.all_safe(), row.number::<u8>("all_safe") == 1, "{}", row.at());
+        assert_eq!(state.has_faults(), row.number::<u8>("has_faults") == 1, "{}", row.at());
+        assert_eq!(PendantState::from_value(state.value()), Ok(state), "{}: device side", row.at());
     }
 }
 
@@ -476,17 +265,9 @@ fn safety_limits_equal_the_vectors_and_zero_is_refused() {
             assert_eq!(frames, Err(LimitError::NotPositive), "{}", row.at());
             continue;
         }
-        assert_eq!(
-            frames,
-            Ok([first, row.frame("frame2_id", "frame2_hex")]),
-            "{}",
-            row.at()
-        );
+        assert_eq!(frames, Ok([first, row.frame("frame2_id", "frame2_hex")]), "{}", row.at());
     }
-    assert_eq!(
-        velocity_limits(&table, f64::NAN, 0.5),
-        Err(LimitError::NotFinite)
-    );
+    assert_eq!(velocity_limits(&table, f64::NAN, 0.5), Err(LimitError::NotFinite));
     assert_eq!(velocity_limits(&table, 0.5, 0.6), Err(LimitError::Order));
     assert_eq!(velocity_limits(&table, 8.0, 0.6), Err(LimitError::Range));
 }

@@ -5,8 +5,7 @@ use puck::hand::{HandCommander, HandError, angles, finger_counts};
 use puck::{CanFrame, Counts, PropertyTable};
 
 fn commander() -> HandCommander {
-    HandCommander::new(&PropertyTable::motor(175).expect("a known firmware"))
-        .expect("a hand firmware")
+    HandCommander::new(&PropertyTable::motor(175).expect("a known firmware")).expect("a hand firmware")
 }
 
 fn frames(row: &Row) -> Vec<CanFrame> {
@@ -38,14 +37,8 @@ fn not_a_number_never_becomes_a_hand_command() {
     let bad = [0.0, f64::NAN, 0.0, 0.0];
     assert_eq!(commander().positions(&bad), Err(HandError::NotFinite));
     assert_eq!(commander().velocity_move(&bad), Err(HandError::NotFinite));
-    assert_eq!(
-        commander().trapezoidal_move(&bad),
-        Err(HandError::NotFinite)
-    );
-    assert_eq!(
-        commander().torques(&bad, &[20_000; 4]),
-        Err(HandError::NotFinite)
-    );
+    assert_eq!(commander().trapezoidal_move(&bad), Err(HandError::NotFinite));
+    assert_eq!(commander().torques(&bad, &[20_000; 4]), Err(HandError::NotFinite));
 }
 
 #[test]
@@ -56,19 +49,12 @@ fn hand_angles_equal_the_vectors() {
             "none" => None,
             counts => Some(Counts(counts.parse().expect("counts"))),
         });
-        let expected = (
-            row.numbers::<f64, 3>("inner", 1),
-            row.numbers::<f64, 3>("outer", 1),
-            row.number::<f64>("spread"),
-        );
+        let expected =
+            (row.numbers::<f64, 3>("inner", 1), row.numbers::<f64, 3>("outer", 1), row.number::<f64>("spread"));
         let double = angles::<f64>(&primary, &secondary);
         let single = angles::<f32>(&primary, &secondary);
         let close = |got: f64, expected: f64, bound: f64| {
-            assert!(
-                (got - expected).abs() <= bound,
-                "{}: {got} is not {expected}",
-                row.at()
-            );
+            assert!((got - expected).abs() <= bound, "{}: {got} is not {expected}", row.at());
         };
         for finger in 0..3 {
             close(double.inner[finger], expected.0[finger], 1e-12);

@@ -31,23 +31,10 @@ fn canonical(name: &str) -> &str {
 
 #[test]
 fn every_property_number_equals_the_vectors() {
-    let by_name: BTreeMap<_, _> = Property::ALL
-        .iter()
-        .map(|property| (property.mnemonic(), *property))
-        .collect();
-    assert_eq!(
-        by_name.len(),
-        Property::ALL.len(),
-        "a mnemonic occurs twice"
-    );
-    let path = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../tests/vectors/property_ids.csv"
-    );
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .from_path(path)
-        .expect("the vector file");
+    let by_name: BTreeMap<_, _> = Property::ALL.iter().map(|property| (property.mnemonic(), *property)).collect();
+    assert_eq!(by_name.len(), Property::ALL.len(), "a mnemonic occurs twice");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/vectors/property_ids.csv");
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(path).expect("the vector file");
     let header = reader.headers().expect("a header").clone();
     let mut cells = 0;
     let mut named = std::collections::BTreeSet::new();
@@ -57,43 +44,26 @@ fn every_property_number_equals_the_vectors() {
         let property = by_name[name];
         named.insert(name.to_owned());
         // PEN needs 28 bits although the motor list reserves no second slot for it.
-        assert_eq!(
-            property.is_wide(),
-            &record[1] == "1" || property == Property::Pen,
-            "width of {name}"
-        );
+        assert_eq!(property.is_wide(), &record[1] == "1" || property == Property::Pen, "width of {name}");
         for (column, cell) in header.iter().zip(record.iter()).skip(2) {
-            let expected = (!cell.is_empty())
-                .then(|| PropertyId::new(cell.parse().expect("a number")).expect("7 bits"));
+            let expected =
+                (!cell.is_empty()).then(|| PropertyId::new(cell.parse().expect("a number")).expect("7 bits"));
             let got = table(column).id(property);
             assert_eq!(got, expected, "{name} in {column}");
             cells += 1;
             if let Some(id) = got {
                 let found = table(column).property(id).expect("the number has a name");
-                assert_eq!(
-                    table(column).id(found),
-                    Some(id),
-                    "{name} in {column}, looked up by number"
-                );
+                assert_eq!(table(column).id(found), Some(id), "{name} in {column}, looked up by number");
             }
         }
     }
-    assert_eq!(
-        named.len(),
-        Property::ALL.len(),
-        "the table has properties that the vectors lack"
-    );
+    assert_eq!(named.len(), Property::ALL.len(), "the table has properties that the vectors lack");
     assert!(cells > 5000, "only {cells} cells compared");
 }
 
 #[test]
 fn a_version_between_two_generations_uses_the_older_one() {
-    let id = |version, property| {
-        PropertyTable::motor(version)
-            .expect("known")
-            .id(property)
-            .map(PropertyId::number)
-    };
+    let id = |version, property| PropertyTable::motor(version).expect("known").id(property).map(PropertyId::number);
     assert_eq!(id(131, Property::Hold), Some(94));
     assert_eq!(id(132, Property::Hold), Some(77));
     assert_eq!(id(131, Property::En), Some(77));
@@ -104,14 +74,8 @@ fn a_version_between_two_generations_uses_the_older_one() {
 #[test]
 fn unknown_firmware_is_refused() {
     for version in [i32::MIN, -1, 0, 256, i32::MAX] {
-        assert_eq!(
-            PropertyTable::motor(version),
-            Err(UnknownFirmware { version })
-        );
-        assert_eq!(
-            PropertyTable::safety(version),
-            Err(UnknownFirmware { version })
-        );
+        assert_eq!(PropertyTable::motor(version), Err(UnknownFirmware { version }));
+        assert_eq!(PropertyTable::safety(version), Err(UnknownFirmware { version }));
     }
 }
 
@@ -129,9 +93,5 @@ fn the_constants_agree_with_the_tables_of_every_arm_in_use() {
     let sensor = PropertyTable::force_torque();
     assert_eq!(sensor.id(Property::Ft), Some(PropertyId::FORCE_TORQUE));
     assert_eq!(sensor.id(Property::A), Some(PropertyId::ACCELERATION));
-    assert_eq!(
-        PropertyTable::monitor().id(Property::Mode),
-        None,
-        "a monitor has no MODE"
-    );
+    assert_eq!(PropertyTable::monitor().id(Property::Mode), None, "a monitor has no MODE");
 }

@@ -5,8 +5,7 @@ use crate::vectors::rows;
 use puck::device::{reply16, reply32};
 use puck::hand::{HandCommand, HandCommander};
 use puck::{
-    Action, CanFrame, Destination, Group, Node, Property, PropertyId, PropertyTable, Reply,
-    Request, Status, get, set,
+    Action, CanFrame, Destination, Group, Node, Property, PropertyId, PropertyTable, Reply, Request, Status, get, set,
 };
 
 /// The recorded frames; replies are decoded and encoded once on the way.
@@ -14,23 +13,10 @@ fn transcript(name: &str) -> Vec<CanFrame> {
     let mut frames = Vec::new();
     for row in rows(name) {
         let frame = row.frame("can_id_hex", "data_hex");
-        assert_eq!(
-            frame.payload().len(),
-            row.number::<usize>("dlc"),
-            "{}",
-            row.at()
-        );
+        assert_eq!(frame.payload().len(), row.number::<usize>("dlc"), "{}", row.at());
         match row.text("dir") {
-            "T" => assert!(
-                Request::decode(&frame).is_ok(),
-                "{}: a device cannot read {frame:?}",
-                row.at()
-            ),
-            _ => assert!(
-                matches!(Reply::decode(&frame), Ok(Reply::Property { .. })),
-                "{}: {frame:?}",
-                row.at()
-            ),
+            "T" => assert!(Request::decode(&frame).is_ok(), "{}: a device cannot read {frame:?}", row.at()),
+            _ => assert!(matches!(Reply::decode(&frame), Ok(Reply::Property { .. })), "{}: {frame:?}", row.at()),
         }
         frames.push(frame);
     }
@@ -58,11 +44,7 @@ impl Conversation<'_> {
         };
         for node in nodes {
             let (value, wide) = (self.answer)(node, property);
-            self.frames.push(if wide {
-                reply32(node, property, value)
-            } else {
-                reply16(node, property, value as i16)
-            });
+            self.frames.push(if wide { reply32(node, property, value) } else { reply16(node, property, value as i16) });
         }
     }
 }
@@ -78,11 +60,7 @@ fn the_safety_constructor_is_reproduced_frame_by_frame() {
         PropertyId::STAT => (2, false),
         other => panic!("asked for {other:?}"),
     };
-    let mut conversation = Conversation {
-        frames: Vec::new(),
-        answer: &answer,
-        hand: &[],
-    };
+    let mut conversation = Conversation { frames: Vec::new(), answer: &answer, hand: &[] };
     for property in [PropertyId::ROLE, PropertyId::VERS, PropertyId::STAT] {
         conversation.send(get(safety, property));
     }
@@ -116,11 +94,7 @@ fn the_hand_initialisation_is_reproduced_frame_by_frame() {
         };
         (value, name.is_wide())
     };
-    let mut conversation = Conversation {
-        frames: Vec::new(),
-        answer: &answer,
-        hand: &Node::HAND,
-    };
+    let mut conversation = Conversation { frames: Vec::new(), answer: &answer, hand: &Node::HAND };
     for node in Node::HAND {
         for property in [PropertyId::ROLE, PropertyId::VERS, PropertyId::STAT] {
             conversation.send(get(node, property));

@@ -19,11 +19,7 @@ impl<W: World> GuidedWorld<W> {
     /// Puts the person into the world.
     #[must_use]
     pub fn new(world: W, person: Person) -> Self {
-        Self {
-            world,
-            person,
-            outside: ([0.0; 3], [0.0; 3]),
-        }
+        Self { world, person, outside: ([0.0; 3], [0.0; 3]) }
     }
 
     /// The world without the person.
@@ -60,10 +56,7 @@ impl<W: World> World for GuidedWorld<W> {
 
     fn step(&mut self, torques: &[f64; 7]) {
         let (force, torque) = self.person.pull(&self.world.grasp_pose());
-        self.world.push(
-            add_scaled(self.outside.0, 1.0, force),
-            add_scaled(self.outside.1, 1.0, torque),
-        );
+        self.world.push(add_scaled(self.outside.0, 1.0, force), add_scaled(self.outside.1, 1.0, torque));
         self.world.step(torques);
     }
 

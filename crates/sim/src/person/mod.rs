@@ -25,12 +25,10 @@ pub use path::{GuidePath, side_grasp_path};
 /// Found by `Kinematics::inverse` from the goal posture backwards along the path (the test
 /// `the_demonstration_postures_reach_the_ends_of_the_path` repeats it).
 /// The straight way in joint space from the home posture to here touches nothing.
-pub const DEMONSTRATION_START: [f64; 7] =
-    [-0.8713, 0.6359, 0.4817, 1.8822, -0.6786, -0.5848, -0.4608];
+pub const DEMONSTRATION_START: [f64; 7] = [-0.8713, 0.6359, 0.4817, 1.8822, -0.6786, -0.5848, -0.4608];
 
 /// A joint posture that reaches the goal of [`side_grasp_path`], rad; the arm being redundant, a demonstration ends near it.
-pub const DEMONSTRATION_GOAL: [f64; 7] =
-    [-0.5501, 1.1622, 0.7957, 1.7611, -0.6966, -0.8446, -0.3368];
+pub const DEMONSTRATION_GOAL: [f64; 7] = [-0.5501, 1.1622, 0.7957, 1.7611, -0.6966, -0.8446, -0.3368];
 
 /// What kind of person guides the arm.
 #[derive(Clone, Debug)]
@@ -204,8 +202,7 @@ impl Person {
     /// How firmly the hand is held, 0 to 1.
     fn grip(&self) -> f64 {
         let rise = (self.path_time() + GRIP_SECONDS) / GRIP_SECONDS;
-        let fall = (self.path.duration() + self.config.settle + GRIP_SECONDS - self.path_time())
-            / GRIP_SECONDS;
+        let fall = (self.path.duration() + self.config.settle + GRIP_SECONDS - self.path_time()) / GRIP_SECONDS;
         rise.min(fall).clamp(0.0, 1.0)
     }
 
@@ -224,13 +221,7 @@ impl Person {
             let shake: [f64; 6] = std::array::from_fn(|i| self.tremor[i].next(&mut self.noise));
             let c = &self.config;
             let spring = [
-                (
-                    add_scaled(aim.position, -1.0, hand.position),
-                    c.stiffness,
-                    c.damping,
-                    c.tremor_force,
-                    c.force_limit,
-                ),
+                (add_scaled(aim.position, -1.0, hand.position), c.stiffness, c.damping, c.tremor_force, c.force_limit),
                 (
                     difference(aim.quaternion, hand.quaternion),
                     c.rotation_stiffness,
@@ -239,11 +230,9 @@ impl Person {
                     c.torque_limit,
                 ),
             ];
-            for (k, (stretch, stiffness, damping, tremor, limit)) in spring.into_iter().enumerate()
-            {
+            for (k, (stretch, stiffness, damping, tremor, limit)) in spring.into_iter().enumerate() {
                 let pull: [f64; 3] = std::array::from_fn(|i| {
-                    grip * (stiffness * stretch[i] - damping * self.speed[k][i]
-                        + tremor * shake[3 * k + i])
+                    grip * (stiffness * stretch[i] - damping * self.speed[k][i] + tremor * shake[3 * k + i])
                 });
                 wrench[k] = shortened(pull, limit);
             }
@@ -255,10 +244,7 @@ impl Person {
     /// Speed of the hand, from one pose to the next.
     fn feel(&mut self, hand: &Pose) {
         let last = self.last.replace(*hand).unwrap_or(*hand);
-        let moved = [
-            add_scaled(hand.position, -1.0, last.position),
-            difference(hand.quaternion, last.quaternion),
-        ];
+        let moved = [add_scaled(hand.position, -1.0, last.position), difference(hand.quaternion, last.quaternion)];
         let share = STEP_SECONDS / SPEED_FILTER_SECONDS;
         for (speed, moved) in self.speed.iter_mut().zip(moved) {
             let change = add_scaled(moved.map(|x| x / STEP_SECONDS), -1.0, *speed);
@@ -281,10 +267,8 @@ impl Person {
             for k in 0..2 {
                 let length = norm(error[k]);
                 if length > careless[k] {
-                    let share =
-                        self.config.correction_rate * STEP_SECONDS * (1.0 - careless[k] / length);
-                    self.correction[k] =
-                        shortened(add_scaled(self.correction[k], share, error[k]), limits[k]);
+                    let share = self.config.correction_rate * STEP_SECONDS * (1.0 - careless[k] / length);
+                    self.correction[k] = shortened(add_scaled(self.correction[k], share, error[k]), limits[k]);
                 }
             }
         }
@@ -297,10 +281,7 @@ impl Person {
                 d,
                 [wander[0], wander[1], wander[2]],
             ),
-            quaternion: multiply(
-                exponential(add_scaled(turn, 1.0, self.correction[1])),
-                wanted.quaternion,
-            ),
+            quaternion: multiply(exponential(add_scaled(turn, 1.0, self.correction[1])), wanted.quaternion),
         }
     }
 }

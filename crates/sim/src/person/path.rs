@@ -34,27 +34,15 @@ impl GuidePath {
         let s = minimum_jerk(time / self.duration);
         let r = 1.0 - s;
         let weights = [r * r * r, 3.0 * r * r * s, 3.0 * r * s * s, s * s * s];
-        let position = self
-            .control
-            .iter()
-            .zip(weights)
-            .fold([0.0; 3], |sum, (p, w)| add_scaled(sum, w, *p));
+        let position = self.control.iter().zip(weights).fold([0.0; 3], |sum, (p, w)| add_scaled(sum, w, *p));
         // The hand is level before the fingers come near the object: both turns end before the curve does.
-        let left = [
-            1.0 - minimum_jerk(s / 0.95),
-            1.0 - minimum_jerk((s - 0.1) / 0.85),
-        ];
+        let left = [1.0 - minimum_jerk(s / 0.95), 1.0 - minimum_jerk((s - 0.1) / 0.85)];
         let quaternion = self
             .turns
             .iter()
             .zip(left)
-            .fold(self.goal, |q, (turn, left)| {
-                multiply(q, exponential(turn.map(|x| left * x)))
-            });
-        Pose {
-            position,
-            quaternion,
-        }
+            .fold(self.goal, |q, (turn, left)| multiply(q, exponential(turn.map(|x| left * x))));
+        Pose { position, quaternion }
     }
 
     /// Pose before the movement.
@@ -72,13 +60,8 @@ impl GuidePath {
     /// Length of the curve of the grasp point, m.
     #[must_use]
     pub fn length(&self) -> f64 {
-        let points: Vec<_> = (0..=500)
-            .map(|i| self.pose(self.duration * f64::from(i) / 500.0).position)
-            .collect();
-        points
-            .windows(2)
-            .map(|w| norm(add_scaled(w[1], -1.0, w[0])))
-            .sum()
+        let points: Vec<_> = (0..=500).map(|i| self.pose(self.duration * f64::from(i) / 500.0).position).collect();
+        points.windows(2).map(|w| norm(add_scaled(w[1], -1.0, w[0]))).sum()
     }
 }
 
@@ -93,33 +76,19 @@ pub fn side_grasp_path() -> GuidePath {
     let approach = [cosine, sine, 0.0];
     let left = [-sine, cosine, 0.0];
     let goal = [0.80, 0.0, -0.01];
-    let start = add_scaled(
-        add_scaled(add_scaled(goal, -0.28, approach), -0.2, left),
-        0.18,
-        [0.0, 0.0, 1.0],
-    );
+    let start = add_scaled(add_scaled(add_scaled(goal, -0.28, approach), -0.2, left), 0.18, [0.0, 0.0, 1.0]);
     // The last control point lies on the line of approach, so the curve ends straight into the grasp.
     let arrive = add_scaled(goal, -0.14, approach);
     let towards = add_scaled(arrive, -1.0, start);
-    let leave = add_scaled(
-        add_scaled(add_scaled(start, 0.35, towards), 0.03, left),
-        0.05,
-        [0.0, 0.0, 1.0],
-    );
+    let leave = add_scaled(add_scaled(add_scaled(start, 0.35, towards), 0.03, left), 0.05, [0.0, 0.0, 1.0]);
     // Palm level: hand z along the approach, hand x straight up (F1 and F2 above one another, the fingers close sideways).
     // A half turn about the bisector of x and z swaps those two axes; then the whole hand turns to the approach.
     let half = 0.5_f64.sqrt();
-    let goal_quaternion = multiply(
-        exponential([0.0, 0.0, 30.0_f64.to_radians()]),
-        [0.0, half, 0.0, half],
-    );
+    let goal_quaternion = multiply(exponential([0.0, 0.0, 30.0_f64.to_radians()]), [0.0, half, 0.0, half]);
     GuidePath {
         control: [start, leave, arrive, goal],
         goal: goal_quaternion,
-        turns: [
-            [0.0, -30.0_f64.to_radians(), -25.0_f64.to_radians()],
-            [-25.0_f64.to_radians(), 0.0, 0.0],
-        ],
+        turns: [[0.0, -30.0_f64.to_radians(), -25.0_f64.to_radians()], [-25.0_f64.to_radians(), 0.0, 0.0]],
         duration: 7.0,
     }
 }

@@ -19,13 +19,8 @@ impl Tremor {
         let stages = [BandPass::new(Self::CENTRE_HERTZ, Self::WIDTH_HERTZ); 2];
         let mut probe = stages;
         // The power of the output to unit white noise is the energy of the impulse response; 20 000 samples are its all.
-        let energy: f64 = (0..20_000)
-            .map(|n| filter(&mut probe, if n == 0 { 1.0 } else { 0.0 }).powi(2))
-            .sum();
-        Self {
-            gain: 1.0 / energy.sqrt(),
-            stages,
-        }
+        let energy: f64 = (0..20_000).map(|n| filter(&mut probe, if n == 0 { 1.0 } else { 0.0 }).powi(2)).sum();
+        Self { gain: 1.0 / energy.sqrt(), stages }
     }
 
     /// The next sample, one physics step after the last; unit root mean square.
@@ -49,21 +44,12 @@ struct BandPass {
 impl BandPass {
     fn new(centre_hertz: f64, width_hertz: f64) -> Self {
         let radius = (-PI * width_hertz * STEP_SECONDS).exp();
-        let feedback = [
-            2.0 * radius * (2.0 * PI * centre_hertz * STEP_SECONDS).cos(),
-            -radius * radius,
-        ];
-        Self {
-            feedback,
-            input: [0.0; 2],
-            output: [0.0; 2],
-        }
+        let feedback = [2.0 * radius * (2.0 * PI * centre_hertz * STEP_SECONDS).cos(), -radius * radius];
+        Self { feedback, input: [0.0; 2], output: [0.0; 2] }
     }
 
     fn next(&mut self, x: f64) -> f64 {
-        let y = x - self.input[1]
-            + self.feedback[0] * self.output[0]
-            + self.feedback[1] * self.output[1];
+        let y = x - self.input[1] + self.feedback[0] * self.output[0] + self.feedback[1] * self.output[1];
         self.input = [x, self.input[0]];
         self.output = [y, self.output[0]];
         y
@@ -127,18 +113,11 @@ mod tests {
         let x = record(|r| tremor.next(r));
         assert!((rms(&x) - 1.0).abs() < 0.05, "rms {}", rms(&x));
         let peak = power(&x, 10.0);
-        for (hertz, low, high) in [
-            (0.0, 0.0, 0.01),
-            (4.0, 0.0, 0.1),
-            (8.0, 0.3, 0.85),
-            (12.0, 0.3, 0.85),
-            (25.0, 0.0, 0.1),
-        ] {
+        for (hertz, low, high) in
+            [(0.0, 0.0, 0.01), (4.0, 0.0, 0.1), (8.0, 0.3, 0.85), (12.0, 0.3, 0.85), (25.0, 0.0, 0.1)]
+        {
             let share = power(&x, hertz) / peak;
-            assert!(
-                (low..high).contains(&share),
-                "{share} of the peak at {hertz} Hz"
-            );
+            assert!((low..high).contains(&share), "{share} of the peak at {hertz} Hz");
         }
     }
 
@@ -147,10 +126,7 @@ mod tests {
         let mut drift = Drift::default();
         let x = record(|r| drift.next(r));
         assert!((rms(&x) - 1.0).abs() < 0.2, "rms {}", rms(&x));
-        let fastest = x
-            .windows(2)
-            .map(|w| (w[1] - w[0]).abs() / STEP_SECONDS)
-            .fold(0.0, f64::max);
+        let fastest = x.windows(2).map(|w| (w[1] - w[0]).abs() / STEP_SECONDS).fold(0.0, f64::max);
         assert!(fastest < 8.0, "changes by {fastest} per second");
     }
 }

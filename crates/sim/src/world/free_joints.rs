@@ -29,24 +29,10 @@ const LINKS: [(f64, Vector); 7] = [
 ];
 
 /// Force/torque sensor and hand together: mass (kg), centre of mass in frame 7 (m), `[payload.wam7_bh280_ft]`.
-const PAYLOAD: (f64, Vector) = (
-    1.337308,
-    [
-        -6.029705722242e-05,
-        -0.009027260457134806,
-        0.0673508537777823,
-    ],
-);
+const PAYLOAD: (f64, Vector) = (1.337308, [-6.029705722242e-05, -0.009027260457134806, 0.0673508537777823]);
 
 /// What the sensor carries: the hand alone, mass (kg), centre of mass in frame 7 (m) = hand frame turned by pi, 12 mm out.
-const HAND: (f64, Vector) = (
-    1.201308,
-    [
-        -6.71232831213989e-05,
-        -0.010049236022244114,
-        0.074296379915774,
-    ],
-);
+const HAND: (f64, Vector) = (1.201308, [-6.71232831213989e-05, -0.010049236022244114, 0.074296379915774]);
 
 /// Where the sensor measures, frame 7, m (`[ft_sensor] origin_in_frame7`); its axes are those of frame 7.
 const SENSOR_ORIGIN: Vector = [0.0, 0.0, 0.006];
@@ -65,9 +51,7 @@ const INERTIA: [f64; 7] = [
 const MEAN_LINK_INERTIA: [f64; 7] = [1.4071, 2.1873, 0.1938, 0.3301, 0.0158, 0.0269, 0.003];
 
 /// Viscous friction, N m s/rad, `[arm.friction]`.
-const VISCOUS: [f64; 7] = [
-    1.27163, 1.15061, 0.407672, 0.233564, 0.0159914, 0.0159914, 0.00267989,
-];
+const VISCOUS: [f64; 7] = [1.27163, 1.15061, 0.407672, 0.233564, 0.0159914, 0.0159914, 0.00267989];
 /// Coulomb friction, N m, `[arm.friction]` (an estimate there).
 const COULOMB: [f64; 7] = [1.5, 2.0, 1.0, 0.8, 0.2, 0.2, 0.1];
 
@@ -75,15 +59,8 @@ const COULOMB: [f64; 7] = [1.5, 2.0, 1.0, 0.8, 0.2, 0.2, 0.1];
 const ELBOW_STOP: f64 = 314.0 / 100.0;
 
 /// Joint stops, rad, `q_min` and `q_max`.
-const STOPS: [(f64, f64); 7] = [
-    (-2.6, 2.6),
-    (-2.0, 2.0),
-    (-2.8, 2.8),
-    (-0.9, ELBOW_STOP),
-    (-4.76, 1.24),
-    (-1.57, 1.57),
-    (-3.0, 3.0),
-];
+const STOPS: [(f64, f64); 7] =
+    [(-2.6, 2.6), (-2.0, 2.0), (-2.8, 2.8), (-0.9, ELBOW_STOP), (-4.76, 1.24), (-1.57, 1.57), (-3.0, 3.0)];
 
 /// The WAM's home, rad (`[arm] home`): on the stop of joint 2, elbow folded.
 pub const HOME: [f64; 7] = [0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0];
@@ -117,11 +94,7 @@ impl FreeJoints {
     /// The arm at rest without gravity and without Coulomb friction: every torque shows at once.
     #[must_use]
     pub fn weightless(q: [f64; 7]) -> Self {
-        Self {
-            gravity: [0.0; 3],
-            coulomb: [0.0; 7],
-            ..Self::new(q)
-        }
+        Self { gravity: [0.0; 3], coulomb: [0.0; 7], ..Self::new(q) }
     }
 
     /// Torque of gravity and of the push on each joint, N m, by the principle of virtual work.
@@ -129,19 +102,9 @@ impl FreeJoints {
         let mut forces: Vec<(usize, Vector, Vector)> = LINKS
             .iter()
             .enumerate()
-            .map(|(link, (mass, centre))| {
-                (
-                    link,
-                    frames[link + 1].point(*centre),
-                    self.gravity.map(|g| g * mass),
-                )
-            })
+            .map(|(link, (mass, centre))| (link, frames[link + 1].point(*centre), self.gravity.map(|g| g * mass)))
             .collect();
-        forces.push((
-            6,
-            frames[7].point(PAYLOAD.1),
-            self.gravity.map(|g| g * PAYLOAD.0),
-        ));
+        forces.push((6, frames[7].point(PAYLOAD.1), self.gravity.map(|g| g * PAYLOAD.0)));
         forces.push((6, chain::grasp_frame(&frames[7]).origin, self.push_force));
         std::array::from_fn(|joint| {
             let (axis, origin) = (frames[joint].axes[2], frames[joint].origin);
@@ -167,20 +130,15 @@ impl World for FreeJoints {
         let external = self.external_torques(&chain::frames(&self.q));
         for joint in 0..7 {
             let inertia = INERTIA[joint] + STEP_SECONDS * VISCOUS[joint];
-            let driven = (INERTIA[joint] * self.dq[joint]
-                + STEP_SECONDS * (torques[joint] + external[joint]))
-                / inertia;
+            let driven =
+                (INERTIA[joint] * self.dq[joint] + STEP_SECONDS * (torques[joint] + external[joint])) / inertia;
             let rubbed = STEP_SECONDS * self.coulomb[joint] / inertia;
             let velocity = driven.signum() * (driven.abs() - rubbed).max(0.0);
             let position = self.q[joint] + STEP_SECONDS * velocity;
             let (low, high) = STOPS[joint];
             // Stops are inelastic: the joint rests against them until a torque takes it away.
             self.q[joint] = position.clamp(low, high);
-            self.dq[joint] = if self.q[joint] == position {
-                velocity
-            } else {
-                0.0
-            };
+            self.dq[joint] = if self.q[joint] == position { velocity } else { 0.0 };
         }
     }
 
@@ -191,10 +149,7 @@ impl World for FreeJoints {
         let force = add(weight, self.push_force);
         let moments = [
             cross(subtract(plate.point(HAND.1), sensor), weight),
-            cross(
-                subtract(chain::grasp_frame(&plate).origin, sensor),
-                self.push_force,
-            ),
+            cross(subtract(chain::grasp_frame(&plate).origin, sensor), self.push_force),
             self.push_torque,
         ];
         let torque = moments.into_iter().fold([0.0; 3], add);
@@ -204,10 +159,7 @@ impl World for FreeJoints {
 
     fn grasp_pose(&self) -> Pose {
         let grasp = chain::grasp_frame(&chain::frames(&self.q)[7]);
-        Pose {
-            position: grasp.origin,
-            quaternion: grasp.quaternion(),
-        }
+        Pose { position: grasp.origin, quaternion: grasp.quaternion() }
     }
 
     fn push(&mut self, force: [f64; 3], torque: [f64; 3]) {
@@ -221,17 +173,10 @@ mod tests {
     use super::*;
 
     fn golden_rows() -> Vec<(Vec<String>, Vec<f64>)> {
-        let text = include_str!(concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../../tests/vectors/dyn_wam7_bh280_ft.csv"
-        ));
+        let text = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/vectors/dyn_wam7_bh280_ft.csv"));
         let mut lines = text.lines().filter(|line| !line.starts_with('#'));
         let names: Vec<String> = lines.next().unwrap().split(',').map(String::from).collect();
-        let numbers = |line: &str| {
-            line.split(',')
-                .map(|value| value.parse().unwrap())
-                .collect()
-        };
+        let numbers = |line: &str| line.split(',').map(|value| value.parse().unwrap()).collect();
         lines.map(|line| (names.clone(), numbers(line))).collect()
     }
 
@@ -247,10 +192,7 @@ mod tests {
             for (joint, torque) in torques.iter().enumerate() {
                 // g is what holds the arm; gravity pulls the other way.
                 let held = column(&row, &format!("g{}", joint + 1));
-                assert!(
-                    (torque + held).abs() < 1e-9,
-                    "joint {joint}: {torque} and {held}"
-                );
+                assert!((torque + held).abs() < 1e-9, "joint {joint}: {torque} and {held}");
             }
         }
     }
@@ -268,10 +210,7 @@ mod tests {
     #[test]
     fn friction_holds_a_joint_until_the_torque_exceeds_it() {
         let turned = |torque: f64| {
-            let mut world = FreeJoints {
-                gravity: [0.0; 3],
-                ..FreeJoints::new([0.0; 7])
-            };
+            let mut world = FreeJoints { gravity: [0.0; 3], ..FreeJoints::new([0.0; 7]) };
             for _ in 0..1000 {
                 world.step(&[torque, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
             }

@@ -51,14 +51,7 @@ pub struct MujocoOptions {
 impl Default for MujocoOptions {
     /// At home, with friction, the flashlight at [`FLASHLIGHT`], fingers open at 0.25 rad, gravity -9.81 m/s^2.
     fn default() -> Self {
-        Self {
-            posture: HOME,
-            joint_friction: true,
-            flashlight: FLASHLIGHT,
-            fingers: 0.25,
-            spread: 0.0,
-            gravity: -9.81,
-        }
+        Self { posture: HOME, joint_friction: true, flashlight: FLASHLIGHT, fingers: 0.25, spread: 0.0, gravity: -9.81 }
     }
 }
 
@@ -123,11 +116,7 @@ impl MujocoWorld {
         let mut data = MjData::new(model);
         place(&mut data, &addresses, options);
         data.forward();
-        Ok(Self {
-            data,
-            addresses,
-            push: ([0.0; 3], [0.0; 3]),
-        })
+        Ok(Self { data, addresses, push: ([0.0; 3], [0.0; 3]) })
     }
 
     /// Simulated time, s.
@@ -155,10 +144,7 @@ impl MujocoWorld {
     #[must_use]
     pub fn flashlight_pose(&self) -> Pose {
         let q = &self.data.qpos()[self.addresses.flashlight..][..7];
-        Pose {
-            position: [q[0], q[1], q[2]],
-            quaternion: [q[3], q[4], q[5], q[6]],
-        }
+        Pose { position: [q[0], q[1], q[2]], quaternion: [q[3], q[4], q[5], q[6]] }
     }
 
     /// Angle between the flashlight's axis and the vertical, rad.
@@ -179,11 +165,7 @@ impl MujocoWorld {
     /// Number of warnings MuJoCo raised so far: anything but 0 means that physics broke.
     #[must_use]
     pub fn warnings(&self) -> u64 {
-        self.data
-            .warning()
-            .iter()
-            .map(|w| u64::from(w.number.unsigned_abs()))
-            .sum()
+        self.data.warning().iter().map(|w| u64::from(w.number.unsigned_abs())).sum()
     }
 
     /// Hands the push to MuJoCo as a wrench at the palm's centre of mass, moved there from the grasp point.
@@ -193,11 +175,7 @@ impl MujocoWorld {
     fn apply_push(&mut self) {
         let (force, torque) = self.push;
         let palm = self.addresses.palm;
-        let lever = add_scaled(
-            self.data.site_xpos()[self.addresses.grasp],
-            -1.0,
-            self.data.xipos()[palm],
-        );
+        let lever = add_scaled(self.data.site_xpos()[self.addresses.grasp], -1.0, self.data.xipos()[palm]);
         let torque = add_scaled(torque, 1.0, cross(lever, force));
         let [fx, fy, fz] = force;
         let [tx, ty, tz] = torque;
@@ -242,10 +220,7 @@ impl World for MujocoWorld {
 
     fn grasp_pose(&self) -> Pose {
         let site = self.addresses.grasp;
-        Pose {
-            position: self.data.site_xpos()[site],
-            quaternion: from_matrix(&self.data.site_xmat()[site]),
-        }
+        Pose { position: self.data.site_xpos()[site], quaternion: from_matrix(&self.data.site_xmat()[site]) }
     }
 
     fn push(&mut self, force: [f64; 3], torque: [f64; 3]) {
@@ -255,8 +230,7 @@ impl World for MujocoWorld {
 
 /// Loads the model and sets it up as the options say.
 fn load(options: &MujocoOptions) -> Result<(Box<MjModel>, Addresses), WorldError> {
-    let mut model =
-        MjModel::from_xml_string(&without_looks()).map_err(|e| WorldError::Model(e.to_string()))?;
+    let mut model = MjModel::from_xml_string(&without_looks()).map_err(|e| WorldError::Model(e.to_string()))?;
     let addresses = Addresses::of(&model)?;
     check(options, &addresses)?;
     model.opt_mut().timestep = STEP_SECONDS;
@@ -307,17 +281,11 @@ fn place(data: &mut MjData<Box<MjModel>>, addresses: &Addresses, options: &Mujoc
 fn check(options: &MujocoOptions, addresses: &Addresses) -> Result<(), WorldError> {
     for (i, (&angle, [low, high])) in options.posture.iter().zip(addresses.ranges).enumerate() {
         if !(low..=high).contains(&angle) {
-            return Err(WorldError::Posture {
-                joint: i + 1,
-                angle,
-                low,
-                high,
-            });
+            return Err(WorldError::Posture { joint: i + 1, angle, low, high });
         }
     }
     let [x, y] = options.flashlight;
-    let on_table =
-        (0..2).all(|i| (options.flashlight[i] - TABLE_CENTRE[i]).abs() <= TABLE_HALF_EXTENT[i]);
+    let on_table = (0..2).all(|i| (options.flashlight[i] - TABLE_CENTRE[i]).abs() <= TABLE_HALF_EXTENT[i]);
     if !on_table {
         return Err(WorldError::OffTable { x, y });
     }
@@ -330,10 +298,7 @@ fn check(options: &MujocoOptions, addresses: &Addresses) -> Result<(), WorldErro
         }
     }
     if !options.gravity.is_finite() {
-        return Err(WorldError::OutOfRange {
-            what: "gravity",
-            value: options.gravity,
-        });
+        return Err(WorldError::OutOfRange { what: "gravity", value: options.gravity });
     }
     Ok(())
 }

@@ -4,8 +4,7 @@
 #![allow(dead_code, missing_docs, unreachable_pub)]
 
 use puck::{
-    CanFrame, Counts, Drives, Group, Node, Property, PropertyId, PropertyTable, Ratios, Reply,
-    Transmission, get, set,
+    CanFrame, Counts, Drives, Group, Node, Property, PropertyId, PropertyTable, Ratios, Reply, Transmission, get, set,
 };
 use sim::{FreeJoints, HOME, Plant, PlantConfig, TICKS_PER_MILLISECOND, Ticks};
 
@@ -26,12 +25,7 @@ impl Master {
     }
 
     pub fn with_world(config: PlantConfig, world: FreeJoints) -> Self {
-        Self {
-            plant: Plant::new(config, Box::new(world)),
-            now: 0,
-            heard: Vec::new(),
-            sent: 0,
-        }
+        Self { plant: Plant::new(config, Box::new(world)), now: 0, heard: Vec::new(), sent: 0 }
     }
 
     /// Lets time pass and keeps every frame that arrives.
@@ -44,8 +38,7 @@ impl Master {
             self.now = self.now.max(next);
             let event = self.plant.event(self.now);
             self.sent += usize::from(event.transmitted);
-            self.heard
-                .extend(event.received.map(|frame| (self.now, frame)));
+            self.heard.extend(event.received.map(|frame| (self.now, frame)));
         }
         self.now = until;
         self.plant.advance(until);
@@ -64,26 +57,15 @@ impl Master {
         self.heard.clear();
         self.send(frame);
         self.wait_ms(2);
-        let replies = self
-            .heard
-            .iter()
-            .map(|(_, frame)| Reply::decode(frame).expect("a valid reply"));
-        replies
-            .filter(|reply| *reply != Reply::SafetyBroadcast)
-            .collect()
+        let replies = self.heard.iter().map(|(_, frame)| Reply::decode(frame).expect("a valid reply"));
+        replies.filter(|reply| *reply != Reply::SafetyBroadcast).collect()
     }
 
     /// The value of a property of one node, if it answers.
     pub fn value(&mut self, node: Node, property: PropertyId) -> Option<i32> {
         match self.ask(get(node, property)).as_slice() {
             [] => None,
-            [
-                Reply::Property {
-                    node: from,
-                    property: answered,
-                    value,
-                },
-            ] => {
+            [Reply::Property { node: from, property: answered, value }] => {
                 assert_eq!((*from, *answered), (node, property));
                 Some(*value)
             }
@@ -96,8 +78,7 @@ impl Master {
     }
 
     pub fn safety_value(&mut self, property: Property) -> i32 {
-        self.value(Node::SAFETY_MODULE, safety_id(property))
-            .expect("the safety module always answers")
+        self.value(Node::SAFETY_MODULE, safety_id(property)).expect("the safety module always answers")
     }
 
     /// SET, then the silence that the receiver needs: 1 ms for a puck, 10 ms for the safety module.
@@ -176,19 +157,11 @@ pub fn motor_id(property: Property) -> PropertyId {
 }
 
 pub fn safety_id(property: Property) -> PropertyId {
-    PropertyTable::safety(VERSION)
-        .unwrap()
-        .id(property)
-        .unwrap()
+    PropertyTable::safety(VERSION).unwrap().id(property).unwrap()
 }
 
 /// What the encoders should read at home.
 pub fn home_counts() -> [Counts; 7] {
-    let motors = Transmission::new(&Ratios::WAM7)
-        .unwrap()
-        .motor_from_joint(&HOME);
-    Drives::new([4096; 7], [2472; 7])
-        .unwrap()
-        .counts(&motors)
-        .unwrap()
+    let motors = Transmission::new(&Ratios::WAM7).unwrap().motor_from_joint(&HOME);
+    Drives::new([4096; 7], [2472; 7]).unwrap().counts(&motors).unwrap()
 }

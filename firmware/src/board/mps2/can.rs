@@ -96,10 +96,7 @@ impl Controller {
             return;
         }
         // An event beyond the timer's 171 s makes it fire early, which finds nothing due and arms it again.
-        let ticks = self
-            .next
-            .saturating_sub(clock::now())
-            .clamp(2, u64::from(u32::MAX)) as u32;
+        let ticks = self.next.saturating_sub(clock::now()).clamp(2, u64::from(u32::MAX)) as u32;
         TIMER1.reload.write(ticks - 1);
         TIMER1.value.write(ticks - 1);
         TIMER1.control.write(Timer::RUN);
@@ -111,14 +108,8 @@ pub(super) fn start(nvic: &mut NVIC) {
     let Ok(wire) = Wire::open() else {
         panic!("no semihosting: start QEMU with -semihosting-config enable=on");
     };
-    let controller = Controller {
-        wire,
-        next: u64::MAX,
-        waiting: 0,
-        received: Deque::new(),
-        overruns: 0,
-        link: Buffer::new(),
-    };
+    let controller =
+        Controller { wire, next: u64::MAX, waiting: 0, received: Deque::new(), overruns: 0, link: Buffer::new() };
     critical_section::with(|section| CONTROLLER.borrow_ref_mut(section).replace(controller));
     let level = ((1 << NVIC_PRIO_BITS) - WIRE_PRIORITY) << (8 - NVIC_PRIO_BITS);
     // SAFETY: the priority is above every RTIC ceiling, and the handler shares nothing with RTIC's resources.

@@ -65,22 +65,12 @@ unsafe extern "C" {
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [Vector; 32] = {
     let mut table = [Vector { reserved: 0 }; 32];
-    table[Interrupt::SLOT_TIMER as usize] = Vector {
-        handler: SLOT_TIMER,
-    };
+    table[Interrupt::SLOT_TIMER as usize] = Vector { handler: SLOT_TIMER };
     table[Interrupt::BUS_WIRE as usize] = Vector { handler: BUS_WIRE };
-    table[Interrupt::CAN_RECEIVE as usize] = Vector {
-        handler: CAN_RECEIVE,
-    };
-    table[Interrupt::CAN_TRANSMIT as usize] = Vector {
-        handler: CAN_TRANSMIT,
-    };
-    table[Interrupt::DISPATCH_SESSION as usize] = Vector {
-        handler: DISPATCH_SESSION,
-    };
-    table[Interrupt::DISPATCH_LOG as usize] = Vector {
-        handler: DISPATCH_LOG,
-    };
+    table[Interrupt::CAN_RECEIVE as usize] = Vector { handler: CAN_RECEIVE };
+    table[Interrupt::CAN_TRANSMIT as usize] = Vector { handler: CAN_TRANSMIT };
+    table[Interrupt::DISPATCH_SESSION as usize] = Vector { handler: DISPATCH_SESSION };
+    table[Interrupt::DISPATCH_LOG as usize] = Vector { handler: DISPATCH_LOG };
     table
 };
 

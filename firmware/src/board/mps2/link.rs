@@ -30,9 +30,7 @@ pub(super) struct Buffer {
 
 impl Buffer {
     pub(super) const fn new() -> Self {
-        Self {
-            bytes: Deque::new(),
-        }
+        Self { bytes: Deque::new() }
     }
 
     /// Keeps received bytes as long as there is room; see [`LinkPort::read`].
@@ -80,10 +78,7 @@ impl LinkPort for Port {
     }
 
     fn room(&self) -> usize {
-        let unsent = self
-            .free_at
-            .saturating_sub(clock::now())
-            .div_ceil(BYTE_TICKS);
+        let unsent = self.free_at.saturating_sub(clock::now()).div_ceil(BYTE_TICKS);
         TRANSMIT_DEPTH.saturating_sub(unsent) as usize
     }
 }

@@ -38,12 +38,8 @@ struct Shared(UnsafeCell<State>);
 // `start`, before any task runs.
 unsafe impl Sync for Shared {}
 
-static STATE: Shared = Shared(UnsafeCell::new(State {
-    stream: None,
-    encoder: defmt::Encoder::new(),
-    message: Vec::new(),
-    mask: 0,
-}));
+static STATE: Shared =
+    Shared(UnsafeCell::new(State { stream: None, encoder: defmt::Encoder::new(), message: Vec::new(), mask: 0 }));
 
 /// Opens standard error. Without it messages are dropped.
 pub(super) fn start() {
@@ -61,9 +57,7 @@ unsafe impl defmt::Logger for Logger {
         let state = unsafe { &mut *STATE.0.get() };
         state.mask = mask;
         state.message.clear();
-        state
-            .encoder
-            .start_frame(|bytes| gather(&mut state.message, bytes));
+        state.encoder.start_frame(|bytes| gather(&mut state.message, bytes));
     }
 
     unsafe fn flush() {}
@@ -71,9 +65,7 @@ unsafe impl defmt::Logger for Logger {
     unsafe fn release() {
         // SAFETY: see `Shared`.
         let state = unsafe { &mut *STATE.0.get() };
-        state
-            .encoder
-            .end_frame(|bytes| gather(&mut state.message, bytes));
+        state.encoder.end_frame(|bytes| gather(&mut state.message, bytes));
         if let Some(stream) = &state.stream {
             // A log that cannot be written must not stop an arm.
             let _ = sys::write(stream.as_fd(), &state.message);
@@ -86,9 +78,7 @@ unsafe impl defmt::Logger for Logger {
     unsafe fn write(bytes: &[u8]) {
         // SAFETY: see `Shared`.
         let state = unsafe { &mut *STATE.0.get() };
-        state
-            .encoder
-            .write(bytes, |bytes| gather(&mut state.message, bytes));
+        state.encoder.write(bytes, |bytes| gather(&mut state.message, bytes));
     }
 }
 
@@ -98,7 +88,4 @@ fn gather(message: &mut Vec<u8, MESSAGE_BYTES>, bytes: &[u8]) {
     }
 }
 
-defmt::timestamp!(
-    "{=u64:us}",
-    clock::now() * 1_000_000 / u64::from(PERIPHERAL_HZ)
-);
+defmt::timestamp!("{=u64:us}", clock::now() * 1_000_000 / u64::from(PERIPHERAL_HZ));

@@ -42,12 +42,7 @@ impl super::Edge for Board {
     }
 
     fn split(self) -> (Self::Clock, Self::SlotTimer, Self::Can, Self::LinkPort) {
-        (
-            clock::Clock,
-            slot_timer::SlotTimer,
-            can::Can,
-            link::Port::new(),
-        )
+        (clock::Clock, slot_timer::SlotTimer, can::Can, link::Port::new())
     }
 
     fn stop(frames: &[CanFrame], reason: core::fmt::Arguments<'_>) -> ! {

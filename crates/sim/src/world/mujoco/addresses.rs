@@ -45,21 +45,15 @@ impl Addresses {
     /// Looks everything up.
     pub(super) fn of(model: &MjModel) -> Result<Self, WorldError> {
         let find = |kind: MjtObjBase, word: &'static str, name: &str| {
-            model
-                .name_to_id(kind, name)
-                .ok_or_else(|| WorldError::Missing {
-                    kind: word,
-                    name: name.to_owned(),
-                })
+            model.name_to_id(kind, name).ok_or_else(|| WorldError::Missing { kind: word, name: name.to_owned() })
         };
         let joint = |name: &str| find(MjtObjBase::mjOBJ_JOINT, "joint", name);
         let servo = |name: &str| find(MjtObjBase::mjOBJ_ACTUATOR, "actuator", name);
         // MuJoCo numbers with `int`; an index that it gives out itself is never negative.
         let position = |name: &str| joint(name).map(|i| model.jnt_qposadr()[i] as usize);
         let velocity = |name: &str| joint(name).map(|i| model.jnt_dofadr()[i] as usize);
-        let sensor = |name: &str| {
-            find(MjtObjBase::mjOBJ_SENSOR, "sensor", name).map(|i| model.sensor_adr()[i] as usize)
-        };
+        let sensor =
+            |name: &str| find(MjtObjBase::mjOBJ_SENSOR, "sensor", name).map(|i| model.sensor_adr()[i] as usize);
         let range = |name: &str| joint(name).map(|i| model.jnt_range()[i]);
         Ok(Self {
             ranges: seven(|j| range(&format!("j{j}")))?,
@@ -86,9 +80,7 @@ impl Addresses {
 }
 
 /// One value per joint, 1 to 7.
-fn seven<T: Copy + Default>(
-    value: impl Fn(usize) -> Result<T, WorldError>,
-) -> Result<[T; 7], WorldError> {
+fn seven<T: Copy + Default>(value: impl Fn(usize) -> Result<T, WorldError>) -> Result<[T; 7], WorldError> {
     let mut all = [T::default(); 7];
     for (i, slot) in all.iter_mut().enumerate() {
         *slot = value(i + 1)?;
@@ -100,8 +92,5 @@ fn seven<T: Copy + Default>(
 pub(super) fn robot_contacts(data: &MjData<Box<MjModel>>) -> usize {
     let types = data.model().geom_contype();
     let robot = |geom: i32| usize::try_from(geom).is_ok_and(|g| types[g] == ROBOT_CONTACT_TYPE);
-    data.contact()
-        .iter()
-        .filter(|c| robot(c.geom1) || robot(c.geom2))
-        .count()
+    data.contact().iter().filter(|c| robot(c.geom1) || robot(c.geom2)).count()
 }

@@ -58,10 +58,7 @@ impl Kinematics {
     pub fn grasp_pose(&mut self, q: &[f64; 7]) -> Pose {
         self.set(q);
         let site = self.addresses.grasp;
-        Pose {
-            position: self.data.site_xpos()[site],
-            quaternion: from_matrix(&self.data.site_xmat()[site]),
-        }
+        Pose { position: self.data.site_xpos()[site], quaternion: from_matrix(&self.data.site_xmat()[site]) }
     }
 
     /// Jacobian of the grasp point in the posture `q`: rows linear velocity (m), then angular velocity, world axes.
@@ -70,11 +67,7 @@ impl Kinematics {
         let (linear, angular) = self.data.jac_site(true, true, self.addresses.grasp);
         let columns = self.data.qvel().len();
         std::array::from_fn(|row| {
-            let (matrix, row) = if row < 3 {
-                (&linear, row)
-            } else {
-                (&angular, row - 3)
-            };
+            let (matrix, row) = if row < 3 { (&linear, row) } else { (&angular, row - 3) };
             self.addresses.velocities.map(|i| matrix[row * columns + i])
         })
     }
@@ -95,11 +88,7 @@ impl Kinematics {
     pub fn inverse(&mut self, target: &Pose, near: &[f64; 7]) -> Result<[f64; 7], Unreachable> {
         let mut q = *near;
         for iteration in 0..Self::ITERATIONS[0] + Self::ITERATIONS[1] {
-            let pull = if iteration < Self::ITERATIONS[0] {
-                Self::POSTURE_PULL
-            } else {
-                0.0
-            };
+            let pull = if iteration < Self::ITERATIONS[0] { Self::POSTURE_PULL } else { 0.0 };
             let gap = self.gap(target, &q);
             let jacobian = self.jacobian(&q);
             let towards: [f64; 7] = std::array::from_fn(|i| pull * (near[i] - q[i]));
@@ -114,17 +103,10 @@ impl Kinematics {
             }
             let multipliers = solve(normal);
             let step: [f64; 7] = std::array::from_fn(|i| {
-                towards[i]
-                    + (0..6)
-                        .map(|row| jacobian[row][i] * multipliers[row])
-                        .sum::<f64>()
+                towards[i] + (0..6).map(|row| jacobian[row][i] * multipliers[row]).sum::<f64>()
             });
             let longest = step.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
-            let scale = if longest > Self::LONGEST_STEP {
-                Self::LONGEST_STEP / longest
-            } else {
-                1.0
-            };
+            let scale = if longest > Self::LONGEST_STEP { Self::LONGEST_STEP / longest } else { 1.0 };
             for (i, [low, high]) in self.addresses.ranges.into_iter().enumerate() {
                 q[i] = (q[i] + scale * step[i]).clamp(low + Self::MARGIN, high - Self::MARGIN);
             }
@@ -132,11 +114,7 @@ impl Kinematics {
         let gap = self.gap(target, &q);
         let length = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
         let (position, rotation) = (length(&gap[..3]), length(&gap[3..]));
-        if position < 1e-6 && rotation < 1e-6 {
-            Ok(q)
-        } else {
-            Err(Unreachable { position, rotation })
-        }
+        if position < 1e-6 && rotation < 1e-6 { Ok(q) } else { Err(Unreachable { position, rotation }) }
     }
 
     /// What is left to the target: metres, then a rotation vector in world axes.
