@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, Result};
+use serde_json::Value;
 
 use crate::{build, setup, shell};
 
@@ -20,34 +21,42 @@ const TEACH: Step = Step {
     words: &["--device", "sim:", "teach", "--output", "grasp.csv"],
 };
 
-/// From the recording to a movement and its figure.
-const PLAY: &[Step] = &[
-    Step {
-        sentence: "learn: the recording becomes a movement primitive",
-        words: &["learn", "grasp.csv", "--output", "grasp.toml"],
-    },
-    Step { sentence: "check: the primitive against the limits of the arm", words: &["check", "grasp.toml"] },
-    Step {
-        sentence: "run: the image under QEMU takes the primitive and plays it on the simulated arm",
-        words: &["--device", "sim:", "run", "grasp.toml", "--record", "run.csv"],
-    },
-    Step {
-        sentence: "plot: demonstration, plan and execution",
-        words: &[
-            "plot",
-            "--demonstration",
-            "grasp.csv",
-            "--primitive",
-            "grasp.toml",
-            "--run",
-            "run.csv",
-            "--output",
-            "run.svg",
-            "--output",
-            "run.png",
-        ],
-    },
-];
+/// From the recording to a primitive; its report is shown in the summary.
+const LEARN: Step = Step {
+    sentence: "learn: the recording becomes a movement primitive",
+    words: &["--json", "learn", "grasp.csv", "--output", "grasp.toml"],
+};
+
+/// On the host first.
+const CHECK: Step =
+    Step { sentence: "check: the primitive against the limits of the arm", words: &["check", "grasp.toml"] };
+
+/// On the arm; its report is shown in the summary.
+const RUN: Step = Step {
+    sentence: "upload and run: the image under QEMU takes the primitive and plays it on the simulated arm",
+    words: &["--json", "--device", "sim:", "run", "grasp.toml", "--record", "run.csv"],
+};
+
+/// What people look at.
+const PLOT: Step = Step {
+    sentence: "plot: demonstration, plan and execution; and a picture of the arm",
+    words: &[
+        "--quiet",
+        "plot",
+        "--demonstration",
+        "grasp.csv",
+        "--primitive",
+        "grasp.toml",
+        "--run",
+        "run.csv",
+        "--output",
+        "run.svg",
+        "--output",
+        "run.png",
+        "--picture",
+        "arm.png",
+    ],
+};
 
 /// The primitive that [`largest`] leaves.
 pub(crate) const LARGEST: &str = "largest.toml";
@@ -65,9 +74,41 @@ pub(crate) fn run(rest: &[&str]) -> Result<()> {
     build::image(&machine)?;
     let tactus = build::host()?;
     play(&tactus, &[TEACH])?;
-    let folder = play(&tactus, PLAY)?;
-    shell::note(&format!("files: {}", folder.display()));
+    let fit = report(&tactus, &LEARN)?;
+    play(&tactus, &[CHECK])?;
+    let run = report(&tactus, &RUN)?;
+    let folder = play(&tactus, &[PLOT])?;
+    shell::step("what came of it");
+    print!("{}", summary(&fit, &run));
+    println!("figure                     {}", folder.join("run.png").display());
+    println!("picture of the arm         {}", folder.join("arm.png").display());
     Ok(())
+}
+
+/// The table at the end of the demonstration.
+fn summary(fit: &Value, run: &Value) -> String {
+    let number = |value: &Value, pointer: &str| value.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    let of_fit = |name: &str| number(fit, &format!("/fit/{name}"));
+    let of_run = |name: &str| number(run, &format!("/{name}"));
+    let pose = |metres: f64, radians: f64| format!("{:.2} mm  {:.2} deg", metres * 1e3, radians.to_degrees());
+    let rows = [
+        ("fit error, RMS", pose(of_fit("position_rms_m"), of_fit("orientation_rms_rad"))),
+        ("tracking error, RMS", pose(of_run("tracking/position_rms_m"), of_run("tracking/orientation_rms_rad"))),
+        ("error at the goal", pose(of_run("tracking/position_end_m"), of_run("tracking/orientation_end_rad"))),
+        ("control cycles", format!("{}", of_run("cycles"))),
+        ("missed deadlines", format!("{}", of_run("missed_deadlines"))),
+        ("control cycle, worst", format!("{} instructions", of_run("worst_instructions"))),
+        ("bus load", format!("{:.1} %", of_run("bus/load") * 100.0)),
+        ("frames on the bus, invalid", format!("{}, {}", of_run("bus/frames"), of_run("bus/invalid_frames"))),
+    ];
+    rows.iter().map(|(name, value)| format!("{name:<26} {value}\n")).collect()
+}
+
+/// Runs one step and gives what it reports as JSON.
+fn report(tactus: &Path, step: &Step) -> Result<Value> {
+    shell::step(step.sentence);
+    let text = shell::capture(Command::new(tactus).args(step.words).current_dir(folder()?))?;
+    serde_json::from_str(&text).with_context(|| format!("no report came from tactus {}", step.words.join(" ")))
 }
 
 /// Teaches and learns the primitive [`LARGEST`]; returns the folder in which it lies.
@@ -77,11 +118,17 @@ pub(crate) fn largest(tactus: &Path) -> Result<PathBuf> {
 
 /// Runs steps inside `target/demo`, where their files stay for a look afterwards; returns that folder.
 fn play(tactus: &Path, steps: &[Step]) -> Result<PathBuf> {
-    let folder = shell::target_dir().join("demo");
-    fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
+    let folder = folder()?;
     for step in steps {
         shell::step(step.sentence);
         shell::run(Command::new(tactus).args(step.words).current_dir(&folder))?;
     }
+    Ok(folder)
+}
+
+/// `target/demo`.
+fn folder() -> Result<PathBuf> {
+    let folder = shell::target_dir().join("demo");
+    fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
     Ok(folder)
 }

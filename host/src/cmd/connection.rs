@@ -30,7 +30,8 @@ pub(super) fn open(
         OpenError::Transport(error) => HostError::Transport(error).into_failure(doing),
         OpenError::Simulation(error) => simulation_failure(error, doing),
     })?;
-    let mut client = Client::connect(device, &owner()).map_err(|error| error.into_failure(doing))?;
+    let owner = owner(matches!(address, Address::Simulated(..)));
+    let mut client = Client::connect(device, &owner).map_err(|error| error.into_failure(doing))?;
     client.set_timeout(global.timeout);
     client.set_interrupt(interrupt());
     Ok(client)
@@ -87,8 +88,12 @@ fn simulation_failure(error: SimulationError, doing: &str) -> Failure {
     Failure::new(exit, code, doing, error).help(help)
 }
 
-/// Who this is, for people who find the device busy.
-fn owner() -> String {
+/// Who this is, for people who find the device busy. Nobody else finds a simulated device of this process, and what is said to it
+/// must be the same in every run, or its virtual times would not be.
+fn owner(simulated: bool) -> String {
+    if simulated {
+        return "tactus".to_owned();
+    }
     let user = std::env::var("USER").unwrap_or_else(|_| "somebody".to_owned());
     format!("{user} (process {})", std::process::id())
 }

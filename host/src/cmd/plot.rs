@@ -33,6 +33,9 @@ pub struct Cmd {
     /// Where to write the figure: `.svg` or `.png`. May be given more than once.
     #[arg(long, short, required = true, value_name = "FILE")]
     pub output: Vec<PathBuf>,
+    /// Also a picture of the simulated arm along the run, PNG.
+    #[arg(long, value_name = "FILE", requires = "run")]
+    pub picture: Option<PathBuf>,
 }
 
 /// Draws the figure.
@@ -93,7 +96,53 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             Failure::new(exit, code, doing, cause)
         })?;
     }
+    if let (Some(file), Some(run)) = (&command.picture, &movement.execution) {
+        spinner.set_message("rendering");
+        picture(run, file)?;
+    }
     spinner.finish_and_clear();
-    let text: Vec<String> = command.output.iter().map(|file| file.display().to_string()).collect();
-    output.result(&json!({ "figures": command.output, "tracking": tracking }), text.join("\n"))
+    let files = command.output.iter().chain(&command.picture);
+    let text: Vec<String> = files.map(|file| file.display().to_string()).collect();
+    output.result(
+        &json!({ "figures": command.output, "picture": command.picture, "tracking": tracking }),
+        text.join("\n"),
+    )
+}
+
+/// Renders the scene at the end of the run, the way of the grasp point, and ghosts of the arm along it.
+#[cfg(feature = "mujoco")]
+fn picture(run: &Recording, file: &std::path::Path) -> Result<(), Failure> {
+    use sim::render::{RenderOptions, Scene, Trail, render_png};
+    use sim::world::mujoco::MujocoOptions;
+
+    /// Arm postures drawn as ghosts.
+    const GHOSTS: usize = 4;
+    /// One dot of the trail every so many cycles.
+    const DOT_EVERY: usize = 15;
+
+    let doing = "plot: the picture";
+    let failed = |cause: Box<dyn std::error::Error + Send + Sync>| Failure::new(Exit::Internal, "E112", doing, cause);
+    let (Some(postures), Some(path)) = (&run.q, &run.position) else {
+        return Err(Failure::new(Exit::Invalid, "E611", doing, "the run has no joint angles or no positions"));
+    };
+    let Some(last) = postures.last() else {
+        return Err(Failure::new(Exit::Invalid, "E612", doing, "the run has no samples"));
+    };
+    let ghosts = (0..GHOSTS).map(|ghost| postures[ghost * postures.len() / (GHOSTS + 1)]).collect();
+    let trail = Trail {
+        points: path.iter().copied().step_by(DOT_EVERY).collect(),
+        colour: [0.84, 0.37, 0.0, 1.0],
+        radius: 0.006,
+    };
+    let scene = Scene::set_up(&MujocoOptions::default()).map_err(|cause| failed(cause.into()))?.with_posture(last);
+    let options = RenderOptions { ghosts, trails: vec![trail], ..RenderOptions::default() };
+    render_png(&scene, file, &options)
+        .map_err(|cause| failed(cause.into()).help("`cargo xtask setup` installs what pictures need"))
+}
+
+/// Without MuJoCo there is nothing to see.
+#[cfg(not(feature = "mujoco"))]
+fn picture(_run: &Recording, _file: &std::path::Path) -> Result<(), Failure> {
+    Err(Failure::new(Exit::NoDevice, "E310", "plot: the picture", "this tactus was built without the MuJoCo world")
+        .help("`cargo xtask build`"))
 }
