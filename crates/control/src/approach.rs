@@ -29,6 +29,9 @@ const SAMPLE_MARGIN: f64 = 1.05;
 /// Longest approach that may be asked for (s).
 pub const LONGEST: f64 = 120.0;
 
+/// Longest time that the arm may take to close in on the target after the path has ended (control periods): 1 s.
+pub const SETTLING: u16 = 300;
+
 /// Shortest approach (s), so that a move over no distance still begins and ends.
 const SHORTEST: f64 = 0.5;
 
@@ -41,6 +44,8 @@ pub struct Approach<R: Real> {
     length: i32,
     /// Control periods passed.
     passed: i32,
+    /// Control periods at the target since then, saturating.
+    settled: u16,
     /// 1/T (1/s).
     rate: R,
 }
@@ -66,7 +71,7 @@ impl<R: Real> Approach<R> {
         let longest = R::of(LONGEST);
         let needed = crate::arm::at_most(needed, longest);
         let length = (needed * R::of(RATE)).whole_below().to_whole() + 1;
-        Approach { start: start.0, way, length, passed: 0, rate: R::of(RATE) / R::from_counts(length) }
+        Approach { start: start.0, way, length, passed: 0, settled: 0, rate: R::of(RATE) / R::from_counts(length) }
     }
 
     /// Duration of the move (s).
@@ -79,9 +84,14 @@ impl<R: Real> Approach<R> {
         R::from_counts(self.passed) / R::from_counts(self.length)
     }
 
-    /// Whether the target is reached.
+    /// Whether the path has ended at the target.
     pub fn is_finished(&self) -> bool {
         self.passed >= self.length
+    }
+
+    /// Whether the arm has had all the time to settle there that it gets.
+    pub fn is_overdue(&self) -> bool {
+        self.settled >= SETTLING
     }
 
     /// Where the arm should be now; then one control period passes.
@@ -89,6 +99,8 @@ impl<R: Real> Approach<R> {
         let (position, speed, acceleration) = minimum_jerk(self.progress());
         if self.passed < self.length {
             self.passed += 1;
+        } else {
+            self.settled = self.settled.saturating_add(1);
         }
         JointReference {
             q: JointPositions(self.start + self.way * position),

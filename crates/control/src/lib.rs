@@ -17,7 +17,7 @@ pub mod kinematics;
 pub mod limit;
 pub mod load;
 pub mod model;
-mod monitor;
+pub mod monitor;
 pub mod real;
 pub mod record;
 mod run;

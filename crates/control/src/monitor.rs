@@ -11,7 +11,7 @@ use crate::supervisor::{State, Trigger};
 use crate::units::JOINTS;
 
 /// Largest speed of elbow and forearm in any state with torque (m/s); the safety module faults at 1.0.
-pub(crate) const TIP_SPEED_LIMIT: f64 = 0.8;
+pub const TIP_SPEED_LIMIT: f64 = 0.8;
 
 /// A joint may exceed its speed limit by this factor before it is stopped: noise and overshoot.
 const SPEED_MARGIN: f64 = 1.2;

@@ -23,8 +23,9 @@ mod app {
         StoredPrimitive, TimedRecord, Timing,
     };
     use embedded_can::nb::Can as _;
+    use embedded_hal::digital::{OutputPin, PinState};
     use firmware::board::device::Interrupt;
-    use firmware::board::{Board, CanStatus, Clock, Edge, LinkPort, SlotTimer, stack};
+    use firmware::board::{Board, CanStatus, Clock, Edge, LinkPort, Parts, SlotTimer, stack};
     use firmware::meters::Meters;
     use heapless::spsc::{Consumer, Producer, Queue};
     use link::image::IMAGE_BYTES_LIMIT;
@@ -59,6 +60,7 @@ mod app {
     struct Local {
         clock: <Board as Edge>::Clock,
         slot_timer: <Board as Edge>::SlotTimer,
+        light: <Board as Edge>::StatusLight,
         slot: Slot,
         queues: SlotQueues,
         lost_frames: u32,
@@ -89,7 +91,7 @@ mod app {
             simulated: Board::SIMULATED,
             ticks_per_second: <Board as Edge>::Clock::HZ,
         };
-        let (clock, mut slot_timer, can, port) = board.split();
+        let Parts { clock, mut slot_timer, can, link: port, light } = board.split();
         let (to_bus, outgoing) = cx.local.outgoing_queue.split();
         let (incoming, from_bus) = cx.local.incoming_queue.split();
         let (to_core, commands) = cx.local.commands_queue.split();
@@ -103,6 +105,7 @@ mod app {
             Local {
                 clock,
                 slot_timer,
+                light,
                 slot: Slot::Request,
                 queues: SlotQueues { from_bus, to_bus, commands, records, events },
                 lost_frames: 0,
@@ -172,10 +175,10 @@ mod app {
         binds = SLOT_TIMER,
         priority = 12,
         shared = [core, can],
-        local = [clock, slot_timer, slot, queues, lost_frames]
+        local = [clock, slot_timer, light, slot, queues, lost_frames]
     )]
     fn slot(mut cx: slot::Context) {
-        let slot::LocalResources { clock, slot_timer, slot, queues, lost_frames, .. } = cx.local;
+        let slot::LocalResources { clock, slot_timer, light, slot, queues, lost_frames, .. } = cx.local;
         METERS.slot(slot_timer.acknowledge());
         let begin = clock.short_ticks();
         let now = clock.now_us();
@@ -201,6 +204,8 @@ mod app {
         let cost_ticks = clock.short_ticks().wrapping_sub(begin);
         if let Some(record) = record {
             METERS.control(cost_ticks);
+            // A light that cannot be switched must not stop the arm.
+            let _ = light.set_state(PinState::from(record.state.has_torque()));
             // A session that lags 50 ms behind loses telemetry, which its host sees by the cycle numbers.
             let _ = queues.records.enqueue(TimedRecord { record, cost_ticks });
         }

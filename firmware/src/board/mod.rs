@@ -5,6 +5,7 @@
 //! a defmt logger, and [`Edge::stop`] for the end. The binaries name nothing else.
 
 use embedded_can::nb;
+use embedded_hal::digital::OutputPin;
 use puck::CanFrame;
 
 mod mps2;
@@ -21,6 +22,8 @@ pub trait Edge: Sized {
     type Can: nb::Can<Frame = CanFrame> + CanStatus;
     /// See [`LinkPort`].
     type LinkPort: LinkPort;
+    /// Lit while the supervisor lets torque through: people beside the arm see it before they touch it.
+    type StatusLight: OutputPin;
 
     /// Name for people, e.g. "mps2-an500".
     const NAME: &'static str;
@@ -34,11 +37,25 @@ pub trait Edge: Sized {
     fn serial(&self) -> &'static str;
 
     /// The peripherals, for the tasks that own them.
-    fn split(self) -> (Self::Clock, Self::SlotTimer, Self::Can, Self::LinkPort);
+    fn split(self) -> Parts<Self>;
 
     /// The end: sends these frames, waits until they are on the bus as far as the bus allows, says why, and stops or
     /// restarts the processor. Called with interrupts masked, from anywhere, perhaps with peripherals in mid-sentence.
     fn stop(frames: &[CanFrame], reason: core::fmt::Arguments<'_>) -> !;
+}
+
+/// The peripherals of a board, each for the task that owns it.
+pub struct Parts<E: Edge> {
+    /// Time.
+    pub clock: E::Clock,
+    /// The timer that makes the slots.
+    pub slot_timer: E::SlotTimer,
+    /// The arm's bus.
+    pub can: E::Can,
+    /// The line to the host.
+    pub link: E::LinkPort,
+    /// The status light.
+    pub light: E::StatusLight,
 }
 
 /// Time since start-up.

@@ -9,6 +9,7 @@ mod error;
 mod in_process;
 mod options;
 mod qemu;
+mod seat;
 
 pub use error::SimulationError;
 pub use options::{DEFAULT_SEED, Engine, IMAGE_VARIABLE, SimulationOptions, WorldKind};
@@ -58,6 +59,24 @@ impl Simulation {
     /// The physical world.
     pub fn world(&mut self) -> &mut dyn World {
         self.plant.world()
+    }
+
+    /// Angle between the axis of the flashlight on the table and the vertical, rad; `None` where the world has none.
+    ///
+    /// What a run came to in the world itself, which no telemetry can tell: whether the flashlight was knocked over.
+    pub fn flashlight_tilt(&mut self) -> Option<f64> {
+        #[cfg(feature = "mujoco")]
+        {
+            use sim::person::GuidedWorld;
+            use sim::world::mujoco::MujocoWorld;
+            let world: &dyn std::any::Any = self.plant.world();
+            let mujoco = world
+                .downcast_ref::<MujocoWorld>()
+                .or_else(|| world.downcast_ref::<GuidedWorld<MujocoWorld>>().map(GuidedWorld::world));
+            mujoco.map(MujocoWorld::flashlight_tilt)
+        }
+        #[cfg(not(feature = "mujoco"))]
+        None
     }
 
     /// Virtual time reached.

@@ -9,6 +9,7 @@ use std::thread::JoinHandle;
 
 use sim::{Lockstep, Plant, Ticks};
 
+use super::seat::Seat;
 use super::{Execute, SimulationError};
 
 /// The machine the image is built for, with everything QEMU would add by itself switched off.
@@ -40,6 +41,7 @@ const LAST_WORDS: usize = 4096;
 /// A running QEMU and the streams to it.
 pub(super) struct Qemu {
     child: Child,
+    _seat: Seat,
     lockstep: Lockstep<BufReader<ChildStdout>, ChildStdin>,
     log: Option<JoinHandle<()>>,
     words: Arc<Mutex<Vec<u8>>>,
@@ -77,7 +79,8 @@ impl Qemu {
                 words.drain(..surplus);
             }
         });
-        Ok(Self { child, lockstep: Lockstep::new(BufReader::new(from), to), log: Some(log), words })
+        let seat = Seat::share(&child);
+        Ok(Self { child, _seat: seat, lockstep: Lockstep::new(BufReader::new(from), to), log: Some(log), words })
     }
 
     /// Why the firmware fell silent.

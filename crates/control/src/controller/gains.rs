@@ -17,6 +17,10 @@ const FRICTION_FRACTION: f64 = 0.8;
 /// that has to be more than its friction.
 const CLAMP: [f64; 7] = [0.10, 0.10, 0.10, 0.10, 0.20, 0.15, 0.20];
 
+/// Largest torque of the integral of `Hold` and `Approach`, in parts of the model's Coulomb friction: enough for friction that
+/// is 30 % more, with 20 % to spare.
+const SETTLING_FRACTION: f64 = 1.5;
+
 /// Damping of a soft stop (N m s/rad).
 const STOP_DAMPING: [f64; 7] = [22.0, 40.0, 4.5, 5.0, 0.22, 0.6, 0.06];
 
@@ -42,6 +46,8 @@ pub struct Gains<R: Real> {
     pub inverse_damping: R,
     /// Largest `|q_d - q|` per joint (rad).
     pub clamp: Vector7<R>,
+    /// Largest shift of a held posture by the integral (rad); times `K_p` the most it adds against an obstacle.
+    pub settling: Vector7<R>,
     /// Proportional gain of Eq (12); the paper has 1.
     pub force_proportional: R,
     /// `K_i` of Eq (12) (1/s).
@@ -66,6 +72,7 @@ impl<R: Real> Gains<R> {
             posture: R::of(1.0),
             inverse_damping: R::of(4e-4),
             clamp: vector(CLAMP),
+            settling: (vector(model::FRICTION_COULOMB) * R::of(SETTLING_FRACTION)).component_div(&vector(STIFFNESS)),
             force_proportional: R::of(1.0),
             force_integral: R::of(2.0),
             force_window: 60,

@@ -10,7 +10,7 @@ use crate::supervisor::{State, Trigger};
 use crate::units::JointPositions;
 
 /// Below this joint speed (rad/s) the arm counts as standing, for leaving a stop.
-const STANDING: f64 = 0.05;
+pub(super) const STANDING: f64 = 0.05;
 
 /// Below this joint speed (rad/s) a movement may begin.
 const CALM: f64 = 0.2;
@@ -120,7 +120,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if self.fastest(measured) > R::of(CALM) { Err(Refusal::Moving) } else { Ok(()) }
     }
 
-    fn fastest(&self, measured: &Measured<'_, R>) -> R {
+    pub(super) fn fastest(&self, measured: &Measured<'_, R>) -> R {
         measured.state.dq.0.amax()
     }
 

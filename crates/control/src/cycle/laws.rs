@@ -28,14 +28,14 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let mut demand = match self.supervisor.law() {
             State::Idle | State::Fault | State::Coast => return None,
             State::Gravity => self.float(measured),
-            State::Hold => self.track(measured, JointReference::at_rest(self.hold)),
+            State::Hold => self.hold_to(measured, JointReference::at_rest(self.hold)),
             State::Approach => {
                 let reference = match &mut self.approach {
                     Some(approach) => approach.step(),
                     None => JointReference::at_rest(self.hold),
                 };
                 self.hold = reference.q;
-                self.track(measured, reference)
+                self.hold_to(measured, reference)
             }
             State::Run => self.run_primitive(measured),
             State::SoftStop => self.stop(measured),
@@ -75,11 +75,15 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.plain(measured, gravity + rest * share - damping)
     }
 
-    /// Eq (10) along a joint reference.
-    fn track(&mut self, measured: &Measured<'_, R>, reference: JointReference<R>) -> Demand<R> {
+    /// Eq (10) along a joint reference, with the integral that takes away what friction leaves.
+    fn hold_to(&mut self, measured: &Measured<'_, R>, reference: JointReference<R>) -> Demand<R> {
         let frozen = measured.state.missing > 0;
+        if !frozen && !self.limited {
+            self.integral.step(&self.gains, &reference.q, &measured.state.q);
+        }
+        let shifted = JointReference { q: JointPositions(reference.q.0 + self.integral.shift()), ..reference };
         let torque =
-            self.joint_controller.torque(&self.model, &self.gains, measured.frames, measured.state, &reference, frozen);
+            self.joint_controller.torque(&self.model, &self.gains, measured.frames, measured.state, &shifted, frozen);
         let pose_d = Frames::new(&self.model, &reference.q).tool_pose();
         Demand { torque, q_d: reference.q, pose_d, phase: R::of(0.0), flags: 0 }
     }

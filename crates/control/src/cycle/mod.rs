@@ -17,7 +17,8 @@ use crate::approach::Approach;
 use crate::arm::ArmModel;
 use crate::calibration::Calibration;
 use crate::command::Refusal;
-use crate::controller::{ForceController, Gains, JointBounds, JointController, OperationalController};
+use crate::controller::{ForceController, Gains, JointBounds, JointController, OperationalController, PostureIntegral};
+use crate::cycle::commands::STANDING;
 use crate::estimate::{JointEstimator, JointState};
 use crate::fault::Fault;
 use crate::kinematics::Frames;
@@ -66,6 +67,7 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     joint_controller: JointController<R>,
     operational: OperationalController<R>,
     force: ForceController<R>,
+    integral: PostureIntegral<R>,
     primitive: Option<Primitive<R, N>>,
     run: Option<Run<R, N>>,
     approach: Option<Approach<R>>,
@@ -77,7 +79,10 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     /// Control periods since torque came on, saturating.
     armed_for: u16,
     zero_cycles: u8,
+    /// Whether the last torque was cut to a joint or motor limit.
     saturated: bool,
+    /// Whether the last torque was cut at all, to the rate limit included.
+    limited: bool,
     tracking: R,
     pending: Option<Event>,
     /// Whether the caller reports a fault of its own in this cycle.
@@ -112,6 +117,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             joint_controller: JointController::new(),
             operational: OperationalController::new(home),
             force: ForceController::new(gains.force_window),
+            integral: PostureIntegral::new(),
             primitive: None,
             run: None,
             approach: None,
@@ -121,6 +127,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             armed_for: 0,
             zero_cycles: 0,
             saturated: false,
+            limited: false,
             tracking: R::of(0.0),
             pending: None,
             outside_fault: false,
@@ -309,15 +316,17 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         match law {
             State::Hold => {
-                self.hold = match from {
-                    State::Run => *self.operational.q_d(),
-                    State::Approach => self.hold,
-                    _ => q,
-                };
+                match from {
+                    // What Eq (11) has put between q_d and q against friction becomes the integral's.
+                    State::Run => self.hold = self.integral.take_over(&self.gains, self.operational.q_d(), &q),
+                    State::Approach => {}
+                    _ => self.hold = q,
+                }
             }
             State::Run => {
-                let start = if from == State::Hold { self.hold } else { q };
-                self.operational = OperationalController::new(start);
+                // From what the feedback is drawn to while holding, so that the torque against friction stays.
+                let start = if from == State::Hold { self.hold.0 + self.integral.shift() } else { q.0 };
+                self.operational = OperationalController::new(JointPositions(start));
                 self.force.reset();
                 self.tracking = R::of(0.0);
             }
@@ -326,6 +335,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.rest = (self.limiter.last().torques().0 - gravity.0, STOP_RAMP);
             }
             _ => {}
+        }
+        if !matches!(law, State::Hold | State::Approach) {
+            self.integral.reset();
         }
         if law != State::Run {
             self.run = None;
@@ -340,11 +352,13 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.limiter.reset();
         self.joint_controller.reset();
         self.force.reset();
+        self.integral.reset();
         self.run = None;
         self.approach = None;
         self.rest = (Vector7::zeros(), 0);
         self.tracking = R::of(0.0);
         self.saturated = false;
+        self.limited = false;
         self.zero_cycles = ZERO_CYCLES;
     }
 
@@ -363,6 +377,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         };
         let (torques, report) = self.limiter.limit(&demand.torque);
         self.saturated = report.joint || report.motor;
+        self.limited = self.saturated || report.rate;
         self.armed_for = self.armed_for.saturating_add(1);
         record.q_d = demand.q_d.to_f32();
         record.pose_d = demand.pose_d.to_f32();
@@ -378,7 +393,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             }
         }
         record.tau = torques.torques().to_f32();
-        if self.is_over() {
+        if self.is_over(measured) {
             self.trigger(Trigger::Arrived, Fault::None, Some(measured));
             record.flags |= flags::ARRIVED;
             self.pending = Some(Event::Arrived);
@@ -386,10 +401,13 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         Actuation::torque(&torques, &self.calibration)
     }
 
-    fn is_over(&self) -> bool {
+    fn is_over(&self, measured: &Measured<'_, R>) -> bool {
         match self.supervisor.state() {
             State::Run => self.run.as_ref().is_some_and(Run::is_over),
-            State::Approach => self.approach.as_ref().is_some_and(Approach::is_finished),
+            State::Approach => self.approach.as_ref().is_some_and(|approach| {
+                let rests = self.integral.is_settled() && self.fastest(measured) < R::of(STANDING);
+                approach.is_overdue() || (approach.is_finished() && rests)
+            }),
             _ => false,
         }
     }

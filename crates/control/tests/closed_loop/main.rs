@@ -3,6 +3,7 @@
 mod authority;
 mod contact;
 mod losses;
+mod postures;
 mod primitives;
 mod rig;
 mod tracking;

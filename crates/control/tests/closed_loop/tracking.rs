@@ -154,7 +154,7 @@ fn approach_arrives_slowly_enough_and_holds() {
     assert!(seconds < 25.0, "{seconds} s is longer than the limits ask for");
     rig.run_for(1.0);
     let error = (rig.plant.q - Vector7::from(START)).amax();
-    assert!(error < 0.03, "{error} rad");
+    assert!(error < 0.008, "{error} rad");
 }
 
 #[test]

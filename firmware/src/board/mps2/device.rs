@@ -129,3 +129,6 @@ pub(super) const COUNTER: Register = Register(0x4002_8018);
 
 /// FPGAIO prescaler of [`COUNTER`]: 0 counts every tick of the peripheral clock.
 pub(super) const PRESCALE: Register = Register(0x4002_801C);
+
+/// FPGAIO light-emitting diodes: bit 0 is the first one.
+pub(super) const LEDS: Register = Register(0x4002_8000);

@@ -8,6 +8,7 @@
 mod can;
 mod clock;
 pub mod device;
+mod light;
 mod link;
 mod lockstep;
 mod logger;
@@ -18,6 +19,8 @@ use semihosting::io::Write;
 use puck::CanFrame;
 use semihosting::process::ExitCode;
 
+use super::Parts;
+
 /// The board.
 pub struct Board(());
 
@@ -26,6 +29,7 @@ impl super::Edge for Board {
     type SlotTimer = slot_timer::SlotTimer;
     type Can = can::Can;
     type LinkPort = link::Port;
+    type StatusLight = light::StatusLight;
 
     const NAME: &'static str = "mps2-an500";
     const SIMULATED: bool = true;
@@ -41,8 +45,14 @@ impl super::Edge for Board {
         "qemu"
     }
 
-    fn split(self) -> (Self::Clock, Self::SlotTimer, Self::Can, Self::LinkPort) {
-        (clock::Clock, slot_timer::SlotTimer, can::Can, link::Port::new())
+    fn split(self) -> Parts<Self> {
+        Parts {
+            clock: clock::Clock,
+            slot_timer: slot_timer::SlotTimer,
+            can: can::Can,
+            link: link::Port::new(),
+            light: light::StatusLight,
+        }
     }
 
     fn stop(frames: &[CanFrame], reason: core::fmt::Arguments<'_>) -> ! {

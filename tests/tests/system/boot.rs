@@ -1,0 +1,93 @@
+//! From power-up under QEMU to an arm that floats.
+
+use std::cell::RefCell;
+
+use control::State;
+use device::Stage;
+use sim::{FrameClass, SLOT_TICKS};
+use system_tests::bus::{CYCLE_TICKS, position_requests, torques};
+use system_tests::execution::{distance, watch};
+use system_tests::{connect, expect, ready, simulation};
+use tactus::procedure;
+
+/// Latest start of a position request behind its timer, ticks: interrupt and round (10 us) behind the rest of the
+/// longest frame that may be on the wire (135 us).
+const JITTER: u64 = 145 * sim::TICKS_PER_MICROSECOND;
+
+#[test]
+fn firmware_boots_from_the_emergency_stop_to_ready_through_every_stage() {
+    let mut arm = connect("sim:seed=11");
+    let mode = simulation(arm.transport()).plant().safety_mode();
+    assert_eq!(mode, puck::SafetyMode::EStop, "the arm must start with the E-stop pressed");
+    let stages = RefCell::new(Vec::new());
+    expect(procedure::make_ready(&mut arm, false, |stage| stages.borrow_mut().push(stage)));
+    let stages = stages.into_inner();
+    assert!(stages.is_sorted(), "stages went back: {stages:?}");
+    for stage in [Stage::WaitingForIdle, Stage::Waking, Stage::WaitingForZero, Stage::WaitingForActive, Stage::Ready] {
+        assert!(stages.contains(&stage), "{stage:?} is not among {stages:?}");
+    }
+    let status = expect(arm.status());
+    assert_eq!((status.safety_mode, status.zeroed, status.fault), (Some(2), true, 0));
+    let simulation = simulation(arm.transport());
+    let (truth, trace) = (simulation.world().joint_positions(), simulation.plant().trace());
+    assert_eq!(trace.invalid, 0, "invalid frames on the bus: {:?}", trace.invalid_examples);
+    assert_eq!(simulation.plant().lost_requests(), 0, "requests came too fast for the pucks");
+    for (joint, (measured, truth)) in status.q.iter().zip(truth).enumerate() {
+        let error = f64::from(*measured) - truth;
+        assert!(error.abs() < 2e-3, "joint {} is measured {error:e} rad beside the truth", joint + 1);
+    }
+}
+
+#[test]
+fn every_cycle_begins_on_the_300_hz_grid() {
+    let mut arm = ready("sim:seed=12,world=simple");
+    let from = simulation(arm.transport()).ticks();
+    let telemetry = watch(&mut arm, 600);
+    assert!(telemetry.windows(2).all(|pair| pair[1].cycle == pair[0].cycle + 1), "a cycle is missing");
+    let simulation = simulation(arm.transport());
+    let until = simulation.ticks();
+    let requests: Vec<u64> =
+        position_requests(simulation.plant().recorded()).into_iter().filter(|start| *start >= from).collect();
+    let expected = (until - from) / CYCLE_TICKS;
+    assert!(
+        (expected..=expected + 1).contains(&(requests.len() as u64)),
+        "{} requests in {expected} cycles",
+        requests.len()
+    );
+    let slot = requests[0] / SLOT_TICKS;
+    for (count, start) in requests.iter().enumerate() {
+        // The timer's grid never drifts: the hundredth request is measured from the first slot, not from the 99th.
+        let timer = (slot + 3 * count as u64) * SLOT_TICKS;
+        let late = start.checked_sub(timer).unwrap_or_else(|| panic!("request {count} came before its timer"));
+        assert!(late <= JITTER, "request {count} came {late} ticks after its timer");
+    }
+    assert_eq!(expect(arm.statistics()).missed_deadlines, 0);
+}
+
+#[test]
+fn no_torque_flows_before_a_person_commands() {
+    let mut arm = ready("sim:seed=13");
+    watch(&mut arm, 150);
+    let plant = simulation(arm.transport()).plant();
+    let sent = torques(plant.recorded());
+    assert!(sent.len() > 100, "the pucks must be told zero explicitly: {} frames", sent.len());
+    assert_eq!(sent.iter().find(|(_, units)| *units != [0; 4]), None, "torque without a command");
+    assert_eq!(plant.trace().count(FrameClass::PackedTorque), sent.len() as u64);
+    assert_eq!(State::from_code(expect(arm.status()).state), Some(State::Idle));
+}
+
+#[test]
+fn gravity_compensation_holds_the_arm_still() {
+    let mut arm = ready("sim:seed=14");
+    expect(arm.gravity());
+    let start = simulation(arm.transport()).world().grasp_pose().position;
+    let telemetry = watch(&mut arm, 900);
+    assert!(telemetry.iter().all(|cycle| State::from_code(cycle.state) == Some(State::Gravity)));
+    let end = simulation(arm.transport()).world().grasp_pose().position;
+    let drift = distance(&start, &end);
+    println!("drift in 3 s: {:.3} mm", drift * 1e3);
+    assert!(drift < 5e-3, "the floating arm drifted {:.1} mm in 3 s", drift * 1e3);
+    // It is the arm that is held, not a brake: the torques carry it.
+    let carrying = telemetry.iter().flat_map(|cycle| cycle.tau).fold(0.0, |largest: f32, tau| largest.max(tau.abs()));
+    assert!(carrying > 1.0, "no torque carries the arm: {carrying} N m at the most");
+}

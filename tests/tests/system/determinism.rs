@@ -1,0 +1,93 @@
+//! A run is a function of image, primitive and seed; the computer's speed is no part of it.
+
+use std::time::Duration;
+
+use system_tests::execution::play;
+use system_tests::load::Load;
+use system_tests::{Arm, expect, ready, simulation, taught};
+use tactus::procedure::{self, Recorder};
+
+/// Hash of the bus and bytes of the recording.
+type Account = (u64, Vec<u8>);
+
+/// Start-up, hold, and a short move, recorded.
+fn short_movement(address: &str) -> Account {
+    let mut arm = ready(address);
+    expect(arm.hold());
+    let mut recorder = expect(Recorder::start(&mut arm, Vec::new(), "short movement"));
+    let home = expect(arm.status()).q;
+    expect(arm.approach(std::array::from_fn(|joint| home[joint] + if joint == 3 { -0.15 } else { 0.05 }), 0.0));
+    while recorder.rows() < 300 {
+        expect(recorder.take(&mut arm));
+    }
+    let bytes = expect(recorder.finish(&mut arm));
+    (hash(&mut arm), bytes)
+}
+
+/// A whole run of the taught primitive.
+fn whole_run(address: &str) -> Account {
+    let mut arm = ready(address);
+    let execution = play(&mut arm, taught());
+    (hash(&mut arm), execution.bytes)
+}
+
+fn hash(arm: &mut Arm) -> u64 {
+    simulation(arm.transport()).plant().trace().hash
+}
+
+/// Whether two accounts are the same, without printing a megabyte when they are not.
+#[track_caller]
+fn assert_same(one: &Account, other: &Account, what: &str) {
+    println!("{what}: {:016x} and {:016x}", one.0, other.0);
+    assert_eq!(one.0, other.0, "{what}: other frames, or other times of frames");
+    assert!(one.1 == other.1, "{what}: another recording");
+}
+
+#[track_caller]
+fn assert_different(one: &Account, other: &Account, what: &str) {
+    println!("{what}: {:016x} and {:016x}", one.0, other.0);
+    assert_ne!(one.0, other.0, "{what}");
+    assert!(one.1 != other.1, "{what}: the same recording");
+}
+
+#[test]
+fn equal_seeds_give_equal_runs_under_qemu() {
+    let once = whole_run("sim:seed=21");
+    assert_same(&once, &whole_run("sim:seed=21"), "sim: with one seed");
+}
+
+#[test]
+fn a_busy_computer_changes_nothing_and_a_seed_does() {
+    let at_leisure = short_movement("sim:seed=22");
+    assert_different(&at_leisure, &short_movement("sim:seed=23"), "sim: with two seeds");
+    let load = Load::on_every_core();
+    let under_load = short_movement("sim:seed=22");
+    drop(load);
+    assert_same(&at_leisure, &under_load, "sim: with both cores busy");
+}
+
+#[test]
+fn equal_seeds_give_equal_runs_in_process() {
+    let once = whole_run("sil:seed=24");
+    assert_same(&once, &whole_run("sil:seed=24"), "sil: with one seed");
+    let _load = Load::on_every_core();
+    assert_same(&once, &whole_run("sil:seed=24"), "sil: with both cores busy");
+    assert_different(&once, &whole_run("sil:seed=25"), "sil: with two seeds");
+}
+
+#[test]
+fn time_passes_only_while_the_host_waits() {
+    let mut arm = ready("sim:seed=26,world=simple");
+    let before = simulation(arm.transport()).ticks();
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(simulation(arm.transport()).ticks(), before);
+    // Half a second of silence stops a motion; a host that merely computed was not silent.
+    expect(arm.hold());
+    expect(procedure::travel(&mut arm, expect_posture(), |_| {}));
+    assert_eq!(expect(arm.statistics()).link_timeouts, 0);
+}
+
+/// A posture a little beside home.
+fn expect_posture() -> [f32; 7] {
+    std::array::from_fn(|joint| control::model::HOME[joint] as f32 + if joint == 3 { -0.1 } else { 0.0 })
+}

@@ -1,0 +1,11 @@
+//! The whole system: firmware under QEMU, bus, world, link, host tools. One program, so that all share what was taught.
+
+mod bad_input;
+mod boot;
+mod command_line;
+mod determinism;
+mod firmware_ends;
+mod journey;
+mod served_arm;
+mod sil_and_qemu;
+mod stopping;
