@@ -8,7 +8,7 @@ use clap::Args;
 use control::State;
 use serde_json::json;
 
-use super::{Failure, Global, connection};
+use super::{Exit, Failure, Global, connection};
 use crate::client::Client;
 use crate::device::Device;
 use crate::procedure::{self, ProcedureError, Recorder, Take};
@@ -51,6 +51,16 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "teach";
     let output = global.output();
     let mut client = connection::open(global, DOING, |options| options.person = Some(command.person))?;
+    let alone = global.non_interactive && command.duration.is_none();
+    if alone && default_posture(&mut client).is_none() {
+        return Err(Failure::new(
+            Exit::Usage,
+            "E205",
+            DOING,
+            "nobody may be asked to press Enter when the movement is shown",
+        )
+        .help("say how long to record with `--duration SECONDS`"));
+    }
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let failed = |error| connection::failure(error, DOING);
 

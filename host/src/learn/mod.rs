@@ -17,7 +17,7 @@ use thiserror::Error;
 use crate::demonstration::{Demonstration, DemonstrationError, PoseSource, Preparation, Recording, angle_between};
 use crate::plan;
 use crate::plot::movement::rotation_vectors;
-use crate::primitive_file::{OrientationErrorKind, PrimitiveFile, PrimitiveFileError, Provenance};
+use crate::primitive_file::{KERNEL_CAPACITY, OrientationErrorKind, PrimitiveFile, PrimitiveFileError, Provenance};
 use hand::HandMotion;
 use report::{FitReport, row_error, wrench_statistics};
 
@@ -111,6 +111,11 @@ pub struct Learned {
     pub demonstration: Demonstration,
 }
 
+/// Reproductions worse than this (m, RMS) deserve more kernels.
+const COARSE_POSITION: f64 = 2e-3;
+/// Reproductions worse than this (rad, RMS: half a degree) deserve more kernels.
+const COARSE_ORIENTATION: f64 = 0.5 * std::f64::consts::PI / 180.0;
+
 /// Learns a primitive from a recording; `file` is where the primitive will be written.
 ///
 /// # Errors
@@ -156,7 +161,16 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
         provenance: None,
         ..fitted
     };
-    let report = compare(&primitive, recording, &demonstration, &posture, &hand, largest_angle, warnings)?;
+    let mut report = compare(&primitive, recording, &demonstration, &posture, &hand, largest_angle, warnings)?;
+    let coarse = report.position_rms_m > COARSE_POSITION || report.orientation_rms_rad > COARSE_ORIENTATION;
+    if coarse && options.kernels < KERNEL_CAPACITY {
+        report.warnings.push(format!(
+            "{} kernels are too few for this movement: the reproduction is off by {:.1} mm and {:.1} degrees RMS; learn it with --kernels {KERNEL_CAPACITY}",
+            options.kernels,
+            report.position_rms_m * 1e3,
+            report.orientation_rms_rad.to_degrees()
+        ));
+    }
     primitive.provenance = Some(Provenance {
         demonstration: recording.file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
         demonstration_checksum: recording.checksum,
