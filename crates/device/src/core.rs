@@ -289,6 +289,8 @@ impl Core {
         if !self.startup.is_zero_pending() {
             match io.command() {
                 Some(Command::Zero { home }) => self.startup.zero(&home),
+                // Nothing moves and no torque flows: what a stop asks for is so already.
+                Some(Command::Control(control::Command::Stop)) => self.tell(EventKind::Accepted, io),
                 Some(Command::Control(_)) => {
                     self.tell(EventKind::Refused(Refusal::NotReady(self.stage())), io);
                 }

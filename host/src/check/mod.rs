@@ -9,6 +9,7 @@ mod plant;
 
 use control::load::{REACH, within_reach};
 use control::model::{SOFT_MAX, SOFT_MIN, VELOCITY_MAX};
+use control::monitor::TIP_SPEED_LIMIT;
 use serde::Serialize;
 
 use crate::arm::TORQUE_LIMITS;
@@ -22,9 +23,6 @@ use closed_loop::{ClosedLoop, Ending, Sample};
 pub const GOAL_DISTANCE: f64 = 3e-3;
 /// Largest angle from the goal when the run is over, rad: 1 degree.
 pub const GOAL_ANGLE: f64 = std::f64::consts::PI / 180.0;
-/// Speed of elbow and forearm at which the control code stops the arm, m/s. (`control` keeps its own copy to itself;
-/// the closed loop proves that this one is not the larger.)
-pub const TIP_SPEED_LIMIT: f64 = 0.8;
 
 /// Which limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -105,6 +105,10 @@ impl Execute for Qemu {
             Ok(served) if !served.is_last() => Ok(plant.now()),
             Ok(_) => Err(self.ended()),
             Err(sim::LockstepError::Truncated { .. }) => Err(self.ended()),
+            // Killed between its request and our answer.
+            Err(sim::LockstepError::Stream(cause)) if cause.kind() == std::io::ErrorKind::BrokenPipe => {
+                Err(self.ended())
+            }
             Err(error) => Err(error.into()),
         }
     }

@@ -106,8 +106,9 @@ fn bad_images_are_refused_with_the_reason_and_the_stored_one_stays() {
     assert!(matches!(expect(arm.upload(&sound, |_, _, _| {})), UploadOutcome::Stored(_)));
     let mut refused = |bad: &[u8]| refused(&mut arm, &name, &sound, bad);
 
-    let (reason, [code, _], _) = refused(&image::with_wrong_crc(&sound));
-    assert_eq!((reason, code), (Refusal::ImageInvalid, 5), "check sum");
+    let (reason, [computed, carried], _) = refused(&image::with_wrong_crc(&sound));
+    assert_eq!((reason, computed), (Refusal::UploadCrc, link::image::stored_crc(&sound)));
+    assert_ne!(computed, carried, "the message must name the two check sums that differ");
     let (reason, detail, _) = refused(&image::of_schema(&sound, 7));
     assert_eq!((reason, detail), (Refusal::ImageInvalid, [3, 7]), "schema, with the version found");
     let (reason, detail, _) = refused(&image::of_model(&sound, !control::MODEL_HASH));

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use control::State;
 use device::Stage;
-use link::frame::Decoder;
-use link::{Reply, Telemetry};
+use link::frame::{Decoder, LINK_TIMEOUT_MS};
+use link::{EventKind, HostHello, Reply, Request, Telemetry, Text};
 use sim::{PendantAction, TICKS_PER_SECOND};
 use system_tests::bus::{CYCLE_TICKS, torques};
 use system_tests::execution::{begin, beyond_torque_limits, largest_torque_step, prepare};
@@ -83,29 +83,39 @@ fn arm_stops_half_a_second_after_its_host_fell_silent() {
     let (mut arm, telemetry) = in_the_middle("sim:seed=42");
     let silent_since = telemetry.last().expect("it runs").cycle;
     let device = arm.transport();
-    let until = device.now() + Duration::from_millis(900);
+    let until = device.now() + Duration::from_millis(700);
     let mut decoder = Decoder::new();
     let mut heard = Vec::new();
     while device.now() < until {
         heard.extend(raw::listen(device, &mut decoder, until));
     }
-    let cycles: Vec<Telemetry> = heard
-        .into_iter()
-        .filter_map(|reply| match reply {
-            Reply::Telemetry(telemetry) => Some(telemetry),
-            _ => None,
-        })
-        .collect();
-    let stopped = cycles.iter().find(|cycle| state(cycle) == Some(State::SoftStop)).expect("it stopped");
-    let after = f64::from(stopped.cycle - silent_since) / 300.0;
+    // The last words of the session say why it ends; telemetry ends with it.
+    let Some(Reply::Event(event)) = heard.last() else { panic!("{:?}", heard.last()) };
+    assert_eq!((event.kind, event.detail), (EventKind::LinkTimeout, LINK_TIMEOUT_MS));
+    let after = f64::from(event.cycle - silent_since) / 300.0;
     println!("stopped {after:.3} s after the host's last look");
-    // The host's last ping was up to 100 ms before.
+    // The host's last ping was up to 100 ms before that.
     assert!((0.39..=0.51).contains(&after), "stopped after {after:.3} s of silence");
-    assert!(largest_torque_step(&cycles) <= 1.0 + ROUNDING);
-    // A host that comes back finds an arm at rest, and is told why.
-    let statistics = expect(arm.statistics());
+    let states = heard.iter().filter_map(|reply| match reply {
+        Reply::Telemetry(cycle) => State::from_code(cycle.state),
+        _ => None,
+    });
+    assert!(states.clone().count() > 100 && states.clone().all(|state| state == State::Run));
+
+    // A host that comes finds an arm at rest that is carried.
+    let owner = Text::new("the next host");
+    let (link_version, schema_hash, model_hash) = (link::LINK_VERSION, link::SCHEMA_HASH, control::MODEL_HASH);
+    let hello = Request::Hello(HostHello { link_version, schema_hash, model_hash, owner });
+    let answer = raw::ask(device, 77, 1, &hello);
+    assert!(matches!(answer, Some(Reply::Hello { .. })), "{answer:?}");
+    let answer = raw::ask(device, 77, 2, &Request::Statistics);
+    let Some(Reply::Statistics { statistics, .. }) = answer else { panic!("{answer:?}") };
     assert_eq!(statistics.link_timeouts, 1);
-    assert_eq!(State::from_code(expect(arm.status()).state), Some(State::SoftStop));
+    let answer = raw::ask(device, 77, 3, &Request::Status);
+    let Some(Reply::Status { status, .. }) = answer else { panic!("{answer:?}") };
+    assert_eq!(State::from_code(status.state), Some(State::SoftStop));
+    let speed = simulation(device).world().joint_velocities().iter().fold(0.0, |most: f64, dq| most.max(dq.abs()));
+    assert!(speed < 0.05, "the arm still moves at {speed} rad/s");
 }
 
 #[test]
@@ -123,7 +133,7 @@ fn emergency_stop_takes_the_torque_away_and_start_up_begins_again() {
     let last = sent.iter().filter(|(_, units)| *units != [0; 4]).map(|(start, _)| *start).max().expect("it had run");
     let after = last.saturating_sub(pressed);
     println!("last torque {after} ticks after the button");
-    assert!(after <= 6 * CYCLE_TICKS, "torque {after} ticks after the E-stop");
+    assert!(after <= 2 * CYCLE_TICKS, "torque {after} ticks after the E-stop");
     let status = expect(arm.status());
     assert_ne!(Stage::from_code(status.startup_stage), Some(Stage::Ready));
     assert!(!status.zeroed, "pucks without power forget where they are");

@@ -82,8 +82,10 @@ impl<S: Store> Session<S> {
         };
         let image = match PrimitiveImage::parse(bytes) {
             Ok(image) => image,
-            Err(ImageError::Crc { computed, .. }) => {
-                return Err((Refusal::UploadCrc, [computed, upload.crc]));
+            Err(ImageError::Crc { computed, stored }) => {
+                // Arrived as announced, the image was wrong when it left: then its own check sum is the one that differs.
+                let expected = if computed == upload.crc { stored } else { upload.crc };
+                return Err((Refusal::UploadCrc, [computed, expected]));
             }
             Err(ImageError::Kernels { found }) => return Err(too_many_kernels(found)),
             Err(error) => return Err((Refusal::ImageInvalid, [error.code(), error.number()])),

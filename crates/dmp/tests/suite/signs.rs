@@ -1,9 +1,9 @@
 //! Checks that a wrong sign, a wrong frame or a forgotten tau cannot pass. Numbers are those of the design's list.
 
-use crate::common::{DT, K, Plan, run};
+use crate::common::{ALPHA, DT, K, Plan, run};
 use dmp::{
-    Coupling, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, Quaternion, Reference, SENSORS, Scalar,
-    SensorMap, Velocity,
+    CanonicalSystem, Coupling, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, Phase, PointInput,
+    PointState, Quaternion, Reference, RotationChart, SENSORS, Scalar, SensorMap, TransformationSystem, Velocity,
 };
 
 type Row = Reference<f64>;
@@ -29,9 +29,11 @@ fn check_1_first_tick_is_driven_by_the_forcing_term_alone() {
     let primitive = plan.build::<f64>();
     let f = primitive.forcing().evaluate(1.0);
     let first = &nominal(&plan, 0.1)[0];
+    println!("first tick: {:?} m/s^2, {:?} rad/s^2", first.position.a, first.orientation.domega);
     for i in 0..3 {
-        assert!((first.position.a[i] - K * f[i] / 25.0).abs() < 1e-12);
-        assert!((first.orientation.domega[i] - K * f[3 + i] / 25.0).abs() < 1e-12);
+        let (expected, turning) = (K * f[i] / 25.0, K * f[3 + i] / 25.0);
+        assert!((first.position.a[i] - expected).abs() < 1e-12, "{} {expected}", first.position.a[i]);
+        assert!((first.orientation.domega[i] - turning).abs() < 1e-12, "{} {turning}", first.orientation.domega[i]);
         assert_eq!(first.position.x[i], plan.start.position[i]);
     }
     for i in 0..4 {
@@ -85,7 +87,7 @@ fn check_3_path_does_not_depend_on_the_course_of_tau() {
         Coupling::NONE
     });
     let mut compared = 0;
-    let mut worst = 0.0_f64;
+    let (mut worst, mut worst_turn) = (0.0_f64, 0.0_f64);
     let mut left = 0;
     for row in varied.iter().filter(|row| row.progress < 1.0) {
         while reference[left + 1].progress <= row.progress {
@@ -97,14 +99,52 @@ fn check_3_path_does_not_depend_on_the_course_of_tau() {
             let x = a.position.x[i] + (b.position.x[i] - a.position.x[i]) * w;
             worst = worst.max((row.position.x[i] - x).abs());
         }
+        let (q, next) = (&a.orientation.quaternion, &b.orientation.quaternion);
+        let way = q.conjugate().product(next).rotation_vector().map(|r| r * w);
+        let planned = q.product(&Quaternion::from_rotation_vector(&way));
+        let turned = row.orientation.quaternion.conjugate().product(&planned).rotation_vector();
+        worst_turn = turned.iter().fold(worst_turn, |worst, r| worst.max(r.abs()));
         compared += 1;
     }
-    println!("path over {compared} ticks of varying tau: {worst:.1e} m");
+    println!("path over {compared} ticks of varying tau: {worst:.1e} m, {worst_turn:.1e} rad");
     assert!(compared > 20_000);
-    // The integrator's own error at this step; rescaling v at a change of tau bends the path by centimetres.
-    assert!(worst < 2e-5);
+    // The integrator's own error at this step; what a wrong law does is shown by the negative control below.
+    assert!(worst < 2e-5, "{worst:.1e} m");
+    assert!(worst_turn < 2e-5, "{worst_turn:.1e} rad");
     // The phase never runs backwards.
     assert!(varied.windows(2).all(|pair| pair[1].phase <= pair[0].phase));
+}
+
+/// Where one unforced row with 1 m to go is at half of the progress when tau goes from 5 s to 10 s on the way.
+/// `carry` makes the scaled velocity after the change from the one before and the ratio of the two tau.
+fn half_way_through_a_slowdown(change: bool, carry: fn(f64, f64) -> f64) -> f64 {
+    let canonical = CanonicalSystem::new(ALPHA).unwrap();
+    let system = TransformationSystem::<f64>::critically_damped(K).unwrap();
+    let (mut phase, mut state) = (Phase::START, PointState::new(0.0, 0.0));
+    let dt = DT / 64.0;
+    let mut tau = 5.0;
+    while phase.progress() < 0.5 {
+        if change && tau < 10.0 && phase.progress() >= 0.2 {
+            tau = 10.0;
+            state = PointState::new(state.x(), carry(state.v(), 2.0));
+        }
+        let input = PointInput { start: 0.0, goal: 1.0, s: phase.s(), f: 0.0, zeta: 0.0 };
+        let rhs = system.right_hand_side(&state, &input);
+        state.step(rhs, dt / tau);
+        phase.step(&canonical, dt / tau);
+    }
+    state.x()
+}
+
+#[test]
+fn check_3_negative_control_rescaled_velocity_leaves_the_path() {
+    let undisturbed = half_way_through_a_slowdown(false, |v, _| v);
+    let kept = half_way_through_a_slowdown(true, |v, _| v) - undisturbed;
+    // v = tau xd: who keeps the physical velocity instead scales v by the ratio of the durations.
+    let rescaled = half_way_through_a_slowdown(true, |v, ratio| v * ratio) - undisturbed;
+    println!("tau doubled on the way: v kept {kept:.1e} m, v rescaled {rescaled:.1e} m");
+    assert!(kept.abs() < 2e-4, "{kept:.1e}");
+    assert!(rescaled.abs() > 5e-3, "{rescaled:.1e}");
 }
 
 #[test]
@@ -116,8 +156,10 @@ fn check_5_antipodal_goal_turns_half_a_radian_and_no_more() {
         let rows = nominal(&plan, 20.0);
         let end = rows.last().unwrap().orientation.quaternion;
         let target = Quaternion::from_rotation_vector(&[0.0, 0.0, 0.5]);
-        assert!(end.aligned_with(&target).conjugate().product(&target).angle() < 1e-6);
-        assert!((path_length(&rows) - 0.5).abs() < 1e-3, "{error:?}");
+        let (missed, path) = (end.aligned_with(&target).conjugate().product(&target).angle(), path_length(&rows));
+        println!("{error:?}: path {path:.4} rad, missed by {missed:.1e} rad");
+        assert!(missed < 1e-6, "{error:?}: {missed} rad from the goal after {path} rad");
+        assert!((path - 0.5).abs() < 1e-3, "{error:?}: path of {path} rad");
     }
     // Negative control: told that the far sign was demonstrated, it goes the long way round.
     plan.orientation_error = OrientationError::RotationVector;
@@ -135,9 +177,9 @@ fn check_6_constant_feedback_settles_where_it_should() {
     let end = rows.last().unwrap();
     for (i, zeta) in coupling.position.iter().enumerate() {
         let settled = plan.goal.position[i] + zeta / K;
-        assert!((end.position.x[i] - settled).abs() < 1e-9);
+        assert!((end.position.x[i] - settled).abs() < 1e-9, "{} {settled}", end.position.x[i]);
     }
-    assert!((end.hand.x[1] - 4.0 / K).abs() < 1e-9);
+    assert!((end.hand.x[1] - 4.0 / K).abs() < 1e-9, "{}", end.hand.x[1]);
     let turned = end.orientation.quaternion.rotation_vector();
     assert!((turned[0] - 2.0 * (20.0_f64 / K).asin()).abs() < 1e-9, "{turned:?}");
     // Negative control: 20/K, the answer for a position row, is half of it.
@@ -151,7 +193,31 @@ fn check_6_constant_feedback_settles_where_it_should() {
     let primitive = plan.build::<f64>();
     let rows = run(&primitive, 9000, DT, |_, _| coupling);
     let turned = rows.last().unwrap().orientation.quaternion.rotation_vector();
-    assert!((turned[0] - 0.1).abs() < 1e-9);
+    assert!((turned[0] - 0.1).abs() < 1e-9, "{turned:?}");
+}
+
+#[test]
+fn check_6_feedback_on_rotation_vectors_does_the_work_of_the_moment() {
+    // A moment zeta (body frame) on the coordinates y: its power is zeta . omega = (J^T zeta) . dy for every motion dy.
+    let ends = [[0.3, -0.8, 0.5], [-0.4, 0.2, 0.9]].map(|r| Quaternion::<f64>::from_rotation_vector(&r));
+    let chart = RotationChart::between(&ends[0], &ends[1]);
+    let zeta = [20.0, -7.0, 11.0];
+    let dot = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    for y in [[0.0, 0.0, 0.2], [0.9, -0.5, 1.1], [-1.5, 1.2, 0.4]] {
+        let mut separation = 0.0_f64;
+        for dy in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
+            // The rate of the orientation itself, from two orientations: independent of the chart's own Jacobian.
+            let step = 1e-5;
+            let beside = |sign: f64| chart.orientation(&std::array::from_fn(|i| y[i] + sign * step * dy[i]));
+            let turn = beside(-1.0).conjugate().product(&beside(1.0)).rotation_vector();
+            let power = dot(&zeta, &turn) / (2.0 * step);
+            let felt = dot(&chart.generalised(&y, &zeta), &dy);
+            assert!((power - felt).abs() < 1e-6, "at {y:?} along {dy:?}: {power} {felt}");
+            // Negative control: the Jacobian where its transpose belongs does another work.
+            separation = separation.max((dot(&chart.omega(&y, &zeta), &dy) - power).abs());
+        }
+        assert!(separation > 0.5, "{separation}");
+    }
 }
 
 #[test]
@@ -236,8 +302,30 @@ fn check_9_quaternion_stays_unit_over_a_million_ticks() {
         norm_after_a_million_ticks::<f32>(OrientationError::Quaternion),
     );
     println!("norm after 1e6 ticks: f64 {double:.1e}, f32 {single:.1e}");
-    assert!(double < 1e-14);
-    assert!(single < 2e-7);
+    assert!(double < 1e-14, "f64 {double:.1e}");
+    assert!(single < 2e-7, "f32 {single:.1e}");
+}
+
+#[test]
+fn check_9_negative_control_the_norm_runs_away_where_the_step_is_another() {
+    // The turn of the check above per tick, in single precision, by two steps that are not the library's.
+    let turn = [0.016_f32, 0.01, -0.005];
+    let exact = Quaternion::from_rotation_vector(&turn);
+    // Explicit Euler: q + q (x) (0, turn)/2.
+    let euler = Quaternion::from_parts(1.0, turn.map(|r| 0.5 * r));
+    let largest_error = |factor: &Quaternion<f32>, ticks: usize| {
+        let mut q = Quaternion::<f32>::from_rotation_vector(&[0.3, -0.2, 0.5]);
+        let mut worst = 0.0_f32;
+        for _ in 0..ticks {
+            q = q.product(factor);
+            worst = worst.max((q.dot(&q).sqrt() - 1.0).abs());
+        }
+        worst
+    };
+    let (drift, growth) = (largest_error(&exact, 1_000_000), largest_error(&euler, 10_000));
+    println!("norm in f32: not renormalised {drift:.1e} after 1e6 ticks, explicit Euler {growth:.1e} after 1e4");
+    assert!(drift > 1e-5, "{drift:.1e}");
+    assert!(growth > 0.1, "{growth:.1e}");
 }
 
 #[test]
@@ -285,7 +373,7 @@ fn check_10_reported_rates_are_the_derivatives_of_the_reported_path() {
             }
         }
         println!("{error:?}: dx {v:.1e} m/s, dv {a:.1e} m/s^2, dq {w:.1e} rad/s, domega {dw:.1e} rad/s^2");
-        assert!(v < 2e-4 && w < 5e-4);
+        assert!(v < 2e-4 && w < 5e-4, "{v} {w}");
         assert!(a < 0.02 && dw < 0.02, "{a} {dw}");
     }
 }
