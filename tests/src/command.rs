@@ -1,5 +1,6 @@
 //! The `tactus` command as a user or a script runs it.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process;
 
@@ -59,6 +60,22 @@ impl Running {
     #[must_use]
     pub fn id(&self) -> u32 {
         self.0.as_ref().map_or(0, process::Child::id)
+    }
+
+    /// Waits until the command says these words on stderr; what it said until then is not in [`Running::finish`]'s output.
+    ///
+    /// # Panics
+    /// It ends without having said them.
+    pub fn hear(&mut self, words: &str) {
+        let stderr = self.0.as_mut().and_then(|child| child.stderr.as_mut()).expect("stderr is a pipe");
+        let mut said = Vec::new();
+        let mut byte = [0];
+        // Byte by byte, so that nothing that comes later is taken away.
+        while !String::from_utf8_lossy(&said).contains(words) {
+            let count = stderr.read(&mut byte).expect("stderr can be read");
+            assert!(count > 0, "the command ended with: {}", String::from_utf8_lossy(&said));
+            said.push(byte[0]);
+        }
     }
 
     /// Presses Ctrl-C.

@@ -155,6 +155,7 @@ fn play(
     let goal = Goal { position: command.goal.map(|goal| goal.map(|value| value as f32)), orientation: None };
     client.run(&name, RunOptions { goal, speed: command.speed as f32, ..RunOptions::default() })?;
 
+    output.say(format!("running '{}'", file.name));
     let planned = file.duration / command.speed;
     let bar = output.bar((planned * RATE) as u64, "running");
     let limited = flags::JOINT_LIMITED | flags::MOTOR_LIMITED | flags::RATE_LIMITED;

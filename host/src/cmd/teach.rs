@@ -61,6 +61,15 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         )
         .help("say how long to record with `--duration SECONDS`"));
     }
+    if command.from.is_some() && default_posture(&mut client).is_some() {
+        return Err(Failure::new(
+            Exit::Usage,
+            "E206",
+            DOING,
+            "the simulated person knows one movement, and where it begins",
+        )
+        .help("leave out `--from`"));
+    }
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let failed = |error| connection::failure(error, DOING);
 

@@ -6,7 +6,7 @@ mod travel;
 
 pub use ready::make_ready;
 pub use recorder::{Recorder, Take};
-pub use travel::{TravelEnd, after, travel, wait_for};
+pub use travel::{after, travel, wait_for};
 
 use control::Fault;
 

@@ -12,25 +12,19 @@ use crate::device::Device;
 /// Longest move to a posture, s: what `control` allows.
 const LONGEST_TRAVEL: u64 = 125;
 
-/// How a motion ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TravelEnd {
-    /// The arm holds the posture.
-    Arrived,
-}
+/// How long an arm that has just got its torque holds still before it moves. Whoever held it until then lets go: a hand that still does
+/// would be worked against, and the torque for that would be too much a moment later.
+const LET_GO: Duration = Duration::from_secs(1);
 
 /// Moves the joints to `q` (rad) and waits until the arm holds there. `progress` hears the time since the start, s.
 ///
 /// # Errors
 /// [`ProcedureError`]: the device refuses, the arm stops by itself, or it takes too long.
-pub fn travel(
-    client: &mut Client<Device>,
-    q: [f32; 7],
-    progress: impl FnMut(f64),
-) -> Result<TravelEnd, ProcedureError> {
+pub fn travel(client: &mut Client<Device>, q: [f32; 7], progress: impl FnMut(f64)) -> Result<(), ProcedureError> {
     // Torque begins with holding: from rest the arm must first carry itself before it may move.
     if State::from_code(client.status()?.state) != Some(State::Hold) {
         client.hold()?;
+        pass(client, LET_GO)?;
     }
     client.take_events();
     client.approach(q, 0.0)?;
@@ -46,7 +40,7 @@ pub fn wait_for(
     seconds: u64,
     client: &mut Client<Device>,
     mut progress: impl FnMut(f64),
-) -> Result<TravelEnd, ProcedureError> {
+) -> Result<(), ProcedureError> {
     let started = client.now();
     loop {
         let passed = client.now().saturating_sub(started);
@@ -59,11 +53,24 @@ pub fn wait_for(
             continue;
         };
         match event.kind {
-            EventKind::Arrived => return Ok(TravelEnd::Arrived),
+            EventKind::Arrived => return Ok(()),
             EventKind::State => after(event.code, event.detail)?,
             _ => {}
         }
     }
+}
+
+/// Lets time pass; the arm must not leave its state meanwhile.
+fn pass(client: &mut Client<Device>, time: Duration) -> Result<(), ProcedureError> {
+    let end = client.now() + time;
+    while client.now() < end {
+        if let Some(Incoming::Event(event)) = client.next(end.saturating_sub(client.now()))?
+            && event.kind == EventKind::State
+        {
+            after(event.code, event.detail)?;
+        }
+    }
+    Ok(())
 }
 
 /// Whether a state entered during a motion ends it.

@@ -45,8 +45,8 @@ fn an_arm_that_stays_serves_one_command_after_the_other() {
     assert_eq!(object(folder, &["list"])["primitives"][0]["name"], PRIMITIVE);
 
     // Ctrl-C in the middle of a run stops the arm first, and says so with its exit code.
-    let run = start(folder, &[&ARM[..], &["run", "primitive.toml", "--record", "first.csv"]].concat());
-    std::thread::sleep(Duration::from_secs(9));
+    let mut run = start(folder, &[&ARM[..], &["run", "primitive.toml", "--record", "first.csv"]].concat());
+    run.hear("running");
     run.interrupt();
     let output = run.finish();
     assert_exit(&output, 130);
