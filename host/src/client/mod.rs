@@ -188,6 +188,11 @@ impl<T: Transport> Client<T> {
         self.transport.now()
     }
 
+    /// Whether that clock is virtual.
+    pub fn is_virtual(&self) -> bool {
+        self.transport.is_virtual()
+    }
+
     /// What this end of the link counted.
     pub fn counters(&self) -> LinkCounters {
         self.decoder.counters()

@@ -1,6 +1,7 @@
 //! From the options of the command line to a conversation with a device.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use device::Stage;
 
@@ -57,6 +58,14 @@ pub(super) fn ready(client: &mut Client<Device>, at_home: bool, output: Output, 
     let kind = if simulated { "simulated " } else { "" };
     output.say(format!("{kind}arm ready on {} ({})", hello.board.as_str(), hello.firmware.as_str()));
     Ok(())
+}
+
+/// Says how much faster than life a simulated device was. In words only: data must be the same in every run.
+pub(super) fn tell_speed(client: &Client<Device>, started: Instant, output: Output) {
+    let (simulated, taken) = (client.now().as_secs_f64(), started.elapsed().as_secs_f64());
+    if client.is_virtual() && taken > 0.0 {
+        output.say(format!("simulated {simulated:.1} s in {taken:.1} s: {:.1} times real time", simulated / taken));
+    }
 }
 
 /// The failure of a procedure.

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::PathBuf;
+use std::time::Instant;
 
 use clap::Args;
 use serde_json::json;
@@ -28,6 +29,7 @@ pub struct Cmd {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "record";
     let output = global.output();
+    let started = Instant::now();
     let mut client = connection::open(global, DOING, |_| {})?;
     // A simulated device has just been switched on: without this there would be nothing to see.
     if client.hello().simulated {
@@ -47,6 +49,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let rows = recorder.rows();
     recorder.finish(&mut client).map_err(failed)?;
     let gaps = client.gaps().telemetry;
+    connection::tell_speed(&client, started, output);
     output.say(format!("wrote {}", command.output.display()));
     output.result(
         &json!({ "file": command.output, "samples": rows, "gaps": gaps }),

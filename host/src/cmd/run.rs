@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use clap::Args;
 use control::{State, flags};
@@ -113,6 +114,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let file = upload::read(&command.primitive, DOING)?;
     upload::precheck(&file, command.speed, output, DOING)?;
+    let started = Instant::now();
     let mut client = connection::open(global, DOING, |_| {})?;
     if command.bus_log.is_some()
         && let Some(simulation) = client.transport().simulation()
@@ -132,6 +134,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             .map_err(|cause| connection::failure(ProcedureError::Recording(cause), DOING))?;
     }
     let report = result.map_err(|error| connection::failure(error, DOING))?;
+    connection::tell_speed(&client, started, output);
     if let Some(path) = &command.record {
         output.say(format!("wrote {}", path.display()));
     }

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::PathBuf;
+use std::time::Instant;
 
 use clap::Args;
 use control::State;
@@ -50,6 +51,7 @@ pub type Posture = [f32; 7];
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "teach";
     let output = global.output();
+    let started = Instant::now();
     let mut client = connection::open(global, DOING, |options| options.person = Some(command.person))?;
     let alone = global.non_interactive && command.duration.is_none();
     if alone && default_posture(&mut client).is_none() {
@@ -95,6 +97,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let held = client.hold();
     let (rows, gaps) = recorded.map_err(failed)?;
     held.map_err(|error| failed(error.into()))?;
+    connection::tell_speed(&client, started, output);
     output.say(format!("wrote {}", command.output.display()));
     output.result(
         &json!({ "file": command.output, "samples": rows, "duration_s": rows as f64 / 300.0, "gaps": gaps }),
