@@ -6,17 +6,19 @@
 use std::process::Child;
 
 /// While it lives, this thread and the child share the processor the thread was on. Does nothing where that is not possible.
-pub(super) struct Seat {
-    #[cfg(target_os = "linux")]
-    before: Option<rustix::thread::CpuSet>,
-}
+pub(super) struct Seat(());
+
+/// Processors this program may use, as found before the first seat was taken. Every seat gives these back, so that seats may
+/// overlap and end in any order.
+#[cfg(target_os = "linux")]
+static ALL: std::sync::OnceLock<Option<rustix::thread::CpuSet>> = std::sync::OnceLock::new();
 
 #[cfg(target_os = "linux")]
 impl Seat {
     /// Takes the child to this thread's processor. Call before the child has started threads: they inherit the place.
     pub(super) fn share(child: &Child) -> Self {
         use rustix::thread::{CpuSet, Pid, sched_getaffinity, sched_getcpu, sched_setaffinity};
-        let before = sched_getaffinity(None).ok();
+        ALL.get_or_init(|| sched_getaffinity(None).ok());
         let mut here = CpuSet::new();
         here.set(sched_getcpu());
         let pid = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
@@ -26,15 +28,15 @@ impl Seat {
         {
             let _ = sched_setaffinity(None, &here);
         }
-        Self { before }
+        Self(())
     }
 }
 
 #[cfg(target_os = "linux")]
 impl Drop for Seat {
     fn drop(&mut self) {
-        if let Some(before) = &self.before {
-            let _ = rustix::thread::sched_setaffinity(None, before);
+        if let Some(Some(all)) = ALL.get() {
+            let _ = rustix::thread::sched_setaffinity(None, all);
         }
     }
 }
@@ -42,6 +44,6 @@ impl Drop for Seat {
 #[cfg(not(target_os = "linux"))]
 impl Seat {
     pub(super) fn share(_child: &Child) -> Self {
-        Self {}
+        Self(())
     }
 }
