@@ -74,7 +74,7 @@ pub struct ExpectationMarks {
     pub spread_floor: f32,
 }
 
-/// Everything an image holds, with tables of reals of type `F`: slices to write one, [`Reals`] when read.
+/// Everything an image holds, with tables of reals of type `F`: slices to write one, [`Reals`](super::Reals) when read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImageContent<F> {
     /// Hash of the robot model the primitive was learned with.
@@ -105,14 +105,14 @@ pub struct ImageContent<F> {
     pub marks: ExpectationMarks,
     /// Kernels of each row.
     pub kernels: usize,
-    /// K1 of Eq (8) by phase: points x [`COUPLED_ROWS`], point after point, first at the start. Empty: no
+    /// K1 of Eq (8) by phase: points x [`COUPLED_ROWS`](super::COUPLED_ROWS), point after point, first at the start. Empty: no
     /// feedback. One point: constant.
     pub k1: F,
-    /// K2 of Eq (8) by phase: points x [`SENSOR_ROWS`].
+    /// K2 of Eq (8) by phase: points x [`SENSOR_ROWS`](super::SENSOR_ROWS).
     pub k2: F,
-    /// Weights, [`WEIGHT_ROWS`] x kernels, row after row.
+    /// Weights, [`WEIGHT_ROWS`](super::WEIGHT_ROWS) x kernels, row after row.
     pub weights: F,
-    /// Expected sensor values by phase: points x [`SENSOR_ROWS`], environment on robot. Force N in world axes,
+    /// Expected sensor values by phase: points x [`SENSOR_ROWS`](super::SENSOR_ROWS), environment on robot. Force N in world axes,
     /// torque N m in hand axes at the grasp point, fingers N m. May be empty.
     pub expected_mean: F,
     /// Their standard deviations, same shape.

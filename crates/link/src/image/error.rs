@@ -12,7 +12,7 @@ pub enum ImageError {
         /// Bytes given.
         length: u32,
     },
-    /// The first bytes are not [`MAGIC`].
+    /// The first bytes are not [`MAGIC`](super::MAGIC).
     Magic,
     /// Another version of the layout.
     Schema {
@@ -33,7 +33,7 @@ pub enum ImageError {
         /// Check sum at their end.
         stored: u32,
     },
-    /// The name breaks the rules of [`Name`] or is not padded with zeros.
+    /// The name breaks the rules of [`Name`](crate::Name) or is not padded with zeros.
     Name,
     /// Flags this version does not know.
     Flags {

@@ -13,8 +13,8 @@ impl ImageContent<&[f32]> {
     /// Writes the image to the front of `out` and returns its length.
     ///
     /// # Errors
-    /// [`ImageError::Shape`] if a table does not fit the counts or `out` is too small ([`image_bytes`]); the
-    /// same errors as [`PrimitiveImage::parse`] for counts and reals that could not be read back.
+    /// [`ImageError::Shape`] if a table does not fit the counts or `out` is too small ([`image_bytes`](super::image_bytes)); the
+    /// same errors as [`PrimitiveImage::parse`](super::PrimitiveImage::parse) for counts and reals that could not be read back.
     pub fn encode(&self, name: &Name, out: &mut [u8]) -> Result<usize, ImageError> {
         let counts = Counts {
             kernels: self.kernels,
