@@ -104,7 +104,7 @@ impl Demonstration {
     }
 
     /// Number of samples.
-    #[allow(clippy::len_without_is_empty)] // a demonstration is never empty
+    #[allow(clippy::len_without_is_empty, reason = "a demonstration is never empty")]
     pub fn len(&self) -> usize {
         self.position.len()
     }
