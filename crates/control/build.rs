@@ -169,6 +169,42 @@ fn main() {
         constant(&mut out, name, text, "PayloadTable", &value);
     }
 
+    // Frame H sits on the sensor's far face, half a turn about z from frame 7.
+    let hand = table(&model, "hand");
+    let mount = &hand["mount_in_frame7"];
+    let yaw = number(&mount["yaw"]);
+    assert!((yaw - std::f64::consts::PI).abs() < 1e-12, "the hand is mounted half a turn about z");
+    let fitted = &payloads["wam7_bh280_ft"];
+    let [x, y, z] = numbers(&fitted["hand_only_com"])[..] else { panic!("{MODEL}: hand_only_com") };
+    let origin = numbers(&sensor["origin_in_frame7"]);
+    let centre = [-x - origin[0], -y - origin[1], z + number(&mount["z"]) - origin[2]];
+    constant(
+        &mut out,
+        "HAND_MASS",
+        "What hangs on the wrist sensor (kg).",
+        "f64",
+        &format!("{:?}", number(&fitted["hand_only_mass"])),
+    );
+    constant(
+        &mut out,
+        "HAND_CENTRE",
+        "Its centre of mass from the origin of the wrist sensor, in the sensor's axes (m).",
+        "[f64; 3]",
+        &format!("{centre:?}"),
+    );
+    for (name, key, text) in [
+        ("FINGER_RANGE", "theta2_range", "Range of an inner link (rad)."),
+        ("SPREAD_RANGE", "spread_range", "Range of the spread (rad)."),
+    ] {
+        constant(&mut out, name, text, "[f64; 2]", &list(&hand[key]));
+    }
+    for (name, key, text) in [
+        ("FINGER_TORQUE_MAX", "finger_torque_max", "Largest torque of a finger's drive at its inner link (N m)."),
+        ("SPREAD_TORQUE_MAX", "spread_torque_max", "Largest torque of the spread's drive at the spread (N m)."),
+    ] {
+        constant(&mut out, name, text, "f64", &format!("{:?}", number(&hand[key])));
+    }
+
     let path = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR")).join("wam7.rs");
     fs::write(path, out).expect("OUT_DIR is writable");
 }

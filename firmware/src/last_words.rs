@@ -1,4 +1,4 @@
-//! What the image does when it cannot go on: interrupts off, zero torque, arm to idle, a reason, the end.
+//! What the image does when it cannot go on: interrupts off, zero torque, arm and hand to idle, a reason, the end.
 //!
 //! The pucks hold the last torque they were sent until their watchdog or the safety module stops them, so the zero
 //! torques go first. The panic may have come from anywhere: nothing here depends on the state of the application.
@@ -10,9 +10,10 @@ use puck::{CanFrame, Group, MotorMode, PropertyId, set, zero_torques};
 
 use crate::board::{Board, Edge};
 
-fn last_frames() -> [CanFrame; 3] {
+fn last_frames() -> [CanFrame; 4] {
     let [arm, wrist] = zero_torques();
-    [arm, wrist, set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value())]
+    let idle = MotorMode::Idle.value();
+    [arm, wrist, set(Group::ARM, PropertyId::MODE, idle), set(Group::HAND, PropertyId::MODE, idle)]
 }
 
 #[panic_handler]

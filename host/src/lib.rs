@@ -7,6 +7,7 @@ pub mod cmd;
 pub mod demonstration;
 pub mod device;
 pub mod error;
+pub mod experiment;
 pub mod failure;
 pub mod learn;
 pub mod plan;

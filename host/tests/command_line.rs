@@ -179,3 +179,31 @@ fn quiet_says_nothing_but_the_result() {
     assert_eq!(stderr(&learned), "");
     assert!(!stdout(&learned).is_empty());
 }
+
+#[test]
+fn a_rehearsed_primitive_adapts_and_one_that_was_not_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("demo.csv"), common::text(&common::rows(3.0))).unwrap();
+    tactus(at, &["learn", "demo.csv", "-o", "grasp.toml"]).success();
+    let device = ["--device", "sil:world=simple", "--quiet", "--json"];
+    let refused = tactus(at, &[&device[..], &["run", "grasp.toml", "--mode", "adapt"]].concat()).failure().code(6);
+    assert!(stderr(&refused).contains("tactus rehearse grasp.toml"), "{}", stderr(&refused));
+
+    let rehearsed = tactus(at, &[&device[..], &["rehearse", "grasp.toml", "--record-dir", "kept"]].concat()).success();
+    let report = json(&rehearsed);
+    assert_eq!(report["expectation"]["trials"], 3);
+    assert_eq!(report["weighted"], true);
+    assert!(at.join("kept/grasp-3.csv").is_file());
+    let run = ["run", "grasp.toml", "--mode", "adapt", "--speed-at", "1:0.8", "--record", "run.csv"];
+    let run = json(&tactus(at, &[&device[..], &run].concat()).success());
+    assert_eq!((&run["mode"], &run["flags"]["stale"]), (&"adapt".into(), &0.into()));
+    // In free motion the adaptation finds nothing to do.
+    assert!(run["tracking"]["position_max_m"].as_f64().unwrap() < 0.05, "{run}");
+
+    let kept = ["kept/grasp-1.csv", "kept/grasp-2.csv", "kept/grasp-3.csv"];
+    let gathered = json(&tactus(at, &[&["--json", "experience", "grasp.toml"][..], &kept].concat()).success());
+    assert_eq!(gathered["experience"]["trials"], 3);
+    // A run whose speed was changed on the way is no run of the same duration.
+    tactus(at, &["experience", "grasp.toml", kept[0], "run.csv"]).failure().code(6);
+}

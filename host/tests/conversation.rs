@@ -65,10 +65,13 @@ impl SessionPort for Half {
             stage: Stage::Ready,
             blocked: None,
             state: self.state,
+            fault: control::Fault::None,
             zeroed: true,
             safety_mode: None,
             pendant: None,
             temperatures: [None; 7],
+            hand: link::HandStage::Absent,
+            hand_temperatures: [None; 4],
             counters: Counters::default(),
         }
     }
@@ -199,6 +202,9 @@ fn image(name: &str, duration: f32) -> Vec<u8> {
         weights: &[0.0; 17 * 20],
         expected_mean: &[],
         expected_spread: &[],
+        experience_trials: 0,
+        experience_mean: &[],
+        experience_spread: &[],
     };
     let mut bytes = vec![0; 4096];
     let length = content.encode(&Name::new(name).unwrap(), &mut bytes).unwrap();

@@ -5,9 +5,10 @@ mod common;
 use std::path::Path;
 
 use tactus::demonstration::{Preparation, Recording};
+use tactus::learn::feedback::FeedbackOptions;
 use tactus::learn::{LearnError, LearnOptions, Learned, hand::HandMotion, learn};
 use tactus::primitive_file::{
-    ExpectationTable, FeedbackTables, OrientationErrorKind, PrimitiveFile, PrimitiveFileError,
+    ExpectationTable, ExperienceTable, FeedbackTables, OrientationErrorKind, PrimitiveFile, PrimitiveFileError,
 };
 
 fn taught(duration: f64) -> Recording {
@@ -162,6 +163,7 @@ fn full() -> PrimitiveFile {
         k2: (0..3).map(|point| row(point, 9).iter().map(|value| value.abs()).collect()).collect(),
     });
     primitive.expectation = Some(ExpectationTable {
+        model_hash: control::MODEL_HASH,
         recorded_duration: 3.1,
         payload_mass: 0.1,
         payload_centre: [0.0, 0.01, 1e-7],
@@ -170,6 +172,11 @@ fn full() -> PrimitiveFile {
         spread_floor: 0.05,
         mean: (0..50).map(|point| row(point, 9)).collect(),
         spread: (0..50).map(|point| row(point + 7, 9).iter().map(|value| value.abs()).collect()).collect(),
+    });
+    primitive.experience = Some(ExperienceTable {
+        trials: 5,
+        mean: (0..64).map(|point| row(point, 12)).collect(),
+        spread: (0..64).map(|point| row(point, 12).iter().map(|value| value.abs() + 0.01).collect()).collect(),
     });
     primitive
 }
@@ -254,6 +261,119 @@ fn the_image_holds_the_same_primitive_in_single_precision() {
     }
     assert_eq!(content.expected_mean.len(), 50 * 9);
     assert_eq!(content.clamps.position, 0.23);
+    assert_eq!((content.experience_trials, content.experience_mean.len()), (5, 64 * 12));
+    let experience = primitive.experience.unwrap();
+    for (index, value) in experience.spread.concat().iter().enumerate() {
+        assert_eq!(content.experience_spread.get(index), Some(*value as f32));
+    }
+}
+
+#[test]
+fn an_experience_that_is_changed_cut_or_impossible_is_refused() {
+    let text = full().to_text();
+    let parse = |text: &str| PrimitiveFile::parse(Path::new("reach.toml"), text);
+    let section = text.find("[experience]").unwrap();
+    let (head, tail) = text.split_at(section);
+    let changed = format!("{head}{}", tail.replacen("trials = 5", "trials = 6", 1));
+    assert!(matches!(parse(&changed).unwrap_err(), PrimitiveFileError::Checksum { .. }));
+    let unknown = format!("{head}{}", tail.replacen("trials = 5", "runs = 5", 1));
+    let error = parse(&unknown).unwrap_err().to_string();
+    assert!(error.contains("line ") && error.contains("runs"), "{error}");
+
+    let mut short = full();
+    short.experience.as_mut().unwrap().spread.pop();
+    let error = PrimitiveFile::parse(Path::new("reach.toml"), &short.to_text()).unwrap_err();
+    assert!(error.to_string().contains("experience.spread"), "{error}");
+    let mut narrow = full();
+    narrow.experience.as_mut().unwrap().mean[3].pop();
+    let error = PrimitiveFile::parse(Path::new("reach.toml"), &narrow.to_text()).unwrap_err();
+    assert!(error.to_string().contains("experience.mean"), "{error}");
+    let mut certain = full();
+    certain.experience.as_mut().unwrap().spread[10][2] = 0.0;
+    let error = certain.to_primitive().unwrap_err();
+    assert!(error.to_string().contains("spread is not positive"), "{error}");
+}
+
+#[test]
+fn an_expectation_of_another_speed_or_another_model_is_refused() {
+    let mut slow = full();
+    slow.expectation.as_mut().unwrap().recorded_duration = slow.duration / 1.51;
+    for error in [slow.to_primitive().map(|_| ()).unwrap_err(), slow.to_image().map(|_| ()).unwrap_err()] {
+        assert!(matches!(error, PrimitiveFileError::ExpectationDuration { .. }), "{error}");
+        assert!(error.to_string().contains("more than 50 % apart"), "{error}");
+    }
+    slow.expectation.as_mut().unwrap().recorded_duration = slow.duration / 1.45;
+    assert!(slow.to_image().is_ok());
+    let mut foreign = full();
+    foreign.expectation.as_mut().unwrap().model_hash ^= 1;
+    let error = foreign.to_image().unwrap_err();
+    assert!(matches!(error, PrimitiveFileError::ExpectationModel { .. }), "{error}");
+    // Such a file can still be read, so that it can be rehearsed again.
+    let again = PrimitiveFile::parse(Path::new("reach.toml"), &foreign.to_text()).unwrap();
+    assert!(again.without_memory().to_image().is_ok());
+}
+
+#[test]
+fn a_dwell_makes_the_movement_longer_by_exactly_that_and_rests_at_the_goal() {
+    let plain = learned(&taught(4.0), &LearnOptions::named("reach")).unwrap();
+    let options = LearnOptions {
+        dwell: 2.5,
+        hand: HandMotion { start: [0.0; 4], goal: [0.0, 2.0, 2.0, 2.0], window: (0.65, 0.95) },
+        ..LearnOptions::named("grasp")
+    };
+    let grasp = learned(&taught(4.0), &options).unwrap();
+    assert!((grasp.primitive.duration - plain.primitive.duration - 2.5).abs() < 1e-12);
+    assert_eq!(grasp.demonstration.len(), plain.demonstration.len() + 750);
+    let primitive = grasp.primitive.to_primitive().unwrap();
+    let mut rollout = dmp::Rollout::start(&primitive, &dmp::StartState::demonstrated(&primitive)).unwrap();
+    loop {
+        let plan = rollout.step(&primitive, 1.0 / 300.0, &dmp::Coupling::NONE);
+        if plan.time > plain.primitive.duration + 0.3 {
+            let away = (0..3).map(|axis| plan.position.x[axis] - grasp.primitive.goal.position[axis]);
+            assert!(away.map(|e| e * e).sum::<f64>().sqrt() < 3e-3, "at {} s", plan.time);
+        }
+        if plan.time > grasp.primitive.duration {
+            assert!((plan.hand.x[1] - 2.0).abs() < 0.02, "{:?}", plan.hand.x);
+            break;
+        }
+    }
+    for dwell in [-1.0, f64::NAN, 1e9] {
+        let options = LearnOptions { dwell, ..LearnOptions::named("x") };
+        assert!(matches!(learned(&taught(4.0), &options).unwrap_err(), LearnError::Option { option: "--dwell", .. }));
+    }
+}
+
+#[test]
+fn gains_that_the_user_gives_are_taken_and_explained_and_a_heavy_plan_is_warned_of() {
+    let feedback = |k1: [f64; 10], stiffness: f64| LearnOptions {
+        feedback: FeedbackOptions {
+            stiffness: Some(stiffness),
+            orientation_stiffness: None,
+            sensitivity: Some(k1),
+            limits: Some([0.2, 30.0, 0.5]),
+        },
+        ..LearnOptions::named("reach")
+    };
+    let mut k1 = [0.0; 10];
+    (k1[0], k1[5]) = (5.0, 100.0);
+    let soft = learned(&taught(5.0), &feedback(k1, 300.0)).unwrap();
+    let tables = soft.primitive.feedback.as_ref().unwrap();
+    assert_eq!((tables.k1[0].as_slice(), tables.k2[0].as_slice()), (k1.as_slice(), [1.0; 9].as_slice()));
+    assert_eq!(tables.clamps[1], 30_f64.to_radians());
+    assert_eq!(soft.primitive.gains[0].stiffness, 300.0);
+    assert!((soft.primitive.gains[0].damping - 2.0 * 300_f64.sqrt()).abs() < 1e-12);
+    let report = soft.report.feedback.as_ref().unwrap();
+    let row = report.rows[0];
+    // 0.2 m against a spring of K/K1 = 60 N/m; tau^2/K1.
+    assert!((row.load_at_limit - 12.0).abs() < 1e-9, "{row:?}");
+    assert!((row.inertia - soft.primitive.duration.powi(2) / 5.0).abs() < 1e-9, "{row:?}");
+    assert_eq!((report.rows.len(), report.rows[1].row), (2, "rotation z"));
+    assert!(soft.report.warnings.iter().any(|warning| warning.contains("2 kg")), "{:?}", soft.report.warnings);
+    k1[1] = -1.0;
+    let error = learned(&taught(5.0), &feedback(k1, 300.0)).unwrap_err();
+    assert!(matches!(error, LearnError::Option { option: "--k1", .. }), "{error}");
+    let error = learned(&taught(5.0), &feedback([1.0; 10], f64::NAN)).unwrap_err();
+    assert!(matches!(error, LearnError::Option { option: "--stiffness", .. }), "{error}");
 }
 
 #[test]

@@ -204,6 +204,30 @@ fn what_was_written_is_read() {
 }
 
 #[test]
+fn recordings_of_the_time_before_the_hand_are_read() {
+    let old = layout::header().iter().position(|name| name == layout::HAND[0]).unwrap();
+    let cut: Vec<String> =
+        good()
+            .iter()
+            .map(|line| {
+                if line.starts_with('#') {
+                    line.clone()
+                } else {
+                    line.split(',').take(old).collect::<Vec<_>>().join(",")
+                }
+            })
+            .collect();
+    let recording = parse(&cut.join("\n")).unwrap();
+    assert!(recording.hand.is_none() && recording.gauges.is_none() && recording.surprise.is_none());
+    assert!(recording.wrench.is_some() && recording.flags.is_some());
+    let now = parse(&good().join("\n")).unwrap();
+    assert_eq!(now.hand.unwrap()[0], [0.0, 0.25, 0.5, 0.75]);
+    assert_eq!(now.hand_d.unwrap()[0], [0.0, 0.25, 0.5, 1.0]);
+    assert_eq!(now.gauges.unwrap()[0], [0.0, -0.5, 0.125]);
+    assert_eq!(now.surprise.unwrap()[0], 1.5);
+}
+
+#[test]
 fn lost_samples_are_counted_by_the_cycle_counter_and_by_time() {
     let mut rows = common::rows(2.0);
     rows.drain(100..103);

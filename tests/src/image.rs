@@ -13,7 +13,7 @@ const SCHEMA: usize = 4;
 const LENGTH: usize = 8;
 const MODEL: usize = 12;
 const KERNELS: usize = 48;
-const REALS: usize = 56;
+const REALS: usize = 60;
 
 /// Reals that every image has between header and tables.
 const FIXED_REALS: usize = 75;

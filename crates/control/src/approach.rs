@@ -111,7 +111,7 @@ impl<R: Real> Approach<R> {
 }
 
 /// Minimum-jerk path over unit time: position and its first two derivatives.
-fn minimum_jerk<R: Real>(u: R) -> (R, R, R) {
+pub(crate) fn minimum_jerk<R: Real>(u: R) -> (R, R, R) {
     let n = R::of;
     let rest = n(1.0) - u;
     let position = u * u * u * (n(10.0) - u * (n(15.0) - u * n(6.0)));

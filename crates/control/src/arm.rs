@@ -3,9 +3,10 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::calibration::Payload;
+use crate::kinematics::Frames;
 use crate::model::{self, BodyTable, PayloadTable};
 use crate::real::Real;
-use crate::units::{JOINTS, JointPositions};
+use crate::units::{JOINTS, JointPositions, Vector6};
 
 /// Mass properties of one link.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +32,10 @@ pub struct ArmModel<R: Real> {
     pub(crate) tool_cosine: R,
     pub(crate) tool_sine: R,
     pub(crate) sensor_origin: Vector3<R>,
+    /// Mass of what hangs on the wrist sensor (kg).
+    pub(crate) hanging_mass: R,
+    /// Its centre of mass from the sensor's origin, sensor axes (m).
+    pub(crate) hanging_centre: Vector3<R>,
     /// Acceleration that a body at rest must be given to stand still in gravity: -g (m/s^2, world axes).
     pub(crate) base_acceleration: Vector3<R>,
     /// Lower soft limits (rad).
@@ -78,10 +83,23 @@ impl<R: Real> ArmModel<R> {
             tool_cosine: R::of(tool_cosine),
             tool_sine: R::of(tool_sine),
             sensor_origin: Vector3::from(model::SENSOR_ORIGIN.map(R::of)),
+            hanging_mass: R::of(match payload {
+                Payload::None => 0.0,
+                Payload::SensorAndHand => model::HAND_MASS,
+            }),
+            hanging_centre: Vector3::from(model::HAND_CENTRE.map(R::of)),
             base_acceleration: -Vector3::from(model::GRAVITY.map(R::of)),
             soft_min: real(model::SOFT_MIN),
             soft_max: real(model::SOFT_MAX),
         }
+    }
+
+    /// What the wrist sensor feels of the hand alone while the arm is at rest: its weight, as force (N) and torque about the
+    /// sensor's origin (N m), in sensor axes.
+    pub fn hanging_weight(&self, frames: &Frames<R>) -> Vector6<R> {
+        let force = frames.sensor_to_world().tr_mul(&self.base_acceleration) * -self.hanging_mass;
+        let torque = self.hanging_centre.cross(&force);
+        Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
     }
 
     /// Whether every joint lies within its soft limits. False for a NaN.

@@ -7,6 +7,9 @@ use puck::{Drives, Ratios, Transmission, TransmissionError};
 use crate::model;
 use crate::real::Real;
 
+/// Torque units per N m of the hand's motors where nothing else is known.
+const NOMINAL_HAND_UNITS: [i32; 4] = [20_000; 4];
+
 /// What is mounted on the tool plate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Payload {
@@ -22,6 +25,7 @@ pub struct Calibration<R: Real> {
     pub(crate) transmission: Transmission<R>,
     pub(crate) drives: Drives,
     pub(crate) payload: Payload,
+    pub(crate) hand_units_per_newton_metre: [i32; 4],
 }
 
 /// Why a calibration is refused.
@@ -31,6 +35,8 @@ pub enum CalibrationError {
     CountsPerRevolution(u8),
     /// Torque counts per N m of this motor (0 = M1) are not in 500 to 50000.
     TorqueCounts(u8),
+    /// Torque counts per N m of this digit of the hand (0 = F1, 3 = spread) are not in 500 to 50000.
+    HandTorqueCounts(u8),
     /// The transmission does not accept these scales.
     Transmission(TransmissionError),
 }
@@ -43,6 +49,9 @@ impl fmt::Display for CalibrationError {
             }
             CalibrationError::TorqueCounts(motor) => {
                 write!(formatter, "puck {}: torque counts per N m are not in 500..=50000", motor + 1)
+            }
+            CalibrationError::HandTorqueCounts(digit) => {
+                write!(formatter, "puck {}: torque counts per N m are not in 500..=50000", digit + 11)
             }
             CalibrationError::Transmission(error) => error.fmt(formatter),
         }
@@ -75,6 +84,7 @@ impl<R: Real> Calibration<R> {
             transmission: Transmission::new(&Ratios::WAM7).map_err(CalibrationError::Transmission)?,
             drives: Drives::new(counts_per_revolution, torque_counts).map_err(CalibrationError::Transmission)?,
             payload,
+            hand_units_per_newton_metre: NOMINAL_HAND_UNITS,
         })
     }
 
@@ -82,6 +92,24 @@ impl<R: Real> Calibration<R> {
     pub fn nominal(payload: Payload) -> Calibration<R> {
         Calibration::new([model::ENCODER_COUNTS as i32; 7], model::TORQUE_COUNTS.map(|counts| counts as i32), payload)
             .expect("the scales of the model file are valid, which a test proves")
+    }
+
+    /// The same with the hand's own scales (IPNM of F1, F2, F3, spread).
+    ///
+    /// # Errors
+    /// [`CalibrationError::HandTorqueCounts`] names the first puck whose scale is out of bounds.
+    pub fn with_hand(self, units_per_newton_metre: [i32; 4]) -> Result<Calibration<R>, CalibrationError> {
+        for (digit, units) in (0u8..).zip(&units_per_newton_metre) {
+            if !(500..=50_000).contains(units) {
+                return Err(CalibrationError::HandTorqueCounts(digit));
+            }
+        }
+        Ok(Calibration { hand_units_per_newton_metre: units_per_newton_metre, ..self })
+    }
+
+    /// Torque units per N m at the motor of F1, F2, F3, spread.
+    pub fn hand_units_per_newton_metre(&self) -> &[i32; 4] {
+        &self.hand_units_per_newton_metre
     }
 
     /// Joint and motor space.

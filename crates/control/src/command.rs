@@ -51,6 +51,10 @@ pub struct RunOptions {
     pub pose_feedback: PoseFeedback,
     /// Acceleration used in Eq (10).
     pub acceleration: AccelerationSource,
+    /// Whether the finger gauges bend the finger rows; only together with `feedback`.
+    pub finger_feedback: bool,
+    /// Whether the arm tracks with the compliant gains, so that the force controller is not overruled.
+    pub compliant: bool,
 }
 
 impl Default for RunOptions {
@@ -63,6 +67,8 @@ impl Default for RunOptions {
             force_control: false,
             pose_feedback: PoseFeedback::Measured,
             acceleration: AccelerationSource::Analytic,
+            finger_feedback: true,
+            compliant: false,
         }
     }
 }
@@ -96,8 +102,15 @@ pub enum Command {
         /// Speed factor on the stored duration.
         factor: f32,
     },
-    /// Take the present filtered wrench as zero.
+    /// Take the present filtered wrench, less the weight of the hand, and the present gauges as zero.
     Tare,
+    /// Move the hand along a minimum-jerk path; taken in Gravity, Hold and Approach.
+    MoveHand {
+        /// Target: spread, F1, F2, F3 of the inner links (rad).
+        q: [f32; 4],
+        /// Requested duration (s); lengthened where the speed limits ask for it. 0 asks for the shortest.
+        duration: f32,
+    },
 }
 
 /// Why a command was refused. The codes travel over the link and are never renumbered.
@@ -128,11 +141,19 @@ pub enum Refusal {
     WrenchMissing = 11,
     /// A fault is latched and has not been cleared.
     FaultLatched = 12,
+    /// The run uses force, and the primitive carries no expectation of it.
+    NoExpectation = 13,
+    /// A digit of the hand is farther than 0.15 rad from where the primitive starts.
+    HandTooFar = 14,
+    /// There is no initialised hand.
+    NoHand = 15,
+    /// The force at rest differs by more than 5 N from the weight of the hand: a load, a contact, or a sensor adrift.
+    ForceAtRest = 16,
 }
 
 impl Refusal {
     /// Every reason, for tables and documents.
-    pub const ALL: [Refusal; 12] = [
+    pub const ALL: [Refusal; 16] = [
         Refusal::WrongState,
         Refusal::SafetyNotActive,
         Refusal::PositionsMissing,
@@ -145,6 +166,10 @@ impl Refusal {
         Refusal::Moving,
         Refusal::WrenchMissing,
         Refusal::FaultLatched,
+        Refusal::NoExpectation,
+        Refusal::HandTooFar,
+        Refusal::NoHand,
+        Refusal::ForceAtRest,
     ];
 
     /// The stable number of this reason.
@@ -173,6 +198,10 @@ impl fmt::Display for Refusal {
             Refusal::Moving => "the arm moves too fast for this command",
             Refusal::WrenchMissing => "no wrench is measured",
             Refusal::FaultLatched => "a fault is latched, clear it first",
+            Refusal::NoExpectation => "the run uses force, and the primitive carries no expectation of it",
+            Refusal::HandTooFar => "the hand is more than 0.15 rad away from where the primitive starts",
+            Refusal::NoHand => "there is no initialised hand",
+            Refusal::ForceAtRest => "the force at rest is more than 5 N away from the weight of the hand",
         })
     }
 }

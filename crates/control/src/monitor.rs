@@ -45,6 +45,8 @@ pub(crate) struct Observation<'a, R: Real> {
     pub(crate) tracking: R,
     /// Whether the run depends on the wrench, and it is gone.
     pub(crate) wrench_lost: bool,
+    /// Whether the sensor has been at full scale: in a force, or in a torque that the run depends on.
+    pub(crate) full_scale: bool,
 }
 
 impl<R: Real> Monitor<R> {
@@ -66,7 +68,7 @@ impl<R: Real> Monitor<R> {
             let fault = if state.implausible { Fault::ImplausiblePosition } else { Fault::RepliesLost };
             return Some((Trigger::SoftFault, fault));
         }
-        let pressed = seen.force > R::of(FORCE_LIMIT);
+        let pressed = seen.force > R::of(FORCE_LIMIT) || seen.full_scale;
         self.pressed = if pressed { self.pressed.saturating_add(1) } else { 0 };
         let moving_by_itself = matches!(law, State::Hold | State::Approach | State::Run);
         let finding = if moving_by_itself && self.pressed >= FORCE_CYCLES {

@@ -7,6 +7,17 @@ use crate::command::{Command, Refusal};
 use crate::fault::Fault;
 use crate::supervisor::State;
 
+/// What the hand's pucks told since the last cycle, in the order F1, F2, F3, spread.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HandSample {
+    /// Motor positions of the four pucks; `None` where the reply was lost or malformed.
+    pub primary: [Option<Counts>; 4],
+    /// Positions of the fingers' worm encoders; `None` where they were lost or do not exist.
+    pub secondary: [Option<Counts>; 3],
+    /// Raw counts of the fingers' strain gauges; `None` where the reply was lost.
+    pub gauges: [Option<u16>; 3],
+}
+
 /// What the bus round of one cycle brought in.
 ///
 /// Only replies of this cycle belong here: the caller empties its mailboxes before it sends the requests, so a late
@@ -19,6 +30,8 @@ pub struct BusSample {
     pub wrench: Option<RawWrench>,
     /// Latest mode of the safety module, where it was polled since the last cycle.
     pub safety: Option<SafetyMode>,
+    /// What the hand told since the last cycle; `None` without a hand, or while it is not initialised.
+    pub hand: Option<HandSample>,
 }
 
 /// The input of one control cycle.
@@ -56,38 +69,55 @@ pub enum Event {
     Entered(State, Fault),
     /// The movement ended and the arm holds the goal.
     Arrived,
+    /// The run does not go as the successful ones did.
+    Surprised {
+        /// Progress of the movement, 0 to 1.
+        phase: f32,
+        /// The channel that stands out most: force x, y, z, torque x, y, z, gauges F1 to F3, fingers F1 to F3.
+        channel: u8,
+    },
 }
 
 /// Flags of a [`CycleRecord`], one bit each.
 pub mod flags {
     /// A joint torque was cut by its joint limit.
-    pub const JOINT_LIMITED: u16 = 1 << 0;
+    pub const JOINT_LIMITED: u32 = 1 << 0;
     /// The torques were scaled because a motor reached its limit.
-    pub const MOTOR_LIMITED: u16 = 1 << 1;
+    pub const MOTOR_LIMITED: u32 = 1 << 1;
     /// A torque was cut by its rate limit.
-    pub const RATE_LIMITED: u16 = 1 << 2;
+    pub const RATE_LIMITED: u32 = 1 << 2;
     /// A torque was not finite and was replaced.
-    pub const NOT_FINITE: u16 = 1 << 3;
+    pub const NOT_FINITE: u32 = 1 << 3;
     /// At least one position of this cycle was extrapolated.
-    pub const COASTING: u16 = 1 << 4;
+    pub const COASTING: u32 = 1 << 4;
     /// The wrench of this cycle is older than the cycle.
-    pub const WRENCH_STALE: u16 = 1 << 5;
+    pub const WRENCH_STALE: u32 = 1 << 5;
     /// The desired joint position reached the anti-windup clamp.
-    pub const CLAMPED: u16 = 1 << 6;
+    pub const CLAMPED: u32 = 1 << 6;
     /// The repulsion of a joint limit acts.
-    pub const NEAR_LIMIT: u16 = 1 << 7;
+    pub const NEAR_LIMIT: u32 = 1 << 7;
     /// Sensory feedback bends the plan.
-    pub const FEEDBACK: u16 = 1 << 8;
+    pub const FEEDBACK: u32 = 1 << 8;
     /// The force controller adds torque.
-    pub const FORCE_CONTROL: u16 = 1 << 9;
+    pub const FORCE_CONTROL: u32 = 1 << 9;
     /// The movement has ended; the arm holds its goal.
-    pub const ARRIVED: u16 = 1 << 10;
+    pub const ARRIVED: u32 = 1 << 10;
     /// The safety module reports ACTIVE.
-    pub const SAFETY_ACTIVE: u16 = 1 << 11;
+    pub const SAFETY_ACTIVE: u32 = 1 << 11;
     /// All joint positions have been measured at least once.
-    pub const POSITIONS_KNOWN: u16 = 1 << 12;
+    pub const POSITIONS_KNOWN: u32 = 1 << 12;
     /// The wrench has been tared.
-    pub const TARED: u16 = 1 << 13;
+    pub const TARED: u32 = 1 << 13;
+    /// The wrist sensor is at its full scale, or one of its gauges has saturated since its last own tare.
+    pub const SENSOR_SATURATED: u32 = 1 << 14;
+    /// The hand is initialised and its positions are known.
+    pub const HAND_READY: u32 = 1 << 15;
+    /// The feedback is derated or fades out: another duration than recorded, a silent sensor, or the end of the run.
+    pub const FEEDBACK_FADED: u32 = 1 << 16;
+    /// This run does not go as the successful ones did.
+    pub const SURPRISE: u32 = 1 << 17;
+    /// Replies of the hand were lost for so long that its drives are left alone.
+    pub const HAND_LOST: u32 = 1 << 18;
 }
 
 /// Everything one cycle measured and decided, of constant size; the source of telemetry and fault records.
@@ -100,7 +130,7 @@ pub struct CycleRecord {
     /// Latched fault.
     pub fault: Fault,
     /// Bits of [`flags`].
-    pub flags: u16,
+    pub flags: u32,
     /// Phase of the movement, 1 at its start, towards 0 at its end; 0 outside a run.
     pub phase: f32,
     /// Measured joint positions (rad).
@@ -118,6 +148,14 @@ pub struct CycleRecord {
     /// Filtered, tared wrench of the environment on the robot at the grasp point: force in world axes (N), torque in
     /// tool axes (N m).
     pub wrench: [f32; 6],
+    /// Measured hand: spread, F1, F2, F3 of the inner links (rad); 0 without a hand.
+    pub hand: [f32; 4],
+    /// Desired hand in the same order (rad); the measured one where nothing is desired.
+    pub hand_d: [f32; 4],
+    /// Filtered, tared torque of the environment on the fingers F1, F2, F3 (N m): negative when closing on an object.
+    pub gauges: [f32; 3],
+    /// Statistic of the watch for unusual runs; 0 without one.
+    pub surprise: f32,
     /// Position replies lost in this cycle (0 to 7).
     pub lost_replies: u8,
 }
@@ -137,6 +175,10 @@ impl CycleRecord {
         pose_d: [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
         pose: [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
         wrench: [0.0; 6],
+        hand: [0.0; 4],
+        hand_d: [0.0; 4],
+        gauges: [0.0; 3],
+        surprise: 0.0,
         lost_replies: 0,
     };
 }

@@ -1,15 +1,16 @@
 //! `Run`: the loaded primitive in motion: its rollout, the options of this run, and the decision that it is over.
 
-use dmp::{
-    Configuration, Coupling, Primitive, Quaternion, Reference, Rollout, RolloutError, SENSORS, SensorMap, StartState,
-};
+use dmp::{Configuration, Coupling, Primitive, Quaternion, Reference, Rollout, RolloutError, SensorMap, StartState};
 use nalgebra::Vector3;
 
 use crate::command::{Goal, Refusal, RunOptions};
 use crate::cycle::PERIOD;
+use crate::deviation::Deviation;
+use crate::hand::HandState;
 use crate::load::within_reach;
 use crate::real::Real;
-use crate::units::{JointPositions, Pose, Vector6, Wrench};
+use crate::units::{JointPositions, Pose, Wrench};
+use crate::watch::{Surprise, Watch};
 
 /// Largest distance of any joint from the start posture of the primitive (rad).
 pub(crate) const START_DISTANCE: f64 = 0.05;
@@ -20,6 +21,9 @@ pub(crate) const SPEEDS: (f32, f32) = (0.1, 2.0);
 /// The plan counts as at rest below these speeds (m/s, rad/s).
 const REST: (f64, f64) = (2e-3, 1e-2);
 
+/// The hand rows count as at rest below this speed (rad/s).
+const HAND_REST: f64 = 5e-2;
+
 /// Control periods that the plan stays at rest before the run is over: three time constants of the pose feedback of
 /// Eq (11), so that the arm has closed the last millimetres.
 const SETTLING: u16 = 300;
@@ -27,12 +31,43 @@ const SETTLING: u16 = 300;
 /// Progress beyond which a plan that never comes to rest (feedback still bends it) is over as well.
 const LATEST: f64 = 1.5;
 
+/// The same for a run that the feedback bends: it never comes to rest while something presses.
+const LATEST_WITH_FEEDBACK: f64 = 1.15;
+
+/// Control periods in which the feedback fades out when the sensor falls silent: 100 ms.
+pub(crate) const FADE: u16 = 30;
+
+/// Control periods after the end of the movement in which the displacement of the plan stops to change: 0.3 s. It stays,
+/// because a plan that springs back tips what has just been grasped.
+const LATCH: u16 = 90;
+
+/// Largest distance of a digit of the hand from where the primitive starts (rad).
+const HAND_DISTANCE: f64 = 0.15;
+
+/// How well this tick's sensors can be believed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Senses {
+    /// All values are of this tick.
+    Fresh,
+    /// Something is missing in this tick: what was computed last stays.
+    Frozen,
+    /// The wrench has been silent for too long: the feedback fades.
+    Lost,
+}
+
 /// A run in progress.
 #[derive(Clone, Debug)]
 pub(crate) struct Run<R: Real, const N: usize> {
     rollout: Rollout<R, N>,
     pub(crate) options: RunOptions,
+    /// Feedback as computed last, before it fades.
     coupling: Coupling<R>,
+    deviation: Option<Deviation<R>>,
+    watch: Watch<R>,
+    /// Control periods of fading left: `FADE` in full, 0 gone.
+    kept: u16,
+    /// Control periods since the movement's end, up to `LATCH`.
+    ended: u16,
     rested: u16,
 }
 
@@ -42,6 +77,7 @@ impl<R: Real, const N: usize> Run<R, N> {
         primitive: &Primitive<R, N>,
         q: &JointPositions<R>,
         pose: &Pose<R>,
+        hand: Option<&HandState<R>>,
         options: RunOptions,
     ) -> Result<Self, Refusal> {
         let taught = primitive.start();
@@ -52,15 +88,37 @@ impl<R: Real, const N: usize> Run<R, N> {
         if q.0.iter().zip(&taught.posture).any(far) {
             return Err(Refusal::StartTooFar);
         }
+        let hand = match hand {
+            Some(state) => {
+                let far = |(q, start): (&R, &R)| {
+                    let distance = *q - *start;
+                    !(distance <= R::of(HAND_DISTANCE) && distance >= R::of(-HAND_DISTANCE))
+                };
+                if state.q.iter().zip(&taught.hand).any(far) {
+                    return Err(Refusal::HandTooFar);
+                }
+                state.q
+            }
+            None => taught.hand,
+        };
         let [w, x, y, z] = pose.orientation.0;
         let start = StartState::at_rest(Configuration {
             position: pose.position.into(),
             orientation: Quaternion::new(w, x, y, z),
             posture: q.0.into(),
-            hand: taught.hand,
+            hand,
         });
         let rollout = Rollout::start(primitive, &start).map_err(reason)?;
-        let mut run = Run { rollout, options, coupling: Coupling::NONE, rested: 0 };
+        let mut run = Run {
+            rollout,
+            options,
+            coupling: Coupling::NONE,
+            deviation: None,
+            watch: Watch::new(),
+            kept: FADE,
+            ended: 0,
+            rested: 0,
+        };
         // The first speed acts at once; later ones are approached at the rollout's slew rate.
         run.rollout.set_speed_slew(None).map_err(reason)?;
         run.set_speed(primitive, options.speed)?;
@@ -100,58 +158,113 @@ impl<R: Real, const N: usize> Run<R, N> {
         self.rollout.set_speed(primitive, R::of(f64::from(factor))).map_err(reason)
     }
 
-    /// The plan of this tick. With `frozen` feedback (the wrench or a position is missing) the last coupling stays.
-    pub(crate) fn step(&mut self, primitive: &Primitive<R, N>, wrench: &Wrench<R>, frozen: bool) -> Reference<R> {
-        if !self.options.feedback {
-            self.coupling = Coupling::NONE;
-        } else if !frozen {
-            let measured = self.sensors(primitive, wrench);
-            self.coupling = self.rollout.coupling(primitive, &measured, &SensorMap::IDENTITY);
+    /// The plan of this tick.
+    pub(crate) fn step(
+        &mut self,
+        primitive: &Primitive<R, N>,
+        wrench: &Wrench<R>,
+        gauges: Option<&[R; 3]>,
+        senses: Senses,
+    ) -> Reference<R> {
+        self.kept = match senses {
+            Senses::Lost => self.kept.saturating_sub(1),
+            _ => FADE.min(self.kept + 1),
+        };
+        if senses == Senses::Fresh {
+            let progress = self.rollout.progress();
+            self.deviation =
+                primitive.expected().map(|expected| Deviation::new(&expected.at(progress), wrench, gauges));
         }
-        let plan = self.rollout.step(primitive, R::of(PERIOD), &self.coupling);
+        if let Some(deviation) = self.deviation.filter(|_| self.options.feedback && senses == Senses::Fresh) {
+            let seen = if self.options.finger_feedback {
+                deviation
+            } else {
+                Deviation { gauges: [R::of(0.0); 3], ..deviation }
+            };
+            let wanted = self.rollout.coupling(primitive, &seen.sensors(), &SensorMap::IDENTITY);
+            self.coupling = blend(&self.coupling, &wanted, self.follows());
+        }
+        if self.rollout.is_finished() {
+            self.ended = LATCH.min(self.ended + 1);
+        }
+        let coupling = blend(&Coupling::NONE, &self.coupling, self.kept());
+        let plan = self.rollout.step(primitive, R::of(PERIOD), &coupling);
         let slow =
             |speeds: &[R], limit: f64| speeds.iter().all(|speed| *speed < R::of(limit) && *speed > R::of(-limit));
         let resting = self.rollout.is_finished()
             && slow(&plan.position.v, REST.0)
             && slow(&plan.orientation.omega, REST.1)
-            && slow(&plan.posture.v, REST.1);
+            && slow(&plan.posture.v, REST.1)
+            && slow(&plan.hand.v, HAND_REST);
         self.rested = if resting { self.rested.saturating_add(1) } else { 0 };
         plan
     }
 
+    /// Compares what is felt with the experience of the primitive, if it has one; tells what has just become a surprise.
+    pub(crate) fn watch(
+        &mut self,
+        primitive: &Primitive<R, N>,
+        wrench: &Wrench<R>,
+        hand: Option<&HandState<R>>,
+    ) -> Option<Surprise> {
+        let experience = primitive.experience()?;
+        let (f, n) = (&wrench.force, &wrench.torque);
+        let zero = [R::of(0.0); 3];
+        let [g1, g2, g3] = hand.map_or(zero, |hand| hand.gauges);
+        let [q1, q2, q3] = hand.map_or(zero, |hand| {
+            let [_spread, fingers @ ..] = hand.q;
+            fingers
+        });
+        let values = [f.x, f.y, f.z, n.x, n.y, n.z, g1, g2, g3, q1, q2, q3];
+        self.watch.step(experience, self.rollout.progress(), &values, hand.is_some())
+    }
+
+    /// The largest deviation from the experience, 1 at the limit of a surprise; 0 without an experience.
+    pub(crate) fn surprise(&self) -> R {
+        self.watch.statistic()
+    }
+
+    /// Share of the feedback that has not faded: 1 unless the sensor is silent.
+    pub(crate) fn kept(&self) -> R {
+        R::from_counts(i32::from(self.kept)) * R::of(1.0 / FADE as f64)
+    }
+
+    /// Share of a change of the feedback that acts: 1 up to the end of the movement, then less.
+    fn follows(&self) -> R {
+        R::from_counts(i32::from(LATCH - self.ended)) * R::of(1.0 / LATCH as f64)
+    }
+
+    /// Whether the feedback or the force controller acts with less than it would: the sensor is silent, or the run takes
+    /// another time than the recording of the expectation.
+    pub(crate) fn is_faded(&self, primitive: &Primitive<R, N>) -> bool {
+        let uses_force = self.options.feedback || self.options.force_control;
+        let derated = self.options.feedback
+            && primitive.expected().is_some_and(|expected| {
+                let relative = expected.recorded_duration() / primitive.duration() * self.rollout.speed();
+                expected.trust(relative) < R::of(1.0)
+            });
+        (uses_force && self.kept < FADE) || derated
+    }
+
     /// Whether the movement is over.
     pub(crate) fn is_over(&self) -> bool {
-        self.rested >= SETTLING || self.rollout.progress() > R::of(LATEST)
+        let latest = if self.options.feedback { LATEST_WITH_FEEDBACK } else { LATEST };
+        self.rested >= SETTLING || self.rollout.progress() > R::of(latest)
     }
 
-    /// Error of the force controller, `F_expected - F` (N, N m, force world axes, torque tool axes); `None` without an
-    /// expectation.
-    pub(crate) fn force_error(&self, primitive: &Primitive<R, N>, wrench: &Wrench<R>) -> Option<Wrench<R>> {
-        let [fx, fy, fz, nx, ny, nz, ..] = primitive.expected()?.at(self.rollout.progress());
-        Some(Wrench {
-            force: Vector3::new(fx, fy, fz) - wrench.force,
-            torque: Vector3::new(nx, ny, nz) - wrench.torque,
-        })
+    /// What is expected and what is felt beyond it, as of the last complete tick; `None` without an expectation.
+    pub(crate) fn deviation(&self) -> Option<&Deviation<R>> {
+        self.deviation.as_ref()
     }
+}
 
-    /// Sensor values for Eq (8). Finger gauges are not measured yet: they read what is expected, so they bend nothing.
-    fn sensors(&self, primitive: &Primitive<R, N>, wrench: &Wrench<R>) -> [R; SENSORS] {
-        let mut sensors = match primitive.expected() {
-            Some(expected) => expected.at(self.rollout.progress()),
-            None => [R::of(0.0); SENSORS],
-        };
-        let felt = Vector6::new(
-            wrench.force.x,
-            wrench.force.y,
-            wrench.force.z,
-            wrench.torque.x,
-            wrench.torque.y,
-            wrench.torque.z,
-        );
-        for (sensor, value) in sensors.iter_mut().zip(felt.iter()) {
-            *sensor = *value;
-        }
-        sensors
+/// From one feedback towards another, by `share`.
+fn blend<R: Real>(from: &Coupling<R>, to: &Coupling<R>, share: R) -> Coupling<R> {
+    let mix = |from: R, to: R| from + (to - from) * share;
+    Coupling {
+        position: core::array::from_fn(|row| mix(from.position[row], to.position[row])),
+        orientation: core::array::from_fn(|row| mix(from.orientation[row], to.orientation[row])),
+        hand: core::array::from_fn(|row| mix(from.hand[row], to.hand[row])),
     }
 }
 

@@ -29,7 +29,7 @@ fn no_damping_mode_is_faster_than_the_delay_of_the_loop_allows() {
     let arm = ArmModel::<f64>::new(Payload::SensorAndHand);
     let gains = Gains::<f64>::tuned();
     let mut worst = 0.0f64;
-    for damping in [gains.damping, gains.stop_damping] {
+    for damping in [gains.stiff.damping, gains.compliant.damping, gains.stop_damping] {
         // Eigenvalues of M^-1 K_d are those of the symmetric K_d^1/2 M^-1 K_d^1/2.
         let root = SMatrix::<f64, 7, 7>::from_diagonal(&damping.map(f64::sqrt));
         for q in postures() {
@@ -46,9 +46,11 @@ fn no_damping_mode_is_faster_than_the_delay_of_the_loop_allows() {
 #[test]
 fn the_anti_windup_clamp_leaves_more_torque_than_friction() {
     let gains = Gains::<f64>::tuned();
-    for joint in 0..7 {
-        let push = gains.clamp[joint] * gains.stiffness[joint];
-        assert!(push > 2.0 * model::FRICTION_COULOMB[joint], "J{}: {push} N m", joint + 1);
+    for tracking in [gains.stiff, gains.compliant] {
+        for joint in 0..7 {
+            let push = tracking.clamp[joint] * tracking.stiffness[joint];
+            assert!(push > 2.0 * model::FRICTION_COULOMB[joint], "J{}: {push} N m", joint + 1);
+        }
     }
 }
 
@@ -56,6 +58,7 @@ fn the_anti_windup_clamp_leaves_more_torque_than_friction() {
 fn friction_is_never_fed_forward_in_full() {
     let gains = Gains::<f64>::tuned();
     for joint in 0..7 {
-        assert!(gains.coulomb[joint] < model::FRICTION_COULOMB[joint]);
+        assert!(gains.stiff.coulomb[joint] < model::FRICTION_COULOMB[joint]);
+        assert!(gains.compliant.coulomb[joint] < model::FRICTION_COULOMB[joint]);
     }
 }

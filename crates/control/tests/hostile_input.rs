@@ -2,12 +2,18 @@
 
 use control::arm::ArmModel;
 use control::command::{AccelerationSource, Command, Goal, PoseFeedback, RunOptions};
+use control::hand::limit::TORQUE_LIMIT as HAND_LIMIT;
 use control::limit::STEP_LIMIT;
 use control::load::{self, End, LoadError};
-use control::{BusSample, Calibration, Cycle, CycleInput, Event, Fault, Payload, Refusal, State, flags};
-use dmp::{Configuration, Hemisphere, OrientationError, PrimitiveTables, Quaternion, Velocity};
+use control::{BusSample, Calibration, Cycle, CycleInput, Event, Fault, HandSample, Payload, Refusal, State, flags};
+use dmp::{
+    Configuration, ExpectedWrench, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, PrimitiveTables,
+    Quaternion, Velocity,
+};
+use std::sync::LazyLock;
+
 use proptest::prelude::*;
-use puck::{Counts, GaugeStatus, RawWrench, SafetyMode};
+use puck::{Action, CanFrame, Counts, GaugeStatus, RawWrench, Request, SafetyMode};
 
 const KERNELS: usize = 10;
 const POSTURE: [f64; 7] = [-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75];
@@ -32,6 +38,15 @@ fn configuration(q: [f64; 7]) -> Configuration<f32> {
 
 const WEIGHTS: [f32; dmp::ROWS * KERNELS] = [0.0; dmp::ROWS * KERNELS];
 
+static FEEDBACK: LazyLock<Feedback<f32>> = LazyLock::new(|| {
+    let gains = GainSchedule::constant([20.0; dmp::COUPLED_ROWS]).expect("gains");
+    let weights = GainSchedule::constant([1.0; dmp::SENSORS]).expect("weights");
+    Feedback::new(gains, weights, Limits { displacement: 0.25, rotation: 0.4, hand: 0.5 }).expect("limits")
+});
+
+static EXPECTED: LazyLock<ExpectedWrench<f32>> =
+    LazyLock::new(|| ExpectedWrench::new(&[[0.0; dmp::SENSORS]; 2], 4.0).expect("an expectation"));
+
 fn tables() -> PrimitiveTables<'static, f32> {
     PrimitiveTables {
         duration: 4.0,
@@ -46,14 +61,20 @@ fn tables() -> PrimitiveTables<'static, f32> {
         start: configuration(POSTURE),
         goal: configuration([-0.3, 1.4, 1.3, 2.0, -0.2, -0.5, 1.6]),
         start_velocity: Velocity { position: [0.0; 3], orientation: [0.0; 3], posture: [0.0; 7], hand: [0.0; 4] },
-        feedback: None,
-        expected: None,
+        feedback: Some(&FEEDBACK),
+        expected: Some(&EXPECTED),
+        experience: None,
     }
 }
 
 fn sample(positions: [Option<Counts>; 7]) -> CycleInput {
     CycleInput {
-        sample: BusSample { positions, wrench: Some(RawWrench::default()), safety: Some(SafetyMode::Active) },
+        sample: BusSample {
+            positions,
+            wrench: Some(RawWrench::default()),
+            safety: Some(SafetyMode::Active),
+            hand: None,
+        },
         ..CycleInput::default()
     }
 }
@@ -75,9 +96,19 @@ fn cycle_in(state: State) -> Cycle<f32, KERNELS> {
         State::Gravity => feed(Some(Command::Gravity), 50),
         _ => feed(Some(Command::Hold), 50),
     }
+    // The wrench of these cycles is zero counts: without a tare that is a hand without weight.
+    feed(Some(Command::Tare), 1);
     match state {
         State::Approach => feed(Some(Command::Approach { q: [0.0, 1.0, 1.0, 1.5, 0.0, 0.0, 0.0], duration: 3.0 }), 20),
-        State::Run => feed(Some(Command::Run(RunOptions { force_control: true, ..RunOptions::default() })), 20),
+        State::Run => feed(
+            Some(Command::Run(RunOptions {
+                feedback: true,
+                force_control: true,
+                compliant: true,
+                ..RunOptions::default()
+            })),
+            20,
+        ),
         State::SoftStop => feed(Some(Command::Stop), 5),
         _ => {}
     }
@@ -111,6 +142,27 @@ fn any_wrench() -> impl Strategy<Value = Option<RawWrench>> {
     )
 }
 
+/// Replies of the hand: each near an opened hand, or anything.
+fn any_hand() -> impl Strategy<Value = Option<HandSample>> {
+    let digit = || (0..4u8, -150i32..150, any_counts());
+    let near = |(kind, jitter, wild): (u8, i32, Option<Counts>), truth: i32| {
+        if kind > 0 { Some(Counts(truth + jitter)) } else { wild }
+    };
+    let replies = (
+        prop::array::uniform4(digit()),
+        prop::array::uniform3(digit()),
+        prop::array::uniform3(prop::option::of(any::<u16>())),
+    );
+    prop::option::weighted(
+        0.9,
+        replies.prop_map(move |(primary, secondary, gauges)| HandSample {
+            primary: primary.map(|digit| near(digit, 1000)),
+            secondary: secondary.map(|digit| near(digit, 400)),
+            gauges,
+        }),
+    )
+}
+
 fn any_goal() -> impl Strategy<Value = Goal> {
     (
         prop::option::of(prop::array::uniform3(prop::num::f32::ANY)),
@@ -126,13 +178,15 @@ fn any_command() -> impl Strategy<Value = Command> {
         (prop::array::uniform7(prop::num::f32::ANY), prop::num::f32::ANY)
             .prop_map(|(q, duration)| Command::Approach { q, duration }),
         (prop::array::uniform7(-0.5f32..2.0), 0.0f32..5.0).prop_map(|(q, duration)| Command::Approach { q, duration }),
-        (any_goal(), prop::num::f32::ANY, any::<[bool; 4]>()).prop_map(|(goal, speed, [a, b, c, d])| {
+        (any_goal(), prop::num::f32::ANY, any::<[bool; 6]>()).prop_map(|(goal, speed, [a, b, c, d, e, f])| {
             Command::Run(RunOptions {
                 goal: if d { goal } else { Goal::STORED },
                 speed: if d { speed } else { 1.0 },
                 feedback: a,
                 force_control: b,
                 pose_feedback: if c { PoseFeedback::Measured } else { PoseFeedback::Planned },
+                finger_feedback: e,
+                compliant: f,
                 acceleration: if a { AccelerationSource::Analytic } else { AccelerationSource::Differentiated },
             })
         }),
@@ -142,6 +196,9 @@ fn any_command() -> impl Strategy<Value = Command> {
         any_goal().prop_map(Command::SetGoal),
         prop::num::f32::ANY.prop_map(|factor| Command::SetSpeed { factor }),
         Just(Command::Tare),
+        (prop::array::uniform4(prop::num::f32::ANY), prop::num::f32::ANY)
+            .prop_map(|(q, duration)| Command::MoveHand { q, duration }),
+        (prop::array::uniform4(0.0f32..2.4), 0.0f32..2.0).prop_map(|(q, duration)| Command::MoveHand { q, duration }),
     ]
 }
 
@@ -153,14 +210,23 @@ fn any_input() -> impl Strategy<Value = CycleInput> {
         1 => Just(Some(SafetyMode::EStop)),
     ];
     let fault = prop_oneof![30 => Just(None), 1 => Just(Some(Fault::BusFault)), 1 => Just(Some(Fault::Overrun))];
-    (any_positions(), any_wrench(), safety, prop::option::weighted(0.2, any_command()), fault, any::<u64>()).prop_map(
-        |(positions, wrench, safety, command, external_fault, cycle)| CycleInput {
+    (any_positions(), any_wrench(), any_hand(), safety, prop::option::weighted(0.2, any_command()), fault, any::<u64>())
+        .prop_map(|(positions, wrench, hand, safety, command, external_fault, cycle)| CycleInput {
             cycle,
-            sample: BusSample { positions, wrench, safety },
+            sample: BusSample { positions, wrench, safety, hand },
             command,
             external_fault,
-        },
-    )
+        })
+}
+
+/// What the frame of the hand makes its drives do by the nominal model (N m, spread, F1, F2, F3).
+fn hand_torques(frame: Option<CanFrame>) -> [f64; 4] {
+    let Some(frame) = frame else { return [0.0; 4] };
+    let Action::PackedTorques { torques, .. } = Request::decode(&frame).expect("a valid frame").action else {
+        panic!("{frame:?}")
+    };
+    let [f1, f2, f3, spread] = torques.map(|torque| f64::from(torque.units()) / 20_000.0);
+    [spread * 17.5, f1 * 12.5, f2 * 12.5, f3 * 12.5]
 }
 
 fn any_state() -> impl Strategy<Value = State> {
@@ -177,6 +243,7 @@ proptest! {
     ) {
         let mut cycle = cycle_in(state);
         let mut last = [f32::NAN; 7];
+        let mut last_hand = [0.0; 4];
         for input in inputs {
             let active = input.sample.safety;
             let output = cycle.step(&input);
@@ -197,6 +264,19 @@ proptest! {
                 prop_assert_eq!(record.tau, [0.0; 7]);
             }
             last = record.tau;
+            prop_assert!(record.hand.iter().chain(&record.hand_d).chain(&record.gauges).all(|value| value.is_finite()));
+            let hand = hand_torques(output.actuation.hand_frame());
+            // Full scale in 15 cycles, and a unit of rounding; a hand that is let go is let go at once.
+            if output.actuation.hand_frame().is_some() {
+                for ((now, before), limit) in hand.iter().zip(last_hand).zip(HAND_LIMIT) {
+                    prop_assert!(now.abs() <= limit + 1e-3 && (now - before).abs() <= limit / 15.0 + 1e-3);
+                }
+            }
+            if !record.state.has_torque() || record.state == State::SoftStop || input.sample.hand.is_none() {
+                prop_assert_eq!(output.actuation.hand_frame(), None);
+            }
+            // After that it starts anew from nothing.
+            last_hand = hand;
         }
     }
 }

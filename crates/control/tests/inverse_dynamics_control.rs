@@ -10,7 +10,7 @@ use control::{Payload, model};
 #[test]
 fn the_torque_is_inertia_bias_feedback_and_friction() {
     let arm = ArmModel::<f64>::new(Payload::SensorAndHand);
-    let gains = Gains::<f64>::tuned();
+    let gains = Gains::<f64>::tuned().stiff;
     let state = JointState {
         q: JointPositions::from_array([-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75]),
         dq: JointVelocities::from_array([0.2, -0.1, 0.3, 0.4, -0.5, 0.6, -0.2]),

@@ -213,7 +213,7 @@ fn e1_every_pair_does_what_the_table_says_and_latches_its_fault() {
 fn codes_are_stable_and_unique() {
     assert_eq!(State::ALL.map(State::code), [0, 1, 2, 3, 4, 5, 6, 7]);
     assert_eq!(Fault::ALL.map(Fault::code), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13]);
-    assert_eq!(Refusal::ALL.map(Refusal::code), [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]);
+    assert_eq!(Refusal::ALL.map(Refusal::code), [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16]);
     for state in State::ALL {
         assert_eq!(State::from_code(state.code()), Some(state));
     }

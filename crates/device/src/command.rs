@@ -13,6 +13,8 @@ pub enum Command {
         /// Joint angles of the present pose, rad.
         home: [f32; 7],
     },
+    /// "The hand may open": drive its digits to their open stops and count from there.
+    InitialiseHand,
     /// Anything the control cycle decides about.
     Control(control::Command),
 }
@@ -32,6 +34,10 @@ pub enum Refusal {
     NotReady(Stage),
     /// The arm can only be zeroed while the safety module is IDLE and no torque is asked for.
     ZeroNeedsIdle,
+    /// No hand answers on the bus.
+    NoHand,
+    /// The hand is being initialised already, or a movement runs.
+    HandBusy,
     /// This home angle (0 = J1) is not a number, is outside the joint's limits, or does not fit into the encoder's range.
     HomeOutOfRange {
         /// Index of the joint.
@@ -49,6 +55,8 @@ impl fmt::Display for Refusal {
             Refusal::ZeroNeedsIdle => {
                 formatter.write_str("the arm can only be zeroed at rest, while the safety module is idle")
             }
+            Refusal::NoHand => formatter.write_str("the arm has no hand that answers"),
+            Refusal::HandBusy => formatter.write_str("the hand is being initialised, or a movement runs"),
             Refusal::HomeOutOfRange { joint } => {
                 write!(formatter, "the home angle of joint {} is outside what the joint can reach", joint + 1)
             }

@@ -6,7 +6,7 @@
 //! | slot | at | what |
 //! |---|---|---|
 //! | [`Slot::Request`] | 0 | empty the reply slots, ask all pucks for their position and the sensor for its wrench |
-//! | [`Slot::Control`] | 1.11 ms | take what has come, advance the control cycle, send both torque frames |
+//! | [`Slot::Control`] | 1.11 ms | take what has come, advance the control cycle, send both torque frames, then drive and ask the hand |
 //! | [`Slot::Slow`] | 2.22 ms | one question about modes, pendant or temperatures |
 //!
 //! No torque but zero leaves before the start-up is over, a person has activated the arm, and a person has commanded it:
@@ -18,6 +18,7 @@ use puck::{CanFrame, MotorMode, Node, PropertyId, Reply, SafetyMode, Status, set
 use crate::bus::{Outlet, SlotOutlet};
 use crate::command::{Command, Refusal};
 use crate::event::{Event, EventKind};
+use crate::hand::Hand;
 use crate::health::{Counters, Health};
 use crate::port::StoredPrimitive;
 use crate::round::{Round, Taken};
@@ -86,6 +87,7 @@ pub struct Core {
     startup: Startup,
     pacer: Pacer,
     round: Round,
+    hand: Hand,
     slow: Option<SlowPoll>,
     counters: Counters,
     safety_mode: Option<SafetyMode>,
@@ -93,6 +95,7 @@ pub struct Core {
     fresh_safety: Option<SafetyMode>,
     pendant: Option<i32>,
     temperatures: [Option<i16>; 7],
+    hand_temperatures: [Option<i16>; 4],
     stage: Stage,
     blocked: Option<StartupError>,
     /// A fault of the bus, to be told to the next cycle, and the cycles left until the bus is started anew.
@@ -116,12 +119,14 @@ impl Core {
             startup: Startup::new(),
             pacer: Pacer::default(),
             round: Round::default(),
+            hand: Hand::new(),
             slow: None,
             counters: Counters::default(),
             safety_mode: None,
             fresh_safety: None,
             pendant: None,
             temperatures: [None; 7],
+            hand_temperatures: [None; 4],
             stage: Stage::Enumerating,
             blocked: None,
             fault: None,
@@ -149,6 +154,9 @@ impl Core {
             None => {}
         }
         self.tell_stage(io);
+        if let Some((stage, cause)) = self.hand.news() {
+            self.tell(EventKind::Hand { stage, cause }, io);
+        }
     }
 
     /// Takes a primitive for the next run.
@@ -185,10 +193,13 @@ impl Core {
             stage: self.stage(),
             blocked: self.startup.error(),
             state: self.cycle.state(),
+            fault: self.cycle.fault(),
             zeroed: self.startup.is_zeroed(),
             safety_mode: self.safety_mode,
             pendant: self.pendant,
             temperatures: self.temperatures,
+            hand: self.hand.stage(),
+            hand_temperatures: self.hand_temperatures,
             counters: self.counters,
         }
     }
@@ -238,6 +249,9 @@ impl Core {
         if self.round.take(reply, &mut self.counters) == Taken::Yes {
             return true;
         }
+        if self.hand.take(reply, &mut self.counters) {
+            return true;
+        }
         let Reply::Property { node, property, value } = *reply else {
             return false;
         };
@@ -254,6 +268,12 @@ impl Core {
             Told::Pendant(value) => self.pendant = Some(value),
             Told::Temperature(joint, value) => {
                 if let Some(place) = self.temperatures.get_mut(joint) {
+                    *place = Some(value as i16);
+                }
+            }
+            Told::HandMode(node, value) => self.hand.hear_mode(node, value),
+            Told::HandTemperature(digit, value) => {
+                if let Some(place) = self.hand_temperatures.get_mut(digit) {
                     *place = Some(value as i16);
                 }
             }
@@ -291,7 +311,7 @@ impl Core {
                 Some(Command::Zero { home }) => self.startup.zero(&home),
                 // Nothing moves and no torque flows: what a stop asks for is so already.
                 Some(Command::Control(control::Command::Stop)) => self.tell(EventKind::Accepted, io),
-                Some(Command::Control(_)) => {
+                Some(Command::Control(_) | Command::InitialiseHand) => {
                     self.tell(EventKind::Refused(Refusal::NotReady(self.stage())), io);
                 }
                 None => {}
@@ -315,6 +335,10 @@ impl Core {
         }
         self.slow = Some(SlowPoll::new(safety));
         self.round = Round::new(self.startup.has_sensor());
+        match self.startup.take_hand() {
+            Some(found) => self.hand.begin(found),
+            None => self.hand.resume(),
+        }
         self.fault = None;
         self.last_cycles = None;
         self.fresh_safety = None;
@@ -331,6 +355,8 @@ impl Core {
         self.slow = None;
         self.cycle.reset();
         self.startup.restart();
+        self.hand.suspend();
+        self.hand_temperatures = [None; 4];
     }
 
     fn request(&mut self, now_us: u64, io: &mut impl CoreIo) {
@@ -348,6 +374,7 @@ impl Core {
             return;
         }
         let gathered = self.round.close(&mut self.counters);
+        let hand = self.hand.sample(&mut self.counters);
         self.number += 1;
         Counters::count(&mut self.counters.cycles);
         if self.slow.is_some_and(|slow| slow.safety_silence() >= SAFETY_SILENCE)
@@ -366,12 +393,16 @@ impl Core {
                 positions: gathered.positions,
                 wrench: gathered.wrench,
                 safety: self.safety_of_cycle(),
+                hand,
             },
-            command: self.next_command(io),
+            command: self.next_command(now_us, io),
             external_fault: self.fault.take(),
         };
         let output = self.cycle.step(&input);
         self.send_torques(output.actuation.frames(), now_us, io);
+        for frame in self.hand.frames(output.actuation.hand_frame()).into_iter().flatten() {
+            self.outlet(now_us, io).send(frame);
+        }
         self.wants_idle = output.actuation.requests_idle();
         io.record(output.record);
         if let Some(event) = output.event {
@@ -387,9 +418,20 @@ impl Core {
     }
 
     /// The command for the control cycle; those for the start-up are answered here.
-    fn next_command(&mut self, io: &mut impl CoreIo) -> Option<control::Command> {
+    fn next_command(&mut self, now_us: u64, io: &mut impl CoreIo) -> Option<control::Command> {
         match io.command()? {
-            Command::Control(command) => Some(command),
+            Command::Control(command) => {
+                if command == control::Command::Stop {
+                    self.hand.stop();
+                }
+                Some(command)
+            }
+            Command::InitialiseHand => {
+                let running = matches!(self.cycle.state(), State::Run | State::Coast);
+                let outcome = if running { Err(Refusal::HandBusy) } else { self.hand.initialise(now_us) };
+                self.tell(outcome.map_or_else(EventKind::Refused, |()| EventKind::Accepted), io);
+                None
+            }
             Command::Zero { home } => {
                 if self.cycle.state() == State::Idle && self.safety_mode == Some(SafetyMode::Idle) {
                     self.startup.zero(&home);
@@ -451,9 +493,18 @@ impl Core {
             }
             return;
         }
-        let suspect = self.round.suspect();
-        if let Some(frame) = self.slow.as_mut().and_then(|slow| slow.next(suspect)) {
-            self.outlet(now_us, io).send(frame);
+        let Some(slow) = &mut self.slow else {
+            return;
+        };
+        let mut outlet = SlotOutlet { io, counters: &mut self.counters, pacer: &mut self.pacer, now_us, cyclic: true };
+        let question = match (slow.begin(), self.round.suspect()) {
+            (Some(safety), _) => Some(safety),
+            (None, Some(node)) => Some(slow.suspect(node)),
+            (None, None) if self.hand.act(&mut outlet) => None,
+            (None, None) => slow.other(self.hand.answers_questions()),
+        };
+        if let Some(frame) = question {
+            outlet.send(frame);
         }
     }
 

@@ -1,9 +1,11 @@
 //! What the control half tells a person, unasked or in answer to a command.
 
 use control::{Fault, State};
-use puck::SafetyMode;
+use link::HandStage;
+use puck::{Node, SafetyMode};
 
 use crate::command::Refusal;
+use crate::hand::HandTrouble;
 use crate::startup::{Stage, StartupError};
 
 /// Something happened.
@@ -32,6 +34,20 @@ pub enum EventKind {
     Blocked(StartupError),
     /// The safety module reports another mode than before.
     Safety(SafetyMode),
+    /// The run no longer goes as the successful ones before it.
+    Surprised {
+        /// Progress of the movement, 0 to 1.
+        phase: f32,
+        /// The channel of the experience that stands out most.
+        channel: u8,
+    },
+    /// The hand reached a stage, or was found unfit at the start.
+    Hand {
+        /// Which.
+        stage: HandStage,
+        /// The puck that caused it and why, where something went wrong.
+        cause: Option<(Node, HandTrouble)>,
+    },
 }
 
 impl From<control::Event> for EventKind {
@@ -41,6 +57,7 @@ impl From<control::Event> for EventKind {
             control::Event::Refused(reason) => EventKind::Refused(Refusal::Control(reason)),
             control::Event::Entered(state, fault) => EventKind::Entered(state, fault),
             control::Event::Arrived => EventKind::Arrived,
+            control::Event::Surprised { phase, channel } => EventKind::Surprised { phase, channel },
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Counters and states that tell how well the bus and the arm are, for the statistics of the link.
 
-use control::State;
+use control::{Fault, State};
+use link::HandStage;
 use puck::SafetyMode;
 
 use crate::startup::{Stage, StartupError};
@@ -34,6 +35,8 @@ pub struct Counters {
     pub bus_errors: u32,
     /// Times the start-up began anew.
     pub restarts: u32,
+    /// Replies of the hand that had not come when the cycle needed them.
+    pub hand_lost_replies: u32,
 }
 
 impl Counters {
@@ -54,6 +57,8 @@ pub struct Health {
     pub blocked: Option<StartupError>,
     /// State of the supervisor.
     pub state: State,
+    /// The latched fault.
+    pub fault: Fault,
     /// The encoders count from a known pose, by the word of the safety module.
     pub zeroed: bool,
     /// Latest mode of the safety module; `None` before it answered.
@@ -62,6 +67,10 @@ pub struct Health {
     pub pendant: Option<i32>,
     /// Latest temperature of each arm puck, degree Celsius.
     pub temperatures: [Option<i16>; 7],
+    /// How far the hand has come.
+    pub hand: HandStage,
+    /// Latest temperature of each hand puck (F1, F2, F3, spread), degree Celsius.
+    pub hand_temperatures: [Option<i16>; 4],
     /// Counters.
     pub counters: Counters,
 }

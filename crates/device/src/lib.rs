@@ -6,7 +6,9 @@ mod bus;
 pub mod command;
 pub mod core;
 pub mod event;
+pub mod hand;
 pub mod health;
+mod mailbox;
 mod round;
 mod slow;
 pub mod startup;
@@ -14,6 +16,7 @@ pub mod startup;
 pub use self::core::{Core, CoreIo, Slot};
 pub use command::{Command, Refusal};
 pub use event::{Event, EventKind};
+pub use hand::HandTrouble;
 pub use health::{Counters, Health};
 pub use startup::{Stage, StartupError};
 

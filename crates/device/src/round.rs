@@ -1,13 +1,13 @@
 //! One round of requests and replies per control cycle, each reply in the slot of its sender.
 //!
 //! A frame carries no cycle number, so the round itself is the tag: slots are emptied before the requests leave, and what
-//! comes while no round is open belongs to a cycle that is over. Two different replies of one sender within a round mean
-//! that one of them is late; as nothing tells which, both are discarded. A queue per identifier, as in Barrett's library,
-//! would answer each request with the reply to the one before, for ever.
+//! comes while no round is open belongs to a cycle that is over. A queue per identifier, as in Barrett's library, would
+//! answer each request with the reply to the one before, for ever.
 
 use puck::{CanFrame, Counts, GaugeStatus, Group, Node, PropertyId, RawWrench, Reply, force_torque, get};
 
 use crate::health::Counters;
+use crate::mailbox::Mailbox;
 
 /// Rounds in a row without a reply after which a puck is suspected to have reset: it must be found
 /// within 20 ms, and the slow slot takes up to 10 of them.
@@ -15,37 +15,6 @@ const SUSPECT_ROUNDS: u16 = 2;
 
 /// Half of a wrench sample.
 type WrenchHalf = ([i16; 3], Option<GaugeStatus>);
-
-/// The place for the reply of one sender in one round.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-enum Mailbox<T> {
-    #[default]
-    Empty,
-    Holds(T),
-    /// Different replies came: one is late, nobody knows which.
-    Contradicted,
-}
-
-impl<T: Copy + PartialEq> Mailbox<T> {
-    /// Puts a reply in; whether another was there before.
-    fn put(&mut self, reply: T) -> bool {
-        let before = *self;
-        *self = match before {
-            Mailbox::Empty => Mailbox::Holds(reply),
-            Mailbox::Holds(earlier) if earlier == reply => before,
-            Mailbox::Holds(_) | Mailbox::Contradicted => Mailbox::Contradicted,
-        };
-        before != Mailbox::Empty
-    }
-
-    /// The reply of this round.
-    fn reply(&self) -> Option<T> {
-        match self {
-            Mailbox::Holds(reply) => Some(*reply),
-            Mailbox::Empty | Mailbox::Contradicted => None,
-        }
-    }
-}
 
 /// What a round brought in.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

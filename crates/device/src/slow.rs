@@ -6,7 +6,10 @@
 //! | STAT of a puck that fell silent | 150 Hz, while it is silent | a puck that has reset must be found within 20 ms |
 //! | MODE of puck 1 | 10 Hz | braking pucks under an ACTIVE safety module mean that IDLE was pressed |
 //! | PEN | 5 Hz | lights and warnings for a person |
+//! | MODE of each hand puck | 10 Hz, while there is a hand | a SET has no acknowledge, and others may set modes too |
 //! | TEMP | 1 Hz for each puck | heat |
+//!
+//! The odd slots may be taken by the hand for something more urgent.
 
 use puck::{CanFrame, Node, PropertyId, get};
 
@@ -18,15 +21,19 @@ const TEMPERATURE: PropertyId = match PropertyId::new(9) {
     None => unreachable!(),
 };
 
-/// Slow slots between two looks at MODE of puck 1. All four spacings are odd offsets of even periods, so that no two
-/// questions fall into one slot and the even slots stay with the safety module.
+/// Slow slots between two looks at MODE of puck 1. All offsets are odd and all periods multiples of 6, so that no two
+/// questions fall into one slot and the even slots stay with the safety module. Offsets 1, 7, 13.. are for modes.
 const PUCK_MODE: (u32, u32) = (30, 1);
+/// Slow slots between two looks at MODE of a hand puck; the one of puck 1 falls into the same raster.
+const HAND_MODE: (u32, u32) = (6, 1);
 /// Slow slots between two looks at the pendant.
 const PENDANT: (u32, u32) = (60, 3);
+/// Slow slots between two looks at a temperature of the hand; the four pucks take turns.
+const HAND_TEMPERATURES: (u32, u32) = (60, 33);
 /// Slow slots between two looks at a temperature; the seven pucks take turns.
 const TEMPERATURES: (u32, u32) = (42, 5);
-/// After this many slots everything repeats: the least common multiple of the periods and the seven pucks.
-const REPEAT: u32 = 42 * 7 * 10;
+/// After this many slots everything repeats: a common multiple of the periods, the seven pucks and the four digits.
+const REPEAT: u32 = 42 * 7 * 40;
 
 /// What a slow reply told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +48,10 @@ pub(crate) enum Told {
     Temperature(usize, i32),
     /// STAT of a suspected puck.
     Status(Node, i32),
+    /// MODE of a hand puck.
+    HandMode(Node, i32),
+    /// TEMP of a hand puck (0..=3), degree Celsius.
+    HandTemperature(usize, i32),
 }
 
 /// Whose turn it is.
@@ -56,33 +67,51 @@ pub(crate) struct SlowPoll {
 impl SlowPoll {
     /// The polls of a bus whose safety module has these properties.
     pub(crate) fn new(safety: &SafetyProperties) -> SlowPoll {
-        SlowPoll { tick: 0, asked: None, pendant: safety.pendant, safety_silence: 0 }
+        SlowPoll { tick: REPEAT - 1, asked: None, pendant: safety.pendant, safety_silence: 0 }
     }
 
-    /// The question of this slot, if there is one.
-    pub(crate) fn next(&mut self, suspect: Option<Node>) -> Option<CanFrame> {
+    /// Begins a slot. The question to the safety module, if the slot is its own.
+    pub(crate) fn begin(&mut self) -> Option<CanFrame> {
         if self.asked.is_some_and(|(node, _)| node == Node::SAFETY_MODULE) {
             self.safety_silence = self.safety_silence.saturating_add(1);
         }
+        self.asked = None;
+        self.tick = (self.tick + 1) % REPEAT;
+        self.tick.is_multiple_of(2).then(|| self.ask(Node::SAFETY_MODULE, PropertyId::MODE))
+    }
+
+    /// The question to a puck that fell silent.
+    pub(crate) fn suspect(&mut self, node: Node) -> CanFrame {
+        self.ask(node, PropertyId::STAT)
+    }
+
+    /// The question whose turn it is, if there is one; `hand`: its pucks may be asked too.
+    pub(crate) fn other(&mut self, hand: bool) -> Option<CanFrame> {
         let tick = self.tick;
-        self.tick = (tick + 1) % REPEAT;
         let due = |(period, offset): (u32, u32)| tick % period == offset;
+        let turn = |period: u32, pucks: usize| (tick / period) as usize % pucks;
         let [first, ..] = Node::ARM;
-        self.asked = if tick.is_multiple_of(2) {
-            Some((Node::SAFETY_MODULE, PropertyId::MODE))
-        } else if let Some(node) = suspect {
-            Some((node, PropertyId::STAT))
-        } else if due(PUCK_MODE) {
-            Some((first, PropertyId::MODE))
+        let (node, property) = if due(PUCK_MODE) {
+            (first, PropertyId::MODE)
+        } else if hand && due(HAND_MODE) {
+            // Of five places of the raster the first is that of puck 1, four remain for the four digits.
+            let digit = (tick % PUCK_MODE.0 / HAND_MODE.0).checked_sub(1)?;
+            (*Node::HAND.get(digit as usize)?, PropertyId::MODE)
         } else if due(PENDANT) {
-            Some((Node::SAFETY_MODULE, self.pendant))
+            (Node::SAFETY_MODULE, self.pendant)
+        } else if hand && due(HAND_TEMPERATURES) {
+            (*Node::HAND.get(turn(HAND_TEMPERATURES.0, Node::HAND.len()))?, TEMPERATURE)
         } else if due(TEMPERATURES) {
-            let turn = (tick / TEMPERATURES.0) as usize % Node::ARM.len();
-            Node::ARM.get(turn).map(|node| (*node, TEMPERATURE))
+            (*Node::ARM.get(turn(TEMPERATURES.0, Node::ARM.len()))?, TEMPERATURE)
         } else {
-            None
+            return None;
         };
-        self.asked.map(|(node, property)| get(node, property))
+        Some(self.ask(node, property))
+    }
+
+    fn ask(&mut self, node: Node, property: PropertyId) -> CanFrame {
+        self.asked = Some((node, property));
+        get(node, property)
     }
 
     /// A property reply has come; `None` if it answers no open question.
@@ -93,7 +122,9 @@ impl SlowPoll {
         self.asked = None;
         Some(match property {
             PropertyId::STAT => Told::Status(node, value),
+            TEMPERATURE if node.hand_index().is_some() => Told::HandTemperature(node.hand_index()?, value),
             TEMPERATURE if node != Node::SAFETY_MODULE => Told::Temperature(node.arm_index()?, value),
+            PropertyId::MODE if node.hand_index().is_some() => Told::HandMode(node, value),
             PropertyId::MODE if node != Node::SAFETY_MODULE => Told::PuckMode(value),
             PropertyId::MODE => {
                 self.safety_silence = 0;
@@ -121,12 +152,12 @@ mod tests {
     use std::collections::BTreeMap;
     use std::vec::Vec;
 
-    fn polls(seconds: usize) -> BTreeMap<(u8, u8), usize> {
+    fn polls(seconds: usize, hand: bool) -> BTreeMap<(u8, u8), usize> {
         let safety = SafetyProperties::for_tests();
         let mut slow = SlowPoll::new(&safety);
         let mut counts = BTreeMap::new();
         for _ in 0..300 * seconds {
-            if let Some(frame) = slow.next(None) {
+            if let Some(frame) = slow.begin().or_else(|| slow.other(hand)) {
                 let request = Request::decode(&frame).expect("a request");
                 let puck::Destination::Node(node) = request.to else { panic!("a poll to a group") };
                 let puck::Action::Get { property } = request.action else { panic!("a poll that sets") };
@@ -139,7 +170,7 @@ mod tests {
 
     #[test]
     fn every_quantity_is_polled_often_enough() {
-        let counts = polls(10);
+        let counts = polls(10, true);
         let rate = |node: u8, property: u8| counts.get(&(node, property)).copied().unwrap_or(0) as f64 / 10.0;
         assert!(rate(10, 8) >= 100.0, "safety MODE");
         assert!(rate(1, 8) >= 10.0, "MODE of puck 1");
@@ -147,6 +178,11 @@ mod tests {
         for node in 1..=7 {
             assert!(rate(node, 9) >= 1.0, "TEMP of puck {node}: {}", rate(node, 9));
         }
+        for node in 11..=14 {
+            assert!(rate(node, 8) >= 9.9, "MODE of hand puck {node}: {}", rate(node, 8));
+            assert!(rate(node, 9) >= 1.0, "TEMP of hand puck {node}: {}", rate(node, 9));
+        }
+        assert!(polls(10, false).keys().all(|(node, _)| *node <= 10), "an arm without a hand");
     }
 
     #[test]
@@ -162,7 +198,7 @@ mod tests {
     fn a_reply_that_nobody_asked_for_tells_nothing() {
         let mut slow = SlowPoll::new(&SafetyProperties::for_tests());
         assert_eq!(slow.take(Node::SAFETY_MODULE, PropertyId::MODE, 2), None);
-        slow.next(None);
+        slow.begin();
         assert_eq!(slow.take(Node::SAFETY_MODULE, PropertyId::STAT, 2), None);
         assert_eq!(slow.take(Node::SAFETY_MODULE, PropertyId::MODE, 2), Some(Told::SafetyMode(2)));
         assert_eq!(slow.take(Node::SAFETY_MODULE, PropertyId::MODE, 2), None, "a duplicate");

@@ -4,6 +4,7 @@
 //! a device has said something unexpected. After a failure it rests for a second and begins anew.
 
 mod exchange;
+mod hand;
 mod home;
 mod pace;
 mod sequence;
@@ -12,6 +13,7 @@ mod survey;
 mod waking;
 mod zeroing;
 
+pub(crate) use exchange::{Answer, Exchange};
 pub(crate) use pace::Pacer;
 pub(crate) use sequence::Startup;
 pub use stage::{Stage, StartupError};

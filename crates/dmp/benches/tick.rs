@@ -35,6 +35,7 @@ fn primitive<T: Scalar, const N: usize>(kernels: usize) -> Primitive<T, N> {
         start_velocity: Velocity::ZERO,
         feedback: None,
         expected: None,
+        experience: None,
     })
     .unwrap()
 }

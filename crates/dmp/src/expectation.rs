@@ -35,6 +35,38 @@ impl<T: Scalar> ExpectedWrench<T> {
         Ok(Self { table, recorded_duration })
     }
 
+    /// Stands for an expectation that is not there; never leaves this crate.
+    pub(crate) const EMPTY: Self = Self { table: PhaseTable::EMPTY, recorded_duration: T::ZERO };
+
+    /// As [`ExpectedWrench::new`], in place. After an error it is empty.
+    pub(crate) fn assign(
+        &mut self,
+        values: impl IntoIterator<Item = T>,
+        recorded_duration: T,
+    ) -> Result<(), TableError> {
+        self.clear();
+        if !(recorded_duration > T::ZERO && recorded_duration.is_finite()) {
+            return Err(TableError::Duration);
+        }
+        self.table.assign(values)?;
+        self.recorded_duration = recorded_duration;
+        Ok(())
+    }
+
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.table.copy_from(&other.table);
+        self.recorded_duration = other.recorded_duration;
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.table.clear();
+        self.recorded_duration = T::ZERO;
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.table.samples().is_empty()
+    }
+
     /// Expected values at progress `u`; beyond the ends the end values hold.
     #[inline]
     pub fn at(&self, u: T) -> [T; SENSORS] {

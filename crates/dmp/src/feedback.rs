@@ -112,20 +112,65 @@ impl<T: Scalar> Feedback<T> {
         weight: GainSchedule<T, SENSORS>,
         limits: Limits<T>,
     ) -> Result<Self, TableError> {
-        let Limits { displacement, rotation, hand } = limits;
+        let feedback = Self { sensitivity, weight, limits };
+        feedback.check()?;
+        Ok(feedback)
+    }
+
+    fn check(&self) -> Result<(), TableError> {
+        let Limits { displacement, rotation, hand } = self.limits;
         if !(displacement.is_finite() && rotation.is_finite() && hand.is_finite()) {
             return Err(TableError::NotFinite);
         }
-        let gains = sensitivity.samples().iter().flatten();
+        let gains = self.sensitivity.samples().iter().flatten();
         if gains
-            .chain(weight.samples().iter().flatten())
+            .chain(self.weight.samples().iter().flatten())
             .chain(&[displacement, rotation, hand])
             .any(|&value| value < T::ZERO)
             || rotation > T::from_f64(core::f64::consts::PI + 1e-6)
         {
             return Err(TableError::Negative);
         }
-        Ok(Self { sensitivity, weight, limits })
+        Ok(())
+    }
+
+    /// Stands for feedback that is not there; never leaves this crate.
+    pub(crate) const EMPTY: Self = Self {
+        sensitivity: PhaseTable::EMPTY,
+        weight: PhaseTable::EMPTY,
+        limits: Limits { displacement: T::ZERO, rotation: T::ZERO, hand: T::ZERO },
+    };
+
+    /// As [`Feedback::new`], in place: `K1` and `K2` point after point. After an error it is empty.
+    pub(crate) fn assign(
+        &mut self,
+        sensitivity: impl IntoIterator<Item = T>,
+        weight: impl IntoIterator<Item = T>,
+        limits: Limits<T>,
+    ) -> Result<(), TableError> {
+        self.limits = limits;
+        let filled = self.sensitivity.assign(sensitivity).and_then(|()| self.weight.assign(weight));
+        let result = filled.and_then(|()| self.check());
+        if result.is_err() {
+            self.clear();
+        }
+        result
+    }
+
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.sensitivity.copy_from(&other.sensitivity);
+        self.weight.copy_from(&other.weight);
+        self.limits = other.limits;
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.sensitivity.clear();
+        self.weight.clear();
+        self.limits = Self::EMPTY.limits;
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.sensitivity.samples().is_empty()
     }
 
     /// Sensitivity `K1` over the phase.

@@ -44,6 +44,13 @@ impl<T: Scalar, const N: usize> Basis<T, N> {
         Some(basis)
     }
 
+    /// Two kernels, at the start and at the end of the phase: as few as there can be.
+    pub(crate) const fn fewest() -> Self {
+        let mut centres = [T::ZERO; N];
+        centres[0] = T::ONE;
+        Self { count: 2, centres, root_widths: [T::ONE; N] }
+    }
+
     /// Number of kernels in use.
     #[inline]
     pub fn count(&self) -> usize {
@@ -144,17 +151,37 @@ pub struct ForcingTerm<T, const ROWS: usize, const N: usize> {
 impl<T: Scalar, const ROWS: usize, const N: usize> ForcingTerm<T, ROWS, N> {
     /// From weights in row-major order `[ROWS][count]`; `None` if there are not exactly `ROWS * count` finite ones.
     pub fn new(basis: Basis<T, N>, weights: &[T]) -> Option<Self> {
+        let mut forcing = Self::without_force(Basis::fewest());
+        forcing.assign(&basis, weights).then_some(forcing)
+    }
+
+    /// All weights zero.
+    pub(crate) const fn without_force(basis: Basis<T, N>) -> Self {
+        Self { basis, weights: [[T::ZERO; ROWS]; N] }
+    }
+
+    /// As [`ForcingTerm::new`], in place; on `false` nothing is changed.
+    pub(crate) fn assign(&mut self, basis: &Basis<T, N>, weights: &[T]) -> bool {
         let count = basis.count();
         if weights.len() != ROWS * count || !weights.iter().all(|w| w.is_finite()) {
-            return None;
+            return false;
         }
-        let mut by_kernel = [[T::ZERO; ROWS]; N];
+        self.basis.clone_from(basis);
+        for kernel in self.weights.iter_mut().skip(count) {
+            *kernel = [T::ZERO; ROWS];
+        }
         for (row, weights) in weights.chunks_exact(count).enumerate() {
-            for (kernel, weight) in by_kernel.iter_mut().zip(weights) {
+            for (kernel, weight) in self.weights.iter_mut().zip(weights) {
                 kernel[row] = *weight;
             }
         }
-        Some(Self { basis, weights: by_kernel })
+        true
+    }
+
+    /// Takes over basis and weights of another one.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.basis.clone_from(&other.basis);
+        self.weights.copy_from_slice(&other.weights);
     }
 
     /// The common basis.

@@ -8,6 +8,7 @@ extern crate std;
 
 mod chart;
 mod expectation;
+mod experience;
 mod feedback;
 mod forcing;
 mod group;
@@ -29,6 +30,7 @@ pub mod fit;
 
 pub use chart::RotationChart;
 pub use expectation::{EXPECTED_CAPACITY, ExpectedWrench};
+pub use experience::{EXPERIENCE_CAPACITY, EXPERIENCE_CHANNELS, Experience};
 pub use feedback::{
     COUPLED_ROWS, Coupling, Feedback, GAIN_CAPACITY, GainSchedule, Limits, SENSORS, SensorMap, Stiffness,
 };

@@ -25,6 +25,11 @@ impl<T: Scalar> CanonicalSystem<T> {
         range.contains(&alpha).then_some(Self { alpha })
     }
 
+    /// alpha = 1, for what rests.
+    pub(crate) const fn unit() -> Self {
+        Self { alpha: T::ONE }
+    }
+
     /// Decay `alpha`.
     #[inline]
     pub fn alpha(&self) -> T {

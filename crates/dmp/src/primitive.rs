@@ -7,8 +7,8 @@ use core::fmt;
 
 use crate::vector::all_finite;
 use crate::{
-    Basis, CanonicalSystem, ExpectedWrench, Feedback, ForcingTerm, GainError, OrientationError, Quaternion, Scalar,
-    Stiffness, TransformationSystem,
+    Basis, CanonicalSystem, ExpectedWrench, Experience, Feedback, ForcingTerm, GainError, Limits, OrientationError,
+    Quaternion, Scalar, Stiffness, TableError, TransformationSystem,
 };
 
 /// Rows of the end-effector position (x, y, z in the world frame, metres).
@@ -120,9 +120,11 @@ pub struct PrimitiveTables<'a, T> {
     /// Velocity at the start of the demonstration (zero if it began at rest).
     pub start_velocity: Velocity<T>,
     /// Gains of the sensory feedback, Eq. (8); `None` runs open loop.
-    pub feedback: Option<Feedback<T>>,
+    pub feedback: Option<&'a Feedback<T>>,
     /// What the sensors should feel, by phase; `None` (not recorded yet) runs open loop.
-    pub expected: Option<ExpectedWrench<T>>,
+    pub expected: Option<&'a ExpectedWrench<T>>,
+    /// How successful runs felt, by phase; `None` (not recorded yet) is not watched.
+    pub experience: Option<&'a Experience<T>>,
 }
 
 /// Group of rows with common gains.
@@ -213,8 +215,9 @@ impl core::error::Error for PrimitiveError {}
 
 /// One movement with checked parameters; `N` = kernel capacity.
 ///
-/// For f32 and N = 100 about 14 kB: keep it in a static or behind a reference on a small stack.
-#[derive(Clone, Debug, PartialEq)]
+/// For f32 and N = 100 about 23 kB: keep it in a static or behind a reference on a small stack, and fill it there with
+/// [`Primitive::assign`] and the other `assign_` functions.
+#[derive(Debug, PartialEq)]
 pub struct Primitive<T, const N: usize> {
     duration: T,
     rate: T,
@@ -230,16 +233,129 @@ pub struct Primitive<T, const N: usize> {
     start: Configuration<T>,
     goal: Configuration<T>,
     start_velocity: Velocity<T>,
-    feedback: Option<Feedback<T>>,
-    expected: Option<ExpectedWrench<T>>,
+    // An empty table stands for one that is not there: an `Option` of kilobytes would be moved through the stack.
+    feedback: Feedback<T>,
+    expected: ExpectedWrench<T>,
+    experience: Experience<T>,
+}
+
+/// A copy into an existing primitive ([`Clone::clone_from`]) needs no second one on the stack.
+impl<T: Scalar, const N: usize> Clone for Primitive<T, N> {
+    fn clone(&self) -> Self {
+        let mut copy = Self::PLACEHOLDER;
+        copy.clone_from(self);
+        copy
+    }
+
+    fn clone_from(&mut self, source: &Self) {
+        self.duration = source.duration;
+        self.rate = source.rate;
+        self.minimum_duration = source.minimum_duration;
+        self.canonical = source.canonical;
+        self.forcing.copy_from(&source.forcing);
+        self.position = source.position;
+        self.orientation = source.orientation;
+        self.orientation_error = source.orientation_error;
+        self.posture = source.posture;
+        self.hand = source.hand;
+        self.hemisphere = source.hemisphere;
+        self.start = source.start;
+        self.goal = source.goal;
+        self.start_velocity = source.start_velocity;
+        self.feedback.copy_from(&source.feedback);
+        self.expected.copy_from(&source.expected);
+        self.experience.copy_from(&source.experience);
+    }
+}
+
+/// What is computed from tables before anything is written.
+struct Checked<T, const N: usize> {
+    canonical: CanonicalSystem<T>,
+    basis: Basis<T, N>,
+    systems: [TransformationSystem<T>; 4],
+    minimum_duration: T,
+    start: Configuration<T>,
+    goal: Configuration<T>,
 }
 
 impl<T: Scalar, const N: usize> Primitive<T, N> {
+    /// Something to [`assign`](Primitive::assign) to, for statics: rests at the origin for a second. No movement of use.
+    pub const PLACEHOLDER: Self = {
+        let system = TransformationSystem::unit();
+        let origin = Configuration {
+            position: [T::ZERO; POSITION_ROWS],
+            orientation: Quaternion::IDENTITY,
+            posture: [T::ZERO; POSTURE_ROWS],
+            hand: [T::ZERO; HAND_ROWS],
+        };
+        Self {
+            duration: T::ONE,
+            rate: T::ONE,
+            minimum_duration: T::ZERO,
+            canonical: CanonicalSystem::unit(),
+            forcing: ForcingTerm::without_force(Basis::fewest()),
+            position: system,
+            orientation: system,
+            orientation_error: OrientationError::Quaternion,
+            posture: system,
+            hand: system,
+            hemisphere: Hemisphere::Nearest,
+            start: origin,
+            goal: origin,
+            start_velocity: Velocity::ZERO,
+            feedback: Feedback::EMPTY,
+            expected: ExpectedWrench::EMPTY,
+            experience: Experience::EMPTY,
+        }
+    };
+
     /// Checks the tables and builds the primitive.
     ///
     /// # Errors
     /// The first [`PrimitiveError`] found.
     pub fn new(tables: &PrimitiveTables<'_, T>) -> Result<Self, PrimitiveError> {
+        let mut primitive = Self::PLACEHOLDER;
+        primitive.assign(tables)?;
+        Ok(primitive)
+    }
+
+    /// Checks the tables and, if they are good, makes this primitive theirs. Everything is written in place: on a small
+    /// stack there is never a second primitive.
+    ///
+    /// # Errors
+    /// The first [`PrimitiveError`] found; then nothing has been changed.
+    pub fn assign(&mut self, tables: &PrimitiveTables<'_, T>) -> Result<(), PrimitiveError> {
+        let checked = Self::check(tables)?;
+        // The only check that is left to the writer; it refuses before it writes.
+        if !self.forcing.assign(&checked.basis, tables.weights) {
+            return Err(PrimitiveError::Weight);
+        }
+        self.duration = tables.duration;
+        self.rate = T::ONE / tables.duration;
+        self.minimum_duration = checked.minimum_duration;
+        self.canonical = checked.canonical;
+        [self.position, self.orientation, self.posture, self.hand] = checked.systems;
+        self.orientation_error = tables.orientation_error;
+        self.hemisphere = tables.hemisphere;
+        self.start = checked.start;
+        self.goal = checked.goal;
+        self.start_velocity = tables.start_velocity;
+        self.feedback.clear();
+        self.expected.clear();
+        self.experience.clear();
+        if let Some(feedback) = tables.feedback {
+            self.feedback.copy_from(feedback);
+        }
+        if let Some(expected) = tables.expected {
+            self.expected.copy_from(expected);
+        }
+        if let Some(experience) = tables.experience {
+            self.experience.copy_from(experience);
+        }
+        Ok(())
+    }
+
+    fn check(tables: &PrimitiveTables<'_, T>) -> Result<Checked<T, N>, PrimitiveError> {
         let duration = tables.duration;
         if !(duration > T::ZERO && duration <= T::from_f64(3600.0)) {
             return Err(PrimitiveError::Duration);
@@ -252,13 +368,12 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
         if tables.weights.len() != ROWS * tables.kernel_count {
             return Err(PrimitiveError::WeightCount);
         }
-        let forcing = ForcingTerm::new(basis, tables.weights).ok_or(PrimitiveError::Weight)?;
-
-        let [position, orientation, posture, hand] = tables.systems()?;
+        if !all_finite(tables.weights) {
+            return Err(PrimitiveError::Weight);
+        }
+        let systems = tables.systems()?;
         let mut minimum_duration = T::ZERO;
-        for (row, system) in
-            [(Row::Position, &position), (Row::Orientation, &orientation), (Row::Posture, &posture), (Row::Hand, &hand)]
-        {
+        for (row, system) in [Row::Position, Row::Orientation, Row::Posture, Row::Hand].into_iter().zip(&systems) {
             let shortest = T::from_f64(CONTROL_PERIOD) / system.largest_step();
             if !(duration > shortest) {
                 return Err(PrimitiveError::Unstable(row));
@@ -267,7 +382,6 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
                 minimum_duration = shortest;
             }
         }
-
         if !tables.start.is_finite() {
             return Err(PrimitiveError::Start);
         }
@@ -287,24 +401,7 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
         if tables.orientation_error == OrientationError::Quaternion && cosine < T::from_f64(0.043_619) {
             return Err(PrimitiveError::TurnsTooFar);
         }
-        Ok(Self {
-            duration,
-            rate: T::ONE / duration,
-            minimum_duration,
-            canonical,
-            forcing,
-            position,
-            orientation,
-            orientation_error: tables.orientation_error,
-            posture,
-            hand,
-            hemisphere: tables.hemisphere,
-            start,
-            goal,
-            start_velocity: tables.start_velocity,
-            feedback: tables.feedback,
-            expected: tables.expected,
-        })
+        Ok(Checked { canonical, basis, systems, minimum_duration, start, goal })
     }
 
     /// Duration tau as taught, s.
@@ -394,18 +491,70 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
     /// Gains of the sensory feedback.
     #[inline]
     pub fn feedback(&self) -> Option<&Feedback<T>> {
-        self.feedback.as_ref()
+        (!self.feedback.is_empty()).then_some(&self.feedback)
     }
 
     /// What the sensors should feel.
     #[inline]
     pub fn expected(&self) -> Option<&ExpectedWrench<T>> {
-        self.expected.as_ref()
+        (!self.expected.is_empty()).then_some(&self.expected)
+    }
+
+    /// How successful runs felt.
+    #[inline]
+    pub fn experience(&self) -> Option<&Experience<T>> {
+        (!self.experience.is_empty()).then_some(&self.experience)
     }
 
     /// Replaces the expectation, e.g. after the open-loop run that recorded it; `None` runs open loop.
-    pub fn set_expected(&mut self, expected: Option<ExpectedWrench<T>>) {
-        self.expected = expected;
+    pub fn set_expected(&mut self, expected: Option<&ExpectedWrench<T>>) {
+        match expected {
+            Some(expected) => self.expected.copy_from(expected),
+            None => self.expected.clear(),
+        }
+    }
+
+    /// Replaces the feedback by values that come one by one, as from a stored image: `K1` and `K2` by phase, point after
+    /// point, and the limits.
+    ///
+    /// # Errors
+    /// As [`Feedback::new`] and [`crate::PhaseTable::new`], [`TableError::Shape`] for a point that is cut short; the
+    /// primitive then has no feedback and runs open loop.
+    pub fn assign_feedback(
+        &mut self,
+        sensitivity: impl IntoIterator<Item = T>,
+        weight: impl IntoIterator<Item = T>,
+        limits: Limits<T>,
+    ) -> Result<(), TableError> {
+        self.feedback.assign(sensitivity, weight, limits)
+    }
+
+    /// Replaces the expectation by values that come one by one, point after point; recorded at the duration
+    /// `recorded_duration` (s).
+    ///
+    /// # Errors
+    /// As [`ExpectedWrench::new`], [`TableError::Shape`] for a point that is cut short; the primitive then has no
+    /// expectation and runs open loop.
+    pub fn assign_expected(
+        &mut self,
+        samples: impl IntoIterator<Item = T>,
+        recorded_duration: T,
+    ) -> Result<(), TableError> {
+        self.expected.assign(samples, recorded_duration)
+    }
+
+    /// Replaces the experience by values that come one by one, point after point.
+    ///
+    /// # Errors
+    /// As [`Experience::new`], [`TableError::Shape`] also for a point that is cut short; the primitive then has no
+    /// experience and is not watched.
+    pub fn assign_experience(
+        &mut self,
+        mean: impl IntoIterator<Item = T>,
+        spread: impl IntoIterator<Item = T>,
+        trials: u16,
+    ) -> Result<(), TableError> {
+        self.experience.assign(mean, spread, trials)
     }
 
     pub(crate) fn stiffness(&self) -> Stiffness<T> {

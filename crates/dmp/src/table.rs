@@ -9,10 +9,17 @@ use crate::Scalar;
 use crate::vector::all_finite;
 
 /// `COLUMNS` values at up to `CAPACITY` evenly spaced phases.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct PhaseTable<T, const COLUMNS: usize, const CAPACITY: usize> {
     count: usize,
     samples: [[T; COLUMNS]; CAPACITY],
+}
+
+/// Equal if the samples in use are: what an earlier table left behind them does not count.
+impl<T: PartialEq, const COLUMNS: usize, const CAPACITY: usize> PartialEq for PhaseTable<T, COLUMNS, CAPACITY> {
+    fn eq(&self, other: &Self) -> bool {
+        self.samples.get(..self.count) == other.samples.get(..other.count)
+    }
 }
 
 /// Why a table is refused.
@@ -29,6 +36,12 @@ pub enum TableError {
     Negative,
     /// The duration of the recording is not a positive number.
     Duration,
+    /// A spread is not positive: that sensor would never be allowed to differ from its mean.
+    Spread,
+    /// The number of values is no multiple of the columns, or two tables that belong together differ in length.
+    Shape,
+    /// Fewer recordings than it takes to tell a spread.
+    Trials,
 }
 
 impl fmt::Display for TableError {
@@ -39,6 +52,9 @@ impl fmt::Display for TableError {
             Self::NotFinite => "the table holds a value that is not a number",
             Self::Negative => "a gain or limit is negative",
             Self::Duration => "the duration of the recording is not a positive number",
+            Self::Spread => "a spread is not positive",
+            Self::Shape => "the tables do not have the sizes that belong together",
+            Self::Trials => "more recordings are needed",
         })
     }
 }
@@ -71,6 +87,49 @@ impl<T: Scalar, const COLUMNS: usize, const CAPACITY: usize> PhaseTable<T, COLUM
         }
         target.copy_from_slice(samples);
         Ok(table)
+    }
+
+    /// No samples: stands for a table that is not there, and never leaves this crate.
+    pub(crate) const EMPTY: Self = Self { count: 0, samples: [[T::ZERO; COLUMNS]; CAPACITY] };
+
+    /// Replaces the samples by `values`, point after point, without a second table on the stack.
+    ///
+    /// # Errors
+    /// As [`PhaseTable::new`], and [`TableError::Shape`] for a point that is cut short. The table is then empty.
+    pub(crate) fn assign(&mut self, values: impl IntoIterator<Item = T>) -> Result<(), TableError> {
+        self.count = 0;
+        let mut values = values.into_iter();
+        let mut count = 0;
+        while let Some(first) = values.next() {
+            let place = self.samples.get_mut(count).ok_or(TableError::TooMany)?;
+            for (column, entry) in place.iter_mut().enumerate() {
+                let value = if column == 0 { first } else { values.next().ok_or(TableError::Shape)? };
+                if !value.is_finite() {
+                    return Err(TableError::NotFinite);
+                }
+                *entry = value;
+            }
+            count += 1;
+        }
+        if count == 0 {
+            return Err(TableError::Empty);
+        }
+        self.count = count;
+        Ok(())
+    }
+
+    /// Takes over the samples of another table, and only those in use.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        let samples = other.samples();
+        if let Some(target) = self.samples.get_mut(..samples.len()) {
+            target.copy_from_slice(samples);
+            self.count = samples.len();
+        }
+    }
+
+    /// Without samples.
+    pub(crate) fn clear(&mut self) {
+        self.count = 0;
     }
 
     /// The samples.

@@ -70,6 +70,11 @@ impl<T: Scalar> TransformationSystem<T> {
         Self::new(stiffness, root + root)
     }
 
+    /// K = D = 1, for what rests.
+    pub(crate) const fn unit() -> Self {
+        Self { stiffness: T::ONE, damping: T::ONE }
+    }
+
     /// Stiffness `K`.
     #[inline]
     pub fn stiffness(&self) -> T {

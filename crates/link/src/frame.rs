@@ -23,7 +23,7 @@ use crate::report::LinkCounters;
 /// Bytes of the envelope in front of the message.
 pub const ENVELOPE_BYTES: usize = 8;
 
-/// Most bytes of one message in postcard. The largest is a chunk of an image, 203 bytes.
+/// Most bytes of one message in postcard. The largest is telemetry, 207 bytes; a chunk of an image has 203.
 pub const MESSAGE_BYTES: usize = 216;
 
 const CRC_BYTES: usize = 4;

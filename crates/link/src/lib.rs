@@ -27,5 +27,5 @@ pub use image::{ImageError, PrimitiveImage};
 pub use message::{DeviceHello, Goal, HostHello, Reply, Request, RunOptions};
 pub use name::{Name, NameError, Text};
 pub use refusal::Refusal;
-pub use report::{Event, EventKind, LinkCounters, Listing, Statistics, Status, Telemetry};
+pub use report::{Event, EventKind, HandStage, LinkCounters, Listing, Statistics, Status, Telemetry};
 pub use schema::{LINK_VERSION, SCHEMA_HASH};

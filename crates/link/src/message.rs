@@ -111,6 +111,10 @@ pub struct RunOptions {
     pub pose_feedback: PoseFeedback,
     /// Acceleration used in Eq (10).
     pub acceleration: AccelerationSource,
+    /// The fingers' strain gauges bend the plan of the fingers too; only with `feedback`.
+    pub finger_feedback: bool,
+    /// The arm gives way to what pushes it instead of insisting on the plan.
+    pub compliant: bool,
 }
 
 impl Default for RunOptions {
@@ -122,6 +126,8 @@ impl Default for RunOptions {
             force_control: false,
             pose_feedback: PoseFeedback::Measured,
             acceleration: AccelerationSource::Analytic,
+            finger_feedback: true,
+            compliant: false,
         }
     }
 }
@@ -221,6 +227,15 @@ pub enum Request {
     Release,
     /// Takes the present wrench as zero.
     Tare,
+    /// Opens the hand to its stops and lets it count from there. The fingers move, for about five seconds.
+    InitialiseHand,
+    /// Moves spread and fingers smoothly.
+    MoveHand {
+        /// Spread and fingers F1 to F3 (inner links), rad.
+        q: [f32; 4],
+        /// Time for it, s; 0 lets the device choose.
+        duration: f32,
+    },
 }
 
 impl Request {
@@ -239,7 +254,9 @@ impl Request {
             | Self::SetGoal(_)
             | Self::SetSpeed { .. }
             | Self::Release
-            | Self::Tare => true,
+            | Self::Tare
+            | Self::InitialiseHand
+            | Self::MoveHand { .. } => true,
             Self::Hello(_)
             | Self::Goodbye
             | Self::Ping
@@ -285,6 +302,8 @@ impl Request {
             Self::Read { .. } => "read",
             Self::Release => "release",
             Self::Tare => "tare",
+            Self::InitialiseHand => "initialise hand",
+            Self::MoveHand { .. } => "move hand",
         }
     }
 }

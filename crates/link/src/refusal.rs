@@ -82,11 +82,27 @@ pub enum Refusal {
     NoAnswer,
     /// Zeroing needs a resting arm whose safety module is idle.
     ZeroNeedsIdle,
+    /// There is no hand, or it does not work. `detail` = stage of the hand.
+    NoHand,
+    /// The hand must be initialised first. `detail` = stage of the hand.
+    HandNotReady,
+    /// The target lies outside what the hand can reach.
+    HandOutOfRange,
+    /// The expectation was recorded through another filter. `detail` = cut-off of the image, of the device, in mHz.
+    ImageFilter,
+    /// Feedback or force control needs an expectation and the primitive has none.
+    NoExpectation,
+    /// A digit of the hand is farther from the taught start than the controller accepts.
+    HandFarFromStart,
+    /// The force at rest is not the weight of the hand, so it cannot be taken as zero.
+    ForceAtRest,
+    /// The hand can only be initialised at rest: not during a run, and not while the hand is being initialised.
+    HandBusy,
 }
 
 impl Refusal {
     /// Every refusal, in the order of its code.
-    pub const ALL: [Self; 36] = [
+    pub const ALL: [Self; 44] = [
         Self::LinkVersion,
         Self::Schema,
         Self::Model,
@@ -123,6 +139,14 @@ impl Refusal {
         Self::WrenchMissing,
         Self::NoAnswer,
         Self::ZeroNeedsIdle,
+        Self::NoHand,
+        Self::HandNotReady,
+        Self::HandOutOfRange,
+        Self::ImageFilter,
+        Self::NoExpectation,
+        Self::HandFarFromStart,
+        Self::ForceAtRest,
+        Self::HandBusy,
     ];
 
     /// Number on the wire.
@@ -171,6 +195,14 @@ impl Refusal {
             Self::WrenchMissing => "no wrench is measured",
             Self::NoAnswer => "the control cycle did not answer",
             Self::ZeroNeedsIdle => "the arm can only be zeroed at rest, while the safety module is idle",
+            Self::NoHand => "the arm has no hand that works",
+            Self::HandNotReady => "the hand is not initialised, so its finger angles are unknown",
+            Self::HandOutOfRange => "the target lies outside the hand's range",
+            Self::ImageFilter => "the expectation was recorded through another filter than the device has",
+            Self::NoExpectation => "the primitive does not know what it should feel",
+            Self::HandFarFromStart => "the hand is not near where the primitive starts",
+            Self::ForceAtRest => "the force at rest is not the weight of the hand",
+            Self::HandBusy => "the hand is being moved or initialised",
         }
     }
 
@@ -210,6 +242,13 @@ impl Refusal {
             Self::WrenchMissing => "check the force sensor and its cable",
             Self::NoAnswer => "send the request again; if it persists restart the device",
             Self::ZeroNeedsIdle => "press Shift+Idle on the pendant, then zero the arm",
+            Self::NoHand => "check the hand's cable; its four pucks are looked for when the arm's bus starts",
+            Self::HandNotReady => "initialise the hand; its fingers will open",
+            Self::HandOutOfRange => "choose a spread from 0 to 180 degrees and fingers from 0 to 140 degrees",
+            Self::ImageFilter | Self::NoExpectation => "record the expectation: `tactus rehearse`",
+            Self::HandFarFromStart => "move the hand to the start first",
+            Self::ForceAtRest => "free the hand of load and contact; if it persists the sensor is adrift",
+            Self::HandBusy => "wait until the hand has finished, or stop the motion",
         }
     }
 }

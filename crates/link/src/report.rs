@@ -7,6 +7,55 @@ use serde::{Deserialize, Serialize};
 
 use crate::name::Name;
 
+/// How far the hand has come. Append-only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+pub enum HandStage {
+    /// Not all four pucks of the hand answer: the arm is used without it.
+    #[default]
+    Absent,
+    /// The pucks are awake; where the fingers stand is unknown until a person has the hand initialised.
+    NotInitialised,
+    /// The fingers drive to their open stops.
+    Initialising,
+    /// Positions and strain gauges are read in every cycle, the hand can be moved.
+    Ready,
+    /// The initialisation did not end, or a puck fell silent or lost its position. The hand is not driven.
+    Failed,
+}
+
+impl HandStage {
+    /// The words for people.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Absent => "absent",
+            Self::NotInitialised => "not initialised",
+            Self::Initialising => "initialising",
+            Self::Ready => "ready",
+            Self::Failed => "failed",
+        }
+    }
+
+    /// Number of the stage in events.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// The stage with a number.
+    #[must_use]
+    pub const fn from_code(code: u8) -> Option<Self> {
+        Some(match code {
+            0 => Self::Absent,
+            1 => Self::NotInitialised,
+            2 => Self::Initialising,
+            3 => Self::Ready,
+            4 => Self::Failed,
+            _ => return None,
+        })
+    }
+}
+
 /// The state of the device at one moment.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Status {
@@ -38,6 +87,12 @@ pub struct Status {
     pub telemetry_every: u8,
     /// Bytes of the upload under way that have arrived.
     pub upload_received: Option<u32>,
+    /// How far the hand has come.
+    pub hand_stage: HandStage,
+    /// Spread and fingers F1 to F3 as measured, rad; 0 unless the hand is ready.
+    pub hand: [f32; 4],
+    /// Temperature of each hand puck (F1, F2, F3, spread), degree Celsius; `None` before it was read.
+    pub hand_temperatures: [Option<i16>; 4],
 }
 
 /// What the receiving end of a link counted. Every byte that arrived is accounted for in one of these.
@@ -102,6 +157,8 @@ pub struct Statistics {
     pub stack_free: u32,
     /// Size of the stack, bytes; 0 where it is not measured.
     pub stack_size: u32,
+    /// Replies of the hand that did not come in their cycle.
+    pub hand_lost_replies: u32,
 }
 
 /// One primitive in the store.
@@ -135,7 +192,7 @@ pub struct Telemetry {
     /// Code of the latched fault, 0 for none.
     pub fault: u8,
     /// Flag bits of the cycle record (`control`).
-    pub flags: u16,
+    pub flags: u32,
     /// Phase s of the primitive.
     pub phase: f32,
     /// Measured joint angles, rad.
@@ -153,6 +210,15 @@ pub struct Telemetry {
     pub lost_replies: u8,
     /// Control computation of this cycle, ticks.
     pub cost_ticks: u32,
+    /// Spread and fingers F1 to F3 (inner links) as measured, rad.
+    pub hand: [f32; 4],
+    /// The same as desired, rad.
+    pub hand_d: [f32; 4],
+    /// Torque of the environment on fingers F1 to F3 about their outer joints, by the strain gauges, N m: negative when
+    /// they close on an object.
+    pub gauges: [f32; 3],
+    /// How much this run differs from the successful ones before it; 0 when nothing is compared.
+    pub surprise: f32,
 }
 
 /// What kind of thing happened. Append-only.
@@ -174,6 +240,12 @@ pub enum EventKind {
     CommandRefused,
     /// The bus start-up cannot go on: `code` and `detail` as `Status::blocked`.
     Blocked,
+    /// The run no longer goes as the successful ones before it: `code` is the channel of the experience, `detail` how
+    /// far the movement has come, 0 to 1000.
+    Surprise,
+    /// The hand reached a stage: `code` is [`HandStage`]. `detail`: the CAN node that caused it in the low 8 bits and the
+    /// number of the reason (`device`) above them; 0 for none.
+    Hand,
 }
 
 /// Something happened.

@@ -5,6 +5,7 @@
 pub mod can;
 pub mod device;
 pub mod force_torque;
+pub mod gauge;
 pub mod hand;
 pub mod message;
 pub mod position;

@@ -1,8 +1,10 @@
-//! Starts a cold arm, runs ten seconds of 300 Hz cycles with zero torques, and says how fast that went.
+//! Starts a cold arm with a hand, runs ten seconds of 300 Hz cycles with zero torques, and says how fast that went.
 //!
 //! `cargo run --release -p sim --example speed`
 
-use puck::{CanFrame, Group, Node, PropertyId, PuckTorque, force_torque, get, packed_torques, set};
+use puck::{
+    CanFrame, Group, Node, Property, PropertyId, PropertyTable, PuckTorque, force_torque, get, packed_torques, set,
+};
 use sim::{FrameClass, FreeJoints, HOME, Plant, PlantConfig, SLOT_TICKS, TICKS_PER_MILLISECOND, Ticks, seconds};
 use std::time::Instant;
 
@@ -22,21 +24,24 @@ fn wait(plant: &mut Plant, until: Ticks) -> u64 {
 fn main() {
     let mut plant = Plant::new(PlantConfig::default(), Box::new(FreeJoints::new(HOME)));
     wait(&mut plant, 100 * TICKS_PER_MILLISECOND);
-    for node in Node::ARM.into_iter().chain([Node::FORCE_TORQUE]) {
+    for node in Node::ARM.into_iter().chain(Node::HAND).chain([Node::FORCE_TORQUE]) {
         let now = plant.now();
         plant.submit(now, set(node, PropertyId::STAT, 2));
         wait(&mut plant, now + 10 * TICKS_PER_MILLISECOND);
     }
-    wait(&mut plant, 1200 * TICKS_PER_MILLISECOND);
+    wait(&mut plant, 1400 * TICKS_PER_MILLISECOND);
 
     let (begun, busy_before, started) = (plant.now(), plant.trace().busy, Instant::now());
     let cycles: Ticks = 3000;
     let mut events = 0;
     let zero = [PuckTorque::ZERO; 4];
-    let slots: [[CanFrame; 2]; 2] = [
-        [get(Group::ARM, PropertyId::POSITION), force_torque::get_wrench()],
-        [Group::ARM_TORQUES, Group::WRIST_TORQUES].map(|group| packed_torques(group, PropertyId::TORQUE, zero)),
-    ];
+    let gauges =
+        PropertyTable::motor(200).ok().and_then(|table| table.id(Property::Sg)).expect("hand pucks have gauges");
+    let torques = |group| packed_torques(group, PropertyId::TORQUE, zero);
+    let requests = vec![get(Group::ARM, PropertyId::POSITION), force_torque::get_wrench()];
+    let commands: Vec<CanFrame> = [Group::ARM_TORQUES, Group::WRIST_TORQUES, Group::HAND].map(torques).into();
+    let hand = [get(Group::HAND, PropertyId::POSITION), get(Group::HAND, gauges)];
+    let slots = [requests, commands.into_iter().chain(hand).collect()];
     for cycle in 0..cycles {
         for (slot, frames) in slots.iter().enumerate() {
             let t = begun + (3 * cycle + slot as Ticks) * SLOT_TICKS;

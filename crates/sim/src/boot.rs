@@ -34,6 +34,7 @@ enum Phase {
     Off,
     Starting { until: Ticks },
     Waking { leaves: Ticks, answers: Ticks },
+    Running,
 }
 
 /// Power and firmware state of one puck.
@@ -57,13 +58,18 @@ impl Boot {
             Phase::Starting { .. } => Presence::Monitor,
             Phase::Waking { leaves, .. } if now < leaves => Presence::Monitor,
             Phase::Waking { answers, .. } if now < answers => Presence::Absent,
-            Phase::Waking { .. } => Presence::Ready,
+            Phase::Waking { .. } | Phase::Running => Presence::Ready,
         }
     }
 
     /// Motor power comes, or the puck is told to return to its monitor.
     pub(crate) fn start(&mut self, now: Ticks) {
         self.phase = Phase::Starting { until: now + START_TIME };
+    }
+
+    /// The main firmware has been running since before the story begins.
+    pub(crate) fn run(&mut self) {
+        self.phase = Phase::Running;
     }
 
     /// Motor power goes.

@@ -12,13 +12,13 @@ use crate::time::{TICKS_PER_BIT, Ticks};
 use crate::trace::BusTrace;
 use crate::wire::{INTERFRAME_BITS, frame_ticks};
 use puck::{CanFrame, Node};
+use std::collections::VecDeque;
 
 /// A frame in a node's transmit queue.
 #[derive(Clone, Copy, Debug)]
 struct Waiting {
     ready: Ticks,
     sequence: u64,
-    sender: Node,
     frame: CanFrame,
 }
 
@@ -43,10 +43,15 @@ impl Passage {
     }
 }
 
+/// One transmit queue for each of the 32 node numbers.
+type Queues = [VecDeque<Waiting>; 32];
+
 /// The bus: what waits, what is on the wire, what has been.
 #[derive(Clone, Debug, Default)]
 pub struct Bus {
-    waiting: Vec<Waiting>,
+    queues: Queues,
+    /// Bit n: node n has something to send.
+    senders: u32,
     on_wire: Option<Passage>,
     free_at: Ticks,
     submissions: u64,
@@ -58,12 +63,14 @@ impl Bus {
     /// Puts a frame into the transmit queue of `sender`; it competes for the bus from `ready` on.
     pub fn queue(&mut self, ready: Ticks, sender: Node, frame: CanFrame) {
         self.submissions += 1;
-        self.waiting.push(Waiting { ready, sequence: self.submissions, sender, frame });
+        self.queues[usize::from(sender.number())].push_back(Waiting { ready, sequence: self.submissions, frame });
+        self.senders |= 1 << sender.number();
     }
 
     /// Takes back everything a node has not yet begun to send: it has lost its power or left the bus.
     pub fn withdraw(&mut self, sender: Node) {
-        self.waiting.retain(|waiting| waiting.sender != sender);
+        self.queues[usize::from(sender.number())].clear();
+        self.senders &= !(1 << sender.number());
     }
 
     /// When the bus next has something to do, as far as is known now: the end of the frame on the wire, or a start.
@@ -71,7 +78,7 @@ impl Bus {
     pub fn next_time(&self) -> Option<Ticks> {
         match self.on_wire {
             Some(passage) => Some(passage.end),
-            None => self.heads().map(|waiting| waiting.ready.max(self.free_at)).min(),
+            None => self.heads().map(|(_, waiting)| waiting.ready.max(self.free_at)).min(),
         }
     }
 
@@ -89,15 +96,17 @@ impl Bus {
         if self.on_wire.is_some() || now < self.free_at {
             return false;
         }
-        let winner = self
-            .heads()
-            .filter(|waiting| waiting.ready <= now)
-            .min_by_key(|waiting| (waiting.frame.can_id().raw(), waiting.sequence))
-            .copied();
-        let Some(winner) = winner else { return false };
-        self.waiting.retain(|waiting| waiting.sequence != winner.sequence);
-        let end = now + frame_ticks(&winner.frame);
-        let passage = Passage { start: now, end, sender: winner.sender, frame: winner.frame };
+        let ready = self.heads().filter(|(_, waiting)| waiting.ready <= now);
+        let winner = ready.min_by_key(|(_, waiting)| (waiting.frame.can_id().raw(), waiting.sequence));
+        let Some((sender, Waiting { frame, .. })) = winner.map(|(sender, waiting)| (sender, *waiting)) else {
+            return false;
+        };
+        let queue = &mut self.queues[usize::from(sender.number())];
+        queue.pop_front();
+        if queue.is_empty() {
+            self.senders &= !(1 << sender.number());
+        }
+        let passage = Passage { start: now, end: now + frame_ticks(&frame), sender, frame };
         self.trace.note(&passage);
         if let Some(log) = &mut self.log {
             log.push(passage);
@@ -130,9 +139,13 @@ impl Bus {
     }
 
     /// The first unsent frame of each node: only these compete.
-    fn heads(&self) -> impl Iterator<Item = &Waiting> {
-        self.waiting.iter().filter(|candidate| {
-            !self.waiting.iter().any(|other| other.sender == candidate.sender && other.sequence < candidate.sequence)
+    fn heads(&self) -> impl Iterator<Item = (Node, &Waiting)> {
+        let mut remaining = self.senders;
+        std::iter::from_fn(move || {
+            // 32 trailing zeros, nobody left, is no node number.
+            let sender = Node::new(u8::try_from(remaining.trailing_zeros()).ok()?)?;
+            remaining &= remaining - 1;
+            self.queues[usize::from(sender.number())].front().map(|waiting| (sender, waiting))
         })
     }
 }

@@ -1,13 +1,16 @@
 //! The wrist force/torque sensor (node 8): GET FT answers with a force frame and a torque frame.
 //!
-//! The wrench is that of the environment (hand and payload) **on** the sensor, sensor frame, minus what it was at the last
-//! tare, plus seeded noise, quantised and saturated to 16 bits. After an overload the torque frame carries a status byte
+//! The wrench is that of the environment (hand and payload) **on** the sensor, sensor frame, as its elastic element gives it away:
+//! lagging by its hysteresis, plus seeded noise, minus what that was at the last tare; then bias
+//! and drift, which are what the tare did *not* catch; quantised and saturated to 16 bits. Hysteresis is that of play: the output
+//! stays while the input turns back by less than twice the half-width. After an overload the torque frame carries a status byte
 //! until the next tare. The sensor boots like a motor puck and loses power with them (wam-can 7, inferred).
 
 use crate::boot::{Boot, Presence};
 use crate::inbox::{Inbox, SET_TIME};
 use crate::noise::Noise;
-use crate::time::Ticks;
+use crate::properties::Numbers;
+use crate::time::{Ticks, seconds};
 use puck::device::{acceleration_frame, force_frame, quantise, reply16, torque_frame};
 use puck::force_torque::{NEWTON_METRE_PER_COUNT, NEWTON_PER_COUNT};
 use puck::{Action, CanFrame, Destination, GaugeStatus, Node, Property, PropertyTable, Request, Role, Status};
@@ -21,12 +24,34 @@ pub struct ForceTorqueConfig {
     pub force_noise: f64,
     /// Standard deviation of each torque axis, N m.
     pub torque_noise: f64,
+    /// Multiplies both standard deviations.
+    pub noise_scale: f64,
+    /// Added to every sample after the tare, N and N m: the error that a tare leaves.
+    pub bias: [f64; 6],
+    /// Grows from the last tare on, N/s and N m/s.
+    pub drift: [f64; 6],
+    /// Half-width of the hysteresis loop of each force axis, N.
+    pub force_hysteresis: f64,
+    /// Half-width of the hysteresis loop of each torque axis, N m.
+    pub torque_hysteresis: f64,
+    /// From when on the sensor says nothing more; `None`: never. A fault to inject.
+    pub silent_from: Option<Ticks>,
 }
 
 impl Default for ForceTorqueConfig {
-    /// Fitted; 50 mN and 1.5 mN m, the resolution of the sensor's data sheet.
+    /// Fitted, without systematic errors; 50 mN and 1.5 mN m, the resolution of the sensor's data sheet.
     fn default() -> Self {
-        Self { fitted: true, force_noise: 0.05, torque_noise: 0.0015 }
+        Self {
+            fitted: true,
+            force_noise: 0.05,
+            torque_noise: 0.0015,
+            noise_scale: 1.0,
+            bias: [0.0; 6],
+            drift: [0.0; 6],
+            force_hysteresis: 0.0,
+            torque_hysteresis: 0.0,
+            silent_from: None,
+        }
     }
 }
 
@@ -44,6 +69,10 @@ pub(crate) struct ForceTorque {
     inbox: Inbox,
     noise: Noise,
     tare: [f64; 6],
+    tared_at: Ticks,
+    /// What the elastic element gives away, N and N m; `None` before it has been asked.
+    strained: Option<[f64; 6]>,
+    numbers: [Numbers; 2],
     /// Gauges that have saturated since the last tare. Which axis strains which gauge is not documented: one each.
     saturated: u8,
 }
@@ -57,7 +86,31 @@ impl ForceTorque {
             inbox: Inbox::new(SET_TIME),
             noise: sensor_noise,
             tare: [0.0; 6],
+            tared_at: 0,
+            strained: None,
+            numbers: [PropertyTable::monitor(), PropertyTable::force_torque()].map(|table| Numbers::new(&table)),
             saturated: 0,
+        }
+    }
+
+    /// One step of physics: the elastic element follows the true `wrench` (N, N m).
+    pub(crate) fn follow(&mut self, wrench: &[f64; 6]) {
+        let half_width = per_axis(self.config.force_hysteresis, self.config.torque_hysteresis);
+        let before = self.strained.unwrap_or(*wrench);
+        self.strained = Some(std::array::from_fn(|axis| {
+            before[axis].clamp(wrench[axis] - half_width[axis], wrench[axis] + half_width[axis])
+        }));
+    }
+
+    /// Whether every step of physics matters to the sensor.
+    pub(crate) fn has_memory(&self) -> bool {
+        self.config.force_hysteresis != 0.0 || self.config.torque_hysteresis != 0.0
+    }
+
+    /// Awake since before the story begins.
+    pub(crate) fn run(&mut self) {
+        if self.config.fitted {
+            self.boot.run();
         }
     }
 
@@ -88,64 +141,74 @@ impl ForceTorque {
     }
 
     /// Carries out one request that is done by `now` under the true `wrench` (N, N m); the frames to send.
-    pub(crate) fn step(&mut self, now: Ticks, wrench: &[f64; 6]) -> Vec<CanFrame> {
+    pub(crate) fn step(&mut self, now: Ticks, wrench: &[f64; 6]) -> [Option<CanFrame>; 2] {
+        const NOTHING: [Option<CanFrame>; 2] = [None; 2];
         let Some(action) = self.inbox.take(now) else {
-            return Vec::new();
+            return NOTHING;
         };
         let presence = self.boot.presence(now);
-        let table = match presence {
-            Presence::Absent => return Vec::new(),
-            Presence::Monitor => PropertyTable::monitor(),
-            Presence::Ready => PropertyTable::force_torque(),
+        let [monitor, main] = &self.numbers;
+        let numbers = match presence {
+            Presence::Absent => return NOTHING,
+            Presence::Monitor => monitor,
+            Presence::Ready => main,
         };
+        if self.config.silent_from.is_some_and(|from| now >= from) {
+            return NOTHING;
+        }
         match action {
-            Action::Get { property: id } => match table.property(id) {
-                Some(Property::Ft) => self.sample(wrench),
+            Action::Get { property: id } => match numbers.property(id) {
+                Some(Property::Ft) => self.sample(now, wrench),
                 // At rest the sensor feels no acceleration that a consumer of this simulator would use.
-                Some(Property::A) => vec![acceleration_frame([0; 3])],
-                Some(property) => small_property(property, presence)
-                    .map(|value| reply16(Node::FORCE_TORQUE, id, value))
-                    .into_iter()
-                    .collect(),
-                None => Vec::new(),
+                Some(Property::A) => [Some(acceleration_frame([0; 3])), None],
+                Some(property) => {
+                    let value = small_property(property, presence);
+                    [value.map(|value| reply16(Node::FORCE_TORQUE, id, value)), None]
+                }
+                None => NOTHING,
             },
             Action::Set { property: id, value } => {
-                match table.property(id) {
-                    Some(Property::Ft) if value == 0 => self.tare(wrench),
+                match numbers.property(id) {
+                    Some(Property::Ft) if value == 0 => self.tare(now, wrench),
                     Some(Property::Stat) => self.set_status(now, presence, value),
                     _ => {}
                 }
-                Vec::new()
+                NOTHING
             }
-            Action::PackedTorques { .. } => Vec::new(),
+            Action::PackedTorques { .. } => NOTHING,
         }
     }
 
-    fn sample(&mut self, wrench: &[f64; 6]) -> Vec<CanFrame> {
+    fn sample(&mut self, now: Ticks, wrench: &[f64; 6]) -> [Option<CanFrame>; 2] {
         let overloaded = gauges_beyond_range(wrench);
         self.saturated |= overloaded;
         let felt = self.felt(wrench);
-        let [fx, fy, fz, tx, ty, tz] = std::array::from_fn(|axis| felt[axis] - self.tare[axis]);
+        let age = seconds(now - self.tared_at);
+        let [fx, fy, fz, tx, ty, tz] = std::array::from_fn(|axis| {
+            felt[axis] - self.tare[axis] + self.config.bias[axis] + self.config.drift[axis] * age
+        });
         let status = (self.saturated != 0).then(|| {
             let bad = if overloaded != 0 { 0x40 } else { 0 };
             GaugeStatus(0x80 | bad | self.saturated)
         });
-        vec![
-            force_frame([fx, fy, fz].map(|force: f64| quantise(force, NEWTON_PER_COUNT))),
-            torque_frame([tx, ty, tz].map(|torque: f64| quantise(torque, NEWTON_METRE_PER_COUNT)), status),
+        [
+            Some(force_frame([fx, fy, fz].map(|force: f64| quantise(force, NEWTON_PER_COUNT)))),
+            Some(torque_frame([tx, ty, tz].map(|torque: f64| quantise(torque, NEWTON_METRE_PER_COUNT)), status)),
         ]
     }
 
-    fn tare(&mut self, wrench: &[f64; 6]) {
+    fn tare(&mut self, now: Ticks, wrench: &[f64; 6]) {
         self.tare = self.felt(wrench);
+        self.tared_at = now;
         self.saturated = gauges_beyond_range(wrench);
     }
 
-    /// The wrench with this sample's noise.
+    /// What the gauges give away, with this sample's noise.
     fn felt(&mut self, wrench: &[f64; 6]) -> [f64; 6] {
-        let [force, torque] = [self.config.force_noise, self.config.torque_noise];
-        let sigma = [force, force, force, torque, torque, torque];
-        std::array::from_fn(|axis| wrench[axis] + self.noise.gaussian(sigma[axis]))
+        self.follow(wrench);
+        let strained = self.strained.unwrap_or(*wrench);
+        let sigma = per_axis(self.config.force_noise, self.config.torque_noise);
+        std::array::from_fn(|axis| strained[axis] + self.noise.gaussian(sigma[axis] * self.config.noise_scale))
     }
 
     fn set_status(&mut self, now: Ticks, presence: Presence, value: i32) {
@@ -161,8 +224,15 @@ impl ForceTorque {
     fn forget(&mut self) {
         self.inbox.clear();
         self.tare = [0.0; 6];
+        self.tared_at = 0;
+        self.strained = None;
         self.saturated = 0;
     }
+}
+
+/// The same value for the three forces, another for the three torques.
+fn per_axis(force: f64, torque: f64) -> [f64; 6] {
+    [force, force, force, torque, torque, torque]
 }
 
 /// Properties that are constants.

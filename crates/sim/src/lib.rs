@@ -4,7 +4,9 @@
 mod boot;
 mod bus;
 mod chain;
+mod firmware;
 mod force_torque;
+mod hand;
 mod inbox;
 mod link_wire;
 pub mod lockstep;
@@ -13,6 +15,7 @@ mod noise;
 mod operator;
 pub mod person;
 mod plant;
+mod properties;
 mod puck_model;
 #[cfg(feature = "render")]
 pub mod render;
@@ -27,6 +30,7 @@ pub mod world;
 
 pub use bus::{Bus, Passage};
 pub use force_torque::ForceTorqueConfig;
+pub use hand::HandConfig;
 pub use link_wire::{BYTE_TICKS, CHUNK};
 pub use lockstep::{Lockstep, LockstepError, Served};
 pub use noise::Noise;
@@ -36,4 +40,4 @@ pub use puck_model::PuckConfig;
 pub use safety::SafetyConfig;
 pub use time::*;
 pub use trace::{BusTrace, FrameClass};
-pub use world::{FreeJoints, HOME, Pose, World};
+pub use world::{FingerObstacle, FreeJoints, HOME, HandState, HandTargets, Pose, World};

@@ -1,8 +1,8 @@
 //! Seven motors between pucks and joints: torque in, angles out, and the clock of physics.
 //!
 //! Physics advances in steps of half a slot. The torque of a step is the time average of what the pucks applied during
-//! it, so that a command in the middle of a step counts from its own instant. Between two steps joint angles are
-//! extrapolated with the velocity of the last one: that is what an encoder shows at the latch.
+//! it, so that a command in the middle of a step counts from its own instant. Encoders sit on the motors: with elastic cables
+//! all angles here are those of the motor side. Between two steps they are extrapolated with the velocity of the last one: that is what an encoder shows at the latch.
 //!
 //! A puck that is not in torque mode shorts the windings: `tau = -b dtheta`, with b = J/2 ms from the rotor inertia J.
 //! Barrett publishes no figure for the brake; with this one the arm sinks from home at some tenths of rad/s, and the explicit
@@ -20,7 +20,7 @@ const ROTOR_INERTIA: [f64; 7] = [0.00011631, 0.00011831, 0.00011831, 0.00010686,
 /// Time constant of a shorted motor that drives nothing but its own inertia, s. Assumed.
 const BRAKE_TIME_CONSTANT: f64 = 0.002;
 
-/// Motors, transmission and the state of the joints at the last physics step.
+/// Motors, transmission and the state of their end of the joints at the last physics step.
 #[derive(Clone, Debug)]
 pub(crate) struct Motors {
     transmission: Transmission<f64>,
@@ -48,14 +48,14 @@ impl Motors {
     ) -> Self {
         Self {
             transmission,
-            q: world.joint_positions(),
-            dq: world.joint_velocities(),
+            q: world.motor_positions(),
+            dq: world.motor_velocities(),
             stepped_at: 0,
             units_per_newton_metre: *drives.units_per_newton_metre(),
             impulse: [0; 7],
             braked: [0; 7],
             are_powered: false,
-            hand: SteadyHand::new(world.joint_positions(), patience),
+            hand: SteadyHand::new(world.motor_positions(), patience),
         }
     }
 
@@ -104,8 +104,8 @@ impl Motors {
         let driven = self.transmission.joint_torques_from_motor(&torques);
         let held = self.hand.torques(self.next_step(), &self.q, &self.dq);
         world.step(&std::array::from_fn(|joint| driven[joint] + held[joint]));
-        self.q = world.joint_positions();
-        self.dq = world.joint_velocities();
+        self.q = world.motor_positions();
+        self.dq = world.motor_velocities();
         self.stepped_at += STEP_TICKS;
         self.impulse = [0; 7];
         self.braked = [0; 7];

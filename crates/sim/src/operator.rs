@@ -47,6 +47,20 @@ impl Default for OperatorConfig {
     }
 }
 
+impl OperatorConfig {
+    /// An operator before an arm that is up already: ACTIVE after 20 ms of position traffic, lets go 600 ms later, when
+    /// a host that uploads first has let the arm hold itself.
+    #[must_use]
+    pub fn prompt() -> Self {
+        Self {
+            idle_at: None,
+            activate_after: Some(20 * TICKS_PER_MILLISECOND),
+            holds_until_active_for: Some(600 * TICKS_PER_MILLISECOND),
+            script: Vec::new(),
+        }
+    }
+}
+
 /// What the operator can see on the pendant and on his screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct PendantView {
@@ -79,6 +93,11 @@ impl Operator {
         let mut script: Vec<_> = own.chain(config.script).collect();
         script.sort_by_key(|(at, _)| *at); // stable: equal times keep their order
         Self { script, activate_after: config.activate_after, means_to_activate: false }
+    }
+
+    /// The E-stop was released and Shift-Idle pressed before the story begins: he means to activate the arm.
+    pub(crate) fn resume(&mut self) {
+        self.means_to_activate = true;
     }
 
     /// When he acts next, as far as he knows now.

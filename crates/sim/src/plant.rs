@@ -1,7 +1,7 @@
 //! Everything at the other end of the co-controller's two wires, in virtual time.
 //!
 //! ```text
-//! co-controller --submit--> bus --> pucks 1..7, F/T 8, safety module 10 <-- operator
+//! co-controller --submit--> bus --> pucks 1..7, F/T 8, hand 11..14, safety module 10 <-- operator
 //!               <--event---  |         | torques        ^ angles at the latch
 //!               <--link--> host        +----> world, one step every half slot
 //! ```
@@ -13,6 +13,7 @@
 
 use crate::bus::{Bus, Passage};
 use crate::force_torque::{ForceTorque, ForceTorqueConfig};
+use crate::hand::{Hand, HandConfig};
 use crate::link_wire::LinkWire;
 use crate::motors::Motors;
 use crate::noise::Noise;
@@ -20,11 +21,12 @@ use crate::operator::{Operator, OperatorConfig, PendantAction};
 use crate::puck_model::{Puck, PuckConfig};
 use crate::safety::{SafetyConfig, SafetyModule};
 use crate::speed::SpeedMonitor;
-use crate::time::{STEP_TICKS, TICKS_PER_SECOND, Ticks};
+use crate::time::{CYCLE_TICKS, STEP_TICKS, TICKS_PER_SECOND, Ticks};
 use crate::trace::BusTrace;
 use crate::world::World;
 use puck::{
-    CanFrame, Drives, Node, PendantState, Ratios, Request, SafetyMode, Transmission, TransmissionError, UnknownFirmware,
+    Action, CanFrame, Drives, Node, PendantState, Ratios, Request, SafetyMode, Transmission, TransmissionError,
+    UnknownFirmware,
 };
 use std::collections::VecDeque;
 
@@ -41,8 +43,16 @@ pub struct PlantConfig {
     pub safety: SafetyConfig,
     /// The force/torque sensor.
     pub force_torque: ForceTorqueConfig,
+    /// The hand; `None`: the world may have one, but nobody answers for it on the bus.
+    pub hand: Option<HandConfig>,
     /// The person at the pendant.
     pub operator: OperatorConfig,
+    /// The arm was started and zeroed before the story begins: pucks, sensor and hand run, the hand is initialised, positions are the
+    /// true ones, the safety module is in IDLE. The operator presses Shift-Activate as he is set up to; see
+    /// [`OperatorConfig::prompt`] for one who does not tarry.
+    pub started: bool,
+    /// Whole control cycles by which packed torques, arm's and hand's, come late to the motors. The safety module judges them at once.
+    pub torque_delay_cycles: u8,
 }
 
 impl Default for PlantConfig {
@@ -53,7 +63,10 @@ impl Default for PlantConfig {
             pucks: PuckConfig::default(),
             safety: SafetyConfig::default(),
             force_torque: ForceTorqueConfig::default(),
+            hand: Some(HandConfig::default()),
             operator: OperatorConfig::default(),
+            started: false,
+            torque_delay_cycles: 0,
         }
     }
 }
@@ -100,15 +113,21 @@ struct Delivery {
     received: Option<CanFrame>,
 }
 
-/// Bus, pucks 1 to 7, safety module, force/torque sensor, operator, world, and the wire of the host link.
+/// Bus, pucks 1 to 7, safety module, force/torque sensor, hand, operator, world, and the wire of the host link.
 pub struct Plant {
     now: Ticks,
+    /// When anything but physics happens next: [`Plant::look_ahead`] as of the last change. Asked several times per event.
+    next_happening: Option<Ticks>,
     bus: Bus,
     pucks: [Puck; 7],
     motors: Motors,
     safety: SafetyModule,
     force_torque: ForceTorque,
+    hand: Option<Hand>,
     operator: Operator,
+    torque_delay: Ticks,
+    /// Packed torques that are still on their way to the motors, with the time they arrive.
+    late_torques: VecDeque<(Ticks, Request)>,
     link: LinkWire,
     deliveries: VecDeque<Delivery>,
     world: Box<dyn World>,
@@ -140,18 +159,41 @@ impl Plant {
         let [a, b, c, d, e, f, g] =
             std::array::from_fn(|index| Puck::new(index, &config.pucks, stream(Node::ARM[index])));
         let boot_noise = stream(Node::FORCE_TORQUE);
-        Ok(Self {
+        let hand = config.hand.map(|hand| Hand::new(hand, &*world, |number| Noise::new(config.seed, number)));
+        // What has happened already need not happen again.
+        let idle_at = config.operator.idle_at.filter(|_| !config.started);
+        let operator = OperatorConfig { idle_at, ..config.operator };
+        let mut plant = Self {
             now: 0,
+            next_happening: None,
             bus: Bus::default(),
             pucks: [a?, b?, c?, d?, e?, f?, g?],
-            motors: Motors::new(transmission, &drives, &*world, config.operator.holds_until_active_for),
+            motors: Motors::new(transmission, &drives, &*world, operator.holds_until_active_for),
             safety: SafetyModule::new(config.safety, SpeedMonitor::new(transmission, drives))?,
             force_torque: ForceTorque::new(config.force_torque, boot_noise, stream(Node::HOST)),
-            operator: Operator::new(config.operator),
+            hand: hand.transpose()?,
+            operator: Operator::new(operator),
+            torque_delay: Ticks::from(config.torque_delay_cycles) * CYCLE_TICKS,
+            late_torques: VecDeque::new(),
             link: LinkWire::default(),
             deliveries: VecDeque::new(),
             world,
-        })
+        };
+        if config.started {
+            plant.resume();
+        }
+        plant.next_happening = plant.look_ahead();
+        Ok(plant)
+    }
+
+    /// Everything is up and the arm zeroed, as if by somebody before.
+    fn resume(&mut self) {
+        self.safety.resume();
+        self.operator.resume();
+        self.motors.set_powered(true);
+        self.pucks.iter_mut().for_each(Puck::run);
+        self.force_torque.run();
+        self.hand.iter_mut().for_each(Hand::run);
     }
 
     /// The co-controller hands a frame to its CAN controller at time `t`.
@@ -160,7 +202,7 @@ impl Plant {
     pub fn submit(&mut self, t: Ticks, frame: CanFrame) {
         self.run_to(t);
         self.bus.queue(self.now, Node::HOST, frame);
-        self.bus.arbitrate(self.now);
+        self.arbitrate();
     }
 
     /// When the co-controller has to call [`Plant::event`] next, as far as can be known before it gets there.
@@ -170,7 +212,7 @@ impl Plant {
     pub fn next_event(&self) -> Option<Ticks> {
         let waiting = self.deliveries.front().map(|delivery| delivery.at);
         // While a frame is on the wire nothing else can change what the co-controller will see next.
-        let on_bus = if self.bus.is_busy() { self.bus.next_time() } else { self.next_happening() };
+        let on_bus = if self.bus.is_busy() { self.bus.next_time() } else { self.next_happening };
         [waiting, on_bus, self.link.next_time()].into_iter().flatten().min()
     }
 
@@ -223,7 +265,7 @@ impl Plant {
         self.operator.observe(action);
         self.safety.press(self.now, action);
         self.settle_power();
-        self.bus.arbitrate(self.now);
+        self.arbitrate();
     }
 
     /// Mode of the safety module.
@@ -241,7 +283,8 @@ impl Plant {
     /// Requests that pucks lost because they came too fast.
     #[must_use]
     pub fn lost_requests(&self) -> u64 {
-        self.pucks.iter().map(Puck::lost_requests).sum()
+        let arm: u64 = self.pucks.iter().map(Puck::lost_requests).sum();
+        arm + self.hand.as_ref().map_or(0, Hand::lost_requests)
     }
 
     /// What went over the bus so far.
@@ -287,16 +330,18 @@ impl Plant {
 
     /// The next time at which anything happens, physics included.
     fn next_moment(&self) -> Option<Ticks> {
-        [Some(self.motors.next_step()), self.next_happening()].into_iter().flatten().min()
+        [Some(self.motors.next_step()), self.next_happening].into_iter().flatten().min()
     }
 
     /// The next time at which something happens that can put a frame on the bus or take it off.
-    fn next_happening(&self) -> Option<Ticks> {
+    fn look_ahead(&self) -> Option<Ticks> {
         let pucks = self.pucks.iter().filter_map(Puck::next_time).min();
         [
             self.bus.next_time(),
             pucks,
             self.force_torque.next_time(),
+            self.hand.as_ref().and_then(Hand::next_time),
+            self.late_torques.front().map(|(at, _)| *at),
             self.safety.next_time(),
             self.operator.next_time(&self.safety.view()),
         ]
@@ -309,7 +354,16 @@ impl Plant {
     fn happen(&mut self) {
         let now = self.now;
         if self.motors.next_step() <= now {
+            if let Some(hand) = &mut self.hand {
+                hand.drive(now, &mut *self.world);
+            }
             self.motors.step(&mut *self.world);
+            if self.force_torque.has_memory() {
+                self.force_torque.follow(&self.world.wrist_wrench());
+            }
+        }
+        while let Some((_, request)) = self.late_torques.pop_front_if(|(at, _)| *at <= now) {
+            self.instruct(now, &request);
         }
         if let Some(passage) = self.bus.finish(now) {
             self.deliver(&passage);
@@ -326,9 +380,12 @@ impl Plant {
             }
         }
         while self.force_torque.next_time().is_some_and(|at| at <= now) {
-            for reply in self.force_torque.step(now, &self.world.wrist_wrench()) {
+            for reply in self.force_torque.step(now, &self.world.wrist_wrench()).into_iter().flatten() {
                 self.bus.queue(now, Node::FORCE_TORQUE, reply);
             }
+        }
+        if let Some(hand) = &mut self.hand {
+            hand.step(now, |digit, reply| self.bus.queue(now, digit, reply));
         }
         while self.safety.next_time().is_some_and(|at| at <= now) {
             self.safety.step(now);
@@ -338,7 +395,13 @@ impl Plant {
             self.safety.press(now, action);
             self.settle_power();
         }
-        self.bus.arbitrate(now);
+        self.arbitrate();
+    }
+
+    /// Comes last whatever happens: lets the bus choose, and looks what is next.
+    fn arbitrate(&mut self) {
+        self.bus.arbitrate(self.now);
+        self.next_happening = self.look_ahead();
     }
 
     fn deliver(&mut self, passage: &Passage) {
@@ -349,12 +412,24 @@ impl Plant {
             // What a puck says is a request to nobody; the safety module is the only device that gives orders.
             && matches!(request.sender, Node::HOST | Node::SAFETY_MODULE)
         {
-            for puck in &mut self.pucks {
-                puck.receive(at, &request);
+            if self.torque_delay > 0 && matches!(request.action, Action::PackedTorques { .. }) {
+                self.late_torques.push_back((at + self.torque_delay, request));
+            } else {
+                self.instruct(at, &request);
             }
-            self.force_torque.receive(at, &request);
         }
         self.safety.hear(at, &passage.frame);
+    }
+
+    /// A request reaches pucks, sensor and hand.
+    fn instruct(&mut self, at: Ticks, request: &Request) {
+        for puck in &mut self.pucks {
+            puck.receive(at, request);
+        }
+        self.force_torque.receive(at, request);
+        if let Some(hand) = &mut self.hand {
+            hand.receive(at, request);
+        }
     }
 
     /// Sends what the safety module has to say, and lets motor power follow its mode.
@@ -380,9 +455,12 @@ impl Plant {
         }
         if should_be_powered {
             self.force_torque.power_on(self.now);
+            self.hand.iter_mut().for_each(|hand| hand.power_on(self.now));
         } else {
             self.force_torque.power_off();
             self.bus.withdraw(Node::FORCE_TORQUE);
+            self.hand.iter_mut().for_each(Hand::power_off);
+            Node::HAND.into_iter().for_each(|digit| self.bus.withdraw(digit));
         }
     }
 }

@@ -4,16 +4,11 @@
 //! only in MODE 2, is clipped to MT, and stays applied until it is changed or the mode changes (wam-can 4.5: no public
 //! source knows of a time-out in the puck). In every other mode the puck shorts its windings and brakes.
 
-use crate::boot::{Boot, Presence};
-use crate::inbox::{Inbox, SET_TIME};
+use crate::firmware::{Firmware, Heard, Order};
 use crate::noise::Noise;
 use crate::time::Ticks;
-use puck::device::{position_frame, reply16, reply32};
-use puck::{
-    Action, CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId, PropertyTable, Request, Role,
-    Status, UnknownFirmware,
-};
-use std::collections::BTreeMap;
+use puck::device::position_frame;
+use puck::{CanFrame, Counts, Group, MotorMode, Node, Property, Request, Role, UnknownFirmware};
 use std::f64::consts::TAU;
 
 /// What distinguishes the pucks of one arm from those of another.
@@ -62,29 +57,10 @@ const PLACES: [i32; 7] = [1, 2, 3, 4, 1, 2, 3];
 /// Puck temperature TEMP and motor temperature THERM, deg C. Constant: nothing here heats up.
 const TEMPERATURES: (i32, i32) = (34, 31);
 
-/// Properties that answer but cannot be written.
-const READ_ONLY: &[Property] = &[
-    Property::Vers,
-    Property::Role,
-    Property::Sn,
-    Property::Id,
-    Property::Error,
-    Property::Temp,
-    Property::Therm,
-    Property::Mech,
-    Property::Cts,
-];
-
 /// One motor puck.
 #[derive(Clone, Debug)]
 pub(crate) struct Puck {
-    node: Node,
-    boot: Boot,
-    inbox: Inbox,
-    table: PropertyTable,
-    monitor_version: i32,
-    factory: BTreeMap<Property, i32>,
-    values: BTreeMap<Property, i32>,
+    firmware: Firmware,
     offset: i64,
     /// T as the master set it; what acts is clipped to MT.
     commanded: i32,
@@ -95,7 +71,7 @@ impl Puck {
     pub(crate) fn new(index: usize, config: &PuckConfig, noise: Noise) -> Result<Self, UnknownFirmware> {
         let node = Node::ARM[index];
         let torque_group = if index < 4 { Group::ARM_TORQUES } else { Group::WRIST_TORQUES };
-        let factory: BTreeMap<_, _> = [
+        let factory = [
             (Property::Vers, i32::from(config.version)),
             (Property::Role, i32::from(Role::MOTOR)),
             (Property::Sn, 1000 + i32::from(node.number())),
@@ -117,157 +93,103 @@ impl Puck {
             (Property::Poles, POLES[index]),
             (Property::Ecmax, 0),
             (Property::Ecmin, 0),
-        ]
-        .into();
-        Ok(Self {
-            node,
-            boot: Boot::new(noise),
-            inbox: Inbox::new(SET_TIME),
-            table: PropertyTable::motor(config.version.into())?,
-            monitor_version: config.monitor_version.into(),
-            values: factory.clone(),
-            factory,
-            offset: 0,
-            commanded: 0,
-        })
+        ];
+        let firmware = Firmware::new(node, config.monitor_version, &factory, noise)?;
+        Ok(Self { firmware, offset: 0, commanded: 0 })
     }
 
     /// Motor power comes.
     pub(crate) fn power_on(&mut self, now: Ticks) {
-        self.boot.start(now);
+        self.firmware.power_on(now);
+    }
+
+    /// The main firmware runs, and its position is the true one: power and zeroing lie in the past.
+    pub(crate) fn run(&mut self) {
+        self.firmware.run();
     }
 
     /// Motor power goes: the position is lost.
     pub(crate) fn power_off(&mut self) {
-        self.boot.cut();
+        self.firmware.power_off();
         self.forget();
     }
 
     /// A request on the bus at time `at`; packed torques act at once, the rest waits its turn.
     pub(crate) fn receive(&mut self, at: Ticks, request: &Request) {
-        let presence = self.boot.presence(at);
-        if presence == Presence::Absent || !self.listens_to(request.to) {
-            return;
-        }
-        match request.action {
-            Action::PackedTorques { property, .. } => {
-                let place = self.values.get(&Property::Pidx).and_then(|place| u8::try_from(*place).ok());
-                let torque = place.and_then(|place| request.action.torque_for(place));
-                if presence == Presence::Ready
-                    && self.table.property(property) == Some(Property::T)
-                    && let Some(torque) = torque
-                {
-                    self.command(torque.units().into());
-                }
-            }
-            action => self.inbox.receive(at, action),
+        if let Heard::Torque(units) = self.firmware.receive(at, request) {
+            self.command(units);
         }
     }
 
     /// When the next request will be done.
     pub(crate) fn next_time(&self) -> Option<Ticks> {
-        self.inbox.next_time()
+        self.firmware.next_time()
     }
 
     /// Carries out one request that is done by `now`, with the motor at `angle` (rad); the reply, if there is one.
     pub(crate) fn step(&mut self, now: Ticks, angle: f64) -> Option<CanFrame> {
-        let action = self.inbox.take(now)?;
-        let (table, presence) = match self.boot.presence(now) {
-            Presence::Absent => return None,
-            Presence::Monitor => (PropertyTable::monitor(), Presence::Monitor),
-            Presence::Ready => (self.table, Presence::Ready),
-        };
-        match action {
-            Action::Get { property: id } => self.reply(table.property(id)?, id, presence, angle),
-            Action::Set { property: id, value } => {
-                self.set(now, table.property(id)?, value, presence, angle);
+        match self.firmware.take(now)? {
+            Order::Answer(frame) => frame,
+            Order::Get { property: Property::P, .. } => {
+                Some(position_frame(self.firmware.node(), self.position(angle), None))
+            }
+            Order::Get { property: Property::T, id } => Some(self.firmware.reply(Property::T, id, self.commanded)),
+            Order::Get { property: Property::Mech, id } => {
+                let within = self.encoder(angle).rem_euclid(self.counts_per_revolution());
+                Some(self.firmware.reply(Property::Mech, id, within as i32))
+            }
+            Order::Get { property, id } => self.firmware.answer(property, id),
+            Order::Set { property, value } => {
+                self.set(property, value, angle);
                 None
             }
-            Action::PackedTorques { .. } => None,
+            Order::Restarted => {
+                self.forget();
+                // The encoder counter starts at zero with the main firmware.
+                self.offset = -self.encoder(angle);
+                None
+            }
         }
     }
 
     /// What the puck does to its motor at `now`.
     pub(crate) fn drive(&self, now: Ticks) -> Drive {
-        let value = |property| self.values.get(&property).copied().unwrap_or(0);
-        if self.boot.presence(now) != Presence::Ready || value(Property::Mode) != MotorMode::Torque.value() {
+        if self.firmware.value(Property::Mode) != MotorMode::Torque.value() || !self.firmware.is_ready(now) {
             return Drive::Brake;
         }
-        let limit = value(Property::Mt).max(0);
+        let limit = self.firmware.value(Property::Mt).max(0);
         Drive::Torque(self.commanded.clamp(-limit, limit))
     }
 
     /// Requests lost to a full receive buffer.
     pub(crate) fn lost_requests(&self) -> u64 {
-        self.inbox.lost()
+        self.firmware.lost_requests()
     }
 
-    fn listens_to(&self, to: Destination) -> bool {
-        match to {
-            Destination::Node(node) => node == self.node,
-            Destination::Group(group) => [Property::Grpa, Property::Grpb, Property::Grpc]
-                .iter()
-                .any(|property| self.values.get(property) == Some(&i32::from(group.number()))),
-        }
-    }
-
-    fn reply(&self, property: Property, id: PropertyId, presence: Presence, angle: f64) -> Option<CanFrame> {
-        let value = match property {
-            Property::P => return Some(position_frame(self.node, self.position(angle), None)),
-            Property::Stat if presence == Presence::Ready => Status::Ready.value(),
-            Property::Stat => Status::Reset.value(),
-            Property::Vers if presence == Presence::Monitor => self.monitor_version,
-            Property::T => self.commanded,
-            Property::Mech => self.encoder(angle).rem_euclid(self.counts_per_revolution()) as i32,
-            other => *self.values.get(&other)?,
-        };
-        // 16-bit values were truncated when they were stored, so the cast keeps them.
-        Some(if property.is_wide() { reply32(self.node, id, value) } else { reply16(self.node, id, value as i16) })
-    }
-
-    fn set(&mut self, now: Ticks, property: Property, value: i32, presence: Presence, angle: f64) {
-        let value = if property.is_wide() || property == Property::P { value } else { i32::from(value as i16) };
+    fn set(&mut self, property: Property, value: i32, angle: f64) {
         match property {
-            Property::Stat if presence == Presence::Monitor && value == Status::Ready.value() => {
-                self.boot.wake(now);
-                self.forget();
-                // The encoder counter starts at zero with the main firmware.
-                self.offset = -self.encoder(angle);
-            }
-            Property::Stat if presence == Presence::Ready && value == Status::Reset.value() => {
-                self.boot.start(now);
-                self.forget();
-            }
-            Property::Stat => {}
             Property::P => self.offset = i64::from(value) - self.encoder(angle),
             Property::T => self.command(value),
             Property::Mode => {
                 self.commanded = 0;
-                self.values.insert(Property::Mode, value);
+                self.firmware.store(Property::Mode, value);
             }
-            other if READ_ONLY.contains(&other) => {}
-            other => {
-                if let Some(stored) = self.values.get_mut(&other) {
-                    *stored = value;
-                }
-            }
+            other => self.firmware.store(other, value),
         }
     }
 
     fn command(&mut self, units: i32) {
-        let is_torque_mode = self.values.get(&Property::Mode) == Some(&MotorMode::Torque.value());
+        let is_torque_mode = self.firmware.value(Property::Mode) == MotorMode::Torque.value();
         self.commanded = if is_torque_mode { units } else { 0 };
     }
 
     fn forget(&mut self) {
-        self.inbox.clear();
-        self.values = self.factory.clone();
         self.offset = 0;
         self.commanded = 0;
     }
 
     fn counts_per_revolution(&self) -> i64 {
-        self.values.get(&Property::Cts).copied().unwrap_or(4096).into()
+        self.firmware.value(Property::Cts).into()
     }
 
     /// Encoder counts before the offset: quantised toward minus infinity, as Barrett's library rounds.

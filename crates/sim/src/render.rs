@@ -4,7 +4,7 @@
 //! a copy of the model that exists only for the picture, so physics never sees them.
 
 use crate::Pose;
-use crate::world::mujoco::{MODEL, MujocoOptions, MujocoWorld, WorldError};
+use crate::world::mujoco::{self, MujocoOptions, MujocoWorld, WorldError};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjvCamera};
 use mujoco_rs::renderer::{MjRenderer, RendererError, png};
 use std::fmt::Write as _;
@@ -17,6 +17,9 @@ const LOOK_GROUP: i32 = 1;
 
 /// Red, green, blue towards which the colours of ghosts are drawn.
 const GHOST_TINT: [f32; 3] = [0.55, 0.72, 0.95];
+
+/// Generalized positions of seven arm joints and eight joints of the hand.
+const ARM_AND_HAND: usize = 15;
 
 /// Width over height of a picture for which the camera's distance is meant; narrower ones step back to show as much.
 const FULL_ASPECT: f64 = 1.25;
@@ -35,10 +38,15 @@ pub struct Camera {
 }
 
 impl Default for Camera {
-    /// From the front left: the whole arm from the side, the way of the hand to the flashlight unobstructed.
+    /// From the front left: the whole arm from the side, the way of the hand to the object unobstructed.
     fn default() -> Self {
         Self { look_at: [0.44, 0.0, 0.02], distance: 2.4, azimuth: -138.0, elevation: -20.0 }
     }
+}
+
+impl Camera {
+    /// Near the table, from the front left: hand and object of a grasp.
+    pub const GRASP: Self = Self { look_at: [0.66, 0.10, -0.03], distance: 1.25, azimuth: -150.0, elevation: -18.0 };
 }
 
 /// A dotted line in space, such as the way of the grasp point.
@@ -77,6 +85,7 @@ impl Default for RenderOptions {
 /// What a picture shows: where everything is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
+    setting: mujoco::Scene,
     configuration: Vec<f64>,
 }
 
@@ -84,7 +93,20 @@ impl Scene {
     /// The world as it is now.
     #[must_use]
     pub fn of(world: &MujocoWorld) -> Self {
-        Self { configuration: world.configuration().to_vec() }
+        Self { setting: *world.scene(), configuration: world.configuration().to_vec() }
+    }
+
+    /// A world as it once was: what [`MujocoWorld::configuration`] gave in a world of this setting, kept since then.
+    /// `None` if the configuration has not as many numbers as such a world.
+    #[must_use]
+    pub fn stored(setting: &mujoco::Scene, configuration: &[f64]) -> Option<Self> {
+        let fits = configuration.len() == Self::first_joint(setting) + ARM_AND_HAND;
+        fits.then(|| Self { setting: *setting, configuration: configuration.to_vec() })
+    }
+
+    /// Where joint 1 is in the configuration: the seven numbers of the object come first, if there is one.
+    fn first_joint(setting: &mujoco::Scene) -> usize {
+        if setting.object.is_some() { 7 } else { 0 }
     }
 
     /// The world as it is set up by `options`.
@@ -98,16 +120,17 @@ impl Scene {
     /// The same scene with the arm in the posture `q`, rad.
     #[must_use]
     pub fn with_posture(mut self, q: &[f64; 7]) -> Self {
-        // The model's order: seven numbers of the flashlight, then the arm.
-        self.configuration[7..14].copy_from_slice(q);
+        self.configuration[Self::first_joint(&self.setting)..][..7].copy_from_slice(q);
         self
     }
 
-    /// The same scene with the flashlight elsewhere.
+    /// The same scene with the object elsewhere; nothing changes without an object.
     #[must_use]
-    pub fn with_flashlight(mut self, pose: &Pose) -> Self {
-        self.configuration[..3].copy_from_slice(&pose.position);
-        self.configuration[3..7].copy_from_slice(&pose.quaternion);
+    pub fn with_object(mut self, pose: &Pose) -> Self {
+        if self.setting.object.is_some() {
+            self.configuration[..3].copy_from_slice(&pose.position);
+            self.configuration[3..7].copy_from_slice(&pose.quaternion);
+        }
         self
     }
 }
@@ -155,20 +178,26 @@ pub fn render_strip(scenes: &[Scene], path: &Path, options: &RenderOptions) -> R
     if panel == 0 || height == 0 || width > 2560 || height > 1600 {
         return Err(impossible);
     }
-    let model = picture_model(scenes, options)?;
-    let mut data = MjData::new(&model);
-    let mut camera = MjvCamera::new_free(&model);
-    let c = &options.camera;
-    let distance = c.distance * (FULL_ASPECT * f64::from(height) / f64::from(panel)).max(1.0);
-    (camera.lookat, camera.distance, camera.azimuth, camera.elevation) = (c.look_at, distance, c.azimuth, c.elevation);
-    let mut renderer = MjRenderer::builder().width(panel).height(height).camera(camera).build(&model)?;
     let mut picture = Picture::new(panel * scenes.len() as u32, height);
-    for (i, scene) in scenes.iter().enumerate() {
-        data.qpos_mut().copy_from_slice(&scene.configuration);
-        data.forward();
-        renderer.sync_data(&mut data)?;
-        renderer.render()?;
-        picture.put(i as u32 * panel, panel, renderer.rgb_flat().ok_or(RendererError::RgbDisabled)?);
+    let mut left = 0;
+    // Scenes of one setting share a model.
+    for alike in scenes.chunk_by(|a, b| a.setting == b.setting) {
+        let model = picture_model(alike, options)?;
+        let mut data = MjData::new(&model);
+        let mut camera = MjvCamera::new_free(&model);
+        let c = &options.camera;
+        let distance = c.distance * (FULL_ASPECT * f64::from(height) / f64::from(panel)).max(1.0);
+        (camera.lookat, camera.distance, camera.azimuth, camera.elevation) =
+            (c.look_at, distance, c.azimuth, c.elevation);
+        let mut renderer = MjRenderer::builder().width(panel).height(height).camera(camera).build(&model)?;
+        for scene in alike {
+            data.qpos_mut().copy_from_slice(&scene.configuration);
+            data.forward();
+            renderer.sync_data(&mut data)?;
+            renderer.render()?;
+            picture.put(left, panel, renderer.rgb_flat().ok_or(RendererError::RgbDisabled)?);
+            left += panel;
+        }
     }
     picture.save(path)?;
     Ok(())
@@ -178,8 +207,9 @@ pub fn render_strip(scenes: &[Scene], path: &Path, options: &RenderOptions) -> R
 fn picture_model(scenes: &[Scene], options: &RenderOptions) -> Result<MjModel, RenderError> {
     let load = |text: &str| MjModel::from_xml_string(text).map_err(|e| RenderError::Model(e.to_string()));
     let mut additions = String::new();
+    let text = scenes.first().map(|scene| scene.setting).unwrap_or_default().model(true);
     if let Some(scene) = scenes.first().filter(|_| !options.ghosts.is_empty()) {
-        let plain = load(MODEL)?;
+        let plain = load(&text)?;
         for (i, posture) in options.ghosts.iter().enumerate() {
             let opacity = 0.08 + 0.22 * (i + 1) as f64 / options.ghosts.len() as f64;
             ghost(&plain, &scene.clone().with_posture(posture), opacity, &mut additions);
@@ -196,7 +226,7 @@ fn picture_model(scenes: &[Scene], options: &RenderOptions) -> Result<MjModel, R
             );
         }
     }
-    match MODEL.split_once("</worldbody>") {
+    match text.split_once("</worldbody>") {
         Some((before, after)) => load(&format!("{before}{additions}</worldbody>{after}")),
         None => Err(RenderError::Model("it has no worldbody".to_owned())),
     }
@@ -209,7 +239,7 @@ fn ghost(model: &MjModel, scene: &Scene, opacity: f64, text: &mut String) {
     data.qpos_mut().copy_from_slice(&scene.configuration);
     data.kinematics();
     // The pedestal and the base joint's drum look the same in every posture; drawn twice they would flicker.
-    let unmoved = ["flashlight", "base", "link1"].map(|name| model.name_to_id(MjtObjBase::mjOBJ_BODY, name));
+    let unmoved = ["object", "base", "link1"].map(|name| model.name_to_id(MjtObjBase::mjOBJ_BODY, name));
     for (i, &group) in model.geom_group().iter().enumerate() {
         let body = model.geom_bodyid()[i] as usize;
         // Body 0 is the world: table and floor have no ghosts.

@@ -6,6 +6,7 @@
 
 use crate::inbox::Inbox;
 use crate::operator::{PendantAction, PendantView};
+use crate::properties::{Numbers, Values};
 use crate::speed::SpeedMonitor;
 use crate::time::{TICKS_PER_MILLISECOND, Ticks};
 use puck::device::{reply16, reply32, safety_broadcast};
@@ -14,7 +15,6 @@ use puck::{
     Action, CanFrame, Counts, Destination, Group, MotorMode, Node, PendantState, Property, PropertyTable, Reply,
     Request, Role, SafetyMode, Status, UnknownFirmware,
 };
-use std::collections::BTreeMap;
 
 /// How the safety module is set up.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,12 +61,12 @@ const DISPLAY_ZERO: u8 = 0x3F;
 #[derive(Clone, Debug)]
 pub(crate) struct SafetyModule {
     config: SafetyConfig,
-    table: PropertyTable,
+    numbers: Numbers,
     inbox: Inbox,
     mode: SafetyMode,
     button_latched: bool,
     zeroed_since: Option<Ticks>,
-    limits: BTreeMap<Property, i32>,
+    limits: Values,
     /// How many velocity faults are still to be ignored (IFAULT).
     ignored_faults: i32,
     speed: SpeedMonitor,
@@ -85,13 +85,13 @@ impl SafetyModule {
     /// A module whose E-stop button is pressed. `speed` knows the arm's geometry.
     pub(crate) fn new(config: SafetyConfig, speed: SpeedMonitor) -> Result<Self, UnknownFirmware> {
         Ok(Self {
-            table: PropertyTable::safety(config.version.into())?,
+            numbers: Numbers::new(&PropertyTable::safety(config.version.into())?),
             config,
             inbox: Inbox::new(SET_TIME),
             mode: SafetyMode::EStop,
             button_latched: true,
             zeroed_since: None,
-            limits: FACTORY.into(),
+            limits: Values::new(&FACTORY),
             ignored_faults: 0,
             speed,
             velocity_fault: false,
@@ -102,6 +102,13 @@ impl SafetyModule {
             heartbeat_due: None,
             outgoing: Vec::new(),
         })
+    }
+
+    /// In IDLE with a zeroed arm since before the story begins.
+    pub(crate) fn resume(&mut self) {
+        self.mode = SafetyMode::Idle;
+        self.button_latched = false;
+        self.zeroed_since = Some(0);
     }
 
     /// The mode; below IDLE the motors, and with them the pucks, have no power.
@@ -262,7 +269,7 @@ impl SafetyModule {
     fn carry_out(&mut self, now: Ticks, action: Action) {
         match action {
             Action::Get { property: id } => {
-                let Some(property) = self.table.property(id) else {
+                let Some(property) = self.numbers.property(id) else {
                     return;
                 };
                 let Some(value) = self.value(property) else {
@@ -274,7 +281,7 @@ impl SafetyModule {
                 self.outgoing.push(if is_wide { reply32(node, id, value) } else { reply16(node, id, value as i16) });
             }
             Action::Set { property: id, value } => {
-                if let Some(property) = self.table.property(id) {
+                if let Some(property) = self.numbers.property(id) {
                     self.set(now, property, i32::from(value as i16));
                 }
             }
@@ -292,7 +299,7 @@ impl SafetyModule {
             Property::Mode => self.mode.value(),
             Property::Zero => self.zeroed_since.is_some().into(),
             Property::Pen => self.pendant().value(),
-            other => *self.limits.get(&other)?,
+            other => self.limits.get(other)?,
         })
     }
 
@@ -310,16 +317,12 @@ impl SafetyModule {
             // The value of LOAD names a property; the library sends DEF with the same value just before.
             Property::Load => {
                 let named =
-                    u8::try_from(value).ok().and_then(puck::PropertyId::new).and_then(|id| self.table.property(id));
+                    u8::try_from(value).ok().and_then(puck::PropertyId::new).and_then(|id| self.numbers.property(id));
                 if let Some((property, default)) = FACTORY.iter().find(|(property, _)| Some(*property) == named) {
-                    self.limits.insert(*property, *default);
+                    self.limits.set(*property, *default);
                 }
             }
-            other => {
-                if let Some(limit) = self.limits.get_mut(&other) {
-                    *limit = value;
-                }
-            }
+            other => self.limits.set(other, value),
         }
     }
 
@@ -334,7 +337,7 @@ impl SafetyModule {
     }
 
     fn limit(&self, property: Property) -> i32 {
-        self.limits.get(&property).copied().unwrap_or(0)
+        self.limits.of(property)
     }
 
     fn idle(&mut self) {

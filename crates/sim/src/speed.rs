@@ -27,6 +27,8 @@ struct Sample {
     /// Time in which pauses are shortened, ticks.
     reckoned: Ticks,
     q: [f64; 7],
+    /// Elbow and the point beyond it, m.
+    points: [Vector; 2],
 }
 
 /// The monitor.
@@ -86,7 +88,7 @@ impl SpeedMonitor {
         let pause = (at - self.last_complete).min(LONGEST_PAUSE);
         let reckoned = self.history.back().map_or(0, |sample| sample.reckoned + pause);
         self.last_complete = at;
-        self.history.push_back(Sample { reckoned, q });
+        self.history.push_back(Sample { reckoned, q, points: supervised_points(&q) });
         if self.history.len() > HISTORY {
             self.history.pop_front();
         }
@@ -95,16 +97,16 @@ impl SpeedMonitor {
         };
         let elapsed = seconds(last.reckoned - first.reckoned);
         if elapsed > 0.0 {
-            let moved = if is_zeroed { tip_travel(&first.q, &last.q) } else { joint_travel(&first.q, &last.q) };
+            let moved =
+                if is_zeroed { tip_travel(&first.points, &last.points) } else { joint_travel(&first.q, &last.q) };
             self.latest = Some(moved / elapsed);
         }
     }
 }
 
 /// The farther of the two supervised points' straight ways, m.
-fn tip_travel(from: &[f64; 7], to: &[f64; 7]) -> f64 {
-    let (from, to) = (supervised_points(from), supervised_points(to));
-    from.iter().zip(to).map(|(a, b)| norm(subtract(b, *a))).fold(0.0, f64::max)
+fn tip_travel(from: &[Vector; 2], to: &[Vector; 2]) -> f64 {
+    from.iter().zip(to).map(|(a, b)| norm(subtract(*b, *a))).fold(0.0, f64::max)
 }
 
 /// The largest turn of joints 1..4, rad.

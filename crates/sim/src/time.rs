@@ -22,6 +22,9 @@ pub const TICKS_PER_BIT: Ticks = 25;
 /// One slot of the 900 Hz schedule, rounded to ticks (25 MHz / 900 Hz = 27 777.8); three make a 300 Hz control cycle.
 pub const SLOT_TICKS: Ticks = 27_778;
 
+/// One control cycle: three slots.
+pub const CYCLE_TICKS: Ticks = 3 * SLOT_TICKS;
+
 /// One physics step: half a slot, so that six steps fit one control cycle exactly.
 pub const STEP_TICKS: Ticks = SLOT_TICKS / 2;
 

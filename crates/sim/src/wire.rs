@@ -19,66 +19,102 @@ const UNSTUFFED_TAIL_BITS: u32 = 10;
 /// Intermission between two frames, bits. No node may start earlier.
 pub const INTERFRAME_BITS: u32 = 3;
 
-/// Bits of a stuffed region without stuff bits, at most: SOF 1 + id 11 + control 7 + data 64 + CRC 15.
-const STUFFED_REGION_MAX: usize = 98;
+/// SOF 1, identifier 11, RTR, IDE and reserved bit 3, length 4.
+const HEADER_BITS: u32 = 19;
 
-/// The part of a frame that is stuffed, as single bits, dominant = `false`.
-struct BitString {
-    bits: [bool; STUFFED_REGION_MAX],
-    length: usize,
-}
+/// Bits of the checksum.
+const CRC_BITS: u32 = 15;
 
-impl BitString {
-    fn push(&mut self, value: u32, width: u32) {
-        for shift in (0..width).rev() {
-            self.bits[self.length] = value >> shift & 1 == 1;
-            self.length += 1;
+/// What one byte does to the checksum, for each value of the register's upper eight bits combined with it.
+const CRC_TABLE: [u16; 256] = {
+    let mut table = [0; 256];
+    let mut index = 0;
+    while index < table.len() {
+        let mut register = (index as u16) << (CRC_BITS - 8);
+        let mut bit = 0;
+        while bit < 8 {
+            let carry = register >> (CRC_BITS - 1) & 1;
+            register = (register << 1 & 0x7FFF) ^ (carry * CRC_POLYNOMIAL);
+            bit += 1;
         }
+        table[index] = register;
+        index += 1;
     }
+    table
+};
 
-    fn written(&self) -> &[bool] {
-        &self.bits[..self.length]
-    }
+/// SOF, identifier, control: the first bits on the wire, dominant = 0, as a number.
+fn header(frame: &CanFrame) -> u32 {
+    // SOF, RTR, IDE and the reserved bit are all dominant.
+    u32::from(frame.can_id().raw()) << 7 | frame.payload().len() as u32
 }
 
-/// CRC-15 over the unstuffed bits from SOF to the end of the data.
-fn crc15(bits: &[bool]) -> u16 {
-    bits.iter().fold(0, |register: u16, &bit| {
-        let feedback = bit != (register >> 14 & 1 == 1);
-        let shifted = register << 1 & 0x7FFF;
-        if feedback { shifted ^ CRC_POLYNOMIAL } else { shifted }
+/// The frame's CRC-15, over the unstuffed bits from SOF to the end of the data, as a bus analyser would show it.
+#[must_use]
+pub fn frame_crc(frame: &CanFrame) -> u16 {
+    // The register starts at zero, so that the leading zeros which fill the header up to whole bytes change nothing.
+    let [_, high, middle, low] = header(frame).to_be_bytes();
+    [high, middle, low].iter().chain(frame.payload()).fold(0, |register: u16, byte| {
+        let index = (register >> (CRC_BITS - 8)) as u8 ^ byte;
+        (register << 8 & 0x7FFF) ^ CRC_TABLE[usize::from(index)]
     })
 }
 
-/// SOF to CRC of a frame, not yet stuffed.
-fn stuffed_region(frame: &CanFrame) -> BitString {
-    let mut region = BitString { bits: [false; STUFFED_REGION_MAX], length: 0 };
-    region.push(0, 1); // start of frame
-    region.push(frame.can_id().raw().into(), 11);
-    region.push(0, 3); // RTR, IDE and the reserved bit: data frame, base format
-    region.push(frame.payload().len() as u32, 4);
-    for &byte in frame.payload() {
-        region.push(byte.into(), 8);
-    }
-    let crc = crc15(region.written());
-    region.push(crc.into(), 15);
-    region
+/// SOF to CRC of a frame, not yet stuffed: the bits at the upper end of the number, and how many.
+fn stuffed_region(frame: &CanFrame) -> (u128, u32) {
+    let data = frame.payload().iter().fold(u128::from(header(frame)), |bits, byte| bits << 8 | u128::from(*byte));
+    let length = HEADER_BITS + 8 * frame.payload().len() as u32 + CRC_BITS;
+    let bits = data << CRC_BITS | u128::from(frame_crc(frame));
+    (bits << (u128::BITS - length), length)
 }
 
-/// How many stuff bits the transmitter inserts.
-fn stuff_bits(bits: &[bool]) -> u32 {
-    let mut inserted = 0;
-    let mut run = 0;
-    let mut last = None;
-    for &bit in bits {
-        run = if last == Some(bit) { run + 1 } else { 1 };
-        last = Some(bit);
-        if run == 5 {
-            inserted += 1;
-            // The stuff bit is the complement and opens a run of its own.
-            last = Some(!bit);
-            run = 1;
+/// The wire as the stuffing rule sees it: the last level times 5, plus how many bits have had it (0: before SOF; at most 4).
+type Run = u8;
+
+/// A recessive wire before SOF.
+const AT_REST: Run = 5;
+
+/// One bit: the run it leaves behind, and whether a stuff bit follows it.
+const fn extend(run: Run, bit: bool) -> (Run, bool) {
+    let level = bit as Run * 5;
+    let length = if run / 5 == bit as Run { run % 5 + 1 } else { 1 };
+    // The stuff bit is the complement and opens a run of its own.
+    if length == 5 { ((5 - level) + 1, true) } else { (level + length, false) }
+}
+
+/// For each run and each byte: the run it leaves behind, and the stuff bits it draws.
+const STUFFING: [[(Run, u8); 256]; 10] = {
+    let mut table = [[(0, 0); 256]; 10];
+    let mut before = 0;
+    while before < table.len() {
+        let mut byte = 0;
+        while byte < 256 {
+            let (mut run, mut inserted, mut bit) = (before as Run, 0, 8);
+            while bit > 0 {
+                bit -= 1;
+                let (next, is_stuffed) = extend(run, byte >> bit & 1 == 1);
+                run = next;
+                inserted += is_stuffed as u8;
+            }
+            table[before][byte] = (run, inserted);
+            byte += 1;
         }
+        before += 1;
+    }
+    table
+};
+
+/// How many stuff bits the transmitter inserts into `length` bits, which start at the upper end of `bits`.
+fn stuff_bits(bits: u128, length: u32) -> u32 {
+    let (mut run, mut inserted) = (AT_REST, 0);
+    let odd = length % 8;
+    for bit in 0..odd {
+        let (next, is_stuffed) = extend(run, bits >> (u128::BITS - 1 - bit) & 1 == 1);
+        (run, inserted) = (next, inserted + u32::from(is_stuffed));
+    }
+    for byte in (bits << odd).to_be_bytes().iter().take((length / 8) as usize) {
+        let (next, count) = STUFFING[usize::from(run)][usize::from(*byte)];
+        (run, inserted) = (next, inserted + u32::from(count));
     }
     inserted
 }
@@ -86,19 +122,12 @@ fn stuff_bits(bits: &[bool]) -> u32 {
 /// Bits from SOF to the end of the interframe space.
 #[must_use]
 pub fn frame_bits(frame: &CanFrame) -> u32 {
-    let region = stuffed_region(frame);
-    region.length as u32 + stuff_bits(region.written()) + UNSTUFFED_TAIL_BITS + INTERFRAME_BITS
+    let (bits, length) = stuffed_region(frame);
+    length + stuff_bits(bits, length) + UNSTUFFED_TAIL_BITS + INTERFRAME_BITS
 }
 
 /// Time a frame keeps the bus busy, interframe space included.
 #[must_use]
 pub fn frame_ticks(frame: &CanFrame) -> Ticks {
     Ticks::from(frame_bits(frame)) * TICKS_PER_BIT
-}
-
-/// The frame's CRC-15, as a bus analyser would show it.
-#[must_use]
-pub fn frame_crc(frame: &CanFrame) -> u16 {
-    let region = stuffed_region(frame);
-    crc15(&region.written()[..region.length - 15])
 }

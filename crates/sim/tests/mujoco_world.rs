@@ -2,7 +2,9 @@
 #![cfg(feature = "mujoco")]
 
 use sim::person::{DEMONSTRATION_GOAL, DEMONSTRATION_START};
-use sim::world::mujoco::{Kinematics, MujocoOptions, MujocoWorld, WorldError};
+use sim::world::mujoco::{
+    Cables, Imperfections, Kinematics, MujocoOptions, MujocoWorld, ObjectKind, ObjectSpec, Scene, WorldError,
+};
 use sim::{HOME, Noise, Pose, STEP_SECONDS, World};
 use std::collections::HashMap;
 
@@ -14,6 +16,10 @@ const SENSOR_TO_GRASP: f64 = 0.126;
 
 fn world(options: MujocoOptions) -> MujocoWorld {
     MujocoWorld::new(&options).expect("the scene loads")
+}
+
+fn torch_at(position: [f64; 2]) -> Scene {
+    Scene::with(ObjectSpec::new(ObjectKind::SmallTorch).at(position))
 }
 
 fn steps(seconds: f64) -> usize {
@@ -212,13 +218,13 @@ fn an_arm_without_power_falls_and_comes_to_rest_within_its_stops() {
 #[test]
 fn the_flashlight_stands_still_for_twenty_seconds() {
     let mut world = world(MujocoOptions::default());
-    let start = world.flashlight_pose().position;
+    let start = world.object_pose().expect("an object").position;
     let mut tilt: f64 = 0.0;
     for _ in 0..steps(20.0) {
         world.step(&[0.0; 7]);
-        tilt = tilt.max(world.flashlight_tilt());
+        tilt = tilt.max(world.object_tilt().expect("an object"));
     }
-    let end = world.flashlight_pose().position;
+    let end = world.object_pose().expect("an object").position;
     assert!((start[2] + 0.025).abs() < 1e-9 && (end[2] - start[2]).abs() < 5e-4, "it stands at {end:?}");
     assert!(tilt.to_degrees() < 0.1, "{} degrees", tilt.to_degrees());
     assert!((end[0] - start[0]).hypot(end[1] - start[1]) < 2e-4, "{start:?} to {end:?}");
@@ -250,8 +256,11 @@ fn the_same_inputs_give_the_same_bits_and_others_give_others() {
 
 #[test]
 fn a_flashlight_where_the_hand_goes_is_hit() {
-    let mut world =
-        world(MujocoOptions { posture: DEMONSTRATION_START, flashlight: [0.74, -0.08], ..MujocoOptions::default() });
+    let mut world = world(MujocoOptions {
+        posture: DEMONSTRATION_START,
+        scene: torch_at([0.74, -0.08]),
+        ..MujocoOptions::default()
+    });
     let mut contacts = 0;
     for step in 0..steps(3.0) {
         let share = (step as f64 / steps(2.0) as f64).min(1.0);
@@ -263,7 +272,7 @@ fn a_flashlight_where_the_hand_goes_is_hit() {
         }));
         contacts += world.robot_contacts();
     }
-    assert!(contacts > 0 && world.flashlight_tilt().to_degrees() > 10.0, "{contacts} contacts");
+    assert!(contacts > 0 && world.object_tilt().expect("an object").to_degrees() > 10.0, "{contacts} contacts");
     assert_eq!(world.warnings(), 0);
 }
 
@@ -276,13 +285,22 @@ fn options_that_make_no_sense_are_refused_with_the_reason() {
     assert_eq!(error.to_string(), "joint 6 cannot start at 1.6 rad: its range is -1.57 .. 1.57 rad");
     posture[5] = f64::NAN;
     assert!(matches!(refused(MujocoOptions { posture, ..Default::default() }), WorldError::Posture { joint: 6, .. }));
-    for flashlight in [[0.3, 0.0], [0.8, 0.5], [f64::NAN, 0.0]] {
-        assert!(matches!(refused(MujocoOptions { flashlight, ..Default::default() }), WorldError::OffTable { .. }));
+    for position in [[0.3, 0.0], [0.8, 0.6], [f64::NAN, 0.0]] {
+        let scene = torch_at(position);
+        assert!(matches!(refused(MujocoOptions { scene, ..Default::default() }), WorldError::OffTable { .. }));
     }
+    let hollow = Scene::with(ObjectSpec { mass: 0.0, ..ObjectSpec::new(ObjectKind::Cup) });
+    let torn = Imperfections { cables: Some(Cables { stiffness: [0.0; 7], ..Cables::WAM }), ..Imperfections::NONE };
     for options in [
         MujocoOptions { fingers: -0.1, ..Default::default() },
         MujocoOptions { spread: 4.0, ..Default::default() },
         MujocoOptions { gravity: f64::INFINITY, ..Default::default() },
+        MujocoOptions { scene: hollow, ..Default::default() },
+        MujocoOptions { imperfections: torn, ..Default::default() },
+        MujocoOptions {
+            imperfections: Imperfections { friction: [f64::NAN; 7], ..Imperfections::NONE },
+            ..Default::default()
+        },
     ] {
         assert!(matches!(refused(options), WorldError::OutOfRange { .. }));
     }

@@ -2,9 +2,10 @@
 #![cfg(feature = "render")]
 
 use sim::HOME;
+use sim::person::Lesson;
 use sim::person::{DEMONSTRATION_GOAL, DEMONSTRATION_START, side_grasp_path};
 use sim::render::{RenderError, RenderOptions, Scene, Trail, render_png, render_strip};
-use sim::world::mujoco::MujocoOptions;
+use sim::world::mujoco::{self, MujocoOptions, MujocoWorld, ObjectKind, ObjectSpec};
 use std::path::PathBuf;
 
 /// Pictures of these tests go where cargo wants the output of tests.
@@ -64,6 +65,53 @@ fn a_film_strip_has_a_panel_for_each_scene() {
     let scenes = [HOME, DEMONSTRATION_START, DEMONSTRATION_GOAL].map(scene);
     render_strip(&scenes, &path, &options).expect("a picture without a display");
     assert_eq!(&std::fs::read(&path).expect("the picture exists")[16..24], &[0, 0, 7, 8, 0, 0, 1, 224]);
+}
+
+#[test]
+fn every_object_has_its_own_picture_and_scenes_of_different_objects_share_a_strip() {
+    let small = RenderOptions { width: 480, height: 300, ..RenderOptions::default() };
+    let kinds =
+        [ObjectKind::SmallTorch, ObjectKind::Flashlight, ObjectKind::Cup, ObjectKind::Bottle, ObjectKind::Weight];
+    let settings =
+        kinds.map(|kind| mujoco::Scene::with(ObjectSpec::new(kind))).into_iter().chain([mujoco::Scene::EMPTY]);
+    let scenes: Vec<Scene> = settings
+        .map(|scene| {
+            let posture =
+                if scene.object.is_some_and(|object| object.lies()) { Lesson::Bottle } else { Lesson::Flashlight };
+            let posture = posture.start();
+            Scene::set_up(&MujocoOptions { scene, posture, ..MujocoOptions::default() }).expect("the scene loads")
+        })
+        .collect();
+    let pictures: Vec<Vec<u8>> = scenes
+        .iter()
+        .enumerate()
+        .map(|(i, scene)| {
+            let path = file(&format!("object {i}.png"));
+            render_png(scene, &path, &small).expect("a picture without a display");
+            std::fs::read(path).expect("the picture exists")
+        })
+        .collect();
+    for (i, picture) in pictures.iter().enumerate() {
+        assert!(pictures[..i].iter().all(|other| other != picture), "object {i} looks like another");
+    }
+    let wide = RenderOptions { width: 2400, height: 400, ..RenderOptions::default() };
+    render_strip(&scenes, &file("objects.png"), &wide).expect("a strip of different objects");
+}
+
+#[test]
+fn a_stored_configuration_gives_the_picture_of_the_world_it_came_from() {
+    let small = RenderOptions { width: 320, height: 200, ..RenderOptions::default() };
+    for scene in [mujoco::Scene::with(ObjectSpec::new(ObjectKind::Cup)), mujoco::Scene::EMPTY] {
+        let posture = Lesson::Cup.start();
+        let world = MujocoWorld::new(&MujocoOptions { scene, posture, ..MujocoOptions::default() }).expect("it loads");
+        let stored = Scene::stored(&scene, world.configuration()).expect("it fits");
+        assert_eq!(stored, Scene::of(&world));
+        assert_eq!(Scene::stored(&scene, &world.configuration()[1..]), None);
+        // The arm is found behind the object, or first where there is none.
+        assert_eq!(stored.clone().with_posture(&posture), stored);
+        assert_ne!(stored.clone().with_posture(&HOME), stored);
+        render_png(&stored.with_posture(&HOME), &file("stored.png"), &small).expect("a picture");
+    }
 }
 
 #[test]

@@ -66,7 +66,7 @@ fn run(seed: u64) -> BusTrace {
 fn a_cold_arm_becomes_active() {
     let mut master = Master::new(PlantConfig::default());
     let (nodes, drives) = start_up(&mut master);
-    assert_eq!(nodes, [1, 2, 3, 4, 5, 6, 7, 8, 10]);
+    assert_eq!(nodes, [1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 14]);
     assert_eq!(drives.map(|(cts, _)| cts), [4096; 7]);
     assert_eq!(drives.map(|(_, ipnm)| ipnm), [2472, 2472, 2472, 2472, 6105, 6105, 21400]);
     for (position, home) in master.positions().into_iter().zip(home_counts()) {

@@ -149,7 +149,7 @@ struct Demonstration {
 fn demonstrate(seed: u64) -> Demonstration {
     let options = MujocoOptions { posture: DEMONSTRATION_START, ..MujocoOptions::default() };
     let world = MujocoWorld::new(&options).expect("the scene loads");
-    let flashlight = world.flashlight_pose().position;
+    let flashlight = world.object_pose().expect("a torch").position;
     let person = Person::new(PersonConfig { seed, ..PersonConfig::default() }, side_grasp_path());
     let mut guided = GuidedWorld::new(world, person);
     let mut mechanism = kinematics();
@@ -180,7 +180,7 @@ fn demonstrate(seed: u64) -> Demonstration {
         let bias = guided.world().bias_torques();
         guided.step(&bias);
         steps += 1;
-        d.tilt = d.tilt.max(guided.world().flashlight_tilt().to_degrees());
+        d.tilt = d.tilt.max(guided.world().object_tilt().expect("a torch").to_degrees());
         d.contacts += guided.world().robot_contacts();
         let q = guided.joint_positions();
         d.margin = d.margin.min(margin(&q, &ranges));
@@ -194,7 +194,7 @@ fn demonstrate(seed: u64) -> Demonstration {
     }
     let (distance, turn) = apart(&guided.grasp_pose(), &side_grasp_path().goal());
     (d.distance, d.turn) = (distance, turn.to_degrees());
-    let moved = guided.world().flashlight_pose().position;
+    let moved = guided.world().object_pose().expect("a torch").position;
     d.moved = (moved[0] - flashlight[0]).hypot(moved[1] - flashlight[1]);
     d.end = guided.joint_positions();
     d.seconds = f64::from(steps) * STEP_SECONDS;

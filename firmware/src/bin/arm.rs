@@ -31,7 +31,8 @@ mod app {
     use link::image::IMAGE_BYTES_LIMIT;
     use puck::CanFrame;
 
-    /// Frames on their way to the controller. No slot sends more than 2; 16 hold eight slots of a dead bus.
+    /// Frames on their way to the controller. A cycle sends at most 8, of these 5 in its control slot (torques of arm, wrist
+    /// and hand, two questions to the hand); 16 hold two cycles of a dead bus.
     const OUTGOING: usize = 16;
     /// Frames on their way to the core. The bus carries at most 24 of the shortest in a slot, and each slot drains them.
     const INCOMING: usize = 32;

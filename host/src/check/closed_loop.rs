@@ -84,7 +84,12 @@ impl ClosedLoop {
             };
             let output = cycle.step(&CycleInput {
                 cycle: number,
-                sample: BusSample { positions: counts.map(Some), wrench: None, safety: Some(SafetyMode::Active) },
+                sample: BusSample {
+                    positions: counts.map(Some),
+                    wrench: None,
+                    safety: Some(SafetyMode::Active),
+                    hand: None,
+                },
                 command,
                 external_fault: None,
             });

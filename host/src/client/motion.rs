@@ -46,6 +46,23 @@ impl<T: Transport> Client<T> {
         self.order(&Request::Approach { q, duration })
     }
 
+    /// Initialises the hand: the fingers drive to their stops, for about five seconds. Accepted before that time is over;
+    /// the status tells the rest.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn initialise_hand(&mut self) -> Result<(), HostError> {
+        self.order(&Request::InitialiseHand)
+    }
+
+    /// Moves spread and fingers F1 to F3 to `q` (rad) in `duration` (s); 0 lets the device choose.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn move_hand(&mut self, q: [f32; 4], duration: f32) -> Result<(), HostError> {
+        self.order(&Request::MoveHand { q, duration })
+    }
+
     /// Starts a stored primitive.
     ///
     /// # Errors

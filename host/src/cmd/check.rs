@@ -49,6 +49,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 pub(super) fn failure(cause: PrimitiveFileError, path: &Path, doing: &str) -> Failure {
     let (exit, code, help) = match &cause {
         PrimitiveFileError::Model { .. } => (Exit::Incompatible, "E430", "learn the primitive again with this version"),
+        PrimitiveFileError::ExpectationModel { .. } | PrimitiveFileError::ExpectationDuration { .. } => {
+            let help = format!("record it again: `tactus rehearse {}`", path.display());
+            return Failure::new(Exit::Invalid, "E634", format!("{doing} refused {}", path.display()), cause)
+                .help(help);
+        }
         PrimitiveFileError::Schema { .. } => {
             (Exit::Incompatible, "E431", "learn the primitive again with this version")
         }

@@ -79,12 +79,13 @@ pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
         ProcedureError::Stopped(_) => (Exit::Refused, "E592", "find the cause; `tactus stop` brings the arm to rest"),
         ProcedureError::Diverted(_) => (Exit::Refused, "E593", "try again"),
         ProcedureError::TooLong { .. } => (Exit::Refused, "E594", "look what holds the arm"),
+        ProcedureError::Hand(_) => (Exit::Refused, "E595", "free the fingers, then `tactus hand init`"),
         ProcedureError::Recording(_) => (Exit::Internal, "E121", "check the disk and the rights of the folder"),
     };
     Failure::new(exit, code, doing, error).help(help)
 }
 
-fn simulation_failure(error: SimulationError, doing: &str) -> Failure {
+pub(super) fn simulation_failure(error: SimulationError, doing: &str) -> Failure {
     let (exit, code, help) = match &error {
         SimulationError::UnknownWorld(_) => (Exit::Usage, "E203", "for example `--device sim:world=mujoco`"),
         SimulationError::WithoutMujoco => {
@@ -108,7 +109,7 @@ fn owner(simulated: bool) -> String {
 }
 
 /// Raised by the first Ctrl-C. A second one ends the process at once.
-fn interrupt() -> Interrupt {
+pub(super) fn interrupt() -> Interrupt {
     let interrupt = Interrupt::never();
     let flag = interrupt.flag();
     // Registered first, acts last: ends the process only if the flag was already raised.

@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::{Exit, Failure, Global};
 use crate::demonstration::{Preparation, Recording};
+use crate::learn::feedback::FeedbackOptions;
 use crate::learn::hand::HandMotion;
 use crate::learn::{self, LearnError, LearnOptions};
 use crate::primitive_file::OrientationErrorKind;
@@ -44,10 +45,29 @@ pub struct Cmd {
     /// Hand at the end: spread and fingers 1 to 3, rad
     #[arg(long, value_name = "S,F1,F2,F3", default_value = "0,0,0,0", value_parser = numbers::<4>, allow_hyphen_values = true)]
     pub hand_goal: [f64; 4],
-    /// Fractions of the duration between which the fingers move
+    /// Rest at the goal behind the movement, s: time for the fingers to close
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    pub dwell: f64,
+    /// Fractions of the duration, the dwell included, between which the fingers move
     #[arg(long, value_name = "BEGIN,END", default_value = "0.6,1", value_parser = numbers::<2>)]
     pub hand_window: [f64; 2],
+    /// Spring K of the position [default: 400 for 12 s, growing with the square of the duration, at least 200]
+    #[arg(long, value_name = "K")]
+    pub stiffness: Option<f64>,
+    /// Spring K of the orientation [default: 200 for 12 s, likewise]
+    #[arg(long, value_name = "K")]
+    pub orientation_stiffness: Option<f64>,
+    /// Sensitivity K1 to forces (position, world axes) and torques (rotation, hand axes), optionally spread and fingers
+    /// [default: 0.2 K in the horizontal, 1.5 K about the vertical at the goal, fingers 0.3 K]
+    #[arg(long, value_name = "X,Y,Z,RX,RY,RZ[,SPREAD,F1,F2,F3]", value_parser = sensitivity, allow_hyphen_values = true)]
+    pub k1: Option<Sensitivity>,
+    /// Farthest that feedback may move the plan: metres, degrees, and radians of the fingers
+    #[arg(long, value_name = "METRES,DEGREES,RAD", default_value = "0.25,25,0.6", value_parser = numbers::<3>, allow_hyphen_values = true)]
+    pub clamp: [f64; 3],
 }
+
+/// K1 of the ten rows that force can bend.
+pub type Sensitivity = [f64; 10];
 
 /// Learns and writes the primitive.
 ///
@@ -74,7 +94,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         } else {
             OrientationErrorKind::Quaternion
         },
+        dwell: command.dwell,
         hand: HandMotion { start: command.hand_start, goal: command.hand_goal, window: command.hand_window.into() },
+        feedback: FeedbackOptions {
+            stiffness: command.stiffness,
+            orientation_stiffness: command.orientation_stiffness,
+            sensitivity: command.k1,
+            limits: Some(command.clamp),
+        },
     };
     let spinner = output.spinner("learning");
     let recording = Recording::read(&command.demonstration)
@@ -118,6 +145,15 @@ fn failure(error: LearnError, command: &Cmd) -> Failure {
         Some(help) => failure.help(help),
         None => failure,
     }
+}
+
+/// Six or ten gains; without the last four force does not bend the fingers.
+fn sensitivity(text: &str) -> Result<Sensitivity, String> {
+    if text.split(',').count() == 6 {
+        let arm = numbers::<6>(text)?;
+        return Ok(std::array::from_fn(|row| arm.get(row).copied().unwrap_or(0.0)));
+    }
+    numbers::<10>(text).map_err(|reason| format!("{reason}, or only the first 6"))
 }
 
 /// Numbers separated by commas.

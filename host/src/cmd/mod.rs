@@ -2,11 +2,15 @@
 
 pub mod check;
 mod connection;
+pub mod experience;
+pub mod experiment;
+pub mod hand;
 pub mod learn;
 pub mod list;
 pub mod output;
 pub mod plot;
 pub mod record;
+pub mod rehearse;
 pub mod run;
 pub mod sim;
 pub mod stop;
@@ -75,6 +79,10 @@ pub enum Command {
     Teach(teach::Cmd),
     /// Make a primitive from a demonstration
     Learn(learn::Cmd),
+    /// Play a primitive without feedback and remember what it feels like
+    Rehearse(rehearse::Cmd),
+    /// Remember successful runs, so that the device notices when one goes wrong
+    Experience(experience::Cmd),
     /// Validate a primitive before it moves an arm
     Check(check::Cmd),
     /// Put a primitive into the device
@@ -83,10 +91,14 @@ pub enum Command {
     List(list::Cmd),
     /// Play a primitive on the arm
     Run(run::Cmd),
+    /// Initialise, open, close or move the hand
+    Hand(hand::Cmd),
     /// Bring the arm to rest
     Stop(stop::Cmd),
     /// Write down what the arm does
     Record(record::Cmd),
+    /// Try a movement on objects that are not where it expects them
+    Experiment(experiment::Cmd),
     /// Draw demonstration, plan and execution
     Plot(plot::Cmd),
 }
@@ -104,6 +116,10 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Record(command) => record::run(&command, &global),
         Command::Learn(command) => learn::run(&command, &global),
         Command::Check(command) => check::run(&command, &global),
+        Command::Rehearse(command) => rehearse::run(&command, &global),
+        Command::Experience(command) => experience::run(&command, &global),
+        Command::Hand(command) => hand::run(&command, &global),
+        Command::Experiment(command) => experiment::run(&command, &global),
         Command::Plot(command) => plot::run(&command, &global),
     };
     match result {

@@ -6,27 +6,22 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use control::{State, flags};
 use embedded_can::Frame as _;
-use link::{EventKind, Goal, RunOptions, Statistics};
+use link::{Goal, RunOptions, Statistics};
 use serde::Serialize;
 
-use super::{Failure, Global, Output, Table, connection, upload};
+use super::{Exit, Failure, Global, Output, Table, connection, upload};
 use crate::client::Client;
 use crate::demonstration::{RATE, Recording};
 use crate::device::Device;
 use crate::primitive_file::PrimitiveFile;
-use crate::procedure::{self, ProcedureError, Recorder, Take};
+use crate::procedure::{
+    self, Change, ChangeKind, FlagCounts, Mode, ProcedureError, RunOutcome, RunRequest, Surprise, recording_text,
+};
 use crate::tracking::Tracking;
 
 /// Rest that is recorded at the goal, s.
 const AFTERGLOW: f64 = 1.0;
-
-/// A joint farther than this from the start posture makes the arm go there first, rad; the device refuses at 50 mrad.
-const START_TOLERANCE: f64 = 0.02;
-
-/// Longest time a run may take beyond its planned duration, s.
-const PATIENCE: f64 = 5.0;
 
 /// Instructions per tick of the emulated board's clock (125 million and 25 million a second).
 const INSTRUCTIONS_PER_TICK: u32 = 5;
@@ -46,6 +41,18 @@ pub struct Cmd {
     /// Another goal of the grasp point, world frame, m
     #[arg(long, value_name = "X,Y,Z", value_parser = super::learn::numbers::<3>, allow_hyphen_values = true)]
     pub goal: Option<[f64; 3]>,
+    /// How force enters the run
+    #[arg(long, value_enum, default_value_t)]
+    pub mode: Mode,
+    /// Let the fingers keep to their plan, whatever their gauges feel
+    #[arg(long)]
+    pub no_finger_feedback: bool,
+    /// Move the goal while it runs: seconds after the start, then the goal as for --goal. May be given more than once
+    #[arg(long, value_name = "T:X,Y,Z", value_parser = goal_at, allow_hyphen_values = true)]
+    pub goal_at: Vec<Change>,
+    /// Change the speed while it runs: seconds after the start, then the factor. May be given more than once
+    #[arg(long, value_name = "T:FACTOR", value_parser = speed_at)]
+    pub speed_at: Vec<Change>,
     /// I have brought the arm to its home pose: zero it there if need be
     #[arg(long)]
     pub at_home: bool,
@@ -62,6 +69,8 @@ pub struct Cmd {
 pub struct Report {
     /// Name of the primitive.
     pub name: String,
+    /// How force entered the run.
+    pub mode: Mode,
     /// Duration of the movement, s.
     pub duration_s: f64,
     /// How well the plan was kept.
@@ -72,6 +81,10 @@ pub struct Report {
     pub gaps: u32,
     /// Samples in which the torque limiter was at work.
     pub limited_samples: usize,
+    /// Samples in which something was out of the ordinary.
+    pub flags: FlagCounts,
+    /// Where the run did not go as the successful ones did.
+    pub surprises: Vec<Surprise>,
     /// Control cycles since the device was switched on.
     pub cycles: u32,
     /// Cycles whose torque frames were not queued in time.
@@ -113,6 +126,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "run";
     let output = global.output();
     let file = upload::read(&command.primitive, DOING)?;
+    check_expectation(&file, command, output)?;
     upload::precheck(&file, command.speed, output, DOING)?;
     let started = Instant::now();
     let mut client = connection::open(global, DOING, |_| {})?;
@@ -150,64 +164,107 @@ fn play(
     file: &PrimitiveFile,
     output: Output,
 ) -> Result<Report, ProcedureError> {
-    go_to_start(client, file, output)?;
-    let mut recorder = Recorder::start(client, Vec::new(), &notes(client, file))?;
-    client.take_events();
+    let spinner = output.spinner("moving to the start");
+    let at_start = procedure::go_to_start(client, &file.start, |passed| {
+        spinner.set_message(format!("moving to the start, {passed:.0} s"));
+    });
+    spinner.finish_and_clear();
+    at_start?;
     let name =
         link::Name::new(&file.name).map_err(|error| crate::transport::TransportError::other(error.to_string()))?;
     let goal = Goal { position: command.goal.map(|goal| goal.map(|value| value as f32)), orientation: None };
-    client.run(&name, RunOptions { goal, speed: command.speed as f32, ..RunOptions::default() })?;
+    let options = RunOptions {
+        goal,
+        speed: command.speed as f32,
+        finger_feedback: !command.no_finger_feedback,
+        ..command.mode.options()
+    };
+    let changes = command.goal_at.iter().chain(&command.speed_at).copied().collect();
+    let request = RunRequest { rest: AFTERGLOW, changes, ..RunRequest::new(name, file.duration, options) };
 
-    output.say(format!("running '{}'", file.name));
-    let planned = file.duration / command.speed;
-    let bar = output.bar((planned * RATE) as u64, "running");
-    let limited = flags::JOINT_LIMITED | flags::MOTOR_LIMITED | flags::RATE_LIMITED;
-    let mut limited_samples = 0;
-    let mut arrived: Option<usize> = None;
-    loop {
-        match recorder.take(client)? {
-            Take::Event(event) => match event.kind {
-                EventKind::Arrived => arrived = Some(recorder.rows()),
-                EventKind::State => procedure::after(event.code, event.detail)?,
-                _ => {}
-            },
-            Take::Cycle(telemetry) => {
-                limited_samples += usize::from(telemetry.flags & limited != 0);
-                bar.set_position(recorder.rows() as u64);
-            }
-        }
-        let rows = recorder.rows();
-        if arrived.is_some_and(|at| rows as f64 >= at as f64 + AFTERGLOW * RATE) {
-            break;
-        }
-        if rows as f64 > (planned + PATIENCE) * RATE && arrived.is_none() {
-            client.stop()?;
-            return Err(ProcedureError::TooLong { what: "the movement", seconds: (planned + PATIENCE) as u64 });
-        }
-    }
+    output.say(format!("running '{}' ({})", file.name, command.mode.name()));
+    let notes = notes(client, file);
+    let bar = output.bar((file.duration / command.speed * RATE) as u64, "running");
+    let mut cycles = Vec::new();
+    let outcome = procedure::play(client, &request, &mut |cycle| {
+        cycles.push(*cycle);
+        bar.set_position(cycles.len() as u64);
+    });
     bar.finish_and_clear();
-    let rows = recorder.rows();
-    let bytes = recorder.finish(client)?;
+    let bytes = recording_text(&cycles, &notes)?;
+    // What led to an early end is worth reading as well.
     if let Some(path) = &command.record {
         std::fs::write(path, &bytes)?;
     }
+    let outcome = outcome?;
+    tell(&outcome, output);
     let statistics = client.statistics()?;
-    report(client, file, &bytes, (rows, limited_samples), &statistics)
+    report(client, file, command.mode, &bytes, outcome, &statistics)
 }
 
-/// Brings the arm to the posture in which the primitive begins.
-fn go_to_start(client: &mut Client<Device>, file: &PrimitiveFile, output: Output) -> Result<(), ProcedureError> {
-    let status = client.status()?;
-    let start = file.start.posture;
-    let far = status.q.iter().zip(&start).any(|(q, start)| (f64::from(*q) - start).abs() > START_TOLERANCE);
-    let standing = State::from_code(status.state) == Some(State::Hold);
-    if far || !standing {
-        let spinner = output.spinner("moving to the start");
-        let travelled = procedure::travel(client, start.map(|angle| angle as f32), |passed| {
-            spinner.set_message(format!("moving to the start, {passed:.0} s"));
-        });
-        spinner.finish_and_clear();
-        travelled?;
+/// Says what a person should know about how the run went.
+fn tell(outcome: &RunOutcome, output: Output) {
+    for surprise in &outcome.surprises {
+        output.warn(format!(
+            "not as the successful runs: {} stands out {:.2} s into the run, at phase {:.3}",
+            surprise.channel, surprise.time_s, surprise.phase
+        ));
+    }
+    let seconds = |samples: usize| samples as f64 / RATE;
+    let FlagCounts { faded, saturated, stale, hand_lost, clamped, .. } = outcome.flags;
+    for (samples, words) in [
+        (clamped, "the adaptation was at its limits"),
+        (faded, "the adaptation was derated or fading"),
+        (saturated, "the force sensor was saturated; force control stood still"),
+        (stale, "the force sensor was silent"),
+        (hand_lost, "the hand did not answer and was left alone"),
+    ] {
+        if samples > 0 {
+            output.say(format!("for {:.2} s {words}", seconds(samples)));
+        }
+    }
+}
+
+/// Refuses a run that compares forces with an expectation that is not there or says nothing about this run.
+fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Result<(), Failure> {
+    if !command.mode.needs_expectation() {
+        return Ok(());
+    }
+    let doing = format!("run refused: mode `{}`", command.mode.name());
+    let help = format!("tactus rehearse {}", file.file.display());
+    let Some(expectation) = &file.expectation else {
+        return Err(Failure::new(
+            Exit::Invalid,
+            "E635",
+            doing,
+            format!("{}: the primitive does not know what it should feel", file.file.display()),
+        )
+        .help(help));
+    };
+    let primitive = file.to_primitive().map_err(|cause| super::check::failure(cause, &file.file, "run"))?;
+    let relative = expectation.recorded_duration / (file.duration / command.speed);
+    let trust = primitive.expected().map_or(0.0, |expected| expected.trust(relative));
+    if trust <= 0.0 {
+        return Err(Failure::new(
+            Exit::Invalid,
+            "E636",
+            doing,
+            format!(
+                "the expectation was recorded at {:.2} s, this run would take {:.2} s: more than 50 % apart",
+                expectation.recorded_duration,
+                file.duration / command.speed
+            ),
+        )
+        .help(format!("{help} --speed {}", command.speed)));
+    }
+    if trust < 1.0 {
+        output.warn(format!(
+            "the expectation was recorded at another speed: the adaptation is derated to {:.0} %",
+            trust * 100.0
+        ));
+    }
+    if expectation.payload_mass > 0.0 {
+        output.say(format!("expects the load it was rehearsed with: {:.3} kg", expectation.payload_mass));
     }
     Ok(())
 }
@@ -220,8 +277,9 @@ fn notes(client: &Client<Device>, file: &PrimitiveFile) -> String {
 fn report(
     client: &mut Client<Device>,
     file: &PrimitiveFile,
+    mode: Mode,
     bytes: &[u8],
-    (rows, limited_samples): (usize, usize),
+    outcome: RunOutcome,
     statistics: &Statistics,
 ) -> Result<Report, ProcedureError> {
     let unreadable = |error: &dyn std::fmt::Display| std::io::Error::other(format!("it reads back wrong: {error}"));
@@ -245,11 +303,14 @@ fn report(
     });
     Ok(Report {
         name: file.name.clone(),
+        mode,
         duration_s: tracking.samples as f64 / RATE,
         tracking,
-        samples: rows,
+        samples: outcome.samples,
         gaps,
-        limited_samples,
+        limited_samples: outcome.flags.limited,
+        flags: outcome.flags,
+        surprises: outcome.surprises,
         cycles: statistics.cycles,
         missed_deadlines: statistics.missed_deadlines,
         lost_replies: statistics.lost_replies,
@@ -270,6 +331,7 @@ impl Report {
         let mut row = |name: &str, value: String| {
             table.row([name.to_owned(), value]);
         };
+        row("mode", self.mode.name().to_owned());
         row("duration", format!("{:.2} s", self.duration_s));
         row(
             "tracking, RMS",
@@ -288,6 +350,7 @@ impl Report {
         row("lost replies", self.lost_replies.to_string());
         row("samples, lost on the link", format!("{}, {}", self.samples, self.gaps));
         row("samples with limited torque", self.limited_samples.to_string());
+        row("surprises", self.surprises.len().to_string());
         if self.worst_instructions > 0 {
             row("control cycle, worst", format!("{} instructions", self.worst_instructions));
             row("control cycle, mean", format!("{} instructions", self.mean_instructions));
@@ -319,4 +382,43 @@ fn write_bus_log(client: &mut Client<Device>, path: &Path) -> std::io::Result<()
         writeln!(file)?;
     }
     file.flush()
+}
+
+/// A time and a goal, as in `3.5:0.7,0.1,0.2`.
+fn goal_at(text: &str) -> Result<Change, String> {
+    let (time, goal) = timed(text)?;
+    let position = super::learn::numbers::<3>(goal)?.map(|value| value as f32);
+    Ok(Change { time, kind: ChangeKind::Goal(Goal { position: Some(position), orientation: None }) })
+}
+
+/// A time and a speed factor, as in `3.5:0.5`.
+fn speed_at(text: &str) -> Result<Change, String> {
+    let (time, factor) = timed(text)?;
+    Ok(Change { time, kind: ChangeKind::Speed(super::check::factor(factor)? as f32) })
+}
+
+fn timed(text: &str) -> Result<(f64, &str), String> {
+    let (time, rest) = text.split_once(':').ok_or("a time in seconds, a colon and a value are expected")?;
+    match time.parse::<f64>() {
+        Ok(time) if (0.0..=3600.0).contains(&time) => Ok((time, rest)),
+        _ => Err(format!("`{time}` is not a time between 0 and 3600 s")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_carry_their_time_and_nonsense_is_refused() {
+        let change = goal_at("3.5:0.7,-0.1,0.2").unwrap();
+        assert_eq!(change.time, 3.5);
+        let goal = Goal { position: Some([0.7, -0.1, 0.2]), orientation: None };
+        assert_eq!(change.kind, ChangeKind::Goal(goal));
+        assert_eq!(speed_at("0:0.5").unwrap().kind, ChangeKind::Speed(0.5));
+        for wrong in ["0.7,0.1,0.2", "-1:0.7,0.1,0.2", "nan:0.7,0.1,0.2", "1:0.7,0.1", "1:"] {
+            assert!(goal_at(wrong).is_err(), "{wrong}");
+        }
+        assert!(speed_at("1:3").is_err() && speed_at("1:nan").is_err());
+    }
 }

@@ -8,6 +8,7 @@ use std::time::Instant;
 use clap::Args;
 use control::State;
 use serde_json::json;
+use sim::person::Lesson;
 
 use super::{Exit, Failure, Global, connection};
 use crate::client::Client;
@@ -39,6 +40,37 @@ pub struct Cmd {
     /// Seed of the simulated person's hand
     #[arg(long, default_value_t = DEFAULT_SEED)]
     pub person: u64,
+    /// What the simulated person shows
+    #[arg(long, value_enum, default_value_t)]
+    pub lesson: LessonName,
+}
+
+/// What the simulated person can show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum LessonName {
+    /// A side grasp with turns about every axis
+    #[default]
+    Demonstration,
+    /// A level side grasp of a standing flashlight
+    Flashlight,
+    /// A side grasp of a cup
+    Cup,
+    /// A grasp of a lying bottle from above
+    Bottle,
+    /// A grasp and a lift
+    Lift,
+}
+
+impl LessonName {
+    fn lesson(self) -> Lesson {
+        match self {
+            LessonName::Demonstration => Lesson::Demonstration,
+            LessonName::Flashlight => Lesson::Flashlight,
+            LessonName::Cup => Lesson::Cup,
+            LessonName::Bottle => Lesson::Bottle,
+            LessonName::Lift => Lesson::Lift,
+        }
+    }
 }
 
 /// Seven joint angles, rad.
@@ -52,9 +84,13 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "teach";
     let output = global.output();
     let started = Instant::now();
-    let mut client = connection::open(global, DOING, |options| options.person = Some(command.person))?;
+    let mut client = connection::open(global, DOING, |options| {
+        options.person = Some(command.person);
+        options.lesson = command.lesson.lesson();
+        clear_the_table(options);
+    })?;
     let alone = global.non_interactive && command.duration.is_none();
-    if alone && default_posture(&mut client).is_none() {
+    if alone && default_posture(&mut client, command.lesson).is_none() {
         return Err(Failure::new(
             Exit::Usage,
             "E205",
@@ -63,7 +99,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         )
         .help("say how long to record with `--duration SECONDS`"));
     }
-    if command.from.is_some() && default_posture(&mut client).is_some() {
+    if command.from.is_some() && default_posture(&mut client, command.lesson).is_some() {
         return Err(Failure::new(
             Exit::Usage,
             "E206",
@@ -75,7 +111,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let failed = |error| connection::failure(error, DOING);
 
-    if let Some(posture) = command.from.or_else(|| default_posture(&mut client)) {
+    if let Some(posture) = command.from.or_else(|| default_posture(&mut client, command.lesson)) {
         let spinner = output.spinner("moving to the start");
         let travelled = procedure::travel(&mut client, posture, |passed| {
             spinner.set_message(format!("moving to the start, {passed:.0} s"));
@@ -161,17 +197,26 @@ fn wait_for_enter() -> std::thread::JoinHandle<()> {
 mod person {
     use std::any::Any;
 
-    use sim::person::{GuidedWorld, Stage};
-    use sim::world::mujoco::MujocoWorld;
+    use sim::person::{GuidedWorld, Lesson, Stage};
+    use sim::world::mujoco::{MujocoWorld, Scene};
 
     use crate::client::Client;
     use crate::device::Device;
+    use crate::simulation::SimulationOptions;
 
     type Guided = GuidedWorld<MujocoWorld>;
 
     fn guided(client: &mut Client<Device>) -> Option<&mut Guided> {
         let world: &mut dyn Any = client.transport().simulation()?.world();
         world.downcast_mut()
+    }
+
+    /// The way is shown without the object: a person who leads the hand would push it over, and what is shown is the way. The
+    /// first lesson keeps it, because its grasp ends beside it.
+    pub(super) fn clear_the_table(options: &mut SimulationOptions) {
+        if options.lesson != Lesson::Demonstration {
+            options.scene = Scene::EMPTY;
+        }
     }
 
     /// Tells the simulated person to begin; `false` if there is none.
@@ -188,9 +233,9 @@ mod person {
     }
 
     /// Where the simulated person's path begins.
-    pub(super) fn default_posture(client: &mut Client<Device>) -> Option<super::Posture> {
+    pub(super) fn default_posture(client: &mut Client<Device>, lesson: super::LessonName) -> Option<super::Posture> {
         guided(client)?;
-        Some(sim::person::DEMONSTRATION_START.map(|angle| angle as f32))
+        Some(lesson.lesson().start().map(|angle| angle as f32))
     }
 }
 
@@ -199,6 +244,9 @@ mod person {
 mod person {
     use crate::client::Client;
     use crate::device::Device;
+    use crate::simulation::SimulationOptions;
+
+    pub(super) fn clear_the_table(_options: &mut SimulationOptions) {}
 
     pub(super) fn begin_guiding(_client: &mut Client<Device>) -> bool {
         false
@@ -208,12 +256,12 @@ mod person {
         false
     }
 
-    pub(super) fn default_posture(_client: &mut Client<Device>) -> Option<super::Posture> {
+    pub(super) fn default_posture(_client: &mut Client<Device>, _lesson: super::LessonName) -> Option<super::Posture> {
         None
     }
 }
 
-use person::{begin_guiding, default_posture, guiding_is_over};
+use person::{begin_guiding, clear_the_table, default_posture, guiding_is_over};
 
 /// Seven numbers separated by commas.
 pub(super) fn posture(text: &str) -> Result<Posture, String> {

@@ -26,6 +26,17 @@ pub const ORIENTATION_D: [&str; 4] = ["qw_d", "qx_d", "qy_d", "qz_d"];
 /// Columns of the wrench of the environment on the robot, at the tool frame.
 pub const WRENCH: [&str; 6] = ["fx_N", "fy_N", "fz_N", "tx_Nm", "ty_Nm", "tz_Nm"];
 
+/// Column of the flag bits.
+pub const FLAGS: &str = "flags";
+/// Columns of the measured hand: spread and fingers 1 to 3, inner links.
+pub const HAND: [&str; 4] = ["spread_rad", "finger1_rad", "finger2_rad", "finger3_rad"];
+/// Columns of the desired hand.
+pub const HAND_D: [&str; 4] = ["spread_d_rad", "finger1_d_rad", "finger2_d_rad", "finger3_d_rad"];
+/// Columns of the torque of the environment on the fingers, by their strain gauges.
+pub const GAUGES: [&str; 3] = ["gauge1_Nm", "gauge2_Nm", "gauge3_Nm"];
+/// Column of the statistic of the watch for unusual runs.
+pub const SURPRISE: &str = "surprise";
+
 /// `q1_rad` and so on: the name of one joint's column.
 pub fn joint_column(symbol: &str, joint: usize, unit: &str) -> String {
     format!("{symbol}{}_{unit}", joint + 1)
@@ -48,7 +59,7 @@ pub fn joint_torques() -> [String; JOINTS] {
 
 /// Every column of our own layout in its order.
 pub fn header() -> Vec<String> {
-    let mut names: Vec<String> = [CYCLE, TIME, STATE, "fault", "flags", PHASE].map(String::from).to_vec();
+    let mut names: Vec<String> = [CYCLE, TIME, STATE, "fault", FLAGS, PHASE].map(String::from).to_vec();
     names.extend(joint_positions());
     names.extend(joint_velocities());
     names.extend(joint_torques());
@@ -58,6 +69,11 @@ pub fn header() -> Vec<String> {
     names.extend(ORIENTATION_D.map(String::from));
     names.extend(WRENCH.map(String::from));
     names.extend(["lost_replies", "cost_ticks"].map(String::from));
+    // Appended: recordings of the time before the hand have none of these.
+    names.extend(HAND.map(String::from));
+    names.extend(HAND_D.map(String::from));
+    names.extend(GAUGES.map(String::from));
+    names.push(SURPRISE.to_owned());
     names
 }
 

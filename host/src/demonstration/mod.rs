@@ -80,6 +80,27 @@ pub enum PoseSource {
 }
 
 impl Demonstration {
+    /// Rests at the end for another `seconds`, to the nearest sample.
+    pub fn rest(&mut self, seconds: f64) {
+        let samples = (seconds * RATE).round() as usize;
+        fn hold<T: Clone>(values: &mut Vec<T>, samples: usize) {
+            if let Some(last) = values.last().cloned() {
+                values.resize(values.len() + samples, last);
+            }
+        }
+        for _ in 0..samples {
+            self.time.push(self.time.len() as f64 / RATE);
+        }
+        hold(&mut self.position, samples);
+        hold(&mut self.orientation, samples);
+        if let Some(q) = &mut self.q {
+            hold(q, samples);
+        }
+        if let Some(wrench) = &mut self.wrench {
+            hold(wrench, samples);
+        }
+    }
+
     /// Resamples, finds the pose and trims.
     ///
     /// Joint angles count more than pose columns: they are what the arm measured, and the pose that the controller

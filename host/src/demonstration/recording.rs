@@ -56,6 +56,16 @@ pub struct Recording {
     pub orientation_d: Option<Vec<[f64; 4]>>,
     /// Wrench of the environment on the robot: force N (world axes), torque N m.
     pub wrench: Option<Vec<[f64; 6]>>,
+    /// Flag bits of each cycle, see `control::record::flags`.
+    pub flags: Option<Vec<u32>>,
+    /// Measured hand: spread and fingers 1 to 3, rad.
+    pub hand: Option<Vec<[f64; 4]>>,
+    /// Desired hand: spread and fingers 1 to 3, rad.
+    pub hand_d: Option<Vec<[f64; 4]>>,
+    /// Torque of the environment on fingers 1 to 3, N m.
+    pub gauges: Option<Vec<[f64; 3]>>,
+    /// Statistic of the watch for unusual runs, 1.
+    pub surprise: Option<Vec<f64>>,
     /// Gaps: places where samples are missing.
     pub gaps: usize,
     /// Samples that are missing in all gaps together.
@@ -98,6 +108,9 @@ impl Recording {
         let position_d = table.group(&layout::POSITION_D, &mut missing);
         let orientation_d = table.group(&layout::ORIENTATION_D, &mut missing);
         let wrench = table.group(&layout::WRENCH, &mut missing);
+        let hand = table.group(&layout::HAND, &mut missing);
+        let hand_d = table.group(&layout::HAND_D, &mut missing);
+        let gauges = table.group(&layout::GAUGES, &mut missing);
         // A position without an orientation (or the reverse) is half a pose: say which half is missing.
         match (&position, &orientation) {
             (Some(_), None) if missing.is_empty() => {
@@ -138,6 +151,7 @@ impl Recording {
             None => None,
             Some(column) => Some(table.whole_numbers(column)?),
         };
+        let flags = table.column(layout::FLAGS).map(|column| table.whole_numbers(column)).transpose()?;
         let orientation = orientation.map(|columns| table.quaternions(columns)).transpose()?;
         let orientation_d = orientation_d.map(|columns| table.quaternions(columns)).transpose()?;
         let (gaps, missing_samples, longest_gap) = count_gaps(&time, cycle.as_deref());
@@ -146,13 +160,18 @@ impl Recording {
             checksum: checksum(bytes),
             header_line: table.header_line,
             columns: table.names.len(),
-            phase: table.column(layout::PHASE).map(|column| table.rows.iter().map(|row| row[column]).collect()),
+            phase: table.column(layout::PHASE).map(|column| table.numbers(column)),
+            surprise: table.column(layout::SURPRISE).map(|column| table.numbers(column)),
             q: q.map(|columns| table.vectors(columns)),
             dq: dq.map(|columns| table.vectors(columns)),
             tau: tau.map(|columns| table.vectors(columns)),
             position: position.map(|columns| table.vectors(columns)),
             position_d: position_d.map(|columns| table.vectors(columns)),
             wrench: wrench.map(|columns| table.vectors(columns)),
+            hand: hand.map(|columns| table.vectors(columns)),
+            hand_d: hand_d.map(|columns| table.vectors(columns)),
+            gauges: gauges.map(|columns| table.vectors(columns)),
+            flags,
             state: table.states,
             lines: table.lines,
             time,
@@ -212,6 +231,11 @@ impl Recording {
             position_d: self.position_d.as_ref().map(|values| pick(values, keep)),
             orientation_d: self.orientation_d.as_ref().map(|values| pick(values, keep)),
             wrench: self.wrench.as_ref().map(|values| pick(values, keep)),
+            hand: self.hand.as_ref().map(|values| pick(values, keep)),
+            hand_d: self.hand_d.as_ref().map(|values| pick(values, keep)),
+            gauges: self.gauges.as_ref().map(|values| pick(values, keep)),
+            flags: self.flags.as_ref().map(|values| pick(values, keep)),
+            surprise: self.surprise.as_ref().map(|values| pick(values, keep)),
             time,
             cycle,
             gaps,
@@ -416,6 +440,10 @@ impl<'a> Table<'a> {
         }
         make_sign_continuous(&mut values);
         Ok(values)
+    }
+
+    fn numbers(&self, column: usize) -> Vec<f64> {
+        self.rows.iter().map(|row| row[column]).collect()
     }
 
     fn whole_numbers(&self, column: usize) -> Result<Vec<u32>, RecordingError> {

@@ -18,7 +18,7 @@ pub struct RecordingRow {
     /// Stable code of the latched fault, 0 for none.
     pub fault: u8,
     /// Flags of the telemetry message.
-    pub flags: u16,
+    pub flags: u32,
     /// Phase of the movement.
     pub phase: f32,
     /// Joint angles, rad.
@@ -37,6 +37,14 @@ pub struct RecordingRow {
     pub lost_replies: u8,
     /// Cost of the control cycle in ticks of the device's clock.
     pub cost_ticks: u32,
+    /// Measured hand: spread and fingers 1 to 3, rad.
+    pub hand: [f32; 4],
+    /// Desired hand: spread and fingers 1 to 3, rad.
+    pub hand_d: [f32; 4],
+    /// Torque of the environment on fingers 1 to 3, N m.
+    pub gauges: [f32; 3],
+    /// Statistic of the watch for unusual runs.
+    pub surprise: f32,
 }
 
 /// A recording that is being written.
@@ -75,7 +83,11 @@ impl<W: Write> RecordingWriter<W> {
         for value in row.pose_d.iter().chain(&row.wrench) {
             write!(output, ",{value}")?;
         }
-        writeln!(output, ",{},{}", row.lost_replies, row.cost_ticks)?;
+        write!(output, ",{},{}", row.lost_replies, row.cost_ticks)?;
+        for value in row.hand.iter().chain(&row.hand_d).chain(&row.gauges).chain([&row.surprise]) {
+            write!(output, ",{value}")?;
+        }
+        writeln!(output)?;
         self.rows += 1;
         Ok(())
     }

@@ -3,7 +3,7 @@
 use dmp::fit::{Demonstration as Samples, FitOptions};
 use dmp::{Configuration, OrientationError, Quaternion};
 
-use super::LearnOptions;
+use super::{LearnOptions, feedback};
 use crate::demonstration::{Demonstration, RATE};
 use crate::primitive_file::{Gain, HemisphereKind, OrientationErrorKind, PrimitiveFile, Waypoint, WaypointVelocity};
 
@@ -23,6 +23,7 @@ pub(super) fn fit(
         &FitOptions {
             kernel_count: options.kernels,
             cutoff: Some(options.cutoff),
+            stiffness: feedback::stiffness(&options.feedback, samples.duration()),
             orientation_error: match options.orientation_error {
                 OrientationErrorKind::Quaternion => OrientationError::Quaternion,
                 OrientationErrorKind::RotationVector => OrientationError::RotationVector,
@@ -56,6 +57,7 @@ pub(super) fn fit(
         weights: learned.weights.chunks(learned.options.kernel_count).map(<[f64]>::to_vec).collect(),
         feedback: None,
         expectation: None,
+        experience: None,
         provenance: None,
     })
 }

@@ -5,8 +5,10 @@
 //! angles, the fingers from a generated movement. What is reported is not the residual of the regression but the
 //! error of the primitive that was made, rolled out from the demonstration's start and compared sample by sample.
 
+pub mod feedback;
 mod fit;
 pub mod hand;
+pub mod memory;
 pub mod report;
 
 use std::path::{Path, PathBuf};
@@ -18,11 +20,15 @@ use crate::demonstration::{Demonstration, DemonstrationError, PoseSource, Prepar
 use crate::plan;
 use crate::plot::movement::rotation_vectors;
 use crate::primitive_file::{KERNEL_CAPACITY, OrientationErrorKind, PrimitiveFile, PrimitiveFileError, Provenance};
+use feedback::{FeedbackOptions, FeedbackReport};
 use hand::HandMotion;
 use report::{FitReport, row_error, wrench_statistics};
 
 /// Speed of the tool (turning counted, m/s) above which a demonstration does not begin or end at rest.
 const MOVING_END: f64 = 0.01;
+
+/// Longest rest at the goal, s.
+const LONGEST_DWELL: f64 = 60.0;
 
 /// Arm posture for recordings without joint angles, rad: the middle of every joint's range but the elbow bent by a
 /// right angle, far from every limit and every singularity.
@@ -41,8 +47,12 @@ pub struct LearnOptions {
     pub preparation: Preparation,
     /// Orientation error.
     pub orientation_error: OrientationErrorKind,
-    /// Movement of the fingers.
+    /// Rest at the goal that is appended to the demonstration, s: time for the fingers to close.
+    pub dwell: f64,
+    /// Movement of the fingers, in fractions of the duration with the dwell.
     pub hand: HandMotion,
+    /// Springs, sensitivity and limits.
+    pub feedback: FeedbackOptions,
 }
 
 impl LearnOptions {
@@ -54,7 +64,9 @@ impl LearnOptions {
             cutoff: 7.5,
             preparation: Preparation::default(),
             orientation_error: OrientationErrorKind::Quaternion,
+            dwell: 0.0,
             hand: HandMotion::default(),
+            feedback: FeedbackOptions::default(),
         }
     }
 }
@@ -127,7 +139,22 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
             reason: "two fractions of the duration in order, between 0 and 1, are expected".to_owned(),
         });
     }
-    let demonstration = Demonstration::prepare(recording, &options.preparation)?;
+    check_feedback(&options.feedback)?;
+    if !(0.0..=LONGEST_DWELL).contains(&options.dwell) {
+        return Err(LearnError::Option {
+            option: "--dwell",
+            reason: format!("a time between 0 and {LONGEST_DWELL} s is expected"),
+        });
+    }
+    let mut demonstration = Demonstration::prepare(recording, &options.preparation)?;
+    let moving_end = demonstration.speed().last().is_some_and(|speed| *speed > MOVING_END);
+    if options.dwell > 0.0 && moving_end {
+        return Err(LearnError::Option {
+            option: "--dwell",
+            reason: "the demonstration ends in motion, and nothing can rest behind that".to_owned(),
+        });
+    }
+    demonstration.rest(options.dwell);
     let mut warnings = Vec::new();
     let largest_angle = check_angle(recording, &demonstration, options, &mut warnings)?;
     let posture = match &demonstration.q {
@@ -161,7 +188,10 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
         provenance: None,
         ..fitted
     };
+    primitive.feedback = Some(feedback::tables(&primitive, options));
     let mut report = compare(&primitive, recording, &demonstration, &posture, &hand, largest_angle, warnings)?;
+    report.feedback = FeedbackReport::of(&primitive);
+    report.warnings.extend(report.feedback.as_ref().map(FeedbackReport::warnings).unwrap_or_default());
     let coarse = report.position_rms_m > COARSE_POSITION || report.orientation_rms_rad > COARSE_ORIENTATION;
     if coarse && options.kernels < KERNEL_CAPACITY {
         report.warnings.push(format!(
@@ -183,6 +213,29 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
         tool: format!("tactus {}", env!("CARGO_PKG_VERSION")),
     });
     Ok(Learned { primitive, report, demonstration })
+}
+
+/// Refuses gains and limits that are no numbers of use.
+fn check_feedback(feedback: &FeedbackOptions) -> Result<(), LearnError> {
+    let wrong = |option: &'static str, reason: &str| Err(LearnError::Option { option, reason: reason.to_owned() });
+    let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value <= 1e6);
+    if !positive(feedback.stiffness) {
+        return wrong("--stiffness", "a number between 0 and 1e6 is expected");
+    }
+    if !positive(feedback.orientation_stiffness) {
+        return wrong("--orientation-stiffness", "a number between 0 and 1e6 is expected");
+    }
+    if feedback.sensitivity.is_some_and(|k1| !k1.iter().all(|k1| (0.0..=1e6).contains(k1))) {
+        return wrong("--k1", "numbers between 0 and 1e6 are expected: a negative one would run towards what pushes");
+    }
+    match feedback.limits {
+        Some([metres, degrees, hand])
+            if !((0.0..=1.0).contains(&metres) && (0.0..=180.0).contains(&degrees) && (0.0..=3.0).contains(&hand)) =>
+        {
+            wrong("--clamp", "metres up to 1, degrees up to 180 and radians up to 3 are expected")
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Largest angle to the goal along the way that was shown, rad, or why it is too large.
@@ -327,6 +380,7 @@ fn compare(
         orientation_path_ratio: if shown_path > 0.01 { path(&orientation) / shown_path } else { 1.0 },
         rows,
         wrench: demonstration.wrench.as_deref().map(wrench_statistics).unwrap_or_default(),
+        feedback: None,
         warnings,
     })
 }

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::feedback::FeedbackReport;
 use crate::table::Table;
 
 /// Names of the 17 rows with the unit of their error.
@@ -102,6 +103,8 @@ pub struct FitReport {
     pub rows: Vec<RowError>,
     /// Wrench that was felt while the movement was shown; empty if it was not recorded.
     pub wrench: Vec<WrenchStatistics>,
+    /// What the gains of the feedback mean.
+    pub feedback: Option<FeedbackReport>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -156,6 +159,9 @@ impl FitReport {
                 ]);
             }
             text += &format!("\n{wrench}");
+        }
+        if let Some(feedback) = &self.feedback {
+            text += &format!("\n{}", feedback.to_text());
         }
         text
     }

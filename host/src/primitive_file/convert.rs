@@ -1,12 +1,15 @@
 //! From the file to what a controller runs: `dmp::Primitive` on the host, the image for a device.
 
 use dmp::{
-    Configuration, ExpectedWrench, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, Primitive,
+    Configuration, ExpectedWrench, Experience, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, Primitive,
     PrimitiveTables, Quaternion, TableError, Velocity,
 };
 use link::image::{ExpectationMarks, FeedbackClamps, IMAGE_BYTES_LIMIT, ImageContent, PrimitiveImage};
 
-use super::{HemisphereKind, OrientationErrorKind, PrimitiveFile, PrimitiveFileError, Waypoint, WaypointVelocity};
+use super::{
+    ExperienceTable, HemisphereKind, OrientationErrorKind, PrimitiveFile, PrimitiveFileError, Waypoint,
+    WaypointVelocity,
+};
 
 /// Most kernels of a row, the same as on a device.
 pub const KERNEL_CAPACITY: usize = control::MAX_KERNELS;
@@ -21,6 +24,7 @@ impl PrimitiveFile {
     /// [`PrimitiveFileError::Invalid`] with the reason that `dmp` gives.
     pub fn to_primitive(&self) -> Result<HostPrimitive, PrimitiveFileError> {
         let refused = |reason: String| PrimitiveFileError::Invalid { file: self.file.clone(), reason };
+        self.require_expectation()?;
         let weights = self.weights.concat();
         let feedback = self
             .feedback
@@ -40,6 +44,15 @@ impl PrimitiveFile {
             .map(|table| ExpectedWrench::new(&points(&table.mean), table.recorded_duration))
             .transpose()
             .map_err(|error| refused(format!("expectation: {error}")))?;
+        let experience = self
+            .experience
+            .as_ref()
+            .map(|table| {
+                let trials = u16::try_from(table.trials).unwrap_or(u16::MAX);
+                Experience::new(&points(&table.mean), &points(&table.spread), trials)
+            })
+            .transpose()
+            .map_err(|error| refused(format!("experience: {error}")))?;
         let tables = PrimitiveTables {
             duration: self.duration,
             alpha: self.alpha,
@@ -59,8 +72,9 @@ impl PrimitiveFile {
             start: configuration(&self.start),
             goal: configuration(&self.goal),
             start_velocity: velocity(&self.start_velocity),
-            feedback,
-            expected,
+            feedback: feedback.as_ref(),
+            expected: expected.as_ref(),
+            experience: experience.as_ref(),
         };
         Primitive::new(&tables).map_err(|error| refused(error.to_string()))
     }
@@ -70,6 +84,7 @@ impl PrimitiveFile {
     /// # Errors
     /// [`PrimitiveFileError::Image`], for example for more kernels than an image can hold.
     pub fn to_image(&self) -> Result<Vec<u8>, PrimitiveFileError> {
+        self.require_expectation()?;
         let refused = |cause| PrimitiveFileError::Image { file: self.file.clone(), cause };
         let single = |rows: &[Vec<f64>]| -> Vec<f32> { rows.iter().flatten().map(|value| *value as f32).collect() };
         let weights = single(&self.weights);
@@ -77,6 +92,10 @@ impl PrimitiveFile {
         let k2 = self.feedback.as_ref().map_or_else(Vec::new, |tables| single(&tables.k2));
         let mean = self.expectation.as_ref().map_or_else(Vec::new, |table| single(&table.mean));
         let spread = self.expectation.as_ref().map_or_else(Vec::new, |table| single(&table.spread));
+        let known = |pick: fn(&ExperienceTable) -> &Vec<Vec<f64>>| {
+            self.experience.as_ref().map_or_else(Vec::new, |table| single(pick(table)))
+        };
+        let (experience_mean, experience_spread) = (known(|table| &table.mean), known(|table| &table.spread));
         let content = ImageContent::<&[f32]> {
             model_hash: self.model_hash,
             duration: self.duration as f32,
@@ -119,6 +138,12 @@ impl PrimitiveFile {
             weights: &weights,
             expected_mean: &mean,
             expected_spread: &spread,
+            experience_trials: self
+                .experience
+                .as_ref()
+                .map_or(0, |table| u16::try_from(table.trials).unwrap_or(u16::MAX)),
+            experience_mean: &experience_mean,
+            experience_spread: &experience_spread,
         };
         let name = link::Name::new(&self.name).map_err(|_| refused(link::ImageError::Name))?;
         let mut bytes = vec![0; IMAGE_BYTES_LIMIT];

@@ -5,8 +5,8 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::{
-    ExpectationTable, FeedbackTables, Gain, HemisphereKind, OrientationErrorKind, PrimitiveFile, PrimitiveFileError,
-    Provenance, SCHEMA, Waypoint, WaypointVelocity,
+    ExpectationTable, ExperienceTable, FeedbackTables, Gain, HemisphereKind, OrientationErrorKind, PrimitiveFile,
+    PrimitiveFileError, Provenance, SCHEMA, Waypoint, WaypointVelocity,
 };
 
 #[derive(Deserialize)]
@@ -24,6 +24,7 @@ struct Document {
     weights: WeightsSection,
     feedback: Option<FeedbackSection>,
     expectation: Option<ExpectationSection>,
+    experience: Option<ExperienceSection>,
     provenance: Option<ProvenanceSection>,
 }
 
@@ -117,12 +118,21 @@ struct FeedbackSection {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ExpectationSection {
+    model_hash: String,
     recorded_duration_s: f64,
     payload_mass_kg: f64,
     payload_centre_m: [f64; 3],
     filter_cutoff_hz: f64,
     trials: u32,
     spread_floor: f64,
+    mean: Vec<Vec<f64>>,
+    spread: Vec<Vec<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ExperienceSection {
+    trials: u32,
     mean: Vec<Vec<f64>>,
     spread: Vec<Vec<f64>>,
 }
@@ -240,6 +250,22 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<(PrimitiveFile, u32), Pri
             })
         })
         .transpose()?;
+    let expectation = document
+        .expectation
+        .map(|section| -> Result<ExpectationTable, PrimitiveFileError> {
+            Ok(ExpectationTable {
+                model_hash: hexadecimal("expectation.model_hash", &section.model_hash)?,
+                recorded_duration: section.recorded_duration_s,
+                payload_mass: section.payload_mass_kg,
+                payload_centre: section.payload_centre_m,
+                filter_cutoff: section.filter_cutoff_hz,
+                trials: section.trials,
+                spread_floor: section.spread_floor,
+                mean: section.mean,
+                spread: section.spread,
+            })
+        })
+        .transpose()?;
     let gains = document.gains;
     let velocity = document.start_velocity;
     let primitive = PrimitiveFile {
@@ -266,13 +292,9 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<(PrimitiveFile, u32), Pri
             k1: section.k1,
             k2: section.k2,
         }),
-        expectation: document.expectation.map(|section| ExpectationTable {
-            recorded_duration: section.recorded_duration_s,
-            payload_mass: section.payload_mass_kg,
-            payload_centre: section.payload_centre_m,
-            filter_cutoff: section.filter_cutoff_hz,
+        expectation,
+        experience: document.experience.map(|section| ExperienceTable {
             trials: section.trials,
-            spread_floor: section.spread_floor,
             mean: section.mean,
             spread: section.spread,
         }),

@@ -105,4 +105,24 @@ pub enum PrimitiveFileError {
         /// Hash of the model that this tool was built with.
         expected: u32,
     },
+    /// The expectation was recorded at a speed that says nothing about this one.
+    #[error("{file}: [expectation]: recorded_duration_s = {recorded:.3}, but the movement takes {duration:.3} s: more than 50 % apart", file = file.display())]
+    ExpectationDuration {
+        /// The file.
+        file: PathBuf,
+        /// Duration of the recorded runs, s.
+        recorded: f64,
+        /// Duration of the movement, s.
+        duration: f64,
+    },
+    /// The expectation was recorded with another model of the arm than the movement was learned with.
+    #[error("{file}: [expectation]: recorded with robot model 0x{found:08x}, the movement has model 0x{expected:08x}", file = file.display())]
+    ExpectationModel {
+        /// The file.
+        file: PathBuf,
+        /// Hash of the expectation.
+        found: u32,
+        /// Hash of the movement.
+        expected: u32,
+    },
 }

@@ -20,6 +20,10 @@ use crate::demonstration::recording::checksum;
 /// Version of the layout. A file that names another one is refused.
 pub const SCHEMA: &str = "tactus-primitive/1";
 
+/// Largest deviation of the duration from the recorded one at which an expectation means anything; `dmp` gives no trust
+/// to one beyond it.
+pub const LARGEST_DURATION_DEVIATION: f64 = 0.5;
+
 /// Rows of weights by group: position, orientation, posture, hand.
 pub const GROUPS: [(&str, usize); 4] = [
     ("position", dmp::POSITION_ROWS),
@@ -95,6 +99,8 @@ pub struct FeedbackTables {
 /// What the sensors should feel, by phase.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpectationTable {
+    /// Hash of the robot model it was recorded with.
+    pub model_hash: u32,
     /// Duration of the recorded runs, s.
     pub recorded_duration: f64,
     /// Mass carried while recording beyond the hand, kg.
@@ -110,6 +116,17 @@ pub struct ExpectationTable {
     /// Mean by phase, 9 sensor rows a point: force N (world), torque N m, finger gauges N m.
     pub mean: Vec<Vec<f64>>,
     /// Standard deviation, same shape.
+    pub spread: Vec<Vec<f64>>,
+}
+
+/// How successful runs felt and where the fingers stood, by phase: what the device watches a run by.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExperienceTable {
+    /// Successful runs it was made from.
+    pub trials: u32,
+    /// Mean by phase, 12 channels a point: the 9 sensor rows of the expectation, then fingers F1 to F3, rad.
+    pub mean: Vec<Vec<f64>>,
+    /// Standard deviation, same shape, positive.
     pub spread: Vec<Vec<f64>>,
 }
 
@@ -169,6 +186,8 @@ pub struct PrimitiveFile {
     pub feedback: Option<FeedbackTables>,
     /// Expected sensor values, if they were recorded.
     pub expectation: Option<ExpectationTable>,
+    /// How successful runs felt, if any were gathered.
+    pub experience: Option<ExperienceTable>,
     /// Where it comes from.
     pub provenance: Option<Provenance>,
 }
@@ -232,6 +251,37 @@ impl PrimitiveFile {
         }
     }
 
+    /// Refuses an expectation that is not that of this movement on this arm: recorded at a duration more than half away from
+    /// that of the movement (the inertial part of a wrench goes with the square of the speed), or with another model.
+    ///
+    /// # Errors
+    /// [`PrimitiveFileError::ExpectationDuration`], [`PrimitiveFileError::ExpectationModel`].
+    pub fn require_expectation(&self) -> Result<(), PrimitiveFileError> {
+        let Some(expectation) = &self.expectation else { return Ok(()) };
+        if expectation.model_hash != self.model_hash {
+            return Err(PrimitiveFileError::ExpectationModel {
+                file: self.file.clone(),
+                found: expectation.model_hash,
+                expected: self.model_hash,
+            });
+        }
+        let recorded = expectation.recorded_duration;
+        // Both are finite: a file with another number is not read.
+        if (recorded - self.duration).abs() > LARGEST_DURATION_DEVIATION * recorded {
+            return Err(PrimitiveFileError::ExpectationDuration {
+                file: self.file.clone(),
+                recorded,
+                duration: self.duration,
+            });
+        }
+        Ok(())
+    }
+
+    /// The movement alone, as it can be rehearsed: without expectation and experience.
+    pub fn without_memory(&self) -> PrimitiveFile {
+        PrimitiveFile { expectation: None, experience: None, ..self.clone() }
+    }
+
     /// Number of kernels of each row.
     pub fn kernels(&self) -> usize {
         self.weights.first().map_or(0, Vec::len)
@@ -285,12 +335,18 @@ impl PrimitiveFile {
             tables.push(("feedback.k2".into(), feedback.k2.concat()));
         }
         if let Some(expectation) = &self.expectation {
-            let mut marks = vec![expectation.recorded_duration, expectation.payload_mass];
+            let model = f64::from(expectation.model_hash);
+            let mut marks = vec![model, expectation.recorded_duration, expectation.payload_mass];
             marks.extend(expectation.payload_centre);
             marks.extend([expectation.filter_cutoff, f64::from(expectation.trials), expectation.spread_floor]);
             tables.push(("expectation".into(), marks));
             tables.push(("expectation.mean".into(), expectation.mean.concat()));
             tables.push(("expectation.spread".into(), expectation.spread.concat()));
+        }
+        if let Some(experience) = &self.experience {
+            tables.push(("experience".into(), vec![f64::from(experience.trials)]));
+            tables.push(("experience.mean".into(), experience.mean.concat()));
+            tables.push(("experience.spread".into(), experience.spread.concat()));
         }
         tables
     }
@@ -324,6 +380,14 @@ impl PrimitiveFile {
             shape("expectation.spread", expectation.spread.len(), expectation.mean.len())?;
             for point in expectation.mean.iter().chain(&expectation.spread) {
                 shape("expectation", point.len(), link::image::SENSOR_ROWS)?;
+            }
+        }
+        if let Some(experience) = &self.experience {
+            shape("experience.spread", experience.spread.len(), experience.mean.len())?;
+            for (key, rows) in [("experience.mean", &experience.mean), ("experience.spread", &experience.spread)] {
+                for point in rows {
+                    shape(key, point.len(), link::image::EXPERIENCE_ROWS)?;
+                }
             }
         }
         Ok(())

@@ -83,6 +83,11 @@ fn write_all(text: &mut String, primitive: &PrimitiveFile) -> std::fmt::Result {
             text,
             "\n[expectation]      # wrench of the environment on the robot by phase: force N (world), torque N m, gauges N m"
         )?;
+        writeln!(
+            text,
+            "model_hash = \"0x{:08x}\"      # model of the arm it was recorded with",
+            expectation.model_hash
+        )?;
         writeln!(text, "recorded_duration_s = {:?}", expectation.recorded_duration)?;
         writeln!(text, "payload_mass_kg = {:?}", expectation.payload_mass)?;
         write_numbers(text, "payload_centre_m", &expectation.payload_centre)?;
@@ -91,6 +96,15 @@ fn write_all(text: &mut String, primitive: &PrimitiveFile) -> std::fmt::Result {
         writeln!(text, "spread_floor = {:?}", expectation.spread_floor)?;
         write_rows(text, "mean", &expectation.mean)?;
         write_rows(text, "spread", &expectation.spread)?;
+    }
+    if let Some(experience) = &primitive.experience {
+        writeln!(
+            text,
+            "\n[experience]      # of successful runs, by phase: the rows of the expectation, then fingers F1 to F3 rad"
+        )?;
+        writeln!(text, "trials = {}", experience.trials)?;
+        write_rows(text, "mean", &experience.mean)?;
+        write_rows(text, "spread", &experience.spread)?;
     }
     if let Some(provenance) = &primitive.provenance {
         writeln!(text, "\n[provenance]      # where it comes from; errors are [maximum, RMS] of the reproduction")?;

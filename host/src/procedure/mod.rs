@@ -1,12 +1,16 @@
 //! What an operator does step by step, done by the host: make the arm ready, bring it to a posture, record what it does.
 
+mod hand;
 mod ready;
 mod recorder;
+mod run;
 mod travel;
 
+pub use hand::{HandReach, initialise_hand, move_hand};
 pub use ready::make_ready;
-pub use recorder::{Recorder, Take};
-pub use travel::{after, travel, wait_for};
+pub use recorder::{Recorder, Take, recording_row, recording_text};
+pub use run::{CHANNELS, Change, ChangeKind, FlagCounts, Mode, RunOutcome, RunRequest, Surprise, play};
+pub use travel::{after, go_to_start, travel, wait_for};
 
 use control::Fault;
 
@@ -38,6 +42,9 @@ pub enum ProcedureError {
         /// How long, s.
         seconds: u64,
     },
+    /// The hand did not get ready.
+    #[error("the hand does not get ready: {0}")]
+    Hand(&'static str),
     /// The recording cannot be written.
     #[error("the recording cannot be written: {0}")]
     Recording(#[from] std::io::Error),

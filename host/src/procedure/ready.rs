@@ -5,7 +5,7 @@ use std::time::Duration;
 use device::Stage;
 use link::EventKind;
 
-use super::ProcedureError;
+use super::{ProcedureError, initialise_hand};
 use crate::client::{Client, Incoming};
 use crate::device::Device;
 use crate::error::explain_blocked;
@@ -19,7 +19,7 @@ const PATIENCE: u64 = 600;
 /// How often the stage is looked at.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Waits until the arm can be commanded, and tells every stage.
+/// Waits until the arm can be commanded, tells every stage, and initialises the hand where there is one.
 ///
 /// A simulated arm stands at home, so it is zeroed there. For a real one `at_home` must be the word of a person.
 ///
@@ -44,7 +44,7 @@ pub fn make_ready(
             told = Some(stage);
         }
         match stage {
-            Some(Stage::Ready) => return Ok(()),
+            Some(Stage::Ready) => return initialise_hand(client).map(|_| ()),
             Some(Stage::WaitingForZero) if simulated || at_home => client.zero(home())?,
             Some(Stage::WaitingForZero) => return Err(ProcedureError::NotZeroed),
             _ => {}

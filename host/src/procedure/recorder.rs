@@ -25,6 +25,47 @@ pub enum Take {
     Event(Event),
 }
 
+/// One cycle as a line of a recording whose first line is the cycle `first`.
+pub fn recording_row(telemetry: &Telemetry, first: u32) -> RecordingRow {
+    let (position, orientation) = arm::tool_pose(&telemetry.q.map(f64::from));
+    let mut pose = [0.0; 7];
+    pose[..3].copy_from_slice(&position);
+    pose[3..].copy_from_slice(&orientation);
+    RecordingRow {
+        cycle: telemetry.cycle,
+        time: f64::from(telemetry.cycle.wrapping_sub(first)) / RATE,
+        state: State::from_code(telemetry.state).map_or("unknown", State::name),
+        fault: telemetry.fault,
+        flags: telemetry.flags,
+        phase: telemetry.phase,
+        q: telemetry.q,
+        dq: telemetry.dq,
+        tau: telemetry.tau,
+        pose,
+        pose_d: telemetry.pose_d,
+        wrench: telemetry.wrench,
+        lost_replies: telemetry.lost_replies,
+        cost_ticks: telemetry.cost_ticks,
+        hand: telemetry.hand,
+        hand_d: telemetry.hand_d,
+        gauges: telemetry.gauges,
+        surprise: telemetry.surprise,
+    }
+}
+
+/// The text of a recording of these cycles.
+///
+/// # Errors
+/// None that a memory could give; the type is that of [`RecordingWriter`].
+pub fn recording_text(cycles: &[Telemetry], notes: &str) -> std::io::Result<Vec<u8>> {
+    let mut writer = RecordingWriter::new(Vec::new(), notes)?;
+    let first = cycles.first().map_or(0, |telemetry| telemetry.cycle);
+    for telemetry in cycles {
+        writer.write(&recording_row(telemetry, first))?;
+    }
+    writer.finish()
+}
+
 /// A recording that is being made.
 pub struct Recorder<W: Write> {
     writer: RecordingWriter<W>,
@@ -59,26 +100,7 @@ impl<W: Write> Recorder<W> {
 
     fn write(&mut self, telemetry: &Telemetry) -> std::io::Result<()> {
         let first = *self.first.get_or_insert(telemetry.cycle);
-        let (position, orientation) = arm::tool_pose(&telemetry.q.map(f64::from));
-        let mut pose = [0.0; 7];
-        pose[..3].copy_from_slice(&position);
-        pose[3..].copy_from_slice(&orientation);
-        self.writer.write(&RecordingRow {
-            cycle: telemetry.cycle,
-            time: f64::from(telemetry.cycle.wrapping_sub(first)) / RATE,
-            state: State::from_code(telemetry.state).map_or("unknown", State::name),
-            fault: telemetry.fault,
-            flags: telemetry.flags,
-            phase: telemetry.phase,
-            q: telemetry.q,
-            dq: telemetry.dq,
-            tau: telemetry.tau,
-            pose,
-            pose_d: telemetry.pose_d,
-            wrench: telemetry.wrench,
-            lost_replies: telemetry.lost_replies,
-            cost_ticks: telemetry.cost_ticks,
-        })
+        self.writer.write(&recording_row(telemetry, first))
     }
 
     /// Cycles written so far.

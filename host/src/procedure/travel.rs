@@ -3,11 +3,12 @@
 use std::time::Duration;
 
 use control::{Fault, State};
-use link::EventKind;
+use link::{EventKind, HandStage};
 
-use super::ProcedureError;
+use super::{HandReach, ProcedureError, move_hand};
 use crate::client::{Client, Incoming};
 use crate::device::Device;
+use crate::primitive_file::Waypoint;
 
 /// Longest move to a posture, s: what `control` allows.
 const LONGEST_TRAVEL: u64 = 125;
@@ -29,6 +30,41 @@ pub fn travel(client: &mut Client<Device>, q: [f32; 7], progress: impl FnMut(f64
     client.take_events();
     client.approach(q, 0.0)?;
     wait_for("the move to the posture", LONGEST_TRAVEL, client, progress)
+}
+
+/// A joint farther than this from the start posture makes the arm go there first, rad; the device refuses at 50 mrad.
+const START_TOLERANCE: f64 = 0.02;
+
+/// A digit farther than this from the start posture makes the hand go there first, rad; the device refuses at 0.15 rad.
+const HAND_TOLERANCE: f64 = 0.08;
+
+/// Brings arm and hand to where a primitive begins, if they are not there yet. The arm holds then. `progress` hears the
+/// time since the start, s.
+///
+/// # Errors
+/// As [`travel`]; [`ProcedureError::Hand`] if the hand cannot open.
+pub fn go_to_start(
+    client: &mut Client<Device>,
+    start: &Waypoint,
+    progress: impl FnMut(f64),
+) -> Result<(), ProcedureError> {
+    let far = |at: &[f32], to: &[f64], tolerance: f64| {
+        at.iter().zip(to).any(|(at, to)| (f64::from(*at) - to).abs() > tolerance)
+    };
+    let status = client.status()?;
+    if far(&status.q, &start.posture, START_TOLERANCE) || State::from_code(status.state) != Some(State::Hold) {
+        travel(client, start.posture.map(|angle| angle as f32), progress)?;
+    }
+    let status = client.status()?;
+    if status.hand_stage == HandStage::Ready && far(&status.hand, &start.hand, HAND_TOLERANCE) {
+        let hand = start.hand.map(|angle| angle as f32);
+        if let HandReach::Stopped(at) = move_hand(client, hand)?
+            && far(&at, &start.hand, HAND_TOLERANCE)
+        {
+            return Err(ProcedureError::Hand("something keeps it from going to where the movement begins"));
+        }
+    }
+    Ok(())
 }
 
 /// Waits until a motion that was just commanded has arrived.

@@ -43,7 +43,7 @@ impl Simulation {
     /// The world or the engine named in `options` cannot be started here; the message names the command that sets it up.
     pub fn start(options: &SimulationOptions) -> Result<Self, SimulationError> {
         let world = options.build_world()?;
-        let plant = Plant::new(PlantConfig { seed: options.seed, ..PlantConfig::default() }, world);
+        let plant = Plant::new(PlantConfig { seed: options.seed, ..options.plant.clone() }, world);
         let engine: Box<dyn Execute> = match &options.engine {
             Engine::InProcess => Box::new(InProcess::new()),
             Engine::Qemu { image } => Box::new(Qemu::spawn(image, options.firmware_log.as_deref())?),
@@ -73,7 +73,7 @@ impl Simulation {
             let mujoco = world
                 .downcast_ref::<MujocoWorld>()
                 .or_else(|| world.downcast_ref::<GuidedWorld<MujocoWorld>>().map(GuidedWorld::world));
-            mujoco.map(MujocoWorld::flashlight_tilt)
+            mujoco.and_then(MujocoWorld::object_tilt)
         }
         #[cfg(not(feature = "mujoco"))]
         None

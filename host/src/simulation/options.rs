@@ -2,8 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use sim::person::Lesson;
 use sim::world::HOME;
-use sim::{FreeJoints, World};
+#[cfg(feature = "mujoco")]
+use sim::world::mujoco::{Imperfections, MujocoWorld, Scene};
+use sim::{FreeJoints, PlantConfig, World};
 
 use super::SimulationError;
 use crate::transport::{SimulatorKind, SimulatorOptions};
@@ -36,7 +39,7 @@ pub enum WorldKind {
 }
 
 /// How a simulated device is set up.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct SimulationOptions {
     /// What executes the application.
     pub engine: Engine,
@@ -44,8 +47,23 @@ pub struct SimulationOptions {
     pub seed: u64,
     /// Which physics.
     pub world: WorldKind,
+    /// Joint posture in which the arm stands at the beginning, rad.
+    pub posture: [f64; 7],
     /// Seed of the person who teaches; `None`: nobody stands beside the arm.
     pub person: Option<u64>,
+    /// What that person teaches.
+    pub lesson: Lesson,
+    /// Bus, pucks, sensor, hand and operator; its seed is not used, [`seed`](Self::seed) is.
+    pub plant: PlantConfig,
+    /// Table and object.
+    #[cfg(feature = "mujoco")]
+    pub scene: Scene,
+    /// How the arm differs from the controller's model.
+    #[cfg(feature = "mujoco")]
+    pub imperfections: Imperfections,
+    /// Puts the MuJoCo world, where nobody stands beside the arm, into another one around it, such as one that watches.
+    #[cfg(feature = "mujoco")]
+    pub dress: Option<fn(MujocoWorld) -> Box<dyn World>>,
     /// Where the firmware's log goes, raw defmt frames; `None` drops it.
     pub firmware_log: Option<PathBuf>,
 }
@@ -70,24 +88,51 @@ impl SimulationOptions {
         if world == WorldKind::Mujoco && !cfg!(feature = "mujoco") {
             return Err(SimulationError::WithoutMujoco);
         }
-        Ok(Self { engine, seed: options.seed.unwrap_or(DEFAULT_SEED), world, person: None, firmware_log: None })
+        Ok(Self::new(engine, options.seed.unwrap_or(DEFAULT_SEED), world))
     }
 
-    /// The world at its start, the arm at home.
+    /// The usual arm at home, switched off, with the usual things around it and nobody beside it.
+    #[must_use]
+    pub fn new(engine: Engine, seed: u64, world: WorldKind) -> Self {
+        Self {
+            engine,
+            seed,
+            world,
+            posture: HOME,
+            person: None,
+            lesson: Lesson::Demonstration,
+            plant: PlantConfig::default(),
+            #[cfg(feature = "mujoco")]
+            scene: Scene::default(),
+            #[cfg(feature = "mujoco")]
+            imperfections: Imperfections::NONE,
+            #[cfg(feature = "mujoco")]
+            dress: None,
+            firmware_log: None,
+        }
+    }
+
+    /// The world at its start.
     pub(super) fn build_world(&self) -> Result<Box<dyn World>, SimulationError> {
         match self.world {
-            WorldKind::Simple => Ok(Box::new(FreeJoints::new(HOME))),
+            WorldKind::Simple => Ok(Box::new(FreeJoints::new(self.posture))),
             #[cfg(feature = "mujoco")]
             WorldKind::Mujoco => {
-                use sim::person::{GuidedWorld, Person, PersonConfig, side_grasp_path};
-                use sim::world::mujoco::{MujocoOptions, MujocoWorld};
-                let world = MujocoWorld::new(&MujocoOptions::default())?;
-                Ok(match self.person {
-                    None => Box::new(world),
-                    Some(seed) => {
-                        let person = Person::new(PersonConfig { seed, ..PersonConfig::default() }, side_grasp_path());
+                use sim::person::{GuidedWorld, Person, PersonConfig};
+                use sim::world::mujoco::MujocoOptions;
+                let world = MujocoWorld::new(&MujocoOptions {
+                    posture: self.posture,
+                    scene: self.scene,
+                    imperfections: self.imperfections,
+                    ..MujocoOptions::default()
+                })?;
+                Ok(match (self.person, self.dress) {
+                    (Some(seed), _) => {
+                        let person = Person::new(PersonConfig { seed, ..PersonConfig::default() }, self.lesson.path());
                         Box::new(GuidedWorld::new(world, person))
                     }
+                    (None, Some(dress)) => dress(world),
+                    (None, None) => Box::new(world),
                 })
             }
             #[cfg(not(feature = "mujoco"))]

@@ -52,6 +52,10 @@ pub(crate) fn rows(duration: f64) -> Vec<RecordingRow> {
                 wrench: [0.5, -0.25, 1.0, 0.0, 0.0, 0.125],
                 lost_replies: 0,
                 cost_ticks: 20_000,
+                hand: [0.0, 0.25, 0.5, 0.75],
+                hand_d: [0.0, 0.25, 0.5, 1.0],
+                gauges: [0.0, -0.5, 0.125],
+                surprise: 1.5,
             }
         })
         .collect()

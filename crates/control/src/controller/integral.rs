@@ -49,13 +49,13 @@ impl<R: Real> PostureIntegral<R> {
         &self.shift
     }
 
-    /// Takes over from a law that wanted `q_d` while the arm was at `q`, without a step of torque: as much of the
-    /// distance as the clamp allows becomes shift. Returns the posture to hold: `q` where friction alone is in the way.
-    pub fn take_over(&mut self, gains: &Gains<R>, q_d: &JointPositions<R>, q: &JointPositions<R>) -> JointPositions<R> {
+    /// Takes over from a law whose torque, beyond what the arm itself needs, equals `K_p offset`: as much of the offset (rad)
+    /// as the clamp allows becomes shift, so that the torque makes no step. Returns the posture to hold: `q` where friction
+    /// and the error of the model alone are in the way.
+    pub fn take_over(&mut self, gains: &Gains<R>, offset: &Vector7<R>, q: &JointPositions<R>) -> JointPositions<R> {
         self.reset();
-        let distances = (q_d.0 - q.0).zip_map(&gains.settling, within);
-        self.shift = distances;
-        JointPositions(q_d.0 - distances)
+        self.shift = offset.zip_map(&gains.settling, within);
+        JointPositions(q.0 + offset - self.shift)
     }
 
     /// Whether every joint was close enough to be left alone in the last control period.

@@ -5,7 +5,7 @@
 //! measured one it would be positive feedback. External forces are deliberately absent, Eq (12) deals with them.
 
 use crate::arm::ArmModel;
-use crate::controller::gains::Gains;
+use crate::controller::gains::Tracking;
 use crate::estimate::JointState;
 use crate::kinematics::Frames;
 use crate::real::Real;
@@ -56,7 +56,7 @@ impl<R: Real> JointController<R> {
     pub fn torque(
         &mut self,
         model: &ArmModel<R>,
-        gains: &Gains<R>,
+        gains: &Tracking<R>,
         frames: &Frames<R>,
         state: &JointState<R>,
         reference: &JointReference<R>,
@@ -79,7 +79,7 @@ impl<R: Real> Default for JointController<R> {
 }
 
 /// Friction expected at the desired velocity (N m).
-fn friction<R: Real>(gains: &Gains<R>, dq_d: &JointVelocities<R>) -> Vector7<R> {
+fn friction<R: Real>(gains: &Tracking<R>, dq_d: &JointVelocities<R>) -> Vector7<R> {
     let mut torque = gains.viscous.component_mul(&dq_d.0);
     for ((torque, coulomb), rate) in torque.iter_mut().zip(gains.coulomb.iter()).zip(dq_d.0.iter()) {
         let magnitude = if *rate < R::of(0.0) { -*rate } else { *rate };

@@ -7,10 +7,12 @@ pub mod integral;
 pub mod joint;
 pub mod joint_limits;
 pub mod operational;
+pub mod window;
 
 pub use force::ForceController;
-pub use gains::Gains;
+pub use gains::{Gains, HandGains, Tracking};
 pub use integral::PostureIntegral;
 pub use joint::{JointController, JointReference};
 pub use joint_limits::JointBounds;
 pub use operational::{OperationalController, TaskReference};
+pub use window::Window;

@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 use crate::arm::{ArmModel, at_least, at_most};
 use crate::command::{AccelerationSource, PoseFeedback};
-use crate::controller::gains::Gains;
+use crate::controller::gains::Tracking;
 use crate::controller::joint::JointReference;
 use crate::cycle::{PERIOD, RATE};
 use crate::estimate::JointState;
@@ -70,7 +70,7 @@ impl<R: Real> OperationalController<R> {
     pub fn step(
         &mut self,
         model: &ArmModel<R>,
-        gains: &Gains<R>,
+        gains: &Tracking<R>,
         frames: &Frames<R>,
         state: &JointState<R>,
         task: &TaskReference<R>,

@@ -1,13 +1,18 @@
 //! Commands: their conditions, and what they start.
 
+use dmp::Primitive;
+use nalgebra::Vector3;
+
 use crate::approach::{Approach, LONGEST};
 use crate::command::{Command, Refusal};
 use crate::cycle::{Cycle, Measured, WRENCH_AGE};
 use crate::fault::Fault;
+use crate::hand;
 use crate::real::Real;
 use crate::run::Run;
 use crate::supervisor::{State, Trigger};
 use crate::units::JointPositions;
+use crate::wrench::REST_FORCE;
 
 /// Below this joint speed (rad/s) the arm counts as standing, for leaving a stop.
 pub(super) const STANDING: f64 = 0.05;
@@ -23,7 +28,6 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 let trigger = if command == Command::ClearFault { Trigger::Clear } else { Trigger::Release };
                 self.supervisor.take(trigger, Fault::None).map(|_| ())
             }
-            Command::Tare => self.tare(),
             _ => Err(Refusal::PositionsMissing),
         }
     }
@@ -32,7 +36,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if self.supervisor.law() == State::Run {
             return Err(Refusal::WrongState);
         }
-        if self.wrench.tare() { Ok(()) } else { Err(Refusal::WrenchMissing) }
+        if self.wrench.tare() {
+            self.hand.tare();
+            Ok(())
+        } else {
+            Err(Refusal::WrenchMissing)
+        }
     }
 
     pub(super) fn command(&mut self, command: Command, measured: &Measured<'_, R>) -> Result<(), Refusal> {
@@ -49,6 +58,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.change(Trigger::Clear, measured)
             }
             Command::Tare => self.tare(),
+            Command::MoveHand { q, duration } => self.move_hand(&q, duration, measured),
             Command::Gravity => {
                 self.may_begin(measured)?;
                 self.change(Trigger::Gravity, measured)
@@ -78,10 +88,13 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.supervisor.allows(Trigger::Run)?;
                 self.may_move(measured)?;
                 let primitive = self.primitive.as_ref().ok_or(Refusal::NoPrimitive)?;
-                if (options.feedback || options.force_control) && self.wrench.age().is_none_or(|age| age > WRENCH_AGE) {
-                    return Err(Refusal::WrenchMissing);
+                if options.feedback || options.force_control {
+                    self.may_use_force(primitive, measured)?;
                 }
-                self.run = Some(Run::start(primitive, q, &measured.pose, options)?);
+                let hand = self.hand.answering();
+                self.run = Some(Run::start(primitive, q, &measured.pose, hand.as_ref(), options)?);
+                self.wrench.tare_drift();
+                self.hand.tare_drift();
                 self.change(Trigger::Run, measured)
             }
             Command::SetGoal(goal) => match (&mut self.run, &self.primitive) {
@@ -93,6 +106,36 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 _ => Err(Refusal::WrongState),
             },
         }
+    }
+
+    /// Conditions of a run that uses force: it is measured, expected, and at rest what it should be (B5). A load that the
+    /// primitive expects at its start is no reason to refuse it.
+    fn may_use_force(&self, primitive: &Primitive<R, N>, measured: &Measured<'_, R>) -> Result<(), Refusal> {
+        if self.wrench.age().is_none_or(|age| age > WRENCH_AGE) {
+            return Err(Refusal::WrenchMissing);
+        }
+        let expected = primitive.expected().ok_or(Refusal::NoExpectation)?;
+        let [fx, fy, fz, ..] = expected.at(R::of(0.0));
+        let felt = measured.frames.sensor_to_world() * self.wrench.rest_force();
+        let limit = R::of(REST_FORCE * REST_FORCE);
+        let within = |force: Vector3<R>| force.dot(&force) <= limit;
+        if within(felt) || within(felt - Vector3::new(fx, fy, fz)) { Ok(()) } else { Err(Refusal::ForceAtRest) }
+    }
+
+    fn move_hand(&mut self, q: &[f32; 4], duration: f32, measured: &Measured<'_, R>) -> Result<(), Refusal> {
+        self.may_begin(measured)?;
+        if !matches!(self.supervisor.law(), State::Gravity | State::Hold | State::Approach) {
+            return Err(Refusal::WrongState);
+        }
+        if self.hand.answering().is_none() {
+            return Err(Refusal::NoHand);
+        }
+        let timely = duration >= 0.0 && f64::from(duration) <= hand::motion::LONGEST;
+        if !timely || !hand::within_range(q) {
+            return Err(Refusal::OutOfRange);
+        }
+        self.hand.move_to(&q.map(|q| R::of(f64::from(q))), R::of(f64::from(duration)));
+        Ok(())
     }
 
     /// Conditions of every command that keeps or raises torque.

@@ -1,12 +1,14 @@
 //! The laws of the states: from what is measured to the torque that is wanted.
 
 use crate::controller::{ForceController, JointReference, TaskReference};
-use crate::cycle::{Cycle, Measured, PERIOD, STOP_RAMP};
+use crate::cycle::{Cycle, HANDOVER, Measured, PERIOD, STOP_RAMP, WRENCH_AGE};
+use crate::hand::{HandReference, HandState};
 use crate::kinematics::Frames;
 use crate::real::Real;
-use crate::record::flags;
+use crate::record::{Event, flags};
+use crate::run::Senses;
 use crate::supervisor::State;
-use crate::units::{JointPositions, JointTorques, Pose, Vector7};
+use crate::units::{JointPositions, JointTorques, Pose, Vector6, Vector7, Wrench};
 
 /// Length of the damping that carries the arm while gravity torque builds up after arming (control periods): 0.5 s.
 const ARMING: u16 = 150;
@@ -17,7 +19,7 @@ pub(super) struct Demand<R: Real> {
     pub(super) q_d: JointPositions<R>,
     pub(super) pose_d: Pose<R>,
     pub(super) phase: R,
-    pub(super) flags: u16,
+    pub(super) flags: u32,
 }
 
 impl<R: Real, const N: usize> Cycle<R, N> {
@@ -82,50 +84,98 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             self.integral.step(&self.gains, &reference.q, &measured.state.q);
         }
         let shifted = JointReference { q: JointPositions(reference.q.0 + self.integral.shift()), ..reference };
-        let torque =
-            self.joint_controller.torque(&self.model, &self.gains, measured.frames, measured.state, &shifted, frozen);
+        let torque = self.joint_controller.torque(
+            &self.model,
+            &self.gains.stiff,
+            measured.frames,
+            measured.state,
+            &shifted,
+            frozen,
+        );
         let pose_d = Frames::new(&self.model, &reference.q).tool_pose();
         Demand { torque, q_d: reference.q, pose_d, phase: R::of(0.0), flags: 0 }
     }
 
-    /// Eqs (8), (9), (11), (10), (12), (13).
+    /// Eqs (8), (9), (11), (10), (12), (13), and the hand's part for Eq (14).
     fn run_primitive(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
         let (Some(run), Some(primitive)) = (&mut self.run, &self.primitive) else {
             // The state machine enters `Run` only with both; without them the arm floats.
             return self.float(measured);
         };
         let frozen = measured.state.missing > 0;
+        let senses = match self.wrench.age() {
+            Some(0) if !frozen => Senses::Fresh,
+            Some(age) if age <= WRENCH_AGE => Senses::Frozen,
+            _ => Senses::Lost,
+        };
         let options = run.options;
-        let error = run.force_error(primitive, &measured.wrench);
-        let plan = run.step(primitive, &measured.wrench, frozen || self.wrench.age() != Some(0));
+        let tracking = self.gains.tracking(options.compliant);
+        let gauges = self.hand.answering().filter(HandState::feels).map(|state| state.gauges);
+        let plan = run.step(primitive, &measured.wrench, gauges.as_ref(), senses);
+        if senses == Senses::Fresh {
+            let hand = self.hand.answering().filter(HandState::feels);
+            if let Some(surprise) = run.watch(primitive, &measured.wrench, hand.as_ref()) {
+                self.pending = Some(Event::Surprised { phase: surprise.progress, channel: surprise.channel });
+            }
+        }
+        let deviation = run.deviation().filter(|_| options.force_control);
+        let expected_gauges = deviation.map(|deviation| deviation.expected_gauges);
+        self.hand.follow(&HandReference { q: plan.hand.x, dq: plan.hand.v }, expected_gauges);
         let task = TaskReference::from_plan(&plan);
         let reference = self.operational.step(
             &self.model,
-            &self.gains,
+            tracking,
             measured.frames,
             measured.state,
             &task,
             (options.pose_feedback, options.acceleration),
         );
         let mut torque =
-            self.joint_controller.torque(&self.model, &self.gains, measured.frames, measured.state, &reference, frozen);
+            self.joint_controller.torque(&self.model, tracking, measured.frames, measured.state, &reference, frozen);
         let mut set = if options.feedback { flags::FEEDBACK } else { 0 };
-        if let Some(error) = error.filter(|_| options.force_control) {
+        if let Some(deviation) = deviation {
+            let to_world = measured.frames.tool_to_world();
+            let error = Wrench { torque: deviation.wrench.torque * tracking.moment_share, ..deviation.wrench };
             let command = self.force.command(
-                &error.in_world(measured.frames.tool_to_world()),
-                self.gains.force_proportional,
-                self.gains.force_integral,
+                &-error.in_world(to_world),
+                tracking.force_proportional,
+                tracking.force_integral,
                 R::of(PERIOD),
-                self.saturated || frozen,
+                self.saturated || senses != Senses::Fresh,
             );
-            torque.0 += ForceController::torque(&measured.frames.jacobian(), &command).0;
+            let bounded = bounded(&command, tracking.force_limit) * run.kept();
+            // What the primitive expects to carry or to press is fed forward: the integral has a finite gain.
+            let wanted = bounded - deviation.expected.in_world(to_world);
+            torque.0 += ForceController::torque(&measured.frames.jacobian(), &wanted).0;
             set |= flags::FORCE_CONTROL;
+        }
+        if run.surprise() > R::of(1.0) {
+            set |= flags::SURPRISE;
+        }
+        if run.is_faded(primitive) {
+            set |= flags::FEEDBACK_FADED;
         }
         if self.operational.is_clamped() {
             set |= flags::CLAMPED;
         }
+        let (rest, left) = self.handover;
+        torque.0 += rest * (R::from_counts(i32::from(left)) * R::of(1.0 / f64::from(HANDOVER)));
+        self.handover.1 = left.saturating_sub(1);
         let offset = task.pose.position - measured.pose.position;
         self.tracking = offset.dot(&offset).square_root();
         Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, flags: set }
     }
+}
+
+/// The command with its force and its torque cut to these magnitudes (N, N m), their directions kept.
+fn bounded<R: Real>(command: &Vector6<R>, (force, torque): (R, R)) -> Vector6<R> {
+    let mut bounded = *command;
+    for (first, limit) in [(0, force), (3, torque)] {
+        let mut part = bounded.fixed_rows_mut::<3>(first);
+        let length = part.dot(&part).square_root();
+        if length > limit {
+            part *= limit / length;
+        }
+    }
+    bounded
 }

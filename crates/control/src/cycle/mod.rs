@@ -1,13 +1,14 @@
 //! `Cycle`: one control period, the only entry that yields torque.
 //!
 //! ```text
-//! replies -> JointEstimator, WrenchEstimator -> Monitor, command -> Supervisor
-//!   -> the law of the state: gravity | hold | approach | run (Eqs 9, 11, 10, 12, 13) | soft stop
-//!   -> TorqueLimiter -> Actuation (two frames) ; everything -> CycleRecord
+//! replies -> JointEstimator, WrenchEstimator, HandDrive -> Monitor, command -> Supervisor
+//!   -> the law of the state: gravity | hold | approach | run (Eqs 9, 11, 10, 12, 13) | soft stop ; the hand's (Eq 14)
+//!   -> TorqueLimiter, HandLimiter -> Actuation (two frames, and one for the hand) ; everything -> CycleRecord
 //! ```
 
 mod commands;
 mod laws;
+mod transitions;
 
 use dmp::Primitive;
 use puck::SafetyMode;
@@ -21,13 +22,14 @@ use crate::controller::{ForceController, Gains, JointBounds, JointController, Op
 use crate::cycle::commands::STANDING;
 use crate::estimate::{JointEstimator, JointState};
 use crate::fault::Fault;
+use crate::hand::HandDrive;
 use crate::kinematics::Frames;
 use crate::limit::{LimitReport, TorqueLimiter};
 use crate::load::{self, LoadRefusal};
 use crate::monitor::{Monitor, Observation};
 use crate::real::Real;
 use crate::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
-use crate::run::Run;
+use crate::run::{FADE, Run};
 use crate::supervisor::{State, Supervisor, Trigger};
 use crate::units::{JointPositions, Pose, Vector7, Wrench};
 use crate::wrench::WrenchEstimator;
@@ -53,6 +55,9 @@ const WRENCH_AGE: u8 = 5;
 /// Length of the ramp that takes all but gravity and damping away in a soft stop (control periods): 100 ms.
 const STOP_RAMP: u16 = 30;
 
+/// Length of the ramp that takes away what a compliant run inherits from the stiff hold before it (control periods): 1 s.
+const HANDOVER: u16 = 300;
+
 /// The control code of one arm. `N` is the number of kernels per row that its primitive may have.
 pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     calibration: Calibration<R>,
@@ -68,6 +73,7 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     operational: OperationalController<R>,
     force: ForceController<R>,
     integral: PostureIntegral<R>,
+    hand: HandDrive<R>,
     primitive: Option<Primitive<R, N>>,
     run: Option<Run<R, N>>,
     approach: Option<Approach<R>>,
@@ -75,6 +81,8 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     hold: JointPositions<R>,
     /// Torque beyond gravity when a soft stop began (N m), and the control periods left of its ramp.
     rest: (Vector7<R>, u16),
+    /// Torque beyond what the arm itself needs when a compliant run began (N m), and the control periods left of its ramp.
+    handover: (Vector7<R>, u16),
     safety: Option<(SafetyMode, u16)>,
     /// Control periods since torque came on, saturating.
     armed_for: u16,
@@ -116,13 +124,15 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             limiter: TorqueLimiter::new(&calibration),
             joint_controller: JointController::new(),
             operational: OperationalController::new(home),
-            force: ForceController::new(gains.force_window),
+            force: ForceController::new(gains.stiff.force_window),
             integral: PostureIntegral::new(),
+            hand: HandDrive::new(&gains.hand),
             primitive: None,
             run: None,
             approach: None,
             hold: home,
             rest: (Vector7::zeros(), 0),
+            handover: (Vector7::zeros(), 0),
             safety: None,
             armed_for: 0,
             zero_cycles: 0,
@@ -191,7 +201,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             return Err(LoadRefusal::Running);
         }
         load::check(&self.model, primitive).map_err(LoadRefusal::Unfit)?;
-        self.primitive = Some(primitive.clone());
+        // In place: a primitive is too large to be handed around on the stack.
+        match &mut self.primitive {
+            Some(present) => present.clone_from(primitive),
+            empty => *empty = Some(primitive.clone()),
+        }
         Ok(())
     }
 
@@ -214,18 +228,30 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         let torque_on = self.supervisor.state().has_torque();
         let state = self.joints.update(&input.sample.positions, torque_on);
-        self.wrench.update(input.sample.wrench.as_ref());
+        self.hand.update(input.sample.hand.as_ref());
 
         let mut record = CycleRecord { cycle: input.cycle, ..CycleRecord::EMPTY };
+        if let Some(hand) = self.hand.state() {
+            record.hand = hand.q.map(Real::single);
+            record.hand_d = record.hand;
+            record.gauges = hand.gauges.map(Real::single);
+        }
         let mut answer = None;
         let actuation = match state {
             None => {
+                self.wrench.update(input.sample.wrench.as_ref(), None, false);
                 answer = input.command.map(|command| self.command_blind(command));
                 record.lost_replies = input.sample.positions.iter().filter(|reply| reply.is_none()).count() as u8;
                 self.actuate_without_torque()
             }
             Some(state) => {
                 let frames = Frames::new(&self.model, &state.q);
+                let at_rest = state.missing == 0 && state.dq.0.amax() < R::of(STANDING);
+                let weight = self.model.hanging_weight(&frames);
+                self.wrench.update(input.sample.wrench.as_ref(), Some(&weight), at_rest);
+                if self.supervisor.state() == State::Idle && !self.wrench.is_tared() {
+                    self.tare_first();
+                }
                 let measured = Measured {
                     state: &state,
                     frames: &frames,
@@ -280,86 +306,21 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             bounds: &self.bounds,
             force: self.wrench.raw_force(),
             tracking: self.tracking,
-            wrench_lost: depends && self.wrench.age().is_none_or(|age| age > WRENCH_AGE),
+            // The feedback fades in the meantime.
+            wrench_lost: depends && self.wrench.age().is_none_or(|age| u16::from(age) > u16::from(WRENCH_AGE) + FADE),
+            full_scale: self.wrench.full_scale().force > 0 || (depends && self.wrench.full_scale().torque > 0),
         };
         if let Some((trigger, fault)) = self.monitor.check(self.supervisor.law(), measured.state, &seen) {
             self.trigger(trigger, fault, Some(measured));
         }
     }
 
-    /// Takes a trigger that no person caused.
-    fn trigger(&mut self, trigger: Trigger, fault: Fault, measured: Option<&Measured<'_, R>>) {
-        let from = self.supervisor.law();
-        // Only commands can be refused.
-        if let Ok(true) = self.supervisor.take(trigger, fault) {
-            self.entered(from, measured);
+    /// The first rest after start-up is the zero of the sensors; the arm is braked then, and nobody uses the hand.
+    fn tare_first(&mut self) {
+        self.wrench.tare_first();
+        if self.wrench.is_tared() {
+            self.hand.tare_drift();
         }
-    }
-
-    /// Prepares the law of the state that was just entered.
-    fn entered(&mut self, from: State, measured: Option<&Measured<'_, R>>) {
-        let law = self.supervisor.law();
-        let Some(measured) = measured.filter(|_| law.has_torque()) else {
-            // Without a measurement there is nothing to hold or to stop with: only states without torque can follow, or a
-            // soft stop whose ramp has nothing to take away.
-            self.rest = (Vector7::zeros(), 0);
-            if !law.has_torque() {
-                self.leave_torque();
-            }
-            return;
-        };
-        let q = measured.state.q;
-        if !from.has_torque() {
-            self.bounds = JointBounds::around(&self.model, &q);
-            self.limiter.reset();
-            self.armed_for = 0;
-        }
-        match law {
-            State::Hold => {
-                match from {
-                    // What Eq (11) has put between q_d and q against friction becomes the integral's.
-                    State::Run => self.hold = self.integral.take_over(&self.gains, self.operational.q_d(), &q),
-                    State::Approach => {}
-                    _ => self.hold = q,
-                }
-            }
-            State::Run => {
-                // From what the feedback is drawn to while holding, so that the torque against friction stays.
-                let start = if from == State::Hold { self.hold.0 + self.integral.shift() } else { q.0 };
-                self.operational = OperationalController::new(JointPositions(start));
-                self.force.reset();
-                self.tracking = R::of(0.0);
-            }
-            State::SoftStop => {
-                let gravity = self.model.gravity_torque(measured.frames);
-                self.rest = (self.limiter.last().torques().0 - gravity.0, STOP_RAMP);
-            }
-            _ => {}
-        }
-        if !matches!(law, State::Hold | State::Approach) {
-            self.integral.reset();
-        }
-        if law != State::Run {
-            self.run = None;
-        }
-        if law != State::Approach {
-            self.approach = None;
-        }
-        self.joint_controller.reset();
-    }
-
-    fn leave_torque(&mut self) {
-        self.limiter.reset();
-        self.joint_controller.reset();
-        self.force.reset();
-        self.integral.reset();
-        self.run = None;
-        self.approach = None;
-        self.rest = (Vector7::zeros(), 0);
-        self.tracking = R::of(0.0);
-        self.saturated = false;
-        self.limited = false;
-        self.zero_cycles = ZERO_CYCLES;
     }
 
     /// Computes the torque of the state and sends it, or nothing; fills in the record.
@@ -382,6 +343,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         record.q_d = demand.q_d.to_f32();
         record.pose_d = demand.pose_d.to_f32();
         record.phase = demand.phase.single();
+        record.surprise = self.run.as_ref().map_or(0.0, |run| run.surprise().single());
         record.flags |= demand.flags | limit_flags(report);
         if report.not_finite {
             // A soft stop computes with less; if that is not finite either, nothing is left but zero.
@@ -398,7 +360,14 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             record.flags |= flags::ARRIVED;
             self.pending = Some(Event::Arrived);
         }
-        Actuation::torque(&torques, &self.calibration)
+        let actuation = Actuation::torque(&torques, &self.calibration);
+        let keeps = self.supervisor.law() != State::Gravity;
+        let hand = self.hand.step(&self.gains.hand, keeps);
+        record.hand_d = self.hand.desired().map(Real::single);
+        match hand {
+            Some(torques) => actuation.with_hand(&torques, &self.calibration),
+            None => actuation,
+        }
     }
 
     fn is_over(&self, measured: &Measured<'_, R>) -> bool {
@@ -426,7 +395,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
-    fn standing_flags(&self) -> u16 {
+    fn standing_flags(&self) -> u32 {
         let mut set = 0;
         if self.supervisor.state() == State::Coast {
             set |= flags::COASTING;
@@ -440,12 +409,20 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if self.is_active() {
             set |= flags::SAFETY_ACTIVE;
         }
+        if self.wrench.is_saturated() {
+            set |= flags::SENSOR_SATURATED;
+        }
+        match self.hand.state() {
+            Some(hand) if hand.is_lost() => set |= flags::HAND_LOST,
+            Some(_) => set |= flags::HAND_READY,
+            None => {}
+        }
         set
     }
 }
 
-fn limit_flags(report: LimitReport) -> u16 {
-    let bit = |set: bool, flag: u16| if set { flag } else { 0 };
+fn limit_flags(report: LimitReport) -> u32 {
+    let bit = |set: bool, flag: u32| if set { flag } else { 0 };
     bit(report.joint, flags::JOINT_LIMITED)
         | bit(report.motor, flags::MOTOR_LIMITED)
         | bit(report.rate, flags::RATE_LIMITED)

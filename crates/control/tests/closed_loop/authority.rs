@@ -131,7 +131,7 @@ fn a_silent_safety_module_counts_as_dropped() {
     rig.command(Command::Hold);
     let mut cycles = 0;
     while rig.cycle.state() == State::Hold {
-        let sample = control::BusSample { positions: rig.plant.counts(), wrench: None, safety: None };
+        let sample = control::BusSample { positions: rig.plant.counts(), wrench: None, safety: None, hand: None };
         rig.cycle.step(&control::CycleInput { sample, ..Default::default() });
         cycles += 1;
     }
@@ -214,13 +214,20 @@ fn b8_a_joint_pushed_to_its_limit_is_pushed_back() {
 #[test]
 fn a_joint_that_leaves_its_soft_limits_under_control_is_stopped_with_the_reason() {
     let mut posture = GOAL;
-    posture[1] = 1.90;
+    posture[5] = -1.45;
     let mut rig = Rig::<f32>::new(posture, 1);
     rig.command(Command::Hold);
     rig.run_for(1.0);
-    rig.plant.push = [0.0, 0.0, -60.0, 0.0, 0.0, 0.0];
-    rig.until(State::SoftStop, 5.0);
-    assert!(matches!(rig.cycle.fault(), Fault::JointLimit | Fault::ContactForce), "{:?}", rig.cycle.fault());
+    // Slowly, about the axis that bends the wrist towards its stop.
+    let axis = rig.plant.frames().jacobian().0.column(5).fixed_rows::<3>(3).into_owned();
+    for step in 0..1500 {
+        let torque = -axis * (6.0 * f64::from(step) / 1500.0);
+        rig.plant.push = [0.0, 0.0, 0.0, torque.x, torque.y, torque.z];
+        if rig.tick(None).record.state == State::SoftStop {
+            break;
+        }
+    }
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::SoftStop, Fault::JointLimit));
     assert_eq!(rig.tick(Some(Command::Hold)).event, Some(Event::Refused(Refusal::FaultLatched)));
     rig.plant.push = [0.0; 6];
     rig.run_for(2.0);
@@ -245,7 +252,12 @@ fn a_bus_fault_takes_torque_off_and_asks_for_idle() {
     let mut rig = Rig::<f32>::new(GOAL, 1);
     rig.command(Command::Hold);
     rig.run_for(1.0);
-    let sample = control::BusSample { positions: rig.plant.counts(), wrench: None, safety: Some(SafetyMode::Active) };
+    let sample = control::BusSample {
+        positions: rig.plant.counts(),
+        wrench: None,
+        safety: Some(SafetyMode::Active),
+        hand: None,
+    };
     let input = control::CycleInput { cycle: 0, sample, command: None, external_fault: Some(Fault::BusFault) };
     let output = rig.cycle.step(&input);
     assert_eq!((output.record.state, output.record.fault), (State::Fault, Fault::BusFault));

@@ -1,7 +1,10 @@
 //! The whole control cycle against a simulated arm.
 
+mod adaptation;
 mod authority;
 mod contact;
+mod hand;
+mod hand_plant;
 mod losses;
 mod postures;
 mod primitives;

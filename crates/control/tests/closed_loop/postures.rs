@@ -114,7 +114,7 @@ fn a_frictionless_arm_is_held_steadily_as_well() {
 fn an_obstacle_feels_no_more_than_one_and_a_half_times_the_friction_in_addition() {
     let mut rig = holding(GOAL, 1, 1.0);
     rig.plant.push[1] = 25.0;
-    let stiffness = f64::from(Gains::<f32>::tuned().stiffness[0]);
+    let stiffness = f64::from(Gains::<f32>::tuned().stiff.stiffness[0]);
     let mut most = 0.0f64;
     for _ in 0..3000 {
         let record = rig.tick(None).record;
@@ -179,7 +179,7 @@ fn while_a_torque_is_cut_the_integral_waits() {
         record = rig.tick(None).record;
         cycles += 1;
     }
-    let spring = Gains::<f32>::tuned().stiffness[0] * (record.q_d[0] - record.q[0]);
+    let spring = Gains::<f32>::tuned().stiff.stiffness[0] * (record.q_d[0] - record.q[0]);
     assert!(cycles > 10, "{cycles} cycles");
     assert!(spring.abs() > 3.0 && (record.tau[0] - spring).abs() < 0.02, "{} of {spring} N m", record.tau[0]);
 }

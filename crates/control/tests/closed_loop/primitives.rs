@@ -16,6 +16,10 @@ use crate::rig::KERNELS;
 pub(crate) const START: [f64; 7] = [-0.20, 1.30, 1.20, 2.10, -0.30, -0.50, 1.40];
 pub(crate) const GOAL: [f64; 7] = [-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75];
 
+/// Largest displacement (m) and rotation (rad) of the test primitives by feedback.
+pub(crate) const DISPLACEMENT: f64 = 0.1;
+pub(crate) const ROTATION: f64 = 0.4;
+
 /// The pose and posture of the arm at `q`.
 pub(crate) fn configuration<R: Real>(q: [f64; 7]) -> Configuration<R> {
     let model = ArmModel::<f64>::new(Payload::SensorAndHand);
@@ -54,12 +58,30 @@ pub(crate) struct Design {
     pub(crate) goal: [f64; 7],
     /// Expected wrench (six rows), constant; with it the primitive has feedback gains.
     pub(crate) expected: Option<[f64; 6]>,
+    /// Expected torque on F1, F2, F3 (N m), constant.
+    pub(crate) expected_gauges: [f64; 3],
+    /// Sensitivity K1 of position, orientation and hand rows.
+    pub(crate) sensitivity: [f64; 3],
+    /// Duration at which the expectation is said to have been recorded; that of the primitive, if `None`.
+    pub(crate) recorded: Option<f64>,
+    /// Where the fingers close to (rad).
+    pub(crate) closed: f64,
     pub(crate) bent: bool,
 }
 
 impl Default for Design {
     fn default() -> Self {
-        Design { duration: 5.0, start: START, goal: GOAL, expected: None, bent: true }
+        Design {
+            duration: 5.0,
+            start: START,
+            goal: GOAL,
+            expected: None,
+            expected_gauges: [0.0; 3],
+            sensitivity: [4.0, 20.0, 400.0],
+            recorded: None,
+            closed: 0.25,
+            bent: true,
+        }
     }
 }
 
@@ -69,20 +91,21 @@ pub(crate) fn primitive<R: Real>(design: &Design) -> Primitive<R, KERNELS> {
     let stiffness = R::of(200.0);
     let critical = R::of(2.0 * 200f64.sqrt());
     let weights = if design.bent { weights() } else { vec![zero; dmp::ROWS * KERNELS] };
+    let [p, o, h] = design.sensitivity;
     let feedback = design.expected.map(|_| {
         Feedback::new(
-            GainSchedule::constant([4.0, 4.0, 4.0, 20.0, 20.0, 20.0, 0.0, 0.0, 0.0, 0.0].map(R::of)).expect("gains"),
+            GainSchedule::constant([p, p, p, o, o, o, 0.0, h, h, h].map(R::of)).expect("gains"),
             GainSchedule::constant([R::of(1.0); dmp::SENSORS]).expect("gains"),
-            Limits { displacement: R::of(0.1), rotation: R::of(0.4), hand: zero },
+            Limits { displacement: R::of(DISPLACEMENT), rotation: R::of(ROTATION), hand: R::of(0.8) },
         )
         .expect("gains")
     });
     let expected = design.expected.map(|wrench| {
         let mut row = [zero; dmp::SENSORS];
-        for (entry, value) in row.iter_mut().zip(wrench) {
+        for (entry, value) in row.iter_mut().zip(wrench.into_iter().chain(design.expected_gauges)) {
             *entry = R::of(value);
         }
-        ExpectedWrench::new(&[row, row], R::of(design.duration)).expect("an expectation")
+        ExpectedWrench::new(&[row, row], R::of(design.recorded.unwrap_or(design.duration))).expect("an expectation")
     });
     let tables = PrimitiveTables {
         duration: R::of(design.duration),
@@ -95,10 +118,14 @@ pub(crate) fn primitive<R: Real>(design: &Design) -> Primitive<R, KERNELS> {
         orientation_error: OrientationError::Quaternion,
         hemisphere: Hemisphere::Nearest,
         start: configuration(design.start),
-        goal: configuration(design.goal),
+        goal: Configuration {
+            hand: [0.0, design.closed, design.closed, design.closed].map(R::of),
+            ..configuration(design.goal)
+        },
         start_velocity: Velocity { position: [zero; 3], orientation: [zero; 3], posture: [zero; 7], hand: [zero; 4] },
-        feedback,
-        expected,
+        feedback: feedback.as_ref(),
+        expected: expected.as_ref(),
+        experience: None,
     };
     load::primitive(&ArmModel::new(Payload::SensorAndHand), &tables).expect("a movement this arm can run")
 }

@@ -6,6 +6,7 @@
 
 use std::collections::VecDeque;
 
+use crate::hand_plant::Hand;
 use control::arm::ArmModel;
 use control::command::Command;
 use control::kinematics::Frames;
@@ -32,6 +33,12 @@ pub(crate) struct Plant {
     pub(crate) hand_weight: f64,
     /// Force that the sensor alone reports, along its x axis (N).
     pub(crate) glitch: f64,
+    /// What the sensor reports whatever it feels.
+    pub(crate) stuck: Option<RawWrench>,
+    /// Whether the sensor's replies are lost.
+    pub(crate) deaf: bool,
+    /// The hand, if it is on the bus.
+    pub(crate) hand: Option<Hand>,
     queue: VecDeque<Vector7<f64>>,
     calibration: Calibration<f64>,
 }
@@ -47,8 +54,11 @@ impl Plant {
             push: [0.0; 6],
             wall: None,
             torque: Vector7::zeros(),
-            hand_weight: 1.2013 * 9.81,
+            hand_weight: model::HAND_MASS * 9.81,
             glitch: 0.0,
+            stuck: None,
+            deaf: false,
+            hand: None,
             queue: (0..delay).map(|_| Vector7::zeros()).collect(),
             calibration: Calibration::nominal(Payload::SensorAndHand),
         }
@@ -78,9 +88,12 @@ impl Plant {
     pub(crate) fn wrench(&self) -> RawWrench {
         let frames = self.frames();
         let [fx, fy, fz, nx, ny, nz] = self.environment();
-        let force = Vector3::new(fx, fy, fz) + Vector3::new(0.0, 0.0, -self.hand_weight);
-        let torque = Vector3::new(nx, ny, nz) - frames.tool_to_sensor().cross(&Vector3::new(fx, fy, fz));
+        let weight = Vector3::new(0.0, 0.0, -self.hand_weight);
         let to_sensor = frames.sensor_to_world().transpose();
+        let centre = frames.sensor_to_world() * Vector3::from(model::HAND_CENTRE);
+        let force = Vector3::new(fx, fy, fz) + weight;
+        let torque =
+            Vector3::new(nx, ny, nz) - frames.tool_to_sensor().cross(&Vector3::new(fx, fy, fz)) + centre.cross(&weight);
         let counts = |v: Vector3<f64>, scale: f64| [0, 1, 2].map(|axis| (v[axis] * scale).floor() as i16);
         RawWrench {
             force: counts(to_sensor * force + Vector3::new(self.glitch, 0.0, 0.0), 256.0),
@@ -172,10 +185,19 @@ impl<R: Real> Rig<R> {
                 *position = None;
             }
         }
-        let sample = BusSample { positions, wrench: Some(self.plant.wrench()), safety: Some(self.safety) };
+        let sample = BusSample {
+            positions,
+            wrench: self.plant.stuck.or(Some(self.plant.wrench())).filter(|_| !self.plant.deaf),
+            safety: Some(self.safety),
+            hand: self.plant.hand.as_ref().map(Hand::sample),
+        };
         let input = CycleInput { cycle: self.number, sample, command, external_fault: None };
         let output = self.cycle.step(&input);
         self.plant.receive(output.actuation.frames());
+        if let Some(hand) = &mut self.plant.hand {
+            hand.receive(output.actuation.hand_frame());
+            hand.advance();
+        }
         self.plant.advance();
         self.number += 1;
         self.last = Some(output);

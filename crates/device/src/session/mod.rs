@@ -25,7 +25,7 @@ use link::image::{KERNEL_LIMIT, WEIGHT_ROWS};
 use link::{Event, EventKind, Refusal, Reply, Request, Statistics};
 
 use crate::event::EventKind as CoreEvent;
-use crate::port::{SessionPort, TimedRecord};
+use crate::port::{SessionPort, StoredPrimitive, TimedRecord};
 use crate::store::Store;
 use directory::{Directory, Entry};
 use owner::Owner;
@@ -58,7 +58,7 @@ pub struct Identity {
 
 /// The device's end of the link.
 ///
-/// About 12 kB beside the store; [`crate::RamStore`] should be a static of its own, lent as `&mut`.
+/// About 35 kB beside the store; [`crate::RamStore`] should be a static of its own, lent as `&mut`.
 #[derive(Debug)]
 pub struct Session<S> {
     identity: Identity,
@@ -80,6 +80,8 @@ pub struct Session<S> {
     events_dropped: u32,
     link_timeouts: u32,
     room: WeightRoom,
+    /// Where primitives are built, to be checked or handed to the control half.
+    primitive: StoredPrimitive,
 }
 
 impl<S: Store> Session<S> {
@@ -106,6 +108,7 @@ impl<S: Store> Session<S> {
             events_dropped: 0,
             link_timeouts: 0,
             room: [0.0; WEIGHT_ROWS * KERNEL_LIMIT],
+            primitive: StoredPrimitive::PLACEHOLDER,
         }
     }
 
@@ -151,10 +154,7 @@ impl<S: Store> Session<S> {
         while let Some(event) = port.event() {
             let answer = match event.kind {
                 CoreEvent::Accepted => Some(Ok(())),
-                CoreEvent::Refused(reason) => {
-                    let fault = self.latest.map_or(0, |timed| timed.record.fault.code());
-                    Some(Err(wire::refusal(reason, &port.health(), fault)))
-                }
+                CoreEvent::Refused(reason) => Some(Err(wire::refusal(reason, &port.health()))),
                 _ => None,
             };
             let Some(answer) = answer else {
@@ -200,7 +200,7 @@ impl<S: Store> Session<S> {
 
     /// Cycle records: the latest is kept, every so many go out as telemetry if the line has room.
     fn forward_records(&mut self, now_ms: u32, port: &mut impl SessionPort) {
-        const LIMITED: u16 =
+        const LIMITED: u32 =
             control::flags::JOINT_LIMITED | control::flags::MOTOR_LIMITED | control::flags::RATE_LIMITED;
         while let Some(timed) = port.record() {
             self.latest = Some(timed);
@@ -316,6 +316,7 @@ impl<S: Store> Session<S> {
             link,
             stack_free: timing.stack_free,
             stack_size: timing.stack_size,
+            hand_lost_replies: counters.hand_lost_replies,
         }
     }
 }

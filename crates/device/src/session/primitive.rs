@@ -1,17 +1,16 @@
 //! From an image in the store to the primitive the control half runs.
 
 use control::arm::ArmModel;
-use control::load;
-use dmp::{
-    Configuration, ExpectedWrench, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, PrimitiveTables,
-    Quaternion, SENSORS, Velocity,
-};
+use control::load::{self, LoadError};
+use dmp::{Configuration, Hemisphere, Limits, OrientationError, PrimitiveTables, Quaternion, Velocity};
+use link::Refusal;
 use link::image::{
-    COUPLED_ROWS, EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, HemisphereKind, ImageContent, KERNEL_LIMIT,
-    OrientationErrorKind, Reals, WEIGHT_ROWS, Waypoint,
+    EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT, EXPERIENCE_ROWS, GAIN_POINTS_LIMIT, HemisphereKind,
+    ImageContent, KERNEL_LIMIT, OrientationErrorKind, Reals, WEIGHT_ROWS, Waypoint,
 };
 
-use super::wire::{PrimitiveTrouble, TROUBLE_EXPECTATION, TROUBLE_FEEDBACK};
+use super::upload::Refused;
+use super::wire::{PrimitiveTrouble, TROUBLE_EXPECTATION, TROUBLE_EXPERIENCE, TROUBLE_FEEDBACK};
 use crate::port::StoredPrimitive;
 
 // The image's limits must not exceed what the control half can hold; a table that does not fit would be refused
@@ -19,16 +18,62 @@ use crate::port::StoredPrimitive;
 const _: () = assert!(KERNEL_LIMIT <= control::MAX_KERNELS);
 const _: () = assert!(GAIN_POINTS_LIMIT <= dmp::GAIN_CAPACITY);
 const _: () = assert!(EXPECTATION_POINTS_LIMIT <= dmp::EXPECTED_CAPACITY);
+const _: () = assert!(EXPERIENCE_POINTS_LIMIT <= dmp::EXPERIENCE_CAPACITY);
+const _: () = assert!(EXPERIENCE_ROWS == dmp::EXPERIENCE_CHANNELS);
 
 /// Room to copy the weights into, because those of an image are not aligned.
 pub(crate) type WeightRoom = [f32; WEIGHT_ROWS * KERNEL_LIMIT];
 
-/// Checks the content against the arm and builds the primitive.
+/// How much the cut-off of the filter behind an expectation may differ from the device's, of one.
+const CUT_OFF_TOLERANCE: f32 = 0.01;
+
+/// Why an image is not a primitive for this device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unfit {
+    /// Its content is outside what the controller accepts.
+    Content(PrimitiveTrouble),
+    /// Its expectation was recorded through a filter of another cut-off, mHz.
+    Filter(u32),
+}
+
+impl From<PrimitiveTrouble> for Unfit {
+    fn from(trouble: PrimitiveTrouble) -> Self {
+        Self::Content(trouble)
+    }
+}
+
+impl From<Unfit> for Refused {
+    fn from(unfit: Unfit) -> Self {
+        match unfit {
+            Unfit::Content(trouble) => (Refusal::PrimitiveInvalid, trouble.0),
+            Unfit::Filter(found) => (Refusal::ImageFilter, [found, millihertz(CUT_OFF)]),
+        }
+    }
+}
+
+/// Cut-off of the device's filter on wrench and gauges, Hz.
+const CUT_OFF: f32 = control::wrench::WRENCH_CUT_OFF as f32;
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "cut to what fits")]
+fn millihertz(frequency: f32) -> u32 {
+    (frequency.clamp(0.0, 4.0e6) * 1000.0 + 0.5) as u32
+}
+
+/// Checks the content against the arm and makes `primitive` its own, in place: it has 23 kB, the stack has 64.
+///
+/// # Errors
+/// [`Unfit`]; what `primitive` holds then is of no use.
 pub(crate) fn build(
     model: &ArmModel<f32>,
     content: &ImageContent<Reals<'_>>,
     room: &mut WeightRoom,
-) -> Result<StoredPrimitive, PrimitiveTrouble> {
+    primitive: &mut StoredPrimitive,
+) -> Result<(), Unfit> {
+    let found = content.marks.filter_cutoff;
+    let recorded = !content.expected_mean.is_empty() || !content.experience_mean.is_empty();
+    if recorded && (found / CUT_OFF - 1.0).abs() > CUT_OFF_TOLERANCE {
+        return Err(Unfit::Filter(millihertz(found)));
+    }
     let weights = content.weights.copy_to(room).unwrap_or_default();
     let velocity = &content.start_velocity;
     let tables = PrimitiveTables {
@@ -55,10 +100,28 @@ pub(crate) fn build(
             posture: velocity.posture,
             hand: velocity.hand,
         },
-        feedback: feedback(content)?,
-        expected: expectation(content)?,
+        // These follow, number by number.
+        feedback: None,
+        expected: None,
+        experience: None,
     };
-    load::primitive(model, &tables).map_err(PrimitiveTrouble::from)
+    primitive.assign(&tables).map_err(|error| PrimitiveTrouble::from(LoadError::Primitive(error)))?;
+    load::check(model, primitive).map_err(PrimitiveTrouble::from)?;
+    if !content.k1.is_empty() {
+        let clamps = &content.clamps;
+        let limits = Limits { displacement: clamps.position, rotation: clamps.orientation, hand: clamps.hand };
+        primitive.assign_feedback(content.k1.iter(), content.k2.iter(), limits).map_err(|_| TROUBLE_FEEDBACK)?;
+    }
+    if !content.expected_mean.is_empty() {
+        primitive
+            .assign_expected(content.expected_mean.iter(), content.marks.recorded_duration)
+            .map_err(|_| TROUBLE_EXPECTATION)?;
+    }
+    if !content.experience_mean.is_empty() {
+        let (mean, spread) = (content.experience_mean.iter(), content.experience_spread.iter());
+        primitive.assign_experience(mean, spread, content.experience_trials).map_err(|_| TROUBLE_EXPERIENCE)?;
+    }
+    Ok(())
 }
 
 fn configuration(waypoint: &Waypoint) -> Configuration<f32> {
@@ -69,41 +132,4 @@ fn configuration(waypoint: &Waypoint) -> Configuration<f32> {
         posture: waypoint.posture,
         hand: waypoint.hand,
     }
-}
-
-fn feedback(content: &ImageContent<Reals<'_>>) -> Result<Option<Feedback<f32>>, PrimitiveTrouble> {
-    if content.k1.is_empty() {
-        return Ok(None);
-    }
-    let mut k1 = [[0.0; COUPLED_ROWS]; GAIN_POINTS_LIMIT];
-    let mut k2 = [[0.0; SENSORS]; GAIN_POINTS_LIMIT];
-    let limits = Limits {
-        displacement: content.clamps.position,
-        rotation: content.clamps.orientation,
-        hand: content.clamps.hand,
-    };
-    GainSchedule::new(points(content.k1, &mut k1))
-        .and_then(|k1| Feedback::new(k1, GainSchedule::new(points(content.k2, &mut k2))?, limits))
-        .map(Some)
-        .map_err(|_| TROUBLE_FEEDBACK)
-}
-
-fn expectation(content: &ImageContent<Reals<'_>>) -> Result<Option<ExpectedWrench<f32>>, PrimitiveTrouble> {
-    if content.expected_mean.is_empty() {
-        return Ok(None);
-    }
-    let mut mean = [[0.0; SENSORS]; EXPECTATION_POINTS_LIMIT];
-    ExpectedWrench::new(points(content.expected_mean, &mut mean), content.marks.recorded_duration)
-        .map(Some)
-        .map_err(|_| TROUBLE_EXPECTATION)
-}
-
-/// Copies a table, point after point, to the front of `room`.
-fn points<'a, const COLUMNS: usize>(table: Reals<'_>, room: &'a mut [[f32; COLUMNS]]) -> &'a [[f32; COLUMNS]] {
-    let count = (table.len() / COLUMNS).min(room.len());
-    let used = room.get_mut(..count).unwrap_or_default();
-    for (place, value) in used.as_flattened_mut().iter_mut().zip(table.iter()) {
-        *place = value;
-    }
-    used
 }

@@ -128,6 +128,12 @@ impl<S: Store> Session<S> {
             }
             Request::Release => self.command(now_ms, of, Control::Release.into(), port),
             Request::Tare => self.command(now_ms, of, Control::Tare.into(), port),
+            Request::InitialiseHand => self.command(now_ms, of, Command::InitialiseHand, port),
+            Request::MoveHand { q, duration } => {
+                finite(&q)?;
+                finite(&[duration])?;
+                self.command(now_ms, of, Control::MoveHand { q, duration }.into(), port)
+            }
             Request::Telemetry { every } => {
                 self.telemetry_every = every;
                 done
@@ -201,11 +207,10 @@ impl<S: Store> Session<S> {
         // Checked again: memory may have been damaged since the upload.
         let image =
             PrimitiveImage::parse(bytes).map_err(|error| (Refusal::ImageInvalid, [error.code(), error.number()]))?;
-        let primitive = primitive::build(&self.model, image.content(), &mut self.room)
-            .map_err(|trouble| (Refusal::PrimitiveInvalid, trouble.0))?;
+        primitive::build(&self.model, image.content(), &mut self.room, &mut self.primitive)?;
         // After a refusal nothing is known to be loaded: a later run loads again rather than run what is left there.
         self.loaded = None;
-        port.load(&primitive).map_err(|refusal| match refusal {
+        port.load(&self.primitive).map_err(|refusal| match refusal {
             LoadRefusal::Running => (Refusal::State, [State::Run.code().into(), 0]),
             LoadRefusal::Unfit(error) => (Refusal::PrimitiveInvalid, PrimitiveTrouble::from(error).0),
         })?;
@@ -256,7 +261,7 @@ impl<S: Store> Session<S> {
         Status {
             cycle: wire::cycle(health.cycle),
             state: health.state.code(),
-            fault: record.map_or(0, |record| record.fault.code()),
+            fault: health.fault.code(),
             startup_stage: health.stage.code(),
             blocked: health.blocked.map(|error| StartupTrouble::from(error).0),
             zeroed: health.zeroed,
@@ -268,6 +273,9 @@ impl<S: Store> Session<S> {
             temperatures: health.temperatures,
             telemetry_every: self.telemetry_every,
             upload_received: self.upload.as_ref().map(|upload| upload.received),
+            hand_stage: health.hand,
+            hand: record.map_or([0.0; 4], |record| record.hand),
+            hand_temperatures: health.hand_temperatures,
         }
     }
 }
@@ -315,5 +323,7 @@ fn run_options(options: &link::RunOptions) -> Result<RunOptions, Refused> {
             AccelerationSource::Analytic => control::AccelerationSource::Analytic,
             AccelerationSource::Differentiated => control::AccelerationSource::Differentiated,
         },
+        finger_feedback: options.finger_feedback,
+        compliant: options.compliant,
     })
 }

@@ -100,8 +100,7 @@ impl<S: Store> Session<S> {
         if *image.name() != upload.name {
             return Err((Refusal::ImageName, [0, 0]));
         }
-        primitive::build(&self.model, image.content(), &mut self.room)
-            .map_err(|trouble| (Refusal::PrimitiveInvalid, trouble.0))?;
+        primitive::build(&self.model, image.content(), &mut self.room, &mut self.primitive)?;
         let entry = Entry::of(&image);
         let place = self.directory.find(&entry.name).map(|(slot, _)| slot).or_else(|| self.directory.free());
         let Some(slot) = place else {

@@ -7,7 +7,7 @@ use core::fmt;
 use control::CalibrationError;
 use control::load::{End, LoadError};
 use dmp::{GainError, PrimitiveError, Row};
-use link::{Event as LinkEvent, EventKind as LinkKind, Refusal as LinkRefusal, Telemetry};
+use link::{Event as LinkEvent, EventKind as LinkKind, HandStage, Refusal as LinkRefusal, Telemetry};
 use puck::Node;
 
 use crate::command::Refusal;
@@ -23,14 +23,14 @@ pub(crate) const fn cycle(number: u64) -> u32 {
 }
 
 /// A refusal of the control half as a refusal of the link, with its detail.
-pub(crate) fn refusal(reason: Refusal, health: &Health, fault: u8) -> (LinkRefusal, [u32; 2]) {
+pub(crate) fn refusal(reason: Refusal, health: &Health) -> (LinkRefusal, [u32; 2]) {
     use control::Refusal as Control;
     match reason {
         Refusal::NotReady(Stage::WaitingForZero) => (LinkRefusal::NotZeroed, [0, 0]),
         Refusal::NotReady(stage) => (LinkRefusal::NotReady, [stage.code().into(), 0]),
         Refusal::ZeroNeedsIdle => (LinkRefusal::ZeroNeedsIdle, [0, 0]),
         Refusal::HomeOutOfRange { joint } => (LinkRefusal::BadValue, [joint.into(), 0]),
-        Refusal::Control(Control::FaultLatched) => (LinkRefusal::Faulted, [fault.into(), 0]),
+        Refusal::Control(Control::FaultLatched) => (LinkRefusal::Faulted, [health.fault.code().into(), 0]),
         Refusal::Control(Control::WrongState) => (LinkRefusal::State, [health.state.code().into(), 0]),
         Refusal::Control(Control::SafetyNotActive) => {
             (LinkRefusal::SafetyMode, [health.safety_mode.map_or(u32::MAX, |mode| mode.value().unsigned_abs()), 0])
@@ -44,7 +44,23 @@ pub(crate) fn refusal(reason: Refusal, health: &Health, fault: u8) -> (LinkRefus
         Refusal::Control(Control::CauseRemains) => (LinkRefusal::CauseRemains, [0, 0]),
         Refusal::Control(Control::Moving) => (LinkRefusal::Moving, [0, 0]),
         Refusal::Control(Control::WrenchMissing) => (LinkRefusal::WrenchMissing, [0, 0]),
+        Refusal::Control(Control::NoExpectation) => (LinkRefusal::NoExpectation, [0, 0]),
+        Refusal::Control(Control::HandTooFar) => (LinkRefusal::HandFarFromStart, [0, 0]),
+        Refusal::Control(Control::ForceAtRest) => (LinkRefusal::ForceAtRest, [0, 0]),
+        Refusal::Control(Control::NoHand) | Refusal::NoHand => hand(health.hand),
+        Refusal::HandBusy => (LinkRefusal::HandBusy, [0, 0]),
     }
+}
+
+/// Why there is no hand to use.
+fn hand(stage: HandStage) -> (LinkRefusal, [u32; 2]) {
+    let refusal = match stage {
+        HandStage::Absent | HandStage::Failed => LinkRefusal::NoHand,
+        HandStage::Initialising => LinkRefusal::HandBusy,
+        // Ready since the cycle refused, or about to be.
+        HandStage::NotInitialised | HandStage::Ready => LinkRefusal::HandNotReady,
+    };
+    (refusal, [stage.code().into(), 0])
 }
 
 /// An event of the control half for the host; `None` for the answers to commands, which travel as answers.
@@ -58,9 +74,19 @@ pub(crate) fn event(event: Event) -> Option<LinkEvent> {
             let StartupTrouble([code, detail]) = StartupTrouble::from(error);
             (LinkKind::Blocked, u16::try_from(code).unwrap_or(u16::MAX), detail)
         }
+        EventKind::Surprised { phase, channel } => (LinkKind::Surprise, channel.into(), thousandths(phase)),
+        EventKind::Hand { stage, cause } => {
+            (LinkKind::Hand, stage.code().into(), cause.map_or(0, |(node, trouble)| trouble.number(node)))
+        }
         EventKind::Safety(mode) => (LinkKind::SafetyMode, u16::try_from(mode.value()).unwrap_or(u16::MAX), 0),
     };
     Some(LinkEvent { cycle: cycle(event.cycle), kind, code, detail })
+}
+
+/// A share of one in 1/1000, rounded to the nearest; 0 for what is no share.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=1000 before")]
+fn thousandths(share: f32) -> u32 {
+    (share.clamp(0.0, 1.0) * 1000.0 + 0.5) as u32
 }
 
 /// A cycle record as telemetry.
@@ -79,6 +105,10 @@ pub(crate) fn telemetry(timed: &TimedRecord) -> Telemetry {
         wrench: record.wrench,
         lost_replies: record.lost_replies,
         cost_ticks: timed.cost_ticks,
+        hand: record.hand,
+        hand_d: record.hand_d,
+        gauges: record.gauges,
+        surprise: record.surprise,
     }
 }
 
@@ -106,6 +136,7 @@ impl From<StartupError> for StartupTrouble {
             StartupError::Calibration(CalibrationError::CountsPerRevolution(motor)) => Self([11, motor.into()]),
             StartupError::Calibration(CalibrationError::TorqueCounts(motor)) => Self([12, motor.into()]),
             StartupError::Calibration(CalibrationError::Transmission(_)) => Self([13, 0]),
+            StartupError::Calibration(CalibrationError::HandTorqueCounts(digit)) => Self([16, digit.into()]),
             StartupError::ZeroNotTaken(node) => at(14, node, 0),
             StartupError::SafetyNotZeroed => Self([15, 0]),
         }
@@ -134,6 +165,7 @@ impl StartupTrouble {
             12 => StartupError::Calibration(CalibrationError::TorqueCounts(byte)),
             14 => StartupError::ZeroNotTaken(node),
             15 => StartupError::SafetyNotZeroed,
+            16 => StartupError::Calibration(CalibrationError::HandTorqueCounts(byte)),
             _ => return None,
         })
     }
@@ -174,6 +206,7 @@ const PLAIN: [PrimitiveError; 12] = [
 /// Codes of the tables beside the primitive itself.
 pub(crate) const TROUBLE_FEEDBACK: PrimitiveTrouble = PrimitiveTrouble([8, 0]);
 pub(crate) const TROUBLE_EXPECTATION: PrimitiveTrouble = PrimitiveTrouble([9, 0]);
+pub(crate) const TROUBLE_EXPERIENCE: PrimitiveTrouble = PrimitiveTrouble([10, 0]);
 
 fn place<T: PartialEq>(list: &[T], item: &T) -> u32 {
     list.iter().zip(0..).find(|(other, _)| *other == item).map_or(u32::MAX, |(_, index)| index)
@@ -225,6 +258,9 @@ impl fmt::Display for PrimitiveTrouble {
         match (self.error(), *self) {
             (Some(error), _) => error.fmt(f),
             (None, TROUBLE_FEEDBACK) => f.write_str("a gain or clamp of the feedback is negative or too large"),
+            (None, TROUBLE_EXPERIENCE) => {
+                f.write_str("a spread of the experience is not positive, or no run is behind it")
+            }
             (None, TROUBLE_EXPECTATION) => f.write_str("the recorded duration of the expectation is not positive"),
             (None, Self([code, detail])) => write!(f, "unknown reason {code} ({detail:#x})"),
         }

@@ -8,6 +8,7 @@ use control::Calibration;
 use puck::{Counts, Group, Node, PropertyId, Reply, force_torque, set};
 
 use super::exchange::{Answer, Exchange};
+use super::hand::HandSurvey;
 use super::stage::{Stage, StartupError};
 use super::survey::{SafetyProperties, Survey};
 use crate::bus::Outlet;
@@ -29,7 +30,7 @@ pub(super) const ENUMERATED: core::ops::RangeInclusive<u8> = 1..=31;
 /// Where the start-up stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Step {
-    /// Take off what torque may still be applied: frames 0 and 1 zero torques, frame 2 MODE IDLE.
+    /// Take off what torque may still be applied: frames 0 and 1 zero torques, then MODE IDLE to the arm and to the hand.
     Hush { frame: u8 },
     /// Ask this node for its STAT.
     Enumerate { node: u8, powered: bool },
@@ -49,10 +50,12 @@ pub(super) enum Step {
     Silence { until_us: u64 },
     /// STAT (0) and VERS (1) of each device.
     Verify { device: u8, item: u8 },
-    /// SET MODE IDLE to the arm.
-    Brake,
+    /// SET MODE IDLE to the arm, and to what there is of a hand.
+    Brake { hand: bool },
     /// A property of a puck.
     Read { joint: u8, item: u8 },
+    /// A property of a hand puck.
+    ReadHand { digit: u8, item: u8 },
     /// Ask whether the arm is zeroed.
     AskZero,
     /// Wait for a person; look at the safety module from this time on.
@@ -95,6 +98,7 @@ pub(crate) struct Startup {
     pub(super) step: Step,
     pub(super) exchange: Exchange,
     pub(super) survey: Survey,
+    pub(super) hand: HandSurvey,
     pub(super) enumerations: u8,
     pub(super) safety: Option<SafetyProperties>,
     pub(super) calibration: Option<Calibration<f32>>,
@@ -124,6 +128,7 @@ impl Startup {
             step: Step::Enumerate { node: *ENUMERATED.start(), powered: false },
             exchange: Exchange::default(),
             survey: Survey::new(),
+            hand: HandSurvey::default(),
             enumerations: 0,
             safety: None,
             calibration: None,
@@ -148,7 +153,7 @@ impl Startup {
             Step::AwaitIdle { .. } => Stage::WaitingForIdle,
             Step::Identify { .. } | Step::Wake { .. } | Step::Silence { .. } => Stage::Waking,
             Step::Verify { .. } => Stage::Verifying,
-            Step::Brake | Step::Read { .. } | Step::AskZero => Stage::Reading,
+            Step::Brake { .. } | Step::Read { .. } | Step::ReadHand { .. } | Step::AskZero => Stage::Reading,
             Step::AwaitZero { .. } | Step::ConfirmIdle => Stage::WaitingForZero,
             Step::IgnoreFaults
             | Step::WritePosition { .. }
@@ -264,12 +269,18 @@ impl Startup {
             Step::Silence { until_us } if outlet.now_us() < until_us => Ok(Next::Stay),
             Step::Silence { .. } => Ok(Next::Go(Step::Verify { device: 0, item: 0 })),
             Step::Verify { device, item } => self.verify(device, item, outlet),
-            Step::Brake => {
-                // Only ever IDLE: the safety module alone sets TORQUE, when a person activates.
-                let frame = set(Group::ARM, PropertyId::MODE, puck::MotorMode::Idle.value());
-                Ok(after(outlet.send(frame), Step::Read { joint: 0, item: 0 }))
+            Step::Brake { hand } => {
+                // Only ever IDLE: the safety module alone sets TORQUE of the arm, when a person activates.
+                let group = if hand { Group::HAND } else { Group::ARM };
+                let next = if hand || !self.survey.has_digits() {
+                    Step::Read { joint: 0, item: 0 }
+                } else {
+                    Step::Brake { hand: true }
+                };
+                Ok(after(outlet.send(set(group, PropertyId::MODE, puck::MotorMode::Idle.value())), next))
             }
             Step::Read { joint, item } => self.read(joint, item, outlet),
+            Step::ReadHand { digit, item } => Ok(self.read_digit(digit, item, outlet)),
             Step::AskZero => Ok(match self.ask_safety(self.safety()?.zero, outlet)? {
                 None => Next::Stay,
                 Some(0) => {
@@ -313,8 +324,8 @@ impl Startup {
             Step::Done => Ok(Next::Stay),
             Step::Blocked { until_us } if outlet.now_us() < until_us => Ok(Next::Stay),
             Step::Blocked { .. } => {
-                let error = self.error;
-                *self = Startup { error, ..Startup::new() };
+                let (error, hand) = (self.error, self.hand.again());
+                *self = Startup { error, hand, ..Startup::new() };
                 Ok(Next::Stay)
             }
         }

@@ -124,11 +124,10 @@ impl Survey {
         Node::ARM.into_iter().find(|node| !self.is_present(*node))
     }
 
-    /// The devices of the arm that answered: pucks 1 to 7, then the force/torque sensor. The pucks of a hand are left
-    /// asleep: nothing here moves them, and a sleeping puck ignores broadcasts.
-    pub(crate) fn device(&self, index: u8) -> Option<Node> {
+    /// The devices of the arm that answered: pucks 1 to 7, then the force/torque sensor.
+    pub(crate) fn devices(&self) -> impl Iterator<Item = Node> + use<> {
         let sensor = self.is_present(Node::FORCE_TORQUE).then_some(Node::FORCE_TORQUE);
-        Node::ARM.into_iter().chain(sensor).nth(usize::from(index))
+        Node::ARM.into_iter().chain(sensor)
     }
 
     /// Checks ROLE of a device of the arm, or of the safety module.

@@ -1,6 +1,6 @@
 //! The first half of the start-up: from an unknown bus to pucks that are awake, checked and read.
 
-use puck::{Group, Node, PropertyId, SafetyMode, Status, get, set, zero_torques};
+use puck::{Group, MotorMode, Node, PropertyId, SafetyMode, Status, get, set, zero_torques};
 
 use super::exchange::Answer;
 use super::sequence::{ENUMERATED, Next, POLL_US, Startup, Step, after};
@@ -21,8 +21,9 @@ impl Startup {
         let (content, next) = match frame {
             0 => (arm, Step::Hush { frame: 1 }),
             1 => (wrist, Step::Hush { frame: 2 }),
+            2 => (set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value()), Step::Hush { frame: 3 }),
             _ => (
-                set(Group::ARM, PropertyId::MODE, puck::MotorMode::Idle.value()),
+                set(Group::HAND, PropertyId::MODE, MotorMode::Idle.value()),
                 Step::Enumerate { node: *ENUMERATED.start(), powered: false },
             ),
         };
@@ -38,8 +39,13 @@ impl Startup {
 
     pub(super) fn count_pucks(&mut self) -> Result<Next, StartupError> {
         self.enumerations += 1;
+        let hand_may_come = self.survey.hand_is_partial() && self.enumerations < ENUMERATIONS;
         match self.survey.missing_puck() {
-            None => Ok(Next::Go(Step::Identify { device: 0 })),
+            None if !hand_may_come => {
+                self.survey_hand();
+                Ok(Next::Go(Step::Identify { device: 0 }))
+            }
+            None => Ok(Next::Go(Step::Enumerate { node: *ENUMERATED.start(), powered: true })),
             Some(node) if self.enumerations >= ENUMERATIONS => Err(StartupError::MissingPuck(node)),
             Some(_) => Ok(Next::Go(Step::Enumerate { node: *ENUMERATED.start(), powered: true })),
         }
@@ -93,6 +99,7 @@ impl Startup {
         // ACTIVE is not good enough: pucks must not be woken or zeroed with torque on.
         if SafetyMode::from_value(mode) == Some(SafetyMode::Idle) {
             self.survey = Survey::new();
+            self.hand = self.hand.again();
             self.enumerations = 0;
             return Ok(Next::Go(Step::Enumerate { node: *ENUMERATED.start(), powered: true }));
         }
@@ -103,9 +110,10 @@ impl Startup {
 
     pub(super) fn identify(&mut self, index: u8, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
         let next = Step::Identify { device: index + 1 };
-        match self.survey.device(index) {
+        match self.device(index) {
             None => Ok(Next::Go(Step::Wake { device: 0, woken: false })),
             Some(Node::FORCE_TORQUE) => Ok(Next::Go(next)),
+            Some(node) if node.hand_index().is_some() => Ok(self.identify_digit(node, next, outlet)),
             Some(node) => {
                 let Some(role) = self.ask(node, PropertyId::ROLE, outlet)? else {
                     return Ok(Next::Stay);
@@ -117,7 +125,7 @@ impl Startup {
     }
 
     pub(super) fn wake(&mut self, index: u8, woken: bool, outlet: &mut impl Outlet) -> Next {
-        let Some(node) = self.survey.device(index) else {
+        let Some(node) = self.device(index) else {
             return Next::Go(if woken {
                 Step::Silence { until_us: outlet.now_us() + WAKE_SILENCE_US }
             } else {
@@ -132,9 +140,12 @@ impl Startup {
     }
 
     pub(super) fn verify(&mut self, index: u8, item: u8, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
-        let Some(node) = self.survey.device(index) else {
-            return Ok(Next::Go(Step::Brake));
+        let Some(node) = self.device(index) else {
+            return Ok(Next::Go(Step::Brake { hand: false }));
         };
+        if node.hand_index().is_some() {
+            return Ok(self.verify_digit(node, index, item, outlet));
+        }
         let next = Step::Verify { device: index + 1, item: 0 };
         if item == 0 {
             let status = match self.exchange.ask(node, PropertyId::STAT, outlet) {
@@ -161,7 +172,7 @@ impl Startup {
     pub(super) fn read(&mut self, joint: u8, item: u8, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
         let Some(node) = Node::ARM.get(usize::from(joint)).copied() else {
             self.calibration = Some(self.survey.calibration()?);
-            return Ok(Next::Go(Step::AskZero));
+            return Ok(Next::Go(Step::ReadHand { digit: 0, item: 0 }));
         };
         let Some(property) = DRIVE_PROPERTIES.get(usize::from(item)).copied() else {
             return Ok(Next::Go(Step::Read { joint: joint + 1, item: 0 }));

@@ -72,7 +72,7 @@ impl Startup {
         };
         if SafetyMode::from_value(mode) == Some(SafetyMode::EStop) {
             // The pucks have lost power, and with it everything read and written.
-            *self = Startup::new();
+            *self = Startup { hand: self.hand.again(), ..Startup::new() };
             return Ok(Next::Stay);
         }
         Ok(Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US }))

@@ -19,6 +19,9 @@ enum Happening {
     Activate,
     EmergencyStop,
     PuckResets(usize),
+    DigitResets(usize),
+    DigitLost(usize, u32),
+    DigitDeaf(usize, u32),
     NoRoom(u32),
     Overrun,
     BusError(bool),
@@ -28,6 +31,7 @@ enum Happening {
 #[derive(Clone, Debug)]
 enum Person {
     Zero([f32; 7]),
+    InitialiseHand,
     Control(u8, [f32; 7]),
 }
 
@@ -35,7 +39,8 @@ impl Person {
     fn command(&self) -> Command {
         match self {
             Person::Zero(home) => Command::Zero { home: *home },
-            Person::Control(kind, q) => Command::Control(match kind % 8 {
+            Person::InitialiseHand => Command::InitialiseHand,
+            Person::Control(kind, q) => Command::Control(match kind % 9 {
                 0 => Control::Gravity,
                 1 => Control::Hold,
                 2 => Control::Approach { q: *q, duration: q[0] },
@@ -43,6 +48,7 @@ impl Person {
                 4 => Control::Stop,
                 5 => Control::ClearFault,
                 6 => Control::SetSpeed { factor: q[2] },
+                7 => Control::MoveHand { q: [q[0], q[1], q[2], q[3]], duration: q[4] },
                 _ => Control::Tare,
             }),
         }
@@ -54,7 +60,10 @@ fn happening() -> impl Strategy<Value = Happening> {
         CanFrame::from_slice(CanId::new(id).expect("eleven bits"), &data).expect("at most eight bytes")
     });
     // Frames of the right kind from the right nodes reach further than random ones.
-    let reply = (prop::sample::select(vec![0x426_u16, 0x546, 0x423, 0x4E3, 0x50A, 0x50B, 0x540]), any::<[u8; 4]>())
+    let reply = (
+        prop::sample::select(vec![0x426_u16, 0x546, 0x423, 0x4E3, 0x50A, 0x50B, 0x540, 0x563, 0x566, 0x5C6]),
+        any::<[u8; 4]>(),
+    )
         .prop_map(|(id, data)| CanFrame::from_slice(CanId::new(id).expect("eleven bits"), &data).expect("four bytes"));
     let angles = prop::array::uniform7(prop_oneof![8 => -3.0_f32..3.0, 1 => Just(f32::NAN), 1 => Just(f32::INFINITY)]);
     prop_oneof![
@@ -69,6 +78,10 @@ fn happening() -> impl Strategy<Value = Happening> {
         2 => Just(Happening::Activate),
         1 => Just(Happening::EmergencyStop),
         1 => (0..7_usize).prop_map(Happening::PuckResets),
+        2 => Just(Happening::Person(Person::InitialiseHand)),
+        1 => (0..4_usize).prop_map(Happening::DigitResets),
+        1 => (0..4_usize, 0..8_u32).prop_map(|(digit, count)| Happening::DigitLost(digit, count)),
+        1 => (0..4_usize, 0..3_u32).prop_map(|(digit, count)| Happening::DigitDeaf(digit, count)),
         1 => (0..30_u32).prop_map(Happening::NoRoom),
         1 => Just(Happening::Overrun),
         1 => any::<bool>().prop_map(Happening::BusError),
@@ -92,6 +105,11 @@ fn happen(core: &mut Core, bus: &mut Bus, happening: &Happening) {
         }
         Happening::EmergencyStop => bus.press_emergency_stop(),
         Happening::PuckResets(joint) => bus.pucks[*joint].awake_at = None,
+        Happening::DigitResets(digit) => bus.digits[*digit].lose_power(),
+        Happening::DigitLost(digit, count) => bus.digits[*digit].lose = *count,
+        Happening::DigitDeaf(digit, count) => {
+            (bus.digits[*digit].lose_commands, bus.digits[*digit].lose_modes) = (*count, *count);
+        }
         Happening::NoRoom(frames) => bus.refuse = *frames,
         Happening::Overrun => core.note_overrun(),
         Happening::BusError(bus_off) => core.note_bus_error(*bus_off),
@@ -103,10 +121,14 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
     /// The double panics on any request that no master may send (setting TORQUE, pulling the emergency stop, zeroing under
-    /// torque, malformed frames), so this is a test of both directions.
+    /// torque, malformed frames, disturbing a hand that is initialised, driving one that never was), so this is a test of both directions.
     #[test]
-    fn c2_torque_needs_a_whole_start_up_and_a_command(story in prop::collection::vec(happening(), 1..60)) {
-        let (mut core, mut bus) = (Core::new(), Bus::idle());
+    fn c2_torque_needs_a_whole_start_up_and_a_command(
+        hand in any::<bool>(),
+        story in prop::collection::vec(happening(), 1..60),
+    ) {
+        let bus = Bus::idle();
+        let (mut core, mut bus) = (Core::new(), if hand { bus.with_hand() } else { bus });
         let mut may_move = false;
         for happening in &story {
             let before = bus.log.len();

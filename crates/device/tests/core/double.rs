@@ -1,12 +1,15 @@
-//! A small double of the arm's bus: seven pucks, a force/torque sensor and a safety module, spoken to in frames.
+//! A small double of the arm's bus: seven pucks, a force/torque sensor, a safety module and perhaps a hand, spoken to in
+//! frames.
 //!
 //! It answers as the reference says devices answer, through the device side of the `puck` crate, and logs every frame with
 //! its time. There is no arbitration and no physics: an arm of this double stands still.
 
 use std::collections::VecDeque;
 
+use crate::digit::Digit;
 use control::CycleRecord;
 use device::{Command, Core, CoreIo, Event, EventKind, Slot, Stage};
+use link::HandStage;
 use puck::device::{force_frame, position_frame, reply16, reply32, safety_broadcast, torque_frame};
 use puck::{
     Action, CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId, PropertyTable, PuckTorque,
@@ -16,9 +19,9 @@ use puck::{
 /// From the last bit of a request to the first of its answer, us.
 const LATENCY_US: u64 = 200;
 /// From the wake to the first answer, us.
-const BOOT_US: u64 = 500_000;
+pub(crate) const BOOT_US: u64 = 500_000;
 /// VERS of the boot loader: deliberately one that would choose wrong property numbers.
-const MONITOR_VERSION: i32 = 90;
+pub(crate) const MONITOR_VERSION: i32 = 90;
 
 /// A motor puck.
 #[derive(Clone, Debug)]
@@ -78,6 +81,7 @@ pub(crate) struct Bus {
     pub(crate) records: Vec<CycleRecord>,
     pub(crate) commands: VecDeque<Command>,
     pub(crate) pucks: [Puck; 7],
+    pub(crate) digits: [Digit; 4],
     pub(crate) powered: bool,
     pub(crate) safety_present: bool,
     pub(crate) safety_mode: SafetyMode,
@@ -91,6 +95,8 @@ pub(crate) struct Bus {
     /// When a button of the pendant was pressed last.
     pressed_us: u64,
     ticks: u64,
+    /// Every answer of a device, with the time of its request.
+    pub(crate) answers: Vec<(u64, CanFrame)>,
     on_the_wire: Vec<(u64, CanFrame)>,
     received: VecDeque<CanFrame>,
 }
@@ -106,6 +112,7 @@ impl Bus {
             records: Vec::new(),
             commands: VecDeque::new(),
             pucks: std::array::from_fn(Puck::new),
+            digits: std::array::from_fn(Digit::new),
             powered: false,
             safety_present: true,
             safety_mode: SafetyMode::EStop,
@@ -117,6 +124,7 @@ impl Bus {
             refuse: 0,
             pressed_us: 0,
             ticks: 0,
+            answers: Vec::new(),
             on_the_wire: Vec::new(),
             received: VecDeque::new(),
         }
@@ -140,6 +148,14 @@ impl Bus {
         bus
     }
 
+    /// The same bus with a hand, asleep.
+    pub(crate) fn with_hand(mut self) -> Bus {
+        for digit in &mut self.digits {
+            digit.present = true;
+        }
+        self
+    }
+
     /// The emergency stop is released and Shift-Idle pressed.
     pub(crate) fn press_idle(&mut self) {
         if !self.powered {
@@ -148,6 +164,9 @@ impl Bus {
             self.sensor_awake_at = None;
             for puck in &mut self.pucks {
                 puck.awake_at = None;
+            }
+            for digit in &mut self.digits {
+                digit.lose_power();
             }
         }
         self.set_modes(SafetyMode::Idle, MotorMode::Idle);
@@ -234,6 +253,7 @@ impl Bus {
     }
 
     fn answer(&mut self, delay_us: u64, frame: CanFrame) {
+        self.answers.push((self.now_us, frame));
         self.on_the_wire.push((self.now_us + LATENCY_US + delay_us, frame));
     }
 
@@ -259,6 +279,13 @@ impl Bus {
             };
             if member && self.pucks[joint].present {
                 self.serve_puck(joint, node, request.action);
+            }
+        }
+        for (index, node) in Node::HAND.into_iter().enumerate() {
+            if self.digits[index].present && self.digits[index].hears(node, request.to) {
+                for frame in self.digits[index].serve(node, self.now_us, request.action) {
+                    self.answer(75 * index as u64, frame);
+                }
             }
         }
         if self.sensor_present && request.to == Destination::Node(Node::FORCE_TORQUE) {
@@ -459,7 +486,31 @@ pub(crate) fn started() -> (Core, Bus) {
     (core, bus)
 }
 
-/// The same, activated and floating under gravity compensation away from the joint limits.
+/// A core and its bus with a hand, activated, holding; the hand is not initialised.
+pub(crate) fn holding_with_hand() -> (Core, Bus) {
+    let (mut core, mut bus) = (Core::new(), Bus::idle().with_hand());
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: [0.1, 0.5, 0.1, 1.5, 0.1, 0.2, 0.1] });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    bus.press_activate();
+    bus.run_until(&mut core, Stage::Ready);
+    bus.run(&mut core, 0.1);
+    bus.commands.push_back(control::Command::Hold.into());
+    bus.run(&mut core, 1.0);
+    assert_eq!(core.health().state, control::State::Hold, "{:?}", bus.events);
+    (core, bus)
+}
+
+/// The same, with an initialised hand.
+pub(crate) fn holding_with_ready_hand() -> (Core, Bus) {
+    let (mut core, mut bus) = holding_with_hand();
+    bus.commands.push_back(Command::InitialiseHand);
+    bus.run(&mut core, 7.0);
+    assert_eq!(core.health().hand, HandStage::Ready, "{:?}", bus.events);
+    (core, bus)
+}
+
+/// The same as [`started`], activated and floating under gravity compensation away from the joint limits.
 pub(crate) fn floating() -> (Core, Bus) {
     let (mut core, mut bus) = (Core::new(), Bus::idle());
     bus.run_until(&mut core, Stage::WaitingForZero);

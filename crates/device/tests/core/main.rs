@@ -1,6 +1,9 @@
 //! The control half on a double of the arm's bus: start-up, rounds, slow polls, and every way out of torque.
 
 mod arbitrary;
+mod bus_time;
 mod cycles;
+mod digit;
 mod double;
+mod hand;
 mod startup;

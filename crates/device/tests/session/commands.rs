@@ -1,9 +1,9 @@
 //! Requests for the control half, and what it tells.
 
 use control::{Fault, State};
-use device::{Command, Counters, EventKind, Refusal as Core, Stage};
+use device::{Command, Counters, EventKind, HandTrouble, Refusal as Core, Stage};
 use link::message::{AccelerationSource, PoseFeedback};
-use link::{Event, EventKind as LinkKind, Goal, Name, Refusal, Reply, Request, RunOptions, Telemetry};
+use link::{Event, EventKind as LinkKind, Goal, HandStage, Name, Refusal, Reply, Request, RunOptions, Telemetry};
 use proptest::prelude::*;
 use puck::SafetyMode;
 
@@ -51,6 +51,11 @@ fn each_request_becomes_its_command() {
         (Request::SetSpeed { factor: 0.5 }, Control::SetSpeed { factor: 0.5 }.into()),
         (Request::Release, Control::Release.into()),
         (Request::Tare, Control::Tare.into()),
+        (Request::InitialiseHand, Command::InitialiseHand),
+        (
+            Request::MoveHand { q: [0.1, 0.2, 0.3, 0.4], duration: 1.5 },
+            Control::MoveHand { q: [0.1, 0.2, 0.3, 0.4], duration: 1.5 }.into(),
+        ),
     ];
     for (request, command) in pairs {
         rig.commanded(request);
@@ -69,6 +74,8 @@ fn run_loads_the_primitive_once_and_passes_every_option() {
         force_control: true,
         pose_feedback: PoseFeedback::Planned,
         acceleration: AccelerationSource::Differentiated,
+        finger_feedback: false,
+        compliant: true,
     };
     rig.commanded(Request::Run { name: name("reach"), options });
     rig.commanded(Request::Run { name: name("reach"), options });
@@ -80,6 +87,8 @@ fn run_loads_the_primitive_once_and_passes_every_option() {
         force_control: true,
         pose_feedback: control::PoseFeedback::Planned,
         acceleration: control::AccelerationSource::Differentiated,
+        finger_feedback: false,
+        compliant: true,
     };
     assert_eq!(rig.bench.commands[0], Command::Control(control::Command::Run(expected)));
 }
@@ -167,6 +176,12 @@ fn every_refusal_of_the_control_half_reaches_the_host() {
         (Core::NotReady(Stage::WaitingForZero), Refusal::NotZeroed, [0, 0]),
         (Core::ZeroNeedsIdle, Refusal::ZeroNeedsIdle, [0, 0]),
         (Core::HomeOutOfRange { joint: 3 }, Refusal::BadValue, [3, 0]),
+        (control(control::Refusal::NoExpectation), Refusal::NoExpectation, [0, 0]),
+        (control(control::Refusal::HandTooFar), Refusal::HandFarFromStart, [0, 0]),
+        (control(control::Refusal::ForceAtRest), Refusal::ForceAtRest, [0, 0]),
+        (control(control::Refusal::NoHand), Refusal::HandNotReady, [HandStage::NotInitialised.code().into(), 0]),
+        (Core::NoHand, Refusal::HandNotReady, [HandStage::NotInitialised.code().into(), 0]),
+        (Core::HandBusy, Refusal::HandBusy, [0, 0]),
     ];
     let mut rig = Rig::greeted();
     rig.cycle(1, Fault::JointSpeed);
@@ -176,6 +191,18 @@ fn every_refusal_of_the_control_half_reaches_the_host() {
         let answer = rig.answer();
         assert_eq!(answer, Some(Reply::Refused { of: rig.sequence, reason, detail }), "{core:?}");
     }
+}
+
+#[test]
+fn a_surprise_and_the_stages_of_the_hand_are_told() {
+    let mut rig = Rig::greeted();
+    rig.event(EventKind::Surprised { phase: 0.625, channel: 7 });
+    let cause = Some((puck::Node::FINGERS[1], HandTrouble::Silent));
+    rig.event(EventKind::Hand { stage: HandStage::Failed, cause });
+    let told: Vec<_> = events(&mut rig).iter().map(|event| (event.kind, event.code, event.detail)).collect();
+    let failed = (LinkKind::Hand, u16::from(HandStage::Failed.code()), 11 << 8 | 12);
+    assert_eq!(told, [(LinkKind::Surprise, 7, 625), failed]);
+    assert_eq!(HandTrouble::from_number(told[1].2), cause, "a host can say it in words");
 }
 
 #[test]

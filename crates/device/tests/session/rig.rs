@@ -13,7 +13,7 @@ use device::{
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame};
 use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
 use link::message::{ChunkData, DeviceHello, HostHello};
-use link::{LINK_VERSION, Name, Refusal, Reply, Request, SCHEMA_HASH, Text};
+use link::{HandStage, LINK_VERSION, Name, Refusal, Reply, Request, SCHEMA_HASH, Text};
 use puck::SafetyMode;
 
 /// Places of the store on the bench.
@@ -40,10 +40,14 @@ pub(crate) struct Bench {
     pub(crate) records: VecDeque<TimedRecord>,
     /// Durations of the primitives that were loaded.
     pub(crate) loaded: Vec<f32>,
+    /// The one loaded last.
+    pub(crate) primitive: Option<StoredPrimitive>,
     /// What the control half says to a load.
     pub(crate) load: Result<(), LoadRefusal>,
     /// The state of the control half.
     pub(crate) state: State,
+    /// Its latched fault.
+    pub(crate) fault: Fault,
     /// Counters of the control half.
     pub(crate) counters: Counters,
 }
@@ -70,6 +74,7 @@ impl SessionPort for Bench {
         assert_ne!(self.state, State::Run, "a primitive was exchanged under a run");
         self.load?;
         self.loaded.push(primitive.duration());
+        self.primitive = Some(primitive.clone());
         Ok(())
     }
 
@@ -87,10 +92,13 @@ impl SessionPort for Bench {
             stage: Stage::Ready,
             blocked: None,
             state: self.state,
+            fault: self.fault,
             zeroed: true,
             safety_mode: Some(SafetyMode::Active),
             pendant: Some(0x0F3F_1249),
             temperatures: [Some(30), None, None, None, None, None, Some(35)],
+            hand: HandStage::NotInitialised,
+            hand_temperatures: [Some(31), None, None, Some(34)],
             counters: self.counters,
         }
     }
@@ -133,8 +141,10 @@ impl Rig {
             events: VecDeque::new(),
             records: VecDeque::new(),
             loaded: Vec::new(),
+            primitive: None,
             load: Ok(()),
             state: State::Hold,
+            fault: Fault::None,
             counters: Counters::default(),
         };
         let session = Session::new(identity, model(), Store::new());
@@ -211,6 +221,7 @@ impl Rig {
     /// A control cycle ends.
     pub(crate) fn cycle(&mut self, number: u64, fault: Fault) {
         let record = CycleRecord { cycle: number, state: self.bench.state, fault, ..CycleRecord::EMPTY };
+        self.bench.fault = fault;
         self.bench.records.push_back(TimedRecord { record, cost_ticks: 99 });
         self.poll();
     }
@@ -320,6 +331,9 @@ pub(crate) fn image_with(
         weights: &weights,
         expected_mean: &[],
         expected_spread: &[],
+        experience_trials: 0,
+        experience_mean: &[],
+        experience_spread: &[],
     };
     // The same rotation has two signs; a demonstration would have kept the one of its start.
     let dot: f32 = content.start.orientation.iter().zip(content.goal.orientation).map(|(a, b)| a * b).sum();

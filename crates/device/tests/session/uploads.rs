@@ -179,7 +179,59 @@ fn a_primitive_outside_the_limits_of_the_arm_is_refused_in_words() {
     static NEGATIVE: [f32; 10] = [-1.0; 10];
     static ONE: [f32; 9] = [1.0; 9];
     assert!(words(|content| (content.k1, content.k2) = (&NEGATIVE, &ONE)).contains("feedback"));
-    assert!(words(|content| (content.expected_mean, content.expected_spread) = (&ONE, &ONE)).contains("expectation"));
+    let expectation = |content: &mut link::image::ImageContent<&[f32]>| {
+        (content.expected_mean, content.expected_spread) = (&ONE, &ONE);
+        content.marks.filter_cutoff = 15.0;
+    };
+    assert!(words(expectation).contains("expectation"), "recorded in no time");
+    let experience = |content: &mut link::image::ImageContent<&[f32]>| {
+        (content.experience_mean, content.experience_spread, content.experience_trials) = (&TWELVE, &TWELVE, 0);
+        content.marks.filter_cutoff = 15.0;
+    };
+    assert!(words(experience).contains("experience"), "no run behind it");
+}
+
+static TWELVE: [f32; 12] = [1.0; 12];
+static NINE: [f32; 9] = [1.0; 9];
+
+#[test]
+fn an_expectation_recorded_through_another_filter_is_refused_with_both() {
+    let mut rig = Rig::greeted();
+    let mut through = |filter_cutoff: f32| {
+        let with_expectation = |content: &mut link::image::ImageContent<&[f32]>| {
+            (content.expected_mean, content.expected_spread) = (&NINE, &NINE);
+            content.marks.recorded_duration = 3.0;
+            content.marks.filter_cutoff = filter_cutoff;
+        };
+        match rig.upload("reach", &image_with("reach", 3.0, 10, with_expectation)) {
+            Some(Reply::Accepted { .. }) => Ok(()),
+            Some(Reply::Refused { reason, detail, .. }) => Err((reason, detail)),
+            other => panic!("{other:?}"),
+        }
+    };
+    let device = control::wrench::WRENCH_CUT_OFF as f32;
+    assert_eq!(through(device), Ok(()));
+    assert_eq!(through(0.5 * device), Err((Refusal::ImageFilter, [500 * device as u32, 1000 * device as u32])));
+    assert_eq!(through(0.0), Err((Refusal::ImageFilter, [0, 1000 * device as u32])));
+}
+
+#[test]
+fn expectation_and_experience_reach_the_control_half() {
+    let mut rig = Rig::greeted();
+    let whole = |content: &mut link::image::ImageContent<&[f32]>| {
+        (content.expected_mean, content.expected_spread) = (&NINE, &NINE);
+        (content.experience_mean, content.experience_spread, content.experience_trials) = (&TWELVE, &TWELVE, 5);
+        content.marks.recorded_duration = 3.0;
+        content.marks.filter_cutoff = control::wrench::WRENCH_CUT_OFF as f32;
+    };
+    rig.store("felt", &image_with("felt", 3.0, 10, whole));
+    rig.store("plain", &image("plain", 4.0, 10));
+    for (text, felt) in [("felt", true), ("plain", false), ("felt", true)] {
+        rig.commanded(Request::Run { name: name(text), options: link::RunOptions::default() });
+        let loaded = rig.bench.primitive.as_ref().expect("a primitive");
+        assert_eq!(loaded.expected().is_some(), felt, "{text}: nothing may be left of the one before");
+        assert_eq!(loaded.experience().map(|experience| experience.trials()), felt.then_some(5));
+    }
 }
 
 #[test]

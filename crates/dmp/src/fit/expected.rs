@@ -1,14 +1,21 @@
-//! From recorded sensor values to an [`ExpectedWrench`].
+//! From recorded sensor values to an [`ExpectedWrench`] and to the weights `K2` of Eq. (8).
 
 use std::vec::Vec;
 
-use crate::{ExpectedWrench, SENSORS, TableError};
+use super::statistics::phase_statistics;
+use crate::{ExpectedWrench, GAIN_CAPACITY, SENSORS, TableError};
+
+/// Fewest recordings whose spread says something about the sensors; with two, chance decides.
+pub const FEWEST_TRIALS: usize = 3;
+
+/// `K2` stays between 1 and this factor below and above 1: a sensor is trusted less where it scattered, never silenced, and
+/// never trusted so much that a chance coincidence of three recordings becomes a gain.
+pub const WEIGHT_RANGE: f64 = 4.0;
 
 /// The expectation at `count` evenly spaced phases from samples at arbitrary progress `u`.
 ///
-/// Every sample is shared between the two neighbouring entries by its distance, and each entry is the weighted mean: a
-/// triangular average, which does not shift the record in phase. Entries without any sample are interpolated. Samples
-/// outside 0..=1 are left out. `recorded_duration` is the duration tau of the recorded run, s.
+/// `recorded_duration` is the duration tau of the recorded run, s. How samples become entries, see
+/// [`phase_statistics`].
 ///
 /// # Errors
 /// [`TableError::Empty`] without a usable sample, [`TableError::TooMany`], [`TableError::NotFinite`],
@@ -18,53 +25,61 @@ pub fn expected_wrench(
     count: usize,
     recorded_duration: f64,
 ) -> Result<ExpectedWrench<f64>, TableError> {
-    let Some(last) = count.checked_sub(1) else {
-        return Err(TableError::Empty);
-    };
     if count > crate::EXPECTED_CAPACITY {
         return Err(TableError::TooMany);
     }
-    let mut sums = std::vec![([0.0; SENSORS], 0.0); count];
-    for (u, values) in samples {
-        if !u.is_finite() || !values.iter().all(|value| value.is_finite()) {
-            return Err(TableError::NotFinite);
-        }
-        if !(0.0..=1.0).contains(u) {
-            continue;
-        }
-        let place = u * last as f64;
-        let left = (place as usize).min(last.saturating_sub(1));
-        let share = place - left as f64;
-        for (entry, weight) in [(left, 1.0 - share), ((left + 1).min(last), share)] {
-            let (sum, total) = &mut sums[entry];
-            *total += weight;
-            for (sum, value) in sum.iter_mut().zip(values) {
-                *sum += weight * value;
-            }
-        }
+    ExpectedWrench::new(&phase_statistics(&[samples], count)?.mean, recorded_duration)
+}
+
+/// The weights `K2` of Eq. (8) at `count` evenly spaced phases from the spread of `trials` recordings.
+///
+/// `K2_i(u) = k_i/(sigma_i(u)^2 + sigma_min_i^2)` with `sigma_min_i` = `floor` times the root mean square of `sigma_i` over the
+/// phase, and `k_i` such that the mean over the phase is 1 before it is kept within [`WEIGHT_RANGE`]: a sensor counts more where it repeats itself, while `K1` keeps its
+/// meaning in every row, whatever the units of the sensors. `sigma^2` is averaged around each phase first. A sensor that never moved has weight 1.
+///
+/// # Errors
+/// [`TableError::Trials`] below [`FEWEST_TRIALS`], [`TableError::Negative`] for a floor that is not positive (without it a
+/// silent sensor would outweigh all others), [`TableError::Empty`], [`TableError::TooMany`] above [`GAIN_CAPACITY`],
+/// [`TableError::NotFinite`].
+pub fn weights_from_spread(
+    spread: &[[f64; SENSORS]],
+    trials: usize,
+    count: usize,
+    floor: f64,
+) -> Result<Vec<[f64; SENSORS]>, TableError> {
+    if trials < FEWEST_TRIALS {
+        return Err(TableError::Trials);
     }
-    let known: Vec<(usize, [f64; SENSORS])> = sums
+    if !(floor > 0.0 && floor.is_finite()) {
+        return Err(TableError::Negative);
+    }
+    if spread.is_empty() || count == 0 {
+        return Err(TableError::Empty);
+    }
+    if count > GAIN_CAPACITY {
+        return Err(TableError::TooMany);
+    }
+    if !spread.iter().flatten().all(|sigma| sigma.is_finite()) {
+        return Err(TableError::NotFinite);
+    }
+    let squares: Vec<(f64, [f64; SENSORS])> = spread
         .iter()
         .enumerate()
-        .filter(|(_, (_, total))| *total > 1e-9)
-        .map(|(i, (sum, total))| (i, sum.map(|sum| sum / total)))
+        .map(|(i, sigma)| (i as f64 / (spread.len() - 1).max(1) as f64, sigma.map(|sigma| sigma * sigma)))
         .collect();
-    let (Some(first), Some(end)) = (known.first(), known.last()) else {
-        return Err(TableError::Empty);
-    };
-    let table: Vec<[f64; SENSORS]> = (0..count)
-        .map(|i| {
-            let after = known.partition_point(|(k, _)| *k < i);
-            match (after.checked_sub(1).map(|b| &known[b]), known.get(after)) {
-                (_, Some((k, values))) if *k == i => *values,
-                (Some((a, low)), Some((b, high))) => {
-                    let share = (i - a) as f64 / (b - a) as f64;
-                    core::array::from_fn(|c| low[c] + (high[c] - low[c]) * share)
-                }
-                (None, _) => first.1,
-                (_, None) => end.1,
-            }
-        })
-        .collect();
-    ExpectedWrench::new(&table, recorded_duration)
+    let mut weights = phase_statistics(&[squares.as_slice()], count)?.mean;
+    for sensor in 0..SENSORS {
+        let mean = squares.iter().map(|(_, squares)| squares[sensor]).sum::<f64>() / squares.len() as f64;
+        let smallest = floor * floor * mean;
+        if !(smallest > f64::MIN_POSITIVE) {
+            weights.iter_mut().for_each(|point| point[sensor] = 1.0);
+            continue;
+        }
+        weights.iter_mut().for_each(|point| point[sensor] = 1.0 / (point[sensor] + smallest));
+        let scale = count as f64 / weights.iter().map(|point| point[sensor]).sum::<f64>();
+        for point in &mut weights {
+            point[sensor] = (point[sensor] * scale).clamp(1.0 / WEIGHT_RANGE, WEIGHT_RANGE);
+        }
+    }
+    Ok(weights)
 }

@@ -12,15 +12,17 @@ mod filter;
 mod orientation;
 mod report;
 mod ridge;
+mod statistics;
 
 use std::vec::Vec;
 
 pub use demonstration::{Demonstration, DemonstrationError, minimum_jerk};
 pub use derivative::{first_derivative, second_derivative};
-pub use expected::expected_wrench;
+pub use expected::{FEWEST_TRIALS, WEIGHT_RANGE, expected_wrench, weights_from_spread};
 pub use filter::ZeroPhaseFilter;
 pub use orientation::{angular_velocity, largest_angle_to_goal, make_sign_continuous};
 pub use report::{OrientationReport, Report, RowReport};
+pub use statistics::{PhaseStatistics, experience, phase_statistics};
 
 use core::fmt;
 
@@ -196,6 +198,7 @@ impl Learned {
             },
             feedback: None,
             expected: None,
+            experience: None,
         }
     }
 }

@@ -159,8 +159,9 @@ impl Plan {
                 posture: self.start_velocity.posture.map(T::from_f64),
                 hand: self.start_velocity.hand.map(T::from_f64),
             },
-            feedback,
+            feedback: feedback.as_ref(),
             expected: None,
+            experience: None,
         })
         .unwrap()
     }

@@ -3,5 +3,6 @@
 mod common;
 mod fit;
 mod golden;
+mod memory;
 mod robustness;
 mod signs;

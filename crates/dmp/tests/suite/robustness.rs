@@ -24,6 +24,7 @@ fn tables(weights: &[f64]) -> PrimitiveTables<'_, f64> {
         start_velocity: Velocity::ZERO,
         feedback: None,
         expected: None,
+        experience: None,
     }
 }
 
@@ -316,6 +317,7 @@ proptest! {
             start_velocity: Velocity::ZERO,
             feedback: None,
             expected: None,
+            experience: None,
         };
         if let Ok(primitive) = Primitive::<f64, 4>::new(&tables) {
             let start = StartState::demonstrated(&primitive);

@@ -238,7 +238,7 @@ fn pushes_of_the_environment_move_the_plan_along_and_are_clamped() {
     let open = rollout(&primitive).coupling(&primitive, &push, &SensorMap::IDENTITY);
     assert_eq!(open, Coupling::NONE);
     let expected = dmp::ExpectedWrench::new(&[[0.0; SENSORS], [1.0; SENSORS]], 5.0).unwrap();
-    primitive.set_expected(Some(expected));
+    primitive.set_expected(Some(&expected));
     let run = rollout(&primitive);
     let zeta = run.coupling(&primitive, &push, &SensorMap::IDENTITY);
     assert_eq!(zeta.position, [12.0, 0.0, 0.0]);

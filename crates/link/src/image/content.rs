@@ -103,6 +103,8 @@ pub struct ImageContent<F> {
     pub clamps: FeedbackClamps,
     /// How the expectation was recorded; all zero without one.
     pub marks: ExpectationMarks,
+    /// Successful runs behind the experience; 0 without one.
+    pub experience_trials: u16,
     /// Kernels of each row.
     pub kernels: usize,
     /// K1 of Eq (8) by phase: points x [`COUPLED_ROWS`](super::COUPLED_ROWS), point after point, first at the start. Empty: no
@@ -117,4 +119,9 @@ pub struct ImageContent<F> {
     pub expected_mean: F,
     /// Their standard deviations, same shape.
     pub expected_spread: F,
+    /// What successful runs felt and did, by phase: points x [`EXPERIENCE_ROWS`](super::EXPERIENCE_ROWS): the sensor values as
+    /// in `expected_mean`, then the angles of fingers F1 to F3, rad. May be empty.
+    pub experience_mean: F,
+    /// Their standard deviations, same shape.
+    pub experience_spread: F,
 }

@@ -3,7 +3,7 @@
 use super::ImageError;
 
 /// Version of this layout. An image of another version is refused with both versions named.
-pub const IMAGE_SCHEMA: u16 = 1;
+pub const IMAGE_SCHEMA: u16 = 2;
 
 /// First bytes of every image.
 pub const MAGIC: [u8; 4] = *b"TACP";
@@ -26,7 +26,13 @@ pub const GAIN_POINTS_LIMIT: usize = 32;
 /// Most points of the expectation.
 pub const EXPECTATION_POINTS_LIMIT: usize = 128;
 
-pub(super) const HEADER_BYTES: usize = 56;
+/// Channels of an experience: what the sensor rows are, then the angles of the three fingers.
+pub const EXPERIENCE_ROWS: usize = 12;
+
+/// Most points of the experience.
+pub const EXPERIENCE_POINTS_LIMIT: usize = 64;
+
+pub(super) const HEADER_BYTES: usize = 60;
 pub(super) const CRC_BYTES: usize = 4;
 pub(super) const REAL_BYTES: usize = 4;
 
@@ -44,26 +50,34 @@ pub(super) const KNOWN_FLAGS: u16 = FLAG_ROTATION_VECTOR | FLAG_NEAREST_HEMISPHE
 
 /// Bytes of an image with these counts.
 #[must_use]
-pub const fn image_bytes(kernels: usize, k1_points: usize, k2_points: usize, expectation_points: usize) -> usize {
+pub const fn image_bytes(
+    kernels: usize,
+    k1_points: usize,
+    k2_points: usize,
+    expectation_points: usize,
+    experience_points: usize,
+) -> usize {
     let reals = FIXED_REALS
         + COUPLED_ROWS * k1_points
         + SENSOR_ROWS * k2_points
         + WEIGHT_ROWS * kernels
-        + 2 * SENSOR_ROWS * expectation_points;
+        + 2 * SENSOR_ROWS * expectation_points
+        + 2 * EXPERIENCE_ROWS * experience_points;
     HEADER_BYTES + REAL_BYTES * reals + CRC_BYTES
 }
 
 /// Bytes of the largest image there can be.
 pub const IMAGE_BYTES_LIMIT: usize =
-    image_bytes(KERNEL_LIMIT, GAIN_POINTS_LIMIT, GAIN_POINTS_LIMIT, EXPECTATION_POINTS_LIMIT);
+    image_bytes(KERNEL_LIMIT, GAIN_POINTS_LIMIT, GAIN_POINTS_LIMIT, EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT);
 
-/// The four numbers that fix the length of an image.
+/// The five numbers that fix the length of an image.
 #[derive(Clone, Copy)]
 pub(super) struct Counts {
     pub(super) kernels: usize,
     pub(super) k1_points: usize,
     pub(super) k2_points: usize,
     pub(super) expectation_points: usize,
+    pub(super) experience_points: usize,
 }
 
 impl Counts {
@@ -78,11 +92,14 @@ impl Counts {
         if self.expectation_points > EXPECTATION_POINTS_LIMIT {
             return Err(ImageError::ExpectationPoints { found: clip(self.expectation_points) });
         }
+        if self.experience_points > EXPERIENCE_POINTS_LIMIT {
+            return Err(ImageError::ExperiencePoints { found: clip(self.experience_points) });
+        }
         Ok(())
     }
 
     pub(super) const fn bytes(self) -> usize {
-        image_bytes(self.kernels, self.k1_points, self.k2_points, self.expectation_points)
+        image_bytes(self.kernels, self.k1_points, self.k2_points, self.expectation_points, self.experience_points)
     }
 }
 

@@ -5,8 +5,8 @@ use super::content::{
 };
 use super::error::ImageError;
 use super::layout::{
-    COUPLED_ROWS, CRC_BYTES, Counts, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES, IMAGE_SCHEMA,
-    KNOWN_FLAGS, MAGIC, REAL_BYTES, SENSOR_ROWS, WEIGHT_ROWS, clip,
+    COUPLED_ROWS, CRC_BYTES, Counts, EXPERIENCE_ROWS, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES,
+    IMAGE_SCHEMA, KNOWN_FLAGS, MAGIC, REAL_BYTES, SENSOR_ROWS, WEIGHT_ROWS, clip,
 };
 use crate::frame::CRC;
 use crate::name::{NAME_BYTES, Name};
@@ -95,7 +95,9 @@ impl<'a> PrimitiveImage<'a> {
             k1_points: usize::from(header.u16().ok_or(short)?),
             k2_points: usize::from(header.u16().ok_or(short)?),
             expectation_points: usize::from(header.u16().ok_or(short)?),
+            experience_points: usize::from(header.u16().ok_or(short)?),
         };
+        let experience_trials = header.u16().ok_or(short)?;
         counts.check()?;
         if counts.bytes() != bytes.len() {
             return Err(ImageError::Length { expected: clip(counts.bytes()), found: clip(bytes.len()) });
@@ -108,7 +110,7 @@ impl<'a> PrimitiveImage<'a> {
         if let Some(real) = Reals(body).iter().position(|value| !value.is_finite()) {
             return Err(ImageError::NotFinite { real: clip(real) });
         }
-        let content = read_content(Cursor(body), model_hash, flags, counts).ok_or(short)?;
+        let content = read_content(Cursor(body), model_hash, flags, counts, experience_trials).ok_or(short)?;
         Ok(Self { bytes, name, crc: computed, content })
     }
 
@@ -142,6 +144,12 @@ impl<'a> PrimitiveImage<'a> {
     pub fn has_expectation(&self) -> bool {
         !self.content.expected_mean.is_empty()
     }
+
+    /// Whether it has a table of what successful runs were like.
+    #[must_use]
+    pub fn has_experience(&self) -> bool {
+        !self.content.experience_mean.is_empty()
+    }
 }
 
 /// Check sum of a whole image as uploads and listings name it.
@@ -168,6 +176,7 @@ fn read_content<'a>(
     model_hash: u32,
     flags: u16,
     counts: Counts,
+    experience_trials: u16,
 ) -> Option<ImageContent<Reals<'a>>> {
     let [duration, alpha, activation] = body.reals()?;
     let stiffness = body.reals()?;
@@ -214,12 +223,15 @@ fn read_content<'a>(
             trials,
             spread_floor,
         },
+        experience_trials,
         kernels: counts.kernels,
         k1: body.table(COUPLED_ROWS * counts.k1_points)?,
         k2: body.table(SENSOR_ROWS * counts.k2_points)?,
         weights: body.table(WEIGHT_ROWS * counts.kernels)?,
         expected_mean: body.table(SENSOR_ROWS * counts.expectation_points)?,
         expected_spread: body.table(SENSOR_ROWS * counts.expectation_points)?,
+        experience_mean: body.table(EXPERIENCE_ROWS * counts.experience_points)?,
+        experience_spread: body.table(EXPERIENCE_ROWS * counts.experience_points)?,
     })
 }
 

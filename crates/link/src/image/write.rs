@@ -3,8 +3,8 @@
 use super::content::{HemisphereKind, ImageContent, OrientationErrorKind, Waypoint};
 use super::error::ImageError;
 use super::layout::{
-    COUPLED_ROWS, Counts, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES, IMAGE_SCHEMA, MAGIC, REAL_BYTES,
-    SENSOR_ROWS, WEIGHT_ROWS, clip,
+    COUPLED_ROWS, Counts, EXPERIENCE_ROWS, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES, IMAGE_SCHEMA,
+    MAGIC, REAL_BYTES, SENSOR_ROWS, WEIGHT_ROWS, clip,
 };
 use crate::frame::CRC;
 use crate::name::{NAME_BYTES, Name};
@@ -21,9 +21,13 @@ impl ImageContent<&[f32]> {
             k1_points: points(self.k1, COUPLED_ROWS)?,
             k2_points: points(self.k2, SENSOR_ROWS)?,
             expectation_points: points(self.expected_mean, SENSOR_ROWS)?,
+            experience_points: points(self.experience_mean, EXPERIENCE_ROWS)?,
         };
         counts.check()?;
-        if self.weights.len() != WEIGHT_ROWS * self.kernels || self.expected_spread.len() != self.expected_mean.len() {
+        if self.weights.len() != WEIGHT_ROWS * self.kernels
+            || self.expected_spread.len() != self.expected_mean.len()
+            || self.experience_spread.len() != self.experience_mean.len()
+        {
             return Err(ImageError::Shape);
         }
         let length = counts.bytes();
@@ -46,9 +50,12 @@ impl ImageContent<&[f32]> {
         writer.bytes(&clip(length).to_le_bytes())?;
         writer.bytes(&self.model_hash.to_le_bytes())?;
         writer.bytes(&padded)?;
-        for count in [counts.kernels, counts.k1_points, counts.k2_points, counts.expectation_points] {
+        for count in
+            [counts.kernels, counts.k1_points, counts.k2_points, counts.expectation_points, counts.experience_points]
+        {
             writer.bytes(&u16::try_from(count).map_err(|_| ImageError::Shape)?.to_le_bytes())?;
         }
+        writer.bytes(&self.experience_trials.to_le_bytes())?;
         writer.reals(&[self.duration, self.alpha, self.activation])?;
         writer.reals(&self.stiffness)?;
         writer.reals(&self.damping)?;
@@ -64,7 +71,15 @@ impl ImageContent<&[f32]> {
         writer.reals(&[marks.recorded_duration, marks.payload_mass])?;
         writer.reals(&marks.payload_centre)?;
         writer.reals(&[marks.filter_cutoff, marks.trials, marks.spread_floor])?;
-        for table in [self.k1, self.k2, self.weights, self.expected_mean, self.expected_spread] {
+        for table in [
+            self.k1,
+            self.k2,
+            self.weights,
+            self.expected_mean,
+            self.expected_spread,
+            self.experience_mean,
+            self.experience_spread,
+        ] {
             writer.reals(table)?;
         }
         let written = writer.position;

@@ -6,7 +6,7 @@ use crate::samples::{EVENT_KINDS, Tables, event_index, replies, reply_index, req
 use link::frame::{self, Envelope, FRAME_BYTES};
 use link::image::{HemisphereKind, IMAGE_SCHEMA, PrimitiveImage, image_bytes};
 use link::message::{AccelerationSource, PoseFeedback};
-use link::{LINK_VERSION, Refusal, SCHEMA_HASH};
+use link::{HandStage, LINK_VERSION, Refusal, SCHEMA_HASH};
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |mut text, byte| {
@@ -48,14 +48,18 @@ fn schema() -> String {
     for kind in EVENT_KINDS {
         line(format!("event {} {kind:?} {}", event_index(kind), encoded(&kind)));
     }
+    for code in 0..=4 {
+        let stage = HandStage::from_code(code).expect("a stage");
+        line(format!("hand_stage {code} {stage:?} {}", encoded(&stage)));
+    }
     for choice in [PoseFeedback::Measured, PoseFeedback::Planned] {
         line(format!("pose_feedback {choice:?} {}", encoded(&choice)));
     }
     for choice in [AccelerationSource::Analytic, AccelerationSource::Differentiated] {
         line(format!("acceleration {choice:?} {}", encoded(&choice)));
     }
-    line(format!("image {IMAGE_SCHEMA} kernels 2 gain points 1 expectation points 2"));
-    for part in Tables::new(2, 1, 2).image().chunks(32) {
+    line(format!("image {IMAGE_SCHEMA} kernels 2 gain points 1 expectation points 2 experience points 1"));
+    for part in Tables::new(2, 1, 2, 1).image().chunks(32) {
         line(hex(part));
     }
     text
@@ -79,14 +83,14 @@ fn every_layout_is_the_one_in_the_schema_text() {
 
 #[test]
 fn schema_hash_is_pinned() {
-    assert_eq!(SCHEMA_HASH, 0x0240_b2ec, "{SCHEMA_HASH:#010x}: the layouts changed, or their text did");
+    assert_eq!(SCHEMA_HASH, 0xb241_73b2, "{SCHEMA_HASH:#010x}: the layouts changed, or their text did");
 }
 
 #[test]
 fn samples_cover_every_variant_in_order() {
-    assert!(requests().iter().map(request_index).eq(0..24));
+    assert!(requests().iter().map(request_index).eq(0..26));
     assert!(replies().iter().map(reply_index).eq(0..9));
-    assert!(EVENT_KINDS.iter().map(|kind| event_index(*kind)).eq(0..8));
+    assert!(EVENT_KINDS.iter().map(|kind| event_index(*kind)).eq(0..10));
     assert!(Refusal::ALL.iter().map(|refusal| usize::from(refusal.code())).eq(0..Refusal::ALL.len()));
 }
 
@@ -114,8 +118,8 @@ fn worked_example_of_the_protocol_document() {
 /// The worked example of `docs/image-format.md`.
 #[test]
 fn worked_example_of_the_image_document() {
-    let image = Tables::new(2, 1, 2).image();
-    assert_eq!(image.len(), image_bytes(2, 1, 1, 2));
+    let image = Tables::new(2, 1, 2, 1).image();
+    assert_eq!(image.len(), image_bytes(2, 1, 1, 2, 1));
     let parsed = PrimitiveImage::parse(&image).unwrap();
     assert_eq!(parsed.content().hemisphere, HemisphereKind::Demonstrated);
     let document = include_str!("../../../../docs/image-format.md");

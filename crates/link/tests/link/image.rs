@@ -2,7 +2,8 @@
 
 use crate::samples::Tables;
 use link::image::{
-    EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_BYTES_LIMIT, KERNEL_LIMIT, Waypoint, image_bytes, stored_crc,
+    EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_BYTES_LIMIT, KERNEL_LIMIT, Waypoint,
+    image_bytes, stored_crc,
 };
 use link::{ImageError, Name, PrimitiveImage};
 use proptest::prelude::*;
@@ -12,7 +13,7 @@ const SCHEMA: usize = 4;
 const FLAGS: usize = 6;
 const NAME: usize = 16;
 const KERNELS: usize = 48;
-const FIRST_REAL: usize = 56;
+const FIRST_REAL: usize = 60;
 
 /// Makes the check sum right again, as somebody would who writes images on purpose.
 fn sealed(mut image: Vec<u8>) -> Vec<u8> {
@@ -28,14 +29,14 @@ fn refusal(image: &[u8]) -> ImageError {
 
 #[test]
 fn what_was_written_is_what_is_read() {
-    let tables = Tables::new(5, 3, 4);
+    let tables = Tables::new(5, 3, 4, 6);
     let bytes = tables.image();
     let image = PrimitiveImage::parse(&bytes).unwrap();
     let (read, written) = (image.content(), tables.content());
     assert_eq!(image.name(), &Name::new("side-grasp").unwrap());
     assert_eq!(image.crc().to_le_bytes(), bytes[bytes.len() - 4..]);
     assert_eq!(image.bytes(), bytes);
-    assert!(image.has_expectation());
+    assert!(image.has_expectation() && image.has_experience());
     assert_eq!(read.model_hash, written.model_hash);
     assert_eq!(
         (read.duration, read.alpha, read.activation, read.kernels),
@@ -44,13 +45,18 @@ fn what_was_written_is_what_is_read() {
     assert_eq!((read.stiffness, read.damping), (written.stiffness, written.damping));
     assert_eq!((read.orientation_error, read.hemisphere), (written.orientation_error, written.hemisphere));
     assert_eq!((read.start, read.start_velocity, read.goal), (written.start, written.start_velocity, written.goal));
-    assert_eq!((read.clamps, read.marks), (written.clamps, written.marks));
+    assert_eq!(
+        (read.clamps, read.marks, read.experience_trials),
+        (written.clamps, written.marks, written.experience_trials)
+    );
     for (read, written) in [
         (read.k1, written.k1),
         (read.k2, written.k2),
         (read.weights, written.weights),
         (read.expected_mean, written.expected_mean),
         (read.expected_spread, written.expected_spread),
+        (read.experience_mean, written.experience_mean),
+        (read.experience_spread, written.experience_spread),
     ] {
         assert_eq!(read.iter().collect::<Vec<_>>(), written);
         assert_eq!(read.get(1), written.get(1).copied());
@@ -62,22 +68,22 @@ fn what_was_written_is_what_is_read() {
 
 #[test]
 fn the_largest_image_has_the_stated_size() {
-    let image = Tables::new(KERNEL_LIMIT, GAIN_POINTS_LIMIT, EXPECTATION_POINTS_LIMIT).image();
+    let image = Tables::new(KERNEL_LIMIT, GAIN_POINTS_LIMIT, EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT).image();
     assert_eq!(image.len(), IMAGE_BYTES_LIMIT);
     assert!(PrimitiveImage::parse(&image).is_ok());
-    assert_eq!(image_bytes(50, 1, 1, 0), 56 + 4 * (75 + 19 + 850) + 4);
+    assert_eq!(image_bytes(50, 1, 1, 0, 0), 60 + 4 * (75 + 19 + 850) + 4);
 }
 
 #[test]
 fn a_primitive_without_feedback_and_expectation_is_an_image() {
-    let bytes = Tables::new(2, 0, 0).image();
+    let bytes = Tables::new(2, 0, 0, 0).image();
     let image = PrimitiveImage::parse(&bytes).unwrap();
-    assert!(!image.has_expectation() && image.content().k1.is_empty());
+    assert!(!image.has_expectation() && !image.has_experience() && image.content().k1.is_empty());
 }
 
 #[test]
 fn c6_every_single_flipped_bit_is_refused() {
-    let image = Tables::new(10, 2, 10).image();
+    let image = Tables::new(10, 2, 10, 3).image();
     for bit in 0..8 * image.len() {
         let mut damaged = image.clone();
         damaged[bit / 8] ^= 1 << (bit % 8);
@@ -87,7 +93,7 @@ fn c6_every_single_flipped_bit_is_refused() {
 
 #[test]
 fn every_shortened_or_lengthened_image_is_refused() {
-    let image = Tables::new(3, 1, 2).image();
+    let image = Tables::new(3, 1, 2, 1).image();
     for length in 0..image.len() {
         assert!(PrimitiveImage::parse(&image[..length]).is_err(), "{length}");
     }
@@ -96,7 +102,7 @@ fn every_shortened_or_lengthened_image_is_refused() {
 
 #[test]
 fn c7_another_schema_is_named_even_when_all_else_differs() {
-    let mut image = Tables::new(3, 1, 2).image();
+    let mut image = Tables::new(3, 1, 2, 1).image();
     image[SCHEMA] = 9;
     assert_eq!(refusal(&image), ImageError::Schema { found: 9 });
     assert_eq!(refusal(&image[..6]), ImageError::Schema { found: 9 });
@@ -106,7 +112,7 @@ fn c7_another_schema_is_named_even_when_all_else_differs() {
 
 #[test]
 fn a_not_finite_real_is_refused_wherever_it_is() {
-    let image = Tables::new(2, 1, 2).image();
+    let image = Tables::new(2, 1, 2, 1).image();
     let reals = (image.len() - FIRST_REAL - 4) / 4;
     for real in 0..reals {
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
@@ -119,32 +125,33 @@ fn a_not_finite_real_is_refused_wherever_it_is() {
 
 #[test]
 fn counts_beyond_the_limits_are_refused() {
-    let with_counts = |kernels: u16, k1: u16, k2: u16, expectation: u16| {
-        let length = image_bytes(kernels.into(), k1.into(), k2.into(), expectation.into());
-        let mut image = Tables::new(2, 0, 0).image();
+    let with_counts = |kernels: u16, k1: u16, k2: u16, expectation: u16, experience: u16| {
+        let length = image_bytes(kernels.into(), k1.into(), k2.into(), expectation.into(), experience.into());
+        let mut image = Tables::new(2, 0, 0, 0).image();
         image.resize(length, 0);
         image[8..12].copy_from_slice(&(length as u32).to_le_bytes());
-        for (index, count) in [kernels, k1, k2, expectation].into_iter().enumerate() {
+        for (index, count) in [kernels, k1, k2, expectation, experience].into_iter().enumerate() {
             image[KERNELS + 2 * index..][..2].copy_from_slice(&count.to_le_bytes());
         }
         sealed(image)
     };
-    assert!(PrimitiveImage::parse(&with_counts(100, 32, 1, 128)).is_ok());
-    assert_eq!(refusal(&with_counts(101, 0, 0, 0)), ImageError::Kernels { found: 101 });
-    assert_eq!(refusal(&with_counts(1, 0, 0, 0)), ImageError::Kernels { found: 1 });
-    assert_eq!(refusal(&with_counts(2, 33, 1, 0)), ImageError::GainPoints { found: 33 });
-    assert_eq!(refusal(&with_counts(2, 1, 0, 0)), ImageError::GainPoints { found: 1 });
-    assert_eq!(refusal(&with_counts(2, 0, 0, 129)), ImageError::ExpectationPoints { found: 129 });
-    assert_eq!(refusal(&with_counts(u16::MAX, 0, 0, 0)), ImageError::Kernels { found: 65_535 });
+    assert!(PrimitiveImage::parse(&with_counts(100, 32, 1, 128, 64)).is_ok());
+    assert_eq!(refusal(&with_counts(101, 0, 0, 0, 0)), ImageError::Kernels { found: 101 });
+    assert_eq!(refusal(&with_counts(1, 0, 0, 0, 0)), ImageError::Kernels { found: 1 });
+    assert_eq!(refusal(&with_counts(2, 33, 1, 0, 0)), ImageError::GainPoints { found: 33 });
+    assert_eq!(refusal(&with_counts(2, 1, 0, 0, 0)), ImageError::GainPoints { found: 1 });
+    assert_eq!(refusal(&with_counts(2, 0, 0, 129, 0)), ImageError::ExpectationPoints { found: 129 });
+    assert_eq!(refusal(&with_counts(2, 0, 0, 0, 65)), ImageError::ExperiencePoints { found: 65 });
+    assert_eq!(refusal(&with_counts(u16::MAX, 0, 0, 0, 0)), ImageError::Kernels { found: 65_535 });
 
-    let mut lying = Tables::new(2, 0, 0).image();
+    let mut lying = Tables::new(2, 0, 0, 0).image();
     lying[KERNELS] = 3;
     assert!(matches!(refusal(&sealed(lying)), ImageError::Length { .. }), "counts that ask for another length");
 }
 
 #[test]
 fn bad_names_and_unknown_flags_are_refused() {
-    let image = Tables::new(2, 0, 0).image();
+    let image = Tables::new(2, 0, 0, 0).image();
     for name in [b"../etc".as_slice(), b"a b", b"", b"\xFF\xFE"] {
         let mut damaged = image.clone();
         damaged[NAME..NAME + 32].fill(0);
@@ -161,7 +168,7 @@ fn bad_names_and_unknown_flags_are_refused() {
 
 #[test]
 fn what_could_not_be_read_back_is_not_written() {
-    let tables = Tables::new(4, 1, 2);
+    let tables = Tables::new(4, 1, 2, 1);
     let mut out = vec![0; 8192];
     let name = Name::new("a").unwrap();
     let good = tables.content();
@@ -177,6 +184,8 @@ fn what_could_not_be_read_back_is_not_written() {
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
     let bad = link::image::ImageContent { expected_spread: &good.k1[..0], ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
+    let bad = link::image::ImageContent { experience_spread: &good.k1[..0], ..good };
+    assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
     let bad = link::image::ImageContent { k2: &good.k2[..0], ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::GainPoints { found: 1 }));
 }
@@ -188,10 +197,10 @@ proptest! {
     }
 
     #[test]
-    fn any_counts_behind_a_right_check_sum_are_harmless(header in prop::collection::vec(any::<u8>(), 44), length in 60_usize..4000) {
-        let mut image = Tables::new(2, 0, 0).image();
+    fn any_counts_behind_a_right_check_sum_are_harmless(header in prop::collection::vec(any::<u8>(), 48), length in 60_usize..4000) {
+        let mut image = Tables::new(2, 0, 0, 0).image();
         image.resize(length, 0);
-        image[12..56].copy_from_slice(&header);
+        image[12..60].copy_from_slice(&header);
         image[FLAGS..FLAGS + 2].fill(0);
         image[8..12].copy_from_slice(&(length as u32).to_le_bytes());
         // It may be refused or, by luck, be an image; it must not panic.
@@ -199,11 +208,12 @@ proptest! {
     }
 
     #[test]
-    fn every_shape_within_the_limits_survives(kernels in 2_usize..=100, gains in 0_usize..=32, expectation in 0_usize..=128) {
-        let tables = Tables::new(kernels, gains, expectation);
+    fn every_shape_within_the_limits_survives(kernels in 2_usize..=100, gains in 0_usize..=32, expectation in 0_usize..=128, experience in 0_usize..=64) {
+        let tables = Tables::new(kernels, gains, expectation, experience);
         let bytes = tables.image();
         let image = PrimitiveImage::parse(&bytes).unwrap();
         prop_assert!(image.content().weights.iter().eq(tables.content().weights.iter().copied()));
         prop_assert!(image.content().expected_spread.iter().eq(tables.content().expected_spread.iter().copied()));
+        prop_assert!(image.content().experience_spread.iter().eq(tables.content().experience_spread.iter().copied()));
     }
 }

@@ -5,8 +5,8 @@ use link::image::{
 };
 use link::message::{AccelerationSource, ChunkData, PoseFeedback};
 use link::{
-    DeviceHello, Event, EventKind, Goal, HostHello, LinkCounters, Listing, Name, Refusal, Reply, Request, RunOptions,
-    Statistics, Status, Telemetry, Text,
+    DeviceHello, Event, EventKind, Goal, HandStage, HostHello, LinkCounters, Listing, Name, Refusal, Reply, Request,
+    RunOptions, Statistics, Status, Telemetry, Text,
 };
 
 fn name() -> Name {
@@ -31,6 +31,8 @@ pub(crate) fn requests() -> Vec<Request> {
         force_control: false,
         pose_feedback: PoseFeedback::Planned,
         acceleration: AccelerationSource::Differentiated,
+        finger_feedback: true,
+        compliant: false,
     };
     let hello =
         HostHello { link_version: 1, schema_hash: 0x1234_5678, model_hash: 0x9ABC_DEF0, owner: Text::new("anna@lab3") };
@@ -59,6 +61,8 @@ pub(crate) fn requests() -> Vec<Request> {
         Request::Read { name: name(), offset: 384 },
         Request::Release,
         Request::Tare,
+        Request::InitialiseHand,
+        Request::MoveHand { q: ramp(0.5), duration: 1.25 },
     ]
 }
 
@@ -89,6 +93,8 @@ pub(crate) fn request_index(request: &Request) -> usize {
         Request::Read { .. } => 21,
         Request::Release => 22,
         Request::Tare => 23,
+        Request::InitialiseHand => 24,
+        Request::MoveHand { .. } => 25,
     }
 }
 
@@ -124,6 +130,9 @@ pub(crate) fn replies() -> Vec<Reply> {
         temperatures: [None, Some(-1), Some(64), None, None, None, Some(2)],
         telemetry_every: 3,
         upload_received: Some(576),
+        hand_stage: HandStage::Ready,
+        hand: ramp(0.75),
+        hand_temperatures: [Some(31), None, Some(33), None],
     };
     let statistics = Statistics {
         cycles: 1,
@@ -147,6 +156,7 @@ pub(crate) fn replies() -> Vec<Reply> {
         link: LinkCounters { accepted: 16, bad_cobs: 17, bad_crc: 18, too_long: 19, undecodable: 20, overrun: 22 },
         stack_free: 21,
         stack_size: 300,
+        hand_lost_replies: 26,
     };
     let listing = Listing {
         index: 2,
@@ -162,7 +172,7 @@ pub(crate) fn replies() -> Vec<Reply> {
         cycle: 70_000,
         state: 4,
         fault: 0,
-        flags: 0x1081,
+        flags: 0x0002_1081,
         phase: 0.5,
         q: ramp(0.0),
         dq: ramp(-2.0),
@@ -171,6 +181,10 @@ pub(crate) fn replies() -> Vec<Reply> {
         wrench: ramp(-9.0),
         lost_replies: 1,
         cost_ticks: 9_876,
+        hand: ramp(0.25),
+        hand_d: ramp(0.5),
+        gauges: ramp(-0.75),
+        surprise: 2.5,
     };
     vec![
         Reply::Hello { of: 1, hello },
@@ -201,7 +215,7 @@ pub(crate) fn reply_index(reply: &Reply) -> usize {
 }
 
 /// Every kind of event, in the order of the enum.
-pub(crate) const EVENT_KINDS: [EventKind; 8] = [
+pub(crate) const EVENT_KINDS: [EventKind; 10] = [
     EventKind::State,
     EventKind::Arrived,
     EventKind::Startup,
@@ -210,6 +224,8 @@ pub(crate) const EVENT_KINDS: [EventKind; 8] = [
     EventKind::Store,
     EventKind::CommandRefused,
     EventKind::Blocked,
+    EventKind::Surprise,
+    EventKind::Hand,
 ];
 
 /// Place of an event kind in the enum.
@@ -223,6 +239,8 @@ pub(crate) fn event_index(kind: EventKind) -> usize {
         EventKind::Store => 5,
         EventKind::CommandRefused => 6,
         EventKind::Blocked => 7,
+        EventKind::Surprise => 8,
+        EventKind::Hand => 9,
     }
 }
 
@@ -233,12 +251,14 @@ pub(crate) struct Tables {
     weights: Vec<f32>,
     mean: Vec<f32>,
     spread: Vec<f32>,
+    experience_mean: Vec<f32>,
+    experience_spread: Vec<f32>,
     kernels: usize,
 }
 
 impl Tables {
     /// Tables with so many kernels and points.
-    pub(crate) fn new(kernels: usize, gain_points: usize, expectation_points: usize) -> Self {
+    pub(crate) fn new(kernels: usize, gain_points: usize, expectation_points: usize, experience_points: usize) -> Self {
         let series = |count: usize, step: f32| (0..count).map(|index| step * index as f32 - 1.0).collect();
         Self {
             k1: series(10 * gain_points, 0.5),
@@ -246,6 +266,8 @@ impl Tables {
             weights: series(17 * kernels, 0.125),
             mean: series(9 * expectation_points, 2.0),
             spread: series(9 * expectation_points, 4.0),
+            experience_mean: series(12 * experience_points, 3.0),
+            experience_spread: series(12 * experience_points, 5.0),
             kernels,
         }
     }
@@ -284,12 +306,15 @@ impl Tables {
                 trials: 3.0,
                 spread_floor: 0.1,
             },
+            experience_trials: 7,
             kernels: self.kernels,
             k1: &self.k1,
             k2: &self.k2,
             weights: &self.weights,
             expected_mean: &self.mean,
             expected_spread: &self.spread,
+            experience_mean: &self.experience_mean,
+            experience_spread: &self.experience_spread,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::Person;
 use crate::rotation::add_scaled;
-use crate::{Pose, World};
+use crate::{HandState, HandTargets, Pose, World};
 
 /// A world in which a [`Person`] stands beside the arm: before every physics step they pull at the grasp point.
 ///
@@ -54,6 +54,14 @@ impl<W: World> World for GuidedWorld<W> {
         self.world.joint_velocities()
     }
 
+    fn motor_positions(&self) -> [f64; 7] {
+        self.world.motor_positions()
+    }
+
+    fn motor_velocities(&self) -> [f64; 7] {
+        self.world.motor_velocities()
+    }
+
     fn step(&mut self, torques: &[f64; 7]) {
         let (force, torque) = self.person.pull(&self.world.grasp_pose());
         self.world.push(add_scaled(self.outside.0, 1.0, force), add_scaled(self.outside.1, 1.0, torque));
@@ -71,5 +79,13 @@ impl<W: World> World for GuidedWorld<W> {
     /// Somebody else's push, added to the person's.
     fn push(&mut self, force: [f64; 3], torque: [f64; 3]) {
         self.outside = (force, torque);
+    }
+
+    fn hand(&self) -> HandState {
+        self.world.hand()
+    }
+
+    fn drive_hand(&mut self, targets: &HandTargets) {
+        self.world.drive_hand(targets);
     }
 }

@@ -9,6 +9,7 @@
 //! is integrated until it is gone. `g` fades in when the hand is taken and out when it is let go.
 
 mod guided;
+mod lesson;
 mod path;
 mod tremor;
 
@@ -18,6 +19,7 @@ use std::collections::VecDeque;
 use tremor::{Drift, Tremor};
 
 pub use guided::GuidedWorld;
+pub use lesson::Lesson;
 pub use path::{GuidePath, side_grasp_path};
 
 /// Joint posture in which the demonstration begins, rad: the grasp point is at the start of [`side_grasp_path`].

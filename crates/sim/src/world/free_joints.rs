@@ -4,12 +4,13 @@
 //! gravity torque of every link and of the hand, the torque of a push at the grasp point, joint stops, viscous and
 //! Coulomb friction. **Simplified**: the mass matrix is a constant diagonal (reflected rotor inertia plus the mean of the
 //! link inertia over the arm's work space), hence no coupling and no Coriolis torque; the hand is rigid and the wrist
-//! wrench is quasi-static; there is nothing to touch. Do not judge a controller's tracking by it.
+//! wrench is quasi-static; there is nothing to touch but springs in the way of the fingers ([`FingerObstacle`]), whose links are
+//! where their drives hold them otherwise, without inertia. Do not judge a controller's tracking by it.
 //!
 //! `v = (I v + h tau) / (I + h b)`, then Coulomb friction takes at most `h c / (I + h b)` from `|v|` and never turns its sign,
 //! so that a joint at rest stays at rest whatever the step: `I` inertia, `b` viscous, `c` Coulomb friction, `h` step.
 
-use super::{Pose, World};
+use super::{HandState, HandTargets, Pose, World};
 use crate::chain::{self, Frame, Vector, add, dot, subtract};
 use crate::rotation::cross;
 use crate::time::STEP_SECONDS;
@@ -65,6 +66,22 @@ const STOPS: [(f64, f64); 7] =
 /// The WAM's home, rad (`[arm] home`): on the stop of joint 2, elbow folded.
 pub const HOME: [f64; 7] = [0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0];
 
+/// Springs in the way of one finger: beyond an angle the link stays behind its drive, and the drive feels the spring.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FingerObstacle {
+    /// Angle at which the inner link touches, rad; infinite for nothing in its way.
+    pub inner: f64,
+    /// Angle at which the outer link touches, rad relative to the inner link; infinite for nothing in its way.
+    pub outer: f64,
+    /// Stiffness at either link, N m per rad by which the drive is beyond the link.
+    pub stiffness: f64,
+}
+
+impl FingerObstacle {
+    /// Nothing in the way.
+    pub const NOTHING: Self = Self { inner: f64::INFINITY, outer: f64::INFINITY, stiffness: 0.0 };
+}
+
 /// Seven decoupled joints with the WAM's statics.
 #[derive(Clone, Debug)]
 pub struct FreeJoints {
@@ -74,6 +91,9 @@ pub struct FreeJoints {
     coulomb: [f64; 7],
     push_force: Vector,
     push_torque: Vector,
+    hand: HandTargets,
+    obstacles: [FingerObstacle; 3],
+    spread_push: f64,
 }
 
 impl FreeJoints {
@@ -88,6 +108,22 @@ impl FreeJoints {
             coulomb: COULOMB,
             push_force: [0.0; 3],
             push_torque: [0.0; 3],
+            hand: HandTargets::default(),
+            obstacles: [FingerObstacle::NOTHING; 3],
+            spread_push: 0.0,
+        }
+    }
+
+    /// The same arm with the links of its hand here; the drives hold them.
+    #[must_use]
+    pub fn with_hand(self, hand: HandTargets) -> Self {
+        Self { hand, ..self }
+    }
+
+    /// Puts a spring in the way of finger `finger` (0..=2), or takes it away ([`FingerObstacle::NOTHING`]); other numbers do nothing.
+    pub fn obstruct(&mut self, finger: usize, obstacle: FingerObstacle) {
+        if let Some(place) = self.obstacles.get_mut(finger) {
+            *place = obstacle;
         }
     }
 
@@ -97,15 +133,20 @@ impl FreeJoints {
         Self { gravity: [0.0; 3], coulomb: [0.0; 7], ..Self::new(q) }
     }
 
+    /// Sets the torque with which something pushes the fingers towards larger spread, N m.
+    pub fn push_spread(&mut self, torque: f64) {
+        self.spread_push = torque;
+    }
+
     /// Torque of gravity and of the push on each joint, N m, by the principle of virtual work.
     fn external_torques(&self, frames: &[Frame; 8]) -> [f64; 7] {
-        let mut forces: Vec<(usize, Vector, Vector)> = LINKS
-            .iter()
-            .enumerate()
-            .map(|(link, (mass, centre))| (link, frames[link + 1].point(*centre), self.gravity.map(|g| g * mass)))
-            .collect();
-        forces.push((6, frames[7].point(PAYLOAD.1), self.gravity.map(|g| g * PAYLOAD.0)));
-        forces.push((6, chain::grasp_frame(&frames[7]).origin, self.push_force));
+        let weight = |mass: f64| self.gravity.map(|g| g * mass);
+        // Seven links, then sensor and hand, then the push: which link it acts on, where, and the force.
+        let forces: [(usize, Vector, Vector); 9] = std::array::from_fn(|part| match LINKS.get(part) {
+            Some((mass, centre)) => (part, frames[part + 1].point(*centre), weight(*mass)),
+            None if part == LINKS.len() => (6, frames[7].point(PAYLOAD.1), weight(PAYLOAD.0)),
+            None => (6, chain::grasp_frame(&frames[7]).origin, self.push_force),
+        });
         std::array::from_fn(|joint| {
             let (axis, origin) = (frames[joint].axes[2], frames[joint].origin);
             let moments = forces
@@ -165,6 +206,22 @@ impl World for FreeJoints {
     fn push(&mut self, force: [f64; 3], torque: [f64; 3]) {
         self.push_force = force;
         self.push_torque = torque;
+    }
+
+    fn hand(&self) -> HandState {
+        let mut state = HandState { spread: self.hand.spread, spread_load: -self.spread_push, ..HandState::default() };
+        for (finger, obstacle) in self.obstacles.iter().enumerate() {
+            let (inner, outer) = (self.hand.inner[finger], self.hand.outer[finger]);
+            state.inner[finger] = inner.min(obstacle.inner);
+            state.outer[finger] = outer.min(obstacle.outer);
+            state.inner_load[finger] = obstacle.stiffness * (inner - state.inner[finger]);
+            state.outer_load[finger] = obstacle.stiffness * (outer - state.outer[finger]);
+        }
+        state
+    }
+
+    fn drive_hand(&mut self, targets: &HandTargets) {
+        self.hand = *targets;
     }
 }
 

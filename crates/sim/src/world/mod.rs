@@ -9,7 +9,7 @@ mod free_joints;
 #[cfg(feature = "mujoco")]
 pub mod mujoco;
 
-pub use free_joints::{FreeJoints, HOME};
+pub use free_joints::{FingerObstacle, FreeJoints, HOME};
 
 /// A rigid pose in the world frame: origin where the axes of joints 1 and 2 meet, z up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +20,38 @@ pub struct Pose {
     pub quaternion: [f64; 4],
 }
 
+/// Where the links of the hand are, and what its drives exert on them. Fingers in the order F1, F2, F3.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HandState {
+    /// Inner links, rad; 0 open, positive closing.
+    pub inner: [f64; 3],
+    /// Outer links relative to the inner ones, rad, in Barrett's zero (without the some 42 degrees of bend).
+    pub outer: [f64; 3],
+    /// Spread, rad; 0 with all fingers on one side.
+    pub spread: f64,
+    /// Torque of the drive on each inner link about its joint, N m, positive closing.
+    pub inner_load: [f64; 3],
+    /// Torque of the drive on each outer link about its joint, N m, positive closing: what a strain gauge feels.
+    pub outer_load: [f64; 3],
+    /// Torque of the drive on the spread, N m, positive towards larger spread.
+    pub spread_load: f64,
+}
+
+/// Where the worm drives of the hand hold its links, rad; zeros and order as in [`HandState`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HandTargets {
+    /// Inner links.
+    pub inner: [f64; 3],
+    /// Outer links relative to the inner ones.
+    pub outer: [f64; 3],
+    /// Spread.
+    pub spread: f64,
+}
+
 /// Where the arm and the things around it obey physics.
+///
+/// Torques of [`World::step`] act on the motor side: a world with elastic cables lets the motors of
+/// [`World::motor_positions`] take them.
 ///
 /// `Any` lets the owner of a plant get its own world back from [`Plant::world`](crate::Plant::world)
 /// by upcasting (`let any: &mut dyn Any = plant.world();`), for pictures and for scenes.
@@ -30,6 +61,16 @@ pub trait World: Any + Send {
 
     /// Joint velocities dq, rad/s.
     fn joint_velocities(&self) -> [f64; 7];
+
+    /// Angles at the motor side of the cables, reflected to the joints, rad: what the encoders see. Rigid cables: the joints' own.
+    fn motor_positions(&self) -> [f64; 7] {
+        self.joint_positions()
+    }
+
+    /// Velocities at the motor side of the cables, reflected to the joints, rad/s.
+    fn motor_velocities(&self) -> [f64; 7] {
+        self.joint_velocities()
+    }
 
     /// Advances physics by one step of [`STEP_TICKS`](crate::STEP_TICKS) under joint torques, N m.
     ///
@@ -44,4 +85,10 @@ pub trait World: Any + Send {
 
     /// Sets the wrench a person applies at the grasp point, world frame (N, N m); it lasts until it is set again.
     fn push(&mut self, force: [f64; 3], torque: [f64; 3]);
+
+    /// The links of the hand and what its drives exert on them, after the last step.
+    fn hand(&self) -> HandState;
+
+    /// Sets where the worm drives hold the links of the hand from the next step on, until it is set again.
+    fn drive_hand(&mut self, targets: &HandTargets);
 }

@@ -1,109 +1,57 @@
-//! The MuJoCo world: the WAM with force/torque sensor and hand, a table, and an upright flashlight.
+//! The MuJoCo world: the WAM with force/torque sensor and hand at a table, and an object.
 //!
-//! The model is `model/wam7_bh280.xml`. One physics step lasts [`STEP_SECONDS`](crate::STEP_SECONDS). The seven motors
-//! take joint torques; the fingers are held where the options say. Physics has no randomness: the same inputs give the
-//! same bits on the same machine. Seeds belong to the sensors (the plant) and to the [`Person`](crate::person::Person).
+//! The model is `model/wam7_bh280.xml`. One physics step lasts [`STEP_SECONDS`]. The seven motors
+//! take joint torques; the links of the hand are held where they are told to be. Physics has no randomness: the same inputs
+//! give the same bits on the same machine. Seeds belong to the sensors (the plant), to the
+//! [`Person`](crate::person::Person) and to [`Imperfections::drawn`].
 
 mod addresses;
+mod cables;
+mod contacts;
+mod imperfections;
 mod kinematics;
+mod object;
+mod options;
+mod scene;
 
-use super::{HOME, Pose, World};
+use super::{HandState, HandTargets, Pose, World};
 use crate::STEP_SECONDS;
 use crate::rotation::{add_scaled, cross, from_matrix};
 use addresses::Addresses;
+use cables::Motors;
+use contacts::Parts;
 use mujoco_rs::prelude::{MjData, MjModel};
+use std::collections::VecDeque;
 
+pub use contacts::ContactForces;
+pub use imperfections::{Cables, Imperfections};
 pub use kinematics::{Kinematics, Unreachable};
+pub use object::{ObjectKind, ObjectSpec, TABLE_TOP};
+pub use options::{MujocoOptions, WorldError};
+pub use scene::Scene;
 
-/// The model, read at compile time: the simulator needs no file at run time.
-pub(crate) const MODEL: &str = include_str!("../../model/wam7_bh280.xml");
-
-/// Where the flashlight stands unless told otherwise, world x and y, m.
-pub const FLASHLIGHT: [f64; 2] = [0.80, 0.0];
-
-/// Height of the table's top, world z, m.
-pub const TABLE_TOP: f64 = -0.15;
-
-/// Half the height of the flashlight, m: its body frame lies this far above the table.
-const FLASHLIGHT_HALF_HEIGHT: f64 = 0.125;
-
-/// The table's top, world x and y, m: centre and half extents.
-const TABLE_CENTRE: [f64; 2] = [0.80, 0.0];
-const TABLE_HALF_EXTENT: [f64; 2] = [0.25, 0.45];
-
-/// How the world is set up before the first step.
-#[derive(Clone, Debug)]
-pub struct MujocoOptions {
-    /// Joint posture in which the arm starts, at rest, rad.
-    pub posture: [f64; 7],
-    /// Dry and viscous friction of the seven joints (wam7.toml); off makes an ideal drive.
-    pub joint_friction: bool,
-    /// Where the flashlight stands on the table, world x and y, m.
-    pub flashlight: [f64; 2],
-    /// Angle at which the inner finger joints are held, rad: 0 is fully open, 2.44 fully closed.
-    pub fingers: f64,
-    /// Angle at which the spread is held, rad: 0 puts F1 and F2 opposite to F3.
-    pub spread: f64,
-    /// Gravity along world z, m/s^2.
-    pub gravity: f64,
-}
-
-impl Default for MujocoOptions {
-    /// At home, with friction, the flashlight at [`FLASHLIGHT`], fingers open at 0.25 rad, gravity -9.81 m/s^2.
-    fn default() -> Self {
-        Self { posture: HOME, joint_friction: true, flashlight: FLASHLIGHT, fingers: 0.25, spread: 0.0, gravity: -9.81 }
-    }
-}
-
-/// Why a MuJoCo world or its kinematics could not be set up.
-#[derive(Debug, thiserror::Error)]
-pub enum WorldError {
-    /// MuJoCo did not take the model: the library does not fit to this program.
-    #[error("MuJoCo refuses the arm model: {0}")]
-    Model(String),
-    /// The model lacks a part that this program looks up by name.
-    #[error("the arm model has no {kind} named `{name}`")]
-    Missing {
-        /// Kind of the part.
-        kind: &'static str,
-        /// Name looked for.
-        name: String,
-    },
-    /// A starting joint angle is not a number within the joint's range.
-    #[error("joint {joint} cannot start at {angle} rad: its range is {low} .. {high} rad")]
-    Posture {
-        /// Joint, 1 to 7.
-        joint: usize,
-        /// Angle asked for, rad.
-        angle: f64,
-        /// Lower end of its range, rad.
-        low: f64,
-        /// Upper end of its range, rad.
-        high: f64,
-    },
-    /// The flashlight would stand beside the table.
-    #[error("the flashlight cannot stand at ({x}, {y}) m: that is not on the table")]
-    OffTable {
-        /// World x, m.
-        x: f64,
-        /// World y, m.
-        y: f64,
-    },
-    /// A finger or spread angle, or gravity, is not a usable number.
-    #[error("{what} cannot be {value}")]
-    OutOfRange {
-        /// What is out of range.
-        what: &'static str,
-        /// The value asked for.
-        value: f64,
-    },
-}
+/// Steps over which [`MujocoWorld::mean_contact_forces`] takes the mean: 10 ms, three cycles of control.
+const MEAN_STEPS: usize = 18;
 
 /// The WAM with its hand at a table, obeying MuJoCo.
 pub struct MujocoWorld {
     data: MjData<Box<MjModel>>,
     addresses: Addresses,
+    parts: Parts,
+    motors: Option<Motors>,
     push: ([f64; 3], [f64; 3]),
+    scene: Scene,
+    /// The latest contact forces, the newest last.
+    contacts: VecDeque<ContactForces>,
+    crush: Crush,
+}
+
+/// Whether a finger pressed harder than the object bears.
+#[derive(Clone, Copy, Debug, Default)]
+struct Crush {
+    /// Force of the finger that presses hardest, N, smoothed over some 10 ms.
+    felt: f64,
+    crushed: bool,
 }
 
 impl MujocoWorld {
@@ -112,11 +60,23 @@ impl MujocoWorld {
     /// # Errors
     /// [`WorldError`] if an option is out of range or MuJoCo does not take the model.
     pub fn new(options: &MujocoOptions) -> Result<Self, WorldError> {
-        let (model, addresses) = load(options)?;
-        let mut data = MjData::new(model);
+        let (mut data, addresses, mut motors) = load(options)?;
+        let parts = Parts::of(data.model())?;
         place(&mut data, &addresses, options);
         data.forward();
-        Ok(Self { data, addresses, push: ([0.0; 3], [0.0; 3]) })
+        if let Some(motors) = &mut motors {
+            motors.settle(&data, &addresses);
+        }
+        Ok(Self {
+            data,
+            addresses,
+            parts,
+            motors,
+            push: ([0.0; 3], [0.0; 3]),
+            scene: options.scene,
+            contacts: VecDeque::with_capacity(MEAN_STEPS),
+            crush: Crush::default(),
+        })
     }
 
     /// Simulated time, s.
@@ -140,26 +100,53 @@ impl MujocoWorld {
         self.addresses.velocities.map(|i| bias[i])
     }
 
-    /// Pose of the flashlight's centre.
+    /// Table and object as they were set up.
     #[must_use]
-    pub fn flashlight_pose(&self) -> Pose {
-        let q = &self.data.qpos()[self.addresses.flashlight..][..7];
-        Pose { position: [q[0], q[1], q[2]], quaternion: [q[3], q[4], q[5], q[6]] }
+    pub fn scene(&self) -> &Scene {
+        &self.scene
     }
 
-    /// Angle between the flashlight's axis and the vertical, rad.
+    /// Pose of the middle of the object's axis, z along the axis; `None` without an object.
     #[must_use]
-    pub fn flashlight_tilt(&self) -> f64 {
-        let [_, x, y, _] = self.flashlight_pose().quaternion;
+    pub fn object_pose(&self) -> Option<Pose> {
+        let q = &self.data.qpos()[self.addresses.object?..][..7];
+        Some(Pose { position: [q[0], q[1], q[2]], quaternion: [q[3], q[4], q[5], q[6]] })
+    }
+
+    /// How far the object's axis has left the vertical (of what stood) or the horizontal (of what lay), rad; `None` without an object.
+    #[must_use]
+    pub fn object_tilt(&self) -> Option<f64> {
+        let [_, x, y, _] = self.object_pose()?.quaternion;
         // The turned z axis has the vertical component 1 - 2 (x^2 + y^2) = cos(tilt) for a unit quaternion; the half angle
         // keeps the precision that acos loses near 1.
-        2.0 * x.hypot(y).min(1.0).asin()
+        let from_vertical = 2.0 * x.hypot(y).min(1.0).asin();
+        let lay = self.scene.object.is_some_and(|object| object.lies());
+        Some(if lay { (from_vertical - std::f64::consts::FRAC_PI_2).abs() } else { from_vertical })
+    }
+
+    /// Whether a finger has pressed harder than the object bears ([`ObjectSpec::crush_force`]).
+    #[must_use]
+    pub fn object_crushed(&self) -> bool {
+        self.crush.crushed
+    }
+
+    /// Contact forces during the last step.
+    #[must_use]
+    pub fn contact_forces(&self) -> ContactForces {
+        self.contacts.back().copied().unwrap_or_default()
+    }
+
+    /// Mean of the contact forces over the last 10 ms, three cycles of control.
+    #[must_use]
+    pub fn mean_contact_forces(&self) -> ContactForces {
+        let share = 1.0 / MEAN_STEPS as f64;
+        self.contacts.iter().fold(ContactForces::default(), |sum, forces| sum.add_scaled(share, forces))
     }
 
     /// Number of contacts between the arm or hand and anything else.
     #[must_use]
     pub fn robot_contacts(&self) -> usize {
-        addresses::robot_contacts(&self.data)
+        self.parts.robot_contacts(&self.data)
     }
 
     /// Number of warnings MuJoCo raised so far: anything but 0 means that physics broke.
@@ -182,7 +169,32 @@ impl MujocoWorld {
         self.data.xfrc_applied_mut()[palm] = [fx, fy, fz, tx, ty, tz];
     }
 
-    /// All generalized positions in the order of the model (flashlight, arm, fingers), for pictures.
+    /// Sets the force (N) that somebody applies to the object at a point (m), both in world axes; it lasts until it is set again.
+    /// Does nothing without an object.
+    pub fn push_object(&mut self, force: [f64; 3], point: [f64; 3]) {
+        let Some(body) = self.addresses.object_body else {
+            return;
+        };
+        let [tx, ty, tz] = cross(add_scaled(point, -1.0, self.data.xipos()[body]), force);
+        let [fx, fy, fz] = force;
+        self.data.xfrc_applied_mut()[body] = [fx, fy, fz, tx, ty, tz];
+    }
+
+    /// Keeps what the solver found about contacts in the step that it just solved.
+    fn note_contacts(&mut self) {
+        if self.contacts.len() == MEAN_STEPS {
+            self.contacts.pop_front();
+        }
+        let forces = self.parts.forces(&self.data);
+        self.contacts.push_back(forces);
+        if let Some(limit) = self.scene.object.and_then(|object| object.crush_force) {
+            let hardest = forces.fingers_on_object.into_iter().fold(0.0, f64::max);
+            self.crush.felt += (hardest - self.crush.felt) / MEAN_STEPS as f64;
+            self.crush.crushed |= self.crush.felt > limit;
+        }
+    }
+
+    /// All generalized positions in the order of the model (object if there is one, arm, fingers), for pictures.
     #[must_use]
     pub fn configuration(&self) -> &[f64] {
         self.data.qpos()
@@ -200,14 +212,32 @@ impl World for MujocoWorld {
         self.addresses.velocities.map(|i| dq[i])
     }
 
+    fn motor_positions(&self) -> [f64; 7] {
+        self.motors.as_ref().map_or_else(|| self.joint_positions(), |motors| motors.positions)
+    }
+
+    fn motor_velocities(&self) -> [f64; 7] {
+        self.motors.as_ref().map_or_else(|| self.joint_velocities(), |motors| motors.velocities)
+    }
+
     fn step(&mut self, torques: &[f64; 7]) {
-        for (address, torque) in self.addresses.motors.iter().zip(torques) {
-            self.data.ctrl_mut()[*address] = *torque;
+        if let Some(motors) = &mut self.motors {
+            let (q, dq) = (self.data.qpos(), self.data.qvel());
+            let (q, dq) = (self.addresses.positions.map(|i| q[i]), self.addresses.velocities.map(|i| dq[i]));
+            // As generalized forces: the limits of the motors in the model are not those of a cable.
+            for (address, torque) in self.addresses.velocities.iter().zip(motors.step(&q, &dq, torques)) {
+                self.data.qfrc_applied_mut()[*address] = torque;
+            }
+        } else {
+            for (address, torque) in self.addresses.motors.iter().zip(torques) {
+                self.data.ctrl_mut()[*address] = *torque;
+            }
         }
         self.apply_push();
         // Second half of the old step, then first half of the next: so positions, poses and contacts that anybody
         // reads between two steps belong to the same instant.
         self.data.step2();
+        self.note_contacts();
         self.data.step1();
     }
 
@@ -226,79 +256,77 @@ impl World for MujocoWorld {
     fn push(&mut self, force: [f64; 3], torque: [f64; 3]) {
         self.push = (force, torque);
     }
-}
 
-/// Loads the model and sets it up as the options say.
-fn load(options: &MujocoOptions) -> Result<(Box<MjModel>, Addresses), WorldError> {
-    let mut model = MjModel::from_xml_string(&without_looks()).map_err(|e| WorldError::Model(e.to_string()))?;
-    let addresses = Addresses::of(&model)?;
-    check(options, &addresses)?;
-    model.opt_mut().timestep = STEP_SECONDS;
-    model.opt_mut().gravity = [0.0, 0.0, options.gravity];
-    if !options.joint_friction {
-        for i in addresses.velocities {
-            model.dof_frictionloss_mut()[i] = 0.0;
-            model.dof_damping_mut()[i] = 0.0;
+    fn hand(&self) -> HandState {
+        let (q, force) = (self.data.qpos(), self.data.actuator_force());
+        let a = &self.addresses;
+        HandState {
+            inner: a.fingers.map(|[inner, _]| q[inner]),
+            outer: a.fingers.map(|[_, outer]| q[outer]),
+            spread: q[a.spreads[0]],
+            inner_load: a.finger_servos.map(|[inner, _]| force[inner]),
+            outer_load: a.finger_servos.map(|[_, outer]| force[outer]),
+            spread_load: force[a.spread_servo],
         }
     }
-    Ok((Box::new(model), addresses))
+
+    fn drive_hand(&mut self, targets: &HandTargets) {
+        let servos = self.data.ctrl_mut();
+        for (finger, [inner, outer]) in self.addresses.finger_servos.into_iter().enumerate() {
+            servos[inner] = targets.inner[finger];
+            servos[outer] = targets.outer[finger];
+        }
+        servos[self.addresses.spread_servo] = targets.spread;
+    }
 }
 
-/// The model without the geoms that are only looked at; they would cost an eighth of the time of a step.
-fn without_looks() -> String {
-    MODEL
-        .lines()
-        .filter(|line| !line.trim_start().starts_with(r#"<geom class="look""#))
-        .flat_map(|line| [line, "\n"])
-        .collect()
+/// A model with its data, where its parts are, and the motors if they turn the joints through elastic cables.
+type Loaded = (MjData<Box<MjModel>>, Addresses, Option<Motors>);
+
+/// Loads the model and sets it up as the options say.
+fn load(options: &MujocoOptions) -> Result<Loaded, WorldError> {
+    // A scene that cannot be is refused before it becomes part of the model's text.
+    options.scene.check()?;
+    let mut model =
+        MjModel::from_xml_string(&options.scene.model(false)).map_err(|e| WorldError::Model(e.to_string()))?;
+    let addresses = Addresses::of(&model)?;
+    options::check(options, &addresses)?;
+    model.opt_mut().timestep = STEP_SECONDS;
+    model.opt_mut().gravity = [0.0, 0.0, options.gravity];
+    for (i, factor) in addresses.velocities.into_iter().zip(options.imperfections.friction) {
+        let factor = if options.joint_friction { factor } else { 0.0 };
+        model.dof_frictionloss_mut()[i] *= factor;
+        model.dof_damping_mut()[i] *= factor;
+    }
+    let motors = options.imperfections.cables.map(|cables| Motors::take_from(&mut model, &addresses, &cables));
+    let weighed = options.imperfections.weigh(&mut model)?;
+    let mut data = MjData::new(Box::new(model));
+    if weighed {
+        data.set_const();
+    }
+    Ok((data, addresses, motors))
 }
 
-/// Puts arm, fingers and flashlight where the options say.
+/// Puts arm, hand and object where the options say.
 fn place(data: &mut MjData<Box<MjModel>>, addresses: &Addresses, options: &MujocoOptions) {
+    // The finger's gears turn the outer link by a third of the inner one (Barrett: 125 / 375).
+    let hand = [options.fingers, options.fingers / 3.0];
     let q = data.qpos_mut();
     for (address, angle) in addresses.positions.iter().zip(options.posture) {
         q[*address] = angle;
     }
-    let [x, y] = options.flashlight;
-    let upright = [x, y, TABLE_TOP + FLASHLIGHT_HALF_HEIGHT, 1.0, 0.0, 0.0, 0.0];
-    q[addresses.flashlight..][..7].copy_from_slice(&upright);
-    for [inner, outer] in addresses.fingers {
-        q[inner] = options.fingers;
-        // The finger's gears turn the outer link by a third of the inner one (Barrett: 125 / 375).
-        q[outer] = options.fingers / 3.0;
+    if let (Some(address), Some(object)) = (addresses.object, &options.scene.object) {
+        q[address..][..7].copy_from_slice(&object.start());
     }
-    for spread in addresses.spreads {
-        q[spread] = options.spread;
+    for (address, angle) in addresses.fingers.into_iter().flat_map(|finger| finger.into_iter().zip(hand)) {
+        q[address] = angle;
+    }
+    for address in addresses.spreads {
+        q[address] = options.spread;
     }
     let servos = data.ctrl_mut();
-    for servo in addresses.finger_servos {
-        servos[servo] = options.fingers;
+    for (address, angle) in addresses.finger_servos.into_iter().flat_map(|finger| finger.into_iter().zip(hand)) {
+        servos[address] = angle;
     }
     servos[addresses.spread_servo] = options.spread;
-}
-
-/// Parse, do not validate: whatever passes here can be simulated.
-fn check(options: &MujocoOptions, addresses: &Addresses) -> Result<(), WorldError> {
-    for (i, (&angle, [low, high])) in options.posture.iter().zip(addresses.ranges).enumerate() {
-        if !(low..=high).contains(&angle) {
-            return Err(WorldError::Posture { joint: i + 1, angle, low, high });
-        }
-    }
-    let [x, y] = options.flashlight;
-    let on_table = (0..2).all(|i| (options.flashlight[i] - TABLE_CENTRE[i]).abs() <= TABLE_HALF_EXTENT[i]);
-    if !on_table {
-        return Err(WorldError::OffTable { x, y });
-    }
-    for (what, value, [low, high]) in [
-        ("the finger angle", options.fingers, addresses.finger_range),
-        ("the spread angle", options.spread, addresses.spread_range),
-    ] {
-        if !(low..=high).contains(&value) {
-            return Err(WorldError::OutOfRange { what, value });
-        }
-    }
-    if !options.gravity.is_finite() {
-        return Err(WorldError::OutOfRange { what: "gravity", value: options.gravity });
-    }
-    Ok(())
 }

@@ -6,7 +6,7 @@
 use puck::{
     CanFrame, Counts, Drives, Group, Node, Property, PropertyId, PropertyTable, Ratios, Reply, Transmission, get, set,
 };
-use sim::{FreeJoints, HOME, Plant, PlantConfig, TICKS_PER_MILLISECOND, Ticks};
+use sim::{FreeJoints, HOME, Plant, PlantConfig, TICKS_PER_MILLISECOND, Ticks, World};
 
 /// Firmware of the simulated pucks.
 pub const VERSION: i32 = 200;
@@ -25,7 +25,11 @@ impl Master {
     }
 
     pub fn with_world(config: PlantConfig, world: FreeJoints) -> Self {
-        Self { plant: Plant::new(config, Box::new(world)), now: 0, heard: Vec::new(), sent: 0 }
+        Self::with_any_world(config, Box::new(world))
+    }
+
+    pub fn with_any_world(config: PlantConfig, world: Box<dyn World>) -> Self {
+        Self { plant: Plant::new(config, world), now: 0, heard: Vec::new(), sent: 0 }
     }
 
     /// Lets time pass and keeps every frame that arrives.
@@ -162,6 +166,11 @@ pub fn safety_id(property: Property) -> PropertyId {
 
 /// What the encoders should read at home.
 pub fn home_counts() -> [Counts; 7] {
-    let motors = Transmission::new(&Ratios::WAM7).unwrap().motor_from_joint(&HOME);
+    counts_at(&HOME)
+}
+
+/// What zeroed encoders should read at these joint angles.
+pub fn counts_at(q: &[f64; 7]) -> [Counts; 7] {
+    let motors = Transmission::new(&Ratios::WAM7).unwrap().motor_from_joint(q);
     Drives::new([4096; 7], [2472; 7]).unwrap().counts(&motors).unwrap()
 }

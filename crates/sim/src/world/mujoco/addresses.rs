@@ -1,10 +1,7 @@
 //! Where the parts of the model lie in MuJoCo's arrays, looked up once by name.
 
 use super::WorldError;
-use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase};
-
-/// Contact type bit of the arm's and the hand's geoms in the model (`contype` of the classes `robot` and `hand`).
-const ROBOT_CONTACT_TYPE: i32 = 2;
+use mujoco_rs::prelude::{MjModel, MjtObjBase};
 
 /// Indices into MuJoCo's arrays.
 #[derive(Clone, Debug)]
@@ -21,14 +18,16 @@ pub(super) struct Addresses {
     pub(super) spread_range: [f64; 2],
     /// The seven torque motors in the controls.
     pub(super) motors: [usize; 7],
-    /// Position and quaternion of the flashlight in the generalized positions.
-    pub(super) flashlight: usize,
+    /// Position and quaternion of the object in the generalized positions; `None` in a scene without one.
+    pub(super) object: Option<usize>,
+    /// The object among the bodies.
+    pub(super) object_body: Option<usize>,
     /// Inner and outer joint of F1, F2, F3 in the generalized positions.
     pub(super) fingers: [[usize; 2]; 3],
     /// The spread joints of F1 and F2 in the generalized positions.
     pub(super) spreads: [usize; 2],
-    /// The servos of the fingers in the controls.
-    pub(super) finger_servos: [usize; 3],
+    /// The servos of the inner and outer links of F1, F2, F3 in the controls.
+    pub(super) finger_servos: [[usize; 2]; 3],
     /// The servo of the spread in the controls.
     pub(super) spread_servo: usize,
     /// The grasp point among the sites.
@@ -62,14 +61,19 @@ impl Addresses {
             positions: seven(|j| position(&format!("j{j}")))?,
             velocities: seven(|j| velocity(&format!("j{j}")))?,
             motors: seven(|j| servo(&format!("tau{j}")))?,
-            flashlight: position("flashlight_free")?,
+            object: position("object_free").ok(),
+            object_body: model.name_to_id(MjtObjBase::mjOBJ_BODY, "object"),
             fingers: [
                 [position("f1_inner")?, position("f1_outer")?],
                 [position("f2_inner")?, position("f2_outer")?],
                 [position("f3_inner")?, position("f3_outer")?],
             ],
             spreads: [position("f1_spread")?, position("f2_spread")?],
-            finger_servos: [servo("f1")?, servo("f2")?, servo("f3")?],
+            finger_servos: [
+                [servo("f1_inner")?, servo("f1_outer")?],
+                [servo("f2_inner")?, servo("f2_outer")?],
+                [servo("f3_inner")?, servo("f3_outer")?],
+            ],
             spread_servo: servo("spread")?,
             grasp: find(MjtObjBase::mjOBJ_SITE, "site", "grasp")?,
             palm: find(MjtObjBase::mjOBJ_BODY, "body", "bh_palm")?,
@@ -86,11 +90,4 @@ fn seven<T: Copy + Default>(value: impl Fn(usize) -> Result<T, WorldError>) -> R
         *slot = value(i + 1)?;
     }
     Ok(all)
-}
-
-/// Contacts in which the arm or the hand takes part.
-pub(super) fn robot_contacts(data: &MjData<Box<MjModel>>) -> usize {
-    let types = data.model().geom_contype();
-    let robot = |geom: i32| usize::try_from(geom).is_ok_and(|g| types[g] == ROBOT_CONTACT_TYPE);
-    data.contact().iter().filter(|c| robot(c.geom1) || robot(c.geom2)).count()
 }

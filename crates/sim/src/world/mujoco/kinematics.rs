@@ -2,7 +2,8 @@
 //!
 //! For set-up, tests and pictures. The co-controller has kinematics of its own; nothing here is shared with it.
 
-use super::addresses::{Addresses, robot_contacts};
+use super::addresses::Addresses;
+use super::contacts::Parts;
 use super::{MujocoOptions, WorldError};
 use crate::Pose;
 use crate::rotation::{add_scaled, difference, from_matrix};
@@ -22,6 +23,7 @@ pub struct Unreachable {
 pub struct Kinematics {
     data: MjData<Box<MjModel>>,
     addresses: Addresses,
+    parts: Parts,
 }
 
 impl Kinematics {
@@ -41,11 +43,11 @@ impl Kinematics {
     /// # Errors
     /// [`WorldError`] as for [`MujocoWorld::new`](super::MujocoWorld::new).
     pub fn new(options: &MujocoOptions) -> Result<Self, WorldError> {
-        let (model, addresses) = super::load(options)?;
-        let mut data = MjData::new(model);
+        let (mut data, addresses, _) = super::load(options)?;
+        let parts = Parts::of(data.model())?;
         super::place(&mut data, &addresses, options);
         data.forward();
-        Ok(Self { data, addresses })
+        Ok(Self { data, addresses, parts })
     }
 
     /// Range of each joint between its mechanical stops, rad.
@@ -76,7 +78,7 @@ impl Kinematics {
     pub fn robot_contacts(&mut self, q: &[f64; 7]) -> usize {
         self.set(q);
         self.data.collision();
-        robot_contacts(&self.data)
+        self.parts.robot_contacts(&self.data)
     }
 
     /// A posture that reaches `target`, as near to the posture `near` as the redundancy of the arm allows.

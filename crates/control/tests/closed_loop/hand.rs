@@ -1,0 +1,219 @@
+//! The hand in the control cycle: who drives it, how it follows, and what it does with what it feels.
+
+use control::command::{Command, RunOptions};
+use control::hand::estimate::LOST_CYCLES;
+use control::{Event, Refusal, State, flags};
+
+use crate::hand_plant::Hand;
+use crate::primitives::{Design, START, primitive};
+use crate::rig::Rig;
+
+const OPEN: [f64; 4] = [0.0, 0.25, 0.25, 0.25];
+
+/// A rig that holds the start of the test primitives, with an opened hand, tared.
+fn holding() -> Rig<f32> {
+    let mut rig = Rig::<f32>::new(START, 1);
+    rig.plant.hand = Some(Hand::new(OPEN));
+    rig.command(Command::Hold);
+    rig.run_for(2.0);
+    rig.command(Command::Tare);
+    rig
+}
+
+fn hand(rig: &Rig<f32>) -> &Hand {
+    rig.plant.hand.as_ref().expect("fitted")
+}
+
+/// A primitive that closes the fingers to `closed` (rad), in 3 s, on the spot.
+fn closing(closed: f64, gauges: [f64; 3]) -> Design {
+    Design {
+        duration: 3.0,
+        goal: START,
+        bent: false,
+        expected: Some([0.0; 6]),
+        expected_gauges: gauges,
+        closed,
+        ..Design::default()
+    }
+}
+
+#[test]
+fn a_hand_is_moved_when_asked_to_and_its_worms_hold_it_otherwise() {
+    for (state, driven_afterwards) in [(Command::Gravity, false), (Command::Hold, true)] {
+        let mut rig = Rig::<f32>::new(START, 1);
+        rig.plant.hand = Some(Hand::new(OPEN));
+        rig.command(state);
+        rig.run_for(1.0);
+        assert_eq!(hand(&rig).frames, 0, "nobody has asked for anything");
+        assert!(rig.last.expect("ran").record.flags & flags::HAND_READY != 0);
+        rig.command(Command::MoveHand { q: [1.0, 1.2, 1.3, 1.4], duration: 1.5 });
+        let mut fastest = 0.0f64;
+        for _ in 0..750 {
+            let record = rig.tick(None).record;
+            fastest = fastest.max(hand(&rig).dq[3]);
+            for digit in 0..4 {
+                let error = f64::from(record.hand_d[digit]) - hand(&rig).q[digit];
+                assert!(error.abs() < 0.08, "digit {digit}: {error} rad behind");
+            }
+        }
+        let found = hand(&rig).q;
+        for (digit, wanted) in [1.0, 1.2, 1.3, 1.4].into_iter().enumerate() {
+            assert!((found[digit] - wanted).abs() < 0.05, "digit {digit}: {found:?}");
+        }
+        // Peak speed of a minimum jerk: 1.875 times the mean.
+        assert!((fastest - 1.15 * 1.875 / 1.5).abs() < 0.1, "{fastest}");
+        let driven = rig.tick(None).actuation.hand_frame().is_some();
+        assert_eq!(driven, driven_afterwards, "{state:?}");
+    }
+}
+
+#[test]
+fn a_move_that_asks_for_too_much_speed_takes_longer_and_nonsense_is_refused() {
+    let mut rig = holding();
+    rig.command(Command::MoveHand { q: [0.0, 2.3, 2.3, 2.3], duration: 0.0 });
+    let mut fastest = 0.0f64;
+    for _ in 0..1200 {
+        rig.tick(None);
+        fastest = fastest.max(hand(&rig).dq[1]);
+    }
+    assert!(fastest < 1.65, "{fastest} rad/s");
+    assert!((hand(&rig).q[1] - 2.3).abs() < 0.05);
+    let mut refused = |q: [f32; 4], duration: f32| rig.tick(Some(Command::MoveHand { q, duration })).event;
+    let out_of_range = Some(Event::Refused(Refusal::OutOfRange));
+    assert_eq!(refused([0.0, 2.6, 0.0, 0.0], 1.0), out_of_range);
+    assert_eq!(refused([-0.2, 0.0, 0.0, 0.0], 1.0), out_of_range);
+    assert_eq!(refused([f32::NAN, 0.0, 0.0, 0.0], 1.0), out_of_range);
+    assert_eq!(refused([0.0; 4], -1.0), out_of_range);
+    assert_eq!(refused([0.0; 4], f32::NAN), out_of_range);
+    rig.plant.hand = None;
+    assert_eq!(
+        rig.tick(Some(Command::MoveHand { q: [0.0; 4], duration: 1.0 })).event,
+        Some(Event::Refused(Refusal::NoHand))
+    );
+    assert_eq!(rig.last.expect("ran").record.flags & (flags::HAND_READY | flags::HAND_LOST), 0);
+}
+
+#[test]
+fn a_run_moves_the_fingers_and_the_hold_after_it_keeps_the_grip() {
+    let mut rig = holding();
+    rig.plant.hand.as_mut().expect("fitted").object = [Some((1.0, 30.0)); 3];
+    rig.cycle.load(&primitive(&closing(1.6, [0.0; 3]))).expect("loads");
+    rig.command(Command::Run(RunOptions::default()));
+    let refused = rig.tick(Some(Command::MoveHand { q: [0.0; 4], duration: 1.0 })).event;
+    assert_eq!(refused, Some(Event::Refused(Refusal::WrongState)));
+    rig.until(State::Hold, 10.0);
+    let gripping = hand(&rig).pressing(0);
+    assert!(gripping > 0.8, "open loop presses with what the drive gives: {gripping} N m");
+    let posture = START.map(|q| q as f32 + 0.1);
+    rig.command(Command::Approach { q: posture, duration: 2.0 });
+    rig.run_for(4.0);
+    assert_eq!(rig.cycle.state(), State::Hold);
+    assert!(hand(&rig).pressing(0) > 0.95 * gripping, "{} of {gripping}", hand(&rig).pressing(0));
+    assert!(rig.last.expect("ran").actuation.hand_frame().is_some());
+    // Floating, nothing drives the hand, and the worm keeps the grip.
+    let frames = hand(&rig).frames;
+    rig.command(Command::Gravity);
+    rig.run_for(1.0);
+    assert_eq!(hand(&rig).frames, frames);
+    assert!(hand(&rig).pressing(0) > 0.9 * gripping);
+}
+
+#[test]
+fn a_hand_far_from_where_the_primitive_starts_is_refused_and_no_hand_is_not() {
+    let mut rig = holding();
+    rig.cycle.load(&primitive(&closing(1.6, [0.0; 3]))).expect("loads");
+    rig.plant.hand.as_mut().expect("fitted").q[2] += 0.2;
+    rig.run_for(0.5);
+    let event = rig.tick(Some(Command::Run(RunOptions::default()))).event;
+    assert_eq!(event, Some(Event::Refused(Refusal::HandTooFar)));
+    rig.plant.hand.as_mut().expect("fitted").q[2] -= 0.1;
+    rig.run_for(0.5);
+    rig.command(Command::Run(RunOptions::default()));
+    let planned = rig.last.expect("ran").record.hand_d;
+    assert!((f64::from(planned[2]) - hand(&rig).q[2]).abs() < 0.01, "from where the finger is: {planned:?}");
+    rig.command(Command::Hold);
+    rig.run_for(0.5);
+    rig.plant.hand = None;
+    rig.run_for(0.1);
+    rig.command(Command::Run(RunOptions::default()));
+    rig.until(State::Hold, 10.0);
+}
+
+#[test]
+fn closing_on_an_object_reads_as_a_negative_gauge_whatever_its_zero() {
+    for unloaded in [1900.0, 2000.0, 2100.0] {
+        let mut rig = Rig::<f32>::new(START, 1);
+        rig.plant.hand = Some(Hand { unloaded, ..Hand::new(OPEN) });
+        rig.command(Command::Hold);
+        rig.run_for(1.0);
+        rig.command(Command::Tare);
+        rig.plant.hand.as_mut().expect("fitted").object[1] = Some((0.25 - 0.01, 30.0));
+        rig.run_for(0.5);
+        let gauges = rig.last.expect("ran").record.gauges.map(f64::from);
+        assert!((gauges[1] + 0.3).abs() < 0.01, "{gauges:?}");
+        assert!(gauges[0].abs() < 2e-3 && gauges[2].abs() < 2e-3, "{gauges:?}");
+    }
+}
+
+/// Torque with which F2 presses on an object at the end of a run that closes on it.
+fn grip(options: RunOptions, reversed_gauges: bool, expected: f64) -> f64 {
+    let mut rig = holding();
+    {
+        let hand = rig.plant.hand.as_mut().expect("fitted");
+        hand.object = [Some((1.0, 30.0)); 3];
+        hand.reversed_gauges = reversed_gauges;
+    }
+    rig.cycle.load(&primitive(&closing(1.2, [expected; 3]))).expect("loads");
+    rig.command(Command::Run(options));
+    rig.run_for(2.9);
+    assert_eq!(rig.cycle.state(), State::Run);
+    hand(&rig).pressing(1)
+}
+
+#[test]
+fn a_finger_under_force_control_yields_to_an_object_it_did_not_expect() {
+    let open = RunOptions::default();
+    let force = RunOptions { force_control: true, ..open };
+    let adapting = RunOptions { force_control: true, feedback: true, ..open };
+    let (stiff, soft, bent) = (grip(open, false, 0.0), grip(force, false, 0.0), grip(adapting, false, 0.0));
+    println!("grip: {stiff} N m open loop, {soft} with Eq (14), {bent} with Eq (8) as well");
+    assert!(soft < 0.9 * stiff, "{soft} of {stiff}");
+    assert!(bent < 0.7 * soft, "the plan of the finger gives way as well: {bent} of {soft}");
+    // Negative control: with gauges of the wrong sign the finger presses harder instead.
+    let wrong = grip(adapting, true, 0.0);
+    assert!(wrong > soft, "{wrong}");
+    // What is expected is pressed, as far as the drive goes.
+    let pressing = grip(adapting, false, -0.6);
+    assert!(pressing > bent + 0.15, "{pressing} against {bent}");
+    // Without the gauges the plan of the fingers stays what it was.
+    let unbent = grip(RunOptions { finger_feedback: false, ..adapting }, false, 0.0);
+    assert!((unbent - soft).abs() < 0.05, "{unbent} {soft}");
+}
+
+#[test]
+fn a_hand_that_falls_silent_is_bridged_then_left_to_its_worms_and_taken_up_again() {
+    let mut rig = holding();
+    rig.command(Command::MoveHand { q: [0.0, 1.2, 1.2, 1.2], duration: 1.5 });
+    rig.run_for(0.7);
+    let before = hand(&rig).torque;
+    rig.plant.hand.as_mut().expect("fitted").silent = true;
+    for cycle in 1..=20u8 {
+        let output = rig.tick(None);
+        assert_eq!(output.actuation.hand_frame().is_some(), cycle <= LOST_CYCLES, "cycle {cycle}");
+        assert_eq!(output.record.flags & flags::HAND_LOST != 0, cycle > LOST_CYCLES);
+        assert_eq!(output.record.flags & flags::HAND_READY != 0, cycle <= LOST_CYCLES);
+        if cycle <= LOST_CYCLES {
+            assert!((hand(&rig).torque[1] - before[1]).abs() < 0.1, "the last torque stays");
+        }
+    }
+    assert_eq!(rig.cycle.state(), State::Hold, "the arm is not concerned");
+    let mut torque = 0.0f64;
+    rig.plant.hand.as_mut().expect("fitted").silent = false;
+    for _ in 0..600 {
+        rig.tick(None);
+        let step = (hand(&rig).torque[1] - torque).abs();
+        assert!(step < 1.2 / 15.0 + 1e-3, "{step} N m in one cycle");
+        torque = hand(&rig).torque[1];
+    }
+    assert!((hand(&rig).q[1] - 1.2).abs() < 0.05, "{:?}", hand(&rig).q);
+}

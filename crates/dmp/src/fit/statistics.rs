@@ -1,0 +1,157 @@
+//! `PhaseStatistics`: mean and spread by phase of what several runs recorded; experiences are made of them.
+
+use std::vec::Vec;
+
+use crate::{EXPERIENCE_CAPACITY, EXPERIENCE_CHANNELS, Experience, TableError};
+
+/// Mean and spread at evenly spaced phases.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhaseStatistics<const CHANNELS: usize> {
+    /// Mean over the runs.
+    pub mean: Vec<[f64; CHANNELS]>,
+    /// Standard deviation of a single sample from that mean, over the runs.
+    pub spread: Vec<[f64; CHANNELS]>,
+    /// Number of runs.
+    pub trials: usize,
+}
+
+/// Samples at one entry: sum of the values, of their squared distances from the mean, and of the weights.
+#[derive(Clone, Copy)]
+struct Entry<const CHANNELS: usize> {
+    values: [f64; CHANNELS],
+    squares: [f64; CHANNELS],
+    weight: f64,
+}
+
+/// Mean and spread at `count` evenly spaced phases of runs that were sampled at arbitrary progress `u`.
+///
+/// Every sample is shared between the two neighbouring entries by its distance, and each entry is the weighted mean: a
+/// triangular average, which does not shift the record in phase. Every run has the same weight, however densely it was
+/// sampled. The spread is that of the samples about the interpolated mean, so that a steep but repeatable slope is not
+/// taken for scatter; it holds the noise of the sensor and the differences between runs (with `n/(n-1)` for the mean that was
+/// estimated from the same `n` runs; of one run it is the noise alone). Entries without any sample are interpolated.
+/// Samples outside 0..=1 are left out.
+///
+/// # Errors
+/// [`TableError::Empty`] without a usable sample or for `count` = 0, [`TableError::NotFinite`].
+pub fn phase_statistics<const CHANNELS: usize>(
+    trials: &[&[(f64, [f64; CHANNELS])]],
+    count: usize,
+) -> Result<PhaseStatistics<CHANNELS>, TableError> {
+    let Some(last) = count.checked_sub(1) else {
+        return Err(TableError::Empty);
+    };
+    let samples = || trials.iter().flat_map(|trial| trial.iter());
+    if samples().any(|(u, values)| !u.is_finite() || !values.iter().all(|value| value.is_finite())) {
+        return Err(TableError::NotFinite);
+    }
+    let nothing = Entry { values: [0.0; CHANNELS], squares: [0.0; CHANNELS], weight: 0.0 };
+    let mut entries = std::vec![nothing; count];
+    for trial in trials {
+        let within = trial.iter().filter(|(u, _)| (0.0..=1.0).contains(u)).count();
+        for (u, values) in trial.iter() {
+            for (entry, share) in places(*u, last) {
+                let share = share / within as f64;
+                entries[entry].weight += share;
+                for (sum, value) in entries[entry].values.iter_mut().zip(values) {
+                    *sum += share * value;
+                }
+            }
+        }
+    }
+    let mean = fill(&entries, |entry| entry.values.map(|sum| sum / entry.weight))?;
+    for trial in trials {
+        let within = trial.iter().filter(|(u, _)| (0.0..=1.0).contains(u)).count();
+        for (u, values) in trial.iter() {
+            let between: [(usize, f64); 2] = places(*u, last);
+            for (entry, share) in between {
+                let weight = share / within as f64;
+                for (channel, value) in values.iter().enumerate() {
+                    let expected: f64 = between.iter().map(|(i, share)| share * mean[*i][channel]).sum();
+                    entries[entry].squares[channel] += weight * (value - expected) * (value - expected);
+                }
+            }
+        }
+    }
+    let runs = trials.iter().filter(|trial| trial.iter().any(|(u, _)| (0.0..=1.0).contains(u))).count();
+    let correction = if runs > 1 { runs as f64 / (runs - 1) as f64 } else { 1.0 };
+    let spread = fill(&entries, |entry| entry.squares.map(|sum| libm::sqrt(correction * sum / entry.weight)))?;
+    Ok(PhaseStatistics { mean, spread, trials: runs })
+}
+
+/// An experience of `count` phases from the recordings of successful runs.
+///
+/// `floor` is the smallest spread of each channel: a few runs that agree by chance must not make the next one a failure.
+/// The variance is averaged with that of the neighbouring entries, because the spread of a few runs is itself uncertain.
+///
+/// # Errors
+/// [`TableError::Trials`] without a run, [`TableError::TooMany`] above [`EXPERIENCE_CAPACITY`], [`TableError::Spread`] for a floor
+/// that is not positive, [`TableError::Empty`], [`TableError::NotFinite`].
+pub fn experience(
+    trials: &[&[(f64, [f64; EXPERIENCE_CHANNELS])]],
+    count: usize,
+    floor: &[f64; EXPERIENCE_CHANNELS],
+) -> Result<Experience<f64>, TableError> {
+    if trials.is_empty() {
+        return Err(TableError::Trials);
+    }
+    if count > EXPERIENCE_CAPACITY {
+        return Err(TableError::TooMany);
+    }
+    if !floor.iter().all(|floor| *floor > 0.0 && floor.is_finite()) {
+        return Err(TableError::Spread);
+    }
+    let statistics = phase_statistics(trials, count)?;
+    let spread: Vec<[f64; EXPERIENCE_CHANNELS]> = (0..count)
+        .map(|i| {
+            let around = &statistics.spread[i.saturating_sub(1)..(i + 2).min(count)];
+            core::array::from_fn(|channel| {
+                let variance = around.iter().map(|point| point[channel] * point[channel]).sum::<f64>();
+                libm::sqrt(variance / around.len() as f64).max(floor[channel])
+            })
+        })
+        .collect();
+    let runs = u16::try_from(statistics.trials).unwrap_or(u16::MAX);
+    Experience::new(&statistics.mean, &spread, runs)
+}
+
+/// The entries beside progress `u` and their shares; shares of 0 for a sample outside.
+fn places(u: f64, last: usize) -> [(usize, f64); 2] {
+    if !(0.0..=1.0).contains(&u) {
+        return [(0, 0.0), (0, 0.0)];
+    }
+    let place = u * last as f64;
+    let left = (place as usize).min(last.saturating_sub(1));
+    let share = place - left as f64;
+    [(left, 1.0 - share), ((left + 1).min(last), share)]
+}
+
+/// The value of each entry; entries without samples are interpolated between their neighbours that have some.
+fn fill<const CHANNELS: usize>(
+    entries: &[Entry<CHANNELS>],
+    value: impl Fn(&Entry<CHANNELS>) -> [f64; CHANNELS],
+) -> Result<Vec<[f64; CHANNELS]>, TableError> {
+    let known: Vec<(usize, [f64; CHANNELS])> = entries
+        .iter()
+        .enumerate()
+        .filter(|(_, entry)| entry.weight > 1e-12)
+        .map(|(i, entry)| (i, value(entry)))
+        .collect();
+    let (Some(first), Some(end)) = (known.first(), known.last()) else {
+        return Err(TableError::Empty);
+    };
+    Ok((0..entries.len())
+        .map(|i| {
+            let after = known.partition_point(|(k, _)| *k < i);
+            match (after.checked_sub(1).map(|before| &known[before]), known.get(after)) {
+                (_, Some((k, values))) if *k == i => *values,
+                (Some((a, low)), Some((b, high))) => {
+                    let share = (i - a) as f64 / (b - a) as f64;
+                    core::array::from_fn(|c| low[c] + (high[c] - low[c]) * share)
+                }
+                (None, _) => first.1,
+                (_, None) => end.1,
+            }
+        })
+        .collect())
+}

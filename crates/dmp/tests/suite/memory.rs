@@ -1,0 +1,222 @@
+//! What a primitive remembers beside its movement: expectation, weights from the spread, experience, and filling all of it in place.
+
+use crate::common::{ALPHA, DT, ORIGIN};
+use dmp::fit::{WEIGHT_RANGE, experience, phase_statistics, weights_from_spread};
+use dmp::{
+    Coupling, EXPERIENCE_CHANNELS, ExpectedWrench, Experience, Feedback, GainSchedule, Hemisphere, Limits,
+    OrientationError, Primitive, PrimitiveTables, ROWS, Rollout, SENSORS, StartState, TableError, Velocity,
+};
+
+type Trial<const CHANNELS: usize> = Vec<(f64, [f64; CHANNELS])>;
+
+/// A run of 3600 samples whose channels are `mean(u)` plus `offset` plus alternating noise of size `noise`.
+fn trial<const CHANNELS: usize>(offset: f64, noise: f64, mean: impl Fn(f64) -> f64) -> Trial<CHANNELS> {
+    (0..3600)
+        .map(|k| {
+            let u = f64::from(k) / 3599.0;
+            let shake = if k % 2 == 0 { noise } else { -noise };
+            (u, [mean(u) + offset + shake; CHANNELS])
+        })
+        .collect()
+}
+
+fn slices<const CHANNELS: usize>(trials: &[Trial<CHANNELS>]) -> Vec<&[(f64, [f64; CHANNELS])]> {
+    trials.iter().map(Vec::as_slice).collect()
+}
+
+#[test]
+fn mean_and_spread_are_those_of_the_runs_and_a_slope_is_no_spread() {
+    // A steep slope, 10 N over the movement, three runs 0.3 N apart, noise of 0.1 N.
+    let trials: Vec<Trial<1>> = [-0.3, 0.0, 0.3].map(|offset| trial(offset, 0.1, |u| 10.0 * u)).to_vec();
+    let statistics = phase_statistics(&slices(&trials), 128).unwrap();
+    assert_eq!(statistics.trials, 3);
+    // Between the runs 2/3 0.09 plus noise 0.01, with the correction 3/2 for the estimated mean.
+    let sigma = (1.5_f64 * (0.06 + 0.01)).sqrt();
+    for (i, (mean, spread)) in statistics.mean.iter().zip(&statistics.spread).enumerate().skip(1).take(126) {
+        assert!((mean[0] - 10.0 * i as f64 / 127.0).abs() < 0.01, "{i}: {mean:?}");
+        assert!((spread[0] / sigma - 1.0).abs() < 0.05, "{i}: {spread:?} {sigma}");
+    }
+    // One run alone tells its noise, nothing about the next run.
+    let alone = phase_statistics(&slices(&trials[..1]), 128).unwrap();
+    assert!((alone.spread[64][0] - 0.1).abs() < 0.01, "{:?}", alone.spread[64]);
+}
+
+#[test]
+fn a_run_that_was_sampled_more_densely_has_no_more_weight() {
+    let dense: Trial<1> = trial(1.0, 0.0, |_| 0.0);
+    let sparse: Trial<1> = trial::<1>(0.0, 0.0, |_| 0.0).into_iter().step_by(10).collect();
+    let statistics = phase_statistics(&[&dense, &sparse], 16).unwrap();
+    for mean in &statistics.mean {
+        assert!((mean[0] - 0.5).abs() < 0.02, "{mean:?}");
+    }
+}
+
+#[test]
+fn samples_behind_the_end_and_gaps_do_not_spoil_the_statistics() {
+    let mut run: Trial<1> = trial(0.0, 0.0, |u| u);
+    run.retain(|(u, _)| !(0.3..0.5).contains(u));
+    run.push((1.7, [1e6]));
+    let statistics = phase_statistics(&[&run], 101).unwrap();
+    for (i, mean) in statistics.mean.iter().enumerate() {
+        assert!((mean[0] - i as f64 / 100.0).abs() < 0.01, "{i} {mean:?}");
+    }
+    assert_eq!(phase_statistics::<1>(&[], 16).unwrap_err(), TableError::Empty);
+    assert_eq!(phase_statistics(&[&run], 0).unwrap_err(), TableError::Empty);
+    assert_eq!(phase_statistics(&[&[(0.5, [f64::NAN])]], 16).unwrap_err(), TableError::NotFinite);
+}
+
+#[test]
+fn a_sensor_counts_more_where_it_repeats_itself_and_its_mean_weight_is_one() {
+    // Sensor 0 scatters ten times more in the second half, sensor 1 always the same, sensor 2 never moves.
+    let spread: Vec<[f64; SENSORS]> = (0..128)
+        .map(|i| {
+            let mut point = [0.2; SENSORS];
+            point[0] = if i < 64 { 0.1 } else { 1.0 };
+            point[2] = 0.0;
+            point
+        })
+        .collect();
+    let weights = weights_from_spread(&spread, 3, 16, 0.5).unwrap();
+    assert_eq!(weights.len(), 16);
+    let mean = |sensor: usize| weights.iter().map(|point| point[sensor]).sum::<f64>() / 16.0;
+    assert!((mean(0) - 1.0).abs() < 0.02, "{}", mean(0));
+    // sigma_min = 0.5 rms, rms^2 = 0.505: the weights would be 8.27 to 1, and the smaller one is lifted to 1/4.
+    assert!((weights[2][0] - 1.88).abs() < 0.02 && weights[13][0] == 0.25, "{weights:?}");
+    for point in &weights {
+        assert!((point[1] - 1.0).abs() < 1e-9 && point[2] == 1.0, "{point:?}");
+        assert!(point.iter().all(|weight| (1.0 / WEIGHT_RANGE..=WEIGHT_RANGE).contains(weight)));
+    }
+    assert_eq!(weights_from_spread(&spread, 2, 16, 0.5).unwrap_err(), TableError::Trials);
+    assert_eq!(weights_from_spread(&spread, 3, 16, 0.0).unwrap_err(), TableError::Negative);
+    assert_eq!(weights_from_spread(&spread, 3, 33, 0.5).unwrap_err(), TableError::TooMany);
+    assert_eq!(weights_from_spread(&[], 3, 16, 0.5).unwrap_err(), TableError::Empty);
+}
+
+#[test]
+fn an_experience_tells_how_many_spreads_a_run_is_away_and_never_divides_by_nothing() {
+    let trials: Vec<Trial<EXPERIENCE_CHANNELS>> =
+        [-0.5, 0.0, 0.5].map(|offset| trial(offset, 0.0, |u| 4.0 * u)).to_vec();
+    let floor = [0.05; EXPERIENCE_CHANNELS];
+    let known = experience(&slices(&trials), 64, &floor).unwrap();
+    assert_eq!((known.trials(), known.mean().len()), (3, 64));
+    let away = known.deviation(0.5, &[3.0; EXPERIENCE_CHANNELS]);
+    assert!((away[11] - 2.0).abs() < 0.02, "{away:?}");
+    let below = known.deviation(0.5, &[1.0; EXPERIENCE_CHANNELS]);
+    assert!((below[0] + 2.0).abs() < 0.02, "{below:?}");
+    // Runs that agree to the last digit leave the floor.
+    let same: Vec<Trial<EXPERIENCE_CHANNELS>> = vec![trials[0].clone(); 3];
+    assert_eq!(experience(&slices(&same), 64, &floor).unwrap().spread_at(0.3)[4], 0.05);
+    assert_eq!(experience(&slices(&same), 64, &[0.0; 12]).unwrap_err(), TableError::Spread);
+    assert_eq!(experience(&slices(&same), 65, &floor).unwrap_err(), TableError::TooMany);
+    assert_eq!(experience(&[], 64, &floor).unwrap_err(), TableError::Trials);
+    let (row, zero) = ([[1.0; EXPERIENCE_CHANNELS]; 2], [[0.0; EXPERIENCE_CHANNELS]; 2]);
+    assert_eq!(Experience::new(&row, &zero, 3).unwrap_err(), TableError::Spread);
+    assert_eq!(Experience::new(&row, &row[..1], 3).unwrap_err(), TableError::Shape);
+    assert_eq!(Experience::new(&row, &row, 0).unwrap_err(), TableError::Trials);
+    assert_eq!(Experience::new(&row, &[[f64::NAN; 12]; 2], 3).unwrap_err(), TableError::NotFinite);
+}
+
+const LIMITS: Limits<f64> = Limits { displacement: 0.25, rotation: 0.4, hand: 0.6 };
+
+/// The tables of a movement with `count` kernels; `goal` is its goal along x.
+fn tables<'a>(weights: &'a [f64], goal: f64) -> PrimitiveTables<'a, f64> {
+    let mut end = ORIGIN;
+    end.position[0] = goal;
+    PrimitiveTables {
+        duration: 2.0 + goal,
+        alpha: ALPHA,
+        activation: 0.7,
+        kernel_count: weights.len() / ROWS,
+        weights,
+        stiffness: [200.0; 4],
+        damping: [28.3, 20.0, 28.3, 28.3],
+        orientation_error: OrientationError::Quaternion,
+        hemisphere: Hemisphere::Demonstrated,
+        start: ORIGIN,
+        goal: end,
+        start_velocity: Velocity::ZERO,
+        feedback: None,
+        expected: None,
+        experience: None,
+    }
+}
+
+fn path(primitive: &Primitive<f64, 30>) -> Vec<f64> {
+    let mut rollout = Rollout::start(primitive, &StartState::demonstrated(primitive)).unwrap();
+    (0..900).map(|_| rollout.step(primitive, DT, &Coupling::NONE).position.x[0]).collect()
+}
+
+#[test]
+fn a_primitive_filled_in_place_is_the_same_as_a_new_one_whatever_it_was_before() {
+    let (few, many) = ([0.3; ROWS * 10], [-0.2; ROWS * 30]);
+    let k1 = GainSchedule::constant([80.0; 10]).unwrap();
+    let k2 = GainSchedule::new(&[[1.0; SENSORS]; 16]).unwrap();
+    let feedback = Feedback::new(k1, k2, LIMITS).unwrap();
+    let expected = ExpectedWrench::new(&[[0.5; SENSORS]; 128], 2.5).unwrap();
+    let experience = Experience::new(&[[0.5; 12]; 64], &[[0.1; 12]; 64], 5).unwrap();
+    let rich = PrimitiveTables {
+        feedback: Some(&feedback),
+        expected: Some(&expected),
+        experience: Some(&experience),
+        ..tables(&many, 0.5)
+    };
+    let mut primitive = Primitive::<f64, 30>::PLACEHOLDER;
+    primitive.assign(&rich).unwrap();
+    assert_eq!(primitive, Primitive::new(&rich).unwrap());
+    assert_eq!(primitive.experience(), Some(&experience));
+
+    // Value by value, as from a stored image.
+    let mut streamed = Primitive::new(&tables(&many, 0.5)).unwrap();
+    streamed.assign_feedback([80.0; 10], [1.0; SENSORS * 16], LIMITS).unwrap();
+    streamed.assign_expected([0.5; SENSORS * 128], 2.5).unwrap();
+    streamed.assign_experience([0.5; 12 * 64], [0.1; 12 * 64], 5).unwrap();
+    assert_eq!(streamed, primitive);
+    let mut copy = Primitive::<f64, 30>::PLACEHOLDER;
+    copy.clone_from(&streamed);
+    assert_eq!(copy, primitive);
+
+    // A poorer movement afterwards: nothing of the rich one is left in it.
+    let poor = Primitive::new(&tables(&few, 0.1)).unwrap();
+    primitive.assign(&tables(&few, 0.1)).unwrap();
+    copy.clone_from(&poor);
+    assert_eq!(primitive, poor);
+    assert_eq!(copy, poor);
+    assert!(primitive.feedback().is_none() && primitive.expected().is_none() && primitive.experience().is_none());
+    assert_eq!(path(&primitive), path(&poor));
+}
+
+#[test]
+fn a_refused_movement_changes_nothing_and_a_refused_table_is_gone() {
+    let good = [0.3; ROWS * 10];
+    let mut bad = [0.1; ROWS * 10];
+    bad[ROWS * 10 - 1] = f64::NAN;
+    let mut primitive = Primitive::<f64, 30>::new(&tables(&good, 0.5)).unwrap();
+    primitive.assign_expected([0.5; SENSORS * 2], 2.5).unwrap();
+    let before = primitive.clone();
+    let mut unstable = tables(&good, 0.5);
+    unstable.duration = 0.02;
+    let mut far = tables(&good, 0.5);
+    far.goal.position[2] = f64::INFINITY;
+    for refused in [tables(&bad, 0.1), tables(&good[1..], 0.1), unstable, far] {
+        assert!(primitive.assign(&refused).is_err());
+        assert_eq!(primitive, before);
+    }
+    // A value is missing, one is not finite, there are too many, a gain is negative.
+    assert_eq!(primitive.assign_expected([0.5; SENSORS * 2 - 1], 2.5), Err(TableError::Shape));
+    assert!(primitive.expected().is_none(), "half an expectation must not be believed");
+    assert_eq!(primitive.assign_expected([0.5; SENSORS * 129], 2.5), Err(TableError::TooMany));
+    assert_eq!(primitive.assign_expected([0.5; SENSORS], 0.0), Err(TableError::Duration));
+    assert_eq!(primitive.assign_feedback([-1.0; 10], [1.0; SENSORS], LIMITS), Err(TableError::Negative));
+    assert_eq!(primitive.assign_feedback([1.0; 10], [f64::NAN; SENSORS], LIMITS), Err(TableError::NotFinite));
+    assert!(primitive.feedback().is_none());
+    assert_eq!(primitive.assign_experience([0.5; 12], [0.0; 12], 3), Err(TableError::Spread));
+    assert_eq!(primitive.assign_experience([0.5; 24], [0.1; 12], 3), Err(TableError::Shape));
+    assert!(primitive.experience().is_none());
+    assert_eq!(path(&primitive), path(&before));
+}
+
+#[test]
+fn the_placeholder_rests() {
+    let primitive = Primitive::<f64, 30>::PLACEHOLDER;
+    assert!(path(&primitive).iter().all(|x| *x == 0.0));
+}

@@ -1,0 +1,145 @@
+//! What a person can teach: for each lesson the path of the hand, the posture it begins in and the one it reaches.
+//!
+//! World frame; the table's top is at z = -0.15. In every lesson the hand's z axis is the direction of approach.
+
+use super::path::{GuidePath, Leg};
+use crate::rotation::{add_scaled, exponential, multiply};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+
+/// Something a person teaches the arm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lesson {
+    /// The demonstration of the first teaching: a side grasp of the small torch out of a turn about all axes of the hand.
+    Demonstration,
+    /// A level side grasp of the flashlight: 45 degrees to the left of straight ahead, the palm 12 cm above the table.
+    Flashlight,
+    /// The same for a cup: the palm 6 cm above the table, and 2 cm less far, for the cup is thick.
+    Cup,
+    /// A grasp from above across a lying bottle, whose axis is world x where its yaw is 0; closing fingertips would touch the table.
+    Bottle,
+    /// A level side grasp of the weight, a rest for the fingers to close, then 10 cm straight up.
+    Lift,
+}
+
+/// Distance along which the hand approaches, m.
+const APPROACH: f64 = 0.42;
+
+/// Duration of an approach, s.
+const APPROACH_SECONDS: f64 = 10.0;
+
+/// Time in which the hand reaches and leaves its steady speed, s: 4.9 cm/s over 42 cm. Nobody who approaches something that topples
+/// arrives faster.
+const SOFT_ENDS: f64 = 1.5;
+
+/// Rest while the fingers close, s.
+const CLOSING_SECONDS: f64 = 3.5;
+
+/// Height (m) and duration (s) of the lift.
+const LIFT: (f64, f64) = (0.10, 2.5);
+
+/// Where side grasps end, world x and y, m.
+const SIDE_GOAL: [f64; 2] = [0.75, 0.20];
+
+/// Where the grasp from above ends, m: 5.5 cm above the table. The fingers reach 6.8 cm beyond the grasp point as they close.
+const BOTTLE_GOAL: [f64; 3] = [0.62, 0.10, -0.095];
+
+impl Lesson {
+    /// All lessons.
+    pub const ALL: [Self; 5] = [Self::Demonstration, Self::Flashlight, Self::Cup, Self::Bottle, Self::Lift];
+
+    /// The way along which the hand is guided.
+    #[must_use]
+    pub fn path(self) -> GuidePath {
+        match self {
+            Self::Demonstration => super::side_grasp_path(),
+            Self::Flashlight => GuidePath::new(level_hand(), vec![side_approach(-0.03, self.short_of_object())]),
+            Self::Cup => GuidePath::new(level_hand(), vec![side_approach(-0.09, self.short_of_object())]),
+            Self::Bottle => GuidePath::new(hand_down(), vec![from_above()]),
+            Self::Lift => {
+                let approach = side_approach(-0.06, self.short_of_object());
+                let held = approach.end();
+                let up = add_scaled(held, LIFT.0, [0.0, 0.0, 1.0]);
+                let lift = Leg::straight(held, up, LIFT.1);
+                GuidePath::new(level_hand(), vec![approach, Leg::rest(held, CLOSING_SECONDS), lift])
+            }
+        }
+    }
+
+    /// Joint posture in which the lesson begins, rad: the grasp point is at the start of the path.
+    ///
+    /// Found by `Kinematics::inverse` as the posture nearest to the goal's (a test repeats it).
+    /// The straight way in joint space from the home posture to here touches nothing.
+    #[must_use]
+    pub fn start(self) -> [f64; 7] {
+        match self {
+            Self::Demonstration => super::DEMONSTRATION_START,
+            Self::Flashlight => [-1.2001, 1.5209, 1.4540, 2.7009, -0.1928, -0.7217, 1.7148],
+            Self::Cup => [-1.2933, 1.6342, 1.3301, 2.6968, -0.3064, -0.6327, 1.6472],
+            Self::Bottle => [0.1029, 0.3395, -0.0333, 1.8077, 0.0132, 0.9946, 0.0643],
+            Self::Lift => [-1.2388, 1.5864, 1.4041, 2.7033, -0.2266, -0.6868, 1.6597],
+        }
+    }
+
+    /// A joint posture that reaches the end of the path, rad; the arm being redundant, a lesson ends near it.
+    #[must_use]
+    pub fn goal(self) -> [f64; 7] {
+        match self {
+            Self::Demonstration => super::DEMONSTRATION_GOAL,
+            Self::Flashlight => [-0.4639, 1.5634, 1.4731, 1.8028, -0.1703, -0.5615, 1.7533],
+            Self::Cup => [-0.5224, 1.6690, 1.4513, 1.8810, -0.2552, -0.5897, 1.7207],
+            Self::Bottle => [0.1689, 0.8372, -0.0162, 1.7791, 0.0239, 0.5255, 0.1373],
+            Self::Lift => [-0.4899, 1.4375, 1.4889, 1.8443, -0.0740, -0.5678, 1.7844],
+        }
+    }
+
+    /// How far short of the object's axis the grasp point ends, along the approach, m; negative where a person brings the palm close
+    /// to what is slender.
+    #[must_use]
+    pub const fn short_of_object(self) -> f64 {
+        match self {
+            Self::Flashlight => -0.015,
+            Self::Cup => 0.02,
+            Self::Demonstration | Self::Bottle | Self::Lift => 0.0,
+        }
+    }
+
+    /// Time at which the grasp point is where the fingers close, s after the start of the path.
+    #[must_use]
+    pub fn arrival(self) -> f64 {
+        match self {
+            Self::Lift => APPROACH_SECONDS,
+            _ => self.path().duration(),
+        }
+    }
+}
+
+/// Palm level, hand z 45 degrees to the left of straight ahead, hand x straight down: the fingers close sideways, F3 from the
+/// right. Upside down compared with [`side_grasp_path`](super::side_grasp_path): so joint 7 is far from its stops out there.
+fn level_hand() -> [f64; 4] {
+    // A quarter turn about y takes z to straight ahead and x to straight down; then the whole hand turns to the approach.
+    multiply(exponential([0.0, 0.0, FRAC_PI_4]), exponential([0.0, FRAC_PI_2, 0.0]))
+}
+
+/// Along the level direction of approach to this height, `short` of the goal (m), slightly curved: it begins 3 cm to the left of the line and 2 cm above it.
+fn side_approach(height: f64, short: f64) -> Leg {
+    let (sine, cosine) = FRAC_PI_4.sin_cos();
+    let (approach, left) = ([cosine, sine, 0.0], [-sine, cosine, 0.0]);
+    let goal = add_scaled([SIDE_GOAL[0], SIDE_GOAL[1], height], -short, approach);
+    let back = |distance: f64, aside: f64, above: f64| {
+        add_scaled(add_scaled(add_scaled(goal, -distance, approach), aside, left), above, [0.0, 0.0, 1.0])
+    };
+    let control = [back(APPROACH, 0.03, 0.02), back(0.28, 0.04, 0.03), back(0.14, 0.0, 0.0), goal];
+    Leg::new(control, [[0.0; 3]; 2], APPROACH_SECONDS).steady(SOFT_ENDS)
+}
+
+/// Hand z down, hand x along world x.
+fn hand_down() -> [f64; 4] {
+    exponential([PI, 0.0, 0.0])
+}
+
+/// From in front of the bottle and above it, straight down at the end.
+fn from_above() -> Leg {
+    let goal = BOTTLE_GOAL;
+    let at = |back: f64, above: f64| [goal[0] - back, goal[1] - 0.5 * back, goal[2] + above];
+    Leg::new([at(0.12, 0.28), at(0.06, 0.30), at(0.0, 0.14), goal], [[0.0; 3]; 2], APPROACH_SECONDS)
+}

@@ -1,0 +1,194 @@
+//! Every lesson is reachable, and a person can teach it to an arm under gravity compensation.
+#![cfg(feature = "mujoco")]
+
+use sim::person::{GuidedWorld, Lesson, Person, PersonConfig, Stage};
+use sim::world::mujoco::{
+    Imperfections, Kinematics, MujocoOptions, MujocoWorld, ObjectKind, ObjectSpec, Scene, TABLE_TOP,
+};
+use sim::{HOME, Pose, STEP_SECONDS, World};
+
+/// Stations at which paths are examined.
+const STATIONS: u32 = 200;
+
+/// The lessons that `teaching.rs` does not examine already.
+const LESSONS: [Lesson; 4] = [Lesson::Flashlight, Lesson::Cup, Lesson::Bottle, Lesson::Lift];
+
+/// The object that is meant.
+fn object(lesson: Lesson) -> ObjectSpec {
+    ObjectSpec::new(match lesson {
+        Lesson::Demonstration => ObjectKind::SmallTorch,
+        Lesson::Flashlight => ObjectKind::Flashlight,
+        Lesson::Cup => ObjectKind::Cup,
+        Lesson::Bottle => ObjectKind::Bottle,
+        Lesson::Lift => ObjectKind::Weight,
+    })
+}
+
+fn kinematics(scene: Scene) -> Kinematics {
+    Kinematics::new(&MujocoOptions { scene, ..MujocoOptions::default() }).expect("the scene loads")
+}
+
+/// Distance (m) and turn (rad) between two poses.
+fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
+    let distance = (0..3).map(|i| (a.position[i] - b.position[i]).powi(2)).sum::<f64>().sqrt();
+    let cosine = (0..4).map(|i| a.quaternion[i] * b.quaternion[i]).sum::<f64>().abs().min(1.0);
+    (distance, 2.0 * cosine.acos())
+}
+
+/// Smallest distance to a mechanical stop, rad.
+fn margin(q: &[f64; 7], ranges: &[[f64; 2]; 7]) -> f64 {
+    q.iter().zip(ranges).map(|(q, [low, high])| (q - low).min(high - q)).fold(f64::INFINITY, f64::min)
+}
+
+/// The hand's x and z axes in the world.
+fn hand_axes([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 2] {
+    [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)],
+        [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+}
+
+#[test]
+fn the_postures_of_every_lesson_reach_the_ends_of_its_path() {
+    let mut mechanism = kinematics(Scene::EMPTY);
+    for lesson in Lesson::ALL {
+        let path = lesson.path();
+        // How the constants were found, and will be found again if a path changes.
+        let goal = mechanism.inverse(&path.goal(), &lesson.goal()).expect("reachable");
+        println!("{lesson:?} goal {goal:.4?} start {:.4?}", mechanism.inverse(&path.start(), &goal));
+        for (posture, pose) in [(lesson.start(), path.start()), (lesson.goal(), path.goal())] {
+            let (distance, turn) = apart(&mechanism.grasp_pose(&posture), &pose);
+            assert!(distance < 3e-4 && turn < 3e-4, "{lesson:?}: {posture:?} misses by {distance} m, {turn} rad");
+        }
+        // The way the start was found.
+        let found = mechanism.inverse(&path.start(), &lesson.goal()).expect("reachable");
+        assert!((0..7).all(|i| (found[i] - lesson.start()[i]).abs() < 2e-3), "{lesson:?}: {found:.4?}");
+    }
+}
+
+#[test]
+fn every_path_keeps_away_from_stops_and_from_all_but_the_object() {
+    for lesson in LESSONS {
+        let mut mechanism = kinematics(Scene::with(object(lesson)));
+        let ranges = mechanism.joint_ranges();
+        let path = lesson.path();
+        let mut last: Option<[f64; 7]> = None;
+        for station in 0..=STATIONS {
+            let pose = path.pose(path.duration() * f64::from(station) / f64::from(STATIONS));
+            let q = mechanism.inverse(&pose, &lesson.goal()).expect("every pose of the path is reachable");
+            assert!(margin(&q, &ranges) > 0.3, "{lesson:?}: {} rad from a stop at {q:?}", margin(&q, &ranges));
+            assert_eq!(mechanism.robot_contacts(&q), 0, "{lesson:?}: the arm touches something at {q:?}");
+            // No jump from one posture to another along the way.
+            let step = last.map_or(0.0, |last| (0..7).map(|i| (q[i] - last[i]).abs()).fold(0.0, f64::max));
+            assert!(step < 0.05, "{lesson:?} jumps by {step} rad");
+            last = Some(q);
+        }
+        for station in 0..=STATIONS {
+            let share = f64::from(station) / f64::from(STATIONS);
+            let q: [f64; 7] = std::array::from_fn(|i| HOME[i] + share * (lesson.start()[i] - HOME[i]));
+            assert_eq!(mechanism.robot_contacts(&q), 0, "{lesson:?}: on the way from home, at {q:?}");
+        }
+    }
+}
+
+#[test]
+fn side_grasps_arrive_level_and_at_45_degrees_and_the_bottle_is_grasped_from_above() {
+    let half = 0.5_f64.sqrt();
+    for (lesson, height, z_axis, x_axis) in [
+        (Lesson::Flashlight, 0.12, [half, half, 0.0], [0.0, 0.0, -1.0]),
+        (Lesson::Cup, 0.06, [half, half, 0.0], [0.0, 0.0, -1.0]),
+        (Lesson::Bottle, 0.055, [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]),
+        (Lesson::Lift, 0.19, [half, half, 0.0], [0.0, 0.0, -1.0]),
+    ] {
+        let path = lesson.path();
+        let goal = path.goal();
+        let [x, z] = hand_axes(goal.quaternion);
+        assert!((0..3).all(|i| (x[i] - x_axis[i]).abs() < 1e-9 && (z[i] - z_axis[i]).abs() < 1e-9), "{lesson:?}");
+        assert!((goal.position[2] - TABLE_TOP - height).abs() < 1e-9, "{lesson:?} ends at {:?}", goal.position);
+        let there = object(lesson).position;
+        let short = lesson.short_of_object();
+        let aim: [f64; 2] = std::array::from_fn(|i| there[i] - short * z[i]);
+        assert!((0..2).all(|i| (goal.position[i] - aim[i]).abs() < 1e-9), "{lesson:?} beside its object");
+        // The last centimetres before the fingers close follow the hand's z.
+        let arrived = path.pose(lesson.arrival()).position;
+        let before = path.pose(lesson.arrival() - 2.5).position;
+        let along: f64 = (0..3).map(|i| (arrived[i] - before[i]) * z[i]).sum();
+        let way = (0..3).map(|i| (arrived[i] - before[i]).powi(2)).sum::<f64>().sqrt();
+        assert!(way > 0.01 && along / way > 0.98, "{lesson:?} arrives askew: {along} of {way} m");
+    }
+    assert!((Lesson::Flashlight.path().length() - 0.42).abs() < 0.02, "{}", Lesson::Flashlight.path().length());
+}
+
+#[test]
+fn the_lift_rests_for_the_fingers_and_then_goes_straight_up() {
+    let path = Lesson::Lift.path();
+    let arrival = Lesson::Lift.arrival();
+    assert!((path.duration() - arrival - 6.0).abs() < 1e-12);
+    let rest = path.pose(arrival);
+    for time in [0.5, 2.0, 3.5] {
+        assert!(apart(&path.pose(arrival + time), &rest).0 < 1e-12);
+    }
+    for step in 0..=50 {
+        let pose = path.pose(arrival + 3.5 + 0.05 * f64::from(step));
+        assert!((pose.position[0] - rest.position[0]).hypot(pose.position[1] - rest.position[1]) < 1e-12);
+    }
+    assert!((path.goal().position[2] - rest.position[2] - 0.10).abs() < 1e-12);
+    // Never faster than a person would, never with a jump between the legs.
+    for step in 0..(100.0 * path.duration()) as u32 {
+        let (way, _) = apart(&path.pose(0.01 * f64::from(step)), &path.pose(0.01 * f64::from(step + 1)));
+        assert!(way < 0.0012, "{way} m in 10 ms at {step}");
+    }
+}
+
+/// Guides the arm through a lesson under ideal gravity compensation. Gives the smallest margin to a stop on the way, and the
+/// world at its end.
+fn teach(lesson: Lesson, seed: u64, scene: Scene, imperfections: Imperfections) -> (f64, GuidedWorld<MujocoWorld>) {
+    let options = MujocoOptions { posture: lesson.start(), scene, imperfections, ..MujocoOptions::default() };
+    let world = MujocoWorld::new(&options).expect("the scene loads");
+    let person = Person::new(PersonConfig { seed, ..PersonConfig::default() }, lesson.path());
+    let mut guided = GuidedWorld::new(world, person);
+    let ranges = guided.world().joint_ranges();
+    guided.person_mut().begin();
+    let mut smallest = f64::INFINITY;
+    for step in 0.. {
+        let bias = guided.world().bias_torques();
+        guided.step(&bias);
+        smallest = smallest.min(margin(&guided.joint_positions(), &ranges));
+        if guided.person().stage() == Stage::Done {
+            break;
+        }
+        assert!(f64::from(step) * STEP_SECONDS < 20.0, "the person never lets go");
+    }
+    (smallest, guided)
+}
+
+#[test]
+fn a_person_teaches_every_lesson_without_touching_the_object() {
+    for lesson in LESSONS {
+        for seed in 0..2 {
+            // The lift is taught empty-handed: nobody closes the fingers here.
+            let scene = if lesson == Lesson::Lift { Scene::EMPTY } else { Scene::with(object(lesson)) };
+            let (margin, guided) = teach(lesson, seed, scene, Imperfections::NONE);
+            let (distance, turn) = apart(&guided.grasp_pose(), &lesson.path().goal());
+            let q = guided.joint_positions();
+            println!(
+                "{lesson:?} {seed}: {distance:.4} m, {:.2} degrees, margin {margin:.2}, {q:.3?}",
+                turn.to_degrees()
+            );
+            assert!(distance < 0.015 && turn.to_degrees() < 5.0, "{lesson:?}: {distance} m, {turn} rad");
+            assert!(margin > 0.15, "{lesson:?}: {margin} rad from a stop");
+            assert_eq!(guided.world().robot_contacts(), 0);
+            assert!(guided.world().object_tilt().is_none_or(|tilt| tilt.to_degrees() < 0.5));
+            assert_eq!(guided.world().warnings(), 0);
+        }
+    }
+}
+
+#[test]
+fn a_person_teaches_an_imperfect_arm_in_an_empty_room_too() {
+    let (margin, guided) = teach(Lesson::Flashlight, 5, Scene::NOTHING, Imperfections::drawn(5));
+    let (distance, turn) = apart(&guided.grasp_pose(), &Lesson::Flashlight.path().goal());
+    assert!(margin > 0.15 && distance < 0.02 && turn.to_degrees() < 6.0, "{margin} {distance} {turn}");
+    assert_eq!(guided.hand().spread, guided.world().hand().spread);
+    assert_ne!(guided.motor_positions(), guided.joint_positions(), "the motors are hidden by the person");
+}

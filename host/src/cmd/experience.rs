@@ -1,0 +1,75 @@
+//! `tactus experience`: what successful runs felt like becomes what the device watches the next runs by.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::{Exit, Failure, Global, rehearse, upload};
+use crate::demonstration::Recording;
+use crate::learn::memory::remember_successes;
+
+/// Options of `experience`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// The primitive, TOML
+    #[arg(value_name = "PRIMITIVE")]
+    pub primitive: PathBuf,
+    /// Recordings of runs that succeeded, all in the same mode and at the same speed, CSV
+    #[arg(value_name = "RECORDING", required_unless_present = "forget")]
+    pub recordings: Vec<PathBuf>,
+    /// Where the primitive with the experience goes [default: back into PRIMITIVE]
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Take the experience out: runs are then not watched
+    #[arg(long, conflicts_with = "recordings")]
+    pub forget: bool,
+}
+
+/// Gathers experience.
+///
+/// # Errors
+/// A file is wrong, or the recordings do not fit the primitive.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "experience";
+    let output = global.output();
+    let mut file = upload::read(&command.primitive, DOING)?;
+    let target = command.output.clone().unwrap_or_else(|| command.primitive.clone());
+    if command.forget {
+        file.experience = None;
+        rehearse::write(&file, &target, DOING)?;
+        let checksum = format!("0x{:08x}", file.checksum());
+        return output.result(
+            &json!({ "name": file.name, "file": target, "checksum": checksum, "experience": null }),
+            format!("{}: without experience; content {checksum}", file.name),
+        );
+    }
+    let bar = output.bar(command.recordings.len() as u64, "reading");
+    let mut recordings = Vec::new();
+    for path in &command.recordings {
+        let recording =
+            Recording::read(path).map_err(|cause| Failure::new(Exit::Invalid, "E620", "experience refused", cause))?;
+        recordings.push(recording);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let summary = remember_successes(&mut file, &recordings)
+        .map_err(|cause| rehearse::memory_failure(cause, "experience: nothing was remembered"))?;
+    rehearse::write(&file, &target, DOING)?;
+    output.say(format!("wrote {}", target.display()));
+    if recordings.len() < dmp::fit::FEWEST_TRIALS {
+        output.warn("the spread of fewer than 3 runs is chance: the watch will go by its smallest spread");
+    }
+    let checksum = format!("0x{:08x}", file.checksum());
+    output.result(
+        &json!({ "name": file.name, "file": target, "checksum": checksum, "experience": summary }),
+        format!(
+            "{}: {} run(s) of {:.2} s, {} points; content {checksum}\n\n{}",
+            file.name,
+            summary.trials,
+            summary.duration_s,
+            summary.points,
+            rehearse::memory_table(&summary)
+        ),
+    )
+}

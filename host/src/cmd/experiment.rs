@@ -1,0 +1,289 @@
+//! `tactus experiment`: the same movement on objects that are not where it expects them.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{Exit, Failure, Global};
+use crate::experiment::{Grid, Mode, Object, PlantKind, Scenario, Variation};
+
+/// Options of `experiment`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// Which experiment
+    #[arg(value_enum)]
+    pub scenario: Scenario,
+    /// Where the object stands: `paper` (8 x 6 cells, 4 cm apart), a part of it such as `4x3`, or cells ALONG:SIDEWAYS in cm such as `-24:8,0:0`
+    #[arg(long, visible_alias = "cells", allow_hyphen_values = true)]
+    pub grid: Option<Grid>,
+    /// Turn the grid about its middle, degrees
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub rotate: f64,
+    /// Shift the grid along the approach and sideways, cm
+    #[arg(long, value_name = "ALONG,SIDEWAYS", value_parser = super::learn::numbers::<2>, default_value = "0,0", allow_hyphen_values = true)]
+    pub shift: [f64; 2],
+    /// Modes: a open loop, b force control, c force control and adaptation
+    #[arg(long, value_delimiter = ',', default_value = "a,b,c")]
+    pub modes: Vec<Mode>,
+    /// Try every cell with the seeds 1 to N; a seed is an arm
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000), conflicts_with = "seed")]
+    pub seeds: Option<u64>,
+    /// Try every cell with this seed only
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// The primitive, TOML; without it one is taught, learned and rehearsed first
+    #[arg(long, value_name = "FILE")]
+    pub primitive: Option<PathBuf>,
+    /// How well the controller's model fits the simulated arm
+    #[arg(long, value_enum, default_value = "honest")]
+    pub plant: PlantKind,
+    /// What differs from that arm: mass, table-friction, finger-friction, joint-friction, link-mass, noise (factors), delay (cycles), bias (N)
+    #[arg(long, value_name = "NAME=VALUE,...", default_value = "")]
+    pub vary: Variation,
+    /// What stands on the table instead of the usual object
+    #[arg(long, value_enum)]
+    pub object: Option<Object>,
+    /// Simulations at a time [default: one for each processor]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=512))]
+    pub jobs: Option<u16>,
+    /// Folder of the results [default: the experiment's name]
+    #[arg(long, short, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+    /// Go on with the results in the folder
+    #[arg(long)]
+    pub resume: bool,
+    /// Render frames of one trial in each mode
+    #[arg(long)]
+    pub render: bool,
+    /// Write the telemetry of every trial into the folder `recordings`
+    #[arg(long)]
+    pub keep_recordings: bool,
+}
+
+/// Carries an experiment through.
+///
+/// # Errors
+/// An object cannot be reached, results of another configuration are there, or a trial could not be carried through.
+#[cfg(feature = "mujoco")]
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    work::run(command, global)
+}
+
+/// Says what is missing.
+///
+/// # Errors
+/// Always: experiments need the MuJoCo world.
+#[cfg(not(feature = "mujoco"))]
+pub fn run(_command: &Cmd, _global: &Global) -> Result<(), Failure> {
+    Err(Failure::new(Exit::NoDevice, "E310", "experiment", crate::simulation::SimulationError::WithoutMujoco)
+        .help("`cargo xtask build`"))
+}
+
+#[cfg(feature = "mujoco")]
+mod work {
+    use std::path::Path;
+    use std::time::Instant;
+
+    use super::{Cmd, Exit, Failure, Global, Grid};
+    use crate::client::Interrupt;
+    use crate::cmd::{Output, connection, upload};
+    use crate::experiment::lesson::{self, LessonError};
+    use crate::experiment::trial::TrialError;
+    use crate::experiment::{Config, Experiment, ExperimentError, Progress, figures, map};
+    use crate::primitive_file::PrimitiveFile;
+    use crate::simulation::{Engine, SimulationOptions};
+    use crate::transport::Address;
+
+    const DOING: &str = "experiment";
+    /// Where the device is simulated unless said otherwise.
+    const DEVICE: &str = "sil:";
+    /// Runs that make the experience of a primitive made here: columns and rows of the paper's grid.
+    const EXPERIENCE: (usize, usize) = (4, 3);
+
+    pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+        let output = global.output();
+        let interrupt = connection::interrupt();
+        let out = command.out.clone().unwrap_or_else(|| command.scenario.name().into());
+        let engine = engine(global)?;
+        std::fs::create_dir_all(&out).map_err(|cause| unwritable(&out, cause))?;
+        let primitive = primitive(command, &out, &interrupt, output)?;
+        let usual = Config::new(command.scenario, primitive);
+        let grid = command.grid.clone().unwrap_or_else(|| usual.grid.clone());
+        let config = Config {
+            object: command.object.unwrap_or(usual.object),
+            grid: grid.moved(command.rotate, command.shift.map(|value| value * 0.01)),
+            modes: modes(command),
+            seeds: command.seed.map_or_else(|| (1..=command.seeds.unwrap_or(1)).collect(), |seed| vec![seed]),
+            engine,
+            plant: command.plant,
+            variation: command.vary,
+            jobs: command.jobs.map_or(usual.jobs, usize::from),
+            out: Some(out.clone()),
+            resume: command.resume,
+            keep_traces: true,
+            keep_recordings: command.keep_recordings,
+            ..usual
+        };
+        let started = Instant::now();
+        let bar = output.bar(config.keys().len() as u64, "trials");
+        let carried = crate::experiment::run(&config, &interrupt, &mut |progress| match progress {
+            Progress::Begin { all, done } => {
+                bar.set_length(all as u64);
+                bar.set_position(done as u64);
+                bar.reset_eta();
+            }
+            Progress::Done(report) => {
+                bar.inc(1);
+                let key = &report.key;
+                bar.set_message(format!("{} ({}) {}", key.cell, key.mode, report.outcome.word()));
+            }
+        });
+        bar.finish_and_clear();
+        let experiment = carried.map_err(|error| failure(error, &out))?;
+        let wall = started.elapsed().as_secs_f64();
+        report(&config, &experiment, &out, command.render, output, wall)
+    }
+
+    fn modes(command: &Cmd) -> Vec<crate::experiment::Mode> {
+        let mut modes = command.modes.clone();
+        modes.sort_unstable();
+        modes.dedup();
+        modes
+    }
+
+    fn engine(global: &Global) -> Result<Engine, Failure> {
+        let text = global.device.as_deref().unwrap_or(DEVICE);
+        let address: Address =
+            text.parse().map_err(|error| crate::error::HostError::Address(error).into_failure(DOING))?;
+        let Address::Simulated(kind, options) = address else {
+            return Err(Failure::new(Exit::Usage, "E204", DOING, format!("'{text}' is not a simulated device"))
+                .help("`--device sil:`, or `--device sim:` for the firmware under QEMU"));
+        };
+        let options = SimulationOptions::from_address(kind, &options)
+            .map_err(|error| connection::simulation_failure(error, DOING))?;
+        Ok(options.engine)
+    }
+
+    /// The primitive that is given, the one that was made here before, or a new one.
+    fn primitive(command: &Cmd, out: &Path, interrupt: &Interrupt, output: Output) -> Result<PrimitiveFile, Failure> {
+        if let Some(file) = &command.primitive {
+            return upload::read(file, DOING);
+        }
+        let file = out.join(format!("{}.toml", command.scenario));
+        if file.is_file() {
+            output.say(format!("the primitive is {}", file.display()));
+            return upload::read(&file, DOING);
+        }
+        let spinner = output.spinner("teaching");
+        let made = lesson::make(command.scenario, command.plant, &file, interrupt, &mut |doing| {
+            spinner.set_message(doing.to_owned());
+        })
+        .and_then(|mut primitive| {
+            // Whatever becomes of the experience, the primitive is worth keeping.
+            primitive.write(&file)?;
+            spinner.set_message("gathering experience");
+            let config = Config { plant: command.plant, ..Config::new(command.scenario, primitive.clone()) };
+            let grid = Grid::spread(EXPERIENCE.0, EXPERIENCE.1).unwrap_or_else(|_| Grid::paper());
+            let grid = if config.grid.cells.len() < grid.cells.len() { config.grid.clone() } else { grid };
+            let (held, of) = lesson::experience(&config, config.object, &grid, interrupt, &mut primitive)?;
+            output.say(format!("{held} of {of} runs succeeded and became experience"));
+            primitive.write(&file)?;
+            Ok(primitive)
+        });
+        spinner.finish_and_clear();
+        let primitive = made.map_err(lesson_failure)?;
+        output.say(format!("taught, learned and rehearsed: {}", file.display()));
+        Ok(primitive)
+    }
+
+    /// Writes what came out and shows it.
+    fn report(
+        config: &Config,
+        experiment: &Experiment,
+        out: &Path,
+        render: bool,
+        output: Output,
+        wall: f64,
+    ) -> Result<(), Failure> {
+        let summaries = experiment.summaries(config);
+        let results = experiment.results.without_wall_times();
+        let data = serde_json::json!({
+            "experiment": config.scenario, "configuration": config.header(), "tipping_force_n": config.tipping_force(),
+            "modes": summaries, "trials": results.reports,
+        });
+        let file = out.join("results.json");
+        let text =
+            serde_json::to_string_pretty(&data).map_err(|cause| Failure::new(Exit::Internal, "E101", DOING, cause))?;
+        std::fs::write(&file, text).map_err(|cause| unwritable(&file, cause))?;
+        let file = out.join("results.csv");
+        results.write_csv(&file).map_err(|cause| unwritable(&file, cause))?;
+        let figures = figures::write(config, experiment, &out.join("figures"), render)
+            .map_err(|cause| Failure::new(Exit::Internal, "E123", "experiment: a figure cannot be made", cause))?;
+        for figure in figures.iter().filter(|file| file.extension().is_some_and(|kind| kind == "png")) {
+            output.say(format!("wrote {}", figure.display()));
+        }
+        output.say(format!(
+            "{} trials; {wall:.0} s, {:.1} s of computing a trial",
+            results.reports.len(),
+            mean(experiment.results.reports.iter().filter_map(|report| report.wall_s))
+        ));
+        let text = format!("{}\n{}", map::draw(&results, &config.grid), map::table(&summaries));
+        output.result(&serde_json::json!({ "experiment": config.scenario, "folder": out, "modes": summaries }), text)
+    }
+
+    fn mean(values: impl Iterator<Item = f64>) -> f64 {
+        let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
+        sum / f64::from(count.max(1))
+    }
+
+    fn unwritable(file: &Path, cause: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Failure {
+        Failure::new(Exit::Internal, "E124", format!("experiment: {} cannot be written", file.display()), cause)
+            .help("check the disk and the rights of the folder")
+    }
+
+    fn failure(error: ExperimentError, out: &Path) -> Failure {
+        use crate::experiment::results::ResultsError;
+        let refused = "experiment refused";
+        match error {
+            ExperimentError::OutOfReach(_) => Failure::new(Exit::Invalid, "E660", refused, error)
+                .help("leave these cells out, for example with `--grid 4x3` or a list of `--cells`"),
+            ExperimentError::Results(ResultsError::Exists { .. }) => Failure::new(Exit::Usage, "E207", refused, error)
+                .help("`--resume` goes on with them; `--out FOLDER` begins anew elsewhere"),
+            ExperimentError::Results(ResultsError::OtherConfiguration { .. }) => {
+                Failure::new(Exit::Incompatible, "E404", refused, error)
+                    .help(format!("choose another folder with `--out`, or remove {}", out.display()))
+            }
+            ExperimentError::Results(ResultsError::Line { .. }) => {
+                Failure::new(Exit::Invalid, "E661", refused, error).help("choose another folder with `--out`")
+            }
+            ExperimentError::Interrupted { .. } => {
+                Failure::new(Exit::Interrupted, "E130", DOING, error).help("`--resume` goes on from here")
+            }
+            ExperimentError::Primitive(cause) => trial_failure(cause),
+            ExperimentError::Trial { .. } => Failure::new(Exit::Refused, "E596", DOING, error)
+                .help("`--resume` goes on from here when the reason is gone"),
+            ExperimentError::Results(ResultsError::File { .. }) | ExperimentError::File { .. } => {
+                Failure::new(Exit::Internal, "E124", DOING, error).help("check the disk and the rights of the folder")
+            }
+        }
+    }
+
+    fn trial_failure(error: TrialError) -> Failure {
+        match error {
+            TrialError::Simulation(error) => connection::simulation_failure(error, DOING),
+            TrialError::Procedure(error) => connection::failure(error, DOING),
+            error @ (TrialError::Primitive(_) | TrialError::Movement(_)) => {
+                Failure::new(Exit::Invalid, "E631", "experiment refused", error)
+                    .help("`tactus check` tells what is wrong with a primitive")
+            }
+        }
+    }
+
+    fn lesson_failure(error: LessonError) -> Failure {
+        match error {
+            LessonError::Trial(error) => trial_failure(error),
+            error => Failure::new(Exit::Invalid, "E662", "experiment: no primitive was made", error)
+                .help("make one with `tactus teach`, `learn` and `rehearse`, and give it with `--primitive`"),
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! `tactus rehearse`: plays a primitive without feedback, and remembers what it felt like.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use link::RunOptions;
+use serde::Serialize;
+
+use super::{Exit, Failure, Global, Table, connection, upload};
+use crate::client::Client;
+use crate::demonstration::{RATE, Recording};
+use crate::device::Device;
+use crate::learn::memory::{MemoryError, MemorySummary, Payload, remember_rehearsals};
+use crate::primitive_file::PrimitiveFile;
+use crate::procedure::{self, CHANNELS, FlagCounts, Mode, ProcedureError, RunRequest, recording_text};
+
+/// Options of `rehearse`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// The primitive, TOML
+    #[arg(value_name = "PRIMITIVE")]
+    pub primitive: PathBuf,
+    /// How often it is played; from 3 on the spread weighs the sensors (K2)
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=50))]
+    pub trials: u8,
+    /// Speed relative to the taught one, 0.1 to 2
+    #[arg(long, default_value_t = 1.0, value_parser = super::check::factor)]
+    pub speed: f64,
+    /// Where the primitive with its expectation goes [default: back into PRIMITIVE]
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Keep the recordings in this folder, as NAME-1.csv and so on
+    #[arg(long, value_name = "FOLDER")]
+    pub record_dir: Option<PathBuf>,
+    /// Load in the hand from the beginning: its mass, and its centre in the tool frame
+    #[arg(long, value_name = "KG[,X,Y,Z]", value_parser = payload, allow_hyphen_values = true)]
+    pub payload: Option<Payload>,
+    /// Leave all sensors the same weight (K2 = 1), whatever their spread
+    #[arg(long)]
+    pub equal_weights: bool,
+    /// I have brought the arm to its home pose: zero it there if need be
+    #[arg(long)]
+    pub at_home: bool,
+    /// What stands around a simulated arm
+    #[arg(long, value_enum, default_value_t)]
+    pub surroundings: Surroundings,
+}
+
+/// What stands around a simulated arm while it rehearses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum Surroundings {
+    /// The table without the object: what is expected is then the movement alone
+    #[default]
+    Table,
+    /// Neither table nor object, for movements that shall give way to the table
+    Nothing,
+    /// Table and object
+    Object,
+}
+
+/// What a rehearsal came to.
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    /// Name of the primitive.
+    pub name: String,
+    /// The file that was written.
+    pub file: PathBuf,
+    /// Its check sum.
+    pub checksum: String,
+    /// What was felt.
+    pub expectation: MemorySummary,
+    /// Whether K2 came from the spread.
+    pub weighted: bool,
+    /// What was out of the ordinary, trial by trial.
+    pub flags: Vec<FlagCounts>,
+    /// Telemetry messages lost.
+    pub gaps: u32,
+}
+
+/// Rehearses a primitive.
+///
+/// # Errors
+/// The primitive is wrong, the device refuses, a run ends early, or what was recorded cannot be used.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "rehearse";
+    let output = global.output();
+    let mut file = upload::read(&command.primitive, DOING)?;
+    let movement = file.without_memory();
+    upload::precheck(&movement, command.speed, output, DOING)?;
+    if let Some(folder) = &command.record_dir {
+        std::fs::create_dir_all(folder)
+            .map_err(|cause| connection::failure(ProcedureError::Recording(cause), DOING))?;
+    }
+    let started = Instant::now();
+    let mut client = connection::open(global, DOING, |options| surround(options, command.surroundings))?;
+    upload::send(&mut client, &movement, output, DOING)?;
+    connection::ready(&mut client, command.at_home, output, DOING)?;
+    let mut recordings = Vec::new();
+    let mut marks = Vec::new();
+    for trial in 1..=command.trials {
+        let bar = output.bar((file.duration / command.speed * RATE) as u64, "to the start");
+        let played = play(&mut client, &movement, command.speed, &mut |samples| {
+            bar.set_message(format!("rehearsal {trial} of {}", command.trials));
+            bar.set_position(samples as u64);
+        });
+        bar.finish_and_clear();
+        let (bytes, flags) = played.map_err(|error| connection::failure(error, DOING))?;
+        let path = match &command.record_dir {
+            None => PathBuf::from(format!("rehearsal {trial}")),
+            Some(folder) => {
+                let path = folder.join(format!("{}-{trial}.csv", file.name));
+                std::fs::write(&path, &bytes)
+                    .map_err(|cause| connection::failure(ProcedureError::Recording(cause), DOING))?;
+                path
+            }
+        };
+        let recording = Recording::parse(&path, &bytes)
+            .map_err(|cause| Failure::new(Exit::Internal, "E122", "rehearse: the recording reads back wrong", cause))?;
+        recordings.push(recording);
+        marks.push(flags);
+    }
+    let gaps = client.gaps().telemetry;
+    connection::tell_speed(&client, started, output);
+
+    let duration = file.duration / command.speed;
+    let summary = remember_rehearsals(
+        &mut file,
+        &recordings,
+        duration,
+        command.payload.unwrap_or_default(),
+        !command.equal_weights,
+    )
+    .map_err(|cause| memory_failure(cause, "rehearse: nothing was remembered"))?;
+    let target = command.output.clone().unwrap_or_else(|| command.primitive.clone());
+    write(&file, &target, "rehearse")?;
+    output.say(format!("wrote {}", target.display()));
+    if marks.iter().any(|flags| flags.limited > 0) {
+        output.warn("the torque limiter was at work: the arm did not follow its plan everywhere");
+    }
+    if file.feedback.is_none() {
+        output.warn("the primitive has no gains for feedback: learn it again, then rehearse it");
+    }
+    let report = Report {
+        name: file.name.clone(),
+        file: target,
+        checksum: format!("0x{:08x}", file.checksum()),
+        weighted: file.feedback.as_ref().is_some_and(|feedback| feedback.k2.len() > 1),
+        expectation: summary,
+        flags: marks,
+        gaps,
+    };
+    output.result(&report, report.to_text())
+}
+
+/// One rehearsal from the start posture; gives the recording.
+fn play(
+    client: &mut Client<Device>,
+    movement: &PrimitiveFile,
+    speed: f64,
+    progress: &mut dyn FnMut(usize),
+) -> Result<(Vec<u8>, FlagCounts), ProcedureError> {
+    procedure::go_to_start(client, &movement.start, |_| {})?;
+    let name =
+        link::Name::new(&movement.name).map_err(|error| crate::transport::TransportError::other(error.to_string()))?;
+    // The same gains and the same pose feedback as in the runs that will compare themselves with this one.
+    let options = RunOptions { speed: speed as f32, ..Mode::Open.options() };
+    let mut cycles = Vec::new();
+    let outcome = procedure::play(client, &RunRequest::new(name, movement.duration, options), &mut |cycle| {
+        cycles.push(*cycle);
+        progress(cycles.len());
+    })?;
+    let simulated = if client.hello().simulated { " (simulated arm)" } else { "" };
+    let notes = format!("Tactus recording of a rehearsal of '{}', 300 Hz{simulated}", movement.name);
+    Ok((recording_text(&cycles, &notes)?, outcome.flags))
+}
+
+/// Writes a primitive that has learned something.
+pub(super) fn write(file: &PrimitiveFile, target: &Path, doing: &str) -> Result<(), Failure> {
+    let failed =
+        |cause| Failure::new(Exit::Internal, "E120", format!("{doing}: the primitive cannot be written"), cause);
+    // What a device would refuse is not written.
+    file.to_image().map_err(|cause| super::check::failure(cause, target, doing))?;
+    file.write(target).map_err(failed)
+}
+
+/// The failure of what could not be remembered.
+pub(super) fn memory_failure(cause: MemoryError, doing: &str) -> Failure {
+    let help = match &cause {
+        MemoryError::None | MemoryError::Incomplete { .. } => {
+            "record whole runs with `tactus run PRIMITIVE --record FILE`"
+        }
+        MemoryError::Columns { .. } => "record with this version of tactus",
+        MemoryError::Saturated { .. } | MemoryError::Stale { .. } => {
+            "check the force sensor and its cable, and that the hand touches nothing"
+        }
+        MemoryError::Duration { .. } => "give recordings of this primitive, all at the same speed",
+        MemoryError::Table(_) => "give other recordings",
+    };
+    Failure::new(Exit::Invalid, "E640", doing, cause).help(help)
+}
+
+impl Report {
+    /// The report for people.
+    pub fn to_text(&self) -> String {
+        let memory = &self.expectation;
+        let weights = if self.weighted { "K2 from the spread" } else { "K2 = 1" };
+        format!(
+            "{}: {} rehearsal(s) of {:.2} s, {} points, {weights}; content {}\n\n{}",
+            self.name,
+            memory.trials,
+            memory.duration_s,
+            memory.points,
+            self.checksum,
+            memory_table(memory)
+        )
+    }
+}
+
+/// Channel by channel what is remembered.
+pub(super) fn memory_table(memory: &MemorySummary) -> Table {
+    const UNITS: [&str; 4] = ["N", "N m", "N m", "rad"];
+    let mut table = Table::new(["channel", "largest mean", "spread", "unit"]);
+    for (channel, (extreme, spread)) in memory.extremes.iter().zip(&memory.spread).enumerate() {
+        table.row([
+            CHANNELS[channel].to_owned(),
+            format!("{extreme:.3}"),
+            format!("{spread:.3}"),
+            UNITS[channel / 3].to_owned(),
+        ]);
+    }
+    table
+}
+
+/// Clears the surroundings of a simulated arm.
+#[cfg(feature = "mujoco")]
+fn surround(options: &mut crate::simulation::SimulationOptions, surroundings: Surroundings) {
+    use sim::world::mujoco::Scene;
+    match surroundings {
+        Surroundings::Table => options.scene = Scene::EMPTY,
+        Surroundings::Nothing => options.scene = Scene::NOTHING,
+        Surroundings::Object => {}
+    }
+}
+
+/// Nothing stands around an arm without MuJoCo.
+#[cfg(not(feature = "mujoco"))]
+fn surround(_options: &mut crate::simulation::SimulationOptions, _surroundings: Surroundings) {}
+
+/// A mass, or a mass and its centre.
+fn payload(text: &str) -> Result<Payload, String> {
+    let payload = if text.contains(',') {
+        let [mass, x, y, z] = super::learn::numbers::<4>(text)?;
+        Payload { mass, centre: [x, y, z] }
+    } else {
+        let [mass] = super::learn::numbers::<1>(text)?;
+        Payload { mass, centre: [0.0; 3] }
+    };
+    if (0.0..=10.0).contains(&payload.mass) {
+        Ok(payload)
+    } else {
+        Err("a mass from 0 to 10 kg is expected".to_owned())
+    }
+}

@@ -1,0 +1,49 @@
+//! Experiments: the same movement tried on objects that are not where it expects them, in several modes, over a grid and over seeds.
+//!
+//! ```text
+//! Config --keys--> trial::run (own simulation, own noise) --> Report --> results.jsonl
+//!                  | one thread each                                      |
+//!                  '- Trace, Observation, Snapshot (first seed)           '-> Results -> Summary, map, figures
+//! ```
+
+#[cfg(feature = "mujoco")]
+pub mod config;
+pub mod figures;
+pub mod grid;
+pub mod inverse;
+#[cfg(feature = "mujoco")]
+pub mod lesson;
+#[cfg(test)]
+pub mod made_up;
+pub mod map;
+pub mod mode;
+pub mod observation;
+#[cfg(feature = "mujoco")]
+pub mod observed;
+pub mod outcome;
+#[cfg(feature = "mujoco")]
+pub mod plant;
+#[cfg(feature = "mujoco")]
+pub mod reach;
+pub mod results;
+#[cfg(feature = "mujoco")]
+mod runner;
+pub mod scenario;
+pub mod seed;
+pub mod statistics;
+pub mod trace;
+#[cfg(feature = "mujoco")]
+pub mod trial;
+pub mod variation;
+
+#[cfg(feature = "mujoco")]
+pub use config::Config;
+pub use grid::{Cell, Grid};
+pub use mode::Mode;
+pub use outcome::Outcome;
+pub use results::Results;
+#[cfg(feature = "mujoco")]
+pub use runner::{Experiment, ExperimentError, Progress, run};
+pub use scenario::{Object, PlantKind, Scenario};
+pub use statistics::Summary;
+pub use variation::Variation;

@@ -1,0 +1,112 @@
+//! The hand: initialise it, move it, and tell whether something is in the way.
+
+use std::time::Duration;
+
+use control::State;
+use link::HandStage;
+
+use super::ProcedureError;
+use crate::client::{Client, Incoming};
+use crate::device::Device;
+
+/// Longest initialisation, s; it takes about five.
+const INITIALISATION: u64 = 30;
+
+/// Longest move of the hand, s: from stop to stop takes about three.
+const LONGEST_MOVE: u64 = 15;
+
+/// How often the hand is looked at.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// A digit nearer to its target than this has arrived, rad: friction in the drive was seen to leave 0.04 rad at the spread.
+const NEAR: f32 = 0.06;
+
+/// A digit that moves less than this between two looks stands, rad.
+const STANDING: f32 = 2e-3;
+
+/// A hand that stands so long has met something; a minimum jerk is slow at its beginning, but not for so long.
+const STILL: Duration = Duration::from_millis(800);
+
+/// How a move of the hand ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum HandReach {
+    /// Every digit is at its target.
+    Reached,
+    /// The hand stands elsewhere: it has closed on something. Spread and fingers F1 to F3, rad.
+    Stopped([f32; 4]),
+}
+
+/// Initialises the hand if there is one that needs it; gives its stage: ready, or absent.
+///
+/// The fingers move to their stops. Ask a person first. An arm without torque holds its pose before: it would sink in the
+/// seconds this takes.
+///
+/// # Errors
+/// [`ProcedureError::Hand`] if it fails, and as [`Client::request`].
+pub fn initialise_hand(client: &mut Client<Device>) -> Result<HandStage, ProcedureError> {
+    match client.status()?.hand_stage {
+        stage @ (HandStage::Absent | HandStage::Ready) => return Ok(stage),
+        HandStage::Initialising => {}
+        HandStage::NotInitialised | HandStage::Failed => {
+            if State::from_code(client.status()?.state) == Some(State::Idle) {
+                client.hold()?;
+            }
+            client.initialise_hand()?;
+        }
+    }
+    let deadline = client.now() + Duration::from_secs(INITIALISATION);
+    loop {
+        look(client)?;
+        match client.status()?.hand_stage {
+            HandStage::Ready => return Ok(HandStage::Ready),
+            HandStage::Absent => return Err(ProcedureError::Hand("a puck of it does not answer any more")),
+            HandStage::Failed => {
+                return Err(ProcedureError::Hand("a finger did not come to its stop, or a puck fell silent"));
+            }
+            HandStage::Initialising | HandStage::NotInitialised if client.now() > deadline => {
+                return Err(ProcedureError::TooLong { what: "initialising the hand", seconds: INITIALISATION });
+            }
+            HandStage::Initialising | HandStage::NotInitialised => {}
+        }
+    }
+}
+
+/// Moves the hand to `q` (spread, F1, F2, F3; rad) and waits until it stands there or at something it has met.
+///
+/// # Errors
+/// The device refuses, for example without torque, or the hand does not come to rest.
+pub fn move_hand(client: &mut Client<Device>, q: [f32; 4]) -> Result<HandReach, ProcedureError> {
+    client.move_hand(q, 0.0)?;
+    let started = client.now();
+    let (mut last, mut moved) = (client.status()?.hand, started);
+    loop {
+        look(client)?;
+        let hand = client.status()?.hand;
+        let distance = |to: &[f32; 4]| hand.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        if distance(&q) < NEAR {
+            return Ok(HandReach::Reached);
+        }
+        if distance(&last) > STANDING {
+            (last, moved) = (hand, client.now());
+        } else if client.now().saturating_sub(moved) > STILL {
+            return Ok(HandReach::Stopped(hand));
+        }
+        if client.now().saturating_sub(started) > Duration::from_secs(LONGEST_MOVE) {
+            return Err(ProcedureError::TooLong { what: "moving the hand", seconds: LONGEST_MOVE });
+        }
+    }
+}
+
+/// Lets a moment pass. Telemetry and events of that time are dropped, except those that end the procedure.
+fn look(client: &mut Client<Device>) -> Result<(), ProcedureError> {
+    let end = client.now() + LOOK;
+    while client.now() < end {
+        if let Some(Incoming::Event(event)) = client.next(end.saturating_sub(client.now()))?
+            && event.kind == link::EventKind::State
+            && event.detail != 0
+        {
+            super::after(event.code, event.detail)?;
+        }
+    }
+    Ok(())
+}
