@@ -10,7 +10,7 @@ use tactus::primitive_file::PrimitiveFile;
 
 fn primitive() -> PrimitiveFile {
     let file = Path::new("flashlight.toml");
-    lesson::make(Scenario::Flashlight, PlantKind::Honest, file, &Interrupt::never(), &mut |_| {})
+    lesson::make(Scenario::Flashlight, PlantKind::Honest, file, 2, &Interrupt::never(), &mut |_| {})
         .expect("the person teaches, and the arm learns")
 }
 

@@ -349,6 +349,7 @@ fn gains_that_the_user_gives_are_taken_and_explained_and_a_heavy_plan_is_warned_
         feedback: FeedbackOptions {
             stiffness: Some(stiffness),
             orientation_stiffness: None,
+            hand_stiffness: None,
             sensitivity: Some(k1),
             limits: Some([0.2, 30.0, 0.5]),
         },

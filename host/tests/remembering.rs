@@ -85,13 +85,51 @@ fn successes_become_an_experience_that_ends_with_the_next_rehearsal() {
     assert!((summary.duration_s - DURATION).abs() < 0.01, "{}", summary.duration_s);
     let experience = file.experience.as_ref().unwrap();
     assert_eq!((experience.trials, experience.mean.len()), (3, 64));
-    assert!((experience.spread[30][0] - 0.6).abs() < 0.02, "{:?}", experience.spread[30]);
-    assert_eq!(experience.spread[30][4], 0.03);
+    // A third of the others' band is what each outer run is beyond it: that fits in the room that is left.
+    assert!((experience.mean[30][0] - 2.0 * 30.0 / 63.0).abs() < 0.02, "{:?}", experience.mean[30]);
+    assert_eq!((experience.spread[30][0], experience.spread[30][4]), (0.5, 0.06));
     let finger = experience.mean[32][9];
     assert!((finger - 32.0 / 63.0).abs() < 0.01, "{finger}");
     assert!(file.to_image().is_ok());
     remember_rehearsals(&mut file, &runs, DURATION, Payload::default(), true).unwrap();
     assert!(file.experience.is_none());
+}
+
+/// The largest statistic of the device's watch over a recording, judged by the experience of a primitive.
+fn watched(file: &PrimitiveFile, recording: &Recording) -> f64 {
+    let primitive = file.to_primitive().unwrap();
+    let mut watch = control::watch::Watch::<f64>::new();
+    let run = recording.running();
+    let (phase, wrench, gauges, hand) =
+        (run.phase.unwrap(), run.wrench.unwrap(), run.gauges.unwrap(), run.hand.unwrap());
+    let mut largest = 0.0_f64;
+    for index in 0..phase.len() {
+        let mut values = [0.0; dmp::EXPERIENCE_CHANNELS];
+        values[..6].copy_from_slice(&wrench[index]);
+        values[6..9].copy_from_slice(&gauges[index]);
+        values[9..].copy_from_slice(&hand[index][1..]);
+        watch.step(primitive.experience().unwrap(), -phase[index].ln() / file.alpha, &values, true);
+        largest = largest.max(watch.statistic());
+    }
+    largest
+}
+
+#[test]
+fn every_success_is_within_two_thirds_of_the_limit_and_so_is_the_next_one_like_them() {
+    let mut file = primitive();
+    // One in eight is far from the others, in its force and in the moment of contact.
+    let run = |offset: f64, touch: f64| recording(&rows(file.alpha, |u| if u > touch { 2.0 + offset } else { 0.0 }));
+    let runs: Vec<_> =
+        (0..8).map(|k| run(if k == 7 { 6.0 } else { 0.1 * f64::from(k) }, 0.4 + 0.05 * f64::from(k))).collect();
+    let next = run(5.5, 0.72);
+    let summary = remember_successes(&mut file, &runs).unwrap();
+    assert_eq!(summary.trials, 8);
+    for recording in runs.iter().chain([&next]) {
+        let largest = watched(&file, recording);
+        assert!(largest < 0.67, "{largest}");
+    }
+    let far = recording(&rows(file.alpha, |u| if u > 0.5 { 40.0 } else { 0.0 }));
+    assert!(watched(&file, &far) > 1.0);
 }
 
 #[test]

@@ -12,7 +12,9 @@ pub mod raw;
 
 use std::fmt::Display;
 use std::sync::OnceLock;
+use std::time::Duration;
 
+use device::Stage;
 use tactus::client::Client;
 use tactus::device::Device;
 use tactus::primitive_file::PrimitiveFile;
@@ -66,6 +68,24 @@ pub fn ready(address: &str) -> Arm {
     let mut arm = connect(address);
     expect(procedure::make_ready(&mut arm, false, |_| {}));
     arm
+}
+
+/// Boots a simulated device and waits until it is up, with torque off: nobody has commanded anything, not even the hand's initialisation.
+///
+/// # Panics
+/// It does not get there.
+#[track_caller]
+pub fn at_rest(address: &str) -> Arm {
+    let mut arm = connect(address);
+    let deadline = arm.now() + Duration::from_secs(30);
+    loop {
+        match Stage::from_code(expect(arm.status()).startup_stage) {
+            Some(Stage::Ready) => return arm,
+            Some(Stage::WaitingForZero) => expect(arm.zero(control::model::HOME.map(|angle| angle as f32))),
+            stage => assert!(arm.now() < deadline, "start-up hangs in {stage:?}"),
+        }
+        expect(arm.next(Duration::from_millis(50)));
+    }
 }
 
 /// The simulation behind a device.

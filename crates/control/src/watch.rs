@@ -1,8 +1,12 @@
 //! `Watch`: notices, from what successful runs felt like, that this one is not going as it should.
 //!
-//! Each channel of the [`Experience`] is compared with its band. The deviation in units of the spread is averaged over
-//! [`MEMORY`], with its sign: noise averages out, a missing object does not. A channel whose average leaves
-//! [`LIMIT`] is told once per run. The watch only tells; it never touches a torque, since a wrong alarm must not stop an arm
+//! Two things are told. A channel leaves its band: its deviation from the [`Experience`], in units of the spread, is averaged
+//! over [`MEMORY`] with its sign (noise averages out, a missing object does not) and passes [`LIMIT`]. Of a finger only
+//! going too far counts: one that stops early has met something, be it thicker than usual; one that closes farther than ever
+//! holds nothing. And contact is lost: before the fingers move, the force falls to a small part of what it was. No table
+//! by phase can tell that, because objects are met at different phases, but what was met and fell over is not felt any more.
+//!
+//! Each is told once per run. The watch only tells; it never touches a torque, since a wrong alarm must not stop an arm
 //! that holds something.
 
 use dmp::{EXPERIENCE_CHANNELS, Experience};
@@ -16,16 +20,39 @@ pub const MEMORY: f64 = 0.1;
 /// Averaged deviation beyond which a channel counts as a surprise (spreads).
 pub const LIMIT: f64 = 4.0;
 
+/// First of the channels that are angles of fingers.
+pub const FIRST_FINGER: usize = 9;
+
 /// Largest deviation that a single sample counts for (spreads): one corrupt sample stays below the limit.
 const WILDEST: f64 = 40.0;
 
 /// Channels that the wrist sensor measures; those after them belong to the hand.
 const WRIST_CHANNELS: usize = 6;
 
+/// Time over which the force is averaged before contact is judged (s): longer than a bounce, or the swing of an object that
+/// stays on its foot.
+const CONTACT_MEMORY: f64 = 0.5;
+
+/// Averaged force that counts as contact (N): ten times what the sensor drifts by.
+const CONTACT: f64 = 1.0;
+
+/// Share of its largest value to which the force falls when contact is lost. Successful runs keep a quarter at least, even
+/// those that give way.
+const KEPT: f64 = 1.0 / 7.0;
+
+/// Movement of a finger from where it was at the start by which the hand is closing (rad).
+const CLOSING: f64 = 0.1;
+
+/// Statistic of a run that has lost contact: twice the limit.
+const LOST: f64 = 2.0;
+
+/// Largest force that is compared (N); more would be no sample.
+const STRONGEST: f64 = 1e3;
+
 /// What was not as it should be, and when.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surprise {
-    /// Channel of the experience, 0 to 11.
+    /// Channel of the experience, 0 to 11. For lost contact it is the axis along which the force was largest, 0 to 2.
     pub channel: u8,
     /// Progress of the movement, 0 to 1 and a little beyond.
     pub progress: f32,
@@ -36,12 +63,17 @@ pub struct Surprise {
 pub struct Watch<R: Real> {
     averages: [R; EXPERIENCE_CHANNELS],
     told: [bool; EXPERIENCE_CHANNELS],
+    contact: Contact<R>,
 }
 
 impl<R: Real> Watch<R> {
     /// Before the first sample.
     pub fn new() -> Self {
-        Watch { averages: [R::of(0.0); EXPERIENCE_CHANNELS], told: [false; EXPERIENCE_CHANNELS] }
+        Watch {
+            averages: [R::of(0.0); EXPERIENCE_CHANNELS],
+            told: [false; EXPERIENCE_CHANNELS],
+            contact: Contact::new(),
+        }
     }
 
     /// Takes the values of one control period at `progress`; gives the most deviant channel that has just left its band.
@@ -62,7 +94,7 @@ impl<R: Real> Watch<R> {
                 continue;
             }
             *average += (clamp(deviation) - *average) * R::of(PERIOD / MEMORY);
-            let size = magnitude(*average);
+            let size = size(channel, *average);
             if size > R::of(LIMIT) && !*told {
                 *told = true;
                 if worst.is_none_or(|(_, other)| size > other) {
@@ -70,15 +102,29 @@ impl<R: Real> Watch<R> {
                 }
             }
         }
-        worst.map(|(channel, _)| Surprise { channel: channel as u8, progress: progress.single() })
+        let lost = self.contact.step(progress, values, has_hand);
+        lost.or(worst.map(|(channel, _)| channel))
+            .map(|channel| Surprise { channel: channel as u8, progress: progress.single() })
     }
 
-    /// The largest averaged deviation, as a share of [`LIMIT`]: above 1 is a surprise.
+    /// The largest averaged deviation, as a share of [`LIMIT`]: above 1 is a surprise. At least 2 once contact was lost.
     pub fn statistic(&self) -> R {
-        self.averages.iter().fold(R::of(0.0), |largest, average| {
-            let size = magnitude(*average) * R::of(1.0 / LIMIT);
-            if size > largest { size } else { largest }
+        let begin = if self.contact.lost { R::of(LOST) } else { R::of(0.0) };
+        self.averages.iter().enumerate().fold(begin, |largest, (channel, average)| {
+            let share = size(channel, *average) * R::of(1.0 / LIMIT);
+            if share > largest { share } else { largest }
         })
+    }
+
+    /// How far each channel is on the way to a surprise (spreads, never negative): the averaged deviation, of fingers only
+    /// that of closing too far.
+    pub fn sizes(&self) -> [R; EXPERIENCE_CHANNELS] {
+        core::array::from_fn(|channel| self.averages.get(channel).map_or(R::of(0.0), |average| size(channel, *average)))
+    }
+
+    /// Whether contact was lost before the fingers closed.
+    pub fn has_lost_contact(&self) -> bool {
+        self.contact.lost
     }
 
     /// Averaged deviation of each channel (spreads), with its sign.
@@ -90,6 +136,68 @@ impl<R: Real> Watch<R> {
 impl<R: Real> Default for Watch<R> {
     fn default() -> Self {
         Watch::new()
+    }
+}
+
+/// Whether what was met is still felt.
+#[derive(Clone, Debug)]
+struct Contact<R: Real> {
+    /// Averaged force (N, world).
+    force: [R; 3],
+    /// Square of the largest averaged force so far (N^2), and its largest axis.
+    largest: R,
+    axis: usize,
+    /// Where the fingers stood at the start (rad).
+    fingers: Option<[R; 3]>,
+    closing: bool,
+    lost: bool,
+}
+
+impl<R: Real> Contact<R> {
+    fn new() -> Self {
+        let zero = R::of(0.0);
+        Contact { force: [zero; 3], largest: zero, axis: 0, fingers: None, closing: false, lost: false }
+    }
+
+    /// Gives the axis of the force that is no longer felt, once.
+    fn step(&mut self, progress: R, values: &[R; EXPERIENCE_CHANNELS], has_hand: bool) -> Option<usize> {
+        let [fx, fy, fz, .., q1, q2, q3] = *values;
+        if has_hand {
+            let start = *self.fingers.get_or_insert([q1, q2, q3]);
+            let moved = |(q, start): (R, R)| magnitude(q - start) > R::of(CLOSING);
+            self.closing = self.closing || [q1, q2, q3].into_iter().zip(start).any(moved);
+        }
+        // The force of a grasp has other reasons, and after the movement nothing is known of it.
+        if self.closing || self.lost || progress > R::of(1.0) {
+            return None;
+        }
+        let mut square = R::of(0.0);
+        let mut strongest = (0, R::of(0.0));
+        for (axis, (average, force)) in self.force.iter_mut().zip([fx, fy, fz]).enumerate() {
+            if magnitude(force) < R::of(STRONGEST) {
+                *average += (force - *average) * R::of(PERIOD / CONTACT_MEMORY);
+            }
+            square += *average * *average;
+            if magnitude(*average) > strongest.1 {
+                strongest = (axis, magnitude(*average));
+            }
+        }
+        if square > self.largest {
+            (self.largest, self.axis) = (square, strongest.0);
+        }
+        self.lost = self.largest > R::of(CONTACT * CONTACT) && square < self.largest * R::of(KEPT * KEPT);
+        self.lost.then_some(self.axis)
+    }
+}
+
+/// Of an averaged deviation what counts: its magnitude, of a finger only the part that closes too far.
+fn size<R: Real>(channel: usize, average: R) -> R {
+    if channel < FIRST_FINGER {
+        magnitude(average)
+    } else if average > R::of(0.0) {
+        average
+    } else {
+        R::of(0.0)
     }
 }
 
@@ -151,6 +259,68 @@ mod tests {
         assert_eq!(told.next().map(|surprise| surprise.channel), Some(9));
         assert_eq!(told.next(), None);
         assert!(watch.statistic() > 1.0);
+    }
+
+    #[test]
+    fn a_finger_that_stops_early_has_met_something_and_is_no_surprise() {
+        let (experience, mut watch) = (experience(), Watch::new());
+        for _ in 0..300 {
+            assert_eq!(watch.step(&experience, 1.0, &values(0.6, 0.0), true), None);
+        }
+        assert_eq!(watch.statistic(), 0.0);
+        assert!(watch.averages()[9] < -2.0 * LIMIT);
+    }
+
+    /// An experience to which every force is usual.
+    fn indifferent() -> Experience<f64> {
+        let mut spread = [100.0; EXPERIENCE_CHANNELS];
+        spread[9] = 0.1;
+        Experience::new(&[[0.25; EXPERIENCE_CHANNELS]; 2], &[spread; 2], 10).expect("a valid experience")
+    }
+
+    /// Pushed with 2 N for two seconds, then with `then` N for two; gives what was told, and after which time (s).
+    fn pushed(then: f64, finger: f64) -> (Option<(u8, f64)>, f64) {
+        let (experience, mut watch) = (indifferent(), Watch::new());
+        let mut told = None;
+        for tick in 0..1500 {
+            let time = f64::from(tick) * PERIOD;
+            let force = if time < 1.0 {
+                0.0
+            } else if time < 3.0 {
+                -2.0
+            } else {
+                then
+            };
+            let mut values = values(0.25, 0.0);
+            values[1] = force;
+            if time > 2.9 {
+                values[9] = finger;
+            }
+            if let Some(surprise) = watch.step(&experience, 0.5, &values, true) {
+                assert_eq!(told, None);
+                told = Some((surprise.channel, time));
+            }
+        }
+        assert_eq!(watch.has_lost_contact(), told.is_some());
+        (told, watch.statistic())
+    }
+
+    #[test]
+    fn contact_that_is_lost_before_the_fingers_close_is_told_with_its_axis_within_a_second() {
+        let (told, statistic) = pushed(-0.1, 0.25);
+        let (channel, time) = told.expect("told");
+        assert!(channel == 1 && (3.5..4.5).contains(&time), "{channel} at {time} s");
+        assert!(statistic > 1.0);
+    }
+
+    #[test]
+    fn a_hand_that_gives_way_and_still_feels_a_quarter_has_lost_nothing() {
+        assert_eq!(pushed(-0.5, 0.25).0, None);
+    }
+
+    #[test]
+    fn the_force_may_vanish_when_the_fingers_have_begun_to_close() {
+        assert_eq!(pushed(0.0, 0.4).0, None);
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! `Experience`: how successful runs felt and where the fingers stood, by phase.
 //!
-//! Mean `m(u)` and spread `sigma(u)` of twelve channels. A run whose values leave the band for longer than noise would
-//! explain is not going as it should: the object was missed, something blocks the way, what was held is lost. Two tables
+//! Mean `m(u)` and spread `sigma(u)` of twelve channels: the middle of what successful runs felt, and the unit in which a
+//! distance from it is judged; `fit::experience` says how they come from recordings. A run whose values leave the band for longer
+//! than noise would explain is not going as it should: the object was missed, something blocks the way, what was held is lost. Two tables
 //! are kept apart on purpose: [`crate::ExpectedWrench`] bends the plan and is best recorded without the object (with it,
 //! the inner forces of the grasp would drag the hand away whenever the object is not there); this one only watches, and
 //! comes from runs that met the object.
@@ -25,7 +26,7 @@ pub struct Experience<T> {
 }
 
 impl<T: Scalar> Experience<T> {
-    /// From points evenly spaced in progress from 0 to 1: mean and standard deviation of each channel over `trials`
+    /// From points evenly spaced in progress from 0 to 1: middle and spread of each channel over `trials`
     /// successful runs.
     ///
     /// # Errors
@@ -89,13 +90,13 @@ impl<T: Scalar> Experience<T> {
         self.mean.samples().is_empty()
     }
 
-    /// Mean of each channel at progress `u`; beyond the ends the end values hold.
+    /// Middle of each channel at progress `u`; beyond the ends the end values hold.
     #[inline]
     pub fn mean_at(&self, u: T) -> [T; EXPERIENCE_CHANNELS] {
         self.mean.at(u)
     }
 
-    /// Spread (one standard deviation, always positive) of each channel at progress `u`.
+    /// Spread (always positive) of each channel at progress `u`.
     #[inline]
     pub fn spread_at(&self, u: T) -> [T; EXPERIENCE_CHANNELS] {
         self.spread.at(u)

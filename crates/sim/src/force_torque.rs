@@ -55,6 +55,21 @@ impl Default for ForceTorqueConfig {
     }
 }
 
+/// An error that comes up by and by and stays, such as that of a sensor that warms.
+#[derive(Clone, Copy, Debug)]
+struct Creep {
+    error: [f64; 6],
+    from: Ticks,
+    to: Ticks,
+}
+
+impl Creep {
+    fn share(&self, now: Ticks) -> f64 {
+        let whole = seconds(self.to.saturating_sub(self.from)).max(f64::MIN_POSITIVE);
+        (seconds(now.saturating_sub(self.from)) / whole).min(1.0)
+    }
+}
+
 /// Load at which a gauge saturates: forces N, torques N m (`wam7.toml` `[ft_sensor]` ranges).
 const RANGE: [f64; 6] = [80.0, 80.0, 135.0, 2.75, 2.75, 2.75];
 
@@ -70,6 +85,7 @@ pub(crate) struct ForceTorque {
     noise: Noise,
     tare: [f64; 6],
     tared_at: Ticks,
+    creep: Option<Creep>,
     /// What the elastic element gives away, N and N m; `None` before it has been asked.
     strained: Option<[f64; 6]>,
     numbers: [Numbers; 2],
@@ -87,10 +103,16 @@ impl ForceTorque {
             noise: sensor_noise,
             tare: [0.0; 6],
             tared_at: 0,
+            creep: None,
             strained: None,
             numbers: [PropertyTable::monitor(), PropertyTable::force_torque()].map(|table| Numbers::new(&table)),
             saturated: 0,
         }
+    }
+
+    /// From `from` on the samples become wrong by `error` (N and N m), all of it at `to`: what no earlier tare can catch.
+    pub(crate) fn creep(&mut self, error: [f64; 6], from: Ticks, to: Ticks) {
+        self.creep = Some(Creep { error, from, to });
     }
 
     /// One step of physics: the elastic element follows the true `wrench` (N, N m).
@@ -184,8 +206,9 @@ impl ForceTorque {
         self.saturated |= overloaded;
         let felt = self.felt(wrench);
         let age = seconds(now - self.tared_at);
+        let creep = self.creep.map_or([0.0; 6], |creep| creep.error.map(|error| error * creep.share(now)));
         let [fx, fy, fz, tx, ty, tz] = std::array::from_fn(|axis| {
-            felt[axis] - self.tare[axis] + self.config.bias[axis] + self.config.drift[axis] * age
+            felt[axis] - self.tare[axis] + self.config.bias[axis] + self.config.drift[axis] * age + creep[axis]
         });
         let status = (self.saturated != 0).then(|| {
             let bad = if overloaded != 0 { 0x40 } else { 0 };

@@ -304,6 +304,12 @@ impl Plant {
         self.bus.recorded()
     }
 
+    /// From now on the force/torque sensor errs by more and more, after `over` by `error` (N and N m, sensor axes), and stays so: an
+    /// error that no tare before it can catch.
+    pub fn creep_force_torque(&mut self, error: [f64; 6], over: Ticks) {
+        self.force_torque.creep(error, self.now, self.now + over);
+    }
+
     /// The physical world.
     pub fn world(&mut self) -> &mut dyn World {
         &mut *self.world

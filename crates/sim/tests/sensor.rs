@@ -124,3 +124,21 @@ fn a_sensor_that_falls_silent_answers_nothing_more() {
     assert!(felt(&mut master).is_none());
     assert_eq!(master.value(Node::FORCE_TORQUE, PropertyId::STAT), None);
 }
+
+#[test]
+fn an_error_that_creeps_in_after_the_tare_is_all_there_in_the_end_and_stays() {
+    let mut master = master(noiseless());
+    master.wait_ms(100);
+    tare(&mut master);
+    master.plant.creep_force_torque([0.2, 0.0, -0.1, 0.0, 0.05, 0.0], 200 * TICKS_PER_MILLISECOND);
+    let at_first = felt(&mut master).expect("the sensor answers");
+    assert!(at_first.iter().all(|value| value.abs() < 0.01), "{at_first:?}");
+    master.wait_ms(100);
+    let half = felt(&mut master).expect("the sensor answers");
+    assert!((half[0] - 0.1).abs() < 0.02 && (half[4] - 0.025).abs() < 0.005, "{half:?}");
+    for _ in 0..2 {
+        master.wait_ms(200);
+        let whole = felt(&mut master).expect("the sensor answers");
+        assert!((whole[0] - 0.2).abs() < 0.005 && (whole[2] + 0.1).abs() < 0.005, "{whole:?}");
+    }
+}

@@ -78,7 +78,7 @@ pub trait Clock: Copy {
 
 /// The 900 Hz timer that makes three slots of a control cycle. Its interrupt is `SLOT_TIMER`.
 pub trait SlotTimer {
-    /// Starts the timer: the first slot comes one period from now.
+    /// Starts the timer: the first slot comes at least one period from now.
     fn start(&mut self);
 
     /// Takes the interrupt back and returns how long ago the slot began, ticks of [`Clock`].

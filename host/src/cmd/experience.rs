@@ -15,7 +15,7 @@ pub struct Cmd {
     /// The primitive, TOML
     #[arg(value_name = "PRIMITIVE")]
     pub primitive: PathBuf,
-    /// Recordings of runs that succeeded, all in the same mode and at the same speed, CSV
+    /// Recordings of runs that succeeded, all at the same speed, CSV
     #[arg(value_name = "RECORDING", required_unless_present = "forget")]
     pub recordings: Vec<PathBuf>,
     /// Where the primitive with the experience goes [default: back into PRIMITIVE]
@@ -59,6 +59,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     output.say(format!("wrote {}", target.display()));
     if recordings.len() < dmp::fit::FEWEST_TRIALS {
         output.warn("the spread of fewer than 3 runs is chance: the watch will go by its smallest spread");
+    }
+    if summary.empty_hand.is_some_and(|share| share < 1.0) {
+        output.warn("by these runs a hand that closes on nothing cannot be told from one that holds something");
     }
     let checksum = format!("0x{:08x}", file.checksum());
     output.result(

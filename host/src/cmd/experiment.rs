@@ -22,8 +22,8 @@ pub struct Cmd {
     /// Shift the grid along the approach and sideways, cm
     #[arg(long, value_name = "ALONG,SIDEWAYS", value_parser = super::learn::numbers::<2>, default_value = "0,0", allow_hyphen_values = true)]
     pub shift: [f64; 2],
-    /// Modes: a open loop, b force control, c force control and adaptation
-    #[arg(long, value_delimiter = ',', default_value = "a,b,c")]
+    /// Modes: a open loop, b force control, c force control and adaptation, d as c but the fingers do not adapt [default: a,b,c; lift c; fingers c,d]
+    #[arg(long, value_delimiter = ',')]
     pub modes: Vec<Mode>,
     /// Try every cell with the seeds 1 to N; a seed is an arm
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000), conflicts_with = "seed")]
@@ -37,7 +37,7 @@ pub struct Cmd {
     /// How well the controller's model fits the simulated arm
     #[arg(long, value_enum, default_value = "honest")]
     pub plant: PlantKind,
-    /// What differs from that arm: mass, table-friction, finger-friction, joint-friction, link-mass, noise (factors), delay (cycles), bias (N)
+    /// What differs from that arm: mass, table-friction, finger-friction, joint-friction, link-mass, noise (factors), delay (cycles), bias (N, comes up after the run's tare)
     #[arg(long, value_name = "NAME=VALUE,...", default_value = "")]
     pub vary: Variation,
     /// What stands on the table instead of the usual object
@@ -52,6 +52,9 @@ pub struct Cmd {
     /// Go on with the results in the folder
     #[arg(long)]
     pub resume: bool,
+    /// Make figures and tables of the results in the folder, without trials
+    #[arg(long, conflicts_with = "resume")]
+    pub figures_only: bool,
     /// Render frames of one trial in each mode
     #[arg(long)]
     pub render: bool,
@@ -84,12 +87,13 @@ mod work {
     use std::path::Path;
     use std::time::Instant;
 
-    use super::{Cmd, Exit, Failure, Global, Grid};
+    use super::{Cmd, Exit, Failure, Global};
     use crate::client::Interrupt;
     use crate::cmd::{Output, connection, upload};
     use crate::experiment::lesson::{self, LessonError};
+    use crate::experiment::lift::{self, Case};
     use crate::experiment::trial::TrialError;
-    use crate::experiment::{Config, Experiment, ExperimentError, Progress, figures, map};
+    use crate::experiment::{Comparison, Config, Experiment, ExperimentError, Progress, Scenario, figures, map};
     use crate::primitive_file::PrimitiveFile;
     use crate::simulation::{Engine, SimulationOptions};
     use crate::transport::Address;
@@ -97,8 +101,6 @@ mod work {
     const DOING: &str = "experiment";
     /// Where the device is simulated unless said otherwise.
     const DEVICE: &str = "sil:";
-    /// Runs that make the experience of a primitive made here: columns and rows of the paper's grid.
-    const EXPERIENCE: (usize, usize) = (4, 3);
 
     pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         let output = global.output();
@@ -112,7 +114,7 @@ mod work {
         let config = Config {
             object: command.object.unwrap_or(usual.object),
             grid: grid.moved(command.rotate, command.shift.map(|value| value * 0.01)),
-            modes: modes(command),
+            modes: modes(command).unwrap_or(usual.modes),
             seeds: command.seed.map_or_else(|| (1..=command.seeds.unwrap_or(1)).collect(), |seed| vec![seed]),
             engine,
             plant: command.plant,
@@ -120,13 +122,25 @@ mod work {
             jobs: command.jobs.map_or(usual.jobs, usize::from),
             out: Some(out.clone()),
             resume: command.resume,
+            as_it_is: command.figures_only,
             keep_traces: true,
             keep_recordings: command.keep_recordings,
             ..usual
         };
+        if config.scenario == Scenario::Lift {
+            return lift(&config, command.render, &interrupt, output);
+        }
+        let (experiment, wall) = carry(&config, &interrupt, output)?;
+        let folder = config.out.as_deref().unwrap_or(&out);
+        let (data, text) = report(&config, &experiment, folder, command.render, output, wall)?;
+        output.result(&data, text)
+    }
+
+    /// Carries all trials through with a progress bar; gives the time it took as well, s.
+    fn carry(config: &Config, interrupt: &Interrupt, output: Output) -> Result<(Experiment, f64), Failure> {
         let started = Instant::now();
         let bar = output.bar(config.keys().len() as u64, "trials");
-        let carried = crate::experiment::run(&config, &interrupt, &mut |progress| match progress {
+        let carried = crate::experiment::run(config, interrupt, &mut |progress| match progress {
             Progress::Begin { all, done } => {
                 bar.set_length(all as u64);
                 bar.set_position(done as u64);
@@ -139,16 +153,54 @@ mod work {
             }
         });
         bar.finish_and_clear();
+        let out = config.out.clone().unwrap_or_default();
         let experiment = carried.map_err(|error| failure(error, &out))?;
-        let wall = started.elapsed().as_secs_f64();
-        report(&config, &experiment, &out, command.render, output, wall)
+        Ok((experiment, started.elapsed().as_secs_f64()))
     }
 
-    fn modes(command: &Cmd) -> Vec<crate::experiment::Mode> {
+    /// The three cases of the experiment with a weight.
+    fn lift(config: &Config, render: bool, interrupt: &Interrupt, output: Output) -> Result<(), Failure> {
+        let out = config.out.clone().unwrap_or_default();
+        let mut rows = Vec::new();
+        let mut texts = Vec::new();
+        for case in Case::ALL {
+            let shared = out.join(format!("{}-{}.toml", config.scenario, case.rehearsed_as().name()));
+            let primitive = if shared.is_file() {
+                upload::read(&shared, DOING)?
+            } else {
+                let spinner = output.spinner("rehearsing with the weight");
+                let rehearsed = case.rehearsed(config, interrupt);
+                spinner.finish_and_clear();
+                let primitive = rehearsed.map_err(lesson_failure)?;
+                primitive.write(&shared).map_err(|error| lesson_failure(error.into()))?;
+                primitive
+            };
+            let config = case.config(config, primitive);
+            let folder = config.out.clone().unwrap_or_default();
+            std::fs::create_dir_all(&folder).map_err(|cause| unwritable(&folder, cause))?;
+            let (experiment, wall) = carry(&config, interrupt, output)?;
+            rows.extend(lift::carried(case, &experiment.results));
+            let (_, text) = report(&config, &experiment, &folder, render, output, wall)?;
+            texts.push(text);
+        }
+        let file = out.join("figures");
+        figures::write_lift(&rows, config.grid.cells.len() * config.seeds.len(), &file)
+            .map_err(|cause| Failure::new(Exit::Internal, "E123", "experiment: a figure cannot be made", cause))?;
+        output.say(format!("wrote {}", file.join("sag.png").display()));
+        let data = serde_json::json!({ "experiment": config.scenario, "folder": out, "cases": rows });
+        let file = out.join("results.json");
+        let json =
+            serde_json::to_string_pretty(&data).map_err(|cause| Failure::new(Exit::Internal, "E101", DOING, cause))?;
+        std::fs::write(&file, json).map_err(|cause| unwritable(&file, cause))?;
+        output.result(&data, lift::table(&rows))
+    }
+
+    /// The modes that are asked for, if any are.
+    fn modes(command: &Cmd) -> Option<Vec<crate::experiment::Mode>> {
         let mut modes = command.modes.clone();
         modes.sort_unstable();
         modes.dedup();
-        modes
+        Some(modes).filter(|modes| !modes.is_empty())
     }
 
     fn engine(global: &Global) -> Result<Engine, Failure> {
@@ -175,7 +227,9 @@ mod work {
             return upload::read(&file, DOING);
         }
         let spinner = output.spinner("teaching");
-        let made = lesson::make(command.scenario, command.plant, &file, interrupt, &mut |doing| {
+        let jobs =
+            command.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from);
+        let made = lesson::make(command.scenario, command.plant, &file, jobs, interrupt, &mut |doing| {
             spinner.set_message(doing.to_owned());
         })
         .and_then(|mut primitive| {
@@ -183,9 +237,7 @@ mod work {
             primitive.write(&file)?;
             spinner.set_message("gathering experience");
             let config = Config { plant: command.plant, ..Config::new(command.scenario, primitive.clone()) };
-            let grid = Grid::spread(EXPERIENCE.0, EXPERIENCE.1).unwrap_or_else(|_| Grid::paper());
-            let grid = if config.grid.cells.len() < grid.cells.len() { config.grid.clone() } else { grid };
-            let (held, of) = lesson::experience(&config, config.object, &grid, interrupt, &mut primitive)?;
+            let (held, of) = lesson::experience(&config, interrupt, &mut primitive)?;
             output.say(format!("{held} of {of} runs succeeded and became experience"));
             primitive.write(&file)?;
             Ok(primitive)
@@ -196,7 +248,7 @@ mod work {
         Ok(primitive)
     }
 
-    /// Writes what came out and shows it.
+    /// Writes what came out; gives it for the terminal, as data and as text.
     fn report(
         config: &Config,
         experiment: &Experiment,
@@ -204,12 +256,13 @@ mod work {
         render: bool,
         output: Output,
         wall: f64,
-    ) -> Result<(), Failure> {
+    ) -> Result<(serde_json::Value, String), Failure> {
         let summaries = experiment.summaries(config);
         let results = experiment.results.without_wall_times();
+        let comparison = Comparison::of(&results, config.scenario);
         let data = serde_json::json!({
             "experiment": config.scenario, "configuration": config.header(), "tipping_force_n": config.tipping_force(),
-            "modes": summaries, "trials": results.reports,
+            "modes": summaries, "comparison": comparison, "trials": results.reports,
         });
         let file = out.join("results.json");
         let text =
@@ -227,8 +280,14 @@ mod work {
             results.reports.len(),
             mean(experiment.results.reports.iter().filter_map(|report| report.wall_s))
         ));
-        let text = format!("{}\n{}", map::draw(&results, &config.grid), map::table(&summaries));
-        output.result(&serde_json::json!({ "experiment": config.scenario, "folder": out, "modes": summaries }), text)
+        let mut text = format!("{}\n{}", map::draw(&results, &config.grid), map::table(&summaries));
+        if let Some(comparison) = &comparison {
+            text.push_str(&format!("\n{comparison}"));
+        }
+        let data = serde_json::json!({
+            "experiment": config.scenario, "folder": out, "modes": summaries, "comparison": comparison,
+        });
+        Ok((data, text))
     }
 
     fn mean(values: impl Iterator<Item = f64>) -> f64 {

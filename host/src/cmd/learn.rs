@@ -99,6 +99,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         feedback: FeedbackOptions {
             stiffness: command.stiffness,
             orientation_stiffness: command.orientation_stiffness,
+            hand_stiffness: None,
             sensitivity: command.k1,
             limits: Some(command.clamp),
         },

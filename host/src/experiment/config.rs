@@ -47,6 +47,8 @@ pub struct Config {
     pub out: Option<PathBuf>,
     /// Go on with the results that are there.
     pub resume: bool,
+    /// Take the results that are there for all: no trials.
+    pub as_it_is: bool,
     /// Keep what pictures and time series need of the first seed's trials.
     pub keep_traces: bool,
     /// Write every trial's telemetry into the folder.
@@ -60,7 +62,7 @@ impl Config {
             scenario,
             object: scenario.object(),
             grid: scenario.grid(),
-            modes: Mode::ALL.to_vec(),
+            modes: scenario.modes(),
             seeds: vec![1],
             engine: Engine::InProcess,
             plant: PlantKind::Honest,
@@ -69,6 +71,7 @@ impl Config {
             jobs: std::thread::available_parallelism().map_or(1, usize::from),
             out: None,
             resume: false,
+            as_it_is: false,
             keep_traces: false,
             keep_recordings: false,
         }

@@ -21,7 +21,7 @@ pub fn frame() -> ApproachFrame {
 /// All trials of the paper's grid with these seeds.
 pub fn results(seeds: &[u64]) -> Results {
     let mut reports = Vec::new();
-    for (mode, map) in Mode::ALL.into_iter().zip(MAPS) {
+    for (mode, map) in Mode::PAPER.into_iter().zip(MAPS) {
         for (index, (cell, letter)) in Grid::paper().cells.into_iter().zip(map.chars()).enumerate() {
             for &seed in seeds {
                 let trial_seed = seed::of_trial(seed, cell);
@@ -61,8 +61,10 @@ pub fn results(seeds: &[u64]) -> Results {
                         contact_peak_n: [2.5, 1.8, 1.2][mode as usize] * (0.6 + chance),
                         contact_sustained_n: [2.2, 1.6, 0.9][mode as usize] * (0.6 + chance),
                         contact_median_n: 1.0,
+                        contact_mean_n: [1.0, 0.8, 0.4][mode as usize],
                         finger_n: [6.0, 6.0, 8.0],
                         table_peak_n: 0.0,
+                        finger_peak_n: 8.0,
                     },
                     adaptation_m: share * cell.distance(),
                     adaptation_deg: share * 80.0 * cell.distance(),

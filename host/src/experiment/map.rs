@@ -19,7 +19,7 @@ pub fn draw(results: &Results, grid: &Grid) -> String {
     let modes = results.modes();
     let mut text = format!(
         "columns: object along the approach, {} .. {} cm (negative = nearer the arm); rows: sideways\n\
-         S held, K knocked over, M missed, P pushed away, D dropped, F stopped by a fault{}\n",
+         S held, K knocked over, M missed, P pushed away, D dropped, C crushed, F stopped by a fault{}\n",
         centimetres(columns.first().copied().unwrap_or(0)),
         centimetres(columns.last().copied().unwrap_or(0)),
         if results.seeds().len() > 1 { "; a number: seeds of which it was held where they differ" } else { "" },
@@ -94,7 +94,7 @@ pub fn table(summaries: &[Summary]) -> String {
     row("knocked over, missed, pushed away", &|s| {
         format!("{} {} {}", short(s.knocked_over), short(s.missed), short(s.pushed_away))
     });
-    row("dropped, stopped", &|s| format!("{} {}", short(s.dropped), short(s.stopped)));
+    row("dropped, crushed, stopped", &|s| format!("{} {} {}", short(s.dropped), short(s.crushed), short(s.stopped)));
     row("farthest success", &|s| format!("{:.1} cm", s.farthest_success_m * 100.0));
     row("largest adaptation", &|s| format!("{:.1} cm  {:.1} deg", s.adaptation_m * 100.0, s.adaptation_deg));
     row("peak force before closing, median, max", &|s| {
@@ -108,8 +108,9 @@ pub fn table(summaries: &[Summary]) -> String {
     row("pushed before closing, median, max", &|s| {
         format!("{:.1} cm  {:.1} cm", s.push_m.median * 100.0, s.push_m.max * 100.0)
     });
+    row("finger on object, median, max", &|s| format!("{:.1} N  {:.1} N", s.finger_peak_n.median, s.finger_peak_n.max));
     row("hand on table, max", &|s| format!("{:.1} N", s.table_peak_n.max));
-    row("sag while lifting, median, max", &|s| format!("{:.1} mm  {:.1} mm", s.sag_m.median * 1e3, s.sag_m.max * 1e3));
+    row("sag when lifted, median, max", &|s| format!("{:.1} mm  {:.1} mm", s.sag_m.median * 1e3, s.sag_m.max * 1e3));
     row("false alarms", &|s| format!("{} of {}", s.detection.false_alarms, s.detection.successes));
     row("failures reported before the lift", &|s| {
         format!("{} of {}", s.detection.flagged_before_lift, s.detection.failures)
@@ -160,7 +161,7 @@ mod tests {
     #[test]
     fn the_table_names_every_mode() {
         let results = made_up::results(&[1, 2]);
-        let summaries: Vec<Summary> = Mode::ALL.iter().map(|mode| Summary::of(&results, *mode, Some(2.0))).collect();
+        let summaries: Vec<Summary> = Mode::PAPER.iter().map(|mode| Summary::of(&results, *mode, Some(2.0))).collect();
         let text = table(&summaries);
         assert!(
             text.contains("(c) force control and adaptation") && text.contains("trials below the tipping force"),

@@ -8,11 +8,14 @@
 
 #[cfg(feature = "mujoco")]
 pub mod config;
+pub mod comparison;
 pub mod figures;
 pub mod grid;
 pub mod inverse;
 #[cfg(feature = "mujoco")]
 pub mod lesson;
+#[cfg(feature = "mujoco")]
+pub mod lift;
 #[cfg(test)]
 pub mod made_up;
 pub mod map;
@@ -38,6 +41,7 @@ pub mod variation;
 
 #[cfg(feature = "mujoco")]
 pub use config::Config;
+pub use comparison::Comparison;
 pub use grid::{Cell, Grid};
 pub use mode::Mode;
 pub use outcome::Outcome;

@@ -1,9 +1,11 @@
-//! The three ways in which a primitive is played, so that they can be compared.
+//! The ways in which a primitive is played, so that they can be compared: the paper's three, and one without the fingers' own adaptation.
 
 use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
+
+use link::RunOptions;
 
 use crate::procedure;
 
@@ -19,11 +21,17 @@ pub enum Mode {
     /// Force control, and the difference between felt and expected wrench bends the plan (Eqs 8, 9).
     #[serde(rename = "c")]
     Adaptive,
+    /// As the adaptive mode, but what the fingers feel does not bend their plan: tells what their own adaptation is good for.
+    #[serde(rename = "d")]
+    RigidFingers,
 }
 
 impl Mode {
     /// All modes, in their order.
-    pub const ALL: [Mode; 3] = [Mode::OpenLoop, Mode::ForceControl, Mode::Adaptive];
+    pub const ALL: [Mode; 4] = [Mode::OpenLoop, Mode::ForceControl, Mode::Adaptive, Mode::RigidFingers];
+
+    /// Those that the paper compares.
+    pub const PAPER: [Mode; 3] = [Mode::OpenLoop, Mode::ForceControl, Mode::Adaptive];
 
     /// Its letter in tables, files and options.
     pub fn letter(self) -> char {
@@ -31,6 +39,7 @@ impl Mode {
             Mode::OpenLoop => 'a',
             Mode::ForceControl => 'b',
             Mode::Adaptive => 'c',
+            Mode::RigidFingers => 'd',
         }
     }
 
@@ -40,15 +49,17 @@ impl Mode {
             Mode::OpenLoop => "open loop",
             Mode::ForceControl => "force control",
             Mode::Adaptive => "force control and adaptation",
+            Mode::RigidFingers => "adaptation of the arm only",
         }
     }
 
-    /// The same as a mode of `tactus run`.
-    pub fn of_run(self) -> procedure::Mode {
+    /// What the device is asked for: those of the modes of `tactus run`, with or without `--no-finger-feedback`.
+    pub fn options(self) -> RunOptions {
         match self {
-            Mode::OpenLoop => procedure::Mode::Open,
-            Mode::ForceControl => procedure::Mode::Force,
-            Mode::Adaptive => procedure::Mode::Adapt,
+            Mode::OpenLoop => procedure::Mode::Open.options(),
+            Mode::ForceControl => procedure::Mode::Force.options(),
+            Mode::Adaptive => procedure::Mode::Adapt.options(),
+            Mode::RigidFingers => RunOptions { finger_feedback: false, ..procedure::Mode::Adapt.options() },
         }
     }
 }
@@ -64,7 +75,8 @@ impl FromStr for Mode {
 
     fn from_str(text: &str) -> Result<Self, String> {
         Mode::ALL.into_iter().find(|mode| text.trim() == mode.letter().to_string()).ok_or_else(|| {
-            format!("there is no mode '{text}'; there are a (open loop), b (force control) and c (with adaptation)")
+            let known = Mode::ALL.map(|mode| format!("{mode} ({})", mode.name())).join(", ");
+            format!("there is no mode '{text}'; there are {known}")
         })
     }
 }
@@ -79,14 +91,16 @@ mod tests {
             assert_eq!(mode.to_string().parse(), Ok(mode));
             assert_eq!(serde_json::to_string(&mode).unwrap(), format!("\"{mode}\""));
         }
-        assert!("d".parse::<Mode>().unwrap_err().contains("no mode 'd'"));
+        assert!("e".parse::<Mode>().unwrap_err().contains("no mode 'e'"));
     }
 
     #[test]
-    fn only_the_last_mode_bends_the_plan_and_only_the_first_ignores_forces() {
-        let options = Mode::ALL.map(|mode| mode.of_run().options());
-        assert_eq!(options.map(|options| options.feedback), [false, false, true]);
-        assert_eq!(options.map(|options| options.force_control), [false, true, true]);
+    fn modes_differ_in_what_they_are_named_for_and_in_nothing_else() {
+        let options = Mode::ALL.map(Mode::options);
+        assert_eq!(options.map(|options| options.feedback), [false, false, true, true]);
+        assert_eq!(options.map(|options| options.force_control), [false, true, true, true]);
+        let fingers = options.map(|options| options.feedback && options.finger_feedback);
+        assert_eq!(fingers, [false, false, true, false]);
         // Nothing else may differ between the modes that are compared.
         for option in options {
             assert_eq!((option.pose_feedback, option.compliant), (options[0].pose_feedback, options[0].compliant));

@@ -74,6 +74,8 @@ pub struct Marks {
 pub struct Observation {
     /// Samples in order of time.
     pub samples: Vec<Sample>,
+    /// Whether a finger has pressed harder than the object bears.
+    pub crushed: bool,
 }
 
 impl Observation {
@@ -110,7 +112,7 @@ mod tests {
             digits: [0.0; 4],
             contact: Contact::default(),
         };
-        let observation = Observation { samples: (0..10).map(|k| sample(f64::from(k))).collect() };
+        let observation = Observation { samples: (0..10).map(|k| sample(f64::from(k))).collect(), ..Observation::default() };
         assert_eq!(observation.between(2.0, 4.0).iter().map(|s| s.time).collect::<Vec<_>>(), [2.0, 3.0]);
         assert!(observation.between(4.0, 2.0).is_empty());
         assert_eq!(observation.at(3.5).map(|s| s.time), Some(3.0));

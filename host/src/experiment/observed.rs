@@ -43,6 +43,7 @@ impl ObservedWorld {
 
     /// Hands out what was written down.
     pub fn take(&mut self) -> (Observation, Vec<Snapshot>) {
+        self.observation.crushed = self.world.object_crushed();
         (std::mem::take(&mut self.observation), std::mem::take(&mut self.snapshots))
     }
 

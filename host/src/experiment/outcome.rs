@@ -15,6 +15,10 @@ const LIFTED: f64 = 0.08;
 const RAISED: f64 = 0.02;
 /// An object that was moved by more than this, and not grasped, was pushed away, m.
 const PUSHED: f64 = 0.03;
+/// An object that is knocked over has begun to fall when it leaves this lean for good: until then it may still come back.
+const FALLING: f64 = 10.0 * std::f64::consts::PI / 180.0;
+/// Inner links of a hand that holds something stand at 1.8 to 2.2 rad: a finger beyond this, rad, should have met it.
+const SHOULD_HOLD: f64 = 1.9;
 /// A finger that moved by this much is closing, rad.
 const CLOSING: f64 = 0.05;
 /// The grasp point is at most this far from the middle of an object in the hand, m.
@@ -38,6 +42,8 @@ pub enum Outcome {
     PushedAway,
     /// Raised, but not in the hand at the end.
     Dropped,
+    /// A finger pressed harder than the object bears.
+    Crushed,
     /// The arm stopped by itself; the name of the fault.
     Stopped(String),
 }
@@ -51,6 +57,7 @@ impl Outcome {
             Outcome::Missed => 'M',
             Outcome::PushedAway => 'P',
             Outcome::Dropped => 'D',
+            Outcome::Crushed => 'C',
             Outcome::Stopped(_) => 'F',
         }
     }
@@ -68,6 +75,7 @@ impl Outcome {
             Outcome::Missed => "missed",
             Outcome::PushedAway => "pushed away",
             Outcome::Dropped => "dropped",
+            Outcome::Crushed => "crushed",
             Outcome::Stopped(_) => "stopped",
         }
     }
@@ -97,7 +105,8 @@ pub struct Measures {
     pub closing_s: f64,
     /// The arm began to lift.
     pub lift_s: f64,
-    /// When the failure became visible in the world: fell past 30 degrees, was pushed 3 cm, or fingers closed on nothing.
+    /// When the failure began in the world: the object leaned over 10 degrees and went on to fall, was pushed 3 cm, the first finger
+    /// passed the angle at which it should have held the object, or the hand touched what it dropped for the last time.
     pub failure_s: Option<f64>,
     /// Largest horizontal force on the object before the fingers close, 10 ms average, N.
     pub contact_peak_n: f64,
@@ -105,10 +114,16 @@ pub struct Measures {
     pub contact_sustained_n: f64,
     /// Median of the horizontal force on the object before the fingers close, while it is touched, N.
     pub contact_median_n: f64,
+    /// The same in the mean from the first touch until the fingers close, N.
+    #[serde(default)]
+    pub contact_mean_n: f64,
     /// Force of each finger on the object at the end, N.
     pub finger_n: [f64; 3],
     /// Largest force of the hand on the table, 10 ms average, N.
     pub table_peak_n: f64,
+    /// Largest force of one finger on the object, 10 ms average, N.
+    #[serde(default)]
+    pub finger_peak_n: f64,
 }
 
 /// What a trial is judged by.
@@ -141,6 +156,8 @@ pub fn judge(observation: &Observation, marks: &Marks, rule: Rule, fault: Option
 
     let outcome = if let Some(fault) = fault {
         Outcome::Stopped(fault.to_owned())
+    } else if observation.crushed {
+        Outcome::Crushed
     } else if rule.upright && tilt > TILT_LIMIT {
         Outcome::KnockedOver
     } else if is_lifted(last, first) && observation.at(marks.hold).is_some_and(|sample| is_lifted(sample, first)) {
@@ -155,11 +172,20 @@ pub fn judge(observation: &Observation, marks: &Marks, rule: Rule, fault: Option
     let first_time =
         |test: &dyn Fn(&Sample) -> bool| run.iter().find(|sample| test(sample)).map(|sample| sample.time - marks.run);
     let failure_s = match outcome {
-        Outcome::KnockedOver => first_time(&|sample| sample.tilt > TILT_LIMIT),
+        Outcome::KnockedOver => {
+            let over = run.iter().position(|sample| sample.tilt > TILT_LIMIT).unwrap_or(run.len());
+            let upright = run[..over].iter().rposition(|sample| sample.tilt <= FALLING).map_or(0, |index| index + 1);
+            run.get(upright).map(|sample| sample.time - marks.run)
+        }
         Outcome::PushedAway => first_time(&|sample| moved(sample) > PUSHED),
-        Outcome::Missed => Some(closing - marks.run),
-        Outcome::Dropped | Outcome::Held | Outcome::Stopped(_) => None,
+        Outcome::Missed => first_time(&|sample| sample.digits[1..].iter().any(|inner| *inner > SHOULD_HOLD))
+            .or(Some(closing - marks.run)),
+        Outcome::Dropped => {
+            lifted.iter().rfind(|sample| sample.contact.touches()).map(|sample| sample.time - marks.run)
+        }
+        Outcome::Crushed | Outcome::Held | Outcome::Stopped(_) => None,
     };
+    let whole = observation.between(marks.run, f64::INFINITY);
     let measures = Measures {
         lift_m: height(last),
         tilt_deg: tilt.to_degrees(),
@@ -171,12 +197,10 @@ pub fn judge(observation: &Observation, marks: &Marks, rule: Rule, fault: Option
         contact_peak_n: forces.iter().copied().fold(0.0, f64::max),
         contact_sustained_n: sustained(&forces),
         contact_median_n: quantile(&touching, 0.5).unwrap_or(0.0),
+        contact_mean_n: mean_since(forces.iter().skip_while(|force| **force <= TOUCH)),
         finger_n: last.contact.fingers,
-        table_peak_n: observation
-            .between(marks.run, f64::INFINITY)
-            .iter()
-            .map(|sample| sample.contact.table)
-            .fold(0.0, f64::max),
+        table_peak_n: whole.iter().map(|sample| sample.contact.table).fold(0.0, f64::max),
+        finger_peak_n: whole.iter().flat_map(|sample| sample.contact.fingers).fold(0.0, f64::max),
     };
     (outcome, measures)
 }
@@ -184,6 +208,12 @@ pub fn judge(observation: &Observation, marks: &Marks, rule: Rule, fault: Option
 fn is_lifted(sample: &Sample, first: &Sample) -> bool {
     let distance = (0..3).map(|axis| (sample.object[axis] - sample.hand[axis]).powi(2)).sum::<f64>().sqrt();
     sample.object[2] - first.object[2] >= LIFTED && distance < IN_HAND && sample.contact.touches()
+}
+
+/// Mean of forces; zero of none.
+fn mean_since<'a>(forces: impl Iterator<Item = &'a f64>) -> f64 {
+    let (sum, count) = forces.fold((0.0, 0.0), |(sum, count), force| (sum + force, count + 1.0));
+    sum / f64::max(count, 1.0)
 }
 
 /// Largest mean over [`SUSTAINED`].
@@ -226,7 +256,7 @@ mod tests {
                 },
             }
         });
-        Observation { samples: samples.collect() }
+        Observation { samples: samples.collect(), crushed: false }
     }
 
     #[test]
@@ -235,7 +265,7 @@ mod tests {
         assert_eq!(outcome, Outcome::Held);
         assert!((measures.lift_m - 0.1).abs() < 1e-9);
         assert!((measures.contact_peak_n - 3.0).abs() < 1e-12 && (measures.contact_median_n - 3.0).abs() < 1e-12);
-        assert!((measures.contact_sustained_n - 3.0).abs() < 1e-12);
+        assert!((measures.contact_sustained_n - 3.0).abs() < 1e-12 && (measures.contact_mean_n - 3.0).abs() < 1e-12);
         assert!((measures.touch_s.unwrap() - 5.0).abs() < 0.011, "{:?}", measures.touch_s);
         // The fingers have moved 0.05 rad a tenth of a second after they began.
         assert!((measures.closing_s - 8.1).abs() < 0.02, "{}", measures.closing_s);
@@ -246,11 +276,22 @@ mod tests {
     fn leaning_over_thirty_degrees_before_the_lift_is_a_failure_even_if_it_is_held() {
         let mut observation = good();
         observation.samples[800].tilt = 0.53;
+        // It rocked once and came back; half a second before it falls it leaves its foot for good.
+        observation.samples[700].tilt = 0.3;
+        observation.samples[750..800].iter_mut().for_each(|sample| sample.tilt = 0.2);
         let (outcome, measures) = judge(&observation, &MARKS, UPRIGHT, None);
         assert_eq!(outcome, Outcome::KnockedOver);
-        assert!((measures.failure_s.unwrap() - 7.0).abs() < 1e-9);
+        assert!((measures.failure_s.unwrap() - 6.5).abs() < 1e-9);
         // A bottle that lies has no upright to lean from.
         assert_eq!(judge(&observation, &MARKS, Rule { upright: false }, None).0, Outcome::Held);
+    }
+
+    #[test]
+    fn a_crushed_object_is_no_success_however_well_it_is_held() {
+        let mut observation = good();
+        observation.crushed = true;
+        let (outcome, measures) = judge(&observation, &MARKS, UPRIGHT, None);
+        assert_eq!((outcome.is_success(), outcome.word(), measures.finger_peak_n), (false, "crushed", 8.0));
     }
 
     #[test]
@@ -258,6 +299,8 @@ mod tests {
         let mut observation = good();
         observation.samples.iter_mut().filter(|sample| sample.time > 16.0).for_each(|sample| sample.object[2] = 0.0);
         assert_eq!(judge(&observation, &MARKS, UPRIGHT, None).0, Outcome::Dropped);
+        observation.samples[1620..].iter_mut().for_each(|sample| sample.contact = Contact::default());
+        assert!((judge(&observation, &MARKS, UPRIGHT, None).1.failure_s.unwrap() - 15.19).abs() < 1e-9);
         // Thrown up and out of the hand is not held either.
         let mut observation = good();
         observation.samples.iter_mut().filter(|sample| sample.time > 15.5).for_each(|sample| sample.object[0] = 1.3);

@@ -68,7 +68,7 @@ pub struct Report {
     pub adaptation_m: f64,
     /// Largest turn of the plan from the taught one, degrees.
     pub adaptation_deg: f64,
-    /// How far the hand stayed below its plan while it lifted and held, m.
+    /// How far the hand is below its plan when it has lifted, mean over 1 s, m.
     pub sag_m: f64,
     /// First surprise that the device reported.
     pub surprise: Option<Surprise>,
@@ -307,10 +307,12 @@ impl Results {
             "contact_peak_n",
             "contact_sustained_n",
             "contact_median_n",
+            "contact_mean_n",
             "finger1_n",
             "finger2_n",
             "finger3_n",
             "table_peak_n",
+            "finger_peak_n",
             "sag_m",
             "touch_s",
             "closing_s",
@@ -343,10 +345,12 @@ impl Results {
                 number(m.contact_peak_n),
                 number(m.contact_sustained_n),
                 number(m.contact_median_n),
+                number(m.contact_mean_n),
                 number(m.finger_n[0]),
                 number(m.finger_n[1]),
                 number(m.finger_n[2]),
                 number(m.table_peak_n),
+                number(m.finger_peak_n),
                 number(report.sag_m),
                 optional(m.touch_s),
                 number(m.closing_s),

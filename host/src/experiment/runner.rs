@@ -110,12 +110,16 @@ pub fn run(
     if !troubles.is_empty() {
         return Err(ExperimentError::OutOfReach(troubles));
     }
-    let opened = config.out.as_deref().map(|folder| Log::open(folder, &config.header(), config.resume)).transpose()?;
+    let resume = config.resume || config.as_it_is;
+    let opened = config.out.as_deref().map(|folder| Log::open(folder, &config.header(), resume)).transpose()?;
     let (mut log, mut reports) = opened.map_or((None, Vec::new()), |(log, reports)| (Some(log), reports));
     let keys = config.keys();
     let all = keys.len();
-    let wanted: Vec<Key> =
-        keys.iter().copied().filter(|key| !reports.iter().any(|report| report.key == *key)).collect();
+    let wanted: Vec<Key> = keys
+        .iter()
+        .copied()
+        .filter(|key| !config.as_it_is && !reports.iter().any(|report| report.key == *key))
+        .collect();
     // Results of modes and seeds that are not asked for this time stay in the file, but are not counted.
     reports.retain(|report| keys.contains(&report.key));
     progress(Progress::Begin { all, done: reports.len() });
@@ -175,8 +179,42 @@ pub fn run(
     if interrupt.is_raised() {
         return Err(ExperimentError::Interrupted { done: reports.len(), all });
     }
+    let results = Results::new(reports);
+    if config.keep_traces {
+        // What was there from before has left no trace, but a trial can be repeated: the same key, the same trial.
+        for key in telling(&results) {
+            if !trials.iter().any(|trial| trial.report.key == key) {
+                trials.push(
+                    trial::run(config, &prepared, key, interrupt)
+                        .map_err(|cause| ExperimentError::Trial { key, cause })?,
+                );
+            }
+        }
+    }
     trials.sort_by_key(|trial| trial.report.key);
-    Ok(Experiment { results: Results::new(reports), trials, prepared })
+    Ok(Experiment { results, trials, prepared })
+}
+
+/// One trial of each mode, first seed, in the cell that tells most: the adapted one held the object and another mode did not; the middle
+/// of all such cells by distance, neither the easiest nor the hardest.
+pub(super) fn telling(results: &Results) -> Vec<Key> {
+    let seed = results.seeds().first().copied();
+    let reports = || results.reports.iter().filter(|report| Some(report.key.seed) == seed);
+    let held = |index: usize, mode: Mode| {
+        let report = reports().find(|report| report.key.index == index && report.key.mode == mode);
+        report.map(|report| report.outcome.is_success())
+    };
+    let mut cells: Vec<(f64, usize)> = reports().map(|report| (report.key.cell.distance(), report.key.index)).collect();
+    cells.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    cells.dedup();
+    let tells = |index: usize| {
+        let others = [Mode::OpenLoop, Mode::RigidFingers];
+        held(index, Mode::Adaptive) == Some(true) && others.iter().any(|mode| held(index, *mode) == Some(false))
+    };
+    let telling: Vec<usize> = cells.iter().map(|(_, index)| *index).filter(|index| tells(*index)).collect();
+    let chosen = telling.get(telling.len() / 2).or(cells.get(cells.len() / 2).map(|(_, index)| index));
+    let of_cell = |index: usize| reports().filter(move |report| report.key.index == index).map(|report| report.key);
+    chosen.map(|index| of_cell(*index).collect()).unwrap_or_default()
 }
 
 /// Writes the telemetry of a trial into the folder `recordings`, in the layout of every recording.

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use sim::person::Lesson;
 
 use super::grid::Grid;
+use super::mode::Mode;
 
 /// An experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
@@ -18,8 +19,10 @@ pub enum Scenario {
     Cup,
     /// A lying bottle, grasped from above, with the table in the way
     Bottle,
-    /// A weight that is grasped and lifted within the movement
+    /// A weight that is grasped and lifted within the movement, expected or not
     Lift,
+    /// A paper cup that stiff fingers crush
+    Fingers,
 }
 
 impl Scenario {
@@ -30,6 +33,7 @@ impl Scenario {
             Scenario::Cup => "cup",
             Scenario::Bottle => "bottle",
             Scenario::Lift => "lift",
+            Scenario::Fingers => "fingers",
         }
     }
 
@@ -37,7 +41,7 @@ impl Scenario {
     pub fn lesson(self) -> Lesson {
         match self {
             Scenario::Flashlight => Lesson::Flashlight,
-            Scenario::Cup => Lesson::Cup,
+            Scenario::Cup | Scenario::Fingers => Lesson::Cup,
             Scenario::Bottle => Lesson::Bottle,
             Scenario::Lift => Lesson::Lift,
         }
@@ -50,6 +54,7 @@ impl Scenario {
             Scenario::Cup => Object::Cup,
             Scenario::Bottle => Object::Bottle,
             Scenario::Lift => Object::Weight,
+            Scenario::Fingers => Object::PaperCup,
         }
     }
 
@@ -61,6 +66,16 @@ impl Scenario {
             // Ten places around the goal: what the fingers can reach around a bottle whose place is only roughly known.
             Scenario::Bottle => Grid::raster(&[-40, -20, 0, 20, 40], &[-20, 20]),
             Scenario::Lift => Grid::raster(&[0], &[0]),
+            Scenario::Fingers => Grid::spread(4, 3).unwrap_or_else(|_| Grid::paper()),
+        }
+    }
+
+    /// The modes unless others are asked for: the paper's three, or those between which the experiment decides.
+    pub fn modes(self) -> Vec<Mode> {
+        match self {
+            Scenario::Flashlight | Scenario::Cup | Scenario::Bottle => Mode::PAPER.to_vec(),
+            Scenario::Lift => vec![Mode::Adaptive],
+            Scenario::Fingers => vec![Mode::Adaptive, Mode::RigidFingers],
         }
     }
 
@@ -154,7 +169,7 @@ mod tests {
 
     #[test]
     fn every_experiment_has_cells_around_its_goal() {
-        for scenario in [Scenario::Flashlight, Scenario::Cup, Scenario::Bottle, Scenario::Lift] {
+        for scenario in [Scenario::Flashlight, Scenario::Cup, Scenario::Bottle, Scenario::Lift, Scenario::Fingers] {
             let grid = scenario.grid();
             assert!(!grid.cells.is_empty() && grid.cells.iter().all(|cell| cell.distance() < 0.3), "{scenario}");
         }

@@ -33,18 +33,39 @@ impl Spread {
     }
 }
 
+/// Failures of one kind, and how many of them the device told before the lift.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Told {
+    /// Trials that failed in this way.
+    pub failures: usize,
+    /// Of these, how many were reported before the lift.
+    pub before_lift: usize,
+}
+
 /// How well the device's watch tells failures.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Detection {
     /// Trials that succeeded.
     pub successes: usize,
-    /// Of these, how many were reported as surprising.
+    /// Of these, how many were reported as surprising, at any time.
     pub false_alarms: usize,
-    /// Trials that failed by something that can be felt before the lift: all but objects that were dropped.
+    /// Trials that failed, but for those that a fault of the arm stopped.
     pub failures: usize,
     /// Of these, how many were reported before the lift.
     pub flagged_before_lift: usize,
-    /// Median time from the failure (object past 30 degrees, pushed 3 cm, fingers closing on nothing) to the report, s; negative: reported before.
+    /// Those in which the object was knocked over.
+    pub knocked_over: Told,
+    /// Those in which the fingers closed beside it.
+    pub missed: Told,
+    /// Those in which it was pushed away.
+    pub pushed_away: Told,
+    /// Those in which it was raised and lost; what slips only then cannot be told before.
+    pub dropped: Told,
+    /// Those in which it was crushed.
+    pub crushed: Told,
+    /// Median time from the beginning of the failure in the world ([`failure_s`](super::outcome::Measures::failure_s)) to the report, s;
+    /// negative: reported before. A failure that was not reported before the lift counts as reported at the lift, so that silence does not
+    /// pass for speed. What was dropped is left out.
     pub median_delay_s: Option<f64>,
 }
 
@@ -64,21 +85,29 @@ impl Detection {
         let mut detection = Detection::default();
         let mut delays = Vec::new();
         for report in reports {
-            match report.outcome {
+            let alarm = report.surprise.map(|surprise| surprise.time_s);
+            let told = match report.outcome {
                 Outcome::Held => {
                     detection.successes += 1;
-                    detection.false_alarms += usize::from(report.surprise.is_some());
+                    detection.false_alarms += usize::from(alarm.is_some());
+                    continue;
                 }
-                // A fault of the arm reports itself; what slips during the lift cannot be told before it.
-                Outcome::Dropped | Outcome::Stopped(_) => {}
-                Outcome::KnockedOver | Outcome::Missed | Outcome::PushedAway => {
-                    detection.failures += 1;
-                    if let Some(surprise) = report.surprise.filter(|surprise| surprise.time_s < report.measures.lift_s)
-                    {
-                        detection.flagged_before_lift += 1;
-                        delays.extend(report.measures.failure_s.map(|failure| surprise.time_s - failure));
-                    }
-                }
+                // A fault of the arm reports itself.
+                Outcome::Stopped(_) => continue,
+                Outcome::KnockedOver => &mut detection.knocked_over,
+                Outcome::Missed => &mut detection.missed,
+                Outcome::PushedAway => &mut detection.pushed_away,
+                Outcome::Dropped => &mut detection.dropped,
+                Outcome::Crushed => &mut detection.crushed,
+            };
+            let lift = report.measures.lift_s;
+            let in_time = alarm.filter(|alarm| *alarm < lift);
+            told.failures += 1;
+            told.before_lift += usize::from(in_time.is_some());
+            detection.failures += 1;
+            detection.flagged_before_lift += usize::from(in_time.is_some());
+            if report.outcome != Outcome::Dropped {
+                delays.extend(report.measures.failure_s.map(|failure| in_time.unwrap_or(lift) - failure));
             }
         }
         detection.median_delay_s = quantile(&delays, 0.5);
@@ -107,6 +136,8 @@ pub struct Summary {
     pub pushed_away: f64,
     /// Dropped.
     pub dropped: f64,
+    /// Crushed.
+    pub crushed: f64,
     /// Stopped by a fault.
     pub stopped: f64,
     /// Largest displacement with success in at least half of the seeds, m.
@@ -121,9 +152,11 @@ pub struct Summary {
     pub below_tipping: Option<f64>,
     /// Way the object was pushed before the fingers close, m.
     pub push_m: Spread,
+    /// Peak force of one finger on the object, N.
+    pub finger_peak_n: Spread,
     /// Peak force of hand on table, N.
     pub table_peak_n: Spread,
-    /// How far the hand stayed below its plan while it lifted, m.
+    /// How far the hand is below its plan when it has lifted, m.
     pub sag_m: Spread,
     /// Failure detection.
     pub detection: Detection,
@@ -159,6 +192,7 @@ impl Summary {
             missed: mean("missed"),
             pushed_away: mean("pushed away"),
             dropped: mean("dropped"),
+            crushed: mean("crushed"),
             stopped: mean("stopped"),
             farthest_success_m: farthest.fold(0.0, f64::max),
             adaptation_m: successes().map(|report| report.adaptation_m).fold(0.0, f64::max),
@@ -168,6 +202,7 @@ impl Summary {
                 count(&|report| report.measures.contact_sustained_n < limit) as f64 / reports.len().max(1) as f64
             }),
             push_m: spread(|report| report.measures.push_m),
+            finger_peak_n: spread(|report| report.measures.finger_peak_n),
             table_peak_n: spread(|report| report.measures.table_peak_n),
             sag_m: spread(|report| report.sag_m),
             detection: Detection::of(reports.iter().copied()),
@@ -214,12 +249,29 @@ mod tests {
             (0..reports.len()).filter(|index| reports[*index].outcome == Outcome::KnockedOver).collect();
         let at = |time_s| Some(Surprise { phase: 0.5, channel: 0, time_s });
         reports[held].surprise = at(3.0);
-        for (index, time) in [(fallen[0], 0.4), (fallen[1], 1.0), (fallen[2], 99.0)] {
-            reports[index].surprise = at(reports[index].measures.failure_s.unwrap() + time);
-        }
+        let three: Vec<Report> = [(fallen[0], 0.4), (fallen[1], 1.0), (fallen[2], 99.0)]
+            .map(|(index, time)| {
+                reports[index].surprise = at(reports[index].measures.failure_s.unwrap() + time);
+                reports[index].clone()
+            })
+            .to_vec();
         let detection = Detection::of(reports.iter());
         assert_eq!((detection.false_alarms, detection.flagged_before_lift), (1, 2));
-        assert!((detection.median_delay_s.unwrap() - 0.7).abs() < 1e-12);
+        assert_eq!((detection.knocked_over.before_lift, detection.knocked_over.failures), (2, fallen.len()));
         assert!(detection.detection_rate() < 0.1 && detection.false_alarm_rate() > 0.0);
+        // Those that were told late or never count as told at the lift.
+        let alone = Detection::of(three.iter());
+        assert!((alone.median_delay_s.unwrap() - 1.0).abs() < 1e-12);
+        let silent = detection.median_delay_s.unwrap();
+        assert!(silent > 1.0, "{silent}");
+    }
+
+    #[test]
+    fn what_was_dropped_is_a_failure_and_what_the_arm_stopped_is_none_of_the_watch() {
+        let mut reports = made_up::results(&[1]).reports;
+        reports.truncate(2);
+        (reports[0].outcome, reports[1].outcome) = (Outcome::Dropped, Outcome::Stopped("torque limit".into()));
+        let detection = Detection::of(reports.iter());
+        assert_eq!((detection.failures, detection.dropped.failures, detection.median_delay_s), (1, 1, None));
     }
 }

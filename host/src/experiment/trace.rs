@@ -55,10 +55,12 @@ impl Trace {
         largest
     }
 
-    /// Largest distance of the hand below its plan between two times, m.
+    /// Mean distance of the hand below its plan between two times, m; negative where it is above.
     pub fn sag(&self, from: f64, to: f64) -> f64 {
         let cycles = self.cycles.iter().filter(|cycle| (from..=to).contains(&cycle.time));
-        cycles.map(|cycle| cycle.position_d[2] - cycle.position[2]).fold(0.0, f64::max)
+        let (sum, count) =
+            cycles.fold((0.0, 0.0), |(sum, count), cycle| (sum + cycle.position_d[2] - cycle.position[2], count + 1.0));
+        sum / f64::max(count, 1.0)
     }
 }
 
@@ -126,11 +128,12 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn sag_counts_only_what_is_below() {
+    fn sag_is_what_the_hand_is_below_its_plan_in_the_mean() {
         let mut trace = Trace { cycles: vec![cycle(1.0), cycle(2.0), cycle(3.0)] };
         trace.cycles[0].position_d[2] = 0.5;
         trace.cycles[1].position_d[2] = 0.004;
         trace.cycles[2].position[2] = 0.02;
-        assert!((trace.sag(1.5, 3.5) - 0.004).abs() < 1e-12);
+        assert!((trace.sag(1.5, 2.5) - 0.004).abs() < 1e-12);
+        assert!((trace.sag(1.5, 3.5) + 0.008).abs() < 1e-12);
     }
 }

@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use link::EventKind;
 use sim::world::mujoco::Scene;
+use sim::{CYCLE_TICKS, SLOT_TICKS, TICKS_PER_MILLISECOND, Ticks};
 
 use super::config::Config;
 use super::grid::ApproachFrame;
@@ -35,10 +36,22 @@ const CORRECTION_SECONDS: f64 = 0.7;
 const PATIENCE_SECONDS: f64 = 2.0;
 /// How long it then holds, s.
 const HOLD_SECONDS: f64 = 2.0;
+/// Time over which the height of a lifted hand is averaged, s.
+const SETTLED_SECONDS: f64 = 1.0;
 /// Rest between the end of the movement and the lift, s.
 const REST_SECONDS: f64 = 0.3;
 /// The plan of a movement that lifts by itself has begun to lift when it is this far above where the fingers close, m.
 const RISEN: f64 = 0.005;
+/// Times that a move is asked for, a rest apart, while the arm still swings.
+const CALMING: usize = 10;
+/// What moves the arm is asked for at multiples of so many control cycles, 0.1 s.
+const BEAT: Ticks = 30 * CYCLE_TICKS;
+/// An upload is followed by a longer one, 0.5 s: it takes 0.35 s, and on a board, which has to check it, 0.05 s more.
+const BEAT_OF_UPLOAD: Ticks = 150 * CYCLE_TICKS;
+/// So long after the cycle began: the request reaches the device before the next cycle does, even if the engine overruns this by a slot.
+const AFTER_BEAT: Ticks = TICKS_PER_MILLISECOND / 2;
+/// One tick, ns.
+const NANOSECONDS_PER_TICK: u128 = 40;
 /// Cycles between two points of a path: 0.1 s.
 const PATH_EVERY: usize = 30;
 
@@ -139,9 +152,14 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
     let options = plant::options(&arm, config.trial_seed(&key), config.primitive.start.posture, scene);
     let mut client = connect(&options, interrupt)?;
     client.upload(&prepared.image, |_, _, _| {})?;
-    let ready = procedure::make_ready(&mut client, true, |_| {})
-        .and_then(|()| procedure::go_to_start(&mut client, &config.primitive.start, |_| {}));
+    let ready = wait_for_beat(&mut client, BEAT_OF_UPLOAD)
+        .and_then(|()| procedure::make_ready(&mut client, true, |_| {}))
+        .and_then(|()| procedure::go_to_start(&mut client, &config.primitive.start, |_| {}))
+        .and_then(|()| wait_for_beat(&mut client, BEAT));
     let mut telemetry = Vec::new();
+    if let Some(simulation) = client.transport().simulation() {
+        simulation.plant().creep_force_torque(plant::bias(&arm), plant::BIAS_OVER);
+    }
     let begin = client.now().as_secs_f64();
     let mut attempt = Attempt { client: &mut client, telemetry: &mut telemetry };
     let played = ready.and_then(|()| attempt.play(config, prepared, key));
@@ -153,8 +171,9 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
     };
     let mut hold = arrived;
     if fault.is_none() {
+        let on_time = wait_for_beat(&mut client, BEAT);
         let mut attempt = Attempt { client: &mut client, telemetry: &mut telemetry };
-        let lifted = if config.scenario.lifts_itself() { Ok(()) } else { attempt.lift() };
+        let lifted = on_time.and_then(|()| if config.scenario.lifts_itself() { Ok(()) } else { attempt.lift() });
         hold = attempt.client.now().as_secs_f64();
         let held = lifted.and_then(|()| attempt.watch(HOLD_SECONDS));
         if let Err(error) = held {
@@ -179,7 +198,12 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
         measures,
         adaptation_m,
         adaptation_deg,
-        sag_m: if fault.is_none() { trace.sag(measures.lift_s, end - run) } else { 0.0 },
+        // A movement that lifts by itself is measured against its own plan: behind it the arm holds whatever it has reached.
+        sag_m: match (&fault, config.scenario.lifts_itself()) {
+            (Some(_), _) => 0.0,
+            (None, true) => trace.sag(arrived - run - SETTLED_SECONDS, arrived - run),
+            (None, false) => trace.sag(end - run - SETTLED_SECONDS, end - run),
+        },
         surprise: surprises.first().map(|surprise| Surprise {
             phase: surprise.phase,
             channel: CHANNELS.iter().position(|name| *name == surprise.channel).map_or(u8::MAX, |index| index as u8),
@@ -201,6 +225,24 @@ pub(super) fn connect(
     let mut client = Client::connect(device, "tactus")?;
     client.set_interrupt(interrupt.clone());
     Ok(client)
+}
+
+/// Lets time pass until the next multiple of `beat`. Checking an upload takes a device its time, one in this process none; from here on both are at
+/// the same cycle, and what is asked for comes in the same one.
+fn wait_for_beat(client: &mut Client<Device>, beat: Ticks) -> Result<(), ProcedureError> {
+    let now = (client.now().as_nanos() / NANOSECONDS_PER_TICK) as Ticks;
+    // The first slot of a cycle is the tenth since power-up, and every third from there.
+    let phase = SLOT_TICKS + AFTER_BEAT;
+    let next = (now.saturating_sub(phase) / beat + 1) * beat + phase;
+    let until = Duration::from_nanos(next * NANOSECONDS_PER_TICK as u64);
+    while client.now() < until {
+        if let Some(Incoming::Event(event)) = client.next(until.saturating_sub(client.now()))?
+            && event.kind == EventKind::State
+        {
+            procedure::after(event.code, event.detail)?;
+        }
+    }
+    Ok(())
 }
 
 /// The name of what stopped the arm, or the error that is none of the arm's.
@@ -226,7 +268,7 @@ impl Attempt<'_> {
         prepared: &Prepared,
         key: Key,
     ) -> Result<procedure::RunOutcome, ProcedureError> {
-        let options = key.mode.of_run().options();
+        let options = key.mode.options();
         let mut request = RunRequest::new(prepared.name.clone(), config.primitive.duration, options);
         request.rest = REST_SECONDS;
         let telemetry = &mut *self.telemetry;
@@ -245,7 +287,9 @@ impl Attempt<'_> {
             // What cannot be reached is not lifted to, and judged.
             let Some(target) = inverse::reach([x, y, aim], orientation, q) else { break };
             self.client.take_events();
-            self.client.approach(target.map(|angle| angle as f32), seconds as f32)?;
+            if !self.approach(target.map(|angle| angle as f32), seconds as f32)? {
+                break;
+            }
             // An arm that does not settle, under a load or against something, takes no further command.
             if !self.arrive(seconds + PATIENCE_SECONDS)? {
                 break;
@@ -258,6 +302,18 @@ impl Attempt<'_> {
             seconds = CORRECTION_SECONDS;
         }
         Ok(())
+    }
+
+    /// Asks for the move until the arm is calm enough to take it; `false` if it never is.
+    fn approach(&mut self, target: [f32; 7], seconds: f32) -> Result<bool, ProcedureError> {
+        for _ in 0..CALMING {
+            match self.client.approach(target, seconds) {
+                Ok(()) => return Ok(true),
+                Err(HostError::Refused { reason: link::Refusal::Moving, .. }) => self.watch(REST_SECONDS)?,
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(false)
     }
 
     fn posture(&mut self) -> Result<[f64; 7], ProcedureError> {

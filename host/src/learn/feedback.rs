@@ -19,10 +19,10 @@ const POSITION_STIFFNESS: f64 = 400.0;
 const ORIENTATION_STIFFNESS: f64 = 200.0;
 /// No K is smaller, however short the movement: softer plans are late at a goal that was moved.
 const SOFTEST: f64 = dmp::TransformationSystem::<f64>::DEFAULT_STIFFNESS;
-/// K1/K of the position rows, m/N: 25 cm of way for 1.25 N, well below the 2 N that topple a flashlight.
-const POSITION_COMPLIANCE: f64 = 0.2;
+/// K1/K of the position rows, m/N: 25 cm of way for 1 N beyond the dead band of 0.3 N, well below the 2 N that topple a flashlight.
+const POSITION_COMPLIANCE: f64 = 0.25;
 /// K1/K_o about the vertical, rad/(N m).
-const ROTATION_COMPLIANCE: f64 = 2.5;
+const ROTATION_COMPLIANCE: f64 = 3.2;
 /// K1/K of the fingers, rad/(N m). At the drive's whole torque (1.4 N m) a finger yields by 0.42 rad, within its limit, and at
 /// the 0.3 N m of a light touch by 0.1 rad: it takes the shape of the object instead of pushing it.
 const FINGER_COMPLIANCE: f64 = 0.3;
@@ -40,6 +40,8 @@ pub struct FeedbackOptions {
     pub stiffness: Option<f64>,
     /// K_o of the orientation rows.
     pub orientation_stiffness: Option<f64>,
+    /// K of the hand rows.
+    pub hand_stiffness: Option<f64>,
     /// K1: position x, y, z (world), rotation x, y, z (hand), spread, F1, F2, F3.
     pub sensitivity: Option<[f64; 10]>,
     /// Limits: displacement m, rotation degrees, fingers rad.
@@ -54,7 +56,7 @@ pub fn stiffness(options: &FeedbackOptions, duration: f64) -> [f64; 4] {
         options.stiffness.unwrap_or_else(|| scaled(POSITION_STIFFNESS)),
         options.orientation_stiffness.unwrap_or_else(|| scaled(ORIENTATION_STIFFNESS)),
         SOFTEST,
-        scaled(SOFTEST),
+        options.hand_stiffness.unwrap_or_else(|| scaled(SOFTEST)),
     ]
 }
 

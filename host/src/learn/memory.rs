@@ -4,11 +4,12 @@
 use std::path::PathBuf;
 
 use control::flags;
-use dmp::fit::{FEWEST_TRIALS, experience, phase_statistics, weights_from_spread};
-use dmp::{EXPECTED_CAPACITY, EXPERIENCE_CAPACITY, EXPERIENCE_CHANNELS, SENSORS, TableError};
+use dmp::fit::{FEWEST_TRIALS, phase_statistics, weights_from_spread};
+use dmp::{EXPECTED_CAPACITY, EXPERIENCE_CHANNELS, SENSORS, TableError};
 use serde::Serialize;
 use thiserror::Error;
 
+use super::calibration::calibrated;
 use crate::demonstration::Recording;
 use crate::primitive_file::{ExpectationTable, ExperienceTable, PrimitiveFile};
 
@@ -19,10 +20,18 @@ const WEIGHT_POINTS: usize = 16;
 /// as much as one of ordinary spread.
 const SPREAD_FLOOR: f64 = 0.5;
 
+/// What the sensors cannot tell: the controller's dead band on force and torque, and the same for the gauges. The stick-slip of the
+/// joints scatters by a tenth of a newton where a movement is slow; without this floor K2 would make the arm four times
+/// deafer there than at its end.
+const RESOLUTION: [f64; SENSORS] = {
+    let (f, n) = (control::deviation::FORCE_DEAD_BAND, control::deviation::TORQUE_DEAD_BAND);
+    [f, f, f, n, n, n, 0.05, 0.05, 0.05]
+};
+
 /// Smallest spread of the channels of an experience: what objects and grasps that are all good differ by, however alike the
-/// gathered runs were. Force 0.3 N (the bias of a tared sensor), torque 0.03 N m, gauges 0.05 N m, fingers 0.03 rad.
+/// gathered runs were. Force 0.5 N, torque 0.06 N m (that force at the distance of the fingers), gauges 0.075 N m, fingers 0.025 rad.
 const EXPERIENCE_FLOOR: [f64; EXPERIENCE_CHANNELS] =
-    [0.3, 0.3, 0.3, 0.03, 0.03, 0.03, 0.05, 0.05, 0.05, 0.03, 0.03, 0.03];
+    [0.5, 0.5, 0.5, 0.06, 0.06, 0.06, 0.075, 0.075, 0.075, 0.025, 0.025, 0.025];
 
 /// A recording must cover the movement from this progress at the latest to one minus this at the earliest.
 const MARGIN: f64 = 0.02;
@@ -115,6 +124,9 @@ pub struct MemorySummary {
     pub extremes: Vec<f64>,
     /// Root mean square spread of each channel over the phase.
     pub spread: Vec<f64>,
+    /// Of an experience: how far a hand that closes on nothing goes, as a share of the watch's limit; above 1 it is told.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub empty_hand: Option<f64>,
 }
 
 /// Puts the expectation of these rehearsals into a primitive, and K2 if there are enough of them and `weigh`. The experience
@@ -135,7 +147,7 @@ pub fn remember_rehearsals(
     let trials: Vec<_> = runs.iter().map(Vec::as_slice).collect();
     let statistics = phase_statistics(&trials, EXPECTED_CAPACITY)?;
     let weights = if weigh && statistics.trials >= FEWEST_TRIALS {
-        Some(weights_from_spread(&statistics.spread, statistics.trials, WEIGHT_POINTS, SPREAD_FLOOR)?)
+        Some(weights_from_spread(&statistics.spread, statistics.trials, WEIGHT_POINTS, SPREAD_FLOOR, &RESOLUTION)?)
     } else {
         None
     };
@@ -161,7 +173,8 @@ pub fn remember_rehearsals(
     Ok(summary(trials, duration, &statistics.mean, &statistics.spread))
 }
 
-/// Puts the experience of these successful runs into a primitive; they must have been made at one speed.
+/// Puts the experience of these successful runs into a primitive; they must have been made at one speed. The more they differ
+/// (in place of the object, arm and mode), the less will be told of a run that is only unusual.
 ///
 /// # Errors
 /// [`MemoryError`]; the primitive is then unchanged.
@@ -172,12 +185,13 @@ pub fn remember_successes(
     let first = recordings.first().ok_or(MemoryError::None)?;
     let (_, duration) = progress(first, primitive.alpha)?;
     let runs = runs::<EXPERIENCE_CHANNELS>(primitive, recordings, duration, channels)?;
-    let trials: Vec<_> = runs.iter().map(Vec::as_slice).collect();
-    let gathered = experience(&trials, EXPERIENCE_CAPACITY, &EXPERIENCE_FLOOR)?;
+    let calibrated = calibrated(primitive, &runs, &EXPERIENCE_FLOOR)?;
+    let gathered = &calibrated.experience;
     let trials = u32::from(gathered.trials());
     primitive.experience =
         Some(ExperienceTable { trials, mean: rows(gathered.mean()), spread: rows(gathered.spread()) });
-    Ok(summary(trials, duration, gathered.mean(), gathered.spread()))
+    let empty_hand = Some(calibrated.empty_hand);
+    Ok(MemorySummary { empty_hand, ..summary(trials, duration, gathered.mean(), gathered.spread()) })
 }
 
 /// Progress of every sample of the movement itself with its index, and the duration of the movement that follows from it, s.
@@ -287,5 +301,6 @@ fn summary<const CHANNELS: usize>(
         points: mean.len(),
         extremes: (0..CHANNELS).map(extreme).collect(),
         spread: (0..CHANNELS).map(scatter).collect(),
+        empty_hand: None,
     }
 }

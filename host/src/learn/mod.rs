@@ -5,6 +5,7 @@
 //! angles, the fingers from a generated movement. What is reported is not the residual of the regression but the
 //! error of the primitive that was made, rolled out from the demonstration's start and compared sample by sample.
 
+mod calibration;
 pub mod feedback;
 mod fit;
 pub mod hand;

@@ -1,7 +1,8 @@
 //! The engine of `sil:`: core and session called directly, at the same slot times as on a board.
 //!
-//! Two things differ from a board. Computing takes no virtual time: torque frames are handed over at the very start of the control
-//! slot, about 0.2 ms earlier than under QEMU. And the session is polled once a slot instead of whenever the processor is free.
+//! Two things differ from a board. Computing takes the same virtual time in every cycle, where the board's differs by some
+//! microseconds from cycle to cycle. And the session, whose computing takes none, is polled once a slot instead of whenever the
+//! processor is free.
 
 use std::collections::VecDeque;
 
@@ -13,7 +14,7 @@ use device::{
 };
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
-use sim::{Plant, SLOT_TICKS, Ticks};
+use sim::{Plant, SLOT_TICKS, TICKS_PER_MICROSECOND, Ticks};
 
 use super::{Execute, SimulationError};
 
@@ -27,8 +28,16 @@ const LINE_ROOM: usize = 2048;
 /// Primitives the store holds, as in the firmware.
 const STORE_SLOTS: usize = 8;
 
-/// Ticks of the simulated clock in one microsecond.
-const TICKS_PER_MICROSECOND: u64 = 25;
+/// The first slot, in slots since power-up, as on the board (`docs/lockstep.md`).
+const FIRST_SLOT: Ticks = 10;
+
+/// From the beginning of a slot to its frames in the bus controller: what the image takes under QEMU, in the middle of its range.
+const fn computing(slot: Slot) -> Ticks {
+    match slot {
+        Slot::Control => 200 * TICKS_PER_MICROSECOND,
+        Slot::Request | Slot::Slow => 10 * TICKS_PER_MICROSECOND,
+    }
+}
 
 /// What both halves see of each other and of the board.
 #[derive(Default)]
@@ -120,6 +129,8 @@ pub(super) struct InProcess {
     queues: Queues,
     slot: Slot,
     next_slot: Ticks,
+    /// Frames that are still being computed, with the time at which they leave.
+    leaving: VecDeque<(Ticks, CanFrame)>,
     line: Vec<u8>,
 }
 
@@ -138,7 +149,8 @@ impl InProcess {
             session: Session::new(identity, ArmModel::new(Payload::SensorAndHand), RamStore::new()),
             queues: Queues::default(),
             slot: Slot::Request,
-            next_slot: SLOT_TICKS,
+            next_slot: FIRST_SLOT * SLOT_TICKS,
+            leaving: VecDeque::new(),
             line: Vec::new(),
         }
     }
@@ -148,9 +160,8 @@ impl InProcess {
         plant.advance(now);
         let now_us = now / TICKS_PER_MICROSECOND;
         self.core.slot(self.slot, now_us, &mut self.queues);
-        for frame in self.queues.transmitted.drain(..) {
-            plant.submit(now, frame);
-        }
+        let leave = now + computing(self.slot);
+        self.leaving.extend(self.queues.transmitted.drain(..).map(|frame| (leave, frame)));
         let room = LINE_ROOM.saturating_sub(plant.link_backlog());
         let mut port = Port { queues: &mut self.queues, core: &mut self.core, line: &mut self.line, room };
         self.session.poll(now_us, &mut port);
@@ -165,13 +176,19 @@ impl InProcess {
 
 impl Execute for InProcess {
     fn advance(&mut self, plant: &mut Plant, limit: Ticks) -> Result<Ticks, SimulationError> {
-        let horizon = self.next_slot.min(limit);
+        let leaving = self.leaving.front().map_or(Ticks::MAX, |(at, _)| *at);
+        let horizon = self.next_slot.min(leaving).min(limit);
         match plant.next_event() {
             Some(at) if at < horizon => {
                 let event = plant.event(at);
                 self.queues.received.extend(event.received);
                 if !event.link.is_empty() {
                     self.session.receive(&event.link);
+                }
+            }
+            _ if leaving <= horizon => {
+                if let Some((at, frame)) = self.leaving.pop_front() {
+                    plant.submit(at, frame);
                 }
             }
             _ if self.next_slot <= limit => self.slot(plant),

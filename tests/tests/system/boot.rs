@@ -7,7 +7,7 @@ use device::Stage;
 use sim::FrameClass;
 use system_tests::bus::{CYCLE_TICKS, position_requests, torques};
 use system_tests::execution::{distance, watch};
-use system_tests::{connect, expect, ready, simulation};
+use system_tests::{at_rest, connect, expect, ready, simulation};
 use tactus::procedure;
 
 /// How far the start of a position request may wander, ticks: interrupt and round (10 us) behind the rest of the longest
@@ -66,7 +66,7 @@ fn every_cycle_begins_on_the_300_hz_grid() {
 
 #[test]
 fn no_torque_flows_before_a_person_commands() {
-    let mut arm = ready("sim:seed=13");
+    let mut arm = at_rest("sim:seed=13");
     watch(&mut arm, 150);
     let plant = simulation(arm.transport()).plant();
     let sent = torques(plant.recorded());

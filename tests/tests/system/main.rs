@@ -9,3 +9,4 @@ mod journey;
 mod served_arm;
 mod sil_and_qemu;
 mod stopping;
+mod touch;

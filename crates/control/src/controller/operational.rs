@@ -115,6 +115,15 @@ impl<R: Real> OperationalController<R> {
             self.clamped |= kept != *desired;
             *desired = kept;
         }
+        // What feedback asks for beyond a soft limit is not wanted of this joint: the arm gives way as far as it can, and does not stop.
+        let limits = model.soft_min.iter().zip(&model.soft_max);
+        for ((desired, rate), (min, max)) in q_d.iter_mut().zip(self.dq_d.0.iter_mut()).zip(limits) {
+            let kept = at_most(at_least(*desired, *min), *max);
+            if kept != *desired {
+                (*desired, *rate) = (kept, R::of(0.0));
+                self.clamped = true;
+            }
+        }
         self.q_d = JointPositions(q_d);
         JointReference { q: self.q_d, dq: self.dq_d, ddq: JointAccelerations(ddq_d) }
     }

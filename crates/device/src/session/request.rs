@@ -148,6 +148,7 @@ impl<S: Store> Session<S> {
             }
             Request::UploadCommit => {
                 let slot = self.upload_commit()?;
+                self.preload(slot, port);
                 self.store_changed(now_ms, slot, port);
                 done
             }
@@ -186,6 +187,16 @@ impl<S: Store> Session<S> {
         }
         self.pending.push(Some((session, of)), now_ms);
         Ok(None)
+    }
+
+    /// Hands the primitive that has just been checked to the control half, so that its run need not be waited for. Where that cannot be
+    /// done now, the run does it.
+    fn preload(&mut self, slot: u8, port: &mut impl SessionPort) {
+        let Some(entry) = self.directory.get(slot) else { return };
+        if !self.pending.is_empty() || matches!(port.health().state, State::Run | State::Coast) {
+            return;
+        }
+        self.loaded = port.load(&self.primitive).is_ok().then(|| entry.clone());
     }
 
     /// Makes sure that the control half holds the primitive of this name, as it is in the store now.

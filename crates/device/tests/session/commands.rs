@@ -113,10 +113,11 @@ fn no_primitive_is_loaded_under_a_run_or_under_a_command_that_may_start_one() {
     rig.commanded(run("reach"));
     rig.bench.state = State::Run;
     assert_eq!(rig.refused(run("grasp")), (Refusal::State, [State::Run.code().into(), 0]));
+    rig.store("other", &image("other", 5.0, 10));
     rig.bench.state = State::Hold;
     assert_eq!(rig.ask(Request::Gravity), None);
     assert_eq!(rig.refused(run("grasp")).0, Refusal::CommandQueueFull);
-    assert_eq!(rig.bench.loaded, [3.0]);
+    assert_eq!(rig.bench.loaded, [3.0, 4.0, 3.0], "each upload at rest, and the first run");
 }
 
 #[test]
@@ -131,7 +132,7 @@ fn a_primitive_the_control_half_does_not_take_is_not_run() {
     assert_eq!(rig.bench.commands.len(), 1, "the old one would have run under the new name");
     rig.bench.load = Ok(());
     rig.commanded(run("grasp"));
-    assert_eq!(rig.bench.loaded, [3.0, 4.0]);
+    assert_eq!(rig.bench.loaded, [3.0, 4.0, 3.0, 4.0]);
 }
 
 #[test]

@@ -49,7 +49,7 @@ fn an_upload_is_stored_listed_and_read_back_to_the_last_byte() {
     let listed = listing(&mut rig, 0).unwrap();
     assert_eq!((listed.name.as_str(), listed.length as usize, listed.kernels), ("reach", image.len(), 25));
     assert_eq!((listed.crc, listed.duration), (link::image::stored_crc(&image), 3.0));
-    assert!(!listed.loaded && !listed.expectation);
+    assert!(listed.loaded && !listed.expectation, "what came last is ready to run");
     assert_eq!(read_back(&mut rig, "reach"), image);
     assert_eq!(listing(&mut rig, 1), None);
     assert_eq!(rig.refused(Request::List { index: 3 }), (Refusal::NoSuchPrimitive, [3, 0]));

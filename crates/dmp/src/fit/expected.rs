@@ -34,11 +34,12 @@ pub fn expected_wrench(
 /// The weights `K2` of Eq. (8) at `count` evenly spaced phases from the spread of `trials` recordings.
 ///
 /// `K2_i(u) = k_i/(sigma_i(u)^2 + sigma_min_i^2)` with `sigma_min_i` = `floor` times the root mean square of `sigma_i` over the
-/// phase, and `k_i` such that the mean over the phase is 1 before it is kept within [`WEIGHT_RANGE`]: a sensor counts more where it repeats itself, while `K1` keeps its
+/// phase, but at least `resolution[i]` (N or N m): what a sensor cannot tell, or the dead band behind it drops, is no reason to trust it
+/// less. `k_i` is such that the mean over the phase is 1 before it is kept within [`WEIGHT_RANGE`]: a sensor counts more where it repeats itself, while `K1` keeps its
 /// meaning in every row, whatever the units of the sensors. `sigma^2` is averaged around each phase first. A sensor that never moved has weight 1.
 ///
 /// # Errors
-/// [`TableError::Trials`] below [`FEWEST_TRIALS`], [`TableError::Negative`] for a floor that is not positive (without it a
+/// [`TableError::Trials`] below [`FEWEST_TRIALS`], [`TableError::Negative`] for a floor that is not positive or a negative resolution (without a floor a
 /// silent sensor would outweigh all others), [`TableError::Empty`], [`TableError::TooMany`] above [`GAIN_CAPACITY`],
 /// [`TableError::NotFinite`].
 pub fn weights_from_spread(
@@ -46,11 +47,12 @@ pub fn weights_from_spread(
     trials: usize,
     count: usize,
     floor: f64,
+    resolution: &[f64; SENSORS],
 ) -> Result<Vec<[f64; SENSORS]>, TableError> {
     if trials < FEWEST_TRIALS {
         return Err(TableError::Trials);
     }
-    if !(floor > 0.0 && floor.is_finite()) {
+    if !(floor > 0.0 && floor.is_finite()) || resolution.iter().any(|smallest| !(*smallest >= 0.0)) {
         return Err(TableError::Negative);
     }
     if spread.is_empty() || count == 0 {
@@ -70,7 +72,7 @@ pub fn weights_from_spread(
     let mut weights = phase_statistics(&[squares.as_slice()], count)?.mean;
     for sensor in 0..SENSORS {
         let mean = squares.iter().map(|(_, squares)| squares[sensor]).sum::<f64>() / squares.len() as f64;
-        let smallest = floor * floor * mean;
+        let smallest = (floor * floor * mean).max(resolution[sensor] * resolution[sensor]);
         if !(smallest > f64::MIN_POSITIVE) {
             weights.iter_mut().for_each(|point| point[sensor] = 1.0);
             continue;

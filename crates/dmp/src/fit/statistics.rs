@@ -81,8 +81,15 @@ pub fn phase_statistics<const CHANNELS: usize>(
 
 /// An experience of `count` phases from the recordings of successful runs.
 ///
+/// Runs that met their object in different places differ by far more than noise, and are not normally distributed: a
+/// standard deviation would make the outermost of them a failure. So the band goes by the envelope of the runs: the
+/// centre is the middle between the smallest and the largest of the runs' means at a phase and its two neighbours (the moment of
+/// contact shifts), and the spread is a quarter of their distance, of which normally distributed runs, 20 to 40 of them, span
+/// four. Of the fingers only closing too far is of interest: their centre is the mean, and their spread half the distance from
+/// there to the largest.
+///
 /// `floor` is the smallest spread of each channel: a few runs that agree by chance must not make the next one a failure.
-/// The variance is averaged with that of the neighbouring entries, because the spread of a few runs is itself uncertain.
+/// Samples beyond progress 1 count at 1, since whoever compares with the experience goes on with its end.
 ///
 /// # Errors
 /// [`TableError::Trials`] without a run, [`TableError::TooMany`] above [`EXPERIENCE_CAPACITY`], [`TableError::Spread`] for a floor
@@ -101,19 +108,42 @@ pub fn experience(
     if !floor.iter().all(|floor| *floor > 0.0 && floor.is_finite()) {
         return Err(TableError::Spread);
     }
-    let statistics = phase_statistics(trials, count)?;
-    let spread: Vec<[f64; EXPERIENCE_CHANNELS]> = (0..count)
-        .map(|i| {
-            let around = &statistics.spread[i.saturating_sub(1)..(i + 2).min(count)];
-            core::array::from_fn(|channel| {
-                let variance = around.iter().map(|point| point[channel] * point[channel]).sum::<f64>();
-                libm::sqrt(variance / around.len() as f64).max(floor[channel])
-            })
+    let means = trials
+        .iter()
+        .map(|trial| {
+            let held: Vec<_> = trial.iter().map(|(u, values)| (u.min(1.0), *values)).collect();
+            phase_statistics(&[held.as_slice()], count).map(|run| run.mean)
         })
-        .collect();
-    let runs = u16::try_from(statistics.trials).unwrap_or(u16::MAX);
-    Experience::new(&statistics.mean, &spread, runs)
+        .collect::<Result<Vec<_>, _>>()?;
+    let (mut centre, mut spread) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    for i in 0..count {
+        let (mut middle, mut width) = ([0.0; EXPERIENCE_CHANNELS], *floor);
+        for channel in 0..EXPERIENCE_CHANNELS {
+            let is_finger = channel >= FINGER_CHANNELS.start;
+            let around = if is_finger { i..i + 1 } else { i.saturating_sub(1)..(i + 2).min(count) };
+            let felt = || means.iter().flat_map(|run| &run[around.clone()]).map(|point| point[channel]);
+            let (low, high) =
+                felt().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+            let half = if is_finger {
+                middle[channel] = felt().sum::<f64>() / means.len() as f64;
+                high - middle[channel]
+            } else {
+                middle[channel] = 0.5 * (low + high);
+                0.5 * (high - low)
+            };
+            width[channel] = width[channel].max(half / ENVELOPE);
+        }
+        centre.push(middle);
+        spread.push(width);
+    }
+    Experience::new(&centre, &spread, u16::try_from(trials.len()).unwrap_or(u16::MAX))
 }
+
+/// Spreads from the centre of the runs to the outermost of them.
+const ENVELOPE: f64 = 2.0;
+
+/// Channels that are angles of fingers.
+const FINGER_CHANNELS: core::ops::Range<usize> = 9..EXPERIENCE_CHANNELS;
 
 /// The entries beside progress `u` and their shares; shares of 0 for a sample outside.
 fn places(u: f64, last: usize) -> [(usize, f64); 2] {

@@ -76,7 +76,7 @@ fn a_sensor_counts_more_where_it_repeats_itself_and_its_mean_weight_is_one() {
             point
         })
         .collect();
-    let weights = weights_from_spread(&spread, 3, 16, 0.5).unwrap();
+    let weights = weights_from_spread(&spread, 3, 16, 0.5, &[0.0; SENSORS]).unwrap();
     assert_eq!(weights.len(), 16);
     let mean = |sensor: usize| weights.iter().map(|point| point[sensor]).sum::<f64>() / 16.0;
     assert!((mean(0) - 1.0).abs() < 0.02, "{}", mean(0));
@@ -86,10 +86,13 @@ fn a_sensor_counts_more_where_it_repeats_itself_and_its_mean_weight_is_one() {
         assert!((point[1] - 1.0).abs() < 1e-9 && point[2] == 1.0, "{point:?}");
         assert!(point.iter().all(|weight| (1.0 / WEIGHT_RANGE..=WEIGHT_RANGE).contains(weight)));
     }
-    assert_eq!(weights_from_spread(&spread, 2, 16, 0.5).unwrap_err(), TableError::Trials);
-    assert_eq!(weights_from_spread(&spread, 3, 16, 0.0).unwrap_err(), TableError::Negative);
-    assert_eq!(weights_from_spread(&spread, 3, 33, 0.5).unwrap_err(), TableError::TooMany);
-    assert_eq!(weights_from_spread(&[], 3, 16, 0.5).unwrap_err(), TableError::Empty);
+    // Scatter below the resolution of a sensor is no scatter.
+    let even = weights_from_spread(&spread, 3, 16, 0.5, &[10.0; SENSORS]).unwrap();
+    assert!(even.iter().flatten().all(|weight| (weight - 1.0).abs() < 0.01), "{even:?}");
+    assert_eq!(weights_from_spread(&spread, 2, 16, 0.5, &[0.0; SENSORS]).unwrap_err(), TableError::Trials);
+    assert_eq!(weights_from_spread(&spread, 3, 16, 0.0, &[0.0; SENSORS]).unwrap_err(), TableError::Negative);
+    assert_eq!(weights_from_spread(&spread, 3, 33, 0.5, &[0.0; SENSORS]).unwrap_err(), TableError::TooMany);
+    assert_eq!(weights_from_spread(&[], 3, 16, 0.5, &[0.0; SENSORS]).unwrap_err(), TableError::Empty);
 }
 
 #[test]
@@ -99,10 +102,19 @@ fn an_experience_tells_how_many_spreads_a_run_is_away_and_never_divides_by_nothi
     let floor = [0.05; EXPERIENCE_CHANNELS];
     let known = experience(&slices(&trials), 64, &floor).unwrap();
     assert_eq!((known.trials(), known.mean().len()), (3, 64));
+    // The runs lie between -0.5 and 0.5 about the middle: two spreads to the outermost, and the slope between three neighbours on top.
+    let (middle, slope) = (known.mean_at(0.5), 4.0 / 63.0);
+    assert!((middle[0] - 2.0).abs() < 0.02 && (middle[11] - 2.0).abs() < 0.02, "{middle:?}");
+    assert!((known.spread_at(0.5)[0] - (0.5 + slope) / 2.0).abs() < 0.01, "{:?}", known.spread_at(0.5));
     let away = known.deviation(0.5, &[3.0; EXPERIENCE_CHANNELS]);
-    assert!((away[11] - 2.0).abs() < 0.02, "{away:?}");
+    assert!((away[11] - 4.0).abs() < 0.05, "{away:?}");
     let below = known.deviation(0.5, &[1.0; EXPERIENCE_CHANNELS]);
-    assert!((below[0] + 2.0).abs() < 0.02, "{below:?}");
+    assert!((below[0] + 2.0 / (0.5 + slope)).abs() < 0.1, "{below:?}");
+    // Of fingers only closing too far widens the band; of everything else both sides.
+    let lagging: Vec<Trial<EXPERIENCE_CHANNELS>> =
+        [-0.9, 0.0, 0.0, 0.0].map(|offset| trial(offset, 0.0, |_| 1.0)).to_vec();
+    let uneven = experience(&slices(&lagging), 8, &floor).unwrap();
+    assert!((uneven.spread_at(0.5)[0] - 0.225).abs() < 1e-3 && (uneven.spread_at(0.5)[9] - 0.1125).abs() < 1e-3);
     // Runs that agree to the last digit leave the floor.
     let same: Vec<Trial<EXPERIENCE_CHANNELS>> = vec![trials[0].clone(); 3];
     assert_eq!(experience(&slices(&same), 64, &floor).unwrap().spread_at(0.3)[4], 0.05);

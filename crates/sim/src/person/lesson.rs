@@ -4,16 +4,16 @@
 
 use super::path::{GuidePath, Leg};
 use crate::rotation::{add_scaled, exponential, multiply};
-use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, FRAC_PI_4, PI};
 
 /// Something a person teaches the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lesson {
     /// The demonstration of the first teaching: a side grasp of the small torch out of a turn about all axes of the hand.
     Demonstration,
-    /// A level side grasp of the flashlight: 45 degrees to the left of straight ahead, the palm 12 cm above the table.
+    /// A level side grasp of the flashlight: 60 degrees to the left of straight ahead, the palm 12 cm above the table.
     Flashlight,
-    /// The same for a cup: the palm 6 cm above the table, and 2 cm less far, for the cup is thick.
+    /// The same for a cup: 45 degrees to the left, the palm 6 cm above the table, and 2 cm less far, for the cup is thick.
     Cup,
     /// A grasp from above across a lying bottle, whose axis is world x where its yaw is 0; closing fingertips would touch the table.
     Bottle,
@@ -25,9 +25,9 @@ pub enum Lesson {
 const APPROACH: f64 = 0.42;
 
 /// Duration of an approach, s.
-const APPROACH_SECONDS: f64 = 10.0;
+const APPROACH_SECONDS: f64 = 12.0;
 
-/// Time in which the hand reaches and leaves its steady speed, s: 4.9 cm/s over 42 cm. Nobody who approaches something that topples
+/// Time in which the hand reaches and leaves its steady speed, s: 4 cm/s over 42 cm. Nobody who approaches something that topples
 /// arrives faster.
 const SOFT_ENDS: f64 = 1.5;
 
@@ -37,11 +37,19 @@ const CLOSING_SECONDS: f64 = 3.5;
 /// Height (m) and duration (s) of the lift.
 const LIFT: (f64, f64) = (0.10, 2.5);
 
+/// Direction of side grasps, rad to the left of straight ahead.
+const SIDE_AZIMUTH: f64 = FRAC_PI_4;
+
+/// The same for the flashlight: here the wrist (joint 6) has half a radian to spare on either side wherever the hand retreats and turns
+/// along the approach; at 45 degrees it meets its stop.
+const FLASHLIGHT_AZIMUTH: f64 = FRAC_PI_3;
+
 /// Where side grasps end, world x and y, m.
 const SIDE_GOAL: [f64; 2] = [0.75, 0.20];
 
-/// Where the grasp from above ends, m: 5.5 cm above the table. The fingers reach 6.8 cm beyond the grasp point as they close.
-const BOTTLE_GOAL: [f64; 3] = [0.62, 0.10, -0.095];
+/// Where the grasp from above ends, m: 2.5 cm above the table, the palm just above the bottle. The fingers reach 6.8 cm beyond the
+/// grasp point as they close: 4 cm into the table.
+const BOTTLE_GOAL: [f64; 3] = [0.62, 0.10, -0.125];
 
 impl Lesson {
     /// All lessons.
@@ -52,15 +60,21 @@ impl Lesson {
     pub fn path(self) -> GuidePath {
         match self {
             Self::Demonstration => super::side_grasp_path(),
-            Self::Flashlight => GuidePath::new(level_hand(), vec![side_approach(-0.03, self.short_of_object())]),
-            Self::Cup => GuidePath::new(level_hand(), vec![side_approach(-0.09, self.short_of_object())]),
+            Self::Flashlight => {
+                let approach = side_approach(FLASHLIGHT_AZIMUTH, -0.03, self.short_of_object());
+                GuidePath::new(level_hand(FLASHLIGHT_AZIMUTH), vec![approach])
+            },
+            Self::Cup => {
+                let approach = side_approach(SIDE_AZIMUTH, -0.09, self.short_of_object());
+                GuidePath::new(level_hand(SIDE_AZIMUTH), vec![approach])
+            },
             Self::Bottle => GuidePath::new(hand_down(), vec![from_above()]),
             Self::Lift => {
-                let approach = side_approach(-0.06, self.short_of_object());
+                let approach = side_approach(SIDE_AZIMUTH, -0.06, self.short_of_object());
                 let held = approach.end();
                 let up = add_scaled(held, LIFT.0, [0.0, 0.0, 1.0]);
                 let lift = Leg::straight(held, up, LIFT.1);
-                GuidePath::new(level_hand(), vec![approach, Leg::rest(held, CLOSING_SECONDS), lift])
+                GuidePath::new(level_hand(SIDE_AZIMUTH), vec![approach, Leg::rest(held, CLOSING_SECONDS), lift])
             }
         }
     }
@@ -73,9 +87,9 @@ impl Lesson {
     pub fn start(self) -> [f64; 7] {
         match self {
             Self::Demonstration => super::DEMONSTRATION_START,
-            Self::Flashlight => [-1.2001, 1.5209, 1.4540, 2.7009, -0.1928, -0.7217, 1.7148],
+            Self::Flashlight => [-1.2709, 1.6025, 1.5808, 2.1810, -0.2082, 0.1400, 1.7605],
             Self::Cup => [-1.2933, 1.6342, 1.3301, 2.6968, -0.3064, -0.6327, 1.6472],
-            Self::Bottle => [0.1029, 0.3395, -0.0333, 1.8077, 0.0132, 0.9946, 0.0643],
+            Self::Bottle => [0.1024, 0.3395, -0.0326, 1.8077, 0.0129, 0.9946, 0.0646],
             Self::Lift => [-1.2388, 1.5864, 1.4041, 2.7033, -0.2266, -0.6868, 1.6597],
         }
     }
@@ -85,9 +99,9 @@ impl Lesson {
     pub fn goal(self) -> [f64; 7] {
         match self {
             Self::Demonstration => super::DEMONSTRATION_GOAL,
-            Self::Flashlight => [-0.4639, 1.5634, 1.4731, 1.8028, -0.1703, -0.5615, 1.7533],
+            Self::Flashlight => [-0.4833, 1.6052, 1.5404, 1.6712, -0.2227, -0.1442, 1.7581],
             Self::Cup => [-0.5224, 1.6690, 1.4513, 1.8810, -0.2552, -0.5897, 1.7207],
-            Self::Bottle => [0.1689, 0.8372, -0.0162, 1.7791, 0.0239, 0.5255, 0.1373],
+            Self::Bottle => [0.1680, 0.8806, -0.0146, 1.7940, 0.0250, 0.4672, 0.1364],
             Self::Lift => [-0.4899, 1.4375, 1.4889, 1.8443, -0.0740, -0.5678, 1.7844],
         }
     }
@@ -113,16 +127,16 @@ impl Lesson {
     }
 }
 
-/// Palm level, hand z 45 degrees to the left of straight ahead, hand x straight down: the fingers close sideways, F3 from the
+/// Palm level, hand z to the left of straight ahead by the azimuth (rad), hand x straight down: the fingers close sideways, F3 from the
 /// right. Upside down compared with [`side_grasp_path`](super::side_grasp_path): so joint 7 is far from its stops out there.
-fn level_hand() -> [f64; 4] {
+fn level_hand(azimuth: f64) -> [f64; 4] {
     // A quarter turn about y takes z to straight ahead and x to straight down; then the whole hand turns to the approach.
-    multiply(exponential([0.0, 0.0, FRAC_PI_4]), exponential([0.0, FRAC_PI_2, 0.0]))
+    multiply(exponential([0.0, 0.0, azimuth]), exponential([0.0, FRAC_PI_2, 0.0]))
 }
 
-/// Along the level direction of approach to this height, `short` of the goal (m), slightly curved: it begins 3 cm to the left of the line and 2 cm above it.
-fn side_approach(height: f64, short: f64) -> Leg {
-    let (sine, cosine) = FRAC_PI_4.sin_cos();
+/// Along the level direction of approach (azimuth, rad) to this height (m), `short` of the goal (m), slightly curved: it begins 3 cm to the left of the line and 2 cm above it.
+fn side_approach(azimuth: f64, height: f64, short: f64) -> Leg {
+    let (sine, cosine) = azimuth.sin_cos();
     let (approach, left) = ([cosine, sine, 0.0], [-sine, cosine, 0.0]);
     let goal = add_scaled([SIDE_GOAL[0], SIDE_GOAL[1], height], -short, approach);
     let back = |distance: f64, aside: f64, above: f64| {
@@ -141,5 +155,5 @@ fn hand_down() -> [f64; 4] {
 fn from_above() -> Leg {
     let goal = BOTTLE_GOAL;
     let at = |back: f64, above: f64| [goal[0] - back, goal[1] - 0.5 * back, goal[2] + above];
-    Leg::new([at(0.12, 0.28), at(0.06, 0.30), at(0.0, 0.14), goal], [[0.0; 3]; 2], APPROACH_SECONDS)
+    Leg::new([at(0.12, 0.31), at(0.06, 0.33), at(0.0, 0.14), goal], [[0.0; 3]; 2], APPROACH_SECONDS)
 }

@@ -36,6 +36,7 @@ pub fn colour(mode: Mode) -> Colour {
         Mode::OpenLoop => "#D55E00",
         Mode::ForceControl => "#E9B44C",
         Mode::Adaptive => "#0072B2",
+        Mode::RigidFingers => "#009E73",
     }
 }
 

@@ -1,5 +1,6 @@
 //! Figures of an experiment.
 
+pub mod bars;
 pub mod drawing;
 pub mod forces;
 pub mod paths;
@@ -11,7 +12,7 @@ pub mod success_map;
 mod write;
 
 #[cfg(feature = "mujoco")]
-pub use write::{FigureError, write};
+pub use write::{FigureError, write, write_lift};
 
 #[cfg(test)]
 mod tests {

@@ -139,7 +139,10 @@ fn draw_panel(
     for (time, name) in marks {
         let [x, _] = frame.at([*time, frame.y[0]]);
         drawing.dashed(&[[x, frame.corner[1]], [x, frame.bottom()]], GREY, 1.2, [3.0, 4.0]);
-        if frame.corner[1] < TOP + 1.0 {
+        // Names side by side need room: 7 px a letter.
+        let next = marks.iter().map(|(later, _)| *later).filter(|later| later > time).fold(f64::INFINITY, f64::min);
+        let room = frame.at([next, 0.0])[0] - x > 7.0 * name.len() as f64 + 8.0;
+        if frame.corner[1] < TOP + 1.0 && room {
             drawing.text([x + 4.0, frame.corner[1] + 11.0], *name, 13, Anchor::Start, GREY);
         }
     }

@@ -54,10 +54,13 @@ pub fn draw(results: &Results, grid: &Grid, title: &str, radius: f64) -> Drawing
     drawing
 }
 
+/// Largest side of a cell, mm: where cells are farther apart, nothing is known of what is between them.
+const LARGEST: i32 = 40;
+
 /// Distance between neighbouring columns or rows, mm.
 fn pitch(values: &[i32]) -> f64 {
     let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    f64::from(steps.min().unwrap_or(40))
+    f64::from(steps.min().unwrap_or(LARGEST).min(LARGEST))
 }
 
 /// Shares of a cell by the simplest mode that holds there, and what is left.
@@ -111,6 +114,7 @@ fn legend(drawing: &mut Drawing, results: &Results, grid: &Grid, [x, top]: [f64;
             (Mode::OpenLoop, _) => "already in open loop",
             (Mode::ForceControl, _) => "with force control",
             (Mode::Adaptive, _) => "only with adaptation of the movement",
+            (Mode::RigidFingers, _) => "only if the fingers do not adapt",
         };
         drawing.text([text, y + 13.0], words, 16, Anchor::Start, INK);
         let count = format!("this mode: {} of {}", short(results.success_count(mode)), grid.cells.len());
@@ -144,7 +148,7 @@ mod tests {
             let held = match report.key.mode {
                 Mode::OpenLoop => false,
                 Mode::ForceControl => report.key.seed == 1,
-                Mode::Adaptive => true,
+                Mode::Adaptive | Mode::RigidFingers => true,
             };
             report.outcome = if held { Outcome::Held } else { Outcome::Missed };
         }

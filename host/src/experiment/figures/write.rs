@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use super::series::Expected;
-use super::{forces, paths, series, strip, success_map};
-use crate::experiment::Config;
+use super::{bars, forces, paths, series, strip, success_map};
+use crate::experiment::lift::{Carried, Case};
 use crate::experiment::mode::Mode;
-use crate::experiment::runner::Experiment;
+use crate::experiment::outcome::Measures;
+use crate::experiment::runner::{Experiment, telling};
 use crate::experiment::trace::CHANNELS;
 use crate::experiment::trial::Trial;
+use crate::experiment::{Config, Scenario, comparison};
 use crate::plot::PlotError;
 use crate::primitive_file::PrimitiveFile;
 
@@ -68,7 +70,29 @@ pub fn write(
         )?;
     }
     put(forces::draw(results, &format!("{title}: contact forces"), config.tipping_force()), "forces")?;
-    let shown = telling(&experiment.trials);
+    let modes = results.modes();
+    let several = |count: usize| if count == 1 { String::new() } else { format!(", mean of {count} seeds") };
+    let panel = |name: &str, unit: &str, scale: f64, value: fn(&Measures) -> f64, limit: Option<(f64, String)>| {
+        let title = format!("{name}, {unit}{}", several(results.seeds().len()));
+        bars::by_cell(results, &config.grid, &modes, title, move |measures| scale * value(measures), limit)
+    };
+    let mut panels: Vec<bars::Panel> = comparison::quantities(config.scenario)
+        .iter()
+        .filter(|_| config.scenario != Scenario::Flashlight)
+        .map(|quantity| panel(quantity.name, quantity.unit, quantity.scale, quantity.value, None))
+        .collect();
+    if let Some(limit) = config.object_at(&experiment.prepared.frame, Default::default()).crush_force {
+        let words = format!("crushed by {limit:.0} N");
+        let name = "largest force of a finger on the object";
+        panels.push(panel(name, "N", 1.0, |measures| measures.finger_peak_n, Some((limit, words))));
+    }
+    if !panels.is_empty() {
+        let below = "cell: object along the approach and sideways, cm";
+        put(bars::draw(&panels, &bars::members(&modes), &format!("{title}: mode against mode"), below), "bars")?;
+    }
+    let keys = telling(results);
+    let shown: Vec<&Trial> =
+        keys.iter().filter_map(|key| experiment.trials.iter().find(|trial| trial.report.key == *key)).collect();
     if !shown.is_empty() {
         let expected = expected(&config.primitive);
         let runs: Vec<_> = shown
@@ -92,27 +116,28 @@ pub fn write(
     Ok(written)
 }
 
-/// One trial of each mode in the cell that tells most: the adapted one held the object and the open loop did not; the nearest of them to the middle of
-/// all such cells' distances, neither the easiest nor the hardest.
-fn telling(trials: &[Trial]) -> Vec<&Trial> {
-    let find = |index: usize, mode: Mode| {
-        trials.iter().find(|trial| trial.report.key.index == index && trial.report.key.mode == mode)
-    };
-    let held = |index: usize, mode: Mode| find(index, mode).map(|trial| trial.report.outcome.is_success());
-    let mut cells: Vec<(f64, usize)> = trials
-        .iter()
-        .map(|trial| trial.report.key)
-        .filter(|key| key.mode == trials[0].report.key.mode)
-        .map(|key| (key.cell.distance(), key.index))
-        .collect();
-    cells.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let telling: Vec<usize> = cells
-        .iter()
-        .map(|(_, index)| *index)
-        .filter(|index| held(*index, Mode::Adaptive) == Some(true) && held(*index, Mode::OpenLoop) == Some(false))
-        .collect();
-    let chosen = telling.get(telling.len() / 2).or(cells.get(cells.len() / 2).map(|(_, index)| index));
-    chosen.map(|&index| Mode::ALL.into_iter().filter_map(|mode| find(index, mode)).collect()).unwrap_or_default()
+/// Writes the sag of every case of the experiment with a weight; `trials` of each case and mode.
+///
+/// # Errors
+/// [`FigureError`]
+pub fn write_lift(rows: &[Carried], trials: usize, folder: &Path) -> Result<(), FigureError> {
+    std::fs::create_dir_all(folder).map_err(|cause| FigureError::Folder { folder: folder.to_owned(), cause })?;
+    let mut modes: Vec<Mode> = rows.iter().map(|row| row.mode).collect();
+    modes.sort_unstable();
+    modes.dedup();
+    let groups = Case::ALL.into_iter().map(|case| {
+        let of = |mode: Mode| rows.iter().find(|row| row.case == case.name() && row.mode == mode);
+        let label = modes
+            .iter()
+            .find_map(|mode| of(*mode))
+            .map_or_else(String::new, |row| format!("{:.1} kg, {:.1} kg expected", row.carried_kg, row.remembered_kg));
+        (label, modes.iter().map(|mode| of(*mode).map(|row| row.sag_median_m * 1e3)).collect())
+    });
+    let title = format!("hand below its plan when it has lifted, mm, median of {trials} trials");
+    let panel = bars::Panel { title, groups: groups.collect(), limit: None };
+    let title = "Weight: what is expected does not sag";
+    bars::draw(&[panel], &bars::members(&modes), title, "weight carried, weight expected").write(folder, "sag")?;
+    Ok(())
 }
 
 /// What the primitive expects, over time: the experience of successful runs if there is one, else the rehearsals.

@@ -25,7 +25,7 @@ pub enum ObjectKind {
     Bottle,
     /// A can whose weight is the matter: 0.6 kg unless told otherwise, radius 30 mm, 160 mm tall.
     Weight,
-    /// A cup of paper: 0.05 kg, the size of the cup; a finger that presses with more than 6 N crushes it.
+    /// A cup of paper: 0.05 kg, the size of the cup; a finger that presses with more than 10 N crushes it.
     PaperCup,
 }
 
@@ -83,7 +83,7 @@ impl ObjectSpec {
                 radius: 0.040,
                 table_friction: 0.5,
                 finger_friction: 0.5,
-                crush_force: Some(6.0),
+                crush_force: Some(10.0),
                 ..plain
             },
         }
