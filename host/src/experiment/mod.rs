@@ -6,9 +6,9 @@
 //!                  '- Trace, Observation, Snapshot (first seed)           '-> Results -> Summary, map, figures
 //! ```
 
+pub mod comparison;
 #[cfg(feature = "mujoco")]
 pub mod config;
-pub mod comparison;
 pub mod figures;
 pub mod grid;
 pub mod inverse;
@@ -39,9 +39,9 @@ pub mod trace;
 pub mod trial;
 pub mod variation;
 
+pub use comparison::Comparison;
 #[cfg(feature = "mujoco")]
 pub use config::Config;
-pub use comparison::Comparison;
 pub use grid::{Cell, Grid};
 pub use mode::Mode;
 pub use outcome::Outcome;

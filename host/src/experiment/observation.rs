@@ -112,7 +112,8 @@ mod tests {
             digits: [0.0; 4],
             contact: Contact::default(),
         };
-        let observation = Observation { samples: (0..10).map(|k| sample(f64::from(k))).collect(), ..Observation::default() };
+        let observation =
+            Observation { samples: (0..10).map(|k| sample(f64::from(k))).collect(), ..Observation::default() };
         assert_eq!(observation.between(2.0, 4.0).iter().map(|s| s.time).collect::<Vec<_>>(), [2.0, 3.0]);
         assert!(observation.between(4.0, 2.0).is_empty());
         assert_eq!(observation.at(3.5).map(|s| s.time), Some(3.0));

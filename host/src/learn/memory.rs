@@ -29,9 +29,10 @@ const RESOLUTION: [f64; SENSORS] = {
 };
 
 /// Smallest spread of the channels of an experience: what objects and grasps that are all good differ by, however alike the
-/// gathered runs were. Force 0.5 N, torque 0.06 N m (that force at the distance of the fingers), gauges 0.075 N m, fingers 0.025 rad.
+/// gathered runs were. Force 0.5 N, torque 0.06 N m (that force at the distance of the fingers), gauges 0.15 N m (a finger
+/// that happens to carry the object alone), fingers 0.025 rad.
 const EXPERIENCE_FLOOR: [f64; EXPERIENCE_CHANNELS] =
-    [0.5, 0.5, 0.5, 0.06, 0.06, 0.06, 0.075, 0.075, 0.075, 0.025, 0.025, 0.025];
+    [0.5, 0.5, 0.5, 0.06, 0.06, 0.06, 0.15, 0.15, 0.15, 0.025, 0.025, 0.025];
 
 /// A recording must cover the movement from this progress at the latest to one minus this at the earliest.
 const MARGIN: f64 = 0.02;

@@ -72,11 +72,12 @@ pub fn weights_from_spread(
     let mut weights = phase_statistics(&[squares.as_slice()], count)?.mean;
     for sensor in 0..SENSORS {
         let mean = squares.iter().map(|(_, squares)| squares[sensor]).sum::<f64>() / squares.len() as f64;
-        let smallest = (floor * floor * mean).max(resolution[sensor] * resolution[sensor]);
-        if !(smallest > f64::MIN_POSITIVE) {
+        if !(floor * floor * mean > f64::MIN_POSITIVE) {
+            // Nothing to divide by, or equal weights that scaling would leave a rounding error beside 1.
             weights.iter_mut().for_each(|point| point[sensor] = 1.0);
             continue;
         }
+        let smallest = (floor * floor * mean).max(resolution[sensor] * resolution[sensor]);
         weights.iter_mut().for_each(|point| point[sensor] = 1.0 / (point[sensor] + smallest));
         let scale = count as f64 / weights.iter().map(|point| point[sensor]).sum::<f64>();
         for point in &mut weights {

@@ -25,9 +25,9 @@ pub enum Lesson {
 const APPROACH: f64 = 0.42;
 
 /// Duration of an approach, s.
-const APPROACH_SECONDS: f64 = 12.0;
+const APPROACH_SECONDS: f64 = 14.0;
 
-/// Time in which the hand reaches and leaves its steady speed, s: 4 cm/s over 42 cm. Nobody who approaches something that topples
+/// Time in which the hand reaches and leaves its steady speed, s: 3.4 cm/s over 42 cm. Nobody who approaches something that topples
 /// arrives faster.
 const SOFT_ENDS: f64 = 1.5;
 
@@ -63,11 +63,11 @@ impl Lesson {
             Self::Flashlight => {
                 let approach = side_approach(FLASHLIGHT_AZIMUTH, -0.03, self.short_of_object());
                 GuidePath::new(level_hand(FLASHLIGHT_AZIMUTH), vec![approach])
-            },
+            }
             Self::Cup => {
                 let approach = side_approach(SIDE_AZIMUTH, -0.09, self.short_of_object());
                 GuidePath::new(level_hand(SIDE_AZIMUTH), vec![approach])
-            },
+            }
             Self::Bottle => GuidePath::new(hand_down(), vec![from_above()]),
             Self::Lift => {
                 let approach = side_approach(SIDE_AZIMUTH, -0.06, self.short_of_object());
