@@ -9,7 +9,7 @@ use crate::setup::{ARM, Machine};
 use crate::shell;
 
 /// Features of the host packages with the MuJoCo world and its pictures.
-pub(crate) const WORLD: &str = "tactus/mujoco,sim/mujoco,sim/render";
+pub(crate) const WORLD: &str = "tactus/mujoco,sim/mujoco,sim/render,system-tests/mujoco";
 
 /// Builds the `tactus` command with the MuJoCo world, optimised; returns its path.
 pub(crate) fn host() -> Result<PathBuf> {

@@ -9,4 +9,5 @@ mod journey;
 mod served_arm;
 mod sil_and_qemu;
 mod stopping;
+#[cfg(feature = "mujoco")]
 mod touch;

@@ -47,8 +47,8 @@ const FLASHLIGHT_AZIMUTH: f64 = FRAC_PI_3;
 /// Where side grasps end, world x and y, m.
 const SIDE_GOAL: [f64; 2] = [0.75, 0.20];
 
-/// Where the grasp from above ends, m: 2.5 cm above the table, the palm just above the bottle. The fingers reach 6.8 cm beyond the
-/// grasp point as they close: 4 cm into the table.
+/// Where the grasp from above ends, m: 2.5 cm above the table, the palm just above the bottle and the open fingertips on the table.
+/// The fingers reach 6.8 cm beyond the grasp point as they close: 4 cm into the table.
 const BOTTLE_GOAL: [f64; 3] = [0.62, 0.10, -0.125];
 
 impl Lesson {

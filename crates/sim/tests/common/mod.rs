@@ -1,7 +1,11 @@
 //! A master of the bus for tests: it sends frames, lets virtual time pass and keeps what it hears.
 
-// Each test binary compiles this file for itself and uses a part of it.
-#![allow(dead_code, missing_docs, unreachable_pub)]
+#![allow(
+    dead_code,
+    missing_docs,
+    unreachable_pub,
+    reason = "each test program compiles this file for itself and uses a part of it"
+)]
 
 use puck::{
     CanFrame, Counts, Drives, Group, Node, Property, PropertyId, PropertyTable, Ratios, Reply, Transmission, get, set,
