@@ -37,8 +37,8 @@ const LATEST_WITH_FEEDBACK: f64 = 1.15;
 /// Control periods in which the feedback fades out when the sensor falls silent: 100 ms.
 pub(crate) const FADE: u16 = 30;
 
-/// Control periods after the end of the movement in which the displacement of the plan stops to change: 0.3 s. It stays,
-/// because a plan that springs back tips what has just been grasped.
+/// Control periods after the end of the movement in which the feedback stops to change: 0.3 s. It stays as it was computed last, because
+/// a plan that springs back tips what has just been grasped. What is held is a sample of the force, not the displacement of the plan.
 const LATCH: u16 = 90;
 
 /// Largest distance of a digit of the hand from where the primitive starts (rad).
