@@ -87,7 +87,7 @@ pub struct HandAngles<R> {
     pub inner: [R; 3],
     /// Outer link of each finger relative to its inner link; the mechanical bend of about 42 degrees is not included.
     pub outer: [R; 3],
-    /// Spread, 0 with the fingers on one side.
+    /// Spread; at 0 F1 and F2 stand opposite F3.
     pub spread: R,
 }
 

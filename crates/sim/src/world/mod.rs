@@ -27,7 +27,7 @@ pub struct HandState {
     pub inner: [f64; 3],
     /// Outer links relative to the inner ones, rad, in Barrett's zero (without the some 42 degrees of bend).
     pub outer: [f64; 3],
-    /// Spread, rad; 0 with all fingers on one side.
+    /// Spread, rad; at 0 F1 and F2 stand opposite F3.
     pub spread: f64,
     /// Torque of the drive on each inner link about its joint, N m, positive closing.
     pub inner_load: [f64; 3],
