@@ -37,10 +37,6 @@ const LATEST_WITH_FEEDBACK: f64 = 1.15;
 /// Control periods in which the feedback fades out when the sensor falls silent: 100 ms.
 pub(crate) const FADE: u16 = 30;
 
-/// Control periods after the end of the movement in which the feedback stops to change: 0.3 s. It stays as it was computed last, because
-/// a plan that springs back tips what has just been grasped. What is held is a sample of the force, not the displacement of the plan.
-const LATCH: u16 = 90;
-
 /// Largest distance of a digit of the hand from where the primitive starts (rad).
 const HAND_DISTANCE: f64 = 0.15;
 
@@ -66,8 +62,8 @@ pub(crate) struct Run<R: Real, const N: usize> {
     watch: Watch<R>,
     /// Control periods of fading left: `FADE` in full, 0 gone.
     kept: u16,
-    /// Control periods since the movement's end, up to `LATCH`.
-    ended: u16,
+    /// The movement has ended, and the plan stays as the feedback has bent it.
+    settled: bool,
     rested: u16,
 }
 
@@ -116,7 +112,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             deviation: None,
             watch: Watch::new(),
             kept: FADE,
-            ended: 0,
+            settled: false,
             rested: 0,
         };
         // The first speed acts at once; later ones are approached at the rollout's slew rate.
@@ -175,19 +171,22 @@ impl<R: Real, const N: usize> Run<R, N> {
             self.deviation =
                 primitive.expected().map(|expected| Deviation::new(&expected.at(progress), wrench, gauges));
         }
-        if let Some(deviation) = self.deviation.filter(|_| self.options.feedback && senses == Senses::Fresh) {
+        let bends = self.options.feedback && !self.settled;
+        if let Some(deviation) = self.deviation.filter(|_| bends && senses == Senses::Fresh) {
             let seen = if self.options.finger_feedback {
                 deviation
             } else {
                 Deviation { gauges: [R::of(0.0); 3], ..deviation }
             };
-            let wanted = self.rollout.coupling(primitive, &seen.sensors(), &SensorMap::IDENTITY);
-            self.coupling = blend(&self.coupling, &wanted, self.follows());
+            self.coupling = self.rollout.coupling(primitive, &seen.sensors(), &SensorMap::IDENTITY);
         }
-        if self.rollout.is_finished() {
-            self.ended = LATCH.min(self.ended + 1);
+        // A plan that springs back tips what has just been grasped, and one that goes on giving way pulls at it.
+        if bends && self.rollout.is_finished() && self.kept == FADE {
+            self.rollout.settle();
+            self.coupling = Coupling::NONE;
+            self.settled = true;
         }
-        let coupling = blend(&Coupling::NONE, &self.coupling, self.kept());
+        let coupling = part(&self.coupling, self.kept());
         let plan = self.rollout.step(primitive, R::of(PERIOD), &coupling);
         let slow =
             |speeds: &[R], limit: f64| speeds.iter().all(|speed| *speed < R::of(limit) && *speed > R::of(-limit));
@@ -229,11 +228,6 @@ impl<R: Real, const N: usize> Run<R, N> {
         R::from_counts(i32::from(self.kept)) * R::of(1.0 / FADE as f64)
     }
 
-    /// Share of a change of the feedback that acts: 1 up to the end of the movement, then less.
-    fn follows(&self) -> R {
-        R::from_counts(i32::from(LATCH - self.ended)) * R::of(1.0 / LATCH as f64)
-    }
-
     /// Whether the feedback or the force controller acts with less than it would: the sensor is silent, or the run takes
     /// another time than the recording of the expectation.
     pub(crate) fn is_faded(&self, primitive: &Primitive<R, N>) -> bool {
@@ -258,13 +252,12 @@ impl<R: Real, const N: usize> Run<R, N> {
     }
 }
 
-/// From one feedback towards another, by `share`.
-fn blend<R: Real>(from: &Coupling<R>, to: &Coupling<R>, share: R) -> Coupling<R> {
-    let mix = |from: R, to: R| from + (to - from) * share;
+/// A share of a feedback.
+fn part<R: Real>(of: &Coupling<R>, share: R) -> Coupling<R> {
     Coupling {
-        position: core::array::from_fn(|row| mix(from.position[row], to.position[row])),
-        orientation: core::array::from_fn(|row| mix(from.orientation[row], to.orientation[row])),
-        hand: core::array::from_fn(|row| mix(from.hand[row], to.hand[row])),
+        position: of.position.map(|value| value * share),
+        orientation: of.orientation.map(|value| value * share),
+        hand: of.hand.map(|value| value * share),
     }
 }
 

@@ -65,4 +65,10 @@ impl<T: Scalar, const D: usize> Group<T, D> {
         }
         Ok(())
     }
+
+    /// The present values become the goal.
+    pub(crate) fn settle(&mut self) {
+        self.goal = self.state.map(|state| state.x());
+        self.commanded = self.goal;
+    }
 }

@@ -211,6 +211,15 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
         self.hand.command(goal, self.goal_filter.is_some())
     }
 
+    /// Makes the place where the plan is now its goal, in all rows: what the feedback has bent stays as it is when the feedback ends. The
+    /// phase runs on, so what is left of the forcing term (`s` of it) still fades out about the new goal.
+    pub fn settle(&mut self) {
+        self.position.settle();
+        self.posture.settle();
+        self.hand.settle();
+        self.orientation.settle();
+    }
+
     /// Goal filter `tau gd = a_g (g_commanded - g)` for the goals set from now on; 12.5 is a usual `a_g`.
     ///
     /// `None` (the default, as in the paper) lets goals act at once, including one the filter has not reached yet.

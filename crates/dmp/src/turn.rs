@@ -105,4 +105,13 @@ impl<T: Scalar> Turn<T> {
             Self::Vector { group, .. } => group.goal = group.commanded,
         }
     }
+
+    /// The present orientation becomes the goal.
+    pub(crate) fn settle(&mut self) {
+        match self {
+            // Of the sign that the path has now: it is the near one by itself.
+            Self::Quaternion { state, goal, commanded, .. } => (*goal, *commanded) = (state.q, state.q),
+            Self::Vector { group, .. } => group.settle(),
+        }
+    }
 }

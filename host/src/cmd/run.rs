@@ -18,7 +18,7 @@ use crate::primitive_file::PrimitiveFile;
 use crate::procedure::{
     self, Change, ChangeKind, FlagCounts, Mode, ProcedureError, RunOutcome, RunRequest, Surprise, recording_text,
 };
-use crate::tracking::Tracking;
+use crate::tracking::{HandTracking, Tracking};
 
 /// Rest that is recorded at the goal, s.
 const AFTERGLOW: f64 = 1.0;
@@ -44,6 +44,9 @@ pub struct Cmd {
     /// How force enters the run
     #[arg(long, value_enum, default_value_t)]
     pub mode: Mode,
+    /// Stiff gains in every mode: for a hand that must keep its place where nothing pushes
+    #[arg(long)]
+    pub stiff: bool,
     /// Let the fingers keep to their plan, whatever their gauges feel
     #[arg(long)]
     pub no_finger_feedback: bool,
@@ -73,8 +76,12 @@ pub struct Report {
     pub mode: Mode,
     /// Duration of the movement, s.
     pub duration_s: f64,
-    /// How well the plan was kept.
-    pub tracking: Tracking,
+    /// How well the tool kept to the plan; none where a hand alone is driven.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracking: Option<Tracking>,
+    /// How well the digits kept to the plan, where a hand alone is driven.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hand_tracking: Option<HandTracking>,
     /// Samples in the recording, and how many the link lost.
     pub samples: usize,
     /// Telemetry messages lost.
@@ -173,11 +180,13 @@ fn play(
     let name =
         link::Name::new(&file.name).map_err(|error| crate::transport::TransportError::other(error.to_string()))?;
     let goal = Goal { position: command.goal.map(|goal| goal.map(|value| value as f32)), orientation: None };
+    let usual = command.mode.options();
     let options = RunOptions {
         goal,
         speed: command.speed as f32,
         finger_feedback: !command.no_finger_feedback,
-        ..command.mode.options()
+        compliant: usual.compliant && !command.stiff,
+        ..usual
     };
     let changes = command.goal_at.iter().chain(&command.speed_at).copied().collect();
     let request = RunRequest { rest: AFTERGLOW, changes, ..RunRequest::new(name, file.duration, options) };
@@ -199,7 +208,7 @@ fn play(
     let outcome = outcome?;
     tell(&outcome, output);
     let statistics = client.statistics()?;
-    report(client, file, command.mode, &bytes, outcome, &statistics)
+    report(client, file, command.mode, &request.name, &bytes, outcome, &statistics)
 }
 
 /// Says what a person should know about how the run went.
@@ -278,13 +287,13 @@ fn report(
     client: &mut Client<Device>,
     file: &PrimitiveFile,
     mode: Mode,
+    name: &link::Name,
     bytes: &[u8],
     outcome: RunOutcome,
     statistics: &Statistics,
 ) -> Result<Report, ProcedureError> {
     let unreadable = |error: &dyn std::fmt::Display| std::io::Error::other(format!("it reads back wrong: {error}"));
     let recording = Recording::parse(Path::new("run"), bytes).map_err(|error| unreadable(&error))?;
-    let tracking = Tracking::of_run(&recording).map_err(|error| unreadable(&error))?;
     let ticks_per_second = client.hello().ticks_per_second;
     let counts_instructions = client.hello().board.as_str().starts_with("mps2");
     let instructions = |ticks: u32| {
@@ -301,11 +310,18 @@ fn report(
             hash: format!("{:016x}", trace.hash),
         }
     });
+    // Asked last: the bus goes on meanwhile, and its figures are those at the end of the run.
+    let (tracking, hand_tracking) = if procedure::drives_arm(client, name)? {
+        (Some(Tracking::of_run(&recording).map_err(|error| unreadable(&error))?), None)
+    } else {
+        (None, Some(HandTracking::of_run(&recording).map_err(|error| unreadable(&error))?))
+    };
     Ok(Report {
         name: file.name.clone(),
         mode,
-        duration_s: tracking.samples as f64 / RATE,
+        duration_s: recording.running().len() as f64 / RATE,
         tracking,
+        hand_tracking,
         samples: outcome.samples,
         gaps,
         limited_samples: outcome.flags.limited,
@@ -326,25 +342,26 @@ fn report(
 impl Report {
     /// The report as a table for people.
     pub fn to_text(&self) -> String {
-        let tracking = &self.tracking;
         let mut table = Table::new(["run", &self.name]);
         let mut row = |name: &str, value: String| {
             table.row([name.to_owned(), value]);
         };
         row("mode", self.mode.name().to_owned());
         row("duration", format!("{:.2} s", self.duration_s));
-        row(
-            "tracking, RMS",
-            format!("{:.2} mm  {:.2} deg", tracking.position_rms_m * 1e3, tracking.orientation_rms_rad.to_degrees()),
-        );
-        row(
-            "tracking, worst",
-            format!("{:.2} mm  {:.2} deg", tracking.position_max_m * 1e3, tracking.orientation_max_rad.to_degrees()),
-        );
-        row(
-            "error at the goal",
-            format!("{:.2} mm  {:.2} deg", tracking.position_end_m * 1e3, tracking.orientation_end_rad.to_degrees()),
-        );
+        if let Some(tracking) = &self.tracking {
+            let pose = |metres: f64, radians: f64| format!("{:.2} mm  {:.2} deg", metres * 1e3, radians.to_degrees());
+            row("tracking, RMS", pose(tracking.position_rms_m, tracking.orientation_rms_rad));
+            row("tracking, worst", pose(tracking.position_max_m, tracking.orientation_max_rad));
+            row("error at the goal", pose(tracking.position_end_m, tracking.orientation_end_rad));
+        }
+        if let Some(tracking) = &self.hand_tracking {
+            let digits = |[spread, first, second, third]: [f64; 4]| {
+                format!("spread {spread:.3}, fingers {first:.3}, {second:.3}, {third:.3} rad")
+            };
+            row("tracking, RMS", digits(tracking.rms_rad));
+            row("tracking, worst", digits(tracking.max_rad));
+            row("error at the goal", digits(tracking.end_rad));
+        }
         row("cycles since power-up", self.cycles.to_string());
         row("missed deadlines", self.missed_deadlines.to_string());
         row("lost replies", self.lost_replies.to_string());

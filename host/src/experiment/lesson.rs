@@ -50,23 +50,22 @@ struct Handling {
     closed: f64,
     /// K1/K of the position rows sideways and upwards, m/N; `None`: as recommended.
     compliance: Option<[f64; 2]>,
-    /// Farthest that the plan gives way, m; `None`: as recommended.
-    farthest: Option<f64>,
+    /// Whether the plan turns by what it feels.
+    turns: bool,
     /// K of the hand rows and their K1/K, rad/(N m); `None`: as recommended.
     fingers: Option<[f64; 2]>,
 }
 
 impl Handling {
     fn of(scenario: Scenario) -> Handling {
-        let usual = Handling { closing: 3.5, closed: 2.35, compliance: None, farthest: None, fingers: None };
+        let usual = Handling { closing: 3.5, closed: 2.35, compliance: None, turns: true, fingers: None };
         // A light cup slides at 1 N: half of that must bend the plan by its whole reach, and 0.3 N of it are the dead band.
         let light = Some([2.0, 0.0]);
         match scenario {
             Scenario::Flashlight | Scenario::Lift => usual,
             Scenario::Cup => Handling { compliance: light, ..usual },
-            // What is in the way is below: the hand gives way upwards, but not so far that the fingers close above the bottle. Fingers that
-            // sweep along a table take their time.
-            Scenario::Bottle => Handling { closing: 7.0, compliance: Some([0.2, 1.0]), farthest: Some(0.09), ..usual },
+            // What is in the way is below: the hand gives way upwards and nowhere else. Fingers that sweep along a table take their time.
+            Scenario::Bottle => Handling { closing: 7.0, compliance: Some([0.0, 0.5]), turns: false, ..usual },
             // What a finger can crush is touched slowly, and the plan of the fingers is quick enough (K) and gives way enough (K1) to end
             // where they touch. They close to 0.4 rad beyond the cup, in both modes.
             Scenario::Fingers => {
@@ -163,7 +162,7 @@ pub fn rehearsed(config: &Config, interrupt: &Interrupt) -> Result<PrimitiveFile
     let seeds: Vec<u64> = (1..=REHEARSALS).collect();
     // A weight is only felt where it is lifted: an arm that gives way would leave it on the table.
     let exact = config.scenario == Scenario::Lift;
-    let options = if exact { procedure::Mode::Track.options() } else { Mode::OpenLoop.options() };
+    let options = if exact { procedure::Mode::Track.options() } else { config.scenario.options(Mode::OpenLoop) };
     let runs = in_parallel(config.jobs, &seeds, |seed| rehearsal(&movement, &arm, scene, *seed, options, interrupt));
     let recordings = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
     remember_rehearsals(&mut primitive, &recordings, movement.duration, Payload::default(), true)?;
@@ -188,10 +187,11 @@ fn in_parallel<Item: Sync, Done: Send>(jobs: usize, items: &[Item], work: impl F
     done
 }
 
-/// The person shows the movement on an empty table.
+/// The person shows the movement on an empty table; one that shall find the table in its way, without it.
 fn teach(scenario: Scenario, arm: &Arm, interrupt: &Interrupt) -> Result<Recording, LessonError> {
     let lesson = scenario.lesson();
-    let mut options = plant::options(arm, LESSON_SEED, lesson.start(), Scene::EMPTY);
+    let scene = if scenario == Scenario::Bottle { Scene::NOTHING } else { Scene::EMPTY };
+    let mut options = plant::options(arm, LESSON_SEED, lesson.start(), scene);
     (options.person, options.lesson) = (Some(LESSON_SEED), lesson);
     let mut client = trial::connect(&options, interrupt)?;
     procedure::make_ready(&mut client, true, |_| {})?;
@@ -256,10 +256,12 @@ fn learn(scenario: Scenario, recording: &Recording, file: &Path) -> Result<Primi
     let mut primitive = learn::learn(recording, file, &options)?.primitive;
     let [position, _, _, hand] = primitive.gains.map(|gain| gain.stiffness);
     if let Some(feedback) = &mut primitive.feedback {
-        feedback.clamps[0] = handling.farthest.unwrap_or(feedback.clamps[0]);
         for row in &mut feedback.k1 {
             if let (Some([sideways, upwards]), [x, y, z, ..]) = (handling.compliance, row.as_mut_slice()) {
                 (*x, *y, *z) = (sideways * position, sideways * position, upwards * position);
+            }
+            if let (false, Some(rotation)) = (handling.turns, row.get_mut(3..6)) {
+                rotation.fill(0.0);
             }
             if let (Some([_, compliance]), Some(fingers)) = (handling.fingers, row.get_mut(7..)) {
                 fingers.fill(compliance * hand);

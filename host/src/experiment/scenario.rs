@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use link::RunOptions;
 use serde::{Deserialize, Serialize};
 use sim::person::Lesson;
 
@@ -77,6 +78,14 @@ impl Scenario {
             Scenario::Lift => vec![Mode::Adaptive],
             Scenario::Fingers => vec![Mode::Adaptive, Mode::RigidFingers],
         }
+    }
+
+    /// What the device is asked for in a mode. All modes of a scenario have the same gains.
+    ///
+    /// What stands is approached with compliant gains, so that a touch moves the arm before it topples the object. A hand above a table needs its
+    /// height: with compliant gains it sags by its own friction as much as it shall give way, so there the gains are stiff.
+    pub fn options(self, mode: Mode) -> RunOptions {
+        RunOptions { compliant: self != Scenario::Bottle, ..mode.options() }
     }
 
     /// Whether the movement itself lifts the object.

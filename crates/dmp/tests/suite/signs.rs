@@ -396,3 +396,35 @@ fn world_rates_turn_with_the_hand() {
     let difference: f64 = row.omega.iter().zip(row.omega_world()).map(|(a, b)| (a - b).abs()).sum();
     assert!(difference > 0.05);
 }
+
+#[test]
+fn a_plan_that_settles_stays_where_its_feedback_has_bent_it() {
+    for error in [OrientationError::Quaternion, OrientationError::RotationVector] {
+        // Without forcing: at rest at its end, as a fitted plan is.
+        let (start, goal) = (Plan::golden().start, Plan::golden().goal);
+        let primitive = Plan { orientation_error: error, start, goal, ..Plan::empty() }.build::<f64>();
+        let bent =
+            Coupling { position: [6.0, -4.0, 3.0], orientation: [20.0, 10.0, -15.0], hand: [0.0, 40.0, 40.0, 40.0] };
+        let ticks = (primitive.duration() * 300.0) as usize;
+        let play = |settles: bool| {
+            run(&primitive, 4 * ticks, DT, |tick, rollout| {
+                if settles && tick == ticks {
+                    rollout.settle();
+                }
+                if tick < ticks { bent } else { Coupling::NONE }
+            })
+        };
+        let (kept, freed) = (play(true), play(false));
+        let (at_end, settled, sprung) = (&kept[ticks], &kept[4 * ticks - 1], &freed[4 * ticks - 1]);
+        let apart = |a: &Row, b: &Row| {
+            let way = (0..3).map(|i| (a.position.x[i] - b.position.x[i]).powi(2)).sum::<f64>().sqrt();
+            let turn = a.orientation.quaternion.conjugate().product(&b.orientation.quaternion).angle();
+            (way, turn, (a.hand.x[1] - b.hand.x[1]).abs())
+        };
+        let (way, turn, finger) = apart(at_end, settled);
+        assert!(way < 1e-3 && turn < 1e-2 && finger < 1e-3, "{error:?}: {way} m, {turn} rad, {finger} rad");
+        // Negative control: without it the plan springs back to its goal.
+        let (way, turn, finger) = apart(at_end, sprung);
+        assert!(way > 0.03 && turn > 0.05 && finger > 0.1, "{error:?}: {way} m, {turn} rad, {finger} rad");
+    }
+}

@@ -1,0 +1,38 @@
+//! `tactus compare`: how two recordings of the same movement differ.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{Exit, Failure, Global};
+use crate::demonstration::Recording;
+use crate::difference::Difference;
+
+/// Options of `compare`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// Recording of a run, CSV
+    #[arg(value_name = "ONE")]
+    pub one: PathBuf,
+    /// Recording of another run of the same movement, CSV
+    #[arg(value_name = "OTHER")]
+    pub other: PathBuf,
+    /// Force that counts as a contact, N
+    #[arg(long, default_value_t = 1.0, value_name = "NEWTON")]
+    pub contact: f64,
+}
+
+/// Compares.
+///
+/// # Errors
+/// A recording cannot be read, or lacks what is compared.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    let invalid = |cause: Box<dyn std::error::Error + Send + Sync>| {
+        Failure::new(Exit::Invalid, "E613", "compare", cause)
+            .help("tactus run PRIMITIVE --record FILE makes a recording")
+    };
+    let one = Recording::read(&command.one).map_err(|cause| invalid(cause.into()))?;
+    let other = Recording::read(&command.other).map_err(|cause| invalid(cause.into()))?;
+    let difference = Difference::between(&one, &other, command.contact).map_err(|cause| invalid(cause.into()))?;
+    global.output().result(&difference, difference.to_string())
+}

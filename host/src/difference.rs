@@ -1,0 +1,170 @@
+//! How two executions of the same movement differ, cycle by cycle: what `tactus compare` shows, and what must be small between the
+//! firmware and the same application in this process.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::demonstration::{RATE, Recording, angle_between};
+
+/// Largest differences over a part of two runs.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Largest {
+    /// Cycles compared.
+    pub samples: usize,
+    /// Of any joint angle, rad.
+    pub joint_rad: f64,
+    /// Between the measured positions, m.
+    pub position_m: f64,
+    /// Between the measured orientations, rad.
+    pub orientation_rad: f64,
+    /// Between the planned positions, m; 0 without those columns.
+    pub plan_m: f64,
+    /// Of any component of the force, N.
+    pub force_n: f64,
+    /// Of any joint torque, N m; 0 without those columns.
+    pub torque_nm: f64,
+}
+
+/// How two runs differ.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Difference {
+    /// In the first cycle of the run.
+    pub start: Largest,
+    /// From the first cycle until either feels a contact.
+    pub before_contact: Largest,
+    /// When that was, s after the first cycle; `None`: never.
+    pub contact_s: Option<f64>,
+    /// Over all cycles that both have.
+    pub whole: Largest,
+}
+
+/// Why two recordings cannot be compared.
+#[derive(Debug, Error)]
+pub enum DifferenceError {
+    /// Something to compare is missing.
+    #[error("{file}: joint angles, measured pose and wrench (q1_rad.., x_m..qz, fx_N..tz_Nm) are needed", file = file.display())]
+    Columns {
+        /// The file.
+        file: PathBuf,
+    },
+    /// No sample is left to compare.
+    #[error("{file}: there is no sample in state `run`", file = file.display())]
+    NoRun {
+        /// The file.
+        file: PathBuf,
+    },
+}
+
+/// The columns of one run that are compared.
+struct Run<'a> {
+    index: Vec<usize>,
+    q: &'a [[f64; 7]],
+    position: &'a [[f64; 3]],
+    orientation: &'a [[f64; 4]],
+    wrench: &'a [[f64; 6]],
+    plan: Option<&'a [[f64; 3]]>,
+    torque: Option<&'a [[f64; 7]]>,
+}
+
+impl<'a> Run<'a> {
+    fn of(recording: &'a Recording) -> Result<Run<'a>, DifferenceError> {
+        let missing = || DifferenceError::Columns { file: recording.file.clone() };
+        let first = recording.time.first().ok_or_else(|| DifferenceError::NoRun { file: recording.file.clone() })?;
+        Ok(Run {
+            // Samples that the link lost leave a gap: cycles are matched by their number since the first one.
+            index: recording.time.iter().map(|time| ((time - first) * RATE).round() as usize).collect(),
+            q: recording.q.as_deref().ok_or_else(missing)?,
+            position: recording.position.as_deref().ok_or_else(missing)?,
+            orientation: recording.orientation.as_deref().ok_or_else(missing)?,
+            wrench: recording.wrench.as_deref().ok_or_else(missing)?,
+            plan: recording.position_d.as_deref(),
+            torque: recording.tau.as_deref(),
+        })
+    }
+
+    fn force(&self, sample: usize) -> f64 {
+        let [x, y, z, ..] = self.wrench[sample];
+        (x * x + y * y + z * z).sqrt()
+    }
+}
+
+impl Largest {
+    fn take(&mut self, one: &Run<'_>, a: usize, other: &Run<'_>, b: usize) {
+        let distance = |p: &[f64; 3], q: &[f64; 3]| (0..3).map(|axis| (p[axis] - q[axis]).powi(2)).sum::<f64>().sqrt();
+        let apart = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(p, q)| (p - q).abs()).fold(0.0, f64::max);
+        self.samples += 1;
+        self.joint_rad = self.joint_rad.max(apart(&one.q[a], &other.q[b]));
+        self.position_m = self.position_m.max(distance(&one.position[a], &other.position[b]));
+        self.orientation_rad = self.orientation_rad.max(angle_between(&one.orientation[a], &other.orientation[b]));
+        self.force_n = self.force_n.max(apart(&one.wrench[a][..3], &other.wrench[b][..3]));
+        if let (Some(one), Some(other)) = (one.plan, other.plan) {
+            self.plan_m = self.plan_m.max(distance(&one[a], &other[b]));
+        }
+        if let (Some(one), Some(other)) = (one.torque, other.torque) {
+            self.torque_nm = self.torque_nm.max(apart(&one[a], &other[b]));
+        }
+    }
+}
+
+impl Difference {
+    /// Compares the parts of two recordings in which a plan was played. A contact is a force above `contact` (N).
+    ///
+    /// # Errors
+    /// [`DifferenceError`].
+    pub fn between(one: &Recording, other: &Recording, contact: f64) -> Result<Difference, DifferenceError> {
+        let (one, other) = (one.running(), other.running());
+        let (one, other) = (Run::of(&one)?, Run::of(&other)?);
+        let [mut start, mut before_contact, mut whole] = [Largest::default(); 3];
+        let mut contact_s = None;
+        let mut b = 0;
+        for (a, index) in one.index.iter().enumerate() {
+            while other.index.get(b).is_some_and(|other| other < index) {
+                b += 1;
+            }
+            if other.index.get(b) != Some(index) {
+                continue;
+            }
+            if contact_s.is_none() && (one.force(a) > contact || other.force(b) > contact) {
+                contact_s = Some(*index as f64 / RATE);
+            }
+            if whole.samples == 0 {
+                start.take(&one, a, &other, b);
+            }
+            if contact_s.is_none() {
+                before_contact.take(&one, a, &other, b);
+            }
+            whole.take(&one, a, &other, b);
+        }
+        Ok(Difference { start, before_contact, contact_s, whole })
+    }
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let heading = self.contact_s.map_or("no contact".to_owned(), |s| format!("before contact ({s:.2} s)"));
+        writeln!(f, "largest difference      {:>14}{:>26}{:>14}", "first cycle", heading, "whole run")?;
+        let parts = [&self.start, &self.before_contact, &self.whole];
+        writeln!(
+            f,
+            "cycles compared         {:>14}{:>26}{:>14}",
+            parts[0].samples, parts[1].samples, parts[2].samples
+        )?;
+        type Row = (&'static str, fn(&Largest) -> f64, &'static str);
+        let rows: [Row; 6] = [
+            ("joint angle", |part| part.joint_rad * 1e3, "mrad"),
+            ("position", |part| part.position_m * 1e3, "mm"),
+            ("orientation", |part| part.orientation_rad.to_degrees(), "deg"),
+            ("planned position", |part| part.plan_m * 1e3, "mm"),
+            ("force", |part| part.force_n, "N"),
+            ("joint torque", |part| part.torque_nm, "N m"),
+        ];
+        for (name, value, unit) in rows {
+            let [start, before, whole] = parts.map(value);
+            writeln!(f, "{:<24}{start:>14.3}{before:>26.3}{whole:>14.3}", format!("{name}, {unit}"))?;
+        }
+        Ok(())
+    }
+}
