@@ -7,7 +7,7 @@ use crate::health::Counters;
 use crate::startup::Pacer;
 
 /// Where a frame is sent, at a moment of device time.
-pub(crate) trait Outlet {
+pub trait Outlet {
     /// Device time of this slot, us.
     fn now_us(&self) -> u64;
     /// Sends the frame, unless a pause is not over or the controller has no room. Whether it was sent.

@@ -41,7 +41,7 @@ pub struct Counters {
 
 impl Counters {
     /// Add one, wrapping.
-    pub(crate) fn count(counter: &mut u32) {
+    pub fn count(counter: &mut u32) {
         *counter = counter.wrapping_add(1);
     }
 }

@@ -22,8 +22,9 @@ pub use startup::{Stage, StartupError};
 
 mod port;
 mod session;
+pub mod storage;
 mod store;
 
 pub use port::{QueueFull, SessionPort, StoredPrimitive, TimedRecord, Timing};
-pub use session::{Identity, PrimitiveTrouble, Session, StartupTrouble};
+pub use session::{Asker, Identity, Owner, Pending, PrimitiveTrouble, Session, StartupTrouble, Turn};
 pub use store::{RamStore, STORE_SLOT_BYTES, STORE_SLOTS, Store, StoreError};

@@ -13,7 +13,7 @@ mod survey;
 mod waking;
 mod zeroing;
 
-pub(crate) use exchange::{Answer, Exchange};
+pub use exchange::{Answer, Exchange};
 pub(crate) use pace::Pacer;
 pub(crate) use sequence::Startup;
 pub use stage::{Stage, StartupError};

@@ -1,8 +1,8 @@
 //! Where primitives are kept: places for whole images, and a spare one in which an upload grows.
 //!
-//! Invariants every [`Store`] keeps: an image is either wholly there or not at all; until [`Store::commit`] returns,
-//! reading gives what it gave before the upload began, even if power fails in between (for a store that outlives
-//! power); names are the session's business, not the store's.
+//! Invariants every [`Store`] keeps: an image is either wholly there or not at all; until [`Store::finished`] tells of success,
+//! reading gives what it gave before the change was asked for; if power fails in between, the next start finds the old
+//! or the new (for a store that outlives power); names are the session's business, not the store's.
 
 use core::fmt;
 
@@ -23,6 +23,10 @@ pub enum StoreError {
     NoPlace,
     /// The medium failed.
     Medium,
+    /// The store is being opened, or another change is not durable yet.
+    Busy,
+    /// The medium has no room for another image.
+    Full,
 }
 
 impl StoreError {
@@ -34,6 +38,8 @@ impl StoreError {
             Self::NotOpen => 2,
             Self::NoPlace => 3,
             Self::Medium => 4,
+            Self::Busy => 5,
+            Self::Full => 6,
         }
     }
 }
@@ -45,6 +51,8 @@ impl fmt::Display for StoreError {
             Self::NotOpen => "no image is being written",
             Self::NoPlace => "there is no image at that place",
             Self::Medium => "the storage failed",
+            Self::Busy => "the storage is being read, or still writing the last change",
+            Self::Full => "the storage is full",
         })
     }
 }
@@ -53,6 +61,11 @@ impl core::error::Error for StoreError {}
 
 /// Places for images.
 pub trait Store {
+    /// Whether the store knows by now what it holds.
+    fn is_open(&self) -> bool {
+        true
+    }
+
     /// Number of places.
     fn slots(&self) -> u8;
 
@@ -65,7 +78,7 @@ pub trait Store {
     /// Opens the spare place for an image of `length` bytes; forgets one that was being written.
     ///
     /// # Errors
-    /// [`StoreError::TooLarge`], [`StoreError::Medium`]
+    /// [`StoreError::TooLarge`], [`StoreError::Medium`], [`StoreError::Busy`]
     fn begin(&mut self, length: usize) -> Result<(), StoreError>;
 
     /// Writes a part of the image.
@@ -77,23 +90,36 @@ pub trait Store {
     /// The image being written, all of its announced length.
     fn staged(&self) -> Option<&[u8]>;
 
-    /// Makes the image being written the one at place `slot`, whatever was there.
+    /// Begins to make the image being written the one at place `slot`, whatever was there. It is when [`Store::finished`]
+    /// says so.
     ///
     /// # Errors
-    /// [`StoreError::NotOpen`], [`StoreError::NoPlace`], [`StoreError::Medium`]. The store is then as before.
+    /// [`StoreError::NotOpen`], [`StoreError::NoPlace`], [`StoreError::Medium`], [`StoreError::Busy`]. The store is then as
+    /// before.
     fn commit(&mut self, slot: u8) -> Result<(), StoreError>;
 
-    /// Forgets the image being written.
+    /// Forgets the image being written, unless it is being committed.
     fn abort(&mut self);
 
-    /// Empties a place.
+    /// Begins to empty a place. It is empty when [`Store::finished`] says so.
     ///
     /// # Errors
-    /// [`StoreError::NoPlace`], [`StoreError::Medium`]
+    /// [`StoreError::NoPlace`], [`StoreError::Medium`], [`StoreError::Busy`]
     fn delete(&mut self, slot: u8) -> Result<(), StoreError>;
+
+    /// How the change ended that was begun by [`Store::commit`] or [`Store::delete`]: told once, as soon as it is durable.
+    fn finished(&mut self) -> Option<Result<(), StoreError>>;
 }
 
 impl<S: Store + ?Sized> Store for &mut S {
+    fn is_open(&self) -> bool {
+        (**self).is_open()
+    }
+
+    fn finished(&mut self) -> Option<Result<(), StoreError>> {
+        (**self).finished()
+    }
+
     fn slots(&self) -> u8 {
         (**self).slots()
     }
@@ -151,13 +177,14 @@ impl<const BYTES: usize> Area<BYTES> {
 pub struct RamStore<const SLOTS: usize, const BYTES: usize> {
     areas: [Area<BYTES>; SLOTS],
     spare: Area<BYTES>,
+    changed: bool,
 }
 
 impl<const SLOTS: usize, const BYTES: usize> RamStore<SLOTS, BYTES> {
     /// An empty store.
     #[must_use]
     pub const fn new() -> Self {
-        Self { areas: [Area::EMPTY; SLOTS], spare: Area::EMPTY }
+        Self { areas: [Area::EMPTY; SLOTS], spare: Area::EMPTY, changed: false }
     }
 }
 
@@ -209,6 +236,7 @@ impl<const SLOTS: usize, const BYTES: usize> Store for RamStore<SLOTS, BYTES> {
         let area = self.areas.get_mut(usize::from(slot)).ok_or(StoreError::NoPlace)?;
         core::mem::swap(area, &mut self.spare);
         self.abort();
+        self.changed = true;
         Ok(())
     }
 
@@ -218,6 +246,15 @@ impl<const SLOTS: usize, const BYTES: usize> Store for RamStore<SLOTS, BYTES> {
 
     fn delete(&mut self, slot: u8) -> Result<(), StoreError> {
         let area = self.areas.get_mut(usize::from(slot)).ok_or(StoreError::NoPlace)?;
-        if core::mem::take(&mut area.length) == 0 { Err(StoreError::NoPlace) } else { Ok(()) }
+        if core::mem::take(&mut area.length) == 0 {
+            return Err(StoreError::NoPlace);
+        }
+        self.changed = true;
+        Ok(())
+    }
+
+    /// At once: memory has no power failure to survive.
+    fn finished(&mut self) -> Option<Result<(), StoreError>> {
+        core::mem::take(&mut self.changed).then_some(Ok(()))
     }
 }

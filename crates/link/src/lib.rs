@@ -5,6 +5,8 @@
 //!
 //! - [`message`]: [`Request`] (host to device) and [`Reply`] (device to host), append-only.
 //! - [`frame`]: one message to bytes and back: postcard, CRC-32, COBS, terminated by a zero byte.
+//! - [`can`]: the same bytes over classic CAN frames.
+//! - [`metadata`]: [`ImageMetadata`], what a firmware image says about itself to those who have its file.
 //! - [`image`]: [`PrimitiveImage`], a movement primitive as it is uploaded and stored.
 //! - [`SCHEMA_HASH`]: a number that changes with every change of any of these layouts.
 //!
@@ -15,9 +17,11 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod can;
 pub mod frame;
 pub mod image;
 pub mod message;
+pub mod metadata;
 pub mod name;
 pub mod refusal;
 pub mod report;
@@ -25,6 +29,7 @@ mod schema;
 
 pub use image::{ImageError, PrimitiveImage};
 pub use message::{DeviceHello, Goal, HostHello, Reply, Request, RunOptions};
+pub use metadata::ImageMetadata;
 pub use name::{Name, NameError, Text};
 pub use refusal::Refusal;
 pub use report::{Event, EventKind, HandStage, LinkCounters, Listing, Statistics, Status, Telemetry};

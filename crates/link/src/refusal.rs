@@ -98,11 +98,13 @@ pub enum Refusal {
     ForceAtRest,
     /// The hand can only be initialised at rest: not during a run, and not while the hand is being initialised.
     HandBusy,
+    /// The device drives a hand alone: it has no arm to do this with.
+    NoArm,
 }
 
 impl Refusal {
     /// Every refusal, in the order of its code.
-    pub const ALL: [Self; 44] = [
+    pub const ALL: [Self; 45] = [
         Self::LinkVersion,
         Self::Schema,
         Self::Model,
@@ -147,6 +149,7 @@ impl Refusal {
         Self::HandFarFromStart,
         Self::ForceAtRest,
         Self::HandBusy,
+        Self::NoArm,
     ];
 
     /// Number on the wire.
@@ -203,6 +206,7 @@ impl Refusal {
             Self::HandFarFromStart => "the hand is not near where the primitive starts",
             Self::ForceAtRest => "the force at rest is not the weight of the hand",
             Self::HandBusy => "the hand is being moved or initialised",
+            Self::NoArm => "the device drives a hand alone, without an arm",
         }
     }
 
@@ -249,6 +253,7 @@ impl Refusal {
             Self::HandFarFromStart => "move the hand to the start first",
             Self::ForceAtRest => "free the hand of load and contact; if it persists the sensor is adrift",
             Self::HandBusy => "wait until the hand has finished, or stop the motion",
+            Self::NoArm => "ask the device that drives the arm",
         }
     }
 }

@@ -138,6 +138,11 @@ impl Bus {
         self.log.as_deref().unwrap_or(&[])
     }
 
+    /// Takes out the frames kept so far; keeping goes on.
+    pub fn take_recorded(&mut self) -> Vec<Passage> {
+        self.log.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
     /// The first unsent frame of each node: only these compete.
     fn heads(&self) -> impl Iterator<Item = (Node, &Waiting)> {
         let mut remaining = self.senders;

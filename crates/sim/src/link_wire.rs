@@ -1,6 +1,6 @@
-//! The serial line between host and co-controller, 921 600 baud 8N1, in virtual time.
+//! The line between host and co-controller in virtual time: any [`LinkLine`], and the serial one, 921 600 baud 8N1.
 //!
-//! Towards the device, bytes are handed over in chunks of at most 64, as a UART with DMA and an idle-line interrupt does: one
+//! On the serial line, towards the device, bytes are handed over in chunks of at most 64, as a UART with DMA and an idle-line interrupt does: one
 //! event per chunk instead of one per byte. A chunk becomes due when its last byte has arrived.
 
 use crate::time::Ticks;
@@ -12,28 +12,49 @@ pub const BYTE_TICKS: Ticks = 271;
 /// Most bytes that one event hands to the device.
 pub const CHUNK: usize = 64;
 
-/// Both directions of the line.
+/// Carries the bytes of the host link between host and co-controller.
+///
+/// Everything happens at the `now` it is told, which never goes backwards; what was begun keeps its end.
+pub trait LinkLine: Send {
+    /// The host sends bytes; transmission begins at `now` or when the line is free.
+    fn send_to_device(&mut self, now: Ticks, bytes: &[u8]);
+
+    /// The device sends bytes.
+    fn send_from_device(&mut self, now: Ticks, bytes: &[u8]);
+
+    /// When the device must look next: bytes towards it are complete, or the line itself has something to do.
+    fn next_time(&self) -> Option<Ticks>;
+
+    /// Bytes that have reached the device by `now`, at most [`CHUNK`] of them.
+    fn take_to_device(&mut self, now: Ticks) -> Vec<u8>;
+
+    /// What the host has received by `now`.
+    fn take_from_device(&mut self, now: Ticks) -> Vec<u8>;
+
+    /// Bytes that the device has handed over and that have not left by `now`.
+    fn backlog_from_device(&self, now: Ticks) -> usize;
+}
+
+/// Both directions of the serial line.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct LinkWire {
+pub(crate) struct SerialLine {
     to_device: VecDeque<(Ticks, u8)>,
     to_device_free: Ticks,
     from_device: VecDeque<(Ticks, u8)>,
     from_device_free: Ticks,
 }
 
-impl LinkWire {
-    /// The host sends bytes; transmission begins at `now` or when the line is free.
-    pub(crate) fn send_to_device(&mut self, now: Ticks, bytes: &[u8]) {
+impl LinkLine for SerialLine {
+    fn send_to_device(&mut self, now: Ticks, bytes: &[u8]) {
         transmit(&mut self.to_device, &mut self.to_device_free, now, bytes);
     }
 
-    /// The device sends bytes.
-    pub(crate) fn send_from_device(&mut self, now: Ticks, bytes: &[u8]) {
+    fn send_from_device(&mut self, now: Ticks, bytes: &[u8]) {
         transmit(&mut self.from_device, &mut self.from_device_free, now, bytes);
     }
 
     /// When the next chunk towards the device is complete.
-    pub(crate) fn next_time(&self) -> Option<Ticks> {
+    fn next_time(&self) -> Option<Ticks> {
         let due = self.to_device.iter().take(CHUNK).map(|(due, _)| *due);
         // A gap on the line ends a chunk.
         due.scan(None, |previous: &mut Option<Ticks>, due| {
@@ -45,20 +66,18 @@ impl LinkWire {
     }
 
     /// The chunk that is complete by `now`, or nothing.
-    pub(crate) fn take_to_device(&mut self, now: Ticks) -> Vec<u8> {
+    fn take_to_device(&mut self, now: Ticks) -> Vec<u8> {
         match self.next_time() {
             Some(due) if due <= now => take_due(&mut self.to_device, due),
             _ => Vec::new(),
         }
     }
 
-    /// What the host has received by `now`.
-    pub(crate) fn take_from_device(&mut self, now: Ticks) -> Vec<u8> {
+    fn take_from_device(&mut self, now: Ticks) -> Vec<u8> {
         take_due(&mut self.from_device, now)
     }
 
-    /// Bytes that the device has handed over and that have not left yet.
-    pub(crate) fn backlog_from_device(&self, now: Ticks) -> usize {
+    fn backlog_from_device(&self, now: Ticks) -> usize {
         self.from_device.iter().filter(|(due, _)| *due > now).count()
     }
 }

@@ -14,7 +14,7 @@
 use crate::bus::{Bus, Passage};
 use crate::force_torque::{ForceTorque, ForceTorqueConfig};
 use crate::hand::{Hand, HandConfig};
-use crate::link_wire::LinkWire;
+use crate::link_wire::{LinkLine, SerialLine};
 use crate::motors::Motors;
 use crate::noise::Noise;
 use crate::operator::{Operator, OperatorConfig, PendantAction};
@@ -51,6 +51,8 @@ pub struct PlantConfig {
     /// true ones, the safety module is in IDLE. The operator presses Shift-Activate as he is set up to; see
     /// [`OperatorConfig::prompt`] for one who does not tarry.
     pub started: bool,
+    /// The hand stands alone on the bus, with power: no arm, no sensor, no safety module, and nobody at a pendant.
+    pub hand_alone: bool,
     /// Whole control cycles by which packed torques, arm's and hand's, come late to the motors. The safety module judges them at once.
     pub torque_delay_cycles: u8,
 }
@@ -66,6 +68,7 @@ impl Default for PlantConfig {
             hand: Some(HandConfig::default()),
             operator: OperatorConfig::default(),
             started: false,
+            hand_alone: false,
             torque_delay_cycles: 0,
         }
     }
@@ -128,7 +131,8 @@ pub struct Plant {
     torque_delay: Ticks,
     /// Packed torques that are still on their way to the motors, with the time they arrive.
     late_torques: VecDeque<(Ticks, Request)>,
-    link: LinkWire,
+    link: Box<dyn LinkLine>,
+    hand_alone: bool,
     deliveries: VecDeque<Delivery>,
     world: Box<dyn World>,
 }
@@ -162,7 +166,11 @@ impl Plant {
         let hand = config.hand.map(|hand| Hand::new(hand, &*world, |number| Noise::new(config.seed, number)));
         // What has happened already need not happen again.
         let idle_at = config.operator.idle_at.filter(|_| !config.started);
-        let operator = OperatorConfig { idle_at, ..config.operator };
+        let operator = if config.hand_alone {
+            OperatorConfig { idle_at: None, activate_after: None, holds_until_active_for: None, script: Vec::new() }
+        } else {
+            OperatorConfig { idle_at, ..config.operator }
+        };
         let mut plant = Self {
             now: 0,
             next_happening: None,
@@ -175,11 +183,14 @@ impl Plant {
             operator: Operator::new(operator),
             torque_delay: Ticks::from(config.torque_delay_cycles) * CYCLE_TICKS,
             late_torques: VecDeque::new(),
-            link: LinkWire::default(),
+            link: Box::new(SerialLine::default()),
+            hand_alone: config.hand_alone,
             deliveries: VecDeque::new(),
             world,
         };
-        if config.started {
+        if config.hand_alone {
+            plant.hand.iter_mut().for_each(|hand| if config.started { hand.run() } else { hand.power_on(0) });
+        } else if config.started {
             plant.resume();
         }
         plant.next_happening = plant.look_ahead();
@@ -260,6 +271,11 @@ impl Plant {
         self.link.send_to_device(self.now, bytes);
     }
 
+    /// Puts another line in place of the serial one; what was under way on the old one is lost.
+    pub fn set_link_line(&mut self, line: Box<dyn LinkLine>) {
+        self.link = line;
+    }
+
     /// Somebody other than the scripted operator does something at the pendant, now.
     pub fn press(&mut self, action: PendantAction) {
         self.operator.observe(action);
@@ -302,6 +318,11 @@ impl Plant {
     #[must_use]
     pub fn recorded(&self) -> &[Passage] {
         self.bus.recorded()
+    }
+
+    /// Takes out the frames kept since [`Plant::record_bus`] or the last call; the last one may still be on the wire.
+    pub fn take_recorded(&mut self) -> Vec<Passage> {
+        self.bus.take_recorded()
     }
 
     /// From now on the force/torque sensor errs by more and more, after `over` by `error` (N and N m, sensor axes), and stays so: an
@@ -424,15 +445,19 @@ impl Plant {
                 self.instruct(at, &request);
             }
         }
-        self.safety.hear(at, &passage.frame);
+        if !self.hand_alone {
+            self.safety.hear(at, &passage.frame);
+        }
     }
 
     /// A request reaches pucks, sensor and hand.
     fn instruct(&mut self, at: Ticks, request: &Request) {
-        for puck in &mut self.pucks {
-            puck.receive(at, request);
+        if !self.hand_alone {
+            for puck in &mut self.pucks {
+                puck.receive(at, request);
+            }
+            self.force_torque.receive(at, request);
         }
-        self.force_torque.receive(at, request);
         if let Some(hand) = &mut self.hand {
             hand.receive(at, request);
         }

@@ -20,7 +20,7 @@ enum Wanted {
 
 /// The drives of the hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Drive {
+pub struct Drive {
     wanted: Wanted,
     /// The SET of the wanted mode has not left yet.
     due: bool,
@@ -31,12 +31,12 @@ pub(crate) struct Drive {
 
 impl Drive {
     /// Drives at rest. `due`: MODE IDLE shall be sent, for what they did before is not known.
-    pub(crate) const fn resting(due: bool) -> Drive {
+    pub const fn resting(due: bool) -> Drive {
         Drive { wanted: Wanted::Rest, due, undriven: 0, astray: None }
     }
 
     /// The frame of this cycle from the one the control cycle asks for.
-    pub(crate) fn torque_frame(&mut self, asked: Option<CanFrame>) -> Option<CanFrame> {
+    pub fn torque_frame(&mut self, asked: Option<CanFrame>) -> Option<CanFrame> {
         match (asked, self.wanted) {
             (Some(frame), Wanted::Torque) => {
                 self.undriven = 0;
@@ -58,7 +58,7 @@ impl Drive {
     }
 
     /// The SET that is due, if there is one. Call [`Drive::mode_sent`] when it has left.
-    pub(crate) fn mode_frame(&self) -> Option<CanFrame> {
+    pub fn mode_frame(&self) -> Option<CanFrame> {
         let value = match self.wanted {
             Wanted::Rest => MotorMode::Idle,
             Wanted::Torque => MotorMode::Torque,
@@ -72,13 +72,13 @@ impl Drive {
     }
 
     /// What [`Drive::mode_frame`] returned has left.
-    pub(crate) fn mode_sent(&mut self) {
+    pub fn mode_sent(&mut self) {
         self.due = false;
         self.astray = None;
     }
 
     /// A puck has told its MODE.
-    pub(crate) fn hear_mode(&mut self, node: Node, value: i32) {
+    pub fn hear_mode(&mut self, node: Node, value: i32) {
         let in_torque = MotorMode::from_value(value) == Some(MotorMode::Torque);
         let right = match self.wanted {
             Wanted::Torque => in_torque,

@@ -7,14 +7,15 @@ use super::trouble::HandTrouble;
 
 /// The numbers of the hand's properties that the device uses, the same on all four pucks, and how its digits rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct HandProperties {
-    pub(crate) commander: HandCommander,
+pub struct HandProperties {
+    /// The frames of its commands.
+    pub commander: HandCommander,
     /// SG.
-    pub(crate) gauge: PropertyId,
+    pub gauge: PropertyId,
     /// TSTOP.
-    pub(crate) stall: PropertyId,
+    pub stall: PropertyId,
     /// HOLD of each digit: whether it stays in MODE 3 after a move.
-    pub(crate) holds: [bool; 4],
+    pub holds: [bool; 4],
 }
 
 /// A hand as the start-up leaves it.

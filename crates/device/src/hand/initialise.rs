@@ -65,7 +65,7 @@ enum Step {
 
 /// What has come of the initialisation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Outcome {
+pub enum Outcome {
     /// Under way.
     Busy,
     /// The hand counts from its open stops.
@@ -76,7 +76,7 @@ pub(crate) enum Outcome {
 
 /// An initialisation under way.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Initialisation {
+pub struct Initialisation {
     step: Step,
     digits: Digits,
     limit_us: u64,
@@ -95,7 +95,7 @@ pub(crate) struct Initialisation {
 
 impl Initialisation {
     /// Begins; `driven` says whether the drives may be under torque.
-    pub(crate) fn new(driven: bool, now_us: u64) -> Initialisation {
+    pub fn new(driven: bool, now_us: u64) -> Initialisation {
         Initialisation {
             step: if driven { Step::Brake } else { Step::Command },
             digits: Digits::Fingers,
@@ -111,7 +111,7 @@ impl Initialisation {
     }
 
     /// A property reply of a digit has come; whether it was expected.
-    pub(crate) fn receive(&mut self, digit: usize, node: Node, property: PropertyId, value: i32) -> bool {
+    pub fn receive(&mut self, digit: usize, node: Node, property: PropertyId, value: i32) -> bool {
         if property != PropertyId::MODE {
             return self.exchange.receive(node, property, value);
         }
@@ -125,7 +125,7 @@ impl Initialisation {
     }
 
     /// The position of a digit has come; whether it was expected.
-    pub(crate) fn receive_position(&mut self, digit: usize, position: Counts) -> bool {
+    pub fn receive_position(&mut self, digit: usize, position: Counts) -> bool {
         match (self.step, self.positions.get_mut(digit)) {
             (Step::Compare { .. }, Some(place)) => {
                 *place = Some(position);
@@ -136,7 +136,7 @@ impl Initialisation {
     }
 
     /// A slot in which the hand may be asked: sends at most one frame.
-    pub(crate) fn advance(&mut self, properties: &HandProperties, outlet: &mut impl Outlet) -> Outcome {
+    pub fn advance(&mut self, properties: &HandProperties, outlet: &mut impl Outlet) -> Outcome {
         let now_us = outlet.now_us();
         match self.step {
             Step::Brake => {

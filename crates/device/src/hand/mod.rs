@@ -21,13 +21,15 @@ use control::HandSample;
 use link::HandStage;
 use puck::{CanFrame, Node, PropertyId, Reply, Status, get};
 
-use crate::bus::Outlet;
+pub use crate::bus::Outlet;
 use crate::command::Refusal;
 use crate::health::Counters;
-use drive::Drive;
-pub(crate) use found::{Found, HandProperties};
-use initialise::{Initialisation, Outcome};
-use round::HandRound;
+pub use crate::startup::{Answer, Exchange};
+pub use drive::Drive;
+pub(crate) use found::Found;
+pub use found::HandProperties;
+pub use initialise::{Initialisation, Outcome};
+pub use round::HandRound;
 pub use trouble::HandTrouble;
 
 /// Rounds in a row that a puck may be silent before the hand is given up: 0.2 s.

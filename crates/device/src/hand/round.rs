@@ -14,7 +14,7 @@ const GAUGE_LIMIT: i32 = 4095;
 
 /// The replies of one round, each in the slot of its sender.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct HandRound {
+pub struct HandRound {
     open: bool,
     positions: [Mailbox<(Counts, Option<Counts>)>; 4],
     gauges: [Mailbox<i32>; 3],
@@ -23,7 +23,7 @@ pub(crate) struct HandRound {
 
 impl HandRound {
     /// Empties the slots and opens the round. Returns what to ask.
-    pub(crate) fn open(&mut self, gauge: PropertyId) -> [CanFrame; 2] {
+    pub fn open(&mut self, gauge: PropertyId) -> [CanFrame; 2] {
         self.positions = [Mailbox::Empty; 4];
         self.gauges = [Mailbox::Empty; 3];
         self.open = true;
@@ -31,13 +31,7 @@ impl HandRound {
     }
 
     /// The position of a digit has come.
-    pub(crate) fn take_position(
-        &mut self,
-        digit: usize,
-        primary: Counts,
-        secondary: Option<Counts>,
-        counters: &mut Counters,
-    ) {
+    pub fn take_position(&mut self, digit: usize, primary: Counts, secondary: Option<Counts>, counters: &mut Counters) {
         let repeats = self.open && self.positions.get_mut(digit).is_some_and(|slot| slot.put((primary, secondary)));
         if repeats || !self.open {
             Counters::count(&mut counters.late_replies);
@@ -45,7 +39,7 @@ impl HandRound {
     }
 
     /// The strain gauge of a digit has come. The spread has none; its puck answers the group's question all the same.
-    pub(crate) fn take_gauge(&mut self, digit: usize, value: i32, counters: &mut Counters) {
+    pub fn take_gauge(&mut self, digit: usize, value: i32, counters: &mut Counters) {
         let repeats = self.open && self.gauges.get_mut(digit).is_some_and(|slot| slot.put(value));
         if repeats || !self.open {
             Counters::count(&mut counters.late_replies);
@@ -53,7 +47,7 @@ impl HandRound {
     }
 
     /// Closes the round and hands over what it brought; `None` if no round was open.
-    pub(crate) fn close(&mut self, counters: &mut Counters) -> Option<HandSample> {
+    pub fn close(&mut self, counters: &mut Counters) -> Option<HandSample> {
         if !core::mem::take(&mut self.open) {
             return None;
         }
@@ -81,13 +75,13 @@ impl HandRound {
     }
 
     /// The first puck that has been silent long enough to be suspected.
-    pub(crate) fn suspect(&self) -> Option<Node> {
+    pub fn suspect(&self) -> Option<Node> {
         let (node, _) = Node::HAND.into_iter().zip(self.missed).find(|(_, missed)| *missed >= SUSPECT_ROUNDS)?;
         Some(node)
     }
 
     /// The puck that has been silent for at least so many rounds.
-    pub(crate) fn silent_for(&self, rounds: u16) -> Option<Node> {
+    pub fn silent_for(&self, rounds: u16) -> Option<Node> {
         let (node, _) = Node::HAND.into_iter().zip(self.missed).find(|(_, missed)| *missed >= rounds)?;
         Some(node)
     }

@@ -7,13 +7,15 @@
 //! - every request is answered once, and acted on once however often it is repeated;
 //! - a request for the control half is answered when that half has taken or refused it;
 //! - an arm that moves is stopped when the host has been silent for half a second;
-//! - an image replaces another only when it is complete, undamaged and fit for this arm.
+//! - an image replaces another only when it is complete, undamaged and fit for this arm;
+//! - a change of the store is answered when it is durable.
 
 mod directory;
 mod owner;
 mod pending;
 mod primitive;
 mod request;
+mod saving;
 mod upload;
 mod wire;
 
@@ -28,11 +30,12 @@ use crate::event::EventKind as CoreEvent;
 use crate::port::{SessionPort, StoredPrimitive, TimedRecord};
 use crate::store::Store;
 use directory::{Directory, Entry};
-use owner::Owner;
-use pending::Pending;
 use primitive::WeightRoom;
+use saving::Saving;
 use upload::Upload;
 
+pub use owner::{Owner, Turn};
+pub use pending::{Asker, Pending};
 pub use wire::{PrimitiveTrouble, StartupTrouble};
 
 /// Requests that have arrived and are not handled yet. A host waits for its answers, so two would do.
@@ -72,6 +75,8 @@ pub struct Session<S> {
     owner: Option<Owner>,
     pending: Pending,
     upload: Option<Upload>,
+    saving: Option<Saving>,
+    opened: bool,
     loaded: Option<Entry>,
     telemetry_every: u8,
     latest: Option<TimedRecord>,
@@ -88,6 +93,7 @@ impl<S: Store> Session<S> {
     /// A session without a host. Reads the store. `model` is the arm primitives are checked against.
     pub fn new(identity: Identity, model: ArmModel<f32>, store: S) -> Self {
         let directory = Directory::read(&store);
+        let opened = store.is_open();
         Self {
             identity,
             model,
@@ -100,6 +106,8 @@ impl<S: Store> Session<S> {
             owner: None,
             pending: Pending::default(),
             upload: None,
+            saving: None,
+            opened,
             loaded: None,
             telemetry_every: 0,
             latest: None,
@@ -115,6 +123,11 @@ impl<S: Store> Session<S> {
     /// The store, for inspection.
     pub fn store(&self) -> &S {
         &self.store
+    }
+
+    /// The store, for whoever makes its changes durable.
+    pub fn store_mut(&mut self) -> &mut S {
+        &mut self.store
     }
 
     /// Takes bytes from the line. Never acts on them; [`Session::poll`] does.
@@ -139,12 +152,16 @@ impl<S: Store> Session<S> {
         let now_ms = milliseconds(now_us);
         self.forward_events(now_ms, port);
         self.drop_unanswered(now_ms, port);
-        while port.room() >= 2 * ANSWER_ROOM {
+        self.settle(now_ms, port);
+        let opening = self.is_opening(now_ms);
+        while !opening && port.room() >= 2 * ANSWER_ROOM {
             let Some(frame) = self.inbox.pop_front() else {
                 break;
             };
             self.handle(now_ms, frame, port);
         }
+        // A store in memory is done at once.
+        self.settle(now_ms, port);
         self.forward_records(now_ms, port);
         self.watch_host(now_ms, port);
     }

@@ -12,36 +12,36 @@ const PENDING: usize = 8;
 const ANSWER_TIMEOUT_MS: u32 = 100;
 
 /// Who waits for an answer: session and number of the request; `None` if the device itself sent the command.
-pub(crate) type Asker = Option<(u16, u16)>;
+pub type Asker = Option<(u16, u16)>;
 
 /// Commands without an answer, oldest first.
 #[derive(Debug, Default)]
-pub(crate) struct Pending(Deque<(Asker, u32), PENDING>);
+pub struct Pending(Deque<(Asker, u32), PENDING>);
 
 impl Pending {
     /// Whether another command can be tracked.
-    pub(crate) fn has_room(&self, stop: bool) -> bool {
+    pub fn has_room(&self, stop: bool) -> bool {
         self.0.len() + usize::from(!stop) < PENDING
     }
 
     /// Whether the control half owes an answer.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
     /// A command has been queued.
-    pub(crate) fn push(&mut self, asker: Asker, now_ms: u32) {
+    pub fn push(&mut self, asker: Asker, now_ms: u32) {
         // `has_room` was asked before; without room the answer would find nobody, and be ignored.
         let _ = self.0.push_back((asker, now_ms));
     }
 
     /// The oldest command has been answered: who asked? The outer `None`: no command was on its way.
-    pub(crate) fn answered(&mut self) -> Option<Asker> {
+    pub fn answered(&mut self) -> Option<Asker> {
         self.0.pop_front().map(|(asker, _)| asker)
     }
 
     /// Takes out the oldest command if it has waited too long: who asked, and how long ago, ms.
-    pub(crate) fn expired(&mut self, now_ms: u32) -> Option<(Asker, u32)> {
+    pub fn expired(&mut self, now_ms: u32) -> Option<(Asker, u32)> {
         let waited = now_ms.wrapping_sub(self.0.front()?.1);
         if waited < ANSWER_TIMEOUT_MS {
             return None;

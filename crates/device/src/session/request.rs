@@ -15,7 +15,7 @@ use super::upload::Refused;
 use super::wire::{self, PrimitiveTrouble, StartupTrouble};
 use crate::command::Command;
 use crate::port::SessionPort;
-use crate::store::Store;
+use crate::store::{Store, StoreError};
 
 impl<S: Store> Session<S> {
     /// Takes one request: greets, refuses strangers, repeats answers, acts.
@@ -94,6 +94,7 @@ impl<S: Store> Session<S> {
             Request::Status => Ok(Some(Reply::Status { of, status: self.status(port) })),
             Request::Statistics => Ok(Some(Reply::Statistics { of, statistics: self.statistics(port) })),
             Request::List { index } => {
+                self.need_open()?;
                 if index >= self.directory.places() {
                     return Err((Refusal::NoSuchPrimitive, [self.directory.places().into(), 0]));
                 }
@@ -147,10 +148,9 @@ impl<S: Store> Session<S> {
                 done
             }
             Request::UploadCommit => {
-                let slot = self.upload_commit()?;
-                self.preload(slot, port);
-                self.store_changed(now_ms, slot, port);
-                done
+                let (slot, entry) = self.upload_commit()?;
+                self.save(of, slot, Some(entry));
+                Ok(None)
             }
             Request::UploadAbort => {
                 self.upload_abort();
@@ -158,10 +158,11 @@ impl<S: Store> Session<S> {
             }
             Request::Delete { name } => {
                 let slot = self.delete(&name, port)?;
-                self.store_changed(now_ms, slot, port);
-                done
+                self.save(of, slot, None);
+                Ok(None)
             }
             Request::Read { name, offset } => {
+                self.need_open()?;
                 let (slot, _) = self.directory.find(&name).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
                 let image = self.store.image(slot).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
                 let rest = usize::try_from(offset).ok().and_then(|start| image.get(start..)).unwrap_or_default();
@@ -191,7 +192,7 @@ impl<S: Store> Session<S> {
 
     /// Hands the primitive that has just been checked to the control half, so that its run need not be waited for. Where that cannot be
     /// done now, the run does it.
-    fn preload(&mut self, slot: u8, port: &mut impl SessionPort) {
+    pub(super) fn preload(&mut self, slot: u8, port: &mut impl SessionPort) {
         let Some(entry) = self.directory.get(slot) else { return };
         if !self.pending.is_empty() || matches!(port.health().state, State::Run | State::Coast) {
             return;
@@ -201,7 +202,11 @@ impl<S: Store> Session<S> {
 
     /// Makes sure that the control half holds the primitive of this name, as it is in the store now.
     fn load(&mut self, name: &Name, port: &mut impl SessionPort) -> Result<(), Refused> {
+        self.need_open()?;
         let (slot, entry) = self.directory.find(name).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
+        if self.is_deleting(slot) {
+            return Err(StoreError::Busy.into());
+        }
         if self.loaded.as_ref().is_some_and(|loaded| loaded.is_same(entry)) {
             return Ok(());
         }
@@ -215,9 +220,16 @@ impl<S: Store> Session<S> {
         }
         let entry = entry.clone();
         let bytes = self.store.image(slot).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
-        // Checked again: memory may have been damaged since the upload.
+        // Checked again: memory may have been damaged since the upload, and the image may be from before the firmware.
         let image =
             PrimitiveImage::parse(bytes).map_err(|error| (Refusal::ImageInvalid, [error.code(), error.number()]))?;
+        let model = image.content().model_hash;
+        if model != control::MODEL_HASH {
+            return Err((Refusal::ImageModel, [model, control::MODEL_HASH]));
+        }
+        if let Some(saving) = &mut self.saving {
+            saving.building();
+        }
         primitive::build(&self.model, image.content(), &mut self.room, &mut self.primitive)?;
         // After a refusal nothing is known to be loaded: a later run loads again rather than run what is left there.
         self.loaded = None;
@@ -230,20 +242,17 @@ impl<S: Store> Session<S> {
     }
 
     fn delete(&mut self, name: &Name, port: &mut impl SessionPort) -> Result<u8, Refused> {
+        self.need_open()?;
         let (slot, entry) = self.directory.find(name).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
         let loaded = self.loaded.as_ref().is_some_and(|loaded| loaded.is_same(entry));
         if loaded && matches!(port.health().state, State::Run | State::Coast) {
             return Err((Refusal::InUse, [0, 0]));
         }
         self.store.delete(slot)?;
-        self.directory.set(slot, None);
-        if loaded {
-            self.loaded = None;
-        }
         Ok(slot)
     }
 
-    fn store_changed(&mut self, now_ms: u32, slot: u8, port: &mut impl SessionPort) {
+    pub(super) fn store_changed(&mut self, now_ms: u32, slot: u8, port: &mut impl SessionPort) {
         let cycle = wire::cycle(port.health().cycle);
         self.tell(now_ms, Event { cycle, kind: EventKind::Store, code: slot.into(), detail: 0 }, port);
     }

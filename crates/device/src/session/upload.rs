@@ -6,7 +6,7 @@ use link::{Name, PrimitiveImage, Refusal};
 use super::Session;
 use super::directory::Entry;
 use super::primitive;
-use crate::store::{Store, StoreError};
+use crate::store::Store;
 
 /// A refusal with its detail.
 pub(crate) type Refused = (Refusal, [u32; 2]);
@@ -18,12 +18,6 @@ pub(crate) struct Upload {
     length: u32,
     crc: u32,
     pub(crate) received: u32,
-}
-
-impl From<StoreError> for Refused {
-    fn from(error: StoreError) -> Self {
-        (Refusal::StoreFailed, [error.code(), 0])
-    }
 }
 
 impl<S: Store> Session<S> {
@@ -64,8 +58,9 @@ impl<S: Store> Session<S> {
         self.store.abort();
     }
 
-    /// Checks the image from the first byte to the last real number, then puts it into its place.
-    pub(crate) fn upload_commit(&mut self) -> Result<u8, Refused> {
+    /// Checks the image from the first byte to the last real number, then has it put into its place: which, and what will be
+    /// there once that is durable.
+    pub(crate) fn upload_commit(&mut self) -> Result<(u8, Entry), Refused> {
         let upload = self.upload.as_ref().ok_or((Refusal::NoUpload, [0, 0]))?;
         if upload.received != upload.length {
             // Not forgotten: the host may still send the rest.
@@ -76,7 +71,7 @@ impl<S: Store> Session<S> {
         committed
     }
 
-    fn check_and_commit(&mut self) -> Result<u8, Refused> {
+    fn check_and_commit(&mut self) -> Result<(u8, Entry), Refused> {
         let (Some(upload), Some(bytes)) = (&self.upload, self.store.staged()) else {
             return Err((Refusal::NoUpload, [0, 0]));
         };
@@ -100,6 +95,9 @@ impl<S: Store> Session<S> {
         if *image.name() != upload.name {
             return Err((Refusal::ImageName, [0, 0]));
         }
+        if let Some(saving) = &mut self.saving {
+            saving.building();
+        }
         primitive::build(&self.model, image.content(), &mut self.room, &mut self.primitive)?;
         let entry = Entry::of(&image);
         let place = self.directory.find(&entry.name).map(|(slot, _)| slot).or_else(|| self.directory.free());
@@ -107,8 +105,7 @@ impl<S: Store> Session<S> {
             return Err((Refusal::StoreFull, [self.directory.places().into(), 0]));
         };
         self.store.commit(slot)?;
-        self.directory.set(slot, Some(entry));
-        Ok(slot)
+        Ok((slot, entry))
     }
 }
 

@@ -204,9 +204,16 @@ const PLAIN: [PrimitiveError; 12] = [
 ];
 
 /// Codes of the tables beside the primitive itself.
-pub(crate) const TROUBLE_FEEDBACK: PrimitiveTrouble = PrimitiveTrouble([8, 0]);
-pub(crate) const TROUBLE_EXPECTATION: PrimitiveTrouble = PrimitiveTrouble([9, 0]);
+pub(crate) const TROUBLE_FEEDBACK: PrimitiveTrouble = PrimitiveTrouble::FEEDBACK;
+pub(crate) const TROUBLE_EXPECTATION: PrimitiveTrouble = PrimitiveTrouble::EXPECTATION;
 pub(crate) const TROUBLE_EXPERIENCE: PrimitiveTrouble = PrimitiveTrouble([10, 0]);
+
+impl PrimitiveTrouble {
+    /// The gains of the feedback.
+    pub const FEEDBACK: PrimitiveTrouble = PrimitiveTrouble([8, 0]);
+    /// The expectation.
+    pub const EXPECTATION: PrimitiveTrouble = PrimitiveTrouble([9, 0]);
+}
 
 fn place<T: PartialEq>(list: &[T], item: &T) -> u32 {
     list.iter().zip(0..).find(|(other, _)| *other == item).map_or(u32::MAX, |(_, index)| index)

@@ -11,7 +11,7 @@ const ATTEMPTS: u8 = 3;
 
 /// What has come of a question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Answer {
+pub enum Answer {
     /// Not yet.
     Pending,
     /// The value of the property.
@@ -31,13 +31,13 @@ struct Question {
 
 /// The question under way, if there is one.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Exchange {
+pub struct Exchange {
     question: Option<Question>,
 }
 
 impl Exchange {
     /// Puts the question, or looks how it stands. To be called with the same arguments until it is no longer pending.
-    pub(crate) fn ask(&mut self, node: Node, property: PropertyId, outlet: &mut impl Outlet) -> Answer {
+    pub fn ask(&mut self, node: Node, property: PropertyId, outlet: &mut impl Outlet) -> Answer {
         let deadline_us = outlet.now_us() + PATIENCE_US;
         match &mut self.question {
             Some(question) if question.node == node && question.property == property => {
@@ -68,7 +68,7 @@ impl Exchange {
     }
 
     /// A property reply has come; whether it was asked for.
-    pub(crate) fn receive(&mut self, node: Node, property: PropertyId, value: i32) -> bool {
+    pub fn receive(&mut self, node: Node, property: PropertyId, value: i32) -> bool {
         match &mut self.question {
             Some(question) if question.node == node && question.property == property => {
                 question.value = Some(value);
@@ -79,7 +79,7 @@ impl Exchange {
     }
 
     /// Forgets the question: what still comes is nobody's answer.
-    pub(crate) fn abandon(&mut self) {
+    pub fn abandon(&mut self) {
         self.question = None;
     }
 }

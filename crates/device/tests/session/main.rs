@@ -3,4 +3,5 @@
 mod commands;
 mod conversation;
 mod rig;
+mod saving;
 mod uploads;

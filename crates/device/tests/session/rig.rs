@@ -109,9 +109,9 @@ impl SessionPort for Bench {
 }
 
 /// A session with its bench and one host.
-pub(crate) struct Rig {
+pub(crate) struct Rig<S = Store> {
     /// The session under test.
-    pub(crate) session: Session<Store>,
+    pub(crate) session: Session<S>,
     /// What is around it.
     pub(crate) bench: Bench,
     /// The device's time, ms.
@@ -126,6 +126,20 @@ pub(crate) struct Rig {
 impl Rig {
     /// A session nobody has spoken to.
     pub(crate) fn new() -> Self {
+        Self::over(Store::new())
+    }
+
+    /// A session with an open conversation.
+    pub(crate) fn greeted() -> Self {
+        let mut rig = Self::new();
+        rig.greet();
+        rig
+    }
+}
+
+impl<S: device::Store> Rig<S> {
+    /// A session over a store of another kind, nobody has spoken to.
+    pub(crate) fn over(store: S) -> Self {
         let identity = Identity {
             firmware: "1.2.3 (abcdef0)",
             board: "bench",
@@ -147,15 +161,8 @@ impl Rig {
             fault: Fault::None,
             counters: Counters::default(),
         };
-        let session = Session::new(identity, model(), Store::new());
+        let session = Session::new(identity, model(), store);
         Self { session, bench, now_ms: 10_000, number: 77, sequence: 0, decoder: Decoder::new() }
-    }
-
-    /// A session with an open conversation.
-    pub(crate) fn greeted() -> Self {
-        let mut rig = Self::new();
-        rig.greet();
-        rig
     }
 
     /// Says hello as the present host.

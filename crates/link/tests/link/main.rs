@@ -3,4 +3,6 @@
 mod framing;
 mod golden;
 mod image;
+mod metadata;
 mod samples;
+mod segments;

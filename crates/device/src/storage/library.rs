@@ -1,0 +1,194 @@
+//! The library in memory, and what is to be done about it on the flash.
+
+use crate::storage::Opening;
+use crate::store::{RamStore, Store, StoreError};
+
+/// A change under way: what the flash must hold before the memory may.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Work {
+    /// Keep the image being written as that of a place.
+    Save {
+        /// The place.
+        slot: u8,
+        /// Bytes of the image.
+        length: usize,
+    },
+    /// Forget the image of a place.
+    Delete {
+        /// The place.
+        slot: u8,
+    },
+}
+
+/// How far a change has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Job {
+    /// Nothing to do.
+    None,
+    /// Asked for.
+    Asked(Work),
+    /// In the hands of the keeper.
+    Taken(Work),
+    /// Over; the session has not asked yet.
+    Over(Result<(), StoreError>),
+}
+
+/// Primitives in memory whose changes become true when they are durable. Takes `(SLOTS + 1) * BYTES` bytes; put it into
+/// a static. A new one is all zeros (an `Option<Opening>` would not be), so that no flash holds its content.
+#[derive(Debug)]
+pub struct Library<const SLOTS: usize, const BYTES: usize> {
+    memory: RamStore<SLOTS, BYTES>,
+    job: Job,
+    is_open: bool,
+    opening: Opening,
+}
+
+impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
+    /// A library that has not been opened.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { memory: RamStore::new(), job: Job::None, is_open: false, opening: Opening::NOTHING }
+    }
+
+    /// What was found at start-up; `None` until then.
+    #[must_use]
+    pub fn opening(&self) -> Option<Opening> {
+        self.is_open.then_some(self.opening)
+    }
+
+    /// The keeper found an image.
+    pub fn restore(&mut self, slot: u8, image: &[u8]) {
+        let kept = self.memory.begin(image.len()).and_then(|()| self.memory.write(0, image));
+        if kept.and_then(|()| self.memory.commit(slot)).is_err() {
+            // What does not fit is as good as not there, but an older one must not stand for it.
+            self.forget(slot);
+        }
+        let _ = self.memory.finished();
+    }
+
+    /// The keeper found an image that was deleted later.
+    pub fn forget(&mut self, slot: u8) {
+        let _ = self.memory.delete(slot);
+        let _ = self.memory.finished();
+    }
+
+    /// The keeper found everything there was.
+    pub fn open(&mut self, opening: Opening) {
+        if opening.formatted || opening.failed {
+            (0..self.memory.slots()).for_each(|slot| self.forget(slot));
+        }
+        self.opening = opening;
+        self.is_open = true;
+    }
+
+    /// Hands a change to the keeper, with a copy of the image to save.
+    pub fn take(&mut self, image: &mut [u8]) -> Option<Work> {
+        let Job::Asked(work) = self.job else { return None };
+        if let Work::Save { length, .. } = work {
+            let staged = self.memory.staged();
+            let pair = staged.zip(image.get_mut(..length)).filter(|(from, to)| from.len() == to.len());
+            let Some((from, to)) = pair else {
+                self.job = Job::Over(Err(StoreError::TooLarge));
+                return None;
+            };
+            to.copy_from_slice(from);
+        }
+        self.job = Job::Taken(work);
+        Some(work)
+    }
+
+    /// The keeper is done with the change: it is durable, or the flash is as before.
+    pub fn settle(&mut self, outcome: Result<(), StoreError>) {
+        let Job::Taken(work) = self.job else { return };
+        let outcome = outcome.and_then(|()| match work {
+            Work::Save { slot, .. } => self.memory.commit(slot),
+            Work::Delete { slot } => self.memory.delete(slot),
+        });
+        let _ = self.memory.finished();
+        if outcome.is_err() {
+            self.memory.abort();
+        }
+        self.job = Job::Over(outcome);
+    }
+
+    fn ask(&mut self, work: Work) -> Result<(), StoreError> {
+        if !self.is_open || self.job != Job::None {
+            return Err(StoreError::Busy);
+        }
+        self.job = Job::Asked(work);
+        Ok(())
+    }
+
+    /// Whether the image being written is on its way to the flash.
+    fn is_saving(&self) -> bool {
+        matches!(self.job, Job::Asked(Work::Save { .. }) | Job::Taken(Work::Save { .. }))
+    }
+}
+
+impl<const SLOTS: usize, const BYTES: usize> Default for Library<SLOTS, BYTES> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const SLOTS: usize, const BYTES: usize> Store for Library<SLOTS, BYTES> {
+    fn is_open(&self) -> bool {
+        self.is_open
+    }
+
+    fn slots(&self) -> u8 {
+        self.memory.slots()
+    }
+
+    fn slot_bytes(&self) -> usize {
+        self.memory.slot_bytes()
+    }
+
+    fn image(&self, slot: u8) -> Option<&[u8]> {
+        self.memory.image(slot)
+    }
+
+    fn begin(&mut self, length: usize) -> Result<(), StoreError> {
+        if !self.is_open || self.is_saving() {
+            return Err(StoreError::Busy);
+        }
+        self.memory.begin(length)
+    }
+
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), StoreError> {
+        if self.is_saving() {
+            return Err(StoreError::Busy);
+        }
+        self.memory.write(offset, bytes)
+    }
+
+    fn staged(&self) -> Option<&[u8]> {
+        self.memory.staged().filter(|_| !self.is_saving())
+    }
+
+    fn commit(&mut self, slot: u8) -> Result<(), StoreError> {
+        let length = self.staged().ok_or(StoreError::NotOpen)?.len();
+        if slot >= self.slots() {
+            return Err(StoreError::NoPlace);
+        }
+        self.ask(Work::Save { slot, length })
+    }
+
+    fn abort(&mut self) {
+        // What has been committed cannot be taken back.
+        if !self.is_saving() {
+            self.memory.abort();
+        }
+    }
+
+    fn delete(&mut self, slot: u8) -> Result<(), StoreError> {
+        self.image(slot).ok_or(StoreError::NoPlace)?;
+        self.ask(Work::Delete { slot })
+    }
+
+    fn finished(&mut self) -> Option<Result<(), StoreError>> {
+        let Job::Over(outcome) = self.job else { return None };
+        self.job = Job::None;
+        Some(outcome)
+    }
+}

@@ -1,0 +1,53 @@
+//! The library of primitives on a NOR flash: what survives when the power goes.
+//!
+//! ```text
+//! Session ── Store ──> Library (memory) <── Desk ── keep() ──> MapStorage ──> SoundFlash ──> NorFlash of the board
+//!  link requests        what runs read       lowest priority     log of values   erases done over    words and sectors
+//! ```
+//!
+//! The session works with the [`Library`] in memory. What it changes there is a job for [`keep`], the one task that
+//! touches the flash: it runs when nothing else does, waits as long as the flash likes, and tells the library when the
+//! change is durable; only then the host is answered. The flash holds a log of `sequential-storage`: the newest value of
+//! a key counts, an older one goes only when its sector is needed and all that still counts has been copied. Layout,
+//! guarantees and measurements: `docs/storage.md`.
+
+mod journal;
+mod keeper;
+mod library;
+mod sound;
+
+pub use keeper::{Desk, Room, keep, value_bytes};
+pub use library::{Library, Work};
+
+use core::fmt;
+
+/// What the device found in its flash at start-up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Opening {
+    /// Images found, sound or not.
+    pub found: u8,
+    /// The flash was not one of ours, or its log could not be read: it was erased, and holds nothing now.
+    pub formatted: bool,
+    /// An erase that power had failed in was done again.
+    pub resumed: bool,
+    /// The flash does not work: what is stored from now on is refused.
+    pub failed: bool,
+}
+
+impl Opening {
+    /// A sound flash with nothing on it.
+    pub(crate) const NOTHING: Self = Self { found: 0, formatted: false, resumed: false, failed: false };
+}
+
+impl fmt::Display for Opening {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self { failed: true, .. } => f.write_str("the storage does not work: nothing is kept over a restart"),
+            Self { formatted: true, .. } => f.write_str("the storage was blank or foreign; it is empty now"),
+            Self { found, resumed, .. } => {
+                write!(f, "{found} images in the storage")?;
+                if *resumed { f.write_str("; an interrupted erase was finished") } else { Ok(()) }
+            }
+        }
+    }
+}

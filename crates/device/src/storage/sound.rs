@@ -1,0 +1,161 @@
+//! A flash whose erases are done or not done: what the log above needs and no flash gives.
+//!
+//! `sequential-storage` trusts two things that a power failure can break. That a sector whose erase was interrupted shows
+//! it: here the [`Journal`] knows, and the erase is repeated before anybody reads. And that a marker word at the edge of a
+//! sector is read the same every time: here a marker counts as written as soon as one bit of it is, because half a
+//! marker can be neither trusted nor written again.
+
+use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+
+use super::journal::{Account, Journal, SECTORS, sector_bytes};
+
+/// Most bytes of a word.
+const WORD_LIMIT: usize = 32;
+
+/// Sectors the log needs: one is always blank, and while one is emptied its content must fit elsewhere.
+const LOG_SECTORS: u32 = 2;
+
+/// Bytes looked at in one go when a sector is tested for being blank.
+const BLANK_CHUNK: usize = 256;
+
+/// The region without its journal.
+#[derive(Debug)]
+pub(super) struct SoundFlash<F> {
+    flash: F,
+    journal: Journal,
+    /// Bytes of the log: all but the journal.
+    capacity: u32,
+}
+
+/// How the region was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Found {
+    /// In order.
+    Sound,
+    /// One erase had been interrupted and has been repeated.
+    Resumed,
+    /// Blank or foreign: it is ours now, and blank.
+    Formatted,
+}
+
+impl<F: NorFlash> SoundFlash<F> {
+    /// Bytes of the log in a region of this flash; `None`: the flash is of a kind this storage cannot use.
+    pub(super) fn log_bytes(flash: &F) -> Option<u32> {
+        let usable = F::WRITE_SIZE <= WORD_LIMIT
+            && F::READ_SIZE <= WORD_LIMIT
+            && WORD_LIMIT.is_multiple_of(F::WRITE_SIZE.max(F::READ_SIZE))
+            && F::ERASE_SIZE.is_multiple_of(BLANK_CHUNK);
+        let sectors = u32::try_from(flash.capacity() / F::ERASE_SIZE).ok()?;
+        let log = sectors.checked_sub(SECTORS).filter(|log| usable && *log >= LOG_SECTORS)?;
+        u32::try_from(F::ERASE_SIZE).ok()?.checked_mul(sectors)?;
+        Some(log * sector_bytes::<F>())
+    }
+
+    /// Opens a region whose log has this many bytes, and puts in order what a power failure left.
+    ///
+    /// # Errors
+    /// Those of the flash.
+    pub(super) async fn open(mut flash: F, capacity: u32) -> Result<(Self, Found), F::Error> {
+        match Journal::read(&mut flash, capacity).await? {
+            Some(Account { journal, unfinished }) => {
+                let mut sound = Self { flash, journal, capacity };
+                let sector = unfinished.filter(|sector| u32::from(*sector) * sector_bytes::<F>() < capacity);
+                let Some(sector) = sector else { return Ok((sound, Found::Sound)) };
+                let from = u32::from(sector) * sector_bytes::<F>();
+                sound.flash.erase(from, from + sector_bytes::<F>()).await?;
+                sound.journal.erased(&mut sound.flash).await?;
+                Ok((sound, Found::Resumed))
+            }
+            None => {
+                let journal = make_ours(&mut flash, capacity).await?;
+                Ok((Self { flash, journal, capacity }, Found::Formatted))
+            }
+        }
+    }
+
+    /// Gives everything up: the region is blank afterwards.
+    ///
+    /// # Errors
+    /// Those of the flash.
+    pub(super) async fn format(&mut self) -> Result<(), F::Error> {
+        self.journal = make_ours(&mut self.flash, self.capacity).await?;
+        Ok(())
+    }
+
+    /// Whether these bytes are at a marker word, the first or last of a sector.
+    fn is_marker(offset: u32, length: usize) -> bool {
+        let word = F::WRITE_SIZE.max(F::READ_SIZE);
+        let (start, end) = (offset as usize % F::ERASE_SIZE, offset as usize % F::ERASE_SIZE + length);
+        end <= word || start >= F::ERASE_SIZE - word
+    }
+}
+
+/// Erases what is not blank, the log first: a journal says that the region is ours only when all of it is.
+async fn make_ours<F: NorFlash>(flash: &mut F, log: u32) -> Result<Journal, F::Error> {
+    for sector in (0..log).step_by(F::ERASE_SIZE) {
+        if !is_blank(flash, sector).await? {
+            flash.erase(sector, sector + sector_bytes::<F>()).await?;
+        }
+    }
+    let mut journal_blank = true;
+    for sector in (log..log + SECTORS * sector_bytes::<F>()).step_by(F::ERASE_SIZE) {
+        journal_blank &= is_blank(flash, sector).await?;
+    }
+    Journal::create(flash, log, journal_blank).await
+}
+
+async fn is_blank<F: NorFlash>(flash: &mut F, sector: u32) -> Result<bool, F::Error> {
+    let mut chunk = [0; BLANK_CHUNK];
+    for at in (sector..sector + sector_bytes::<F>()).step_by(BLANK_CHUNK) {
+        flash.read(at, &mut chunk).await?;
+        if chunk.iter().any(|byte| *byte != 0xFF) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+impl<F: NorFlash> ErrorType for SoundFlash<F> {
+    type Error = F::Error;
+}
+
+impl<F: NorFlash> ReadNorFlash for SoundFlash<F> {
+    const READ_SIZE: usize = F::READ_SIZE;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), F::Error> {
+        if !Self::is_marker(offset, bytes.len()) {
+            return self.flash.read(offset, bytes).await;
+        }
+        // A marker is all zeros; one bit of it is enough.
+        let word = F::WRITE_SIZE.max(F::READ_SIZE);
+        let mut whole = [0xFF; WORD_LIMIT];
+        let whole = whole.get_mut(..word).unwrap_or_default();
+        let start = offset - offset % u32::try_from(word).unwrap_or(1);
+        self.flash.read(start, whole).await?;
+        bytes.fill(if whole.iter().all(|byte| *byte == 0xFF) { 0xFF } else { 0 });
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.capacity as usize
+    }
+}
+
+impl<F: NorFlash> NorFlash for SoundFlash<F> {
+    const WRITE_SIZE: usize = F::WRITE_SIZE;
+    const ERASE_SIZE: usize = F::ERASE_SIZE;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), F::Error> {
+        for start in (from..to).step_by(F::ERASE_SIZE) {
+            let sector = u16::try_from(start / sector_bytes::<F>()).unwrap_or(u16::MAX);
+            self.journal.erasing(&mut self.flash, sector).await?;
+            self.flash.erase(start, start + sector_bytes::<F>()).await?;
+            self.journal.erased(&mut self.flash).await?;
+        }
+        Ok(())
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), F::Error> {
+        self.flash.write(offset, bytes).await
+    }
+}

@@ -1,0 +1,120 @@
+//! A device reduced to its library, on a flash whose power can fail.
+
+use core::pin::pin;
+use core::task::{Context, Poll, Waker};
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use device::storage::{Desk, Library, Opening, Room, Work, keep, value_bytes};
+use device::{Store, StoreError};
+use embedded_storage_async::nor_flash::NorFlash;
+use sim::flash::{Flash, FlashChip, FlashPort, FlashTimes, VirtualClock};
+
+/// Bytes of the images here: as large as the device's.
+pub(crate) const IMAGE: usize = 16_384;
+const VALUE: usize = value_bytes(IMAGE);
+
+/// The library, as the keeper sees it.
+pub(crate) struct Shared<const SLOTS: usize>(Arc<Mutex<Library<SLOTS, IMAGE>>>);
+
+impl<const SLOTS: usize> Shared<SLOTS> {
+    pub(crate) fn library(&self) -> MutexGuard<'_, Library<SLOTS, IMAGE>> {
+        self.0.lock().expect("no test panics while it holds the library")
+    }
+}
+
+impl<const SLOTS: usize> Desk for Shared<SLOTS> {
+    fn restore(&mut self, slot: u8, image: &[u8]) {
+        self.library().restore(slot, image);
+    }
+
+    fn forget(&mut self, slot: u8) {
+        self.library().forget(slot);
+    }
+
+    fn open(&mut self, opening: Opening) {
+        self.library().open(opening);
+    }
+
+    fn take(&mut self, image: &mut [u8]) -> Option<Work> {
+        self.library().take(image)
+    }
+
+    fn settle(&mut self, outcome: Result<(), StoreError>) {
+        self.library().settle(outcome);
+    }
+}
+
+/// What the host asks for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Wish {
+    /// Store the image of this number at a place.
+    Save(u8, u8),
+    /// Store [`TINY`] at a place.
+    Tiny(u8),
+    Delete(u8),
+}
+
+/// An image of a few bytes.
+pub(crate) const TINY: [u8; 20] = [250; 20];
+
+/// An image made of its number, of a length that depends on it.
+pub(crate) fn image(number: u8) -> Vec<u8> {
+    let length = IMAGE - usize::from(number) * 61;
+    (0..length).map(|place| number ^ (place as u8).wrapping_mul(31)).collect()
+}
+
+/// Starts the device on this flash, has it fulfil the wishes one after the other, and gives its library and the answers.
+/// `None` in place of an answer: power failed before it came.
+pub(crate) fn run<const SLOTS: usize, F: NorFlash>(
+    flash: F,
+    wishes: &[Wish],
+) -> (Shared<SLOTS>, Vec<Option<Result<(), StoreError>>>) {
+    let shared = Shared(Arc::new(Mutex::new(Library::<SLOTS, IMAGE>::new())));
+    let mut room = Box::new(Room::<IMAGE, VALUE>::new());
+    let mut desk = Shared(Arc::clone(&shared.0));
+    let mut keeper = pin!(keep(flash, &mut room, &mut desk));
+    let mut context = Context::from_waker(Waker::noop());
+    let mut answers = Vec::new();
+    let mut step = || {
+        let Poll::Pending = keeper.as_mut().poll(&mut context);
+    };
+    // A flash that takes no time leaves only pauses: one for each value read, and then the wait for work.
+    (0..2000).for_each(|_| step());
+    for wish in wishes {
+        if !shared.library().is_open() {
+            answers.push(None);
+            continue;
+        }
+        let asked = match *wish {
+            Wish::Save(slot, number) => save(&mut shared.library(), slot, &image(number)),
+            Wish::Tiny(slot) => save(&mut shared.library(), slot, &TINY),
+            Wish::Delete(slot) => shared.library().delete(slot),
+        };
+        if let Err(error) = asked {
+            answers.push(Some(Err(error)));
+            continue;
+        }
+        (0..4).for_each(|_| step());
+        answers.push(shared.library().finished());
+    }
+    (shared, answers)
+}
+
+fn save<const SLOTS: usize>(library: &mut Library<SLOTS, IMAGE>, slot: u8, image: &[u8]) -> Result<(), StoreError> {
+    library.begin(image.len())?;
+    library.write(0, image)?;
+    library.commit(slot)
+}
+
+/// As [`run`], on a simulated chip.
+pub(crate) fn run_on<const SLOTS: usize>(
+    chip: &FlashChip,
+    wishes: &[Wish],
+) -> (Shared<SLOTS>, Vec<Option<Result<(), StoreError>>>) {
+    run(FlashPort::new(chip.clone(), VirtualClock::default()), wishes)
+}
+
+/// A chip with this content, power on.
+pub(crate) fn chip(content: &[u8]) -> FlashChip {
+    FlashChip::new(Flash::with_content(content.to_vec(), FlashTimes::NONE))
+}

@@ -1,0 +1,227 @@
+//! Power fails in the middle of every single word and sector, and every restart finds the old or the new.
+
+use device::Store;
+use sim::flash::FlashChip;
+
+use crate::bench::{TINY, Wish, chip, image, run_on};
+
+/// Places of the library here.
+const SLOTS: usize = 4;
+
+/// What a torn word leaves behind is drawn this many times for each word; there are a thousand words.
+const WORD_DRAWS: u64 = 1;
+
+/// What a torn erase leaves behind is drawn this many times for each erase: at least twice each of its kinds.
+const ERASE_DRAWS: u64 = 24;
+
+/// What stands at each place: the number of its image.
+type Content = [Option<u8>; SLOTS];
+
+/// The library on a chip after a start.
+fn found(chip: &FlashChip) -> Content {
+    let (library, _) = run_on::<SLOTS>(chip, &[]);
+    let library = library.library();
+    assert!(library.is_open(), "the device did not open its storage");
+    std::array::from_fn(|slot| {
+        let bytes = library.image(slot as u8)?;
+        // An image begins with its number.
+        assert!(bytes == image(bytes[0]) || bytes == TINY, "an image that nobody ever stored");
+        Some(bytes[0])
+    })
+}
+
+fn content(chip: &FlashChip) -> Vec<u8> {
+    chip.lock().content().to_vec()
+}
+
+/// Has a device fulfil all wishes on a chip with this content; what the chip holds then.
+fn after(before: &[u8], wishes: &[Wish]) -> Vec<u8> {
+    let chip = chip(before);
+    let (_, answers) = run_on::<SLOTS>(&chip, wishes);
+    assert!(answers.iter().all(|answer| *answer == Some(Ok(()))), "{answers:?}");
+    content(&chip)
+}
+
+/// Which operations of a wish are erases.
+fn erases_of(before: &[u8], wish: Wish, operations: u64) -> Vec<u64> {
+    let count = |operation: u64| {
+        let chip = chip(before);
+        chip.lock().cut_power_at(operation, 0);
+        run_on::<SLOTS>(&chip, &[wish]);
+        let flash = chip.lock();
+        flash.erases().iter().sum::<u32>()
+    };
+    // Erases so far never grow less: each is found by halving.
+    let mut found = Vec::new();
+    let mut from = 0;
+    while from < operations && count(operations - 1) > found.len() as u32 {
+        let (mut low, mut high) = (from, operations - 1);
+        while low < high {
+            let middle = (low + high) / 2;
+            if count(middle) > found.len() as u32 { high = middle } else { low = middle + 1 }
+        }
+        found.push(low);
+        from = low + 1;
+    }
+    found
+}
+
+/// Fulfils `wish` with power failing at each of its operations, then starts again, with power failing at each operation of
+/// that start too. Returns how many cuts were tried.
+fn cut_everywhere(before: &[u8], wish: Wish) -> usize {
+    let old = found(&chip(before));
+    let (slot, number) = match wish {
+        Wish::Save(slot, number) => (slot, Some(number)),
+        Wish::Tiny(slot) => (slot, Some(TINY[0])),
+        Wish::Delete(slot) => (slot, None),
+    };
+    let mut new = old;
+    new[usize::from(slot)] = number;
+    let whole = chip(before);
+    let (_, answers) = run_on::<SLOTS>(&whole, &[wish]);
+    assert_eq!(answers, [Some(Ok(()))]);
+    assert_eq!(found(&whole), new, "without any cut");
+    let operations = whole.lock().operations();
+    let erases = erases_of(before, wish, operations);
+    let mut cuts = 0;
+    for operation in 0..operations {
+        let draws = if erases.contains(&operation) { ERASE_DRAWS } else { WORD_DRAWS };
+        for draw in 0..draws {
+            let chip = chip(before);
+            chip.lock().cut_power_at(operation, operation * 31 + draw);
+            let (_, answers) = run_on::<SLOTS>(&chip, &[wish]);
+            assert_eq!(answers, [None], "answered although power failed in operation {operation}");
+            cuts += 1;
+            let torn = content(&chip);
+            chip.lock().restart();
+            let before_start = chip.lock().operations();
+            let now = found(&chip);
+            let start_operations = chip.lock().operations() - before_start;
+            assert!(now == old || now == new, "cut {operation}, draw {draw}: {now:?} is neither {old:?} nor {new:?}");
+            cuts += cut_the_start(&torn, old, new, operation, start_operations);
+            // And it works on. Most words are alike: every eighth cut is followed up.
+            if draws == ERASE_DRAWS || operation % 8 == 0 {
+                let again = after(&content(&chip), &[Wish::Save(slot, 200), Wish::Save((slot + 1) % 4, 201)]);
+                let now = found(&self::chip(&again));
+                assert_eq!(now[usize::from(slot)], Some(200), "cut {operation}, draw {draw}: does not work on");
+            }
+        }
+    }
+    println!("{operations} operations, {} of them erases; {cuts} cuts, {cuts} times the old or the new", erases.len());
+    cuts
+}
+
+/// Power fails again in each of the operations with which the device puts its flash in order.
+fn cut_the_start(torn: &[u8], old: Content, new: Content, first: u64, operations: u64) -> usize {
+    for operation in 0..operations {
+        let chip = chip(torn);
+        chip.lock().cut_power_at(operation, first ^ operation);
+        run_on::<SLOTS>(&chip, &[]);
+        chip.lock().restart();
+        let now = found(&chip);
+        assert!(now == old || now == new, "cut {first}, then {operation} of the start: {now:?}");
+    }
+    usize::try_from(operations).expect("few")
+}
+
+/// A flash that has been written all around, so that the next image needs a sector that still holds images: places 0, 1, 2
+/// with images 40, 41, 42 of which the oldest stands in the sector to be emptied.
+fn crowded() -> Vec<u8> {
+    let blank = vec![0xFF; sim::flash::FLASH_BYTES];
+    let mut before = after(&blank, &[Wish::Save(0, 40), Wish::Save(1, 41), Wish::Save(2, 42)]);
+    // Place 3 is written over and over, until the next image would be the first to erase.
+    for number in 0_u8.. {
+        let wish = Wish::Save(3, number % 64);
+        let trial = chip(&before);
+        run_on::<SLOTS>(&trial, &[wish]);
+        if trial.lock().erases().iter().sum::<u32>() > 0 {
+            return before;
+        }
+        before = content(&trial);
+    }
+    unreachable!("a flash that never needs an erase")
+}
+
+#[test]
+fn power_fails_at_every_word_of_an_upload_that_replaces_and_the_old_or_the_new_is_there() {
+    let blank = vec![0xFF; sim::flash::FLASH_BYTES];
+    let before = after(&blank, &[Wish::Save(0, 1), Wish::Save(1, 2), Wish::Save(2, 3)]);
+    let cuts = cut_everywhere(&before, Wish::Save(1, 9));
+    assert!(cuts > 490 * WORD_DRAWS as usize, "{cuts} cuts are too few for an image of 16 kB in words of 32 bytes");
+}
+
+#[test]
+fn power_fails_at_every_operation_of_an_upload_that_needs_an_erase_and_the_old_or_the_new_is_there() {
+    let before = crowded();
+    let cuts = cut_everywhere(&before, Wish::Save(1, 9));
+    assert!(cuts > 1000 * WORD_DRAWS as usize, "{cuts} cuts: the images in the emptied sector were not copied");
+}
+
+#[test]
+fn power_fails_at_every_operation_of_a_delete_and_the_image_is_there_or_gone() {
+    let blank = vec![0xFF; sim::flash::FLASH_BYTES];
+    let before = after(&blank, &[Wish::Save(0, 1), Wish::Save(1, 2), Wish::Save(2, 3)]);
+    let cuts = cut_everywhere(&before, Wish::Delete(1));
+    assert!(cuts >= 2 * WORD_DRAWS as usize);
+}
+
+#[test]
+fn power_fails_at_every_operation_of_a_delete_that_needs_an_erase_and_the_image_is_there_or_gone() {
+    // An image of a few bytes takes as much room as the note that one was deleted: fill the sector with such.
+    let mut before = crowded();
+    loop {
+        let trial = chip(&before);
+        run_on::<SLOTS>(&trial, &[Wish::Tiny(3)]);
+        if trial.lock().erases().iter().sum::<u32>() > 0 {
+            break;
+        }
+        before = content(&trial);
+    }
+    let cuts = cut_everywhere(&before, Wish::Delete(0));
+    assert!(cuts > 500, "{cuts} cuts: no sector was emptied");
+}
+
+#[test]
+fn power_fails_at_every_operation_of_the_first_start_and_the_flash_becomes_ours() {
+    let blank = vec![0xFF; sim::flash::FLASH_BYTES];
+    let foreign: Vec<u8> = (0..sim::flash::FLASH_BYTES).map(|place| (place / 7) as u8).collect();
+    for before in [blank, foreign] {
+        let whole = chip(&before);
+        assert_eq!(found(&whole), [None; SLOTS]);
+        let operations = whole.lock().operations();
+        for operation in 0..operations {
+            for draw in 0..8 {
+                let chip = chip(&before);
+                chip.lock().cut_power_at(operation, draw);
+                run_on::<SLOTS>(&chip, &[]);
+                chip.lock().restart();
+                assert_eq!(found(&chip), [None; SLOTS]);
+                let now = after(&content(&chip), &[Wish::Save(0, 5)]);
+                assert_eq!(found(&self::chip(&now))[0], Some(5));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_deleted_image_stays_deleted_however_often_its_sector_is_emptied() {
+    let blank = vec![0xFF; sim::flash::FLASH_BYTES];
+    let mut now = after(&blank, &[Wish::Save(0, 1), Wish::Save(1, 2), Wish::Delete(1)]);
+    for number in 0..120 {
+        now = after(&now, &[Wish::Save(2, number)]);
+        assert_eq!(found(&chip(&now)), [Some(1), None, Some(number), None]);
+    }
+}
+
+#[test]
+fn wear_is_spread_over_the_sectors_of_the_log() {
+    let chip = chip(&vec![0xFF; sim::flash::FLASH_BYTES]);
+    let wishes: Vec<_> = (0..420).map(|count| Wish::Save(0, (count % 50) as u8)).collect();
+    let (_, answers) = run_on::<SLOTS>(&chip, &wishes);
+    assert!(answers.iter().all(|answer| *answer == Some(Ok(()))));
+    let flash = chip.lock();
+    let log = &flash.erases()[..6];
+    let (least, most) = (log.iter().min(), log.iter().max());
+    println!("erases after 420 uploads: {:?}", flash.erases());
+    assert!(most.zip(least).is_some_and(|(most, least)| most - least <= 1), "{log:?}");
+}

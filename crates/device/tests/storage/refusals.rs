@@ -1,0 +1,137 @@
+//! What the storage refuses, and what it makes of a flash that is not its own.
+
+use device::{Store, StoreError};
+use sim::flash::{FLASH_BYTES, FlashPort, VirtualClock};
+
+use crate::bench::{Wish, chip, image, run, run_on};
+
+fn noise(seed: u64) -> Vec<u8> {
+    let mut state = seed;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 56) as u8
+    };
+    (0..FLASH_BYTES).map(|_| next()).collect()
+}
+
+#[test]
+fn a_foreign_flash_is_made_ours_and_works() {
+    for content in [vec![0; FLASH_BYTES], noise(1), noise(2), vec![0x55; FLASH_BYTES]] {
+        let chip = chip(&content);
+        let (shared, answers) = run_on::<4>(&chip, &[Wish::Save(0, 7)]);
+        assert_eq!(answers, [Some(Ok(()))]);
+        assert!(shared.library().opening().is_some_and(|opening| opening.formatted));
+        let (shared, _) = run_on::<4>(&chip, &[]);
+        assert_eq!(shared.library().image(0), Some(image(7).as_slice()));
+        assert!(shared.library().opening().is_some_and(|opening| !opening.formatted && opening.found == 1));
+    }
+}
+
+#[test]
+fn damage_anywhere_in_the_log_costs_at_most_the_image_it_is_in() {
+    let whole = chip(&vec![0xFF; FLASH_BYTES]);
+    run_on::<4>(&whole, &[Wish::Save(0, 1), Wish::Save(1, 2), Wish::Save(2, 3)]);
+    let sound = whole.lock().content().to_vec();
+    // Bits fall over in every word of the three images, a word at a time.
+    for word in (0..3 * 16_448).step_by(1184) {
+        let mut content = sound.clone();
+        for byte in &mut content[word..word + 8] {
+            *byte ^= 0x5A;
+        }
+        let (shared, _) = run_on::<4>(&chip(&content), &[]);
+        let library = shared.library();
+        let kept = (0..3_u8).filter(|slot| library.image(*slot) == Some(image(slot + 1).as_slice())).count();
+        assert!(kept >= 2, "damage at {word} cost {} images", 3 - kept);
+    }
+}
+
+#[test]
+fn garbage_inside_our_region_never_crashes_and_the_library_works_on() {
+    let whole = chip(&vec![0xFF; FLASH_BYTES]);
+    run_on::<4>(&whole, &[Wish::Save(0, 1), Wish::Save(1, 2)]);
+    let sound = whole.lock().content().to_vec();
+    for seed in 0..24 {
+        let mut content = sound.clone();
+        let garbage = noise(seed);
+        let from = usize::from(garbage[0]) * 3000 % (FLASH_BYTES * 3 / 4 - 200_000);
+        let count = 1000 + usize::from(garbage[1]) * 700;
+        content[from..from + count].copy_from_slice(&garbage[from..from + count]);
+        let chip = chip(&content);
+        let (_, answers) = run_on::<4>(&chip, &[Wish::Save(3, 9)]);
+        assert_eq!(answers, [Some(Ok(()))], "garbage {seed}: {count} bytes at {from}");
+        let (shared, _) = run_on::<4>(&chip, &[]);
+        assert_eq!(shared.library().image(3), Some(image(9).as_slice()), "garbage {seed}");
+    }
+}
+
+#[test]
+fn a_full_flash_refuses_the_next_image_and_keeps_the_others() {
+    // More places than the flash has room for: only then can it be full.
+    let chip = chip(&vec![0xFF; FLASH_BYTES]);
+    let wishes: Vec<_> = (0..48).map(|slot| Wish::Save(slot, slot)).collect();
+    let (shared, answers) = run_on::<48>(&chip, &wishes);
+    let kept = answers.iter().take_while(|answer| **answer == Some(Ok(()))).count();
+    println!("{kept} images of 16 kB fit");
+    assert!(kept >= 28, "only {kept} images fit into six sectors");
+    assert_eq!(answers[kept], Some(Err(StoreError::Full)));
+    let again = run_on::<48>(&chip, &[]).0;
+    for slot in 0..kept as u8 {
+        assert_eq!(shared.library().image(slot), Some(image(slot).as_slice()));
+        assert_eq!(again.library().image(slot), Some(image(slot).as_slice()), "place {slot} after the restart");
+    }
+}
+
+#[test]
+fn a_flash_that_fails_refuses_and_the_memory_stays_as_it_was() {
+    let chip = chip(&vec![0xFF; FLASH_BYTES]);
+    run_on::<4>(&chip, &[Wish::Save(0, 1)]);
+    let failing = failing::Failing { port: FlashPort::new(chip.clone(), VirtualClock::default()), writes_left: 40 };
+    let (shared, answers) = run::<4, _>(failing, &[Wish::Save(0, 2), Wish::Save(1, 3), Wish::Delete(0)]);
+    assert_eq!(answers, [Some(Err(StoreError::Medium)); 3]);
+    assert_eq!(shared.library().image(0), Some(image(1).as_slice()));
+    assert_eq!(shared.library().image(1), None);
+}
+
+mod failing {
+    use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+    use sim::flash::{FlashError, FlashPort};
+
+    /// A flash that can be written a few more times.
+    pub(super) struct Failing {
+        pub(super) port: FlashPort,
+        pub(super) writes_left: u32,
+    }
+
+    impl ErrorType for Failing {
+        type Error = FlashError;
+    }
+
+    impl ReadNorFlash for Failing {
+        const READ_SIZE: usize = FlashPort::READ_SIZE;
+
+        async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+            self.port.read(offset, bytes).await
+        }
+
+        fn capacity(&self) -> usize {
+            self.port.capacity()
+        }
+    }
+
+    impl NorFlash for Failing {
+        const WRITE_SIZE: usize = FlashPort::WRITE_SIZE;
+        const ERASE_SIZE: usize = FlashPort::ERASE_SIZE;
+
+        async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+            self.port.erase(from, to).await
+        }
+
+        async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+            for (word, at) in bytes.chunks(Self::WRITE_SIZE).zip((offset..).step_by(Self::WRITE_SIZE)) {
+                self.writes_left = self.writes_left.checked_sub(1).ok_or(FlashError::NotBlank)?;
+                self.port.write(at, word).await?;
+            }
+            Ok(())
+        }
+    }
+}
