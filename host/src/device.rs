@@ -2,17 +2,26 @@
 
 use std::time::Duration;
 
+use link::can::DeviceNumber;
+
 use crate::simulation::{Simulation, SimulationError, SimulationOptions};
-use crate::transport::{Address, SerialTransport, StreamTransport, Transport, TransportError};
+use crate::transport::{
+    Address, CanTransport, LineKind, SerialTransport, SimulatedCan, SocketCan, StreamTransport, Transport,
+    TransportError,
+};
 
 /// A way to a device that is simulated here, or reached over a line.
 pub enum Device {
     /// Simulated in or below this process, in virtual time.
     Simulated(Box<Simulation>),
+    /// The same, its host link on a simulated CAN bus.
+    SimulatedCan(Box<CanTransport<SimulatedCan>>),
     /// At the other end of a socket.
     Stream(StreamTransport),
     /// At the other end of a serial line.
     Serial(SerialTransport),
+    /// On a CAN bus.
+    Can(Box<CanTransport<SocketCan>>),
 }
 
 /// Why a device cannot be opened.
@@ -36,19 +45,35 @@ impl Device {
             Address::Simulated(kind, options) => {
                 let mut options = SimulationOptions::from_address(*kind, options)?;
                 adjust(&mut options);
-                Self::Simulated(Box::new(Simulation::start(&options)?))
+                let simulation = Simulation::start(&options)?;
+                match options.line {
+                    LineKind::Serial => Self::Simulated(Box::new(simulation)),
+                    LineKind::Can => {
+                        let port = SimulatedCan::attach(simulation, DeviceNumber::FIRST);
+                        Self::SimulatedCan(Box::new(CanTransport::new(port, DeviceNumber::FIRST)))
+                    }
+                }
             }
             Address::Tcp(address) => Self::Stream(StreamTransport::tcp(address)?),
             Address::Unix(path) => Self::Stream(StreamTransport::unix(path)?),
             Address::Serial { port, baud } => Self::Serial(SerialTransport::open(port, *baud)?),
+            Address::Can { interface, device } => {
+                Self::Can(Box::new(CanTransport::new(SocketCan::open_link(interface, *device)?, *device)))
+            }
         })
+    }
+
+    /// What the line carries at most, byte/s, where that is known whatever the adapter: on a CAN bus.
+    pub fn line_rate(&self) -> Option<f64> {
+        matches!(self, Self::Can(_) | Self::SimulatedCan(_)).then_some(link::can::LINE_BYTES_PER_SECOND)
     }
 
     /// The simulation, if it is one.
     pub fn simulation(&mut self) -> Option<&mut Simulation> {
         match self {
             Self::Simulated(simulation) => Some(simulation),
-            Self::Stream(_) | Self::Serial(_) => None,
+            Self::SimulatedCan(device) => Some(device.port().simulation()),
+            Self::Stream(_) | Self::Serial(_) | Self::Can(_) => None,
         }
     }
 }
@@ -57,28 +82,34 @@ impl Transport for Device {
     fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
         match self {
             Self::Simulated(device) => device.send(bytes),
+            Self::SimulatedCan(device) => device.send(bytes),
             Self::Stream(device) => device.send(bytes),
             Self::Serial(device) => device.send(bytes),
+            Self::Can(device) => device.send(bytes),
         }
     }
 
     fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
         match self {
             Self::Simulated(device) => device.receive(timeout, out),
+            Self::SimulatedCan(device) => device.receive(timeout, out),
             Self::Stream(device) => device.receive(timeout, out),
             Self::Serial(device) => device.receive(timeout, out),
+            Self::Can(device) => device.receive(timeout, out),
         }
     }
 
     fn now(&self) -> Duration {
         match self {
             Self::Simulated(device) => device.now(),
+            Self::SimulatedCan(device) => device.now(),
             Self::Stream(device) => device.now(),
             Self::Serial(device) => device.now(),
+            Self::Can(device) => device.now(),
         }
     }
 
     fn is_virtual(&self) -> bool {
-        matches!(self, Self::Simulated(_))
+        matches!(self, Self::Simulated(_) | Self::SimulatedCan(_))
     }
 }

@@ -125,7 +125,7 @@ const REFUSAL_CODES: [&str; Refusal::ALL.len()] = [
     "E500", "E501", "E502", "E503", "E504", "E505", "E506", "E507", "E508", "E509", "E510", "E511", "E512", "E513",
     "E514", "E515", "E516", "E517", "E518", "E519", "E520", "E521", "E522", "E523", "E524", "E525", "E526", "E527",
     "E528", "E529", "E530", "E531", "E532", "E533", "E534", "E535", "E536", "E537", "E538", "E539", "E540", "E541",
-    "E542", "E543",
+    "E542", "E543", "E544",
 ];
 
 impl HostError {
@@ -135,6 +135,7 @@ impl HostError {
         match self {
             Self::Address(_) => Exit::Usage,
             Self::Transport(TransportError::NotFound { .. } | TransportError::Permission { .. }) => Exit::NoDevice,
+            Self::Transport(TransportError::Can(trouble)) => trouble.exit(),
             Self::Transport(TransportError::Other(_)) => Exit::Internal,
             Self::Transport(TransportError::Closed | TransportError::Io(_))
             | Self::NoAnswer { .. }
@@ -152,6 +153,7 @@ impl HostError {
     pub fn code(&self) -> &'static str {
         match self {
             Self::WrongAnswer { .. } => "E101",
+            Self::Transport(TransportError::Can(trouble)) => trouble.code(),
             Self::Transport(TransportError::Other(_)) => "E102",
             Self::Address(_) => "E201",
             Self::Transport(TransportError::NotFound { .. }) => "E301",
@@ -183,6 +185,7 @@ impl HostError {
             Self::Transport(TransportError::Closed | TransportError::Io(_)) => {
                 "check the cable; the device stops the arm by itself after half a second"
             }
+            Self::Transport(TransportError::Can(trouble)) => return Some(trouble.help()),
             Self::Transport(TransportError::Other(_)) | Self::WrongAnswer { .. } | Self::Interrupted => return None,
             Self::Incompatible { what, .. } => what.remedy(),
             Self::NoAnswer { .. } => "check that the device has power and that its firmware runs; then try again",

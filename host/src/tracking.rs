@@ -24,12 +24,31 @@ pub struct Tracking {
     pub orientation_end_rad: f64,
 }
 
+/// How well the hand kept to its plan in one run: measured against desired digits, in the order spread, F1, F2, F3.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct HandTracking {
+    /// Samples compared.
+    pub samples: usize,
+    /// Root mean square distance of each digit, rad.
+    pub rms_rad: [f64; 4],
+    /// Largest distance of each digit, rad.
+    pub max_rad: [f64; 4],
+    /// Distance of each digit at the last sample, rad.
+    pub end_rad: [f64; 4],
+}
+
 /// Why a recording cannot be compared with its plan.
 #[derive(Debug, Error)]
 pub enum TrackingError {
     /// The recording lacks the measured or the desired pose.
     #[error("{file}: the columns of the measured and of the desired pose (x_m..qz, x_d_m..qz_d) are both needed", file = file.display())]
     Columns {
+        /// The file.
+        file: std::path::PathBuf,
+    },
+    /// The recording lacks the measured or the desired hand.
+    #[error("{file}: the columns of the measured and of the desired hand (spread_rad.., spread_d_rad..) are both needed", file = file.display())]
+    HandColumns {
         /// The file.
         file: std::path::PathBuf,
     },
@@ -67,6 +86,35 @@ impl Tracking {
     }
 }
 
+impl HandTracking {
+    /// Compares the part of a recording in which a plan was played (all of it, if it has no states).
+    ///
+    /// # Errors
+    /// [`TrackingError`].
+    pub fn of_run(recording: &Recording) -> Result<HandTracking, TrackingError> {
+        let run = recording.running();
+        let (Some(hand), Some(hand_d)) = (&run.hand, &run.hand_d) else {
+            return Err(TrackingError::HandColumns { file: recording.file.clone() });
+        };
+        let errors: Vec<[f64; 4]> = hand
+            .iter()
+            .zip(hand_d)
+            .map(|(hand, hand_d)| std::array::from_fn(|digit| (hand[digit] - hand_d[digit]).abs()))
+            .collect();
+        let Some(end_rad) = errors.last().copied() else {
+            return Err(TrackingError::NoRun { file: recording.file.clone() });
+        };
+        let count = errors.len() as f64;
+        let of_digits = |figure: &dyn Fn(usize) -> f64| std::array::from_fn(figure);
+        Ok(HandTracking {
+            samples: errors.len(),
+            rms_rad: of_digits(&|digit| (errors.iter().map(|error| error[digit].powi(2)).sum::<f64>() / count).sqrt()),
+            max_rad: of_digits(&|digit| errors.iter().map(|error| error[digit]).fold(0.0, f64::max)),
+            end_rad,
+        })
+    }
+}
+
 /// Distance (m) and angle (rad) between measured and desired pose at each sample; `None` without those columns.
 pub fn errors(run: &Recording) -> Option<Vec<(f64, f64)>> {
     let position = run.position.as_ref()?.iter().zip(run.position_d.as_ref()?);
@@ -80,4 +128,47 @@ pub fn errors(run: &Recording) -> Option<Vec<(f64, f64)>> {
             })
             .collect(),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// A hand whose finger 2 is behind its plan by as much as the state says: 0.1 and 0.3 rad in turn, and far more before the run.
+    fn recording(names: &str) -> Recording {
+        let mut text = format!("t_s,state,{names}\n");
+        for line in 0..120 {
+            let (state, behind) = match line {
+                0..20 => ("hold", 2.0),
+                _ if line % 2 == 0 => ("run", 0.1),
+                _ => ("coast", 0.3),
+            };
+            let time = f64::from(line) / 300.0;
+            text += &format!("{time},{state},0.5,1,1,1,0.5,1,{},1\n", 1.0 + behind);
+        }
+        Recording::parse(Path::new("run.csv"), text.as_bytes()).unwrap()
+    }
+
+    const HAND: &str = "spread_rad,finger1_rad,finger2_rad,finger3_rad,\
+                        spread_d_rad,finger1_d_rad,finger2_d_rad,finger3_d_rad";
+
+    #[test]
+    fn fingers_are_compared_with_their_plan_while_it_is_played() {
+        let tracking = HandTracking::of_run(&recording(HAND)).unwrap();
+        assert_eq!(tracking.samples, 100);
+        let close = |found: [f64; 4], expected: f64| {
+            (found[2] - expected).abs() < 1e-12 && [found[0], found[1], found[3]] == [0.0; 3]
+        };
+        assert!(close(tracking.rms_rad, 0.05_f64.sqrt()), "{tracking:?}");
+        assert!(close(tracking.max_rad, 0.3) && close(tracking.end_rad, 0.3), "{tracking:?}");
+    }
+
+    #[test]
+    fn without_a_hand_nothing_is_made_up() {
+        let text = HAND.replace("_d_rad", "_x").replace("_rad", "_y");
+        assert!(matches!(HandTracking::of_run(&recording(&text)), Err(TrackingError::HandColumns { .. })));
+        assert!(matches!(Tracking::of_run(&recording(HAND)), Err(TrackingError::Columns { .. })));
+    }
 }

@@ -8,6 +8,7 @@
 mod interrupt;
 mod motion;
 mod telemetry;
+mod transfer;
 mod upload;
 
 use std::collections::VecDeque;
@@ -25,13 +26,18 @@ use crate::transport::Transport;
 
 pub use interrupt::Interrupt;
 pub use telemetry::{Gaps, TelemetryStream};
+pub use transfer::Transfer;
 pub use upload::{UploadOutcome, UploadPhase};
 
 /// How long an answer may take, the repetitions of its request included.
 pub const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// A request without an answer is repeated after this time. Longer than any answer takes on a good line: the
-/// slowest is the commit of an upload, some tens of milliseconds.
+/// How long the answer to a change of the store may take: it comes when the change is durable, and the flash may have to
+/// erase two sectors first, each of which takes up to 4 s.
+pub const STORE_TIMEOUT: Duration = Duration::from_secs(15);
+
+/// A request without an answer is repeated after this time. Longer than most answers take on a good line; a change of the store
+/// takes longer, and then the repetitions tell the device that this host is still there.
 const REPEAT_AFTER: Duration = Duration::from_millis(250);
 
 /// The device hears from this host at least so often while it waits for telemetry; it stops the arm after 500 ms.
@@ -83,6 +89,7 @@ pub struct Client<T: Transport> {
     moving: bool,
     open: bool,
     timeout: Duration,
+    transfer: Transfer,
     interrupt: Interrupt,
     received: Vec<u8>,
 }
@@ -119,6 +126,7 @@ impl<T: Transport> Client<T> {
             moving: false,
             open: false,
             timeout: ANSWER_TIMEOUT,
+            transfer: Transfer::default(),
             interrupt: Interrupt::never(),
             received: Vec::new(),
         };
@@ -203,6 +211,11 @@ impl<T: Transport> Client<T> {
         self.gaps
     }
 
+    /// How quickly the last upload went.
+    pub fn transfer(&self) -> Transfer {
+        self.transfer
+    }
+
     /// How quickly the device answered.
     pub fn round_trips(&self) -> RoundTrips {
         self.round_trips
@@ -241,6 +254,10 @@ impl<T: Transport> Client<T> {
         let envelope = Envelope { session: self.session, sequence: of, time_ms: self.device_ms };
         self.send(envelope, request)?;
         let mut repeat_at = started + REPEAT_AFTER;
+        let timeout = match request {
+            Request::UploadCommit | Request::Delete { .. } => self.timeout.max(STORE_TIMEOUT),
+            _ => self.timeout,
+        };
         loop {
             if let Some(reply) = self.take_answer(of) {
                 let took = self.transport.now().saturating_sub(started);
@@ -255,9 +272,9 @@ impl<T: Transport> Client<T> {
                 };
             }
             let now = self.transport.now();
-            let deadline = started + self.timeout;
+            let deadline = started + timeout;
             if now >= deadline {
-                return Err(HostError::NoAnswer { request: request.word(), after: self.timeout });
+                return Err(HostError::NoAnswer { request: request.word(), after: timeout });
             }
             if now >= repeat_at {
                 self.round_trips.repeated += 1;

@@ -93,6 +93,12 @@ pub(super) fn simulation_failure(error: SimulationError, doing: &str) -> Failure
         }
         SimulationError::NoImage(_) => (Exit::NoDevice, "E311", "`cargo xtask build`"),
         SimulationError::NoQemu(_) => (Exit::NoDevice, "E312", "`cargo xtask setup`"),
+        SimulationError::BusLog(..) => {
+            (Exit::Usage, "E208", "name a file in a folder that can be written, for example `sil:bus=run.log`")
+        }
+        SimulationError::Flash(..) => {
+            (Exit::Usage, "E209", "name a file of an earlier simulation, or one that does not exist yet")
+        }
         _ => (Exit::Internal, "E110", "`cargo xtask setup` repairs the set-up of the simulator"),
     };
     Failure::new(exit, code, doing, error).help(help)

@@ -1,12 +1,16 @@
 //! The command line: one subcommand a file, each with a `Cmd` (its options) and a `run`.
 
+pub mod can;
 pub mod check;
+pub mod compare;
 mod connection;
 pub mod experience;
 pub mod experiment;
+pub mod flash;
 pub mod hand;
 pub mod learn;
 pub mod list;
+pub mod logs;
 pub mod output;
 pub mod plot;
 pub mod record;
@@ -55,7 +59,7 @@ pub struct Global {
     /// Never ask; what would be asked is refused.
     #[arg(long, global = true)]
     pub non_interactive: bool,
-    /// The device: `sim:`, `sil:`, `serial:PATH`, `tcp:HOST:PORT` or `unix:PATH`.
+    /// The device: `sim:`, `sil:`, `serial:PATH`, `can:INTERFACE`, `tcp:HOST:PORT` or `unix:PATH`.
     #[arg(long, global = true, env = "TACTUS_DEVICE", value_name = "DEVICE")]
     pub device: Option<String>,
     /// Longest wait for an answer of the device, s.
@@ -97,10 +101,18 @@ pub enum Command {
     Stop(stop::Cmd),
     /// Write down what the arm does
     Record(record::Cmd),
+    /// Write the firmware image to a board
+    Flash(flash::Cmd),
+    /// Show what a device logs
+    Logs(logs::Cmd),
     /// Try a movement on objects that are not where it expects them
     Experiment(experiment::Cmd),
     /// Draw demonstration, plan and execution
     Plot(plot::Cmd),
+    /// Tell how two recordings of the same movement differ
+    Compare(compare::Cmd),
+    /// Read logs of the arm's CAN bus, or play them to the device's application
+    Can(can::Cmd),
 }
 
 /// Runs what the command line asks for and reports failures; gives the exit code of the process.
@@ -119,8 +131,12 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Rehearse(command) => rehearse::run(&command, &global),
         Command::Experience(command) => experience::run(&command, &global),
         Command::Hand(command) => hand::run(&command, &global),
+        Command::Flash(command) => flash::run(&command, &global),
+        Command::Logs(command) => logs::run(&command, &global),
         Command::Experiment(command) => experiment::run(&command, &global),
         Command::Plot(command) => plot::run(&command, &global),
+        Command::Compare(command) => compare::run(&command, &global),
+        Command::Can(command) => can::run(&command, &global),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

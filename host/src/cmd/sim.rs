@@ -28,6 +28,9 @@ pub struct Cmd {
     /// Do not wait for the wall clock: run as fast as this machine can
     #[arg(long)]
     pub fast: bool,
+    /// Keep the device's flash in this file, so that its primitives are there again after a restart
+    #[arg(long, value_name = "FILE")]
+    pub flash: Option<PathBuf>,
 }
 
 /// A connection that can be read without waiting.
@@ -48,7 +51,11 @@ enum Listener {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "sim";
     let output = global.output();
-    let device = global.device.clone().unwrap_or_else(|| "sim:".to_owned());
+    let mut device = global.device.clone().unwrap_or_else(|| "sim:".to_owned());
+    if let Some(file) = &command.flash {
+        let comma = if device.ends_with(':') { "" } else { "," };
+        device = format!("{device}{comma}flash={}", file.display());
+    }
     let (mut device, interrupt) = connection::simulated(&device, DOING)?;
     let listener = listen(&command.listen).map_err(|cause| {
         Failure::new(Exit::NoDevice, "E320", format!("sim: cannot listen on {}", command.listen), cause)

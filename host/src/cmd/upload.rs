@@ -29,6 +29,13 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let file = read(&command.primitive, DOING)?;
     let mut client = connection::open(global, DOING, |_| {})?;
     let outcome = send(&mut client, &file, output, DOING)?;
+    if let (UploadOutcome::Stored(_), Some(line)) = (&outcome, client.transport().line_rate()) {
+        let rate = client.transfer().sending_rate();
+        let (rate_kb, line_kb, share) = (rate / 1000.0, line / 1000.0, 100.0 * rate / line);
+        output.say(format!(
+            "sent at {rate_kb:.1} kB/s: {share:.0} % of the {line_kb:.1} kB/s that full CAN frames carry"
+        ));
+    }
     let (sent, listing) = match outcome {
         UploadOutcome::Stored(listing) => (true, listing),
         UploadOutcome::AlreadyThere(listing) => (false, listing),

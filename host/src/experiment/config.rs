@@ -159,7 +159,7 @@ impl Config {
         let cells: Vec<String> = self.grid.cells.iter().map(Cell::to_string).collect();
         let engine = match &self.engine {
             Engine::InProcess => "in this process".to_owned(),
-            Engine::Qemu { image } => {
+            Engine::Qemu { image } | Engine::Joint { image } => {
                 let bytes = std::fs::read(image).unwrap_or_default();
                 format!("firmware 0x{:08x} under QEMU", checksum(&bytes))
             }

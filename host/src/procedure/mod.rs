@@ -10,7 +10,7 @@ pub use hand::{HandReach, initialise_hand, move_hand};
 pub use ready::make_ready;
 pub use recorder::{Recorder, Take, recording_row, recording_text};
 pub use run::{CHANNELS, Change, ChangeKind, FlagCounts, Mode, RunOutcome, RunRequest, Surprise, play};
-pub use travel::{after, go_to_start, travel, wait_for};
+pub use travel::{after, drives_arm, go_to_start, travel, wait_for};
 
 use control::Fault;
 

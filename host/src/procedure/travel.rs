@@ -3,11 +3,12 @@
 use std::time::Duration;
 
 use control::{Fault, State};
-use link::{EventKind, HandStage};
+use link::{EventKind, HandStage, Name, Refusal, Request};
 
 use super::{HandReach, ProcedureError, move_hand};
 use crate::client::{Client, Incoming};
 use crate::device::Device;
+use crate::error::HostError;
 use crate::primitive_file::Waypoint;
 
 /// Longest move to a posture, s: what `control` allows.
@@ -53,7 +54,11 @@ pub fn go_to_start(
     };
     let status = client.status()?;
     if far(&status.q, &start.posture, START_TOLERANCE) || State::from_code(status.state) != Some(State::Hold) {
-        travel(client, start.posture.map(|angle| angle as f32), progress)?;
+        match travel(client, start.posture.map(|angle| angle as f32), progress) {
+            // A hand alone goes to its part of the start.
+            Err(ProcedureError::Host(HostError::Refused { reason: Refusal::NoArm, .. })) => {}
+            outcome => outcome?,
+        }
     }
     let status = client.status()?;
     if status.hand_stage == HandStage::Ready && far(&status.hand, &start.hand, HAND_TOLERANCE) {
@@ -65,6 +70,19 @@ pub fn go_to_start(
         }
     }
     Ok(())
+}
+
+/// Whether the device drives an arm, or a hand alone. It is asked for the beginning of a primitive it holds: the device of a hand
+/// alone keeps no images and says why; nothing moves.
+///
+/// # Errors
+/// As [`Client::request`].
+pub fn drives_arm(client: &mut Client<Device>, held: &Name) -> Result<bool, HostError> {
+    match client.request(&Request::Read { name: held.clone(), offset: 0 }) {
+        Ok(_) => Ok(true),
+        Err(HostError::Refused { reason, .. }) => Ok(reason != Refusal::NoArm),
+        Err(error) => Err(error),
+    }
 }
 
 /// Waits until a motion that was just commanded has arrived.

@@ -25,6 +25,15 @@ pub enum SimulationError {
     /// The file for the firmware's log cannot be written.
     #[error("cannot write the firmware's log: {0}")]
     Log(#[source] io::Error),
+    /// The file for the log of the buses cannot be written.
+    #[error("cannot write the log of the buses to {0}: {1}")]
+    BusLog(PathBuf, #[source] io::Error),
+    /// The file that is the device's flash cannot be used.
+    #[error("cannot use {0} as the device's flash: {1}")]
+    Flash(PathBuf, #[source] io::Error),
+    /// The simulated flash lost power, as it was told to, and the device with it.
+    #[error("the power of the simulated device failed while it wrote its flash")]
+    PowerFailed,
     /// The exchange with the firmware broke.
     #[error("the simulated device failed: {0}")]
     Lockstep(#[from] sim::LockstepError),

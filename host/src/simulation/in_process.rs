@@ -5,15 +5,21 @@
 //! processor is free.
 
 use std::collections::VecDeque;
+use std::convert::Infallible;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Waker};
 
 use control::arm::ArmModel;
 use control::{CycleRecord, LoadRefusal, Payload};
+use device::storage::{Desk, Library, Opening, Room, Work, keep, value_bytes};
 use device::{
-    Command, Core, CoreIo, Event, Health, Identity, QueueFull, RamStore, Session, SessionPort, Slot, StoredPrimitive,
+    Command, Core, CoreIo, Event, Health, Identity, QueueFull, Session, SessionPort, Slot, StoreError, StoredPrimitive,
     TimedRecord, Timing,
 };
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
+use sim::flash::{FlashChip, FlashPort, VirtualClock};
 use sim::{Plant, SLOT_TICKS, TICKS_PER_MICROSECOND, Ticks};
 
 use super::{Execute, SimulationError};
@@ -122,10 +128,78 @@ impl SessionPort for Port<'_> {
     }
 }
 
+type Dialogue = Session<Library<STORE_SLOTS, IMAGE_BYTES_LIMIT>>;
+
+/// The session, shared with whoever keeps its library on the flash; never by two at a time.
+#[derive(Clone)]
+struct SharedSession(Arc<Mutex<Dialogue>>);
+
+impl SharedSession {
+    fn lock(&self) -> MutexGuard<'_, Dialogue> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Desk for SharedSession {
+    fn restore(&mut self, slot: u8, image: &[u8]) {
+        self.lock().store_mut().restore(slot, image);
+    }
+
+    fn forget(&mut self, slot: u8) {
+        self.lock().store_mut().forget(slot);
+    }
+
+    fn open(&mut self, opening: Opening) {
+        self.lock().store_mut().open(opening);
+    }
+
+    fn take(&mut self, image: &mut [u8]) -> Option<Work> {
+        self.lock().store_mut().take(image)
+    }
+
+    fn settle(&mut self, outcome: Result<(), StoreError>) {
+        self.lock().store_mut().settle(outcome);
+    }
+}
+
+/// The task of the lowest priority, with the time in which it lives and the flash it keeps the library on.
+struct Keeper {
+    task: Pin<Box<dyn Future<Output = Infallible> + Send>>,
+    clock: VirtualClock,
+    chip: FlashChip,
+}
+
+impl Keeper {
+    fn new(chip: FlashChip, mut desk: SharedSession) -> Self {
+        let clock = VirtualClock::default();
+        let port = FlashPort::new(chip.clone(), clock.clone());
+        let task = Box::pin(async move {
+            let mut room = Box::new(Room::<IMAGE_BYTES_LIMIT, { value_bytes(IMAGE_BYTES_LIMIT) }>::new());
+            keep(port, &mut room, &mut desk).await
+        });
+        Self { task, clock, chip }
+    }
+
+    /// Lets it work from `now` to `end`, as often as its flash gets something done.
+    fn run(&mut self, now: Ticks, end: Ticks) -> Result<(), SimulationError> {
+        let mut context = Context::from_waker(Waker::noop());
+        self.clock.set(now);
+        loop {
+            let Poll::Pending = self.task.as_mut().poll(&mut context);
+            match self.clock.take_alarm() {
+                Some(alarm) if alarm < end => self.clock.set(alarm),
+                _ => break,
+            }
+        }
+        if self.chip.lock().is_powered() { Ok(()) } else { Err(SimulationError::PowerFailed) }
+    }
+}
+
 /// The application and the time of its next slot.
 pub(super) struct InProcess {
     core: Core,
-    session: Session<RamStore<STORE_SLOTS, IMAGE_BYTES_LIMIT>>,
+    session: SharedSession,
+    keeper: Keeper,
     queues: Queues,
     slot: Slot,
     next_slot: Ticks,
@@ -135,8 +209,8 @@ pub(super) struct InProcess {
 }
 
 impl InProcess {
-    /// The device at power-up.
-    pub(super) fn new() -> Self {
+    /// The device at power-up, with this flash.
+    pub(super) fn new(flash: FlashChip) -> Self {
         let identity = Identity {
             firmware: env!("CARGO_PKG_VERSION"),
             board: "in-process",
@@ -144,9 +218,12 @@ impl InProcess {
             simulated: true,
             ticks_per_second: sim::TICKS_PER_SECOND as u32,
         };
+        let session = Session::new(identity, ArmModel::new(Payload::SensorAndHand), Library::new());
+        let session = SharedSession(Arc::new(Mutex::new(session)));
         Self {
             core: Core::new(),
-            session: Session::new(identity, ArmModel::new(Payload::SensorAndHand), RamStore::new()),
+            keeper: Keeper::new(flash, session.clone()),
+            session,
             queues: Queues::default(),
             slot: Slot::Request,
             next_slot: FIRST_SLOT * SLOT_TICKS,
@@ -155,7 +232,7 @@ impl InProcess {
         }
     }
 
-    fn slot(&mut self, plant: &mut Plant) {
+    fn slot(&mut self, plant: &mut Plant) -> Result<(), SimulationError> {
         let now = self.next_slot;
         plant.advance(now);
         let now_us = now / TICKS_PER_MICROSECOND;
@@ -164,13 +241,14 @@ impl InProcess {
         self.leaving.extend(self.queues.transmitted.drain(..).map(|frame| (leave, frame)));
         let room = LINE_ROOM.saturating_sub(plant.link_backlog());
         let mut port = Port { queues: &mut self.queues, core: &mut self.core, line: &mut self.line, room };
-        self.session.poll(now_us, &mut port);
+        self.session.lock().poll(now_us, &mut port);
         if !self.line.is_empty() {
             plant.link_from_device(now, &self.line);
             self.line.clear();
         }
         self.slot = self.slot.next();
         self.next_slot += SLOT_TICKS;
+        self.keeper.run(now, self.next_slot)
     }
 }
 
@@ -183,7 +261,7 @@ impl Execute for InProcess {
                 let event = plant.event(at);
                 self.queues.received.extend(event.received);
                 if !event.link.is_empty() {
-                    self.session.receive(&event.link);
+                    self.session.lock().receive(&event.link);
                 }
             }
             _ if leaving <= horizon => {
@@ -191,7 +269,7 @@ impl Execute for InProcess {
                     plant.submit(at, frame);
                 }
             }
-            _ if self.next_slot <= limit => self.slot(plant),
+            _ if self.next_slot <= limit => self.slot(plant)?,
             _ => plant.advance(limit),
         }
         Ok(plant.now())

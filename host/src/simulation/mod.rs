@@ -5,6 +5,7 @@
 //! waits: virtual time advances only inside [`Transport::receive`], so a whole session is one deterministic sequence of events, whatever
 //! the load of the machine.
 
+mod bus_log;
 mod error;
 mod in_process;
 mod options;
@@ -12,12 +13,16 @@ mod qemu;
 mod seat;
 
 pub use error::SimulationError;
-pub use options::{DEFAULT_SEED, Engine, IMAGE_VARIABLE, SimulationOptions, WorldKind};
+pub use options::{
+    DEFAULT_SEED, Engine, FlashSource, GRIPPED, IMAGE_VARIABLE, JOINT_IMAGE_VARIABLE, SimulationOptions, WorldKind,
+    built_image,
+};
 
 use std::time::Duration;
 
-use sim::{Plant, PlantConfig, TICKS_PER_SECOND, Ticks, World};
+use sim::{Passage, Plant, PlantConfig, TICKS_PER_SECOND, Ticks, World};
 
+use bus_log::BusLog;
 use in_process::InProcess;
 use qemu::Qemu;
 
@@ -34,6 +39,7 @@ pub struct Simulation {
     plant: Plant,
     engine: Box<dyn Execute>,
     now: Ticks,
+    log: Option<BusLog>,
 }
 
 impl Simulation {
@@ -43,12 +49,23 @@ impl Simulation {
     /// The world or the engine named in `options` cannot be started here; the message names the command that sets it up.
     pub fn start(options: &SimulationOptions) -> Result<Self, SimulationError> {
         let world = options.build_world()?;
-        let plant = Plant::new(PlantConfig { seed: options.seed, ..options.plant.clone() }, world);
+        let mut plant = Plant::new(PlantConfig { seed: options.seed, ..options.plant.clone() }, world);
+        let log = options.bus_log.as_deref().map(BusLog::create).transpose()?;
+        if log.is_some() {
+            plant.record_bus();
+        }
         let engine: Box<dyn Execute> = match &options.engine {
-            Engine::InProcess => Box::new(InProcess::new()),
-            Engine::Qemu { image } => Box::new(Qemu::spawn(image, options.firmware_log.as_deref())?),
+            Engine::InProcess => Box::new(InProcess::new(options.flash.chip()?)),
+            Engine::Qemu { image } => {
+                let log = options.firmware_log.as_deref();
+                Box::new(Qemu::spawn(qemu::ARM_MACHINE, image, log, options.flash.chip()?)?)
+            }
+            Engine::Joint { image } => {
+                let log = options.firmware_log.as_deref();
+                Box::new(Qemu::spawn(qemu::JOINT_MACHINE, image, log, options.flash.chip()?)?)
+            }
         };
-        Ok(Self { plant, engine, now: 0 })
+        Ok(Self { plant, engine, now: 0, log })
     }
 
     /// The simulated bus and everything on it.
@@ -85,6 +102,49 @@ impl Simulation {
     }
 }
 
+impl Simulation {
+    /// Virtual time reached since power-up.
+    pub fn elapsed(&self) -> Duration {
+        Duration::from_nanos(self.now * 40)
+    }
+
+    /// Lets virtual time pass until something is `ready` or the time-out is over; `ready` hears the time reached.
+    pub(crate) fn advance_until(
+        &mut self,
+        timeout: Duration,
+        mut ready: impl FnMut(Ticks) -> bool,
+    ) -> Result<(), TransportError> {
+        self.advance_plant_until(timeout, |_, now| ready(now))
+    }
+
+    fn advance_plant_until(
+        &mut self,
+        timeout: Duration,
+        mut ready: impl FnMut(&mut Plant, Ticks) -> bool,
+    ) -> Result<(), TransportError> {
+        let limit = self.now + (timeout.as_secs_f64() * TICKS_PER_SECOND as f64) as Ticks;
+        while !ready(&mut self.plant, self.now) && self.now < limit {
+            self.now = self.engine.advance(&mut self.plant, limit).map_err(TransportError::other)?;
+        }
+        Ok(())
+    }
+
+    /// Whether what the buses carry is written to a file.
+    pub(crate) fn keeps_bus_log(&self) -> bool {
+        self.log.is_some()
+    }
+
+    /// Writes what the arm's bus, and the `host`'s, have carried since this was last called.
+    pub(crate) fn log_buses(&mut self, host: &[Passage]) -> Result<(), TransportError> {
+        if let Some(log) = &mut self.log {
+            log.arm(&self.plant.take_recorded());
+            log.host(host);
+            log.write_until(self.now).map_err(TransportError::Io)?;
+        }
+        Ok(())
+    }
+}
+
 impl Transport for Simulation {
     fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
         self.plant.link_to_device(bytes);
@@ -92,22 +152,16 @@ impl Transport for Simulation {
     }
 
     fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
-        let limit = self.now + (timeout.as_secs_f64() * TICKS_PER_SECOND as f64) as Ticks;
-        loop {
-            let bytes = self.plant.take_from_device();
-            if !bytes.is_empty() {
-                out.extend_from_slice(&bytes);
-                return Ok(());
-            }
-            if self.now >= limit {
-                return Ok(());
-            }
-            self.now = self.engine.advance(&mut self.plant, limit).map_err(TransportError::other)?;
-        }
+        self.advance_plant_until(timeout, |plant, _| {
+            let bytes = plant.take_from_device();
+            out.extend_from_slice(&bytes);
+            !bytes.is_empty()
+        })?;
+        self.log_buses(&[])
     }
 
     fn now(&self) -> Duration {
-        Duration::from_nanos(self.now * 40)
+        self.elapsed()
     }
 
     fn is_virtual(&self) -> bool {

@@ -2,17 +2,24 @@
 
 use std::path::{Path, PathBuf};
 
+use sim::flash::{Flash, FlashChip, FlashTimes};
 use sim::person::Lesson;
 use sim::world::HOME;
 #[cfg(feature = "mujoco")]
 use sim::world::mujoco::{Imperfections, MujocoWorld, Scene};
-use sim::{FreeJoints, PlantConfig, World};
+use sim::{FingerObstacle, FreeJoints, PlantConfig, World};
 
 use super::SimulationError;
-use crate::transport::{SimulatorKind, SimulatorOptions};
+use crate::transport::{LineKind, SimulatorKind, SimulatorOptions};
 
 /// Environment variable that names the firmware image for QEMU.
 pub const IMAGE_VARIABLE: &str = "TACTUS_IMAGE";
+
+/// Environment variable that names the joint image for QEMU.
+pub const JOINT_IMAGE_VARIABLE: &str = "TACTUS_JOINT_IMAGE";
+
+/// What a hand alone finds between its fingers: a spring that its outer links meet at 0.45 rad, with inner links at 1.35 rad.
+pub const GRIPPED: FingerObstacle = FingerObstacle { inner: f64::INFINITY, outer: 0.45, stiffness: 2.0 };
 
 /// Seed of a simulation that was given none.
 pub const DEFAULT_SEED: u64 = 1;
@@ -27,6 +34,11 @@ pub enum Engine {
         /// The image, an ELF file.
         image: PathBuf,
     },
+    /// The joint image under QEMU, on a smaller machine.
+    Joint {
+        /// The image, an ELF file.
+        image: PathBuf,
+    },
 }
 
 /// Which physics.
@@ -36,6 +48,32 @@ pub enum WorldKind {
     Simple,
     /// MuJoCo with the whole arm, a table and a flashlight.
     Mujoco,
+}
+
+/// The flash in the device, which keeps its primitives.
+#[derive(Debug, Clone, Default)]
+pub enum FlashSource {
+    /// A new one, gone when the simulation is.
+    #[default]
+    New,
+    /// This one: whoever else holds it can look at it, cut its power, and put it into the next device.
+    Chip(FlashChip),
+    /// One that is kept in a file.
+    File(PathBuf),
+}
+
+impl FlashSource {
+    /// The chip to put into a device.
+    pub(super) fn chip(&self) -> Result<FlashChip, SimulationError> {
+        match self {
+            Self::New => Ok(FlashChip::default()),
+            Self::Chip(chip) => Ok(chip.clone()),
+            Self::File(path) => {
+                let opened = Flash::in_file(path, FlashTimes::TYPICAL);
+                opened.map(FlashChip::new).map_err(|cause| SimulationError::Flash(path.clone(), cause))
+            }
+        }
+    }
 }
 
 /// How a simulated device is set up.
@@ -66,6 +104,14 @@ pub struct SimulationOptions {
     pub dress: Option<fn(MujocoWorld) -> Box<dyn World>>,
     /// Where the firmware's log goes, raw defmt frames; `None` drops it.
     pub firmware_log: Option<PathBuf>,
+    /// What the host link travels on.
+    pub line: LineKind,
+    /// Where a log of the buses goes, in the format of `candump -L`; `None` keeps none.
+    pub bus_log: Option<PathBuf>,
+    /// The flash in the device.
+    pub flash: FlashSource,
+    /// What is in the way of the fingers of a hand alone; `None`: there is an arm, and a world around it.
+    pub grip: Option<[FingerObstacle; 3]>,
 }
 
 impl SimulationOptions {
@@ -76,7 +122,8 @@ impl SimulationOptions {
     pub fn from_address(kind: SimulatorKind, options: &SimulatorOptions) -> Result<Self, SimulationError> {
         let engine = match kind {
             SimulatorKind::InProcess => Engine::InProcess,
-            SimulatorKind::Qemu => Engine::Qemu { image: find_image()? },
+            SimulatorKind::Qemu => Engine::Qemu { image: find_image(IMAGE_VARIABLE, "arm.elf")? },
+            SimulatorKind::Joint => return Self::joint(options),
         };
         let world = match options.world.as_deref() {
             Some("simple") => WorldKind::Simple,
@@ -88,7 +135,29 @@ impl SimulationOptions {
         if world == WorldKind::Mujoco && !cfg!(feature = "mujoco") {
             return Err(SimulationError::WithoutMujoco);
         }
-        Ok(Self::new(engine, options.seed.unwrap_or(DEFAULT_SEED), world))
+        Ok(Self {
+            line: options.line,
+            bus_log: options.bus.clone(),
+            flash: options.flash.clone().map_or(FlashSource::New, FlashSource::File),
+            ..Self::new(engine, options.seed.unwrap_or(DEFAULT_SEED), world)
+        })
+    }
+
+    /// A hand alone, with power, and something springy between its fingers.
+    fn joint(options: &SimulatorOptions) -> Result<Self, SimulationError> {
+        let grip = match options.world.as_deref() {
+            None => [GRIPPED; 3],
+            Some("empty") => [FingerObstacle::NOTHING; 3],
+            Some(other) => return Err(SimulationError::UnknownWorld(other.to_owned())),
+        };
+        let engine = Engine::Joint { image: find_image(JOINT_IMAGE_VARIABLE, "joint.elf")? };
+        Ok(Self {
+            bus_log: options.bus.clone(),
+            line: options.line,
+            plant: PlantConfig { hand_alone: true, ..PlantConfig::default() },
+            grip: Some(grip),
+            ..Self::new(engine, options.seed.unwrap_or(DEFAULT_SEED), WorldKind::Simple)
+        })
     }
 
     /// The usual arm at home, switched off, with the usual things around it and nobody beside it.
@@ -109,11 +178,22 @@ impl SimulationOptions {
             #[cfg(feature = "mujoco")]
             dress: None,
             firmware_log: None,
+            line: LineKind::Serial,
+            bus_log: None,
+            flash: FlashSource::New,
+            grip: None,
         }
     }
 
     /// The world at its start.
     pub(super) fn build_world(&self) -> Result<Box<dyn World>, SimulationError> {
+        if let Some(grip) = self.grip {
+            let mut world = FreeJoints::weightless(self.posture);
+            for (finger, obstacle) in grip.into_iter().enumerate() {
+                world.obstruct(finger, obstacle);
+            }
+            return Ok(Box::new(world));
+        }
         match self.world {
             WorldKind::Simple => Ok(Box::new(FreeJoints::new(self.posture))),
             #[cfg(feature = "mujoco")]
@@ -145,15 +225,18 @@ impl SimulationOptions {
 ///
 /// The build folder is found from the place of this program (`target/release/tactus`, `target/debug/deps/...`), so that it
 /// does not matter where it is called from.
-fn find_image() -> Result<PathBuf, SimulationError> {
-    if let Some(path) = std::env::var_os(IMAGE_VARIABLE) {
+fn find_image(variable: &str, file: &str) -> Result<PathBuf, SimulationError> {
+    if let Some(path) = std::env::var_os(variable) {
         let path = PathBuf::from(path);
         return if path.is_file() { Ok(path) } else { Err(SimulationError::NoImage(path)) };
     }
+    built_image(file).ok_or_else(|| SimulationError::NoImage(Path::new("target/images").join(file)))
+}
+
+/// An image that was built, by its file name, if there is one beside this program.
+#[must_use]
+pub fn built_image(file: &str) -> Option<PathBuf> {
     let program = std::env::current_exe().unwrap_or_default();
-    let candidates = program.ancestors().skip(1).take(4).map(|folder| folder.join("images").join("arm.elf"));
-    candidates
-        .into_iter()
-        .find(|path| path.is_file())
-        .ok_or_else(|| SimulationError::NoImage(Path::new("target/images/arm.elf").to_owned()))
+    let mut candidates = program.ancestors().skip(1).take(4).map(|folder| folder.join("images").join(file));
+    candidates.find(|path| path.is_file())
 }

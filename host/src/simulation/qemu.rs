@@ -7,18 +7,23 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
+use sim::flash::FlashChip;
 use sim::{Lockstep, Plant, Ticks};
 
 use super::seat::Seat;
 use super::{Execute, SimulationError};
 
-/// The machine the image is built for, with everything QEMU would add by itself switched off.
+/// The machine of the arm image.
+pub(super) const ARM_MACHINE: &str = "mps2-an500";
+
+/// The machine of the joint image: a Cortex-M3.
+pub(super) const JOINT_MACHINE: &str = "mps2-an385";
+
+/// The machine, with everything QEMU would add by itself switched off.
 ///
 /// `shift=3`: one instruction takes 8 ns of virtual time (125 million a second). `sleep=off`: virtual time never waits for the wall
 /// clock. Together they make a run a function of the image and of what the simulator answers.
-const MACHINE: &[&str] = &[
-    "-machine",
-    "mps2-an500",
+const OPTIONS: &[&str] = &[
     "-nodefaults",
     "-nic",
     "none",
@@ -48,11 +53,17 @@ pub(super) struct Qemu {
 }
 
 impl Qemu {
-    /// Boots `image`; the firmware's log goes to the file `log`.
-    pub(super) fn spawn(image: &Path, log: Option<&Path>) -> Result<Self, SimulationError> {
+    /// Boots `image` on `machine` with this flash; the firmware's log goes to the file `log`.
+    pub(super) fn spawn(
+        machine: &str,
+        image: &Path,
+        log: Option<&Path>,
+        flash: FlashChip,
+    ) -> Result<Self, SimulationError> {
         let mut file = log.map(File::create).transpose().map_err(SimulationError::Log)?;
         let mut child = Command::new("qemu-system-arm")
-            .args(MACHINE)
+            .args(["-machine", machine])
+            .args(OPTIONS)
             .arg(image)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -80,7 +91,8 @@ impl Qemu {
             }
         });
         let seat = Seat::share(&child);
-        Ok(Self { child, _seat: seat, lockstep: Lockstep::new(BufReader::new(from), to), log: Some(log), words })
+        let lockstep = Lockstep::new(BufReader::new(from), to).with_flash(flash);
+        Ok(Self { child, _seat: seat, lockstep, log: Some(log), words })
     }
 
     /// Why the firmware fell silent.
@@ -105,6 +117,11 @@ impl Execute for Qemu {
             Ok(served) if !served.is_last() => Ok(plant.now()),
             Ok(_) => Err(self.ended()),
             Err(sim::LockstepError::Truncated { .. }) => Err(self.ended()),
+            Err(sim::LockstepError::PowerFailed) => {
+                // It waits for an answer that will not come; whoever asks on finds its stream ended.
+                let _ = self.child.kill();
+                Err(SimulationError::PowerFailed)
+            }
             // Killed between its request and our answer.
             Err(sim::LockstepError::Stream(cause)) if cause.kind() == std::io::ErrorKind::BrokenPipe => {
                 Err(self.ended())

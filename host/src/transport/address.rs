@@ -3,15 +3,19 @@
 //! ```text
 //! sim:[options]          the firmware under QEMU, with simulated bus and world
 //! sil:[options]          the same application in this process
+//! joint:[options]        the joint image under QEMU, with a hand alone on the simulated bus and something to grip
 //! tcp:HOST:PORT          a socket
 //! unix:PATH              a Unix socket
 //! serial:PORT[@BAUD]     a serial port, 921600 baud unless said otherwise
-//! options: seed=7,world=simple|mujoco, separated by commas
+//! can:INTERFACE[/N]      device number N (0 unless said otherwise) on a CAN interface
+//! options: seed=7,world=simple|mujoco,line=serial|can,bus=FILE, separated by commas
 //! ```
 
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
+
+use link::can::DeviceNumber;
 
 use super::serial::DEFAULT_BAUD;
 
@@ -22,6 +26,18 @@ pub enum SimulatorKind {
     Qemu,
     /// `sil:`, the application in this process.
     InProcess,
+    /// `joint:`, the joint image under QEMU: a hand alone on its bus.
+    Joint,
+}
+
+/// What the host link of a simulated device travels on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LineKind {
+    /// The board's UART.
+    #[default]
+    Serial,
+    /// A CAN bus of its own.
+    Can,
 }
 
 /// Options of a simulated device; the simulator knows which of them it takes.
@@ -31,6 +47,12 @@ pub struct SimulatorOptions {
     pub seed: Option<u64>,
     /// Name of the world; `None` is the best one that was built in.
     pub world: Option<String>,
+    /// What the host link travels on.
+    pub line: LineKind,
+    /// Where a log of the buses goes, in the format of `candump -L`.
+    pub bus: Option<PathBuf>,
+    /// The file that is the device's flash, so that its library is there again after a restart.
+    pub flash: Option<PathBuf>,
 }
 
 /// Where a device is.
@@ -49,23 +71,37 @@ pub enum Address {
         /// Its speed.
         baud: u32,
     },
+    /// A CAN interface of this system.
+    Can {
+        /// Its name, e.g. `can0`.
+        interface: String,
+        /// Which of the devices on its bus.
+        device: DeviceNumber,
+    },
 }
 
 /// Why a text is no address.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AddressError {
     /// The part before the colon names no kind of device.
-    #[error("'{0}' names no kind of device; there are sim:, sil:, tcp:HOST:PORT, unix:PATH and serial:PORT[@BAUD]")]
+    #[error(
+        "'{0}' names no kind of device; there are sim:, sil:, joint:, tcp:HOST:PORT, unix:PATH, serial:PORT[@BAUD] and can:INTERFACE[/N]"
+    )]
     Kind(String),
     /// Something is missing behind the colon.
     #[error("'{0}' is incomplete; it should look like {1}")]
     Incomplete(String, &'static str),
     /// An option of a simulator that there is not.
-    #[error("simulated devices have the options seed=NUMBER and world=NAME, not '{0}'")]
+    #[error(
+        "simulated devices have the options seed=NUMBER, world=NAME, line=serial|can, bus=FILE and flash=FILE, not '{0}'"
+    )]
     Option(String),
     /// A value that is no number.
     #[error("'{0}' is not a whole number")]
     Number(String),
+    /// A device number that there is not.
+    #[error("devices on a CAN bus have the numbers 0 to 15, not '{0}'")]
+    DeviceNumber(String),
 }
 
 impl FromStr for Address {
@@ -76,6 +112,7 @@ impl FromStr for Address {
         match kind {
             "sim" => Ok(Self::Simulated(SimulatorKind::Qemu, options(rest)?)),
             "sil" => Ok(Self::Simulated(SimulatorKind::InProcess, options(rest)?)),
+            "joint" => Ok(Self::Simulated(SimulatorKind::Joint, options(rest)?)),
             "tcp" => match rest.rsplit_once(':') {
                 Some((host, port)) if !host.is_empty() => match port.parse::<u16>() {
                     Ok(_) => Ok(Self::Tcp(rest.to_owned())),
@@ -95,6 +132,15 @@ impl FromStr for Address {
                 }
                 Ok(Self::Serial { port: port.to_owned(), baud })
             }
+            "can" => {
+                let (interface, number) = rest.split_once('/').unwrap_or((rest, "0"));
+                if interface.is_empty() {
+                    return Err(AddressError::Incomplete(text.to_owned(), "can:can0 or can:can0/1"));
+                }
+                let device = number.parse().ok().and_then(DeviceNumber::new);
+                let device = device.ok_or_else(|| AddressError::DeviceNumber(number.to_owned()))?;
+                Ok(Self::Can { interface: interface.to_owned(), device })
+            }
             _ => Err(AddressError::Kind(text.to_owned())),
         }
     }
@@ -108,6 +154,10 @@ fn options(text: &str) -> Result<SimulatorOptions, AddressError> {
                 options.seed = Some(value.parse().map_err(|_| AddressError::Number(value.to_owned()))?);
             }
             Some(("world", value)) if !value.is_empty() => options.world = Some(value.to_owned()),
+            Some(("line", "serial")) => options.line = LineKind::Serial,
+            Some(("line", "can")) => options.line = LineKind::Can,
+            Some(("bus", value)) if !value.is_empty() => options.bus = Some(value.into()),
+            Some(("flash", value)) if !value.is_empty() => options.flash = Some(value.into()),
             _ => return Err(AddressError::Option(part.to_owned())),
         }
     }
@@ -121,16 +171,22 @@ impl fmt::Display for Address {
                 f.write_str(match kind {
                     SimulatorKind::Qemu => "sim:",
                     SimulatorKind::InProcess => "sil:",
+                    SimulatorKind::Joint => "joint:",
                 })?;
                 let seed = options.seed.map(|seed| format!("seed={seed}"));
                 let world = options.world.as_ref().map(|world| format!("world={world}"));
-                let parts: Vec<String> = [seed, world].into_iter().flatten().collect();
+                let line = (options.line == LineKind::Can).then(|| "line=can".to_owned());
+                let bus = options.bus.as_ref().map(|path| format!("bus={}", path.display()));
+                let flash = options.flash.as_ref().map(|path| format!("flash={}", path.display()));
+                let parts: Vec<String> = [seed, world, line, bus, flash].into_iter().flatten().collect();
                 f.write_str(&parts.join(","))
             }
             Self::Tcp(address) => write!(f, "tcp:{address}"),
             Self::Unix(path) => write!(f, "unix:{}", path.display()),
             Self::Serial { port, baud: DEFAULT_BAUD } => write!(f, "serial:{port}"),
             Self::Serial { port, baud } => write!(f, "serial:{port}@{baud}"),
+            Self::Can { interface, device: DeviceNumber::FIRST } => write!(f, "can:{interface}"),
+            Self::Can { interface, device } => write!(f, "can:{interface}/{device}"),
         }
     }
 }
@@ -150,11 +206,15 @@ mod tests {
             "sil:",
             "sim:seed=7,world=simple",
             "sil:world=mujoco",
+            "joint:seed=3",
             "tcp:localhost:3333",
             "tcp:[::1]:3333",
             "unix:/run/tactus.sock",
             "serial:/dev/ttyACM0",
             "serial:/dev/ttyACM0@115200",
+            "can:can0",
+            "can:slcan1/15",
+            "sil:seed=3,line=can,bus=run.log",
         ] {
             assert_eq!(parse(text).unwrap().to_string(), text);
         }
@@ -172,6 +232,12 @@ mod tests {
         assert!(matches!(parse("unix:"), Err(AddressError::Incomplete(..))));
         assert!(matches!(parse("serial:"), Err(AddressError::Incomplete(..))));
         assert_eq!(parse("serial:COM3@fast"), Err(AddressError::Number("fast".into())));
+        assert!(matches!(parse("can:"), Err(AddressError::Incomplete(..))));
+        assert_eq!(parse("can:can0/16"), Err(AddressError::DeviceNumber("16".into())));
+        assert_eq!(parse("can:can0/"), Err(AddressError::DeviceNumber(String::new())));
+        assert_eq!(parse("sil:line=tin"), Err(AddressError::Option("line=tin".into())));
+        assert_eq!(parse("sil:bus="), Err(AddressError::Option("bus=".into())));
+        assert_eq!(parse("sil:flash="), Err(AddressError::Option("flash=".into())));
         assert_eq!(parse("sim:speed=2"), Err(AddressError::Option("speed=2".into())));
         assert_eq!(parse("sim:world="), Err(AddressError::Option("world=".into())));
         assert_eq!(parse("sim:seed=-1"), Err(AddressError::Number("-1".into())));

@@ -5,12 +5,14 @@
 //! nothing in a simulated session depends on how busy the machine is.
 
 mod address;
+pub mod can;
 mod serial;
 mod stream;
 
 use std::time::Duration;
 
-pub use address::{Address, AddressError, SimulatorKind, SimulatorOptions};
+pub use address::{Address, AddressError, LineKind, SimulatorKind, SimulatorOptions};
+pub use can::{CanTransport, CanTrouble, SimulatedCan, SocketCan};
 pub use serial::SerialTransport;
 pub use stream::StreamTransport;
 
@@ -81,6 +83,9 @@ pub enum TransportError {
     /// The system reports an error on an open connection.
     #[error("the connection failed: {0}")]
     Io(#[source] std::io::Error),
+    /// A CAN interface cannot be used.
+    #[error(transparent)]
+    Can(#[from] CanTrouble),
     /// A simulator could not be started or ended unexpectedly.
     #[error("{0}")]
     Other(#[source] Box<dyn std::error::Error + Send + Sync>),

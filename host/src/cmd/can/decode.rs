@@ -1,0 +1,167 @@
+//! `tactus can decode`: every frame of a log, or of a bus, in words.
+
+use std::io::{BufWriter, ErrorKind, Write};
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+use serde_json::json;
+
+use super::source::Source;
+use super::{Exit, Failure, Global, Output, connection};
+use crate::can::{Account, BusKind, Interface, LogLine, Meaning, Reader, Summary};
+
+/// Options of `can decode`.
+///
+/// Lines go to stdout, and behind them a summary. Lines of the log that cannot be read go to stderr with their numbers; the exit
+/// code is then 6.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// A log as `candump -L` writes it; `-` is standard input
+    #[arg(value_name = "LOG")]
+    pub log: Option<PathBuf>,
+    /// Live from this CAN interface; of a log, only the lines of this interface
+    #[arg(long, value_name = "NAME")]
+    pub interface: Option<String>,
+    /// Wait for what is appended to the log, until Ctrl-C
+    #[arg(long)]
+    pub follow: bool,
+    /// Only the summary
+    #[arg(long)]
+    pub summary: bool,
+}
+
+/// Times of a log beyond this one are those of a computer's clock, us: 2001 and later.
+const SINCE_1970: u64 = 1_000_000_000_000_000;
+
+/// One line as data.
+#[derive(Serialize)]
+struct Data<'a> {
+    time_s: f64,
+    interface: &'a str,
+    id: String,
+    data: String,
+    #[serde(flatten)]
+    meaning: &'a Meaning,
+}
+
+/// Reads a log or a bus.
+///
+/// # Errors
+/// It cannot be opened, or holds lines that are none of candump's.
+pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "can decode";
+    let source = Source::open(command.log.as_deref(), command.interface.as_deref(), command.follow, DOING)?;
+    let interrupt = connection::interrupt();
+    let mut out = Printer::new(global.output(), !command.summary);
+    let mut reader = Reader::default();
+    let mut accounts: Vec<Account> = Vec::new();
+    let garbage = source.read(&interrupt, DOING, |_, line| {
+        if command.interface.as_deref().is_some_and(|only| *only != *line.interface) {
+            return Ok(true);
+        }
+        let (meaning, _) = reader.read(&line);
+        let place = reader.interfaces().iter().position(|interface| interface.name == line.interface).unwrap_or(0);
+        accounts.resize_with(reader.interfaces().len(), Account::default);
+        if let Some(account) = accounts.get_mut(place) {
+            account.note(&line, &meaning);
+        }
+        out.line(&line, &meaning)
+    })?;
+    let mut seen: Vec<(&Interface, &Account)> = reader.interfaces().iter().zip(&accounts).collect();
+    // What is looked for is the arm's.
+    seen.sort_by_key(|(interface, _)| interface.kind() == BusKind::Host);
+    let summaries: Vec<Summary> =
+        seen.iter().map(|(interface, account)| account.sum(&interface.name, &interface.decoder)).collect();
+    let damage: Vec<(u32, u32)> = seen.iter().map(|(interface, _)| interface.link.damage()).collect();
+    out.summaries(&summaries, &damage, garbage.lines)?;
+    match garbage.first {
+        None => Ok(()),
+        Some(first) => {
+            let cause = format!("{} lines are none of candump's, the first is line {first}", garbage.lines);
+            Err(Failure::new(Exit::Invalid, "E671", DOING, cause).help("make logs with `candump -L`"))
+        }
+    }
+}
+
+/// Writes lines until nobody reads them any more.
+struct Printer {
+    out: BufWriter<std::io::StdoutLock<'static>>,
+    output: Output,
+    lines: bool,
+    first_us: Option<u64>,
+    closed: bool,
+}
+
+impl Printer {
+    fn new(output: Output, lines: bool) -> Self {
+        let out = BufWriter::new(std::io::stdout().lock());
+        Self { out, output, lines, first_us: None, closed: false }
+    }
+
+    /// One frame; whether there is still a reader.
+    fn line(&mut self, line: &LogLine, meaning: &Meaning) -> Result<bool, Failure> {
+        // Logs of simulations count from power-up; those of a computer's clock are told from their first frame.
+        let zero = if line.time_us < SINCE_1970 { 0 } else { line.time_us };
+        let first = *self.first_us.get_or_insert(zero);
+        if !self.lines {
+            return Ok(true);
+        }
+        let time = line.time_us.saturating_sub(first) as f64 * 1e-6;
+        let (id, data) = (line.frame.id_text(), line.frame.data_text());
+        let text = if self.output.json {
+            let data = Data { time_s: time, interface: &line.interface, id, data, meaning };
+            serde_json::to_string(&data).map_err(|cause| broken(cause.into()))?
+        } else {
+            let parties = format!("{} > {}", meaning.from, meaning.to);
+            format!("{time:12.6}  {:5} {id:>8}  {data:16}  {parties:32}  {}", line.interface, meaning.sentence())
+        };
+        self.write(&text)
+    }
+
+    fn summaries(&mut self, summaries: &[Summary], damage: &[(u32, u32)], garbage: u64) -> Result<(), Failure> {
+        if self.output.json {
+            let gaps: u32 = damage.iter().map(|(gaps, _)| gaps).sum();
+            let bad: u32 = damage.iter().map(|(_, bad)| bad).sum();
+            let data = json!({ "summary": {
+                "interfaces": summaries, "unreadable_lines": garbage,
+                "link_segment_gaps": gaps, "link_damaged_messages": bad,
+            } });
+            self.write(&data.to_string())?;
+        } else {
+            for (place, (summary, (gaps, bad))) in summaries.iter().zip(damage).enumerate() {
+                let before = if self.lines || place > 0 { "\n" } else { "" };
+                self.write(format!("{before}{summary}").trim_end_matches('\n'))?;
+                if gaps + bad > 0 {
+                    self.write(&format!("host link: {gaps} gaps between segments, {bad} damaged messages"))?;
+                }
+            }
+            if summaries.is_empty() {
+                self.write("no frames")?;
+            }
+        }
+        match self.out.flush() {
+            Err(cause) if cause.kind() != ErrorKind::BrokenPipe => Err(broken(cause.into())),
+            _ => Ok(()),
+        }
+    }
+
+    fn write(&mut self, text: &str) -> Result<bool, Failure> {
+        if self.closed {
+            return Ok(false);
+        }
+        match writeln!(self.out, "{text}") {
+            Ok(()) => Ok(true),
+            // `tactus can decode log | head` is a way to use it.
+            Err(cause) if cause.kind() == ErrorKind::BrokenPipe => {
+                self.closed = true;
+                Ok(false)
+            }
+            Err(cause) => Err(broken(cause.into())),
+        }
+    }
+}
+
+fn broken(cause: Box<dyn std::error::Error + Send + Sync>) -> Failure {
+    Failure::new(Exit::Internal, "E101", "writing the result", cause)
+}

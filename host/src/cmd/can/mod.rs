@@ -1,0 +1,37 @@
+//! `tactus can`: the arm's bus as a log or live, and logs played to the device's application.
+
+mod decode;
+mod replay;
+mod source;
+
+use clap::{Args, Subcommand};
+
+use super::{Exit, Failure, Global, Output, connection};
+
+/// Options of `can`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// What to do
+    #[command(subcommand)]
+    pub action: Action,
+}
+
+/// What can be done with a bus.
+#[derive(Debug, Clone, Subcommand)]
+pub enum Action {
+    /// Say what every frame means, and what they come to
+    Decode(decode::Cmd),
+    /// Play a log to the device's application and compare what it does
+    Replay(replay::Cmd),
+}
+
+/// Does it.
+///
+/// # Errors
+/// The log or the interface cannot be read, or shows what it should not.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    match &command.action {
+        Action::Decode(command) => decode::run(command, global),
+        Action::Replay(command) => replay::run(command, global),
+    }
+}

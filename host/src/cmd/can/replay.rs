@@ -1,0 +1,105 @@
+//! `tactus can replay`: a log played to the device's application.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::source::Source;
+use super::{Exit, Failure, Global, connection};
+use crate::can::replay::{Difference, DifferenceKind, Outcome, Replay, ReplayError};
+
+/// Options of `can replay`.
+///
+/// The log must begin before the co-controller gets power. It should hold the host's bus too (`candump -L can0 can1`): orders come
+/// from there.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// A log as `candump -L` writes it; `-` is standard input
+    #[arg(value_name = "LOG")]
+    pub log: PathBuf,
+}
+
+/// Plays a log.
+///
+/// # Errors
+/// It cannot be read or begins in the middle, or the device does something else than in the log.
+pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "can replay";
+    let refused = |error: ReplayError| {
+        Failure::new(Exit::Invalid, "E673", DOING, error)
+            .help("record from before power-up; of a simulated arm: `tactus --device sil:line=can,bus=bus.log ...`")
+    };
+    let output = global.output();
+    let source = Source::open(Some(&command.log), None, false, DOING)?;
+    let interrupt = connection::interrupt();
+    let mut replay = Replay::default();
+    let garbage = source.read(&interrupt, DOING, |number, line| match replay.take(number, line) {
+        Ok(()) => Ok(true),
+        Err(error) => Err(refused(error)),
+    })?;
+    let outcome = replay.finish().map_err(refused)?;
+    if !outcome.has_host {
+        output.warn("the log does not hold the host's bus: orders are missing, and what they caused will differ");
+    }
+    output.result(&outcome, text(&outcome))?;
+    if let Some(first) = garbage.first {
+        let cause = format!("{} lines are none of candump's, the first is line {first}", garbage.lines);
+        return Err(Failure::new(Exit::Invalid, "E671", DOING, cause).help("make logs with `candump -L`"));
+    }
+    match outcome.differences.first() {
+        None => Ok(()),
+        Some(first) => {
+            let frames =
+                if outcome.different == 1 { "frame of the device differs" } else { "frames of the device differ" };
+            let cause = format!("{} {frames}, first: {}", outcome.different, told(first));
+            Err(Failure::new(Exit::Invalid, "E672", DOING, cause)
+                .help("the log is of another version or of other parameters, or something could not be reproduced"))
+        }
+    }
+}
+
+fn text(outcome: &Outcome) -> String {
+    let mut text = format!(
+        "replayed {:.3} s: {} slots, {} control cycles\n\
+         given to the device: {} frames of pucks, sensor and hand; {} requests of the host\n\
+         frames of the device: {} in the log, {} the same, {} different\n",
+        outcome.seconds,
+        outcome.slots,
+        outcome.cycles,
+        outcome.given,
+        outcome.requests,
+        outcome.logged,
+        outcome.same,
+        outcome.different
+    );
+    let (compared, same) = outcome.telemetry;
+    if compared > 0 {
+        text += &format!("telemetry: {compared} cycles compared, {same} the same\n");
+    }
+    if outcome.different == 0 {
+        text += "no difference";
+    } else {
+        let shown = outcome.differences.len();
+        text += &format!("the first {shown} of {} differences:\n", outcome.different);
+        for difference in &outcome.differences {
+            text += &format!("  {}\n", told(difference));
+        }
+    }
+    text
+}
+
+fn told(difference: &Difference) -> String {
+    let Difference { kind, time_s, line, cycle, logged, sent } = difference;
+    let (logged, sent) = (logged.as_deref().unwrap_or(""), sent.as_deref().unwrap_or(""));
+    match kind {
+        DifferenceKind::Other => {
+            format!("line {line}, {time_s:.6} s, cycle {cycle}: the log has `{logged}`, the device sent `{sent}`")
+        }
+        DifferenceKind::NotSent => {
+            format!("line {line}, {time_s:.6} s, cycle {cycle}: the log has `{logged}`, the device did not send it")
+        }
+        DifferenceKind::NotInLog => {
+            format!("about {time_s:.6} s, cycle {cycle}: the device sent `{sent}`, the log has it not")
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! Where lines come from: a file, standard input, or an interface.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Stdin};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, UNIX_EPOCH};
+
+use super::{Exit, Failure};
+use crate::can::{LineError, LogLine};
+use crate::client::Interrupt;
+use crate::error::HostError;
+use crate::transport::SocketCan;
+
+/// Lines that are reported one by one; of more only the number.
+const REPORTED: u64 = 20;
+
+/// Letters of a wrong line that are shown.
+const SHOWN: usize = 60;
+
+/// How often a file that may grow, and an interface, are looked at again.
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// A source of log lines.
+pub(super) enum Source {
+    /// A file that has an end, or `follow`s what is appended to it.
+    File { reader: BufReader<File>, path: PathBuf, follow: bool },
+    /// Standard input.
+    Input(BufReader<Stdin>),
+    /// An interface of this system.
+    Interface { port: SocketCan, name: String },
+}
+
+/// Lines that could not be read.
+#[derive(Debug, Default)]
+pub(super) struct Garbage {
+    /// How many.
+    pub(super) lines: u64,
+    /// Number of the first one.
+    pub(super) first: Option<u64>,
+}
+
+impl Garbage {
+    /// Tells of a line, as long as there are few of them.
+    fn tell(&mut self, number: u64, text: &str, error: &LineError) {
+        self.lines += 1;
+        self.first.get_or_insert(number);
+        if self.lines <= REPORTED {
+            let shown: String = text.trim_end().chars().take(SHOWN).collect();
+            let rest = if shown.len() < text.trim_end().len() { "..." } else { "" };
+            eprintln!("line {number}: {error}: `{}{rest}`", shown.escape_debug());
+        } else if self.lines == REPORTED + 1 {
+            eprintln!("more such lines are only counted");
+        }
+    }
+}
+
+impl Source {
+    /// Opens a file, `-` for standard input, or without a file the interface.
+    pub(super) fn open(
+        file: Option<&Path>,
+        interface: Option<&str>,
+        follow: bool,
+        doing: &str,
+    ) -> Result<Self, Failure> {
+        match (file, interface) {
+            (Some(path), _) if path == Path::new("-") => Ok(Self::Input(BufReader::new(std::io::stdin()))),
+            (Some(path), _) => {
+                let file = File::open(path).map_err(|cause| {
+                    Failure::new(Exit::Invalid, "E670", format!("{doing}: cannot read {}", path.display()), cause)
+                        .help("`candump -L can0 > bus.log` makes such a file, and `--device sil:bus=bus.log` of a simulated arm")
+                })?;
+                Ok(Self::File { reader: BufReader::new(file), path: path.to_owned(), follow })
+            }
+            (None, Some(name)) => {
+                let port =
+                    SocketCan::open_listener(name).map_err(|error| HostError::Transport(error).into_failure(doing))?;
+                Ok(Self::Interface { port, name: name.to_owned() })
+            }
+            (None, None) => Err(Failure::new(Exit::Usage, "E209", doing, "neither a log nor an interface is named")
+                .help("`tactus can decode bus.log`, or live: `tactus can decode --interface can0`")),
+        }
+    }
+
+    /// Hands line after line, with its number, to `take` until the source ends, `take` says no, or the user interrupts.
+    pub(super) fn read(
+        mut self,
+        interrupt: &Interrupt,
+        doing: &str,
+        mut take: impl FnMut(u64, LogLine) -> Result<bool, Failure>,
+    ) -> Result<Garbage, Failure> {
+        let mut garbage = Garbage::default();
+        let mut number = 0;
+        let mut text = Vec::new();
+        while !interrupt.is_raised() {
+            let (count, follow) = match &mut self {
+                Self::Interface { port, name } => {
+                    let heard = port.listen(PAUSE).map_err(|error| HostError::Transport(error).into_failure(doing))?;
+                    let Some((time, frame)) = heard else { continue };
+                    let time_us = time.duration_since(UNIX_EPOCH).unwrap_or_default().as_micros() as u64;
+                    number += 1;
+                    if !take(number, LogLine { time_us, interface: name.as_str().into(), frame })? {
+                        break;
+                    }
+                    continue;
+                }
+                Self::File { reader, path, follow } => {
+                    let count = reader.read_until(b'\n', &mut text).map_err(|cause| {
+                        Failure::new(Exit::Invalid, "E670", format!("{doing}: cannot read {}", path.display()), cause)
+                    })?;
+                    (count, *follow)
+                }
+                Self::Input(reader) => {
+                    let count = reader.read_until(b'\n', &mut text).map_err(|cause| {
+                        Failure::new(Exit::Invalid, "E670", format!("{doing}: cannot read standard input"), cause)
+                    })?;
+                    (count, false)
+                }
+            };
+            let whole = text.ends_with(b"\n");
+            if follow && !whole {
+                // The rest of the line, or the next one, is still to be written.
+                std::thread::sleep(PAUSE);
+                continue;
+            }
+            if count == 0 && text.is_empty() {
+                break;
+            }
+            number += 1;
+            let line = String::from_utf8_lossy(&text);
+            // Empty lines and notes are no garbage.
+            if !line.trim().is_empty() && !line.starts_with('#') {
+                match line.parse() {
+                    Ok(line) => {
+                        if !take(number, line)? {
+                            break;
+                        }
+                    }
+                    Err(error) => garbage.tell(number, &line, &error),
+                }
+            }
+            text.clear();
+        }
+        Ok(garbage)
+    }
+}

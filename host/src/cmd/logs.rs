@@ -1,0 +1,68 @@
+//! `tactus logs`: shows what a device logs.
+
+use std::fs::File;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::flash::{image_failure, open_image, probe_failure};
+use super::{Exit, Failure, Global};
+use crate::image_file::ImageFile;
+use crate::probe::Line;
+use crate::simulation::{IMAGE_VARIABLE, built_image};
+
+/// File that `cargo xtask build` leaves for the emulator.
+const EMULATED_IMAGE: &str = "arm.elf";
+
+/// Options of `logs`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// The image the device runs: the log holds only numbers of its texts [default: the image built last]
+    #[arg(long, value_name = "ELF")]
+    pub image: Option<PathBuf>,
+    /// Which debug probe, if there are several, as `VID:PID` or `VID:PID:SERIAL`
+    #[arg(long, value_name = "PROBE", conflicts_with = "file")]
+    pub probe: Option<String>,
+    /// Show a log that was kept in a file, as the emulator writes it
+    #[arg(long, value_name = "FILE")]
+    pub file: Option<PathBuf>,
+    /// Say what would be run
+    #[arg(long)]
+    pub dry_run: bool,
+}
+
+/// Shows the log until Ctrl-C, or that of a file to its end. The device is never halted.
+///
+/// # Errors
+/// There is no image, or the program that reads the log is missing or fails.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "logs";
+    let (line, input) = match &command.file {
+        Some(path) => {
+            let input = File::open(path).map_err(|error| {
+                Failure::new(Exit::Invalid, "E684", DOING, format!("cannot read {}: {error}", path.display()))
+            })?;
+            (Line::print(&emulated_image(command, DOING)?.path), Some(input))
+        }
+        None => {
+            let image = open_image(command.image.as_ref(), DOING)?;
+            let chip = image.chip().map_err(|error| image_failure(error, DOING))?;
+            (Line::attach(chip, command.probe.as_deref(), &image.path), None)
+        }
+    };
+    global.output().say(line.to_string());
+    if command.dry_run {
+        return Ok(());
+    }
+    line.run(input).map_err(|error| probe_failure(error, DOING))
+}
+
+/// The image whose log is in a file: the one named, or the emulator's.
+fn emulated_image(command: &Cmd, doing: &str) -> Result<ImageFile, Failure> {
+    let named = command.image.clone().or_else(|| std::env::var_os(IMAGE_VARIABLE).map(PathBuf::from));
+    let path = named.or_else(|| built_image(EMULATED_IMAGE)).ok_or_else(|| {
+        Failure::new(Exit::Invalid, "E680", doing, format!("no image {EMULATED_IMAGE} was built"))
+            .help("build it with `cargo xtask build`, or name one with `--image`")
+    })?;
+    ImageFile::read(&path).map_err(|error| image_failure(error, doing))
+}

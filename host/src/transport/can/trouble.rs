@@ -1,0 +1,140 @@
+//! What is wrong with a CAN interface, each with the command that mends it.
+
+use crate::failure::Exit;
+
+/// Why an interface cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CanTrouble {
+    /// There is no interface of that name.
+    #[error("there is no network interface '{interface}'; {}", found(.known))]
+    NoInterface {
+        /// Its name.
+        interface: String,
+        /// The CAN interfaces there are.
+        known: Vec<String>,
+    },
+    /// The interface is no CAN interface.
+    #[error("'{interface}' is no CAN interface; {}", found(.known))]
+    NotCan {
+        /// Its name.
+        interface: String,
+        /// The CAN interfaces there are.
+        known: Vec<String>,
+    },
+    /// The interface is switched off.
+    #[error("the CAN interface '{interface}' is down")]
+    Down {
+        /// Its name.
+        interface: String,
+    },
+    /// The controller has left the bus after too many errors.
+    #[error("the controller of '{interface}' is bus-off: too many errors on the wire")]
+    BusOff {
+        /// Its name.
+        interface: String,
+    },
+    /// Frames do not leave: nobody acknowledges them.
+    #[error("frames handed to '{interface}' have not left for {seconds} s: nobody on the bus acknowledges them")]
+    NotSent {
+        /// Its name.
+        interface: String,
+        /// How long was waited, s.
+        seconds: u64,
+    },
+    /// This kernel has no CAN, or this is not Linux.
+    #[error("this system has no SocketCAN")]
+    Unsupported(#[source] std::io::Error),
+}
+
+fn found(known: &[String]) -> String {
+    if known.is_empty() { "no CAN interface was found".to_owned() } else { format!("there is {}", known.join(", ")) }
+}
+
+/// The commands that switch an interface on as the link needs it: 1 Mbit/s, back from bus-off by itself, and a queue that holds a
+/// few messages.
+fn switch_on(interface: &str) -> String {
+    format!(
+        "`sudo ip link set {interface} type can bitrate {} restart-ms 100 && sudo ip link set {interface} txqueuelen 256 up`",
+        link::can::BITS_PER_SECOND
+    )
+}
+
+impl CanTrouble {
+    /// Exit code of a command that fails with this.
+    #[must_use]
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::NoInterface { .. } | Self::NotCan { .. } | Self::Down { .. } | Self::Unsupported(_) => Exit::NoDevice,
+            Self::BusOff { .. } | Self::NotSent { .. } => Exit::LinkLost,
+        }
+    }
+
+    /// Stable number.
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::NoInterface { .. } => "E303",
+            Self::NotCan { .. } => "E304",
+            Self::Down { .. } => "E305",
+            Self::Unsupported(_) => "E306",
+            Self::BusOff { .. } => "E704",
+            Self::NotSent { .. } => "E705",
+        }
+    }
+
+    /// What mends it.
+    #[must_use]
+    pub fn help(&self) -> String {
+        match self {
+            Self::NoInterface { known, .. } | Self::NotCan { known, .. } => match known.first() {
+                Some(other) => format!("`--device can:{other}`"),
+                None => {
+                    "plug the CAN adapter in and load its driver; `ip -details link show type can` lists what is there"
+                        .to_owned()
+                }
+            },
+            Self::Down { interface } => switch_on(interface),
+            Self::BusOff { interface } => format!(
+                "check bit rate, termination (120 ohm at both ends) and wiring, then `sudo ip link set {interface} down` and {}",
+                switch_on(interface)
+            ),
+            Self::NotSent { interface, .. } => format!(
+                "check that the device has power and that its bit rate is the same; `ip -details link show {interface}` \
+                 tells the state of the controller"
+            ),
+            Self::Unsupported(_) => {
+                "load the kernel's CAN modules: `sudo modprobe can_raw`; on other systems use the serial line"
+                    .to_owned()
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interface_that_is_down_prints_the_command_that_switches_it_on() {
+        let help = CanTrouble::Down { interface: "can7".into() }.help();
+        assert!(help.contains("sudo ip link set can7 type can bitrate 1000000"), "{help}");
+        assert!(help.contains("sudo ip link set can7 txqueuelen 256 up"), "{help}");
+    }
+
+    #[test]
+    fn the_hundreds_of_a_number_are_its_exit_code() {
+        let interface = || "can0".to_owned();
+        let io = || std::io::Error::from(std::io::ErrorKind::Unsupported);
+        for trouble in [
+            CanTrouble::NoInterface { interface: interface(), known: vec![] },
+            CanTrouble::NotCan { interface: interface(), known: vec!["can1".into()] },
+            CanTrouble::Down { interface: interface() },
+            CanTrouble::BusOff { interface: interface() },
+            CanTrouble::NotSent { interface: interface(), seconds: 1 },
+            CanTrouble::Unsupported(io()),
+        ] {
+            assert_eq!(trouble.code().as_bytes()[1] - b'0', trouble.exit() as u8, "{trouble}");
+            assert!(trouble.help().contains('`'), "{trouble}");
+        }
+    }
+}
