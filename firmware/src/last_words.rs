@@ -22,6 +22,14 @@ fn panicked(information: &PanicInfo<'_>) -> ! {
     Board::stop(&last_frames(), format_args!("{information}"))
 }
 
+/// The end after a forbidden access, where the board guards its stack: called on another stack, with interrupts masked.
+pub fn after_memory_fault(address: u32, stack: u32) -> ! {
+    Board::stop(
+        &last_frames(),
+        format_args!("memory fault at {address:#010x}, stack at {stack:#010x}: stack overflow?"),
+    )
+}
+
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     cortex_m::interrupt::disable();

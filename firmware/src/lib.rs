@@ -1,10 +1,18 @@
-//! The parts of the images that touch a board: its edge, its measurements, its last words.
+//! The parts of the images that touch a board: its edge, its measurements, its last words, and the bodies of the tasks.
 //!
-//! Application code (bus start-up, bus rounds, control cycle, link session) is in `device`; the binaries under
-//! `src/bin` join the two. Nothing outside [`board`] knows a register.
+//! What the co-controller does (bus start-up, bus rounds, control cycle, link session, storage) is in `device`;
+//! [`application`] wires it to the pieces of any board, and compiles on the host too; the binaries under `src/bin` bind
+//! its tasks to interrupts. Nothing outside [`board`] knows a register.
 
-#![no_std]
+#![cfg_attr(target_os = "none", no_std)]
 
+pub mod application;
 pub mod board;
+#[cfg(target_os = "none")]
+pub mod defmt_log;
+pub mod joint;
+#[cfg(target_os = "none")]
 pub mod last_words;
+pub mod line;
+pub mod metadata;
 pub mod meters;

@@ -11,6 +11,7 @@ use std::process::Command;
 use anyhow::{Context, Result};
 use serde_json::Value;
 
+use crate::board::STACK_MEASURED;
 use crate::setup::Machine;
 use crate::{build, demo, elf, shell};
 
@@ -43,10 +44,12 @@ pub(crate) fn run(machine: &Machine) -> Result<()> {
     println!("control cycles           {:>8}", number("cycles")?);
     println!("missed deadlines         {missed:>8}");
     println!("interrupt latency, worst {:>8} us", number("worst_latency_us")?);
-    println!("stack, deepest use       {:>8} B", number("stack_used")?);
+    let stack = number("stack_used")?;
+    println!("stack, deepest use       {stack:>8} B  (bound {STACK_MEASURED})");
     println!("flash                    {:>8} B", sizes.flash());
     println!("RAM without stack        {:>8} B", sizes.ram());
     anyhow::ensure!(worst > 0.0, "the image did not measure its control cycle");
+    anyhow::ensure!(stack <= f64::from(STACK_MEASURED), "the stack goes {stack} B deep, more than {STACK_MEASURED}");
     anyhow::ensure!(missed == 0.0, "{missed} control cycles missed their deadline");
     anyhow::ensure!(worst <= CYCLE_BOUND, "the control cycle takes {worst} instructions, more than {CYCLE_BOUND}");
     Ok(())

@@ -1,11 +1,13 @@
-//! Builds the host tools and the image for the board.
+//! Builds the host tools and the images for the boards.
 
 use std::fs;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
-use crate::setup::{ARM, Machine};
+use crate::board::{self, Board};
+use crate::elf::Sizes;
+use crate::setup::{ARM, Machine, Toolchain};
 use crate::shell;
 
 /// Features of the host packages with the MuJoCo world and its pictures.
@@ -20,19 +22,33 @@ pub(crate) fn host() -> Result<PathBuf> {
 
 /// Builds the arm image for the emulated board; returns the path under which the host tools look for it.
 pub(crate) fn image(machine: &Machine) -> Result<PathBuf> {
-    shell::step("building the arm image for QEMU's mps2-an500");
-    let mut cargo = machine.toolchain.cargo("build", ARM)?;
-    cargo.args(["--package", "firmware", "--bin", "arm", "--profile", "firmware"]);
-    if !machine.qemu.may_sleep() {
-        cargo.arg("--no-default-features");
-    }
+    board_image(machine.toolchain, Board::Mps2, machine.qemu.may_sleep())
+}
+
+/// Builds the arm image for a real board, says what it takes of every memory, and fails where that is too much.
+pub(crate) fn real_board(toolchain: Toolchain, board: Board) -> Result<PathBuf> {
+    let image = board_image(toolchain, board, true)?;
+    board::print_sizes(&image)?;
+    Ok(image)
+}
+
+/// Builds the arm image for a board and puts it beside the tools.
+fn board_image(toolchain: Toolchain, board: Board, may_sleep: bool) -> Result<PathBuf> {
+    shell::step(&format!("building the arm image for {board}"));
+    let mut cargo = toolchain.cargo("build", ARM)?;
+    cargo.args(["--package", "firmware", "--bin", "arm", "--profile", board.profile()]).args([
+        "--no-default-features",
+        "--features",
+        board.features(may_sleep),
+    ]);
     shell::run(&mut cargo)?;
-    let built = machine.toolchain.output(ARM, "firmware").join("arm");
+    let built = toolchain.output(ARM, board.profile()).join("arm");
     // One place whatever the toolchain, beside the tools that load it.
     let folder = shell::target_dir().join("images");
     fs::create_dir_all(&folder)?;
-    let image = folder.join("arm.elf");
+    let image = folder.join(board.file());
     fs::copy(&built, &image).with_context(|| format!("cannot copy {}", built.display()))?;
+    ensure!(!Sizes::of(&image)?.allocates(), "the image allocates memory, which nothing on a device may");
     shell::note(&format!("image: {}", image.display()));
     Ok(image)
 }

@@ -2,8 +2,9 @@
 
 use anyhow::Result;
 
+use crate::board::Board;
 use crate::setup::{self, ARM, JOINT, Machine};
-use crate::{budget, build, shell, test};
+use crate::{budget, build, joint, shell, test};
 
 /// Runs every check; the first failure ends it.
 pub(crate) fn run() -> Result<()> {
@@ -15,9 +16,11 @@ pub(crate) fn run() -> Result<()> {
     lint_firmware(&machine)?;
     libraries_without_std(&machine)?;
     plain_root()?;
+    build::real_board(machine.toolchain, Board::Stm32h743)?;
     test::run(&machine)?;
     build::documentation()?;
-    budget::run(&machine)
+    budget::run(&machine)?;
+    joint::run(&machine)
 }
 
 fn lint_host() -> Result<()> {
@@ -39,13 +42,21 @@ fn lint_firmware(machine: &Machine) -> Result<()> {
         shell::note("lints of the image skipped: clippy cannot read Debian's library");
         return Ok(());
     }
-    shell::step("lints of the image");
-    for features in [&[][..], &["--no-default-features"]] {
+    shell::step("lints of the images");
+    for (board, may_sleep) in [(Board::Mps2, true), (Board::Mps2, false), (Board::Stm32h743, true)] {
         let mut clippy = machine.toolchain.cargo("clippy", ARM)?;
-        clippy.args(["--package", "firmware", "--profile", "firmware"]).args(features).args(["--", "-D", "warnings"]);
+        clippy
+            .args(["--package", "firmware", "--bin", "arm", "--profile", board.profile()])
+            .args(["--no-default-features", "--features", board.features(may_sleep)])
+            .args(["--", "-D", "warnings"]);
         shell::run(&mut clippy)?;
     }
-    Ok(())
+    let mut clippy = machine.toolchain.cargo("clippy", JOINT)?;
+    clippy
+        .args(["--package", "firmware", "--bin", "joint", "--profile", "firmware"])
+        .args(["--no-default-features", "--features", Board::Mps2.features(true)])
+        .args(["--", "-D", "warnings"]);
+    shell::run(&mut clippy)
 }
 
 /// The movement primitives must stay usable on any Cortex-M, with and without floating point, by strangers.

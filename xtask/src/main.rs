@@ -1,30 +1,40 @@
 //! Set-up and chores of Tactus: `cargo xtask <verb>`. Says what it does, asks nothing.
 
+mod board;
 mod budget;
 mod build;
 mod ci;
 mod demo;
 mod elf;
+mod joint;
 mod qemu;
+mod runner;
 mod setup;
 mod shell;
 mod test;
 
 use std::process::ExitCode;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
+
+use crate::board::Board;
 
 const HELP: &str = "\
 cargo xtask <verb>
 
   setup    install what is missing: QEMU, Cortex-M target, MuJoCo library, EGL
-  build    build everything: host tools with the MuJoCo world, the image for the board
+  build    build everything: host tools with the MuJoCo world, the image for the emulated board
+           --board stm32h743 | mps2: the image for one board alone, with what it takes of each memory
+           --image joint: the joint image (Cortex-M3, fixed point), with its sizes
+  joint    build, run and measure the joint image: instructions per cycle, accuracy, sizes
+           --check IMAGE: sizes and control path of an image that is there
   demo     teach, learn, check, upload and run a movement on the simulated arm
   test     every test, whole-system tests under QEMU included
   ci       what a change must pass: format, lints, builds, tests, budgets
   budget   instructions per control cycle, interrupt latency, stack, flash and RAM of the image
   size     flash and RAM of the image by section
   qemu     run an image by itself: cargo xtask qemu [IMAGE]
+  run-image IMAGE   run an image where it belongs: QEMU, or a board through probe-rs (cargo's runner)
   doc      documentation of all crates
 
 Every verb does the set-up it needs. Environment:
@@ -52,6 +62,19 @@ fn dispatch(words: &[&str]) -> Result<()> {
             build::host()?;
             build::image(&machine)?;
         }
+        ["build", "--board", word] => {
+            let board = Board::from_word(word)
+                .with_context(|| format!("no board '{word}'; there are: {}", Board::ALL.map(Board::word).join(", ")))?;
+            if board == Board::Mps2 {
+                build::image(&setup::all()?)?;
+            } else {
+                build::real_board(setup::compiler()?, board)?;
+            }
+        }
+        ["build", "--image", "joint"] => drop(joint::image(&setup::all()?)?),
+        ["joint"] => joint::run(&setup::all()?)?,
+        ["joint", "--check", image] => joint::check(image.as_ref())?,
+        ["run-image", image, rest @ ..] => return runner::run(image, rest),
         ["demo", rest @ ..] => demo::run(rest)?,
         ["test"] => test::run(&setup::all()?)?,
         ["ci"] => ci::run()?,

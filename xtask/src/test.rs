@@ -3,11 +3,12 @@
 use anyhow::Result;
 
 use crate::setup::Machine;
-use crate::{build, shell};
+use crate::{build, joint, shell};
 
 /// Builds what the tests need and runs all of them.
 pub(crate) fn run(machine: &Machine) -> Result<()> {
     build::image(machine)?;
+    joint::image(machine)?;
     build::host()?;
     shell::step("tests of all packages, whole-system tests included");
     // Optimised: physics and the emulator's peer are several times faster, and the demo needs the same build.
@@ -15,5 +16,8 @@ pub(crate) fn run(machine: &Machine) -> Result<()> {
         shell::cargo()
             .args(["test", "--release", "--workspace", "--exclude", "firmware"])
             .args(["--features", build::WORLD]),
-    )
+    )?;
+    // The image's own tests run on the host, without a board: its application on an in-memory board, its numbers.
+    shell::step("tests of the firmware on this machine");
+    shell::run(shell::cargo().args(["test", "--release", "--package", "firmware", "--tests"]))
 }

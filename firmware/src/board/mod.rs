@@ -6,10 +6,17 @@
 
 use embedded_can::nb;
 use embedded_hal::digital::OutputPin;
+use embedded_storage_async::nor_flash::NorFlash;
 use puck::CanFrame;
 
+#[cfg(all(target_os = "none", feature = "board-mps2"))]
 mod mps2;
+#[cfg(all(target_os = "none", feature = "board-mps2"))]
 pub use mps2::{Board, device};
+
+pub mod stm32h743;
+#[cfg(all(target_os = "none", feature = "board-stm32h743"))]
+pub use stm32h743::{Board, device};
 
 /// Everything a board offers at start-up.
 pub trait Edge: Sized {
@@ -24,6 +31,10 @@ pub trait Edge: Sized {
     type LinkPort: LinkPort;
     /// Lit while the supervisor lets torque through: people beside the arm see it before they touch it.
     type StatusLight: OutputPin;
+    /// The flash in which the device keeps its library, and nothing else: address 0 is the first byte of that region. Its
+    /// operations are awaited in the idle task alone, where they may take as long as they like; they must not mask
+    /// interrupts meanwhile.
+    type Flash: NorFlash;
 
     /// Name for people, e.g. "mps2-an500".
     const NAME: &'static str;
@@ -31,6 +42,7 @@ pub trait Edge: Sized {
     const SIMULATED: bool;
 
     /// Sets up clocks and peripherals. Call once, with interrupts masked; nothing fires before they are unmasked.
+    #[cfg(target_os = "none")]
     fn start(core: cortex_m::Peripherals) -> Self;
 
     /// What tells this board from others of its kind.
@@ -56,6 +68,8 @@ pub struct Parts<E: Edge> {
     pub link: E::LinkPort,
     /// The status light.
     pub light: E::StatusLight,
+    /// The library's flash.
+    pub flash: E::Flash,
 }
 
 /// Time since start-up.
@@ -71,8 +85,9 @@ pub trait Clock: Copy {
 
     /// Microseconds since start-up.
     fn now_us(self) -> u64 {
-        // Multiplying first keeps the fraction; 64 bits overflow after 23 000 years at 25 MHz.
-        self.ticks() * 1_000_000 / u64::from(Self::HZ)
+        // Whole seconds first: multiplying all ticks by a million would overflow 64 bits within days.
+        let (ticks, per_second) = (self.ticks(), u64::from(Self::HZ));
+        ticks / per_second * 1_000_000 + ticks % per_second * 1_000_000 / per_second
     }
 }
 
@@ -95,6 +110,12 @@ pub trait CanStatus {
 
     /// Received frames lost because nobody fetched them in time, since start-up.
     fn overruns(&self) -> u32;
+
+    /// Times the controller left the bus because of errors, since start-up. It comes back by itself.
+    fn bus_offs(&self) -> u32 {
+        // A controller that cannot leave the bus never does.
+        0
+    }
 }
 
 /// The byte stream to the host.
@@ -111,6 +132,7 @@ pub trait LinkPort {
 }
 
 /// Stack of the image: painted at start-up, so that its deepest use can be seen later.
+#[cfg(target_os = "none")]
 pub mod stack {
     /// Bytes reserved for the stack.
     #[must_use]

@@ -34,6 +34,12 @@ pub(crate) fn all() -> Result<Machine> {
     Ok(Machine { qemu, toolchain })
 }
 
+/// Makes sure that the compiler for Cortex-M is there: all that building an image needs.
+pub(crate) fn compiler() -> Result<Toolchain> {
+    shell::step("set-up: what is missing is installed");
+    toolchain::ensure()
+}
+
 /// Makes sure that `cargo fmt` and `cargo clippy` exist: minimal Rust installations lack them.
 pub(crate) fn lints() -> Result<()> {
     toolchain::ensure_lints()

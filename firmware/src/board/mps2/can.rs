@@ -15,7 +15,7 @@ use puck::CanFrame;
 use super::clock;
 use super::device::{Interrupt, NVIC_PRIO_BITS, TIMER1, Timer};
 use super::link::Buffer;
-use super::lockstep::{Gone, Reply, Request, Wire};
+use super::lockstep::{FlashReply, FlashRequest, Gone, Reply, Request, Wire};
 use crate::board::CanStatus;
 
 /// Logical priority of `BUS_WIRE`: above every task (the highest has 12), as silicon would be.
@@ -56,6 +56,20 @@ impl Controller {
         }
         self.exchange(now, request);
         self.arm();
+    }
+
+    /// Asks something of the flash, which lives on the same wire; bytes it hands over fill `sink`.
+    pub(super) fn flash(&mut self, request: FlashRequest<'_>, sink: &mut [u8]) -> FlashReply {
+        let now = clock::now();
+        while self.next <= now {
+            self.exchange(self.next, &Request::Event);
+        }
+        let Ok(reply) = self.wire.exchange_into(now, &Request::Flash(request), sink) else {
+            panic!("the simulator is gone");
+        };
+        self.take(&reply);
+        self.arm();
+        reply.flash
     }
 
     fn event(&mut self) {

@@ -4,9 +4,16 @@
 //! software only.
 
 use cortex_m_rt as _;
+use link::metadata::MemoryRegion;
 
 /// Priority levels: QEMU implements 8 bits; 4 is what STM32 parts have, so priorities mean the same on both.
 pub const NVIC_PRIO_BITS: u8 = 4;
+
+/// Where the image lies; QEMU loads it there.
+pub const IMAGE: MemoryRegion = MemoryRegion { start: 0, length: 1024 * 1024 };
+
+/// The library's flash is the simulator's, not in this address space.
+pub const STORE: Option<MemoryRegion> = None;
 
 /// Ticks per second of the peripheral clock, which counts the timers and the free-running counter.
 pub const PERIPHERAL_HZ: u32 = 25_000_000;

@@ -32,6 +32,28 @@ pub(super) enum Request<'a> {
     Bye,
     /// Bytes for the host, at most 255.
     Link(&'a [u8]),
+    /// Something the flash does; a read's bytes come with the reply.
+    Flash(FlashRequest<'a>),
+}
+
+/// An operation of the simulated flash, and where: address from the beginning of the region.
+#[derive(Clone, Copy)]
+pub(super) enum FlashRequest<'a> {
+    /// Hand over this many bytes from there.
+    Read(u32, u32),
+    /// Program this word, 32 bytes, which must be blank.
+    Write(u32, &'a [u8]),
+    /// Erase the sector that begins there.
+    Erase(u32),
+}
+
+/// What the flash answers beside bytes.
+#[derive(Clone, Copy)]
+pub(super) struct FlashReply {
+    /// Tick at which the operation is over.
+    pub(super) ready: u64,
+    /// 0: done or under way; else the number of the error.
+    pub(super) status: u8,
 }
 
 /// What the simulator answers.
@@ -42,6 +64,8 @@ pub(super) struct Reply {
     pub(super) transmitted: bool,
     /// Tick of the next event; `u64::MAX` for none.
     pub(super) next: u64,
+    /// Only in the reply to a request for the flash.
+    pub(super) flash: FlashReply,
     link: [u8; LINK_BYTES],
     link_length: usize,
 }
@@ -73,22 +97,30 @@ impl Wire {
 
     /// Tells the simulator something that happens at `time` (ticks) and waits for its answer.
     pub(super) fn exchange(&mut self, time: u64, request: &Request<'_>) -> Result<Reply, Gone> {
+        self.exchange_into(time, request, &mut [])
+    }
+
+    /// As [`Self::exchange`]; bytes read from the flash fill `sink`, as many as were asked for.
+    pub(super) fn exchange_into(&mut self, time: u64, request: &Request<'_>, sink: &mut [u8]) -> Result<Reply, Gone> {
         if BROKEN.swap(true, Ordering::Relaxed) {
             return Err(Gone);
         }
         self.write(&header(time, request))?;
-        if let Request::Link(bytes) = request {
+        if let Request::Link(bytes) | Request::Flash(FlashRequest::Write(_, bytes)) = request {
             self.write(bytes)?;
         }
         let mut answer = [0; REPLY_BYTES];
         self.read(&mut answer)?;
         let [flags, dlc, id_low, id_high, link_length, _, _, _, rest @ ..] = answer;
         let (next, rest) = rest.split_first_chunk().ok_or(Gone)?;
-        let (data, _) = rest.split_first_chunk::<8>().ok_or(Gone)?;
+        let (data, rest) = rest.split_first_chunk::<8>().ok_or(Gone)?;
+        let (flash_length, rest) = rest.split_first_chunk().ok_or(Gone)?;
+        let status = *rest.first().ok_or(Gone)?;
         let mut reply = Reply {
             received: None,
             transmitted: flags & 2 != 0,
             next: u64::from_le_bytes(*next),
+            flash: FlashReply { ready: u64::from_le_bytes(*data), status },
             link: [0; LINK_BYTES],
             link_length: usize::from(link_length),
         };
@@ -99,6 +131,8 @@ impl Wire {
         }
         let link = reply.link.get_mut(..reply.link_length).ok_or(Gone)?;
         self.read(link)?;
+        let count = usize::try_from(u32::from_le_bytes(*flash_length)).map_err(|_| Gone)?;
+        self.read(sink.get_mut(..count).ok_or(Gone)?)?;
         BROKEN.store(false, Ordering::Relaxed);
         Ok(reply)
     }
@@ -131,9 +165,21 @@ fn header(time: u64, request: &Request<'_>) -> [u8; REQUEST_BYTES] {
         Request::Event => (2, 0, None),
         Request::Bye => (3, 0, None),
         Request::Link(bytes) => (4, bytes.len(), None),
+        Request::Flash(FlashRequest::Write(_, word)) => (5, word.len(), None),
+        Request::Flash(_) => (5, 0, None),
     };
     bytes[0] = kind;
     bytes[1] = length as u8;
+    if let Request::Flash(request) = request {
+        let (operation, address, count) = match request {
+            FlashRequest::Read(address, count) => (0_u16, address, *count),
+            FlashRequest::Write(address, word) => (1, address, word.len() as u32),
+            FlashRequest::Erase(address) => (2, address, 0),
+        };
+        bytes[2..4].copy_from_slice(&operation.to_le_bytes());
+        bytes[16..20].copy_from_slice(&address.to_le_bytes());
+        bytes[20..24].copy_from_slice(&count.to_le_bytes());
+    }
     bytes[8..16].copy_from_slice(&time.to_le_bytes());
     if let Some(frame) = frame {
         bytes[2..4].copy_from_slice(&frame.can_id().raw().to_le_bytes());

@@ -8,6 +8,7 @@
 mod can;
 mod clock;
 pub mod device;
+mod flash;
 mod light;
 mod link;
 mod lockstep;
@@ -30,6 +31,7 @@ impl super::Edge for Board {
     type Can = can::Can;
     type LinkPort = link::Port;
     type StatusLight = light::StatusLight;
+    type Flash = flash::Flash;
 
     const NAME: &'static str = "mps2-an500";
     const SIMULATED: bool = true;
@@ -52,6 +54,7 @@ impl super::Edge for Board {
             can: can::Can,
             link: link::Port::new(),
             light: light::StatusLight,
+            flash: flash::Flash,
         }
     }
 

@@ -1,0 +1,184 @@
+//! The bodies of the tasks, for any board.
+//!
+//! ```text
+//! SLOT_TIMER 900 Hz ─> slot (12): Core ─commands<─┐      ┌─ session (2): Session <─> link port
+//!                        │  ^           ─records>──┼──────┤        │ library
+//!              frames out│  │frames in  ─events>───┘      └─ log (1) │
+//!                        v  │                                 idle (0): flash
+//! CAN_TRANSMIT ─> can_transmit (10)   can_receive (10) <─ CAN_RECEIVE
+//! ```
+//!
+//! Numbers are priorities. The halves share nothing but queues, except where the session reads the core's health or
+//! loads a primitive, and where the idle task takes an image from the library: each time for at most one copy.
+//!
+//! The binaries bind these bodies to interrupts and lend them what is shared; no word here names a board, and the
+//! tests of this package run them on a board made of memory.
+
+mod bus;
+mod log;
+mod session;
+mod slot;
+mod storage;
+
+use core::mem::MaybeUninit;
+
+use control::Payload;
+use control::arm::ArmModel;
+use device::storage::{Library, Room, value_bytes};
+use device::{Command, Core, Event, Identity, Session, TimedRecord};
+use heapless::spsc::Queue;
+use link::image::IMAGE_BYTES_LIMIT;
+use puck::CanFrame;
+
+use crate::board::{Clock, Edge, Parts, SlotTimer};
+
+pub use bus::{ReceiveTask, TransmitTask};
+pub use log::{Log, LogTask};
+pub use session::{SessionTask, StackUse};
+pub use slot::SlotTask;
+pub use storage::{keep_library, rest};
+
+/// Frames on their way to the controller. A cycle sends at most 8, of these 5 in its control slot (torques of arm, wrist
+/// and hand, two questions to the hand); 16 hold two cycles of a dead bus.
+const OUTGOING: usize = 16 + 1;
+/// Frames on their way to the core. The bus carries at most 24 of the shortest in a slot, and each slot drains them.
+const INCOMING: usize = 32 + 1;
+/// Commands on their way to the core, which takes one per control cycle; a host waits for each answer.
+const COMMANDS: usize = 8 + 1;
+/// Cycle records on their way to the session: 50 ms, longer than it ever works in one go (checking an image).
+const RECORDS: usize = 16 + 1;
+/// Events on their way to the session: a start-up tells about 10 of them, each in a slot of its own.
+const EVENTS: usize = 16 + 1;
+
+/// Primitives kept, beside the one being uploaded.
+pub const PRIMITIVES: usize = 4;
+
+/// The library in memory.
+pub type Shelf = Library<PRIMITIVES, IMAGE_BYTES_LIMIT>;
+
+/// The session of this application.
+pub type Dialogue = Session<&'static mut Shelf>;
+
+/// Memory of the task that keeps the library on the flash.
+pub type StorageRoom = Room<IMAGE_BYTES_LIMIT, { value_bytes(IMAGE_BYTES_LIMIT) }>;
+
+/// What the tasks hand to each other.
+struct Queues {
+    outgoing: Queue<CanFrame, OUTGOING>,
+    incoming: Queue<CanFrame, INCOMING>,
+    commands: Queue<Command, COMMANDS>,
+    records: Queue<TimedRecord, RECORDS>,
+    events: Queue<Event, EVENTS>,
+    log: Queue<Event, EVENTS>,
+}
+
+/// Everything that lives as long as the image: put it into a static. It is all zeros, so that an image need not keep its
+/// content in flash; [`start`] fills it where it is, because the halves are too large for the stack of a small processor.
+pub struct Memory {
+    queues: Queues,
+    shelf: Shelf,
+    core: MaybeUninit<Core>,
+    session: MaybeUninit<Dialogue>,
+}
+
+impl Memory {
+    /// Not filled yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            queues: Queues {
+                outgoing: Queue::new(),
+                incoming: Queue::new(),
+                commands: Queue::new(),
+                records: Queue::new(),
+                events: Queue::new(),
+                log: Queue::new(),
+            },
+            shelf: Shelf::new(),
+            core: MaybeUninit::uninit(),
+            session: MaybeUninit::uninit(),
+        }
+    }
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Everything an image consists of, for the tasks that own or share it.
+pub struct Application<E: Edge> {
+    /// Shared by slot and session.
+    pub core: &'static mut Core,
+    /// Shared by slot, receiver and transmitter.
+    pub can: E::Can,
+    /// Shared by session and storage.
+    pub session: &'static mut Dialogue,
+    /// On `SLOT_TIMER`.
+    pub slot_task: SlotTask<E>,
+    /// On `CAN_RECEIVE`.
+    pub receive_task: ReceiveTask,
+    /// On `CAN_TRANSMIT`.
+    pub transmit_task: TransmitTask,
+    /// After every slot.
+    pub session_task: SessionTask<E>,
+    /// When there is something to tell.
+    pub log_task: LogTask,
+    /// For [`keep_library`], when nothing else is to be done.
+    pub flash: E::Flash,
+}
+
+/// Joins the application to the pieces of a board, and starts the timer of the slots: the first comes a slot later at the
+/// earliest. `firmware` is the version of the image, for people; `serial` tells this board from others of its kind.
+pub fn start<E: Edge>(
+    firmware: &'static str,
+    serial: &'static str,
+    parts: Parts<E>,
+    memory: &'static mut Memory,
+) -> Application<E> {
+    let identity = Identity {
+        firmware,
+        board: E::NAME,
+        serial,
+        simulated: E::SIMULATED,
+        ticks_per_second: <E::Clock as Clock>::HZ,
+    };
+    let Memory { queues, shelf, core, session } = memory;
+    let Parts { clock, mut slot_timer, can, link, light, flash } = parts;
+    let (to_bus, outgoing) = queues.outgoing.split();
+    let (incoming, from_bus) = queues.incoming.split();
+    let (to_core, commands) = queues.commands.split();
+    let (records, from_core) = queues.records.split();
+    let (events, news) = queues.events.split();
+    let (to_log, to_tell) = queues.log.split();
+    slot_timer.start();
+    Application {
+        core: new_core(core),
+        can,
+        session: new_session(session, identity, shelf),
+        slot_task: SlotTask::new(clock, slot_timer, light, slot::Ends { from_bus, to_bus, commands, records, events }),
+        receive_task: ReceiveTask::new(incoming),
+        transmit_task: TransmitTask::new(outgoing),
+        session_task: SessionTask::new(clock, session::Ends { port: link, to_core, from_core, news, to_log }),
+        log_task: LogTask::new(to_tell),
+        flash,
+    }
+}
+
+/// Builds the control half in its place. Not inlined: what the compiler may put on the stack meanwhile is gone when it
+/// returns.
+#[inline(never)]
+fn new_core(place: &'static mut MaybeUninit<Core>) -> &'static mut Core {
+    place.write(Core::new())
+}
+
+/// Builds the session in its place, as [`new_core`].
+#[inline(never)]
+fn new_session(
+    place: &'static mut MaybeUninit<Dialogue>,
+    identity: Identity,
+    shelf: &'static mut Shelf,
+) -> &'static mut Dialogue {
+    place.write(Session::new(identity, ArmModel::new(Payload::SensorAndHand), shelf))
+}

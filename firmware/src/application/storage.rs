@@ -1,0 +1,62 @@
+//! What is done when nothing else is to be done: the library is kept on the flash.
+
+use core::convert::Infallible;
+use core::pin::pin;
+use core::task::{Context, Poll, Waker};
+
+use device::StoreError;
+use device::storage::{Desk, Opening, Work, keep};
+use embedded_storage_async::nor_flash::NorFlash;
+use rtic_core::Mutex;
+
+use super::{Dialogue, Log, StorageRoom};
+
+/// The library behind the session's lock: each call holds it for one copy of an image at most.
+struct SharedDesk<M, L> {
+    session: M,
+    log: L,
+}
+
+impl<M: Mutex<T = &'static mut Dialogue>, L: Log> Desk for SharedDesk<M, L> {
+    fn restore(&mut self, slot: u8, image: &[u8]) {
+        self.session.lock(|session| session.store_mut().restore(slot, image));
+    }
+
+    fn forget(&mut self, slot: u8) {
+        self.session.lock(|session| session.store_mut().forget(slot));
+    }
+
+    fn open(&mut self, opening: Opening) {
+        self.session.lock(|session| session.store_mut().open(opening));
+        self.log.storage(&opening);
+    }
+
+    fn take(&mut self, image: &mut [u8]) -> Option<Work> {
+        self.session.lock(|session| session.store_mut().take(image))
+    }
+
+    fn settle(&mut self, outcome: Result<(), StoreError>) {
+        self.session.lock(|session| session.store_mut().settle(outcome));
+    }
+}
+
+/// Opens the library and keeps it on the flash, for ever.
+pub async fn keep_library<F: NorFlash>(
+    flash: F,
+    room: &mut StorageRoom,
+    session: impl Mutex<T = &'static mut Dialogue>,
+    log: impl Log,
+) -> Infallible {
+    keep(flash, room, &mut SharedDesk { session, log }).await
+}
+
+/// What a processor does that has nothing to do: asks the `task` whether it can go on, and sleeps until the next interrupt. Lower
+/// than every task, so it may take its time; slots make an interrupt every 1.1 ms, so nothing needs to wake it.
+pub fn rest(task: impl Future<Output = Infallible>, mut sleep: impl FnMut()) -> ! {
+    let mut task = pin!(task);
+    let mut context = Context::from_waker(Waker::noop());
+    loop {
+        let Poll::Pending = task.as_mut().poll(&mut context);
+        sleep();
+    }
+}

@@ -1,0 +1,90 @@
+//! The clock tree: 8 MHz from the debug probe's crystal to 400 MHz for the core, 80 MHz for CAN and 48 MHz for USB.
+//!
+//! ```text
+//! HSE 8 MHz ─┬─ PLL1: / 1 × 100 = 800 MHz ─┬─ / 2 ─ 400 MHz core ─ / 2 ─ 200 MHz AHB ─ / 2 ─ 100 MHz APB 1..4
+//! (ST-LINK)  │                             │                                        └─ × 2 ─ 200 MHz timers
+//!            │                             └─ / 10 ─ 80 MHz FDCAN
+//!            └─ PLL3: / 1 × 48 = 384 MHz ──── / 8 ─ 48 MHz USB
+//! ```
+
+/// Input of all phase-locked loops, Hz: the ST-LINK on the board drives its 8 MHz crystal into HSE (bypass). If it were
+/// wrong every rate below would be wrong by the same factor: bus, line and control.
+pub const HSE_HZ: u32 = 8_000_000;
+
+/// A phase-locked loop: `input / input_divider × multiplier / output_divider`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PhaseLockedLoop {
+    /// Divider of the input (DIVM).
+    pub input_divider: u32,
+    /// Multiplier of the oscillator (DIVN).
+    pub multiplier: u32,
+    /// Divider of output P, if it is used.
+    pub p: Option<u32>,
+    /// Divider of output Q, if it is used.
+    pub q: Option<u32>,
+}
+
+impl PhaseLockedLoop {
+    /// Frequency at which the loop compares, Hz; 8 to 16 MHz for the wide oscillator.
+    #[must_use]
+    pub const fn comparison_hz(&self) -> u32 {
+        HSE_HZ / self.input_divider
+    }
+
+    /// Frequency of its oscillator, Hz; 192 to 836 MHz.
+    #[must_use]
+    pub const fn oscillator_hz(&self) -> u32 {
+        self.comparison_hz() * self.multiplier
+    }
+}
+
+/// Core and CAN.
+pub const PLL1: PhaseLockedLoop = PhaseLockedLoop { input_divider: 1, multiplier: 100, p: Some(2), q: Some(10) };
+
+/// USB.
+pub const PLL3: PhaseLockedLoop = PhaseLockedLoop { input_divider: 1, multiplier: 48, p: None, q: Some(8) };
+
+/// The divided output, Hz; 0 where the output is off.
+const fn output(pll: &PhaseLockedLoop, divider: Option<u32>) -> u32 {
+    match divider {
+        Some(divider) => pll.oscillator_hz() / divider,
+        None => 0,
+    }
+}
+
+/// Core clock, Hz. 400 MHz is the most at voltage scale 1, which every revision of the chip has: 480 MHz needs scale 0
+/// and revision V. The control slot has 444 000 cycles at 400 MHz and needs a tenth of that.
+pub const CORE_HZ: u32 = output(&PLL1, PLL1.p);
+
+/// The most at voltage scale 1, Hz.
+pub const CORE_HZ_LIMIT: u32 = 400_000_000;
+
+/// Divider from the core to the bus matrix, flash and AXI memory.
+pub const AHB_DIVIDER: u32 = 2;
+
+/// Clock of the bus matrix, Hz; at most 200 MHz at voltage scale 1.
+pub const AHB_HZ: u32 = CORE_HZ / AHB_DIVIDER;
+
+/// Divider from the bus matrix to all four peripheral buses.
+pub const APB_DIVIDER: u32 = 2;
+
+/// Clock of the peripheral buses, Hz; at most 100 MHz at voltage scale 1.
+pub const APB_HZ: u32 = AHB_HZ / APB_DIVIDER;
+
+/// Clock of the timers, Hz: twice that of a divided peripheral bus.
+pub const TIMER_HZ: u32 = 2 * APB_HZ;
+
+/// Kernel clock of both CAN controllers, Hz. Must not exceed [`APB_HZ`], and must hold a whole number of time quanta.
+pub const CAN_HZ: u32 = output(&PLL1, PLL1.q);
+
+/// Clock of the USB device, Hz: 48 MHz within 0.25 %, so from the crystal and not from an RC oscillator.
+pub const USB_HZ: u32 = output(&PLL3, PLL3.q);
+
+/// Kernel clock of the serial line to the ST-LINK, Hz.
+pub const UART_HZ: u32 = APB_HZ;
+
+/// The watchdog's own RC oscillator, Hz, nominal.
+pub const LSI_HZ: u32 = 32_000;
+
+/// Most that oscillator is off, in percent, over temperature and supply.
+pub const LSI_TOLERANCE_PERCENT: u32 = 7;

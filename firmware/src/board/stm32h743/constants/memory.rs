@@ -1,0 +1,70 @@
+//! What lies where: code in bank 1 of the flash and in ITCM, the tasks' data in DTCM, stack and the rest in AXI memory,
+//! the primitives in bank 2. `firmware/memory/stm32h743.x` says the same to the linker; a test compares the two.
+
+/// A stretch of the address space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Region {
+    /// Address of the first byte.
+    pub start: u32,
+    /// Bytes.
+    pub length: u32,
+}
+
+impl Region {
+    /// Address of the first byte behind it.
+    #[must_use]
+    pub const fn end(&self) -> u32 {
+        self.start + self.length
+    }
+
+    /// Whether both share a byte.
+    #[must_use]
+    pub const fn overlaps(&self, other: &Self) -> bool {
+        self.start < other.end() && other.start < self.end()
+    }
+}
+
+/// Bank 1: the image. Erased and written by the debug probe only.
+pub const IMAGE: Region = Region { start: 0x0800_0000, length: 1024 * 1024 };
+
+/// Bank 2: the primitives. Erased and written by the running image only; flashing an image must leave it alone.
+pub const STORE: Region = Region { start: 0x0810_0000, length: 1024 * 1024 };
+
+/// Bytes that are erased at a time, the sectors of both banks.
+pub const SECTOR_BYTES: u32 = 128 * 1024;
+
+/// Bytes that are written at a time, once each between erasures: a flash word with its check bits.
+pub const FLASH_WORD_BYTES: u32 = 32;
+
+/// All of the tightly coupled code memory.
+pub const ITCM: Region = Region { start: 0, length: 64 * 1024 };
+
+/// Its first bytes hold nothing and may not be touched, so that a null pointer is noticed.
+pub const NULL_GUARD: Region = Region { start: 0, length: 1024 };
+
+/// What is left: the code of the control cycle.
+pub const HOT_CODE: Region = Region { start: 0x400, length: 63 * 1024 };
+
+/// All of the tightly coupled data memory.
+pub const DTCM: Region = Region { start: 0x2000_0000, length: 128 * 1024 };
+
+/// The tasks' data, the log's buffer and the last words: never cached, never waited for.
+pub const HOT_DATA: Region = Region { start: 0x2000_0000, length: 124 * 1024 };
+
+/// Stack of the handler that runs when the other stack has overflowed.
+pub const EMERGENCY_STACK: Region = Region { start: 0x2001_F000, length: 4 * 1024 };
+
+/// All of the AXI memory.
+pub const AXI: Region = Region { start: 0x2400_0000, length: 512 * 1024 };
+
+/// Initialised and zeroed data: the store's copy, queues. Cached; no peripheral reads it by itself.
+pub const DATA: Region = Region { start: 0x2400_0000, length: 380 * 1024 };
+
+/// May not be touched: whoever gets here has overflowed the stack. 4 KiB; only start-up has functions with more locals
+/// than that, far above it.
+pub const STACK_GUARD: Region = Region { start: 0x2405_F000, length: 4 * 1024 };
+
+/// The stack of all tasks and interrupts, growing down. Start-up needs most of it: it builds the tasks' data there, 70 KiB,
+/// before it moves them to their place, which is why the stack and the data cannot both be in tightly coupled memory.
+/// The tasks themselves need a few KiB, which stay in the cache.
+pub const STACK: Region = Region { start: 0x2406_0000, length: 128 * 1024 };

@@ -1,0 +1,30 @@
+//! Slots of the control cycle, time since start-up, and the watchdog.
+
+use super::clocks::{LSI_HZ, TIMER_HZ};
+
+/// Slots per second: three a control cycle of 1/300 s.
+pub const SLOT_HZ: u32 = 900;
+
+/// Slots of a control cycle.
+pub const CYCLE_SLOTS: u32 = 3;
+
+/// Ticks of the slot timer (TIM2) in one slot, rounded to the nearest. 200 MHz / 900 is not whole: 222 222 ticks make
+/// 900.0009 Hz, one millionth too fast, a tenth of what the crystal itself may be off.
+pub const SLOT_TICKS: u32 = (TIMER_HZ + SLOT_HZ / 2) / SLOT_HZ;
+
+/// Divider in front of the slot timer's counter: none, so that the rounding is as small as it can be.
+pub const SLOT_PRESCALER: u32 = 1;
+
+/// Ticks per second of the time since start-up (TIM5), Hz: every tick of the timer clock. Its 32 bits last 21 s, and every
+/// slot reads it.
+pub const CLOCK_HZ: u32 = TIMER_HZ;
+
+/// Divider in front of the watchdog's counter.
+pub const WATCHDOG_PRESCALER: u32 = 4;
+
+/// What the watchdog counts down: 80 ticks of 8 kHz are 10 ms, nine slots. The control slot may legally be late by one;
+/// pucks keep the last torque until the safety module's heartbeat runs out, so this must be the first to act.
+pub const WATCHDOG_TICKS: u32 = 80;
+
+/// Time until the watchdog resets the chip, us, at the nominal frequency of its oscillator.
+pub const WATCHDOG_US: u32 = WATCHDOG_TICKS * WATCHDOG_PRESCALER * (1_000_000 / 1_000) / (LSI_HZ / 1_000);

@@ -1,0 +1,331 @@
+//! The CAN controllers: registers and message memory, without a single wait.
+//!
+//! [`Controller`] is one of the two; [`ArmBus`] is the first one as the application sees it. Its line 0 is the role
+//! `CAN_RECEIVE`: a frame arrived, frames were lost, or the controller left the bus; all three end in
+//! [`receive`](embedded_can::nb::Can::receive), which the application then calls. Its line 1, "a frame has left", is
+//! answered here and passed on as `CAN_TRANSMIT`, because the application does not touch the controller when it has
+//! nothing to send, and the line would never come down.
+//!
+//! Bus-off: the controller rejoins by itself after 128 times eleven recessive bits (1.4 ms), but whatever waited to be
+//! sent is thrown away first: a torque of the past must not come out later. That motion does not resume is the
+//! application's business ([`CanStatus::bus_offs`]).
+
+use core::convert::Infallible;
+
+use cortex_m::peripheral::NVIC;
+use embassy_stm32::pac::can::Fdcan;
+use embassy_stm32::pac::can::regs::{Ir, Txbar};
+use embassy_stm32::pac::can::vals::Tfqm;
+use embassy_stm32::pac::{FDCAN1, FDCAN2, FDCANRAM, RCC};
+use embedded_can::{Frame as _, Id};
+use puck::{CanFrame, CanId};
+
+use super::super::constants::can::{ARM, BIT_TIMING, ELEMENT_WORDS, HOST, MessageMemory};
+use super::super::constants::filters::{ARM_FILTERS, HOST_FILTERS};
+use super::device::{Chip, Interrupt, level};
+use crate::board::CanStatus;
+
+/// Logical priority of the answer to "a frame has left": above every task, it takes a dozen instructions.
+const SENT_PRIORITY: u8 = 14;
+
+/// Reject what matches no filter.
+const REJECT: u8 = 0b10;
+
+/// Where the identifier stands in the first word of an element.
+const ID_SHIFT: u32 = 18;
+/// First word: the identifier has 29 bits.
+const EXTENDED: u32 = 1 << 30;
+/// First word: a remote frame.
+const REMOTE: u32 = 1 << 29;
+/// Where the length stands in the second word.
+const LENGTH_SHIFT: u32 = 16;
+
+/// Rounds of waiting for the last frames: each reads one register over the peripheral bus, at least 20 core cycles, so
+/// this is 3 ms or more at 400 MHz, enough for 20 frames.
+const LAST_ROUNDS: u32 = 60_000;
+
+/// One of the two controllers.
+pub(super) struct Controller {
+    registers: Fdcan,
+    memory: MessageMemory,
+}
+
+/// The controller of the arm's bus.
+const ARM_CONTROLLER: Controller = Controller { registers: FDCAN1, memory: ARM };
+/// The controller of the host's bus.
+pub(super) const HOST_CONTROLLER: Controller = Controller { registers: FDCAN2, memory: HOST };
+
+impl Controller {
+    /// Bit timing, filters, queues, no interrupts; then onto the bus.
+    fn start(&self, filters: &[u32]) {
+        let r = self.registers;
+        r.cccr().modify(|w| w.set_init(true));
+        while !r.cccr().read().init() {}
+        r.cccr().modify(|w| w.set_cce(true));
+        r.cccr().modify(|w| {
+            w.set_fdoe(false);
+            w.set_bse(false);
+            w.set_dar(false);
+            w.set_txp(false);
+            w.set_mon(false);
+            w.set_asm(false);
+        });
+        r.nbtp().write(|w| {
+            w.set_nbrp((BIT_TIMING.prescaler - 1) as u16);
+            w.set_ntseg1((BIT_TIMING.before_sample - 1) as u8);
+            w.set_ntseg2((BIT_TIMING.after_sample - 1) as u8);
+            w.set_nsjw((BIT_TIMING.jump - 1) as u8);
+        });
+        // The message memory starts with random content, check bits included.
+        for word in self.memory.filters_at..self.memory.end() {
+            FDCANRAM.ram(word as usize).write_value(0);
+        }
+        for (index, filter) in filters.iter().enumerate() {
+            FDCANRAM.ram(self.memory.filters_at as usize + index).write_value(*filter);
+        }
+        r.gfc().write(|w| {
+            w.set_anfs(REJECT);
+            w.set_anfe(REJECT);
+            w.set_rrfs(true);
+            w.set_rrfe(true);
+        });
+        r.sidfc().write(|w| {
+            w.set_flssa(self.memory.filters_at as u16);
+            w.set_lss(self.memory.filters as u8);
+        });
+        r.xidfc().write(|w| w.set_lse(0));
+        r.rxfc(0).write(|w| {
+            w.set_fsa(self.memory.receive_at as u16);
+            w.set_fs(self.memory.receive as u8);
+            // A full queue keeps what it has: the oldest reply belongs to the oldest question.
+            w.set_fom(false);
+        });
+        r.rxfc(1).write(|w| w.set_fs(0));
+        r.rxesc().write(|_| {});
+        r.txesc().write(|_| {});
+        r.txefc().write(|_| {});
+        r.txbc().write(|w| {
+            w.set_tbsa(self.memory.transmit_at as u16);
+            w.set_tfqs(self.memory.transmit as u8);
+            // First in, first out: the order in which the application hands frames over is part of the protocol.
+            w.set_tfqm(Tfqm::FIFO);
+        });
+        r.ie().write(|_| {});
+        r.ir().write_value(Ir(u32::MAX));
+    }
+
+    /// Leaves configuration; the controller joins the bus after eleven recessive bits.
+    fn join(&self) {
+        self.registers.cccr().modify(|w| w.set_cce(false));
+        self.registers.cccr().modify(|w| w.set_init(false));
+    }
+
+    /// Puts a frame behind those that wait; `false` if there is no room.
+    pub(super) fn send(&self, id: u16, data: &[u8], remote: bool) -> bool {
+        let queue = self.registers.txfqs().read();
+        if queue.tfqf() {
+            return false;
+        }
+        let place = queue.tfqpi();
+        let at = (self.memory.transmit_at + u32::from(place) * ELEMENT_WORDS) as usize;
+        let mut bytes = [0; 8];
+        for (byte, given) in bytes.iter_mut().zip(data) {
+            *byte = *given;
+        }
+        let [a, b, c, d, e, f, g, h] = bytes;
+        let length = data.len().min(8) as u32;
+        FDCANRAM.ram(at).write_value(u32::from(id) << ID_SHIFT | if remote { REMOTE } else { 0 });
+        FDCANRAM.ram(at + 1).write_value(length << LENGTH_SHIFT);
+        FDCANRAM.ram(at + 2).write_value(u32::from_le_bytes([a, b, c, d]));
+        FDCANRAM.ram(at + 3).write_value(u32::from_le_bytes([e, f, g, h]));
+        // The element must be in the memory before the controller is told to look.
+        cortex_m::asm::dsb();
+        let mut request = Txbar(0);
+        request.set_ar(usize::from(place), true);
+        self.registers.txbar().write_value(request);
+        true
+    }
+
+    /// Takes the oldest received frame: identifier, length, data.
+    pub(super) fn fetch(&self) -> Option<(u16, usize, [u8; 8])> {
+        loop {
+            let queue = self.registers.rxfs(0).read();
+            if queue.ffl() == 0 {
+                return None;
+            }
+            let place = queue.fgi();
+            let at = (self.memory.receive_at + u32::from(place) * ELEMENT_WORDS) as usize;
+            let head = FDCANRAM.ram(at).read();
+            let length = (FDCANRAM.ram(at + 1).read() >> LENGTH_SHIFT & 0xF) as usize;
+            let [a, b, c, d] = FDCANRAM.ram(at + 2).read().to_le_bytes();
+            let [e, f, g, h] = FDCANRAM.ram(at + 3).read().to_le_bytes();
+            self.registers.rxfa(0).write(|w| w.set_fai(place));
+            // The filters let neither through; a controller that does must not confuse the arm.
+            if head & (EXTENDED | REMOTE) != 0 {
+                continue;
+            }
+            return Some(((head >> ID_SHIFT & 0x7FF) as u16, length.min(8), [a, b, c, d, e, f, g, h]));
+        }
+    }
+
+    /// Frames that have not been on the wire yet.
+    fn waiting(&self) -> usize {
+        self.registers.txbrp().read().0.count_ones() as usize
+    }
+
+    /// Frames that can be handed over now.
+    pub(super) fn room(&self) -> usize {
+        usize::from(self.registers.txfqs().read().tffl())
+    }
+
+    /// If the controller has left the bus: forgets what waited and lets it come back. Tells whether it had left.
+    pub(super) fn rejoin(&self) -> bool {
+        if !(self.registers.psr().read().bo() && self.registers.cccr().read().init()) {
+            return false;
+        }
+        self.registers.txbcr().write(|w| w.0 = u32::MAX);
+        self.registers.cccr().modify(|w| w.set_init(false));
+        true
+    }
+}
+
+/// Starts both controllers and lets the arm's interrupt.
+pub(super) fn start(nvic: &mut NVIC) {
+    RCC.apb1henr().modify(|w| w.set_fdcanen(true));
+    RCC.apb1hrstr().modify(|w| w.set_fdcanrst(true));
+    RCC.apb1hrstr().modify(|w| w.set_fdcanrst(false));
+    ARM_CONTROLLER.start(&ARM_FILTERS);
+    HOST_CONTROLLER.start(&HOST_FILTERS);
+    let r = ARM_CONTROLLER.registers;
+    r.ie().write(|w| {
+        w.set_rfne(0, true);
+        w.set_rfle(0, true);
+        w.set_boe(true);
+        w.set_tce(true);
+    });
+    r.ils().write(|w| w.set_tcl(true));
+    // A frame's departure is told only for the places that ask for it.
+    r.txbtie().write(|w| w.0 = u32::MAX);
+    r.ile().write(|w| {
+        w.set_eint0(true);
+        w.set_eint1(true);
+    });
+    ARM_CONTROLLER.join();
+    HOST_CONTROLLER.join();
+    // SAFETY: the handler below clears one flag and pends one line; it shares nothing with anybody.
+    unsafe {
+        nvic.set_priority(Chip::FDCAN1_IT1, level(SENT_PRIORITY));
+        NVIC::unmask(Chip::FDCAN1_IT1);
+    }
+}
+
+/// A frame has left: there is room.
+#[unsafe(no_mangle)]
+extern "C" fn FDCAN1_IT1() {
+    let mut sent = Ir(0);
+    sent.set_tc(true);
+    ARM_CONTROLLER.registers.ir().write_value(sent);
+    NVIC::pend(Interrupt::CAN_TRANSMIT);
+}
+
+/// The arm's bus as the tasks see it.
+pub struct ArmBus {
+    overruns: u32,
+    bus_offs: u32,
+}
+
+impl ArmBus {
+    /// The one there is; called once.
+    pub(super) const fn take() -> Self {
+        Self { overruns: 0, bus_offs: 0 }
+    }
+
+    /// Answers the flags of line 0.
+    fn answer(&mut self) {
+        let r = ARM_CONTROLLER.registers;
+        let flags = r.ir().read();
+        let mut seen = Ir(0);
+        seen.set_rfn(0, flags.rfn(0));
+        seen.set_rfl(0, flags.rfl(0));
+        seen.set_bo(flags.bo());
+        // Before the queue is looked at: a frame that comes in between interrupts again.
+        r.ir().write_value(seen);
+        if flags.rfl(0) {
+            self.overruns = self.overruns.wrapping_add(1);
+        }
+        if flags.bo() && ARM_CONTROLLER.rejoin() {
+            self.bus_offs = self.bus_offs.wrapping_add(1);
+        }
+    }
+}
+
+impl embedded_can::nb::Can for ArmBus {
+    type Frame = CanFrame;
+    type Error = Infallible;
+
+    /// Waiting frames are never replaced: order matters more than priority.
+    fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, Infallible> {
+        let Id::Standard(id) = frame.id() else {
+            // `CanFrame` has eleven bits by construction; a frame that cannot exist needs no place.
+            return Ok(None);
+        };
+        if ARM_CONTROLLER.send(id.as_raw(), frame.data(), frame.is_remote_frame()) {
+            Ok(None)
+        } else {
+            Err(nb::Error::WouldBlock)
+        }
+    }
+
+    fn receive(&mut self) -> nb::Result<CanFrame, Infallible> {
+        self.answer();
+        loop {
+            let (id, length, data) = ARM_CONTROLLER.fetch().ok_or(nb::Error::WouldBlock)?;
+            let frame = CanId::new(id).and_then(|id| CanFrame::from_slice(id, data.get(..length)?));
+            if let Some(frame) = frame {
+                return Ok(frame);
+            }
+        }
+    }
+}
+
+impl CanStatus for ArmBus {
+    fn waiting(&self) -> usize {
+        ARM_CONTROLLER.waiting()
+    }
+
+    fn overruns(&self) -> u32 {
+        self.overruns
+    }
+
+    fn bus_offs(&self) -> u32 {
+        self.bus_offs
+    }
+}
+
+/// The end: takes back what waits, rejoins if need be, and hands these frames over. Waits for nothing but room.
+pub(super) fn hand_over_last(frames: &[CanFrame]) {
+    let controller = &ARM_CONTROLLER;
+    controller.registers.txbcr().write(|w| w.0 = u32::MAX);
+    controller.registers.cccr().modify(|w| w.set_init(false));
+    // A frame that is on the wire is finished first; the others are gone at once.
+    for _ in 0..LAST_ROUNDS {
+        if controller.waiting() == 0 {
+            break;
+        }
+    }
+    for frame in frames {
+        if let Id::Standard(id) = frame.id() {
+            // There is room for eight after the above; if the bus is dead there is nothing left to try.
+            let _ = controller.send(id.as_raw(), frame.data(), frame.is_remote_frame());
+        }
+    }
+}
+
+/// Waits until the last frames have left, at most a few milliseconds.
+pub(super) fn wait_for_last() {
+    for _ in 0..LAST_ROUNDS {
+        if ARM_CONTROLLER.waiting() == 0 {
+            break;
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! The reason of the last stop, kept in memory that a restart does not clear, and told after it.
+//!
+//! The record lies in tightly coupled memory: no cache holds any of it back when the chip restarts. It counts only if its mark
+//! and its check sum are right, so what the memory holds after power came is never taken for words.
+
+use core::cell::UnsafeCell;
+use core::fmt::{self, Write};
+use core::mem::MaybeUninit;
+
+use link::frame::CRC;
+
+/// Bytes of words that are kept; the rest of a longer reason is lost.
+const WORDS_BYTES: usize = 500;
+
+/// Marks a record, so that random memory is refused before its length is believed.
+const MAGIC: u32 = 0x5441_4354;
+
+#[repr(C)]
+struct Record {
+    magic: u32,
+    length: u32,
+    crc: u32,
+    words: [u8; WORDS_BYTES],
+}
+
+struct Place(UnsafeCell<MaybeUninit<Record>>);
+
+// SAFETY: read and cleared at start-up with interrupts masked, written by `write` with interrupts masked.
+unsafe impl Sync for Place {}
+
+#[unsafe(link_section = ".uninit.last_words")]
+static PLACE: Place = Place(UnsafeCell::new(MaybeUninit::uninit()));
+
+/// Writes text to the record, dropping what does not fit. In place: there may be little stack left.
+struct Pen {
+    length: usize,
+}
+
+impl Write for Pen {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        // SAFETY: see `Place`; only the bytes are touched, and every bit pattern is bytes.
+        let words = unsafe { &mut (*PLACE.0.get().cast::<Record>()).words };
+        for byte in text.bytes() {
+            if let Some(place) = words.get_mut(self.length) {
+                *place = byte;
+                self.length += 1;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Keeps a reason for after the restart. Called once, with interrupts masked.
+pub(super) fn write(reason: fmt::Arguments<'_>) {
+    let record = PLACE.0.get().cast::<Record>();
+    let mut pen = Pen { length: 0 };
+    // What cannot be formatted is cut; the restart must come anyway.
+    let _ = pen.write_fmt(reason);
+    // SAFETY: see `Place`; the mark comes last, when the rest is true.
+    unsafe {
+        let crc = CRC.checksum((*record).words.get(..pen.length).unwrap_or(&[]));
+        (&raw mut (*record).length).write_volatile(pen.length as u32);
+        (&raw mut (*record).crc).write_volatile(crc);
+        (&raw mut (*record).magic).write_volatile(MAGIC);
+    }
+    cortex_m::asm::dsb();
+}
+
+/// Tells what was kept, if anything, and forgets it. Called once, at start-up.
+pub(super) fn tell() {
+    let record = PLACE.0.get().cast::<Record>();
+    // SAFETY: see `Place`; every bit pattern is a record, and all of its memory exists.
+    let found = unsafe { record.read_volatile() };
+    // SAFETY: as above.
+    unsafe { (&raw mut (*record).magic).write_volatile(0) };
+    if found.magic != MAGIC {
+        return;
+    }
+    let Some(words) = found.words.get(..found.length as usize) else { return };
+    if CRC.checksum(words) != found.crc {
+        return;
+    }
+    match core::str::from_utf8(words) {
+        Ok(words) => defmt::error!("before this start: {=str}", words),
+        // A reason that was cut inside a letter.
+        Err(error) => {
+            let whole = words.get(..error.valid_up_to()).and_then(|part| core::str::from_utf8(part).ok());
+            defmt::error!("before this start: {=str}...", whole.unwrap_or(""));
+        }
+    }
+}

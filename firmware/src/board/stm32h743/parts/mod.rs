@@ -1,0 +1,93 @@
+//! The board put together: clocks first, then protection, then the peripherals, then what the last start left behind.
+
+mod clock;
+pub mod device;
+mod fdcan;
+mod flash;
+mod host_can;
+mod last_words;
+mod light;
+mod logger;
+mod pins;
+mod port;
+mod protection;
+mod reset;
+mod serial_number;
+mod slot_timer;
+mod tree;
+mod uart;
+mod usb;
+mod watchdog;
+
+use embassy_stm32::Peripherals;
+use puck::CanFrame;
+
+use crate::board::Parts;
+
+/// The board.
+pub struct Board {
+    light: light::StatusLight,
+    serial: &'static str,
+}
+
+impl crate::board::Edge for Board {
+    type Clock = clock::Clock;
+    type SlotTimer = slot_timer::SlotTimer;
+    type Can = fdcan::ArmBus;
+    type LinkPort = port::Port;
+    type StatusLight = light::StatusLight;
+    type Flash = flash::Bank2;
+
+    const NAME: &'static str = "nucleo-h743zi2";
+    const SIMULATED: bool = false;
+
+    fn start(mut core: cortex_m::Peripherals) -> Self {
+        protection::start(&mut core);
+        let peripherals: Peripherals = embassy_stm32::init(tree::config());
+        tree::repair();
+        clock::start();
+        logger::start();
+        let cause = reset::take_cause();
+        let light = light::StatusLight::new(peripherals.PB14);
+        pins::connect(pins::Pins {
+            arm_receive: peripherals.PD0,
+            arm_transmit: peripherals.PD1,
+            host_receive: peripherals.PB5,
+            host_transmit: peripherals.PB6,
+            uart_receive: peripherals.PD9,
+            uart_transmit: peripherals.PD8,
+            usb_minus: peripherals.PA11,
+            usb_plus: peripherals.PA12,
+        });
+        fdcan::start(&mut core.NVIC);
+        uart::start(&mut core.NVIC);
+        let serial = serial_number::read();
+        usb::start(&mut core.NVIC, serial);
+        defmt::info!("reset by {=str}", cause.words());
+        last_words::tell();
+        Self { light, serial }
+    }
+
+    fn serial(&self) -> &'static str {
+        self.serial
+    }
+
+    fn split(self) -> Parts<Self> {
+        Parts {
+            clock: clock::Clock,
+            slot_timer: slot_timer::SlotTimer,
+            can: fdcan::ArmBus::take(),
+            link: port::new(),
+            light: self.light,
+            flash: flash::Bank2::take(),
+        }
+    }
+
+    fn stop(frames: &[CanFrame], reason: core::fmt::Arguments<'_>) -> ! {
+        // The frames go to the controller, which needs nobody to send them; the words are written meanwhile.
+        fdcan::hand_over_last(frames);
+        last_words::write(reason);
+        fdcan::wait_for_last();
+        cortex_m::peripheral::SCB::sys_reset()
+    }
+}

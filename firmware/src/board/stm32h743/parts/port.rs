@@ -1,0 +1,14 @@
+//! The line to the host: serial, USB and the second CAN bus behind one selector.
+
+use super::host_can::HostCan;
+use super::uart::Serial;
+use super::usb::Usb;
+use crate::line::Either;
+
+/// All three lines; the first that speaks is used.
+pub(super) type Port = Either<Serial, Either<Usb, HostCan>>;
+
+/// The lines, the serial one chosen until another is heard.
+pub(super) fn new() -> Port {
+    Either::new(Serial, Either::new(Usb, HostCan::new()))
+}

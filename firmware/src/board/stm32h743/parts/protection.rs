@@ -1,0 +1,105 @@
+//! Memory protection, caches and faults: set up before anything else runs.
+//!
+//! Three regions of the memory protection unit on top of the processor's default map. The guard below the stack and the
+//! one at address 0 may not be touched by anybody. Bank 2 of the flash is *device* memory: the processor then neither
+//! caches it nor reads ahead in it, so it is only touched when the store asks, and a running erasure never holds up a read
+//! nobody meant.
+//!
+//! No peripheral reads or writes memory by itself (there is no direct memory access anywhere in the image), so the data
+//! cache needs no further rule.
+
+use core::arch::global_asm;
+
+use cortex_m::Peripherals;
+use cortex_m::peripheral::MPU;
+use cortex_m::peripheral::scb::Exception;
+
+use super::super::constants::memory::{IMAGE, NULL_GUARD, Region, STACK_GUARD, STORE};
+
+/// Region attributes: nobody may read, write or execute.
+const NO_ACCESS: u32 = 1 << 28;
+/// Region attributes: read and write, never execute, shareable device.
+const DEVICE: u32 = 1 << 28 | 0b011 << 24 | 1 << 18 | 1 << 16;
+/// Unit on, with the default map behind it, off inside the fault handlers.
+const ENABLE: u32 = 0b101;
+/// Ignore bus faults of handlers that run above all others: they probe damaged flash words, and report.
+const IGNORE_BUS_FAULTS: u32 = 1 << 8;
+
+/// Guards, caches, faults.
+pub(super) fn start(core: &mut Peripherals) {
+    // Usually so after a reset; not if a boot loader or a debugger has started the image.
+    // SAFETY: the image begins with its vector table.
+    unsafe { core.SCB.vtor.write(IMAGE.start) };
+    region(&mut core.MPU, 0, &STACK_GUARD, NO_ACCESS);
+    region(&mut core.MPU, 1, &NULL_GUARD, NO_ACCESS);
+    region(&mut core.MPU, 2, &STORE, DEVICE);
+    // SAFETY: the three regions above take nothing away that is used.
+    unsafe { core.MPU.ctrl.write(ENABLE) };
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+    core.SCB.enable_icache();
+    core.SCB.enable_dcache(&mut core.CPUID);
+    core.SCB.enable(Exception::MemoryManagement);
+    // SAFETY: changes what happens to faulting reads of a handler with the highest priority, see the constant.
+    unsafe { core.SCB.ccr.modify(|value| value | IGNORE_BUS_FAULTS) };
+}
+
+fn region(unit: &mut MPU, number: u32, region: &Region, attributes: u32) {
+    // The size is written as log2 - 1; the constants' tests say that it is a power of two and that the start fits.
+    let size = region.length.trailing_zeros() - 1;
+    // SAFETY: a region with the given attributes; the unit is off or the region was.
+    unsafe {
+        unit.rnr.write(number);
+        unit.rbar.write(region.start);
+        unit.rasr.write(attributes | size << 1 | 1);
+    }
+}
+
+// Before main: the code of the control cycle goes to where it runs. Written by hand, because no function of Rust may run
+// before its memory is there.
+//
+// A memory fault most likely is an overflown stack, so its handler must not use it: it takes another one first. The
+// address at fault and the stack's position come along as arguments.
+global_asm!(
+    ".section .text.__pre_init,\"ax\",%progbits",
+    ".global __pre_init",
+    ".type __pre_init,%function",
+    ".thumb_func",
+    "__pre_init:",
+    "ldr r0, =__shotcode",
+    "ldr r1, =__ehotcode",
+    "ldr r2, =__sihotcode",
+    "1:",
+    "cmp r0, r1",
+    "bcs 2f",
+    "ldr r3, [r2], #4",
+    "str r3, [r0], #4",
+    "b 1b",
+    "2:",
+    "dsb",
+    "isb",
+    "bx lr",
+    ".ltorg",
+    ".section .text.MemoryManagement,\"ax\",%progbits",
+    ".global MemoryManagement",
+    ".type MemoryManagement,%function",
+    ".thumb_func",
+    "MemoryManagement:",
+    "mov r0, sp",
+    "ldr r1, =__emergency_stack",
+    "mov sp, r1",
+    "b memory_fault",
+    ".ltorg",
+);
+
+/// Memory management fault address register.
+const FAULT_ADDRESS: *const u32 = 0xE000_ED34 as *const u32;
+
+/// Somebody touched a guard. Runs on the emergency stack and never returns.
+#[unsafe(no_mangle)]
+extern "C" fn memory_fault(stack: u32) -> ! {
+    cortex_m::interrupt::disable();
+    // SAFETY: a register of the processor that only tells.
+    let address = unsafe { FAULT_ADDRESS.read_volatile() };
+    crate::last_words::after_memory_fault(address, stack)
+}

@@ -1,0 +1,199 @@
+//! The USB line: a serial device of the communication class (CDC ACM), by interrupts.
+//!
+//! The device itself belongs to the interrupt; the session shares two queues with it. A host that does not read fills its
+//! queue and harms nobody: the other lines go on.
+
+use core::cell::{RefCell, UnsafeCell};
+
+use cortex_m::peripheral::NVIC;
+use cortex_m::singleton;
+use critical_section::Mutex;
+use embassy_stm32::pac::{PWR, RCC};
+use heapless::Deque;
+use synopsys_usb_otg::{UsbBus, UsbPeripheral};
+use usb_device::bus::UsbBusAllocator;
+use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbVidPid};
+use usbd_serial::{SerialPort, USB_CLASS_CDC};
+
+use super::super::constants::clocks::AHB_HZ;
+use super::super::constants::lines::{
+    RECEIVE_BYTES, TRANSMIT_BYTES, USB_ENDPOINTS, USB_FIFO_WORDS, USB_PRODUCT, USB_VENDOR,
+};
+use super::device::{Chip, level};
+use crate::board::LinkPort;
+
+/// Logical priority: above the session, below everything that touches the arm.
+const PRIORITY: u8 = 3;
+
+/// Bytes of a full packet, and most bytes moved with interrupts masked in one go.
+const PORTION: usize = 64;
+
+/// Rounds of waiting for the USB supply: about 1 ms. Without it there is no USB line, and everything else works.
+const SUPPLY_ROUNDS: u32 = 20_000;
+
+/// The chip's second USB controller, on PA11 and PA12.
+struct Peripheral;
+
+// SAFETY: the register block of an STM32 USB OTG controller, used by this module only.
+unsafe impl UsbPeripheral for Peripheral {
+    const REGISTERS: *const () = 0x4008_0000 as *const ();
+    const HIGH_SPEED: bool = true;
+    const FIFO_DEPTH_WORDS: usize = USB_FIFO_WORDS;
+    const ENDPOINT_COUNT: usize = USB_ENDPOINTS;
+
+    fn enable() {
+        PWR.cr3().modify(|w| w.set_usb33den(true));
+        for _ in 0..SUPPLY_ROUNDS {
+            if PWR.cr3().read().usb33rdy() {
+                break;
+            }
+        }
+        RCC.ahb1enr().modify(|w| w.set_usb_otg_fsen(true));
+        RCC.ahb1enr().read();
+        RCC.ahb1rstr().modify(|w| w.set_usb_otg_fsrst(true));
+        RCC.ahb1rstr().modify(|w| w.set_usb_otg_fsrst(false));
+        // While the core sleeps the controller must not wait for the clock of an outer transceiver, which it has not.
+        RCC.ahb1lpenr().modify(|w| {
+            w.set_usb_otg_fslpen(true);
+            w.set_usb_otg_fs_ulpilpen(false);
+        });
+    }
+
+    fn ahb_frequency_hz(&self) -> u32 {
+        AHB_HZ
+    }
+}
+
+type Bus = UsbBus<Peripheral>;
+
+/// What the interrupt owns.
+struct Device {
+    device: UsbDevice<'static, Bus>,
+    serial: SerialPort<'static, Bus>,
+}
+
+struct Place(UnsafeCell<Option<Device>>);
+
+// SAFETY: filled by `start` before the interrupt is unmasked; used by the interrupt alone afterwards.
+unsafe impl Sync for Place {}
+
+static DEVICE: Place = Place(UnsafeCell::new(None));
+
+/// The queues between the interrupt and the session.
+struct Queues {
+    received: Deque<u8, RECEIVE_BYTES>,
+    to_send: Deque<u8, TRANSMIT_BYTES>,
+}
+
+static QUEUES: Mutex<RefCell<Queues>> =
+    Mutex::new(RefCell::new(Queues { received: Deque::new(), to_send: Deque::new() }));
+
+fn with<T>(action: impl FnOnce(&mut Queues) -> T) -> T {
+    critical_section::with(|section| action(&mut QUEUES.borrow_ref_mut(section)))
+}
+
+/// Attaches to the host, if there is one.
+pub(super) fn start(nvic: &mut NVIC, number: &'static str) {
+    let (Some(memory), Some(place)) =
+        (singleton!(: [u32; USB_FIFO_WORDS] = [0; USB_FIFO_WORDS]), singleton!(: Option<UsbBusAllocator<Bus>> = None))
+    else {
+        return;
+    };
+    let allocator: &'static UsbBusAllocator<Bus> = place.insert(UsbBus::new(Peripheral, memory));
+    let serial = SerialPort::new(allocator);
+    let names =
+        StringDescriptors::default().manufacturer("Tactus").product("Tactus co-controller").serial_number(number);
+    let builder = UsbDeviceBuilder::new(allocator, UsbVidPid(USB_VENDOR, USB_PRODUCT)).device_class(USB_CLASS_CDC);
+    let Ok(builder) = builder.strings(&[names]) else { return };
+    // SAFETY: see `Place`: the interrupt is still masked.
+    unsafe { *DEVICE.0.get() = Some(Device { device: builder.build(), serial }) };
+    // SAFETY: the handler shares nothing but the queues, behind their lock.
+    unsafe {
+        nvic.set_priority(Chip::OTG_FS, level(PRIORITY));
+        NVIC::unmask(Chip::OTG_FS);
+    }
+}
+
+/// Something happened on the line, or the session has bytes for it.
+#[unsafe(no_mangle)]
+extern "C" fn OTG_FS() {
+    // SAFETY: see `Place`.
+    let Some(Device { device, serial }) = (unsafe { &mut *DEVICE.0.get() }) else { return };
+    device.poll(&mut [serial]);
+    let mut portion = [0; PORTION];
+    loop {
+        // What does not fit stays with the host, which keeps it until there is room.
+        let room = with(|queues| RECEIVE_BYTES - queues.received.len()).min(PORTION);
+        let Some(place) = portion.get_mut(..room).filter(|place| !place.is_empty()) else { break };
+        let Ok(count @ 1..) = serial.read(place) else { break };
+        with(|queues| {
+            for byte in place.iter().take(count) {
+                let _ = queues.received.push_back(*byte);
+            }
+        });
+    }
+    loop {
+        let ready = with(|queues| {
+            let mut ready = 0;
+            for (place, byte) in portion.iter_mut().zip(queues.to_send.iter()) {
+                *place = *byte;
+                ready += 1;
+            }
+            ready
+        });
+        let Some(bytes) = portion.get(..ready).filter(|bytes| !bytes.is_empty()) else { break };
+        let Ok(count @ 1..) = serial.write(bytes) else { break };
+        with(|queues| {
+            for _ in 0..count {
+                queues.to_send.pop_front();
+            }
+        });
+    }
+    // Fails when a packet is under way: its end interrupts again.
+    let _ = serial.flush();
+}
+
+/// The line as the selector sees it.
+pub struct Usb;
+
+impl LinkPort for Usb {
+    fn read(&mut self, buffer: &mut [u8]) -> usize {
+        let mut count = 0;
+        for portion in buffer.chunks_mut(PORTION) {
+            let wanted = portion.len();
+            let found = with(|queues| {
+                let mut found = 0;
+                for place in portion {
+                    let Some(byte) = queues.received.pop_front() else { break };
+                    *place = byte;
+                    found += 1;
+                }
+                found
+            });
+            count += found;
+            if found < wanted {
+                break;
+            }
+        }
+        if count > 0 {
+            // There is room again for what the host still holds.
+            NVIC::pend(Chip::OTG_FS);
+        }
+        count
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for portion in bytes.chunks(PORTION) {
+            with(|queues| {
+                for byte in portion {
+                    let _ = queues.to_send.push_back(*byte);
+                }
+            });
+        }
+        NVIC::pend(Chip::OTG_FS);
+    }
+
+    fn room(&self) -> usize {
+        with(|queues| TRANSMIT_BYTES - queues.to_send.len())
+    }
+}
