@@ -4,6 +4,7 @@
 //! stands still meanwhile, so neither side can overtake the other, however slow the computer is. Layout, timing rule and
 //! the reasons: `docs/lockstep.md`.
 
+use crate::flash::{FlashChip, FlashError, WORD_BYTES};
 use crate::link_wire::CHUNK;
 use crate::plant::{Event, Plant};
 use crate::time::Ticks;
@@ -15,6 +16,9 @@ pub const REQUEST_LENGTH: usize = 24;
 
 /// Bytes of a reply without link bytes.
 pub const REPLY_LENGTH: usize = 32;
+
+/// Most bytes of the flash in one reply.
+pub const FLASH_READ_LIMIT: u32 = 4096;
 
 /// What a reply says instead of a tick if no event will come by itself.
 pub const NEVER: Ticks = Ticks::MAX;
@@ -50,6 +54,19 @@ pub enum LockstepError {
     /// Bytes 4..8 of the header must be zero.
     #[error("reserved bytes of a request are not zero")]
     Reserved,
+    /// An operation that no flash has, or more bytes than it handles in one go.
+    #[error("malformed request for the flash: operation {operation}, {count} bytes, {length} of them with the request")]
+    Flash {
+        /// Operation field.
+        operation: u16,
+        /// Bytes asked for.
+        count: u32,
+        /// Bytes that came with the request.
+        length: u8,
+    },
+    /// The flash was told to lose power in this operation, and with it the device did.
+    #[error("power failed while the flash was being written")]
+    PowerFailed,
 }
 
 /// What one call of [`Lockstep::serve_one`] did.
@@ -61,6 +78,8 @@ pub enum Served {
     Event,
     /// The firmware sent bytes to the host.
     Link,
+    /// The firmware used its flash.
+    Flash,
     /// The firmware said good-bye; it will not ask again.
     Bye,
     /// The stream ended between two requests, without a good-bye.
@@ -82,6 +101,23 @@ enum Request {
     Event,
     Bye,
     Link(Vec<u8>),
+    Flash(FlashRequest),
+}
+
+/// What the firmware asks of its flash.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum FlashRequest {
+    Read { address: u32, count: u32 },
+    Write { address: u32, word: Vec<u8> },
+    Erase { address: u32 },
+}
+
+/// What the flash answers.
+#[derive(Clone, Debug, Default)]
+struct FlashReply {
+    ready: Ticks,
+    status: u8,
+    bytes: Vec<u8>,
 }
 
 /// The two streams and an account of what went through them.
@@ -90,12 +126,19 @@ pub struct Lockstep<R, W> {
     from_firmware: R,
     to_firmware: W,
     exchanges: u64,
+    flash: FlashChip,
 }
 
 impl<R: Read, W: Write> Lockstep<R, W> {
-    /// A lock step over the firmware's standard output and input.
+    /// A lock step over the firmware's standard output and input. The device's flash is a new one.
     pub fn new(from_firmware: R, to_firmware: W) -> Self {
-        Self { from_firmware, to_firmware, exchanges: 0 }
+        Self { from_firmware, to_firmware, exchanges: 0, flash: FlashChip::default() }
+    }
+
+    /// Puts this flash into the device.
+    #[must_use]
+    pub fn with_flash(self, flash: FlashChip) -> Self {
+        Self { flash, ..self }
     }
 
     /// Waits for one request, lets the plant follow to its time, and answers.
@@ -122,6 +165,14 @@ impl<R: Read, W: Write> Lockstep<R, W> {
                 plant.link_from_device(t, &bytes);
                 (Served::Link, Event::default())
             }
+            Request::Flash(request) => {
+                plant.advance(t);
+                let reply = self.flash(t, &request)?;
+                self.exchanges += 1;
+                self.to_firmware.write_all(&encode_flash_reply(&reply, plant.next_event()))?;
+                self.to_firmware.flush()?;
+                return Ok(Served::Flash);
+            }
         };
         self.exchanges += 1;
         self.to_firmware.write_all(&encode_reply(&event, plant.next_event()))?;
@@ -133,6 +184,25 @@ impl<R: Read, W: Write> Lockstep<R, W> {
     #[must_use]
     pub fn exchanges(&self) -> u64 {
         self.exchanges
+    }
+
+    /// Does what is asked of the flash.
+    fn flash(&mut self, t: Ticks, request: &FlashRequest) -> Result<FlashReply, LockstepError> {
+        let mut flash = self.flash.lock();
+        let mut bytes = Vec::new();
+        let outcome = match request {
+            FlashRequest::Read { address, count } => {
+                bytes.resize(usize::try_from(*count).unwrap_or(0), 0);
+                flash.read(*address, &mut bytes).map(|()| t)
+            }
+            FlashRequest::Write { address, word } => flash.write_word(t, *address, word),
+            FlashRequest::Erase { address } => flash.erase_sector(t, *address),
+        };
+        match outcome {
+            Ok(ready) => Ok(FlashReply { ready, status: 0, bytes }),
+            Err(FlashError::NoPower) => Err(LockstepError::PowerFailed),
+            Err(error) => Ok(FlashReply { ready: t, status: error.code(), bytes: Vec::new() }),
+        }
     }
 
     /// The next request and its time; `None` at the end of the stream.
@@ -168,10 +238,38 @@ impl<R: Read, W: Write> Lockstep<R, W> {
                 }
                 Request::Link(bytes)
             }
+            5 => {
+                let [a0, a1, a2, a3, c0, c1, c2, c3] = data;
+                let (address, count) = (u32::from_le_bytes([a0, a1, a2, a3]), u32::from_le_bytes([c0, c1, c2, c3]));
+                let operation = u16::from_le_bytes([id0, id1]);
+                let mut word = vec![0; length.into()];
+                let received = fill(&mut self.from_firmware, &mut word)?;
+                if received < word.len() {
+                    let expected = REQUEST_LENGTH + word.len();
+                    return Err(LockstepError::Truncated { received: REQUEST_LENGTH + received, expected });
+                }
+                Request::Flash(match operation {
+                    0 if length == 0 && count <= FLASH_READ_LIMIT => FlashRequest::Read { address, count },
+                    1 if word.len() == WORD_BYTES => FlashRequest::Write { address, word },
+                    2 if length == 0 => FlashRequest::Erase { address },
+                    _ => return Err(LockstepError::Flash { operation, count, length }),
+                })
+            }
             kind => return Err(LockstepError::Kind { kind }),
         };
         Ok(Some((t, request)))
     }
+}
+
+/// Header and flash bytes of the reply to a request for the flash.
+fn encode_flash_reply(flash: &FlashReply, next: Option<Ticks>) -> Vec<u8> {
+    let mut reply = vec![0; REPLY_LENGTH];
+    reply[8..16].copy_from_slice(&next.unwrap_or(NEVER).to_le_bytes());
+    reply[16..24].copy_from_slice(&flash.ready.to_le_bytes());
+    reply[24..28].copy_from_slice(&(flash.bytes.len() as u32).to_le_bytes());
+    reply[28] = flash.status;
+    reply.extend_from_slice(&flash.bytes);
+    reply
 }
 
 /// Header and link bytes of a reply.

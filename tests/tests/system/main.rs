@@ -5,9 +5,12 @@ mod boot;
 mod command_line;
 mod determinism;
 mod firmware_ends;
+mod joint;
 mod journey;
+mod metadata;
 mod served_arm;
 mod sil_and_qemu;
 mod stopping;
+mod storage;
 #[cfg(feature = "mujoco")]
 mod touch;

@@ -60,17 +60,19 @@ const STOP_DAMPING: [f64; 7] = [22.0, 40.0, 4.5, 5.0, 0.22, 0.6, 0.06];
 
 /// Digits of the hand: stiffness (N m/rad) and damping (N m s/rad) of Eq (14), in the order spread, F1, F2, F3. At a finger
 /// 6 N m/rad against 0.1 N m of friction leave 0.017 rad; the reflected rotor (2.2e-3 kg m^2) and 10 ms of delay bound both.
-const HAND_STIFFNESS: [f64; 4] = [2.0, 6.0, 6.0, 6.0];
-const HAND_DAMPING: [f64; 4] = [0.02, 0.1, 0.1, 0.1];
+pub const HAND_STIFFNESS: [f64; 4] = [2.0, 6.0, 6.0, 6.0];
+/// Damping of the digits (N m s/rad), see [`HAND_STIFFNESS`].
+pub const HAND_DAMPING: [f64; 4] = [0.02, 0.1, 0.1, 0.1];
 
 /// Friction of the hand's drives fed forward along the desired velocity: viscous (N m s/rad; a finger turns at 2.44 rad/s
 /// with its full torque) and 0.8 of the Coulomb friction (N m). All estimates.
-const HAND_VISCOUS: [f64; 4] = [0.1, 0.49, 0.49, 0.49];
-const HAND_COULOMB: [f64; 4] = [0.05, 0.08, 0.08, 0.08];
+pub const HAND_VISCOUS: [f64; 4] = [0.1, 0.49, 0.49, 0.49];
+/// Coulomb friction of the digits that is fed forward (N m), see [`HAND_VISCOUS`].
+pub const HAND_COULOMB: [f64; 4] = [0.05, 0.08, 0.08, 0.08];
 
 /// Proportional and integral gain (1/s) of the gauges, and their window (control periods). The finger is stiff behind its gauge:
 /// with the delay of filter and bus a proportional gain of 1 is close to ringing.
-const HAND_FORCE: (f64, f64, usize) = (0.5, 2.0, 60);
+pub const HAND_FORCE: (f64, f64, usize) = (0.5, 2.0, 60);
 
 /// How the arm follows a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,406 @@
+//! `Core`: the high-priority half. Owns the hand's bus and the control cycle; sans-I/O, driven by three slots per cycle.
+//!
+//! | slot | what |
+//! |---|---|
+//! | request | GET P and GET SG to the group of the hand |
+//! | control | the replies of this very cycle, [`Cycle::step`], the torque frame |
+//! | slow | one of: initialisation, MODE where it is due, STAT of a silent puck, MODE and TEMP in turn |
+//!
+//! On a bus of its own the hand is answered within one slot: 1015 us at worst, stuffing and puck latency included, of 1111. The
+//! torque leaves in the cycle of its sample, one cycle earlier than behind an arm.
+
+use control::{Fault, State};
+use device::hand::{Drive, HandProperties, HandRound, HandTrouble, Initialisation, Outcome, Outlet};
+use device::{Counters, Slot, Stage};
+use link::{Event as LinkEvent, EventKind, HandStage, Refusal};
+use puck::{CanFrame, Node, PropertyId, Reply, Status, get};
+
+use crate::DIGITS;
+use crate::command::{Command, Refused};
+use crate::cycle::Cycle;
+use crate::primitive::FingerPrimitive;
+use crate::record::Record;
+use crate::startup::{FoundHand, Phase, Progress, Startup};
+
+/// Cycles in a row that a puck may be silent before the hand is given up: 0.2 s.
+const SILENT_CYCLES: u16 = 60;
+
+/// The property TEMP of every motor firmware from VERS 61.
+const TEMPERATURE: PropertyId = match PropertyId::new(9) {
+    Some(id) => id,
+    None => unreachable!(),
+};
+
+/// Slow slots between two polls; every eighth poll is a temperature, the others are modes: each digit's mode at 8 Hz.
+const POLL_SLOTS: u32 = 8;
+
+/// The way out, the clock, and the queues to the other half, during one slot.
+pub trait CoreIo {
+    /// The next received frame.
+    fn receive(&mut self) -> Option<CanFrame>;
+    /// Hands a frame to the controller; false without room.
+    fn transmit(&mut self, frame: CanFrame) -> bool;
+    /// The next command of a person.
+    fn command(&mut self) -> Option<Command>;
+    /// The record of a control cycle.
+    fn record(&mut self, record: Record);
+    /// Something happened.
+    fn event(&mut self, event: Event);
+}
+
+/// What the control half tells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// Answer to the oldest command without one.
+    Answer(Result<(), Refused>),
+    /// News, as they go over the link.
+    News(LinkEvent),
+}
+
+/// The state of the control half at one moment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Health {
+    /// Number of the latest control cycle.
+    pub cycle: u32,
+    /// How far the start-up has come.
+    pub stage: Stage,
+    /// State of the ladder.
+    pub state: State,
+    /// Latched fault.
+    pub fault: Fault,
+    /// How far the hand has come.
+    pub hand: HandStage,
+    /// Latest temperature of each puck (F1, F2, F3, spread), degree Celsius.
+    pub temperatures: [Option<i16>; DIGITS],
+    /// Counters.
+    pub counters: Counters,
+}
+
+/// The control half.
+pub struct Core {
+    cycle: Cycle,
+    cycles: u32,
+    startup: Startup,
+    stage: HandStage,
+    told: (HandStage, Option<(Node, HandTrouble)>),
+    cause: Option<(Node, HandTrouble)>,
+    told_phase: Option<Phase>,
+    properties: Option<HandProperties>,
+    initialisation: Option<Initialisation>,
+    round: HandRound,
+    drive: Drive,
+    asked: Option<Node>,
+    polled: Option<(Node, PropertyId)>,
+    tick: u32,
+    temperatures: [Option<i16>; DIGITS],
+    counters: Counters,
+}
+
+/// The outlet of one slot.
+struct SlotOutlet<'a, I> {
+    io: &'a mut I,
+    counters: &'a mut Counters,
+    now_us: u64,
+}
+
+impl<I: CoreIo> Outlet for SlotOutlet<'_, I> {
+    fn now_us(&self) -> u64 {
+        self.now_us
+    }
+
+    /// Slots are 1.1 ms apart and all but the request slot send one frame: the pauses pucks need come by themselves.
+    fn send(&mut self, frame: CanFrame) -> bool {
+        let sent = self.io.transmit(frame);
+        Counters::count(if sent { &mut self.counters.frames_sent } else { &mut self.counters.frames_refused });
+        sent
+    }
+}
+
+impl Core {
+    /// At power-up.
+    pub fn new() -> Core {
+        Core {
+            cycle: Cycle::new(),
+            cycles: 0,
+            startup: Startup::new(),
+            stage: HandStage::Absent,
+            told: (HandStage::Absent, None),
+            cause: None,
+            told_phase: None,
+            properties: None,
+            initialisation: None,
+            round: HandRound::default(),
+            drive: Drive::resting(false),
+            asked: None,
+            polled: None,
+            tick: 0,
+            temperatures: [None; DIGITS],
+            counters: Counters::default(),
+        }
+    }
+
+    /// Takes another primitive; false while one runs.
+    pub fn load(&mut self, primitive: &FingerPrimitive) -> bool {
+        self.cycle.load(primitive)
+    }
+
+    /// A slot began late, or its frames had not left in time.
+    pub fn note_overrun(&mut self) {
+        Counters::count(&mut self.counters.overruns);
+    }
+
+    /// The board lost frames.
+    pub fn note_bus_error(&mut self) {
+        Counters::count(&mut self.counters.bus_errors);
+    }
+
+    /// The state now.
+    pub fn health(&self) -> Health {
+        Health {
+            cycle: self.cycles,
+            stage: match self.startup.phase() {
+                Phase::Enumerating => Stage::Enumerating,
+                Phase::Waking => Stage::Waking,
+                Phase::Reading => Stage::Reading,
+                Phase::Done => Stage::Ready,
+            },
+            state: self.cycle.state(),
+            fault: self.cycle.fault(),
+            hand: self.stage,
+            temperatures: self.temperatures,
+            counters: self.counters,
+        }
+    }
+
+    /// One slot, at device time `now_us`.
+    pub fn slot(&mut self, slot: Slot, now_us: u64, io: &mut impl CoreIo) {
+        while let Some(frame) = io.receive() {
+            self.take(&frame);
+        }
+        match slot {
+            Slot::Request => self.request(now_us, io),
+            Slot::Control => self.control(now_us, io),
+            Slot::Slow => self.slow(now_us, io),
+        }
+        self.tell(io);
+    }
+
+    fn request(&mut self, now_us: u64, io: &mut impl CoreIo) {
+        let (HandStage::Ready, Some(properties)) = (self.stage, self.properties) else {
+            return;
+        };
+        let frames = self.round.open(properties.gauge);
+        let mut outlet = SlotOutlet { io, counters: &mut self.counters, now_us };
+        for frame in frames {
+            outlet.send(frame);
+        }
+    }
+
+    fn control(&mut self, now_us: u64, io: &mut impl CoreIo) {
+        self.cycles = self.cycles.wrapping_add(1);
+        Counters::count(&mut self.counters.cycles);
+        let sample = self.round.close(&mut self.counters);
+        let silent = self.round.silent_for(SILENT_CYCLES).filter(|_| self.stage == HandStage::Ready);
+        if let Some(node) = silent {
+            self.fail(node, HandTrouble::Silent);
+        }
+        let sample = sample.filter(|_| self.stage == HandStage::Ready);
+        let command = io.command();
+        let refused = match command {
+            Some(Command::InitialiseHand) => self.initialise(now_us).err(),
+            Some(Command::Stop | Command::Release) if self.stage == HandStage::Initialising => {
+                self.enter(HandStage::NotInitialised, None);
+                None
+            }
+            _ => None,
+        };
+        let output = self.cycle.step(sample.as_ref(), command.filter(|_| refused.is_none()));
+        let record = Record { cycle: self.cycles, ..output.record };
+        io.record(record);
+        if let Some(reason) = refused {
+            io.event(Event::Answer(Err(reason)));
+        }
+        if let Some(answer) = output.answer {
+            // Only now that the cycle lets go of the hand as well does its initialisation begin.
+            if command == Some(Command::InitialiseHand) && answer.is_ok() {
+                self.begin_initialisation(now_us);
+            }
+            io.event(Event::Answer(answer));
+        }
+        if let Some((state, fault)) = output.entered {
+            self.news(io, EventKind::State, state.code().into(), fault.code().into());
+        }
+        if output.arrived {
+            self.news(io, EventKind::Arrived, 0, 0);
+        }
+        if self.stage == HandStage::Ready
+            && let Some(frame) = self.drive.torque_frame(output.frame)
+        {
+            SlotOutlet { io, counters: &mut self.counters, now_us }.send(frame);
+        }
+    }
+
+    fn slow(&mut self, now_us: u64, io: &mut impl CoreIo) {
+        self.tick = self.tick.wrapping_add(1);
+        let mut outlet = SlotOutlet { io, counters: &mut self.counters, now_us };
+        let Some(properties) = self.properties else {
+            match self.startup.advance(&mut outlet) {
+                Progress::Busy => {}
+                Progress::Found(FoundHand { properties, units_per_newton_metre }) => {
+                    self.cycle.calibrate(units_per_newton_metre);
+                    self.properties = Some(properties);
+                    self.enter(HandStage::NotInitialised, None);
+                }
+                Progress::Unfit(node, trouble) => self.cause = Some((node, trouble)),
+            }
+            return;
+        };
+        if let Some(initialisation) = &mut self.initialisation {
+            match initialisation.advance(&properties, &mut outlet) {
+                Outcome::Busy => {}
+                Outcome::Done => self.enter(HandStage::Ready, None),
+                Outcome::Failed(node, trouble) => self.fail(node, trouble),
+            }
+            return;
+        }
+        if let Some(frame) = self.drive.mode_frame() {
+            if outlet.send(frame) {
+                self.drive.mode_sent();
+            }
+            return;
+        }
+        let suspect = self.round.suspect().filter(|_| self.stage == HandStage::Ready);
+        if let Some(node) = suspect {
+            self.asked = Some(node);
+            outlet.send(get(node, PropertyId::STAT));
+        } else if self.tick.is_multiple_of(POLL_SLOTS) && self.stage != HandStage::Failed {
+            let turn = self.tick / POLL_SLOTS;
+            let property = if turn.is_multiple_of(5) { TEMPERATURE } else { PropertyId::MODE };
+            let digit = if property == TEMPERATURE { turn / 5 } else { turn - turn / 5 };
+            if let Some(node) = Node::HAND.get(digit as usize % DIGITS) {
+                self.polled = Some((*node, property));
+                outlet.send(get(*node, property));
+            }
+        }
+    }
+
+    fn take(&mut self, frame: &CanFrame) {
+        Counters::count(&mut self.counters.frames_received);
+        let Ok(reply) = Reply::decode(frame) else {
+            Counters::count(&mut self.counters.malformed_frames);
+            return;
+        };
+        let heard = match reply {
+            Reply::Position { node, primary, secondary } => match (node.hand_index(), self.properties) {
+                (Some(digit), Some(_)) => {
+                    let initialising = self.initialisation.as_mut();
+                    if !initialising.is_some_and(|initialisation| initialisation.receive_position(digit, primary)) {
+                        self.round.take_position(digit, primary, secondary, &mut self.counters);
+                    }
+                    true
+                }
+                _ => false,
+            },
+            Reply::Property { node, property, value } => {
+                node.hand_index().is_some_and(|digit| self.take_property(digit, node, property, value))
+            }
+            _ => false,
+        };
+        if !heard {
+            Counters::count(&mut self.counters.foreign_frames);
+        }
+    }
+
+    fn take_property(&mut self, digit: usize, node: Node, property: PropertyId, value: i32) -> bool {
+        let Some(properties) = self.properties else {
+            return self.startup.receive(digit, node, property, value);
+        };
+        if let Some(initialisation) = &mut self.initialisation {
+            return initialisation.receive(digit, node, property, value);
+        }
+        if property == properties.gauge {
+            self.round.take_gauge(digit, value, &mut self.counters);
+            return true;
+        }
+        if property == PropertyId::STAT && self.asked == Some(node) {
+            self.asked = None;
+            if Status::from_value(value) != Some(Status::Ready) {
+                self.fail(node, HandTrouble::Reset);
+            }
+            return true;
+        }
+        if self.polled == Some((node, property)) {
+            self.polled = None;
+            if property == PropertyId::MODE {
+                self.drive.hear_mode(node, value);
+            } else if let Some(place) = self.temperatures.get_mut(digit) {
+                *place = i16::try_from(value).ok();
+            }
+            return true;
+        }
+        false
+    }
+
+    /// Whether the hand may be initialised now.
+    fn initialise(&self, _now_us: u64) -> Result<(), Refused> {
+        match (self.stage, self.properties) {
+            (HandStage::Initialising, _) => Err((Refusal::HandBusy, [0, 0])),
+            (HandStage::Absent, _) | (_, None) => Err((Refusal::NoHand, [0, 0])),
+            _ => Ok(()),
+        }
+    }
+
+    fn begin_initialisation(&mut self, now_us: u64) {
+        let driven = self.stage == HandStage::Ready;
+        self.enter(HandStage::Initialising, None);
+        self.drive = Drive::resting(false);
+        self.initialisation = Some(Initialisation::new(driven, now_us));
+    }
+
+    fn fail(&mut self, node: Node, trouble: HandTrouble) {
+        self.cycle.hand_failed();
+        self.enter(HandStage::Failed, Some((node, trouble)));
+        if matches!(trouble, HandTrouble::Reset | HandTrouble::Silent) {
+            // Whatever was known of it may be gone: it is looked for again. What counts as known to people is that it failed.
+            self.properties = None;
+            self.startup = Startup::new();
+        }
+    }
+
+    /// Enters a stage with drives at rest: whatever the pucks did before, they are told to stop.
+    fn enter(&mut self, stage: HandStage, cause: Option<(Node, HandTrouble)>) {
+        self.stage = stage;
+        self.cause = cause;
+        self.initialisation = None;
+        self.round = HandRound::default();
+        // A digit that holds after its initialisation may go on holding.
+        self.drive = Drive::resting(stage != HandStage::Ready);
+        self.asked = None;
+        self.polled = None;
+    }
+
+    /// Tells what is new of start-up and hand.
+    fn tell(&mut self, io: &mut impl CoreIo) {
+        let phase = self.startup.phase();
+        if self.told_phase != Some(phase) {
+            self.told_phase = Some(phase);
+            let stage = self.health().stage.code();
+            self.news(io, EventKind::Startup, stage.into(), 0);
+        }
+        let now = (self.stage, self.cause);
+        if now != core::mem::replace(&mut self.told, now) {
+            let detail = self.cause.map_or(0, |(node, trouble)| trouble.number(node));
+            self.news(io, EventKind::Hand, self.stage.code().into(), detail);
+        }
+    }
+
+    fn news(&self, io: &mut impl CoreIo, kind: EventKind, code: u16, detail: u32) {
+        io.event(Event::News(LinkEvent { cycle: self.cycles, kind, code, detail }));
+    }
+}
+
+impl Default for Core {
+    fn default() -> Self {
+        Core::new()
+    }
+}

@@ -1,0 +1,56 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod command;
+pub mod controller;
+pub mod core;
+pub mod cycle;
+pub mod estimate;
+mod exponential;
+pub mod filter;
+pub mod forcing;
+pub mod image;
+pub mod limit;
+pub mod motion;
+pub mod number;
+pub mod primitive;
+pub mod profile;
+pub mod record;
+pub mod rollout;
+pub mod session;
+pub mod startup;
+
+pub use self::core::{Core, CoreIo, Event, Health};
+pub use command::Command;
+pub use number::Number;
+pub use primitive::FingerPrimitive;
+pub use record::{Record, TimedRecord};
+pub use rollout::Rollout;
+pub use session::{Library, Session, SessionPort};
+
+/// Digits of the hand: spread, F1, F2, F3.
+pub const DIGITS: usize = 4;
+
+/// Fingers, each with a strain gauge.
+pub const FINGERS: usize = 3;
+
+/// Most kernels of a row.
+pub const KERNELS: usize = link::image::KERNEL_LIMIT;
+
+/// Control periods in a row that may pass without a reply of a digit before torque ends, and that a gauge is believed: 17 ms.
+pub const LOST_CYCLES: u8 = 5;
+
+/// Ranges of the digits (rad).
+pub const RANGES: [[f64; 2]; DIGITS] = {
+    use control::model::{FINGER_RANGE, SPREAD_RANGE};
+    [SPREAD_RANGE, FINGER_RANGE, FINGER_RANGE, FINGER_RANGE]
+};
+
+/// The same as numbers of the control path.
+pub(crate) const RANGE_NUMBERS: [[Number; 2]; DIGITS] = [
+    number::constants(RANGES[0]),
+    number::constants(RANGES[1]),
+    number::constants(RANGES[2]),
+    number::constants(RANGES[3]),
+];

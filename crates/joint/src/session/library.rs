@@ -1,0 +1,85 @@
+//! `Library`: the primitives the device holds, by name, in the form in which they run.
+
+use link::{Listing, Name};
+
+use crate::image::Summary;
+use crate::primitive::FingerPrimitive;
+
+/// Places for primitives, beside the one that is being uploaded.
+pub const PLACES: usize = 3;
+
+/// One place.
+#[derive(Clone, Debug)]
+struct Place {
+    summary: Option<Summary>,
+    primitive: FingerPrimitive,
+}
+
+/// All places, and the one where an upload is converted.
+///
+/// About 20 kB: a static of its own, lent to the session.
+#[derive(Clone, Debug)]
+pub struct Library {
+    places: [Place; PLACES],
+    /// Where an upload is converted.
+    pub(super) staging: FingerPrimitive,
+}
+
+impl Library {
+    /// Without primitives.
+    pub const EMPTY: Library = Library {
+        places: [const { Place { summary: None, primitive: FingerPrimitive::EMPTY } }; PLACES],
+        staging: FingerPrimitive::EMPTY,
+    };
+
+    /// What is at a place.
+    pub(super) fn get(&self, place: usize) -> Option<&Summary> {
+        self.places.get(place)?.summary.as_ref()
+    }
+
+    /// Place and summary of a name.
+    pub(super) fn find(&self, name: &Name) -> Option<(usize, &Summary)> {
+        (0..PLACES).find_map(|place| self.get(place).filter(|entry| entry.name == *name).map(|entry| (place, entry)))
+    }
+
+    /// Where a primitive of this name goes: over the old one, or into a free place.
+    pub(super) fn place_for(&self, name: &Name) -> Option<usize> {
+        self.find(name).map(|(place, _)| place).or_else(|| (0..PLACES).find(|place| self.get(*place).is_none()))
+    }
+
+    /// The primitive at a place.
+    pub(super) fn primitive(&self, place: usize) -> Option<&FingerPrimitive> {
+        self.places.get(place).filter(|place| place.summary.is_some()).map(|place| &place.primitive)
+    }
+
+    /// Puts what was converted into a place.
+    pub(super) fn commit(&mut self, place: usize, summary: Summary) {
+        let Self { places, staging } = self;
+        if let Some(place) = places.get_mut(place) {
+            place.primitive.clone_from(staging);
+            place.summary = Some(summary);
+        }
+    }
+
+    /// Empties a place.
+    pub(super) fn delete(&mut self, place: usize) {
+        if let Some(place) = self.places.get_mut(place) {
+            place.summary = None;
+            place.primitive.clear();
+        }
+    }
+}
+
+/// An entry as it goes over the link.
+pub(super) fn listing(index: u8, entry: &Summary, loaded: bool) -> Listing {
+    Listing {
+        index,
+        name: entry.name.clone(),
+        length: entry.length,
+        crc: entry.crc,
+        duration: entry.duration,
+        kernels: entry.kernels,
+        expectation: entry.expectation,
+        loaded,
+    }
+}

@@ -1,0 +1,9 @@
+//! Tests of the fixed-point finger controller against the arm's code in f64, golden vectors, and wide integers.
+
+mod accuracy;
+mod common;
+mod force;
+mod image;
+mod ladder;
+mod rig;
+mod saturation;
