@@ -67,6 +67,24 @@ const LEARN_LARGEST: Step = Step {
     words: &["learn", "grasp.csv", "--kernels", "100", "--output", LARGEST],
 };
 
+/// What it should feel like, so that a run may use all its senses.
+const REHEARSE_LARGEST: Step = Step {
+    sentence: "rehearse: what that movement feels like",
+    words: &["--device", "sil:", "rehearse", LARGEST, "--trials", "3", "--record-dir", "rehearsals"],
+};
+
+/// How far successful runs differ, so that the device watches the run.
+const REMEMBER_LARGEST: Step = Step {
+    sentence: "experience: by what the device watches its runs",
+    words: &[
+        "experience",
+        LARGEST,
+        "rehearsals/largest-1.csv",
+        "rehearsals/largest-2.csv",
+        "rehearsals/largest-3.csv",
+    ],
+};
+
 /// Prepares the machine, builds, and runs every step; takes no further words.
 pub(crate) fn run(rest: &[&str]) -> Result<()> {
     anyhow::ensure!(rest.is_empty(), "the demonstration takes no arguments");
@@ -111,9 +129,9 @@ fn report(tactus: &Path, step: &Step) -> Result<Value> {
     serde_json::from_str(&text).with_context(|| format!("no report came from tactus {}", step.words.join(" ")))
 }
 
-/// Teaches and learns the primitive [`LARGEST`]; returns the folder in which it lies.
+/// Teaches, learns and rehearses the primitive [`LARGEST`]; returns the folder in which it lies.
 pub(crate) fn largest(tactus: &Path) -> Result<PathBuf> {
-    play(tactus, &[TEACH, LEARN_LARGEST])
+    play(tactus, &[TEACH, LEARN_LARGEST, REHEARSE_LARGEST, REMEMBER_LARGEST])
 }
 
 /// Runs steps inside `target/demo`, where their files stay for a look afterwards; returns that folder.
