@@ -188,7 +188,9 @@ impl HostError {
             Self::Transport(TransportError::Can(trouble)) => return Some(trouble.help()),
             Self::Transport(TransportError::Other(_)) | Self::WrongAnswer { .. } | Self::Interrupted => return None,
             Self::Incompatible { what, .. } => what.remedy(),
-            Self::NoAnswer { .. } => "check that the device has power and that its firmware runs; then try again",
+            Self::NoAnswer { .. } => {
+                "check that the device has power, that its firmware runs, and that no other program is connected to it; then try again"
+            }
             Self::Refused { reason, .. } => reason.remedy(),
             Self::Image(_) => "make the primitive again with `tactus learn`",
             Self::ReadBack { .. } => "upload again; if it persists the device's storage is worn out",

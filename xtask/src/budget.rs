@@ -29,7 +29,9 @@ pub(crate) fn run(machine: &Machine) -> Result<()> {
     let folder = demo::largest(&tactus)?;
     shell::step("budget: 100 kernels, hand, force control, adaptation and watch, measured by the image itself");
     let json = shell::capture(
-        Command::new(&tactus).args(["--json", "--device", "sim:", "run", demo::LARGEST, "--mode", "adapt"]).current_dir(folder),
+        Command::new(&tactus)
+            .args(["--json", "--device", "sim:", "run", demo::LARGEST, "--mode", "adapt"])
+            .current_dir(folder),
     )?;
     let report = report(&json).context("the run reported no costs")?;
     let number = |name: &str| -> Result<f64> {

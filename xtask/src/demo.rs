@@ -76,13 +76,7 @@ const REHEARSE_LARGEST: Step = Step {
 /// How far successful runs differ, so that the device watches the run.
 const REMEMBER_LARGEST: Step = Step {
     sentence: "experience: by what the device watches its runs",
-    words: &[
-        "experience",
-        LARGEST,
-        "rehearsals/largest-1.csv",
-        "rehearsals/largest-2.csv",
-        "rehearsals/largest-3.csv",
-    ],
+    words: &["experience", LARGEST, "rehearsals/largest-1.csv", "rehearsals/largest-2.csv", "rehearsals/largest-3.csv"],
 };
 
 /// Prepares the machine, builds, and runs every step; takes no further words.

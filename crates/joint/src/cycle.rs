@@ -4,11 +4,9 @@
 //! Idle/Hold --Move--> Approach --> Hold        torque only in Approach, Run, Coast and a Hold that follows them
 //!     |  ------Run--> Run <-> Coast (1..5 cycles of lost replies)
 //!     |                |--> Hold (arrived: what is gripped stays gripped)
-//!     |                v
-//!     |             SoftStop   torque off, the worm drives hold: a person's stop, a silent host, 6 cycles of lost replies
-//!     |                v
-//!     |              Fault     a puck reset or fell silent for 0.2 s
-//!     <---ClearFault---+
+//!     |                |--> SoftStop   torque off, the worm drives hold: a person's stop, a silent host, 6 cycles of lost replies
+//!     |                '--> Fault      a puck under torque tells that it was reset
+//!     <---ClearFault---- SoftStop, Fault
 //! ```
 //! It goes down by itself and up by a person's command, except from Coast to Run. No state needs torque to be safe: the worms cannot
 //! be driven back.

@@ -225,7 +225,7 @@ impl Refusal {
             Self::NotZeroed => "put the arm into its home pose and zero it",
             Self::NotReady => "wait for the start-up to finish; if it does not, look at pendant and cables",
             Self::SafetyMode => "press Shift+Activate on the pendant",
-            Self::Faulted => "remove the cause, then clear the fault",
+            Self::Faulted => "remove the cause, then `tactus stop --clear-fault`",
             Self::State => "stop the present motion first: `tactus stop`",
             Self::CommandQueueFull => "send the request again",
             Self::NoSuchPrimitive => "`tactus list` shows what is stored; `tactus upload` adds one",

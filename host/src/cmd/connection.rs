@@ -76,7 +76,9 @@ pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
         ProcedureError::NotZeroed => {
             (Exit::Refused, "E591", "bring the arm to its home pose by hand and add `--at-home`")
         }
-        ProcedureError::Stopped(_) => (Exit::Refused, "E592", "find the cause; `tactus stop` brings the arm to rest"),
+        ProcedureError::Stopped(_) => {
+            (Exit::Refused, "E592", "find and remove the cause, then `tactus stop --clear-fault`")
+        }
         ProcedureError::Diverted(_) => (Exit::Refused, "E593", "try again"),
         ProcedureError::TooLong { .. } => (Exit::Refused, "E594", "look what holds the arm"),
         ProcedureError::Hand(_) => (Exit::Refused, "E595", "free the fingers, then `tactus hand init`"),

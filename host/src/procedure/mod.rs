@@ -29,7 +29,7 @@ pub enum ProcedureError {
     #[error("the arm does not know where it stands")]
     NotZeroed,
     /// The arm stopped by itself.
-    #[error("the arm stopped: {}", explain(*.0))]
+    #[error("the arm stopped: {0}")]
     Stopped(Fault),
     /// The arm left its motion for a state that was not asked for.
     #[error("the arm went to state '{0}' instead")]
@@ -54,8 +54,4 @@ impl From<crate::transport::TransportError> for ProcedureError {
     fn from(error: crate::transport::TransportError) -> Self {
         Self::Host(error.into())
     }
-}
-
-fn explain(fault: Fault) -> String {
-    format!("{fault}: {}", fault.explanation())
 }

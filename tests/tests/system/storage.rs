@@ -83,8 +83,8 @@ fn names(arm: &mut Arm) -> Vec<String> {
     expect(arm.list()).into_iter().map(|listing| listing.name.as_str().to_owned()).collect()
 }
 
-/// Content of a flash that holds `images` and has been written all around, so that the next upload must copy images and
-/// erase a sector before it can be durable.
+/// Content of a flash that holds `images` and a "filler" and has been written all around, so that the next upload must copy
+/// images and erase a sector before it can be durable.
 fn crowded(images: &[Vec<u8>]) -> Vec<u8> {
     let chip = FlashChip::new(Flash::blank(FlashTimes::NONE));
     let mut arm = connect("sil:world=simple", &chip);
@@ -95,7 +95,6 @@ fn crowded(images: &[Vec<u8>]) -> Vec<u8> {
         let number = chip.lock().operations();
         upload(&mut arm, &self::image("filler", 1.0 + (number % 1000) as f32 * 0.01));
         if chip.lock().erases().iter().sum::<u32>() > 0 {
-            expect(arm.delete(&name_of("filler")));
             return before;
         }
     }
@@ -159,7 +158,8 @@ fn an_upload_with_an_erase_during_a_run_delays_no_control_cycle() {
     let chip = FlashChip::new(Flash::with_content(crowded(&kept), FlashTimes::SLOW));
     let mut arm = connect("sim:world=simple", &chip);
     to_the_start(&mut arm);
-    // Every third cycle: with all of them the line is full while the image is read back, and telemetry gives way.
+    // Every third cycle, which the line carries beside the upload. With every cycle (about 66 of its 92 kB/s) it is full while the
+    // image is read back, and telemetry gives way to answers, erase or no erase: the second upload below tells how often.
     expect(arm.set_telemetry(3));
     expect(arm.run(&name_of("long"), RunOptions { feedback: false, ..RunOptions::default() }));
     let quiet_from = simulation(arm.transport()).ticks();
@@ -173,9 +173,13 @@ fn an_upload_with_an_erase_during_a_run_delays_no_control_cycle() {
     let busy_until = simulation(arm.transport()).ticks();
     let busy = watch_until(&mut arm, started + took + Duration::from_millis(20));
     let after = expect(arm.statistics());
-    let status = expect(arm.status());
-
+    assert_eq!(arm.gaps().telemetry, 0, "cycles are missing in the telemetry");
     let erases: u32 = chip.lock().erases().iter().sum();
+    expect(arm.set_telemetry(1));
+    upload(&mut arm, &image("new", 7.0));
+    let crowded_line = expect(arm.statistics());
+    let status = expect(arm.status());
+    let more_erases = chip.lock().erases().iter().sum::<u32>() - erases;
     let (quiet_jitter, busy_jitter) = (
         torque_jitter(&arm_torques(&mut arm, quiet_from, busy_from)),
         torque_jitter(&arm_torques(&mut arm, busy_from, busy_until)),
@@ -200,18 +204,21 @@ fn an_upload_with_an_erase_during_a_run_delays_no_control_cycle() {
         quiet.len(),
         busy.len()
     );
+    println!(
+        "with telemetry of every cycle and {more_erases} erases an upload costs {} cycles of it",
+        crowded_line.telemetry_dropped - after.telemetry_dropped
+    );
 
     assert!(erases >= 1, "no sector was erased: the test shows nothing");
     assert!(took > Duration::from_secs(4), "the upload was accepted before its sector was erased");
     assert_eq!((status.state, status.fault), (State::Run.code(), 0), "the run went on");
-    assert_eq!(after.missed_deadlines, 0);
-    assert_eq!(after.lost_replies, before.lost_replies);
+    assert_eq!(crowded_line.missed_deadlines, 0);
+    assert_eq!(crowded_line.lost_replies, before.lost_replies);
     assert_eq!(after.telemetry_dropped, before.telemetry_dropped, "telemetry was dropped");
-    assert_eq!(arm.gaps().telemetry, 0, "cycles are missing in the telemetry");
     // One microsecond is five instructions of a critical section; a flash that stalls the processor costs milliseconds.
     assert!(after.latency_worst_ticks <= before.latency_worst_ticks + 100, "the control slot began late");
     assert!(busy_jitter <= quiet_jitter + 150, "torques left late: {busy_jitter} ticks, {quiet_jitter} without");
-    assert_eq!(names(&mut arm), ["long", "other", "new"]);
+    assert_eq!(names(&mut arm), ["long", "other", "filler", "new"]);
 }
 
 #[test]
