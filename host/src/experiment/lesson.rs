@@ -38,6 +38,8 @@ const OPEN: f64 = 0.25;
 const WIDE_OPEN: f64 = 0.05;
 /// Part of the dwell in which the fingers move.
 const CLOSING: [f64; 2] = [0.06, 0.94];
+/// Kernels of a movement that lifts by itself.
+const LIFTING_KERNELS: usize = 100;
 /// Rehearsals.
 const REHEARSALS: u64 = 3;
 
@@ -240,6 +242,7 @@ fn learn(scenario: Scenario, recording: &Recording, file: &Path) -> Result<Primi
     let arrival = lesson.arrival() / lesson.path().duration() * shown;
     let closes = CLOSING.map(|share| (arrival + share * handling.closing) / (shown + dwell));
     let fingers = |angle: f64| [0.0, angle, angle, angle];
+    let usual = LearnOptions::named(scenario.name());
     let options = LearnOptions {
         dwell,
         hand: HandMotion {
@@ -251,7 +254,9 @@ fn learn(scenario: Scenario, recording: &Recording, file: &Path) -> Result<Primi
             hand_stiffness: handling.fingers.map(|[stiffness, _]| stiffness),
             ..FeedbackOptions::default()
         },
-        ..LearnOptions::named(scenario.name())
+        // A movement that arrives, waits and lifts has more to say in its last part than the usual kernels can.
+        kernels: if scenario.lifts_itself() { LIFTING_KERNELS } else { usual.kernels },
+        ..usual
     };
     let mut primitive = learn::learn(recording, file, &options)?.primitive;
     let [position, _, _, hand] = primitive.gains.map(|gain| gain.stiffness);

@@ -7,7 +7,8 @@ use device::Stage;
 use sim::FrameClass;
 use system_tests::bus::{CYCLE_TICKS, position_requests, torques};
 use system_tests::execution::{distance, watch};
-use system_tests::{at_rest, connect, expect, ready, simulation};
+use system_tests::{at_rest, boot, connect, expect, ready, simulation};
+use tactus::client::Client;
 use tactus::procedure;
 
 /// How far the start of a position request may wander, ticks: interrupt and round (10 us) behind the rest of the longest
@@ -16,9 +17,10 @@ const JITTER: u64 = 145 * sim::TICKS_PER_MICROSECOND;
 
 #[test]
 fn firmware_boots_from_the_emergency_stop_to_ready_through_every_stage() {
-    let mut arm = connect("sim:seed=11");
-    let mode = simulation(arm.transport()).plant().safety_mode();
-    assert_eq!(mode, puck::SafetyMode::EStop, "the arm must start with the E-stop pressed");
+    let mut device = boot("sim:seed=11");
+    let mode = device.simulation().map(|simulation| simulation.plant().safety_mode());
+    assert_eq!(mode, Some(puck::SafetyMode::EStop), "the arm must start with the E-stop pressed");
+    let mut arm = expect(Client::connect(device, "system test"));
     let stages = RefCell::new(Vec::new());
     expect(procedure::make_ready(&mut arm, false, |stage| stages.borrow_mut().push(stage)));
     let stages = stages.into_inner();
