@@ -7,7 +7,7 @@ use device::Stage;
 use sim::FrameClass;
 use system_tests::bus::{CYCLE_TICKS, position_requests, torques};
 use system_tests::execution::{distance, watch};
-use system_tests::{at_rest, boot, connect, expect, ready, simulation};
+use system_tests::{at_rest, boot, expect, ready, simulation};
 use tactus::client::Client;
 use tactus::procedure;
 
