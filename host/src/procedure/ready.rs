@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use control::State;
 use device::Stage;
 use link::EventKind;
 
@@ -18,6 +19,10 @@ const PATIENCE: u64 = 600;
 
 /// How often the stage is looked at.
 const LOOK: Duration = Duration::from_millis(50);
+
+/// How long an arm that is ready is left alone: the device takes its first rest, 0.3 s, for the zero of its sensors, and takes it only
+/// while nothing has been commanded.
+const FIRST_REST: Duration = Duration::from_millis(500);
 
 /// Waits until the arm can be commanded, tells every stage, and initialises the hand where there is one.
 ///
@@ -44,7 +49,12 @@ pub fn make_ready(
             told = Some(stage);
         }
         match stage {
-            Some(Stage::Ready) => return initialise_hand(client).map(|_| ()),
+            Some(Stage::Ready) => {
+                if State::from_code(status.state) == Some(State::Idle) {
+                    leave_alone(client, FIRST_REST)?;
+                }
+                return initialise_hand(client).map(|_| ());
+            }
             Some(Stage::WaitingForZero) if simulated || at_home => client.zero(home())?,
             Some(Stage::WaitingForZero) => return Err(ProcedureError::NotZeroed),
             _ => {}
@@ -60,6 +70,15 @@ pub fn make_ready(
             blocked = Some(explain_blocked([event.detail, 0]));
         }
     }
+}
+
+/// Lets the device's time pass.
+fn leave_alone(client: &mut Client<Device>, time: Duration) -> Result<(), ProcedureError> {
+    let until = client.now() + time;
+    while client.now() < until {
+        client.next(until.saturating_sub(client.now()))?;
+    }
+    Ok(())
 }
 
 /// The home posture of the model, rad.

@@ -249,8 +249,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 let at_rest = state.missing == 0 && state.dq.0.amax() < R::of(STANDING);
                 let weight = self.model.hanging_weight(&frames);
                 self.wrench.update(input.sample.wrench.as_ref(), Some(&weight), at_rest);
-                // An arm that is activated before it has rested long enough finds its zero at the first rest of a hold.
-                if matches!(self.supervisor.state(), State::Idle | State::Hold) && !self.wrench.is_tared() {
+                if self.supervisor.state() == State::Idle && !self.wrench.is_tared() {
                     self.tare_first();
                 }
                 let measured = Measured {
@@ -316,7 +315,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
-    /// The first rest after start-up is the zero of the sensors; the arm is braked or holds then, and nobody uses the hand.
+    /// The first rest after start-up is the zero of the sensors; the arm is braked then, and nobody uses the hand.
     fn tare_first(&mut self) {
         self.wrench.tare_first();
         if self.wrench.is_tared() {
