@@ -72,14 +72,17 @@ struct Queues {
     log: Queue<Event, EVENTS>,
 }
 
-/// Everything that lives as long as the image: put it into a static. It is all zeros, so that an image need not keep its
-/// content in flash; [`start`] fills it where it is, because the halves are too large for the stack of a small processor.
+/// Everything that lives as long as the image but the control half: put it into a static. It is all zeros, so that an image
+/// need not keep its content in flash; [`start`] fills it where it is, because the halves are too large for the stack of a
+/// small processor.
 pub struct Memory {
     queues: Queues,
     shelf: Shelf,
-    core: MaybeUninit<Core>,
     session: MaybeUninit<Dialogue>,
 }
+
+/// The place of the control half. Put it into a static too, in the memory that is never waited for; nobody need clear it.
+pub type CorePlace = MaybeUninit<Core>;
 
 impl Memory {
     /// Not filled yet.
@@ -95,7 +98,6 @@ impl Memory {
                 log: Queue::new(),
             },
             shelf: Shelf::new(),
-            core: MaybeUninit::uninit(),
             session: MaybeUninit::uninit(),
         }
     }
@@ -136,6 +138,7 @@ pub fn start<E: Edge>(
     serial: &'static str,
     parts: Parts<E>,
     memory: &'static mut Memory,
+    core: &'static mut CorePlace,
 ) -> Application<E> {
     let identity = Identity {
         firmware,
@@ -144,7 +147,7 @@ pub fn start<E: Edge>(
         simulated: E::SIMULATED,
         ticks_per_second: <E::Clock as Clock>::HZ,
     };
-    let Memory { queues, shelf, core, session } = memory;
+    let Memory { queues, shelf, session } = memory;
     let Parts { clock, mut slot_timer, can, link, light, flash } = parts;
     let (to_bus, outgoing) = queues.outgoing.split();
     let (incoming, from_bus) = queues.incoming.split();
@@ -169,7 +172,7 @@ pub fn start<E: Edge>(
 /// Builds the control half in its place. Not inlined: what the compiler may put on the stack meanwhile is gone when it
 /// returns.
 #[inline(never)]
-fn new_core(place: &'static mut MaybeUninit<Core>) -> &'static mut Core {
+fn new_core(place: &'static mut CorePlace) -> &'static mut Core {
     place.write(Core::new())
 }
 

@@ -20,8 +20,8 @@ static METADATA: [u8; link::metadata::METADATA_BYTES] = {
 mod app {
     use device::Core;
     use firmware::application::{
-        self, Application, Dialogue, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse, StorageRoom,
-        TransmitTask,
+        self, Application, CorePlace, Dialogue, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse,
+        StorageRoom, TransmitTask,
     };
     use firmware::board::device::Interrupt;
     use firmware::board::{Board, Edge, stack};
@@ -48,14 +48,19 @@ mod app {
         flash: <Board as Edge>::Flash,
     }
 
-    #[init(local = [memory: Memory = Memory::new()])]
+    #[init(local = [
+        memory: Memory = Memory::new(),
+        // Beside what the tasks own, for which RTIC uses this section.
+        #[unsafe(link_section = ".uninit.core")]
+        core: CorePlace = CorePlace::uninit(),
+    ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let board = Board::start(cx.core);
         let version = metadata::FIRMWARE;
         defmt::info!("tactus arm {=str} on {=str}", version, Board::NAME);
         let serial = board.serial();
         let Application { core, can, session, slot_task, receive_task, transmit_task, session_task, log_task, flash } =
-            application::start(version, serial, board.split(), cx.local.memory);
+            application::start(version, serial, board.split(), cx.local.memory, cx.local.core);
         (Shared { core, can, session }, Local { slot_task, receive_task, transmit_task, session_task, log_task, flash })
     }
 

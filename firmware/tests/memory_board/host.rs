@@ -13,8 +13,8 @@ use control::units::JointPositions;
 use device::storage::Opening;
 use device::{Core, Store};
 use firmware::application::{
-    self, Application, Dialogue, Log, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse, StorageRoom,
-    TransmitTask,
+    self, Application, CorePlace, Dialogue, Log, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse,
+    StorageRoom, TransmitTask,
 };
 use firmware::board::Edge;
 use firmware::meters::Meters;
@@ -108,7 +108,7 @@ impl Host {
         let serial = board.serial();
         let memory = Box::leak(Box::new(Memory::new()));
         let Application { core, can, session, slot_task, receive_task, transmit_task, session_task, log_task, flash } =
-            application::start("test", serial, board.split(), memory);
+            application::start("test", serial, board.split(), memory, Box::leak(Box::new(CorePlace::uninit())));
         let (session, notes) = (Lock::new(session), Notes::default());
         let room = Box::leak(Box::new(StorageRoom::new()));
         Self {

@@ -1,4 +1,4 @@
-//! What lies where: code in bank 1 of the flash and in ITCM, the tasks' data in DTCM, stack and the rest in AXI memory,
+//! What lies where: code in bank 1 of the flash and in ITCM, stack and the control half in DTCM, the rest in AXI memory,
 //! the primitives in bank 2. `firmware/memory/stm32h743.x` says the same to the linker; a test compares the two.
 
 /// A stretch of the address space.
@@ -48,8 +48,15 @@ pub const HOT_CODE: Region = Region { start: 0x400, length: 63 * 1024 };
 /// All of the tightly coupled data memory.
 pub const DTCM: Region = Region { start: 0x2000_0000, length: 128 * 1024 };
 
-/// The tasks' data, the log's buffer and the last words: never cached, never waited for.
-pub const HOT_DATA: Region = Region { start: 0x2000_0000, length: 124 * 1024 };
+/// May not be touched: whoever gets here has overflowed the stack. 4 KiB; only start-up has functions with more locals
+/// than that, far above it.
+pub const STACK_GUARD: Region = Region { start: 0x2000_0000, length: 4 * 1024 };
+
+/// The stack of all tasks and interrupts, growing down: never cached, never waited for.
+pub const STACK: Region = Region { start: 0x2000_1000, length: 60 * 1024 };
+
+/// The control half, what the tasks own, the log's buffer and the last words.
+pub const HOT_DATA: Region = Region { start: 0x2001_0000, length: 60 * 1024 };
 
 /// Stack of the handler that runs when the other stack has overflowed.
 pub const EMERGENCY_STACK: Region = Region { start: 0x2001_F000, length: 4 * 1024 };
@@ -57,14 +64,5 @@ pub const EMERGENCY_STACK: Region = Region { start: 0x2001_F000, length: 4 * 102
 /// All of the AXI memory.
 pub const AXI: Region = Region { start: 0x2400_0000, length: 512 * 1024 };
 
-/// Initialised and zeroed data: the store's copy, queues. Cached; no peripheral reads it by itself.
-pub const DATA: Region = Region { start: 0x2400_0000, length: 380 * 1024 };
-
-/// May not be touched: whoever gets here has overflowed the stack. 4 KiB; only start-up has functions with more locals
-/// than that, far above it.
-pub const STACK_GUARD: Region = Region { start: 0x2405_F000, length: 4 * 1024 };
-
-/// The stack of all tasks and interrupts, growing down. Start-up needs most of it: it builds the tasks' data there, 70 KiB,
-/// before it moves them to their place, which is why the stack and the data cannot both be in tightly coupled memory.
-/// The tasks themselves need a few KiB, which stay in the cache.
-pub const STACK: Region = Region { start: 0x2406_0000, length: 128 * 1024 };
+/// Initialised and zeroed data: the session, the library, queues. Cached; no peripheral reads it by itself.
+pub const DATA: Region = Region { start: 0x2400_0000, length: 512 * 1024 };
