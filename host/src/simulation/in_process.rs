@@ -10,121 +10,26 @@ use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 
+use control::Payload;
 use control::arm::ArmModel;
-use control::{CycleRecord, LoadRefusal, Payload};
 use device::storage::{Desk, Library, Opening, Room, Work, keep, value_bytes};
-use device::{
-    Command, Core, CoreIo, Event, Health, Identity, QueueFull, Session, SessionPort, Slot, StoreError, StoredPrimitive,
-    TimedRecord, Timing,
-};
+use device::{Core, Identity, Session, Slot, StoreError};
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
 use sim::flash::{FlashChip, FlashPort, VirtualClock};
 use sim::{Plant, SLOT_TICKS, TICKS_PER_MICROSECOND, Ticks};
 
+use super::halves::{FIRST_SLOT, LINE_ROOM, Port, Queues};
 use super::{Execute, SimulationError};
 
-/// Room of the queues between the halves, as in the firmware.
-const COMMANDS: usize = 8;
-/// Records that may wait for the session.
-const RECORDS: usize = 8;
-/// Bytes that may wait for the line before telemetry is left out; the firmware's port has the same room.
-const LINE_ROOM: usize = 2048;
-
-/// Primitives the store holds, as in the firmware.
+/// Primitives the store holds, twice as many as in the firmware.
 const STORE_SLOTS: usize = 8;
-
-/// The first slot, in slots since power-up, as on the board (`docs/lockstep.md`).
-const FIRST_SLOT: Ticks = 10;
 
 /// From the beginning of a slot to its frames in the bus controller: what the image takes under QEMU, in the middle of its range.
 const fn computing(slot: Slot) -> Ticks {
     match slot {
         Slot::Control => 200 * TICKS_PER_MICROSECOND,
         Slot::Request | Slot::Slow => 10 * TICKS_PER_MICROSECOND,
-    }
-}
-
-/// What both halves see of each other and of the board.
-#[derive(Default)]
-struct Queues {
-    received: VecDeque<CanFrame>,
-    transmitted: Vec<CanFrame>,
-    commands: VecDeque<Command>,
-    records: VecDeque<TimedRecord>,
-    events: VecDeque<Event>,
-}
-
-impl CoreIo for Queues {
-    fn receive(&mut self) -> Option<CanFrame> {
-        self.received.pop_front()
-    }
-
-    fn transmit(&mut self, frame: CanFrame) -> bool {
-        self.transmitted.push(frame);
-        true
-    }
-
-    fn command(&mut self) -> Option<Command> {
-        self.commands.pop_front()
-    }
-
-    fn record(&mut self, record: CycleRecord) {
-        if self.records.len() == RECORDS {
-            self.records.pop_front();
-        }
-        self.records.push_back(TimedRecord { record, cost_ticks: 0 });
-    }
-
-    fn event(&mut self, event: Event) {
-        self.events.push_back(event);
-    }
-}
-
-/// The low-priority half's view while it is polled.
-struct Port<'a> {
-    queues: &'a mut Queues,
-    core: &'a mut Core,
-    line: &'a mut Vec<u8>,
-    room: usize,
-}
-
-impl SessionPort for Port<'_> {
-    fn send(&mut self, bytes: &[u8]) {
-        self.line.extend_from_slice(bytes);
-        self.room = self.room.saturating_sub(bytes.len());
-    }
-
-    fn room(&self) -> usize {
-        self.room
-    }
-
-    fn command(&mut self, command: Command) -> Result<(), QueueFull> {
-        if self.queues.commands.len() == COMMANDS {
-            return Err(QueueFull);
-        }
-        self.queues.commands.push_back(command);
-        Ok(())
-    }
-
-    fn load(&mut self, primitive: &StoredPrimitive) -> Result<(), LoadRefusal> {
-        self.core.load(primitive)
-    }
-
-    fn record(&mut self) -> Option<TimedRecord> {
-        self.queues.records.pop_front()
-    }
-
-    fn event(&mut self) -> Option<Event> {
-        self.queues.events.pop_front()
-    }
-
-    fn health(&mut self) -> Health {
-        self.core.health()
-    }
-
-    fn timing(&mut self) -> Timing {
-        Timing::default()
     }
 }
 

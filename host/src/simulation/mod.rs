@@ -7,6 +7,7 @@
 
 mod bus_log;
 mod error;
+pub(crate) mod halves;
 mod in_process;
 mod options;
 mod qemu;

@@ -1,109 +1,13 @@
 //! The device's application without a bus: what comes is put in, what it sends is taken out, slot by slot.
 
-use std::collections::VecDeque;
-
+use control::Payload;
 use control::arm::ArmModel;
-use control::{CycleRecord, LoadRefusal, Payload};
-use device::{
-    Command, Core, CoreIo, Event, Health, Identity, QueueFull, RamStore, STORE_SLOTS, Session, SessionPort, Slot,
-    StoredPrimitive, TimedRecord, Timing,
-};
+use device::{Core, Identity, RamStore, STORE_SLOTS, Session, Slot};
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
 use sim::{SLOT_TICKS, TICKS_PER_MICROSECOND, Ticks};
 
-/// Room of the queue of commands, as in the firmware.
-const COMMANDS: usize = 8;
-/// Records that may wait for the session, as in the firmware.
-const RECORDS: usize = 8;
-/// Bytes that may wait for the line, as in the firmware.
-const LINE_ROOM: usize = 2048;
-
-/// The first slot of a device, in slots since its power-up (`docs/lockstep.md`).
-pub(super) const FIRST_SLOT: Ticks = 10;
-
-/// What both halves of the application see of each other and of the log.
-#[derive(Default)]
-struct Queues {
-    received: VecDeque<CanFrame>,
-    transmitted: Vec<CanFrame>,
-    commands: VecDeque<Command>,
-    records: VecDeque<TimedRecord>,
-    events: VecDeque<Event>,
-}
-
-impl CoreIo for Queues {
-    fn receive(&mut self) -> Option<CanFrame> {
-        self.received.pop_front()
-    }
-
-    fn transmit(&mut self, frame: CanFrame) -> bool {
-        self.transmitted.push(frame);
-        true
-    }
-
-    fn command(&mut self) -> Option<Command> {
-        self.commands.pop_front()
-    }
-
-    fn record(&mut self, record: CycleRecord) {
-        if self.records.len() == RECORDS {
-            self.records.pop_front();
-        }
-        self.records.push_back(TimedRecord { record, cost_ticks: 0 });
-    }
-
-    fn event(&mut self, event: Event) {
-        self.events.push_back(event);
-    }
-}
-
-/// The session's view while it is polled.
-struct Port<'a> {
-    queues: &'a mut Queues,
-    core: &'a mut Core,
-    line: &'a mut Vec<u8>,
-    room: usize,
-}
-
-impl SessionPort for Port<'_> {
-    fn send(&mut self, bytes: &[u8]) {
-        self.line.extend_from_slice(bytes);
-        self.room = self.room.saturating_sub(bytes.len());
-    }
-
-    fn room(&self) -> usize {
-        self.room
-    }
-
-    fn command(&mut self, command: Command) -> Result<(), QueueFull> {
-        if self.queues.commands.len() == COMMANDS {
-            return Err(QueueFull);
-        }
-        self.queues.commands.push_back(command);
-        Ok(())
-    }
-
-    fn load(&mut self, primitive: &StoredPrimitive) -> Result<(), LoadRefusal> {
-        self.core.load(primitive)
-    }
-
-    fn record(&mut self) -> Option<TimedRecord> {
-        self.queues.records.pop_front()
-    }
-
-    fn event(&mut self) -> Option<Event> {
-        self.queues.events.pop_front()
-    }
-
-    fn health(&mut self) -> Health {
-        self.core.health()
-    }
-
-    fn timing(&mut self) -> Timing {
-        Timing::default()
-    }
-}
+use crate::simulation::halves::{FIRST_SLOT, LINE_ROOM, Port, Queues};
 
 /// The application of a device at power-up, and the time of its next slot.
 pub(super) struct Engine {

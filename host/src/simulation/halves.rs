@@ -1,0 +1,105 @@
+//! The two halves of the device's application in one thread: the queues between them, and what the session sees of the rest.
+
+use std::collections::VecDeque;
+
+use control::{CycleRecord, LoadRefusal};
+use device::{Command, Core, CoreIo, Event, Health, QueueFull, SessionPort, StoredPrimitive, TimedRecord, Timing};
+use puck::CanFrame;
+use sim::Ticks;
+
+/// Room of the queue of commands, as in the firmware.
+const COMMANDS: usize = 8;
+/// Records that may wait for the session, as in the firmware.
+const RECORDS: usize = 16;
+/// Bytes that may wait for the line before telemetry is left out; the firmware's port has the same room.
+pub(crate) const LINE_ROOM: usize = 2048;
+
+/// The first slot of a device, in slots since its power-up, as on the board (`docs/lockstep.md`).
+pub(crate) const FIRST_SLOT: Ticks = 10;
+
+/// What both halves see of each other and of the board.
+#[derive(Default)]
+pub(crate) struct Queues {
+    /// Frames from the bus that the core has not taken yet.
+    pub(crate) received: VecDeque<CanFrame>,
+    /// Frames for the bus.
+    pub(crate) transmitted: Vec<CanFrame>,
+    commands: VecDeque<Command>,
+    records: VecDeque<TimedRecord>,
+    events: VecDeque<Event>,
+}
+
+impl CoreIo for Queues {
+    fn receive(&mut self) -> Option<CanFrame> {
+        self.received.pop_front()
+    }
+
+    fn transmit(&mut self, frame: CanFrame) -> bool {
+        self.transmitted.push(frame);
+        true
+    }
+
+    fn command(&mut self) -> Option<Command> {
+        self.commands.pop_front()
+    }
+
+    fn record(&mut self, record: CycleRecord) {
+        if self.records.len() == RECORDS {
+            self.records.pop_front();
+        }
+        self.records.push_back(TimedRecord { record, cost_ticks: 0 });
+    }
+
+    fn event(&mut self, event: Event) {
+        self.events.push_back(event);
+    }
+}
+
+/// The low-priority half's view while it is polled.
+pub(crate) struct Port<'a> {
+    pub(crate) queues: &'a mut Queues,
+    pub(crate) core: &'a mut Core,
+    /// Where its bytes go.
+    pub(crate) line: &'a mut Vec<u8>,
+    /// Bytes the line still takes.
+    pub(crate) room: usize,
+}
+
+impl SessionPort for Port<'_> {
+    fn send(&mut self, bytes: &[u8]) {
+        self.line.extend_from_slice(bytes);
+        self.room = self.room.saturating_sub(bytes.len());
+    }
+
+    fn room(&self) -> usize {
+        self.room
+    }
+
+    fn command(&mut self, command: Command) -> Result<(), QueueFull> {
+        if self.queues.commands.len() == COMMANDS {
+            return Err(QueueFull);
+        }
+        self.queues.commands.push_back(command);
+        Ok(())
+    }
+
+    fn load(&mut self, primitive: &StoredPrimitive) -> Result<(), LoadRefusal> {
+        self.core.load(primitive)
+    }
+
+    fn record(&mut self) -> Option<TimedRecord> {
+        self.queues.records.pop_front()
+    }
+
+    fn event(&mut self) -> Option<Event> {
+        self.queues.events.pop_front()
+    }
+
+    fn health(&mut self) -> Health {
+        self.core.health()
+    }
+
+    fn timing(&mut self) -> Timing {
+        Timing::default()
+    }
+}
