@@ -32,6 +32,9 @@ const CELLS_OF_FIRMWARE: &str = "0:0,-8:4,-16:8";
 /// Force that counts as the first touch, N: the feet of a leaning flashlight come and go below a newton.
 const TOUCH: f64 = 0.5;
 
+/// How far the planned positions of the same trial may lie apart until contact, m: less than they move in a cycle.
+const SAME_PLAN: f64 = 8e-5;
+
 /// When the sensor falls silent, ticks: in the middle of the movement.
 const SILENT_FROM: u64 = 8 * TICKS_PER_SECOND;
 
@@ -82,21 +85,32 @@ fn firmware_grasps_what_the_application_in_this_process_grasps() {
     let found = (outcomes(&carried_through(&in_process)), outcomes(&carried_through(&firmware)));
     println!("{:?}", found.0);
     assert_eq!(found.0, found.1);
-    // Until something is touched they agree to a few encoder counts (docs/experiments.md): a command that comes a cycle
-    // later, or a torque of another cycle, would show as millimetres.
+    // Until something is touched they agree to a few encoder counts (docs/experiments.md), and the plans to less than they
+    // move in a cycle: a primitive that began a cycle later would be noticed, as is seen here.
     let files = expect(std::fs::read_dir(folder.path().join("sil/recordings")));
     let names: Vec<_> = files.map(|file| expect(file).file_name()).collect();
     assert_eq!(names.len(), found.0.len());
     for name in names {
         let read = |engine: &str| expect(Recording::read(&folder.path().join(engine).join("recordings").join(&name)));
-        let difference = expect(Difference::between(&read("sil"), &read("sim"), TOUCH));
+        let (in_process, firmware) = (read("sil"), read("sim"));
+        let difference = expect(Difference::between(&in_process, &firmware, TOUCH));
         println!("{}\n{difference}", name.display());
         let (start, before) = (difference.start, difference.before_contact);
-        assert!(start.joint_rad < 2e-4, "{name:?} does not begin alike: {start:?}");
+        assert!(start.joint_rad < 2e-6, "{name:?} does not begin alike: {start:?}");
         assert!(before.samples > 600, "{name:?}: {before:?}");
-        let alike = before.joint_rad < 1.5e-3 && before.position_m < 1e-3 && before.plan_m < 5e-4;
+        let alike = before.joint_rad < 1.5e-3 && before.position_m < 1e-3 && before.plan_m < SAME_PLAN;
         assert!(alike, "{name:?}: {before:?}");
+        let later = expect(Difference::between(&planned_a_cycle_later(in_process), &firmware, TOUCH)).before_contact;
+        assert!(later.plan_m > SAME_PLAN, "{name:?}: a cycle more would not be noticed: {later:?}");
     }
+}
+
+/// As if every plan had been made a cycle later.
+fn planned_a_cycle_later(mut recording: Recording) -> Recording {
+    for plan in recording.position_d.iter_mut() {
+        plan.rotate_right(1);
+    }
+    recording
 }
 
 fn engine(address: &str) -> Engine {
