@@ -1,14 +1,14 @@
 //! Builds the host tools and the images for the boards.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
 use crate::board::{self, Board};
 use crate::elf::Sizes;
 use crate::setup::{ARM, Machine, Toolchain};
-use crate::shell;
+use crate::{joint, panics, shell};
 
 /// Features of the host packages with the MuJoCo world and its pictures.
 pub(crate) const WORLD: &str = "tactus/mujoco,sim/mujoco,sim/render,system-tests/mujoco";
@@ -48,9 +48,30 @@ fn board_image(toolchain: Toolchain, board: Board, may_sleep: bool) -> Result<Pa
     fs::create_dir_all(&folder)?;
     let image = folder.join(board.file());
     fs::copy(&built, &image).with_context(|| format!("cannot copy {}", built.display()))?;
-    ensure!(!Sizes::of(&image)?.allocates(), "the image allocates memory, which nothing on a device may");
     shell::note(&format!("image: {}", image.display()));
+    nothing_forbidden(&image, board)?;
     Ok(image)
+}
+
+/// What no image may contain: an allocator, and panics but those that are known.
+pub(crate) fn nothing_forbidden(image: &Path, board: Board) -> Result<()> {
+    ensure!(!Sizes::of(image)?.allocates(), "the image allocates memory, which nothing on a device may");
+    panics::check(image, board)
+}
+
+/// Says where the images that were built can panic.
+pub(crate) fn panics() -> Result<()> {
+    let folder = shell::target_dir().join("images");
+    let mut images: Vec<_> = Board::ALL.map(|board| (folder.join(board.file()), board)).into();
+    images.push((folder.join(joint::FILE), Board::Mps2));
+    for (image, _) in &images {
+        ensure!(
+            image.exists(),
+            "{} is not built: cargo xtask build, --board stm32h743, --image joint",
+            image.display()
+        );
+    }
+    panics::table(&images)
 }
 
 /// Builds the documentation of every crate of the workspace.

@@ -20,7 +20,8 @@ pub(crate) fn run() -> Result<()> {
     test::run(&machine)?;
     build::documentation()?;
     budget::run(&machine)?;
-    joint::run(&machine)
+    joint::run(&machine)?;
+    build::panics()
 }
 
 fn lint_host() -> Result<()> {

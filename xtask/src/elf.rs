@@ -7,18 +7,15 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use link::metadata::METADATA_SECTION;
-
-/// Section flag: present in memory at run time.
-const ALLOCATED: u32 = 2;
-
-/// Section flag: writable, so it lives in RAM.
-const WRITABLE: u32 = 1;
-
-/// Section type: occupies no space in the file, so none in flash.
-const NO_BITS: u32 = 8;
+use object::elf::{SHF_ALLOC, SHF_WRITE, SHT_NOBITS};
+use object::read::elf::{ElfFile32, SectionHeader as _};
+use object::{LittleEndian, Object as _, ObjectSection as _, ObjectSymbol as _};
 
 /// Part of the name of every function of a memory allocator.
 const ALLOCATOR: &str = "__rust_alloc";
+
+/// An ELF file of the kind every image is.
+pub(crate) type Elf<'a> = ElfFile32<'a, LittleEndian>;
 
 /// One section that exists at run time.
 pub(crate) struct Section {
@@ -120,66 +117,31 @@ impl fmt::Display for Sizes {
     }
 }
 
-fn parse(file: &[u8]) -> Option<Sizes> {
-    if file.get(..6)? != b"\x7fELF\x01\x01" {
-        return None;
-    }
-    let table = word(file, 32)? as usize;
-    let entry = half(file, 46)? as usize;
-    let count = half(file, 48)? as usize;
-    let names_entry = table + entry * half(file, 50)? as usize;
-    let names = word(file, names_entry + 16)? as usize;
+fn parse(file: &[u8]) -> object::Result<Sizes> {
+    let file = Elf::parse(file)?;
+    let endian = LittleEndian;
     let mut sections = Vec::new();
-    let (mut vectors, mut description) = (Vec::new(), None);
-    let (mut symbol_table, mut names_of_symbols): (&[u8], &[u8]) = (&[], &[]);
-    for index in 0..count {
-        let at = table + entry * index;
-        let (kind, flags, bytes) = (word(file, at + 4)?, word(file, at + 8)?, word(file, at + 20)?);
-        let name = file.get(names + word(file, at)? as usize..)?;
-        let end = name.iter().position(|byte| *byte == 0)?;
-        let name = String::from_utf8_lossy(name.get(..end)?).into_owned();
-        let content = word(file, at + 16)? as usize;
-        let body = || file.get(content..content.checked_add(bytes as usize)?);
-        match name.as_str() {
-            ".vector_table" => vectors = words(body()?),
-            METADATA_SECTION => description = Some(body()?.to_vec()),
-            ".symtab" => symbol_table = body()?,
-            ".strtab" => names_of_symbols = body()?,
-            _ => {}
-        }
-        if flags & ALLOCATED == 0 || bytes == 0 {
+    for section in file.sections() {
+        let header = section.elf_section_header();
+        let (flags, bytes) = (header.sh_flags(endian), header.sh_size(endian));
+        if flags & SHF_ALLOC == 0 || bytes == 0 {
             continue;
         }
         sections.push(Section {
-            name,
-            address: word(file, at + 12)?,
+            name: section.name()?.to_owned(),
+            address: header.sh_addr(endian),
             bytes,
-            in_flash: kind != NO_BITS,
-            in_ram: flags & WRITABLE != 0,
+            in_flash: header.sh_type(endian) != SHT_NOBITS,
+            in_ram: flags & SHF_WRITE != 0,
         });
     }
-    let symbols = symbols(symbol_table, names_of_symbols);
-    Some(Sizes { sections, vectors, description, symbols })
-}
-
-/// Names and values of a symbol table; entries of sixteen bytes.
-fn symbols(table: &[u8], names: &[u8]) -> BTreeMap<String, u32> {
-    let named = table.chunks_exact(16).filter_map(|entry| {
-        let name = names.get(word(entry, 0)? as usize..)?;
-        let end = name.iter().position(|byte| *byte == 0)?;
-        Some((String::from_utf8_lossy(name.get(..end)?).into_owned(), word(entry, 4)?))
-    });
-    named.collect()
-}
-
-fn words(bytes: &[u8]) -> Vec<u32> {
-    bytes.chunks_exact(4).filter_map(|bytes| word(bytes, 0)).collect()
-}
-
-fn word(file: &[u8], at: usize) -> Option<u32> {
-    Some(u32::from_le_bytes(file.get(at..at + 4)?.try_into().ok()?))
-}
-
-fn half(file: &[u8], at: usize) -> Option<u16> {
-    Some(u16::from_le_bytes(file.get(at..at + 2)?.try_into().ok()?))
+    let content = |name| file.section_by_name(name).map(|section| section.data()).transpose();
+    let vectors = content(".vector_table")?.unwrap_or_default();
+    let vectors = vectors.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
+    let description = content(METADATA_SECTION)?.map(<[u8]>::to_vec);
+    let mut symbols = BTreeMap::new();
+    for symbol in file.symbols() {
+        symbols.insert(symbol.name()?.to_owned(), symbol.address() as u32);
+    }
+    Ok(Sizes { sections, vectors, description, symbols })
 }

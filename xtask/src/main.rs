@@ -4,14 +4,18 @@ mod board;
 mod budget;
 mod build;
 mod ci;
+mod code;
 mod demo;
 mod elf;
 mod joint;
+mod origin;
+mod panics;
 mod qemu;
 mod runner;
 mod setup;
 mod shell;
 mod test;
+mod thumb;
 
 use std::process::ExitCode;
 
@@ -32,6 +36,7 @@ cargo xtask <verb>
   test     every test, whole-system tests under QEMU included
   ci       what a change must pass: format, lints, builds, tests, budgets
   budget   instructions per control cycle, interrupt latency, stack, flash and RAM of the image
+  panics   where the images that are there can panic, and why they do not
   size     flash and RAM of the image by section
   qemu     run an image by itself: cargo xtask qemu [IMAGE]
   run-image IMAGE   run an image where it belongs: QEMU, or a board through probe-rs (cargo's runner)
@@ -74,6 +79,7 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["build", "--image", "joint"] => drop(joint::image(&setup::all()?)?),
         ["joint"] => joint::run(&setup::all()?)?,
         ["joint", "--check", image] => joint::check(image.as_ref())?,
+        ["panics"] => build::panics()?,
         ["run-image", image, rest @ ..] => return runner::run(image, rest),
         ["demo", rest @ ..] => demo::run(rest)?,
         ["test"] => test::run(&setup::all()?)?,
