@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use device::{PrimitiveTrouble, StartupTrouble};
+use device::{HomeError, PrimitiveTrouble, StartupTrouble};
 use link::{ImageError, Refusal};
 
 use crate::failure::{Exit, Failure};
@@ -110,6 +110,14 @@ fn explain(reason: Refusal, detail: [u32; 2]) -> String {
         Refusal::ImageInvalid => format!("{reason} (reason {first}, {second})"),
         Refusal::PrimitiveInvalid => format!("{reason}: {}", PrimitiveTrouble(detail)),
         Refusal::NoAnswer => format!("{reason} within {first} ms"),
+        Refusal::HasTorque => match u8::try_from(first).ok().and_then(control::State::from_code) {
+            Some(state) => format!("{reason}: {state}"),
+            None => format!("{reason}: state {first}"),
+        },
+        Refusal::HomeImplausible => match HomeError::from_detail(detail) {
+            Some(error) => format!("{reason}: {error}"),
+            None => format!("{reason}: J{}", first.saturating_add(1)),
+        },
         _ => reason.to_string(),
     }
 }
@@ -125,7 +133,7 @@ const REFUSAL_CODES: [&str; Refusal::ALL.len()] = [
     "E500", "E501", "E502", "E503", "E504", "E505", "E506", "E507", "E508", "E509", "E510", "E511", "E512", "E513",
     "E514", "E515", "E516", "E517", "E518", "E519", "E520", "E521", "E522", "E523", "E524", "E525", "E526", "E527",
     "E528", "E529", "E530", "E531", "E532", "E533", "E534", "E535", "E536", "E537", "E538", "E539", "E540", "E541",
-    "E542", "E543", "E544",
+    "E542", "E543", "E544", "E545", "E546",
 ];
 
 impl HostError {

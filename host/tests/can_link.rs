@@ -8,7 +8,8 @@ use std::time::Duration;
 use assert_cmd::Command;
 use control::State;
 use embedded_can::Frame as _;
-use link::can::{BITS_PER_SECOND, DeviceNumber, LINE_BYTES_PER_SECOND, SEGMENT_BYTES};
+use link::can::{BITS_PER_SECOND, DeviceNumber, Direction, LINE_BYTES_PER_SECOND, SEGMENT_BYTES, Segmenter};
+use link::frame::{self, Envelope, FRAME_BYTES};
 use link::message::{CHUNK_BYTES, ChunkData};
 use link::{Name, Request, RunOptions, Telemetry};
 use puck::{CanFrame, CanId};
@@ -17,6 +18,7 @@ use tactus::device::Device;
 use tactus::primitive_file::PrimitiveFile;
 use tactus::procedure;
 use tactus::transport::Address;
+use tactus::transport::can::CanPort as _;
 
 /// A primitive with as many kernels as a device takes: the longest upload there is.
 fn primitive(folder: &Path, kernels: &str) -> PrimitiveFile {
@@ -173,6 +175,46 @@ fn full_telemetry_fits_on_the_bus_and_an_order_still_gets_through() {
     assert_eq!(client.statistics().unwrap().telemetry_dropped, 0);
     assert_eq!(client.gaps().telemetry, 0);
     assert!(slowest.as_millis() <= 50, "{slowest:?}");
+}
+
+/// The frames in which another host on the bus says this.
+fn said_by_another(sender: &mut Segmenter, sequence: u16, request: &Request) -> Vec<CanFrame> {
+    let mut buffer = [0; FRAME_BYTES];
+    let envelope = Envelope { session: 999, sequence, time_ms: 0 };
+    let length = frame::encode(envelope, request, &mut buffer).unwrap();
+    // A host begins with a zero byte, and so does every repetition.
+    let message = [&[0], &buffer[..length]].concat();
+    let mut bytes = message.as_slice();
+    let segments = std::iter::from_fn(|| sender.cut(&mut bytes));
+    segments.map(|segment| CanFrame::new(CanId::new(segment.id()).unwrap(), segment.data()).unwrap()).collect()
+}
+
+#[test]
+fn a_second_host_on_the_bus_stops_the_arm_whatever_the_place_of_its_segments() {
+    let mut client = arm("sil:world=simple,line=can");
+    procedure::make_ready(&mut client, false, |_| {}).unwrap();
+    let mut stopped = 0;
+    for place in 0..16 {
+        // All places that its sequence can have relative to that of the first host.
+        let mut other = Segmenter::new(Direction::ToDevice, DeviceNumber::FIRST);
+        for _ in 0..place {
+            other.cut(&mut &[1_u8][..]);
+        }
+        client.hold().unwrap();
+        client.gravity().unwrap();
+        let Device::SimulatedCan(line) = client.transport() else { panic!("a CAN line was asked for") };
+        for frame in said_by_another(&mut other, 1, &Request::Stop) {
+            line.port().send(frame).unwrap();
+        }
+        let asked = client.now();
+        while client.status().unwrap().state == State::Gravity.code() {
+            assert!(client.now() - asked < Duration::from_millis(100), "place {place}: the arm was not stopped");
+        }
+        stopped += usize::from(client.status().unwrap().state == State::SoftStop.code());
+        // The first host goes on, with at most a repetition.
+        client.request(&Request::Ping).unwrap();
+    }
+    assert_eq!(stopped, 16);
 }
 
 #[test]

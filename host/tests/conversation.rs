@@ -1,18 +1,20 @@
 //! The client against the device's own session: handshake, loss, silence, uploads, stopping.
 
+use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::io::Write as _;
+use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use control::arm::ArmModel;
 use control::{CycleRecord, LoadRefusal, Payload, State};
 use device::{
-    Command, Counters, Event, EventKind, Health, Identity, QueueFull, RamStore, Session, SessionPort, Stage,
-    StoredPrimitive, TimedRecord, Timing,
+    Command, Counters, Event, EventKind, FitPrimitive, Health, Identity, QueueFull, RamStore, Session, SessionPort,
+    Stage, TimedRecord, Timing,
 };
 use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
 use link::{LINK_VERSION, Name, Refusal, Request, SCHEMA_HASH};
-use tactus::client::{Client, Incoming, Interrupt, UploadOutcome, UploadPhase};
+use tactus::client::{Client, Halted, Incoming, Interrupt, UploadOutcome, UploadPhase};
 use tactus::error::HostError;
 use tactus::transport::{StreamTransport, Transport, TransportError};
 
@@ -47,7 +49,7 @@ impl SessionPort for Half {
         Ok(())
     }
 
-    fn load(&mut self, _primitive: &StoredPrimitive) -> Result<(), LoadRefusal> {
+    fn load(&mut self, _fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
         Ok(())
     }
 
@@ -67,6 +69,9 @@ impl SessionPort for Half {
             state: self.state,
             fault: control::Fault::None,
             zeroed: true,
+            zeroed_at: None,
+            payload: Payload::SensorAndHand,
+            wrench_zeroed: Some(true),
             safety_mode: None,
             pendant: None,
             temperatures: [None; 7],
@@ -103,7 +108,7 @@ impl Device {
         let identity =
             Identity { firmware: "1.2.3", board: "test", serial: "T-1", simulated: true, ticks_per_second: 25_000_000 };
         Self {
-            session: Session::new(identity, ArmModel::new(Payload::SensorAndHand), RamStore::new()),
+            session: Session::new(identity, RamStore::new()),
             half: Half {
                 state: State::Hold,
                 commands: Vec::new(),
@@ -231,6 +236,82 @@ fn c7_versions_that_differ_are_named_on_both_sides_and_nothing_else_is_sent() {
     let text = error.to_string();
     assert!(text.contains("0x00000bad") && text.contains(&format!("{SCHEMA_HASH:#010x}")), "{text}");
     assert_eq!(error.code(), "E402");
+}
+
+/// A device on a line on which every host hears everything it says, and what each has not heard yet.
+struct Party {
+    device: Device,
+    unheard: Vec<Vec<u8>>,
+}
+
+/// One of these hosts.
+struct Guest {
+    party: Rc<RefCell<Party>>,
+    place: usize,
+}
+
+impl Guest {
+    fn join(party: &Rc<RefCell<Party>>) -> Self {
+        let mut inner = party.borrow_mut();
+        inner.unheard.push(Vec::new());
+        Self { party: Rc::clone(party), place: inner.unheard.len() - 1 }
+    }
+}
+
+fn party() -> Rc<RefCell<Party>> {
+    Rc::new(RefCell::new(Party { device: Device::new(), unheard: Vec::new() }))
+}
+
+impl Transport for Guest {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
+        self.party.borrow_mut().device.send(bytes)
+    }
+
+    fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
+        let Party { device, unheard } = &mut *self.party.borrow_mut();
+        if unheard[self.place].is_empty() {
+            let mut said = Vec::new();
+            device.receive(timeout, &mut said)?;
+            unheard.iter_mut().for_each(|host| host.extend(&said));
+        }
+        out.append(&mut unheard[self.place]);
+        Ok(())
+    }
+
+    fn now(&self) -> Duration {
+        self.party.borrow().device.now()
+    }
+
+    /// Each host draws a session number of its own.
+    fn is_virtual(&self) -> bool {
+        false
+    }
+}
+
+#[test]
+fn a_second_host_stops_the_arm_of_the_first_and_gets_nothing_else() {
+    let party = party();
+    let mut first = Client::connect(Guest::join(&party), "first").unwrap();
+    first.gravity().unwrap();
+    let before = first.now();
+    let Ok(Halted::Others(error)) = Client::halt(Guest::join(&party), "second") else { panic!("not refused") };
+    assert!(first.now() - before < Duration::from_millis(50), "it took {:?}", first.now() - before);
+    assert_eq!(error.code(), "E504");
+    assert_eq!(party.borrow().device.half.state, State::SoftStop);
+    // The first keeps its session, and all of its messages are accounted for.
+    first.status().unwrap();
+    assert_eq!(first.gaps().messages, 0, "what was said to the second counts as lost");
+}
+
+#[test]
+fn a_halt_of_a_device_that_nobody_has_opens_a_conversation() {
+    let party = party();
+    let Ok(Halted::Ours(mut client)) = Client::halt(Guest::join(&party), "test") else { panic!("not ours") };
+    assert!(matches!(party.borrow().device.half.commands[..], [Command::Control(control::Command::Stop)]));
+    client.status().unwrap();
+    party.borrow_mut().device.dead = true;
+    let Err(error) = Client::halt(Guest::join(&party), "test") else { panic!("a dead device has stopped nothing") };
+    assert!(matches!(error, HostError::NoAnswer { request: "stop", .. }), "{error}");
 }
 
 #[test]

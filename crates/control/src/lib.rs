@@ -33,7 +33,7 @@ pub use calibration::{Calibration, CalibrationError, Payload};
 pub use command::{AccelerationSource, Command, Goal, PoseFeedback, Refusal, RunOptions};
 pub use cycle::{Cycle, MAX_KERNELS, PERIOD, RATE};
 pub use fault::Fault;
-pub use load::{LoadError, LoadRefusal};
+pub use load::{Fit, LoadError, LoadRefusal};
 pub use model::MODEL_HASH;
 pub use real::Real;
 pub use record::{BusSample, CycleInput, CycleOutput, CycleRecord, Event, HandSample, flags};

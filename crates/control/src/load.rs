@@ -74,6 +74,70 @@ impl fmt::Display for LoadError {
 
 impl core::error::Error for LoadError {}
 
+/// A primitive that an arm can run: the word of [`check`], which alone gives it, and what [`Cycle::load`](crate::Cycle::load) asks
+/// for. The check costs two forward kinematics and belongs where there is time; taking the primitive over is then a copy.
+#[derive(Debug)]
+pub struct Fit<'a, R: Real, const N: usize> {
+    primitive: &'a Primitive<R, N>,
+    tool: Tool<R>,
+}
+
+impl<'a, R: Real, const N: usize> Fit<'a, R, N> {
+    /// The primitive.
+    pub fn primitive(&self) -> &'a Primitive<R, N> {
+        self.primitive
+    }
+
+    /// Whether it was checked for an arm with the tool of this one. Nothing else of an arm that a check looks at can differ: links
+    /// and limits are constants of the model.
+    pub(crate) fn is_for(&self, model: &ArmModel<R>) -> bool {
+        self.tool == Tool::of(model)
+    }
+}
+
+/// The place of the primitive that the next run plays. It is there from the beginning, so that the first one is copied into it as every
+/// other, and not also built and moved: 23 kB take some time.
+pub(crate) struct Loaded<R: Real, const N: usize> {
+    primitive: Primitive<R, N>,
+    present: bool,
+}
+
+impl<R: Real, const N: usize> Loaded<R, N> {
+    /// Nothing.
+    pub(crate) const NOTHING: Self = Loaded { primitive: Primitive::PLACEHOLDER, present: false };
+
+    /// What is there.
+    pub(crate) fn get(&self) -> Option<&Primitive<R, N>> {
+        self.present.then_some(&self.primitive)
+    }
+
+    /// Copies a primitive here.
+    pub(crate) fn put(&mut self, fit: &Fit<'_, R, N>) {
+        self.primitive.clone_from(fit.primitive);
+        self.present = true;
+    }
+
+    /// Forgets it.
+    pub(crate) fn clear(&mut self) {
+        self.present = false;
+    }
+}
+
+/// Where the tool frame is on the tool plate, which depends on what is mounted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Tool<R> {
+    height: R,
+    cosine: R,
+    sine: R,
+}
+
+impl<R: Real> Tool<R> {
+    /// That of this arm.
+    pub(crate) fn of(model: &ArmModel<R>) -> Self {
+        Tool { height: model.tool_height, cosine: model.tool_cosine, sine: model.tool_sine }
+    }
+}
+
 /// Checks tables and builds the primitive.
 ///
 /// # Errors
@@ -91,13 +155,17 @@ pub fn primitive<R: Real, const N: usize>(
 ///
 /// # Errors
 /// As [`primitive`].
-pub fn check<R: Real, const N: usize>(model: &ArmModel<R>, primitive: &Primitive<R, N>) -> Result<(), LoadError> {
+pub fn check<'a, R: Real, const N: usize>(
+    model: &ArmModel<R>,
+    primitive: &'a Primitive<R, N>,
+) -> Result<Fit<'a, R, N>, LoadError> {
     let duration = primitive.duration();
     if !(duration >= R::of(SHORTEST) && duration <= R::of(LONGEST)) {
         return Err(LoadError::Duration);
     }
     check_end(model, End::Start, primitive.start())?;
-    check_end(model, End::Goal, primitive.goal())
+    check_end(model, End::Goal, primitive.goal())?;
+    Ok(Fit { primitive, tool: Tool::of(model) })
 }
 
 fn check_end<R: Real>(model: &ArmModel<R>, end: End, configuration: &Configuration<R>) -> Result<(), LoadError> {
@@ -129,15 +197,15 @@ pub fn within_reach<R: Real>(position: &nalgebra::Vector3<R>) -> bool {
 pub enum LoadRefusal {
     /// A run is in progress.
     Running,
-    /// This arm cannot run it.
-    Unfit(LoadError),
+    /// It was checked for an arm with another tool: what is mounted has been found to be something else meanwhile.
+    OtherTool,
 }
 
 impl fmt::Display for LoadRefusal {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             LoadRefusal::Running => formatter.write_str("a run is in progress"),
-            LoadRefusal::Unfit(error) => error.fmt(formatter),
+            LoadRefusal::OtherTool => formatter.write_str("it was checked for an arm with another tool"),
         }
     }
 }

@@ -83,7 +83,8 @@ fn sample(positions: [Option<Counts>; 7]) -> CycleInput {
 fn cycle_in(state: State) -> Cycle<f32, KERNELS> {
     let mut cycle = Cycle::new(Calibration::nominal(Payload::SensorAndHand));
     let model = ArmModel::new(Payload::SensorAndHand);
-    cycle.load(&load::primitive(&model, &tables()).expect("a good primitive")).expect("loads");
+    let primitive = load::primitive(&model, &tables()).expect("a good primitive");
+    cycle.load(&load::check(&model, &primitive).expect("fits")).expect("loads");
     let mut feed = |command: Option<Command>, cycles: usize| {
         for index in 0..cycles {
             let command = command.filter(|_| index == 0);
@@ -338,6 +339,30 @@ fn e4_a_primitive_that_this_arm_cannot_run_is_refused_at_load() {
 fn a_primitive_is_not_exchanged_while_it_runs() {
     let model = ArmModel::new(Payload::SensorAndHand);
     let primitive = load::primitive(&model, &tables()).expect("good");
-    assert_eq!(cycle_in(State::Run).load(&primitive), Err(control::LoadRefusal::Running));
-    assert_eq!(cycle_in(State::Hold).load(&primitive), Ok(()));
+    let fit = load::check(&model, &primitive).expect("fits");
+    assert_eq!(cycle_in(State::Run).load(&fit), Err(control::LoadRefusal::Running));
+    assert_eq!(cycle_in(State::Hold).load(&fit), Ok(()));
+}
+
+#[test]
+fn a_primitive_checked_for_an_arm_with_a_hand_is_not_taken_by_a_bare_one() {
+    let model = ArmModel::new(Payload::SensorAndHand);
+    let primitive = load::primitive::<f32, KERNELS>(&model, &tables()).expect("good");
+    let fit = load::check(&model, &primitive).expect("fits");
+    let mut bare = Cycle::new(Calibration::nominal(Payload::None));
+    assert_eq!(bare.load(&fit), Err(control::LoadRefusal::OtherTool));
+    assert!(bare.primitive().is_none());
+    // The bare arm's own check says why: its tool frame is elsewhere.
+    let error = load::check(bare.model(), &primitive).expect_err("the taught pose is the hand's");
+    assert!(matches!(error, LoadError::Inconsistent(_)), "{error:?}");
+}
+
+#[test]
+fn a_primitive_is_forgotten_when_another_payload_is_found() {
+    let mut cycle = cycle_in(State::Idle);
+    assert!(cycle.primitive().is_some());
+    cycle.calibrate(Calibration::nominal(Payload::SensorAndHand)).expect("idle");
+    assert!(cycle.primitive().is_some(), "the same arm again");
+    cycle.calibrate(Calibration::nominal(Payload::None)).expect("idle");
+    assert!(cycle.primitive().is_none());
 }

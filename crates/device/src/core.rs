@@ -20,7 +20,7 @@ use crate::command::{Command, Refusal};
 use crate::event::{Event, EventKind};
 use crate::hand::Hand;
 use crate::health::{Counters, Health};
-use crate::port::StoredPrimitive;
+use crate::port::FitPrimitive;
 use crate::round::{Round, Taken};
 use crate::slow::{SlowPoll, Told};
 use crate::startup::{Pacer, Stage, Startup, StartupError};
@@ -159,12 +159,12 @@ impl Core {
         }
     }
 
-    /// Takes a primitive for the next run.
+    /// Takes a primitive for the next run: a copy, as the slots wait meanwhile.
     ///
     /// # Errors
-    /// [`LoadRefusal`] while a run is in progress, or with the reason why this arm cannot run it. The old one stays.
-    pub fn load(&mut self, primitive: &StoredPrimitive) -> Result<(), LoadRefusal> {
-        self.cycle.load(primitive)
+    /// [`LoadRefusal`] while a run is in progress, or if it was checked for another arm than this. The old one stays.
+    pub fn load(&mut self, fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
+        self.cycle.load(fit)
     }
 
     /// Forgets the primitive. Ignored while it runs.
@@ -195,6 +195,9 @@ impl Core {
             state: self.cycle.state(),
             fault: self.cycle.fault(),
             zeroed: self.startup.is_zeroed(),
+            zeroed_at: self.startup.zeroed_at(),
+            payload: self.cycle.payload(),
+            wrench_zeroed: self.startup.has_sensor().then(|| self.cycle.is_wrench_zeroed()),
             safety_mode: self.safety_mode,
             pendant: self.pendant,
             temperatures: self.temperatures,

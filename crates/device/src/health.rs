@@ -1,6 +1,6 @@
 //! Counters and states that tell how well the bus and the arm are, for the statistics of the link.
 
-use control::{Fault, State};
+use control::{Fault, Payload, State};
 use link::HandStage;
 use puck::SafetyMode;
 
@@ -61,6 +61,12 @@ pub struct Health {
     pub fault: Fault,
     /// The encoders count from a known pose, by the word of the safety module.
     pub zeroed: bool,
+    /// The posture (rad) at which the arm was told to stand when it was zeroed; `None` if that was before the bus was started.
+    pub zeroed_at: Option<[f32; 7]>,
+    /// What is mounted on the arm, as the last start-up found it; sensor and hand until one has.
+    pub payload: Payload,
+    /// Whether the wrench has a zero; `None` without a force/torque sensor.
+    pub wrench_zeroed: Option<bool>,
     /// Latest mode of the safety module; `None` before it answered.
     pub safety_mode: Option<SafetyMode>,
     /// Latest pendant word; `None` before it answered. Decode with [`puck::PendantState::from_value`].

@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod bus;
+pub mod calibration;
 pub mod command;
 pub mod core;
 pub mod event;
@@ -14,6 +15,7 @@ mod slow;
 pub mod startup;
 
 pub use self::core::{Core, CoreIo, Slot};
+pub use calibration::{Home, HomeError, StoredHome};
 pub use command::{Command, Refusal};
 pub use event::{Event, EventKind};
 pub use hand::HandTrouble;
@@ -25,6 +27,6 @@ mod session;
 pub mod storage;
 mod store;
 
-pub use port::{QueueFull, SessionPort, StoredPrimitive, TimedRecord, Timing};
+pub use port::{FitPrimitive, QueueFull, SessionPort, StoredPrimitive, TimedRecord, Timing};
 pub use session::{Asker, Identity, Owner, Pending, PrimitiveTrouble, Session, StartupTrouble, Turn};
 pub use store::{RamStore, STORE_SLOT_BYTES, STORE_SLOTS, Store, StoreError};

@@ -1,6 +1,6 @@
 //! What the low-priority half ([`crate::Session`]) needs from the world: the line, and the queues to the control half.
 
-use control::{CycleRecord, LoadRefusal};
+use control::{CycleRecord, Fit, LoadRefusal};
 use dmp::Primitive;
 
 use crate::command::Command;
@@ -9,6 +9,9 @@ use crate::health::Health;
 
 /// A primitive as the control half holds it.
 pub type StoredPrimitive = Primitive<f32, { control::MAX_KERNELS }>;
+
+/// One that has been checked against an arm.
+pub type FitPrimitive<'a> = Fit<'a, f32, { control::MAX_KERNELS }>;
 
 /// The queue to the control half is full: it has not taken the previous commands yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,11 +65,11 @@ pub trait SessionPort {
     /// [`QueueFull`]
     fn command(&mut self, command: Command) -> Result<(), QueueFull>;
 
-    /// Gives the control cycle another primitive. Called only while no primitive runs.
+    /// Gives the control cycle another primitive, which is no more than a copy. Called only while no primitive runs.
     ///
     /// # Errors
     /// As [`crate::Core::load`]. It must not be swallowed: the next run would be that of the old primitive.
-    fn load(&mut self, primitive: &StoredPrimitive) -> Result<(), LoadRefusal>;
+    fn load(&mut self, fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal>;
 
     /// The next record of a control cycle, oldest first.
     fn record(&mut self) -> Option<TimedRecord>;

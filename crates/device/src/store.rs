@@ -1,10 +1,12 @@
-//! Where primitives are kept: places for whole images, and a spare one in which an upload grows.
+//! Where primitives are kept: places for whole images, and a spare one in which an upload grows; and the home of the arm.
 //!
 //! Invariants every [`Store`] keeps: an image is either wholly there or not at all; until [`Store::finished`] tells of success,
 //! reading gives what it gave before the change was asked for; if power fails in between, the next start finds the old
 //! or the new (for a store that outlives power); names are the session's business, not the store's.
 
 use core::fmt;
+
+use crate::calibration::{Home, StoredHome};
 
 /// Places of the store of a device without flash of its own.
 pub const STORE_SLOTS: usize = 8;
@@ -107,7 +109,22 @@ pub trait Store {
     /// [`StoreError::NoPlace`], [`StoreError::Medium`], [`StoreError::Busy`]
     fn delete(&mut self, slot: u8) -> Result<(), StoreError>;
 
-    /// How the change ended that was begun by [`Store::commit`] or [`Store::delete`]: told once, as soon as it is durable.
+    /// The home of the arm that is kept beside the images.
+    fn home(&self) -> StoredHome;
+
+    /// Begins to keep this home. It is kept when [`Store::finished`] says so.
+    ///
+    /// # Errors
+    /// [`StoreError::Medium`], [`StoreError::Busy`]
+    fn keep_home(&mut self, home: &Home) -> Result<(), StoreError>;
+
+    /// Begins to forget it. It is forgotten when [`Store::finished`] says so.
+    ///
+    /// # Errors
+    /// As [`Store::keep_home`].
+    fn forget_home(&mut self) -> Result<(), StoreError>;
+
+    /// How the change ended that was begun last: told once, as soon as it is durable.
     fn finished(&mut self) -> Option<Result<(), StoreError>>;
 }
 
@@ -155,6 +172,18 @@ impl<S: Store + ?Sized> Store for &mut S {
     fn delete(&mut self, slot: u8) -> Result<(), StoreError> {
         (**self).delete(slot)
     }
+
+    fn home(&self) -> StoredHome {
+        (**self).home()
+    }
+
+    fn keep_home(&mut self, home: &Home) -> Result<(), StoreError> {
+        (**self).keep_home(home)
+    }
+
+    fn forget_home(&mut self) -> Result<(), StoreError> {
+        (**self).forget_home()
+    }
 }
 
 /// One place in memory; empty while `length` is 0.
@@ -177,6 +206,7 @@ impl<const BYTES: usize> Area<BYTES> {
 pub struct RamStore<const SLOTS: usize, const BYTES: usize> {
     areas: [Area<BYTES>; SLOTS],
     spare: Area<BYTES>,
+    home: StoredHome,
     changed: bool,
 }
 
@@ -184,7 +214,7 @@ impl<const SLOTS: usize, const BYTES: usize> RamStore<SLOTS, BYTES> {
     /// An empty store.
     #[must_use]
     pub const fn new() -> Self {
-        Self { areas: [Area::EMPTY; SLOTS], spare: Area::EMPTY, changed: false }
+        Self { areas: [Area::EMPTY; SLOTS], spare: Area::EMPTY, home: StoredHome::Nothing, changed: false }
     }
 }
 
@@ -249,6 +279,22 @@ impl<const SLOTS: usize, const BYTES: usize> Store for RamStore<SLOTS, BYTES> {
         if core::mem::take(&mut area.length) == 0 {
             return Err(StoreError::NoPlace);
         }
+        self.changed = true;
+        Ok(())
+    }
+
+    fn home(&self) -> StoredHome {
+        self.home
+    }
+
+    fn keep_home(&mut self, home: &Home) -> Result<(), StoreError> {
+        self.home = StoredHome::Kept(*home);
+        self.changed = true;
+        Ok(())
+    }
+
+    fn forget_home(&mut self) -> Result<(), StoreError> {
+        self.home = StoredHome::Nothing;
         self.changed = true;
         Ok(())
     }

@@ -32,5 +32,7 @@ pub use message::{DeviceHello, Goal, HostHello, Reply, Request, RunOptions};
 pub use metadata::ImageMetadata;
 pub use name::{Name, NameError, Text};
 pub use refusal::Refusal;
-pub use report::{Event, EventKind, HandStage, LinkCounters, Listing, Statistics, Status, Telemetry};
+pub use report::{
+    Calibration, Event, EventKind, HandStage, HomeSource, LinkCounters, Listing, Statistics, Status, Telemetry,
+};
 pub use schema::{LINK_VERSION, SCHEMA_HASH};

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::name::{Name, Text};
 use crate::refusal::Refusal;
-use crate::report::{Event, Listing, Statistics, Status, Telemetry};
+use crate::report::{Calibration, Event, Listing, Statistics, Status, Telemetry};
 
 /// Most bytes of an image in one [`Request::UploadChunk`] or [`Reply::Chunk`].
 ///
@@ -175,7 +175,7 @@ pub enum Request {
         /// How.
         options: RunOptions,
     },
-    /// Ends any motion: soft stop. Accepted in every state.
+    /// Ends any motion: soft stop. Accepted in every state, and from anybody: it needs no session.
     Stop,
     /// Clears a latched fault whose cause is gone.
     ClearFault,
@@ -236,6 +236,16 @@ pub enum Request {
         /// Time for it, s; 0 lets the device choose.
         duration: f32,
     },
+    /// Asks for [`Reply::Calibration`].
+    Calibration,
+    /// Keeps a home of this arm's own, for every zeroing from now on; refused while the arm has torque. Answered when it is
+    /// durable.
+    Calibrate {
+        /// Joint angles at which the arm stands when it is zeroed, rad.
+        home: [f32; 7],
+    },
+    /// Forgets that home: the model's counts again. Refused while the arm has torque, answered when it is durable.
+    ForgetCalibration,
 }
 
 impl Request {
@@ -270,7 +280,11 @@ impl Request {
             | Self::UploadCommit
             | Self::UploadAbort
             | Self::Delete { .. }
-            | Self::Read { .. } => false,
+            | Self::Read { .. }
+            // Only the next zeroing uses what they change, and that moves.
+            | Self::Calibration
+            | Self::Calibrate { .. }
+            | Self::ForgetCalibration => false,
         }
     }
 
@@ -304,6 +318,9 @@ impl Request {
             Self::Tare => "tare",
             Self::InitialiseHand => "initialise hand",
             Self::MoveHand { .. } => "move hand",
+            Self::Calibration => "calibration",
+            Self::Calibrate { .. } => "calibrate",
+            Self::ForgetCalibration => "forget calibration",
         }
     }
 }
@@ -370,6 +387,13 @@ pub enum Reply {
     Telemetry(Telemetry),
     /// Something happened, unasked.
     Event(Event),
+    /// Answer to [`Request::Calibration`].
+    Calibration {
+        /// Request answered.
+        of: u16,
+        /// Where the arm's zero is.
+        calibration: Calibration,
+    },
 }
 
 impl Reply {
@@ -383,7 +407,8 @@ impl Reply {
             | Self::Status { of, .. }
             | Self::Statistics { of, .. }
             | Self::Listing { of, .. }
-            | Self::Chunk { of, .. } => Some(*of),
+            | Self::Chunk { of, .. }
+            | Self::Calibration { of, .. } => Some(*of),
             Self::Telemetry(_) | Self::Event(_) => None,
         }
     }

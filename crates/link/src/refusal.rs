@@ -100,11 +100,16 @@ pub enum Refusal {
     HandBusy,
     /// The device drives a hand alone: it has no arm to do this with.
     NoArm,
+    /// A home posture is not that of this arm. `detail` = joint (0 for J1), and what is wrong with its angle: 0 not a number,
+    /// 1 outside the joint's range, 2 too far from the model's home.
+    HomeImplausible,
+    /// The arm has torque. `detail` = state code.
+    HasTorque,
 }
 
 impl Refusal {
     /// Every refusal, in the order of its code.
-    pub const ALL: [Self; 45] = [
+    pub const ALL: [Self; 47] = [
         Self::LinkVersion,
         Self::Schema,
         Self::Model,
@@ -150,6 +155,8 @@ impl Refusal {
         Self::ForceAtRest,
         Self::HandBusy,
         Self::NoArm,
+        Self::HomeImplausible,
+        Self::HasTorque,
     ];
 
     /// Number on the wire.
@@ -207,6 +214,8 @@ impl Refusal {
             Self::ForceAtRest => "the force at rest is not the weight of the hand",
             Self::HandBusy => "the hand is being moved or initialised",
             Self::NoArm => "the device drives a hand alone, without an arm",
+            Self::HomeImplausible => "the home posture cannot be that of this arm",
+            Self::HasTorque => "the arm has torque",
         }
     }
 
@@ -254,6 +263,8 @@ impl Refusal {
             Self::ForceAtRest => "free the hand of load and contact; if it persists the sensor is adrift",
             Self::HandBusy => "wait until the hand has finished, or stop the motion",
             Self::NoArm => "ask the device that drives the arm",
+            Self::HomeImplausible => "measure that joint again; angles are in rad, from J1 to J7",
+            Self::HasTorque => "support the arm, press Shift+Idle on the pendant, then try again",
         }
     }
 }

@@ -93,6 +93,47 @@ pub struct Status {
     pub hand: [f32; 4],
     /// Temperature of each hand puck (F1, F2, F3, spread), degree Celsius; `None` before it was read.
     pub hand_temperatures: [Option<i16>; 4],
+    /// The wrench has a zero: the arm has rested since its bus was started. `None`: there is no force/torque sensor.
+    pub wrench_zeroed: Option<bool>,
+}
+
+/// Whose home counts when the arm is zeroed. Append-only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+pub enum HomeSource {
+    /// The robot model's: this arm has none of its own.
+    #[default]
+    Model,
+    /// This arm's own, stored in the device.
+    Stored,
+    /// The model's: what the device had stored is damaged.
+    Damaged,
+    /// The model's: what the device had stored is of another layout or for another robot model.
+    Foreign,
+}
+
+impl HomeSource {
+    /// The words for people.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Model => "the model's",
+            Self::Stored => "stored in the device",
+            Self::Damaged => "the model's, because the stored one is damaged",
+            Self::Foreign => "the model's, because the stored one is for another robot model or layout",
+        }
+    }
+}
+
+/// Where the zero of the arm's joint angles is.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Calibration {
+    /// Joint angles at which the next zeroing takes the arm to stand, rad.
+    pub home: [f32; 7],
+    /// Whose these are.
+    pub source: HomeSource,
+    /// Joint angles at which the last zeroing took the arm to stand, rad; `None` if the device has not zeroed it since its bus was
+    /// started.
+    pub zeroed_at: Option<[f32; 7]>,
 }
 
 /// What the receiving end of a link counted. Every byte that arrived is accounted for in one of these.

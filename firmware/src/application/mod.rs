@@ -22,8 +22,6 @@ mod storage;
 
 use core::mem::MaybeUninit;
 
-use control::Payload;
-use control::arm::ArmModel;
 use device::storage::{Library, Room, value_bytes};
 use device::{Command, Core, Event, Identity, Session, TimedRecord};
 use heapless::spsc::Queue;
@@ -183,5 +181,5 @@ fn new_session(
     identity: Identity,
     shelf: &'static mut Shelf,
 ) -> &'static mut Dialogue {
-    place.write(Session::new(identity, ArmModel::new(Payload::SensorAndHand), shelf))
+    place.write(Session::new(identity, shelf))
 }

@@ -1,7 +1,7 @@
 //! Talks with the host.
 
 use control::LoadRefusal;
-use device::{Command, Core, Event, Health, QueueFull, SessionPort, StoredPrimitive, TimedRecord, Timing};
+use device::{Command, Core, Event, FitPrimitive, Health, QueueFull, SessionPort, TimedRecord, Timing};
 use heapless::spsc::{Consumer, Producer};
 use rtic_core::Mutex;
 
@@ -57,8 +57,8 @@ impl<P: LinkPort, C: Mutex<T = &'static mut Core>> SessionPort for Port<'_, P, C
         self.ends.to_core.enqueue(command).map_err(|_| QueueFull)
     }
 
-    fn load(&mut self, primitive: &StoredPrimitive) -> Result<(), LoadRefusal> {
-        self.core.lock(|core| core.load(primitive))
+    fn load(&mut self, fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
+        self.core.lock(|core| core.load(fit))
     }
 
     fn record(&mut self) -> Option<TimedRecord> {

@@ -114,5 +114,6 @@ fn words(message: &Message) -> String {
         Message::Reply(Reply::Chunk { offset, data, .. }) => format!("chunk ({} bytes at {offset})", data.len()),
         Message::Reply(Reply::Telemetry(telemetry)) => format!("telemetry of cycle {}", telemetry.cycle),
         Message::Reply(Reply::Event(event)) => format!("event {:?}", event.kind),
+        Message::Reply(Reply::Calibration { .. }) => "calibration".to_owned(),
     }
 }

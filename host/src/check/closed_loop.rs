@@ -2,7 +2,7 @@
 
 use control::calibration::Calibration;
 use control::units::{JointVelocities, Vector7};
-use control::{BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, RunOptions, State, flags};
+use control::{BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, RunOptions, State, flags, load};
 use puck::SafetyMode;
 
 use super::plant::Plant;
@@ -44,8 +44,10 @@ pub(super) enum Ending {
     Arrived,
     /// The control code refused to begin.
     Refused(control::Refusal),
-    /// The control code refused to load the primitive.
-    Unfit(control::LoadRefusal),
+    /// This arm cannot run the primitive.
+    Unfit(control::LoadError),
+    /// The control code refused to load it.
+    NotLoaded(control::LoadRefusal),
     /// The control code stopped the run by itself.
     Stopped(State, Fault),
     /// The run did not end in time.
@@ -65,9 +67,17 @@ impl ClosedLoop {
     pub(super) fn play(primitive: &HostPrimitive, speed: f64, mut progress: impl FnMut(f64)) -> ClosedLoop {
         let mut run = ClosedLoop { samples: Vec::new(), ending: Ending::Endless };
         let mut cycle: Cycle<f64> = Cycle::new(Calibration::nominal(arm::PAYLOAD));
-        if let Err(refusal) = cycle.load(primitive) {
-            run.ending = Ending::Unfit(refusal);
-            return run;
+        let loaded = load::check(cycle.model(), primitive).map(|fit| cycle.load(&fit));
+        match loaded {
+            Ok(Ok(())) => {}
+            Ok(Err(refusal)) => {
+                run.ending = Ending::NotLoaded(refusal);
+                return run;
+            }
+            Err(error) => {
+                run.ending = Ending::Unfit(error);
+                return run;
+            }
         }
         let mut plant = Plant::at(primitive.start().posture);
         let expected = (primitive.duration() / speed / PERIOD).ceil();

@@ -247,6 +247,9 @@ fn check_run(file: &PrimitiveFile, run: &ClosedLoop, report: &mut CheckReport) {
     match run.ending {
         Ending::Arrived => {}
         Ending::Unfit(reason) => report.violations.push(format!("the control code refuses the primitive: {reason}")),
+        Ending::NotLoaded(reason) => {
+            report.violations.push(format!("the control code refuses the primitive: {reason}"))
+        }
         Ending::Refused(reason) => report.violations.push(format!("the control code refuses the run: {reason}")),
         Ending::Stopped(state, fault) => {
             let time = run.samples.last().map_or(0.0, |sample| sample.time);

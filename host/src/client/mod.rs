@@ -5,6 +5,8 @@
 //! with the same number, which the device acts on once. As long as somebody waits in [`Client::next`] or in a
 //! request the device hears from this host often enough not to stop the arm; when nobody does, it stops it.
 
+mod calibration;
+mod halt;
 mod interrupt;
 mod motion;
 mod telemetry;
@@ -24,6 +26,7 @@ use link::{
 use crate::error::HostError;
 use crate::transport::Transport;
 
+pub use halt::Halted;
 pub use interrupt::Interrupt;
 pub use telemetry::{Gaps, TelemetryStream};
 pub use transfer::Transfer;
@@ -109,6 +112,13 @@ impl<T: Transport> Client<T> {
     /// # Errors
     /// As [`Client::connect`].
     pub fn connect_as(transport: T, owner: &str, link_version: u16, schema_hash: u32) -> Result<Self, HostError> {
+        let mut client = Self::begin(transport)?;
+        client.open(owner, link_version, schema_hash, BUSY_PATIENCE)?;
+        Ok(client)
+    }
+
+    /// A client that has not spoken yet.
+    fn begin(transport: T) -> Result<Self, HostError> {
         let now = transport.now();
         let mut client = Self {
             session: session_number(transport.is_virtual()),
@@ -132,13 +142,18 @@ impl<T: Transport> Client<T> {
         };
         // Ends whatever half a frame an earlier host may have left on the line.
         client.transport.send(&[0])?;
-        let hello = HostHello { link_version, schema_hash, model_hash: control::MODEL_HASH, owner: Text::new(owner) };
-        client.hello = client.greet(&hello)?;
-        client.open = true;
         Ok(client)
     }
 
-    fn greet(&mut self, hello: &HostHello) -> Result<DeviceHello, HostError> {
+    /// Says hello; waits for so long until another host is gone.
+    fn open(&mut self, owner: &str, link_version: u16, schema_hash: u32, patience: Duration) -> Result<(), HostError> {
+        let hello = HostHello { link_version, schema_hash, model_hash: control::MODEL_HASH, owner: Text::new(owner) };
+        self.hello = self.greet(&hello, patience)?;
+        self.open = true;
+        Ok(())
+    }
+
+    fn greet(&mut self, hello: &HostHello, patience: Duration) -> Result<DeviceHello, HostError> {
         let started = self.transport.now();
         loop {
             match self.exchange(&Request::Hello(hello.clone())) {
@@ -159,7 +174,7 @@ impl<T: Transport> Client<T> {
                     return Err(HostError::WrongAnswer { request: "hello" });
                 }
                 Err(HostError::Refused { reason: Refusal::Busy, detail: [_, wait], .. })
-                    if self.transport.now().saturating_sub(started) < BUSY_PATIENCE =>
+                    if self.transport.now().saturating_sub(started) < patience =>
                 {
                     let until = self.transport.now() + Duration::from_millis(u64::from(wait.clamp(10, 600)));
                     while self.transport.now() < until {
@@ -255,7 +270,9 @@ impl<T: Transport> Client<T> {
         self.send(envelope, request)?;
         let mut repeat_at = started + REPEAT_AFTER;
         let timeout = match request {
-            Request::UploadCommit | Request::Delete { .. } => self.timeout.max(STORE_TIMEOUT),
+            Request::UploadCommit | Request::Delete { .. } | Request::Calibrate { .. } | Request::ForgetCalibration => {
+                self.timeout.max(STORE_TIMEOUT)
+            }
             _ => self.timeout,
         };
         loop {
@@ -278,7 +295,7 @@ impl<T: Transport> Client<T> {
             }
             if now >= repeat_at {
                 self.round_trips.repeated += 1;
-                self.send(envelope, request)?;
+                self.send_again(envelope, request)?;
                 repeat_at = now + REPEAT_AFTER;
             }
             self.pump(repeat_at.min(deadline).saturating_sub(now))?;
@@ -296,12 +313,22 @@ impl<T: Transport> Client<T> {
     }
 
     fn send(&mut self, envelope: Envelope, request: &Request) -> Result<(), HostError> {
+        self.send_behind(&[], envelope, request)
+    }
+
+    fn send_behind(&mut self, head: &[u8], envelope: Envelope, request: &Request) -> Result<(), HostError> {
         let mut buffer = [0; FRAME_BYTES];
         // No request is longer than a frame; `the_largest_messages_fit` in `link` proves it.
         let length = frame::encode(envelope, request, &mut buffer)
             .map_err(|error| crate::transport::TransportError::other(error.to_string()))?;
         self.sent = self.transport.now();
-        Ok(self.transport.send(&buffer[..length])?)
+        Ok(self.transport.send(&[head, &buffer[..length]].concat())?)
+    }
+
+    /// As [`Client::send`], after a zero byte: on a bus where another host speaks to the same device, a message is lost where the two
+    /// alternate, unless such a byte ends what came before.
+    fn send_again(&mut self, envelope: Envelope, request: &Request) -> Result<(), HostError> {
+        self.send_behind(&[0], envelope, request)
     }
 
     /// Waits for bytes and sorts what they carry.
@@ -312,6 +339,8 @@ impl<T: Transport> Client<T> {
         let received = self.transport.receive(timeout.max(Duration::from_micros(10)), &mut bytes);
         let mut rest = bytes.as_slice();
         while let Some(frame) = self.decoder.next::<Reply>(&mut rest) {
+            // What the device says to others carries numbers of the same series.
+            self.gaps.message(frame.envelope.sequence);
             if frame.envelope.session == self.session {
                 self.sort(frame);
             }
@@ -323,7 +352,6 @@ impl<T: Transport> Client<T> {
     fn sort(&mut self, frame: frame::Frame<Reply>) {
         self.heard = self.transport.now();
         self.device_ms = frame.envelope.time_ms;
-        self.gaps.message(frame.envelope.sequence);
         match frame.message {
             Reply::Telemetry(telemetry) => {
                 self.gaps.telemetry(telemetry.cycle);

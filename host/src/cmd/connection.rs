@@ -4,12 +4,13 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use device::Stage;
+use link::HomeSource;
 
 use super::{Exit, Failure, Global, Output};
-use crate::client::{Client, Interrupt};
+use crate::client::{Client, Halted, Interrupt};
 use crate::device::{Device, OpenError};
 use crate::error::HostError;
-use crate::procedure::{self, ProcedureError};
+use crate::procedure::{self, ProcedureError, Readiness};
 use crate::simulation::{SimulationError, SimulationOptions};
 use crate::transport::Address;
 
@@ -22,6 +23,35 @@ pub(super) fn open(
     doing: &str,
     adjust: impl FnOnce(&mut SimulationOptions),
 ) -> Result<Client<Device>, Failure> {
+    let (device, owner) = reach(global, doing, adjust)?;
+    let client = Client::connect(device, &owner).map_err(|error| error.into_failure(doing))?;
+    Ok(set_up(client, global))
+}
+
+/// Stops the arm of the device that the options name, whoever has it in his hands, and says hello then.
+///
+/// # Errors
+/// As [`open`], except that a busy device is none.
+pub(super) fn halt(global: &Global, doing: &str) -> Result<Halted<Device>, Failure> {
+    let (device, owner) = reach(global, doing, |_| {})?;
+    Ok(match Client::halt(device, &owner).map_err(|error| error.into_failure(doing))? {
+        Halted::Ours(client) => Halted::Ours(Box::new(set_up(*client, global))),
+        others => others,
+    })
+}
+
+fn set_up(mut client: Client<Device>, global: &Global) -> Client<Device> {
+    client.set_timeout(global.timeout);
+    client.set_interrupt(interrupt());
+    client
+}
+
+/// The device that the options name, and who asks for it.
+fn reach(
+    global: &Global,
+    doing: &str,
+    adjust: impl FnOnce(&mut SimulationOptions),
+) -> Result<(Device, String), Failure> {
     let Some(text) = &global.device else {
         return Err(Failure::new(Exit::Usage, "E202", doing, "no device is named")
             .help("add `--device sim:` for a simulated arm, or `--device serial:/dev/ttyACM0`, or set TACTUS_DEVICE"));
@@ -31,11 +61,7 @@ pub(super) fn open(
         OpenError::Transport(error) => HostError::Transport(error).into_failure(doing),
         OpenError::Simulation(error) => simulation_failure(error, doing),
     })?;
-    let owner = owner(matches!(address, Address::Simulated(..)));
-    let mut client = Client::connect(device, &owner).map_err(|error| error.into_failure(doing))?;
-    client.set_timeout(global.timeout);
-    client.set_interrupt(interrupt());
-    Ok(client)
+    Ok((device, owner(matches!(address, Address::Simulated(..)))))
 }
 
 /// Makes the arm ready and says what happens and what a person must do.
@@ -43,9 +69,44 @@ pub(super) fn open(
 /// # Errors
 /// The start-up does not get to its end.
 pub(super) fn ready(client: &mut Client<Device>, at_home: bool, output: Output, doing: &str) -> Result<(), Failure> {
+    let readiness = watch(client, output, doing, |client, tell| procedure::make_ready(client, at_home, tell))?;
+    if readiness.wrench_zeroed == Some(false) {
+        output.warn(
+            "the force sensor has no zero: the arm has not rested since its bus was started, or the sensor is silent; \
+             modes `force` and `adapt` need it",
+        );
+    }
+    let simulated = client.hello().simulated;
+    let hello = client.hello();
+    let kind = if simulated { "simulated " } else { "" };
+    output.say(format!("{kind}arm ready on {} ({})", hello.board.as_str(), hello.firmware.as_str()));
+    Ok(())
+}
+
+/// Brings the arm as far as its joint angles are read, zeroing it on the way, and commands nothing.
+///
+/// # Errors
+/// The start-up does not get there.
+pub(super) fn joints_read(
+    client: &mut Client<Device>,
+    at_home: bool,
+    output: Output,
+    doing: &str,
+) -> Result<(), Failure> {
+    watch(client, output, doing, |client, tell| procedure::start_up(client, at_home, Stage::WaitingForActive, tell))?;
+    Ok(())
+}
+
+/// Says what happens in a start-up and what a person must do, and what is wrong with the home the arm was zeroed at.
+fn watch(
+    client: &mut Client<Device>,
+    output: Output,
+    doing: &str,
+    start: impl FnOnce(&mut Client<Device>, &mut dyn FnMut(Stage)) -> Result<Readiness, ProcedureError>,
+) -> Result<Readiness, Failure> {
     let simulated = client.hello().simulated;
     let spinner = output.spinner("starting up");
-    let result = procedure::make_ready(client, at_home, |stage| {
+    let result = start(client, &mut |stage| {
         spinner.set_message(stage.explanation());
         // People at a simulated pendant need no telling; at a real one the words must stay on the screen.
         if !simulated && matches!(stage, Stage::WaitingForIdle | Stage::WaitingForZero | Stage::WaitingForActive) {
@@ -53,11 +114,14 @@ pub(super) fn ready(client: &mut Client<Device>, at_home: bool, output: Output, 
         }
     });
     spinner.finish_and_clear();
-    result.map_err(|error| failure(error, doing))?;
-    let hello = client.hello();
-    let kind = if simulated { "simulated " } else { "" };
-    output.say(format!("{kind}arm ready on {} ({})", hello.board.as_str(), hello.firmware.as_str()));
-    Ok(())
+    let readiness = result.map_err(|error| failure(error, doing))?;
+    if let Some(source @ (HomeSource::Damaged | HomeSource::Foreign)) = readiness.zeroed_at {
+        output.warn(format!(
+            "the arm was zeroed at another home than its own: {}; `tactus calibrate show`",
+            source.name()
+        ));
+    }
+    Ok(readiness)
 }
 
 /// Says how much faster than life a simulated device was. In words only: data must be the same in every run.
@@ -76,10 +140,16 @@ pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
         ProcedureError::NotZeroed => {
             (Exit::Refused, "E591", "bring the arm to its home pose by hand and add `--at-home`")
         }
+        ProcedureError::ZeroOfOthers => {
+            (Exit::Refused, "E598", "emergency stop, then bring the arm home and zero it again with `--at-home`")
+        }
+        ProcedureError::Moves { .. } => (Exit::Refused, "E597", "press Shift-Idle, let the arm rest, and try again"),
         ProcedureError::Stopped(_) => {
             (Exit::Refused, "E592", "find and remove the cause, then `tactus stop --clear-fault`")
         }
-        ProcedureError::Diverted(_) => (Exit::Refused, "E593", "try again"),
+        ProcedureError::Diverted(_) => {
+            (Exit::Refused, "E593", "somebody else may have stopped it with `tactus stop`; look, then try again")
+        }
         ProcedureError::TooLong { .. } => (Exit::Refused, "E594", "look what holds the arm"),
         ProcedureError::Hand(_) => (Exit::Refused, "E595", "free the fingers, then `tactus hand init`"),
         ProcedureError::Recording(_) => (Exit::Internal, "E121", "check the disk and the rights of the folder"),

@@ -1,5 +1,6 @@
 //! The command line: one subcommand a file, each with a `Cmd` (its options) and a `run`.
 
+pub mod calibrate;
 pub mod can;
 pub mod check;
 pub mod compare;
@@ -17,6 +18,7 @@ pub mod record;
 pub mod rehearse;
 pub mod run;
 pub mod sim;
+pub mod status;
 pub mod stop;
 pub mod teach;
 pub mod upload;
@@ -95,6 +97,10 @@ pub enum Command {
     List(list::Cmd),
     /// Play a primitive on the arm
     Run(run::Cmd),
+    /// Show what the device says of itself and its arm
+    Status(status::Cmd),
+    /// Show or correct where the arm stands when it is zeroed
+    Calibrate(calibrate::Cmd),
     /// Initialise, open, close or move the hand
     Hand(hand::Cmd),
     /// Bring the arm to rest
@@ -125,6 +131,8 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::List(command) => list::run(&command, &global),
         Command::Run(command) => run::run(&command, &global),
         Command::Stop(command) => stop::run(&command, &global),
+        Command::Status(command) => status::run(&command, &global),
+        Command::Calibrate(command) => calibrate::run(&command, &global),
         Command::Record(command) => record::run(&command, &global),
         Command::Learn(command) => learn::run(&command, &global),
         Command::Check(command) => check::run(&command, &global),

@@ -42,6 +42,43 @@ enum Listener {
     Tcp(TcpListener),
 }
 
+/// Most connections at a time: the host that uses the arm, and others that may stop it. Each further one waits.
+const GUESTS: usize = 4;
+
+/// A message is shorter than this; what is longer without an end is none.
+const LONGEST: usize = 4096;
+
+/// One connection. The others speak on the same line, so messages go on as wholes.
+struct Guest {
+    peer: Box<dyn Peer>,
+    /// The beginning of a message.
+    begun: Vec<u8>,
+}
+
+impl Guest {
+    /// Messages that have arrived as wholes; `None`: nobody is there any more.
+    fn messages(&mut self) -> Option<Vec<u8>> {
+        let mut buffer = [0; 4096];
+        match self.peer.read(&mut buffer) {
+            Ok(0) => return None,
+            Ok(count) => self.begun.extend_from_slice(&buffer[..count]),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+            Err(_) => return None,
+        }
+        let end = self.begun.iter().rposition(|byte| *byte == 0).map_or(0, |zero| zero + 1);
+        let messages = self.begun.drain(..end).collect();
+        if self.begun.len() > LONGEST {
+            self.begun.clear();
+        }
+        Some(messages)
+    }
+
+    /// Hands over what the device says; `false`: nobody is there any more. One that does not read loses bytes, as on a serial line.
+    fn tell(&mut self, bytes: &[u8]) -> bool {
+        self.peer.write_all(bytes).map_or_else(|error| error.kind() == ErrorKind::WouldBlock, |()| true)
+    }
+}
+
 /// Serves a simulated arm until it is interrupted.
 ///
 /// Bytes arrive when the wall clock brings them, so runs over a socket are not reproducible; `--device sim:` is.
@@ -119,34 +156,27 @@ fn accept(listener: &Listener) -> std::io::Result<Option<Box<dyn Peer>>> {
 
 fn serve(command: &Cmd, device: &mut Device, listener: &Listener, interrupt: &Interrupt) -> Result<(), TransportError> {
     let started = Instant::now();
-    let mut peer: Option<Box<dyn Peer>> = None;
-    let mut buffer = [0; 4096];
+    let mut guests: Vec<Guest> = Vec::new();
     let mut bytes = Vec::new();
     while !interrupt.is_raised() {
         if command.duration.is_some_and(|limit| device.now().as_secs_f64() >= limit) {
             break;
         }
-        if peer.is_none() {
-            peer = accept(listener).map_err(TransportError::Io)?;
+        while guests.len() < GUESTS
+            && let Some(peer) = accept(listener).map_err(TransportError::Io)?
+        {
+            guests.push(Guest { peer, begun: Vec::new() });
         }
-        if let Some(stream) = &mut peer {
-            match stream.read(&mut buffer) {
-                Ok(0) => peer = None,
-                Ok(count) => device.send(&buffer[..count])?,
-                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
-                Err(_) => peer = None,
-            }
+        let mut said = Vec::new();
+        guests.retain_mut(|guest| guest.messages().map(|messages| said.extend(messages)).is_some());
+        if !said.is_empty() {
+            device.send(&said)?;
         }
         let target = device.now() + STRIDE;
         while device.now() < target {
             bytes.clear();
             device.receive(target.saturating_sub(device.now()), &mut bytes)?;
-            // A host that does not read loses bytes, as on a serial line.
-            if let Some(stream) = &mut peer
-                && stream.write_all(&bytes).is_err_and(|error| error.kind() != ErrorKind::WouldBlock)
-            {
-                peer = None;
-            }
+            guests.retain_mut(|guest| guest.tell(&bytes));
         }
         if !command.fast {
             std::thread::sleep(device.now().saturating_sub(started.elapsed()));

@@ -5,6 +5,8 @@ use control::{Fault, State};
 use serde_json::json;
 
 use super::{Failure, Global, connection};
+use crate::client::{Client, Halted};
+use crate::device::Device;
 
 /// Options of `stop`.
 #[derive(Debug, Clone, Args)]
@@ -14,13 +16,27 @@ pub struct Cmd {
     pub clear_fault: bool,
 }
 
-/// Stops any motion softly (gravity compensation and damping), and says which fault is latched.
+const DOING: &str = "stop";
+
+/// Stops any motion softly (gravity compensation and damping), also that of another host, and says which fault is latched.
 ///
 /// # Errors
 /// The device cannot be reached, the arm still moves after 200 ms, or the cause of the fault is still there.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
-    const DOING: &str = "stop";
-    let mut client = connection::open(global, DOING, |_| {})?;
+    match connection::halt(global, DOING)? {
+        Halted::Ours(client) => report(*client, command, global),
+        // The stop is done, but clearing a fault is not for those who do not have the arm.
+        Halted::Others(error) if command.clear_fault => {
+            Err(error.into_failure("stop: stopped, but no fault was cleared"))
+        }
+        Halted::Others(_) => global.output().result(
+            &json!({ "state": null, "fault": null, "cleared": false, "others": true }),
+            "stopped; another host is connected and keeps the arm",
+        ),
+    }
+}
+
+fn report(mut client: Client<Device>, command: &Cmd, global: &Global) -> Result<(), Failure> {
     client.stop().map_err(|error| error.into_failure(DOING))?;
     let status = client.status().map_err(|error| error.into_failure(DOING))?;
     let state = State::from_code(status.state).map_or("unknown", State::name);
@@ -36,5 +52,6 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             global.output().say("when its cause is removed: `tactus stop --clear-fault`");
         }
     }
-    global.output().result(&json!({ "state": state, "fault": status.fault, "cleared": cleared }), text)
+    let data = json!({ "state": state, "fault": status.fault, "cleared": cleared, "others": false });
+    global.output().result(&data, text)
 }

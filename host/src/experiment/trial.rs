@@ -154,7 +154,7 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
     client.upload(&prepared.image, |_, _, _| {})?;
     let ready = wait_for_beat(&mut client, BEAT_OF_UPLOAD)
         .and_then(|()| procedure::make_ready(&mut client, true, |_| {}))
-        .and_then(|()| procedure::go_to_start(&mut client, &config.primitive.start, |_| {}))
+        .and_then(|_| procedure::go_to_start(&mut client, &config.primitive.start, |_| {}))
         .and_then(|()| wait_for_beat(&mut client, BEAT));
     let mut telemetry = Vec::new();
     if let Some(simulation) = client.transport().simulation() {

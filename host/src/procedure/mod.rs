@@ -1,13 +1,15 @@
 //! What an operator does step by step, done by the host: make the arm ready, bring it to a posture, record what it does.
 
+mod calibrate;
 mod hand;
 mod ready;
 mod recorder;
 mod run;
 mod travel;
 
+pub use calibrate::{HomeCorrection, correct_home};
 pub use hand::{HandReach, initialise_hand, move_hand};
-pub use ready::make_ready;
+pub use ready::{Readiness, make_ready, start_up};
 pub use recorder::{Recorder, Take, recording_row, recording_text};
 pub use run::{CHANNELS, Change, ChangeKind, FlagCounts, Mode, RunOutcome, RunRequest, Surprise, play};
 pub use travel::{after, drives_arm, go_to_start, travel, wait_for};
@@ -28,6 +30,17 @@ pub enum ProcedureError {
     /// The arm was not zeroed, and only a person can say where it stands.
     #[error("the arm does not know where it stands")]
     NotZeroed,
+    /// The arm was zeroed before the device was started, or by another device.
+    #[error(
+        "the arm was not zeroed by this device since its bus was started, so nobody knows where it was taken to stand"
+    )]
+    ZeroOfOthers,
+    /// The arm moves where it must stand.
+    #[error("J{} of the arm moves; it has to stand for a fifth of a second", .joint + 1)]
+    Moves {
+        /// The first joint that does, 0 for J1.
+        joint: usize,
+    },
     /// The arm stopped by itself.
     #[error("the arm stopped: {0}")]
     Stopped(Fault),

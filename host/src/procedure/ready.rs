@@ -3,13 +3,13 @@
 use std::time::Duration;
 
 use control::State;
-use device::Stage;
-use link::EventKind;
+use device::{Stage, StoreError};
+use link::{EventKind, HomeSource, Refusal};
 
 use super::{ProcedureError, initialise_hand};
 use crate::client::{Client, Incoming};
 use crate::device::Device;
-use crate::error::explain_blocked;
+use crate::error::{HostError, explain_blocked};
 
 /// How long a simulated start-up may take, s of virtual time; it takes about four.
 const SIMULATED_PATIENCE: u64 = 30;
@@ -20,13 +20,23 @@ const PATIENCE: u64 = 600;
 /// How often the stage is looked at.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// How long an arm that is ready is left alone: the device takes its first rest, 0.3 s, for the zero of its sensors, and takes it only
-/// while nothing has been commanded.
-const FIRST_REST: Duration = Duration::from_millis(500);
+/// For how many control cycles an arm that is ready is left alone until its wrench has a zero: 5 s of the device's time. The device
+/// takes its first rest, 0.3 s, for it, and only while nothing has been commanded; mostly it has rested before it was activated.
+const FIRST_REST: u32 = 1500;
+
+/// What a start-up led to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Readiness {
+    /// Whether the wrench has a zero; `None` without a force/torque sensor.
+    pub wrench_zeroed: Option<bool>,
+    /// Whose home the arm was zeroed at; `None` if it had been zeroed before.
+    pub zeroed_at: Option<HomeSource>,
+}
 
 /// Waits until the arm can be commanded, tells every stage, and initialises the hand where there is one.
 ///
-/// A simulated arm stands at home, so it is zeroed there. For a real one `at_home` must be the word of a person.
+/// A simulated arm stands at home, so it is zeroed there; which home that is the device knows. For a real one `at_home` must be the
+/// word of a person.
 ///
 /// # Errors
 /// [`ProcedureError::NotZeroed`] if nobody vouches for the pose; [`ProcedureError::NotReady`] when the start-up is blocked for
@@ -34,13 +44,31 @@ const FIRST_REST: Duration = Duration::from_millis(500);
 pub fn make_ready(
     client: &mut Client<Device>,
     at_home: bool,
+    tell: impl FnMut(Stage),
+) -> Result<Readiness, ProcedureError> {
+    let readiness = start_up(client, at_home, Stage::Ready, tell)?;
+    initialise_hand(client)?;
+    Ok(readiness)
+}
+
+/// Waits until the start-up has come as far as `goal`, and zeroes the arm on the way; nothing is commanded. An arm that gets
+/// ready is left alone until its wrench has a zero, as far as one comes.
+///
+/// # Errors
+/// As [`make_ready`].
+pub fn start_up(
+    client: &mut Client<Device>,
+    at_home: bool,
+    goal: Stage,
     mut tell: impl FnMut(Stage),
-) -> Result<(), ProcedureError> {
+) -> Result<Readiness, ProcedureError> {
     let simulated = client.hello().simulated;
     let seconds = if simulated { SIMULATED_PATIENCE } else { PATIENCE };
     let deadline = client.now() + Duration::from_secs(seconds);
+    let mut readiness = Readiness::default();
     let mut told = None;
     let mut blocked = None;
+    let mut ready_since = None;
     loop {
         let status = client.status()?;
         let stage = Stage::from_code(status.startup_stage);
@@ -50,12 +78,19 @@ pub fn make_ready(
         }
         match stage {
             Some(Stage::Ready) => {
-                if State::from_code(status.state) == Some(State::Idle) {
-                    leave_alone(client, FIRST_REST)?;
+                let since = *ready_since.get_or_insert(status.cycle);
+                let idle = State::from_code(status.state) == Some(State::Idle);
+                let may_come = idle && status.cycle.wrapping_sub(since) < FIRST_REST;
+                if status.wrench_zeroed != Some(false) || !may_come {
+                    return Ok(Readiness { wrench_zeroed: status.wrench_zeroed, ..readiness });
                 }
-                return initialise_hand(client).map(|_| ());
             }
-            Some(Stage::WaitingForZero) if simulated || at_home => client.zero(home())?,
+            Some(Stage::WaitingForActive) if goal == Stage::WaitingForActive => {
+                return Ok(Readiness { wrench_zeroed: status.wrench_zeroed, ..readiness });
+            }
+            Some(Stage::WaitingForZero) if simulated || at_home => {
+                readiness.zeroed_at = zero(client)?.or(readiness.zeroed_at);
+            }
             Some(Stage::WaitingForZero) => return Err(ProcedureError::NotZeroed),
             _ => {}
         }
@@ -72,16 +107,15 @@ pub fn make_ready(
     }
 }
 
-/// Lets the device's time pass.
-fn leave_alone(client: &mut Client<Device>, time: Duration) -> Result<(), ProcedureError> {
-    let until = client.now() + time;
-    while client.now() < until {
-        client.next(until.saturating_sub(client.now()))?;
+/// Zeroes the arm at the home that the device knows, and tells whose that is; `None`: the device is still reading its storage.
+fn zero(client: &mut Client<Device>) -> Result<Option<HomeSource>, ProcedureError> {
+    let busy = StoreError::Busy.code();
+    match client.calibration() {
+        Ok(calibration) => {
+            client.zero(calibration.home)?;
+            Ok(Some(calibration.source))
+        }
+        Err(HostError::Refused { reason: Refusal::StoreFailed, detail: [code, _], .. }) if code == busy => Ok(None),
+        Err(error) => Err(error.into()),
     }
-    Ok(())
-}
-
-/// The home posture of the model, rad.
-fn home() -> [f32; 7] {
-    control::model::HOME.map(|angle| angle as f32)
 }

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use control::{CycleRecord, LoadRefusal};
-use device::{Command, Core, CoreIo, Event, Health, QueueFull, SessionPort, StoredPrimitive, TimedRecord, Timing};
+use device::{Command, Core, CoreIo, Event, FitPrimitive, Health, QueueFull, SessionPort, TimedRecord, Timing};
 use puck::CanFrame;
 use sim::Ticks;
 
@@ -83,8 +83,8 @@ impl SessionPort for Port<'_> {
         Ok(())
     }
 
-    fn load(&mut self, primitive: &StoredPrimitive) -> Result<(), LoadRefusal> {
-        self.core.load(primitive)
+    fn load(&mut self, fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
+        self.core.load(fit)
     }
 
     fn record(&mut self) -> Option<TimedRecord> {

@@ -10,8 +10,6 @@ use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 
-use control::Payload;
-use control::arm::ArmModel;
 use device::storage::{Desk, Library, Opening, Room, Work, keep, value_bytes};
 use device::{Core, Identity, Session, Slot, StoreError};
 use link::image::IMAGE_BYTES_LIMIT;
@@ -123,7 +121,7 @@ impl InProcess {
             simulated: true,
             ticks_per_second: sim::TICKS_PER_SECOND as u32,
         };
-        let session = Session::new(identity, ArmModel::new(Payload::SensorAndHand), Library::new());
+        let session = Session::new(identity, Library::new());
         let session = SharedSession(Arc::new(Mutex::new(session)));
         Self {
             core: Core::new(),

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod boot;
+mod calibration;
 mod command_line;
 mod determinism;
 mod firmware_ends;

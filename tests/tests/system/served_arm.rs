@@ -64,3 +64,26 @@ fn an_arm_that_stays_serves_one_command_after_the_other() {
     assert!(one_object(&output.stdout)["simulated_s"].as_f64().is_some_and(|seconds| seconds > 15.0));
     assert!(!folder.join("arm.sock").exists(), "the socket was left behind");
 }
+
+#[test]
+fn a_second_terminal_stops_the_run_of_the_first_and_can_do_nothing_else() {
+    let folder = expect(tempfile::tempdir());
+    let folder = folder.path();
+    expect(taught().write(&folder.join("primitive.toml")));
+    let arm = served(folder);
+    let run = start(folder, &[&ARM[..], &["run", "primitive.toml", "--speed", "0.3"]].concat());
+    let mut run = run;
+    run.hear("running");
+    let listed = tactus(folder, &[&ARM[..], &["list"]].concat()).code(5);
+    assert!(String::from_utf8_lossy(&listed.get_output().stderr).contains("E504"), "the arm is the first one's");
+    let stopped = object(folder, &["stop"]);
+    assert_eq!(stopped["others"], true, "{stopped}");
+    let output = run.finish();
+    assert_exit(&output, 5);
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(words.contains("E593") && words.contains("soft stop"), "{words}");
+    let after = object(folder, &["stop"]);
+    assert_eq!((&after["others"], &after["state"]), (&Value::from(false), &Value::from("soft stop")));
+    arm.interrupt();
+    assert_exit(&arm.finish(), 0);
+}

@@ -87,7 +87,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.may_begin(measured)?;
                 self.supervisor.allows(Trigger::Run)?;
                 self.may_move(measured)?;
-                let primitive = self.primitive.as_ref().ok_or(Refusal::NoPrimitive)?;
+                let primitive = self.loaded.get().ok_or(Refusal::NoPrimitive)?;
                 if options.feedback || options.force_control {
                     self.may_use_force(primitive, measured)?;
                 }
@@ -97,11 +97,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.hand.tare_drift();
                 self.change(Trigger::Run, measured)
             }
-            Command::SetGoal(goal) => match (&mut self.run, &self.primitive) {
+            Command::SetGoal(goal) => match (&mut self.run, self.loaded.get()) {
                 (Some(run), Some(primitive)) => run.set_goal(primitive, &goal),
                 _ => Err(Refusal::WrongState),
             },
-            Command::SetSpeed { factor } => match (&mut self.run, &self.primitive) {
+            Command::SetSpeed { factor } => match (&mut self.run, self.loaded.get()) {
                 (Some(run), Some(primitive)) => run.set_speed(primitive, factor),
                 _ => Err(Refusal::WrongState),
             },

@@ -98,7 +98,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
 
     /// Eqs (8), (9), (11), (10), (12), (13), and the hand's part for Eq (14).
     fn run_primitive(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
-        let (Some(run), Some(primitive)) = (&mut self.run, &self.primitive) else {
+        let (Some(run), Some(primitive)) = (&mut self.run, self.loaded.get()) else {
             // The state machine enters `Run` only with both; without them the arm floats.
             return self.float(measured);
         };

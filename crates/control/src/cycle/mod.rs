@@ -16,7 +16,7 @@ use puck::SafetyMode;
 use crate::actuation::Actuation;
 use crate::approach::Approach;
 use crate::arm::ArmModel;
-use crate::calibration::Calibration;
+use crate::calibration::{Calibration, Payload};
 use crate::command::Refusal;
 use crate::controller::{ForceController, Gains, JointBounds, JointController, OperationalController, PostureIntegral};
 use crate::cycle::commands::STANDING;
@@ -25,7 +25,7 @@ use crate::fault::Fault;
 use crate::hand::HandDrive;
 use crate::kinematics::Frames;
 use crate::limit::{LimitReport, TorqueLimiter};
-use crate::load::{self, LoadRefusal};
+use crate::load::{Fit, LoadRefusal, Loaded};
 use crate::monitor::{Monitor, Observation};
 use crate::real::Real;
 use crate::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
@@ -74,7 +74,7 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     force: ForceController<R>,
     integral: PostureIntegral<R>,
     hand: HandDrive<R>,
-    primitive: Option<Primitive<R, N>>,
+    loaded: Loaded<R, N>,
     run: Option<Run<R, N>>,
     approach: Option<Approach<R>>,
     /// Desired posture of `Hold` (rad).
@@ -127,7 +127,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             force: ForceController::new(gains.stiff.force_window),
             integral: PostureIntegral::new(),
             hand: HandDrive::new(&gains.hand),
-            primitive: None,
+            loaded: Loaded::NOTHING,
             run: None,
             approach: None,
             hold: home,
@@ -164,10 +164,20 @@ impl<R: Real, const N: usize> Cycle<R, N> {
 
     /// The primitive that `Run` would run.
     pub fn primitive(&self) -> Option<&Primitive<R, N>> {
-        self.primitive.as_ref()
+        self.loaded.get()
     }
 
-    /// Takes the scales read from the pucks. Positions are learned anew.
+    /// What is mounted on the arm this cycle controls.
+    pub fn payload(&self) -> Payload {
+        self.calibration.payload
+    }
+
+    /// Whether the wrench has a zero; see [`WrenchEstimator::is_tared`].
+    pub fn is_wrench_zeroed(&self) -> bool {
+        self.wrench.is_tared()
+    }
+
+    /// Takes the scales read from the pucks. Positions are learned anew, and a primitive that was for another payload is forgotten.
     ///
     /// # Errors
     /// [`Refusal::WrongState`] while torque is on.
@@ -177,6 +187,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         self.joints = JointEstimator::new(&calibration);
         self.limiter = TorqueLimiter::new(&calibration);
+        if calibration.payload != self.calibration.payload {
+            // It was checked for another tool.
+            self.loaded.clear();
+        }
         self.model = ArmModel::new(calibration.payload);
         self.calibration = calibration;
         Ok(())
@@ -192,27 +206,26 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.leave_torque();
     }
 
-    /// Takes a primitive for the next run, after checking it against this arm. A refused one leaves the old in place.
+    /// Takes a primitive for the next run: no more than a copy, because its caller keeps the control task waiting. A refused one
+    /// leaves the old in place.
     ///
     /// # Errors
-    /// [`LoadRefusal`] while a run is in progress, or with the reason why this arm cannot run it.
-    pub fn load(&mut self, primitive: &Primitive<R, N>) -> Result<(), LoadRefusal> {
+    /// [`LoadRefusal`] while a run is in progress, or if it was checked for another arm than this.
+    pub fn load(&mut self, fit: &Fit<'_, R, N>) -> Result<(), LoadRefusal> {
         if self.supervisor.law() == State::Run {
             return Err(LoadRefusal::Running);
         }
-        load::check(&self.model, primitive).map_err(LoadRefusal::Unfit)?;
-        // In place: a primitive is too large to be handed around on the stack.
-        match &mut self.primitive {
-            Some(present) => present.clone_from(primitive),
-            empty => *empty = Some(primitive.clone()),
+        if !fit.is_for(&self.model) {
+            return Err(LoadRefusal::OtherTool);
         }
+        self.loaded.put(fit);
         Ok(())
     }
 
     /// Forgets the primitive. Ignored while it runs.
     pub fn unload(&mut self) {
         if self.supervisor.law() != State::Run {
-            self.primitive = None;
+            self.loaded.clear();
         }
     }
 

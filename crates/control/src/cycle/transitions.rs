@@ -101,7 +101,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// Torque that the force controller will feed forward for what the primitive expects at its start (N m).
     fn load_expected_first(&self, measured: &Measured<'_, R>) -> Vector7<R> {
         let controls_force = self.run.as_ref().is_some_and(|run| run.options.force_control);
-        match self.primitive.as_ref().and_then(Primitive::expected).filter(|_| controls_force) {
+        match self.loaded.get().and_then(Primitive::expected).filter(|_| controls_force) {
             Some(expected) => {
                 let expected = Deviation::new(&expected.at(R::of(0.0)), &Wrench::zero(), None).expected;
                 let load = -expected.in_world(measured.frames.tool_to_world());

@@ -66,7 +66,7 @@ fn a_push_along_a_world_axis_moves_the_plan_along_it_in_any_orientation_of_the_h
         for axis in 0..3 {
             for sign in [1.0, -1.0] {
                 let mut rig = holding(q);
-                rig.cycle.load(&primitive(&staying(q))).expect("loads");
+                rig.load(&primitive(&staying(q))).expect("loads");
                 rig.command(Command::Run(FEELING));
                 rig.run_for(0.3);
                 let before = position(&rig.last.expect("ran").record);
@@ -133,7 +133,7 @@ fn the_model_knows_the_weight_within_half_a_newton_even_if_the_hand_weighs_more(
 fn a_deviation_within_the_dead_band_moves_nothing() {
     let end = |push: f64| {
         let mut rig = holding(START);
-        rig.cycle.load(&primitive(&staying(START))).expect("loads");
+        rig.load(&primitive(&staying(START))).expect("loads");
         rig.command(Command::Run(FEELING));
         rig.run_for(0.3);
         rig.plant.push[1] = push;
@@ -149,7 +149,7 @@ fn a_deviation_within_the_dead_band_moves_nothing() {
 /// Largest displacement and rotation of the plan of a run that stays in place, with the sensor stuck at a wrench from 0.5 s on.
 fn stuck(force: Vector3<f64>, torque: Vector3<f64>, options: RunOptions) -> (f64, f64, Rig<f32>) {
     let mut rig = holding(START);
-    rig.cycle.load(&primitive(&staying(START))).expect("loads");
+    rig.load(&primitive(&staying(START))).expect("loads");
     rig.command(Command::Run(options));
     let start = rig.last.expect("ran").record;
     let (mut farthest, mut widest) = (0.0f64, 0.0f64);
@@ -206,7 +206,7 @@ fn a_stuck_sensor_under_force_control_is_stopped_before_the_arm_has_gone_far() {
 #[test]
 fn b4_a_silent_sensor_fades_the_feedback_before_the_arm_stops_softly() {
     let mut rig = holding(START);
-    rig.cycle.load(&primitive(&staying(START))).expect("loads");
+    rig.load(&primitive(&staying(START))).expect("loads");
     rig.command(Command::Run(RunOptions { force_control: true, ..FEELING }));
     rig.run_for(0.3);
     rig.plant.push[1] = 4.0;
@@ -241,7 +241,7 @@ fn b4_a_silent_sensor_fades_the_feedback_before_the_arm_stops_softly() {
 #[test]
 fn a_sensor_that_comes_back_while_the_feedback_fades_lets_the_run_go_on() {
     let mut rig = holding(START);
-    rig.cycle.load(&primitive(&staying(START))).expect("loads");
+    rig.load(&primitive(&staying(START))).expect("loads");
     rig.command(Command::Run(FEELING));
     rig.run_for(1.0);
     rig.plant.deaf = true;
@@ -256,7 +256,7 @@ fn a_sensor_that_comes_back_while_the_feedback_fades_lets_the_run_go_on() {
 #[test]
 fn b6_a_sensor_at_full_scale_stops_the_movement_within_ten_milliseconds() {
     let mut rig = holding(START);
-    rig.cycle.load(&primitive(&staying(START))).expect("loads");
+    rig.load(&primitive(&staying(START))).expect("loads");
     rig.command(Command::Run(FEELING));
     rig.run_for(0.5);
     // 2.8 N m and hardly any force: below every threshold of contact.
@@ -285,7 +285,7 @@ fn b5_an_offset_at_rest_is_tared_if_small_and_refused_if_large() {
             rig.plant.glitch = offset;
             rig.run_for(1.0);
         }
-        rig.cycle.load(&primitive(&staying(START))).expect("loads");
+        rig.load(&primitive(&staying(START))).expect("loads");
         let event = rig.tick(Some(Command::Run(FEELING))).event;
         rig.run_for(0.1);
         let [x, y, z, ..] = rig.last.expect("ran").record.wrench.map(f64::from);
@@ -324,14 +324,14 @@ fn the_first_rest_after_start_up_is_the_zero_of_the_sensor() {
 #[test]
 fn force_without_an_expectation_is_refused_and_an_expectation_of_another_duration_is_derated() {
     let mut rig = holding(START);
-    rig.cycle.load(&primitive(&Design { expected: None, ..staying(START) })).expect("loads");
+    rig.load(&primitive(&Design { expected: None, ..staying(START) })).expect("loads");
     for options in [FEELING, RunOptions { feedback: false, force_control: true, ..FEELING }] {
         let event = rig.tick(Some(Command::Run(options))).event;
         assert_eq!(event, Some(Event::Refused(Refusal::NoExpectation)));
     }
     let end = |recorded: f64, push: f64| {
         let mut rig = holding(START);
-        rig.cycle.load(&primitive(&Design { recorded: Some(recorded), ..staying(START) })).expect("loads");
+        rig.load(&primitive(&Design { recorded: Some(recorded), ..staying(START) })).expect("loads");
         rig.command(Command::Run(FEELING));
         rig.run_for(0.3);
         rig.plant.push[1] = push;
@@ -354,7 +354,7 @@ fn force_without_an_expectation_is_refused_and_an_expectation_of_another_duratio
 #[test]
 fn after_the_movement_the_plan_stays_where_the_contact_has_put_it() {
     let mut rig = holding(START);
-    rig.cycle.load(&primitive(&staying(START))).expect("loads");
+    rig.load(&primitive(&staying(START))).expect("loads");
     rig.command(Command::Run(FEELING));
     let start = position(&rig.last.expect("ran").record);
     rig.run_for(0.5);
@@ -382,7 +382,7 @@ fn after_the_movement_the_plan_stays_where_the_contact_has_put_it() {
 #[test]
 fn a_run_that_something_keeps_bending_ends_all_the_same() {
     let mut rig = holding(START);
-    rig.cycle.load(&primitive(&staying(START))).expect("loads");
+    rig.load(&primitive(&staying(START))).expect("loads");
     rig.command(Command::Run(FEELING));
     let began = rig.number;
     while rig.cycle.state() == State::Run {
@@ -403,7 +403,7 @@ fn from_stiff_to_compliant_and_back_the_torque_makes_no_step_and_the_arm_no_jump
         rig.command(Command::Approach { q: START.map(|q| q as f32), duration: 0.0 });
         rig.until(State::Hold, 20.0);
         rig.run_for(1.0);
-        rig.cycle.load(&primitive(&Design { expected: Some([0.0; 6]), ..Design::default() })).expect("loads");
+        rig.load(&primitive(&Design { expected: Some([0.0; 6]), ..Design::default() })).expect("loads");
         let options = RunOptions { compliant: true, force_control: true, ..FEELING };
         let mut last = rig.last.expect("ran").record;
         let (mut largest, mut next) = (0.0f32, Some(Command::Run(options)));
@@ -432,7 +432,7 @@ fn from_stiff_to_compliant_and_back_the_torque_makes_no_step_and_the_arm_no_jump
 fn compliance_gives_way_to_a_push_several_times_as_far() {
     let given_way = |compliant: bool| {
         let mut rig = holding(START);
-        rig.cycle.load(&primitive(&staying(START))).expect("loads");
+        rig.load(&primitive(&staying(START))).expect("loads");
         rig.command(Command::Run(RunOptions { feedback: false, compliant, ..FEELING }));
         rig.run_for(1.5);
         let before = rig.plant.frames().tool_pose().position;
@@ -458,7 +458,7 @@ fn a_wall_is_pressed_with_the_force_that_statics_predicts() {
         rig.command(Command::Hold);
         rig.run_for(2.0);
         rig.command(Command::Tare);
-        rig.cycle.load(&primitive(&design)).expect("loads");
+        rig.load(&primitive(&design)).expect("loads");
         rig.plant.wall = Some((rig.plant.frames().tool_pose().position.x + 0.002, stiffness));
         rig.command(Command::Run(RunOptions { feedback: false, force_control: true, compliant: true, ..FEELING }));
         rig.run_for(7.5);
@@ -508,7 +508,7 @@ fn a_load_that_the_primitive_expects_does_not_sag() {
     let sag = |expected: f64, force_control: bool| {
         let mut rig = holding(START);
         let design = Design { expected: Some([0.0, 0.0, expected, 0.0, 0.0, 0.0]), ..staying(START) };
-        rig.cycle.load(&primitive(&design)).expect("loads");
+        rig.load(&primitive(&design)).expect("loads");
         rig.plant.push[2] = weight;
         rig.run_for(1.5);
         let before = rig.plant.frames().tool_pose().position.z;

@@ -98,7 +98,7 @@ fn nothing_is_armed_without_a_person_an_active_safety_module_and_all_positions()
 fn a15_safety_dropped_ends_in_idle_and_torque_returns_only_when_asked_for() {
     for mode in [SafetyMode::Idle, SafetyMode::EStop] {
         let mut rig = Rig::<f32>::new(START, 1);
-        rig.cycle.load(&primitive(&Design::default())).expect("loads");
+        rig.load(&primitive(&Design::default())).expect("loads");
         rig.command(Command::Hold);
         rig.run_for(2.0);
         rig.command(Command::Run(RunOptions::default()));
@@ -147,12 +147,12 @@ fn e2_a_start_too_far_from_the_primitive_is_refused() {
     rig.command(Command::Hold);
     rig.run_for(2.0);
     assert_eq!(rig.tick(Some(Command::Run(RunOptions::default()))).event, Some(Event::Refused(Refusal::NoPrimitive)));
-    rig.cycle.load(&primitive(&Design::default())).expect("loads");
+    rig.load(&primitive(&Design::default())).expect("loads");
     assert_eq!(rig.tick(Some(Command::Run(RunOptions::default()))).event, Some(Event::Refused(Refusal::StartTooFar)));
     assert_eq!(rig.cycle.state(), State::Hold);
     for speed in [0.0, -1.0, 10.0, f32::NAN, f32::INFINITY] {
         let mut near = Rig::<f32>::new(START, 0);
-        near.cycle.load(&primitive(&Design::default())).expect("loads");
+        near.load(&primitive(&Design::default())).expect("loads");
         near.command(Command::Hold);
         near.run_for(2.0);
         let command = Command::Run(RunOptions { speed, ..RunOptions::default() });
@@ -164,7 +164,7 @@ fn e2_a_start_too_far_from_the_primitive_is_refused() {
 fn e5_stop_at_any_phase_comes_to_rest_within_the_torque_rate() {
     for seconds in [0.02, 0.5, 1.0, 2.0, 3.5] {
         let mut rig = Rig::<f32>::new(START, 1);
-        rig.cycle.load(&primitive(&Design::default())).expect("loads");
+        rig.load(&primitive(&Design::default())).expect("loads");
         rig.command(Command::Hold);
         rig.run_for(2.0);
         rig.command(Command::Run(RunOptions::default()));

@@ -42,7 +42,7 @@ fn displacement(feedback: bool, push: f64) -> f64 {
     let end = |push: f64| {
         let mut rig = holding::<f32>(START);
         let design = Design { expected: Some([0.0; 6]), ..Design::default() };
-        rig.cycle.load(&primitive(&design)).expect("loads");
+        rig.load(&primitive(&design)).expect("loads");
         rig.command(Command::Run(RunOptions { feedback, ..RunOptions::default() }));
         rig.run_for(1.0);
         rig.plant.push[0] = push;
@@ -74,7 +74,7 @@ fn force_control_presses_towards_the_expected_force_and_position_control_alone_d
             bent: false,
             ..Design::default()
         };
-        rig.cycle.load(&primitive(&design)).expect("loads");
+        rig.load(&primitive(&design)).expect("loads");
         let surface = rig.plant.frames().tool_pose().position.x + 0.002;
         rig.plant.wall = Some((surface, 800.0));
         let options =
@@ -105,7 +105,7 @@ fn force_control_gives_way_to_a_moment_about_the_axis_it_acts_on() {
         rig.run_for(2.0);
         rig.command(Command::Tare);
         let design = Design { expected: Some([0.0; 6]), duration: 3.0, goal: START, bent: false, ..Design::default() };
-        rig.cycle.load(&primitive(&design)).expect("loads");
+        rig.load(&primitive(&design)).expect("loads");
         let options =
             RunOptions { force_control: true, pose_feedback: control::PoseFeedback::Planned, ..RunOptions::default() };
         rig.command(Command::Run(options));
@@ -147,7 +147,7 @@ fn b2_one_outlier_of_the_force_sensor_moves_the_plan_by_less_than_a_millimetre()
     let path = |outlier: bool| {
         let mut rig = holding::<f32>(START);
         let design = Design { expected: Some([0.0; 6]), ..Design::default() };
-        rig.cycle.load(&primitive(&design)).expect("loads");
+        rig.load(&primitive(&design)).expect("loads");
         rig.command(Command::Run(RunOptions { feedback: true, ..RunOptions::default() }));
         rig.run_for(1.0);
         rig.plant.glitch = if outlier { 100.0 } else { 0.0 };
@@ -167,7 +167,7 @@ fn b2_one_outlier_of_the_force_sensor_moves_the_plan_by_less_than_a_millimetre()
 fn a_run_that_needs_the_wrench_is_refused_or_stopped_without_it() {
     let mut rig = holding::<f32>(START);
     let design = Design { expected: Some([0.0; 6]), ..Design::default() };
-    rig.cycle.load(&primitive(&design)).expect("loads");
+    rig.load(&primitive(&design)).expect("loads");
     rig.command(Command::Run(RunOptions { feedback: true, ..RunOptions::default() }));
     rig.run_for(0.5);
     for _ in 0..40 {

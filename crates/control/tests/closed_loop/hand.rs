@@ -97,7 +97,7 @@ fn a_move_that_asks_for_too_much_speed_takes_longer_and_nonsense_is_refused() {
 fn a_run_moves_the_fingers_and_the_hold_after_it_keeps_the_grip() {
     let mut rig = holding();
     rig.plant.hand.as_mut().expect("fitted").object = [Some((1.0, 30.0)); 3];
-    rig.cycle.load(&primitive(&closing(1.6, [0.0; 3]))).expect("loads");
+    rig.load(&primitive(&closing(1.6, [0.0; 3]))).expect("loads");
     rig.command(Command::Run(RunOptions::default()));
     let refused = rig.tick(Some(Command::MoveHand { q: [0.0; 4], duration: 1.0 })).event;
     assert_eq!(refused, Some(Event::Refused(Refusal::WrongState)));
@@ -121,7 +121,7 @@ fn a_run_moves_the_fingers_and_the_hold_after_it_keeps_the_grip() {
 #[test]
 fn a_hand_far_from_where_the_primitive_starts_is_refused_and_no_hand_is_not() {
     let mut rig = holding();
-    rig.cycle.load(&primitive(&closing(1.6, [0.0; 3]))).expect("loads");
+    rig.load(&primitive(&closing(1.6, [0.0; 3]))).expect("loads");
     rig.plant.hand.as_mut().expect("fitted").q[2] += 0.2;
     rig.run_for(0.5);
     let event = rig.tick(Some(Command::Run(RunOptions::default()))).event;
@@ -163,7 +163,7 @@ fn grip(options: RunOptions, reversed_gauges: bool, expected: f64) -> f64 {
         hand.object = [Some((1.0, 30.0)); 3];
         hand.reversed_gauges = reversed_gauges;
     }
-    rig.cycle.load(&primitive(&closing(1.2, [expected; 3]))).expect("loads");
+    rig.load(&primitive(&closing(1.2, [expected; 3]))).expect("loads");
     rig.command(Command::Run(options));
     rig.run_for(2.9);
     assert_eq!(rig.cycle.state(), State::Run);

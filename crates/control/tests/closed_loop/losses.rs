@@ -10,7 +10,7 @@ use crate::rig::Rig;
 /// A rig in the middle of a run.
 fn running(seconds: f64) -> Rig<f32> {
     let mut rig = Rig::<f32>::new(START, 1);
-    rig.cycle.load(&primitive(&Design { duration: 3.0, ..Design::default() })).expect("loads");
+    rig.load(&primitive(&Design { duration: 3.0, ..Design::default() })).expect("loads");
     rig.command(Command::Hold);
     rig.run_for(2.0);
     rig.command(Command::Run(RunOptions::default()));

@@ -187,7 +187,7 @@ fn while_a_torque_is_cut_the_integral_waits() {
 #[test]
 fn from_approach_to_hold_to_run_and_back_the_torque_makes_no_step() {
     let mut rig = holding(GOAL, 1, 1.3);
-    rig.cycle.load(&primitive(&Design::default())).expect("loads");
+    rig.load(&primitive(&Design::default())).expect("loads");
     let mut last = rig.last.expect("ran").record;
     let mut largest = 0.0f32;
     for (command, first) in [
@@ -217,7 +217,7 @@ fn after_a_run_the_arm_stays_where_it_arrived() {
     // Eq (11) leaves q_d beyond the arm by what friction takes; holding q_d itself would creep there.
     for delay in 0..=2 {
         let mut rig = holding(START, delay, 1.0);
-        rig.cycle.load(&primitive(&Design::default())).expect("loads");
+        rig.load(&primitive(&Design::default())).expect("loads");
         rig.command(Command::Run(RunOptions::default()));
         rig.until(State::Hold, 20.0);
         let arrived = rig.plant.q;

@@ -11,7 +11,10 @@ use control::arm::ArmModel;
 use control::command::Command;
 use control::kinematics::Frames;
 use control::units::{JointPositions, JointVelocities, Vector7};
-use control::{BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, Payload, Real, State, model};
+use control::{
+    BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, LoadRefusal, Payload, Real, State, load, model,
+};
+use dmp::Primitive;
 use nalgebra::{SMatrix, Vector3};
 use puck::{Action, CanFrame, Counts, Group, RawWrench, Request, SafetyMode};
 
@@ -176,6 +179,11 @@ impl<R: Real> Rig<R> {
             lose: [false; 7],
             last: None,
         }
+    }
+
+    /// Gives the cycle a primitive that its arm can run.
+    pub(crate) fn load(&mut self, primitive: &Primitive<R, KERNELS>) -> Result<(), LoadRefusal> {
+        self.cycle.load(&load::check(self.cycle.model(), primitive).expect("a movement this arm can run"))
     }
 
     pub(crate) fn tick(&mut self, command: Option<Command>) -> CycleOutput {

@@ -36,7 +36,7 @@ fn run<R: Real>(rig: &mut Rig<R>, options: RunOptions) -> Quality {
 
 /// The same, with the plant changed when the run begins: something was picked up.
 fn run_disturbed<R: Real>(rig: &mut Rig<R>, options: RunOptions, change: impl FnOnce(&mut Plant)) -> Quality {
-    rig.cycle.load(&primitive(&Design::default())).expect("loads");
+    rig.load(&primitive(&Design::default())).expect("loads");
     rig.command(Command::Hold);
     rig.run_for(2.0);
     rig.command(Command::Run(options));
@@ -160,7 +160,7 @@ fn approach_arrives_slowly_enough_and_holds() {
 #[test]
 fn a_goal_set_in_flight_is_reached() {
     let mut rig = Rig::<f32>::new(START, 1);
-    rig.cycle.load(&primitive(&Design::default())).expect("loads");
+    rig.load(&primitive(&Design::default())).expect("loads");
     rig.command(Command::Hold);
     rig.run_for(2.0);
     rig.command(Command::Run(RunOptions::default()));
@@ -178,7 +178,7 @@ fn a_goal_set_in_flight_is_reached() {
 fn half_the_speed_takes_twice_the_time_on_the_same_path() {
     let path = |speed: f32| {
         let mut rig = Rig::<f32>::new(START, 1);
-        rig.cycle.load(&primitive(&Design::default())).expect("loads");
+        rig.load(&primitive(&Design::default())).expect("loads");
         rig.command(Command::Hold);
         rig.run_for(2.0);
         rig.command(Command::Run(RunOptions { speed, ..RunOptions::default() }));
@@ -203,7 +203,7 @@ fn half_the_speed_takes_twice_the_time_on_the_same_path() {
 fn b11_single_and_double_precision_plan_the_same_joints() {
     fn plan<R: Real>() -> Vec<CycleRecord> {
         let mut rig = Rig::<R>::new(START, 1);
-        rig.cycle.load(&primitive(&Design { duration: 8.0, ..Design::default() })).expect("loads");
+        rig.load(&primitive(&Design { duration: 8.0, ..Design::default() })).expect("loads");
         rig.command(Command::Hold);
         rig.run_for(2.0);
         // With x = FK(q_d) the plan of the joints does not depend on the plant but through the posture.

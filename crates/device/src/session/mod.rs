@@ -10,6 +10,7 @@
 //! - an image replaces another only when it is complete, undamaged and fit for this arm;
 //! - a change of the store is answered when it is durable.
 
+mod calibration;
 mod directory;
 mod owner;
 mod pending;
@@ -19,8 +20,8 @@ mod saving;
 mod upload;
 mod wire;
 
-use control::State;
 use control::arm::ArmModel;
+use control::{Payload, State};
 use heapless::Deque;
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame, LINK_TIMEOUT_MS};
 use link::image::{KERNEL_LIMIT, WEIGHT_ROWS};
@@ -32,7 +33,7 @@ use crate::store::Store;
 use directory::{Directory, Entry};
 use primitive::WeightRoom;
 use saving::Saving;
-use upload::Upload;
+use upload::{Refused, Upload};
 
 pub use owner::{Owner, Turn};
 pub use pending::{Asker, Pending};
@@ -65,6 +66,8 @@ pub struct Identity {
 #[derive(Debug)]
 pub struct Session<S> {
     identity: Identity,
+    /// What is mounted on the arm that primitives are checked against, and that arm.
+    payload: Payload,
     model: ArmModel<f32>,
     store: S,
     directory: Directory,
@@ -90,13 +93,15 @@ pub struct Session<S> {
 }
 
 impl<S: Store> Session<S> {
-    /// A session without a host. Reads the store. `model` is the arm primitives are checked against.
-    pub fn new(identity: Identity, model: ArmModel<f32>, store: S) -> Self {
+    /// A session without a host. Reads the store. Until the control half knows what is mounted, primitives are checked against an arm
+    /// with sensor and hand.
+    pub fn new(identity: Identity, store: S) -> Self {
         let directory = Directory::read(&store);
         let opened = store.is_open();
         Self {
             identity,
-            model,
+            payload: Payload::SensorAndHand,
+            model: ArmModel::new(Payload::SensorAndHand),
             store,
             directory,
             decoder: Decoder::new(),
@@ -181,16 +186,7 @@ impl<S: Store> Session<S> {
                 continue;
             };
             match (self.pending.answered(), answer) {
-                (Some(asker), answer) => {
-                    let Some(of) = self.waiting(asker) else {
-                        continue;
-                    };
-                    let reply = match answer {
-                        Ok(()) => Reply::Accepted { of },
-                        Err((reason, detail)) => Reply::Refused { of, reason, detail },
-                    };
-                    self.answer(now_ms, reply, port);
-                }
+                (Some(asker), answer) => self.pass_on(now_ms, asker, answer, port),
                 (None, Ok(())) => {}
                 (None, Err((reason, [detail, _]))) => {
                     let (cycle, code) = (wire::cycle(event.cycle), reason.code().into());
@@ -203,16 +199,34 @@ impl<S: Store> Session<S> {
     /// Commands the control half has not answered for too long.
     fn drop_unanswered(&mut self, now_ms: u32, port: &mut impl SessionPort) {
         while let Some((asker, waited)) = self.pending.expired(now_ms) {
-            if let Some(of) = self.waiting(asker) {
-                self.answer(now_ms, Reply::Refused { of, reason: Refusal::NoAnswer, detail: [waited, 0] }, port);
-            }
+            self.pass_on(now_ms, asker, Err((Refusal::NoAnswer, [waited, 0])), port);
         }
     }
 
-    /// The number of the request, if it is the present host that asked.
-    fn waiting(&self, asker: Option<(u16, u16)>) -> Option<u16> {
-        let (session, of) = asker?;
-        self.owner.as_ref().filter(|owner| owner.session() == session).map(|_| of)
+    /// Tells whoever asked what became of a command; a host that has left meanwhile is told nothing.
+    fn pass_on(&mut self, now_ms: u32, asker: Asker, outcome: Result<(), Refused>, port: &mut impl SessionPort) {
+        let reply = |of| match outcome {
+            Ok(()) => Reply::Accepted { of },
+            Err((reason, detail)) => Reply::Refused { of, reason, detail },
+        };
+        match asker {
+            Asker::Owner { session, of } if self.owner.as_ref().map(Owner::session) == Some(session) => {
+                self.answer(now_ms, reply(of), port);
+            }
+            Asker::Stranger { session, of } if port.room() >= FRAME_BYTES => {
+                self.send_to(session, now_ms, &reply(of), port);
+            }
+            _ => {}
+        }
+    }
+
+    /// Checks primitives against the arm that the control half has found. What was loaded for another it has forgotten.
+    fn follow_arm(&mut self, payload: Payload) {
+        if payload != self.payload {
+            self.payload = payload;
+            self.model = ArmModel::new(payload);
+            self.loaded = None;
+        }
     }
 
     /// Cycle records: the latest is kept, every so many go out as telemetry if the line has room.
@@ -252,7 +266,7 @@ impl<S: Store> Session<S> {
             // Tried again in the next poll: the session stays open until the stop is on its way.
             return;
         }
-        self.pending.push(None, now_ms);
+        self.pending.push(Asker::Device, now_ms);
         self.link_timeouts = self.link_timeouts.wrapping_add(1);
         let (cycle, detail) = (wire::cycle(health.cycle), silence.unwrap_or(0));
         self.tell(now_ms, Event { cycle, kind: EventKind::LinkTimeout, code: 0, detail }, port);

@@ -11,8 +11,26 @@ const PENDING: usize = 8;
 /// cycles, 7 ms; longer means that it does not run.
 const ANSWER_TIMEOUT_MS: u32 = 100;
 
-/// Who waits for an answer: session and number of the request; `None` if the device itself sent the command.
-pub type Asker = Option<(u16, u16)>;
+/// Who waits for an answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Asker {
+    /// Nobody: the device itself sent the command.
+    Device,
+    /// The host that had the session.
+    Owner {
+        /// Its session number.
+        session: u16,
+        /// Number of its request.
+        of: u16,
+    },
+    /// A host without a session, which may do nothing but stop.
+    Stranger {
+        /// The session number in its request.
+        session: u16,
+        /// Number of its request.
+        of: u16,
+    },
+}
 
 /// Commands without an answer, oldest first.
 #[derive(Debug, Default)]
@@ -35,7 +53,7 @@ impl Pending {
         let _ = self.0.push_back((asker, now_ms));
     }
 
-    /// The oldest command has been answered: who asked? The outer `None`: no command was on its way.
+    /// The oldest command has been answered: who asked? `None`: no command was on its way.
     pub fn answered(&mut self) -> Option<Asker> {
         self.0.pop_front().map(|(asker, _)| asker)
     }

@@ -11,7 +11,7 @@ use link::image::{
 
 use super::upload::Refused;
 use super::wire::{PrimitiveTrouble, TROUBLE_EXPECTATION, TROUBLE_EXPERIENCE, TROUBLE_FEEDBACK};
-use crate::port::StoredPrimitive;
+use crate::port::{FitPrimitive, StoredPrimitive};
 
 // The image's limits must not exceed what the control half can hold; a table that does not fit would be refused
 // only after its upload.
@@ -59,16 +59,17 @@ fn millihertz(frequency: f32) -> u32 {
     (frequency.clamp(0.0, 4.0e6) * 1000.0 + 0.5) as u32
 }
 
-/// Checks the content against the arm and makes `primitive` its own, in place: it has 23 kB, the stack has 64.
+/// Makes `primitive` that of the content, in place (it has 23 kB, the stack has 64), and checks it against the arm: last, so that
+/// nothing can change between the check and the copy that its result allows.
 ///
 /// # Errors
 /// [`Unfit`]; what `primitive` holds then is of no use.
-pub(crate) fn build(
+pub(crate) fn build<'a>(
     model: &ArmModel<f32>,
     content: &ImageContent<Reals<'_>>,
     room: &mut WeightRoom,
-    primitive: &mut StoredPrimitive,
-) -> Result<(), Unfit> {
+    primitive: &'a mut StoredPrimitive,
+) -> Result<FitPrimitive<'a>, Unfit> {
     let found = content.marks.filter_cutoff;
     let recorded = !content.expected_mean.is_empty() || !content.experience_mean.is_empty();
     if recorded && (found / CUT_OFF - 1.0).abs() > CUT_OFF_TOLERANCE {
@@ -106,7 +107,6 @@ pub(crate) fn build(
         experience: None,
     };
     primitive.assign(&tables).map_err(|error| PrimitiveTrouble::from(LoadError::Primitive(error)))?;
-    load::check(model, primitive).map_err(PrimitiveTrouble::from)?;
     if !content.k1.is_empty() {
         let clamps = &content.clamps;
         let limits = Limits { displacement: clamps.position, rotation: clamps.orientation, hand: clamps.hand };
@@ -121,7 +121,7 @@ pub(crate) fn build(
         let (mean, spread) = (content.experience_mean.iter(), content.experience_spread.iter());
         primitive.assign_experience(mean, spread, content.experience_trials).map_err(|_| TROUBLE_EXPERIENCE)?;
     }
-    Ok(())
+    load::check(model, primitive).map_err(|error| PrimitiveTrouble::from(error).into())
 }
 
 fn configuration(waypoint: &Waypoint) -> Configuration<f32> {

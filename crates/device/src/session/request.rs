@@ -1,6 +1,6 @@
 //! One request: who may ask it, when, and what it does.
 
-use control::{Command as Control, LoadRefusal, RunOptions, State};
+use control::{Command as Control, LoadRefusal, RunOptions, State, load};
 use link::frame::{Frame, REQUEST_AGE_LIMIT_MS};
 use link::message::{AccelerationSource, CHUNK_BYTES, ChunkData, Goal, PoseFeedback};
 use link::{
@@ -10,10 +10,12 @@ use link::{
 
 use super::Session;
 use super::owner::{Owner, Turn};
+use super::pending::Asker;
 use super::primitive;
 use super::upload::Refused;
-use super::wire::{self, PrimitiveTrouble, StartupTrouble};
+use super::wire::{self, StartupTrouble};
 use crate::command::Command;
+use crate::health::Health;
 use crate::port::SessionPort;
 use crate::store::{Store, StoreError};
 
@@ -36,6 +38,9 @@ impl<S: Store> Session<S> {
             }
             Turn::Ignore => return,
         }
+        if message == Request::Stop && !self.is_owner(envelope.session) {
+            return self.stop_for_stranger(now_ms, envelope.session, of, port);
+        }
         if let Err((reason, detail)) = self.admit(now_ms, envelope.session, of, &message) {
             return self.send_to(envelope.session, now_ms, &Reply::Refused { of, reason, detail }, port);
         }
@@ -52,11 +57,23 @@ impl<S: Store> Session<S> {
         }
     }
 
+    fn is_owner(&self, session: u16) -> bool {
+        self.owner.as_ref().is_some_and(|owner| owner.session() == session)
+    }
+
+    /// A stop only ever takes motion away: it is honoured whoever sends it, without a hello, under another host's session and in
+    /// none. Repeating it stops again, so nothing is remembered of it.
+    fn stop_for_stranger(&mut self, now_ms: u32, session: u16, of: u16, port: &mut impl SessionPort) {
+        let asker = Asker::Stranger { session, of };
+        if let Err(refused) = self.send_command(now_ms, asker, Control::Stop.into(), port) {
+            self.pass_on(now_ms, asker, Err(refused), port);
+        }
+    }
+
     /// Whether this host may ask anything; a hello that fits makes it the owner of the session.
     fn admit(&mut self, now_ms: u32, session: u16, of: u16, message: &Request) -> Result<(), Refused> {
-        let is_owner = self.owner.as_ref().is_some_and(|owner| owner.session() == session);
         let Request::Hello(hello) = message else {
-            return if is_owner { Ok(()) } else { Err((Refusal::NoSession, [0, 0])) };
+            return if self.is_owner(session) { Ok(()) } else { Err((Refusal::NoSession, [0, 0])) };
         };
         compare(hello)?;
         if session == 0 {
@@ -148,6 +165,7 @@ impl<S: Store> Session<S> {
                 done
             }
             Request::UploadCommit => {
+                self.follow_arm(port.health().payload);
                 let (slot, entry) = self.upload_commit()?;
                 self.save(of, slot, Some(entry));
                 Ok(None)
@@ -170,6 +188,15 @@ impl<S: Store> Session<S> {
                 let data = ChunkData::from_slice(part).unwrap_or_default();
                 Ok(Some(Reply::Chunk { of, offset, data }))
             }
+            Request::Calibration => self.calibration(of, port).map(Some),
+            Request::Calibrate { home } => {
+                self.calibrate(of, home, port)?;
+                Ok(None)
+            }
+            Request::ForgetCalibration => {
+                self.forget_calibration(of, port)?;
+                Ok(None)
+            }
         }
     }
 
@@ -181,23 +208,38 @@ impl<S: Store> Session<S> {
         command: Command,
         port: &mut impl SessionPort,
     ) -> Result<Option<Reply>, Refused> {
-        let stop = matches!(command, Command::Control(Control::Stop));
         let session = self.owner.as_ref().map(Owner::session).ok_or((Refusal::NoSession, [0, 0]))?;
+        self.send_command(now_ms, Asker::Owner { session, of }, command, port)?;
+        Ok(None)
+    }
+
+    fn send_command(
+        &mut self,
+        now_ms: u32,
+        asker: Asker,
+        command: Command,
+        port: &mut impl SessionPort,
+    ) -> Result<(), Refused> {
+        let stop = matches!(command, Command::Control(Control::Stop));
         if !self.pending.has_room(stop) || port.command(command).is_err() {
             return Err((Refusal::CommandQueueFull, [0, 0]));
         }
-        self.pending.push(Some((session, of)), now_ms);
-        Ok(None)
+        self.pending.push(asker, now_ms);
+        Ok(())
     }
 
     /// Hands the primitive that has just been checked to the control half, so that its run need not be waited for. Where that cannot be
     /// done now, the run does it.
     pub(super) fn preload(&mut self, slot: u8, port: &mut impl SessionPort) {
-        let Some(entry) = self.directory.get(slot) else { return };
-        if !self.pending.is_empty() || matches!(port.health().state, State::Run | State::Coast) {
+        let Some(entry) = self.directory.get(slot).cloned() else { return };
+        let health = port.health();
+        if !self.pending.is_empty() || matches!(health.state, State::Run | State::Coast) {
             return;
         }
-        self.loaded = port.load(&self.primitive).is_ok().then(|| entry.clone());
+        // Checked again: the arm may have been started anew with another tool while the flash was written.
+        self.follow_arm(health.payload);
+        let fit = load::check(&self.model, &self.primitive);
+        self.loaded = fit.is_ok_and(|fit| port.load(&fit).is_ok()).then_some(entry);
     }
 
     /// Makes sure that the control half holds the primitive of this name, as it is in the store now.
@@ -207,18 +249,19 @@ impl<S: Store> Session<S> {
         if self.is_deleting(slot) {
             return Err(StoreError::Busy.into());
         }
-        if self.loaded.as_ref().is_some_and(|loaded| loaded.is_same(entry)) {
+        let entry = entry.clone();
+        let Health { state, stage, payload, .. } = port.health();
+        self.follow_arm(payload);
+        if self.loaded.as_ref().is_some_and(|loaded| loaded.is_same(&entry)) {
             return Ok(());
         }
         // Not under a running primitive, nor under a command that may start one.
-        let state = port.health().state;
         if matches!(state, State::Run | State::Coast) {
             return Err((Refusal::State, [state.code().into(), 0]));
         }
         if !self.pending.is_empty() {
             return Err((Refusal::CommandQueueFull, [0, 0]));
         }
-        let entry = entry.clone();
         let bytes = self.store.image(slot).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
         // Checked again: memory may have been damaged since the upload, and the image may be from before the firmware.
         let image =
@@ -230,12 +273,13 @@ impl<S: Store> Session<S> {
         if let Some(saving) = &mut self.saving {
             saving.building();
         }
-        primitive::build(&self.model, image.content(), &mut self.room, &mut self.primitive)?;
+        let fit = primitive::build(&self.model, image.content(), &mut self.room, &mut self.primitive)?;
         // After a refusal nothing is known to be loaded: a later run loads again rather than run what is left there.
         self.loaded = None;
-        port.load(&self.primitive).map_err(|refusal| match refusal {
+        port.load(&fit).map_err(|refusal| match refusal {
             LoadRefusal::Running => (Refusal::State, [State::Run.code().into(), 0]),
-            LoadRefusal::Unfit(error) => (Refusal::PrimitiveInvalid, PrimitiveTrouble::from(error).0),
+            // The bus has been started anew since the check began.
+            LoadRefusal::OtherTool => (Refusal::NotReady, [stage.code().into(), 0]),
         })?;
         self.loaded = Some(entry);
         Ok(())
@@ -296,6 +340,7 @@ impl<S: Store> Session<S> {
             hand_stage: health.hand,
             hand: record.map_or([0.0; 4], |record| record.hand),
             hand_temperatures: health.hand_temperatures,
+            wrench_zeroed: health.wrench_zeroed,
         }
     }
 }

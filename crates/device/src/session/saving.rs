@@ -18,30 +18,53 @@ const OPENING_PATIENCE_MS: u32 = 1000;
 pub(super) struct Saving {
     /// Session and number of the request.
     asker: Option<(u16, u16)>,
-    slot: u8,
-    /// What will stand at the place: nothing after a delete.
-    entry: Option<Entry>,
-    /// The session's primitive is still that of the image.
-    built: bool,
+    change: Change,
+}
+
+/// What changes.
+#[derive(Debug)]
+enum Change {
+    /// A place of the library.
+    Place {
+        slot: u8,
+        /// What will stand there: nothing after a delete.
+        entry: Option<Entry>,
+        /// The session's primitive is still that of the image.
+        built: bool,
+    },
+    /// The home of the arm.
+    Home,
 }
 
 impl Saving {
     /// The session's primitive is going to be another one.
     pub(super) fn building(&mut self) {
-        self.built = false;
+        if let Change::Place { built, .. } = &mut self.change {
+            *built = false;
+        }
     }
 }
 
 impl<S: Store> Session<S> {
-    /// Notes who asked for the change that the store has begun. The answer comes from [`Self::settle`].
+    /// Notes who asked for the change of a place that the store has begun. The answer comes from [`Self::settle`].
     pub(super) fn save(&mut self, of: u16, slot: u8, entry: Option<Entry>) {
+        self.note(of, Change::Place { slot, built: entry.is_some(), entry });
+    }
+
+    /// The same for a change of the home.
+    pub(super) fn save_home(&mut self, of: u16) {
+        self.note(of, Change::Home);
+    }
+
+    fn note(&mut self, of: u16, change: Change) {
         let asker = self.owner.as_ref().map(|owner| (owner.session(), of));
-        self.saving = Some(Saving { asker, slot, built: entry.is_some(), entry });
+        self.saving = Some(Saving { asker, change });
     }
 
     /// Whether a place is being emptied.
-    pub(super) fn is_deleting(&self, slot: u8) -> bool {
-        self.saving.as_ref().is_some_and(|saving| saving.slot == slot && saving.entry.is_none())
+    pub(super) fn is_deleting(&self, place: u8) -> bool {
+        let change = self.saving.as_ref().map(|saving| &saving.change);
+        matches!(change, Some(Change::Place { slot, entry: None, .. }) if *slot == place)
     }
 
     /// Whether requests must wait because the store does not know yet what it holds.
@@ -56,17 +79,14 @@ impl<S: Store> Session<S> {
     /// Answers the host whose change has become durable, or has failed.
     pub(super) fn settle(&mut self, now_ms: u32, port: &mut impl SessionPort) {
         let Some(outcome) = self.store.finished() else { return };
-        let Some(Saving { asker, slot, entry, built }) = self.saving.take() else { return };
-        if outcome.is_ok() {
-            let old = self.directory.get(slot).cloned();
-            let deleted = entry.is_none();
-            self.directory.set(slot, entry);
-            if deleted && self.loaded.as_ref().zip(old.as_ref()).is_some_and(|(loaded, old)| loaded.is_same(old)) {
-                self.loaded = None;
-            }
+        let Some(Saving { asker, change }) = self.saving.take() else { return };
+        let mut changed = None;
+        if let (Ok(()), Change::Place { slot, entry, built }) = (outcome, change) {
+            self.replace(slot, entry);
             if built {
                 self.preload(slot, port);
             }
+            changed = Some(slot);
         }
         let of = asker.filter(|(session, _)| self.owner.as_ref().map(Owner::session) == Some(*session));
         if let Some((_, of)) = of {
@@ -76,8 +96,18 @@ impl<S: Store> Session<S> {
             };
             self.answer(now_ms, reply, port);
         }
-        if outcome.is_ok() {
+        if let Some(slot) = changed {
             self.store_changed(now_ms, slot, port);
+        }
+    }
+
+    /// Notes what stands at a place now.
+    fn replace(&mut self, slot: u8, entry: Option<Entry>) {
+        let old = self.directory.get(slot).cloned();
+        let deleted = entry.is_none();
+        self.directory.set(slot, entry);
+        if deleted && self.loaded.as_ref().zip(old.as_ref()).is_some_and(|(loaded, old)| loaded.is_same(old)) {
+            self.loaded = None;
         }
     }
 

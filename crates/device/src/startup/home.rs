@@ -2,13 +2,11 @@
 //!
 //! `P_i = floor(CTS / 2 pi * (J2MP * home)_i)`.
 
-use control::{Calibration, model};
+use control::Calibration;
 use puck::Counts;
 
+use crate::calibration::reach;
 use crate::command::Refusal;
-
-/// How far beyond the joint's range a home pose may lie, rad: home is at the stops, and stops are where cables stretch.
-const MARGIN: f32 = 0.05;
 
 /// The counts of the seven motors at `home` (rad).
 ///
@@ -16,10 +14,8 @@ const MARGIN: f32 = 0.05;
 /// [`Refusal::HomeOutOfRange`] with the joint whose angle is not a number or out of reach, or whose motor would leave the
 /// 22 bits of the bus.
 pub(crate) fn home_counts(calibration: &Calibration<f32>, home: &[f32; 7]) -> Result<[Counts; 7], Refusal> {
-    let limits = model::POSITION_MIN.into_iter().zip(model::POSITION_MAX);
-    for (joint, (angle, (least, most))) in (0_u8..).zip(home.iter().zip(limits)) {
-        let range = least as f32 - MARGIN..=most as f32 + MARGIN;
-        if !range.contains(angle) {
+    for (joint, angle) in (0_u8..).zip(home) {
+        if !reach(joint.into()).contains(angle) {
             return Err(Refusal::HomeOutOfRange { joint });
         }
     }

@@ -105,6 +105,10 @@ pub(crate) struct Startup {
     pub(super) targets: [Counts; 7],
     pub(super) positions: [Option<Counts>; 7],
     pub(super) zeroed: bool,
+    /// The posture that `targets` are the counts of (rad).
+    pub(super) home: [f32; 7],
+    /// The same once the arm has been zeroed there.
+    pub(super) zeroed_at: Option<[f32; 7]>,
     pub(super) zero_request: ZeroRequest,
     pub(super) error: Option<StartupError>,
 }
@@ -135,6 +139,8 @@ impl Startup {
             targets: [Counts(0); 7],
             positions: [None; 7],
             zeroed: false,
+            home: [0.0; 7],
+            zeroed_at: None,
             zero_request: ZeroRequest::None,
             error: None,
         }
@@ -179,6 +185,11 @@ impl Startup {
     /// Whether the safety module says that positions count from a known pose.
     pub(crate) fn is_zeroed(&self) -> bool {
         self.zeroed
+    }
+
+    /// The posture (rad) at which it was zeroed; `None` if that was before this start-up.
+    pub(crate) fn zeroed_at(&self) -> Option<[f32; 7]> {
+        self.zeroed_at
     }
 
     /// The scales of this arm, once read.
@@ -309,6 +320,7 @@ impl Startup {
                 Some(0) => return Err(StartupError::SafetyNotZeroed),
                 Some(_) => {
                     self.zeroed = true;
+                    self.zeroed_at = Some(self.home);
                     Next::Go(Step::Tare)
                 }
             }),

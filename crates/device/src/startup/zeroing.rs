@@ -28,6 +28,7 @@ impl Startup {
             return Err(Refusal::NotReady(self.stage()));
         };
         self.targets = home_counts(calibration, home)?;
+        self.home = *home;
         self.exchange.abandon();
         self.step = Step::ConfirmIdle;
         Ok(())
@@ -55,6 +56,7 @@ impl Startup {
         if SafetyMode::from_value(mode) == Some(SafetyMode::Idle) {
             self.zero_request = ZeroRequest::Answered(Ok(()));
             self.zeroed = false;
+            self.zeroed_at = None;
             return Ok(Next::Go(Step::IgnoreFaults));
         }
         self.zero_request = ZeroRequest::Answered(Err(Refusal::ZeroNeedsIdle));

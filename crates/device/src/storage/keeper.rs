@@ -9,9 +9,10 @@ use sequential_storage::Error;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 
-use super::Opening;
 use super::library::Work;
 use super::sound::{Found, SoundFlash};
+use super::{HOME_KEY, Opening};
+use crate::calibration::StoredHome;
 use crate::store::StoreError;
 
 /// Bytes of a value with an image of at most this many bytes: key, image, filling up to the largest word.
@@ -119,7 +120,7 @@ async fn open<F: NorFlash, D: Desk>(flash: F, value: &mut [u8], desk: &mut D) ->
     let mut opening =
         Opening { resumed: found == Found::Resumed, formatted: found == Found::Formatted, ..Opening::default() };
     match read_all(&mut log, value, desk).await {
-        Ok(found) => opening.found = found,
+        Ok((found, home)) => (opening.found, opening.home) = (found, home),
         Err(Error::Storage { .. }) => return None,
         Err(_) => {
             log.flash().format().await.ok()?;
@@ -129,15 +130,20 @@ async fn open<F: NorFlash, D: Desk>(flash: F, value: &mut [u8], desk: &mut D) ->
     Some((log, opening))
 }
 
-/// Tells the library every value; the last one of a place counts. Returns the number of places that hold an image.
+/// Tells the library every image; the last one of a place counts. Returns the number of places that hold one, and the home.
 async fn read_all<F: NorFlash, D: Desk>(
     log: &mut Log<F>,
     value: &mut [u8],
     desk: &mut D,
-) -> Result<u8, Error<F::Error>> {
+) -> Result<(u8, StoredHome), Error<F::Error>> {
     let mut holding = [false; 256];
+    let mut home = StoredHome::Nothing;
     let mut values = log.fetch_all_items(value).await?;
     while let Some((slot, image)) = values.next::<&[u8]>(value).await? {
+        if slot == HOME_KEY {
+            home = StoredHome::read(image);
+            continue;
+        }
         if let Some(holds) = holding.get_mut(usize::from(slot)) {
             *holds = !image.is_empty();
         }
@@ -149,7 +155,8 @@ async fn read_all<F: NorFlash, D: Desk>(
         // A long flash is read in parts: others have work to do.
         pause().await;
     }
-    Ok(u8::try_from(holding.iter().filter(|holds| **holds).count()).unwrap_or(u8::MAX))
+    let found = u8::try_from(holding.iter().filter(|holds| **holds).count()).unwrap_or(u8::MAX);
+    Ok((found, home))
 }
 
 /// Appends the new value, and reads it back: it is durable when the flash says the same as the memory.

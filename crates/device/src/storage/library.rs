@@ -1,23 +1,32 @@
 //! The library in memory, and what is to be done about it on the flash.
 
-use crate::storage::Opening;
+use crate::calibration::{HOME_BYTES, Home, StoredHome};
+use crate::storage::{HOME_KEY, Opening};
 use crate::store::{RamStore, Store, StoreError};
 
 /// A change under way: what the flash must hold before the memory may.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
-    /// Keep the image being written as that of a place.
+    /// Keep the image being written as that of a place, or the home.
     Save {
-        /// The place.
+        /// The place, or [`HOME_KEY`].
         slot: u8,
-        /// Bytes of the image.
+        /// Bytes of it.
         length: usize,
     },
-    /// Forget the image of a place.
+    /// Forget the image of a place, or the home.
     Delete {
-        /// The place.
+        /// The place, or [`HOME_KEY`].
         slot: u8,
     },
+}
+
+impl Work {
+    /// Whether it is about the home, and about no place.
+    fn is_of_home(self) -> bool {
+        let (Self::Save { slot, .. } | Self::Delete { slot }) = self;
+        slot == HOME_KEY
+    }
 }
 
 /// How far a change has come.
@@ -38,6 +47,9 @@ enum Job {
 #[derive(Debug)]
 pub struct Library<const SLOTS: usize, const BYTES: usize> {
     memory: RamStore<SLOTS, BYTES>,
+    home: StoredHome,
+    /// The home that is being kept.
+    staged_home: [u8; HOME_BYTES],
     job: Job,
     is_open: bool,
     opening: Opening,
@@ -47,7 +59,15 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
     /// A library that has not been opened.
     #[must_use]
     pub const fn new() -> Self {
-        Self { memory: RamStore::new(), job: Job::None, is_open: false, opening: Opening::NOTHING }
+        const { assert!(SLOTS <= HOME_KEY as usize, "a place would have the key of the home") };
+        Self {
+            memory: RamStore::new(),
+            home: StoredHome::Nothing,
+            staged_home: [0; HOME_BYTES],
+            job: Job::None,
+            is_open: false,
+            opening: Opening::NOTHING,
+        }
     }
 
     /// What was found at start-up; `None` until then.
@@ -77,15 +97,16 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         if opening.formatted || opening.failed {
             (0..self.memory.slots()).for_each(|slot| self.forget(slot));
         }
+        self.home = opening.home;
         self.opening = opening;
         self.is_open = true;
     }
 
-    /// Hands a change to the keeper, with a copy of the image to save.
+    /// Hands a change to the keeper, with a copy of what is to be saved.
     pub fn take(&mut self, image: &mut [u8]) -> Option<Work> {
         let Job::Asked(work) = self.job else { return None };
-        if let Work::Save { length, .. } = work {
-            let staged = self.memory.staged();
+        if let Work::Save { slot, length } = work {
+            let staged = if slot == HOME_KEY { Some(self.staged_home.as_slice()) } else { self.memory.staged() };
             let pair = staged.zip(image.get_mut(..length)).filter(|(from, to)| from.len() == to.len());
             let Some((from, to)) = pair else {
                 self.job = Job::Over(Err(StoreError::TooLarge));
@@ -100,12 +121,14 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
     /// The keeper is done with the change: it is durable, or the flash is as before.
     pub fn settle(&mut self, outcome: Result<(), StoreError>) {
         let Job::Taken(work) = self.job else { return };
-        let outcome = outcome.and_then(|()| match work {
-            Work::Save { slot, .. } => self.memory.commit(slot),
-            Work::Delete { slot } => self.memory.delete(slot),
-        });
+        let outcome = match work {
+            Work::Save { slot: HOME_KEY, .. } => outcome.map(|()| self.home = StoredHome::read(&self.staged_home)),
+            Work::Delete { slot: HOME_KEY } => outcome.map(|()| self.home = StoredHome::Nothing),
+            Work::Save { slot, .. } => outcome.and_then(|()| self.memory.commit(slot)),
+            Work::Delete { slot } => outcome.and_then(|()| self.memory.delete(slot)),
+        };
         let _ = self.memory.finished();
-        if outcome.is_err() {
+        if outcome.is_err() && !work.is_of_home() {
             self.memory.abort();
         }
         self.job = Job::Over(outcome);
@@ -121,7 +144,10 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
 
     /// Whether the image being written is on its way to the flash.
     fn is_saving(&self) -> bool {
-        matches!(self.job, Job::Asked(Work::Save { .. }) | Job::Taken(Work::Save { .. }))
+        match self.job {
+            Job::Asked(work) | Job::Taken(work) => matches!(work, Work::Save { .. }) && !work.is_of_home(),
+            Job::None | Job::Over(_) => false,
+        }
     }
 }
 
@@ -184,6 +210,20 @@ impl<const SLOTS: usize, const BYTES: usize> Store for Library<SLOTS, BYTES> {
     fn delete(&mut self, slot: u8) -> Result<(), StoreError> {
         self.image(slot).ok_or(StoreError::NoPlace)?;
         self.ask(Work::Delete { slot })
+    }
+
+    fn home(&self) -> StoredHome {
+        self.home
+    }
+
+    fn keep_home(&mut self, home: &Home) -> Result<(), StoreError> {
+        self.ask(Work::Save { slot: HOME_KEY, length: HOME_BYTES })?;
+        self.staged_home = home.encode();
+        Ok(())
+    }
+
+    fn forget_home(&mut self) -> Result<(), StoreError> {
+        self.ask(Work::Delete { slot: HOME_KEY })
     }
 
     fn finished(&mut self) -> Option<Result<(), StoreError>> {

@@ -1,4 +1,4 @@
-//! The library of primitives on a NOR flash: what survives when the power goes.
+//! The library of primitives and the home of the arm on a NOR flash: what survives when the power goes.
 //!
 //! ```text
 //! Session ── Store ──> Library (memory) <── Desk ── keep() ──> MapStorage ──> SoundFlash ──> NorFlash of the board
@@ -21,8 +21,13 @@ pub use library::{Library, Work};
 
 use core::fmt;
 
+use crate::calibration::StoredHome;
+
+/// The key of the arm's home in the log; those below it are the places of images.
+pub const HOME_KEY: u8 = 0xC0;
+
 /// What the device found in its flash at start-up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Opening {
     /// Images found, sound or not.
     pub found: u8,
@@ -32,11 +37,14 @@ pub struct Opening {
     pub resumed: bool,
     /// The flash does not work: what is stored from now on is refused.
     pub failed: bool,
+    /// The home of the arm.
+    pub home: StoredHome,
 }
 
 impl Opening {
     /// A sound flash with nothing on it.
-    pub(crate) const NOTHING: Self = Self { found: 0, formatted: false, resumed: false, failed: false };
+    pub(crate) const NOTHING: Self =
+        Self { found: 0, formatted: false, resumed: false, failed: false, home: StoredHome::Nothing };
 }
 
 impl fmt::Display for Opening {
@@ -44,8 +52,16 @@ impl fmt::Display for Opening {
         match self {
             Self { failed: true, .. } => f.write_str("the storage does not work: nothing is kept over a restart"),
             Self { formatted: true, .. } => f.write_str("the storage was blank or foreign; it is empty now"),
-            Self { found, resumed, .. } => {
+            Self { found, resumed, home, .. } => {
                 write!(f, "{found} images in the storage")?;
+                match home {
+                    StoredHome::Nothing => {}
+                    StoredHome::Kept(_) => f.write_str(", and this arm's home")?,
+                    StoredHome::Damaged => f.write_str("; the home of the arm is damaged, the model's counts")?,
+                    StoredHome::Foreign => {
+                        f.write_str("; the home of the arm is for another robot model or layout, this model's counts")?;
+                    }
+                }
                 if *resumed { f.write_str("; an interrupted erase was finished") } else { Ok(()) }
             }
         }

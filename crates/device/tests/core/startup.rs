@@ -91,6 +91,7 @@ fn from_emergency_stop_to_ready_in_the_documented_order() {
     assert!(bus.torques_since(0).all(|torque| torque == PuckTorque::ZERO));
     let health = core.health();
     assert!(health.zeroed && health.blocked.is_none() && health.safety_mode == Some(SafetyMode::Active));
+    assert_eq!(health.zeroed_at, Some(HOME));
     assert_eq!((health.counters.malformed_frames, health.counters.foreign_frames), (0, 0), "{health:?}");
     assert!(health.counters.broadcasts >= 2, "the broadcasts of the safety module were seen and ignored");
 }
@@ -156,6 +157,7 @@ fn a_zeroed_arm_keeps_its_counts() {
     let (mut core, mut bus) = (Core::new(), Bus::already_zeroed());
     bus.run_until(&mut core, Stage::WaitingForActive);
     assert!(core.health().zeroed);
+    assert_eq!(core.health().zeroed_at, None, "nobody told this device where the arm stood then");
     assert!(bus.sets().all(|(_, _, property, _)| property != PropertyId::POSITION && property != PropertyId::STAT));
     for (joint, puck) in bus.pucks.iter().enumerate() {
         assert_eq!(puck.position, Counts(100 + joint as i32));
@@ -239,6 +241,23 @@ fn an_arm_without_a_sensor_starts_too() {
     let asked = bus.log.iter().filter(|(_, frame)| frame.can_id().raw() == 8 && frame.payload() == [54]).count();
     assert_eq!(asked, 0);
     assert_eq!(core.health().counters.lost_replies, 0);
+    let health = core.health();
+    assert_eq!((health.wrench_zeroed, health.payload), (None, control::Payload::None));
+}
+
+#[test]
+fn the_wrench_has_its_zero_after_the_first_rest_and_none_after_a_new_start() {
+    let (mut core, mut bus) = started();
+    assert_eq!(core.health().payload, control::Payload::SensorAndHand);
+    // The rest is 0.3 s long.
+    bus.run(&mut core, 0.1);
+    assert_eq!(core.health().wrench_zeroed, Some(false));
+    bus.run(&mut core, 0.5);
+    assert_eq!(core.health().wrench_zeroed, Some(true));
+    bus.press_emergency_stop();
+    bus.run(&mut core, 0.5);
+    assert_ne!(core.health().wrench_zeroed, Some(true), "the pucks were off");
+    assert_eq!(core.health().zeroed_at, None, "and so were the encoders");
 }
 
 #[test]

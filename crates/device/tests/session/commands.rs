@@ -127,12 +127,30 @@ fn a_primitive_the_control_half_does_not_take_is_not_run() {
     rig.store("grasp", &image("grasp", 4.0, 10));
     let run = |text| Request::Run { name: name(text), options: RunOptions::default() };
     rig.commanded(run("reach"));
-    rig.bench.load = Err(control::LoadRefusal::Unfit(control::load::LoadError::Duration));
-    assert_eq!(rig.refused(run("grasp")).0, Refusal::PrimitiveInvalid);
+    rig.bench.load = Err(control::LoadRefusal::OtherTool);
+    assert_eq!(rig.refused(run("grasp")).0, Refusal::NotReady);
     assert_eq!(rig.bench.commands.len(), 1, "the old one would have run under the new name");
     rig.bench.load = Ok(());
     rig.commanded(run("grasp"));
     assert_eq!(rig.bench.loaded, [3.0, 4.0, 3.0, 4.0]);
+}
+
+#[test]
+fn a_primitive_is_checked_for_the_arm_that_the_start_up_found() {
+    let mut rig = Rig::greeted();
+    rig.store("reach", &image("reach", 3.0, 10));
+    let run = Request::Run { name: name("reach"), options: RunOptions::default() };
+    rig.commanded(run.clone());
+    assert_eq!(rig.bench.loaded, [3.0]);
+    // The hand is taken off and the bus started anew: the taught pose is not that of the taught posture any more.
+    rig.bench.payload = control::Payload::None;
+    assert_eq!(rig.refused(run.clone()).0, Refusal::PrimitiveInvalid);
+    rig.send_parts("other", &image("other", 4.0, 10));
+    assert_eq!(rig.refused(Request::UploadCommit).0, Refusal::PrimitiveInvalid);
+    // And put on again: the control half has forgotten the primitive, so it is given it once more.
+    rig.bench.payload = control::Payload::SensorAndHand;
+    rig.commanded(run);
+    assert_eq!(rig.bench.loaded, [3.0, 3.0]);
 }
 
 #[test]

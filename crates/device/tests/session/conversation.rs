@@ -15,7 +15,7 @@ fn nothing_is_answered_or_done_before_a_hello() {
         Request::Ping,
         Request::Status,
         Request::Gravity,
-        Request::Stop,
+        Request::Calibrate { home: [0.0; 7] },
         Request::Zero { home: [0.0; 7] },
         Request::Telemetry { every: 1 },
         Request::List { index: 0 },
@@ -98,6 +98,76 @@ fn c9_a_second_host_is_refused_until_the_first_has_been_silent() {
     rig.greet();
     rig.number = 77;
     assert_eq!(rig.refused(Request::Status).0, Refusal::NoSession, "the first has lost the session");
+}
+
+/// A host of another number sends a request; what the device says to it.
+fn from_another(rig: &mut Rig, number: u16, request: Request) -> Vec<Reply> {
+    let (own, sequence) = (std::mem::replace(&mut rig.number, number), rig.sequence);
+    rig.put(9000, 60_000, &request);
+    rig.event(EventKind::Accepted);
+    (rig.number, rig.sequence) = (own, sequence);
+    let said = rig.sent().into_iter().filter(|frame| frame.envelope.session == number);
+    said.map(|frame| frame.message).collect()
+}
+
+#[test]
+fn a_stop_is_honoured_from_anybody_and_the_session_stays_where_it_was() {
+    for owned in [true, false] {
+        for number in [0, 500] {
+            let mut rig = Rig::new();
+            if owned {
+                rig.greet();
+                rig.bench.state = State::Run;
+            }
+            let said = from_another(&mut rig, number, Request::Stop);
+            assert_eq!(said, [Reply::Accepted { of: 9000 }], "session {number}, owned {owned}");
+            assert_eq!(rig.bench.commands, [Command::Control(control::Command::Stop)]);
+            if owned {
+                // The owner goes on, and its silence is not forgiven by the stranger's word.
+                rig.done(Request::Ping);
+                rig.wait(490);
+                from_another(&mut rig, number, Request::Stop);
+                rig.wait(20);
+                assert_eq!(rig.refused(Request::Ping).0, Refusal::NoSession);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_host_without_a_session_can_do_nothing_but_stop() {
+    let mut rig = Rig::greeted();
+    let home = [0.0, -2.0, 0.0, 3.1, 0.0, 0.0, 0.0];
+    let others =
+        [Request::Gravity, Request::Release, Request::ClearFault, Request::Status, Request::Calibrate { home }];
+    for request in others {
+        let said = from_another(&mut rig, 500, request.clone());
+        assert!(
+            matches!(said[..], [Reply::Refused { reason: Refusal::NoSession, .. }]),
+            "{request:?} was answered with {said:?}"
+        );
+    }
+    assert!(rig.bench.commands.is_empty());
+}
+
+#[test]
+fn a_stop_that_is_repeated_by_a_stranger_stops_again_and_is_answered_each_time() {
+    let mut rig = Rig::greeted();
+    for count in 1..=5 {
+        assert_eq!(from_another(&mut rig, 500, Request::Stop), [Reply::Accepted { of: 9000 }]);
+        assert_eq!(rig.bench.commands.len(), count);
+    }
+}
+
+#[test]
+fn a_stop_of_a_stranger_that_the_control_half_never_answers_is_refused_to_the_stranger() {
+    let mut rig = Rig::greeted();
+    rig.number = 500;
+    rig.put(9000, 0, &Request::Stop);
+    rig.number = 77;
+    rig.wait(150);
+    let said: Vec<_> = rig.sent().into_iter().filter(|frame| frame.envelope.session == 500).collect();
+    assert!(matches!(said[0].message, Reply::Refused { of: 9000, reason: Refusal::NoAnswer, .. }), "{said:?}");
 }
 
 #[test]

@@ -7,8 +7,8 @@ use control::kinematics::Frames;
 use control::units::JointPositions;
 use control::{CycleRecord, Fault, LoadRefusal, Payload, State};
 use device::{
-    Command, Counters, Event, EventKind, Health, Identity, QueueFull, RamStore, Session, SessionPort, Stage,
-    StoredPrimitive, TimedRecord, Timing,
+    Command, Counters, Event, EventKind, FitPrimitive, Health, Identity, QueueFull, RamStore, Session, SessionPort,
+    Stage, StoredPrimitive, TimedRecord, Timing,
 };
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame};
 use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
@@ -48,6 +48,10 @@ pub(crate) struct Bench {
     pub(crate) state: State,
     /// Its latched fault.
     pub(crate) fault: Fault,
+    /// What is mounted on its arm.
+    pub(crate) payload: Payload,
+    /// Where its arm was zeroed.
+    pub(crate) zeroed_at: Option<[f32; 7]>,
     /// Counters of the control half.
     pub(crate) counters: Counters,
 }
@@ -70,11 +74,11 @@ impl SessionPort for Bench {
         Ok(())
     }
 
-    fn load(&mut self, primitive: &StoredPrimitive) -> Result<(), LoadRefusal> {
+    fn load(&mut self, fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
         assert_ne!(self.state, State::Run, "a primitive was exchanged under a run");
         self.load?;
-        self.loaded.push(primitive.duration());
-        self.primitive = Some(primitive.clone());
+        self.loaded.push(fit.primitive().duration());
+        self.primitive = Some(fit.primitive().clone());
         Ok(())
     }
 
@@ -94,6 +98,9 @@ impl SessionPort for Bench {
             state: self.state,
             fault: self.fault,
             zeroed: true,
+            zeroed_at: self.zeroed_at,
+            payload: self.payload,
+            wrench_zeroed: Some(true),
             safety_mode: Some(SafetyMode::Active),
             pendant: Some(0x0F3F_1249),
             temperatures: [Some(30), None, None, None, None, None, Some(35)],
@@ -159,9 +166,11 @@ impl<S: device::Store> Rig<S> {
             load: Ok(()),
             state: State::Hold,
             fault: Fault::None,
+            payload: Payload::SensorAndHand,
+            zeroed_at: None,
             counters: Counters::default(),
         };
-        let session = Session::new(identity, model(), store);
+        let session = Session::new(identity, store);
         Self { session, bench, now_ms: 10_000, number: 77, sequence: 0, decoder: Decoder::new() }
     }
 

@@ -4,8 +4,8 @@ use core::pin::pin;
 use core::task::{Context, Poll, Waker};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use device::storage::{Desk, Library, Opening, Room, Work, keep, value_bytes};
-use device::{Store, StoreError};
+use device::storage::{Desk, HOME_KEY, Library, Opening, Room, Work, keep, value_bytes};
+use device::{Home, Store, StoreError};
 use embedded_storage_async::nor_flash::NorFlash;
 use sim::flash::{Flash, FlashChip, FlashPort, FlashTimes, VirtualClock};
 
@@ -52,6 +52,15 @@ pub(crate) enum Wish {
     /// Store [`TINY`] at a place.
     Tiny(u8),
     Delete(u8),
+    /// Keep the home of this number.
+    Home(u8),
+    ForgetHome,
+}
+
+/// A home made of its number.
+pub(crate) fn home(number: u8) -> Home {
+    let turn = f32::from(number) / 1000.0;
+    Home::new([turn, turn - 1.95, -turn, 3.1 - turn, turn, -turn, 0.02]).expect("within the bounds")
 }
 
 /// An image of a few bytes.
@@ -89,6 +98,8 @@ pub(crate) fn run<const SLOTS: usize, F: NorFlash>(
             Wish::Save(slot, number) => save(&mut shared.library(), slot, &image(number)),
             Wish::Tiny(slot) => save(&mut shared.library(), slot, &TINY),
             Wish::Delete(slot) => shared.library().delete(slot),
+            Wish::Home(number) => shared.library().keep_home(&home(number)),
+            Wish::ForgetHome => shared.library().forget_home(),
         };
         if let Err(error) = asked {
             answers.push(Some(Err(error)));
@@ -117,4 +128,37 @@ pub(crate) fn run_on<const SLOTS: usize>(
 /// A chip with this content, power on.
 pub(crate) fn chip(content: &[u8]) -> FlashChip {
     FlashChip::new(Flash::with_content(content.to_vec(), FlashTimes::NONE))
+}
+
+/// A keeper's desk that has it store these bytes as the home, whatever they are.
+struct Forger<'a>(Option<&'a [u8]>);
+
+impl Desk for Forger<'_> {
+    fn restore(&mut self, _: u8, _: &[u8]) {}
+
+    fn forget(&mut self, _: u8) {}
+
+    fn open(&mut self, _: Opening) {}
+
+    fn take(&mut self, room: &mut [u8]) -> Option<Work> {
+        let bytes = self.0.take()?;
+        room[..bytes.len()].copy_from_slice(bytes);
+        Some(Work::Save { slot: HOME_KEY, length: bytes.len() })
+    }
+
+    fn settle(&mut self, outcome: Result<(), StoreError>) {
+        assert_eq!(outcome, Ok(()));
+    }
+}
+
+/// Stores these bytes on the chip as the home.
+pub(crate) fn write_home(chip: &FlashChip, bytes: &[u8]) {
+    let mut room = Box::new(Room::<IMAGE, VALUE>::new());
+    let mut forger = Forger(Some(bytes));
+    let port = FlashPort::new(chip.clone(), VirtualClock::default());
+    let mut keeper = pin!(keep(port, &mut room, &mut forger));
+    let mut context = Context::from_waker(Waker::noop());
+    for _ in 0..2000 {
+        let Poll::Pending = keeper.as_mut().poll(&mut context);
+    }
 }

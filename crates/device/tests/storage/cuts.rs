@@ -1,9 +1,9 @@
 //! Power fails in the middle of every single word and sector, and every restart finds the old or the new.
 
-use device::Store;
+use device::{Store, StoredHome};
 use sim::flash::FlashChip;
 
-use crate::bench::{TINY, Wish, chip, image, run_on};
+use crate::bench::{TINY, Wish, chip, home, image, run_on};
 
 /// Places of the library here.
 const SLOTS: usize = 4;
@@ -14,20 +14,32 @@ const WORD_DRAWS: u64 = 1;
 /// What a torn erase leaves behind is drawn this many times for each erase: at least twice each of its kinds.
 const ERASE_DRAWS: u64 = 24;
 
-/// What stands at each place: the number of its image.
-type Content = [Option<u8>; SLOTS];
+/// What the flash holds, by number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Content {
+    images: [Option<u8>; SLOTS],
+    home: Option<u8>,
+}
+
+const EMPTY: Content = Content { images: [None; SLOTS], home: None };
 
 /// The library on a chip after a start.
 fn found(chip: &FlashChip) -> Content {
     let (library, _) = run_on::<SLOTS>(chip, &[]);
     let library = library.library();
     assert!(library.is_open(), "the device did not open its storage");
-    std::array::from_fn(|slot| {
+    let images = std::array::from_fn(|slot| {
         let bytes = library.image(slot as u8)?;
         // An image begins with its number.
         assert!(bytes == image(bytes[0]) || bytes == TINY, "an image that nobody ever stored");
         Some(bytes[0])
-    })
+    });
+    let home = match library.home() {
+        StoredHome::Nothing => None,
+        StoredHome::Kept(kept) => Some((0..=255).find(|number| home(*number) == kept).expect("one of ours")),
+        other => panic!("the home is {other:?}"),
+    };
+    Content { images, home }
 }
 
 fn content(chip: &FlashChip) -> Vec<u8> {
@@ -70,13 +82,25 @@ fn erases_of(before: &[u8], wish: Wish, operations: u64) -> Vec<u64> {
 /// that start too. Returns how many cuts were tried.
 fn cut_everywhere(before: &[u8], wish: Wish) -> usize {
     let old = found(&chip(before));
-    let (slot, number) = match wish {
-        Wish::Save(slot, number) => (slot, Some(number)),
-        Wish::Tiny(slot) => (slot, Some(TINY[0])),
-        Wish::Delete(slot) => (slot, None),
-    };
     let mut new = old;
-    new[usize::from(slot)] = number;
+    let mut put = |slot: u8, number| {
+        new.images[usize::from(slot)] = number;
+        slot
+    };
+    // The place that is written to afterwards, to see that everything works on.
+    let slot = match wish {
+        Wish::Save(slot, number) => put(slot, Some(number)),
+        Wish::Tiny(slot) => put(slot, Some(TINY[0])),
+        Wish::Delete(slot) => put(slot, None),
+        Wish::Home(number) => {
+            new.home = Some(number);
+            0
+        }
+        Wish::ForgetHome => {
+            new.home = None;
+            0
+        }
+    };
     let whole = chip(before);
     let (_, answers) = run_on::<SLOTS>(&whole, &[wish]);
     assert_eq!(answers, [Some(Ok(()))]);
@@ -103,7 +127,8 @@ fn cut_everywhere(before: &[u8], wish: Wish) -> usize {
             if draws == ERASE_DRAWS || operation % 8 == 0 {
                 let again = after(&content(&chip), &[Wish::Save(slot, 200), Wish::Save((slot + 1) % 4, 201)]);
                 let now = found(&self::chip(&again));
-                assert_eq!(now[usize::from(slot)], Some(200), "cut {operation}, draw {draw}: does not work on");
+                assert_eq!(now.images[usize::from(slot)], Some(200), "cut {operation}, draw {draw}: does not work on");
+                assert!([old.home, new.home].contains(&now.home), "cut {operation}, draw {draw}: {now:?} later");
             }
         }
     }
@@ -125,10 +150,10 @@ fn cut_the_start(torn: &[u8], old: Content, new: Content, first: u64, operations
 }
 
 /// A flash that has been written all around, so that the next image needs a sector that still holds images: places 0, 1, 2
-/// with images 40, 41, 42 of which the oldest stands in the sector to be emptied.
+/// with images 40, 41, 42 of which the oldest stands in the sector to be emptied, as does the home, 7.
 fn crowded() -> Vec<u8> {
     let blank = vec![0xFF; sim::flash::FLASH_BYTES];
-    let mut before = after(&blank, &[Wish::Save(0, 40), Wish::Save(1, 41), Wish::Save(2, 42)]);
+    let mut before = after(&blank, &[Wish::Home(7), Wish::Save(0, 40), Wish::Save(1, 41), Wish::Save(2, 42)]);
     // Place 3 is written over and over, until the next image would be the first to erase.
     for number in 0_u8.. {
         let wish = Wish::Save(3, number % 64);
@@ -168,16 +193,41 @@ fn power_fails_at_every_operation_of_a_delete_and_the_image_is_there_or_gone() {
 #[test]
 fn power_fails_at_every_operation_of_a_delete_that_needs_an_erase_and_the_image_is_there_or_gone() {
     // An image of a few bytes takes as much room as the note that one was deleted: fill the sector with such.
+    let cuts = cut_everywhere(&full_for(Wish::Tiny(3)), Wish::Delete(0));
+    assert!(cuts > 500, "{cuts} cuts: no sector was emptied");
+}
+
+/// A crowded flash in which what is left of the sector is filled with small images, until this wish would need an erase.
+fn full_for(wish: Wish) -> Vec<u8> {
     let mut before = crowded();
     loop {
         let trial = chip(&before);
-        run_on::<SLOTS>(&trial, &[Wish::Tiny(3)]);
+        run_on::<SLOTS>(&trial, &[wish]);
         if trial.lock().erases().iter().sum::<u32>() > 0 {
-            break;
+            return before;
         }
-        before = content(&trial);
+        before = after(&before, &[Wish::Tiny(3)]);
     }
-    let cuts = cut_everywhere(&before, Wish::Delete(0));
+}
+
+#[test]
+fn power_fails_at_every_word_of_a_calibration_and_the_old_home_or_the_new_is_there() {
+    let blank = vec![0xFF; sim::flash::FLASH_BYTES];
+    let mut cuts = 0;
+    for before in [vec![], vec![Wish::Home(3)], vec![Wish::Home(3), Wish::ForgetHome]] {
+        let before = [vec![Wish::Save(0, 1), Wish::Save(1, 2)], before].concat();
+        let before = after(&blank, &before);
+        for wish in [Wish::Home(4), Wish::Home(5), Wish::ForgetHome] {
+            cuts += cut_everywhere(&before, wish);
+        }
+    }
+    // Home: head and 45 bytes in words of 32. Forgotten: head and one byte.
+    assert!(cuts >= 3 * (3 + 3 + 2), "{cuts} cuts");
+}
+
+#[test]
+fn power_fails_at_every_operation_of_a_calibration_that_needs_an_erase_and_the_old_home_or_the_new_is_there() {
+    let cuts = cut_everywhere(&full_for(Wish::Home(9)), Wish::Home(9));
     assert!(cuts > 500, "{cuts} cuts: no sector was emptied");
 }
 
@@ -187,7 +237,7 @@ fn power_fails_at_every_operation_of_the_first_start_and_the_flash_becomes_ours(
     let foreign: Vec<u8> = (0..sim::flash::FLASH_BYTES).map(|place| (place / 7) as u8).collect();
     for before in [blank, foreign] {
         let whole = chip(&before);
-        assert_eq!(found(&whole), [None; SLOTS]);
+        assert_eq!(found(&whole), EMPTY);
         let operations = whole.lock().operations();
         for operation in 0..operations {
             for draw in 0..8 {
@@ -195,9 +245,10 @@ fn power_fails_at_every_operation_of_the_first_start_and_the_flash_becomes_ours(
                 chip.lock().cut_power_at(operation, draw);
                 run_on::<SLOTS>(&chip, &[]);
                 chip.lock().restart();
-                assert_eq!(found(&chip), [None; SLOTS]);
-                let now = after(&content(&chip), &[Wish::Save(0, 5)]);
-                assert_eq!(found(&self::chip(&now))[0], Some(5));
+                assert_eq!(found(&chip), EMPTY);
+                let now = after(&content(&chip), &[Wish::Save(0, 5), Wish::Home(6)]);
+                let now = found(&self::chip(&now));
+                assert_eq!((now.images[0], now.home), (Some(5), Some(6)));
             }
         }
     }
@@ -206,10 +257,11 @@ fn power_fails_at_every_operation_of_the_first_start_and_the_flash_becomes_ours(
 #[test]
 fn a_deleted_image_stays_deleted_however_often_its_sector_is_emptied() {
     let blank = vec![0xFF; sim::flash::FLASH_BYTES];
-    let mut now = after(&blank, &[Wish::Save(0, 1), Wish::Save(1, 2), Wish::Delete(1)]);
+    let mut now = after(&blank, &[Wish::Home(3), Wish::Save(0, 1), Wish::Save(1, 2), Wish::Delete(1)]);
     for number in 0..120 {
         now = after(&now, &[Wish::Save(2, number)]);
-        assert_eq!(found(&chip(&now)), [Some(1), None, Some(number), None]);
+        let expected = Content { images: [Some(1), None, Some(number), None], home: Some(3) };
+        assert_eq!(found(&chip(&now)), expected);
     }
 }
 

@@ -1,9 +1,9 @@
 //! What the storage refuses, and what it makes of a flash that is not its own.
 
-use device::{Store, StoreError};
+use device::{Store, StoreError, StoredHome};
 use sim::flash::{FLASH_BYTES, FlashPort, VirtualClock};
 
-use crate::bench::{Wish, chip, image, run, run_on};
+use crate::bench::{Wish, chip, home, image, run, run_on, write_home};
 
 fn noise(seed: u64) -> Vec<u8> {
     let mut state = seed;
@@ -61,6 +61,33 @@ fn garbage_inside_our_region_never_crashes_and_the_library_works_on() {
         assert_eq!(answers, [Some(Ok(()))], "garbage {seed}: {count} bytes at {from}");
         let (shared, _) = run_on::<4>(&chip, &[]);
         assert_eq!(shared.library().image(3), Some(image(9).as_slice()), "garbage {seed}");
+    }
+}
+
+#[test]
+fn a_home_that_is_damaged_or_foreign_on_the_flash_is_said_and_can_be_replaced() {
+    let sound = home(3).encode();
+    let mut damaged = sound;
+    damaged[20] ^= 1;
+    // A home of another robot model is as sound as this arm's own.
+    let mut foreign = sound;
+    foreign[8] ^= 1;
+    let (body, sum) = foreign.split_last_chunk_mut::<4>().expect("longer than a check sum");
+    *sum = link::frame::CRC.checksum(body).to_le_bytes();
+    for (bytes, expected) in [(damaged, StoredHome::Damaged), (foreign, StoredHome::Foreign)] {
+        let chip = chip(&vec![0xFF; FLASH_BYTES]);
+        run_on::<4>(&chip, &[Wish::Save(1, 7), Wish::Home(3)]);
+        write_home(&chip, &bytes);
+        let (shared, _) = run_on::<4>(&chip, &[]);
+        let opening = shared.library().opening().expect("open");
+        assert_eq!((opening.home, opening.found), (expected, 1));
+        assert!(
+            opening.to_string().contains("the model's counts") || opening.to_string().contains("this model's counts")
+        );
+        assert_eq!(shared.library().image(1), Some(image(7).as_slice()));
+        let (shared, answers) = run_on::<4>(&chip, &[Wish::Home(4)]);
+        assert_eq!((answers, shared.library().home()), (vec![Some(Ok(()))], StoredHome::Kept(home(4))));
+        assert_eq!(run_on::<4>(&chip, &[]).0.library().home(), StoredHome::Kept(home(4)));
     }
 }
 

@@ -12,7 +12,7 @@ use heapless::Deque;
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame, LINK_TIMEOUT_MS};
 use link::{Event as LinkEvent, EventKind, Name, Refusal, Reply, Request, Statistics, Telemetry};
 
-use crate::command::Command;
+use crate::command::{Command, Refused};
 use crate::core::{Event, Health};
 use crate::image::{ImageReader, Summary};
 use crate::number::real;
@@ -143,16 +143,7 @@ impl<'a> Session<'a> {
                 Event::Answer(answer) => answer,
             };
             match (self.pending.answered(), answer) {
-                (Some(asker), answer) => {
-                    let Some(of) = self.waiting(asker) else {
-                        continue;
-                    };
-                    let reply = match answer {
-                        Ok(()) => Reply::Accepted { of },
-                        Err((reason, detail)) => Reply::Refused { of, reason, detail },
-                    };
-                    self.answer(now_ms, reply, port);
-                }
+                (Some(asker), answer) => self.pass_on(now_ms, asker, answer, port),
                 (None, Ok(())) => {}
                 (None, Err((reason, [detail, _]))) => {
                     let cycle = port.health().cycle;
@@ -165,16 +156,25 @@ impl<'a> Session<'a> {
 
     fn drop_unanswered(&mut self, now_ms: u32, port: &mut impl SessionPort) {
         while let Some((asker, waited)) = self.pending.expired(now_ms) {
-            if let Some(of) = self.waiting(asker) {
-                self.answer(now_ms, Reply::Refused { of, reason: Refusal::NoAnswer, detail: [waited, 0] }, port);
-            }
+            self.pass_on(now_ms, asker, Err((Refusal::NoAnswer, [waited, 0])), port);
         }
     }
 
-    /// The number of the request, if it is the present host that asked.
-    fn waiting(&self, asker: Asker) -> Option<u16> {
-        let (session, of) = asker?;
-        self.owner.as_ref().filter(|owner| owner.session() == session).map(|_| of)
+    /// Tells whoever asked what became of a command; a host that has left meanwhile is told nothing.
+    fn pass_on(&mut self, now_ms: u32, asker: Asker, outcome: Result<(), Refused>, port: &mut impl SessionPort) {
+        let reply = |of| match outcome {
+            Ok(()) => Reply::Accepted { of },
+            Err((reason, detail)) => Reply::Refused { of, reason, detail },
+        };
+        match asker {
+            Asker::Owner { session, of } if self.owner.as_ref().map(Owner::session) == Some(session) => {
+                self.answer(now_ms, reply(of), port);
+            }
+            Asker::Stranger { session, of } if port.room() >= FRAME_BYTES => {
+                self.send_to(session, now_ms, &reply(of), port);
+            }
+            _ => {}
+        }
     }
 
     fn forward_records(&mut self, now_ms: u32, port: &mut impl SessionPort) {
@@ -211,7 +211,7 @@ impl<'a> Session<'a> {
             // Tried again in the next poll: the session stays open until the stop is on its way.
             return;
         }
-        self.pending.push(None, now_ms);
+        self.pending.push(Asker::Device, now_ms);
         self.link_timeouts = self.link_timeouts.wrapping_add(1);
         let news =
             LinkEvent { cycle: health.cycle, kind: EventKind::LinkTimeout, code: 0, detail: silence.unwrap_or(0) };

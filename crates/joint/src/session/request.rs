@@ -1,6 +1,6 @@
 //! One request: who may ask it, when, and what it does.
 
-use device::{Owner, Turn};
+use device::{Asker, Owner, Turn};
 use link::frame::{Frame, REQUEST_AGE_LIMIT_MS};
 use link::image::{IMAGE_BYTES_LIMIT, IMAGE_SCHEMA};
 use link::{
@@ -36,6 +36,9 @@ impl Session<'_> {
             }
             Turn::Ignore => return,
         }
+        if message == Request::Stop && !self.is_owner(envelope.session) {
+            return self.stop_for_stranger(now_ms, envelope.session, of, port);
+        }
         if let Err((reason, detail)) = self.admit(now_ms, envelope.session, of, &message) {
             return self.send_to(envelope.session, now_ms, &Reply::Refused { of, reason, detail }, port);
         }
@@ -52,11 +55,23 @@ impl Session<'_> {
         }
     }
 
+    fn is_owner(&self, session: u16) -> bool {
+        self.owner.as_ref().is_some_and(|owner| owner.session() == session)
+    }
+
+    /// A stop only ever takes motion away: it is honoured whoever sends it, without a hello, under another host's session and in
+    /// none. Repeating it stops again, so nothing is remembered of it.
+    fn stop_for_stranger(&mut self, now_ms: u32, session: u16, of: u16, port: &mut impl SessionPort) {
+        let asker = Asker::Stranger { session, of };
+        if let Err(refused) = self.send_command(now_ms, asker, Command::Stop, port) {
+            self.pass_on(now_ms, asker, Err(refused), port);
+        }
+    }
+
     /// Whether this host may ask anything; a hello that fits makes it the owner of the session.
     fn admit(&mut self, now_ms: u32, session: u16, of: u16, message: &Request) -> Result<(), Refused> {
-        let is_owner = self.owner.as_ref().is_some_and(|owner| owner.session() == session);
         let Request::Hello(hello) = message else {
-            return if is_owner { Ok(()) } else { Err((Refusal::NoSession, [0, 0])) };
+            return if self.is_owner(session) { Ok(()) } else { Err((Refusal::NoSession, [0, 0])) };
         };
         compare(hello)?;
         if session == 0 {
@@ -103,7 +118,13 @@ impl Session<'_> {
                 });
                 Ok(Some(Reply::Listing { of, listing }))
             }
-            Request::Zero { .. } | Request::Gravity | Request::Approach { .. } | Request::SetGoal(_) => Err(NO_ARM),
+            Request::Zero { .. }
+            | Request::Gravity
+            | Request::Approach { .. }
+            | Request::SetGoal(_)
+            | Request::Calibration
+            | Request::Calibrate { .. }
+            | Request::ForgetCalibration => Err(NO_ARM),
             Request::Hold => self.command(now_ms, of, Command::Hold, port),
             Request::Run { name, options } => {
                 if options.goal != Goal::default() {
@@ -219,11 +240,22 @@ impl Session<'_> {
         port: &mut impl SessionPort,
     ) -> Result<Option<Reply>, Refused> {
         let session = self.owner.as_ref().map(Owner::session).ok_or((Refusal::NoSession, [0, 0]))?;
+        self.send_command(now_ms, Asker::Owner { session, of }, command, port)?;
+        Ok(None)
+    }
+
+    fn send_command(
+        &mut self,
+        now_ms: u32,
+        asker: Asker,
+        command: Command,
+        port: &mut impl SessionPort,
+    ) -> Result<(), Refused> {
         if !self.pending.has_room(command == Command::Stop) || port.command(command).is_err() {
             return Err((Refusal::CommandQueueFull, [0, 0]));
         }
-        self.pending.push(Some((session, of)), now_ms);
-        Ok(None)
+        self.pending.push(asker, now_ms);
+        Ok(())
     }
 
     /// Makes sure that the control half holds the primitive of this name.

@@ -262,6 +262,18 @@ fn a_silent_host_stops_a_run_but_not_a_grip() {
 }
 
 #[test]
+fn a_stop_is_honoured_from_anybody_and_nothing_else_is() {
+    let mut rig = gripping(adapt());
+    rig.run(1.0);
+    assert!(matches!(rig.ask_as_stranger(Request::Hold), Reply::Refused { reason: Refusal::NoSession, .. }));
+    assert_eq!(rig.health().state, State::Run);
+    assert!(matches!(rig.ask_as_stranger(Request::Stop), Reply::Accepted { .. }));
+    assert_eq!(rig.health().state, State::SoftStop);
+    // The host that has the hand still has it.
+    rig.accept(Request::Ping);
+}
+
+#[test]
 fn requests_for_an_arm_are_refused_with_that_reason() {
     let mut rig = Rig::ready(OBJECT);
     for request in [
@@ -270,6 +282,9 @@ fn requests_for_an_arm_are_refused_with_that_reason() {
         Request::Approach { q: [0.0; 7], duration: 1.0 },
         Request::SetGoal(link::Goal::default()),
         Request::Read { name: Name::new("grip").expect("a name"), offset: 0 },
+        Request::Calibration,
+        Request::Calibrate { home: [0.0; 7] },
+        Request::ForgetCalibration,
     ] {
         assert_eq!(rig.refusal(request), Refusal::NoArm);
     }

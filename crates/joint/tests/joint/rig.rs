@@ -208,11 +208,24 @@ impl Rig {
     fn send(&mut self, request: &Request) -> u16 {
         self.sequence = self.sequence.wrapping_add(1);
         let time_ms = (self.ticks / TICKS_PER_MICROSECOND / 1000) as u32;
-        let envelope = Envelope { session: 7, sequence: self.sequence, time_ms };
+        self.put(Envelope { session: 7, sequence: self.sequence, time_ms }, request);
+        self.sequence
+    }
+
+    /// The answer to a host without a session.
+    #[track_caller]
+    pub(crate) fn ask_as_stranger(&mut self, request: Request) -> Reply {
+        const OF: u16 = 60_000;
+        self.heard.clear();
+        self.put(Envelope { session: 999, sequence: OF, time_ms: 0 }, &request);
+        self.run(0.1);
+        self.heard.iter().find(|reply| reply.answers() == Some(OF)).expect("an answer").clone()
+    }
+
+    fn put(&mut self, envelope: Envelope, request: &Request) {
         let mut buffer = [0; FRAME_BYTES];
         let length = frame::encode(envelope, request, &mut buffer).expect("it fits");
         self.session.receive(&buffer[..length]);
-        self.sequence
     }
 
     /// The answer to a request.

@@ -6,7 +6,7 @@ use crate::samples::{EVENT_KINDS, Tables, event_index, replies, reply_index, req
 use link::frame::{self, Envelope, FRAME_BYTES};
 use link::image::{HemisphereKind, IMAGE_SCHEMA, PrimitiveImage, image_bytes};
 use link::message::{AccelerationSource, PoseFeedback};
-use link::{HandStage, LINK_VERSION, Refusal, SCHEMA_HASH};
+use link::{HandStage, HomeSource, LINK_VERSION, Refusal, SCHEMA_HASH};
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |mut text, byte| {
@@ -52,6 +52,9 @@ fn schema() -> String {
         let stage = HandStage::from_code(code).expect("a stage");
         line(format!("hand_stage {code} {stage:?} {}", encoded(&stage)));
     }
+    for source in [HomeSource::Model, HomeSource::Stored, HomeSource::Damaged, HomeSource::Foreign] {
+        line(format!("home_source {source:?} {}", encoded(&source)));
+    }
     for choice in [PoseFeedback::Measured, PoseFeedback::Planned] {
         line(format!("pose_feedback {choice:?} {}", encoded(&choice)));
     }
@@ -83,13 +86,13 @@ fn every_layout_is_the_one_in_the_schema_text() {
 
 #[test]
 fn schema_hash_is_pinned() {
-    assert_eq!(SCHEMA_HASH, 0xcf84_dc11, "{SCHEMA_HASH:#010x}: the layouts changed, or their text did");
+    assert_eq!(SCHEMA_HASH, 0x9f9d_4189, "{SCHEMA_HASH:#010x}: the layouts changed, or their text did");
 }
 
 #[test]
 fn samples_cover_every_variant_in_order() {
-    assert!(requests().iter().map(request_index).eq(0..26));
-    assert!(replies().iter().map(reply_index).eq(0..9));
+    assert!(requests().iter().map(request_index).eq(0..29));
+    assert!(replies().iter().map(reply_index).eq(0..10));
     assert!(EVENT_KINDS.iter().map(|kind| event_index(*kind)).eq(0..10));
     assert!(Refusal::ALL.iter().map(|refusal| usize::from(refusal.code())).eq(0..Refusal::ALL.len()));
 }

@@ -5,8 +5,8 @@ use link::image::{
 };
 use link::message::{AccelerationSource, ChunkData, PoseFeedback};
 use link::{
-    DeviceHello, Event, EventKind, Goal, HandStage, HostHello, LinkCounters, Listing, Name, Refusal, Reply, Request,
-    RunOptions, Statistics, Status, Telemetry, Text,
+    Calibration, DeviceHello, Event, EventKind, Goal, HandStage, HomeSource, HostHello, LinkCounters, Listing, Name,
+    Refusal, Reply, Request, RunOptions, Statistics, Status, Telemetry, Text,
 };
 
 fn name() -> Name {
@@ -63,6 +63,9 @@ pub(crate) fn requests() -> Vec<Request> {
         Request::Tare,
         Request::InitialiseHand,
         Request::MoveHand { q: ramp(0.5), duration: 1.25 },
+        Request::Calibration,
+        Request::Calibrate { home: ramp(-2.0) },
+        Request::ForgetCalibration,
     ]
 }
 
@@ -95,6 +98,9 @@ pub(crate) fn request_index(request: &Request) -> usize {
         Request::Tare => 23,
         Request::InitialiseHand => 24,
         Request::MoveHand { .. } => 25,
+        Request::Calibration => 26,
+        Request::Calibrate { .. } => 27,
+        Request::ForgetCalibration => 28,
     }
 }
 
@@ -133,6 +139,7 @@ pub(crate) fn replies() -> Vec<Reply> {
         hand_stage: HandStage::Ready,
         hand: ramp(0.75),
         hand_temperatures: [Some(31), None, Some(33), None],
+        wrench_zeroed: Some(true),
     };
     let statistics = Statistics {
         cycles: 1,
@@ -196,6 +203,10 @@ pub(crate) fn replies() -> Vec<Reply> {
         Reply::Chunk { of: 7, offset: 192, data: data() },
         Reply::Telemetry(telemetry),
         Reply::Event(Event { cycle: 300, kind: EventKind::LinkTimeout, code: 1, detail: 500 }),
+        Reply::Calibration {
+            of: 9,
+            calibration: Calibration { home: ramp(-2.0), source: HomeSource::Stored, zeroed_at: Some(ramp(-1.75)) },
+        },
     ]
 }
 
@@ -211,6 +222,7 @@ pub(crate) fn reply_index(reply: &Reply) -> usize {
         Reply::Chunk { .. } => 6,
         Reply::Telemetry(_) => 7,
         Reply::Event(_) => 8,
+        Reply::Calibration { .. } => 9,
     }
 }
 

@@ -1,7 +1,5 @@
 //! The device's application without a bus: what comes is put in, what it sends is taken out, slot by slot.
 
-use control::Payload;
-use control::arm::ArmModel;
 use device::{Core, Identity, RamStore, STORE_SLOTS, Session, Slot};
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
@@ -31,7 +29,7 @@ impl Engine {
         };
         Self {
             core: Core::new(),
-            session: Session::new(identity, ArmModel::new(Payload::SensorAndHand), RamStore::new()),
+            session: Session::new(identity, RamStore::new()),
             queues: Queues::default(),
             slot: Slot::Request,
             next: FIRST_SLOT * SLOT_TICKS,

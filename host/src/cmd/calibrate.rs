@@ -1,0 +1,163 @@
+//! `tactus calibrate`: the home of the arm, where it stands when it is zeroed.
+
+use clap::{ArgGroup, Args, Subcommand};
+use link::{Calibration, Refusal};
+use serde_json::{Value, json};
+
+use super::{Failure, Global, Table, connection, learn};
+use crate::client::Client;
+use crate::device::Device;
+use crate::error::HostError;
+use crate::procedure::{self, HomeCorrection};
+
+/// Options of `calibrate`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// What to do
+    #[command(subcommand)]
+    pub action: Action,
+}
+
+/// What can be done about a home.
+#[derive(Debug, Clone, Subcommand)]
+pub enum Action {
+    /// Show where the arm is taken to stand when it is zeroed, and whose home that is
+    Show,
+    /// Store a home of this arm's own; it counts from the next zeroing on
+    Home(Home),
+    /// Forget it: the robot model's home counts again
+    Forget,
+}
+
+/// The home to store.
+#[derive(Debug, Clone, Args)]
+#[command(group = ArgGroup::new("angles").required(true))]
+pub struct Home {
+    /// The arm stands at these true angles now, zeroed, and the home is corrected by what it reads instead, rad
+    #[arg(long, group = "angles", value_name = "J1,...,J7", value_parser = posture, allow_hyphen_values = true)]
+    pub here: Option<Posture>,
+    /// This home itself, rad
+    #[arg(long, group = "angles", value_name = "J1,...,J7", value_parser = posture, allow_hyphen_values = true)]
+    pub set: Option<Posture>,
+    /// I have brought the arm to its home pose: zero it there if need be
+    #[arg(long, conflicts_with = "set")]
+    pub at_home: bool,
+}
+
+/// Joint angles from J1 to J7, rad.
+pub type Posture = [f64; 7];
+
+fn posture(text: &str) -> Result<Posture, String> {
+    learn::numbers::<7>(text)
+}
+
+const DOING: &str = "calibrate";
+
+/// Shows, stores or forgets the home of the arm.
+///
+/// # Errors
+/// The device cannot be reached, the arm is not zeroed or moves, or the device refuses the home.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    let mut client = connection::open(global, DOING, |_| {})?;
+    match &command.action {
+        Action::Show => show(&mut client, global),
+        Action::Forget => {
+            client.forget_calibration().map_err(|error| error.into_failure(DOING))?;
+            show(&mut client, global)
+        }
+        Action::Home(Home { set: Some(home), .. }) => {
+            store(&mut client, home.map(|angle| angle as f32), None, global)?;
+            show(&mut client, global)
+        }
+        Action::Home(Home { here: Some(truth), at_home, .. }) => {
+            connection::joints_read(&mut client, *at_home, global.output(), DOING)?;
+            let corrected = procedure::correct_home(&mut client, *truth);
+            let correction = corrected.map_err(|error| connection::failure(error, DOING))?;
+            store(&mut client, correction.home, Some(&correction), global)?;
+            global.output().result(&data(&correction), format!("{}stored in the device", table(&correction)))
+        }
+        Action::Home(Home { here: None, set: None, .. }) => {
+            Err(Failure::new(super::Exit::Usage, "E222", DOING, "no angles are given").help("`--here` or `--set`"))
+        }
+    }
+}
+
+/// Has the device keep a home. Where the arm has torque the measurement is not lost: the help repeats its result.
+fn store(
+    client: &mut Client<Device>,
+    home: [f32; 7],
+    correction: Option<&HomeCorrection>,
+    global: &Global,
+) -> Result<(), Failure> {
+    client.calibrate(home).map_err(|error| {
+        let has_torque = matches!(error, HostError::Refused { reason: Refusal::HasTorque, .. });
+        let mut failure = error.into_failure(DOING);
+        if has_torque {
+            let angles = home.map(|angle| format!("{angle:.5}")).join(",");
+            failure = failure.help(format!(
+                "support the arm, press Shift+Idle on the pendant, then `tactus calibrate home --set {angles}`"
+            ));
+        }
+        match correction {
+            Some(correction) => failure.data(data(correction)),
+            None => failure,
+        }
+    })?;
+    if client.status().map_err(|error| error.into_failure(DOING))?.zeroed {
+        global.output().say("the arm still counts from its old zero: emergency stop, bring it home, zero it again");
+    }
+    Ok(())
+}
+
+fn show(client: &mut Client<Device>, global: &Global) -> Result<(), Failure> {
+    let calibration = client.calibration().map_err(|error| error.into_failure(DOING))?;
+    let Calibration { home, source, zeroed_at } = calibration;
+    let mut table = Table::new(["joint", "home", "model's", "difference", "zeroed at"]);
+    for (joint, (home, model)) in home.iter().zip(control::model::HOME).enumerate() {
+        let zeroed_at = zeroed_at.map_or_else(|| "-".to_owned(), |posture| format!("{:.5}", posture[joint]));
+        let difference = f64::from(*home) - model;
+        table.row([
+            format!("J{}", joint + 1),
+            format!("{home:.5}"),
+            format!("{model:.5}"),
+            degrees(difference),
+            zeroed_at,
+        ]);
+    }
+    global.output().result(
+        &json!({
+            "home_rad": home, "stored": source == link::HomeSource::Stored, "source": source.name(),
+            "model_rad": control::model::HOME, "zeroed_at_rad": zeroed_at,
+        }),
+        format!("{table}home: {}", source.name()),
+    )
+}
+
+/// A difference in rad and degrees.
+fn degrees(difference: f64) -> String {
+    format!("{difference:+.5} ({:+.2} deg)", difference.to_degrees())
+}
+
+fn table(correction: &HomeCorrection) -> Table {
+    let mut table = Table::new(["joint", "read", "true", "difference", "home before", "home now"]);
+    for joint in 0..7 {
+        let (read, truth) = (correction.read[joint], correction.truth[joint]);
+        table.row([
+            format!("J{}", joint + 1),
+            format!("{read:.5}"),
+            format!("{truth:.5}"),
+            degrees(truth - read),
+            format!("{:.5}", correction.zeroed_at[joint]),
+            format!("{:.5}", correction.home[joint]),
+        ]);
+    }
+    table
+}
+
+fn data(correction: &HomeCorrection) -> Value {
+    let difference: Vec<f64> = correction.truth.iter().zip(correction.read).map(|(truth, read)| truth - read).collect();
+    json!({
+        "read_rad": correction.read, "true_rad": correction.truth, "difference_rad": difference,
+        "home_before_rad": correction.zeroed_at, "home_rad": correction.home,
+    })
+}
