@@ -10,6 +10,7 @@ pub mod event;
 pub mod hand;
 pub mod health;
 mod mailbox;
+pub mod recorded_filter;
 mod round;
 mod slow;
 pub mod startup;

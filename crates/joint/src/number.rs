@@ -78,11 +78,9 @@ pub fn share(part: Number, whole: Number) -> Number {
     if part < ZERO { -result } else { result }
 }
 
-/// The value as a real number for people, off the control path.
+/// The value as a real number for people, off the control path, in the single precision of telemetry.
 pub fn real(value: Number) -> f32 {
-    #[allow(clippy::cast_possible_truncation, reason = "telemetry is single precision")]
-    let single = value.to_f64() as f32;
-    single
+    value.to_f64() as f32
 }
 
 /// The number nearest to a real one, off the control path. Saturates; NaN becomes 0.

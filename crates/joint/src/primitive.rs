@@ -4,6 +4,7 @@
 
 use control::load::{LONGEST, LoadError, SHORTEST};
 use device::PrimitiveTrouble;
+use device::recorded_filter::{self, OtherFilter};
 use dmp::{GainError, PrimitiveError, Row, TransformationSystem};
 use link::Refusal;
 use link::image::{EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT};
@@ -15,9 +16,6 @@ use crate::{DIGITS, KERNELS};
 
 /// Most a start or goal may lie outside the range of its digit (rad): what noise of a demonstration at the stops leaves.
 const RANGE_MARGIN: f64 = 0.05;
-
-/// How much the cut-off of the filter behind an expectation may differ from the device's, of one.
-const CUT_OFF_TOLERANCE: f32 = 0.01;
 
 /// Largest magnitude of a feedback limit (rad).
 const FEEDBACK_LIMIT: f32 = 3.2;
@@ -58,8 +56,8 @@ pub enum Unfit {
     Feedback,
     /// A value of the expectation is beyond the range of the numbers.
     Expectation,
-    /// The expectation was recorded through a filter of another cut-off (mHz).
-    Filter(u32),
+    /// The expectation was recorded through another filter.
+    Filter(OtherFilter),
 }
 
 impl From<PrimitiveError> for Unfit {
@@ -74,17 +72,9 @@ impl From<Unfit> for (Refusal, [u32; 2]) {
             Unfit::Movement(error) => (Refusal::PrimitiveInvalid, PrimitiveTrouble::from(error).0),
             Unfit::Feedback => (Refusal::PrimitiveInvalid, PrimitiveTrouble::FEEDBACK.0),
             Unfit::Expectation => (Refusal::PrimitiveInvalid, PrimitiveTrouble::EXPECTATION.0),
-            Unfit::Filter(found) => (Refusal::ImageFilter, [found, millihertz(CUT_OFF)]),
+            Unfit::Filter(other) => other.into(),
         }
     }
-}
-
-/// Cut-off of the filter on the gauges (Hz).
-const CUT_OFF: f32 = control::wrench::WRENCH_CUT_OFF as f32;
-
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "cut to what fits")]
-fn millihertz(frequency: f32) -> u32 {
-    (frequency.clamp(0.0, 4.0e6) * 1000.0 + 0.5) as u32
 }
 
 /// The four rows of the hand, with feedback and expectation of the three gauges.
@@ -212,11 +202,7 @@ impl FingerPrimitive {
             return Err(Unfit::Feedback);
         }
         if !self.expected.is_empty() {
-            let found = marks.filter_cut_off;
-            // A NaN is unfit, too.
-            if !(1.0 - CUT_OFF_TOLERANCE..=1.0 + CUT_OFF_TOLERANCE).contains(&(found / CUT_OFF)) {
-                return Err(Unfit::Filter(millihertz(found)));
-            }
+            recorded_filter::check(marks.filter_cut_off).map_err(Unfit::Filter)?;
             let speed = f64::from(marks.recorded_duration) / f64::from(marks.duration);
             if !(speed > 0.0 && speed < 1e3) {
                 return Err(Unfit::Expectation);

@@ -353,7 +353,6 @@ impl<S: Store> Session<S> {
 }
 
 /// The device's time as it stands in envelopes, where it wraps after 49 days.
-#[allow(clippy::cast_possible_truncation, reason = "wrapping is the documented meaning")]
 const fn milliseconds(now_us: u64) -> u32 {
     (now_us / 1000) as u32
 }

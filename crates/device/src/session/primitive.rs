@@ -12,6 +12,7 @@ use link::image::{
 use super::upload::Refused;
 use super::wire::{PrimitiveTrouble, TROUBLE_EXPECTATION, TROUBLE_EXPERIENCE, TROUBLE_FEEDBACK};
 use crate::port::{FitPrimitive, StoredPrimitive};
+use crate::recorded_filter::{self, OtherFilter};
 
 // The image's limits must not exceed what the control half can hold; a table that does not fit would be refused
 // only after its upload.
@@ -24,16 +25,13 @@ const _: () = assert!(EXPERIENCE_ROWS == dmp::EXPERIENCE_CHANNELS);
 /// Room to copy the weights into, because those of an image are not aligned.
 pub(crate) type WeightRoom = [f32; WEIGHT_ROWS * KERNEL_LIMIT];
 
-/// How much the cut-off of the filter behind an expectation may differ from the device's, of one.
-const CUT_OFF_TOLERANCE: f32 = 0.01;
-
 /// Why an image is not a primitive for this device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Unfit {
     /// Its content is outside what the controller accepts.
     Content(PrimitiveTrouble),
-    /// Its expectation was recorded through a filter of another cut-off, mHz.
-    Filter(u32),
+    /// Its expectation was recorded through another filter.
+    Filter(OtherFilter),
 }
 
 impl From<PrimitiveTrouble> for Unfit {
@@ -46,17 +44,9 @@ impl From<Unfit> for Refused {
     fn from(unfit: Unfit) -> Self {
         match unfit {
             Unfit::Content(trouble) => (Refusal::PrimitiveInvalid, trouble.0),
-            Unfit::Filter(found) => (Refusal::ImageFilter, [found, millihertz(CUT_OFF)]),
+            Unfit::Filter(other) => other.into(),
         }
     }
-}
-
-/// Cut-off of the device's filter on wrench and gauges, Hz.
-const CUT_OFF: f32 = control::wrench::WRENCH_CUT_OFF as f32;
-
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "cut to what fits")]
-fn millihertz(frequency: f32) -> u32 {
-    (frequency.clamp(0.0, 4.0e6) * 1000.0 + 0.5) as u32
 }
 
 /// Makes `primitive` that of the content, in place (it has 23 kB, the stack has 64), and checks it against the arm: last, so that
@@ -70,10 +60,9 @@ pub(crate) fn build<'a>(
     room: &mut WeightRoom,
     primitive: &'a mut StoredPrimitive,
 ) -> Result<FitPrimitive<'a>, Unfit> {
-    let found = content.marks.filter_cutoff;
     let recorded = !content.expected_mean.is_empty() || !content.experience_mean.is_empty();
-    if recorded && (found / CUT_OFF - 1.0).abs() > CUT_OFF_TOLERANCE {
-        return Err(Unfit::Filter(millihertz(found)));
+    if recorded {
+        recorded_filter::check(content.marks.filter_cutoff).map_err(Unfit::Filter)?;
     }
     let weights = content.weights.copy_to(room).unwrap_or_default();
     let velocity = &content.start_velocity;

@@ -17,7 +17,6 @@ use crate::port::TimedRecord;
 use crate::startup::{Stage, StartupError};
 
 /// A cycle number as it goes over the link, where it wraps after 165 days.
-#[allow(clippy::cast_possible_truncation, reason = "wrapping is the documented meaning")]
 pub(crate) const fn cycle(number: u64) -> u32 {
     number as u32
 }
@@ -84,7 +83,6 @@ pub(crate) fn event(event: Event) -> Option<LinkEvent> {
 }
 
 /// A share of one in 1/1000, rounded to the nearest; 0 for what is no share.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=1000 before")]
 fn thousandths(share: f32) -> u32 {
     (share.clamp(0.0, 1.0) * 1000.0 + 0.5) as u32
 }

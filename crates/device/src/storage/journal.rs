@@ -115,7 +115,7 @@ impl Journal {
     }
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "checked when the region is opened: a flash has less than 4 GB")]
+/// Bytes of a sector. It fits: that a flash has less than 4 GB is checked when the region is opened.
 pub(super) const fn sector_bytes<F: NorFlash>() -> u32 {
     F::ERASE_SIZE as u32
 }
