@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 
 use crate::command::{Goal, Refusal, RunOptions};
 use crate::cycle::PERIOD;
-use crate::deviation::Deviation;
+use crate::deviation::{Deviation, Slow};
 use crate::hand::HandState;
 use crate::load::within_reach;
 use crate::real::Real;
@@ -59,6 +59,7 @@ pub(crate) struct Run<R: Real, const N: usize> {
     /// Feedback as computed last, before it fades.
     coupling: Coupling<R>,
     deviation: Option<Deviation<R>>,
+    slow: Slow<R>,
     watch: Watch<R>,
     /// Control periods of fading left: `FADE` in full, 0 gone.
     kept: u16,
@@ -110,6 +111,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             options,
             coupling: Coupling::NONE,
             deviation: None,
+            slow: Slow::new(),
             watch: Watch::new(),
             kept: FADE,
             settled: false,
@@ -126,6 +128,9 @@ impl<R: Real, const N: usize> Run<R, N> {
 
     /// Takes a new goal, or leaves everything as it was.
     pub(crate) fn set_goal(&mut self, primitive: &Primitive<R, N>, goal: &Goal) -> Result<(), Refusal> {
+        if goal.position.is_none() && goal.orientation.is_none() {
+            return Ok(());
+        }
         let mut next = self.rollout.clone();
         if let Some(position) = goal.position {
             if position.iter().any(|value| !value.is_finite()) {
@@ -170,14 +175,16 @@ impl<R: Real, const N: usize> Run<R, N> {
             let progress = self.rollout.progress();
             self.deviation =
                 primitive.expected().map(|expected| Deviation::new(&expected.at(progress), wrench, gauges));
+            if let Some(deviation) = &self.deviation {
+                self.slow.step(wrench, &deviation.expected);
+            }
         }
         let bends = self.options.feedback && !self.settled;
         if let Some(deviation) = self.deviation.filter(|_| bends && senses == Senses::Fresh) {
-            let seen = if self.options.finger_feedback {
-                deviation
-            } else {
-                Deviation { gauges: [R::of(0.0); 3], ..deviation }
-            };
+            let mut seen = deviation.slowly(&self.slow);
+            if !self.options.finger_feedback {
+                seen.gauges = [R::of(0.0); 3];
+            }
             self.coupling = self.rollout.coupling(primitive, &seen.sensors(), &SensorMap::IDENTITY);
         }
         // A plan that springs back tips what has just been grasped, and one that goes on giving way pulls at it.

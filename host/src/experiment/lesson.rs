@@ -336,8 +336,12 @@ pub fn experience(
 
 /// Where and how experience is gathered: `(mode, runs, part of the grid about the goal)`. The less a mode answers to what it feels, the
 /// nearer the object must be.
-const PRACTICE: [(Mode, usize, f64); 4] =
-    [(Mode::OpenLoop, 8, 0.3), (Mode::ForceControl, 12, 0.5), (Mode::Adaptive, 20, 1.0), (Mode::RigidFingers, 12, 1.0)];
+const PRACTICE: [(Mode, usize, f64); 4] = [
+    (Mode::OpenLoop, 20, 0.5),
+    (Mode::ForceControl, 16, 0.6),
+    (Mode::Adaptive, 20, 1.0),
+    (Mode::RigidFingers, 12, 1.0),
+];
 /// First of the seeds of arms that gather experience; experiments count from 1 to at most 1000.
 const PRACTICE_SEED: u64 = 1_000_000;
 

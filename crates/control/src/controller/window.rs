@@ -10,6 +10,9 @@ pub struct Window<R: Real, const D: usize, const CAPACITY: usize> {
     errors: [SVector<R, D>; CAPACITY],
     length: usize,
     next: usize,
+    /// Whether the window has been filled since it was emptied: before that there is no oldest error, and what the ring holds
+    /// is from earlier. So emptying it writes nothing but a few words, within a control cycle.
+    full: bool,
     sum: SVector<R, D>,
     /// Errors taken in since the window was last summed afresh.
     rebuilt: SVector<R, D>,
@@ -22,6 +25,7 @@ impl<R: Real, const D: usize, const CAPACITY: usize> Window<R, D, CAPACITY> {
             errors: [SVector::zeros(); CAPACITY],
             length: length.clamp(1, CAPACITY),
             next: 0,
+            full: false,
             sum: SVector::zeros(),
             rebuilt: SVector::zeros(),
         }
@@ -29,9 +33,9 @@ impl<R: Real, const D: usize, const CAPACITY: usize> Window<R, D, CAPACITY> {
 
     /// Empties the window and gives it this length.
     pub fn restart(&mut self, length: usize) {
-        self.errors = [SVector::zeros(); CAPACITY];
         self.length = length.clamp(1, CAPACITY);
         self.next = 0;
+        self.full = false;
         self.sum = SVector::zeros();
         self.rebuilt = SVector::zeros();
     }
@@ -44,7 +48,8 @@ impl<R: Real, const D: usize, const CAPACITY: usize> Window<R, D, CAPACITY> {
     /// Takes in the error of this control period and lets go of the oldest one.
     pub fn push(&mut self, error: &SVector<R, D>) {
         if let Some(slot) = self.errors.get_mut(self.next) {
-            self.sum += error - *slot;
+            let oldest = if self.full { *slot } else { SVector::zeros() };
+            self.sum += error - oldest;
             self.rebuilt += error;
             *slot = *error;
         }
@@ -52,6 +57,7 @@ impl<R: Real, const D: usize, const CAPACITY: usize> Window<R, D, CAPACITY> {
         if self.next >= self.length {
             // A running sum drifts by rounding; once per turn it is replaced by the sum of what is in the window.
             self.next = 0;
+            self.full = true;
             self.sum = self.rebuilt;
             self.rebuilt = SVector::zeros();
         }
@@ -60,5 +66,29 @@ impl<R: Real, const D: usize, const CAPACITY: usize> Window<R, D, CAPACITY> {
     /// Sum of the errors in the window.
     pub fn sum(&self) -> &SVector<R, D> {
         &self.sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector1;
+
+    use super::*;
+
+    #[test]
+    fn an_emptied_window_forgets_what_was_in_it_whatever_its_new_length() {
+        let errors: [f64; 39] = core::array::from_fn(|index| 1.0 + index as f64);
+        let mut window = Window::<f64, 1, 8>::new(8);
+        for (before, length) in [(3, 8), (8, 5), (20, 8), (11, 1), (1, 3)] {
+            errors[..before].iter().for_each(|error| window.push(&Vector1::new(100.0 * error)));
+            window.restart(length);
+            assert_eq!(window.sum()[0], 0.0);
+            for (last, error) in errors.iter().enumerate() {
+                window.push(&Vector1::new(*error));
+                // From the definition.
+                let sum: f64 = errors[(last + 1).saturating_sub(length)..=last].iter().sum();
+                assert_eq!(window.sum()[0], sum, "error {last} of a window of {length} after {before}");
+            }
+        }
     }
 }
