@@ -181,7 +181,8 @@ impl<R: Real, const N: usize> Run<R, N> {
         }
         let bends = self.options.feedback && !self.settled;
         if let Some(deviation) = self.deviation.filter(|_| bends && senses == Senses::Fresh) {
-            let mut seen = deviation.slowly(&self.slow);
+            // What swings is an arm that follows softly; a stiff one meets hard things, where each millisecond counts.
+            let mut seen = if self.options.compliant { deviation.slowly(&self.slow) } else { deviation };
             if !self.options.finger_feedback {
                 seen.gauges = [R::of(0.0); 3];
             }
