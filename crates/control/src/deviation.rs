@@ -49,9 +49,9 @@ impl<R: Real> Deviation<R> {
         Deviation { expected, expected_gauges, wrench, gauges }
     }
 
-    /// The same with the wrench's deviation as `Slow` has it.
-    pub fn slowly(&self, slow: &Slow<R>) -> Self {
-        Deviation { wrench: slow.beyond_dead_band(), ..*self }
+    /// The same with the smoothed deviation of the wrench.
+    pub fn smoothed(&self, wrench: &SmoothedWrench<R>) -> Self {
+        Deviation { wrench: wrench.beyond_dead_band(), ..*self }
     }
 
     /// The sensor values that Eq (8) is to see: what is expected, plus the deviation beyond the dead band.
@@ -65,14 +65,14 @@ impl<R: Real> Deviation<R> {
 
 /// The deviation of the wrench through a low-pass of [`FEEDBACK_CUT_OFF`], before its dead band.
 #[derive(Clone, Debug)]
-pub struct Slow<R: Real> {
+pub struct SmoothedWrench<R: Real> {
     filter: LowPass<R, 6>,
 }
 
-impl<R: Real> Slow<R> {
+impl<R: Real> SmoothedWrench<R> {
     /// No deviation so far.
     pub fn new() -> Self {
-        Slow { filter: LowPass::new(Butterworth::new(FEEDBACK_CUT_OFF, RATE)) }
+        SmoothedWrench { filter: LowPass::new(Butterworth::new(FEEDBACK_CUT_OFF, RATE)) }
     }
 
     /// Takes what is felt in this control period beyond the expected wrench.
@@ -83,15 +83,16 @@ impl<R: Real> Slow<R> {
 
     /// What is beyond the dead bands.
     fn beyond_dead_band(&self) -> Wrench<R> {
-        let slow = self.filter.output();
-        let (force, torque) = (Vector3::new(slow[0], slow[1], slow[2]), Vector3::new(slow[3], slow[4], slow[5]));
+        let smoothed = self.filter.output();
+        let force = Vector3::new(smoothed[0], smoothed[1], smoothed[2]);
+        let torque = Vector3::new(smoothed[3], smoothed[4], smoothed[5]);
         Wrench { force: shrunk(force, R::of(FORCE_DEAD_BAND)), torque: shrunk(torque, R::of(TORQUE_DEAD_BAND)) }
     }
 }
 
-impl<R: Real> Default for Slow<R> {
+impl<R: Real> Default for SmoothedWrench<R> {
     fn default() -> Self {
-        Slow::new()
+        SmoothedWrench::new()
     }
 }
 

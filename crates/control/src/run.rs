@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 
 use crate::command::{Goal, Refusal, RunOptions};
 use crate::cycle::PERIOD;
-use crate::deviation::{Deviation, Slow};
+use crate::deviation::{Deviation, SmoothedWrench};
 use crate::hand::HandState;
 use crate::load::within_reach;
 use crate::real::Real;
@@ -59,7 +59,8 @@ pub(crate) struct Run<R: Real, const N: usize> {
     /// Feedback as computed last, before it fades.
     coupling: Coupling<R>,
     deviation: Option<Deviation<R>>,
-    slow: Slow<R>,
+    /// What a compliant run bends by.
+    smoothed: SmoothedWrench<R>,
     watch: Watch<R>,
     /// Control periods of fading left: `FADE` in full, 0 gone.
     kept: u16,
@@ -111,7 +112,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             options,
             coupling: Coupling::NONE,
             deviation: None,
-            slow: Slow::new(),
+            smoothed: SmoothedWrench::new(),
             watch: Watch::new(),
             kept: FADE,
             settled: false,
@@ -175,14 +176,14 @@ impl<R: Real, const N: usize> Run<R, N> {
             let progress = self.rollout.progress();
             self.deviation =
                 primitive.expected().map(|expected| Deviation::new(&expected.at(progress), wrench, gauges));
-            if let Some(deviation) = &self.deviation {
-                self.slow.step(wrench, &deviation.expected);
+            if let Some(deviation) = self.deviation.as_ref().filter(|_| self.options.compliant) {
+                self.smoothed.step(wrench, &deviation.expected);
             }
         }
         let bends = self.options.feedback && !self.settled;
         if let Some(deviation) = self.deviation.filter(|_| bends && senses == Senses::Fresh) {
             // What swings is an arm that follows softly; a stiff one meets hard things, where each millisecond counts.
-            let mut seen = if self.options.compliant { deviation.slowly(&self.slow) } else { deviation };
+            let mut seen = if self.options.compliant { deviation.smoothed(&self.smoothed) } else { deviation };
             if !self.options.finger_feedback {
                 seen.gauges = [R::of(0.0); 3];
             }
