@@ -73,9 +73,10 @@ impl Guest {
         Some(messages)
     }
 
-    /// Hands over what the device says; `false`: nobody is there any more. One that does not read loses bytes, as on a serial line.
-    fn tell(&mut self, bytes: &[u8]) -> bool {
-        self.peer.write_all(bytes).map_or_else(|error| error.kind() == ErrorKind::WouldBlock, |()| true)
+    /// Hands over what the device says. One that does not read loses bytes, as on a serial line; one that has hung up may have
+    /// said its last words before, so only [`Self::messages`] tells who is gone.
+    fn tell(&mut self, bytes: &[u8]) {
+        let _ = self.peer.write_all(bytes);
     }
 }
 
@@ -176,11 +177,33 @@ fn serve(command: &Cmd, device: &mut Device, listener: &Listener, interrupt: &In
         while device.now() < target {
             bytes.clear();
             device.receive(target.saturating_sub(device.now()), &mut bytes)?;
-            guests.retain_mut(|guest| guest.tell(&bytes));
+            guests.iter_mut().for_each(|guest| guest.tell(&bytes));
         }
         if !command.fast {
             std::thread::sleep(device.now().saturating_sub(started.elapsed()));
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::net::UnixStream;
+
+    use super::*;
+
+    #[test]
+    fn the_last_words_of_one_who_has_hung_up_are_heard_whatever_he_is_told_meanwhile() {
+        let (mut host, arm) = UnixStream::pair().unwrap();
+        arm.set_nonblocking(true).unwrap();
+        let mut guest = Guest { peer: Box::new(arm), begun: Vec::new() };
+        assert_eq!(guest.messages().as_deref(), Some(&[][..]));
+        // A stop and a goodbye, and the process ends while telemetry goes on.
+        host.write_all(b"stop\0goodbye\0").unwrap();
+        drop(host);
+        guest.tell(b"telemetry");
+        guest.tell(b"telemetry");
+        assert_eq!(guest.messages().as_deref(), Some(&b"stop\0goodbye\0"[..]));
+        assert_eq!(guest.messages(), None);
+    }
 }
