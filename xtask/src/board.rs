@@ -88,7 +88,7 @@ impl Board {
             (Self::Mps2, true) => "board-mps2,wfi",
             (Self::Mps2, false) => "board-mps2",
             // A real core sleeps at no cost to its timers.
-            (Self::Stm32h743, _) => "board-stm32h743,wfi",
+            (Self::Stm32h743, _) => "board-stm32h743",
         }
     }
 

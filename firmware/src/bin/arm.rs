@@ -67,14 +67,10 @@ mod app {
     /// Keeps the library on the flash; sleeps otherwise.
     #[idle(shared = [session], local = [flash, room: StorageRoom = StorageRoom::new()])]
     fn idle(cx: idle::Context) -> ! {
-        application::rest(application::keep_library(cx.local.flash, cx.local.room, cx.shared.session, DefmtLog), sleep)
-    }
-
-    fn sleep() {
-        #[cfg(feature = "wfi")]
-        cortex_m::asm::wfi();
-        #[cfg(not(feature = "wfi"))]
-        cortex_m::asm::nop();
+        application::rest(
+            application::keep_library(cx.local.flash, cx.local.room, cx.shared.session, DefmtLog),
+            Board::sleep,
+        )
     }
 
     /// A slot begins.

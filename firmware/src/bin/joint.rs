@@ -67,10 +67,7 @@ mod app {
     #[idle]
     fn idle(_: idle::Context) -> ! {
         loop {
-            #[cfg(feature = "wfi")]
-            cortex_m::asm::wfi();
-            #[cfg(not(feature = "wfi"))]
-            cortex_m::asm::nop();
+            Board::sleep();
         }
     }
 

@@ -51,6 +51,10 @@ pub trait Edge: Sized {
     /// The peripherals, for the tasks that own them.
     fn split(self) -> Parts<Self>;
 
+    /// What a processor does that has nothing to do: sleeps until the next interrupt, or only a moment. Called with interrupts
+    /// unmasked.
+    fn sleep();
+
     /// The end: sends these frames, waits until they are on the bus as far as the bus allows, says why, and stops or
     /// restarts the processor. Called with interrupts masked, from anywhere, perhaps with peripherals in mid-sentence.
     fn stop(frames: &[CanFrame], reason: core::fmt::Arguments<'_>) -> !;

@@ -40,3 +40,10 @@ pub(super) fn now() -> u64 {
         now
     })
 }
+
+/// Lets QEMU account for every instruction executed so far.
+#[cfg(feature = "wfi")]
+#[inline(always)]
+pub(super) fn synchronise() {
+    COUNTER.read();
+}

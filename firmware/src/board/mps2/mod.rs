@@ -58,6 +58,19 @@ impl super::Edge for Board {
         }
     }
 
+    fn sleep() {
+        // QEMU's other thread moves virtual time on to the next timer as soon as the core is halted. On a busy machine it may do so
+        // before the core's thread has accounted for what it executed since it last looked at the time, by which the timer then
+        // is late. So the core looks at the time right before it halts; masked, so that no task comes between the two.
+        #[cfg(feature = "wfi")]
+        cortex_m::interrupt::free(|_| {
+            clock::synchronise();
+            cortex_m::asm::wfi();
+        });
+        #[cfg(not(feature = "wfi"))]
+        cortex_m::asm::nop();
+    }
+
     fn stop(frames: &[CanFrame], reason: core::fmt::Arguments<'_>) -> ! {
         // Frames first: words can wait, motors cannot.
         can::send_last(frames);

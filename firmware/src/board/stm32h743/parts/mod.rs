@@ -83,6 +83,10 @@ impl crate::board::Edge for Board {
         }
     }
 
+    fn sleep() {
+        cortex_m::asm::wfi();
+    }
+
     fn stop(frames: &[CanFrame], reason: core::fmt::Arguments<'_>) -> ! {
         // The frames go to the controller, which needs nobody to send them; the words are written meanwhile.
         fdcan::hand_over_last(frames);
