@@ -45,12 +45,8 @@ fn an_image_that_is_no_firmware_ends_with_its_last_words() {
 fn a_killed_firmware_ends_the_command_with_a_message() {
     let folder = expect(tempfile::tempdir());
     let arguments = ["--device", "sim:world=simple", "sim", "--listen", "unix:arm.sock"];
-    let served = start(folder.path(), &arguments);
-    let deadline = Instant::now() + Duration::from_secs(20);
-    while !folder.path().join("arm.sock").exists() {
-        assert!(Instant::now() < deadline, "the simulated arm never listened");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    let mut served = start(folder.path(), &arguments);
+    served.hear("listens");
     tactus(folder.path(), &["--device", "unix:arm.sock", "list"]).success();
     let qemu = child_of(served.id()).expect("QEMU runs below the command");
     let killed = Instant::now();

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 use std::process::Output;
-use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use system_tests::command::{Running, one_object, start, tactus};
@@ -11,12 +10,8 @@ use system_tests::{PRIMITIVE, expect, taught};
 /// A simulated arm that listens on `arm.sock` in the folder.
 fn served(folder: &Path) -> Running {
     let arguments = ["--json", "--device", "sil:world=simple", "sim", "--listen", "unix:arm.sock"];
-    let arm = start(folder, &arguments);
-    let deadline = Instant::now() + Duration::from_secs(20);
-    while !folder.join("arm.sock").exists() {
-        assert!(Instant::now() < deadline, "the simulated arm never listened");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    let mut arm = start(folder, &arguments);
+    arm.hear("listens");
     arm
 }
 

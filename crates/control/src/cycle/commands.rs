@@ -92,7 +92,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                     self.may_use_force(primitive, measured)?;
                 }
                 let hand = self.hand.answering();
-                self.run = Some(Run::start(primitive, q, &measured.pose, hand.as_ref(), options)?);
+                Run::start(&mut self.run, primitive, q, &measured.pose, hand.as_ref(), options)?;
                 self.wrench.tare_drift();
                 self.hand.tare_drift();
                 self.change(Trigger::Run, measured)
