@@ -72,11 +72,26 @@ impl Guest {
         }
         Some(messages)
     }
+}
 
-    /// Hands over what the device says. One that does not read loses bytes, as on a serial line; one that has hung up may have
-    /// said its last words before, so only [`Self::messages`] tells who is gone.
+/// Everybody who is connected.
+#[derive(Default)]
+struct Party(Vec<Guest>);
+
+impl Party {
+    /// What has been said to the device; those who are gone leave once their last words are heard.
+    fn hear(&mut self) -> Vec<u8> {
+        let mut said = Vec::new();
+        self.0.retain_mut(|guest| guest.messages().map(|messages| said.extend(messages)).is_some());
+        said
+    }
+
+    /// Hands over what the device says. One that does not read loses bytes, as on a serial line. Nobody leaves here: one that has
+    /// hung up may have said its last words before.
     fn tell(&mut self, bytes: &[u8]) {
-        let _ = self.peer.write_all(bytes);
+        for guest in &mut self.0 {
+            let _ = guest.peer.write_all(bytes);
+        }
     }
 }
 
@@ -157,19 +172,18 @@ fn accept(listener: &Listener) -> std::io::Result<Option<Box<dyn Peer>>> {
 
 fn serve(command: &Cmd, device: &mut Device, listener: &Listener, interrupt: &Interrupt) -> Result<(), TransportError> {
     let started = Instant::now();
-    let mut guests: Vec<Guest> = Vec::new();
+    let mut party = Party::default();
     let mut bytes = Vec::new();
     while !interrupt.is_raised() {
         if command.duration.is_some_and(|limit| device.now().as_secs_f64() >= limit) {
             break;
         }
-        while guests.len() < GUESTS
+        while party.0.len() < GUESTS
             && let Some(peer) = accept(listener).map_err(TransportError::Io)?
         {
-            guests.push(Guest { peer, begun: Vec::new() });
+            party.0.push(Guest { peer, begun: Vec::new() });
         }
-        let mut said = Vec::new();
-        guests.retain_mut(|guest| guest.messages().map(|messages| said.extend(messages)).is_some());
+        let said = party.hear();
         if !said.is_empty() {
             device.send(&said)?;
         }
@@ -177,7 +191,7 @@ fn serve(command: &Cmd, device: &mut Device, listener: &Listener, interrupt: &In
         while device.now() < target {
             bytes.clear();
             device.receive(target.saturating_sub(device.now()), &mut bytes)?;
-            guests.iter_mut().for_each(|guest| guest.tell(&bytes));
+            party.tell(&bytes);
         }
         if !command.fast {
             std::thread::sleep(device.now().saturating_sub(started.elapsed()));
@@ -196,14 +210,14 @@ mod tests {
     fn the_last_words_of_one_who_has_hung_up_are_heard_whatever_he_is_told_meanwhile() {
         let (mut host, arm) = UnixStream::pair().unwrap();
         arm.set_nonblocking(true).unwrap();
-        let mut guest = Guest { peer: Box::new(arm), begun: Vec::new() };
-        assert_eq!(guest.messages().as_deref(), Some(&[][..]));
+        let mut party = Party(vec![Guest { peer: Box::new(arm), begun: Vec::new() }]);
+        assert_eq!((party.hear(), party.0.len()), (Vec::new(), 1), "who says nothing is still there");
         // A stop and a goodbye, and the process ends while telemetry goes on.
         host.write_all(b"stop\0goodbye\0").unwrap();
         drop(host);
-        guest.tell(b"telemetry");
-        guest.tell(b"telemetry");
-        assert_eq!(guest.messages().as_deref(), Some(&b"stop\0goodbye\0"[..]));
-        assert_eq!(guest.messages(), None);
+        party.tell(b"telemetry");
+        party.tell(b"telemetry");
+        assert_eq!(party.hear(), b"stop\0goodbye\0");
+        assert_eq!((party.hear(), party.0.len()), (Vec::new(), 0), "who is gone has left");
     }
 }
