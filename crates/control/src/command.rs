@@ -32,7 +32,7 @@ pub struct Goal {
 }
 
 impl Goal {
-    /// The goal stored in the primitive, unchanged.
+    /// The goal stored in the primitive, or, while it runs, the present one: nothing is to change.
     pub const STORED: Goal = Goal { position: None, orientation: None };
 }
 

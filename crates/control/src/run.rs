@@ -71,7 +71,7 @@ pub(crate) struct Run<R: Real, const N: usize> {
 
 impl<R: Real, const N: usize> Run<R, N> {
     /// Puts a run into its place that begins at the measured pose and posture, at rest; a refused one leaves the place as it was.
-    /// In place, because moving it out of a result costs 3000 instructions in the cycle that has most to do.
+    /// In place, because moving it out of a result costs 6000 instructions in the cycle that has most to do.
     pub(crate) fn start(
         place: &mut Option<Self>,
         primitive: &Primitive<R, N>,
@@ -112,8 +112,10 @@ impl<R: Real, const N: usize> Run<R, N> {
         // The first speed acts at once; later ones are approached at the rollout's slew rate.
         rollout.set_speed_slew(None).map_err(reason)?;
         set_speed(&mut rollout, primitive, options.speed)?;
-        rollout.set_speed_slew(Some(R::of(2.0))).map_err(reason)?;
-        set_goal(&mut rollout, primitive, &options.goal)?;
+        rollout.set_speed_slew(Some(R::of(Rollout::<R, N>::DEFAULT_SLEW))).map_err(reason)?;
+        if options.goal != Goal::STORED {
+            set_goal(&mut rollout, primitive, &options.goal)?;
+        }
         *place = Some(Run {
             rollout,
             options,
@@ -130,8 +132,10 @@ impl<R: Real, const N: usize> Run<R, N> {
 
     /// Takes a new goal, or leaves everything as it was.
     pub(crate) fn set_goal(&mut self, primitive: &Primitive<R, N>, goal: &Goal) -> Result<(), Refusal> {
-        set_goal(&mut self.rollout, primitive, goal)?;
-        self.rested = 0;
+        if *goal != Goal::STORED {
+            set_goal(&mut self.rollout, primitive, goal)?;
+            self.rested = 0;
+        }
         Ok(())
     }
 
@@ -247,9 +251,6 @@ fn set_goal<R: Real, const N: usize>(
     primitive: &Primitive<R, N>,
     goal: &Goal,
 ) -> Result<(), Refusal> {
-    if goal.position.is_none() && goal.orientation.is_none() {
-        return Ok(());
-    }
     let mut next = rollout.clone();
     if let Some(position) = goal.position {
         if position.iter().any(|value| !value.is_finite()) {
@@ -269,6 +270,7 @@ fn set_goal<R: Real, const N: usize>(
     Ok(())
 }
 
+/// Takes a new speed factor; what the rollout refuses as too fast is out of range as well.
 fn set_speed<R: Real, const N: usize>(
     rollout: &mut Rollout<R, N>,
     primitive: &Primitive<R, N>,
