@@ -1,7 +1,7 @@
 //! A controller and its wire: what is offered, what came of it, and faults.
 //!
-//! The wire keeps a queue for each controller. [`WireEvent::Offer`] appends to it; [`WireEvent::Withdraw`] empties it but for
-//! a frame that has begun. Frames leave in the order in which they were offered.
+//! The wire keeps a queue for each controller. [`WireEvent::Offer`] appends to it; [`WireEvent::Withdraw`] empties it but
+//! for a frame that has begun. Frames leave in the order in which they were offered.
 
 use crate::Nanoseconds;
 use crate::controller::{Bus, Controller, IDLE_BITS, RECOVERY_SEQUENCES};
@@ -19,7 +19,7 @@ const ERROR_FRAME_BITS: u32 = 14;
 const SUSPENSION_BITS: u32 = 8;
 /// Delimiter of the checksum and acknowledge slot: after these a missing acknowledge is known.
 const TO_ACKNOWLEDGE_BITS: u32 = 2;
-/// A burst of disturbance hits the first dominant bit behind the identifier: start of frame 1, identifier 11, and that bit.
+/// A burst of disturbance hits the first dominant bit behind the identifier: start of frame 1, identifier 11, that bit.
 const TO_DISTURBED_BIT: u32 = 13;
 
 /// What the wire must be told.
