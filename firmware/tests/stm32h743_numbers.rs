@@ -20,6 +20,7 @@ fn phase_locked_loops_stay_inside_what_the_chip_bears() {
         assert_eq!(HSE_HZ % pll.input_divider, 0);
         assert!((8_000_000..=16_000_000).contains(&pll.comparison_hz()), "{pll:?}");
         assert!((192_000_000..=836_000_000).contains(&pll.oscillator_hz()), "{pll:?}");
+        assert!(pll.oscillator_hz() > MEDIUM_OSCILLATOR_HZ_LIMIT, "the oscillator for 1 to 2 MHz would be taken: {pll:?}");
         for divider in [pll.p, pll.q].into_iter().flatten() {
             assert!((1..=128).contains(&divider));
             assert_eq!(pll.oscillator_hz() % divider, 0, "a rounded frequency is not the one stated");

@@ -4,7 +4,7 @@
 //! HSE 8 MHz ─┬─ PLL1: / 1 × 100 = 800 MHz ─┬─ / 2 ─ 400 MHz core ─ / 2 ─ 200 MHz AHB ─ / 2 ─ 100 MHz APB 1..4
 //! (ST-LINK)  │                             │                                        └─ × 2 ─ 200 MHz timers
 //!            │                             └─ / 10 ─ 80 MHz FDCAN
-//!            └─ PLL3: / 1 × 48 = 384 MHz ──── / 8 ─ 48 MHz USB
+//!            └─ PLL3: / 1 × 96 = 768 MHz ─── / 16 ─ 48 MHz USB
 //! ```
 
 /// Input of all phase-locked loops, Hz: the ST-LINK on the board drives its 8 MHz crystal into HSE (bypass). If it were
@@ -25,24 +25,29 @@ pub struct PhaseLockedLoop {
 }
 
 impl PhaseLockedLoop {
-    /// Frequency at which the loop compares, Hz; 8 to 16 MHz for the wide oscillator.
+    /// Frequency at which the loop compares, Hz. The wide oscillator wants 2 to 16 MHz, the medium one 1 to 2 MHz.
     #[must_use]
     pub const fn comparison_hz(&self) -> u32 {
         HSE_HZ / self.input_divider
     }
 
-    /// Frequency of its oscillator, Hz; 192 to 836 MHz.
+    /// Frequency of its oscillator, Hz; 192 to 836 MHz for the wide one.
     #[must_use]
     pub const fn oscillator_hz(&self) -> u32 {
         self.comparison_hz() * self.multiplier
     }
 }
 
+/// embassy-stm32 takes the medium oscillator (150 to 420 MHz) for every frequency up to this one, Hz. That oscillator
+/// wants a comparison at 1 to 2 MHz, and these loops compare at 8 MHz: one that stays below this may never lock, and the
+/// start-up would wait for it for ever.
+pub const MEDIUM_OSCILLATOR_HZ_LIMIT: u32 = 420_000_000;
+
 /// Core and CAN.
 pub const PLL1: PhaseLockedLoop = PhaseLockedLoop { input_divider: 1, multiplier: 100, p: Some(2), q: Some(10) };
 
 /// USB.
-pub const PLL3: PhaseLockedLoop = PhaseLockedLoop { input_divider: 1, multiplier: 48, p: None, q: Some(8) };
+pub const PLL3: PhaseLockedLoop = PhaseLockedLoop { input_divider: 1, multiplier: 96, p: None, q: Some(16) };
 
 /// The divided output, Hz; 0 where the output is off.
 const fn output(pll: &PhaseLockedLoop, divider: Option<u32>) -> u32 {
