@@ -4,7 +4,7 @@
 //! HSE 8 MHz ─┬─ PLL1: / 1 × 100 = 800 MHz ─┬─ / 2 ─ 400 MHz core ─ / 2 ─ 200 MHz AHB ─ / 2 ─ 100 MHz APB 1..4
 //! (ST-LINK)  │                             │                                        └─ × 2 ─ 200 MHz timers
 //!            │                             └─ / 10 ─ 80 MHz FDCAN
-//!            └─ PLL3: / 1 × 96 = 768 MHz ─── / 16 ─ 48 MHz USB
+//!            └─ PLL3: / 1 × 96 = 768 MHz ─── / 16 ─ 48 MHz USB and the serial line
 //! ```
 
 /// Input of all phase-locked loops, Hz: the ST-LINK on the board drives its 8 MHz crystal into HSE (bypass). If it were
@@ -46,7 +46,7 @@ pub const MEDIUM_OSCILLATOR_HZ_LIMIT: u32 = 420_000_000;
 /// Core and CAN.
 pub const PLL1: PhaseLockedLoop = PhaseLockedLoop { input_divider: 1, multiplier: 100, p: Some(2), q: Some(10) };
 
-/// USB.
+/// USB and the serial line.
 pub const PLL3: PhaseLockedLoop = PhaseLockedLoop { input_divider: 1, multiplier: 96, p: None, q: Some(16) };
 
 /// The divided output, Hz; 0 where the output is off.
@@ -85,8 +85,9 @@ pub const CAN_HZ: u32 = output(&PLL1, PLL1.q);
 /// Clock of the USB device, Hz: 48 MHz within 0.25 %, so from the crystal and not from an RC oscillator.
 pub const USB_HZ: u32 = output(&PLL3, PLL3.q);
 
-/// Kernel clock of the serial line to the ST-LINK, Hz.
-pub const UART_HZ: u32 = APB_HZ;
+/// Kernel clock of the serial line to the ST-LINK, Hz: 48 MHz / 52 comes nearer to [`super::lines::BAUD`] than any whole
+/// fraction of [`APB_HZ`].
+pub const UART_HZ: u32 = output(&PLL3, PLL3.q);
 
 /// The watchdog's own RC oscillator, Hz, nominal.
 pub const LSI_HZ: u32 = 32_000;

@@ -40,6 +40,7 @@ pub(super) fn config() -> Config {
     config.rcc.ls = rcc::LsConfig::off();
     config.rcc.mux.fdcansel = rcc::mux::Fdcansel::PLL1_Q;
     config.rcc.mux.usbsel = rcc::mux::Usbsel::PLL3_Q;
+    config.rcc.mux.usart234578sel = rcc::mux::Usart234578sel::PLL3_Q;
     config
 }
 
