@@ -3,6 +3,7 @@
 //! The pucks hold the last torque they were sent until their watchdog or the safety module stops them, so the zero
 //! torques go first. The panic may have come from anywhere: nothing here depends on the state of the application.
 
+use core::fmt;
 use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, exception};
@@ -18,20 +19,21 @@ fn last_frames() -> [CanFrame; 4] {
 
 #[panic_handler]
 fn panicked(information: &PanicInfo<'_>) -> ! {
+    stop(format_args!("{information}"))
+}
+
+/// The end, for a reason that the board has found.
+pub fn stop(reason: fmt::Arguments<'_>) -> ! {
     cortex_m::interrupt::disable();
-    Board::stop(&last_frames(), format_args!("{information}"))
+    Board::stop(&last_frames(), reason)
 }
 
 /// The end after a forbidden access, where the board guards its stack: called on another stack, with interrupts masked.
-pub fn after_memory_fault(address: u32, stack: u32) -> ! {
-    Board::stop(
-        &last_frames(),
-        format_args!("memory fault at {address:#010x}, stack at {stack:#010x}: stack overflow?"),
-    )
+pub fn after_memory_fault(address: u32, stack_pointer: u32) -> ! {
+    stop(format_args!("memory fault at {address:#010x}, stack at {stack_pointer:#010x}: stack overflow?"))
 }
 
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    cortex_m::interrupt::disable();
-    Board::stop(&last_frames(), format_args!("hard fault at {:#010x}: {frame:?}", frame.pc()))
+    stop(format_args!("hard fault at {:#010x}: {frame:?}", frame.pc()))
 }

@@ -91,6 +91,17 @@ fn watchdog_waits_for_several_slots_and_the_last_frames_but_not_for_long() {
 }
 
 #[test]
+fn watchdog_bears_with_the_start_and_tells_soon_that_it_has_no_oscillator() {
+    assert_eq!(WATCHDOG_START_US, 512_000, "what the documents state");
+    let slowest_hz = LSI_HZ * (100 - LSI_TOLERANCE_PERCENT) / 100;
+    let update_us = 6 * WATCHDOG_PRESCALER * 1_000_000 / slowest_hz;
+    assert!(2 * update_us < WATCHDOG_UPDATE_US, "a healthy one takes {update_us} us and would be refused");
+    // The wait for it happens inside the window of the start-up, and must not use much of it.
+    let fastest = WATCHDOG_START_US * 100 / (100 + LSI_TOLERANCE_PERCENT);
+    assert!(WATCHDOG_UPDATE_US < fastest / 20);
+}
+
+#[test]
 fn filters_let_through_exactly_the_replies_a_wam_sends_to_its_master() {
     let motors = || Node::ARM.into_iter().chain(Node::HAND);
     let mut wanted: Vec<u16> = motors().map(|node| reply_id(node, Group::POSITION_REPLIES)).collect();

@@ -55,3 +55,17 @@ pub(super) fn now() -> u64 {
         now
     })
 }
+
+/// Asks until it is so, for at most this long; tells whether it was. Works with interrupts masked, once [`start`] has run.
+pub(super) fn within(us: u32, mut is_so: impl FnMut() -> bool) -> bool {
+    let begin = TIM5.cnt().read();
+    let limit = us * (TICKS_PER_US as u32);
+    loop {
+        if is_so() {
+            return true;
+        }
+        if TIM5.cnt().read().wrapping_sub(begin) >= limit {
+            return false;
+        }
+    }
+}

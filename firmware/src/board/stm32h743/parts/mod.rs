@@ -42,6 +42,7 @@ impl crate::board::Edge for Board {
     const SIMULATED: bool = false;
 
     fn start(mut core: cortex_m::Peripherals) -> Self {
+        watchdog::start();
         protection::start(&mut core);
         let peripherals: Peripherals = embassy_stm32::init(tree::config());
         tree::repair();
