@@ -102,6 +102,21 @@ fn watchdog_bears_with_the_start_and_tells_soon_that_it_has_no_oscillator() {
 }
 
 #[test]
+fn the_end_waits_long_enough_for_the_last_frames_and_ends_before_the_watchdog() {
+    // Eleven-bit identifier, eight bytes, a stuff bit after every four bits of what is stuffed, and the space behind it.
+    let longest_bits = 47 + 64 + (34 + 64 - 1) / 4;
+    let frame_us = longest_bits * 1_000_000 / BITS_PER_SECOND;
+    let last = 4;
+    assert!(LAST_ROOM_US > (1 + last) * frame_us);
+    let join_us = 129 * 11 * 1_000_000 / BITS_PER_SECOND;
+    assert!(LAST_LEFT_US > join_us + last * frame_us);
+    assert!(LAST_LEFT_US > (1 + (ARM.transmit - last) + last) * frame_us);
+    let fastest = WATCHDOG_US * 100 / (100 + LSI_TOLERANCE_PERCENT);
+    // Two milliseconds for writing down the reason.
+    assert!(LAST_ROOM_US + LAST_LEFT_US + 2_000 < fastest, "the watchdog would cut the last frames off");
+}
+
+#[test]
 fn filters_let_through_exactly_the_replies_a_wam_sends_to_its_master() {
     let motors = || Node::ARM.into_iter().chain(Node::HAND);
     let mut wanted: Vec<u16> = motors().map(|node| reply_id(node, Group::POSITION_REPLIES)).collect();

@@ -44,3 +44,10 @@ pub const WATCHDOG_UPDATE_US: u32 = 5_000;
 const fn watchdog_us(ticks: u32) -> u32 {
     ticks * WATCHDOG_PRESCALER * (1_000_000 / 1_000) / (LSI_HZ / 1_000)
 }
+
+/// At the end, the longest wait for room for the last frames, us: four full frames of ours and one of another node.
+pub const LAST_ROOM_US: u32 = 1_500;
+
+/// At the end, the longest wait for the last frames to leave, us: either the bus has to be joined again, which takes 129
+/// times eleven bits, or a frame of another node and four that waited come first.
+pub const LAST_LEFT_US: u32 = 3_000;

@@ -22,6 +22,8 @@ use puck::{CanFrame, CanId};
 
 use super::super::constants::can::{ARM, BIT_TIMING, ELEMENT_WORDS, HOST, MessageMemory};
 use super::super::constants::filters::{ARM_FILTERS, HOST_FILTERS};
+use super::super::constants::timers::{LAST_LEFT_US, LAST_ROOM_US};
+use super::clock;
 use super::device::{Chip, Interrupt, level};
 use crate::board::CanStatus;
 
@@ -39,10 +41,6 @@ const EXTENDED: u32 = 1 << 30;
 const REMOTE: u32 = 1 << 29;
 /// Where the length stands in the second word.
 const LENGTH_SHIFT: u32 = 16;
-
-/// Rounds of waiting for the last frames: each reads one register over the peripheral bus, at least 20 core cycles, so
-/// this is 3 ms or more at 400 MHz, enough for 20 frames.
-const LAST_ROUNDS: u32 = 60_000;
 
 /// One of the two controllers.
 pub(super) struct Controller {
@@ -304,15 +302,14 @@ impl CanStatus for ArmBus {
 
 /// The end: takes back what waits, rejoins if need be, and hands these frames over. Waits for nothing but room.
 pub(super) fn hand_over_last(frames: &[CanFrame]) {
+    if !is_started() {
+        return;
+    }
     let controller = &ARM_CONTROLLER;
     controller.registers.txbcr().write(|w| w.0 = u32::MAX);
     controller.registers.cccr().modify(|w| w.set_init(false));
     // A frame that is on the wire is finished first; the others are gone at once.
-    for _ in 0..LAST_ROUNDS {
-        if controller.waiting() == 0 {
-            break;
-        }
-    }
+    clock::within(LAST_ROOM_US, || controller.waiting() == 0);
     for frame in frames {
         if let Id::Standard(id) = frame.id() {
             // There is room for eight after the above; if the bus is dead there is nothing left to try.
@@ -323,9 +320,13 @@ pub(super) fn hand_over_last(frames: &[CanFrame]) {
 
 /// Waits until the last frames have left, at most a few milliseconds.
 pub(super) fn wait_for_last() {
-    for _ in 0..LAST_ROUNDS {
-        if ARM_CONTROLLER.waiting() == 0 {
-            break;
-        }
+    if is_started() {
+        clock::within(LAST_LEFT_US, || ARM_CONTROLLER.waiting() == 0);
     }
+}
+
+/// Whether the controllers have a clock: the end may come before the start-up got here. The clock that bounds the waits is
+/// started before them.
+fn is_started() -> bool {
+    RCC.apb1henr().read().fdcanen()
 }

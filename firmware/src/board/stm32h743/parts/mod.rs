@@ -19,10 +19,15 @@ mod uart;
 mod usb;
 mod watchdog;
 
+use core::sync::atomic::{AtomicBool, Ordering};
+
 use embassy_stm32::Peripherals;
 use puck::CanFrame;
 
 use crate::board::Parts;
+
+/// The end has begun.
+static STOPPING: AtomicBool = AtomicBool::new(false);
 
 /// The board.
 pub struct Board {
@@ -89,9 +94,14 @@ impl crate::board::Edge for Board {
     }
 
     fn stop(frames: &[CanFrame], reason: core::fmt::Arguments<'_>) -> ! {
-        // The frames go to the controller, which needs nobody to send them; the words are written meanwhile.
-        fdcan::hand_over_last(frames);
-        last_words::write(reason);
+        // Once only: should anything below end here again, the watchdog ends that.
+        if !STOPPING.swap(true, Ordering::Relaxed) {
+            // All waits below are bounded by the clock and shorter than the watchdog's window, which begins anew here.
+            watchdog::feed();
+            // The frames go to the controller, which needs nobody to send them; the words are written meanwhile.
+            fdcan::hand_over_last(frames);
+            last_words::write(reason);
+        }
         fdcan::wait_for_last();
         cortex_m::peripheral::SCB::sys_reset()
     }
