@@ -107,13 +107,14 @@ fn the_end_waits_long_enough_for_the_last_frames_and_ends_before_the_watchdog() 
     let longest_bits = 47 + 64 + (34 + 64 - 1) / 4;
     let frame_us = longest_bits * 1_000_000 / BITS_PER_SECOND;
     let last = 4;
+    assert!(ARM.transmit >= last, "they would not fit into an empty queue");
     assert!(LAST_ROOM_US > (1 + last) * frame_us);
     let join_us = 129 * 11 * 1_000_000 / BITS_PER_SECOND;
     assert!(LAST_LEFT_US > join_us + last * frame_us);
     assert!(LAST_LEFT_US > (1 + (ARM.transmit - last) + last) * frame_us);
     let fastest = WATCHDOG_US * 100 / (100 + LSI_TOLERANCE_PERCENT);
     // Two milliseconds for writing down the reason.
-    assert!(LAST_ROOM_US + LAST_LEFT_US + 2_000 < fastest, "the watchdog would cut the last frames off");
+    assert!(LAST_ROOM_US + LAST_STOP_US + LAST_LEFT_US + 2_000 < fastest, "the watchdog would cut the last frames off");
 }
 
 #[test]

@@ -48,6 +48,9 @@ const fn watchdog_us(ticks: u32) -> u32 {
 /// At the end, the longest wait for room for the last frames, us: four full frames of ours and one of another node.
 pub const LAST_ROOM_US: u32 = 1_500;
 
+/// At the end, the longest wait until a controller whose queue does not move has left the bus, us: a few ticks of its clock.
+pub const LAST_STOP_US: u32 = 100;
+
 /// At the end, the longest wait for the last frames to leave, us: either the bus has to be joined again, which takes 129
 /// times eleven bits, or a frame of another node and four that waited come first.
 pub const LAST_LEFT_US: u32 = 3_000;

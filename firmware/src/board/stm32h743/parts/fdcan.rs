@@ -22,7 +22,7 @@ use puck::{CanFrame, CanId};
 
 use super::super::constants::can::{ARM, BIT_TIMING, ELEMENT_WORDS, HOST, MessageMemory};
 use super::super::constants::filters::{ARM_FILTERS, HOST_FILTERS};
-use super::super::constants::timers::{LAST_LEFT_US, LAST_ROOM_US};
+use super::super::constants::timers::{LAST_LEFT_US, LAST_ROOM_US, LAST_STOP_US};
 use super::clock;
 use super::device::{Chip, Interrupt, level};
 use crate::board::CanStatus;
@@ -181,9 +181,18 @@ impl Controller {
         if !(self.registers.psr().read().bo() && self.registers.cccr().read().init()) {
             return false;
         }
-        self.registers.txbcr().write(|w| w.0 = u32::MAX);
-        self.registers.cccr().modify(|w| w.set_init(false));
+        self.forget_and_join();
         true
+    }
+
+    /// Empties both queues and joins the bus. Only for a controller that is off the bus (INIT).
+    ///
+    /// Not by cancelling: that is for dedicated buffers and queues, and the controller's manual does not say that its FIFO
+    /// skips a cancelled frame. Opening the configuration (CCE) makes the controller forget what waits and what it has
+    /// received (TXBRP, TXFQS, RXF0S) and keeps its settings.
+    fn forget_and_join(&self) {
+        self.registers.cccr().modify(|w| w.set_cce(true));
+        self.join();
     }
 }
 
@@ -300,19 +309,23 @@ impl CanStatus for ArmBus {
     }
 }
 
-/// The end: takes back what waits, rejoins if need be, and hands these frames over. Waits for nothing but room.
+/// The end: hands these frames over behind what waits, of which there is less than a millisecond. Only if the queue does
+/// not move, or the controller has left the bus, what waits is thrown away.
 pub(super) fn hand_over_last(frames: &[CanFrame]) {
     if !is_started() {
         return;
     }
     let controller = &ARM_CONTROLLER;
-    controller.registers.txbcr().write(|w| w.0 = u32::MAX);
-    controller.registers.cccr().modify(|w| w.set_init(false));
-    // A frame that is on the wire is finished first; the others are gone at once.
-    clock::within(LAST_ROOM_US, || controller.waiting() == 0);
+    let control = controller.registers.cccr();
+    let on_the_bus = !control.read().init();
+    if !(on_the_bus && clock::within(LAST_ROOM_US, || controller.room() >= frames.len())) {
+        control.modify(|w| w.set_init(true));
+        clock::within(LAST_STOP_US, || control.read().init());
+        controller.forget_and_join();
+    }
     for frame in frames {
         if let Id::Standard(id) = frame.id() {
-            // There is room for eight after the above; if the bus is dead there is nothing left to try.
+            // There is room after the above; if the bus is dead there is nothing left to try.
             let _ = controller.send(id.as_raw(), frame.data(), frame.is_remote_frame());
         }
     }
