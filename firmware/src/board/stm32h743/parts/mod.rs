@@ -2,6 +2,7 @@
 
 mod clock;
 pub mod device;
+mod faults;
 mod fdcan;
 mod flash;
 mod host_can;

@@ -1,4 +1,4 @@
-//! Memory protection, caches and faults: set up before anything else runs.
+//! Memory protection and caches, and which faults have a handler: set up before anything else runs.
 //!
 //! Three regions of the memory protection unit on top of the processor's default map. The guard below the stack and the
 //! one at address 0 may not be touched by anybody. Bank 2 of the flash is *device* memory: the processor then neither
@@ -57,9 +57,6 @@ fn region(unit: &mut MPU, number: u32, region: &Region, attributes: u32) {
 
 // Before main: the code of the control cycle goes to where it runs. Written by hand, because no function of Rust may run
 // before its memory is there.
-//
-// A memory fault most likely is an overflown stack, so its handler must not use it: it takes another one first. The
-// address at fault and the stack's position come along as arguments.
 global_asm!(
     ".section .text.__pre_init,\"ax\",%progbits",
     ".global __pre_init",
@@ -80,26 +77,4 @@ global_asm!(
     "isb",
     "bx lr",
     ".ltorg",
-    ".section .text.MemoryManagement,\"ax\",%progbits",
-    ".global MemoryManagement",
-    ".type MemoryManagement,%function",
-    ".thumb_func",
-    "MemoryManagement:",
-    "mov r0, sp",
-    "ldr r1, =__emergency_stack",
-    "mov sp, r1",
-    "b memory_fault",
-    ".ltorg",
 );
-
-/// Memory management fault address register.
-const FAULT_ADDRESS: *const u32 = 0xE000_ED34 as *const u32;
-
-/// Somebody touched a guard. Runs on the emergency stack and never returns.
-#[unsafe(no_mangle)]
-extern "C" fn memory_fault(stack: u32) -> ! {
-    cortex_m::interrupt::disable();
-    // SAFETY: a register of the processor that only tells.
-    let address = unsafe { FAULT_ADDRESS.read_volatile() };
-    crate::last_words::after_memory_fault(address, stack)
-}
