@@ -196,13 +196,12 @@ impl Controller {
     }
 }
 
-/// Starts both controllers and lets the arm's interrupt.
-pub(super) fn start(nvic: &mut NVIC) {
+/// Starts the arm's controller and lets it interrupt, and the host's if the chip bears both.
+pub(super) fn start(nvic: &mut NVIC, host: bool) {
     RCC.apb1henr().modify(|w| w.set_fdcanen(true));
     RCC.apb1hrstr().modify(|w| w.set_fdcanrst(true));
     RCC.apb1hrstr().modify(|w| w.set_fdcanrst(false));
     ARM_CONTROLLER.start(&ARM_FILTERS);
-    HOST_CONTROLLER.start(&HOST_FILTERS);
     let r = ARM_CONTROLLER.registers;
     r.ie().write(|w| {
         w.set_rfne(0, true);
@@ -218,7 +217,10 @@ pub(super) fn start(nvic: &mut NVIC) {
         w.set_eint1(true);
     });
     ARM_CONTROLLER.join();
-    HOST_CONTROLLER.join();
+    if host {
+        HOST_CONTROLLER.start(&HOST_FILTERS);
+        HOST_CONTROLLER.join();
+    }
     // SAFETY: the handler below clears one flag and pends one line; it shares nothing with anybody.
     unsafe {
         nvic.set_priority(Chip::FDCAN1_IT1, level(SENT_PRIORITY));

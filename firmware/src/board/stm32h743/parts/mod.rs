@@ -25,6 +25,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_stm32::Peripherals;
 use puck::CanFrame;
 
+use super::constants::can;
 use crate::board::Parts;
 
 /// The end has begun.
@@ -34,6 +35,7 @@ static STOPPING: AtomicBool = AtomicBool::new(false);
 pub struct Board {
     light: light::StatusLight,
     serial: &'static str,
+    host_bus: bool,
 }
 
 impl crate::board::Edge for Board {
@@ -66,13 +68,21 @@ impl crate::board::Edge for Board {
             usb_minus: peripherals.PA11,
             usb_plus: peripherals.PA12,
         });
-        fdcan::start(&mut core.NVIC);
+        let revision = tree::revision();
+        let host_bus = can::bears_both(revision);
+        fdcan::start(&mut core.NVIC, host_bus);
         uart::start(&mut core.NVIC);
         let serial = serial_number::read();
         usb::start(&mut core.NVIC, serial);
         defmt::info!("reset by {=str}", cause.words());
         last_words::tell();
-        Self { light, serial }
+        if !host_bus {
+            defmt::warn!(
+                "no second CAN bus: this chip is revision {=u16:#x}, see errata sheet ES0392 2.24.2",
+                revision
+            );
+        }
+        Self { light, serial, host_bus }
     }
 
     fn serial(&self) -> &'static str {
@@ -84,7 +94,7 @@ impl crate::board::Edge for Board {
             clock: clock::Clock,
             slot_timer: slot_timer::SlotTimer,
             can: fdcan::ArmBus::take(),
-            link: port::new(),
+            link: port::new(self.host_bus),
             light: self.light,
             flash: flash::Bank2::take(),
         }
