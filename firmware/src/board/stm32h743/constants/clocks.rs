@@ -11,6 +11,20 @@
 /// wrong every rate below would be wrong by the same factor: bus, line and control.
 pub const HSE_HZ: u32 = 8_000_000;
 
+/// The chip's own RC oscillator, from which everything runs until the clock tree is set up, Hz; 1 % off at room temperature,
+/// so the bus cannot be driven by it.
+pub const HSI_HZ: u32 = 64_000_000;
+
+/// How long HSE may take before the light begins to blink, us: a clock that is there is ready within microseconds.
+pub const HSE_SOON_US: u32 = 2_000;
+
+/// Half a period of that blinking, us: 10 Hz, which nobody takes for the steady light of torque.
+pub const HSE_BLINK_US: u32 = 50_000;
+
+/// Times the light is switched before the image gives up and starts again: 300 ms. The ST-LINK starts together with the
+/// chip and gives its clock when it has started itself.
+pub const HSE_BLINKS: u32 = 6;
+
 /// A phase-locked loop: `input / input_divider × multiplier / output_divider`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PhaseLockedLoop {

@@ -340,8 +340,8 @@ pub(super) fn wait_for_last() {
     }
 }
 
-/// Whether the controllers have a clock: the end may come before the start-up got here. The clock that bounds the waits is
-/// started before them.
+/// Whether the controllers have their clocks: the end may come before the start-up got here, or because the clock failed. The
+/// one that bounds the waits is started before them.
 fn is_started() -> bool {
-    RCC.apb1henr().read().fdcanen()
+    RCC.apb1henr().read().fdcanen() && RCC.cr().read().pllrdy(0)
 }

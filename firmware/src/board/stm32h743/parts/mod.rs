@@ -1,6 +1,7 @@
 //! The board put together: clocks first, then protection, then the peripherals, then what the last start left behind.
 
 mod clock;
+mod crystal;
 pub mod device;
 mod faults;
 mod fdcan;
@@ -52,9 +53,12 @@ impl crate::board::Edge for Board {
     fn start(mut core: cortex_m::Peripherals) -> Self {
         watchdog::start();
         protection::start(&mut core);
+        clock::start();
+        crystal::wait();
         let peripherals: Peripherals = embassy_stm32::init(tree::config());
         tree::repair();
         clock::start();
+        crystal::watch();
         logger::start();
         let cause = reset::take_cause();
         let light = light::StatusLight::new(peripherals.PB14);
