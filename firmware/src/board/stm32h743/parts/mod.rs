@@ -25,6 +25,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use embassy_stm32::Peripherals;
 use puck::CanFrame;
+use reset::Phase;
 
 use super::constants::can;
 use crate::board::Parts;
@@ -52,6 +53,7 @@ impl crate::board::Edge for Board {
 
     fn start(mut core: cortex_m::Peripherals) -> Self {
         watchdog::start();
+        let cause = reset::take_cause();
         protection::start(&mut core);
         clock::start();
         crystal::wait();
@@ -59,8 +61,8 @@ impl crate::board::Edge for Board {
         tree::repair();
         clock::start();
         crystal::watch();
+        reset::enter(Phase::Start);
         logger::start();
-        let cause = reset::take_cause();
         let light = light::StatusLight::new(peripherals.PB14);
         pins::connect(pins::Pins {
             arm_receive: peripherals.PD0,
@@ -78,7 +80,7 @@ impl crate::board::Edge for Board {
         uart::start(&mut core.NVIC);
         let serial = serial_number::read();
         usb::start(&mut core.NVIC, serial);
-        defmt::info!("reset by {=str}", cause.words());
+        defmt::info!("reset by {=str}", cause);
         last_words::tell();
         if !host_bus {
             defmt::warn!(
@@ -118,6 +120,6 @@ impl crate::board::Edge for Board {
             last_words::write(reason);
         }
         fdcan::wait_for_last();
-        cortex_m::peripheral::SCB::sys_reset()
+        reset::restart()
     }
 }

@@ -5,6 +5,7 @@ use embassy_stm32::pac::{RCC, TIM2};
 
 use super::super::constants::clocks::TIMER_HZ;
 use super::super::constants::timers::{CLOCK_HZ, SLOT_PRESCALER, SLOT_TICKS};
+use super::reset::{self, Phase};
 use super::watchdog;
 
 // Latency is told in ticks of the clock: both timers count the same ones.
@@ -17,6 +18,7 @@ impl crate::board::SlotTimer for SlotTimer {
     fn start(&mut self) {
         // First: it takes most of a millisecond, for which no slot may wait.
         watchdog::narrow();
+        reset::enter(Phase::Service);
         RCC.apb1lenr().modify(|w| w.set_tim2en(true));
         RCC.apb1lenr().read();
         TIM2.psc().write_value((SLOT_PRESCALER - 1) as u16);
