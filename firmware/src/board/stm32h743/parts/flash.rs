@@ -154,7 +154,10 @@ fn judge(status: Sr) -> Result<(), Error> {
 /// flash, nothing ahead. `address` must be a flash word of bank 2.
 fn read_word(address: u32) -> [u8; WORD_BYTES] {
     let mut parts = [0_u32; PARTS];
-    // SAFETY: clears bus faults noted earlier, which are nobody's business any more: those that matter never return.
+    // What was noted before this read must not be taken for it: `damaged` is judged by both below. Bus faults noted earlier are
+    // nobody's business any more, those that matter never return; flags of an operation were judged at its end.
+    bank().ccr().write_value(every_flag());
+    // SAFETY: clears the bits of bus faults, see above.
     unsafe { FAULT_STATUS.write_volatile(BUS_FAULTS) };
     // SAFETY: faults of the reads below are ignored (`protection`) and noted in the status register. The mask was clear:
     // this runs in the task of lowest priority.
