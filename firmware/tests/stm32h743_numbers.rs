@@ -12,6 +12,7 @@ use firmware::board::stm32h743::constants::lines::{
     BAUD, BITS_PER_BYTE, UART_BRR, UART_EIGHT_SAMPLES, UART_FIFO_BYTES,
 };
 use firmware::board::stm32h743::constants::memory::*;
+use firmware::board::stm32h743::constants::supply::{BROWN_OUT_LEVEL, brown_out_millivolts};
 use firmware::board::stm32h743::constants::timers::*;
 use link::can::{DeviceNumber, Direction, Heading};
 use puck::{CanFrame, CanId, Group, Node, Reply};
@@ -251,6 +252,15 @@ fn the_guard_is_what_the_stack_meets_first() {
         assert!(region.length.is_power_of_two() && region.length >= 32, "{region:?}");
         assert_eq!(region.start % region.length, 0, "{region:?}");
     }
+}
+
+#[test]
+fn brown_out_lies_between_what_the_flash_needs_and_what_the_supply_may_fall_to() {
+    let levels: Vec<u32> = (0..4).map(brown_out_millivolts).collect();
+    assert_eq!(levels, [1_600, 2_100, 2_400, 2_700]);
+    // The chip programs its flash from 1.71 V on; 3.3 V may be a tenth low, and a transceiver works from 3.0 V on.
+    let wanted = brown_out_millivolts(BROWN_OUT_LEVEL);
+    assert!(wanted > 1_710 + 500 && wanted < 2_970 - 500, "{wanted}");
 }
 
 /// `NAME : ORIGIN = 0x.., LENGTH = ..K` of the linker script.

@@ -16,6 +16,7 @@ mod protection;
 mod reset;
 mod serial_number;
 mod slot_timer;
+mod supply;
 mod tree;
 mod uart;
 mod usb;
@@ -82,6 +83,7 @@ impl crate::board::Edge for Board {
         usb::start(&mut core.NVIC, serial);
         defmt::info!("reset by {=str}", cause);
         last_words::tell();
+        supply::tell();
         if !host_bus {
             defmt::warn!(
                 "no second CAN bus: this chip is revision {=u16:#x}, see errata sheet ES0392 2.24.2",
