@@ -34,7 +34,6 @@ const FLASH: u32 = 0x0800_0000;
 pub struct Board {
     /// The part with its message memory.
     pub mcu: Wired<Part, MessageMemory>,
-    core: SharedCore,
     spec: CoreSpec,
 }
 
@@ -54,19 +53,13 @@ impl Board {
     ///
     /// # Errors
     /// [`BoardError`]: a flaw of this crate or of a new version of the chip's.
-    pub fn new(fitting: &Fitting, core: SharedCore) -> Result<Self, BoardError> {
+    pub fn new(fitting: &Fitting) -> Result<Self, BoardError> {
         let part = Part::new(fitting)?;
         let bytes = NonZeroU64::new(MESSAGE_MEMORY_BYTES).unwrap_or(NonZeroU64::MIN);
         let window = Window::new("FDCAN message memory", MESSAGE_MEMORY, bytes);
         let mcu = Wired::new(part, window, MessageMemory(fitting.can.clone()))?;
-        let spec = core_of(&mcu, &core)?;
-        Ok(Self { mcu, core, spec })
-    }
-
-    /// What the board and the core share.
-    #[must_use]
-    pub fn core(&self) -> &SharedCore {
-        &self.core
+        let spec = core_of(&mcu, &fitting.core)?;
+        Ok(Self { mcu, spec })
     }
 }
 
@@ -97,10 +90,7 @@ const ACCESS_CONTROL: [(u64, u32, u32); 6] = [
 fn core_of(mcu: &Wired<Part, MessageMemory>, shared: &SharedCore) -> Result<CoreSpec, BoardError> {
     let lines = u32::from(mcu.bus().cpu().interrupt_lines);
     let mut own = windows(mcu.bus());
-    own.push(CoreWindow {
-        base: u64::from(MAINTENANCE.start),
-        size: u64::from(MAINTENANCE.end - MAINTENANCE.start),
-    });
+    own.push(CoreWindow { base: u64::from(MAINTENANCE.start), size: u64::from(MAINTENANCE.end - MAINTENANCE.start) });
     let core = armv7m::Core {
         variant: armv7m::Variant::M7,
         clock_hz: CORE_HZ,

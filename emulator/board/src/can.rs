@@ -51,7 +51,8 @@ pub struct Can {
     /// The first frame the chip has sent, ns.
     first_frame: Option<u64>,
     remarks: Vec<Remark>,
-    /// Frames whose end the arm's bus has told.
+    /// Frames offered to the arm's bus, and those whose end it has told.
+    frames_offered: u64,
     frames_sent: u64,
 }
 
@@ -79,6 +80,7 @@ impl SharedCan {
             orphan: false,
             first_frame: None,
             remarks: Vec::new(),
+            frames_offered: 0,
             frames_sent: 0,
         })))
     }
@@ -110,6 +112,12 @@ impl Can {
     #[must_use]
     pub fn frames_sent(&self) -> u64 {
         self.frames_sent
+    }
+
+    /// Frames that were offered to the arm's bus.
+    #[must_use]
+    pub fn frames_offered(&self) -> u64 {
+        self.frames_offered
     }
 
     /// Where one controller stands.
@@ -167,6 +175,7 @@ impl Can {
         if let Some(frame) = frame {
             self.first_frame.get_or_insert(now);
             self.outstanding += 1;
+            self.frames_offered += 1;
             self.world.send(ticks(now), frame);
         }
     }

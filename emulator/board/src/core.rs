@@ -56,6 +56,8 @@ pub enum Order {
     Stack(u32),
     /// Words are written to memory.
     Poke(u32, Vec<u32>),
+    /// A register of the processor's own space is written by a debugger.
+    Own(u32, u32),
     /// The unused stack between these addresses is painted, up to the stack pointer.
     Paint(Range<u32>),
 }
@@ -71,8 +73,6 @@ pub struct CoreState {
     pub damaged: BTreeSet<u32>,
     /// A damaged word was read, for the flash controller's status.
     pub double_error: bool,
-    /// The lowest stack pointer seen between two stretches.
-    pub stack_pointer: u32,
 }
 
 /// [`CoreState`], shared.
@@ -172,6 +172,9 @@ impl Core {
                 }
                 Order::Stack(address) => self.set_register(register::SP, address),
                 Order::Poke(address, words) => poke(bus, address, &words),
+                Order::Own(address, value) => {
+                    self.own(u64::from(address), Some(u64::from(value)));
+                }
                 Order::Paint(range) => {
                     let top = self.register(register::SP).min(range.end);
                     let words = top.saturating_sub(range.start) / 4;
@@ -403,13 +406,7 @@ impl Processor for Core {
         self.inner.set_gdb_register(number, bytes)
     }
 
-    fn debugger_access(
-        &mut self,
-        write: Option<u64>,
-        address: u64,
-        width: Width,
-        now: VirtualNanos,
-    ) -> Option<u64> {
+    fn debugger_access(&mut self, write: Option<u64>, address: u64, width: Width, now: VirtualNanos) -> Option<u64> {
         self.inner.debugger_access(write, address, width, now)
     }
 

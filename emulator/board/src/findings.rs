@@ -110,8 +110,8 @@ impl Findings {
         self.list.iter().filter(move |finding| finding.grade == grade)
     }
 
-    /// Adds one unless the same is there; the new ones, for those who tell people at once.
-    fn add(&mut self, finding: Finding) {
+    /// Adds one unless the same is there.
+    pub fn add(&mut self, finding: Finding) {
         let same = |known: &Finding| {
             known.grade == finding.grade && known.register == finding.register && known.text == finding.text
         };

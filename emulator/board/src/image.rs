@@ -7,6 +7,7 @@ use link::ImageMetadata;
 use object::elf::PT_LOAD;
 use object::read::elf::{FileHeader, ProgramHeader};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
+use sha2::{Digest, Sha256};
 
 /// Name of the only board this emulates.
 pub const BOARD: &str = "nucleo-h743zi2";
@@ -69,8 +70,8 @@ pub struct Image {
     pub path: PathBuf,
     /// Its bytes.
     pub bytes: Vec<u8>,
-    /// FNV-1a of 64 bits over the load segments: physical address, length, content of each.
-    pub hash: u64,
+    /// SHA-256 in hexadecimal digits over the load segments that have content: physical address, length, content of each.
+    pub hash: String,
     /// What it says of its firmware.
     pub firmware: String,
     /// End of the stack (its highest address) and its lowest address.
@@ -147,24 +148,16 @@ impl Image {
     }
 }
 
-fn hash_of(
-    file: &object::read::elf::ElfFile32<'_, object::Endianness>,
-    bytes: &[u8],
-) -> Result<u64, object::Error> {
+fn hash_of(file: &object::read::elf::ElfFile32<'_, object::Endianness>, bytes: &[u8]) -> Result<String, object::Error> {
     let endian = file.elf_header().endian()?;
-    let mut hash: u64 = 0xCBF2_9CE4_8422_2325;
-    let mut mix = |bytes: &[u8]| {
-        for byte in bytes {
-            hash = (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01B3);
-        }
-    };
+    let mut hash = Sha256::new();
     for segment in file.elf_program_headers().iter().filter(|segment| segment.p_type(endian) == PT_LOAD) {
         let data = segment.data(endian, bytes).unwrap_or(&[]);
         if !data.is_empty() {
-            mix(&segment.p_paddr(endian).to_le_bytes());
-            mix(&(data.len() as u32).to_le_bytes());
-            mix(data);
+            hash.update(segment.p_paddr(endian).to_le_bytes());
+            hash.update((data.len() as u32).to_le_bytes());
+            hash.update(data);
         }
     }
-    Ok(hash)
+    Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
 }

@@ -4,12 +4,14 @@ use fdcan_model::Unit;
 use rigless::device::{ErasedDevice, ResetCause};
 use rigless::mcu::{Mcu, Operate};
 use rigless::soc::stm32h743::Stm32h743;
-use rigless::soc::stm32h743::generated::{dbgmcu, rcc};
+use rigless::soc::stm32h743::generated::{dbgmcu, flash, rcc};
 use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
 
 use crate::can::{Controller, SharedCan};
+use crate::core::SharedCore;
 use crate::serial::{Serial, SharedLine};
+use crate::usb::{DeviceRole, PowerGate};
 use crate::watchdog::{SharedWatch, Watchdog};
 
 /// Frequency of the crystal oscillator's input: the debug probe's clock output on the board.
@@ -21,6 +23,9 @@ const SUPPLY: u32 = 3300;
 /// Device identifier in the low half of DBGMCU.IDC.
 const DEVICE: u64 = 0x6450;
 
+/// FLASH.SR2 DBECCERR: a word with two errors was read.
+const DOUBLE_ERROR: u64 = 1 << 26;
+
 /// Where our models answer.
 #[derive(Debug, Clone, Copy)]
 struct Slots {
@@ -28,6 +33,8 @@ struct Slots {
     watchdog: usize,
     serial: usize,
     debug: usize,
+    flash: usize,
+    usb: [usize; 2],
 }
 
 /// What the board hands the part.
@@ -39,10 +46,10 @@ pub struct Fitting {
     pub serial: SharedLine,
     /// Where the watchdog tells what it sees.
     pub watch: SharedWatch,
+    /// What the core shares with the board.
+    pub core: SharedCore,
     /// Revision of the silicon, REV_ID of DBGMCU.IDC: 0x2003 is V, 0x1003 is Y.
     pub revision: u16,
-    /// Whether the crystal oscillator's input has its clock.
-    pub has_hse: bool,
 }
 
 /// The part.
@@ -54,6 +61,8 @@ pub struct Part {
     controllers: [Controller; 2],
     watchdog: Watchdog,
     serial: Serial,
+    usb: (DeviceRole, PowerGate),
+    core: SharedCore,
     slots: Slots,
 }
 
@@ -64,7 +73,7 @@ impl Part {
     /// A description of the chip that names what it has not: a flaw of this crate or of a new version of the chip's.
     pub fn new(fitting: &Fitting) -> Result<Self, Error> {
         let mut chip = Stm32h743::new()?;
-        chip.rcc.attach_crystals(if fitting.has_hse { HSE_HZ } else { 0 }, 0);
+        chip.rcc.attach_crystals(HSE_HZ, 0);
         chip.set_supply(SUPPLY);
         chip.set_analog_supply(SUPPLY);
         let bus = chip.bus();
@@ -73,6 +82,8 @@ impl Part {
             watchdog: bus.slot("IWDG")?,
             serial: bus.slot("USART3")?,
             debug: bus.slot("DBGMCU")?,
+            flash: bus.slot("Flash")?,
+            usb: [bus.slot("OTG2_HS_DEVICE")?, bus.slot("OTG2_HS_PWRCLK")?],
         };
         let identity = DEVICE | u64::from(fitting.revision) << 16;
         chip.bus_mut().slot_mut(slots.debug).registers_mut().set(dbgmcu::Register::Idc, identity);
@@ -82,6 +93,8 @@ impl Part {
             controllers: Unit::BOTH.map(|unit| Controller::new(fitting.can.clone(), unit)),
             watchdog: Watchdog::new(fitting.watch.clone()),
             serial: Serial::new(fitting.serial.clone()),
+            usb: (DeviceRole, PowerGate),
+            core: fitting.core.clone(),
             slots,
         };
         part.check()?;
@@ -141,7 +154,16 @@ impl Mcu for Part {
             &mut self.watchdog
         } else if slot == self.slots.serial {
             &mut self.serial
+        } else if slot == self.slots.usb[0] {
+            &mut self.usb.0
+        } else if slot == self.slots.usb[1] {
+            &mut self.usb.1
         } else {
+            if slot == self.slots.flash && std::mem::take(&mut self.core.lock().double_error) {
+                let registers = self.chip.bus_mut().slot_mut(slot).registers_mut();
+                let status = registers.get(flash::Register::Sr2);
+                registers.set(flash::Register::Sr2, status | DOUBLE_ERROR);
+            }
             return self.chip.split(slot);
         };
         (self.chip.bus_mut(), Some(own))

@@ -1,28 +1,30 @@
-//! A run: the image on the board, watched while it runs.
+//! A run: the image on the board, until the world ends, the time is up or something is not modelled.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use fdcan_model::{Cancellation, Options};
-use rigless::emulator::{self, Driver, Host, Settled, Start, Stop};
+use rigless::emulator::{self, Start};
 use rigless::image::Image as Placed;
 use rigless::session::Session;
-use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 
 use crate::board::{Board, BoardError};
 use crate::cache::BANK;
 use crate::can::{HostLine, SharedCan};
 use crate::core::SharedCore;
-use crate::findings::{Findings, Grade};
+use crate::fault::Fault;
 use crate::image::Image;
 use crate::log::Log;
 use crate::part::Fitting;
+use crate::report::Measured;
 use crate::serial::SharedLine;
 use crate::watchdog::SharedWatch;
+use crate::watcher::{LOOK, Watcher};
 use crate::world::World;
 
 /// How a run is set up.
@@ -32,7 +34,7 @@ pub struct Setup {
     pub host: HostLine,
     /// How the CAN controller takes cancelled places of its transmit queue.
     pub cancellation: Cancellation,
-    /// Revision of the silicon.
+    /// Revision of the silicon, REV_ID.
     pub revision: u16,
     /// Content of bank 2 before and after.
     pub bank2: Option<PathBuf>,
@@ -40,8 +42,12 @@ pub struct Setup {
     pub log: Option<PathBuf>,
     /// End of the run, ns; without it the run ends when the world does.
     pub until: Option<u64>,
-    /// A finding of the grade [`Grade::Unmodelled`] ends the run.
+    /// Something that is not modelled ends the run.
     pub strict: bool,
+    /// What is put in from outside.
+    pub faults: Vec<Fault>,
+    /// Findings are told on standard error while it runs.
+    pub tells: bool,
 }
 
 impl Default for Setup {
@@ -49,14 +55,22 @@ impl Default for Setup {
         Self {
             host: HostLine::Serial,
             cancellation: Cancellation::Skipped,
-            revision: 0x2003,
+            revision: REVISION_V,
             bank2: None,
             log: None,
             until: None,
             strict: true,
+            faults: Vec::new(),
+            tells: false,
         }
     }
 }
+
+/// Silicon of revision V, which present boards have.
+pub const REVISION_V: u16 = 0x2003;
+
+/// First revision without the erratum of the message memory (ES0392 2.24.2).
+const FIRST_SOUND_REVISION: u16 = 0x2001;
 
 /// Why a run could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -80,152 +94,54 @@ pub enum RunError {
     },
 }
 
-/// Nanoseconds between two looks at log and stack: 1 ms.
-const LOOK: u64 = 1_000_000;
-
 /// What a run leaves.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Virtual time, ns.
-    pub now: u64,
-    /// Instructions executed.
-    pub instructions: u64,
-    /// Restarts: time in ns, cause.
-    pub resets: Vec<(u64, String)>,
-    /// What the image did that must be reported.
-    pub findings: Findings,
+    /// Measurements and findings.
+    pub measured: Measured,
     /// The log.
     pub log: Vec<u8>,
     /// Bank 2.
     pub bank2: Vec<u8>,
+    /// Why the run ended before the world and the time did.
+    pub cut_short: Option<String>,
 }
 
-/// Watches the run.
-struct Watcher {
-    image: Arc<Image>,
-    can: SharedCan,
-    findings: Findings,
-    told: usize,
-    log: Log,
-    until: Option<u64>,
-    strict: bool,
-    interrupt: Arc<AtomicBool>,
-    bank2: Vec<u8>,
-    over: bool,
-    now: u64,
-    instructions: u64,
-}
-
-impl Watcher {
-    /// The end: what must outlive the run is taken out of it.
-    fn finish(&mut self, host: &mut dyn Host) {
-        if self.over {
-            return;
-        }
-        self.over = true;
-        self.log.drain(host);
-        self.bank2 = (u64::from(BANK.start)..u64::from(BANK.end))
-            .step_by(8)
-            .flat_map(|address| host.read(address, Width::W64).unwrap_or(u64::MAX).to_le_bytes())
-            .collect();
-        self.interrupt.store(true, Ordering::Relaxed);
-    }
-
-    fn tell_new(&mut self) {
-        for finding in self.findings.all().iter().skip(self.told) {
-            if finding.grade < Grade::Excused {
-                eprintln!("{}", finding.line());
-            }
-        }
-        self.told = self.findings.all().len();
-    }
-}
-
-impl Driver<Board> for Watcher {
-    fn on_settled(&mut self, session: &mut Session<Board>, host: &mut dyn Host, settled: Settled) {
-        let (remarks, gone) = {
-            let mut can = self.can.lock();
-            (can.take_remarks(), can.is_gone())
-        };
-        if !remarks.is_empty() {
-            self.findings.note_remarks(remarks, &self.image, &settled);
-        }
-        self.findings.look(session, &self.image, &settled);
-        if self.findings.all().len() > self.told {
-            self.tell_new();
-        }
-        let (at, count) = match settled {
-            Settled::Access { access, .. } => (access.virtual_time, access.instruction_count),
-            Settled::Stop(stop) => (stop.at, stop.instruction_count),
-            _ => return,
-        };
-        (self.now, self.instructions) = (at.0, count);
-        let failed = self.strict && self.findings.of(Grade::Unmodelled).next().is_some();
-        if gone || failed {
-            self.finish(host);
-        }
-    }
-
-    fn on_stop(&mut self, session: &mut Session<Board>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
-        let _ = session;
-        self.log.drain(host);
-        if self.over || self.until.is_some_and(|until| stop.at.0 >= until) {
-            self.finish(host);
-            return None;
-        }
-        Some(VirtualNanos(stop.at.0 + LOOK))
-    }
-}
-
-/// Runs an image until the world ends, the time is up or something is not modelled.
+/// Runs an image.
 ///
 /// # Errors
 /// [`RunError`]
 pub fn run(image: &Arc<Image>, setup: &Setup, world: Box<dyn World>) -> Result<Outcome, RunError> {
     let serial = SharedLine::default();
-    let options = Options { cancellation: setup.cancellation, ..Options::default() };
+    let options = Options {
+        cancellation: setup.cancellation,
+        erratum: setup.revision < FIRST_SOUND_REVISION,
+        ..Options::default()
+    };
     let can = SharedCan::new(options, world, serial.clone(), setup.host);
-    let watch = SharedWatch::default();
+    let (watch, core) = (SharedWatch::default(), SharedCore::default());
     let fitting =
-        Fitting { can: can.clone(), serial, watch, revision: setup.revision, has_hse: true };
-    let board = Board::new(&fitting, SharedCore::default())?;
+        Fitting { can: can.clone(), serial, watch: watch.clone(), core: core.clone(), revision: setup.revision };
+    let board = Board::new(&fitting)?;
     let mut images = vec![Placed::new(&image.path, image.bytes.clone(), None)?];
     if let Some(path) = &setup.bank2 {
         images.push(Placed::new(path, content(path)?, Some(BANK.start.into()))?);
+        core.lock().damaged = damaged_words(path)?;
     }
     let interrupt = Arc::new(AtomicBool::new(false));
     let log = setup.log.as_ref().map(|path| file(path, File::create(path))).transpose()?;
-    let watcher = Watcher {
-        image: image.clone(),
-        can,
-        findings: Findings::default(),
-        told: 0,
-        log: Log::new(image.log_control, log),
-        until: setup.until,
-        strict: setup.strict,
-        interrupt: interrupt.clone(),
-        bank2: Vec::new(),
-        over: false,
-        now: 0,
-        instructions: 0,
-    };
+    let log = Log::new(image.log_control, log);
+    let watcher = Watcher::new(image.clone(), setup, can, core.clone(), watch, log, interrupt.clone());
     let session = Session::new(Box::new(board), 0, VirtualNanos(LOOK))?;
     let mut start = Start::new(&images);
     start.interrupt = Some(&interrupt);
-    let finished = emulator::run(session, &start, watcher)?;
-    let resets = finished.session.resets().iter().map(|reset| (reset.at.0, format!("{:?}", reset.cause))).collect();
-    let watcher = finished.driver;
+    let mut finished = emulator::run(session, &start, watcher)?;
+    let outcome = finished.driver.into_outcome(&mut finished.session);
     if let Some(path) = &setup.bank2 {
-        file(path, std::fs::write(path, &watcher.bank2))?;
+        file(path, std::fs::write(path, &outcome.bank2))?;
+        keep_damaged(path, &core.lock().damaged)?;
     }
-    Ok(Outcome {
-        now: watcher.now,
-        instructions: watcher.instructions,
-        resets,
-        findings: watcher.findings,
-        log: watcher.log.bytes,
-        bank2: watcher.bank2,
-    })
+    Ok(outcome)
 }
 
 fn file<T>(path: &Path, result: io::Result<T>) -> Result<T, RunError> {
@@ -244,4 +160,29 @@ fn content(path: &Path) -> Result<Vec<u8>, RunError> {
         return file(path, Err(io::Error::new(io::ErrorKind::InvalidData, message)));
     }
     Ok(bytes)
+}
+
+/// The file beside bank 2's that names the words whose check bits do not fit, one address a line.
+fn damaged_path(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".damaged");
+    name.into()
+}
+
+fn damaged_words(path: &Path) -> Result<BTreeSet<u32>, RunError> {
+    let path = damaged_path(path);
+    if !path.exists() {
+        return Ok(BTreeSet::new());
+    }
+    let text = file(&path, std::fs::read_to_string(&path))?;
+    Ok(text.lines().filter_map(|line| u32::from_str_radix(line.trim_start_matches("0x"), 16).ok()).collect())
+}
+
+fn keep_damaged(path: &Path, damaged: &BTreeSet<u32>) -> Result<(), RunError> {
+    let path = damaged_path(path);
+    if damaged.is_empty() {
+        return if path.exists() { file(&path, std::fs::remove_file(&path)) } else { Ok(()) };
+    }
+    let text: String = damaged.iter().map(|address| format!("{address:#010x}\n")).collect();
+    file(&path, std::fs::write(&path, text))
 }

@@ -167,7 +167,9 @@ impl Serial {
 /// Whether the flags of `status` interrupt with the enables as they are.
 fn interrupts(status: u64, registers: &RegisterFile) -> bool {
     let (first, third) = (registers.get(Register::Cr1), registers.get(Register::Cr3));
-    CAUSES.iter().any(|(flag, in_third, enable)| status & flag != 0 && if *in_third { third } else { first } & enable != 0)
+    CAUSES
+        .iter()
+        .any(|(flag, in_third, enable)| status & flag != 0 && if *in_third { third } else { first } & enable != 0)
 }
 
 impl Device for Serial {
@@ -185,20 +187,10 @@ impl Device for Serial {
     }
 
     fn peek(&self, register: Register, registers: &RegisterFile, now: VirtualNanos) -> Option<u64> {
-        if register == Register::Isr {
-            Some(self.status(registers))
-        } else {
-            self.usart.peek(register, registers, now)
-        }
+        if register == Register::Isr { Some(self.status(registers)) } else { self.usart.peek(register, registers, now) }
     }
 
-    fn write(
-        &mut self,
-        register: Register,
-        value: u64,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) {
+    fn write(&mut self, register: Register, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         if register == Register::Icr && value & RTOF != 0 {
             self.flag = false;
         }

@@ -153,11 +153,17 @@ impl Watchdog {
     fn write_guarded(&mut self, place: usize, value: u64, context: &mut DeviceContext<'_>) {
         let name = ["PR", "RLR", "WINR"][place];
         if !self.open {
-            context.tell(name, "RM0433 45.4.1: this register is written only after the key 0x5555, and the write is ignored");
+            context.tell(
+                name,
+                "RM0433 45.4.1: this register is written only after the key 0x5555, and the write is ignored",
+            );
             return;
         }
         if self.crossing[place].is_some() {
-            context.tell(name, "RM0433 45.4.4: written while its update flag in SR stands: the value may be lost, and is lost here");
+            context.tell(
+                name,
+                "RM0433 45.4.4: written while its update flag in SR stands: the value may be lost, and is lost here",
+            );
             return;
         }
         // Without its oscillator nothing passes.

@@ -5,7 +5,7 @@ use std::io::{self, Read, Write};
 
 use puck::{CanFrame, CanId};
 use sim::lockstep::{NEVER, REPLY_LENGTH, REQUEST_LENGTH};
-use sim::{Event, Plant, PlainLine, Ticks};
+use sim::{Event, PlainLine, Plant, Ticks};
 
 /// Nanoseconds of a tick of the lock step.
 pub const TICK_NS: u64 = 40;
@@ -129,14 +129,7 @@ impl<R: Read + Send, W: Write + Send> Lockstep<R, W> {
         }
     }
 
-    fn exchange(
-        &mut self,
-        kind: u8,
-        identifier: u16,
-        now: Ticks,
-        data: &[u8],
-        tail: &[u8],
-    ) -> io::Result<(u8, Event)> {
+    fn exchange(&mut self, kind: u8, identifier: u16, now: Ticks, data: &[u8], tail: &[u8]) -> io::Result<(u8, Event)> {
         let mut request = Vec::with_capacity(REQUEST_LENGTH + tail.len());
         request.push(kind);
         request.push((data.len() + tail.len()) as u8);

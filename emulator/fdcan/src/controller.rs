@@ -4,7 +4,7 @@ use crate::Nanoseconds;
 use crate::controllers::Unit;
 use crate::errors::{BusError, Errors};
 use crate::receive::{self, ReceiveFifo};
-use crate::registers::{self, NBTP, REGISTERS, RXESC, RXF0C, RXF1C, TXBC, TXESC, cccr};
+use crate::registers::{self, NBTP, RXESC, RXF0C, RXF1C, TXBC, TXESC, WORDS, cccr};
 use crate::remark::{Remark, RemarkKind};
 use crate::timing::BitTiming;
 use crate::transmit::{self, Cancellation, Transmit};
@@ -57,8 +57,8 @@ pub(crate) struct Controller {
     pub(crate) unit: Unit,
     pub(crate) now: Nanoseconds,
     pub(crate) kernel_hz: u32,
-    /// Registers without a state of their own, in the order of [`REGISTERS`].
-    pub(crate) values: [u32; REGISTERS.len()],
+    /// Registers without a state of their own, by offset.
+    values: [u32; WORDS],
     pub(crate) init: Init,
     pub(crate) cce: bool,
     pub(crate) flags: u32,
@@ -80,7 +80,7 @@ impl Controller {
             unit,
             now,
             kernel_hz,
-            values: REGISTERS.map(|register| register.reset),
+            values: registers::after_reset(),
             init: Init { written: true, seen: true, settles: None },
             cce: false,
             flags: 0,
@@ -97,14 +97,13 @@ impl Controller {
 
     /// The value of a register without a state of its own.
     pub(crate) fn value(&self, offset: u32) -> u32 {
-        let place = REGISTERS.iter().position(|register| register.offset == offset);
-        place.and_then(|place| self.values.get(place)).copied().unwrap_or(0)
+        self.values.get(offset as usize / 4).copied().unwrap_or(0)
     }
 
     /// Sets the value of such a register.
     pub(crate) fn set_value(&mut self, offset: u32, value: u32) {
-        if let Some(place) = REGISTERS.iter().position(|register| register.offset == offset) {
-            self.values[place] = value;
+        if let Some(place) = self.values.get_mut(offset as usize / 4) {
+            *place = value;
         }
     }
 

@@ -227,9 +227,10 @@ impl Controllers {
         self.unit(unit).begun();
     }
 
-    /// Answer to a [`WireEvent::Withdraw`], at once: the oldest frame could not be taken back, it is on the wire. The
-    /// model takes it for begun, as if [`Controllers::begun`] had been called before: a cancellation of it waits for its
-    /// end. Once the controller has stopped (INIT, bus-off, reset) the answer changes nothing.
+    /// Answer to a [`WireEvent::Withdraw`], at once: the oldest frame could not be taken back, it is on the wire.
+    ///
+    /// The model takes it for begun, as if [`Controllers::begun`] had been called before: a cancellation of it waits for
+    /// its end. Once the controller has stopped (INIT, bus-off, reset) the answer changes nothing.
     pub fn still_on_wire(&mut self, unit: Unit, now: Nanoseconds) {
         self.advance(now);
         self.unit(unit).still_on_wire();

@@ -76,7 +76,7 @@ const FLAGS: u32 = 0x3FCF_FFFF;
 const ALL: u32 = u32::MAX;
 
 /// Every register but those of time-triggered operation (0x100 and up).
-pub(crate) const REGISTERS: [Register; 46] = [
+const REGISTERS: [Register; 46] = [
     r(0x000, "CREL", 0x3214_1218, 0, ReadOnly, 0),
     r(0x004, "ENDN", 0x8765_4321, 0, ReadOnly, 0),
     r(0x00C, "DBTP", 0x0000_0A33, 0x009F_1FFF, Protected, 0),
@@ -124,6 +124,18 @@ pub(crate) const REGISTERS: [Register; 46] = [
     r(0x0F4, "TXEFS", 0, 0, ReadOnly, 0),
     r(0x0F8, "TXEFA", 0, 0x1F, Command, 0),
 ];
+
+/// Words up to the registers of time-triggered operation.
+pub(crate) const WORDS: usize = 0x100 / 4;
+
+/// The value of every word after reset.
+pub(crate) fn after_reset() -> [u32; WORDS] {
+    let mut values = [0; WORDS];
+    for register in &REGISTERS {
+        values[register.offset as usize / 4] = register.reset;
+    }
+    values
+}
 
 /// The register at an offset.
 pub(crate) fn find(offset: u32) -> Option<&'static Register> {

@@ -1,7 +1,7 @@
 //! A controller and its wire: what is offered, what came of it, and faults.
 //!
-//! The wire keeps a queue for each controller. [`WireEvent::Offer`] appends to it; [`WireEvent::Withdraw`] empties it but
-//! for a frame that has begun. Frames leave in the order in which they were offered.
+//! The wire keeps a queue for each controller. [`WireEvent::Offer`] appends to it; [`WireEvent::Withdraw`] empties it
+//! but for a frame that has begun. Frames leave in the order in which they were offered.
 
 use crate::Nanoseconds;
 use crate::controller::{Bus, Controller, IDLE_BITS, RECOVERY_SEQUENCES};

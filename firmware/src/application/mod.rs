@@ -154,11 +154,14 @@ pub fn start<E: Edge>(
     let (records, from_core) = queues.records.split();
     let (events, news) = queues.events.split();
     let (to_log, to_tell) = queues.log.split();
+    let core = in_place::build(core, Core::init());
+    let session = in_place::build(session, Session::init(identity, shelf));
+    // When everything is built, which takes a while: the first slot must find its task ready.
     slot_timer.start();
     Application {
-        core: in_place::build(core, Core::init()),
+        core,
         can,
-        session: in_place::build(session, Session::init(identity, shelf)),
+        session,
         slot_task: SlotTask::new(clock, slot_timer, light, slot::Ends { from_bus, to_bus, commands, records, events }),
         receive_task: ReceiveTask::new(incoming),
         transmit_task: TransmitTask::new(outgoing),

@@ -108,7 +108,8 @@ fn recovery_takes_129_times_eleven_recessive_bits() {
     let mut bench = bus_off();
     bench.write(CCCR, 0);
     let begin = bench.now + 100;
-    bench.pass_ns(100 + 5 * 11 * BIT);
+    assert_eq!(bench.read(PSR) & 7, 5, "the disturbance that led here");
+    bench.pass_ns(begin + 5 * 11 * BIT - bench.now);
     assert_eq!(bench.counters(), (248, 5), "the receive counter counts the sequences");
     assert_eq!((bench.read(PSR) & 7, bench.read(PSR) & 7), (5, 7));
     bench.pass_ns(begin + 129 * 11 * BIT - 1 - bench.now);
