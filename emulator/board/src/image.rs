@@ -76,6 +76,10 @@ pub struct Image {
     pub firmware: String,
     /// End of the stack (its highest address) and its lowest address.
     pub stack: std::ops::Range<u32>,
+    /// Where the handlers of non-maskable interrupt, hard fault and the three configurable faults begin.
+    pub fault_handlers: Vec<u32>,
+    /// Hash of the robot model in it.
+    pub model_hash: u32,
     /// The log's control block.
     pub log_control: u32,
     functions: BTreeMap<u32, (u32, String)>,
@@ -101,6 +105,19 @@ impl Image {
             return Err(ImageError::Board { path, found: metadata.board.to_owned() });
         }
         let firmware = metadata.firmware.to_owned();
+        let model_hash = metadata.model_hash;
+        let vectors =
+            file.section_by_name(".vector_table").ok_or_else(|| ImageError::Anonymous { path: path.clone() })?;
+        let mut fault_handlers: Vec<u32> = vectors
+            .data()
+            .map_err(elf)?
+            .chunks_exact(4)
+            .skip(2)
+            .take(5)
+            .filter_map(|word| Some(u32::from_le_bytes(word.try_into().ok()?) & !1))
+            .collect();
+        fault_handlers.sort_unstable();
+        fault_handlers.dedup();
         let hash = hash_of(&file, &bytes).map_err(elf)?;
         let mut functions = BTreeMap::new();
         let mut named = BTreeMap::new();
@@ -118,7 +135,7 @@ impl Image {
         };
         let stack = symbol("_stack_end")?..symbol("_stack_start")?;
         let log_control = symbol("_SEGGER_RTT")?;
-        Ok(Self { hash, firmware, stack, log_control, functions, path, bytes })
+        Ok(Self { hash, model_hash, fault_handlers, firmware, stack, log_control, functions, path, bytes })
     }
 
     /// The function that holds an address, for people.

@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 
 use crate::cache::CacheCount;
 use crate::clocks::Clocks;
+use crate::core::FaultNote;
 use crate::findings::Findings;
 use crate::image::Image;
 use crate::stack::StackUse;
@@ -33,6 +34,12 @@ pub struct Measured {
     pub watchdog: Watched,
     /// Reads of bank 2.
     pub cache: CacheCount,
+    /// Faults whose handlers began.
+    pub faults: Vec<FaultNote>,
+    /// Identifiers that pass the filters of the two CAN controllers.
+    pub accepted: [Vec<u16>; 2],
+    /// Rate of the serial line, bits per second; 0 while it is off.
+    pub serial_baud: u64,
     /// Operations of bank 2.
     pub bank_operations: u64,
     /// What must be reported.
@@ -58,6 +65,7 @@ impl Measured {
         put("clocks", self.clocks.json());
         put("can_bit_rate", json!(self.timing.map(|timing| timing.bits_per_second())));
         put("sample_point", json!(self.timing.map(|timing| f64::from(timing.sample_point_per_mille()) / 1000.0)));
+        put("serial_baud", json!(self.serial_baud));
         put("slot_hz", json!(self.clocks.slot_micro_hz as f64 / 1e6));
         put(
             "stack",
@@ -86,6 +94,7 @@ impl Measured {
                 "first_stale_by": stale_by,
             }),
         );
+        put("faults", json!(self.faults.iter().map(|note| note.line(image)).collect::<Vec<_>>()));
         for (grade, entries) in self.findings.json() {
             put(grade, entries);
         }

@@ -294,6 +294,7 @@ impl Watcher {
     pub fn into_outcome(self, session: &mut Session<Board>) -> Outcome {
         let resets = session.resets().iter().map(|reset| (reset.at.0, format!("{:?}", reset.cause))).collect();
         let clocks = Clocks::of(&mut session.board_mut().mcu.part);
+        let serial_baud = clocks.baud(&session.board().mcu.part);
         let can = self.can.lock();
         let measured = Measured {
             now: self.now,
@@ -306,6 +307,9 @@ impl Watcher {
             stack: self.stack,
             watchdog: self.watch.get(),
             cache: self.core.cache_count(),
+            faults: self.core.lock().faults.clone(),
+            accepted: can.accepted(),
+            serial_baud,
             bank_operations: self.bank_watch.operations,
             findings: self.findings,
         };
@@ -342,6 +346,7 @@ impl Driver<Board> for Watcher {
                 self.check_clocks(session, &access);
                 self.check_bank(&access, host);
             }
+            Settled::Hit(hit) => self.core.lock().orders.push(Order::Note(hit.at.0)),
             Settled::Stop(stop) => (self.now, self.instructions) = (stop.at.0, stop.instruction_count),
             _ => {}
         }
