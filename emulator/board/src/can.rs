@@ -386,9 +386,11 @@ impl Peer for MessageMemory {
     }
 
     fn write(&mut self, offset: u64, width: Width, value: u64, context: &mut DeviceContext<'_>) {
-        // Narrower writes than a word do not exist on this memory's bus: the controller's remark says so.
-        let _ = width;
-        self.0.lock().controllers.write_memory(offset as u32 & !3, value as u32, context.now().0);
+        let mut can = self.0.lock();
+        let (word, shift) = (offset as u32 & !3, 8 * (offset & 3));
+        let before = u64::from(can.controllers.peek_memory(word));
+        let merged = before & !(width.mask() << shift) | (value & width.mask()) << shift;
+        can.controllers.write_memory(word, merged as u32, context.now().0);
     }
 
     fn peek(&self, offset: u64, _width: Width, _now: VirtualNanos) -> Option<u64> {

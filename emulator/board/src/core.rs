@@ -69,6 +69,17 @@ pub enum Order {
     Paint(Range<u32>),
 }
 
+/// An access to an address where nothing is: a bus fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stray {
+    /// Where to.
+    pub address: u32,
+    /// Where the program was.
+    pub program_counter: u32,
+    /// When, ns.
+    pub at: u64,
+}
+
 /// What the handler of a fault finds when it begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FaultNote {
@@ -127,6 +138,8 @@ pub struct CoreState {
     pub cache: DataCache,
     /// Flash words whose check bits do not fit: reading them fails.
     pub damaged: BTreeSet<u32>,
+    /// Accesses to addresses where nothing is.
+    pub strays: Vec<Stray>,
     /// Faults whose handlers have begun.
     pub faults: Vec<FaultNote>,
     /// A damaged word was read, for the flash controller's status.
@@ -275,6 +288,28 @@ struct CacheBus<'a> {
     asked: Option<Access>,
 }
 
+/// Memory below the peripherals, by first and last address (RM0433 2.3.2): ITCM, flash, system memory, DTCM, AXI, the three
+/// of the second domain, that of the third, the backup memory.
+const MEMORIES: [(u64, u64); 9] = [
+    (0x0000_0000, 0x0000_FFFF),
+    (0x0800_0000, 0x081F_FFFF),
+    (0x1FF0_0000, 0x1FF1_FFFF),
+    (0x1FF4_0000, 0x1FF5_FFFF),
+    (0x2000_0000, 0x2001_FFFF),
+    (0x2400_0000, 0x2407_FFFF),
+    (0x3000_0000, 0x3004_7FFF),
+    (0x3800_0000, 0x3800_FFFF),
+    (0x3880_0000, 0x3880_0FFF),
+];
+
+/// The peripherals, and the processor's own space.
+const PERIPHERALS: [(u64, u64); 2] = [(0x4000_0000, 0x5FFF_FFFF), (0xE000_0000, 0xE00F_FFFF)];
+
+/// Whether anything answers at an address; an access elsewhere is a bus fault.
+fn exists(address: u64) -> bool {
+    MEMORIES.iter().chain(&PERIPHERALS).any(|(first, last)| (*first..=*last).contains(&address))
+}
+
 fn in_bank(address: u64) -> bool {
     (u64::from(BANK.start)..u64::from(BANK.end)).contains(&address)
 }
@@ -335,6 +370,14 @@ impl CoreBus for CacheBus<'_> {
                 self.shared.lock().cache.maintain(access.address as u32, access.value as u32);
             }
             return Some(0);
+        }
+        if !exists(access.address) {
+            self.shared.lock().strays.push(Stray {
+                address: access.address as u32,
+                program_counter: access.program_counter.unwrap_or(0) as u32,
+                at: access.virtual_time.0,
+            });
+            return None;
         }
         self.inner.access(access, from_code)
     }

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use link::frame::{Decoder, Envelope, FRAME_BYTES, encode};
 use link::message::{DeviceHello, HostHello};
 use link::{LINK_VERSION, Reply, Request, SCHEMA_HASH, Statistics, Status, Text};
+use puck::{CanFrame, Node};
 use sim::{HOME, TICKS_PER_MILLISECOND, Ticks};
 
 use crate::world::Host;
@@ -16,6 +17,12 @@ pub const READY: u8 = 10;
 
 /// Time between two questions.
 const PACE: Ticks = 20 * TICKS_PER_MILLISECOND;
+
+/// Time after which an answer is not waited for any longer.
+const PATIENCE: Ticks = 200 * TICKS_PER_MILLISECOND;
+
+/// Frames kept from the beginning.
+const FIRST: usize = 5;
 
 /// What the host has learned.
 #[derive(Debug, Default)]
@@ -34,8 +41,8 @@ pub struct Learned {
     pub answered: u64,
     /// The longest time from a question to its answer, ticks.
     pub slowest: Ticks,
-    /// The first frame on the arm's bus.
-    pub first_frame: Option<sim::Passage>,
+    /// The first frames of the device on the arm's bus.
+    pub first_frames: Vec<CanFrame>,
     /// Hash over time, sender and content of every frame on the arm's bus.
     pub bus_hash: u64,
     /// Frames on the arm's bus.
@@ -128,7 +135,8 @@ impl Host for Inquirer {
         while let Some(frame) = self.decoder.next::<Reply>(&mut rest) {
             self.hear(now, frame.message, frame.envelope.time_ms);
         }
-        if now < self.asked_at + PACE || now < PACE {
+        let wait = if self.waiting { PATIENCE } else { PACE };
+        if now < self.asked_at + wait {
             return Vec::new();
         }
         let question = self.question();
@@ -146,7 +154,9 @@ impl Host for Inquirer {
 
     fn see(&mut self, passage: &sim::Passage) {
         let mut learned = self.learned.lock();
-        learned.first_frame.get_or_insert(*passage);
+        if passage.sender == Node::HOST && learned.first_frames.len() < FIRST {
+            learned.first_frames.push(passage.frame);
+        }
         learned.frames += 1;
         let mut hash = if learned.bus_hash == 0 { 0xCBF2_9CE4_8422_2325 } else { learned.bus_hash };
         let mut mix = |bytes: &[u8]| {

@@ -165,6 +165,9 @@ fn serve(image: &Path, setup: &Setup, report: Option<PathBuf>) -> ExitCode {
             return ExitCode::from(FAILED);
         }
     }
+    if let Some(operation) = outcome.power_cut {
+        eprintln!("power failed in the middle of an operation of bank 2: {operation}");
+    }
     match outcome.cut_short {
         None => ExitCode::SUCCESS,
         Some(reason) => {

@@ -22,6 +22,8 @@ pub struct Measured {
     pub resets: Vec<(u64, String)>,
     /// First frame on the arm's bus, ns.
     pub first_frame: Option<u64>,
+    /// The slot timer's first interrupt, ns.
+    pub first_slot: Option<u64>,
     /// Frames sent on the arm's bus.
     pub frames_sent: u64,
     /// Clocks.
@@ -61,6 +63,7 @@ impl Measured {
         put("instructions", json!(self.instructions));
         put("resets", json!(resets));
         put("first_frame_us", json!(self.first_frame.map(|at| at / 1000)));
+        put("first_slot_us", json!(self.first_slot.map(|at| at / 1000)));
         put("frames_sent", json!(self.frames_sent));
         put("clocks", self.clocks.json());
         put("can_bit_rate", json!(self.timing.map(|timing| timing.bits_per_second())));

@@ -105,6 +105,8 @@ pub struct Outcome {
     pub bank2: Vec<u8>,
     /// Why the run ended before the world and the time did.
     pub cut_short: Option<String>,
+    /// The operation of bank 2 in which power failed, which ended the run.
+    pub power_cut: Option<String>,
 }
 
 /// Runs an image.
@@ -136,6 +138,7 @@ pub fn run(image: &Arc<Image>, setup: &Setup, world: Box<dyn World>) -> Result<O
     for handler in &image.fault_handlers {
         session.watch(Watch::Instruction(u64::from(*handler)));
     }
+    session.watch(Watch::Instruction(u64::from(image.slot_handler)));
     let mut start = Start::new(&images);
     start.interrupt = Some(&interrupt);
     let mut finished = emulator::run(session, &start, watcher)?;
