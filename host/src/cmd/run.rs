@@ -159,7 +159,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     if let Some(path) = &command.record {
         output.say(format!("wrote {}", path.display()));
     }
-    if !client.hello().simulated {
+    if !client.is_simulated() {
         output.say("the arm holds its goal; `tactus stop` makes it soft");
     }
     output.result(&report, report.to_text())
@@ -279,7 +279,7 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
 }
 
 fn notes(client: &Client<Device>, file: &PrimitiveFile) -> String {
-    let simulated = if client.hello().simulated { " (simulated arm)" } else { "" };
+    let simulated = if client.is_simulated() { " (simulated arm)" } else { "" };
     format!("Tactus recording of a run of '{}', 300 Hz, on {}{simulated}", file.name, client.hello().board.as_str())
 }
 
