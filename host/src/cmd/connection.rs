@@ -178,6 +178,7 @@ pub(super) fn simulation_failure(error: SimulationError, doing: &str) -> Failure
         SimulationError::BoardRefused(_) => {
             (Exit::Usage, "E212", "the options of `--device board:` are in docs/board-stm32h743.md")
         }
+        SimulationError::BoardEnded { .. } => (Exit::Internal, "E110", "`cargo xtask board` checks emulator and image"),
         SimulationError::BusLog(..) => {
             (Exit::Usage, "E208", "name a file in a folder that can be written, for example `sil:bus=run.log`")
         }
