@@ -1,0 +1,1 @@
+//! The STM32H743 image executed on an emulated chip.

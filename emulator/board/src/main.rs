@@ -1,0 +1,3 @@
+//! The STM32H743 image executed on an emulated chip.
+
+fn main() {}

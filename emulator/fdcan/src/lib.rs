@@ -1,0 +1,1 @@
+//! One M_CAN controller with its message memory as a model of registers.
