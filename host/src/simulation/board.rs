@@ -8,9 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use sim::{Lockstep, LockstepError, Plant, Ticks};
+use sim::{Lockstep, LockstepError, PlainLine, Plant, Ticks};
 
-use super::line::UntimedLine;
 use super::options::{FlashSource, SimulationOptions};
 use super::seat::Seat;
 use super::words::Words;
@@ -105,12 +104,10 @@ impl EmulatedBoard {
         if !begins {
             return Err(board.ended());
         }
-        let chunk = match options.line {
-            LineKind::Serial => sim::CHUNK,
-            // A reply holds whole frames.
-            LineKind::Can => sim::CHUNK - sim::CHUNK % RECORD_BYTES,
-        };
-        plant.set_link_line(Box::new(UntimedLine::new(chunk)));
+        plant.set_link_line(Box::new(match options.line {
+            LineKind::Serial => PlainLine::default(),
+            LineKind::Can => PlainLine::of_records(RECORD_BYTES),
+        }));
         Ok(board)
     }
 

@@ -10,7 +10,6 @@ mod bus_log;
 mod error;
 pub(crate) mod halves;
 mod in_process;
-mod line;
 mod options;
 mod qemu;
 mod seat;

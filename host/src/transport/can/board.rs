@@ -29,7 +29,7 @@ pub struct BoardCan {
 impl BoardCan {
     /// Takes over the line of a board that was switched on with a host line of CAN.
     #[must_use]
-    pub(crate) fn new(simulation: Simulation) -> Self {
+    pub fn new(simulation: Simulation) -> Self {
         Self { simulation, arrived: VecDeque::new() }
     }
 
