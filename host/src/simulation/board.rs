@@ -44,7 +44,9 @@ impl BoardEngine {
         command.arg("serve").arg("--image").arg(&self.image);
         match &options.flash {
             FlashSource::New => {}
-            FlashSource::File(path) => drop(command.arg("--bank2").arg(path)),
+            FlashSource::File(path) => {
+                command.arg("--bank2").arg(path);
+            }
             FlashSource::Chip(_) => return Err(SimulationError::FlashOfItsOwn),
         }
         command.args(["--host-line", if options.line == LineKind::Can { "can" } else { "serial" }]);

@@ -57,6 +57,8 @@ fn has(tool: &str) -> bool {
 
 fn rustup() -> Command {
     let mut command = Command::new("rustup");
-    INHERITED.map(|name| drop(command.env_remove(name)));
+    for name in INHERITED {
+        command.env_remove(name);
+    }
     command
 }
