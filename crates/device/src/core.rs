@@ -12,7 +12,9 @@
 //! No torque but zero leaves before the start-up is over, a person has activated the arm, and a person has commanded it:
 //! the frames of a cycle come from [`control::Actuation`] or are zero.
 
+use control::controller::Gains;
 use control::{Calibration, Cycle, CycleInput, CycleRecord, Fault, LoadRefusal, Payload, State};
+use pinned_init::{Init, init};
 use puck::{CanFrame, MotorMode, Node, PropertyId, Reply, SafetyMode, Status, set, zero_torques};
 
 use crate::bus::{Outlet, SlotOutlet};
@@ -110,11 +112,11 @@ pub struct Core {
 }
 
 impl Core {
-    /// A device that has just got power: silent, without torque, at the beginning of the start-up.
-    pub fn new() -> Core {
-        Core {
+    /// Makes, in its place, a device that has just got power: silent, without torque, at the beginning of the start-up.
+    pub fn init() -> impl Init<Core> {
+        init!(Core {
             // Never used for torque: the scales of this arm replace it before the first cycle.
-            cycle: Cycle::new(Calibration::nominal(Payload::SensorAndHand)),
+            cycle <- Cycle::init(Calibration::nominal(Payload::SensorAndHand), Gains::tuned()),
             number: 0,
             startup: Startup::new(),
             pacer: Pacer::default(),
@@ -136,7 +138,7 @@ impl Core {
             overruns: 0,
             wants_idle: false,
             idle_request_in: 0,
-        }
+        })
     }
 
     /// One timer tick. `now_us` is the device's time in microseconds and never runs backwards.
@@ -533,11 +535,5 @@ impl Core {
 
     fn tell(&self, kind: EventKind, io: &mut impl CoreIo) {
         io.event(Event { cycle: self.number, kind });
-    }
-}
-
-impl Default for Core {
-    fn default() -> Core {
-        Core::new()
     }
 }

@@ -1,11 +1,11 @@
 //! From power-up to a cyclic loop, and all the reasons not to get there.
 
-use device::{Command, Core, EventKind, Refusal, Stage, StartupError};
+use device::{Command, EventKind, Refusal, Stage, StartupError};
 use puck::{
     Action, Counts, Destination, Group, Node, Property, PropertyId, PropertyTable, PuckTorque, Request, SafetyMode,
 };
 
-use crate::double::{ARM, Bus, HOME, started};
+use crate::double::{ARM, Bus, HOME, silent_device, started};
 
 const SAFETY: Destination = Destination::Node(Node::SAFETY_MODULE);
 
@@ -59,7 +59,7 @@ fn assert_pauses(bus: &Bus) {
 
 #[test]
 fn from_emergency_stop_to_ready_in_the_documented_order() {
-    let (mut core, mut bus) = (Core::new(), Bus::in_emergency_stop());
+    let (mut core, mut bus) = (silent_device(), Bus::in_emergency_stop());
     bus.run(&mut core, 2.0);
     assert_eq!(core.stage(), Stage::WaitingForIdle);
     bus.press_idle();
@@ -131,7 +131,7 @@ fn the_frames_of_the_start_up_are_those_of_the_reference() {
 
 #[test]
 fn an_emergency_stop_is_waited_for_without_end() {
-    let (mut core, mut bus) = (Core::new(), Bus::in_emergency_stop());
+    let (mut core, mut bus) = (silent_device(), Bus::in_emergency_stop());
     bus.run(&mut core, 20.0);
     assert_eq!(core.stage(), Stage::WaitingForIdle);
     assert_eq!(core.health().blocked, None);
@@ -144,7 +144,7 @@ fn an_emergency_stop_is_waited_for_without_end() {
 
 #[test]
 fn an_active_arm_is_not_started_until_a_person_makes_it_idle() {
-    let (mut core, mut bus) = (Core::new(), Bus::already_zeroed());
+    let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
     bus.press_activate();
     bus.run(&mut core, 3.0);
     assert_eq!(core.stage(), Stage::WaitingForIdle);
@@ -154,7 +154,7 @@ fn an_active_arm_is_not_started_until_a_person_makes_it_idle() {
 
 #[test]
 fn a_zeroed_arm_keeps_its_counts() {
-    let (mut core, mut bus) = (Core::new(), Bus::already_zeroed());
+    let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
     bus.run_until(&mut core, Stage::WaitingForActive);
     assert!(core.health().zeroed);
     assert_eq!(core.health().zeroed_at, None, "nobody told this device where the arm stood then");
@@ -166,7 +166,7 @@ fn a_zeroed_arm_keeps_its_counts() {
 
 #[test]
 fn a_puck_that_never_wakes_is_named_and_tried_again() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.pucks[4].never_wakes = true;
     bus.run(&mut core, 8.0);
     let error = StartupError::DidNotWake(Node::ARM[4]);
@@ -180,7 +180,7 @@ fn a_puck_that_never_wakes_is_named_and_tried_again() {
 
 /// What the start-up says of a bus with one thing wrong.
 fn refusal(break_something: impl FnOnce(&mut Bus)) -> Option<StartupError> {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     break_something(&mut bus);
     bus.run_until(&mut core, Stage::Blocked);
     assert!(bus.records.is_empty());
@@ -211,7 +211,7 @@ fn whatever_is_wrong_with_a_device_is_named() {
 
 #[test]
 fn a_position_that_was_not_taken_is_noticed_before_the_safety_module_is_told() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.pucks[3].ignores_position_writes = true;
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.commands.push_back(Command::Zero { home: HOME });
@@ -222,7 +222,7 @@ fn a_position_that_was_not_taken_is_noticed_before_the_safety_module_is_told() {
 
 #[test]
 fn lost_answers_are_asked_for_again() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.run_until(&mut core, Stage::Reading);
     bus.pucks[0].lose_properties = 1;
     bus.pucks[5].lose_properties = 2;
@@ -232,7 +232,7 @@ fn lost_answers_are_asked_for_again() {
 
 #[test]
 fn an_arm_without_a_sensor_starts_too() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.sensor_present = false;
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.commands.push_back(Command::Zero { home: HOME });
@@ -262,7 +262,7 @@ fn the_wrench_has_its_zero_after_the_first_rest_and_none_after_a_new_start() {
 
 #[test]
 fn an_impossible_home_is_refused_by_its_joint() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.run_until(&mut core, Stage::WaitingForZero);
     for (joint, angle) in [(0, f32::NAN), (1, 2.5), (3, f32::INFINITY), (6, -3.2)] {
         let mut home = HOME;
@@ -278,7 +278,7 @@ fn an_impossible_home_is_refused_by_its_joint() {
 
 #[test]
 fn the_arm_is_not_zeroed_under_torque() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.press_activate();
     bus.run(&mut core, 0.5);
@@ -306,7 +306,7 @@ fn a_running_arm_can_be_zeroed_again_at_rest() {
 
 #[test]
 fn commands_before_the_end_of_the_start_up_are_refused_with_its_stage() {
-    let (mut core, mut bus) = (Core::new(), Bus::in_emergency_stop());
+    let (mut core, mut bus) = (silent_device(), Bus::in_emergency_stop());
     bus.run(&mut core, 2.0);
     bus.commands.push_back(control::Command::Gravity.into());
     bus.commands.push_back(Command::Zero { home: HOME });
@@ -317,7 +317,7 @@ fn commands_before_the_end_of_the_start_up_are_refused_with_its_stage() {
 
 #[test]
 fn an_emergency_stop_while_zero_is_awaited_starts_from_the_beginning() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.press_emergency_stop();
     bus.run_until(&mut core, Stage::WaitingForIdle);
