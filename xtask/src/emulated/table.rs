@@ -34,12 +34,6 @@ impl Table {
         self.checked(name, shown(value, unit), format!("at most {}", number(limit)), holds);
     }
 
-    /// A number of some unit that must be this one, but for a share of it.
-    pub(super) fn equal(&mut self, name: &str, value: Option<f64>, unit: &str, wanted: f64, share: f64) {
-        let holds = value.is_some_and(|value| (value - wanted).abs() <= wanted.abs() * share);
-        self.checked(name, shown(value, unit), number(wanted), holds);
-    }
-
     /// Whether everything so far is as it must be.
     pub(super) fn holds(&self) -> bool {
         self.0.iter().all(|row| row.holds)
@@ -73,7 +67,7 @@ impl fmt::Display for Table {
         for Row { name, value, wanted, holds } in &self.0 {
             let mark = if *holds { "" } else { "  <-- WRONG" };
             let wanted = if wanted.is_empty() { String::new() } else { format!("({wanted})") };
-            writeln!(f, "{}", format!("{name:<34} {value:<24} {wanted}{mark}").trim_end())?;
+            writeln!(f, "{}", format!("{name:<42} {value:<26} {wanted}{mark}").trim_end())?;
         }
         Ok(())
     }
@@ -88,14 +82,14 @@ mod tests {
         let mut table = Table::default();
         table.told("speed", "2.1");
         table.at_most("stack", Some(60.0), "%", 60.0);
-        table.equal("rate", Some(900.0009), "Hz", 900.0, 1e-5);
+        table.checked("seeds", "equal", "equal", true);
         assert!(table.holds() && table.verdict().is_ok());
         table.at_most("frame", Some(7.5), "ms", 7.0);
-        table.equal("core", Some(399.0), "Hz", 400.0, 0.0);
-        table.equal("apb", None, "Hz", 100.0, 0.0);
+        table.checked("core", "399 Hz", "400 Hz", false);
+        table.at_most("lost", None, "", 0.0);
         assert!(!table.holds());
         let error = table.verdict().unwrap_err().to_string();
-        for part in ["frame: 7.5 ms, not at most 7", "core: 399 Hz, not 400", "apb: missing"] {
+        for part in ["frame: 7.5 ms, not at most 7", "core: 399 Hz, not 400 Hz", "lost: missing"] {
             assert!(error.contains(part), "{error}");
         }
         assert_eq!(table.to_string().matches("WRONG").count(), 3);
