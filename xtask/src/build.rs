@@ -8,7 +8,7 @@ use anyhow::{Context, Result, ensure};
 use crate::board::{self, Board};
 use crate::elf::Sizes;
 use crate::setup::{ARM, Machine, Toolchain};
-use crate::{joint, panics, shell};
+use crate::{hot, joint, panics, shell};
 
 /// Features of the host packages with the MuJoCo world and its pictures.
 pub(crate) const WORLD: &str = "tactus/mujoco,sim/mujoco,sim/render,system-tests/mujoco";
@@ -29,6 +29,7 @@ pub(crate) fn image(machine: &Machine) -> Result<PathBuf> {
 pub(crate) fn real_board(toolchain: Toolchain, board: Board) -> Result<PathBuf> {
     let image = board_image(toolchain, board, true)?;
     board::print_sizes(&image)?;
+    hot::check(&image)?;
     Ok(image)
 }
 

@@ -8,6 +8,7 @@ mod code;
 mod demo;
 mod elf;
 mod emulated;
+mod hot;
 mod joint;
 mod origin;
 mod panics;
