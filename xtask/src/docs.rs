@@ -2,7 +2,7 @@
 //!
 //! Checked in every tracked or new file. Markdown: links with their anchors, paths and test names in code spans. All text:
 //! paths below `docs/`, numbers of decisions, identifiers of `docs/faults.md`. Rust comments: paths below any folder of the
-//! root.
+//! root. And every document is in the index of the documents.
 
 mod facts;
 mod scan;
@@ -22,6 +22,8 @@ const NOT_READ: [&str; 5] =
     ["LICENSE-", "Cargo.lock", "emulator/Cargo.lock", "docs/images/", "xtask/src/docs/tests.rs"];
 /// The catalogue of faults, whose first column defines the identifiers.
 const CATALOGUE: &str = "docs/faults.md";
+/// The index of the documents.
+const INDEX: &str = "docs/README.md";
 
 /// A word that points to nothing.
 #[derive(Debug, PartialEq, Eq)]
@@ -56,7 +58,7 @@ pub(crate) fn run() -> Result<()> {
 /// Checks these files against each other.
 fn check(files: &[(String, String)]) -> Vec<Dead> {
     let facts = Facts::of(files);
-    let mut dead = Vec::new();
+    let mut dead = unlisted(files);
     if facts.faults.is_empty() {
         dead.push(Dead { text: format!("{CATALOGUE} defines no fault identifier") });
     }
@@ -78,6 +80,17 @@ fn check(files: &[(String, String)]) -> Vec<Dead> {
         }
     }
     dead
+}
+
+/// Documents that the index does not link to.
+fn unlisted(files: &[(String, String)]) -> Vec<Dead> {
+    let index = files.iter().find(|(path, _)| path == INDEX).map_or("", |(_, text)| text);
+    let documents = files.iter().filter(|(path, _)| path.ends_with(".md") && path != INDEX);
+    documents
+        .filter_map(|(path, _)| path.strip_prefix("docs/"))
+        .filter(|name| !index.contains(&format!("]({name})")))
+        .map(|name| Dead { text: format!("{INDEX} does not list {name}") })
+        .collect()
 }
 
 /// Links, and what stands in code spans.

@@ -83,7 +83,7 @@ impl Facts {
         let word = numbered.map_or(word, |(path, _)| path);
         let begins_here = word.split_once('/').is_some_and(|(first, _)| self.folders.contains(first));
         let is_filled_in = word.contains('{') && !word.contains(',');
-        if !begins_here || is_filled_in || ["...", "…", "NNNN", "$"].iter().any(|mark| word.contains(mark)) {
+        if !begins_here || is_filled_in || ["...", "…", "NNNN", "NAME", "$"].iter().any(|mark| word.contains(mark)) {
             return true;
         }
         let mut places = vec!["", folder_of(from)];

@@ -8,11 +8,15 @@ fn repository(more: &[(&str, String)]) -> Vec<(String, String)> {
         ("docs/faults.md".to_owned(), "# Faults\n\n## The catalogue\n\n| id |\n| A8 | x |\n| B12 | y |\n".to_owned()),
         ("docs/guide.md".to_owned(), "# Guide\n\n## Two words, and `code`\n".to_owned()),
         ("docs/decisions/0007-seven.md".to_owned(), String::new()),
+        ("docs/README.md".to_owned(), "[f](faults.md) [g](guide.md) [7](decisions/0007-seven.md) [a](a.md)".to_owned()),
         ("crates/arm/Cargo.toml".to_owned(), String::new()),
         ("crates/arm/src/lib.rs".to_owned(), "pub const fn limit() {}\n".to_owned()),
         ("crates/arm/tests/all.rs".to_owned(), "    fn a8_a_stuck_encoder_stops_the_arm() {}\n".to_owned()),
         ("README.md".to_owned(), String::new()),
     ];
+    if more.iter().all(|(path, _)| *path != "docs/a.md") {
+        files.push(("docs/a.md".to_owned(), String::new()));
+    }
     files.extend(more.iter().map(|(path, text)| ((*path).to_owned(), text.clone())));
     files
 }
@@ -35,7 +39,7 @@ fn links_lead_to_files_folders_and_headings() {
     tells_apart("a.md", "[a](docs/guide.md)", "[a](crates/gone.md)", "dead link 'crates/gone.md'");
     tells_apart("docs/a.md", "[a](guide.md) [b](../README.md) [c](decisions/)", "[a](docs/guide.md)", "dead link");
     tells_apart("a.md", "[a](docs/guide.md#two-words-and-code)", "[a](docs/guide.md#two)", "no heading '#two'");
-    tells_apart("docs/faults.md.md", "[a][b]\n\n[b]: guide.md", "[b]: gone.md", "dead link 'gone.md'");
+    tells_apart("docs/a.md", "[a][b]\n\n[b]: guide.md", "[b]: gone.md", "dead link 'gone.md'");
     tells_apart("a.md", "[a](docs)", "[a](../a.md)", "dead link '../a.md'");
     assert_eq!(
         found("a.md", "[a](https://example.org/x) [b](crate::x) `[c](gone.md)`\n```\n[d](gone.md)\n```"),
@@ -52,7 +56,7 @@ fn paths_in_code_spans_and_comments_are_there() {
     tells_apart("crates/arm/src/a.rs", "// see crates/arm/src/lib.rs:1.", "// see crates/leg.", "'crates/leg'");
     tells_apart("crates/arm/src/a.rs", "let p = \"crates/leg\";", "//! As crates/leg: x", "'crates/leg'");
     // Relative to the package of the file that names it.
-    tells_apart("crates/arm/docs/a.md", "`docs/a.md`", "`docs/b.md`", "'docs/b.md'");
+    tells_apart("crates/arm/docs/b.md", "`docs/b.md`", "`docs/c.md`", "'docs/c.md'");
     assert_eq!(
         found("a.md", "`docs/decisions/NNNN-title.md` `docs/{name}.md` `target/x` `a/b` `cargo run crates/x`"),
         [""; 0]
@@ -83,6 +87,13 @@ fn fault_identifiers_are_those_of_the_catalogue() {
 fn test_names_in_documents_are_functions() {
     let alive = "`a8_a_stuck_encoder_stops_the_arm` `a_b_c` `limit`";
     tells_apart("a.md", alive, "`a8_a_stuck_encoder_stops_the_leg`", "no function");
+}
+
+#[test]
+fn every_document_is_in_the_index() {
+    let more = [("docs/a.md", String::new()), ("docs/new.md", String::new()), ("crates/arm/new.md", String::new())];
+    let causes: Vec<String> = check(&repository(&more)).into_iter().map(|dead| dead.text).collect();
+    assert_eq!(causes, ["docs/README.md does not list new.md"]);
 }
 
 #[test]
