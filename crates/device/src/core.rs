@@ -308,7 +308,9 @@ impl Core {
         self.last_cycles.get_or_insert(LAST_CYCLES);
     }
 
-    /// A slot of the start-up.
+    /// A slot of the start-up. Not inlined, nor is [`Core::control`]: a board keeps the two in different memories, and the frame of the
+    /// start-up stays out of the cycle's.
+    #[inline(never)]
     fn start_up(&mut self, now_us: u64, io: &mut impl CoreIo) {
         // Answers keep the order of the commands: the next one waits while an answer is outstanding.
         if !self.startup.is_zero_pending() {
@@ -373,6 +375,8 @@ impl Core {
         }
     }
 
+    /// The slot that computes and sends torques.
+    #[inline(never)]
     fn control(&mut self, now_us: u64, io: &mut impl CoreIo) {
         if !self.round.is_open() {
             // The start-up ended in the middle of a cycle.
@@ -486,6 +490,8 @@ impl Core {
         }
     }
 
+    /// The slot that asks one slow question.
+    #[inline(never)]
     fn ask_slowly(&mut self, now_us: u64, io: &mut impl CoreIo) {
         self.idle_request_in = self.idle_request_in.saturating_sub(1);
         let writable = self.startup.safety_properties().is_some_and(|safety| safety.mode_is_writable);

@@ -56,6 +56,21 @@ pub struct Can {
     frames_sent: u64,
 }
 
+/// Offset of SIDFC.
+const STANDARD_FILTERS: u32 = 0x84;
+
+/// Whether a filter element stores a standard identifier in the first queue.
+fn passes(element: u32, id: u16) -> bool {
+    let (first, second) = ((element >> 16 & 0x7FF) as u16, (element & 0x7FF) as u16);
+    element >> 27 & 7 == 1
+        && match element >> 30 {
+            0 => (first..=second).contains(&id),
+            1 => id == first || id == second,
+            2 => id & second == first & second,
+            _ => false,
+        }
+}
+
 /// [`Can`], as its devices and the rest of the board hold it.
 #[derive(Clone, Debug)]
 pub struct SharedCan(Arc<Mutex<Can>>);
@@ -124,6 +139,18 @@ impl Can {
     #[must_use]
     pub fn status(&self, unit: Unit) -> Status {
         self.controllers.status(unit)
+    }
+
+    /// The identifiers of standard frames that the filters of each controller let into its first queue, by the elements in
+    /// the message memory (RM0433 56.3.20).
+    #[must_use]
+    pub fn accepted(&self) -> [Vec<u16>; 2] {
+        Unit::BOTH.map(|unit| {
+            let place = self.controllers.peek(unit, STANDARD_FILTERS);
+            let (first, count) = (place & 0xFFFC, place >> 16 & 0xFF);
+            let elements: Vec<u32> = (0..count).map(|index| self.controllers.peek_memory(first + 4 * index)).collect();
+            (0..0x800).filter(|id| elements.iter().any(|element| passes(*element, *id))).collect()
+        })
     }
 
     /// What the controllers found worth a remark since the last call.
@@ -359,9 +386,11 @@ impl Peer for MessageMemory {
     }
 
     fn write(&mut self, offset: u64, width: Width, value: u64, context: &mut DeviceContext<'_>) {
-        // Narrower writes than a word do not exist on this memory's bus: the controller's remark says so.
-        let _ = width;
-        self.0.lock().controllers.write_memory(offset as u32 & !3, value as u32, context.now().0);
+        let mut can = self.0.lock();
+        let (word, shift) = (offset as u32 & !3, 8 * (offset & 3));
+        let before = u64::from(can.controllers.peek_memory(word));
+        let merged = before & !(width.mask() << shift) | (value & width.mask()) << shift;
+        can.controllers.write_memory(word, merged as u32, context.now().0);
     }
 
     fn peek(&self, offset: u64, _width: Width, _now: VirtualNanos) -> Option<u64> {

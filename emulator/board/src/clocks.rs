@@ -2,7 +2,7 @@
 
 use rigless::device::RegisterFile;
 use rigless::mcu::Mcu;
-use rigless::soc::stm32h743::generated::{flash, pwr, rcc, tim2};
+use rigless::soc::stm32h743::generated::{flash, pwr, rcc, tim2, usart1};
 use rigless::soc::stm32h743::peripherals::rcc::{Apb, Kernel, Rcc, TimerBus};
 use serde_json::{Value, json};
 
@@ -58,6 +58,20 @@ impl Clocks {
             power: power.get(pwr::Register::D3cr),
             flash: flash_registers.get(flash::Register::Acr),
         }
+    }
+
+    /// Bits per second of the serial line as its registers make them; 0 while it is off.
+    #[must_use]
+    pub fn baud(&self, part: &Part) -> u64 {
+        let Some(registers) = part.bus().registers("USART3") else { return 0 };
+        let divider = registers.get(usart1::Register::Brr);
+        // With eight samples a bit the lowest four bits of the divider stand one place lower (RM0433 48.5.7).
+        let (clock, divider) = if registers.get(usart1::Register::Cr1) & 1 << 15 != 0 {
+            (2 * self.serial, (divider & !0xF) | (divider & 7) << 1)
+        } else {
+            (self.serial, divider)
+        };
+        clock.checked_div(divider).unwrap_or(0)
     }
 
     /// For the report.

@@ -16,6 +16,7 @@ use rigless::soc::{Endian, Width};
 use rigless::time::VirtualNanos;
 
 use crate::cache::{BANK, CacheCount, DataCache, LINE, MAINTENANCE};
+use crate::image::Image;
 
 /// Registers by the numbers of the crate's debugger.
 mod register {
@@ -29,6 +30,10 @@ mod register {
 
 /// Registers of the system control space.
 const CCR: u64 = 0xE000_ED14;
+const CFSR: u64 = 0xE000_ED28;
+const HFSR: u64 = 0xE000_ED2C;
+const MMFAR: u64 = 0xE000_ED34;
+const BFAR: u64 = 0xE000_ED38;
 const MPU_CTRL: u64 = 0xE000_ED94;
 const MPU_RNR: u64 = 0xE000_ED98;
 const MPU_RBAR: u64 = 0xE000_ED9C;
@@ -58,8 +63,70 @@ pub enum Order {
     Poke(u32, Vec<u32>),
     /// A register of the processor's own space is written by a debugger.
     Own(u32, u32),
+    /// What a fault handler finds is noted, with this time in ns.
+    Note(u64),
     /// The unused stack between these addresses is painted, up to the stack pointer.
     Paint(Range<u32>),
+}
+
+/// An access to an address where nothing is: a bus fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stray {
+    /// Where to.
+    pub address: u32,
+    /// Where the program was.
+    pub program_counter: u32,
+    /// When, ns.
+    pub at: u64,
+}
+
+/// What the handler of a fault finds when it begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FaultNote {
+    /// When, ns.
+    pub at: u64,
+    /// Number of the exception: 3 hard fault, 4 memory management, 5 bus, 6 usage.
+    pub exception: u32,
+    /// The stack pointer.
+    pub stack: u32,
+    /// CFSR, HFSR, MMFAR, BFAR.
+    pub configurable: u32,
+    /// See above.
+    pub hard: u32,
+    /// See above.
+    pub memory_address: u32,
+    /// See above.
+    pub bus_address: u32,
+}
+
+impl FaultNote {
+    /// One line for people.
+    #[must_use]
+    pub fn line(&self, image: &Image) -> String {
+        let name = match self.exception {
+            2 => "non-maskable interrupt",
+            3 => "hard fault",
+            4 => "memory management fault",
+            5 => "bus fault",
+            6 => "usage fault",
+            _ => "unexpected exception",
+        };
+        let place = if self.stack < image.stack.start {
+            let below = image.stack.start - self.stack;
+            format!(", {below} bytes below the stack, which ends at {:#010x}", image.stack.start)
+        } else {
+            String::new()
+        };
+        format!(
+            "{name} at {} us: SP {:#010x}{place}; CFSR {:#010x}, HFSR {:#010x}, MMFAR {:#010x}, BFAR {:#010x}",
+            self.at / 1000,
+            self.stack,
+            self.configurable,
+            self.hard,
+            self.memory_address,
+            self.bus_address
+        )
+    }
 }
 
 /// What the core and the rest of the board share.
@@ -71,6 +138,10 @@ pub struct CoreState {
     pub cache: DataCache,
     /// Flash words whose check bits do not fit: reading them fails.
     pub damaged: BTreeSet<u32>,
+    /// Accesses to addresses where nothing is.
+    pub strays: Vec<Stray>,
+    /// Faults whose handlers have begun.
+    pub faults: Vec<FaultNote>,
     /// A damaged word was read, for the flash controller's status.
     pub double_error: bool,
 }
@@ -154,6 +225,18 @@ impl Core {
         })
     }
 
+    fn note(&mut self, at: u64) -> FaultNote {
+        FaultNote {
+            at,
+            exception: self.register(register::XPSR) & 0x1FF,
+            stack: self.register(register::SP),
+            configurable: self.own(CFSR, None) as u32,
+            hard: self.own(HFSR, None) as u32,
+            memory_address: self.own(MMFAR, None) as u32,
+            bus_address: self.own(BFAR, None) as u32,
+        }
+    }
+
     /// Carries orders out between two instructions.
     fn obey(&mut self, bus: &mut dyn CoreBus) {
         let orders = std::mem::take(&mut self.shared.lock().orders);
@@ -174,6 +257,10 @@ impl Core {
                 Order::Poke(address, words) => poke(bus, address, &words),
                 Order::Own(address, value) => {
                     self.own(u64::from(address), Some(u64::from(value)));
+                }
+                Order::Note(at) => {
+                    let note = self.note(at);
+                    self.shared.lock().faults.push(note);
                 }
                 Order::Paint(range) => {
                     let top = self.register(register::SP).min(range.end);
@@ -199,6 +286,28 @@ struct CacheBus<'a> {
     verdict: Option<(Option<u64>, u64, bool)>,
     /// The read that waits for a verdict.
     asked: Option<Access>,
+}
+
+/// Memory below the peripherals, by first and last address (RM0433 2.3.2): ITCM, flash, system memory, DTCM, AXI, the three
+/// of the second domain, that of the third, the backup memory.
+const MEMORIES: [(u64, u64); 9] = [
+    (0x0000_0000, 0x0000_FFFF),
+    (0x0800_0000, 0x081F_FFFF),
+    (0x1FF0_0000, 0x1FF1_FFFF),
+    (0x1FF4_0000, 0x1FF5_FFFF),
+    (0x2000_0000, 0x2001_FFFF),
+    (0x2400_0000, 0x2407_FFFF),
+    (0x3000_0000, 0x3004_7FFF),
+    (0x3800_0000, 0x3800_FFFF),
+    (0x3880_0000, 0x3880_0FFF),
+];
+
+/// The peripherals, and the processor's own space.
+const PERIPHERALS: [(u64, u64); 2] = [(0x4000_0000, 0x5FFF_FFFF), (0xE000_0000, 0xE00F_FFFF)];
+
+/// Whether anything answers at an address; an access elsewhere is a bus fault.
+fn exists(address: u64) -> bool {
+    MEMORIES.iter().chain(&PERIPHERALS).any(|(first, last)| (*first..=*last).contains(&address))
 }
 
 fn in_bank(address: u64) -> bool {
@@ -261,6 +370,14 @@ impl CoreBus for CacheBus<'_> {
                 self.shared.lock().cache.maintain(access.address as u32, access.value as u32);
             }
             return Some(0);
+        }
+        if !exists(access.address) {
+            self.shared.lock().strays.push(Stray {
+                address: access.address as u32,
+                program_counter: access.program_counter.unwrap_or(0) as u32,
+                at: access.virtual_time.0,
+            });
+            return None;
         }
         self.inner.access(access, from_code)
     }

@@ -13,8 +13,10 @@ pub enum Kind {
     Dominant(u64),
     /// Power fails in the middle of this operation of bank 2, counted from the given time; 0 is the next.
     PowerCut(u64),
-    /// The oscillator's input has no clock from power-up.
+    /// The oscillator's input has no clock from this time on.
     HseDead,
+    /// A debugger makes a non-maskable interrupt pending.
+    Nmi,
     /// The image panics.
     Panic,
     /// The core meets an undefined instruction.
@@ -55,7 +57,7 @@ pub struct Fault {
 
 /// What the command line takes.
 pub const SYNTAX: &str = "KIND@MICROSECONDS[:ARGUMENT], KIND one of bus-off, no-acknowledge[:US], dominant[:US], power-cut:N, \
-hse-dead, panic, hard-fault, hang, stall:US, guard, below-guard, reset:pin|power|brown-out|probe";
+hse-dead, nmi, panic, hard-fault, hang, stall:US, guard, below-guard, reset:pin|power|brown-out|probe";
 
 /// A text that names no fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -77,6 +79,7 @@ impl FromStr for Fault {
             "dominant" => Kind::Dominant(number()?),
             "power-cut" => Kind::PowerCut(number()?),
             "hse-dead" => Kind::HseDead,
+            "nmi" => Kind::Nmi,
             "panic" => Kind::Panic,
             "hard-fault" => Kind::HardFault,
             "hang" => Kind::Hang,

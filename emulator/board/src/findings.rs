@@ -191,12 +191,19 @@ impl Findings {
         }
         for told in session.told() {
             let grade = if told.reason.contains("ignored") { Grade::Ignored } else { Grade::Refused };
+            let register = format!("{}.{}", told.instance, told.register);
+            let by = pc.and_then(function);
+            let known = |finding: &Finding| finding.register == register && finding.at == told.at.0;
+            if self.list.iter().any(known) {
+                continue;
+            }
+            let excuse = excuses::told(&register, by.as_deref().unwrap_or(""));
             self.add(Finding {
-                grade: if excuses::told(told.instance, told.reason).is_some() { Grade::Excused } else { grade },
-                register: format!("{}.{}", told.instance, told.register),
+                grade: if excuse.is_some() { Grade::Excused } else { grade },
+                register,
                 address: None,
-                function: pc.and_then(function),
-                text: excuses::told(told.instance, told.reason).unwrap_or(told.reason).into(),
+                function: by,
+                text: excuse.unwrap_or(told.reason).into(),
                 at: told.at.0,
             });
         }

@@ -12,6 +12,9 @@ use sha2::{Digest, Sha256};
 /// Name of the only board this emulates.
 pub const BOARD: &str = "nucleo-h743zi2";
 
+/// Place of the slot timer (TIM2) in the vector table.
+const SLOT_VECTOR: usize = 16 + 28;
+
 /// Why a file is no image for this board.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
@@ -76,6 +79,12 @@ pub struct Image {
     pub firmware: String,
     /// End of the stack (its highest address) and its lowest address.
     pub stack: std::ops::Range<u32>,
+    /// Where the handlers of non-maskable interrupt, hard fault and the three configurable faults begin.
+    pub fault_handlers: Vec<u32>,
+    /// Where the handler of the slot timer begins.
+    pub slot_handler: u32,
+    /// Hash of the robot model in it.
+    pub model_hash: u32,
     /// The log's control block.
     pub log_control: u32,
     functions: BTreeMap<u32, (u32, String)>,
@@ -101,6 +110,19 @@ impl Image {
             return Err(ImageError::Board { path, found: metadata.board.to_owned() });
         }
         let firmware = metadata.firmware.to_owned();
+        let model_hash = metadata.model_hash;
+        let vectors =
+            file.section_by_name(".vector_table").ok_or_else(|| ImageError::Anonymous { path: path.clone() })?;
+        let vectors: Vec<u32> = vectors
+            .data()
+            .map_err(elf)?
+            .chunks_exact(4)
+            .filter_map(|word| Some(u32::from_le_bytes(word.try_into().ok()?) & !1))
+            .collect();
+        let mut fault_handlers = vectors.get(2..7).unwrap_or(&[]).to_vec();
+        let slot_handler = vectors.get(SLOT_VECTOR).copied().unwrap_or(0);
+        fault_handlers.sort_unstable();
+        fault_handlers.dedup();
         let hash = hash_of(&file, &bytes).map_err(elf)?;
         let mut functions = BTreeMap::new();
         let mut named = BTreeMap::new();
@@ -118,7 +140,18 @@ impl Image {
         };
         let stack = symbol("_stack_end")?..symbol("_stack_start")?;
         let log_control = symbol("_SEGGER_RTT")?;
-        Ok(Self { hash, firmware, stack, log_control, functions, path, bytes })
+        Ok(Self {
+            hash,
+            model_hash,
+            fault_handlers,
+            slot_handler,
+            firmware,
+            stack,
+            log_control,
+            functions,
+            path,
+            bytes,
+        })
     }
 
     /// The function that holds an address, for people.
@@ -134,17 +167,6 @@ impl Image {
     #[must_use]
     pub fn function_named(&self, part: &str) -> Option<u32> {
         self.functions.iter().find(|(_, (_, name))| name.contains(part)).map(|(address, _)| *address)
-    }
-
-    /// Every place in the code that holds this half word on an instruction's boundary at best; for faults that need an
-    /// instruction to stand on.
-    #[must_use]
-    pub fn halfword(&self, wanted: u16) -> Option<u32> {
-        let file = object::read::elf::ElfFile32::<object::Endianness>::parse(&*self.bytes).ok()?;
-        let text = file.section_by_name(".text")?;
-        let data = text.data().ok()?;
-        let place = data.chunks_exact(2).position(|pair| pair == wanted.to_le_bytes())?;
-        Some(text.address() as u32 + 2 * place as u32)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -51,6 +51,15 @@ enum Command {
         #[arg(long = "fault", help = SYNTAX)]
         faults: Vec<Fault>,
     },
+    /// Boots an image against an arm in this process and compares what it does with what it must do.
+    Check {
+        /// The image, an ELF file.
+        #[arg(long)]
+        image: PathBuf,
+        /// One JSON object on standard output instead of a table.
+        #[arg(long)]
+        json: bool,
+    },
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -69,6 +78,8 @@ fn hexadecimal(text: &str) -> Result<u16, std::num::ParseIntError> {
     u16::from_str_radix(text.trim_start_matches("0x"), 16)
 }
 
+/// Exit status of a check: something is not as it must be.
+const DEVIATION: u8 = 1;
 /// Exit status: the arguments or the image cannot be used.
 const BAD_IMAGE: u8 = 2;
 /// Exit status: the image did what it must not, or the emulation cannot go on.
@@ -95,16 +106,49 @@ fn main() -> ExitCode {
             };
             serve(&image, &setup, report)
         }
+        Command::Check { image, json } => check(&image, json),
     }
 }
 
-fn serve(image: &std::path::Path, setup: &Setup, report: Option<PathBuf>) -> ExitCode {
-    let image = match Image::read(image) {
-        Ok(image) => Arc::new(image),
+fn read(path: &Path) -> Result<Arc<Image>, ExitCode> {
+    Image::read(path).map(Arc::new).map_err(|error| {
+        eprintln!("{error}");
+        ExitCode::from(BAD_IMAGE)
+    })
+}
+
+fn check(image: &Path, json: bool) -> ExitCode {
+    let image = match read(image) {
+        Ok(image) => image,
+        Err(code) => return code,
+    };
+    let checked = match emulated_board::check::check(&image) {
+        Ok(checked) => checked,
         Err(error) => {
             eprintln!("{error}");
-            return ExitCode::from(BAD_IMAGE);
+            return ExitCode::from(FAILED);
         }
+    };
+    let is_right = checked.is_right();
+    if json {
+        println!("{:#}", Value::Object(checked.report));
+    } else {
+        println!("{}: {}, {}", image.path.display(), image.firmware, image.hash);
+        print!("{}", checked.table());
+    }
+    if is_right {
+        return ExitCode::SUCCESS;
+    }
+    for reason in &checked.reasons {
+        eprintln!("{reason}");
+    }
+    ExitCode::from(if json { FAILED } else { DEVIATION })
+}
+
+fn serve(image: &Path, setup: &Setup, report: Option<PathBuf>) -> ExitCode {
+    let image = match read(image) {
+        Ok(image) => image,
+        Err(code) => return code,
     };
     let world = Lockstep::new(io::stdin(), io::stdout());
     let outcome = match run(&image, setup, Box::new(world)) {
@@ -120,6 +164,9 @@ fn serve(image: &std::path::Path, setup: &Setup, report: Option<PathBuf>) -> Exi
             eprintln!("{}: {error}", path.display());
             return ExitCode::from(FAILED);
         }
+    }
+    if let Some(operation) = outcome.power_cut {
+        eprintln!("power failed in the middle of an operation of bank 2: {operation}");
     }
     match outcome.cut_short {
         None => ExitCode::SUCCESS,

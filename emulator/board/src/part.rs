@@ -23,6 +23,9 @@ const SUPPLY: u32 = 3300;
 /// Device identifier in the low half of DBGMCU.IDC.
 const DEVICE: u64 = 0x6450;
 
+/// RCC.CR HSECSSON.
+const SECURITY: u64 = 1 << 19;
+
 /// FLASH.SR2 DBECCERR: a word with two errors was read.
 const DOUBLE_ERROR: u64 = 1 << 26;
 
@@ -34,6 +37,7 @@ struct Slots {
     serial: usize,
     debug: usize,
     flash: usize,
+    clock: usize,
     usb: [usize; 2],
 }
 
@@ -83,6 +87,7 @@ impl Part {
             serial: bus.slot("USART3")?,
             debug: bus.slot("DBGMCU")?,
             flash: bus.slot("Flash")?,
+            clock: bus.slot("RCC")?,
             usb: [bus.slot("OTG2_HS_DEVICE")?, bus.slot("OTG2_HS_PWRCLK")?],
         };
         let identity = DEVICE | u64::from(fitting.revision) << 16;
@@ -108,6 +113,19 @@ impl Part {
             let (_, mut context) = self.chip.bus_mut().drive(at, slot);
             controller.begin(&mut context);
         }
+    }
+
+    /// The oscillator's input has lost its clock. Whether the clock security system has noticed.
+    pub fn fail_crystal(&mut self, at: VirtualNanos) -> bool {
+        let control = |part: &mut Self| part.chip.clocks().1.get(rcc::Register::Cr);
+        if control(self) & SECURITY == 0 {
+            return false;
+        }
+        let mut tree = std::mem::take(&mut self.chip.rcc);
+        let (registers, mut context) = self.chip.bus_mut().drive(at, self.slots.clock);
+        tree.fail_hse(registers, &mut context);
+        self.chip.rcc = tree;
+        true
     }
 
     /// Says that the last reset had these causes, flags of RCC.RSR.

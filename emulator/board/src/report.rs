@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 
 use crate::cache::CacheCount;
 use crate::clocks::Clocks;
+use crate::core::FaultNote;
 use crate::findings::Findings;
 use crate::image::Image;
 use crate::stack::StackUse;
@@ -21,6 +22,8 @@ pub struct Measured {
     pub resets: Vec<(u64, String)>,
     /// First frame on the arm's bus, ns.
     pub first_frame: Option<u64>,
+    /// The slot timer's first interrupt, ns.
+    pub first_slot: Option<u64>,
     /// Frames sent on the arm's bus.
     pub frames_sent: u64,
     /// Clocks.
@@ -33,6 +36,12 @@ pub struct Measured {
     pub watchdog: Watched,
     /// Reads of bank 2.
     pub cache: CacheCount,
+    /// Faults whose handlers began.
+    pub faults: Vec<FaultNote>,
+    /// Identifiers that pass the filters of the two CAN controllers.
+    pub accepted: [Vec<u16>; 2],
+    /// Rate of the serial line, bits per second; 0 while it is off.
+    pub serial_baud: u64,
     /// Operations of bank 2.
     pub bank_operations: u64,
     /// What must be reported.
@@ -54,10 +63,12 @@ impl Measured {
         put("instructions", json!(self.instructions));
         put("resets", json!(resets));
         put("first_frame_us", json!(self.first_frame.map(|at| at / 1000)));
+        put("first_slot_us", json!(self.first_slot.map(|at| at / 1000)));
         put("frames_sent", json!(self.frames_sent));
         put("clocks", self.clocks.json());
         put("can_bit_rate", json!(self.timing.map(|timing| timing.bits_per_second())));
         put("sample_point", json!(self.timing.map(|timing| f64::from(timing.sample_point_per_mille()) / 1000.0)));
+        put("serial_baud", json!(self.serial_baud));
         put("slot_hz", json!(self.clocks.slot_micro_hz as f64 / 1e6));
         put(
             "stack",
@@ -86,6 +97,7 @@ impl Measured {
                 "first_stale_by": stale_by,
             }),
         );
+        put("faults", json!(self.faults.iter().map(|note| note.line(image)).collect::<Vec<_>>()));
         for (grade, entries) in self.findings.json() {
             put(grade, entries);
         }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use fdcan_model::{Cancellation, Options};
-use rigless::emulator::{self, Start};
+use rigless::emulator::{self, Start, Watch};
 use rigless::image::Image as Placed;
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
@@ -105,6 +105,8 @@ pub struct Outcome {
     pub bank2: Vec<u8>,
     /// Why the run ended before the world and the time did.
     pub cut_short: Option<String>,
+    /// The operation of bank 2 in which power failed, which ended the run.
+    pub power_cut: Option<String>,
 }
 
 /// Runs an image.
@@ -132,7 +134,11 @@ pub fn run(image: &Arc<Image>, setup: &Setup, world: Box<dyn World>) -> Result<O
     let log = setup.log.as_ref().map(|path| file(path, File::create(path))).transpose()?;
     let log = Log::new(image.log_control, log);
     let watcher = Watcher::new(image.clone(), setup, can, core.clone(), watch, log, interrupt.clone());
-    let session = Session::new(Box::new(board), 0, VirtualNanos(LOOK))?;
+    let mut session = Session::new(Box::new(board), 0, VirtualNanos(LOOK))?;
+    for handler in &image.fault_handlers {
+        session.watch(Watch::Instruction(u64::from(*handler)));
+    }
+    session.watch(Watch::Instruction(u64::from(image.slot_handler)));
     let mut start = Start::new(&images);
     start.interrupt = Some(&interrupt);
     let mut finished = emulator::run(session, &start, watcher)?;

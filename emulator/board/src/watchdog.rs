@@ -40,6 +40,8 @@ pub struct Watched {
     pub feedings: u64,
     /// When the window last changed, ns.
     pub changed_at: u64,
+    /// When it was started, ns.
+    pub started_at: Option<u64>,
 }
 
 /// [`Watched`], shared with who reports it.
@@ -196,6 +198,7 @@ impl Device for Watchdog {
                     self.open = false;
                     if !self.started {
                         self.started = true;
+                        self.watch.lock().started_at = Some(context.now().0);
                         context.request(IWDG_STARTED, Level::High);
                     }
                     self.feed(context);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use fdcan_model::{Fault as WireFault, Unit};
-use rigless::emulator::{Access, AccessKind, Driver, Host, Settled, Stop};
+use rigless::emulator::{Access, AccessKind, Driver, Hit, Host, Settled, Stop, Watch};
 
 use rigless::session::Session;
 use rigless::soc::Width;
@@ -41,12 +41,19 @@ const SYSTEM_RESET: u32 = 0x05FA_0004;
 const POWER_FLAGS: u64 = 0x00FE_0000;
 const BROWN_OUT_FLAGS: u64 = 0x007E_0000;
 
-/// Where an injected panic finds its place in the source: unused memory of the second domain.
-const SCRATCH: u32 = 0x3000_0000;
+/// Where injected instructions and the place of an injected panic lie: the end of the AXI memory, which no image fills.
+const SCRATCH: u32 = 0x2407_FFC0;
 
-/// Instructions: branch to itself, undefined as compilers write it.
-const LOOP: u16 = 0xE7FE;
-const UNDEFINED: u16 = 0xDEFE;
+/// Two instructions each: branch to itself, undefined as compilers write it.
+const LOOP: u32 = 0xE7FE_E7FE;
+const UNDEFINED: u32 = 0xDEFE_DEFE;
+
+/// ICSR and its bit that makes a non-maskable interrupt pending.
+const INTERRUPT_CONTROL: u32 = 0xE000_ED04;
+const PEND_NMI: u32 = 1 << 31;
+
+/// An access this near below the stack is taken for one of the stack's.
+const NEAR_STACK: u32 = 128 * 1024;
 
 /// See the module.
 pub struct Watcher {
@@ -62,6 +69,9 @@ pub struct Watcher {
     /// Faults not yet put in, the earliest first.
     faults: Vec<Fault>,
     hse_dead: bool,
+    stopped_by_crystal: bool,
+    first_slot: Option<u64>,
+    power_cut: Option<String>,
     /// The wire or the core is to be let go at this time.
     release_wire: Option<u64>,
     release_core: Option<u64>,
@@ -94,8 +104,9 @@ impl Watcher {
     ) -> Self {
         let mut faults = setup.faults.clone();
         faults.sort_by_key(|fault| fault.at);
-        let hse_dead = faults.iter().any(|fault| fault.kind == Kind::HseDead);
-        faults.retain(|fault| fault.kind != Kind::HseDead);
+        let dead_from_start = |fault: &Fault| fault.kind == Kind::HseDead && fault.at == 0;
+        let hse_dead = faults.iter().any(dead_from_start);
+        faults.retain(|fault| !dead_from_start(fault));
         Self {
             image,
             can,
@@ -108,6 +119,9 @@ impl Watcher {
             tells: setup.tells,
             faults,
             hse_dead,
+            stopped_by_crystal: false,
+            first_slot: None,
+            power_cut: None,
             release_wire: None,
             release_core: None,
             cut_at: None,
@@ -154,6 +168,9 @@ impl Watcher {
         let offered = self.can.lock().frames_offered();
         if session.resets().len() != self.resets_seen {
             self.resets_seen = session.resets().len();
+            if std::mem::take(&mut self.stopped_by_crystal) {
+                host.hold(false);
+            }
             self.frames_at_reset = offered;
             self.stack.at_start = None;
             self.stack.in_service = None;
@@ -164,6 +181,37 @@ impl Watcher {
             let painted = self.image.stack.end - used..self.image.stack.end;
             self.core.lock().orders.push(Order::Paint(painted));
             self.watch.forget();
+        }
+    }
+
+    /// The core has come to a handler.
+    fn hit(&mut self, hit: Hit, session: &mut Session<Board>) {
+        if hit.address == u64::from(self.image.slot_handler) {
+            self.first_slot.get_or_insert(hit.at.0);
+            session.unwatch(Watch::Instruction(hit.address));
+        } else {
+            self.core.lock().orders.push(Order::Note(hit.at.0));
+        }
+    }
+
+    /// Accesses to where nothing is.
+    fn check_strays(&mut self) {
+        for stray in std::mem::take(&mut self.core.lock().strays) {
+            let stack = &self.image.stack;
+            let below = stack.start.saturating_sub(stray.address);
+            let text = if (1..NEAR_STACK).contains(&below) {
+                format!("nothing is at this address, {below} bytes below the stack: a bus fault")
+            } else {
+                "nothing is at this address: a bus fault".into()
+            };
+            self.findings.add(Finding {
+                grade: Grade::Refused,
+                register: "memory".into(),
+                address: Some(stray.address.into()),
+                function: Some(self.image.function_at(stray.program_counter)),
+                text,
+                at: stray.at,
+            });
         }
     }
 
@@ -214,7 +262,7 @@ impl Watcher {
         if self.cut_at == Some(self.bank_watch.operations) {
             let damaged = tear(&operation, self.bank_watch.operations, host);
             self.core.lock().damaged.extend(damaged);
-            self.cut_short = Some(format!("power failed in {operation:?} of bank 2"));
+            self.power_cut = Some(format!("{operation:?}"));
         }
     }
 
@@ -245,7 +293,8 @@ impl Watcher {
             Kind::NoAcknowledge(us) => wire(WireFault::NoAcknowledge, us),
             Kind::Dominant(us) => wire(WireFault::StuckDominant, us),
             Kind::PowerCut(operation) => self.cut_at = Some(self.bank_watch.operations + operation + 1),
-            Kind::HseDead => {}
+            Kind::HseDead => self.kill_crystal(session, now, host),
+            Kind::Nmi => self.core.lock().orders.push(Order::Own(INTERRUPT_CONTROL, PEND_NMI)),
             Kind::Panic => match self.image.function_named("core::option::unwrap_failed") {
                 Some(pc) => {
                     // A place in the source, for the function that panics: text, its length, line, column.
@@ -281,11 +330,22 @@ impl Watcher {
         }
     }
 
-    /// The core goes on at an instruction that the image holds somewhere.
-    fn stand_on(&mut self, instruction: u16, masked: bool) {
-        match self.image.halfword(instruction) {
-            Some(pc) => self.core.lock().orders.push(Order::Jump { pc, arguments: [0; 4], masked }),
-            None => self.cut_short = Some(format!("the image has no instruction {instruction:#06x} to stand on")),
+    /// The core goes on at these instructions.
+    fn stand_on(&mut self, instructions: u32, masked: bool) {
+        let orders = &mut self.core.lock().orders;
+        orders.push(Order::Poke(SCRATCH, vec![instructions]));
+        orders.push(Order::Jump { pc: SCRATCH, arguments: [0; 4], masked });
+    }
+
+    /// The oscillator's input loses its clock while the chip runs from it. With the clock security system on, the chip goes
+    /// over to its inner oscillator and has a non-maskable interrupt; without, everything but the watchdog stands still.
+    fn kill_crystal(&mut self, session: &mut Session<Board>, now: u64, host: &mut dyn Host) {
+        self.hse_dead = true;
+        if session.board_mut().mcu.part.fail_crystal(VirtualNanos(now)) {
+            self.core.lock().orders.push(Order::Own(INTERRUPT_CONTROL, PEND_NMI));
+        } else {
+            host.hold(true);
+            self.stopped_by_crystal = true;
         }
     }
 
@@ -294,22 +354,33 @@ impl Watcher {
     pub fn into_outcome(self, session: &mut Session<Board>) -> Outcome {
         let resets = session.resets().iter().map(|reset| (reset.at.0, format!("{:?}", reset.cause))).collect();
         let clocks = Clocks::of(&mut session.board_mut().mcu.part);
+        let serial_baud = clocks.baud(&session.board().mcu.part);
         let can = self.can.lock();
         let measured = Measured {
             now: self.now,
             instructions: self.instructions,
             resets,
             first_frame: can.first_frame(),
+            first_slot: self.first_slot,
             frames_sent: can.frames_sent(),
             clocks,
             timing: can.status(Unit::One).timing,
             stack: self.stack,
             watchdog: self.watch.get(),
             cache: self.core.cache_count(),
+            faults: self.core.lock().faults.clone(),
+            accepted: can.accepted(),
+            serial_baud,
             bank_operations: self.bank_watch.operations,
             findings: self.findings,
         };
-        Outcome { measured, log: self.log.bytes, bank2: self.bank2, cut_short: self.cut_short }
+        Outcome {
+            measured,
+            log: self.log.bytes,
+            bank2: self.bank2,
+            cut_short: self.cut_short,
+            power_cut: self.power_cut,
+        }
     }
 }
 
@@ -342,6 +413,7 @@ impl Driver<Board> for Watcher {
                 self.check_clocks(session, &access);
                 self.check_bank(&access, host);
             }
+            Settled::Hit(hit) => self.hit(hit, session),
             Settled::Stop(stop) => (self.now, self.instructions) = (stop.at.0, stop.instruction_count),
             _ => {}
         }
@@ -350,6 +422,7 @@ impl Driver<Board> for Watcher {
             let control = registers.get(rcc::Register::Cr);
             registers.set(rcc::Register::Cr, control & !HSE_READY);
         }
+        self.check_strays();
         if self.findings.all().len() > self.told {
             self.tell_new();
         }
@@ -359,7 +432,7 @@ impl Driver<Board> for Watcher {
         {
             self.cut_short = Some(finding.line());
         }
-        if gone || self.cut_short.is_some() {
+        if gone || self.cut_short.is_some() || self.power_cut.is_some() {
             self.finish(host);
         }
     }

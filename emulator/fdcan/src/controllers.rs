@@ -229,8 +229,8 @@ impl Controllers {
 
     /// Answer to a [`WireEvent::Withdraw`], at once: the oldest frame could not be taken back, it is on the wire.
     ///
-    /// The model takes it for begun, as if [`Controllers::begun`] had been called before: a cancellation of it waits for
-    /// its end. Once the controller has stopped (INIT, bus-off, reset) the answer changes nothing.
+    /// The model takes it for begun, as if [`Controllers::begun`] had been called before: a cancellation of it waits
+    /// for its end. Once the controller has stopped (INIT, bus-off, reset) the answer changes nothing.
     pub fn still_on_wire(&mut self, unit: Unit, now: Nanoseconds) {
         self.advance(now);
         self.unit(unit).still_on_wire();

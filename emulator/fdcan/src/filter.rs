@@ -44,7 +44,8 @@ pub(crate) fn verdict(register: impl Fn(u32) -> u32, memory: &Memory, frame: &Fr
     if frame.remote && global & reject_remote != 0 {
         return Verdict::DROPPED;
     }
-    let (start, count) = ((list & 0xFFFC) / 4, list >> 16 & 0xFF);
+    // More than 128 words of filters count as 128.
+    let (start, count) = ((list & 0xFFFC) / 4, (list >> 16 & 0xFF).min(128 / words));
     let mut unwritten = None;
     for element in 0..count {
         let at = start + element * words;

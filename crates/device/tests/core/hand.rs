@@ -69,7 +69,8 @@ fn move_hand(bus: &mut Bus) {
 fn an_arm_without_a_hand_hears_nothing_of_one() {
     let (mut core, mut bus) = floating();
     assert_eq!((core.health().hand, news(&bus)), (HandStage::Absent, vec![]));
-    let asked: Vec<_> = to_hand(&bus, 0);
+    let [(_, _, first), asked @ ..] = &to_hand(&bus, 0)[..] else { panic!("nothing was sent to a hand") };
+    assert_eq!(*first, Action::Set { property: PropertyId::MODE, value: 0 }, "it may be driven from an earlier life");
     assert!(
         asked.iter().all(|(_, _, action)| matches!(action, Action::Get { property: PropertyId::STAT })),
         "{asked:?}"
@@ -84,8 +85,8 @@ fn an_arm_without_a_hand_hears_nothing_of_one() {
 fn a_hand_is_woken_braked_and_then_left_alone_until_a_person_asks() {
     let (core, bus) = holding_with_hand();
     assert_eq!((core.health().hand, news(&bus)), (HandStage::NotInitialised, vec![(HandStage::NotInitialised, None)]));
-    let mut expected: Vec<_> =
-        Node::HAND.into_iter().map(|node| (Destination::Node(node), PropertyId::STAT, 2)).collect();
+    let mut expected = vec![set_mode(Group::HAND, MotorMode::Idle)];
+    expected.extend(Node::HAND.into_iter().map(|node| (Destination::Node(node), PropertyId::STAT, 2)));
     expected.push(set_mode(Group::HAND, MotorMode::Idle));
     assert_eq!(sets(&bus, 0), expected);
     let asked = |property| {

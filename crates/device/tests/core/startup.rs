@@ -2,7 +2,8 @@
 
 use device::{Command, EventKind, Refusal, Stage, StartupError};
 use puck::{
-    Action, Counts, Destination, Group, Node, Property, PropertyId, PropertyTable, PuckTorque, Request, SafetyMode,
+    Action, CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId, PropertyTable, PuckTorque,
+    Request, SafetyMode, set, zero_torques,
 };
 
 use crate::double::{ARM, Bus, HOME, silent_device, started};
@@ -27,7 +28,7 @@ fn stages(bus: &Bus) -> Vec<Stage> {
 /// The pauses that Barrett's devices need, checked on everything that was sent before the cyclic loop.
 fn assert_pauses(bus: &Bus) {
     let loop_begins = bus.records.first().map_or(bus.log.len(), |_| {
-        // The cyclic loop begins with the first request for a wrench, or with torque.
+        // The cyclic loop begins with the first request for a wrench, or with torque behind that of the first two frames.
         let begins = |frame: &puck::CanFrame| {
             matches!(
                 Request::decode(frame).expect("a request").action,
@@ -35,7 +36,7 @@ fn assert_pauses(bus: &Bus) {
             )
         };
         // The position request of the same slot stands before it.
-        bus.log.iter().position(|(_, frame)| begins(frame)).expect("a loop").saturating_sub(1)
+        1 + bus.log[2..].iter().position(|(_, frame)| begins(frame)).expect("a loop")
     });
     let frames = &bus.log[..loop_begins];
     assert!(frames.len() > 60, "only {} frames before the loop", frames.len());
@@ -102,7 +103,7 @@ fn the_frames_of_the_start_up_are_those_of_the_reference() {
     bus.run(&mut core, 0.1);
     let sets: Vec<_> = bus.sets().map(|(_, to, property, value)| (to, property, value)).collect();
     let limit = |property| i32::from(safety_property(property).number());
-    let mut expected = Vec::new();
+    let mut expected = vec![(ARM, PropertyId::MODE, 0), (Group::HAND.into(), PropertyId::MODE, 0)];
     for property in [Property::Vl1, Property::Vl2, Property::Tl1, Property::Tl2] {
         expected.push((SAFETY, safety_property(Property::Def), limit(property)));
         expected.push((SAFETY, safety_property(Property::Load), limit(property)));
@@ -150,6 +151,21 @@ fn an_active_arm_is_not_started_until_a_person_makes_it_idle() {
     assert_eq!(core.stage(), Stage::WaitingForIdle);
     bus.press_idle();
     bus.run_until(&mut core, Stage::WaitingForActive);
+}
+
+#[test]
+fn g3_a_device_that_restarts_takes_off_the_torque_before_it_asks_anything() {
+    // The board was reset while the arm was ACTIVE: the pucks still apply what the old life commanded.
+    let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
+    bus.press_activate();
+    bus.run(&mut core, 0.02);
+    let [arm, wrist] = zero_torques();
+    let idle = |group| set(group, PropertyId::MODE, MotorMode::Idle.value());
+    let first: Vec<CanFrame> = bus.log.iter().take(4).map(|(_, frame)| *frame).collect();
+    assert_eq!(first, [arm, wrist, idle(Group::ARM), idle(Group::HAND)]);
+    let begun = bus.log.first().map(|(time, _)| *time).expect("a frame");
+    let zeroed = bus.log.get(1).map(|(time, _)| *time).expect("a second frame");
+    assert!(zeroed - begun <= 2_000, "both torque frames leave within two slots, not {} us", zeroed - begun);
 }
 
 #[test]

@@ -104,6 +104,15 @@ fn frames_that_match_no_element_go_where_gfc_says() {
 }
 
 #[test]
+fn a_list_ends_after_128_elements() {
+    let mut elements = [0; 129];
+    elements[128] = element(0, 1, 0x200, 0x200);
+    elements[127] = element(0, 1, 0x100, 0x100);
+    let mut bench = bench(&elements, &[], REJECT_OTHERS);
+    assert_eq!(passed(&mut bench, standard([0x100, 0x200])).0, [0x100]);
+}
+
+#[test]
 fn an_empty_list_matches_nothing() {
     let mut bench = bench(&[], &[], 0b01_0000);
     assert_eq!(passed(&mut bench, standard([5])), (vec![], vec![5]));
