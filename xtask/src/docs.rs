@@ -1,8 +1,9 @@
 //! The words of the repository: no dead link, path, decision number, test name or fault identifier.
 //!
-//! Checked in every tracked or new file. Markdown: links with their anchors, paths and test names in code spans. All text:
-//! paths below `docs/`, numbers of decisions, identifiers of `docs/faults.md`. Rust comments: paths below any folder of the
-//! root. And every document is in the index of the documents.
+//! Checked in every tracked or new file. Markdown: links with their anchors, paths and test names in code spans. All
+//! text: paths below `docs/`, numbers of decisions, identifiers of `docs/faults.md`. Rust comments: paths below any folder
+//! of the root. Every document is in the index of the documents, and every test that begins with a fault identifier is in
+//! the entry of that fault.
 
 mod facts;
 mod scan;
@@ -110,7 +111,7 @@ fn markdown(facts: &Facts, path: &str, line: &str, causes: &mut BTreeSet<String>
     }
 }
 
-/// Paths, decisions and fault identifiers in any kind of file.
+/// Paths, decisions and fault identifiers in any kind of file; tests of a fault that its entry does not name.
 fn anywhere(facts: &Facts, path: &str, line: &str, causes: &mut BTreeSet<String>) {
     let comment = if path.ends_with(".rs") { scan::comment(line) } else { None };
     let in_comment = comment.into_iter().flat_map(scan::words);
@@ -123,12 +124,18 @@ fn anywhere(facts: &Facts, path: &str, line: &str, causes: &mut BTreeSet<String>
     for number in scan::decisions(line).filter(|number| !facts.decisions.contains(*number)) {
         causes.insert(format!("no decision {number}"));
     }
-    let is_prose = path.ends_with(".md") || comment.is_some();
-    let mut identifiers = scan::name(line).map(scan::identifiers_of_name).unwrap_or_default();
-    if is_prose {
-        identifiers.extend(scan::identifiers(comment.unwrap_or(line)));
+    let no_fault = |identifier: &str| format!("{CATALOGUE} has no fault {identifier}");
+    if path.ends_with(".md") || comment.is_some() {
+        let named = scan::identifiers(comment.unwrap_or(line));
+        causes.extend(named.iter().filter(|name| !facts.faults.contains_key(*name)).map(|name| no_fault(name)));
     }
-    for identifier in identifiers.into_iter().filter(|identifier| !facts.faults.contains(identifier)) {
-        causes.insert(format!("{CATALOGUE} has no fault {identifier}"));
+    // A catalogue that does not know its tests says "open" of what is held.
+    let function = scan::name(line).filter(|_| path.ends_with(".rs")).unwrap_or_default();
+    for identifier in scan::identifiers_of_name(function) {
+        match facts.faults.get(&identifier) {
+            None => drop(causes.insert(no_fault(&identifier))),
+            Some(entry) if entry.contains(function) => {}
+            Some(_) => drop(causes.insert(format!("{CATALOGUE} does not name {function} under {identifier}"))),
+        }
     }
 }

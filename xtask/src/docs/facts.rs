@@ -15,7 +15,8 @@ pub(super) struct Facts {
     pub(super) functions: BTreeSet<String>,
     /// Four digits each.
     pub(super) decisions: BTreeSet<String>,
-    pub(super) faults: BTreeSet<String>,
+    /// Identifiers of the catalogue, each with its entry.
+    pub(super) faults: BTreeMap<String, String>,
 }
 
 impl Facts {
@@ -28,7 +29,7 @@ impl Facts {
             anchors: BTreeMap::new(),
             functions: BTreeSet::new(),
             decisions: BTreeSet::new(),
-            faults: BTreeSet::new(),
+            faults: BTreeMap::new(),
         };
         for (path, text) in files {
             for (at, _) in path.match_indices('/') {
@@ -46,8 +47,9 @@ impl Facts {
                 facts.anchors.insert(path.clone(), anchors(text));
             }
             if path == CATALOGUE {
-                let first_cells = text.lines().filter_map(|line| line.strip_prefix("| ")?.split(" |").next());
-                facts.faults.extend(first_cells.filter(|cell| scan::is_identifier(cell)).map(str::to_owned));
+                let entries = text.lines().filter_map(|line| line.strip_prefix("| ")?.split_once(" |"));
+                let entries = entries.filter(|(first, _)| scan::is_identifier(first));
+                facts.faults.extend(entries.map(|(first, rest)| (first.to_owned(), rest.to_owned())));
             }
         }
         facts

@@ -72,14 +72,15 @@ pub(super) fn name(line: &str) -> Option<&str> {
     (end > 0 && !line.starts_with("//")).then(|| &rest[..end])
 }
 
-/// Fault identifiers that a function's name begins with: `b5_b7_a_stuck_sensor` has two.
+/// Fault identifiers that a function's name begins with: `b5_b7_a_stuck_sensor` has two. A name that is nothing else has
+/// none.
 pub(super) fn identifiers_of_name(name: &str) -> Vec<String> {
-    name.split('_')
-        .take_while(|word| is_identifier(&word.to_ascii_uppercase()) && word.starts_with(|c: char| c.is_lowercase()))
-        // Number types, not faults.
-        .filter(|word| !matches!(*word, "f32" | "f64"))
-        .map(str::to_ascii_uppercase)
-        .collect()
+    let is_one = |word: &&str| is_identifier(&word.to_ascii_uppercase()) && !matches!(*word, "f32" | "f64");
+    let first: Vec<&str> = name.split('_').take_while(is_one).collect();
+    if first.len() == name.split('_').count() {
+        return Vec::new();
+    }
+    first.into_iter().map(str::to_ascii_uppercase).collect()
 }
 
 /// Fault identifiers of a text: alone in brackets, before a colon at its beginning, or after the word "fault".

@@ -5,7 +5,11 @@ use super::check;
 /// A small repository: a catalogue, a guide, a decision, a package with a test, and the files of the test.
 fn repository(more: &[(&str, String)]) -> Vec<(String, String)> {
     let mut files = vec![
-        ("docs/faults.md".to_owned(), "# Faults\n\n## The catalogue\n\n| id |\n| A8 | x |\n| B12 | y |\n".to_owned()),
+        (
+            "docs/faults.md".to_owned(),
+            "# Faults\n\n| id |\n| A8 | `a8_a_stuck_encoder_stops_the_arm`, `a8_b12_stop` |\n| B12 | `a8_b12_stop` |\n"
+                .to_owned(),
+        ),
         ("docs/guide.md".to_owned(), "# Guide\n\n## Two words, and `code`\n".to_owned()),
         ("docs/decisions/0007-seven.md".to_owned(), String::new()),
         ("docs/README.md".to_owned(), "[f](faults.md) [g](guide.md) [7](decisions/0007-seven.md) [a](a.md)".to_owned()),
@@ -74,8 +78,9 @@ fn documents_are_checked_in_any_file_and_messages_too() {
 #[test]
 fn fault_identifiers_are_those_of_the_catalogue() {
     let test = |name: &str| format!("fn {name}() {{}}");
-    tells_apart("crates/arm/tests/b.rs", &test("a8_b12_stop"), &test("a8_g3_stop"), "no fault G3");
-    tells_apart("crates/arm/tests/b.rs", &test("f32_is_no_fault"), &test("f1_is_one"), "no fault F1");
+    tells_apart("crates/arm/tests/b.rs", &test("a8_b12_stop"), &test("g3_stop"), "no fault G3");
+    tells_apart("crates/arm/tests/b.rs", &test("a8_b12_stop"), &test("b12_halt"), "does not name b12_halt under B12");
+    tells_apart("crates/arm/tests/b.rs", &(test("f32_is_no_fault") + &test("d3")), &test("f1_is_one"), "no fault F1");
     tells_apart("crates/arm/src/a.rs", "/// A8: stuck", "/// A9: stuck", "no fault A9");
     tells_apart("crates/arm/src/a.rs", "// at rest (A8, B12)", "// at rest (A8, B13)", "no fault B13");
     tells_apart("crates/arm/src/a.rs", "// (faults A8 to B12).", "// (faults A8 to B13).", "no fault B13");
