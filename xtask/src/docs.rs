@@ -1,9 +1,9 @@
 //! The words of the repository: no dead link, path, decision number, test name or fault identifier.
 //!
 //! Checked in every tracked or new file. Markdown: links with their anchors, paths and test names in code spans. All
-//! text: paths below `docs/`, numbers of decisions, identifiers of `docs/faults.md`. Rust comments: paths below any folder
-//! of the root. Every document is in the index of the documents, and every test that begins with a fault identifier is in
-//! the entry of that fault.
+//! text: paths below `docs/`, numbers of decisions, identifiers of `docs/faults.md`. Rust comments: paths below any
+//! folder of the root. Every document is in the index of the documents, and every test that begins with a fault
+//! identifier is in the entry of that fault.
 
 mod facts;
 mod scan;

@@ -107,8 +107,9 @@ impl Facts {
     }
 
     fn package_of<'a>(&self, path: &'a str) -> Option<&'a str> {
-        let folders = path.match_indices('/').map(|(at, _)| &path[..at]);
-        folders.filter(|folder| self.packages.contains(*folder)).last()
+        // From the innermost folder outwards.
+        let mut folders = path.rmatch_indices('/').map(|(at, _)| &path[..at]);
+        folders.find(|folder| self.packages.contains(*folder))
     }
 }
 

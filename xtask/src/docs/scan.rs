@@ -72,8 +72,8 @@ pub(super) fn name(line: &str) -> Option<&str> {
     (end > 0 && !line.starts_with("//")).then(|| &rest[..end])
 }
 
-/// Fault identifiers that a function's name begins with: `b5_b7_a_stuck_sensor` has two. A name that is nothing else has
-/// none.
+/// Fault identifiers that a function's name begins with: `b5_b7_a_stuck_sensor` has two. A name that is nothing else
+/// has none.
 pub(super) fn identifiers_of_name(name: &str) -> Vec<String> {
     let is_one = |word: &&str| is_identifier(&word.to_ascii_uppercase()) && !matches!(*word, "f32" | "f64");
     let first: Vec<&str> = name.split('_').take_while(is_one).collect();
