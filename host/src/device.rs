@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use link::can::DeviceNumber;
 
-use crate::simulation::{Simulation, SimulationError, SimulationOptions};
+use crate::simulation::{Engine, Simulation, SimulationError, SimulationOptions};
 use crate::transport::{
-    Address, CanTransport, LineKind, SerialTransport, SimulatedCan, SocketCan, StreamTransport, Transport,
+    Address, BoardCan, CanTransport, LineKind, SerialTransport, SimulatedCan, SocketCan, StreamTransport, Transport,
     TransportError,
 };
 
@@ -16,6 +16,8 @@ pub enum Device {
     Simulated(Box<Simulation>),
     /// The same, its host link on a simulated CAN bus.
     SimulatedCan(Box<CanTransport<SimulatedCan>>),
+    /// Simulated, its host link on the bus inside the emulated board.
+    BoardCan(Box<CanTransport<BoardCan>>),
     /// At the other end of a socket.
     Stream(StreamTransport),
     /// At the other end of a serial line.
@@ -46,9 +48,13 @@ impl Device {
                 let mut options = SimulationOptions::from_address(*kind, options)?;
                 adjust(&mut options);
                 let simulation = Simulation::start(&options)?;
-                match options.line {
-                    LineKind::Serial => Self::Simulated(Box::new(simulation)),
-                    LineKind::Can => {
+                match (options.line, &options.engine) {
+                    (LineKind::Serial, _) => Self::Simulated(Box::new(simulation)),
+                    (LineKind::Can, Engine::Board(_)) => {
+                        let port = BoardCan::new(simulation);
+                        Self::BoardCan(Box::new(CanTransport::new(port, DeviceNumber::FIRST)))
+                    }
+                    (LineKind::Can, _) => {
                         let port = SimulatedCan::attach(simulation, DeviceNumber::FIRST);
                         Self::SimulatedCan(Box::new(CanTransport::new(port, DeviceNumber::FIRST)))
                     }
@@ -65,7 +71,8 @@ impl Device {
 
     /// What the line carries at most, byte/s, where that is known whatever the adapter: on a CAN bus.
     pub fn line_rate(&self) -> Option<f64> {
-        matches!(self, Self::Can(_) | Self::SimulatedCan(_)).then_some(link::can::LINE_BYTES_PER_SECOND)
+        matches!(self, Self::Can(_) | Self::SimulatedCan(_) | Self::BoardCan(_))
+            .then_some(link::can::LINE_BYTES_PER_SECOND)
     }
 
     /// The simulation, if it is one.
@@ -73,6 +80,7 @@ impl Device {
         match self {
             Self::Simulated(simulation) => Some(simulation),
             Self::SimulatedCan(device) => Some(device.port().simulation()),
+            Self::BoardCan(device) => Some(device.port().simulation()),
             Self::Stream(_) | Self::Serial(_) | Self::Can(_) => None,
         }
     }
@@ -83,6 +91,7 @@ impl Transport for Device {
         match self {
             Self::Simulated(device) => device.send(bytes),
             Self::SimulatedCan(device) => device.send(bytes),
+            Self::BoardCan(device) => device.send(bytes),
             Self::Stream(device) => device.send(bytes),
             Self::Serial(device) => device.send(bytes),
             Self::Can(device) => device.send(bytes),
@@ -93,6 +102,7 @@ impl Transport for Device {
         match self {
             Self::Simulated(device) => device.receive(timeout, out),
             Self::SimulatedCan(device) => device.receive(timeout, out),
+            Self::BoardCan(device) => device.receive(timeout, out),
             Self::Stream(device) => device.receive(timeout, out),
             Self::Serial(device) => device.receive(timeout, out),
             Self::Can(device) => device.receive(timeout, out),
@@ -103,6 +113,7 @@ impl Transport for Device {
         match self {
             Self::Simulated(device) => device.now(),
             Self::SimulatedCan(device) => device.now(),
+            Self::BoardCan(device) => device.now(),
             Self::Stream(device) => device.now(),
             Self::Serial(device) => device.now(),
             Self::Can(device) => device.now(),
@@ -110,6 +121,6 @@ impl Transport for Device {
     }
 
     fn is_virtual(&self) -> bool {
-        matches!(self, Self::Simulated(_) | Self::SimulatedCan(_))
+        matches!(self, Self::Simulated(_) | Self::SimulatedCan(_) | Self::BoardCan(_))
     }
 }

@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use crate::board::Board;
 use crate::setup::{self, ARM, JOINT, Machine};
-use crate::{budget, build, docs, joint, shell, test};
+use crate::{budget, build, docs, emulated, joint, shell, test};
 
 /// Runs every check; the first failure ends it.
 pub(crate) fn run() -> Result<()> {
@@ -17,7 +17,8 @@ pub(crate) fn run() -> Result<()> {
     lint_firmware(&machine)?;
     libraries_without_std(&machine)?;
     plain_root()?;
-    build::real_board(machine.toolchain, Board::Stm32h743)?;
+    emulated::lint()?;
+    emulated::run(None)?;
     test::run(&machine)?;
     build::documentation()?;
     budget::run(&machine)?;

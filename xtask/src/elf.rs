@@ -7,9 +7,10 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use link::metadata::METADATA_SECTION;
-use object::elf::{SHF_ALLOC, SHF_WRITE, SHT_NOBITS};
-use object::read::elf::{ElfFile32, SectionHeader as _};
+use object::elf::{PT_LOAD, SHF_ALLOC, SHF_WRITE, SHT_NOBITS};
+use object::read::elf::{ElfFile32, ProgramHeader as _, SectionHeader as _};
 use object::{LittleEndian, Object as _, ObjectSection as _, ObjectSymbol as _};
+use sha2::{Digest as _, Sha256};
 
 /// Part of the name of every function of a memory allocator.
 const ALLOCATOR: &str = "__rust_alloc";
@@ -115,6 +116,27 @@ impl fmt::Display for Sizes {
         writeln!(f, "{:<20} {:>8} B", "flash", self.flash())?;
         writeln!(f, "{:<20} {:>8} B  without stack", "RAM", self.ram())
     }
+}
+
+/// SHA-256, in hexadecimal digits, of what flashing an image writes: of every load segment with content its physical address, its
+/// length (u32 each, little-endian) and its bytes.
+///
+/// # Errors
+/// If the file cannot be read or is not a 32-bit little-endian ELF file.
+pub(crate) fn load_hash(image: &Path) -> Result<String> {
+    let bytes = fs::read(image).with_context(|| format!("cannot read {}", image.display()))?;
+    let file = Elf::parse(&*bytes).with_context(|| format!("{} is not a 32-bit ELF file", image.display()))?;
+    let endian = LittleEndian;
+    let mut hash = Sha256::new();
+    for segment in file.elf_program_headers().iter().filter(|segment| segment.p_type(endian) == PT_LOAD) {
+        let data = segment.data(endian, &*bytes).unwrap_or_default();
+        if !data.is_empty() {
+            hash.update(segment.p_paddr(endian).to_le_bytes());
+            hash.update((data.len() as u32).to_le_bytes());
+            hash.update(data);
+        }
+    }
+    Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
 fn parse(file: &[u8]) -> object::Result<Sizes> {

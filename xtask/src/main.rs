@@ -8,6 +8,7 @@ mod code;
 mod demo;
 mod docs;
 mod elf;
+mod emulated;
 mod joint;
 mod origin;
 mod panics;
@@ -33,6 +34,8 @@ cargo xtask <verb>
            --image joint: the joint image (Cortex-M3, fixed point), with its sizes
   joint    build, run and measure the joint image: instructions per cycle, accuracy, sizes
            --check IMAGE: sizes and control path of an image that is there
+  board    run the unmodified image for the STM32H743 on an emulated one: start, clocks, stack, a taught movement, a restart
+           --build: only make what `--device board:` needs; --image FILE: run that image
   demo     teach, learn, check, upload and run a movement on the simulated arm
   test     every test, whole-system tests under QEMU included
   ci       what a change must pass: format, lints, builds, tests, budgets
@@ -81,6 +84,9 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["build", "--image", "joint"] => drop(joint::image(&setup::all()?)?),
         ["joint"] => joint::run(&setup::all()?)?,
         ["joint", "--check", image] => joint::check(image.as_ref())?,
+        ["board"] => emulated::run(None)?,
+        ["board", "--build"] => drop(emulated::build(setup::compiler()?)?),
+        ["board", "--image", image] => emulated::run(Some(image.as_ref()))?,
         ["panics"] => build::panics()?,
         ["run-image", image, rest @ ..] => return runner::run(image, rest),
         ["demo", rest @ ..] => demo::run(rest)?,

@@ -1,14 +1,15 @@
-//! Every test: unit and property tests, golden vectors, the MuJoCo world, whole systems under QEMU.
+//! Every test: unit and property tests, golden vectors, the MuJoCo world, whole systems under QEMU and on the emulated board.
 
 use anyhow::Result;
 
 use crate::setup::Machine;
-use crate::{build, joint, shell};
+use crate::{build, emulated, joint, shell};
 
 /// Builds what the tests need and runs all of them.
 pub(crate) fn run(machine: &Machine) -> Result<()> {
     build::image(machine)?;
     joint::image(machine)?;
+    emulated::build(machine.toolchain)?;
     build::host()?;
     shell::step("tests of all packages, whole-system tests included");
     // Optimised: physics and the emulator's peer are several times faster, and the demo needs the same build.
@@ -19,5 +20,6 @@ pub(crate) fn run(machine: &Machine) -> Result<()> {
     )?;
     // The image's own tests run on the host, without a board: its application on an in-memory board, its numbers.
     shell::step("tests of the firmware on this machine");
-    shell::run(shell::cargo().args(["test", "--release", "--package", "firmware", "--tests"]))
+    shell::run(shell::cargo().args(["test", "--release", "--package", "firmware", "--tests"]))?;
+    emulated::test()
 }

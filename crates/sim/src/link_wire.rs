@@ -84,12 +84,29 @@ impl LinkLine for SerialLine {
 }
 
 /// A line that takes no time, for a device that does its own: what one side sends the other has at once.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct PlainLine {
     to_device: VecDeque<u8>,
     /// When the oldest bytes towards the device were sent.
     offered_at: Ticks,
     from_device: VecDeque<u8>,
+    /// Bytes that must not be handed to the device apart.
+    record: usize,
+}
+
+impl PlainLine {
+    /// A line of records of 1 to [`CHUNK`] bytes: the host sends whole ones, and the device gets whole ones.
+    #[must_use]
+    pub fn of_records(bytes: usize) -> Self {
+        Self { to_device: VecDeque::new(), offered_at: 0, from_device: VecDeque::new(), record: bytes.clamp(1, CHUNK) }
+    }
+}
+
+impl Default for PlainLine {
+    /// A line of single bytes.
+    fn default() -> Self {
+        Self::of_records(1)
+    }
 }
 
 impl LinkLine for PlainLine {
@@ -110,6 +127,7 @@ impl LinkLine for PlainLine {
 
     fn take_to_device(&mut self, _now: Ticks) -> Vec<u8> {
         let count = self.to_device.len().min(CHUNK);
+        let count = count - count % self.record;
         self.to_device.drain(..count).collect()
     }
 

@@ -192,6 +192,11 @@ impl<R: Read, W: Write> Lockstep<R, W> {
         Ok(served)
     }
 
+    /// The streams again, to close one before the other.
+    pub fn into_streams(self) -> (R, W) {
+        (self.from_firmware, self.to_firmware)
+    }
+
     /// Requests answered so far.
     #[must_use]
     pub fn exchanges(&self) -> u64 {

@@ -207,3 +207,14 @@ fn frames_that_no_controller_could_send_are_refused() {
     assert!(matches!(error, Some(LockstepError::Frame { id: 0x800, length: 1 })));
     assert_eq!(plant.trace().total(), 0);
 }
+
+#[test]
+fn a_line_of_records_hands_over_whole_ones() {
+    let mut plant = quiet_plant();
+    plant.set_link_line(Box::new(PlainLine::of_records(11)));
+    let sent: Vec<u8> = (0..77).collect();
+    plant.link_to_device(&sent);
+    assert_eq!(plant.event(1000).link, sent[..55]);
+    assert_eq!(plant.event(1000).link, sent[55..]);
+    assert!(plant.event(1000).link.is_empty());
+}

@@ -4,7 +4,7 @@
 //! protection unit or the default map makes the address cacheable, past it otherwise. The registers of cache maintenance
 //! are routed the same way.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -63,6 +63,8 @@ pub enum Order {
     Poke(u32, Vec<u32>),
     /// A register of the processor's own space is written by a debugger.
     Own(u32, u32),
+    /// A register of the processor's own space is read, for [`CoreState::own`].
+    Look(u32),
     /// What a fault handler finds is noted, with this time in ns.
     Note(u64),
     /// The unused stack between these addresses is painted, up to the stack pointer.
@@ -138,6 +140,8 @@ pub struct CoreState {
     pub cache: DataCache,
     /// Flash words whose check bits do not fit: reading them fails.
     pub damaged: BTreeSet<u32>,
+    /// Registers of the processor's own space as they were found.
+    pub own: BTreeMap<u32, u32>,
     /// Accesses to addresses where nothing is.
     pub strays: Vec<Stray>,
     /// Faults whose handlers have begun.
@@ -257,6 +261,10 @@ impl Core {
                 Order::Poke(address, words) => poke(bus, address, &words),
                 Order::Own(address, value) => {
                     self.own(u64::from(address), Some(u64::from(value)));
+                }
+                Order::Look(address) => {
+                    let value = self.own(u64::from(address), None) as u32;
+                    self.shared.lock().own.insert(address, value);
                 }
                 Order::Note(at) => {
                     let note = self.note(at);

@@ -80,7 +80,7 @@ impl HostBus {
                 self.free_at = end;
                 self.finish(sender, &frame, controllers, now);
             } else {
-                self.start(now);
+                self.start(now, controllers);
             }
         }
     }
@@ -99,13 +99,16 @@ impl HostBus {
     }
 
     /// The lowest identifier begins.
-    fn start(&mut self, now: u64) {
+    fn start(&mut self, now: u64, controllers: &mut Controllers) {
         let arbitration = |queue: &VecDeque<Frame>| queue.front().map_or(u32::MAX, Frame::arbitration);
         let (sender, queue) = if arbitration(&self.from_chip) <= arbitration(&self.from_host) {
             (Sender::Chip, &mut self.from_chip)
         } else {
             (Sender::Host, &mut self.from_host)
         };
+        if sender == Sender::Chip {
+            controllers.begun(Unit::Two, now);
+        }
         if let Some(frame) = queue.pop_front() {
             self.on_wire = Some((sender, frame, now + u64::from(frame.bits()) * BIT_NS));
         }

@@ -47,10 +47,16 @@ const SCRATCH: u32 = 0x2407_FFC0;
 /// Two instructions each: branch to itself, undefined as compilers write it.
 const LOOP: u32 = 0xE7FE_E7FE;
 const UNDEFINED: u32 = 0xDEFE_DEFE;
+/// PUSH {R0-R7, LR}, and a branch back to it.
+const RECURSION: u32 = 0xE7FD_B5FF;
 
 /// ICSR and its bit that makes a non-maskable interrupt pending.
 const INTERRUPT_CONTROL: u32 = 0xE000_ED04;
 const PEND_NMI: u32 = 1 << 31;
+
+/// The lines of software that run the session (SPI2, 36) and the log (SPI3, 51), and the words of the interrupt controller
+/// that hold their priorities.
+const PRIORITIES: [(u32, u32); 2] = [(36, 0xE000_E424), (51, 0xE000_E430)];
 
 /// An access this near below the stack is taken for one of the stack's.
 const NEAR_STACK: u32 = 128 * 1024;
@@ -179,7 +185,9 @@ impl Watcher {
             let used = stack::used_since_start(host, &self.image.stack);
             self.stack.at_start = Some(used);
             let painted = self.image.stack.end - used..self.image.stack.end;
-            self.core.lock().orders.push(Order::Paint(painted));
+            let orders = &mut self.core.lock().orders;
+            orders.push(Order::Paint(painted));
+            orders.extend(PRIORITIES.map(|(_, address)| Order::Look(address)));
             self.watch.forget();
         }
     }
@@ -312,8 +320,8 @@ impl Watcher {
                 host.hold(true);
                 self.release_core = Some(now + us * 1000);
             }
-            Kind::Guard => self.core.lock().orders.push(Order::Stack(self.image.stack.start)),
-            Kind::BelowGuard => self.core.lock().orders.push(Order::Stack(BELOW_MEMORY)),
+            Kind::Guard => self.overflow(self.image.stack.start + 16),
+            Kind::BelowGuard => self.overflow(BELOW_MEMORY),
             Kind::Reset(ResetKind::Probe) => {
                 self.core.lock().orders.push(Order::Own(RESET_CONTROL, SYSTEM_RESET));
             }
@@ -337,6 +345,12 @@ impl Watcher {
         orders.push(Order::Jump { pc: SCRATCH, arguments: [0; 4], masked });
     }
 
+    /// The core goes on in a function that calls itself for ever, with its stack here.
+    fn overflow(&mut self, stack: u32) {
+        self.stand_on(RECURSION, false);
+        self.core.lock().orders.push(Order::Stack(stack));
+    }
+
     /// The oscillator's input loses its clock while the chip runs from it. With the clock security system on, the chip goes
     /// over to its inner oscillator and has a non-maskable interrupt; without, everything but the watchdog stands still.
     fn kill_crystal(&mut self, session: &mut Session<Board>, now: u64, host: &mut dyn Host) {
@@ -355,6 +369,13 @@ impl Watcher {
         let resets = session.resets().iter().map(|reset| (reset.at.0, format!("{:?}", reset.cause))).collect();
         let clocks = Clocks::of(&mut session.board_mut().mcu.part);
         let serial_baud = clocks.baud(&session.board().mcu.part);
+        let core = self.core.lock();
+        let faults = core.faults.clone();
+        let priorities = PRIORITIES.map(|(line, address)| {
+            let word = core.own.get(&address).copied().unwrap_or(0);
+            (word >> (8 * (line % 4)) & 0xFF) as u8
+        });
+        drop(core);
         let can = self.can.lock();
         let measured = Measured {
             now: self.now,
@@ -362,13 +383,15 @@ impl Watcher {
             resets,
             first_frame: can.first_frame(),
             first_slot: self.first_slot,
+            second_bus: can.status(Unit::Two).on_bus,
             frames_sent: can.frames_sent(),
             clocks,
             timing: can.status(Unit::One).timing,
             stack: self.stack,
             watchdog: self.watch.get(),
             cache: self.core.cache_count(),
-            faults: self.core.lock().faults.clone(),
+            faults,
+            priorities,
             accepted: can.accepted(),
             serial_baud,
             bank_operations: self.bank_watch.operations,

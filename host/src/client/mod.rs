@@ -216,6 +216,12 @@ impl<T: Transport> Client<T> {
         self.transport.is_virtual()
     }
 
+    /// Whether the arm is a simulated one, as far as can be known here: the device says so, or its time is virtual. The image on an
+    /// emulated board does not know it, and behind a socket nobody does.
+    pub fn is_simulated(&self) -> bool {
+        self.hello.simulated || self.transport.is_virtual()
+    }
+
     /// What this end of the link counted.
     pub fn counters(&self) -> LinkCounters {
         self.decoder.counters()

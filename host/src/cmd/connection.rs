@@ -76,7 +76,7 @@ pub(super) fn ready(client: &mut Client<Device>, at_home: bool, output: Output, 
              modes `force` and `adapt` need it",
         );
     }
-    let simulated = client.hello().simulated;
+    let simulated = client.is_simulated();
     let hello = client.hello();
     let kind = if simulated { "simulated " } else { "" };
     output.say(format!("{kind}arm ready on {} ({})", hello.board.as_str(), hello.firmware.as_str()));
@@ -104,7 +104,7 @@ fn watch(
     doing: &str,
     start: impl FnOnce(&mut Client<Device>, &mut dyn FnMut(Stage)) -> Result<Readiness, ProcedureError>,
 ) -> Result<Readiness, Failure> {
-    let simulated = client.hello().simulated;
+    let simulated = client.is_simulated();
     let spinner = output.spinner("starting up");
     let result = start(client, &mut |stage| {
         spinner.set_message(stage.explanation());
@@ -165,6 +165,20 @@ pub(super) fn simulation_failure(error: SimulationError, doing: &str) -> Failure
         }
         SimulationError::NoImage(_) => (Exit::NoDevice, "E311", "`cargo xtask build`"),
         SimulationError::NoQemu(_) => (Exit::NoDevice, "E312", "`cargo xtask setup`"),
+        SimulationError::NoEmulator(_) => (Exit::NoDevice, "E313", "`cargo xtask board --build`"),
+        SimulationError::NoBoardImage(_) => (Exit::NoDevice, "E314", "`cargo xtask board --build`"),
+        SimulationError::BoardImage(_) => {
+            (Exit::Invalid, "E685", "`cargo xtask board --build` makes the image for the emulated board")
+        }
+        SimulationError::OtherBoard { .. } => (
+            Exit::Incompatible,
+            "E414",
+            "`cargo xtask board --build` makes the image for the emulated board; images for QEMU belong to `--device sim:`",
+        ),
+        SimulationError::BoardRefused(_) => {
+            (Exit::Usage, "E212", "the options of `--device board:` are in docs/board-stm32h743.md")
+        }
+        SimulationError::BoardEnded { .. } => (Exit::Internal, "E110", "`cargo xtask board` checks emulator and image"),
         SimulationError::BusLog(..) => {
             (Exit::Usage, "E208", "name a file in a folder that can be written, for example `sil:bus=run.log`")
         }
@@ -211,7 +225,7 @@ pub(super) fn simulated(text: &str, doing: &str) -> Result<(Device, Interrupt), 
     let address: Address = text.parse().map_err(|error| HostError::Address(error).into_failure(doing))?;
     if !matches!(address, Address::Simulated(..)) {
         return Err(Failure::new(Exit::Usage, "E204", doing, format!("'{text}' is not a simulated device"))
-            .help("`--device sim:` or `--device sil:`"));
+            .help("`--device sim:`, `--device sil:` or `--device board:`"));
     }
     let device = Device::open(&address, |_| {}).map_err(|error| match error {
         OpenError::Transport(error) => HostError::Transport(error).into_failure(doing),

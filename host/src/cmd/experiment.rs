@@ -209,7 +209,7 @@ mod work {
             text.parse().map_err(|error| crate::error::HostError::Address(error).into_failure(DOING))?;
         let Address::Simulated(kind, options) = address else {
             return Err(Failure::new(Exit::Usage, "E204", DOING, format!("'{text}' is not a simulated device"))
-                .help("`--device sil:`, or `--device sim:` for the firmware under QEMU"));
+                .help("`--device sil:`, or `--device sim:` for the firmware under QEMU, or `--device board:` for it on the emulated board"));
         };
         let options = SimulationOptions::from_address(kind, &options)
             .map_err(|error| connection::simulation_failure(error, DOING))?;

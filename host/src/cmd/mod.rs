@@ -61,7 +61,7 @@ pub struct Global {
     /// Never ask; what would be asked is refused.
     #[arg(long, global = true)]
     pub non_interactive: bool,
-    /// The device: `sim:`, `sil:`, `serial:PATH`, `can:INTERFACE`, `tcp:HOST:PORT` or `unix:PATH`.
+    /// The device: `sim:`, `sil:`, `board:`, `serial:PATH`, `can:INTERFACE`, `tcp:HOST:PORT` or `unix:PATH`.
     #[arg(long, global = true, env = "TACTUS_DEVICE", value_name = "DEVICE")]
     pub device: Option<String>,
     /// Longest wait for an answer of the device, s.

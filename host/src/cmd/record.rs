@@ -32,7 +32,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let started = Instant::now();
     let mut client = connection::open(global, DOING, |_| {})?;
     // A simulated device has just been switched on: without this there would be nothing to see.
-    if client.hello().simulated {
+    if client.is_simulated() {
         connection::ready(&mut client, false, output, DOING)?;
     }
     let failed = |error| connection::failure(error, DOING);

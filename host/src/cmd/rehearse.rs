@@ -170,7 +170,7 @@ fn play(
         cycles.push(*cycle);
         progress(cycles.len());
     })?;
-    let simulated = if client.hello().simulated { " (simulated arm)" } else { "" };
+    let simulated = if client.is_simulated() { " (simulated arm)" } else { "" };
     let notes = format!("Tactus recording of a rehearsal of '{}', 300 Hz{simulated}", movement.name);
     Ok((recording_text(&cycles, &notes)?, outcome.flags))
 }

@@ -92,6 +92,8 @@ pub struct Report {
     pub flags: FlagCounts,
     /// Where the run did not go as the successful ones did.
     pub surprises: Vec<Surprise>,
+    /// Virtual time from power-up to an arm that could be commanded, s; none where time is real.
+    pub ready_s: Option<f64>,
     /// Control cycles since the device was switched on.
     pub cycles: u32,
     /// Cycles whose torque frames were not queued in time.
@@ -102,6 +104,8 @@ pub struct Report {
     pub worst_instructions: u32,
     /// Mean control computation, instructions.
     pub mean_instructions: u32,
+    /// Worst control computation by the board's own clock, us.
+    pub worst_computation_us: f64,
     /// Worst delay from timer to control task, us.
     pub worst_latency_us: f64,
     /// Stack used at the most, bytes.
@@ -149,17 +153,19 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             .result(&serde_json::json!({ "name": file.name, "dry_run": true }), "ready to run; nothing moved");
     }
     connection::ready(&mut client, command.at_home, output, DOING)?;
+    let ready_s = client.is_virtual().then(|| client.now().as_secs_f64());
     let result = play(command, &mut client, &file, output);
     if let Some(path) = &command.bus_log {
         write_bus_log(&mut client, path)
             .map_err(|cause| connection::failure(ProcedureError::Recording(cause), DOING))?;
     }
     let report = result.map_err(|error| connection::failure(error, DOING))?;
+    let report = Report { ready_s, ..report };
     connection::tell_speed(&client, started, output);
     if let Some(path) = &command.record {
         output.say(format!("wrote {}", path.display()));
     }
-    if !client.hello().simulated {
+    if !client.is_simulated() {
         output.say("the arm holds its goal; `tactus stop` makes it soft");
     }
     output.result(&report, report.to_text())
@@ -279,7 +285,7 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
 }
 
 fn notes(client: &Client<Device>, file: &PrimitiveFile) -> String {
-    let simulated = if client.hello().simulated { " (simulated arm)" } else { "" };
+    let simulated = if client.is_simulated() { " (simulated arm)" } else { "" };
     format!("Tactus recording of a run of '{}', 300 Hz, on {}{simulated}", file.name, client.hello().board.as_str())
 }
 
@@ -299,6 +305,7 @@ fn report(
     let instructions = |ticks: u32| {
         if counts_instructions { ticks * INSTRUCTIONS_PER_TICK } else { 0 }
     };
+    let microseconds = |ticks: u32| f64::from(ticks) * 1e6 / f64::from(ticks_per_second.max(1));
     let gaps = client.gaps().telemetry;
     let bus = client.transport().simulation().map(|simulation| {
         let elapsed = simulation.ticks();
@@ -327,12 +334,14 @@ fn report(
         limited_samples: outcome.flags.limited,
         flags: outcome.flags,
         surprises: outcome.surprises,
+        ready_s: None,
         cycles: statistics.cycles,
         missed_deadlines: statistics.missed_deadlines,
         lost_replies: statistics.lost_replies,
         worst_instructions: instructions(statistics.cost_worst_ticks),
         mean_instructions: instructions(statistics.cost_mean_ticks),
-        worst_latency_us: f64::from(statistics.latency_worst_ticks) * 1e6 / f64::from(ticks_per_second.max(1)),
+        worst_computation_us: microseconds(statistics.cost_worst_ticks),
+        worst_latency_us: microseconds(statistics.latency_worst_ticks),
         stack_used: statistics.stack_size.saturating_sub(statistics.stack_free),
         telemetry_dropped: statistics.telemetry_dropped,
         bus,
@@ -371,6 +380,11 @@ impl Report {
         if self.worst_instructions > 0 {
             row("control cycle, worst", format!("{} instructions", self.worst_instructions));
             row("control cycle, mean", format!("{} instructions", self.mean_instructions));
+        } else if self.worst_computation_us > 0.0 {
+            row("control cycle, worst", format!("{:.1} us", self.worst_computation_us));
+        }
+        // In this process nobody measures.
+        if self.worst_computation_us > 0.0 {
             row("timer latency, worst", format!("{:.1} us", self.worst_latency_us));
             row("stack used", format!("{} bytes", self.stack_used));
         }

@@ -124,7 +124,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let notes = format!(
         "Tactus recording of a demonstration by hand, 300 Hz, from {} {}",
         client.hello().board.as_str(),
-        if client.hello().simulated { "(simulated arm, simulated person)" } else { "" }
+        if client.is_simulated() { "(simulated arm, simulated person)" } else { "" }
     );
     client.gravity().map_err(|error| failed(error.into()))?;
     let recorder = Recorder::start(&mut client, BufWriter::new(file), notes.trim_end()).map_err(failed)?;

@@ -1,7 +1,7 @@
 //! What an experiment consists of, and the hash by which its results are known.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use sim::world::mujoco::{ObjectKind, ObjectSpec, TABLE_TOP};
 
@@ -16,6 +16,7 @@ use crate::demonstration::recording::checksum;
 use crate::plan;
 use crate::primitive_file::PrimitiveFile;
 use crate::simulation::Engine;
+use crate::transport::ChipOptions;
 
 /// Version of what a trial is: results of another one cannot be continued.
 const VERSION: u32 = 1;
@@ -159,9 +160,11 @@ impl Config {
         let cells: Vec<String> = self.grid.cells.iter().map(Cell::to_string).collect();
         let engine = match &self.engine {
             Engine::InProcess => "in this process".to_owned(),
-            Engine::Qemu { image } | Engine::Joint { image } => {
-                let bytes = std::fs::read(image).unwrap_or_default();
-                format!("firmware 0x{:08x} under QEMU", checksum(&bytes))
+            Engine::Qemu { image } | Engine::Joint { image } => format!("{} under QEMU", firmware(image)),
+            Engine::Board(board) => {
+                let given =
+                    if board.chip == ChipOptions::default() { String::new() } else { format!(", {:?}", board.chip) };
+                format!("{} on the emulated board{given}", firmware(&board.image))
             }
         };
         let variation = self.variation.to_string();
@@ -191,4 +194,9 @@ impl Config {
     pub fn trial_seed(&self, key: &Key) -> u64 {
         seed::of_trial(key.seed, key.cell)
     }
+}
+
+/// The image by its checksum.
+fn firmware(image: &Path) -> String {
+    format!("firmware 0x{:08x}", checksum(&std::fs::read(image).unwrap_or_default()))
 }

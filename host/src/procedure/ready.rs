@@ -62,7 +62,7 @@ pub fn start_up(
     goal: Stage,
     mut tell: impl FnMut(Stage),
 ) -> Result<Readiness, ProcedureError> {
-    let simulated = client.hello().simulated;
+    let simulated = client.is_simulated();
     let seconds = if simulated { SIMULATED_PATIENCE } else { PATIENCE };
     let deadline = client.now() + Duration::from_secs(seconds);
     let mut readiness = Readiness::default();

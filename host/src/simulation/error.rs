@@ -3,6 +3,8 @@
 use std::io;
 use std::path::PathBuf;
 
+use crate::image_file::ImageFileError;
+
 /// Why a simulated device cannot be had, or came to its end.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulationError {
@@ -22,6 +24,42 @@ pub enum SimulationError {
     /// QEMU is not installed.
     #[error("qemu-system-arm cannot be started ({0}); `cargo xtask setup` installs it")]
     NoQemu(#[source] io::Error),
+    /// The image for the emulated board is not there.
+    #[error("no image for the emulated board at {0}; `cargo xtask board --build` makes it")]
+    NoBoardImage(PathBuf),
+    /// The emulator of the board is not there.
+    #[error("no emulator of the board at {0}; `cargo xtask board --build` makes it")]
+    NoEmulator(PathBuf),
+    /// The emulator of the board cannot be started.
+    #[error("the emulator {0} cannot be started: {1}")]
+    Emulator(PathBuf, #[source] io::Error),
+    /// The file for the emulated board is not an image that says what it is.
+    #[error("no image for the emulated board: {0}")]
+    BoardImage(#[source] Box<ImageFileError>),
+    /// The image is for another board than the emulated one.
+    #[error("{} is for board '{board}', not for the emulated '{expected}'", image.display())]
+    OtherBoard {
+        /// The image.
+        image: PathBuf,
+        /// Its board.
+        board: String,
+        /// The emulated board.
+        expected: &'static str,
+    },
+    /// The emulator refused the image or an option.
+    #[error("the emulated board cannot be set up: {0}")]
+    BoardRefused(String),
+    /// A flash of this program was to be put into the emulated board.
+    #[error("the emulated board has its flash inside; it can only be kept in a file")]
+    FlashOfItsOwn,
+    /// The emulator of the board ended by itself.
+    #[error("the emulated board ended{status}; it said: {words}")]
+    BoardEnded {
+        /// Exit status, if it is known.
+        status: String,
+        /// What it said last.
+        words: String,
+    },
     /// The file for the firmware's log cannot be written.
     #[error("cannot write the firmware's log: {0}")]
     Log(#[source] io::Error),

@@ -1,10 +1,11 @@
 //! Simulated devices: the co-controller's real application against the simulated bus and world, in virtual time.
 //!
-//! Two engines run the application. `InProcess` calls `device::Core` and `device::Session` directly (`sil:`); `Qemu` runs the
-//! firmware image under QEMU and exchanges frames with it in lock step (`sim:`). Either way nothing moves unless the host
-//! waits: virtual time advances only inside [`Transport::receive`], so a whole session is one deterministic sequence of events, whatever
+//! Three engines run the application. `InProcess` calls `device::Core` and `device::Session` directly (`sil:`); `Qemu` runs the
+//! firmware image under QEMU and exchanges frames with it in lock step (`sim:`); `EmulatedBoard` does so with the image for the real board
+//! on an emulated STM32H743 (`board:`). Either way nothing moves unless the host waits: virtual time advances only inside [`Transport::receive`], so a whole session is one deterministic sequence of events, whatever
 //! the load of the machine.
 
+mod board;
 mod bus_log;
 mod error;
 pub(crate) mod halves;
@@ -12,17 +13,20 @@ mod in_process;
 mod options;
 mod qemu;
 mod seat;
+mod words;
 
+pub use board::BoardEngine;
 pub use error::SimulationError;
 pub use options::{
-    DEFAULT_SEED, Engine, FlashSource, GRIPPED, IMAGE_VARIABLE, JOINT_IMAGE_VARIABLE, SimulationOptions, WorldKind,
-    built_image,
+    BOARD_EMULATOR_VARIABLE, BOARD_IMAGE_VARIABLE, DEFAULT_SEED, Engine, FlashSource, GRIPPED, IMAGE_VARIABLE,
+    JOINT_IMAGE_VARIABLE, SimulationOptions, WorldKind, built_image,
 };
 
 use std::time::Duration;
 
 use sim::{Passage, Plant, PlantConfig, TICKS_PER_SECOND, Ticks, World};
 
+use board::EmulatedBoard;
 use bus_log::BusLog;
 use in_process::InProcess;
 use qemu::Qemu;
@@ -65,6 +69,7 @@ impl Simulation {
                 let log = options.firmware_log.as_deref();
                 Box::new(Qemu::spawn(qemu::JOINT_MACHINE, image, log, options.flash.chip()?)?)
             }
+            Engine::Board(engine) => Box::new(EmulatedBoard::spawn(engine, options, &mut plant)?),
         };
         Ok(Self { plant, engine, now: 0, log })
     }
@@ -118,7 +123,8 @@ impl Simulation {
         self.advance_plant_until(timeout, |_, now| ready(now))
     }
 
-    fn advance_plant_until(
+    /// As [`advance_until`](Self::advance_until); `ready` may take from the plant what has come.
+    pub(crate) fn advance_plant_until(
         &mut self,
         timeout: Duration,
         mut ready: impl FnMut(&mut Plant, Ticks) -> bool,

@@ -9,7 +9,7 @@ use sim::world::HOME;
 use sim::world::mujoco::{Imperfections, MujocoWorld, Scene};
 use sim::{FingerObstacle, FreeJoints, PlantConfig, World};
 
-use super::SimulationError;
+use super::{BoardEngine, SimulationError};
 use crate::transport::{LineKind, SimulatorKind, SimulatorOptions};
 
 /// Environment variable that names the firmware image for QEMU.
@@ -17,6 +17,12 @@ pub const IMAGE_VARIABLE: &str = "TACTUS_IMAGE";
 
 /// Environment variable that names the joint image for QEMU.
 pub const JOINT_IMAGE_VARIABLE: &str = "TACTUS_JOINT_IMAGE";
+
+/// Environment variable that names the emulator of the board.
+pub const BOARD_EMULATOR_VARIABLE: &str = "TACTUS_BOARD_EMULATOR";
+
+/// Environment variable that names the image for the emulated board.
+pub const BOARD_IMAGE_VARIABLE: &str = "TACTUS_BOARD_IMAGE";
 
 /// What a hand alone finds between its fingers: a spring that its outer links meet at 0.45 rad, with inner links at 1.35 rad.
 pub const GRIPPED: FingerObstacle = FingerObstacle { inner: f64::INFINITY, outer: 0.45, stiffness: 2.0 };
@@ -29,6 +35,8 @@ pub const DEFAULT_SEED: u64 = 1;
 pub enum Engine {
     /// The application in this process.
     InProcess,
+    /// The image for the real board on the emulated one.
+    Board(BoardEngine),
     /// The firmware image under QEMU.
     Qemu {
         /// The image, an ELF file.
@@ -56,7 +64,8 @@ pub enum FlashSource {
     /// A new one, gone when the simulation is.
     #[default]
     New,
-    /// This one: whoever else holds it can look at it, cut its power, and put it into the next device.
+    /// This one: whoever else holds it can look at it, cut its power, and put it into the next device. Not for the emulated board, whose
+    /// flash is inside its chip.
     Chip(FlashChip),
     /// One that is kept in a file.
     File(PathBuf),
@@ -108,6 +117,8 @@ pub struct SimulationOptions {
     pub line: LineKind,
     /// Where a log of the buses goes, in the format of `candump -L`; `None` keeps none.
     pub bus_log: Option<PathBuf>,
+    /// Where the emulated board writes its report when its power is switched off, JSON; other engines have none.
+    pub board_report: Option<PathBuf>,
     /// The flash in the device.
     pub flash: FlashSource,
     /// What is in the way of the fingers of a hand alone; `None`: there is an arm, and a world around it.
@@ -122,7 +133,14 @@ impl SimulationOptions {
     pub fn from_address(kind: SimulatorKind, options: &SimulatorOptions) -> Result<Self, SimulationError> {
         let engine = match kind {
             SimulatorKind::InProcess => Engine::InProcess,
-            SimulatorKind::Qemu => Engine::Qemu { image: find_image(IMAGE_VARIABLE, "arm.elf")? },
+            SimulatorKind::Qemu => {
+                Engine::Qemu { image: find(IMAGE_VARIABLE, "arm.elf").map_err(SimulationError::NoImage)? }
+            }
+            SimulatorKind::Board => Engine::Board(BoardEngine {
+                emulator: find(BOARD_EMULATOR_VARIABLE, "emulated-board").map_err(SimulationError::NoEmulator)?,
+                image: find(BOARD_IMAGE_VARIABLE, "arm-stm32h743.elf").map_err(SimulationError::NoBoardImage)?,
+                chip: options.board.chip.clone(),
+            }),
             SimulatorKind::Joint => return Self::joint(options),
         };
         let world = match options.world.as_deref() {
@@ -138,6 +156,7 @@ impl SimulationOptions {
         Ok(Self {
             line: options.line,
             bus_log: options.bus.clone(),
+            board_report: options.board.report.clone(),
             flash: options.flash.clone().map_or(FlashSource::New, FlashSource::File),
             ..Self::new(engine, options.seed.unwrap_or(DEFAULT_SEED), world)
         })
@@ -150,7 +169,8 @@ impl SimulationOptions {
             Some("empty") => [FingerObstacle::NOTHING; 3],
             Some(other) => return Err(SimulationError::UnknownWorld(other.to_owned())),
         };
-        let engine = Engine::Joint { image: find_image(JOINT_IMAGE_VARIABLE, "joint.elf")? };
+        let engine =
+            Engine::Joint { image: find(JOINT_IMAGE_VARIABLE, "joint.elf").map_err(SimulationError::NoImage)? };
         Ok(Self {
             bus_log: options.bus.clone(),
             line: options.line,
@@ -180,6 +200,7 @@ impl SimulationOptions {
             firmware_log: None,
             line: LineKind::Serial,
             bus_log: None,
+            board_report: None,
             flash: FlashSource::New,
             grip: None,
         }
@@ -221,16 +242,16 @@ impl SimulationOptions {
     }
 }
 
-/// The firmware image: named by the environment, or where `cargo xtask build` leaves it.
+/// An image or a program: named by the environment, or where `cargo xtask` leaves it; an error is where it should be.
 ///
 /// The build folder is found from the place of this program (`target/release/tactus`, `target/debug/deps/...`), so that it
 /// does not matter where it is called from.
-fn find_image(variable: &str, file: &str) -> Result<PathBuf, SimulationError> {
+fn find(variable: &str, file: &str) -> Result<PathBuf, PathBuf> {
     if let Some(path) = std::env::var_os(variable) {
         let path = PathBuf::from(path);
-        return if path.is_file() { Ok(path) } else { Err(SimulationError::NoImage(path)) };
+        return if path.is_file() { Ok(path) } else { Err(path) };
     }
-    built_image(file).ok_or_else(|| SimulationError::NoImage(Path::new("target/images").join(file)))
+    built_image(file).ok_or_else(|| Path::new("target/images").join(file))
 }
 
 /// An image that was built, by its file name, if there is one beside this program.

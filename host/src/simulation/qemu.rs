@@ -1,16 +1,15 @@
 //! The engine of `sim:`: the firmware image under QEMU, in lock step with the plant.
 
 use std::fs::File;
-use std::io::{BufReader, Read, Write};
+use std::io::BufReader;
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::JoinHandle;
 
 use sim::flash::FlashChip;
 use sim::{Lockstep, Plant, Ticks};
 
 use super::seat::Seat;
+use super::words::Words;
 use super::{Execute, SimulationError};
 
 /// The machine of the arm image.
@@ -40,16 +39,12 @@ const OPTIONS: &[&str] = &[
     "-kernel",
 ];
 
-/// Bytes of the firmware's log that are kept for its last words.
-const LAST_WORDS: usize = 4096;
-
 /// A running QEMU and the streams to it.
 pub(super) struct Qemu {
     child: Child,
     _seat: Seat,
     lockstep: Lockstep<BufReader<ChildStdout>, ChildStdin>,
-    log: Option<JoinHandle<()>>,
-    words: Arc<Mutex<Vec<u8>>>,
+    words: Words,
 }
 
 impl Qemu {
@@ -60,7 +55,7 @@ impl Qemu {
         log: Option<&Path>,
         flash: FlashChip,
     ) -> Result<Self, SimulationError> {
-        let mut file = log.map(File::create).transpose().map_err(SimulationError::Log)?;
+        let file = log.map(File::create).transpose().map_err(SimulationError::Log)?;
         let mut child = Command::new("qemu-system-arm")
             .args(["-machine", machine])
             .args(OPTIONS)
@@ -70,29 +65,14 @@ impl Qemu {
             .stderr(Stdio::piped())
             .spawn()
             .map_err(SimulationError::NoQemu)?;
-        let (Some(to), Some(from), Some(mut stderr)) = (child.stdin.take(), child.stdout.take(), child.stderr.take())
+        let (Some(to), Some(from), Some(stderr)) = (child.stdin.take(), child.stdout.take(), child.stderr.take())
         else {
             unreachable!("all three streams were asked for as pipes")
         };
-        let words = Arc::new(Mutex::new(Vec::new()));
-        let kept = Arc::clone(&words);
-        // The log must be drained while the firmware runs, or it would block on a full pipe, and with it virtual time.
-        let log = std::thread::spawn(move || {
-            let mut buffer = [0; 1024];
-            while let Ok(count @ 1..) = stderr.read(&mut buffer) {
-                if let Some(file) = &mut file {
-                    // A full disk must not stop the arm; the log is then short.
-                    let _ = file.write_all(&buffer[..count]);
-                }
-                let mut words = kept.lock().unwrap_or_else(PoisonError::into_inner);
-                words.extend_from_slice(&buffer[..count]);
-                let surplus = words.len().saturating_sub(LAST_WORDS);
-                words.drain(..surplus);
-            }
-        });
+        let words = Words::of(stderr, file);
         let seat = Seat::share(&child);
         let lockstep = Lockstep::new(BufReader::new(from), to).with_flash(flash);
-        Ok(Self { child, _seat: seat, lockstep, log: Some(log), words })
+        Ok(Self { child, _seat: seat, lockstep, words })
     }
 
     /// Why the firmware fell silent.
@@ -101,11 +81,7 @@ impl Qemu {
             Ok(status) => format!(" ({status})"),
             Err(_) => String::new(),
         };
-        if let Some(log) = self.log.take() {
-            let _ = log.join();
-        }
-        let words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
-        SimulationError::Ended { status, words: printable(&words) }
+        SimulationError::Ended { status, words: printable(&self.words.last()) }
     }
 }
 
@@ -136,9 +112,6 @@ impl Drop for Qemu {
         // While it waits for an answer QEMU ignores SIGTERM; `kill` sends SIGKILL.
         let _ = self.child.kill();
         let _ = self.child.wait();
-        if let Some(log) = self.log.take() {
-            let _ = log.join();
-        }
     }
 }
 

@@ -3,12 +3,14 @@
 //! ```text
 //! sim:[options]          the firmware under QEMU, with simulated bus and world
 //! sil:[options]          the same application in this process
+//! board:[options]        the image for the STM32H743 on an emulated board, with simulated bus and world
 //! joint:[options]        the joint image under QEMU, with a hand alone on the simulated bus and something to grip
 //! tcp:HOST:PORT          a socket
 //! unix:PATH              a Unix socket
 //! serial:PORT[@BAUD]     a serial port, 921600 baud unless said otherwise
 //! can:INTERFACE[/N]      device number N (0 unless said otherwise) on a CAN interface
-//! options: seed=7,world=simple|mujoco,line=serial|can,bus=FILE, separated by commas
+//! options: seed=7,world=simple|mujoco,line=serial|can,bus=FILE,flash=FILE, separated by commas
+//! of board: also report=FILE,cancellation=skipped|stuck,revision=0xNNNN,fault=KIND@MICROSECONDS[:ARGUMENT]
 //! ```
 
 use std::fmt;
@@ -17,6 +19,7 @@ use std::str::FromStr;
 
 use link::can::DeviceNumber;
 
+use super::options::SimulatorOptions;
 use super::serial::DEFAULT_BAUD;
 
 /// Which simulated device.
@@ -28,31 +31,8 @@ pub enum SimulatorKind {
     InProcess,
     /// `joint:`, the joint image under QEMU: a hand alone on its bus.
     Joint,
-}
-
-/// What the host link of a simulated device travels on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum LineKind {
-    /// The board's UART.
-    #[default]
-    Serial,
-    /// A CAN bus of its own.
-    Can,
-}
-
-/// Options of a simulated device; the simulator knows which of them it takes.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct SimulatorOptions {
-    /// Seed of all noise; `None` lets the simulator take its own, always the same.
-    pub seed: Option<u64>,
-    /// Name of the world; `None` is the best one that was built in.
-    pub world: Option<String>,
-    /// What the host link travels on.
-    pub line: LineKind,
-    /// Where a log of the buses goes, in the format of `candump -L`.
-    pub bus: Option<PathBuf>,
-    /// The file that is the device's flash, so that its library is there again after a restart.
-    pub flash: Option<PathBuf>,
+    /// `board:`, the image for the STM32H743 on the emulated board.
+    Board,
 }
 
 /// Where a device is.
@@ -85,7 +65,7 @@ pub enum Address {
 pub enum AddressError {
     /// The part before the colon names no kind of device.
     #[error(
-        "'{0}' names no kind of device; there are sim:, sil:, joint:, tcp:HOST:PORT, unix:PATH, serial:PORT[@BAUD] and can:INTERFACE[/N]"
+        "'{0}' names no kind of device; there are sim:, sil:, board:, joint:, tcp:HOST:PORT, unix:PATH, serial:PORT[@BAUD] and can:INTERFACE[/N]"
     )]
     Kind(String),
     /// Something is missing behind the colon.
@@ -96,6 +76,11 @@ pub enum AddressError {
         "simulated devices have the options seed=NUMBER, world=NAME, line=serial|can, bus=FILE and flash=FILE, not '{0}'"
     )]
     Option(String),
+    /// An option of the emulated board that there is not.
+    #[error(
+        "board: has the options of the other simulated devices, and report=FILE, cancellation=skipped|stuck, revision=0xNNNN and fault=KIND@MICROSECONDS[:ARGUMENT], not '{0}'"
+    )]
+    BoardOption(String),
     /// A value that is no number.
     #[error("'{0}' is not a whole number")]
     Number(String),
@@ -110,9 +95,10 @@ impl FromStr for Address {
     fn from_str(text: &str) -> Result<Self, AddressError> {
         let (kind, rest) = text.split_once(':').ok_or_else(|| AddressError::Kind(text.to_owned()))?;
         match kind {
-            "sim" => Ok(Self::Simulated(SimulatorKind::Qemu, options(rest)?)),
-            "sil" => Ok(Self::Simulated(SimulatorKind::InProcess, options(rest)?)),
-            "joint" => Ok(Self::Simulated(SimulatorKind::Joint, options(rest)?)),
+            "sim" => simulated(SimulatorKind::Qemu, rest),
+            "sil" => simulated(SimulatorKind::InProcess, rest),
+            "joint" => simulated(SimulatorKind::Joint, rest),
+            "board" => simulated(SimulatorKind::Board, rest),
             "tcp" => match rest.rsplit_once(':') {
                 Some((host, port)) if !host.is_empty() => match port.parse::<u16>() {
                     Ok(_) => Ok(Self::Tcp(rest.to_owned())),
@@ -146,22 +132,8 @@ impl FromStr for Address {
     }
 }
 
-fn options(text: &str) -> Result<SimulatorOptions, AddressError> {
-    let mut options = SimulatorOptions::default();
-    for part in text.split(',').filter(|part| !part.is_empty()) {
-        match part.split_once('=') {
-            Some(("seed", value)) => {
-                options.seed = Some(value.parse().map_err(|_| AddressError::Number(value.to_owned()))?);
-            }
-            Some(("world", value)) if !value.is_empty() => options.world = Some(value.to_owned()),
-            Some(("line", "serial")) => options.line = LineKind::Serial,
-            Some(("line", "can")) => options.line = LineKind::Can,
-            Some(("bus", value)) if !value.is_empty() => options.bus = Some(value.into()),
-            Some(("flash", value)) if !value.is_empty() => options.flash = Some(value.into()),
-            _ => return Err(AddressError::Option(part.to_owned())),
-        }
-    }
-    Ok(options)
+fn simulated(kind: SimulatorKind, options: &str) -> Result<Address, AddressError> {
+    Ok(Address::Simulated(kind, SimulatorOptions::parse(options, kind == SimulatorKind::Board)?))
 }
 
 impl fmt::Display for Address {
@@ -172,14 +144,9 @@ impl fmt::Display for Address {
                     SimulatorKind::Qemu => "sim:",
                     SimulatorKind::InProcess => "sil:",
                     SimulatorKind::Joint => "joint:",
+                    SimulatorKind::Board => "board:",
                 })?;
-                let seed = options.seed.map(|seed| format!("seed={seed}"));
-                let world = options.world.as_ref().map(|world| format!("world={world}"));
-                let line = (options.line == LineKind::Can).then(|| "line=can".to_owned());
-                let bus = options.bus.as_ref().map(|path| format!("bus={}", path.display()));
-                let flash = options.flash.as_ref().map(|path| format!("flash={}", path.display()));
-                let parts: Vec<String> = [seed, world, line, bus, flash].into_iter().flatten().collect();
-                f.write_str(&parts.join(","))
+                write!(f, "{options}")
             }
             Self::Tcp(address) => write!(f, "tcp:{address}"),
             Self::Unix(path) => write!(f, "unix:{}", path.display()),
@@ -215,6 +182,8 @@ mod tests {
             "can:can0",
             "can:slcan1/15",
             "sil:seed=3,line=can,bus=run.log",
+            "board:",
+            "board:seed=3,flash=bank2.bin,report=board.json,cancellation=stuck,revision=0x1003,fault=bus-off@5000000,fault=hang@7:2",
         ] {
             assert_eq!(parse(text).unwrap().to_string(), text);
         }
@@ -240,6 +209,11 @@ mod tests {
         assert_eq!(parse("sil:flash="), Err(AddressError::Option("flash=".into())));
         assert_eq!(parse("sim:speed=2"), Err(AddressError::Option("speed=2".into())));
         assert_eq!(parse("sim:world="), Err(AddressError::Option("world=".into())));
+        assert_eq!(parse("sim:fault=hang@1"), Err(AddressError::Option("fault=hang@1".into())));
+        assert_eq!(parse("sil:report=a.json"), Err(AddressError::Option("report=a.json".into())));
+        for part in ["speed=2", "fault=", "report", "cancellation=maybe", "revision=2003", "revision=0x12345"] {
+            assert_eq!(parse(&format!("board:seed=1,{part}")), Err(AddressError::BoardOption(part.into())));
+        }
         assert_eq!(parse("sim:seed=-1"), Err(AddressError::Number("-1".into())));
     }
 }

@@ -6,13 +6,16 @@
 
 mod address;
 pub mod can;
+mod options;
 mod serial;
 mod stream;
 
 use std::time::Duration;
 
-pub use address::{Address, AddressError, LineKind, SimulatorKind, SimulatorOptions};
-pub use can::{CanTransport, CanTrouble, SimulatedCan, SocketCan};
+pub use address::{Address, AddressError, SimulatorKind};
+pub(crate) use can::RECORD_BYTES;
+pub use can::{BoardCan, CanTransport, CanTrouble, SimulatedCan, SocketCan};
+pub use options::{BoardOptions, Cancellation, ChipOptions, LineKind, SimulatorOptions};
 pub use serial::SerialTransport;
 pub use stream::StreamTransport;
 

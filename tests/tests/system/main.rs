@@ -1,6 +1,7 @@
-//! The whole system: firmware under QEMU, bus, world, link, host tools. One program, so that all share what was taught.
+//! The whole system: firmware under QEMU or on the emulated board, bus, world, link, host tools. One program, so that all share what was taught.
 
 mod bad_input;
+mod board;
 mod boot;
 mod calibration;
 mod command_line;

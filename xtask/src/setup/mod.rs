@@ -4,6 +4,7 @@
 //! (no root, no apt, no network), the error names the exact command or program and the program stops.
 
 mod apt;
+mod emulator;
 mod mujoco;
 mod pictures;
 mod qemu;
@@ -11,6 +12,7 @@ mod toolchain;
 
 use anyhow::Result;
 
+pub(crate) use emulator::{emulator_cargo, emulator_compiler, emulator_lints, emulator_target};
 pub(crate) use qemu::Qemu;
 pub(crate) use toolchain::{ARM, JOINT, Toolchain};
 

@@ -1,8 +1,10 @@
 //! `can:`: the link's bytes as frames on a CAN bus, real or simulated.
 //!
-//! [`CanTransport`] cuts and joins the stream as `link::can` says; a [`CanPort`] sends and receives frames. Two ports exist:
-//! [`SocketCan`], Linux' own CAN interfaces, and [`SimulatedCan`], a bus in virtual time with a simulated device on it.
+//! [`CanTransport`] cuts and joins the stream as `link::can` says; a [`CanPort`] sends and receives frames. Three ports exist:
+//! [`SocketCan`], Linux' own CAN interfaces; [`SimulatedCan`], a bus in virtual time with a simulated device on it; and [`BoardCan`], the
+//! bus inside the emulated board.
 
+mod board;
 mod simulated;
 mod socket;
 mod trouble;
@@ -15,6 +17,8 @@ use puck::{CanFrame, CanId};
 
 use super::{Transport, TransportError};
 
+pub use board::BoardCan;
+pub(crate) use board::RECORD_BYTES;
 pub use simulated::{HostBus, SimulatedCan};
 pub use socket::SocketCan;
 pub use trouble::CanTrouble;

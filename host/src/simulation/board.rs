@@ -1,0 +1,192 @@
+//! The engine of `board:`: the image for the real board on the emulated chip, in lock step with the plant.
+//!
+//! The emulator is a process of its own (`emulated-board serve`). It keeps the time of the chip, its flash and its host line; bus, world and
+//! people stay on this side, as with QEMU. The end of its input is the power switch: it then writes bank 2 and its report.
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use sim::{Lockstep, LockstepError, PlainLine, Plant, Ticks};
+
+use super::options::{FlashSource, SimulationOptions};
+use super::seat::Seat;
+use super::words::Words;
+use super::{Execute, SimulationError};
+use crate::image_file::{ImageFile, ImageFileError};
+use crate::transport::{ChipOptions, LineKind, RECORD_BYTES};
+
+/// The board whose image the emulator executes, as its image says it.
+const BOARD: &str = "nucleo-h743zi2";
+
+/// How long the emulator may take to write bank 2 and its report when the power is switched off.
+const END_PATIENCE: Duration = Duration::from_secs(10);
+
+/// Exit status of an emulator that cannot begin: its options or the image are not to its liking.
+const REFUSED: i32 = 2;
+
+/// The emulator, the image, and what befalls the chip.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BoardEngine {
+    /// The emulator, a program.
+    pub emulator: PathBuf,
+    /// The image, an ELF file.
+    pub image: PathBuf,
+    /// What the chip is, and what befalls it.
+    pub chip: ChipOptions,
+}
+
+impl BoardEngine {
+    /// The words for the emulator.
+    fn command(&self, options: &SimulationOptions) -> Result<Command, SimulationError> {
+        let mut command = Command::new(&self.emulator);
+        command.arg("serve").arg("--image").arg(&self.image);
+        match &options.flash {
+            FlashSource::New => {}
+            FlashSource::File(path) => {
+                command.arg("--bank2").arg(path);
+            }
+            FlashSource::Chip(_) => return Err(SimulationError::FlashOfItsOwn),
+        }
+        command.args(["--host-line", if options.line == LineKind::Can { "can" } else { "serial" }]);
+        let files = [("--log", &options.firmware_log), ("--report", &options.board_report)];
+        for (name, file) in files {
+            if let Some(path) = file {
+                command.arg(name).arg(path);
+            }
+        }
+        if let Some(reading) = self.chip.cancellation {
+            command.args(["--cancellation", reading.word()]);
+        }
+        if let Some(revision) = self.chip.revision {
+            command.args(["--revision", &format!("{revision:#06x}")]);
+        }
+        for fault in &self.chip.faults {
+            command.args(["--fault", fault]);
+        }
+        Ok(command)
+    }
+}
+
+/// A running emulator and the streams to it.
+pub(super) struct EmulatedBoard {
+    child: Child,
+    _seat: Seat,
+    /// `None` once it has ended, or is being switched off.
+    lockstep: Option<Lockstep<BufReader<ChildStdout>, ChildStdin>>,
+    words: Words,
+}
+
+impl EmulatedBoard {
+    /// Switches the board on and gives the plant a line without delay.
+    pub(super) fn spawn(
+        engine: &BoardEngine,
+        options: &SimulationOptions,
+        plant: &mut Plant,
+    ) -> Result<Self, SimulationError> {
+        check_image(&engine.image)?;
+        let mut child = engine
+            .command(options)?
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(|cause| SimulationError::Emulator(engine.emulator.clone(), cause))?;
+        let (Some(to), Some(from), Some(stderr)) = (child.stdin.take(), child.stdout.take(), child.stderr.take())
+        else {
+            unreachable!("all three streams were asked for as pipes")
+        };
+        let seat = Seat::share(&child);
+        let words = Words::of(stderr, None);
+        let mut from = BufReader::new(from);
+        // Whether it begins at all is told here and not in the middle of a conversation.
+        let begins = from.fill_buf().is_ok_and(|bytes| !bytes.is_empty());
+        let mut board = Self { child, _seat: seat, lockstep: begins.then(|| Lockstep::new(from, to)), words };
+        if !begins {
+            return Err(board.ended());
+        }
+        plant.set_link_line(Box::new(match options.line {
+            LineKind::Serial => PlainLine::default(),
+            LineKind::Can => PlainLine::of_records(RECORD_BYTES),
+        }));
+        Ok(board)
+    }
+
+    /// Why the emulator has ended by itself.
+    fn ended(&mut self) -> SimulationError {
+        self.lockstep = None;
+        let status = self.wait();
+        let words = self.last_words();
+        match status {
+            Some(status) if status.code() == Some(REFUSED) => SimulationError::BoardRefused(words),
+            Some(status) => SimulationError::BoardEnded { status: format!(" ({status})"), words },
+            None => SimulationError::BoardEnded { status: " (it had to be killed)".to_owned(), words },
+        }
+    }
+
+    fn last_words(&mut self) -> String {
+        let words = self.words.last();
+        let words = String::from_utf8_lossy(&words);
+        if words.trim().is_empty() { "nothing".to_owned() } else { words.trim().to_owned() }
+    }
+
+    /// Waits for it to end by itself; `None`: it did not and was killed.
+    fn wait(&mut self) -> Option<ExitStatus> {
+        let deadline = Instant::now() + END_PATIENCE;
+        loop {
+            match self.child.try_wait() {
+                Ok(Some(status)) => return Some(status),
+                Ok(None) if Instant::now() < deadline => std::thread::sleep(Duration::from_millis(2)),
+                _ => break,
+            }
+        }
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        None
+    }
+}
+
+/// Refuses an image that says it is for another board, or nothing at all.
+fn check_image(image: &Path) -> Result<(), SimulationError> {
+    let file = ImageFile::read(image).map_err(|error: ImageFileError| SimulationError::BoardImage(Box::new(error)))?;
+    let board = file.description.board;
+    if board == BOARD {
+        return Ok(());
+    }
+    Err(SimulationError::OtherBoard { image: image.to_owned(), board, expected: BOARD })
+}
+
+impl Execute for EmulatedBoard {
+    fn advance(&mut self, plant: &mut Plant, _limit: Ticks) -> Result<Ticks, SimulationError> {
+        // One exchange, as with QEMU: the emulator decides how far it comes, and asks at least once a slot.
+        let Some(lockstep) = &mut self.lockstep else {
+            return Err(self.ended());
+        };
+        match lockstep.serve_one(plant) {
+            Ok(served) if !served.is_last() => Ok(plant.now()),
+            Ok(_) | Err(LockstepError::Truncated { .. }) => Err(self.ended()),
+            Err(LockstepError::Stream(cause)) if cause.kind() == std::io::ErrorKind::BrokenPipe => Err(self.ended()),
+            Err(error) => Err(error.into()),
+        }
+    }
+}
+
+impl Drop for EmulatedBoard {
+    /// Switches the power off and waits until bank 2 and the report are written.
+    fn drop(&mut self) {
+        let Some(lockstep) = self.lockstep.take() else {
+            // It has ended and was waited for.
+            return;
+        };
+        // Its output stays open meanwhile: a request that is under way must not fail.
+        let (_output, input) = lockstep.into_streams();
+        drop(input);
+        let ended = self.wait();
+        if !ended.is_some_and(|status| status.success()) {
+            // Nobody is left to take an error, but a bank 2 or a report that was not written must not go unnoticed.
+            let how = ended.map_or_else(|| "had to be killed".to_owned(), |status| format!("ended with {status}"));
+            eprintln!("warning: when it was switched off, the emulated board {how}; it said: {}", self.last_words());
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Options of a simulated device: the part of its address behind the colon.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use super::AddressError;
+
+/// What the host link of a simulated device travels on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LineKind {
+    /// The board's UART.
+    #[default]
+    Serial,
+    /// A CAN bus of its own.
+    Can,
+}
+
+/// Options of a simulated device; the simulator knows which of them it takes.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct SimulatorOptions {
+    /// Seed of all noise; `None` lets the simulator take its own, always the same.
+    pub seed: Option<u64>,
+    /// Name of the world; `None` is the best one that was built in.
+    pub world: Option<String>,
+    /// What the host link travels on.
+    pub line: LineKind,
+    /// Where a log of the buses goes, in the format of `candump -L`.
+    pub bus: Option<PathBuf>,
+    /// The file that is the device's flash, so that its library is there again after a restart.
+    pub flash: Option<PathBuf>,
+    /// What only the emulated board takes.
+    pub board: BoardOptions,
+}
+
+/// Options that only the emulated board has.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct BoardOptions {
+    /// Where the emulator writes its report when the power is switched off, JSON.
+    pub report: Option<PathBuf>,
+    /// What the chip is, and what befalls it.
+    pub chip: ChipOptions,
+}
+
+/// What the emulated chip is, and what befalls it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct ChipOptions {
+    /// How the CAN controller treats a cancelled frame in its transmit FIFO; `None` is the emulator's choice.
+    pub cancellation: Option<Cancellation>,
+    /// Revision of the chip, `REV_ID`; `None` is the emulator's choice.
+    pub revision: Option<u16>,
+    /// Faults, `KIND@MICROSECONDS[:ARGUMENT]`; the emulator knows which there are.
+    pub faults: Vec<String>,
+}
+
+/// Readings of the manual on cancelling a frame in the transmit FIFO.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cancellation {
+    /// The FIFO goes on behind the cancelled frame.
+    Skipped,
+    /// The FIFO stops at the cancelled frame.
+    Stuck,
+}
+
+impl Cancellation {
+    /// Both readings.
+    pub const ALL: [Self; 2] = [Self::Skipped, Self::Stuck];
+
+    /// Its word in an address and for the emulator.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Skipped => "skipped",
+            Self::Stuck => "stuck",
+        }
+    }
+}
+
+impl SimulatorOptions {
+    /// Reads `seed=7,world=simple`; `is_board`: the options of the emulated board are allowed.
+    ///
+    /// # Errors
+    /// [`AddressError`] for an option or a value that there is not.
+    pub(super) fn parse(text: &str, is_board: bool) -> Result<Self, AddressError> {
+        let mut options = Self::default();
+        for part in text.split(',').filter(|part| !part.is_empty()) {
+            match part.split_once('=').filter(|(_, value)| !value.is_empty()) {
+                Some(("seed", value)) => {
+                    options.seed = Some(value.parse().map_err(|_| AddressError::Number(value.to_owned()))?);
+                }
+                Some(("world", value)) => options.world = Some(value.to_owned()),
+                Some(("line", "serial")) => options.line = LineKind::Serial,
+                Some(("line", "can")) => options.line = LineKind::Can,
+                Some(("bus", value)) => options.bus = Some(value.into()),
+                Some(("flash", value)) => options.flash = Some(value.into()),
+                Some((name, value)) if is_board => options.board.set(part, name, value)?,
+                _ if is_board => return Err(AddressError::BoardOption(part.to_owned())),
+                _ => return Err(AddressError::Option(part.to_owned())),
+            }
+        }
+        Ok(options)
+    }
+}
+
+impl BoardOptions {
+    fn set(&mut self, part: &str, name: &str, value: &str) -> Result<(), AddressError> {
+        let unknown = || AddressError::BoardOption(part.to_owned());
+        match name {
+            "report" => self.report = Some(value.into()),
+            "fault" => self.chip.faults.push(value.to_owned()),
+            "revision" => {
+                let digits = value.strip_prefix("0x").ok_or_else(unknown)?;
+                self.chip.revision = Some(u16::from_str_radix(digits, 16).map_err(|_| unknown())?);
+            }
+            "cancellation" => {
+                let known = Cancellation::ALL.into_iter().find(|reading| reading.word() == value);
+                self.chip.cancellation = Some(known.ok_or_else(unknown)?);
+            }
+            _ => return Err(unknown()),
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for SimulatorOptions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let chip = &self.board.chip;
+        let seed = self.seed.map(|seed| format!("seed={seed}"));
+        let world = self.world.as_ref().map(|world| format!("world={world}"));
+        let line = (self.line == LineKind::Can).then(|| "line=can".to_owned());
+        let bus = self.bus.as_ref().map(|path| format!("bus={}", path.display()));
+        let flash = self.flash.as_ref().map(|path| format!("flash={}", path.display()));
+        let report = self.board.report.as_ref().map(|path| format!("report={}", path.display()));
+        let cancellation = chip.cancellation.map(|reading| format!("cancellation={}", reading.word()));
+        let revision = chip.revision.map(|revision| format!("revision={revision:#06x}"));
+        let faults = chip.faults.iter().map(|fault| format!("fault={fault}"));
+        let single = [seed, world, line, bus, flash, report, cancellation, revision];
+        let parts: Vec<String> = single.into_iter().flatten().chain(faults).collect();
+        f.write_str(&parts.join(","))
+    }
+}
