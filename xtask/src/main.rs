@@ -6,6 +6,7 @@ mod build;
 mod ci;
 mod code;
 mod demo;
+mod docs;
 mod elf;
 mod emulated;
 mod hot;
@@ -45,6 +46,7 @@ cargo xtask <verb>
   qemu     run an image by itself: cargo xtask qemu [IMAGE]
   run-image IMAGE   run an image where it belongs: QEMU, or a board through probe-rs (cargo's runner)
   doc      documentation of all crates
+  docs     dead links, paths, test names and fault identifiers in any file
 
 Every verb does the set-up it needs. Environment:
   TACTUS_TOOLCHAIN=rustup|debian   force one of the two ways to compile for Cortex-M";
@@ -98,6 +100,7 @@ fn dispatch(words: &[&str]) -> Result<()> {
         }
         ["qemu", rest @ ..] => qemu::run(rest)?,
         ["doc"] => build::documentation()?,
+        ["docs"] => docs::run()?,
         [] | ["help" | "--help" | "-h"] => {
             println!("{HELP}");
             return Ok(());
