@@ -138,8 +138,8 @@ impl Can {
         self.controllers.status(unit)
     }
 
-    /// The identifiers of standard frames that the filters of each controller let into its first queue, by the elements in
-    /// the message memory (RM0433 56.3.20).
+    /// The identifiers of standard frames that the filters of each controller let into its first queue, by the elements
+    /// in the message memory (RM0433 56.3.20).
     #[must_use]
     pub fn accepted(&self) -> [Vec<u16>; 2] {
         Unit::BOTH.map(|unit| {

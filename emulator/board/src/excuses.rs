@@ -30,7 +30,7 @@ pub fn address(_address: u64) -> Option<&'static str> {
 pub fn told(register: &str, function: &str) -> Option<&'static str> {
     let is_start = function.contains("embassy_stm32") || function.contains("__rtic_init_resources");
     (register == "RCC.PLLCKSELR" && is_start).then_some(
-        "embassy-stm32 0.6.0 clears the divider of each loop that the configuration leaves out; the fields of the loop that \
-         runs are protected meanwhile, and keep what it wrote before",
+        "embassy-stm32 0.6.0 clears the divider of each loop that the configuration leaves out; the fields of \
+         the loop that runs are protected meanwhile, and keep what it wrote before",
     )
 }

@@ -5,9 +5,9 @@ use serde_json::{Map, Value, json};
 
 use crate::cache::CacheCount;
 use crate::clocks::Clocks;
-use crate::core::FaultNote;
 use crate::findings::Findings;
 use crate::image::Image;
+use crate::notes::FaultNote;
 use crate::stack::StackUse;
 use crate::watchdog::Watched;
 

@@ -69,7 +69,8 @@ impl Default for Setup {
     }
 }
 
-/// An instruction takes 4 ns unless somebody says otherwise: the crate's own choice for a core of some hundred megahertz.
+/// An instruction takes 4 ns unless somebody says otherwise: the crate's own choice for a core of some hundred
+/// megahertz.
 pub const MIPS: u32 = 250;
 
 /// Silicon of revision V, which present boards have.

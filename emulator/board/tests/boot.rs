@@ -24,11 +24,11 @@ fn equal_runs_are_equal() {
 
 #[test]
 fn a_slow_core_meets_its_first_slot_too() {
-    let story = tell(0.8, Setup { mips: 100, ..Setup::default() });
+    let story = tell(0.8, Setup { mips: 60, ..Setup::default() });
     let statistics = story.learned.lock().statistics.expect("statistics");
     assert_eq!(statistics.missed_deadlines, 0);
     let latency_us = statistics.latency_worst_ticks / 200;
-    assert!(latency_us < 200, "{latency_us} us from the timer to the slot");
+    assert!(latency_us < 20, "{latency_us} us from the timer to the slot");
 }
 
 #[test]

@@ -118,8 +118,8 @@ pub(crate) fn safe_frames() -> [CanFrame; 4] {
     [arm, wrist, set(Group::ARM, PropertyId::MODE, idle), set(Group::HAND, PropertyId::MODE, idle)]
 }
 
-/// One frame of the log without its packing (rzCOBS: groups of seven bytes with a map of their zeros, read from the end),
-/// as far as it is text.
+/// One frame of the log without its packing (rzCOBS: groups of seven bytes with a map of their zeros, read from the
+/// end), as far as it is text.
 fn readable(frame: &[u8]) -> String {
     let mut rest = frame.iter().rev().copied();
     let mut bytes = Vec::new();
