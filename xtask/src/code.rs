@@ -94,6 +94,12 @@ impl Code {
         self.0.get(&address)
     }
 
+    /// Where a linker's bridge leads; `None` for any other function.
+    pub(crate) fn beyond(&self, function: &Function) -> Option<u32> {
+        let meant = function.names.iter().find_map(|name| name.split_once(FAR))?.1;
+        self.address(meant)
+    }
+
     /// Where the function of this name begins; the name as the compiler encodes it.
     pub(crate) fn address(&self, name: &str) -> Option<u32> {
         self.functions().find(|(_, function)| function.names.iter().any(|known| known == name)).map(|found| found.0)

@@ -82,6 +82,10 @@ fn stray(code: &Code) -> Result<BTreeSet<String>> {
     let mut open = vec![named(ROOT)?];
     while let Some(address) = open.pop() {
         let Some(function) = code.at(address).filter(|_| seen.insert(address)) else { continue };
+        if let Some(to) = code.beyond(function) {
+            open.push(to);
+            continue;
+        }
         let name = function.name();
         if !ITCM.contains(&address) {
             if !ELSEWHERE.iter().any(|(listed, _)| name.contains(listed)) {
