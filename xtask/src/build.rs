@@ -8,7 +8,7 @@ use anyhow::{Context, Result, ensure};
 use crate::board::{self, Board};
 use crate::elf::Sizes;
 use crate::setup::{ARM, Machine, Toolchain};
-use crate::{joint, panics, shell};
+use crate::{joint, panics, shell, stack};
 
 /// Features of the host packages with the MuJoCo world and its pictures.
 pub(crate) const WORLD: &str = "tactus/mujoco,sim/mujoco,sim/render,system-tests/mujoco";
@@ -61,6 +61,21 @@ pub(crate) fn nothing_forbidden(image: &Path, board: Board) -> Result<()> {
 
 /// Says where the images that were built can panic.
 pub(crate) fn panics() -> Result<()> {
+    panics::table(&images()?)
+}
+
+/// Says how deep the stacks of the images that were built go, and fails if one is too deep.
+pub(crate) fn stacks() -> Result<()> {
+    let mut results = Vec::new();
+    for (image, _) in images()? {
+        results.push(stack::run(&image));
+        println!();
+    }
+    results.into_iter().collect()
+}
+
+/// Every image, with the board whose code is in it.
+fn images() -> Result<Vec<(PathBuf, Board)>> {
     let folder = shell::target_dir().join("images");
     let mut images: Vec<_> = Board::ALL.map(|board| (folder.join(board.file()), board)).into();
     images.push((folder.join(joint::FILE), Board::Mps2));
@@ -71,7 +86,7 @@ pub(crate) fn panics() -> Result<()> {
             image.display()
         );
     }
-    panics::table(&images)
+    Ok(images)
 }
 
 /// Builds the documentation of every crate of the workspace.

@@ -1,0 +1,132 @@
+//! Which handlers may interrupt which, for every board; the image sets these priorities at run time.
+//!
+//! Handlers of one level never interrupt each other, those of a higher level (a larger number) interrupt those of a lower
+//! one. Level 0 is the idle task.
+
+use anyhow::{Context, Result, ensure};
+
+use super::depth::Calls;
+
+/// Handlers of one priority.
+pub(super) struct Level {
+    /// Logical priority.
+    pub(super) priority: u32,
+    /// Names of the handlers.
+    pub(super) handlers: &'static [&'static str],
+}
+
+/// Another stack than the one everything runs on.
+pub(super) struct OtherStack {
+    /// Symbol of its upper end.
+    pub(super) top: &'static str,
+    /// Its size.
+    pub(super) bytes: u32,
+    /// The handler that takes it.
+    pub(super) handler: &'static str,
+}
+
+/// What interrupts what on a board, and what is below its stack.
+pub(super) struct Layout {
+    /// Name of the board in the image's description.
+    pub(super) board: &'static str,
+    /// Bytes the processor puts on the stack for an exception, at most: eight words, with floating point 18 more, and one
+    /// to align them.
+    pub(super) exception: u32,
+    /// The levels, the lowest first.
+    pub(super) levels: &'static [Level],
+    /// Handlers that never return and mask everything first.
+    pub(super) ends: &'static [&'static str],
+    /// A stack of its own for one of them.
+    pub(super) other: Option<OtherStack>,
+    /// Bytes below the stack that fault when they are touched.
+    pub(super) guard: Option<u32>,
+}
+
+const fn level(priority: u32, handlers: &'static [&'static str]) -> Level {
+    Level { priority, handlers }
+}
+
+/// Exceptions on a processor with floating point.
+const EXTENDED: u32 = 4 * (8 + 18 + 1);
+/// Exceptions on one without.
+const BASIC: u32 = 4 * (8 + 1);
+
+/// Faults and what nobody serves.
+const ENDS: &[&str] = &["HardFault", "DefaultHandler"];
+
+/// RTIC gives the first dispatcher to the tasks of the highest of the priorities that need one; which of the two has which
+/// does not matter here, as they are two levels in any case.
+const FIRST_DISPATCHER: Level = level(1, &["DISPATCH_SESSION"]);
+const SECOND_DISPATCHER: Level = level(2, &["DISPATCH_LOG"]);
+const BUS: Level = level(10, &["CAN_RECEIVE", "CAN_TRANSMIT"]);
+const SLOT: Level = level(12, &["SLOT_TIMER"]);
+
+/// Every board.
+const LAYOUTS: [Layout; 3] = [
+    Layout {
+        board: "nucleo-h743zi2",
+        exception: EXTENDED,
+        levels: &[
+            FIRST_DISPATCHER,
+            SECOND_DISPATCHER,
+            level(3, &["OTG_FS"]),
+            BUS,
+            SLOT,
+            level(13, &["USART3"]),
+            level(14, &["FDCAN1_IT1"]),
+        ],
+        ends: ENDS,
+        other: Some(OtherStack { top: "__emergency_stack", bytes: 4096, handler: "MemoryManagement" }),
+        guard: Some(4096),
+    },
+    Layout {
+        board: "mps2-an500",
+        exception: EXTENDED,
+        levels: &[FIRST_DISPATCHER, SECOND_DISPATCHER, BUS, SLOT, level(14, &["BUS_WIRE"])],
+        ends: ENDS,
+        other: None,
+        guard: None,
+    },
+    Layout {
+        board: "mps2-an385",
+        exception: BASIC,
+        levels: &[level(2, &["DISPATCH_SESSION"]), BUS, SLOT, level(14, &["BUS_WIRE"])],
+        ends: ENDS,
+        other: None,
+        guard: None,
+    },
+];
+
+impl Layout {
+    /// The layout of the board an image says it is for.
+    ///
+    /// # Errors
+    /// If no board has this name.
+    pub(super) fn of(board: &str) -> Result<&'static Self> {
+        let known = LAYOUTS.iter().find(|layout| layout.board == board);
+        known.with_context(|| format!("no priorities are known for the board '{board}' (xtask/src/stack/levels.rs)"))
+    }
+
+    /// Fails if a handler in the vector table is not in this table, or the other way round.
+    pub(super) fn check(&self, calls: &Calls, vectors: &[u32]) -> Result<()> {
+        let listed = || {
+            let levels = self.levels.iter().flat_map(|level| level.handlers);
+            levels.chain(self.ends).copied().chain(self.other.iter().map(|other| other.handler))
+        };
+        // Behind the stack's beginning and where the image begins.
+        for (line, vector) in vectors.iter().enumerate().skip(2).filter(|(_, vector)| **vector != 0) {
+            let address = vector & !1;
+            let known = listed().any(|handler| calls.address(handler).is_ok_and(|known| known == address));
+            ensure!(
+                known,
+                "{}, entry {line} of the vector table, has no priority in xtask/src/stack/levels.rs",
+                calls.name(address)
+            );
+        }
+        for handler in listed().filter(|handler| !self.ends.contains(handler)) {
+            let address = calls.address(handler)?;
+            ensure!(vectors.iter().any(|vector| vector & !1 == address), "{handler} is not in the vector table");
+        }
+        Ok(())
+    }
+}
