@@ -53,10 +53,11 @@ fn board_image(toolchain: Toolchain, board: Board, may_sleep: bool) -> Result<Pa
     Ok(image)
 }
 
-/// What no image may contain: an allocator, and panics but those that are known.
+/// What no image may contain: an allocator, panics but those that are known, a way deeper than its stack allows.
 pub(crate) fn nothing_forbidden(image: &Path, board: Board) -> Result<()> {
     ensure!(!Sizes::of(image)?.allocates(), "the image allocates memory, which nothing on a device may");
-    panics::check(image, board)
+    panics::check(image, board)?;
+    stack::check(image)
 }
 
 /// Says where the images that were built can panic.
@@ -66,12 +67,8 @@ pub(crate) fn panics() -> Result<()> {
 
 /// Says how deep the stacks of the images that were built go, and fails if one is too deep.
 pub(crate) fn stacks() -> Result<()> {
-    let mut results = Vec::new();
-    for (image, _) in images()? {
-        results.push(stack::run(&image));
-        println!();
-    }
-    results.into_iter().collect()
+    let images: Vec<PathBuf> = images()?.into_iter().map(|(image, _)| image).collect();
+    stack::table(&images)
 }
 
 /// Every image, with the board whose code is in it.

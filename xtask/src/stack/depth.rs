@@ -90,6 +90,11 @@ impl Calls {
         all
     }
 
+    /// How many functions of each kind may be behind a pointer.
+    pub(super) fn behind_pointers(&self) -> Vec<usize> {
+        self.pointers.counts()
+    }
+
     /// The functions that unmask interrupts, directly or by calling another.
     pub(super) fn unmasks(&self, address: u32) -> bool {
         self.unmasks.contains(&address)
@@ -140,7 +145,8 @@ fn masks_first(function: &Function) -> bool {
     let position = |wanted: &dyn Fn(&crate::thumb::Instruction) -> bool| function.instructions.iter().position(wanted);
     let masks = position(&|instruction| instruction.halves.0 == frame::MASK);
     let calls = position(&|instruction| {
-        matches!(instruction.flow, Flow::Call(_)) || matches!(super::step::way(instruction), super::step::Way::CallBy(_))
+        matches!(instruction.flow, Flow::Call(_))
+            || matches!(super::step::way(instruction), super::step::Way::CallBy(_))
     });
     masks.is_some_and(|masks| calls.is_none_or(|calls| masks < calls))
 }

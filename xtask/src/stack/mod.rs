@@ -13,38 +13,34 @@ mod pointers;
 mod step;
 #[cfg(test)]
 mod tests;
+mod total;
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use link::metadata::{ImageMetadata, METADATA_SECTION};
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
 
 use crate::code::Code;
 use crate::elf::Elf;
 use crate::shell;
-use depth::{Calls, Part, Search, Stop, Way};
+use depth::{Calls, Part, Search, Stop};
 use levels::Layout;
 use memory::Memory;
+use pointers::KINDS;
+use total::{Image, Ways, sum};
 
 /// Share of the stack that the start-up may take.
-const START_PERCENT: u32 = 60;
+pub(crate) const START_PERCENT: u32 = 60;
 /// Share of the stack that the service may take.
 const SERVICE_PERCENT: u32 = 40;
 
-/// Where an image begins.
-const RESET: &str = "Reset";
-/// Where Rust begins.
-const MAIN: &str = "main";
 /// Both ends of the stack, as the linker places them.
 const STACK: [&str; 2] = ["_stack_end", "_stack_start"];
 /// Functions in the list of the largest frames.
 const LARGEST: usize = 25;
-
-/// A way, and what comes on top of it, each with what it is.
-type Ways = Vec<(String, Way)>;
 
 /// The stack of an image.
 pub(crate) struct Depth {
@@ -59,6 +55,8 @@ pub(crate) struct Depth {
     /// The stack of its own that one handler has, with its size.
     other: Option<(u32, Ways)>,
     largest: Vec<Stop>,
+    /// How many functions of each kind may be behind a pointer; last those of none.
+    behind_pointers: Vec<usize>,
 }
 
 impl Depth {
@@ -86,7 +84,7 @@ impl Depth {
     fn faults(&self) -> Vec<String> {
         let mut faults = Vec::new();
         let mut bound = |what: &str, bytes: u32, percent: u32| {
-            let most = self.size / 100 * percent + self.size % 100 * percent / 100;
+            let most = share(self.size, percent);
             if bytes > most {
                 faults.push(format!("{what} {bytes} B of stack, more than {percent} % of {} B ({most} B)", self.size));
             }
@@ -107,18 +105,9 @@ impl Depth {
         faults
     }
 
-    /// Fails if the image needs more stack than it may.
-    ///
-    /// # Errors
-    /// All that is against the rules, with the ways that lead there.
-    pub(crate) fn check(&self) -> Result<()> {
-        let faults = self.faults();
-        if faults.is_empty() {
-            let Self { size, .. } = self;
-            shell::note(&format!("stack: {} B at start, {} B in service, of {size} B", self.at_start(), self.in_service()));
-            return Ok(());
-        }
-        bail!("{}\nTo see every way: cargo xtask stack --image FILE", faults.join("\n"))
+    /// The figures in a few words.
+    pub(crate) fn summary(&self) -> String {
+        format!("{} B at start, {} B in service, computed", self.at_start(), self.in_service())
     }
 
     /// Prints the figures and the ways.
@@ -137,7 +126,11 @@ impl Depth {
         if let Some((size, ways)) = &self.other {
             println!("{:<16} {:>7} B  of {size} B on a stack of its own", "emergency", sum(ways));
         }
-        for (name, ways) in table.map(|(name, ways, _)| (name, ways)).into_iter().chain(self.other.iter().map(|(_, ways)| ("emergency", ways))) {
+        for (name, ways) in table
+            .map(|(name, ways, _)| (name, ways))
+            .into_iter()
+            .chain(self.other.iter().map(|(_, ways)| ("emergency", ways)))
+        {
             println!("\n{name}:");
             for (what, way) in ways {
                 println!("{:>9} B  {what}", way.bytes);
@@ -146,6 +139,15 @@ impl Depth {
                 }
             }
         }
+        println!("\nfunctions behind pointers:");
+        for (kind, count) in KINDS.iter().zip(&self.behind_pointers) {
+            let nested = kind.nested.map_or(String::new(), |nested| format!(", {nested} inside one another"));
+            println!("{count:>9}    {}{nested}: {}", kind.name, kind.why);
+        }
+        println!(
+            "{:>9}    others: any call through a pointer that is not listed",
+            self.behind_pointers.last().unwrap_or(&0)
+        );
         println!("\nlargest frames:");
         for Stop { function, bytes } in self.largest.iter().take(LARGEST) {
             println!("{bytes:>9} B  {function}");
@@ -153,15 +155,57 @@ impl Depth {
     }
 }
 
-fn sum(ways: &Ways) -> u32 {
-    ways.iter().map(|(_, way)| way.bytes).sum()
+/// A share of some bytes.
+pub(crate) const fn share(bytes: u32, percent: u32) -> u32 {
+    (bytes as u64 * percent as u64 / 100) as u32
+}
+
+/// Fails if an image needs more stack than it may; says in a line what it needs.
+///
+/// # Errors
+/// All that is against the rules.
+pub(crate) fn check(image: &Path) -> Result<()> {
+    let depth = Depth::of(image)?;
+    let faults = depth.faults();
+    ensure!(
+        faults.is_empty(),
+        "{}\nTo see every way: cargo xtask stack --image {}",
+        faults.join("\n"),
+        image.display()
+    );
+    shell::note(&format!("stack: {}, of {} B", depth.summary(), depth.size));
+    Ok(())
+}
+
+/// Computes and prints the depth of every image, and fails if one is too deep or a row of the list of pointers means nothing
+/// in any of them.
+///
+/// # Errors
+/// Of the images as [`check`].
+pub(crate) fn table(images: &[PathBuf]) -> Result<()> {
+    let mut idle = vec![true; KINDS.len()];
+    let mut results = Vec::new();
+    for image in images {
+        let depth = Depth::of(image)?;
+        for (idle, count) in idle.iter_mut().zip(&depth.behind_pointers) {
+            *idle &= *count == 0;
+        }
+        depth.print();
+        println!();
+        results.push(check(image));
+    }
+    let idle: Vec<&str> = KINDS.iter().zip(idle).filter(|(_, idle)| *idle).map(|(kind, _)| kind.name).collect();
+    ensure!(idle.is_empty(), "no image has functions behind pointers of these kinds: {}", idle.join("; "));
+    results.into_iter().collect()
 }
 
 /// Computes and prints the depth of an image, and fails if it is too deep.
+///
+/// # Errors
+/// As [`check`].
 pub(crate) fn run(image: &Path) -> Result<()> {
-    let depth = Depth::of(image)?;
-    depth.print();
-    depth.check()
+    Depth::of(image)?.print();
+    check(image)
 }
 
 fn of(file: &Elf<'_>) -> Result<Depth> {
@@ -198,151 +242,6 @@ fn of(file: &Elf<'_>) -> Result<Depth> {
         end: image.end()?,
         other,
         largest: calls.largest(),
+        behind_pointers: calls.behind_pointers(),
     })
-}
-
-/// An image whose functions have been followed.
-struct Image<'a> {
-    calls: &'a Calls,
-    layout: &'a Layout,
-    /// The function in which every panic ends, with its own frame only.
-    plain: BTreeMap<u32, u32>,
-}
-
-impl Image<'_> {
-    /// From reset until interrupts are unmasked; or then, with all that had been waiting.
-    fn start(&self) -> Result<Ways> {
-        let masked = self.masked(&self.plain)?;
-        let ways = vec![("with interrupts masked".to_owned(), masked)];
-        let mut tail = vec![("what ends with interrupts unmasked".to_owned(), self.thread(&self.plain, Thread::Tail)?)];
-        tail.extend(self.interrupts(&self.plain)?);
-        Ok(if sum(&tail) > sum(&ways) { tail } else { ways })
-    }
-
-    fn service(&self) -> Result<Ways> {
-        let mut ways = vec![("the idle task".to_owned(), self.thread(&self.plain, Thread::Service)?)];
-        ways.extend(self.interrupts(&self.plain)?);
-        Ok(ways)
-    }
-
-    /// The deepest that a panic or a fault may be.
-    fn end(&self) -> Result<Ways> {
-        let last = self.last_words()?;
-        let ends = BTreeMap::from([(self.calls.end()?, last.bytes)]);
-        let start = self.start()?;
-        let service = self.service()?;
-        let mut all = vec![vec![("a panic at start".to_owned(), self.masked(&ends)?)]];
-        // A panic at every level, above all that is below it.
-        let thread = ("a panic in the idle task".to_owned(), self.thread(&ends, Thread::Service)?);
-        let panics: Ways = std::iter::once(thread).chain(self.interrupts(&ends)?).collect();
-        for (level, panic) in panics.into_iter().enumerate() {
-            let mut ways: Ways = service.iter().take(level).cloned().collect();
-            ways.push(panic);
-            all.push(ways);
-        }
-        let fault = self.fault()?;
-        for mut ways in [start, service] {
-            ways.push(fault.clone());
-            all.push(ways);
-        }
-        let mut deepest = all.into_iter().max_by_key(sum).unwrap_or_default();
-        deepest.push(("of which the last words of a panic".to_owned(), Way { bytes: 0, stops: last.stops }));
-        Ok(deepest)
-    }
-
-    /// The deepest handler of every level.
-    fn interrupts(&self, ends: &BTreeMap<u32, u32>) -> Result<Ways> {
-        let mut search = Search::new(self.calls, ends.clone());
-        let mut ways = Vec::new();
-        for level in self.layout.levels {
-            let mut deepest = Way::default();
-            for handler in level.handlers {
-                let way = search.deepest(self.calls.address(handler)?, Part::Whole)?;
-                if way.bytes >= deepest.bytes {
-                    deepest = way;
-                }
-            }
-            deepest.bytes += self.layout.exception;
-            let what = format!("priority {}, {} B for the exception", level.priority, self.layout.exception);
-            ways.push((what, deepest));
-        }
-        Ok(ways)
-    }
-
-    /// The deepest handler that never returns.
-    fn fault(&self) -> Result<(String, Way)> {
-        let mut search = Search::new(self.calls, self.plain.clone());
-        let mut deepest = Way::default();
-        for handler in self.layout.ends {
-            let way = search.deepest(self.calls.address(handler)?, Part::Whole)?;
-            if way.bytes >= deepest.bytes {
-                deepest = way;
-            }
-        }
-        deepest.bytes += self.layout.exception;
-        Ok((format!("a fault, {} B for the exception", self.layout.exception), deepest))
-    }
-
-    /// The start as far as interrupts are masked.
-    fn masked(&self, ends: &BTreeMap<u32, u32>) -> Result<Way> {
-        Search::new(self.calls, ends.clone()).deepest(self.calls.address(RESET)?, Part::Masked)
-    }
-
-    /// What a panic does last.
-    fn last_words(&self) -> Result<Way> {
-        let end = self.calls.end()?;
-        let frame = self.calls.frame(end).context("the end of a panic has no frame")?;
-        let mut search = Search::new(self.calls, self.plain.clone());
-        let mut deepest = Way { bytes: frame.bytes, stops: Vec::new() };
-        for call in &frame.calls {
-            let frame::Target::Function(to) = call.target else { bail!("the end of a panic calls through a pointer") };
-            let mut way = search.deepest(to, Part::Whole)?;
-            way.bytes += call.depth;
-            way.stops.insert(0, Stop { function: self.calls.name(end), bytes: call.depth });
-            if way.bytes >= deepest.bytes {
-                deepest = way;
-            }
-        }
-        Ok(deepest)
-    }
-
-    /// What runs with interrupts unmasked: the end of the start, or the service.
-    fn thread(&self, ends: &BTreeMap<u32, u32>, thread: Thread) -> Result<Way> {
-        let (reset, main) = (self.calls.address(RESET)?, self.calls.address(MAIN)?);
-        let frame = |address| self.calls.frame(address).context("a function has no frame");
-        let to_main = frame(reset)?.calls.iter().find(|call| call.target == frame::Target::Function(main));
-        let below = to_main.with_context(|| format!("{RESET} does not call {MAIN}"))?.depth;
-        let main_frame = frame(main)?;
-        ensure!(self.calls.unmasks(main), "{MAIN} never unmasks interrupts: its service cannot be told from its start");
-        let own = match thread {
-            Thread::Tail => 0,
-            Thread::Service => main_frame.unmasked.unwrap_or(0),
-        };
-        let stops = |at| vec![Stop { function: RESET.to_owned(), bytes: below }, Stop { function: MAIN.to_owned(), bytes: at }];
-        let mut deepest = Way { bytes: below + own, stops: stops(own) };
-        let mut search = Search::new(self.calls, ends.clone());
-        for call in &main_frame.calls {
-            let frame::Target::Function(to) = call.target else { bail!("{MAIN} calls through a pointer") };
-            let part = match thread {
-                Thread::Tail if !call.unmasked && self.calls.unmasks(to) => Part::Unmasked,
-                Thread::Service if call.unmasked => Part::Whole,
-                _ => continue,
-            };
-            let way = search.deepest(to, part)?;
-            let bytes = below + call.depth + way.bytes;
-            if bytes > deepest.bytes {
-                deepest = Way { bytes, stops: stops(call.depth).into_iter().chain(way.stops).collect() };
-            }
-        }
-        Ok(deepest)
-    }
-}
-
-/// What runs with interrupts unmasked.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Thread {
-    /// The functions of the start that have unmasked them and not returned yet.
-    Tail,
-    /// Everything after that.
-    Service,
 }

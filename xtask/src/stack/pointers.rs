@@ -21,7 +21,7 @@ pub(super) struct Kind {
 }
 
 /// Kinds of functions behind pointers. A call by a function that no row lists may lead to any function whose address is
-/// taken; so may one by a listed function, to a function of no kind at all only if the row is not its own.
+/// taken, of whatever kind.
 pub(super) const KINDS: [Kind; 5] = [
     Kind {
         name: "a value's text",
@@ -105,11 +105,19 @@ impl Pointers {
         Self { of_kind }
     }
 
+    /// How many there are of each kind; last those of none.
+    pub(super) fn counts(&self) -> Vec<usize> {
+        self.of_kind.iter().map(Vec::len).collect()
+    }
+
     /// What a function may call through a pointer: the number of the kind, and the function.
     pub(super) fn called_by(&self, caller: &[String]) -> Vec<(usize, u32)> {
         let mut listed = KINDS.iter().enumerate().filter(|(_, kind)| contains(caller, kind.callers)).peekable();
-        let kinds: Vec<usize> =
-            if listed.peek().is_some() { listed.map(|(index, _)| index).collect() } else { (0..=KINDS.len()).collect() };
+        let kinds: Vec<usize> = if listed.peek().is_some() {
+            listed.map(|(index, _)| index).collect()
+        } else {
+            (0..=KINDS.len()).collect()
+        };
         kinds.into_iter().flat_map(|kind| self.of_kind[kind].iter().map(move |function| (kind, *function))).collect()
     }
 }

@@ -1,1 +1,478 @@
+//! The computation on tiny images made by hand: frames, calls, circles, interrupts, limits. Each rule is seen to fail.
 
+use link::metadata::{ImageMetadata, METADATA_SECTION, MemoryRegion};
+use object::write::{Object, Symbol, SymbolSection};
+use object::{Architecture, BinaryFormat, Endianness, SectionFlags, SectionKind, SymbolFlags, SymbolKind, SymbolScope};
+
+use super::Depth;
+use super::depth::{Calls, Part, Search, Way};
+use super::levels::Layout;
+use super::memory::Memory;
+use crate::code::Code;
+use crate::elf::Elf;
+
+/// Distance between the functions of a tiny image.
+const STRIDE: u32 = 0x40;
+/// Where the first begins: a function at 0 would be taken for every zero.
+const FIRST: u32 = STRIDE;
+/// Upper and lower end of the stack.
+const STACK: (u32, u32) = (0x2000_4000, 0x2000_0000);
+
+/// push {r7, lr}; pop {r7, pc}; bx lr; cpsid i; cpsie i; udf #254
+const PUSH: u16 = 0xB580;
+const POP: u16 = 0xBD80;
+const BACK: u16 = 0x4770;
+const MASK: u16 = 0xB672;
+const UNMASK: u16 = 0xB662;
+const NEVER: u16 = 0xDEFE;
+
+/// A piece of a function.
+#[derive(Clone)]
+enum Piece {
+    Code(Vec<u16>),
+    /// BL to a function.
+    Call(&'static str),
+    /// B.W to a function.
+    Jump(&'static str),
+    /// Constants.
+    Data(Vec<u16>),
+}
+
+use Piece::{Call, Data, Jump};
+
+fn code(halves: &[u16]) -> Piece {
+    Piece::Code(halves.to_vec())
+}
+
+/// push {r7, lr}; sub.w sp, sp, #bytes; the calls; add.w sp, sp, #bytes; pop {r7, pc}
+fn framed(bytes: u16, calls: &[&'static str]) -> Vec<Piece> {
+    // Twelve bits of a plain number: i, imm3, imm8.
+    let number = (bytes >> 11 & 1, bytes >> 8 & 7, bytes & 0xFF);
+    let second = number.1 << 12 | 0xD00 | number.2;
+    let mut pieces = vec![code(&[PUSH, 0xF2AD | number.0 << 10, second])];
+    pieces.extend(calls.iter().map(|name| Call(name)));
+    pieces.push(code(&[0xF20D | number.0 << 10, second, POP]));
+    pieces
+}
+
+/// Functions in the order of memory.
+#[derive(Clone, Default)]
+struct Tiny {
+    functions: Vec<(&'static str, Vec<Piece>)>,
+    rodata: Vec<u8>,
+}
+
+impl Tiny {
+    fn with(mut self, name: &'static str, pieces: Vec<Piece>) -> Self {
+        match self.functions.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, known)) => *known = pieces,
+            None => self.functions.push((name, pieces)),
+        }
+        self
+    }
+
+    fn address(&self, name: &str) -> u32 {
+        let index = self.functions.iter().position(|(known, _)| *known == name).expect("a function of this name");
+        FIRST + STRIDE * index as u32
+    }
+
+    /// The ELF file. With a board: vector table, description and stack as well.
+    fn file(&self, board: Option<&str>) -> Vec<u8> {
+        let mut image = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
+        let section = image.add_section(Vec::new(), b".text".to_vec(), SectionKind::Text);
+        let mut text = vec![0; FIRST as usize];
+        let mut symbols = Vec::new();
+        for (name, pieces) in &self.functions {
+            let begin = self.address(name);
+            for piece in pieces {
+                let at = text.len() as u32;
+                let halves = match piece {
+                    Piece::Code(halves) | Data(halves) => halves.clone(),
+                    Call(to) => branch(at, self.address(to), 0xD000),
+                    Jump(to) => branch(at, self.address(to), 0x9000),
+                };
+                text.extend(halves.iter().flat_map(|half| half.to_le_bytes()));
+                let mark = if matches!(piece, Data(_)) { "$d" } else { "$t" };
+                symbols.push((mark.to_owned(), u64::from(at), 0, SymbolKind::Label));
+            }
+            let bytes = text.len() as u64 - u64::from(begin);
+            symbols.push(((*name).to_owned(), u64::from(begin | 1), bytes, SymbolKind::Text));
+            assert!(bytes <= u64::from(STRIDE), "{name} is too long");
+            text.resize((begin + STRIDE) as usize, 0);
+        }
+        image.append_section_data(section, &text, 4);
+        let mut add = |name: &str, value, size, kind, section| {
+            let (scope, flags) = (SymbolScope::Compilation, SymbolFlags::None);
+            image.add_symbol(Symbol { name: name.into(), value, size, kind, scope, weak: false, section, flags });
+        };
+        for (name, value, size, kind) in symbols {
+            add(&name, value, size, kind, SymbolSection::Section(section));
+        }
+        for (name, value) in [("_stack_start", STACK.0), ("_stack_end", STACK.1), ("__emergency_stack", 0x2001_0000)] {
+            add(name, u64::from(value), 0, SymbolKind::Data, SymbolSection::Absolute);
+        }
+        let rodata = image.add_section(Vec::new(), b".rodata".to_vec(), SectionKind::ReadOnlyData);
+        // Not at address 0 as well: sections of an object file are not placed yet, and a word is looked up by its address.
+        image.append_section_data(rodata, &self.rodata, 4);
+        if let Some(board) = board {
+            self.add_board(&mut image, board);
+        }
+        image.write().expect("the image is complete")
+    }
+
+    fn add_board(&self, image: &mut Object<'_>, board: &str) {
+        let region = MemoryRegion { start: 0, length: 0x1000 };
+        let description = ImageMetadata {
+            link_version: 0,
+            simulated: true,
+            schema_hash: 0,
+            model_hash: 0,
+            image: region,
+            store: None,
+            firmware: "",
+            board,
+        };
+        let place = image.add_section(Vec::new(), METADATA_SECTION.as_bytes().to_vec(), SectionKind::ReadOnlyData);
+        image.append_section_data(place, &description.encode(), 4);
+        let vectors: Vec<u8> = std::iter::once(STACK.0)
+            .chain(
+                self.functions.iter().filter(|(name, _)| !INNER.contains(name)).map(|(name, _)| self.address(name) | 1),
+            )
+            .flat_map(u32::to_le_bytes)
+            .collect();
+        let place = image.add_section(Vec::new(), b".vector_table".to_vec(), SectionKind::ReadOnlyData);
+        image.append_section_data(place, &vectors, 4);
+        image.section_mut(place).flags = SectionFlags::Elf { sh_flags: 2 };
+    }
+
+    fn calls(&self) -> anyhow::Result<Calls> {
+        let file = self.file(None);
+        let file = Elf::parse(&*file)?;
+        Calls::of(Code::of(&file)?, &Memory::of(&file)?)
+    }
+
+    /// The deepest way from a function.
+    fn deepest(&self, name: &str) -> anyhow::Result<Way> {
+        let calls = self.calls()?;
+        Search::new(&calls, Default::default()).deepest(calls.address(name)?, Part::Whole)
+    }
+
+    fn depth(&self, board: &str) -> anyhow::Result<Depth> {
+        let file = self.file(Some(board));
+        super::of(&Elf::parse(&*file)?)
+    }
+}
+
+/// BL or B.W.
+fn branch(from: u32, to: u32, kind: u16) -> Vec<u16> {
+    let offset = to.wrapping_sub(from + 4);
+    let (sign, upper) = (offset >> 24 & 1, |bit: u32| 1 ^ (offset >> bit & 1) ^ (offset >> 24 & 1));
+    let first = 0xF000 | sign << 10 | offset >> 12 & 0x3FF;
+    let second = u32::from(kind) | upper(23) << 13 | upper(22) << 11 | offset >> 1 & 0x7FF;
+    vec![first as u16, second as u16]
+}
+
+/// Functions of the tiny images that are no handlers.
+const INNER: [&str; 6] = ["main", "begin", "idle", "deep", "rust_begin_unwind", "stranger"];
+
+/// An image for a board that starts, serves and can end: 8 B for Reset's call of main, 8 for main.
+fn board(name: &str) -> Tiny {
+    let mut tiny = Tiny::default()
+        .with("Reset", vec![Call("main"), code(&[NEVER])])
+        .with("main", vec![code(&[PUSH, MASK]), Call("begin"), Call("idle"), code(&[NEVER])])
+        .with("begin", vec![code(&[PUSH]), Call("deep"), code(&[UNMASK, POP])])
+        .with("deep", framed(400, &[]))
+        .with("idle", framed(100, &[]))
+        .with("rust_begin_unwind", vec![code(&[PUSH, MASK]), Call("deep"), code(&[NEVER])]);
+    let layout = Layout::of(name).expect("a board of this name");
+    for handler in layout.levels.iter().flat_map(|level| level.handlers).chain(layout.ends) {
+        tiny = tiny.with(handler, framed(40, &[]));
+    }
+    match &layout.other {
+        // ldr r1, [pc, #4]; mov sp, r1; b.w deep; the upper end of the emergency stack
+        Some(other) => {
+            tiny.with(other.handler, vec![code(&[0x4901, 0x468D]), Jump("deep"), Data(vec![0x0000, 0x2001])])
+        }
+        None => tiny,
+    }
+}
+
+const JOINT: &str = "mps2-an385";
+const REAL: &str = "nucleo-h743zi2";
+
+fn bytes(tiny: &Tiny, name: &str) -> u32 {
+    tiny.deepest(name).expect("a depth").bytes
+}
+
+fn refusal<T>(result: anyhow::Result<T>) -> String {
+    match result {
+        Ok(_) => panic!("it was not refused"),
+        Err(error) => format!("{error:#}"),
+    }
+}
+
+#[test]
+fn a_way_is_the_sum_of_what_is_in_use_at_each_call() {
+    let tiny = Tiny::default()
+        // A call, then more stack, then a smaller call: the first is deeper.
+        .with("outer", vec![code(&[PUSH]), Call("inner"), code(&[0xB081]), Call("small"), code(&[0xB001, POP])])
+        .with("inner", framed(200, &["small"]))
+        .with("small", framed(16, &[]));
+    assert_eq!(bytes(&tiny, "small"), 24);
+    assert_eq!(bytes(&tiny, "inner"), 208 + 24);
+    let way = tiny.deepest("outer").expect("a depth");
+    assert_eq!(way.bytes, 8 + 208 + 24);
+    let stops: Vec<(&str, u32)> = way.stops.iter().map(|stop| (stop.function.as_str(), stop.bytes)).collect();
+    assert_eq!(stops, [("outer", 8), ("inner", 208), ("small", 24)]);
+}
+
+#[test]
+fn a_jump_to_another_function_leaves_nothing_behind() {
+    let tiny = Tiny::default()
+        // push {r7, lr}; sub sp, #64; add sp, #64; pop.w {r7, lr}; b.w inner
+        .with("outer", vec![code(&[PUSH, 0xB090, 0xB010, 0xE8BD, 0x4080]), Jump("inner")])
+        .with("inner", framed(40, &[]));
+    assert_eq!(bytes(&tiny, "outer"), 72, "its own frame, not on top of it");
+    let tiny = tiny.with("inner", framed(80, &[]));
+    assert_eq!(bytes(&tiny, "outer"), 88, "the frame of the other alone");
+}
+
+#[test]
+fn a_bridge_leads_where_its_constant_says() {
+    // movw r12, #(inner | 1); movt r12, #0; bx r12
+    let tiny =
+        Tiny::default().with("outer", framed(16, &["__Thumbv7ABSLongThunk_inner"])).with("inner", framed(120, &[]));
+    let to = FIRST + 2 * STRIDE + 1;
+    let low = (to & 0xFF) as u16;
+    let bridge = code(&[0xF240, 0x0C00 | low, 0xF2C0, 0x0C00, 0x4760]);
+    let tiny = tiny.with("__Thumbv7ABSLongThunk_inner", vec![bridge]);
+    assert_eq!(tiny.address("inner"), FIRST + STRIDE);
+    // The bridge is the third; let it lead to the second.
+    let low = (tiny.address("inner") | 1) as u16;
+    let tiny = tiny.with("__Thumbv7ABSLongThunk_inner", vec![code(&[0xF240, 0x0C00 | low, 0xF2C0, 0x0C00, 0x4760])]);
+    assert_eq!(bytes(&tiny, "outer"), 24 + 128);
+}
+
+#[test]
+fn both_sides_of_a_branch_and_every_entry_of_a_table_count() {
+    let tiny = Tiny::default()
+        // push; cbz r0, the second call; bl small; pop; bl inner; pop
+        .with("either", vec![code(&[PUSH, 0xB110]), Call("small"), code(&[POP]), Call("inner"), code(&[POP])])
+        // push; tbb [pc, r0]; two entries; bl small; pop; bl inner; pop
+        .with(
+            "table",
+            vec![
+                code(&[PUSH, 0xE8DF, 0xF000]),
+                Data(vec![0x0401]),
+                Call("small"),
+                code(&[POP]),
+                Call("inner"),
+                code(&[POP]),
+            ],
+        )
+        .with("inner", framed(200, &[]))
+        .with("small", framed(16, &[]));
+    assert_eq!(bytes(&tiny, "either"), 8 + 208);
+    assert_eq!(bytes(&tiny, "table"), 8 + 208);
+}
+
+#[test]
+fn large_frames_by_a_register_are_read() {
+    // push; movw r12, #61440; movt r12, #1; sub.w sp, sp, r12; movw, movt, add sp, r12; pop
+    let moved = |by: &[u16]| {
+        let constant = [0xF24F, 0x0C00, 0xF2C0, 0x0C01];
+        vec![code(&[PUSH]), code(&constant), code(by), code(&constant), code(&[0x44E5, POP])]
+    };
+    let tiny = Tiny::default().with("large", moved(&[0xEBAD, 0x0D0C]));
+    assert_eq!(bytes(&tiny, "large"), 8 + 0x1_F000);
+}
+
+#[test]
+fn an_aligned_frame_counts_what_aligning_may_cost_and_comes_back_by_the_frame_pointer() {
+    // push {r4, r6, r7, lr}; add r7, sp, #8; sub sp, #64; mov r4, sp; bfc r4, #0, #5; mov sp, r4;
+    // sub.w r4, r7, #8; mov sp, r4; pop {r4, r6, r7, pc}
+    let aligned = [0xB5D0, 0xAF02, 0xB090, 0x466C, 0xF36F, 0x0404, 0x46A5, 0xF1A7, 0x0408, 0x46A5, 0xBDD0];
+    let tiny = Tiny::default().with("aligned", vec![code(&aligned)]);
+    assert_eq!(bytes(&tiny, "aligned"), 16 + 64 + 28);
+}
+
+#[test]
+fn a_stack_pointer_that_cannot_be_followed_is_refused_by_name() {
+    for (halves, said) in [
+        // push; msr msp, r0; pop
+        (&[PUSH, 0xF380, 0x8808, POP][..], "in a way nobody can read"),
+        // push; sub.w sp, sp, r0 (an argument); pop
+        (&[PUSH, 0xEBAD, 0x0D00, POP], "by a number nobody can read"),
+        // push; mov sp, r0; pop
+        (&[PUSH, 0x4685, POP], "in a way nobody can read"),
+        // push; sub sp, #8; pop
+        (&[PUSH, 0xB082, POP], "with 8 bytes left on the stack"),
+        // pop {r7, pc}
+        (&[POP], "above where it began"),
+        // push; b . - 2: pushes for ever
+        (&[PUSH, 0xE7FD], "it begins anew"),
+        // nop; push; b to the push
+        (&[0xBF00, PUSH, 0xE7FD], "is reached with"),
+        // it eq; pusheq
+        (&[0xBF08, PUSH, BACK], "on a condition"),
+        // ldr.w pc, [r0]
+        (&[0xF8D0, 0xF000], "nobody can read where it goes on"),
+        // bx lr; push {r7, lr}
+        (&[BACK, PUSH, POP], "is not reached"),
+    ] {
+        let said_now = refusal(Tiny::default().with("strange", vec![code(halves)]).deepest("strange"));
+        assert!(said_now.contains("strange") && said_now.contains(said), "{halves:x?}: {said_now}");
+    }
+}
+
+#[test]
+fn circles_are_refused_with_their_functions() {
+    let tiny = Tiny::default()
+        .with("first", framed(8, &["second"]))
+        .with("second", framed(8, &["third"]))
+        .with("third", framed(8, &["second"]));
+    let said = refusal(tiny.deepest("first"));
+    assert!(said.contains("circle: second -> third"), "{said}");
+    assert!(refusal(Tiny::default().with("own", framed(8, &["own"])).deepest("own")).contains("circle: own"));
+}
+
+#[test]
+fn a_call_into_the_middle_of_nothing_is_refused() {
+    // bl to the second half of itself
+    let said = refusal(Tiny::default().with("astray", vec![code(&[PUSH, 0xF000, 0xF840, POP])]).deepest("astray"));
+    assert!(said.contains("astray calls") && said.contains("where no function begins"), "{said}");
+}
+
+/// push; blx r3; pop
+fn through_pointer() -> Vec<Piece> {
+    vec![code(&[PUSH, 0x4798, POP])]
+}
+
+/// A function that makes the address of the function at this place: movw r0; movt r0; bx lr.
+fn making(address: u32) -> Vec<Piece> {
+    let address = address | 1;
+    let second = (address >> 8 & 7) << 12 | address & 0xFF;
+    let first = 0xF240 | (address >> 11 & 1) << 10;
+    vec![code(&[first as u16, second as u16, 0xF2C0, 0x0000, BACK])]
+}
+
+#[test]
+fn a_call_through_a_pointer_may_lead_to_every_function_whose_address_is_made() {
+    let tiny = Tiny::default()
+        .with("caller", through_pointer())
+        .with("taken", framed(80, &[]))
+        .with("other", framed(800, &[]));
+    assert_eq!(bytes(&tiny, "caller"), 8, "no address is taken");
+    let address = tiny.address("taken");
+    let tiny = tiny.with("maker", making(address));
+    assert_eq!(bytes(&tiny, "caller"), 8 + 88);
+}
+
+#[test]
+fn a_call_of_one_kind_leads_to_that_kind_alone_and_as_deep_as_is_listed() {
+    let text = "<x as core::fmt::Debug>::fmt";
+    let tiny = Tiny::default()
+        .with("core::fmt::write", through_pointer())
+        .with(text, framed(32, &["core::fmt::write"]))
+        .with("other", framed(800, &[]));
+    let (first, second) = (tiny.address(text), tiny.address("other"));
+    let tiny = tiny.with("maker", making(first)).with("other maker", making(second));
+    // Six texts inside one another, by the list.
+    assert_eq!(bytes(&tiny, "core::fmt::write"), 6 * (8 + 40) + 8);
+}
+
+#[test]
+fn start_and_service_are_told_apart_and_interrupts_come_on_top() {
+    let tiny = board(JOINT);
+    let depth = tiny.depth(JOINT).expect("a depth");
+    let interrupts = 4 * (36 + 48);
+    assert_eq!(depth.in_service(), 8 + 108 + interrupts);
+    assert_eq!(depth.at_start(), 8 + 8 + 408, "deeper than what waits until interrupts are unmasked");
+    assert_eq!(depth.faults(), [""; 0]);
+    let deep = tiny.clone().with("deep", framed(8, &[])).depth(JOINT).expect("a depth");
+    assert_eq!(deep.at_start(), 8 + 8 + interrupts, "interrupts on top of what unmasked them");
+    // What may end there: a panic in the slot, a fault above everything.
+    let fault = 36 + 48;
+    assert_eq!(super::total::sum(&depth.end).max(1), (8 + 108 + interrupts + fault).max(8 + 8 + 408 + fault));
+}
+
+#[test]
+fn handlers_of_one_level_do_not_add_up_and_those_of_two_do() {
+    let service = |tiny: Tiny| tiny.depth(JOINT).expect("a depth").in_service();
+    let none = service(board(JOINT));
+    assert_eq!(service(board(JOINT).with("CAN_RECEIVE", framed(60, &[]))), none + 20);
+    assert_eq!(
+        service(board(JOINT).with("CAN_RECEIVE", framed(60, &[])).with("CAN_TRANSMIT", framed(60, &[]))),
+        none + 20
+    );
+    assert_eq!(
+        service(board(JOINT).with("CAN_RECEIVE", framed(60, &[])).with("SLOT_TIMER", framed(60, &[]))),
+        none + 40
+    );
+}
+
+#[test]
+fn a_panic_counts_with_its_last_words_once() {
+    let tiny = board(JOINT).with("SLOT_TIMER", framed(40, &["rust_begin_unwind"]));
+    let depth = tiny.depth(JOINT).expect("a depth");
+    let below = 8 + 108 + 2 * 84;
+    assert_eq!(depth.in_service(), below + 36 + 48 + 8 + 84, "the end of a panic without what it calls");
+    let depth = tiny.with("deep", framed(2000, &[])).depth(JOINT).expect("a depth");
+    assert_eq!(super::total::sum(&depth.end), below + 36 + 48 + 8 + 2008);
+}
+
+#[test]
+fn a_handler_that_no_row_lists_is_refused_and_so_is_a_row_without_handler() {
+    let said = refusal(board(JOINT).with("USART3", framed(8, &[])).depth(JOINT));
+    assert!(said.contains("USART3") && said.contains("has no priority"), "{said}");
+    let mut tiny = board(JOINT);
+    tiny.functions.retain(|(name, _)| *name != "BUS_WIRE");
+    assert!(refusal(tiny.depth(JOINT)).contains("BUS_WIRE"));
+    assert!(refusal(board(JOINT).depth("arduino")).contains("arduino"));
+}
+
+#[test]
+fn a_panic_that_leaves_interrupts_on_is_refused() {
+    let tiny = board(JOINT).with("rust_begin_unwind", vec![code(&[PUSH]), Call("deep"), code(&[MASK, NEVER])]);
+    assert!(refusal(tiny.depth(JOINT)).contains("does not mask interrupts"));
+}
+
+#[test]
+fn a_start_or_a_service_that_is_too_deep_fails() {
+    // 16 KiB: at most 9830 B at start, 6553 B in service.
+    let start = |bytes| board(JOINT).with("deep", framed(bytes, &["idle"])).depth(JOINT).expect("a depth");
+    assert_eq!(start(4000).faults(), [""; 0]);
+    let three = board(JOINT)
+        .with("deep", framed(4000, &["stranger"]))
+        .with("stranger", framed(4000, &["idle"]))
+        .with("idle", framed(2000, &[]));
+    let said = three.depth(JOINT).expect("a depth").faults().join("; ");
+    assert!(said.contains("the start takes 10040 B") && said.contains("60 %"), "{said}");
+    let service = board(JOINT).with("idle", framed(4000, &["stranger"])).with("stranger", framed(2500, &[]));
+    let said = service.depth(JOINT).expect("a depth").faults().join("; ");
+    assert!(said.contains("the service takes") && said.contains("40 %"), "{said}");
+}
+
+#[test]
+fn a_frame_larger_than_the_guard_fails_where_there_is_a_guard() {
+    let large = |name| board(name).with("begin", vec![code(&[PUSH, UNMASK, POP])]).with("idle", begin_large());
+    /// push; sub.w sp, sp, #4096; add.w; pop
+    fn begin_large() -> Vec<Piece> {
+        vec![code(&[PUSH, 0xF5AD, 0x5D80, 0xF50D, 0x5D80, POP])]
+    }
+    let said = large(REAL).depth(REAL).expect("a depth").faults().join("; ");
+    assert!(said.contains("idle has a frame of 4104 B") && said.contains("guard of 4096 B"), "{said}");
+    assert!(large(JOINT).depth(JOINT).expect("a depth").faults().iter().all(|fault| !fault.contains("guard")));
+}
+
+#[test]
+fn the_emergency_stack_is_counted_by_itself() {
+    let depth = board(REAL).depth(REAL).expect("a depth");
+    let (size, ways) = depth.other.as_ref().expect("the handler has a stack of its own");
+    assert_eq!((*size, super::total::sum(ways)), (4096, 408));
+    assert_eq!(depth.faults(), [""; 0]);
+    let deep = board(REAL).with("deep", framed(4000, &["idle"])).depth(REAL).expect("a depth");
+    assert!(deep.faults().iter().any(|fault| fault.contains("of its own stack of 4096 B")), "{:?}", deep.faults());
+    let other = board(REAL).with("MemoryManagement", framed(8, &[]));
+    assert!(refusal(other.depth(REAL)).contains("does not take the stack"));
+}
