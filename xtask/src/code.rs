@@ -105,6 +105,12 @@ impl Code {
         self.0.get(&address)
     }
 
+    /// Whether an address lies in a function, between its first instruction and its last.
+    pub(crate) fn is_inside(&self, address: u32) -> bool {
+        let function = self.0.range(..=address).next_back().and_then(|(_, function)| function.instructions.last());
+        function.is_some_and(|last| address < last.address + last.bytes)
+    }
+
     /// Where the function of this name begins; the name as the compiler encodes it.
     pub(crate) fn address(&self, name: &str) -> Option<u32> {
         self.functions().find(|(_, function)| function.names.iter().any(|known| known == name)).map(|found| found.0)

@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 
 use super::frame::{self, Call, Frame, Target};
 use super::memory::Memory;
-use super::pointers::{KINDS, Pointers};
+use super::pointers::{Behind, KINDS, Pointers};
 use crate::code::{Code, Function};
 use crate::thumb::Flow;
 
@@ -129,6 +129,16 @@ impl Calls {
         Ok(address)
     }
 
+    /// What a function calls, but through pointers.
+    fn called(&self, function: u32) -> Vec<u32> {
+        let calls = self.frame(function).map(|frame| frame.calls.as_slice()).unwrap_or_default();
+        let called = calls.iter().filter_map(|call| match call.target {
+            Target::Function(to) => Some(to),
+            Target::Pointer => None,
+        });
+        called.collect()
+    }
+
     /// Readable name of the function at an address.
     pub(super) fn name(&self, address: u32) -> String {
         self.code.at(address).map(Function::name).unwrap_or_default()
@@ -174,9 +184,11 @@ fn unmasking(code: &Code) -> BTreeSet<u32> {
     }
 }
 
-/// A search for the deepest ways.
+/// A search for the deepest ways that begin at some functions.
 pub(super) struct Search<'a> {
     calls: &'a Calls,
+    /// What may be behind a pointer.
+    behind: Behind,
     /// Functions that count as so deep, whatever they call.
     ends: BTreeMap<u32, u32>,
     known: HashMap<Key, (u32, Option<(u32, Key)>)>,
@@ -184,9 +196,12 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// A search in which each of these functions is so deep, whatever it calls.
-    pub(super) fn new(calls: &'a Calls, ends: BTreeMap<u32, u32>) -> Self {
-        Self { calls, ends, known: HashMap::new(), open: Vec::new() }
+    /// A search for ways from a function, in which some functions are so deep, whatever they call. Pointers may have been
+    /// made by the functions it reaches, or kept somewhere by others that ran before.
+    pub(super) fn new(calls: &'a Calls, function: u32, before: &[u32], ends: BTreeMap<u32, u32>) -> Self {
+        let roots: Vec<u32> = before.iter().copied().chain([function]).collect();
+        let behind = calls.pointers.within(&roots, |function| calls.called(function));
+        Self { calls, behind, ends, known: HashMap::new(), open: Vec::new() }
     }
 
     /// The deepest way from a function.
@@ -266,7 +281,7 @@ impl<'a> Search<'a> {
         match call.target {
             Target::Function(to) => vec![(to, part, left)],
             Target::Pointer => {
-                let behind = self.calls.pointers.called_by(self.calls.names(function)).into_iter();
+                let behind = self.behind.called_by(self.calls.names(function)).into_iter();
                 let nested = |kind: usize| KINDS.get(kind).and_then(|kind| kind.nested);
                 behind
                     .filter_map(|(kind, to)| {

@@ -26,7 +26,7 @@ use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
 use crate::code::Code;
 use crate::elf::Elf;
 use crate::shell;
-use depth::{Calls, Part, Search, Stop};
+use depth::{Calls, Part, Stop};
 use levels::Layout;
 use memory::Memory;
 use pointers::KINDS;
@@ -228,7 +228,7 @@ fn of(file: &Elf<'_>) -> Result<Depth> {
             let handler = calls.address(other.handler)?;
             let takes = calls.frame(handler).and_then(|frame| frame.other_stack);
             ensure!(takes == Some(symbol(other.top)?), "{} does not take the stack {}", other.handler, other.top);
-            let way = Search::new(&calls, image.plain.clone()).deepest(handler, Part::Whole)?;
+            let way = image.deepest(handler, Part::Whole, &image.plain)?;
             Some((other.bytes, vec![("the handler".to_owned(), way)]))
         }
         None => None,

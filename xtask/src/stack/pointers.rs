@@ -1,10 +1,10 @@
 //! Functions that are called through pointers: which can be, and by whom.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::memory::Memory;
 use super::step::{self, Source};
-use crate::code::Code;
+use crate::code::{Code, Function};
 
 /// Functions that are called through pointers of one kind, by names.
 pub(super) struct Kind {
@@ -20,8 +20,8 @@ pub(super) struct Kind {
     pub(super) why: &'static str,
 }
 
-/// Kinds of functions behind pointers. A call by a function that no row lists may lead to any function whose address is
-/// taken, of whatever kind.
+/// Kinds of functions behind pointers. A call by a function that no row lists may lead to any function whose address has been
+/// made, of whatever kind.
 pub(super) const KINDS: [Kind; 5] = [
     Kind {
         name: "a value's text",
@@ -67,58 +67,116 @@ pub(super) const KINDS: [Kind; 5] = [
     },
 ];
 
-/// The functions that may be behind a pointer.
+/// Whose addresses the functions of an image make.
 pub(super) struct Pointers {
-    /// By the kinds' order; last those of no kind.
-    of_kind: [Vec<u32>; KINDS.len() + 1],
+    /// The functions whose address a function makes, itself or as part of the data whose address it makes.
+    made: BTreeMap<u32, BTreeSet<u32>>,
+    /// The kind of each of them.
+    kinds: BTreeMap<u32, usize>,
 }
 
 impl Pointers {
-    /// Finds every function whose address is in the data of the image or made by its code. Bridges to functions and
-    /// constants that only happen to be equal count as well.
+    /// Finds every address that code makes, and follows it through the data. Constants that only happen to be equal to the
+    /// address of a function count as well.
     pub(super) fn of(code: &Code, memory: &Memory) -> Self {
-        let mut taken = BTreeSet::new();
-        let mut note = |word: u32| {
-            if word & 1 == 1 && code.at(word & !1).is_some() {
-                taken.insert(word & !1);
-            }
-        };
-        memory.words().for_each(|(_, word)| note(word));
-        for (_, function) in code.functions().filter(|(_, function)| !function.is_bridge()) {
-            let mut lower = [None; 16];
-            for instruction in &function.instructions {
-                match step::source(instruction) {
-                    Some((register, Source::Constant(number))) => lower[register as usize & 15] = Some(number),
-                    Some((register, Source::Upper(upper))) => {
-                        if let Some(number) = lower[register as usize & 15] {
-                            note(upper << 16 | number & 0xFFFF);
-                        }
-                    }
-                    _ => {}
-                }
-            }
-        }
-        let mut of_kind: [Vec<u32>; KINDS.len() + 1] = Default::default();
-        for address in taken {
-            of_kind[kind(code, address)].push(address);
-        }
-        Self { of_kind }
+        let values: BTreeMap<u32, BTreeSet<u32>> = code
+            .functions()
+            .filter(|(_, function)| !function.is_bridge())
+            .map(|(address, function)| (address, values(function, memory)))
+            .collect();
+        let data = Data::of(code, memory, values.values().flatten().copied());
+        let made: BTreeMap<u32, BTreeSet<u32>> = values
+            .into_iter()
+            .map(|(function, values)| {
+                let behind = data.behind(values).into_iter();
+                let functions = behind.filter(|word| word & 1 == 1 && code.at(word & !1).is_some());
+                (function, functions.map(|word| word & !1).collect())
+            })
+            .collect();
+        let kinds = made.values().flatten().map(|function| (*function, kind(code, *function))).collect();
+        Self { made, kinds }
     }
 
     /// How many there are of each kind; last those of none.
     pub(super) fn counts(&self) -> Vec<usize> {
-        self.of_kind.iter().map(Vec::len).collect()
+        (0..=KINDS.len()).map(|kind| self.kinds.values().filter(|known| **known == kind).count()).collect()
     }
 
+    /// The functions that may be behind a pointer while these run: whatever they call may have made it, and so may what
+    /// they call through pointers.
+    pub(super) fn within(&self, roots: &[u32], called: impl Fn(u32) -> Vec<u32>) -> Behind {
+        let mut found: BTreeSet<u32> = BTreeSet::new();
+        let mut behind = BTreeSet::new();
+        let mut open = roots.to_vec();
+        while let Some(function) = open.pop() {
+            if found.insert(function) {
+                open.extend(called(function));
+                let made = self.made.get(&function).into_iter().flatten();
+                open.extend(made.clone());
+                behind.extend(made);
+            }
+        }
+        let of_kind =
+            |kind| behind.iter().copied().filter(|function| self.kinds.get(function) == Some(&kind)).collect();
+        Behind((0..=KINDS.len()).map(of_kind).collect())
+    }
+}
+
+/// Functions that may be behind a pointer, by the kinds' order; last those of no kind.
+pub(super) struct Behind(Vec<Vec<u32>>);
+
+impl Behind {
     /// What a function may call through a pointer: the number of the kind, and the function.
     pub(super) fn called_by(&self, caller: &[String]) -> Vec<(usize, u32)> {
-        let mut listed = KINDS.iter().enumerate().filter(|(_, kind)| contains(caller, kind.callers)).peekable();
-        let kinds: Vec<usize> = if listed.peek().is_some() {
-            listed.map(|(index, _)| index).collect()
-        } else {
-            (0..=KINDS.len()).collect()
-        };
-        kinds.into_iter().flat_map(|kind| self.of_kind[kind].iter().map(move |function| (kind, *function))).collect()
+        let listed: Vec<usize> = (0..KINDS.len()).filter(|kind| contains(caller, KINDS[*kind].callers)).collect();
+        let kinds = if listed.is_empty() { (0..=KINDS.len()).collect() } else { listed };
+        kinds.into_iter().flat_map(|kind| self.0[kind].iter().map(move |function| (kind, *function))).collect()
+    }
+}
+
+/// The numbers a function makes that may be addresses: in two halves, or from a constant near its code.
+fn values(function: &Function, memory: &Memory) -> BTreeSet<u32> {
+    let mut values = BTreeSet::new();
+    let mut lower = [None; 16];
+    for instruction in &function.instructions {
+        match step::source(instruction) {
+            Some((register, Source::Constant(number))) => lower[register as usize & 15] = Some(number),
+            Some((register, Source::Upper(upper))) => {
+                values.extend(lower[register as usize & 15].map(|number| upper << 16 | number & 0xFFFF));
+            }
+            Some((_, Source::Word(address))) => values.extend(memory.word(address)),
+            _ => {}
+        }
+    }
+    values
+}
+
+/// The data of an image. Where a piece of it ends is not known: at the next place whose address is made somewhere.
+struct Data<'a> {
+    memory: &'a Memory,
+    begins: BTreeSet<u32>,
+}
+
+impl<'a> Data<'a> {
+    fn of(code: &Code, memory: &'a Memory, made: impl Iterator<Item = u32>) -> Self {
+        let is_data = |address: &u32| memory.word(*address & !3).is_some() && !code.is_inside(*address);
+        let words = memory.words().map(|(_, word)| word);
+        Self { memory, begins: made.chain(words).filter(is_data).collect() }
+    }
+
+    /// These numbers, and every word of the data they lead to.
+    fn behind(&self, values: BTreeSet<u32>) -> BTreeSet<u32> {
+        let mut found = BTreeSet::new();
+        let mut open: Vec<u32> = values.into_iter().collect();
+        while let Some(value) = open.pop() {
+            if !found.insert(value) || !self.begins.contains(&value) {
+                continue;
+            }
+            let end = self.begins.range(value + 1..).next().copied().unwrap_or(u32::MAX);
+            let words = (value.next_multiple_of(4)..end).step_by(4).map_while(|address| self.memory.word(address));
+            open.extend(words);
+        }
+        found
     }
 }
 

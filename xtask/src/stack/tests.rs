@@ -154,7 +154,8 @@ impl Tiny {
     /// The deepest way from a function.
     fn deepest(&self, name: &str) -> anyhow::Result<Way> {
         let calls = self.calls()?;
-        Search::new(&calls, Default::default()).deepest(calls.address(name)?, Part::Whole)
+        let function = calls.address(name)?;
+        Search::new(&calls, function, &[], Default::default()).deepest(function, Part::Whole)
     }
 
     fn depth(&self, board: &str) -> anyhow::Result<Depth> {
@@ -357,15 +358,18 @@ fn making(address: u32) -> Vec<Piece> {
 }
 
 #[test]
-fn a_call_through_a_pointer_may_lead_to_every_function_whose_address_is_made() {
+fn a_call_through_a_pointer_may_lead_to_every_function_whose_address_is_made_on_the_way() {
     let tiny = Tiny::default()
+        .with("outer", vec![code(&[PUSH]), Call("maker"), Call("caller"), code(&[POP])])
         .with("caller", through_pointer())
         .with("taken", framed(80, &[]))
-        .with("other", framed(800, &[]));
-    assert_eq!(bytes(&tiny, "caller"), 8, "no address is taken");
+        .with("other", framed(800, &[]))
+        .with("maker", vec![code(&[BACK])]);
+    assert_eq!(bytes(&tiny, "outer"), 16, "no address is made");
     let address = tiny.address("taken");
     let tiny = tiny.with("maker", making(address));
-    assert_eq!(bytes(&tiny, "caller"), 8 + 88);
+    assert_eq!(bytes(&tiny, "outer"), 16 + 88);
+    assert_eq!(bytes(&tiny, "caller"), 8, "nothing it reaches makes an address");
 }
 
 #[test]
@@ -376,9 +380,10 @@ fn a_call_of_one_kind_leads_to_that_kind_alone_and_as_deep_as_is_listed() {
         .with(text, framed(32, &["core::fmt::write"]))
         .with("other", framed(800, &[]));
     let (first, second) = (tiny.address(text), tiny.address("other"));
-    let tiny = tiny.with("maker", making(first)).with("other maker", making(second));
+    let both = vec![code(&[PUSH]), Call("maker"), Call("other maker"), Call("core::fmt::write"), code(&[POP])];
+    let tiny = tiny.with("maker", making(first)).with("other maker", making(second)).with("both", both);
     // Six texts inside one another, by the list.
-    assert_eq!(bytes(&tiny, "core::fmt::write"), 6 * (8 + 40) + 8);
+    assert_eq!(bytes(&tiny, "both"), 8 + 6 * (8 + 40) + 8);
 }
 
 #[test]

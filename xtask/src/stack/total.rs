@@ -73,12 +73,11 @@ impl Image<'_> {
 
     /// The deepest handler of every level.
     fn interrupts(&self, ends: &BTreeMap<u32, u32>) -> Result<Ways> {
-        let mut search = Search::new(self.calls, ends.clone());
         let mut ways = Vec::new();
         for level in self.layout.levels {
             let mut deepest = Way::default();
             for handler in level.handlers {
-                let way = search.deepest(self.calls.address(handler)?, Part::Whole)?;
+                let way = self.deepest(self.calls.address(handler)?, Part::Whole, ends)?;
                 if way.bytes >= deepest.bytes {
                     deepest = way;
                 }
@@ -92,10 +91,9 @@ impl Image<'_> {
 
     /// The deepest handler that never returns.
     fn fault(&self) -> Result<(String, Way)> {
-        let mut search = Search::new(self.calls, self.plain.clone());
         let mut deepest = Way::default();
         for handler in self.layout.ends {
-            let way = search.deepest(self.calls.address(handler)?, Part::Whole)?;
+            let way = self.deepest(self.calls.address(handler)?, Part::Whole, &self.plain)?;
             if way.bytes >= deepest.bytes {
                 deepest = way;
             }
@@ -106,18 +104,27 @@ impl Image<'_> {
 
     /// The start as far as interrupts are masked.
     fn masked(&self, ends: &BTreeMap<u32, u32>) -> Result<Way> {
-        Search::new(self.calls, ends.clone()).deepest(self.calls.address(RESET)?, Part::Masked)
+        self.deepest(self.calls.address(RESET)?, Part::Masked, ends)
+    }
+
+    /// The deepest way from a function, when the start has been.
+    pub(super) fn deepest(&self, function: u32, part: Part, ends: &BTreeMap<u32, u32>) -> Result<Way> {
+        let before = self.calls.frame(self.calls.address(MAIN)?).map(|main| main.calls.as_slice()).unwrap_or_default();
+        let before = before.iter().filter(|call| !call.unmasked).filter_map(|call| match call.target {
+            Target::Function(to) => Some(to),
+            Target::Pointer => None,
+        });
+        Search::new(self.calls, function, &before.collect::<Vec<u32>>(), ends.clone()).deepest(function, part)
     }
 
     /// What a panic does last.
     fn last_words(&self) -> Result<Way> {
         let end = self.calls.end()?;
         let frame = self.calls.frame(end).context("the end of a panic has no frame")?;
-        let mut search = Search::new(self.calls, self.plain.clone());
         let mut deepest = Way { bytes: frame.bytes, stops: Vec::new() };
         for call in &frame.calls {
             let Target::Function(to) = call.target else { bail!("the end of a panic calls through a pointer") };
-            let mut way = search.deepest(to, Part::Whole)?;
+            let mut way = self.deepest(to, Part::Whole, &self.plain)?;
             way.bytes += call.depth;
             way.stops.insert(0, Stop { function: self.calls.name(end), bytes: call.depth });
             if way.bytes >= deepest.bytes {
@@ -142,7 +149,6 @@ impl Image<'_> {
         let stops =
             |at| vec![Stop { function: RESET.to_owned(), bytes: below }, Stop { function: MAIN.to_owned(), bytes: at }];
         let mut deepest = Way { bytes: below + own, stops: stops(own) };
-        let mut search = Search::new(self.calls, ends.clone());
         for call in &main_frame.calls {
             let Target::Function(to) = call.target else { bail!("{MAIN} calls through a pointer") };
             let part = match thread {
@@ -150,7 +156,7 @@ impl Image<'_> {
                 Thread::Service if call.unmasked => Part::Whole,
                 _ => continue,
             };
-            let way = search.deepest(to, part)?;
+            let way = self.deepest(to, part, ends)?;
             let bytes = below + call.depth + way.bytes;
             if bytes > deepest.bytes {
                 deepest = Way { bytes, stops: stops(call.depth).into_iter().chain(way.stops).collect() };
