@@ -90,6 +90,17 @@ impl Calls {
         all
     }
 
+    /// Fails if calls through pointers may be deeper inside one another than is listed.
+    ///
+    /// # Errors
+    /// With the functions.
+    pub(super) fn check_nesting(&self) -> Result<()> {
+        let end = self.end()?;
+        // The end of a panic is counted apart.
+        let called = |function| if function == end { Vec::new() } else { self.called(function) };
+        self.pointers.check_nesting(called, &|function| self.name(function))
+    }
+
     /// How many functions of each kind may be behind a pointer.
     pub(super) fn behind_pointers(&self) -> Vec<usize> {
         self.pointers.counts()
@@ -253,7 +264,7 @@ impl<'a> Search<'a> {
         self.open.push(key);
         let mut deepest = (own, None);
         for call in &frame.calls {
-            for next in self.called(key, call) {
+            for next in self.called(key, call)? {
                 if self.calls.frame(next.0).is_none() {
                     bail!("{} calls {:#010x}, where no function begins", self.calls.name(function), next.0);
                 }
@@ -269,29 +280,32 @@ impl<'a> Search<'a> {
     }
 
     /// What a call leads to, as far as it belongs to this part of the function.
-    fn called(&self, (function, part, left): Key, call: &Call) -> Vec<Key> {
+    fn called(&self, (function, part, left): Key, call: &Call) -> Result<Vec<Key>> {
         let part = match (part, call.target) {
             (Part::Whole, _) => Part::Whole,
-            (Part::Masked, _) if call.unmasked => return Vec::new(),
+            (Part::Masked, _) if call.unmasked => return Ok(Vec::new()),
             (Part::Masked, _) => Part::Masked,
             (Part::Unmasked, _) if call.unmasked => Part::Whole,
             (Part::Unmasked, Target::Function(to)) if self.calls.unmasks(to) => Part::Unmasked,
-            (Part::Unmasked, _) => return Vec::new(),
+            (Part::Unmasked, _) => return Ok(Vec::new()),
         };
         match call.target {
-            Target::Function(to) => vec![(to, part, left)],
+            Target::Function(to) => Ok(vec![(to, part, left)]),
             Target::Pointer => {
-                let behind = self.behind.called_by(self.calls.names(function)).into_iter();
+                let behind = self.behind.called_by(self.calls.names(function));
+                if behind.is_empty() {
+                    let (name, address) = (self.calls.name(function), call.address);
+                    bail!("{name} calls at {address:#010x} through a pointer that nothing before it can have made");
+                }
                 let nested = |kind: usize| KINDS.get(kind).and_then(|kind| kind.nested);
-                behind
-                    .filter_map(|(kind, to)| {
-                        let mut left = left;
-                        if nested(kind).is_some() {
-                            left[kind] = left[kind].checked_sub(1)?;
-                        }
-                        Some((to, part, left))
-                    })
-                    .collect()
+                let next = behind.into_iter().filter_map(|(kind, to)| {
+                    let mut left = left;
+                    if nested(kind).is_some() {
+                        left[kind] = left[kind].checked_sub(1)?;
+                    }
+                    Some((to, part, left))
+                });
+                Ok(next.collect())
             }
         }
     }

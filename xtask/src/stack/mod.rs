@@ -218,6 +218,7 @@ fn of(file: &Elf<'_>) -> Result<Depth> {
     };
     let memory = Memory::of(file)?;
     let calls = Calls::of(Code::of(file)?, &memory)?;
+    calls.check_nesting()?;
     layout.check(&calls, memory.vectors())?;
     let [end, begin] = [symbol(STACK[0])?, symbol(STACK[1])?];
     let size = begin.checked_sub(end).context("the stack ends above its beginning")?;

@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use anyhow::{Result, bail, ensure};
+
 use super::memory::Memory;
 use super::step::{self, Source};
 use crate::code::{Code, Function};
@@ -14,7 +16,7 @@ pub(super) struct Kind {
     functions: &'static [&'static str],
     /// A function calls only this kind, and others that list it too, through pointers, if its name contains one of these.
     callers: &'static [&'static str],
-    /// How many calls of this kind may be inside one another; `None` if they never are: that is checked.
+    /// How many calls of this kind may be inside one another; `None` if they never are. Checked in both cases.
     pub(super) nested: Option<usize>,
     /// Why that is so.
     pub(super) why: &'static str,
@@ -35,7 +37,7 @@ pub(super) const KINDS: [Kind; 5] = [
             "core::panic::panic_info",
         ],
         nested: Some(6),
-        why: "the last words hold the panic's information, that its message, that an argument, that a value, that its field",
+        why: "values within values, as the image has them: checked",
     },
     Kind {
         name: "a text's receiver",
@@ -102,6 +104,41 @@ impl Pointers {
         (0..=KINDS.len()).map(|kind| self.kinds.values().filter(|known| **known == kind).count()).collect()
     }
 
+    /// Fails if calls of a kind may be deeper inside one another than its row says: by what such functions hand out
+    /// themselves, and one more, which only passes on what it was given (`&dyn Debug`).
+    pub(super) fn check_nesting(&self, called: impl Fn(u32) -> Vec<u32>, name: &dyn Fn(u32) -> String) -> Result<()> {
+        for (number, kind) in KINDS.iter().enumerate() {
+            let Some(nested) = kind.nested else { continue };
+            let of_kind = || self.kinds.iter().filter(|(_, known)| **known == number).map(|(function, _)| *function);
+            let handed = of_kind().map(|function| (function, self.handed(function, number, &called))).collect();
+            let mut chain = Chain { handed, open: Vec::new(), name };
+            for function in of_kind() {
+                let longest = chain.longest(function)?;
+                ensure!(
+                    longest < nested,
+                    "{} of {} may be {longest} inside one another, and one that passes them on; {nested} are listed",
+                    name(function),
+                    kind.name
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Functions of a kind whose address is made by a function or by what it calls, but not through pointers.
+    fn handed(&self, function: u32, kind: usize, called: impl Fn(u32) -> Vec<u32>) -> BTreeSet<u32> {
+        let (mut found, mut handed) = (BTreeSet::new(), BTreeSet::new());
+        let mut open = vec![function];
+        while let Some(next) = open.pop() {
+            if found.insert(next) {
+                open.extend(called(next));
+                let made = self.made.get(&next).into_iter().flatten();
+                handed.extend(made.copied().filter(|made| self.kinds.get(made) == Some(&kind)));
+            }
+        }
+        handed
+    }
+
     /// The functions that may be behind a pointer while these run: whatever they call may have made it, and so may what
     /// they call through pointers.
     pub(super) fn within(&self, roots: &[u32], called: impl Fn(u32) -> Vec<u32>) -> Behind {
@@ -119,6 +156,30 @@ impl Pointers {
         let of_kind =
             |kind| behind.iter().copied().filter(|function| self.kinds.get(function) == Some(&kind)).collect();
         Behind((0..=KINDS.len()).map(of_kind).collect())
+    }
+}
+
+/// How deep calls of one kind are inside one another by what they hand out themselves: a function hands out those whose
+/// address it makes, or a function it calls makes.
+struct Chain<'a> {
+    handed: BTreeMap<u32, BTreeSet<u32>>,
+    open: Vec<u32>,
+    name: &'a dyn Fn(u32) -> String,
+}
+
+impl Chain<'_> {
+    fn longest(&mut self, function: u32) -> Result<usize> {
+        if let Some(begin) = self.open.iter().position(|open| *open == function) {
+            let circle: Vec<String> = self.open[begin..].iter().map(|open| (self.name)(*open)).collect();
+            bail!("these functions hand out pointers to each other in a circle: {}", circle.join(" -> "));
+        }
+        self.open.push(function);
+        let mut longest = 0;
+        for next in self.handed.get(&function).cloned().unwrap_or_default() {
+            longest = longest.max(self.longest(next)?);
+        }
+        self.open.pop();
+        Ok(longest + 1)
     }
 }
 

@@ -136,7 +136,10 @@ impl Tiny {
         image.append_section_data(place, &description.encode(), 4);
         let vectors: Vec<u8> = std::iter::once(STACK.0)
             .chain(
-                self.functions.iter().filter(|(name, _)| !INNER.contains(name)).map(|(name, _)| self.address(name) | 1),
+                self.functions
+                    .iter()
+                    .filter(|(name, _)| !INNER.contains(name) && !name.starts_with('<'))
+                    .map(|(name, _)| self.address(name) | 1),
             )
             .flat_map(u32::to_le_bytes)
             .collect();
@@ -365,11 +368,14 @@ fn a_call_through_a_pointer_may_lead_to_every_function_whose_address_is_made_on_
         .with("taken", framed(80, &[]))
         .with("other", framed(800, &[]))
         .with("maker", vec![code(&[BACK])]);
-    assert_eq!(bytes(&tiny, "outer"), 16, "no address is made");
+    assert!(refusal(tiny.deepest("outer")).contains("nothing before it can have made"));
     let address = tiny.address("taken");
     let tiny = tiny.with("maker", making(address));
     assert_eq!(bytes(&tiny, "outer"), 16 + 88);
-    assert_eq!(bytes(&tiny, "caller"), 8, "nothing it reaches makes an address");
+    assert!(
+        refusal(tiny.deepest("caller")).contains("nothing before it can have made"),
+        "nothing it reaches makes one"
+    );
 }
 
 #[test]
@@ -384,6 +390,37 @@ fn a_call_of_one_kind_leads_to_that_kind_alone_and_as_deep_as_is_listed() {
     let tiny = tiny.with("maker", making(first)).with("other maker", making(second)).with("both", both);
     // Six texts inside one another, by the list.
     assert_eq!(bytes(&tiny, "both"), 8 + 6 * (8 + 40) + 8);
+}
+
+#[test]
+fn texts_that_hand_out_each_other_deeper_than_listed_are_refused() {
+    const TEXTS: [&str; 7] = [
+        "<a as core::fmt::Debug>::fmt",
+        "<b as core::fmt::Debug>::fmt",
+        "<c as core::fmt::Debug>::fmt",
+        "<d as core::fmt::Debug>::fmt",
+        "<e as core::fmt::Debug>::fmt",
+        "<f as core::fmt::Debug>::fmt",
+        "<g as core::fmt::Debug>::fmt",
+    ];
+    let chain = |texts: &[&'static str], last: &'static str| {
+        let mut tiny = board(JOINT);
+        for text in TEXTS {
+            tiny = tiny.with(text, vec![code(&[BACK])]);
+        }
+        let mut next = last;
+        for text in texts.iter().rev() {
+            let address = tiny.address(next);
+            tiny = tiny.with(text, making(address));
+            next = text;
+        }
+        let address = tiny.address(next);
+        tiny.with("stranger", making(address)).depth(JOINT)
+    };
+    chain(&TEXTS[..4], TEXTS[4]).expect("five and one that passes them on are six");
+    let said = refusal(chain(&TEXTS[..5], TEXTS[5]));
+    assert!(said.contains("<a as core::fmt::Debug>::fmt") && said.contains("may be 6 inside one another"), "{said}");
+    assert!(refusal(chain(&TEXTS[..2], TEXTS[0])).contains("in a circle"));
 }
 
 #[test]
