@@ -26,7 +26,7 @@ struct Block {
 }
 
 /// Vectors in front of the interrupt lines.
-const CORE_VECTORS: usize = 16;
+pub(crate) const CORE_VECTORS: usize = 16;
 
 /// Which handler belongs to which line of the STM32H743.
 const HANDLERS: [(usize, &str); 8] = [

@@ -1,11 +1,15 @@
-//! Which handlers may interrupt which, for every board; the image sets these priorities at run time.
+//! Which handlers may interrupt which, for every board; the image sets these priorities at run time, and its code is held
+//! against this table.
 //!
 //! Handlers of one level never interrupt each other, those of a higher level (a larger number) interrupt those of a lower
 //! one. Level 0 is the idle task.
 
+use std::collections::BTreeMap;
+
 use anyhow::{Context, Result, ensure};
 
 use super::depth::Calls;
+use crate::board::CORE_VECTORS;
 
 /// Handlers of one priority.
 pub(super) struct Level {
@@ -54,8 +58,7 @@ const BASIC: u32 = 4 * (8 + 1);
 /// Faults and what nobody serves.
 const ENDS: &[&str] = &["HardFault", "DefaultHandler"];
 
-/// RTIC gives the first dispatcher to the tasks of the highest of the priorities that need one; which of the two has which
-/// does not matter here, as they are two levels in any case.
+/// RTIC hands out its dispatchers from the lowest priority up, in the order they are listed.
 const FIRST_DISPATCHER: Level = level(1, &["DISPATCH_SESSION"]);
 const SECOND_DISPATCHER: Level = level(2, &["DISPATCH_LOG"]);
 const BUS: Level = level(10, &["CAN_RECEIVE", "CAN_TRANSMIT"]);
@@ -107,8 +110,9 @@ impl Layout {
         known.with_context(|| format!("no priorities are known for the board '{board}' (xtask/src/stack/levels.rs)"))
     }
 
-    /// Fails if a handler in the vector table is not in this table, or the other way round.
-    pub(super) fn check(&self, calls: &Calls, vectors: &[u32]) -> Result<()> {
+    /// Fails if a handler in the vector table is not in this table, or the other way round, or if the image gives it another
+    /// priority: `stored` has those by line.
+    pub(super) fn check(&self, calls: &Calls, vectors: &[u32], stored: &BTreeMap<u32, u32>) -> Result<()> {
         let listed = || {
             let levels = self.levels.iter().flat_map(|level| level.handlers);
             levels.chain(self.ends).copied().chain(self.other.iter().map(|other| other.handler))
@@ -126,6 +130,22 @@ impl Layout {
         for handler in listed().filter(|handler| !self.ends.contains(handler)) {
             let address = calls.address(handler)?;
             ensure!(vectors.iter().any(|vector| vector & !1 == address), "{handler} is not in the vector table");
+        }
+        for level in self.levels {
+            for handler in level.handlers {
+                let address = calls.address(handler)?;
+                let lines = vectors.iter().skip(CORE_VECTORS).zip(0..);
+                let lines = lines.filter(|(vector, _)| **vector & !1 == address).map(|(_, line)| line);
+                for line in lines {
+                    let found = stored.get(&line).copied();
+                    let said = found.map_or("none that can be read".to_owned(), |found| found.to_string());
+                    ensure!(
+                        found == Some(level.priority),
+                        "{handler} has priority {} in xtask/src/stack/levels.rs, but {said} in the image",
+                        level.priority
+                    );
+                }
+            }
         }
         Ok(())
     }

@@ -10,6 +10,7 @@ mod frame;
 mod levels;
 mod memory;
 mod pointers;
+mod priorities;
 mod step;
 #[cfg(test)]
 mod tests;
@@ -217,9 +218,11 @@ fn of(file: &Elf<'_>) -> Result<Depth> {
         Ok(found.with_context(|| format!("the image has no symbol '{name}'"))?.address() as u32)
     };
     let memory = Memory::of(file)?;
-    let calls = Calls::of(Code::of(file)?, &memory)?;
+    let code = Code::of(file)?;
+    let stored = priorities::stored(&code, &memory);
+    let calls = Calls::of(code, &memory)?;
     calls.check_nesting()?;
-    layout.check(&calls, memory.vectors())?;
+    layout.check(&calls, memory.vectors(), &stored)?;
     let [end, begin] = [symbol(STACK[0])?, symbol(STACK[1])?];
     let size = begin.checked_sub(end).context("the stack ends above its beginning")?;
     let mut image = Image { calls: &calls, layout, plain: BTreeMap::new() };

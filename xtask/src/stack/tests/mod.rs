@@ -1,208 +1,11 @@
-//! The computation on tiny images made by hand: frames, calls, circles, interrupts, limits. Each rule is seen to fail.
+//! The computation on tiny images: frames, calls, circles, interrupts, limits. Each rule is seen to fail.
 
-use link::metadata::{ImageMetadata, METADATA_SECTION, MemoryRegion};
-use object::write::{Object, Symbol, SymbolSection};
-use object::{Architecture, BinaryFormat, Endianness, SectionFlags, SectionKind, SymbolFlags, SymbolKind, SymbolScope};
+mod step;
+mod tiny;
 
-use super::Depth;
-use super::depth::{Calls, Part, Search, Way};
-use super::levels::Layout;
-use super::memory::Memory;
-use crate::code::Code;
-use crate::elf::Elf;
-
-/// Distance between the functions of a tiny image.
-const STRIDE: u32 = 0x40;
-/// Where the first begins: a function at 0 would be taken for every zero.
-const FIRST: u32 = STRIDE;
-/// Upper and lower end of the stack.
-const STACK: (u32, u32) = (0x2000_4000, 0x2000_0000);
-
-/// push {r7, lr}; pop {r7, pc}; bx lr; cpsid i; cpsie i; udf #254
-const PUSH: u16 = 0xB580;
-const POP: u16 = 0xBD80;
-const BACK: u16 = 0x4770;
-const MASK: u16 = 0xB672;
-const UNMASK: u16 = 0xB662;
-const NEVER: u16 = 0xDEFE;
-
-/// A piece of a function.
-#[derive(Clone)]
-enum Piece {
-    Code(Vec<u16>),
-    /// BL to a function.
-    Call(&'static str),
-    /// B.W to a function.
-    Jump(&'static str),
-    /// Constants.
-    Data(Vec<u16>),
-}
-
-use Piece::{Call, Data, Jump};
-
-fn code(halves: &[u16]) -> Piece {
-    Piece::Code(halves.to_vec())
-}
-
-/// push {r7, lr}; sub.w sp, sp, #bytes; the calls; add.w sp, sp, #bytes; pop {r7, pc}
-fn framed(bytes: u16, calls: &[&'static str]) -> Vec<Piece> {
-    // Twelve bits of a plain number: i, imm3, imm8.
-    let number = (bytes >> 11 & 1, bytes >> 8 & 7, bytes & 0xFF);
-    let second = number.1 << 12 | 0xD00 | number.2;
-    let mut pieces = vec![code(&[PUSH, 0xF2AD | number.0 << 10, second])];
-    pieces.extend(calls.iter().map(|name| Call(name)));
-    pieces.push(code(&[0xF20D | number.0 << 10, second, POP]));
-    pieces
-}
-
-/// Functions in the order of memory.
-#[derive(Clone, Default)]
-struct Tiny {
-    functions: Vec<(&'static str, Vec<Piece>)>,
-    rodata: Vec<u8>,
-}
-
-impl Tiny {
-    fn with(mut self, name: &'static str, pieces: Vec<Piece>) -> Self {
-        match self.functions.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, known)) => *known = pieces,
-            None => self.functions.push((name, pieces)),
-        }
-        self
-    }
-
-    fn address(&self, name: &str) -> u32 {
-        let index = self.functions.iter().position(|(known, _)| *known == name).expect("a function of this name");
-        FIRST + STRIDE * index as u32
-    }
-
-    /// The ELF file. With a board: vector table, description and stack as well.
-    fn file(&self, board: Option<&str>) -> Vec<u8> {
-        let mut image = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
-        let section = image.add_section(Vec::new(), b".text".to_vec(), SectionKind::Text);
-        let mut text = vec![0; FIRST as usize];
-        let mut symbols = Vec::new();
-        for (name, pieces) in &self.functions {
-            let begin = self.address(name);
-            for piece in pieces {
-                let at = text.len() as u32;
-                let halves = match piece {
-                    Piece::Code(halves) | Data(halves) => halves.clone(),
-                    Call(to) => branch(at, self.address(to), 0xD000),
-                    Jump(to) => branch(at, self.address(to), 0x9000),
-                };
-                text.extend(halves.iter().flat_map(|half| half.to_le_bytes()));
-                let mark = if matches!(piece, Data(_)) { "$d" } else { "$t" };
-                symbols.push((mark.to_owned(), u64::from(at), 0, SymbolKind::Label));
-            }
-            let bytes = text.len() as u64 - u64::from(begin);
-            symbols.push(((*name).to_owned(), u64::from(begin | 1), bytes, SymbolKind::Text));
-            assert!(bytes <= u64::from(STRIDE), "{name} is too long");
-            text.resize((begin + STRIDE) as usize, 0);
-        }
-        image.append_section_data(section, &text, 4);
-        let mut add = |name: &str, value, size, kind, section| {
-            let (scope, flags) = (SymbolScope::Compilation, SymbolFlags::None);
-            image.add_symbol(Symbol { name: name.into(), value, size, kind, scope, weak: false, section, flags });
-        };
-        for (name, value, size, kind) in symbols {
-            add(&name, value, size, kind, SymbolSection::Section(section));
-        }
-        for (name, value) in [("_stack_start", STACK.0), ("_stack_end", STACK.1), ("__emergency_stack", 0x2001_0000)] {
-            add(name, u64::from(value), 0, SymbolKind::Data, SymbolSection::Absolute);
-        }
-        let rodata = image.add_section(Vec::new(), b".rodata".to_vec(), SectionKind::ReadOnlyData);
-        // Not at address 0 as well: sections of an object file are not placed yet, and a word is looked up by its address.
-        image.append_section_data(rodata, &self.rodata, 4);
-        if let Some(board) = board {
-            self.add_board(&mut image, board);
-        }
-        image.write().expect("the image is complete")
-    }
-
-    fn add_board(&self, image: &mut Object<'_>, board: &str) {
-        let region = MemoryRegion { start: 0, length: 0x1000 };
-        let description = ImageMetadata {
-            link_version: 0,
-            simulated: true,
-            schema_hash: 0,
-            model_hash: 0,
-            image: region,
-            store: None,
-            firmware: "",
-            board,
-        };
-        let place = image.add_section(Vec::new(), METADATA_SECTION.as_bytes().to_vec(), SectionKind::ReadOnlyData);
-        image.append_section_data(place, &description.encode(), 4);
-        let vectors: Vec<u8> = std::iter::once(STACK.0)
-            .chain(
-                self.functions
-                    .iter()
-                    .filter(|(name, _)| !INNER.contains(name) && !name.starts_with('<'))
-                    .map(|(name, _)| self.address(name) | 1),
-            )
-            .flat_map(u32::to_le_bytes)
-            .collect();
-        let place = image.add_section(Vec::new(), b".vector_table".to_vec(), SectionKind::ReadOnlyData);
-        image.append_section_data(place, &vectors, 4);
-        image.section_mut(place).flags = SectionFlags::Elf { sh_flags: 2 };
-    }
-
-    fn calls(&self) -> anyhow::Result<Calls> {
-        let file = self.file(None);
-        let file = Elf::parse(&*file)?;
-        Calls::of(Code::of(&file)?, &Memory::of(&file)?)
-    }
-
-    /// The deepest way from a function.
-    fn deepest(&self, name: &str) -> anyhow::Result<Way> {
-        let calls = self.calls()?;
-        let function = calls.address(name)?;
-        Search::new(&calls, function, &[], Default::default()).deepest(function, Part::Whole)
-    }
-
-    fn depth(&self, board: &str) -> anyhow::Result<Depth> {
-        let file = self.file(Some(board));
-        super::of(&Elf::parse(&*file)?)
-    }
-}
-
-/// BL or B.W.
-fn branch(from: u32, to: u32, kind: u16) -> Vec<u16> {
-    let offset = to.wrapping_sub(from + 4);
-    let (sign, upper) = (offset >> 24 & 1, |bit: u32| 1 ^ (offset >> bit & 1) ^ (offset >> 24 & 1));
-    let first = 0xF000 | sign << 10 | offset >> 12 & 0x3FF;
-    let second = u32::from(kind) | upper(23) << 13 | upper(22) << 11 | offset >> 1 & 0x7FF;
-    vec![first as u16, second as u16]
-}
-
-/// Functions of the tiny images that are no handlers.
-const INNER: [&str; 6] = ["main", "begin", "idle", "deep", "rust_begin_unwind", "stranger"];
-
-/// An image for a board that starts, serves and can end: 8 B for Reset's call of main, 8 for main.
-fn board(name: &str) -> Tiny {
-    let mut tiny = Tiny::default()
-        .with("Reset", vec![Call("main"), code(&[NEVER])])
-        .with("main", vec![code(&[PUSH, MASK]), Call("begin"), Call("idle"), code(&[NEVER])])
-        .with("begin", vec![code(&[PUSH]), Call("deep"), code(&[UNMASK, POP])])
-        .with("deep", framed(400, &[]))
-        .with("idle", framed(100, &[]))
-        .with("rust_begin_unwind", vec![code(&[PUSH, MASK]), Call("deep"), code(&[NEVER])]);
-    let layout = Layout::of(name).expect("a board of this name");
-    for handler in layout.levels.iter().flat_map(|level| level.handlers).chain(layout.ends) {
-        tiny = tiny.with(handler, framed(40, &[]));
-    }
-    match &layout.other {
-        // ldr r1, [pc, #4]; mov sp, r1; b.w deep; the upper end of the emergency stack
-        Some(other) => {
-            tiny.with(other.handler, vec![code(&[0x4901, 0x468D]), Jump("deep"), Data(vec![0x0000, 0x2001])])
-        }
-        None => tiny,
-    }
-}
-
-const JOINT: &str = "mps2-an385";
-const REAL: &str = "nucleo-h743zi2";
+use super::frame::{MASK, UNMASK};
+use super::total::sum;
+use tiny::{BACK, Call, Data, JOINT, Jump, NEVER, POP, PUSH, Piece, REAL, Tiny, board, code, framed, main, priorities};
 
 fn bytes(tiny: &Tiny, name: &str) -> u32 {
     tiny.deepest(name).expect("a depth").bytes
@@ -243,17 +46,12 @@ fn a_jump_to_another_function_leaves_nothing_behind() {
 
 #[test]
 fn a_bridge_leads_where_its_constant_says() {
-    // movw r12, #(inner | 1); movt r12, #0; bx r12
+    const BRIDGE: &str = "__Thumbv7ABSLongThunk_inner";
     let tiny =
-        Tiny::default().with("outer", framed(16, &["__Thumbv7ABSLongThunk_inner"])).with("inner", framed(120, &[]));
-    let to = FIRST + 2 * STRIDE + 1;
-    let low = (to & 0xFF) as u16;
-    let bridge = code(&[0xF240, 0x0C00 | low, 0xF2C0, 0x0C00, 0x4760]);
-    let tiny = tiny.with("__Thumbv7ABSLongThunk_inner", vec![bridge]);
-    assert_eq!(tiny.address("inner"), FIRST + STRIDE);
-    // The bridge is the third; let it lead to the second.
+        Tiny::default().with("outer", framed(16, &[BRIDGE])).with("inner", framed(120, &[])).with(BRIDGE, vec![]);
+    // movw r12, #(inner | 1); movt r12, #0; bx r12
     let low = (tiny.address("inner") | 1) as u16;
-    let tiny = tiny.with("__Thumbv7ABSLongThunk_inner", vec![code(&[0xF240, 0x0C00 | low, 0xF2C0, 0x0C00, 0x4760])]);
+    let tiny = tiny.with(BRIDGE, vec![code(&[0xF240, 0x0C00 | low, 0xF2C0, 0x0C00, 0x4760])]);
     assert_eq!(bytes(&tiny, "outer"), 24 + 128);
 }
 
@@ -352,9 +150,13 @@ fn through_pointer() -> Vec<Piece> {
     vec![code(&[PUSH, 0x4798, POP])]
 }
 
-/// A function that makes the address of the function at this place: movw r0; movt r0; bx lr.
+/// A function that makes the address of the function at this place.
 fn making(address: u32) -> Vec<Piece> {
-    let address = address | 1;
+    making_number(address | 1)
+}
+
+/// movw r0; movt r0; bx lr
+fn making_number(address: u32) -> Vec<Piece> {
     let second = (address >> 8 & 7) << 12 | address & 0xFF;
     let first = 0xF240 | (address >> 11 & 1) << 10;
     vec![code(&[first as u16, second as u16, 0xF2C0, 0x0000, BACK])]
@@ -379,6 +181,24 @@ fn a_call_through_a_pointer_may_lead_to_every_function_whose_address_is_made_on_
 }
 
 #[test]
+fn functions_in_data_whose_address_is_made_may_be_behind_a_pointer() {
+    let tiny = Tiny::default()
+        .with("outer", vec![code(&[PUSH]), Call("maker"), Call("caller"), code(&[POP])])
+        .with("caller", through_pointer())
+        .with("near", framed(16, &[]))
+        .with("far", framed(80, &[]))
+        .with("other", framed(800, &[]))
+        .with("maker", vec![])
+        .with("stranger", vec![]);
+    let [near, far, other] = ["near", "far", "other"].map(|name| tiny.address(name) | 1);
+    let begin = tiny.clone().with_data(&[]).1;
+    // Three pieces: one that leads to the last, one that only a stranger knows, and the last.
+    let tiny = tiny.with_data(&[near, begin + 12, other, far]).0.with("stranger", making_number(begin + 8));
+    assert_eq!(bytes(&tiny.clone().with("maker", making_number(begin)), "outer"), 16 + 88);
+    assert_eq!(bytes(&tiny.with("maker", making_number(begin + 8)), "outer"), 16 + 808);
+}
+
+#[test]
 fn a_call_of_one_kind_leads_to_that_kind_alone_and_as_deep_as_is_listed() {
     let text = "<x as core::fmt::Debug>::fmt";
     let tiny = Tiny::default()
@@ -390,6 +210,21 @@ fn a_call_of_one_kind_leads_to_that_kind_alone_and_as_deep_as_is_listed() {
     let tiny = tiny.with("maker", making(first)).with("other maker", making(second)).with("both", both);
     // Six texts inside one another, by the list.
     assert_eq!(bytes(&tiny, "both"), 8 + 6 * (8 + 40) + 8);
+}
+
+#[test]
+fn what_a_function_behind_a_pointer_makes_may_be_behind_the_next() {
+    let (outer, inner) = ("<a as core::fmt::Debug>::fmt", "<b as core::fmt::Debug>::fmt");
+    let tiny = Tiny::default()
+        .with("both", vec![code(&[PUSH]), Call("maker"), Call("core::fmt::write"), code(&[POP])])
+        .with("core::fmt::write", through_pointer())
+        .with(inner, framed(400, &[]))
+        .with("other maker", vec![])
+        .with(outer, framed(32, &["other maker", "core::fmt::write"]));
+    let (first, second) = (tiny.address(outer), tiny.address(inner));
+    let tiny = tiny.with("maker", making(first)).with("other maker", making(second));
+    // Five of the outer and the inner.
+    assert_eq!(bytes(&tiny, "both"), 8 + 5 * (8 + 40) + 8 + 408);
 }
 
 #[test]
@@ -431,11 +266,14 @@ fn start_and_service_are_told_apart_and_interrupts_come_on_top() {
     assert_eq!(depth.in_service(), 8 + 108 + interrupts);
     assert_eq!(depth.at_start(), 8 + 8 + 408, "deeper than what waits until interrupts are unmasked");
     assert_eq!(depth.faults(), [""; 0]);
+    let idle = tiny.clone().with("idle", framed(1000, &[])).depth(JOINT).expect("a depth");
+    assert_eq!(idle.at_start(), depth.at_start(), "what runs later is not the start");
+    assert_eq!(idle.in_service(), 8 + 1008 + interrupts);
     let deep = tiny.clone().with("deep", framed(8, &[])).depth(JOINT).expect("a depth");
     assert_eq!(deep.at_start(), 8 + 8 + interrupts, "interrupts on top of what unmasked them");
     // What may end there: a panic in the slot, a fault above everything.
     let fault = 36 + 48;
-    assert_eq!(super::total::sum(&depth.end).max(1), (8 + 108 + interrupts + fault).max(8 + 8 + 408 + fault));
+    assert_eq!(sum(&depth.end).max(1), (8 + 108 + interrupts + fault).max(8 + 8 + 408 + fault));
 }
 
 #[test]
@@ -460,7 +298,7 @@ fn a_panic_counts_with_its_last_words_once() {
     let below = 8 + 108 + 2 * 84;
     assert_eq!(depth.in_service(), below + 36 + 48 + 8 + 84, "the end of a panic without what it calls");
     let depth = tiny.with("deep", framed(2000, &[])).depth(JOINT).expect("a depth");
-    assert_eq!(super::total::sum(&depth.end), below + 36 + 48 + 8 + 2008);
+    assert_eq!(sum(&depth.end), below + 36 + 48 + 8 + 2008);
 }
 
 #[test]
@@ -471,6 +309,16 @@ fn a_handler_that_no_row_lists_is_refused_and_so_is_a_row_without_handler() {
     tiny.functions.retain(|(name, _)| *name != "BUS_WIRE");
     assert!(refusal(tiny.depth(JOINT)).contains("BUS_WIRE"));
     assert!(refusal(board(JOINT).depth("arduino")).contains("arduino"));
+}
+
+#[test]
+fn a_priority_that_is_not_the_one_in_the_table_is_refused() {
+    let mut other = priorities(JOINT);
+    other[0] = 3;
+    let said = refusal(board(JOINT).with("main", main(&other)).depth(JOINT));
+    assert!(said.contains("DISPATCH_SESSION has priority 2") && said.contains("but 3 in the image"), "{said}");
+    let said = refusal(board(JOINT).with("main", main(&other[..0])).depth(JOINT));
+    assert!(said.contains("none that can be read"), "{said}");
 }
 
 #[test]
@@ -511,7 +359,7 @@ fn a_frame_larger_than_the_guard_fails_where_there_is_a_guard() {
 fn the_emergency_stack_is_counted_by_itself() {
     let depth = board(REAL).depth(REAL).expect("a depth");
     let (size, ways) = depth.other.as_ref().expect("the handler has a stack of its own");
-    assert_eq!((*size, super::total::sum(ways)), (4096, 408));
+    assert_eq!((*size, sum(ways)), (4096, 408));
     assert_eq!(depth.faults(), [""; 0]);
     let deep = board(REAL).with("deep", framed(4000, &["idle"])).depth(REAL).expect("a depth");
     assert!(deep.faults().iter().any(|fault| fault.contains("of its own stack of 4096 B")), "{:?}", deep.faults());
