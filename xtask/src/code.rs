@@ -20,6 +20,8 @@ pub(crate) struct Function {
     names: Vec<String>,
     /// Its instructions in the order of memory, without the constants.
     pub(crate) instructions: Vec<Instruction>,
+    /// Where it ends, its constants included.
+    pub(crate) end: u32,
 }
 
 impl Function {
@@ -89,7 +91,7 @@ impl Code {
                     at += 2;
                 }
             }
-            functions.insert(address, Function { names: vec![name], instructions });
+            functions.insert(address, Function { names: vec![name], instructions, end: address + bytes as u32 });
         }
         ensure!(!functions.is_empty(), "the image has no symbols");
         Ok(Self(functions))

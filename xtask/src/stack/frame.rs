@@ -15,6 +15,8 @@ use crate::thumb::{Flow, Instruction};
 
 /// Number of the register that points to the frame where there is a frame pointer.
 const FRAME_POINTER: u32 = 7;
+/// Number of the program counter.
+const PC: u32 = 15;
 /// Number of the link register.
 const LINK: u32 = 14;
 /// The stack pointer always is a multiple of this.
@@ -70,11 +72,14 @@ impl Frame {
     pub(super) fn of(begin: u32, function: &Function, memory: &Memory, unmasks: &BTreeSet<u32>) -> Result<Self> {
         let mut walk = Walk {
             begin,
+            end: function.end,
             all: &function.instructions,
             memory,
             unmasks,
             index: function.instructions.iter().enumerate().map(|(index, read)| (read.address, index)).collect(),
-            states: vec![None; function.instructions.len()],
+            conditions: conditions(&function.instructions),
+            states: BTreeMap::new(),
+            tables: Vec::new(),
             open: Vec::new(),
             frame: Self::default(),
         };
@@ -94,29 +99,42 @@ struct State {
     unmasked: bool,
 }
 
+/// An instruction. Amid instructions that are executed on a condition: whether it was true, once that has mattered.
+type Place = (usize, Option<bool>);
+
 struct Walk<'a> {
     begin: u32,
+    end: u32,
     all: &'a [Instruction],
     memory: &'a Memory,
     unmasks: &'a BTreeSet<u32>,
     index: BTreeMap<u32, usize>,
-    states: Vec<Option<State>>,
-    open: Vec<usize>,
+    /// The instructions that are executed on a condition: whether on the one of the IT in front of them, or on its opposite.
+    conditions: BTreeMap<usize, bool>,
+    states: BTreeMap<Place, State>,
+    /// Where a table may lead of which only the beginning is known.
+    tables: Vec<(usize, State)>,
+    open: Vec<Place>,
     frame: Frame,
 }
 
 impl Walk<'_> {
     fn run(&mut self) -> Result<()> {
         ensure!(!self.all.is_empty(), "it has no instructions");
-        let conditional = conditional(self.all);
-        self.reach(0, State { depth: 0, pointer: None, unmasked: false }, self.begin)?;
-        while let Some(index) = self.open.pop() {
-            let is_conditional = conditional.contains(&index);
-            self.step(index, is_conditional)?;
+        self.reach((0, None), State { depth: 0, pointer: None, unmasked: false }, self.begin)?;
+        loop {
+            while let Some(place) = self.open.pop() {
+                self.step(place)?;
+            }
+            // Where else the code is reached from is known better.
+            let Some((index, state)) = self.tables.pop() else { break };
+            if !self.is_reached(index) {
+                self.reach((index, None), state, self.all[index].address)?;
+            }
         }
         for (index, instruction) in self.all.iter().enumerate() {
             ensure!(
-                is_filling(instruction) || self.states[index].is_some(),
+                is_filling(instruction) || self.is_reached(index),
                 "the code at {:#010x} is not reached from its beginning",
                 instruction.address
             );
@@ -126,17 +144,28 @@ impl Walk<'_> {
         Ok(())
     }
 
+    fn is_reached(&self, index: usize) -> bool {
+        self.states.range((index, None)..).next().is_some_and(|((reached, _), _)| *reached == index)
+    }
+
     /// One instruction, and where it goes on.
-    fn step(&mut self, index: usize, is_conditional: bool) -> Result<()> {
+    fn step(&mut self, (index, mut is_true): Place) -> Result<()> {
         let instruction = self.all[index];
-        let Some(before) = self.states[index] else { return Ok(()) };
+        let Some(before) = self.states.get(&(index, is_true)).copied() else { return Ok(()) };
         let (at, way) = (instruction.address, step::way(&instruction));
+        if let (Some(condition), Some(is_true)) = (self.conditions.get(&index), is_true)
+            && *condition != is_true
+        {
+            return self.go(at + instruction.bytes, before, at, Some(is_true));
+        }
         let after = self.after(index, before)?;
         ensure!(after.depth >= 0, "the stack pointer is above where it began after {at:#010x}");
-        ensure!(
-            !is_conditional || way != Way::Known || after.depth == before.depth,
-            "the stack pointer changes at {at:#010x} on a condition"
-        );
+        if let (Some(condition), None) = (self.conditions.get(&index).copied(), is_true) {
+            // Either way; from here on only one of them, if the stack pointer depends on it.
+            let matters = after.depth != before.depth;
+            self.go(at + instruction.bytes, before, at, matters.then_some(!condition))?;
+            is_true = matters.then_some(condition);
+        }
         self.note(after);
         let called = match way {
             Way::CallBy(register) => Some(self.pointed(index, register)),
@@ -146,7 +175,7 @@ impl Walk<'_> {
             },
             _ => None,
         };
-        let mut goes_on = called.is_some() || is_conditional;
+        let mut goes_on = called.is_some();
         let mut next = after;
         if let Some(target) = called {
             self.call(at, after, target);
@@ -166,20 +195,19 @@ impl Walk<'_> {
             },
             Way::By(LINK) | Way::Return => {
                 ensure!(after.depth == 0, "it returns at {at:#010x} with {} bytes left on the stack", after.depth);
-                next.depth = before.depth;
             }
             Way::By(register) => self.call(at, after, self.pointed(index, register)),
             Way::Loaded(from) => match self.memory.word(from) {
                 Some(to) => self.call(at, after, Target::Function(to & !1)),
                 None => bail!("it goes on at {at:#010x} where a missing constant says"),
             },
-            Way::Table { entry } => self.table(index, entry, after)?,
+            Way::Table { base, entry } => self.table(index, base, entry, after)?,
             Way::Unknown => bail!("nobody can read where it goes on after {at:#010x}"),
         }
         // Behind a call that never returns and a branch that is always taken the compiler may end a function as it likes.
         let may_end = called.is_some() || matches!(instruction.flow, Flow::Branch(_));
         if goes_on && !(may_end && self.is_last(index)) {
-            self.jump(at + instruction.bytes, next, at)?;
+            self.go(at + instruction.bytes, next, at, is_true)?;
         }
         Ok(())
     }
@@ -302,46 +330,66 @@ impl Walk<'_> {
 
     /// Goes on elsewhere: in this function, or at the beginning of another one.
     fn jump(&mut self, to: u32, state: State, from: u32) -> Result<()> {
+        self.go(to, state, from, None)
+    }
+
+    fn go(&mut self, to: u32, state: State, from: u32, is_true: Option<bool>) -> Result<()> {
         match self.index.get(&to) {
-            Some(index) if to != self.begin || state.depth == 0 => self.reach(*index, state, from)?,
+            Some(index) if to != self.begin || state.depth == 0 => {
+                let is_true = is_true.filter(|_| self.conditions.contains_key(index));
+                self.reach((*index, is_true), state, from)?;
+            }
             Some(_) => bail!("it begins anew at {from:#010x} with {} bytes left on the stack", state.depth),
             None => self.call(from, state, Target::Function(to)),
         }
         Ok(())
     }
 
-    /// The table behind the instruction; it ends where code begins again.
-    fn table(&mut self, index: usize, entry: u32, state: State) -> Result<()> {
+    /// A table of ways to go on. Behind the instruction it ends where code begins again, or with a zero, which would lead to
+    /// the table itself; elsewhere constants may follow.
+    fn table(&mut self, index: usize, base: u32, entry: u32, state: State) -> Result<()> {
         let instruction = self.all[index];
-        let first = instruction.address + instruction.bytes;
-        let end = self.all.get(index + 1).map_or(first, |next| next.address);
+        let counted = instruction.address + instruction.bytes;
+        let is_behind = base == PC;
+        let first = if is_behind { counted } else { self.near(index, base)? };
+        let end = self.index.range(first..).next().map_or(self.end, |(next, _)| *next);
         ensure!(end > first, "the table behind {:#010x} is missing", instruction.address);
         for at in (first..end).step_by(entry as usize) {
             let offset = if entry == 1 { self.memory.byte(at) } else { self.memory.half(at) };
-            let Some(offset) = offset else { bail!("the table behind {:#010x} is cut off", instruction.address) };
-            // What fills it up are zeros and NOPs. No entry is zero, which would lead to the table itself.
-            if offset == 0 {
+            let Some(offset) = offset else { bail!("the table of {:#010x} is cut off", instruction.address) };
+            if is_behind && offset == 0 {
                 break;
             }
-            if let Some(to) = self.index.get(&(first + 2 * offset)) {
-                self.reach(*to, state, instruction.address)?;
+            match self.index.get(&(counted + 2 * offset)) {
+                Some(to) if is_behind => self.reach((*to, None), state, instruction.address)?,
+                Some(to) => self.tables.push((*to, state)),
+                None => {}
             }
         }
         Ok(())
     }
 
-    fn reach(&mut self, index: usize, state: State, from: u32) -> Result<()> {
-        let known = &mut self.states[index];
-        match known {
+    /// The address near the code that a register holds, from the last instruction that can be read to set it.
+    fn near(&self, index: usize, register: u32) -> Result<u32> {
+        let at = self.all[index].address;
+        let before = self.all[..index].iter().rev().filter_map(step::source);
+        match before.into_iter().find(|(to, _)| *to == register) {
+            Some((_, Source::Constant(address))) => Ok(address),
+            _ => bail!("nobody can read where the table of {at:#010x} is"),
+        }
+    }
+
+    fn reach(&mut self, place: Place, state: State, from: u32) -> Result<()> {
+        match self.states.get_mut(&place) {
             None => {
-                *known = Some(state);
-                self.open.push(index);
+                self.states.insert(place, state);
+                self.open.push(place);
             }
             Some(known) => {
                 ensure!(
                     known.depth == state.depth,
                     "{:#010x} is reached with {} and, from {from:#010x}, {} bytes on the stack",
-                    self.all[index].address,
+                    self.all[place.0].address,
                     known.depth,
                     state.depth
                 );
@@ -352,7 +400,7 @@ impl Walk<'_> {
                 };
                 if joined != *known {
                     *known = joined;
-                    self.open.push(index);
+                    self.open.push(place);
                 }
             }
         }
@@ -366,14 +414,16 @@ fn is_filling(instruction: &Instruction) -> bool {
         || matches!(instruction.flow, Flow::Abort | Flow::Unreachable)
 }
 
-/// The instructions that are executed on a condition: those an IT stands in front of.
-fn conditional(all: &[Instruction]) -> BTreeSet<usize> {
-    let mut found = BTreeSet::new();
+/// The instructions an IT stands in front of: whether they are executed on its condition or on the opposite.
+fn conditions(all: &[Instruction]) -> BTreeMap<usize, bool> {
+    let mut found = BTreeMap::new();
     for (index, instruction) in all.iter().enumerate() {
         let code = instruction.halves.0;
         if instruction.bytes == 2 && code & 0xFF00 == 0xBF00 && code & 15 != 0 {
             let length = 4 - (code & 15).trailing_zeros() as usize;
-            found.extend((index + 1..).take(length));
+            // A bit for each instruction but the first: the lowest of the condition, or its opposite.
+            let is_then = |place: usize| place == 0 || code >> (4 - place) & 1 == code >> 4 & 1;
+            found.extend((0..length).map(|place| (index + 1 + place, is_then(place))));
         }
     }
     found

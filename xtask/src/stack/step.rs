@@ -38,8 +38,10 @@ pub(super) enum Way {
     By(u32),
     /// Goes where a constant near the code says (LDR from a fixed place).
     Loaded(u32),
-    /// Goes on by a table of bytes (TBB) or halves (TBH) that follows it.
+    /// Goes on by a table of bytes (TBB) or halves (TBH).
     Table {
+        /// The register that points to it: the program counter, if it follows.
+        base: u32,
         /// Bytes of an entry.
         entry: u32,
     },
@@ -243,11 +245,9 @@ pub(super) fn way(instruction: &Instruction) -> Way {
         };
     }
     match first {
-        _ if first & 0xFFF0 == 0xE8D0 && second & 0xFFE0 == 0xF000 => match (first & 15, second & 0x10) {
-            (PC, 0) => Way::Table { entry: 1 },
-            (PC, _) => Way::Table { entry: 2 },
-            _ => Way::Unknown,
-        },
+        _ if first & 0xFFF0 == 0xE8D0 && second & 0xFFE0 == 0xF000 => {
+            Way::Table { base: first & 15, entry: if second & 0x10 == 0 { 1 } else { 2 } }
+        }
         0xE8BD if second & 0x8000 != 0 => Way::Return,
         // LDR of the program counter: from the stack, from a constant, from anywhere.
         0xF85D if second == 0xFB04 => Way::Return,
@@ -275,6 +275,9 @@ pub(super) fn source(instruction: &Instruction) -> Option<(u32, Source)> {
             0x4800..=0x4FFF => {
                 Some((first >> 8 & 7, Source::Word(literal(instruction.address, true, (first & 0xFF) << 2))))
             }
+            0xA000..=0xA7FF => {
+                Some((first >> 8 & 7, Source::Constant(literal(instruction.address, true, (first & 0xFF) << 2))))
+            }
             0xA800..=0xAFFF => Some((first >> 8 & 7, Source::StackPlus(((first & 0xFF) << 2).cast_signed()))),
             0x4600..=0x46FF => {
                 let (to, from) = (first >> 4 & 8 | first & 7, first >> 3 & 15);
@@ -294,6 +297,9 @@ pub(super) fn source(instruction: &Instruction) -> Option<(u32, Source)> {
     }
     if first & 0xF800 != 0xF000 || second & 0x8000 != 0 {
         return None;
+    }
+    if first & 0xFB5F == 0xF20F {
+        return Some((to, Source::Constant(literal(instruction.address, first & 0xA0 == 0, number))));
     }
     let half = from << 12 | number;
     match first & 0xFBF0 {

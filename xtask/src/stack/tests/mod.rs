@@ -79,6 +79,38 @@ fn both_sides_of_a_branch_and_every_entry_of_a_table_count() {
 }
 
 #[test]
+fn a_way_back_on_a_condition_goes_on_with_the_frame() {
+    let tiny = Tiny::default()
+        // push; sub sp, #64; itt eq; addeq sp, #64; popeq; bl inner; add sp, #64; pop
+        .with("early", vec![code(&[PUSH, 0xB090, 0xBF04, 0xB010, POP]), Call("inner"), code(&[0xB010, POP])])
+        // push; itete eq: addeq sp, #0 would be alike; popeq.w {r7, lr}; nopne; b.weq inner; nopne; pop
+        .with("late", vec![code(&[PUSH, 0xBF0A, 0xE8BD, 0x4080, 0xBF00]), Jump("inner"), code(&[POP])])
+        .with("inner", framed(200, &[]));
+    assert_eq!(bytes(&tiny, "early"), 8 + 64 + 208);
+    assert_eq!(bytes(&tiny, "late"), 208);
+}
+
+#[test]
+fn a_table_elsewhere_is_found_by_the_register_that_points_to_it() {
+    let tiny = Tiny::default()
+        // push; adr r2, the table; tbb [r2, r0]; bl small; pop; bl inner; pop; two entries (zero: behind the instruction)
+        .with(
+            "table",
+            vec![
+                code(&[PUSH, 0xA204, 0xE8D2, 0xF000]),
+                Call("small"),
+                code(&[POP]),
+                Call("inner"),
+                code(&[POP]),
+                Data(vec![0x0300]),
+            ],
+        )
+        .with("inner", framed(200, &[]))
+        .with("small", framed(16, &[]));
+    assert_eq!(bytes(&tiny, "table"), 8 + 208);
+}
+
+#[test]
 fn large_frames_by_a_register_are_read() {
     // push; movw r12, #61440; movt r12, #1; sub.w sp, sp, r12; movw, movt, add sp, r12; pop
     let moved = |by: &[u16]| {
@@ -115,8 +147,8 @@ fn a_stack_pointer_that_cannot_be_followed_is_refused_by_name() {
         (&[PUSH, 0xE7FD], "it begins anew"),
         // nop; push; b to the push
         (&[0xBF00, PUSH, 0xE7FD], "is reached with"),
-        // it eq; pusheq
-        (&[0xBF08, PUSH, BACK], "on a condition"),
+        // it eq; pusheq; bx lr
+        (&[0xBF08, PUSH, BACK], "is reached with"),
         // ldr.w pc, [r0]
         (&[0xF8D0, 0xF000], "nobody can read where it goes on"),
         // bx lr; push {r7, lr}
