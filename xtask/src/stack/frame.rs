@@ -99,8 +99,8 @@ struct State {
     unmasked: bool,
 }
 
-/// An instruction. Amid instructions that are executed on a condition: whether it was true, once that has mattered.
-type Place = (usize, Option<bool>);
+/// An instruction. Amid instructions that are executed on a condition: the one that is true, once that has mattered.
+type Place = (usize, Option<u16>);
 
 struct Walk<'a> {
     begin: u32,
@@ -109,8 +109,8 @@ struct Walk<'a> {
     memory: &'a Memory,
     unmasks: &'a BTreeSet<u32>,
     index: BTreeMap<u32, usize>,
-    /// The instructions that are executed on a condition: whether on the one of the IT in front of them, or on its opposite.
-    conditions: BTreeMap<usize, bool>,
+    /// The instructions that are executed on a condition, each with its condition's number.
+    conditions: BTreeMap<usize, u16>,
     states: BTreeMap<Place, State>,
     /// Where a table may lead of which only the beginning is known.
     tables: Vec<(usize, State)>,
@@ -153,17 +153,16 @@ impl Walk<'_> {
         let instruction = self.all[index];
         let Some(before) = self.states.get(&(index, is_true)).copied() else { return Ok(()) };
         let (at, way) = (instruction.address, step::way(&instruction));
-        if let (Some(condition), Some(is_true)) = (self.conditions.get(&index), is_true)
-            && *condition != is_true
-        {
-            return self.go(at + instruction.bytes, before, at, Some(is_true));
+        let condition = self.conditions.get(&index).copied();
+        if condition.is_some() && condition.map(opposite) == is_true {
+            return self.go(at + instruction.bytes, before, at, is_true);
         }
         let after = self.after(index, before)?;
         ensure!(after.depth >= 0, "the stack pointer is above where it began after {at:#010x}");
-        if let (Some(condition), None) = (self.conditions.get(&index).copied(), is_true) {
+        if let Some(condition) = condition.filter(|_| condition != is_true) {
             // Either way; from here on only one of them, if the stack pointer depends on it.
             let matters = after.depth != before.depth;
-            self.go(at + instruction.bytes, before, at, matters.then_some(!condition))?;
+            self.go(at + instruction.bytes, before, at, matters.then(|| opposite(condition)))?;
             is_true = matters.then_some(condition);
         }
         self.note(after);
@@ -333,10 +332,11 @@ impl Walk<'_> {
         self.go(to, state, from, None)
     }
 
-    fn go(&mut self, to: u32, state: State, from: u32, is_true: Option<bool>) -> Result<()> {
+    fn go(&mut self, to: u32, state: State, from: u32, is_true: Option<u16>) -> Result<()> {
         match self.index.get(&to) {
             Some(index) if to != self.begin || state.depth == 0 => {
-                let is_true = is_true.filter(|_| self.conditions.contains_key(index));
+                let matters = self.conditions.contains_key(index) || is_it(&self.all[*index]);
+                let is_true = is_true.filter(|_| matters);
                 self.reach((*index, is_true), state, from)?;
             }
             Some(_) => bail!("it begins anew at {from:#010x} with {} bytes left on the stack", state.depth),
@@ -414,17 +414,26 @@ fn is_filling(instruction: &Instruction) -> bool {
         || matches!(instruction.flow, Flow::Abort | Flow::Unreachable)
 }
 
-/// The instructions an IT stands in front of: whether they are executed on its condition or on the opposite.
-fn conditions(all: &[Instruction]) -> BTreeMap<usize, bool> {
+/// Whether the next instructions are executed on a condition (IT).
+fn is_it(instruction: &Instruction) -> bool {
+    let code = instruction.halves.0;
+    instruction.bytes == 2 && code & 0xFF00 == 0xBF00 && code & 15 != 0
+}
+
+/// The condition that is true if another is not.
+fn opposite(condition: u16) -> u16 {
+    condition ^ 1
+}
+
+/// The instructions an IT stands in front of, with their conditions.
+fn conditions(all: &[Instruction]) -> BTreeMap<usize, u16> {
     let mut found = BTreeMap::new();
-    for (index, instruction) in all.iter().enumerate() {
+    for (index, instruction) in all.iter().enumerate().filter(|(_, instruction)| is_it(instruction)) {
         let code = instruction.halves.0;
-        if instruction.bytes == 2 && code & 0xFF00 == 0xBF00 && code & 15 != 0 {
-            let length = 4 - (code & 15).trailing_zeros() as usize;
-            // A bit for each instruction but the first: the lowest of the condition, or its opposite.
-            let is_then = |place: usize| place == 0 || code >> (4 - place) & 1 == code >> 4 & 1;
-            found.extend((0..length).map(|place| (index + 1 + place, is_then(place))));
-        }
+        let (first, length) = (code >> 4 & 15, 4 - (code & 15).trailing_zeros() as usize);
+        // The lowest bit of the condition of every instruction but the first.
+        let condition = |place: usize| if place == 0 { first } else { first & !1 | code >> (4 - place) & 1 };
+        found.extend((0..length).map(|place| (index + 1 + place, condition(place))));
     }
     found
 }

@@ -83,9 +83,12 @@ fn a_way_back_on_a_condition_goes_on_with_the_frame() {
     let tiny = Tiny::default()
         // push; sub sp, #64; itt eq; addeq sp, #64; popeq; bl inner; add sp, #64; pop
         .with("early", vec![code(&[PUSH, 0xB090, 0xBF04, 0xB010, POP]), Call("inner"), code(&[0xB010, POP])])
-        // push; itete eq: addeq sp, #0 would be alike; popeq.w {r7, lr}; nopne; b.weq inner; nopne; pop
+        // push; itet eq; popeq.w {r7, lr}; nopne; b.weq inner; pop
         .with("late", vec![code(&[PUSH, 0xBF0A, 0xE8BD, 0x4080, 0xBF00]), Jump("inner"), code(&[POP])])
+        // push; sub sp, #64; it ne; addne sp, #64; it ne; popne; bl inner; add sp, #64; pop
+        .with("twice", vec![code(&[PUSH, 0xB090, 0xBF18, 0xB010, 0xBF18, POP]), Call("inner"), code(&[0xB010, POP])])
         .with("inner", framed(200, &[]));
+    assert_eq!(bytes(&tiny, "twice"), 8 + 64 + 208);
     assert_eq!(bytes(&tiny, "early"), 8 + 64 + 208);
     assert_eq!(bytes(&tiny, "late"), 208);
 }
