@@ -10,6 +10,7 @@ pub mod application;
 pub mod board;
 #[cfg(target_os = "none")]
 pub mod defmt_log;
+pub mod in_place;
 pub mod joint;
 #[cfg(target_os = "none")]
 pub mod last_words;

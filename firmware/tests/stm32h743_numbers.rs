@@ -3,13 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use firmware::board::stm32h743::constants::can::{ARM, BIT_TIMING, BITS_PER_SECOND, HOST, MEMORY_WORDS};
+use firmware::board::stm32h743::constants::can::{ARM, BIT_TIMING, BITS_PER_SECOND, HOST, MEMORY_WORDS, bears_both};
 use firmware::board::stm32h743::constants::clocks::*;
 use firmware::board::stm32h743::constants::filters::{
     ARM_ACCEPTED, ARM_ELEMENTS, ARM_FILTERS, ARM_IDS, HOST_DEVICE, HOST_FILTERS, accepts,
 };
-use firmware::board::stm32h743::constants::lines::{BAUD, BITS_PER_BYTE, UART_DIVIDER, UART_FIFO_BYTES};
+use firmware::board::stm32h743::constants::lines::{
+    BAUD, BITS_PER_BYTE, UART_BRR, UART_EIGHT_SAMPLES, UART_FIFO_BYTES,
+};
 use firmware::board::stm32h743::constants::memory::*;
+use firmware::board::stm32h743::constants::supply::{BROWN_OUT_LEVEL, brown_out_millivolts};
 use firmware::board::stm32h743::constants::timers::*;
 use link::can::{DeviceNumber, Direction, Heading};
 use puck::{CanFrame, CanId, Group, Node, Reply};
@@ -20,6 +23,10 @@ fn phase_locked_loops_stay_inside_what_the_chip_bears() {
         assert_eq!(HSE_HZ % pll.input_divider, 0);
         assert!((8_000_000..=16_000_000).contains(&pll.comparison_hz()), "{pll:?}");
         assert!((192_000_000..=836_000_000).contains(&pll.oscillator_hz()), "{pll:?}");
+        assert!(
+            pll.oscillator_hz() > MEDIUM_OSCILLATOR_HZ_LIMIT,
+            "the oscillator for 1 to 2 MHz would be taken: {pll:?}"
+        );
         for divider in [pll.p, pll.q].into_iter().flatten() {
             assert!((1..=128).contains(&divider));
             assert_eq!(pll.oscillator_hz() % divider, 0, "a rounded frequency is not the one stated");
@@ -85,6 +92,36 @@ fn watchdog_waits_for_several_slots_and_the_last_frames_but_not_for_long() {
 }
 
 #[test]
+fn watchdog_bears_with_the_start_and_tells_soon_that_it_has_no_oscillator() {
+    assert_eq!(WATCHDOG_START_US, 512_000, "what the documents state");
+    let slowest_hz = LSI_HZ * (100 - LSI_TOLERANCE_PERCENT) / 100;
+    let update_us = 6 * WATCHDOG_PRESCALER * 1_000_000 / slowest_hz;
+    assert!(2 * update_us < WATCHDOG_UPDATE_US, "a healthy one takes {update_us} us and would be refused");
+    // All waits of the start-up happen inside its window, and leave most of what remains to the rest of it.
+    let fastest = WATCHDOG_START_US * 100 / (100 + LSI_TOLERANCE_PERCENT);
+    let waits = WATCHDOG_UPDATE_US + HSE_SOON_US + HSE_BLINKS * HSE_BLINK_US;
+    assert!(waits + 100_000 < fastest, "the watchdog would come before the reason is written down");
+    // What the counter of the clock can tell apart.
+    assert!(HSE_BLINK_US < u32::MAX / (HSI_HZ / 1_000_000));
+}
+
+#[test]
+fn the_end_waits_long_enough_for_the_last_frames_and_ends_before_the_watchdog() {
+    // Eleven-bit identifier, eight bytes, a stuff bit after every four bits of what is stuffed, and the space behind it.
+    let longest_bits = 47 + 64 + (34 + 64 - 1) / 4;
+    let frame_us = longest_bits * 1_000_000 / BITS_PER_SECOND;
+    let last = 4;
+    assert!(ARM.transmit >= last, "they would not fit into an empty queue");
+    assert!(LAST_ROOM_US > (1 + last) * frame_us);
+    let join_us = 129 * 11 * 1_000_000 / BITS_PER_SECOND;
+    assert!(LAST_LEFT_US > join_us + last * frame_us);
+    assert!(LAST_LEFT_US > (1 + (ARM.transmit - last) + last) * frame_us);
+    let fastest = WATCHDOG_US * 100 / (100 + LSI_TOLERANCE_PERCENT);
+    // Two milliseconds for writing down the reason.
+    assert!(LAST_ROOM_US + LAST_STOP_US + LAST_LEFT_US + 2_000 < fastest, "the watchdog would cut the last frames off");
+}
+
+#[test]
 fn filters_let_through_exactly_the_replies_a_wam_sends_to_its_master() {
     let motors = || Node::ARM.into_iter().chain(Node::HAND);
     let mut wanted: Vec<u16> = motors().map(|node| reply_id(node, Group::POSITION_REPLIES)).collect();
@@ -137,6 +174,13 @@ fn queues_of_both_controllers_fit_the_message_memory_side_by_side() {
 }
 
 #[test]
+fn both_controllers_run_only_on_chips_without_the_fault_of_the_message_memory() {
+    // Revisions Z, Y (and W), X, V.
+    let revisions = [0x1001, 0x1003, 0x2001, 0x2003];
+    assert_eq!(revisions.map(bears_both), [false, false, true, true]);
+}
+
+#[test]
 fn receive_queues_outlast_the_time_until_somebody_fetches() {
     // Shortest frame without stuffing, and the space behind it: 47 bits. A slot is the longest anyone is kept waiting.
     let slot_us = 1_000_000 / SLOT_HZ;
@@ -146,14 +190,30 @@ fn receive_queues_outlast_the_time_until_somebody_fetches() {
     assert!(HOST.transmit > 2 * slot_us / 111, "the line would fall silent between two visits of the session");
 }
 
+/// Bits per second that the serial controller makes of its baud rate register, as the reference manual says: with sixteen
+/// samples a bit the register is the divider; with eight the divider is that of twice the clock, its lowest four bits stand
+/// one place lower and the lowest is lost; the register's bit 3 must be clear.
+fn serial_rate(clock_hz: u32, register: u16, eight_samples: bool) -> f64 {
+    let register = u32::from(register);
+    if eight_samples {
+        assert_eq!(register & 0b1000, 0, "the register has a bit where none may be");
+        f64::from(2 * clock_hz) / f64::from(register & !0xF | (register & 0b111) << 1)
+    } else {
+        f64::from(clock_hz) / f64::from(register)
+    }
+}
+
 #[test]
 fn the_serial_line_runs_at_the_rate_the_host_opens_it_with() {
-    let rate = f64::from(2 * UART_HZ) / f64::from(UART_DIVIDER);
+    let rate = serial_rate(UART_HZ, UART_BRR, UART_EIGHT_SAMPLES);
+    assert_eq!(rate.round(), 923_077.0, "what the documents state");
     let off = rate / f64::from(BAUD) - 1.0;
-    assert!(off.abs() < 0.005, "{off}");
-    assert!((16..=0xFFFF).contains(&UART_DIVIDER));
+    assert!(off.abs() < 0.002, "{off}");
+    assert!(UART_BRR >= 16, "the controller divides by 16 at least");
     let fifo_us = UART_FIFO_BYTES * BITS_PER_BYTE * 1_000_000 / BAUD;
     assert!(fifo_us > 100);
+    // The set-up of 5a5e456, 100 MHz and eight samples of divider 217: half a percent off, not 0.006 %.
+    assert_eq!(serial_rate(100_000_000, 0xD4, true).round(), 925_926.0);
 }
 
 #[test]
@@ -172,7 +232,7 @@ fn image_and_store_share_no_byte_of_flash_and_begin_at_sectors() {
 
 #[test]
 fn regions_of_memory_do_not_overlap_and_stay_inside_what_there_is() {
-    let all = [HOT_DATA, EMERGENCY_STACK, DATA, STACK_GUARD, STACK, NULL_GUARD, HOT_CODE];
+    let all = [HOT_DATA, EMERGENCY_STACK, DATA, STACK, NULL_GUARD, HOT_CODE];
     for (index, region) in all.iter().enumerate() {
         let inside = |memory: &Region| region.start >= memory.start && region.end() <= memory.end();
         assert_eq!([ITCM, DTCM, AXI].iter().filter(|memory| inside(memory)).count(), 1, "{region:?}");
@@ -187,11 +247,25 @@ fn regions_of_memory_do_not_overlap_and_stay_inside_what_there_is() {
 fn the_guard_is_what_the_stack_meets_first() {
     assert_eq!(STACK_GUARD.end(), STACK.start);
     assert_eq!(STACK.start % 8, 0);
+    // A frame that fits into the stack cannot reach below the guard, and the guard takes no memory away.
+    assert!(STACK_GUARD.length >= STACK.length);
+    for memory in [ITCM, DTCM, AXI] {
+        assert!(!STACK_GUARD.overlaps(&memory), "{memory:?}");
+    }
     // What the protection unit can express: a power of two from 32 bytes on, aligned to its size.
     for region in [STACK_GUARD, NULL_GUARD, STORE] {
         assert!(region.length.is_power_of_two() && region.length >= 32, "{region:?}");
         assert_eq!(region.start % region.length, 0, "{region:?}");
     }
+}
+
+#[test]
+fn brown_out_lies_between_what_the_flash_needs_and_what_the_supply_may_fall_to() {
+    let levels: Vec<u32> = (0..4).map(brown_out_millivolts).collect();
+    assert_eq!(levels, [1_600, 2_100, 2_400, 2_700]);
+    // The chip programs its flash from 1.71 V on; 3.3 V may be a tenth low, and a transceiver works from 3.0 V on.
+    let wanted = brown_out_millivolts(BROWN_OUT_LEVEL);
+    assert!(wanted > 1_710 + 500 && wanted < 2_970 - 500, "{wanted}");
 }
 
 /// `NAME : ORIGIN = 0x.., LENGTH = ..K` of the linker script.
@@ -214,7 +288,6 @@ fn linker_script_and_constants_say_the_same() {
         ("HOTCODE", HOT_CODE),
         ("HOTDATA", HOT_DATA),
         ("EMERGENCY", EMERGENCY_STACK),
-        ("GUARD", STACK_GUARD),
         ("STACK", STACK),
         ("RAM", DATA),
     ];

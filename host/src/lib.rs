@@ -1,6 +1,7 @@
 //! Host side of Tactus.
 
 pub mod arm;
+mod boxed;
 pub mod can;
 pub mod check;
 pub mod client;

@@ -70,8 +70,9 @@ impl Line {
         Self::probe_rs("reset", chip, probe)
     }
 
-    /// Shows the log of a running image. The processor is never halted, whatever happens to it: a halted processor sends no
-    /// torques, and the pucks would hold the last ones.
+    /// Shows the log of a running image. Once attached the processor is not halted, whatever happens to it: a halted
+    /// processor sends no torques, and the pucks would hold the last ones. Attaching itself halts it for a moment, which no
+    /// option of probe-rs prevents (its issue 3135).
     #[must_use]
     pub fn attach(chip: &str, probe: Option<&str>, image: &Path) -> Self {
         let mut line = Self::probe_rs("attach", chip, probe);

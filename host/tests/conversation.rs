@@ -14,6 +14,7 @@ use device::{
 };
 use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
 use link::{LINK_VERSION, Name, Refusal, Request, SCHEMA_HASH};
+use pinned_init::InPlaceWrite;
 use tactus::client::{Client, Halted, Incoming, Interrupt, UploadOutcome, UploadPhase};
 use tactus::error::HostError;
 use tactus::transport::{StreamTransport, Transport, TransportError};
@@ -88,7 +89,7 @@ impl SessionPort for Half {
 
 /// A device in virtual time, with a line that can be cut or lose frames.
 struct Device {
-    session: Session<RamStore<3, 4096>>,
+    session: Box<Session<RamStore<3, 4096>>>,
     half: Half,
     steps: u32,
     /// Every so many portions from the host are lost; 0: none.
@@ -107,8 +108,9 @@ impl Device {
     fn new() -> Self {
         let identity =
             Identity { firmware: "1.2.3", board: "test", serial: "T-1", simulated: true, ticks_per_second: 25_000_000 };
+        let Ok(session) = Box::new_uninit().write_init(Session::init(identity, RamStore::new()));
         Self {
-            session: Session::new(identity, RamStore::new()),
+            session,
             half: Half {
                 state: State::Hold,
                 commands: Vec::new(),

@@ -206,9 +206,15 @@ fn a_device_that_runs_another_image_is_noticed_after_flashing() {
 }
 
 #[test]
-fn logs_are_read_without_ever_halting_the_processor() {
+fn logs_attach_only_when_told_that_this_may_restart_the_board() {
     let folder = laboratory(&elf(Some(&real().encode()), 0x0800_0000), Some(0));
-    tactus(folder.path(), &["logs", "--image", "arm.elf"]).success();
+    let refused = tactus(folder.path(), &["logs", "--image", "arm.elf"]).code(2);
+    let text = stderr(&refused);
+    assert!(text.contains("error[E223]") && text.contains("watchdog") && text.contains("--attach-may-reset"), "{text}");
+    tactus(folder.path(), &["logs", "--image", "arm.elf", "--dry-run"]).success();
+    assert!(calls(folder.path()).is_empty(), "the probe was touched without consent");
+    tactus(folder.path(), &["logs", "--image", "arm.elf", "--attach-may-reset"]).success();
+    // Once attached: no halt at a fault or a reset.
     let expected = "probe-rs attach --chip STM32H743ZITx --no-catch-hardfault --no-catch-reset arm.elf";
     assert_eq!(calls(folder.path()), [expected]);
 }

@@ -52,7 +52,7 @@ const KIB: u32 = 1024;
 const STM32H743: [Block; 5] = [
     Block { name: FLASH, start: 0x0800_0000, length: 1024 * KIB, budget: 448 * KIB },
     Block { name: "ITCM", start: 0x0000_0400, length: 63 * KIB, budget: 63 * KIB },
-    Block { name: STACK, start: 0x2000_1000, length: 60 * KIB, budget: share(60 * KIB, START_PERCENT) },
+    Block { name: STACK, start: 0x2000_0000, length: 64 * KIB, budget: share(64 * KIB, START_PERCENT) },
     Block { name: "DTCM, data", start: 0x2001_0000, length: 60 * KIB, budget: 60 * KIB },
     Block { name: "AXI", start: 0x2400_0000, length: 512 * KIB, budget: 288 * KIB },
 ];

@@ -1,5 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![no_std]
+// The initialiser of a large struct is a macro that calls itself for each field.
+#![recursion_limit = "256"]
 #![forbid(unsafe_code)]
 
 pub mod actuation;

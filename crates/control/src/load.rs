@@ -6,6 +6,7 @@
 use core::fmt;
 
 use dmp::{Configuration, Primitive, PrimitiveError, PrimitiveTables};
+use pinned_init::{Init, init};
 
 use crate::arm::ArmModel;
 use crate::kinematics::Frames;
@@ -103,8 +104,10 @@ pub(crate) struct Loaded<R: Real, const N: usize> {
 }
 
 impl<R: Real, const N: usize> Loaded<R, N> {
-    /// Nothing.
-    pub(crate) const NOTHING: Self = Loaded { primitive: Primitive::PLACEHOLDER, present: false };
+    /// Makes an empty place where it is.
+    pub(crate) fn init() -> impl Init<Self> {
+        init!(Loaded { primitive: Primitive::PLACEHOLDER, present: false })
+    }
 
     /// What is there.
     pub(crate) fn get(&self) -> Option<&Primitive<R, N>> {

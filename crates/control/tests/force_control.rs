@@ -3,8 +3,15 @@
 use control::controller::ForceController;
 use control::units::Vector6;
 use control::{PERIOD, Real};
+use pinned_init::InPlaceWrite;
 
 const AXES: [&str; 6] = ["fx", "fy", "fz", "tx", "ty", "tz"];
+
+/// A controller with an empty window of 60 control periods.
+fn controller<R: Real>() -> Box<ForceController<R>> {
+    let Ok(controller) = Box::new_uninit().write_init(ForceController::init(60));
+    controller
+}
 
 /// Largest deviation of the command and of the joint torques from the golden vectors, relative to their peaks.
 fn deviation<R: Real>() -> (f64, f64)
@@ -23,7 +30,7 @@ where
         let scale = if a < 3 { 0.6 } else { 1.0 };
         R::of(scale * (0.7 * a as f64 + 1.3 * b as f64 + 0.2).sin())
     }));
-    let mut controller = ForceController::<R>::new(60);
+    let mut controller = controller::<R>();
     let (mut worst, mut peak) = ([0.0f64; 2], [0.0f64; 2]);
     let mut rows = 0;
     for record in reader.records() {
@@ -60,7 +67,7 @@ fn golden_force_pi_in_both_precisions() {
 
 #[test]
 fn check_8_unit_step_starts_at_one_step_of_the_integral_ramps_and_stays() {
-    let mut controller = ForceController::<f64>::new(60);
+    let mut controller = controller::<f64>();
     let step = Vector6::from([1.0; 6]);
     let integral = 2.0;
     for tick in 0..200 {
@@ -77,7 +84,7 @@ fn check_8_unit_step_starts_at_one_step_of_the_integral_ramps_and_stays() {
 /// coefficient 0.5). Returns force (environment on robot) and position after 10 s.
 fn against_the_wall(sign: f64) -> (f64, f64) {
     let (mass, damping, wall, expected) = (3.0, 60.0, 5000.0, -10.0);
-    let mut controller = ForceController::<f64>::new(60);
+    let mut controller = controller::<f64>();
     let (mut x, mut v, mut felt) = (1e-3, 0.0, 0.0);
     for _ in 0..3000 {
         let force = if x > 0.0 { -wall * x } else { 0.0 };
@@ -111,7 +118,7 @@ fn check_7_negative_control_a_flipped_sign_leaves_the_wall_for_good() {
 
 #[test]
 fn the_window_does_not_drift_over_an_hour() {
-    let mut controller = ForceController::<f32>::new(60);
+    let mut controller = controller::<f32>();
     let mut state = 1u32;
     for _ in 0..300 * 3600 {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

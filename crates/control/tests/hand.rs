@@ -1,10 +1,12 @@
 //! The hand's estimator, Eq (14) and limits, each alone.
 
 use control::controller::Gains;
+use control::controller::gains::HandGains;
 use control::hand::estimate::{HandState, LOST_CYCLES};
 use control::hand::limit::TORQUE_LIMIT;
 use control::hand::{HandController, HandEstimator, HandLimiter, HandMotion, HandReference};
 use control::{HandSample, PERIOD};
+use pinned_init::InPlaceWrite;
 use proptest::prelude::*;
 use puck::{Counts, gauge};
 
@@ -130,11 +132,17 @@ fn state_of(q: [f64; 4], gauges: [f64; 3]) -> HandState<f64> {
     HandState { q, dq: [0.0; 4], outer: [0.0; 3], gauges, age: [0; 4], gauge_age: 0 }
 }
 
+/// A controller of the digits without history.
+fn controller(gains: &HandGains<f64>) -> Box<HandController<f64>> {
+    let Ok(controller) = Box::new_uninit().write_init(HandController::init(gains));
+    controller
+}
+
 #[test]
 fn a_step_of_the_gauge_ramps_through_the_window_and_then_stays() {
     // Eq (14) with the sign of Eq (12): u_0 = -(P + K_i dt) e, then linear, then flat -(P + K_i Dt) e from tick N-1 on.
     let gains = Gains::<f64>::tuned().hand;
-    let mut controller = HandController::new(&gains);
+    let mut controller = controller(&gains);
     let at = [0.4, 0.7, 0.8, 0.9];
     let reference = HandReference::at_rest(at);
     let felt = [-0.5, 0.0, 0.3];
@@ -159,7 +167,7 @@ fn a_step_of_the_gauge_ramps_through_the_window_and_then_stays() {
 #[test]
 fn the_position_part_pulls_towards_the_reference_and_waits_where_a_reply_is_missing() {
     let gains = Gains::<f64>::tuned().hand;
-    let mut controller = HandController::new(&gains);
+    let mut controller = controller(&gains);
     let reference = HandReference::at_rest([0.1, 0.6, 0.4, 0.5]);
     let torque = controller.torque(&gains, &state_of([0.0, 0.5, 0.5, 0.5], [0.0; 3]), &reference, None, false);
     assert!(torque[0] > 0.0 && torque[1] > 0.0 && torque[2] < 0.0 && torque[3] == 0.0, "{torque:?}");

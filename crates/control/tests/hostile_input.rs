@@ -2,6 +2,7 @@
 
 use control::arm::ArmModel;
 use control::command::{AccelerationSource, Command, Goal, PoseFeedback, RunOptions};
+use control::controller::Gains;
 use control::hand::limit::TORQUE_LIMIT as HAND_LIMIT;
 use control::limit::STEP_LIMIT;
 use control::load::{self, End, LoadError};
@@ -12,6 +13,7 @@ use dmp::{
 };
 use std::sync::LazyLock;
 
+use pinned_init::InPlaceWrite;
 use proptest::prelude::*;
 use puck::{Action, CanFrame, Counts, GaugeStatus, RawWrench, Request, SafetyMode};
 
@@ -79,9 +81,15 @@ fn sample(positions: [Option<Counts>; 7]) -> CycleInput {
     }
 }
 
+/// A cycle of a nominal arm with this payload.
+fn cycle(payload: Payload) -> Box<Cycle<f32, KERNELS>> {
+    let Ok(cycle) = Box::new_uninit().write_init(Cycle::init(Calibration::nominal(payload), Gains::tuned()));
+    cycle
+}
+
 /// A cycle in the given state, at rest at [`POSTURE`].
-fn cycle_in(state: State) -> Cycle<f32, KERNELS> {
-    let mut cycle = Cycle::new(Calibration::nominal(Payload::SensorAndHand));
+fn cycle_in(state: State) -> Box<Cycle<f32, KERNELS>> {
+    let mut cycle = cycle(Payload::SensorAndHand);
     let model = ArmModel::new(Payload::SensorAndHand);
     let primitive = load::primitive(&model, &tables()).expect("a good primitive");
     cycle.load(&load::check(&model, &primitive).expect("fits")).expect("loads");
@@ -349,7 +357,7 @@ fn a_primitive_checked_for_an_arm_with_a_hand_is_not_taken_by_a_bare_one() {
     let model = ArmModel::new(Payload::SensorAndHand);
     let primitive = load::primitive::<f32, KERNELS>(&model, &tables()).expect("good");
     let fit = load::check(&model, &primitive).expect("fits");
-    let mut bare = Cycle::new(Calibration::nominal(Payload::None));
+    let mut bare = cycle(Payload::None);
     assert_eq!(bare.load(&fit), Err(control::LoadRefusal::OtherTool));
     assert!(bare.primitive().is_none());
     // The bare arm's own check says why: its tool frame is elsewhere.

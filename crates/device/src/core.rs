@@ -12,7 +12,9 @@
 //! No torque but zero leaves before the start-up is over, a person has activated the arm, and a person has commanded it:
 //! the frames of a cycle come from [`control::Actuation`] or are zero.
 
+use control::controller::Gains;
 use control::{Calibration, Cycle, CycleInput, CycleRecord, Fault, LoadRefusal, Payload, State};
+use pinned_init::{Init, init};
 use puck::{CanFrame, MotorMode, Node, PropertyId, Reply, SafetyMode, Status, set, zero_torques};
 
 use crate::bus::{Outlet, SlotOutlet};
@@ -110,11 +112,11 @@ pub struct Core {
 }
 
 impl Core {
-    /// A device that has just got power: silent, without torque, at the beginning of the start-up.
-    pub fn new() -> Core {
-        Core {
+    /// Makes, in its place, a device that has just got power: silent, without torque, at the beginning of the start-up.
+    pub fn init() -> impl Init<Core> {
+        init!(Core {
             // Never used for torque: the scales of this arm replace it before the first cycle.
-            cycle: Cycle::new(Calibration::nominal(Payload::SensorAndHand)),
+            cycle <- Cycle::init(Calibration::nominal(Payload::SensorAndHand), Gains::tuned()),
             number: 0,
             startup: Startup::new(),
             pacer: Pacer::default(),
@@ -136,7 +138,7 @@ impl Core {
             overruns: 0,
             wants_idle: false,
             idle_request_in: 0,
-        }
+        })
     }
 
     /// One timer tick. `now_us` is the device's time in microseconds and never runs backwards.
@@ -306,7 +308,9 @@ impl Core {
         self.last_cycles.get_or_insert(LAST_CYCLES);
     }
 
-    /// A slot of the start-up.
+    /// A slot of the start-up. Not inlined, nor is [`Core::control`]: a board keeps the two in different memories, and the frame of the
+    /// start-up stays out of the cycle's.
+    #[inline(never)]
     fn start_up(&mut self, now_us: u64, io: &mut impl CoreIo) {
         // Answers keep the order of the commands: the next one waits while an answer is outstanding.
         if !self.startup.is_zero_pending() {
@@ -371,6 +375,8 @@ impl Core {
         }
     }
 
+    /// The slot that computes and sends torques.
+    #[inline(never)]
     fn control(&mut self, now_us: u64, io: &mut impl CoreIo) {
         if !self.round.is_open() {
             // The start-up ended in the middle of a cycle.
@@ -484,6 +490,8 @@ impl Core {
         }
     }
 
+    /// The slot that asks one slow question.
+    #[inline(never)]
     fn ask_slowly(&mut self, now_us: u64, io: &mut impl CoreIo) {
         self.idle_request_in = self.idle_request_in.saturating_sub(1);
         let writable = self.startup.safety_properties().is_some_and(|safety| safety.mode_is_writable);
@@ -533,11 +541,5 @@ impl Core {
 
     fn tell(&self, kind: EventKind, io: &mut impl CoreIo) {
         io.event(Event { cycle: self.number, kind });
-    }
-}
-
-impl Default for Core {
-    fn default() -> Core {
-        Core::new()
     }
 }

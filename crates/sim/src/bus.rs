@@ -121,6 +121,12 @@ impl Bus {
         self.on_wire.is_some()
     }
 
+    /// Who sends the frame on the wire.
+    #[must_use]
+    pub fn sender(&self) -> Option<Node> {
+        self.on_wire.map(|passage| passage.sender)
+    }
+
     /// What went over the bus so far; the frame on the wire counts from its start.
     #[must_use]
     pub fn trace(&self) -> &BusTrace {

@@ -32,7 +32,7 @@ pub mod world;
 pub use bus::{Bus, Passage};
 pub use force_torque::ForceTorqueConfig;
 pub use hand::HandConfig;
-pub use link_wire::{BYTE_TICKS, CHUNK, LinkLine};
+pub use link_wire::{BYTE_TICKS, CHUNK, LinkLine, PlainLine};
 pub use lockstep::{Lockstep, LockstepError, Served};
 pub use noise::Noise;
 pub use operator::{OperatorConfig, PendantAction};

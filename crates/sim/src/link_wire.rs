@@ -1,4 +1,5 @@
-//! The line between host and co-controller in virtual time: any [`LinkLine`], and the serial one, 921 600 baud 8N1.
+//! The line between host and co-controller in virtual time: any [`LinkLine`], the serial one, 921 600 baud 8N1, and one
+//! without delay.
 //!
 //! On the serial line, towards the device, bytes are handed over in chunks of at most 64, as a UART with DMA and an idle-line interrupt does: one
 //! event per chunk instead of one per byte. A chunk becomes due when its last byte has arrived.
@@ -79,6 +80,45 @@ impl LinkLine for SerialLine {
 
     fn backlog_from_device(&self, now: Ticks) -> usize {
         self.from_device.iter().filter(|(due, _)| *due > now).count()
+    }
+}
+
+/// A line that takes no time, for a device that does its own: what one side sends the other has at once.
+#[derive(Clone, Debug, Default)]
+pub struct PlainLine {
+    to_device: VecDeque<u8>,
+    /// When the oldest bytes towards the device were sent.
+    offered_at: Ticks,
+    from_device: VecDeque<u8>,
+}
+
+impl LinkLine for PlainLine {
+    fn send_to_device(&mut self, now: Ticks, bytes: &[u8]) {
+        if self.to_device.is_empty() {
+            self.offered_at = now;
+        }
+        self.to_device.extend(bytes);
+    }
+
+    fn send_from_device(&mut self, _now: Ticks, bytes: &[u8]) {
+        self.from_device.extend(bytes);
+    }
+
+    fn next_time(&self) -> Option<Ticks> {
+        (!self.to_device.is_empty()).then_some(self.offered_at)
+    }
+
+    fn take_to_device(&mut self, _now: Ticks) -> Vec<u8> {
+        let count = self.to_device.len().min(CHUNK);
+        self.to_device.drain(..count).collect()
+    }
+
+    fn take_from_device(&mut self, _now: Ticks) -> Vec<u8> {
+        self.from_device.drain(..).collect()
+    }
+
+    fn backlog_from_device(&self, _now: Ticks) -> usize {
+        0
     }
 }
 

@@ -80,6 +80,8 @@ pub enum Served {
     Link,
     /// The firmware used its flash.
     Flash,
+    /// The firmware took back every frame that had not begun on the wire.
+    Withdraw,
     /// The firmware said good-bye; it will not ask again.
     Bye,
     /// The stream ended between two requests, without a good-bye.
@@ -102,6 +104,7 @@ enum Request {
     Bye,
     Link(Vec<u8>),
     Flash(FlashRequest),
+    Withdraw,
 }
 
 /// What the firmware asks of its flash.
@@ -172,6 +175,15 @@ impl<R: Read, W: Write> Lockstep<R, W> {
                 self.to_firmware.write_all(&encode_flash_reply(&reply, plant.next_event()))?;
                 self.to_firmware.flush()?;
                 return Ok(Served::Flash);
+            }
+            Request::Withdraw => {
+                let unfinished = plant.withdraw(t);
+                self.exchanges += 1;
+                let mut reply = encode_reply(&Event::default(), plant.next_event());
+                reply[0] |= u8::from(unfinished) << 3;
+                self.to_firmware.write_all(&reply)?;
+                self.to_firmware.flush()?;
+                return Ok(Served::Withdraw);
             }
         };
         self.exchanges += 1;
@@ -255,6 +267,7 @@ impl<R: Read, W: Write> Lockstep<R, W> {
                     _ => return Err(LockstepError::Flash { operation, count, length }),
                 })
             }
+            6 => Request::Withdraw,
             kind => return Err(LockstepError::Kind { kind }),
         };
         Ok(Some((t, request)))

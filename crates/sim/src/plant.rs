@@ -216,6 +216,15 @@ impl Plant {
         self.arbitrate();
     }
 
+    /// The co-controller takes back every frame that has not begun on the wire, at time `t`: it cancels them, has left the bus
+    /// or is reset. Whether one of its frames has begun, whose end [`Plant::event`] has still to tell.
+    pub fn withdraw(&mut self, t: Ticks) -> bool {
+        self.run_to(t);
+        self.bus.withdraw(Node::HOST);
+        self.next_happening = self.look_ahead();
+        self.bus.sender() == Some(Node::HOST) || self.deliveries.iter().any(|delivery| delivery.received.is_none())
+    }
+
     /// When the co-controller has to call [`Plant::event`] next, as far as can be known before it gets there.
     ///
     /// A time that has passed means: at once. `None` means never, unless it submits something.

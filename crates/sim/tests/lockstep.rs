@@ -2,7 +2,9 @@
 
 use puck::SafetyMode;
 use sim::lockstep::{NEVER, REPLY_LENGTH};
-use sim::{BYTE_TICKS, FreeJoints, HOME, Lockstep, LockstepError, OperatorConfig, Plant, PlantConfig, Served};
+use sim::{
+    BYTE_TICKS, FreeJoints, HOME, Lockstep, LockstepError, OperatorConfig, PlainLine, Plant, PlantConfig, Served,
+};
 
 /// An arm nobody switches on: only the safety module speaks, and nothing happens by itself.
 fn quiet_plant() -> Plant {
@@ -123,6 +125,41 @@ fn link_bytes_cross_in_both_directions_at_the_speed_of_the_line() {
     let (_, second, _) = serve(&mut plant, &request(2, 0, 0, now + 100 * BYTE_TICKS, &[]));
     assert_eq!((second[0], second[4], &second[REPLY_LENGTH..]), (0b100, 36, &[7; 36][..]));
     assert_eq!(next_event(&second), NEVER);
+}
+
+#[test]
+fn what_was_withdrawn_never_leaves_and_what_has_begun_is_still_told() {
+    let mut plant = quiet_plant();
+    for t in 0..3 {
+        serve(&mut plant, &request(1, 1, 0x00A, 1000 + t, &[0x08]));
+    }
+    let (served, reply, _) = serve(&mut plant, &request(6, 0, 0, 1010, &[]));
+    assert_eq!(served, [Served::Withdraw, Served::EndOfStream]);
+    assert_eq!(reply[0], 0b1000, "the first of them is on the wire");
+    let (_, done, _) = serve(&mut plant, &request(2, 0, 0, 50_000, &[]));
+    assert_eq!(done[0], 0b010, "its end");
+    let (_, arrived, _) = serve(&mut plant, &request(2, 0, 0, 50_000, &[]));
+    assert_eq!(arrived[0], 0b001, "the answer");
+    assert_eq!(next_event(&arrived), NEVER, "and nothing of the other two");
+    let (_, reply, _) = serve(&mut plant, &request(6, 0, 0, 50_001, &[]));
+    assert_eq!(reply[0], 0, "nothing of the firmware is on the wire");
+}
+
+#[test]
+fn a_line_without_delay_hands_bytes_over_at_once() {
+    let mut plant = quiet_plant();
+    plant.set_link_line(Box::new(PlainLine::default()));
+    serve(&mut plant, &request(2, 0, 0, 1000, &[]));
+    plant.link_to_device(&[7; 100]);
+    let (_, reply, _) = serve(&mut plant, &request(2, 0, 0, 1000, &[]));
+    assert_eq!((reply[0], reply[4], reply.len()), (0b100, 64, REPLY_LENGTH + 64));
+    assert_eq!(next_event(&reply), 1000, "there is more");
+    let (_, reply, _) = serve(&mut plant, &request(2, 0, 0, 1000, &[]));
+    assert_eq!((reply[4], next_event(&reply)), (36, NEVER));
+    let mut bytes = request(4, 3, 0, 1000, &[]);
+    bytes.extend([1, 2, 3]);
+    serve(&mut plant, &bytes);
+    assert_eq!(plant.take_from_device(), [1, 2, 3]);
 }
 
 #[test]

@@ -29,6 +29,7 @@ use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
 
 use crate::board::{Clock, Edge, Parts, SlotTimer};
+use crate::in_place;
 
 pub use bus::{ReceiveTask, TransmitTask};
 pub use log::{Log, LogTask};
@@ -153,11 +154,14 @@ pub fn start<E: Edge>(
     let (records, from_core) = queues.records.split();
     let (events, news) = queues.events.split();
     let (to_log, to_tell) = queues.log.split();
+    let core = in_place::build(core, Core::init());
+    let session = in_place::build(session, Session::init(identity, shelf));
+    // When everything is built, which takes a while: the first slot must find its task ready.
     slot_timer.start();
     Application {
-        core: new_core(core),
+        core,
         can,
-        session: new_session(session, identity, shelf),
+        session,
         slot_task: SlotTask::new(clock, slot_timer, light, slot::Ends { from_bus, to_bus, commands, records, events }),
         receive_task: ReceiveTask::new(incoming),
         transmit_task: TransmitTask::new(outgoing),
@@ -165,21 +169,4 @@ pub fn start<E: Edge>(
         log_task: LogTask::new(to_tell),
         flash,
     }
-}
-
-/// Builds the control half in its place. Not inlined: what the compiler may put on the stack meanwhile is gone when it
-/// returns.
-#[inline(never)]
-fn new_core(place: &'static mut CorePlace) -> &'static mut Core {
-    place.write(Core::new())
-}
-
-/// Builds the session in its place, as [`new_core`].
-#[inline(never)]
-fn new_session(
-    place: &'static mut MaybeUninit<Dialogue>,
-    identity: Identity,
-    shelf: &'static mut Shelf,
-) -> &'static mut Dialogue {
-    place.write(Session::new(identity, shelf))
 }

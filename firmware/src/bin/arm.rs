@@ -15,8 +15,9 @@ static METADATA: [u8; link::metadata::METADATA_BYTES] = {
     firmware::metadata::block(Board::NAME, Board::SIMULATED, device::IMAGE, device::STORE)
 };
 
+// RTIC gives the first line to the lowest priority among the software tasks, which is that of the log.
 #[cfg(target_os = "none")]
-#[rtic::app(device = firmware::board::device, peripherals = false, dispatchers = [DISPATCH_SESSION, DISPATCH_LOG])]
+#[rtic::app(device = firmware::board::device, peripherals = false, dispatchers = [DISPATCH_LOG, DISPATCH_SESSION])]
 mod app {
     use device::Core;
     use firmware::application::{

@@ -1,12 +1,14 @@
 //! The primitive played by the control code itself on an ideal arm: every margin that counts before motion.
 
 use control::calibration::Calibration;
+use control::controller::Gains;
 use control::units::{JointVelocities, Vector7};
 use control::{BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, RunOptions, State, flags, load};
 use puck::SafetyMode;
 
 use super::plant::Plant;
 use crate::arm;
+use crate::boxed::boxed;
 use crate::plan::PERIOD;
 use crate::primitive_file::HostPrimitive;
 
@@ -66,7 +68,7 @@ impl ClosedLoop {
     /// Plays the primitive at `speed` times its taught speed; `progress` hears the fraction done now and then.
     pub(super) fn play(primitive: &HostPrimitive, speed: f64, mut progress: impl FnMut(f64)) -> ClosedLoop {
         let mut run = ClosedLoop { samples: Vec::new(), ending: Ending::Endless };
-        let mut cycle: Cycle<f64> = Cycle::new(Calibration::nominal(arm::PAYLOAD));
+        let mut cycle: Box<Cycle<f64>> = boxed(Cycle::init(Calibration::nominal(arm::PAYLOAD), Gains::tuned()));
         let loaded = load::check(cycle.model(), primitive).map(|fit| cycle.load(&fit));
         match loaded {
             Ok(Ok(())) => {}

@@ -26,15 +26,21 @@ pub struct Cmd {
     /// Show a log that was kept in a file, as the emulator writes it
     #[arg(long, value_name = "FILE")]
     pub file: Option<PathBuf>,
+    /// Attach to a running board: that halts it for a moment, and its watchdog may restart it, so the arm must have no torque
+    #[arg(long, conflicts_with = "file")]
+    pub attach_may_reset: bool,
     /// Say what would be run
     #[arg(long)]
     pub dry_run: bool,
 }
 
-/// Shows the log until Ctrl-C, or that of a file to its end. The device is never halted.
+/// Shows the log until Ctrl-C, or that of a file to its end.
+///
+/// Reading the log does not disturb the device, but attaching to it does: probe-rs halts the core while it clears the
+/// breakpoints of an earlier session, and the watchdog goes on meanwhile. So it has to be asked for by name.
 ///
 /// # Errors
-/// There is no image, or the program that reads the log is missing or fails.
+/// It was not asked for, there is no image, or the program that reads the log is missing or fails.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "logs";
     let (line, input) = match &command.file {
@@ -53,6 +59,13 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     global.output().say(line.to_string());
     if command.dry_run {
         return Ok(());
+    }
+    if command.file.is_none() && !command.attach_may_reset {
+        let text = "attaching the debug probe halts the board for a moment, and its watchdog may restart it";
+        return Err(Failure::new(Exit::Usage, "E223", DOING, text.to_owned()).help(
+            "take the torque from the arm (Shift-Idle), then `tactus logs --attach-may-reset`; better, start it before \
+             the arm is switched on: once attached it only reads",
+        ));
     }
     line.run(input).map_err(|error| probe_failure(error, DOING))
 }

@@ -19,6 +19,7 @@ use sim::{Plant, SLOT_TICKS, TICKS_PER_MICROSECOND, Ticks};
 
 use super::halves::{FIRST_SLOT, LINE_ROOM, Port, Queues};
 use super::{Execute, SimulationError};
+use crate::boxed::boxed;
 
 /// Primitives the store holds, twice as many as in the firmware.
 const STORE_SLOTS: usize = 8;
@@ -35,10 +36,10 @@ type Dialogue = Session<Library<STORE_SLOTS, IMAGE_BYTES_LIMIT>>;
 
 /// The session, shared with whoever keeps its library on the flash; never by two at a time.
 #[derive(Clone)]
-struct SharedSession(Arc<Mutex<Dialogue>>);
+struct SharedSession(Arc<Mutex<Box<Dialogue>>>);
 
 impl SharedSession {
-    fn lock(&self) -> MutexGuard<'_, Dialogue> {
+    fn lock(&self) -> MutexGuard<'_, Box<Dialogue>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -100,7 +101,7 @@ impl Keeper {
 
 /// The application and the time of its next slot.
 pub(super) struct InProcess {
-    core: Core,
+    core: Box<Core>,
     session: SharedSession,
     keeper: Keeper,
     queues: Queues,
@@ -121,10 +122,10 @@ impl InProcess {
             simulated: true,
             ticks_per_second: sim::TICKS_PER_SECOND as u32,
         };
-        let session = Session::new(identity, Library::new());
+        let session = boxed(Session::init(identity, Library::new()));
         let session = SharedSession(Arc::new(Mutex::new(session)));
         Self {
-            core: Core::new(),
+            core: boxed(Core::init()),
             keeper: Keeper::new(flash, session.clone()),
             session,
             queues: Queues::default(),

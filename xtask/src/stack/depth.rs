@@ -127,17 +127,33 @@ impl Calls {
     /// The function in which every panic ends.
     ///
     /// # Errors
-    /// If there is none, or it does not mask interrupts before it calls anybody.
+    /// If there is none.
     pub(super) fn end(&self) -> Result<u32> {
-        let (address, function) = self
-            .code
-            .functions()
-            .find(|(_, function)| function.names().any(|name| name.ends_with(END)))
-            .with_context(|| format!("the image has no function '{END}'"))?;
-        if !masks_first(function) {
-            bail!("{} does not mask interrupts before it calls anybody", function.name());
+        let found = self.code.functions().find(|(_, function)| function.names().any(|name| name.ends_with(END)));
+        found.map(|(address, _)| address).with_context(|| format!("the image has no function '{END}'"))
+    }
+
+    /// Bytes in use until a function has masked interrupts, itself or in what it calls first.
+    ///
+    /// # Errors
+    /// If it calls anybody who does not.
+    pub(super) fn until_masked(&self, function: u32) -> Result<u32> {
+        let (Some(code), Some(frame)) = (self.code.at(function), self.frame(function)) else {
+            bail!("no function begins at {function:#010x}");
+        };
+        if masks_first(code) {
+            return Ok(frame.bytes);
         }
-        Ok(address)
+        let mut deepest = frame.bytes;
+        for call in &frame.calls {
+            match call.target {
+                Target::Function(to) if self.code.at(to).is_some_and(masks_first) => {
+                    deepest = deepest.max(call.depth + self.until_masked(to)?);
+                }
+                _ => bail!("{} does not mask interrupts before it calls anybody", code.name()),
+            }
+        }
+        Ok(deepest)
     }
 
     /// What a function calls, but through pointers.

@@ -25,8 +25,8 @@ pub(super) struct OtherStack {
     pub(super) top: &'static str,
     /// Its size.
     pub(super) bytes: u32,
-    /// The handler that takes it.
-    pub(super) handler: &'static str,
+    /// The handlers that take it. None of them returns, so each begins at its upper end.
+    pub(super) handlers: &'static [&'static str],
 }
 
 /// What interrupts what on a board, and what is below its stack.
@@ -56,11 +56,12 @@ const EXTENDED: u32 = 4 * (8 + 18 + 1);
 const BASIC: u32 = 4 * (8 + 1);
 
 /// Faults and what nobody serves.
-const ENDS: &[&str] = &["HardFault", "DefaultHandler"];
+const ENDS: &[&str] = &["NonMaskableInt", "DefaultHandler"];
+/// The same where a hard fault has no stack of its own.
+const ENDS_AND_HARD_FAULT: &[&str] = &["HardFault", "NonMaskableInt", "DefaultHandler"];
 
-/// RTIC hands out its dispatchers from the lowest priority up, in the order they are listed.
-const FIRST_DISPATCHER: Level = level(1, &["DISPATCH_SESSION"]);
-const SECOND_DISPATCHER: Level = level(2, &["DISPATCH_LOG"]);
+const LOG: Level = level(1, &["DISPATCH_LOG"]);
+const SESSION: Level = level(2, &["DISPATCH_SESSION"]);
 const BUS: Level = level(10, &["CAN_RECEIVE", "CAN_TRANSMIT"]);
 const SLOT: Level = level(12, &["SLOT_TIMER"]);
 
@@ -69,32 +70,24 @@ const LAYOUTS: [Layout; 3] = [
     Layout {
         board: "nucleo-h743zi2",
         exception: EXTENDED,
-        levels: &[
-            FIRST_DISPATCHER,
-            SECOND_DISPATCHER,
-            level(3, &["OTG_FS"]),
-            BUS,
-            SLOT,
-            level(13, &["USART3"]),
-            level(14, &["FDCAN1_IT1"]),
-        ],
+        levels: &[LOG, SESSION, level(3, &["OTG_FS"]), BUS, SLOT, level(13, &["USART3"]), level(14, &["FDCAN1_IT1"])],
         ends: ENDS,
-        other: Some(OtherStack { top: "__emergency_stack", bytes: 4096, handler: "MemoryManagement" }),
-        guard: Some(4096),
+        other: Some(OtherStack { top: "__emergency_stack", bytes: 4096, handlers: &["MemoryManagement", "HardFault"] }),
+        guard: Some(64 * 1024),
     },
     Layout {
         board: "mps2-an500",
         exception: EXTENDED,
-        levels: &[FIRST_DISPATCHER, SECOND_DISPATCHER, BUS, SLOT, level(14, &["BUS_WIRE"])],
-        ends: ENDS,
+        levels: &[LOG, SESSION, BUS, SLOT, level(14, &["BUS_WIRE"])],
+        ends: ENDS_AND_HARD_FAULT,
         other: None,
         guard: None,
     },
     Layout {
         board: "mps2-an385",
         exception: BASIC,
-        levels: &[level(2, &["DISPATCH_SESSION"]), BUS, SLOT, level(14, &["BUS_WIRE"])],
-        ends: ENDS,
+        levels: &[SESSION, BUS, SLOT, level(14, &["BUS_WIRE"])],
+        ends: ENDS_AND_HARD_FAULT,
         other: None,
         guard: None,
     },
@@ -115,7 +108,7 @@ impl Layout {
     pub(super) fn check(&self, calls: &Calls, vectors: &[u32], stored: &BTreeMap<u32, u32>) -> Result<()> {
         let listed = || {
             let levels = self.levels.iter().flat_map(|level| level.handlers);
-            levels.chain(self.ends).copied().chain(self.other.iter().map(|other| other.handler))
+            levels.chain(self.ends).chain(self.other.iter().flat_map(|other| other.handlers)).copied()
         };
         // Behind the stack's beginning and where the image begins.
         for (line, vector) in vectors.iter().enumerate().skip(2).filter(|(_, vector)| **vector != 0) {

@@ -27,7 +27,7 @@ use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
 use crate::code::Code;
 use crate::elf::Elf;
 use crate::shell;
-use depth::{Calls, Part, Stop};
+use depth::{Calls, Part, Stop, Way};
 use levels::Layout;
 use memory::Memory;
 use pointers::KINDS;
@@ -226,14 +226,20 @@ fn of(file: &Elf<'_>) -> Result<Depth> {
     let [end, begin] = [symbol(STACK[0])?, symbol(STACK[1])?];
     let size = begin.checked_sub(end).context("the stack ends above its beginning")?;
     let mut image = Image { calls: &calls, layout, plain: BTreeMap::new() };
-    image.plain = BTreeMap::from([(calls.end()?, calls.frame(calls.end()?).map_or(0, |frame| frame.bytes))]);
+    image.plain = BTreeMap::from([(calls.end()?, calls.until_masked(calls.end()?)?)]);
     let other = match &layout.other {
         Some(other) => {
-            let handler = calls.address(other.handler)?;
-            let takes = calls.frame(handler).and_then(|frame| frame.other_stack);
-            ensure!(takes == Some(symbol(other.top)?), "{} does not take the stack {}", other.handler, other.top);
-            let way = image.deepest(handler, Part::Whole, &image.plain)?;
-            Some((other.bytes, vec![("the handler".to_owned(), way)]))
+            let mut deepest = Way::default();
+            for name in other.handlers {
+                let handler = calls.address(name)?;
+                let takes = calls.frame(handler).and_then(|frame| frame.other_stack);
+                ensure!(takes == Some(symbol(other.top)?), "{name} does not take the stack {}", other.top);
+                let way = image.deepest(handler, Part::Whole, &image.plain)?;
+                if way.bytes >= deepest.bytes {
+                    deepest = way;
+                }
+            }
+            Some((other.bytes, vec![("a handler with a stack of its own".to_owned(), deepest)]))
         }
         None => None,
     };

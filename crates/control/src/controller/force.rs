@@ -6,6 +6,8 @@
 //! `G = P + K_i Dt`. `F` has to be low-passed before it comes here: with unit gain and a tick of delay a stiff contact is
 //! marginally stable.
 
+use pinned_init::{Init, init};
+
 use crate::controller::window::Window;
 use crate::kinematics::Jacobian;
 use crate::real::Real;
@@ -21,9 +23,10 @@ pub struct ForceController<R: Real> {
 }
 
 impl<R: Real> ForceController<R> {
-    /// A controller with an empty window of `length` control periods (kept within 1 and [`WINDOW_CAPACITY`]).
-    pub fn new(length: usize) -> Self {
-        ForceController { window: Window::new(length) }
+    /// Makes, in its place, a controller with an empty window of `length` control periods (kept within 1 and
+    /// [`WINDOW_CAPACITY`]).
+    pub fn init(length: usize) -> impl Init<Self> {
+        init!(ForceController { window <- Window::init(length) })
     }
 
     /// Empties the window.

@@ -1,6 +1,7 @@
 //! `Window`: the sum of the last errors, for the windowed integrals of Eqs (12) and (14).
 
 use nalgebra::SVector;
+use pinned_init::{Init, init, init_array_from_fn};
 
 use crate::real::Real;
 
@@ -19,16 +20,16 @@ pub struct Window<R: Real, const D: usize, const CAPACITY: usize> {
 }
 
 impl<R: Real, const D: usize, const CAPACITY: usize> Window<R, D, CAPACITY> {
-    /// An empty window of `length` control periods (kept within 1 and `CAPACITY`).
-    pub fn new(length: usize) -> Self {
-        Window {
-            errors: [SVector::zeros(); CAPACITY],
+    /// Makes an empty window of `length` control periods (kept within 1 and `CAPACITY`) in its place.
+    pub fn init(length: usize) -> impl Init<Self> {
+        init!(Window {
+            errors <- init_array_from_fn(|_| SVector::zeros()),
             length: length.clamp(1, CAPACITY),
             next: 0,
             full: false,
             sum: SVector::zeros(),
             rebuilt: SVector::zeros(),
-        }
+        })
     }
 
     /// Empties the window and gives it this length.
@@ -71,14 +72,19 @@ impl<R: Real, const D: usize, const CAPACITY: usize> Window<R, D, CAPACITY> {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use std::boxed::Box;
+
     use nalgebra::Vector1;
+    use pinned_init::InPlaceWrite;
 
     use super::*;
 
     #[test]
     fn an_emptied_window_forgets_what_was_in_it_whatever_its_new_length() {
         let errors: [f64; 39] = core::array::from_fn(|index| 1.0 + index as f64);
-        let mut window = Window::<f64, 1, 8>::new(8);
+        let Ok(mut window) = Box::new_uninit().write_init(Window::<f64, 1, 8>::init(8));
         for (before, length) in [(3, 8), (8, 5), (20, 8), (11, 1), (1, 3)] {
             errors[..before].iter().for_each(|error| window.push(&Vector1::new(100.0 * error)));
             window.restart(length);

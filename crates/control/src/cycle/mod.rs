@@ -11,6 +11,7 @@ mod laws;
 mod transitions;
 
 use dmp::Primitive;
+use pinned_init::{Init, init};
 use puck::SafetyMode;
 
 use crate::actuation::Actuation;
@@ -106,16 +107,14 @@ struct Measured<'a, R: Real> {
 }
 
 impl<R: Real, const N: usize> Cycle<R, N> {
-    /// A cycle in `Idle`, with the tuned gains and without a primitive.
-    pub fn new(calibration: Calibration<R>) -> Self {
-        Cycle::with_gains(calibration, Gains::tuned())
-    }
-
-    /// A cycle in `Idle` with other gains.
-    pub fn with_gains(calibration: Calibration<R>, gains: Gains<R>) -> Self {
+    /// Makes, in its place, a cycle in `Idle` with these gains (for a real arm: [`Gains::tuned`]) and without a primitive.
+    ///
+    /// In place, piece by piece, because a cycle takes half of a small processor's stack. Where there is a heap:
+    /// `Box::new_uninit().write_init(Cycle::init(..))`, with [`pinned_init::InPlaceWrite`].
+    pub fn init(calibration: Calibration<R>, gains: Gains<R>) -> impl Init<Self> {
         let model = ArmModel::new(calibration.payload);
         let home = JointPositions::zero();
-        Cycle {
+        init!(Cycle {
             bounds: JointBounds::around(&model, &home),
             supervisor: Supervisor::new(),
             monitor: Monitor::new(),
@@ -124,10 +123,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             limiter: TorqueLimiter::new(&calibration),
             joint_controller: JointController::new(),
             operational: OperationalController::new(home),
-            force: ForceController::new(gains.stiff.force_window),
+            force <- ForceController::init(gains.stiff.force_window),
             integral: PostureIntegral::new(),
-            hand: HandDrive::new(&gains.hand),
-            loaded: Loaded::NOTHING,
+            hand <- HandDrive::init(&gains.hand),
+            loaded <- Loaded::init(),
             run: None,
             approach: None,
             hold: home,
@@ -144,7 +143,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             calibration,
             model,
             gains,
-        }
+        })
     }
 
     /// The present state.

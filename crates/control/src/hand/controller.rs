@@ -6,6 +6,7 @@
 //! what it should press on is driven shut. The spread is controlled in position alone.
 
 use nalgebra::SVector;
+use pinned_init::{Init, init};
 
 use crate::controller::gains::HandGains;
 use crate::controller::window::Window;
@@ -45,9 +46,10 @@ pub struct HandController<R: Real> {
 }
 
 impl<R: Real> HandController<R> {
-    /// A controller without history.
-    pub fn new(gains: &HandGains<R>) -> Self {
-        HandController { window: Window::new(gains.force_window), feedback: [R::of(0.0); DIGITS] }
+    /// Makes a controller without history in its place.
+    pub fn init(gains: &HandGains<R>) -> impl Init<Self> + use<R> {
+        let length = gains.force_window;
+        init!(HandController { window <- Window::init(length), feedback: [R::of(0.0); DIGITS] })
     }
 
     /// Forgets everything.

@@ -1,5 +1,7 @@
 //! `HandDrive`: where the hand is to go, and whether it is driven at all.
 
+use pinned_init::{Init, init};
+
 use crate::controller::gains::HandGains;
 use crate::hand::controller::{HandController, HandReference};
 use crate::hand::estimate::{HandEstimator, HandState};
@@ -39,18 +41,19 @@ pub struct HandDrive<R: Real> {
 }
 
 impl<R: Real> HandDrive<R> {
-    /// No hand known, nothing driven.
-    pub fn new(gains: &HandGains<R>) -> Self {
-        HandDrive {
+    /// Makes, in its place, a drive that knows no hand and drives nothing.
+    pub fn init(gains: &HandGains<R>) -> impl Init<Self> + use<R> {
+        let controller = HandController::init(gains);
+        init!(HandDrive {
             estimator: HandEstimator::new(),
             state: None,
-            controller: HandController::new(gains),
+            controller <- controller,
             limiter: HandLimiter::new(),
             aim: Aim::None,
             expected: None,
             saturated: false,
             driven: false,
-        }
+        })
     }
 
     /// Takes what the hand told since the last cycle.

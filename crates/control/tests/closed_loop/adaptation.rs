@@ -5,11 +5,11 @@ use control::controller::Gains;
 use control::kinematics::Frames;
 use control::limit::STEP_LIMIT;
 use control::units::JointPositions;
-use control::{Cycle, CycleRecord, Event, Fault, Refusal, State, flags};
+use control::{CycleRecord, Event, Fault, Refusal, State, flags};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
 
 use crate::primitives::{DISPLACEMENT, Design, GOAL, ROTATION, START, primitive};
-use crate::rig::Rig;
+use crate::rig::{Rig, cycle};
 
 const FEELING: RunOptions = RunOptions {
     goal: control::Goal::STORED,
@@ -453,7 +453,7 @@ fn a_wall_is_pressed_with_the_force_that_statics_predicts() {
     let design = Design { expected: Some([expected, 0.0, 0.0, 0.0, 0.0, 0.0]), duration: 8.0, ..staying(START) };
     let pressed = |gains: Gains<f32>| {
         let mut rig = Rig::<f32>::new(START, 1);
-        rig.cycle = Cycle::with_gains(control::Calibration::nominal(control::Payload::SensorAndHand), gains);
+        rig.cycle = cycle(gains);
         rig.plant.coulomb *= 0.0;
         rig.command(Command::Hold);
         rig.run_for(2.0);

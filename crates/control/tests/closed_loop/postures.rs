@@ -6,10 +6,10 @@ use control::controller::Gains;
 use control::controller::integral::TOLERANCE;
 use control::limit::STEP_LIMIT;
 use control::units::{JointPositions, Vector7};
-use control::{Calibration, Cycle, Event, Payload, RATE, State, flags, model};
+use control::{Event, RATE, State, flags, model};
 
 use crate::primitives::{Design, GOAL, START, primitive};
-use crate::rig::Rig;
+use crate::rig::{Rig, cycle};
 
 /// A rig that holds `q`, with `scale` times the friction of the model.
 fn holding(q: [f64; 7], delay: usize, scale: f64) -> Rig<f32> {
@@ -78,7 +78,7 @@ fn without_the_integral_friction_leaves_several_times_the_tolerance() {
     let mut left = 0.0f64;
     for scale in [0.7, 1.0, 1.3] {
         let mut rig = Rig::<f32>::new(GOAL, 1);
-        rig.cycle = Cycle::with_gains(Calibration::nominal(Payload::SensorAndHand), gains);
+        rig.cycle = cycle(gains);
         rig.plant.coulomb *= scale;
         rig.command(Command::Hold);
         rig.run_for(2.0);

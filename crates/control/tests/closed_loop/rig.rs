@@ -9,6 +9,7 @@ use std::collections::VecDeque;
 use crate::hand_plant::Hand;
 use control::arm::ArmModel;
 use control::command::Command;
+use control::controller::Gains;
 use control::kinematics::Frames;
 use control::units::{JointPositions, JointVelocities, Vector7};
 use control::{
@@ -16,6 +17,7 @@ use control::{
 };
 use dmp::Primitive;
 use nalgebra::{SMatrix, Vector3};
+use pinned_init::InPlaceWrite;
 use puck::{Action, CanFrame, Counts, Group, RawWrench, Request, SafetyMode};
 
 pub(crate) const KERNELS: usize = 50;
@@ -158,9 +160,16 @@ impl Plant {
     }
 }
 
+/// A controller of the nominal arm with these gains.
+pub(crate) fn cycle<R: Real>(gains: Gains<R>) -> Box<Cycle<R, KERNELS>> {
+    let nominal = Calibration::nominal(Payload::SensorAndHand);
+    let Ok(cycle) = Box::new_uninit().write_init(Cycle::init(nominal, gains));
+    cycle
+}
+
 /// The controller and the plant, joined.
 pub(crate) struct Rig<R: Real> {
-    pub(crate) cycle: Cycle<R, KERNELS>,
+    pub(crate) cycle: Box<Cycle<R, KERNELS>>,
     pub(crate) plant: Plant,
     pub(crate) safety: SafetyMode,
     pub(crate) number: u64,
@@ -172,7 +181,7 @@ pub(crate) struct Rig<R: Real> {
 impl<R: Real> Rig<R> {
     pub(crate) fn new(q: [f64; 7], delay: usize) -> Self {
         Rig {
-            cycle: Cycle::new(Calibration::nominal(Payload::SensorAndHand)),
+            cycle: cycle(Gains::tuned()),
             plant: Plant::new(q, delay),
             safety: SafetyMode::Active,
             number: 0,

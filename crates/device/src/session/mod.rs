@@ -24,8 +24,8 @@ use control::arm::ArmModel;
 use control::{Payload, State};
 use heapless::Deque;
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame, LINK_TIMEOUT_MS};
-use link::image::{KERNEL_LIMIT, WEIGHT_ROWS};
 use link::{Event, EventKind, Refusal, Reply, Request, Statistics};
+use pinned_init::{Init, init, zeroed};
 
 use crate::event::EventKind as CoreEvent;
 use crate::port::{SessionPort, StoredPrimitive, TimedRecord};
@@ -93,12 +93,12 @@ pub struct Session<S> {
 }
 
 impl<S: Store> Session<S> {
-    /// A session without a host. Reads the store. Until the control half knows what is mounted, primitives are checked against an arm
-    /// with sensor and hand.
-    pub fn new(identity: Identity, store: S) -> Self {
+    /// Makes a session without a host in its place. Reads the store. Until the control half knows what is mounted, primitives are
+    /// checked against an arm with sensor and hand.
+    pub fn init(identity: Identity, store: S) -> impl Init<Self> {
         let directory = Directory::read(&store);
         let opened = store.is_open();
-        Self {
+        init!(Session {
             identity,
             payload: Payload::SensorAndHand,
             model: ArmModel::new(Payload::SensorAndHand),
@@ -120,9 +120,9 @@ impl<S: Store> Session<S> {
             telemetry_dropped: 0,
             events_dropped: 0,
             link_timeouts: 0,
-            room: [0.0; WEIGHT_ROWS * KERNEL_LIMIT],
+            room <- zeroed::<WeightRoom>(),
             primitive: StoredPrimitive::PLACEHOLDER,
-        }
+        })
     }
 
     /// The store, for inspection.

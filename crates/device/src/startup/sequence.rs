@@ -1,6 +1,6 @@
 //! The state machine of the start-up: which frame comes next, and what its answer means.
 //!
-//! The order is that of Barrett's library and drivers: enumerate, reload the limits of the safety module, wait for IDLE,
+//! Zero torque and IDLE to everything come first. Then the order is that of Barrett's library and drivers: enumerate, reload the limits of the safety module, wait for IDLE,
 //! enumerate again (the pucks have power only now), wake, verify, read, zero, tare, one position read, then the cyclic loop.
 //! Each step sends through an outlet that may refuse (a pause is not over); it then simply tries again in the next slot.
 
@@ -126,10 +126,11 @@ pub(super) enum ZeroRequest {
 }
 
 impl Startup {
-    /// Begins at the beginning, silently.
+    /// Begins at the beginning. The first frames take off what torque may still be applied: pucks keep the last torque they
+    /// were sent, and a board that was reset does not know whether its arm is ACTIVE.
     pub(crate) fn new() -> Startup {
         Startup {
-            step: Step::Enumerate { node: *ENUMERATED.start(), powered: false },
+            step: Step::Hush { frame: 0 },
             exchange: Exchange::default(),
             survey: Survey::new(),
             hand: HandSurvey::default(),
@@ -146,9 +147,9 @@ impl Startup {
         }
     }
 
-    /// Begins anew after the cyclic loop: first takes off any torque that may still be applied.
+    /// Begins anew after the cyclic loop.
     pub(crate) fn restart(&mut self) {
-        *self = Startup { step: Step::Hush { frame: 0 }, ..Startup::new() };
+        *self = Startup::new();
     }
 
     /// How far it has come.

@@ -5,7 +5,7 @@ use device::{Command, Core, Stage};
 use proptest::prelude::*;
 use puck::{CanFrame, CanId, Counts, Node, PuckTorque, SafetyMode};
 
-use crate::double::{Bus, HOME};
+use crate::double::{Bus, HOME, silent_device};
 
 /// Something that happens to the device.
 #[derive(Clone, Debug)]
@@ -128,7 +128,7 @@ proptest! {
         story in prop::collection::vec(happening(), 1..60),
     ) {
         let bus = Bus::idle();
-        let (mut core, mut bus) = (Core::new(), if hand { bus.with_hand() } else { bus });
+        let (mut core, mut bus) = (silent_device(), if hand { bus.with_hand() } else { bus });
         let mut may_move = false;
         for happening in &story {
             let before = bus.log.len();

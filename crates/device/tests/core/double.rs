@@ -10,6 +10,7 @@ use crate::digit::Digit;
 use control::CycleRecord;
 use device::{Command, Core, CoreIo, Event, EventKind, Slot, Stage};
 use link::HandStage;
+use pinned_init::InPlaceWrite;
 use puck::device::{force_frame, position_frame, reply16, reply32, safety_broadcast, torque_frame};
 use puck::{
     Action, CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId, PropertyTable, PuckTorque,
@@ -477,9 +478,15 @@ impl CoreIo for Bus {
 /// Home of the arm, rad.
 pub(crate) const HOME: [f32; 7] = [0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0];
 
+/// A core that has just got power.
+pub(crate) fn silent_device() -> Box<Core> {
+    let Ok(core) = Box::new_uninit().write_init(Core::init());
+    core
+}
+
 /// A core and its bus, started, zeroed at home and waiting for Shift-Activate.
-pub(crate) fn started() -> (Core, Bus) {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+pub(crate) fn started() -> (Box<Core>, Bus) {
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.commands.push_back(Command::Zero { home: HOME });
     bus.run_until(&mut core, Stage::WaitingForActive);
@@ -487,8 +494,8 @@ pub(crate) fn started() -> (Core, Bus) {
 }
 
 /// A core and its bus with a hand, activated, holding; the hand is not initialised.
-pub(crate) fn holding_with_hand() -> (Core, Bus) {
-    let (mut core, mut bus) = (Core::new(), Bus::idle().with_hand());
+pub(crate) fn holding_with_hand() -> (Box<Core>, Bus) {
+    let (mut core, mut bus) = (silent_device(), Bus::idle().with_hand());
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.commands.push_back(Command::Zero { home: [0.1, 0.5, 0.1, 1.5, 0.1, 0.2, 0.1] });
     bus.run_until(&mut core, Stage::WaitingForActive);
@@ -502,7 +509,7 @@ pub(crate) fn holding_with_hand() -> (Core, Bus) {
 }
 
 /// The same, with an initialised hand.
-pub(crate) fn holding_with_ready_hand() -> (Core, Bus) {
+pub(crate) fn holding_with_ready_hand() -> (Box<Core>, Bus) {
     let (mut core, mut bus) = holding_with_hand();
     bus.commands.push_back(Command::InitialiseHand);
     bus.run(&mut core, 7.0);
@@ -511,8 +518,8 @@ pub(crate) fn holding_with_ready_hand() -> (Core, Bus) {
 }
 
 /// The same as [`started`], activated and floating under gravity compensation away from the joint limits.
-pub(crate) fn floating() -> (Core, Bus) {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+pub(crate) fn floating() -> (Box<Core>, Bus) {
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.commands.push_back(Command::Zero { home: [0.1, 0.5, 0.1, 1.5, 0.1, 0.2, 0.1] });
     bus.run_until(&mut core, Stage::WaitingForActive);

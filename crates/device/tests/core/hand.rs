@@ -1,7 +1,7 @@
 //! The hand: found, woken, initialised by a person alone, read and driven in every cycle, and lost without the arm.
 
 use control::{Command as Control, State, flags};
-use device::{Command, Core, EventKind, HandTrouble, Refusal, Slot, Stage};
+use device::{Command, EventKind, HandTrouble, Refusal, Slot, Stage};
 use link::HandStage;
 use puck::hand::angles;
 use puck::{
@@ -9,7 +9,7 @@ use puck::{
     Request,
 };
 
-use crate::double::{Bus, floating, holding_with_hand, holding_with_ready_hand, started};
+use crate::double::{Bus, floating, holding_with_hand, holding_with_ready_hand, silent_device, started};
 
 /// Slots of a control cycle.
 const CYCLE: usize = 3;
@@ -69,7 +69,8 @@ fn move_hand(bus: &mut Bus) {
 fn an_arm_without_a_hand_hears_nothing_of_one() {
     let (mut core, mut bus) = floating();
     assert_eq!((core.health().hand, news(&bus)), (HandStage::Absent, vec![]));
-    let asked: Vec<_> = to_hand(&bus, 0);
+    let [(_, _, first), asked @ ..] = &to_hand(&bus, 0)[..] else { panic!("nothing was sent to a hand") };
+    assert_eq!(*first, Action::Set { property: PropertyId::MODE, value: 0 }, "it may be driven from an earlier life");
     assert!(
         asked.iter().all(|(_, _, action)| matches!(action, Action::Get { property: PropertyId::STAT })),
         "{asked:?}"
@@ -84,8 +85,8 @@ fn an_arm_without_a_hand_hears_nothing_of_one() {
 fn a_hand_is_woken_braked_and_then_left_alone_until_a_person_asks() {
     let (core, bus) = holding_with_hand();
     assert_eq!((core.health().hand, news(&bus)), (HandStage::NotInitialised, vec![(HandStage::NotInitialised, None)]));
-    let mut expected: Vec<_> =
-        Node::HAND.into_iter().map(|node| (Destination::Node(node), PropertyId::STAT, 2)).collect();
+    let mut expected = vec![set_mode(Group::HAND, MotorMode::Idle)];
+    expected.extend(Node::HAND.into_iter().map(|node| (Destination::Node(node), PropertyId::STAT, 2)));
     expected.push(set_mode(Group::HAND, MotorMode::Idle));
     assert_eq!(sets(&bus, 0), expected);
     let asked = |property| {
@@ -348,7 +349,7 @@ fn a_hand_that_falls_silent_altogether_is_given_up_after_a_fifth_of_a_second() {
 
 /// The arm starts with this hand; what is told of it.
 fn verdict(break_something: impl FnOnce(&mut Bus)) -> (HandStage, Option<(Node, HandTrouble)>) {
-    let (mut core, mut bus) = (Core::new(), Bus::idle().with_hand());
+    let (mut core, mut bus) = (silent_device(), Bus::idle().with_hand());
     break_something(&mut bus);
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.commands.push_back(Command::Zero { home: crate::double::HOME });
@@ -418,7 +419,7 @@ fn a_hand_woken_by_a_start_up_that_failed_is_not_taken_for_one_that_kept_its_pow
 
 #[test]
 fn commands_to_the_hand_before_the_end_of_the_start_up_are_refused_with_its_stage() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle().with_hand());
+    let (mut core, mut bus) = (silent_device(), Bus::idle().with_hand());
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.commands.push_back(Command::InitialiseHand);
     bus.run(&mut core, 0.1);

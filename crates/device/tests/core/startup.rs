@@ -1,11 +1,12 @@
 //! From power-up to a cyclic loop, and all the reasons not to get there.
 
-use device::{Command, Core, EventKind, Refusal, Stage, StartupError};
+use device::{Command, EventKind, Refusal, Stage, StartupError};
 use puck::{
-    Action, Counts, Destination, Group, Node, Property, PropertyId, PropertyTable, PuckTorque, Request, SafetyMode,
+    Action, CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId, PropertyTable, PuckTorque,
+    Request, SafetyMode, set, zero_torques,
 };
 
-use crate::double::{ARM, Bus, HOME, started};
+use crate::double::{ARM, Bus, HOME, silent_device, started};
 
 const SAFETY: Destination = Destination::Node(Node::SAFETY_MODULE);
 
@@ -27,7 +28,7 @@ fn stages(bus: &Bus) -> Vec<Stage> {
 /// The pauses that Barrett's devices need, checked on everything that was sent before the cyclic loop.
 fn assert_pauses(bus: &Bus) {
     let loop_begins = bus.records.first().map_or(bus.log.len(), |_| {
-        // The cyclic loop begins with the first request for a wrench, or with torque.
+        // The cyclic loop begins with the first request for a wrench, or with torque behind that of the first two frames.
         let begins = |frame: &puck::CanFrame| {
             matches!(
                 Request::decode(frame).expect("a request").action,
@@ -35,7 +36,7 @@ fn assert_pauses(bus: &Bus) {
             )
         };
         // The position request of the same slot stands before it.
-        bus.log.iter().position(|(_, frame)| begins(frame)).expect("a loop").saturating_sub(1)
+        1 + bus.log[2..].iter().position(|(_, frame)| begins(frame)).expect("a loop")
     });
     let frames = &bus.log[..loop_begins];
     assert!(frames.len() > 60, "only {} frames before the loop", frames.len());
@@ -59,7 +60,7 @@ fn assert_pauses(bus: &Bus) {
 
 #[test]
 fn from_emergency_stop_to_ready_in_the_documented_order() {
-    let (mut core, mut bus) = (Core::new(), Bus::in_emergency_stop());
+    let (mut core, mut bus) = (silent_device(), Bus::in_emergency_stop());
     bus.run(&mut core, 2.0);
     assert_eq!(core.stage(), Stage::WaitingForIdle);
     bus.press_idle();
@@ -102,7 +103,7 @@ fn the_frames_of_the_start_up_are_those_of_the_reference() {
     bus.run(&mut core, 0.1);
     let sets: Vec<_> = bus.sets().map(|(_, to, property, value)| (to, property, value)).collect();
     let limit = |property| i32::from(safety_property(property).number());
-    let mut expected = Vec::new();
+    let mut expected = vec![(ARM, PropertyId::MODE, 0), (Group::HAND.into(), PropertyId::MODE, 0)];
     for property in [Property::Vl1, Property::Vl2, Property::Tl1, Property::Tl2] {
         expected.push((SAFETY, safety_property(Property::Def), limit(property)));
         expected.push((SAFETY, safety_property(Property::Load), limit(property)));
@@ -131,7 +132,7 @@ fn the_frames_of_the_start_up_are_those_of_the_reference() {
 
 #[test]
 fn an_emergency_stop_is_waited_for_without_end() {
-    let (mut core, mut bus) = (Core::new(), Bus::in_emergency_stop());
+    let (mut core, mut bus) = (silent_device(), Bus::in_emergency_stop());
     bus.run(&mut core, 20.0);
     assert_eq!(core.stage(), Stage::WaitingForIdle);
     assert_eq!(core.health().blocked, None);
@@ -144,7 +145,7 @@ fn an_emergency_stop_is_waited_for_without_end() {
 
 #[test]
 fn an_active_arm_is_not_started_until_a_person_makes_it_idle() {
-    let (mut core, mut bus) = (Core::new(), Bus::already_zeroed());
+    let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
     bus.press_activate();
     bus.run(&mut core, 3.0);
     assert_eq!(core.stage(), Stage::WaitingForIdle);
@@ -153,8 +154,23 @@ fn an_active_arm_is_not_started_until_a_person_makes_it_idle() {
 }
 
 #[test]
+fn g3_a_device_that_restarts_takes_off_the_torque_before_it_asks_anything() {
+    // The board was reset while the arm was ACTIVE: the pucks still apply what the old life commanded.
+    let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
+    bus.press_activate();
+    bus.run(&mut core, 0.02);
+    let [arm, wrist] = zero_torques();
+    let idle = |group| set(group, PropertyId::MODE, MotorMode::Idle.value());
+    let first: Vec<CanFrame> = bus.log.iter().take(4).map(|(_, frame)| *frame).collect();
+    assert_eq!(first, [arm, wrist, idle(Group::ARM), idle(Group::HAND)]);
+    let begun = bus.log.first().map(|(time, _)| *time).expect("a frame");
+    let zeroed = bus.log.get(1).map(|(time, _)| *time).expect("a second frame");
+    assert!(zeroed - begun <= 2_000, "both torque frames leave within two slots, not {} us", zeroed - begun);
+}
+
+#[test]
 fn a_zeroed_arm_keeps_its_counts() {
-    let (mut core, mut bus) = (Core::new(), Bus::already_zeroed());
+    let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
     bus.run_until(&mut core, Stage::WaitingForActive);
     assert!(core.health().zeroed);
     assert_eq!(core.health().zeroed_at, None, "nobody told this device where the arm stood then");
@@ -166,7 +182,7 @@ fn a_zeroed_arm_keeps_its_counts() {
 
 #[test]
 fn a_puck_that_never_wakes_is_named_and_tried_again() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.pucks[4].never_wakes = true;
     bus.run(&mut core, 8.0);
     let error = StartupError::DidNotWake(Node::ARM[4]);
@@ -180,7 +196,7 @@ fn a_puck_that_never_wakes_is_named_and_tried_again() {
 
 /// What the start-up says of a bus with one thing wrong.
 fn refusal(break_something: impl FnOnce(&mut Bus)) -> Option<StartupError> {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     break_something(&mut bus);
     bus.run_until(&mut core, Stage::Blocked);
     assert!(bus.records.is_empty());
@@ -211,7 +227,7 @@ fn whatever_is_wrong_with_a_device_is_named() {
 
 #[test]
 fn a_position_that_was_not_taken_is_noticed_before_the_safety_module_is_told() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.pucks[3].ignores_position_writes = true;
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.commands.push_back(Command::Zero { home: HOME });
@@ -222,7 +238,7 @@ fn a_position_that_was_not_taken_is_noticed_before_the_safety_module_is_told() {
 
 #[test]
 fn lost_answers_are_asked_for_again() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.run_until(&mut core, Stage::Reading);
     bus.pucks[0].lose_properties = 1;
     bus.pucks[5].lose_properties = 2;
@@ -232,7 +248,7 @@ fn lost_answers_are_asked_for_again() {
 
 #[test]
 fn an_arm_without_a_sensor_starts_too() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.sensor_present = false;
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.commands.push_back(Command::Zero { home: HOME });
@@ -262,7 +278,7 @@ fn the_wrench_has_its_zero_after_the_first_rest_and_none_after_a_new_start() {
 
 #[test]
 fn an_impossible_home_is_refused_by_its_joint() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.run_until(&mut core, Stage::WaitingForZero);
     for (joint, angle) in [(0, f32::NAN), (1, 2.5), (3, f32::INFINITY), (6, -3.2)] {
         let mut home = HOME;
@@ -278,7 +294,7 @@ fn an_impossible_home_is_refused_by_its_joint() {
 
 #[test]
 fn the_arm_is_not_zeroed_under_torque() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.press_activate();
     bus.run(&mut core, 0.5);
@@ -306,7 +322,7 @@ fn a_running_arm_can_be_zeroed_again_at_rest() {
 
 #[test]
 fn commands_before_the_end_of_the_start_up_are_refused_with_its_stage() {
-    let (mut core, mut bus) = (Core::new(), Bus::in_emergency_stop());
+    let (mut core, mut bus) = (silent_device(), Bus::in_emergency_stop());
     bus.run(&mut core, 2.0);
     bus.commands.push_back(control::Command::Gravity.into());
     bus.commands.push_back(Command::Zero { home: HOME });
@@ -317,7 +333,7 @@ fn commands_before_the_end_of_the_start_up_are_refused_with_its_stage() {
 
 #[test]
 fn an_emergency_stop_while_zero_is_awaited_starts_from_the_beginning() {
-    let (mut core, mut bus) = (Core::new(), Bus::idle());
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.press_emergency_stop();
     bus.run_until(&mut core, Stage::WaitingForIdle);

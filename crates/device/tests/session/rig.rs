@@ -14,6 +14,7 @@ use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame};
 use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
 use link::message::{ChunkData, DeviceHello, HostHello};
 use link::{HandStage, LINK_VERSION, Name, Refusal, Reply, Request, SCHEMA_HASH, Text};
+use pinned_init::InPlaceWrite;
 use puck::SafetyMode;
 
 /// Places of the store on the bench.
@@ -118,7 +119,7 @@ impl SessionPort for Bench {
 /// A session with its bench and one host.
 pub(crate) struct Rig<S = Store> {
     /// The session under test.
-    pub(crate) session: Session<S>,
+    pub(crate) session: Box<Session<S>>,
     /// What is around it.
     pub(crate) bench: Bench,
     /// The device's time, ms.
@@ -170,7 +171,7 @@ impl<S: device::Store> Rig<S> {
             zeroed_at: None,
             counters: Counters::default(),
         };
-        let session = Session::new(identity, store);
+        let Ok(session) = Box::new_uninit().write_init(Session::init(identity, store));
         Self { session, bench, now_ms: 10_000, number: 77, sequence: 0, decoder: Decoder::new() }
     }
 

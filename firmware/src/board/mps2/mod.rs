@@ -15,12 +15,13 @@ mod lockstep;
 mod logger;
 mod slot_timer;
 
-use semihosting::io::Write;
-
+use cortex_m_rt::{ExceptionFrame, exception};
 use puck::CanFrame;
+use semihosting::io::Write;
 use semihosting::process::ExitCode;
 
 use super::Parts;
+use crate::last_words;
 
 /// The board.
 pub struct Board(());
@@ -80,4 +81,10 @@ impl super::Edge for Board {
         }
         ExitCode::FAILURE.exit_process()
     }
+}
+
+/// QEMU's stack has no guard and can always be read.
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    last_words::after_hard_fault(core::ptr::from_ref(frame).addr() as u32, Some(frame))
 }

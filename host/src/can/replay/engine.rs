@@ -5,12 +5,13 @@ use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
 use sim::{SLOT_TICKS, TICKS_PER_MICROSECOND, Ticks};
 
+use crate::boxed::boxed;
 use crate::simulation::halves::{FIRST_SLOT, LINE_ROOM, Port, Queues};
 
 /// The application of a device at power-up, and the time of its next slot.
 pub(super) struct Engine {
-    core: Core,
-    session: Session<RamStore<STORE_SLOTS, IMAGE_BYTES_LIMIT>>,
+    core: Box<Core>,
+    session: Box<Session<RamStore<STORE_SLOTS, IMAGE_BYTES_LIMIT>>>,
     queues: Queues,
     slot: Slot,
     next: Ticks,
@@ -28,8 +29,8 @@ impl Engine {
             ticks_per_second: sim::TICKS_PER_SECOND as u32,
         };
         Self {
-            core: Core::new(),
-            session: Session::new(identity, RamStore::new()),
+            core: boxed(Core::init()),
+            session: boxed(Session::init(identity, RamStore::new())),
             queues: Queues::default(),
             slot: Slot::Request,
             next: FIRST_SLOT * SLOT_TICKS,

@@ -360,6 +360,13 @@ fn a_priority_that_is_not_the_one_in_the_table_is_refused() {
 fn a_panic_that_leaves_interrupts_on_is_refused() {
     let tiny = board(JOINT).with("rust_begin_unwind", vec![code(&[PUSH]), Call("deep"), code(&[MASK, NEVER])]);
     assert!(refusal(tiny.depth(JOINT)).contains("does not mask interrupts"));
+    // The one it calls may do it.
+    let tiny = board(JOINT)
+        .with("rust_begin_unwind", vec![code(&[PUSH]), Call("stranger"), code(&[NEVER])])
+        .with("stranger", vec![code(&[PUSH, PUSH, MASK]), Call("deep"), code(&[NEVER])])
+        .with("SLOT_TIMER", framed(40, &["rust_begin_unwind"]));
+    let depth = tiny.depth(JOINT).expect("a depth");
+    assert_eq!(depth.in_service(), 8 + 108 + 2 * 84 + 36 + 48 + 8 + 16 + 84);
 }
 
 #[test]
@@ -381,12 +388,12 @@ fn a_start_or_a_service_that_is_too_deep_fails() {
 #[test]
 fn a_frame_larger_than_the_guard_fails_where_there_is_a_guard() {
     let large = |name| board(name).with("begin", vec![code(&[PUSH, UNMASK, POP])]).with("idle", begin_large());
-    /// push; sub.w sp, sp, #4096; add.w; pop
+    /// push; sub.w sp, sp, #65536; add.w; pop
     fn begin_large() -> Vec<Piece> {
-        vec![code(&[PUSH, 0xF5AD, 0x5D80, 0xF50D, 0x5D80, POP])]
+        vec![code(&[PUSH, 0xF5AD, 0x3D80, 0xF50D, 0x3D80, POP])]
     }
     let said = large(REAL).depth(REAL).expect("a depth").faults().join("; ");
-    assert!(said.contains("idle has a frame of 4104 B") && said.contains("guard of 4096 B"), "{said}");
+    assert!(said.contains("idle has a frame of 65544 B") && said.contains("guard of 65536 B"), "{said}");
     assert!(large(JOINT).depth(JOINT).expect("a depth").faults().iter().all(|fault| !fault.contains("guard")));
 }
 

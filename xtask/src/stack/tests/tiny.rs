@@ -222,13 +222,12 @@ pub(super) fn board(name: &str) -> Tiny {
     for handler in layout.levels.iter().flat_map(|level| level.handlers).chain(layout.ends) {
         tiny = tiny.with(handler, framed(40, &[]));
     }
-    match &layout.other {
-        // ldr r1, [pc, #4]; mov sp, r1; b.w deep; the upper end of the emergency stack
-        Some(other) => {
-            tiny.with(other.handler, vec![code(&[0x4901, 0x468D]), Jump("deep"), Data(vec![0x0000, 0x2001])])
-        }
-        None => tiny,
+    // ldr r1, [pc, #4]; mov sp, r1; b.w deep; the upper end of the emergency stack
+    let emergency = || vec![code(&[0x4901, 0x468D]), Jump("deep"), Data(vec![0x0000, 0x2001])];
+    for handler in layout.other.iter().flat_map(|other| other.handlers) {
+        tiny = tiny.with(handler, emergency());
     }
+    tiny
 }
 
 pub(super) const JOINT: &str = "mps2-an385";

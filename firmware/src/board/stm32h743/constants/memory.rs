@@ -48,12 +48,12 @@ pub const HOT_CODE: Region = Region { start: 0x400, length: 63 * 1024 };
 /// All of the tightly coupled data memory.
 pub const DTCM: Region = Region { start: 0x2000_0000, length: 128 * 1024 };
 
-/// May not be touched: whoever gets here has overflowed the stack. 4 KiB; only start-up has functions with more locals
-/// than that, far above it.
-pub const STACK_GUARD: Region = Region { start: 0x2000_0000, length: 4 * 1024 };
+/// Addresses below the stack that may not be touched: whoever gets here has overflowed the stack. There is no memory, so the
+/// guard costs nothing, and it is as long as the stack itself: no frame that fits into the stack can step over it.
+pub const STACK_GUARD: Region = Region { start: 0x1FFF_0000, length: 64 * 1024 };
 
-/// The stack of all tasks and interrupts, growing down: never cached, never waited for.
-pub const STACK: Region = Region { start: 0x2000_1000, length: 60 * 1024 };
+/// The stack of all tasks and interrupts, growing down to the first byte of the DTCM: never cached, never waited for.
+pub const STACK: Region = Region { start: 0x2000_0000, length: 64 * 1024 };
 
 /// The control half, what the tasks own, the log's buffer and the last words.
 pub const HOT_DATA: Region = Region { start: 0x2001_0000, length: 60 * 1024 };

@@ -9,4 +9,5 @@ pub mod clocks;
 pub mod filters;
 pub mod lines;
 pub mod memory;
+pub mod supply;
 pub mod timers;

@@ -19,12 +19,38 @@ pub const SLOT_PRESCALER: u32 = 1;
 /// slot reads it.
 pub const CLOCK_HZ: u32 = TIMER_HZ;
 
-/// Divider in front of the watchdog's counter.
+/// Divider in front of the watchdog's counter, its value after a reset.
 pub const WATCHDOG_PRESCALER: u32 = 4;
 
-/// What the watchdog counts down: 80 ticks of 8 kHz are 10 ms, nine slots. The control slot may legally be late by one;
-/// pucks keep the last torque until the safety module's heartbeat runs out, so this must be the first to act.
+/// What the watchdog counts down from the start of the image until the first slot is due, its value after a reset: 512 ms.
+/// The clock tree and the building of both halves take this long at most, or the chip starts again.
+pub const WATCHDOG_START_TICKS: u32 = 4096;
+
+/// What the watchdog counts down in service: 80 ticks of 8 kHz are 10 ms, nine slots. The control slot may legally be late
+/// by one; pucks keep the last torque until the safety module's heartbeat runs out, so this must be the first to act.
 pub const WATCHDOG_TICKS: u32 = 80;
 
 /// Time until the watchdog resets the chip, us, at the nominal frequency of its oscillator.
-pub const WATCHDOG_US: u32 = WATCHDOG_TICKS * WATCHDOG_PRESCALER * (1_000_000 / 1_000) / (LSI_HZ / 1_000);
+pub const WATCHDOG_US: u32 = watchdog_us(WATCHDOG_TICKS);
+
+/// The same before the first slot, us.
+pub const WATCHDOG_START_US: u32 = watchdog_us(WATCHDOG_START_TICKS);
+
+/// Longest the watchdog may take to make a new window its own, us. It needs six periods of its divided oscillator, 0.8 ms;
+/// one that needs longer than this has no oscillator, and never resets anything.
+pub const WATCHDOG_UPDATE_US: u32 = 5_000;
+
+/// Time of so many ticks of the watchdog, us, at the nominal frequency.
+const fn watchdog_us(ticks: u32) -> u32 {
+    ticks * WATCHDOG_PRESCALER * (1_000_000 / 1_000) / (LSI_HZ / 1_000)
+}
+
+/// At the end, the longest wait for room for the last frames, us: four full frames of ours and one of another node.
+pub const LAST_ROOM_US: u32 = 1_500;
+
+/// At the end, the longest wait until a controller whose queue does not move has left the bus, us: a few ticks of its clock.
+pub const LAST_STOP_US: u32 = 100;
+
+/// At the end, the longest wait for the last frames to leave, us: either the bus has to be joined again, which takes 129
+/// times eleven bits, or a frame of another node and four that waited come first.
+pub const LAST_LEFT_US: u32 = 3_000;

@@ -5,6 +5,7 @@ use core::cell::Cell;
 use critical_section::Mutex;
 use embassy_stm32::pac::{RCC, TIM5};
 
+use super::super::constants::clocks::HSI_HZ;
 use super::super::constants::timers::CLOCK_HZ;
 
 /// Last extended reading. The counter wraps after 21 s; every slot reads the clock, so no wrap is missed.
@@ -33,7 +34,8 @@ impl crate::board::Clock for Clock {
     }
 }
 
-/// Lets the counter count every tick of the timer clock.
+/// Lets the counter count every tick of the timer clock, from 0. Called once before the clock tree is set up, so that there is
+/// a time to wait by, and once afterwards.
 pub(super) fn start() {
     RCC.apb1lenr().modify(|w| w.set_tim5en(true));
     // A clock that was just enabled reaches the peripheral two bus cycles later; reading back waits for that.
@@ -54,4 +56,26 @@ pub(super) fn now() -> u64 {
         last.set(now);
         now
     })
+}
+
+/// Asks until it is so, for at most this long; tells whether it was. Works with interrupts masked, once [`start`] has run.
+pub(super) fn within(us: u32, is_so: impl FnMut() -> bool) -> bool {
+    within_ticks(us * (TICKS_PER_US as u32), is_so)
+}
+
+/// The same before the clock tree is set up, when the counter runs from the chip's own oscillator.
+pub(super) fn within_early(us: u32, is_so: impl FnMut() -> bool) -> bool {
+    within_ticks(us * (HSI_HZ / 1_000_000), is_so)
+}
+
+fn within_ticks(limit: u32, mut is_so: impl FnMut() -> bool) -> bool {
+    let begin = TIM5.cnt().read();
+    loop {
+        if is_so() {
+            return true;
+        }
+        if TIM5.cnt().read().wrapping_sub(begin) >= limit {
+            return false;
+        }
+    }
 }

@@ -22,6 +22,8 @@ use puck::{CanFrame, CanId};
 
 use super::super::constants::can::{ARM, BIT_TIMING, ELEMENT_WORDS, HOST, MessageMemory};
 use super::super::constants::filters::{ARM_FILTERS, HOST_FILTERS};
+use super::super::constants::timers::{LAST_LEFT_US, LAST_ROOM_US, LAST_STOP_US};
+use super::clock;
 use super::device::{Chip, Interrupt, level};
 use crate::board::CanStatus;
 
@@ -39,10 +41,6 @@ const EXTENDED: u32 = 1 << 30;
 const REMOTE: u32 = 1 << 29;
 /// Where the length stands in the second word.
 const LENGTH_SHIFT: u32 = 16;
-
-/// Rounds of waiting for the last frames: each reads one register over the peripheral bus, at least 20 core cycles, so
-/// this is 3 ms or more at 400 MHz, enough for 20 frames.
-const LAST_ROUNDS: u32 = 60_000;
 
 /// One of the two controllers.
 pub(super) struct Controller {
@@ -183,19 +181,27 @@ impl Controller {
         if !(self.registers.psr().read().bo() && self.registers.cccr().read().init()) {
             return false;
         }
-        self.registers.txbcr().write(|w| w.0 = u32::MAX);
-        self.registers.cccr().modify(|w| w.set_init(false));
+        self.forget_and_join();
         true
+    }
+
+    /// Empties both queues and joins the bus. Only for a controller that is off the bus (INIT).
+    ///
+    /// Not by cancelling: that is for dedicated buffers and queues, and the controller's manual does not say that its FIFO
+    /// skips a cancelled frame. Opening the configuration (CCE) makes the controller forget what waits and what it has
+    /// received (TXBRP, TXFQS, RXF0S) and keeps its settings.
+    fn forget_and_join(&self) {
+        self.registers.cccr().modify(|w| w.set_cce(true));
+        self.join();
     }
 }
 
-/// Starts both controllers and lets the arm's interrupt.
-pub(super) fn start(nvic: &mut NVIC) {
+/// Starts the arm's controller and lets it interrupt, and the host's if the chip bears both.
+pub(super) fn start(nvic: &mut NVIC, host: bool) {
     RCC.apb1henr().modify(|w| w.set_fdcanen(true));
     RCC.apb1hrstr().modify(|w| w.set_fdcanrst(true));
     RCC.apb1hrstr().modify(|w| w.set_fdcanrst(false));
     ARM_CONTROLLER.start(&ARM_FILTERS);
-    HOST_CONTROLLER.start(&HOST_FILTERS);
     let r = ARM_CONTROLLER.registers;
     r.ie().write(|w| {
         w.set_rfne(0, true);
@@ -211,7 +217,10 @@ pub(super) fn start(nvic: &mut NVIC) {
         w.set_eint1(true);
     });
     ARM_CONTROLLER.join();
-    HOST_CONTROLLER.join();
+    if host {
+        HOST_CONTROLLER.start(&HOST_FILTERS);
+        HOST_CONTROLLER.join();
+    }
     // SAFETY: the handler below clears one flag and pends one line; it shares nothing with anybody.
     unsafe {
         nvic.set_priority(Chip::FDCAN1_IT1, level(SENT_PRIORITY));
@@ -302,20 +311,23 @@ impl CanStatus for ArmBus {
     }
 }
 
-/// The end: takes back what waits, rejoins if need be, and hands these frames over. Waits for nothing but room.
+/// The end: hands these frames over behind what waits, of which there is less than a millisecond. Only if the queue does
+/// not move, or the controller has left the bus, what waits is thrown away.
 pub(super) fn hand_over_last(frames: &[CanFrame]) {
+    if !is_started() {
+        return;
+    }
     let controller = &ARM_CONTROLLER;
-    controller.registers.txbcr().write(|w| w.0 = u32::MAX);
-    controller.registers.cccr().modify(|w| w.set_init(false));
-    // A frame that is on the wire is finished first; the others are gone at once.
-    for _ in 0..LAST_ROUNDS {
-        if controller.waiting() == 0 {
-            break;
-        }
+    let control = controller.registers.cccr();
+    let on_the_bus = !control.read().init();
+    if !(on_the_bus && clock::within(LAST_ROOM_US, || controller.room() >= frames.len())) {
+        control.modify(|w| w.set_init(true));
+        clock::within(LAST_STOP_US, || control.read().init());
+        controller.forget_and_join();
     }
     for frame in frames {
         if let Id::Standard(id) = frame.id() {
-            // There is room for eight after the above; if the bus is dead there is nothing left to try.
+            // There is room after the above; if the bus is dead there is nothing left to try.
             let _ = controller.send(id.as_raw(), frame.data(), frame.is_remote_frame());
         }
     }
@@ -323,9 +335,13 @@ pub(super) fn hand_over_last(frames: &[CanFrame]) {
 
 /// Waits until the last frames have left, at most a few milliseconds.
 pub(super) fn wait_for_last() {
-    for _ in 0..LAST_ROUNDS {
-        if ARM_CONTROLLER.waiting() == 0 {
-            break;
-        }
+    if is_started() {
+        clock::within(LAST_LEFT_US, || ARM_CONTROLLER.waiting() == 0);
     }
+}
+
+/// Whether the controllers have their clocks: the end may come before the start-up got here, or because the clock failed. The
+/// one that bounds the waits is started before them.
+fn is_started() -> bool {
+    RCC.apb1henr().read().fdcanen() && RCC.cr().read().pllrdy(0)
 }

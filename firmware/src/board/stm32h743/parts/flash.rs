@@ -150,10 +150,14 @@ fn judge(status: Sr) -> Result<(), Error> {
 /// Reads one flash word, or zeros where it is damaged.
 ///
 /// Bus faults are ignored only by handlers above all others, so the eight reads run as one: half a microsecond in which an
-/// interrupt waits. `address` must be a flash word of bank 2.
+/// interrupt waits. The protection unit stays on meanwhile, so they are reads of device memory: in order, each from the
+/// flash, nothing ahead. `address` must be a flash word of bank 2.
 fn read_word(address: u32) -> [u8; WORD_BYTES] {
     let mut parts = [0_u32; PARTS];
-    // SAFETY: clears bus faults noted earlier, which are nobody's business any more: those that matter never return.
+    // What was noted before this read must not be taken for it: `damaged` is judged by both below. Bus faults noted earlier are
+    // nobody's business any more, those that matter never return; flags of an operation were judged at its end.
+    bank().ccr().write_value(every_flag());
+    // SAFETY: clears the bits of bus faults, see above.
     unsafe { FAULT_STATUS.write_volatile(BUS_FAULTS) };
     // SAFETY: faults of the reads below are ignored (`protection`) and noted in the status register. The mask was clear:
     // this runs in the task of lowest priority.

@@ -14,15 +14,18 @@ use crate::board::LinkPort;
 
 /// The line as the selector sees it.
 pub struct HostCan {
+    /// Whether the controller runs. One that does not hears nothing, so the conversation is never here.
+    runs: bool,
     segmenter: Segmenter,
     reassembler: Reassembler,
     to_send: Deque<u8, TRANSMIT_BYTES>,
 }
 
 impl HostCan {
-    /// Nothing sent, nothing received.
-    pub(super) const fn new() -> Self {
+    /// Nothing sent, nothing received; `runs` tells whether the controller was started.
+    pub(super) const fn new(runs: bool) -> Self {
         Self {
+            runs,
             segmenter: Segmenter::new(Direction::ToHost, HOST_DEVICE),
             reassembler: Reassembler::new(Direction::ToDevice, HOST_DEVICE),
             to_send: Deque::new(),
@@ -49,6 +52,9 @@ impl HostCan {
 
 impl LinkPort for HostCan {
     fn read(&mut self, buffer: &mut [u8]) -> usize {
+        if !self.runs {
+            return 0;
+        }
         // A controller that has left the bus (nobody answers on it) comes back by itself.
         HOST_CONTROLLER.rejoin();
         self.pump();

@@ -1,7 +1,9 @@
 //! The board put together: clocks first, then protection, then the peripherals, then what the last start left behind.
 
 mod clock;
+mod crystal;
 pub mod device;
+mod faults;
 mod fdcan;
 mod flash;
 mod host_can;
@@ -14,20 +16,29 @@ mod protection;
 mod reset;
 mod serial_number;
 mod slot_timer;
+mod supply;
 mod tree;
 mod uart;
 mod usb;
 mod watchdog;
 
+use core::sync::atomic::{AtomicBool, Ordering};
+
 use embassy_stm32::Peripherals;
 use puck::CanFrame;
+use reset::Phase;
 
+use super::constants::can;
 use crate::board::Parts;
+
+/// The end has begun.
+static STOPPING: AtomicBool = AtomicBool::new(false);
 
 /// The board.
 pub struct Board {
     light: light::StatusLight,
     serial: &'static str,
+    host_bus: bool,
 }
 
 impl crate::board::Edge for Board {
@@ -42,12 +53,17 @@ impl crate::board::Edge for Board {
     const SIMULATED: bool = false;
 
     fn start(mut core: cortex_m::Peripherals) -> Self {
+        watchdog::start();
+        let cause = reset::take_cause();
         protection::start(&mut core);
+        clock::start();
+        crystal::wait();
         let peripherals: Peripherals = embassy_stm32::init(tree::config());
         tree::repair();
         clock::start();
+        crystal::watch();
+        reset::enter(Phase::Start);
         logger::start();
-        let cause = reset::take_cause();
         let light = light::StatusLight::new(peripherals.PB14);
         pins::connect(pins::Pins {
             arm_receive: peripherals.PD0,
@@ -59,13 +75,22 @@ impl crate::board::Edge for Board {
             usb_minus: peripherals.PA11,
             usb_plus: peripherals.PA12,
         });
-        fdcan::start(&mut core.NVIC);
+        let revision = tree::revision();
+        let host_bus = can::bears_both(revision);
+        fdcan::start(&mut core.NVIC, host_bus);
         uart::start(&mut core.NVIC);
         let serial = serial_number::read();
         usb::start(&mut core.NVIC, serial);
-        defmt::info!("reset by {=str}", cause.words());
+        defmt::info!("reset by {=str}", cause);
         last_words::tell();
-        Self { light, serial }
+        supply::tell();
+        if !host_bus {
+            defmt::warn!(
+                "no second CAN bus: this chip is revision {=u16:#x}, see errata sheet ES0392 2.24.2",
+                revision
+            );
+        }
+        Self { light, serial, host_bus }
     }
 
     fn serial(&self) -> &'static str {
@@ -77,7 +102,7 @@ impl crate::board::Edge for Board {
             clock: clock::Clock,
             slot_timer: slot_timer::SlotTimer,
             can: fdcan::ArmBus::take(),
-            link: port::new(),
+            link: port::new(self.host_bus),
             light: self.light,
             flash: flash::Bank2::take(),
         }
@@ -88,10 +113,15 @@ impl crate::board::Edge for Board {
     }
 
     fn stop(frames: &[CanFrame], reason: core::fmt::Arguments<'_>) -> ! {
-        // The frames go to the controller, which needs nobody to send them; the words are written meanwhile.
-        fdcan::hand_over_last(frames);
-        last_words::write(reason);
+        // Once only: should anything below end here again, the watchdog ends that.
+        if !STOPPING.swap(true, Ordering::Relaxed) {
+            // All waits below are bounded by the clock and shorter than the watchdog's window, which begins anew here.
+            watchdog::feed();
+            // The frames go to the controller, which needs nobody to send them; the words are written meanwhile.
+            fdcan::hand_over_last(frames);
+            last_words::write(reason);
+        }
         fdcan::wait_for_last();
-        cortex_m::peripheral::SCB::sys_reset()
+        reset::restart()
     }
 }

@@ -8,7 +8,7 @@ use crate::line::Either;
 /// All three lines; the first that speaks is used.
 pub(super) type Port = Either<Serial, Either<Usb, HostCan>>;
 
-/// The lines, the serial one chosen until another is heard.
-pub(super) fn new() -> Port {
-    Either::new(Serial, Either::new(Usb, HostCan::new()))
+/// The lines, the serial one chosen until another is heard; `host_bus` tells whether the second CAN bus runs.
+pub(super) fn new(host_bus: bool) -> Port {
+    Either::new(Serial, Either::new(Usb, HostCan::new(host_bus)))
 }

@@ -1,49 +1,84 @@
-//! Why the chip started: read once, then forgotten by the chip.
+//! Why the chip started: what the chip says, and how far the image was when it happened.
+//!
+//! The chip cannot tell a restart that the image asked for from one that a debug probe asked for, nor where the watchdog met
+//! the image. So the image notes its phase in memory that a restart keeps. After power came that memory holds anything,
+//! but then the chip says so, and the phase is not looked at.
 
+use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
+
+use cortex_m::peripheral::SCB;
 use embassy_stm32::pac::RCC;
 
-/// What made the chip start.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Cause {
-    /// Power came, or fell too low for a while.
-    Power,
-    /// The watchdog: no slot had begun for 10 ms.
-    Watchdog,
-    /// The image itself: after its last words.
-    Software,
-    /// The reset button or a debugger.
-    Pin,
-    /// None of the causes the chip tells apart.
-    Unknown,
+/// How far the image is; numbers that memory holds by chance once in a billion times.
+#[derive(Clone, Copy)]
+#[repr(u32)]
+pub(super) enum Phase {
+    /// The clock tree is being set up.
+    Clocks = 0x5441_0001,
+    /// Everything else up to the first slot.
+    Start = 0x5441_0002,
+    /// Slots come.
+    Service = 0x5441_0003,
+    /// The last words are told and a restart was asked for.
+    End = 0x5441_0004,
 }
 
-impl Cause {
-    /// For people.
-    pub(super) const fn words(self) -> &'static str {
-        match self {
-            Self::Power => "power",
-            Self::Watchdog => "the watchdog: no control slot had begun for 10 ms",
-            Self::Software => "the image itself",
-            Self::Pin => "the reset button or a debugger",
-            Self::Unknown => "an unknown cause",
-        }
-    }
+struct Place(UnsafeCell<MaybeUninit<u32>>);
+
+// SAFETY: one word, written and read volatile and whole.
+unsafe impl Sync for Place {}
+
+/// Not cleared by a start.
+#[unsafe(link_section = ".uninit.phase")]
+static PHASE: Place = Place(UnsafeCell::new(MaybeUninit::uninit()));
+
+/// The image has come so far.
+pub(super) fn enter(phase: Phase) {
+    // SAFETY: see `Place`.
+    unsafe { PHASE.0.get().cast::<u32>().write_volatile(phase as u32) };
 }
 
-/// Reads the cause and clears it, so that the next start tells its own.
-pub(super) fn take_cause() -> Cause {
+/// Restarts the chip, so that the next start knows that the image wanted it.
+pub(super) fn restart() -> ! {
+    enter(Phase::End);
+    cortex_m::asm::dsb();
+    SCB::sys_reset()
+}
+
+/// Takes what made the chip start, for people, and begins the first phase. Called first of all, once.
+pub(super) fn take_cause() -> &'static str {
+    // SAFETY: see `Place`; every bit pattern is a number.
+    let phase = unsafe { PHASE.0.get().cast::<u32>().read_volatile() };
+    enter(Phase::Clocks);
     let flags = RCC.rsr().read();
+    // So that the next start tells its own.
     RCC.rsr().modify(|w| w.set_rmvf(true));
     // Every reset also pulls the reset pin, and power also reports brown-out: the most telling cause first.
     if flags.iwdg1rstf() || flags.wwdg1rstf() {
-        Cause::Watchdog
+        by_watchdog(phase)
     } else if flags.sftrstf() {
-        Cause::Software
+        if phase == Phase::End as u32 { "the image itself" } else { "a debug probe" }
     } else if flags.porrstf() || flags.borrstf() {
-        Cause::Power
+        "power"
     } else if flags.pinrstf() {
-        Cause::Pin
+        "the reset pin: button or debug probe"
     } else {
-        Cause::Unknown
+        "an unknown cause"
+    }
+}
+
+/// Where the watchdog met the image.
+fn by_watchdog(phase: u32) -> &'static str {
+    const CLOCKS: u32 = Phase::Clocks as u32;
+    const START: u32 = Phase::Start as u32;
+    const SERVICE: u32 = Phase::Service as u32;
+    const END: u32 = Phase::End as u32;
+    match phase {
+        CLOCKS => "the watchdog: the clock tree did not run after 512 ms",
+        START => "the watchdog: no control slot had begun 512 ms after the start",
+        SERVICE => "the watchdog: no control slot had begun for 10 ms",
+        END => "the watchdog, at the end of the image",
+        _ => "the watchdog",
     }
 }

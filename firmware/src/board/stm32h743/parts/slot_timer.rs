@@ -1,10 +1,11 @@
-//! Timer 2 at 900 Hz, and with it the watchdog: it is fed where a slot begins, and nowhere else.
+//! Timer 2 at 900 Hz, and with it the watchdog: in service it is fed where a slot begins, and nowhere else.
 
 use embassy_stm32::pac::timer::regs::SrGp16;
 use embassy_stm32::pac::{RCC, TIM2};
 
 use super::super::constants::clocks::TIMER_HZ;
 use super::super::constants::timers::{CLOCK_HZ, SLOT_PRESCALER, SLOT_TICKS};
+use super::reset::{self, Phase};
 use super::watchdog;
 
 // Latency is told in ticks of the clock: both timers count the same ones.
@@ -15,6 +16,9 @@ pub struct SlotTimer;
 
 impl crate::board::SlotTimer for SlotTimer {
     fn start(&mut self) {
+        // First: it takes most of a millisecond, for which no slot may wait.
+        watchdog::narrow();
+        reset::enter(Phase::Service);
         RCC.apb1lenr().modify(|w| w.set_tim2en(true));
         RCC.apb1lenr().read();
         TIM2.psc().write_value((SLOT_PRESCALER - 1) as u16);
@@ -24,7 +28,6 @@ impl crate::board::SlotTimer for SlotTimer {
         take_back();
         TIM2.dier().modify(|w| w.set_uie(true));
         TIM2.cr1().modify(|w| w.set_cen(true));
-        watchdog::start();
     }
 
     fn acknowledge(&mut self) -> u32 {

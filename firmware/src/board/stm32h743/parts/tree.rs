@@ -40,6 +40,7 @@ pub(super) fn config() -> Config {
     config.rcc.ls = rcc::LsConfig::off();
     config.rcc.mux.fdcansel = rcc::mux::Fdcansel::PLL1_Q;
     config.rcc.mux.usbsel = rcc::mux::Usbsel::PLL3_Q;
+    config.rcc.mux.usart234578sel = rcc::mux::Usart234578sel::PLL3_Q;
     config
 }
 
@@ -65,8 +66,13 @@ const fn divider(divider: Option<u32>) -> Option<PllDiv> {
 /// What the maker's errata ask for at start-up: before revision V, reading the AXI memory while something else reads it
 /// may give wrong data unless the matrix issues one read at a time.
 pub(super) fn repair() {
-    if embassy_stm32::pac::DBGMCU.idc().read().rev_id() < REVISION_V {
+    if revision() < REVISION_V {
         // SAFETY: a register of the AXI matrix, written once before anything else uses the memory concurrently.
         unsafe { AXI_MEMORY_READS.write_volatile(1) };
     }
+}
+
+/// The chip's revision (REV_ID): 0x1001 Z, 0x1003 Y and W, 0x2001 X, 0x2003 V.
+pub(super) fn revision() -> u16 {
+    embassy_stm32::pac::DBGMCU.idc().read().rev_id()
 }

@@ -12,7 +12,7 @@ use embassy_stm32::pac::usart::vals::Over8;
 use embassy_stm32::pac::{self, RCC};
 use heapless::Deque;
 
-use super::super::constants::lines::{RECEIVE_BYTES, TRANSMIT_BYTES, UART_DIVIDER};
+use super::super::constants::lines::{RECEIVE_BYTES, TRANSMIT_BYTES, UART_BRR, UART_EIGHT_SAMPLES};
 use super::device::{Chip, level};
 use crate::board::LinkPort;
 
@@ -48,7 +48,7 @@ pub(super) fn start(nvic: &mut NVIC) {
     let r = pac::USART3;
     r.cr1().write(|w| {
         w.set_fifoen(true);
-        w.set_over8(Over8::OVERSAMPLING8);
+        w.set_over8(if UART_EIGHT_SAMPLES { Over8::OVERSAMPLING8 } else { Over8::OVERSAMPLING16 });
     });
     r.cr2().write(|w| w.set_rtoen(true));
     r.cr3().write(|w| {
@@ -56,9 +56,7 @@ pub(super) fn start(nvic: &mut NVIC) {
         w.set_txftcfg(HALF);
         w.set_rxftie(true);
     });
-    // Eight samples a bit: the lowest four bits of the divider stand one place lower, the fourth is unused.
-    let divider = UART_DIVIDER as u16;
-    r.brr().write(|w| w.set_brr(divider & !0xF | (divider & 0xF) >> 1));
+    r.brr().write(|w| w.set_brr(UART_BRR));
     r.rtor().write(|w| w.set_rto(SILENCE_BITS));
     r.cr1().modify(|w| {
         w.set_rtoie(true);

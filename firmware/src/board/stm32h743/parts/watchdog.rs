@@ -1,12 +1,18 @@
 //! The independent watchdog: resets the chip when no slot has begun for 10 ms. It has an oscillator of its own, and once
 //! started nothing but a reset stops it.
 //!
+//! It starts with the image, with the widest window it has, so that a start-up that hangs ends as well; [`narrow`] takes
+//! the window of the service just before the first slot.
+//!
 //! It goes on while a debugger halts the core: the pucks would hold the last torque for as long as somebody looks at a
 //! variable. A halt therefore ends in a reset, with the arm at rest.
 
 use embassy_stm32::pac::IWDG1;
+use embassy_stm32::pac::iwdg::vals::Key;
 
-use super::super::constants::timers::{WATCHDOG_PRESCALER, WATCHDOG_TICKS};
+use super::super::constants::timers::{WATCHDOG_PRESCALER, WATCHDOG_START_TICKS, WATCHDOG_TICKS, WATCHDOG_UPDATE_US};
+use super::clock;
+use crate::last_words;
 
 /// Key that opens the registers.
 const OPEN: u16 = 0x5555;
@@ -15,15 +21,26 @@ const FEED: u16 = 0xAAAA;
 /// Key that starts the watchdog.
 const START: u16 = 0xCCCC;
 
-// Register value 0 divides by 4.
-const _: () = assert!(WATCHDOG_PRESCALER == 4);
+// What the registers hold after a reset, and `start` therefore does not write.
+const _: () = assert!(WATCHDOG_PRESCALER == 4 && WATCHDOG_START_TICKS == 0xFFF + 1);
 
-/// Starts it. From here on it wants to be fed.
+/// Starts it with the window of the start-up.
 pub(super) fn start() {
     key(START);
+}
+
+/// Takes the window of the service, and starts it.
+pub(super) fn narrow() {
     key(OPEN);
-    IWDG1.pr().write(|w| w.set_pr(embassy_stm32::pac::iwdg::vals::Pr::DIVIDE_BY4));
     IWDG1.rlr().write(|w| w.set_rl((WATCHDOG_TICKS - 1) as u16));
+    // The value has to pass to the oscillator's side. Whoever feeds before it has arrived gets the old window.
+    let taken = clock::within(WATCHDOG_UPDATE_US, || {
+        let pending = IWDG1.sr().read();
+        !(pending.pvu() || pending.rvu())
+    });
+    if !taken {
+        last_words::stop(format_args!("the watchdog does not take its window: no arm without a watchdog"));
+    }
     key(FEED);
 }
 
@@ -33,5 +50,5 @@ pub(super) fn feed() {
 }
 
 fn key(value: u16) {
-    IWDG1.kr().write(|w| w.set_key(embassy_stm32::pac::iwdg::vals::Key::from_bits(value)));
+    IWDG1.kr().write(|w| w.set_key(Key::from_bits(value)));
 }

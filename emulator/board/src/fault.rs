@@ -1,0 +1,117 @@
+//! Faults that are put in from outside: on the wire, in the supply, in the core.
+
+use std::str::FromStr;
+
+/// Which fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Bit errors until the arm's controller leaves the bus.
+    BusOff,
+    /// Nobody acknowledges on the arm's bus, for these microseconds; 0: for ever.
+    NoAcknowledge(u64),
+    /// The arm's bus is held dominant, likewise.
+    Dominant(u64),
+    /// Power fails in the middle of this operation of bank 2, counted from the given time; 0 is the next.
+    PowerCut(u64),
+    /// The oscillator's input has no clock from this time on.
+    HseDead,
+    /// A debugger makes a non-maskable interrupt pending.
+    Nmi,
+    /// The image panics.
+    Panic,
+    /// The core meets an undefined instruction.
+    HardFault,
+    /// The core goes round in one instruction for ever, with interrupts masked.
+    Hang,
+    /// The core stands still for these microseconds.
+    Stall(u64),
+    /// The stack pointer is just above the guard.
+    Guard,
+    /// The stack pointer is below the guard: nothing a fault handler could push to.
+    BelowGuard,
+    /// A reset of this kind.
+    Reset(ResetKind),
+}
+
+/// What pulls the reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ResetKind {
+    /// The reset pin.
+    Pin,
+    /// The supply came; memory is random.
+    Power,
+    /// The supply sagged; memory is random.
+    BrownOut,
+    /// A debugger writes SYSRESETREQ.
+    Probe,
+}
+
+/// A fault and its time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// Which.
+    pub kind: Kind,
+    /// When, ns since power-up.
+    pub at: u64,
+}
+
+/// What the command line takes.
+pub const SYNTAX: &str = "KIND@MICROSECONDS[:ARGUMENT], KIND one of bus-off, no-acknowledge[:US], dominant[:US], power-cut:N, \
+hse-dead, nmi, panic, hard-fault, hang, stall:US, guard, below-guard, reset:pin|power|brown-out|probe";
+
+/// A text that names no fault.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no fault {0:?}; {SYNTAX}")]
+pub struct NoFault(String);
+
+impl FromStr for Fault {
+    type Err = NoFault;
+
+    fn from_str(text: &str) -> Result<Self, NoFault> {
+        let wrong = || NoFault(text.to_owned());
+        let (kind, rest) = text.split_once('@').ok_or_else(wrong)?;
+        let (time, argument) = rest.split_once(':').map_or((rest, None), |(time, argument)| (time, Some(argument)));
+        let at = time.parse::<u64>().ok().and_then(|us| us.checked_mul(1000)).ok_or_else(wrong)?;
+        let number = || argument.map_or(Ok(0), |argument| argument.parse::<u64>().map_err(|_| wrong()));
+        let kind = match kind {
+            "bus-off" => Kind::BusOff,
+            "no-acknowledge" => Kind::NoAcknowledge(number()?),
+            "dominant" => Kind::Dominant(number()?),
+            "power-cut" => Kind::PowerCut(number()?),
+            "hse-dead" => Kind::HseDead,
+            "nmi" => Kind::Nmi,
+            "panic" => Kind::Panic,
+            "hard-fault" => Kind::HardFault,
+            "hang" => Kind::Hang,
+            "stall" => Kind::Stall(number()?),
+            "guard" => Kind::Guard,
+            "below-guard" => Kind::BelowGuard,
+            "reset" => Kind::Reset(match argument {
+                Some("pin") => ResetKind::Pin,
+                Some("power") => ResetKind::Power,
+                Some("brown-out") => ResetKind::BrownOut,
+                Some("probe") => ResetKind::Probe,
+                _ => return Err(wrong()),
+            }),
+            _ => return Err(wrong()),
+        };
+        Ok(Self { kind, at })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_are_read_from_text() {
+        let at = 2_000_000_000;
+        assert_eq!("bus-off@2000000".parse(), Ok(Fault { kind: Kind::BusOff, at }));
+        assert_eq!("power-cut@2000000:7".parse(), Ok(Fault { kind: Kind::PowerCut(7), at }));
+        let kind = Kind::Reset(ResetKind::BrownOut);
+        assert_eq!("reset@2000000:brown-out".parse(), Ok(Fault { kind, at }));
+        for text in ["bus-off", "fire@1", "stall@x", "reset@1", "reset@1:kick", "panic@99999999999999999999"] {
+            assert!(text.parse::<Fault>().is_err(), "{text}");
+        }
+    }
+}

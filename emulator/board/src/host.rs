@@ -1,0 +1,173 @@
+//! A host in this process: says hello over the serial line, asks how the device is, tells it where the arm stands.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use link::frame::{Decoder, Envelope, FRAME_BYTES, encode};
+use link::message::{DeviceHello, HostHello};
+use link::{LINK_VERSION, Reply, Request, SCHEMA_HASH, Statistics, Status, Text};
+use puck::{CanFrame, Node};
+use sim::{HOME, TICKS_PER_MILLISECOND, Ticks};
+
+use crate::world::Host;
+
+/// Stages of the start-up, as they travel over the link.
+const WAITING_FOR_ZERO: u8 = 6;
+/// The arm can be commanded.
+pub const READY: u8 = 10;
+
+/// Time between two questions.
+const PACE: Ticks = 20 * TICKS_PER_MILLISECOND;
+
+/// Time after which an answer is not waited for any longer.
+const PATIENCE: Ticks = 200 * TICKS_PER_MILLISECOND;
+
+/// Frames kept from the beginning.
+const FIRST: usize = 5;
+
+/// What the host has learned.
+#[derive(Debug, Default)]
+pub struct Learned {
+    /// Who the device is.
+    pub hello: Option<DeviceHello>,
+    /// When the device was first ready, ticks.
+    pub ready_at: Option<Ticks>,
+    /// The last answer.
+    pub status: Option<Status>,
+    /// The last counters.
+    pub statistics: Option<Statistics>,
+    /// Questions, and those that were answered.
+    pub asked: u64,
+    /// See above.
+    pub answered: u64,
+    /// The longest time from a question to its answer, ticks.
+    pub slowest: Ticks,
+    /// The first frames of the device on the arm's bus.
+    pub first_frames: Vec<CanFrame>,
+    /// Hash over time, sender and content of every frame on the arm's bus.
+    pub bus_hash: u64,
+    /// Frames on the arm's bus.
+    pub frames: u64,
+}
+
+/// [`Learned`], shared with who set the host up.
+#[derive(Clone, Debug, Default)]
+pub struct SharedLearned(Arc<Mutex<Learned>>);
+
+impl SharedLearned {
+    /// What the host has learned.
+    pub fn lock(&self) -> MutexGuard<'_, Learned> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The host.
+pub struct Inquirer {
+    learned: SharedLearned,
+    model_hash: u32,
+    decoder: Decoder<FRAME_BYTES>,
+    envelope: Envelope,
+    asked_at: Ticks,
+    waiting: bool,
+    turn: u32,
+}
+
+impl Inquirer {
+    /// A host that knows this robot model.
+    #[must_use]
+    pub fn new(model_hash: u32, learned: SharedLearned) -> Self {
+        Self {
+            learned,
+            model_hash,
+            decoder: Decoder::new(),
+            envelope: Envelope { session: 7, ..Envelope::default() },
+            asked_at: 0,
+            waiting: false,
+            turn: 0,
+        }
+    }
+
+    /// What to ask next.
+    fn question(&mut self) -> Request {
+        let learned = self.learned.lock();
+        if learned.hello.is_none() {
+            let owner = Text::new("emulated-board check");
+            return Request::Hello(HostHello {
+                link_version: LINK_VERSION,
+                schema_hash: SCHEMA_HASH,
+                model_hash: self.model_hash,
+                owner,
+            });
+        }
+        let stage = learned.status.as_ref().map(|status| status.startup_stage);
+        self.turn += 1;
+        match self.turn % 3 {
+            0 if stage == Some(WAITING_FOR_ZERO) => Request::Zero { home: HOME.map(|angle| angle as f32) },
+            1 => Request::Statistics,
+            _ => Request::Status,
+        }
+    }
+
+    fn hear(&mut self, now: Ticks, reply: Reply, time_ms: u32) {
+        self.envelope.time_ms = time_ms;
+        let mut learned = self.learned.lock();
+        if reply.answers() == Some(self.envelope.sequence) && self.waiting {
+            self.waiting = false;
+            learned.answered += 1;
+            learned.slowest = learned.slowest.max(now - self.asked_at);
+        }
+        match reply {
+            Reply::Hello { hello, .. } => learned.hello = Some(hello),
+            Reply::Status { status, .. } => {
+                if status.startup_stage == READY {
+                    learned.ready_at.get_or_insert(now);
+                }
+                learned.status = Some(status);
+            }
+            Reply::Statistics { statistics, .. } => learned.statistics = Some(statistics),
+            _ => {}
+        }
+    }
+}
+
+impl Host for Inquirer {
+    fn talk(&mut self, now: Ticks, bytes: &[u8]) -> Vec<u8> {
+        let mut rest = bytes;
+        while let Some(frame) = self.decoder.next::<Reply>(&mut rest) {
+            self.hear(now, frame.message, frame.envelope.time_ms);
+        }
+        let wait = if self.waiting { PATIENCE } else { PACE };
+        if now < self.asked_at + wait {
+            return Vec::new();
+        }
+        let question = self.question();
+        self.envelope.sequence = self.envelope.sequence.wrapping_add(1);
+        self.asked_at = now;
+        self.waiting = true;
+        self.learned.lock().asked += 1;
+        let mut frame = [0; FRAME_BYTES];
+        match encode(self.envelope, &question, &mut frame) {
+            Ok(length) => frame[..length].to_vec(),
+            // Every request fits a frame.
+            Err(_) => Vec::new(),
+        }
+    }
+
+    fn see(&mut self, passage: &sim::Passage) {
+        let mut learned = self.learned.lock();
+        if passage.sender == Node::HOST && learned.first_frames.len() < FIRST {
+            learned.first_frames.push(passage.frame);
+        }
+        learned.frames += 1;
+        let mut hash = if learned.bus_hash == 0 { 0xCBF2_9CE4_8422_2325 } else { learned.bus_hash };
+        let mut mix = |bytes: &[u8]| {
+            for byte in bytes {
+                hash = (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01B3);
+            }
+        };
+        mix(&passage.start.to_le_bytes());
+        mix(&[passage.sender.number()]);
+        mix(&passage.frame.can_id().raw().to_le_bytes());
+        mix(passage.frame.payload());
+        learned.bus_hash = hash;
+    }
+}
