@@ -227,7 +227,8 @@ impl<'a> Search<'a> {
     /// made by the functions it reaches, or kept somewhere by others that ran before.
     pub(super) fn new(calls: &'a Calls, function: u32, before: &[u32], ends: BTreeMap<u32, u32>) -> Self {
         let roots: Vec<u32> = before.iter().copied().chain([function]).collect();
-        let behind = calls.pointers.within(&roots, |function| calls.called(function));
+        let behind =
+            calls.pointers.within(&roots, |function| calls.called(function), |function| ends.contains_key(&function));
         Self { calls, behind, ends, known: HashMap::new(), open: Vec::new() }
     }
 

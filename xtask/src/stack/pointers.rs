@@ -140,13 +140,13 @@ impl Pointers {
     }
 
     /// The functions that may be behind a pointer while these run: whatever they call may have made it, and so may what
-    /// they call through pointers.
-    pub(super) fn within(&self, roots: &[u32], called: impl Fn(u32) -> Vec<u32>) -> Behind {
+    /// they call through pointers; but not what is called only to end everything.
+    pub(super) fn within(&self, roots: &[u32], called: impl Fn(u32) -> Vec<u32>, ends: impl Fn(u32) -> bool) -> Behind {
         let mut found: BTreeSet<u32> = BTreeSet::new();
         let mut behind = BTreeSet::new();
         let mut open = roots.to_vec();
         while let Some(function) = open.pop() {
-            if found.insert(function) {
+            if (!ends(function) || roots.contains(&function)) && found.insert(function) {
                 open.extend(called(function));
                 let made = self.made.get(&function).into_iter().flatten();
                 open.extend(made.clone());

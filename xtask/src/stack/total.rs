@@ -109,12 +109,18 @@ impl Image<'_> {
 
     /// The deepest way from a function, when the start has been.
     pub(super) fn deepest(&self, function: u32, part: Part, ends: &BTreeMap<u32, u32>) -> Result<Way> {
-        let before = self.calls.frame(self.calls.address(MAIN)?).map(|main| main.calls.as_slice()).unwrap_or_default();
-        let before = before.iter().filter(|call| !call.unmasked).filter_map(|call| match call.target {
+        self.deepest_after(&[], function, part, ends)
+    }
+
+    /// The same, when other functions have begun as well.
+    fn deepest_after(&self, begun: &[u32], function: u32, part: Part, ends: &BTreeMap<u32, u32>) -> Result<Way> {
+        let main = self.calls.frame(self.calls.address(MAIN)?).map(|main| main.calls.as_slice()).unwrap_or_default();
+        let started = main.iter().filter(|call| !call.unmasked).filter_map(|call| match call.target {
             Target::Function(to) => Some(to),
             Target::Pointer => None,
         });
-        Search::new(self.calls, function, &before.collect::<Vec<u32>>(), ends.clone()).deepest(function, part)
+        let before: Vec<u32> = started.chain(begun.iter().copied()).collect();
+        Search::new(self.calls, function, &before, ends.clone()).deepest(function, part)
     }
 
     /// What a panic does last.
@@ -124,7 +130,7 @@ impl Image<'_> {
         let mut deepest = Way { bytes: frame.bytes, stops: Vec::new() };
         for call in &frame.calls {
             let Target::Function(to) = call.target else { bail!("the end of a panic calls through a pointer") };
-            let mut way = self.deepest(to, Part::Whole, &self.plain)?;
+            let mut way = self.deepest_after(&[end], to, Part::Whole, &self.plain)?;
             way.bytes += call.depth;
             way.stops.insert(0, Stop { function: self.calls.name(end), bytes: call.depth });
             if way.bytes >= deepest.bytes {
