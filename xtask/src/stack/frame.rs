@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Result, bail, ensure};
 
+use super::condition::{conditions, is_it, opposite};
 use super::memory::Memory;
 use super::step::{self, Effect, Source, Way};
 use crate::code::Function;
@@ -412,28 +413,4 @@ impl Walk<'_> {
 fn is_filling(instruction: &Instruction) -> bool {
     matches!(instruction.halves, (0xBF00 | 0, 0) | (0xF3AF, 0x8000))
         || matches!(instruction.flow, Flow::Abort | Flow::Unreachable)
-}
-
-/// Whether the next instructions are executed on a condition (IT).
-fn is_it(instruction: &Instruction) -> bool {
-    let code = instruction.halves.0;
-    instruction.bytes == 2 && code & 0xFF00 == 0xBF00 && code & 15 != 0
-}
-
-/// The condition that is true if another is not.
-fn opposite(condition: u16) -> u16 {
-    condition ^ 1
-}
-
-/// The instructions an IT stands in front of, with their conditions.
-fn conditions(all: &[Instruction]) -> BTreeMap<usize, u16> {
-    let mut found = BTreeMap::new();
-    for (index, instruction) in all.iter().enumerate().filter(|(_, instruction)| is_it(instruction)) {
-        let code = instruction.halves.0;
-        let (first, length) = (code >> 4 & 15, 4 - (code & 15).trailing_zeros() as usize);
-        // The lowest bit of the condition of every instruction but the first.
-        let condition = |place: usize| if place == 0 { first } else { first & !1 | code >> (4 - place) & 1 };
-        found.extend((0..length).map(|place| (index + 1 + place, condition(place))));
-    }
-    found
 }

@@ -5,6 +5,7 @@
 //! idle task, and on top of it the deepest handler of every priority. In both, what a panic or a fault does last is counted
 //! apart: it comes once, on top of everything, and only has to fit.
 
+mod condition;
 mod depth;
 mod frame;
 mod levels;
