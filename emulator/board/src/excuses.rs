@@ -28,7 +28,9 @@ pub fn address(_address: u64) -> Option<&'static str> {
 /// Why a write that the chip ignores, made by `function`, is no failure.
 #[must_use]
 pub fn told(register: &str, function: &str) -> Option<&'static str> {
-    let is_start = function.contains("embassy_stm32") || function.contains("__rtic_init_resources");
+    // Where the compiler puts that start, in line or not.
+    let places = ["embassy_stm32", "__rtic_init_resources", "Board as firmware::board::Edge>::start"];
+    let is_start = places.iter().any(|place| function.contains(place));
     (register == "RCC.PLLCKSELR" && is_start).then_some(
         "embassy-stm32 0.6.0 clears the divider of each loop that the configuration leaves out; the fields of \
          the loop that runs are protected meanwhile, and keep what it wrote before",
