@@ -70,7 +70,7 @@ pub(super) fn play(table: &mut Table, emulator: &Path, image: &Path, tactus: &Pa
     shell::step("teach: a person guides the weightless arm; the image for the real board makes it so");
     shell::run(&mut bench.command(&["--device", "board:", "teach", "--output", "grasp.csv"]))?;
     shell::step("learn: the recording becomes a movement primitive");
-    shell::run(&mut bench.command(&["--quiet", "learn", "grasp.csv", "--output", "grasp.toml"]))?;
+    shell::capture(&mut bench.command(&["--quiet", "learn", "grasp.csv", "--output", "grasp.toml"]))?;
     shell::step("upload into bank 2, and run; twice with one seed");
     let begun = Instant::now();
     let (run, report) = bench.play("first")?;
