@@ -76,6 +76,7 @@ pub(super) fn play(table: &mut Table, emulator: &Path, image: &Path, tactus: &Pa
     let (run, report) = bench.play("first")?;
     let speed = number(&report, "/virtual_seconds").unwrap_or(0.0) / begun.elapsed().as_secs_f64();
     let (again, _) = bench.play("second")?;
+    table.part("movement, uploaded into bank 2");
     movement(table, &run);
     table.told("emulation", format!("{speed:.2} x real time"));
     findings(table, &report);
