@@ -6,6 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 
 use crate::elf::{Section, Sizes};
+use crate::stack::{Depth, START_PERCENT, share};
 
 /// A board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,17 +25,8 @@ struct Block {
     budget: u32,
 }
 
-/// Deepest use of the stack that `cargo xtask budget` may measure on QEMU, bytes; that verb fails when the image uses more.
-/// 30.5 kB today: the halves of the application are built in their place, piece by piece. The code of the two boards differs
-/// below the application only.
-pub(crate) const STACK_MEASURED: u32 = 36 * 1024;
-
-/// Share of the measured use that is kept free on top of it, for what QEMU does not run: the board's own interrupts (a
-/// dozen frames of at most 104 bytes) and another optimisation level.
-const STACK_MARGIN_PERCENT: u32 = 25;
-
 /// Vectors in front of the interrupt lines.
-const CORE_VECTORS: usize = 16;
+pub(crate) const CORE_VECTORS: usize = 16;
 
 /// Which handler belongs to which line of the STM32H743.
 const HANDLERS: [(usize, &str); 8] = [
@@ -60,7 +52,7 @@ const KIB: u32 = 1024;
 const STM32H743: [Block; 5] = [
     Block { name: FLASH, start: 0x0800_0000, length: 1024 * KIB, budget: 448 * KIB },
     Block { name: "ITCM", start: 0x0000_0400, length: 63 * KIB, budget: 63 * KIB },
-    Block { name: STACK, start: 0x2000_0000, length: 64 * KIB, budget: 64 * KIB },
+    Block { name: STACK, start: 0x2000_0000, length: 64 * KIB, budget: share(64 * KIB, START_PERCENT) },
     Block { name: "DTCM, data", start: 0x2001_0000, length: 60 * KIB, budget: 60 * KIB },
     Block { name: "AXI", start: 0x2400_0000, length: 512 * KIB, budget: 288 * KIB },
 ];
@@ -121,11 +113,12 @@ impl fmt::Display for Board {
 /// Prints what the image takes of each memory of the STM32H743, and fails if it is more than budgeted.
 pub(crate) fn print_sizes(image: &Path) -> Result<()> {
     let sizes = Sizes::of(image)?;
+    let depth = Depth::of(image)?;
     println!("{:<16} {:>9} {:>9} {:>9}  sections", "memory", "used B", "budget B", "there B");
     let mut over = Vec::new();
     for block in &STM32H743 {
         let (used, what) = if block.name == STACK {
-            (stack_bound(), format!("bound: {STACK_MEASURED} B on QEMU + {STACK_MARGIN_PERCENT} %"))
+            (depth.at_start().max(depth.in_service()), depth.summary())
         } else {
             let inside = |section: &&Section| section.lies_in(block.start, block.length);
             let sections: Vec<&Section> = sizes.sections().iter().filter(inside).collect();
@@ -149,11 +142,6 @@ pub(crate) fn print_sizes(image: &Path) -> Result<()> {
     }
     ensure!(over.is_empty(), "over budget: {}", over.join("; "));
     check_layout(&sizes)
-}
-
-/// Deepest use of the stack to be expected.
-fn stack_bound() -> u32 {
-    STACK_MEASURED + STACK_MEASURED * STACK_MARGIN_PERCENT / 100
 }
 
 /// The chip's interrupt lines by the handler that must stand there, and memory the start-up code clears and copies: what the

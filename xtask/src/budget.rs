@@ -11,7 +11,6 @@ use std::process::Command;
 use anyhow::{Context, Result};
 use serde_json::Value;
 
-use crate::board::STACK_MEASURED;
 use crate::setup::Machine;
 use crate::{build, demo, elf, shell};
 
@@ -21,6 +20,10 @@ const CYCLE_BOUND: f64 = 60_000.0;
 
 /// What a control cycle should stay below.
 const CYCLE_AIM: f64 = 30_000.0;
+
+/// Deepest use of the stack. 29.4 kB today: the halves of the application are built in their place, piece by piece. What the
+/// image may use at most is computed when it is built (`cargo xtask stack`); this is what a run does use.
+const STACK_BOUND: f64 = 36.0 * 1024.0;
 
 /// Prints the table and fails if a bound is crossed.
 pub(crate) fn run(machine: &Machine) -> Result<()> {
@@ -47,11 +50,11 @@ pub(crate) fn run(machine: &Machine) -> Result<()> {
     println!("missed deadlines         {missed:>8}");
     println!("interrupt latency, worst {:>8} us", number("worst_latency_us")?);
     let stack = number("stack_used")?;
-    println!("stack, deepest use       {stack:>8} B  (bound {STACK_MEASURED})");
+    println!("stack, deepest use       {stack:>8} B  (bound {STACK_BOUND})");
     println!("flash                    {:>8} B", sizes.flash());
     println!("RAM without stack        {:>8} B", sizes.ram());
     anyhow::ensure!(worst > 0.0, "the image did not measure its control cycle");
-    anyhow::ensure!(stack <= f64::from(STACK_MEASURED), "the stack goes {stack} B deep, more than {STACK_MEASURED}");
+    anyhow::ensure!(stack <= STACK_BOUND, "the stack goes {stack} B deep, more than {STACK_BOUND}");
     anyhow::ensure!(missed == 0.0, "{missed} control cycles missed their deadline");
     anyhow::ensure!(worst <= CYCLE_BOUND, "the control cycle takes {worst} instructions, more than {CYCLE_BOUND}");
     Ok(())

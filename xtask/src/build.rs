@@ -8,7 +8,7 @@ use anyhow::{Context, Result, ensure};
 use crate::board::{self, Board};
 use crate::elf::Sizes;
 use crate::setup::{ARM, Machine, Toolchain};
-use crate::{joint, panics, shell};
+use crate::{hot, joint, panics, shell, stack};
 
 /// Features of the host packages with the MuJoCo world and its pictures.
 pub(crate) const WORLD: &str = "tactus/mujoco,sim/mujoco,sim/render,system-tests/mujoco";
@@ -29,6 +29,7 @@ pub(crate) fn image(machine: &Machine) -> Result<PathBuf> {
 pub(crate) fn real_board(toolchain: Toolchain, board: Board) -> Result<PathBuf> {
     let image = board_image(toolchain, board, true)?;
     board::print_sizes(&image)?;
+    hot::check(&image)?;
     Ok(image)
 }
 
@@ -53,14 +54,26 @@ fn board_image(toolchain: Toolchain, board: Board, may_sleep: bool) -> Result<Pa
     Ok(image)
 }
 
-/// What no image may contain: an allocator, and panics but those that are known.
+/// What no image may contain: an allocator, panics but those that are known, a way deeper than its stack allows.
 pub(crate) fn nothing_forbidden(image: &Path, board: Board) -> Result<()> {
     ensure!(!Sizes::of(image)?.allocates(), "the image allocates memory, which nothing on a device may");
-    panics::check(image, board)
+    panics::check(image, board)?;
+    stack::check(image)
 }
 
 /// Says where the images that were built can panic.
 pub(crate) fn panics() -> Result<()> {
+    panics::table(&images()?)
+}
+
+/// Says how deep the stacks of the images that were built go, and fails if one is too deep.
+pub(crate) fn stacks() -> Result<()> {
+    let images: Vec<PathBuf> = images()?.into_iter().map(|(image, _)| image).collect();
+    stack::table(&images)
+}
+
+/// Every image, with the board whose code is in it.
+fn images() -> Result<Vec<(PathBuf, Board)>> {
     let folder = shell::target_dir().join("images");
     let mut images: Vec<_> = Board::ALL.map(|board| (folder.join(board.file()), board)).into();
     images.push((folder.join(joint::FILE), Board::Mps2));
@@ -71,7 +84,7 @@ pub(crate) fn panics() -> Result<()> {
             image.display()
         );
     }
-    panics::table(&images)
+    Ok(images)
 }
 
 /// Builds the documentation of every crate of the workspace.

@@ -4,13 +4,14 @@ use anyhow::Result;
 
 use crate::board::Board;
 use crate::setup::{self, ARM, JOINT, Machine};
-use crate::{budget, build, emulated, joint, shell, test};
+use crate::{budget, build, docs, emulated, joint, shell, test};
 
 /// Runs every check; the first failure ends it.
 pub(crate) fn run() -> Result<()> {
     setup::lints()?;
     shell::step("format");
     shell::run(shell::cargo().args(["fmt", "--all", "--check"]))?;
+    docs::run()?;
     let machine = setup::all()?;
     lint_host()?;
     lint_firmware(&machine)?;

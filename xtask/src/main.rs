@@ -6,8 +6,10 @@ mod build;
 mod ci;
 mod code;
 mod demo;
+mod docs;
 mod elf;
 mod emulated;
+mod hot;
 mod joint;
 mod origin;
 mod panics;
@@ -15,6 +17,7 @@ mod qemu;
 mod runner;
 mod setup;
 mod shell;
+mod stack;
 mod test;
 mod thumb;
 
@@ -39,11 +42,14 @@ cargo xtask <verb>
   test     every test, whole-system tests under QEMU included
   ci       what a change must pass: format, lints, builds, tests, budgets
   budget   instructions per control cycle, interrupt latency, stack, flash and RAM of the image
+  stack    how deep the stack of every image that is there goes, function by function
+           --image FILE: of one image
   panics   where the images that are there can panic, and why they do not
   size     flash and RAM of the image by section
   qemu     run an image by itself: cargo xtask qemu [IMAGE]
   run-image IMAGE   run an image where it belongs: QEMU, or a board through probe-rs (cargo's runner)
   doc      documentation of all crates
+  docs     dead links, paths, test names and fault identifiers in any file
 
 Every verb does the set-up it needs. Environment:
   TACTUS_TOOLCHAIN=rustup|debian   force one of the two ways to compile for Cortex-M";
@@ -86,6 +92,8 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["board", "--build"] => drop(emulated::build(setup::compiler()?)?),
         ["board", "--image", image] => emulated::run(Some(image.as_ref()))?,
         ["panics"] => build::panics()?,
+        ["stack"] => build::stacks()?,
+        ["stack", "--image", image] => stack::run(image.as_ref())?,
         ["run-image", image, rest @ ..] => return runner::run(image, rest),
         ["demo", rest @ ..] => demo::run(rest)?,
         ["test"] => test::run(&setup::all()?)?,
@@ -97,6 +105,7 @@ fn dispatch(words: &[&str]) -> Result<()> {
         }
         ["qemu", rest @ ..] => qemu::run(rest)?,
         ["doc"] => build::documentation()?,
+        ["docs"] => docs::run()?,
         [] | ["help" | "--help" | "-h"] => {
             println!("{HELP}");
             return Ok(());

@@ -29,6 +29,8 @@ pub(crate) struct Instruction {
     pub(crate) address: u32,
     /// 2 or 4.
     pub(crate) bytes: u32,
+    /// Its first half, and its second if it has two.
+    pub(crate) halves: (u16, u16),
     /// Where it leads.
     pub(crate) flow: Flow,
 }
@@ -40,9 +42,10 @@ impl Instruction {
         let first = half(0)?;
         // Every instruction that begins with 0b11101, 0b11110 or 0b11111 has two halves.
         Some(if first >> 11 >= 0b11101 {
-            Self { address, bytes: 4, flow: wide(address, first, half(2)?) }
+            let second = half(2)?;
+            Self { address, bytes: 4, halves: (first, second), flow: wide(address, first, second) }
         } else {
-            Self { address, bytes: 2, flow: narrow(address, first) }
+            Self { address, bytes: 2, halves: (first, 0), flow: narrow(address, first) }
         })
     }
 }

@@ -4,7 +4,7 @@
 //! really passed since the last reply, through the transmission, low-passed at 50 Hz (second-order Butterworth, delay 4.5 ms).
 //! One count is 3.7e-5 rad at J1 and 1.0e-4 rad at J7, which plain differencing at 300 Hz turns into steps of 0.011 and
 //! 0.031 rad/s; the noise of differencing lies near half the sampling rate, and behind the 50 Hz filter it is 8 times smaller.
-//! At 30 Hz the delay would already cost the wrist its damping (`reference` gains, three cycles of delay).
+//! At 30 Hz the delay would already cost the wrist its damping (stiff gains, three cycles of delay).
 //!
 //! A reply is believed if the motor cannot have moved farther: 1.5 times its speed limit, per cycle since the last reply.
 //! Missing motors are carried on at the velocity estimated last, for at most [`COAST_CYCLES`]; then they stand still.

@@ -5,7 +5,7 @@ pub const LINK_VERSION: u16 = 4;
 
 /// Every message with its encoding, and the image with its layout, as text.
 ///
-/// `tests/golden.rs` encodes each message and compares it with its line here. So a layout cannot change
+/// `tests/link/golden.rs` encodes each message and compares it with its line here. So a layout cannot change
 /// without this file changing, and this file cannot change without [`SCHEMA_HASH`] changing.
 const SCHEMA: &str = include_str!("schema.txt");
 

@@ -3,8 +3,8 @@
 //! ```text
 //! power on --20 ms--> Monitor (STAT 0) --SET STAT 2--> still there for 10 ms --> silent 0.3..1.0 s --> Ready (STAT 2)
 //! ```
-//! Sources: wam-can 3.2, 4.1, 4.2 and 7. The 10 ms and the range of the silence are documented by drivers; the
-//! time from power to monitor is assumed.
+//! Sources: docs/barrett-can.md. The 10 ms and the range of the silence are documented by drivers; the time from power
+//! to monitor is assumed.
 
 use crate::noise::Noise;
 use crate::time::{TICKS_PER_MILLISECOND, Ticks, ticks};

@@ -1,6 +1,6 @@
 //! What every motor puck has, on the arm and in the hand: power, boot loader, groups, receive buffer, stored properties.
 //!
-//! A device on top of it says what is special: encoders, torque, commands. Rules: wam-can 3.2, 3.3, 4.1, 4.2 and 7.
+//! A device on top of it says what is special: encoders, torque, commands. Rules: docs/barrett-can.md.
 
 use crate::boot::{Boot, Presence};
 use crate::inbox::{Inbox, SET_TIME};

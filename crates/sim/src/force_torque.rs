@@ -4,7 +4,7 @@
 //! lagging by its hysteresis, plus seeded noise, minus what that was at the last tare; then bias
 //! and drift, which are what the tare did *not* catch; quantised and saturated to 16 bits. Hysteresis is that of play: the output
 //! stays while the input turns back by less than twice the half-width. After an overload the torque frame carries a status byte
-//! until the next tare. The sensor boots like a motor puck and loses power with them (wam-can 7, inferred).
+//! until the next tare. The sensor boots like a motor puck and loses power with them (assumed: docs/barrett-can.md).
 
 use crate::boot::{Boot, Presence};
 use crate::inbox::{Inbox, SET_TIME};

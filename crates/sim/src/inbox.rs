@@ -1,7 +1,7 @@
 //! The receive path of a puck: a shallow buffer that loses requests when they come too fast.
 //!
 //! This is the failure that the library's "blocking" SET (SET, then GET STAT and wait) guards against: there is no
-//! acknowledgement, so a lost SET is silent. Depth and processing times are assumptions (wam-can 2.2, 7 and 9): the
+//! acknowledgement, so a lost SET is silent. Depth and processing times are assumptions (docs/barrett-can.md): the
 //! reply latency of 75 us is Barrett's own estimate, the rest is chosen so that SETs 1 ms apart are always safe.
 
 use crate::time::{TICKS_PER_MICROSECOND, Ticks};

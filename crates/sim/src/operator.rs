@@ -1,7 +1,8 @@
 //! The person at the pendant: releases the E-stop, presses Shift-Idle and Shift-Activate, or follows a script.
 //!
-//! Only a person can raise the arm's mode (wam-can 4.1), therefore a run without a person never moves. By default this
-//! one brings the arm to IDLE after a moment and to ACTIVE once the arm is zeroed and positions have been flowing for a while.
+//! Only a person can raise the arm's mode (docs/barrett-can.md), therefore a run without a person never moves. By
+//! default this one brings the arm to IDLE after a moment and to ACTIVE once the arm is zeroed and positions have been
+//! flowing for a while.
 
 use crate::time::{TICKS_PER_MILLISECOND, Ticks};
 use puck::SafetyMode;

@@ -1,8 +1,8 @@
 //! One motor puck of the arm (node 1..7): properties, boot, encoder, torque.
 //!
 //! The encoder counts `floor(theta CTS / 2 pi) + offset`; SET P chooses the offset, power and wake-up lose it. Torque acts
-//! only in MODE 2, is clipped to MT, and stays applied until it is changed or the mode changes (wam-can 4.5: no public
-//! source knows of a time-out in the puck). In every other mode the puck shorts its windings and brakes.
+//! only in MODE 2, is clipped to MT, and stays applied until it is changed or the mode changes (docs/barrett-can.md:
+//! no public source knows of a time-out in the puck). In every other mode the puck shorts its windings and brakes.
 
 use crate::firmware::{Firmware, Heard, Order};
 use crate::noise::Noise;

@@ -2,7 +2,7 @@
 //!
 //! It has its own supply, so it always answers. It listens to torques (groups 1 and 2) and position replies (group 3),
 //! and lowers the mode when a limit is passed; only the person at the pendant raises it. On entering ACTIVE and IDLE it sets
-//! the MODE of all motor pucks by a broadcast on 0x540. Rules: wam-can 3.4, 4.1, 4.5; each assumption is marked.
+//! the MODE of all motor pucks by a broadcast on 0x540. Rules: docs/barrett-can.md; each assumption is marked.
 
 use crate::inbox::Inbox;
 use crate::operator::{PendantAction, PendantView};

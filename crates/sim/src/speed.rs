@@ -4,7 +4,7 @@
 //! wrist is not counted. Arm not zeroed: the largest joint velocity of joints 1..4 (compared with the same limit, read as
 //! rad/s: assumed). The speed spans the last five full sets, the history that the library reckons with when it asks for five
 //! faults to be ignored. A pause between two sets counts as at most 10 ms: that reproduces the documented trap that an arm moved
-//! by hand while nobody polls faults at the first poll (wam-can T8).
+//! by hand while nobody polls faults at the first poll (docs/barrett-can.md).
 
 use crate::chain::{self, Vector, add, subtract};
 use crate::rotation::norm;

@@ -1,8 +1,8 @@
 //! The operator's hands, which hold the arm at home until it is active.
 //!
-//! Zeroing tells the pucks "this is home" (wam-can 4.3), and it is the operator who puts the arm there. The brake of idle
-//! motors alone would let the wrist sink under the hand's weight before the pucks are awake. He lets go, gently, a moment
-//! after the arm has become active. He does not come back: after an E-stop the arm lies where it fell.
+//! Zeroing tells the pucks "this is home" (docs/barrett-can.md), and it is the operator who puts the arm there. The
+//! brake of idle motors alone would let the wrist sink under the hand's weight before the pucks are awake. He lets go,
+//! gently, a moment after the arm has become active. He does not come back: after an E-stop the arm lies where it fell.
 //!
 //! `tau = kp e + kd de + ki int e` per joint, with gains from one frequency and the joint's mean inertia.
 

@@ -16,7 +16,7 @@ pub const TICKS_PER_MICROSECOND: Ticks = 25;
 /// Ticks in one millisecond.
 pub const TICKS_PER_MILLISECOND: Ticks = 25_000;
 
-/// One bit on the wire at 1 Mbit/s (wam-can 1.1).
+/// One bit on the wire at 1 Mbit/s (docs/barrett-can.md).
 pub const TICKS_PER_BIT: Ticks = 25;
 
 /// One slot of the 900 Hz schedule, rounded to ticks (25 MHz / 900 Hz = 27 777.8); three make a 300 Hz control cycle.

@@ -5,7 +5,7 @@
 //! transmitter inserts their complement, and the inserted bit counts for the next run. The CRC delimiter,
 //! acknowledge, end of frame and interframe space are fixed-form and never stuffed.
 //!
-//! Source: Bosch CAN 2.0 part A; lengths agree with the table of wam-can 6.2 (47 + 8n + stuff bits).
+//! Source: Bosch CAN 2.0 part A; lengths agree with the table of docs/barrett-can.md (47 + 8n + stuff bits).
 
 use crate::time::{TICKS_PER_BIT, Ticks};
 use puck::CanFrame;

@@ -1,4 +1,4 @@
-//! The whole way from a cold arm to ACTIVE (wam-can 4.2, 4.3) by a scripted master, frame by frame.
+//! The whole way from a cold arm to ACTIVE (docs/barrett-can.md) by a scripted master, frame by frame.
 
 mod common;
 

@@ -1,4 +1,4 @@
-//! Frame lengths against hand counts, an independent computation and the table of wam-can 6.2.
+//! Frame lengths against hand counts, an independent computation and the table of docs/barrett-can.md.
 
 use proptest::prelude::*;
 use puck::{

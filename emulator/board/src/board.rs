@@ -14,7 +14,7 @@ use rigless::soc::Window;
 
 use crate::cache::MAINTENANCE;
 use crate::can::{MESSAGE_MEMORY, MESSAGE_MEMORY_BYTES, MessageMemory};
-use crate::core::{Core, SharedCore};
+use crate::core::Core;
 use crate::part::{Fitting, Part};
 
 /// Name of the only microcontroller.
@@ -58,13 +58,10 @@ impl Board {
         let bytes = NonZeroU64::new(MESSAGE_MEMORY_BYTES).unwrap_or(NonZeroU64::MIN);
         let window = Window::new("FDCAN message memory", MESSAGE_MEMORY, bytes);
         let mcu = Wired::new(part, window, MessageMemory(fitting.can.clone()))?;
-        let spec = core_of(&mcu, &fitting.core)?;
+        let spec = core_of(&mcu, fitting)?;
         Ok(Self { mcu, spec })
     }
 }
-
-/// Instructions a second: the crate's own choice for a core of some hundred megahertz, 4 ns each.
-const INSTRUCTIONS_PER_SECOND: NonZeroU64 = armv7m::INSTRUCTIONS_PER_SECOND;
 
 /// The core clock, which only the core's own timer counts.
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(400_000_000).expect("not zero");
@@ -87,7 +84,7 @@ const ACCESS_CONTROL: [(u64, u32, u32); 6] = [
 ];
 
 /// The core of the chip, with our processor around the crate's.
-fn core_of(mcu: &Wired<Part, MessageMemory>, shared: &SharedCore) -> Result<CoreSpec, BoardError> {
+fn core_of(mcu: &Wired<Part, MessageMemory>, fitting: &Fitting) -> Result<CoreSpec, BoardError> {
     let lines = u32::from(mcu.bus().cpu().interrupt_lines);
     let mut own = windows(mcu.bus());
     own.push(CoreWindow { base: u64::from(MAINTENANCE.start), size: u64::from(MAINTENANCE.end - MAINTENANCE.start) });
@@ -97,7 +94,7 @@ fn core_of(mcu: &Wired<Part, MessageMemory>, shared: &SharedCore) -> Result<Core
         interrupt_lines: NonZeroU32::new(lines).unwrap_or(NonZeroU32::MIN),
         priority_bits: 4,
         refclk_divider: NonZeroU32::new(8).unwrap_or(NonZeroU32::MIN),
-        instructions_per_second: INSTRUCTIONS_PER_SECOND,
+        instructions_per_second: NonZeroU64::new(u64::from(fitting.mips) * 1_000_000).unwrap_or(NonZeroU64::MIN),
         boot: "flash",
     };
     let mut config = armv7m::Config::new(core, &own);
@@ -117,7 +114,7 @@ fn core_of(mcu: &Wired<Part, MessageMemory>, shared: &SharedCore) -> Result<Core
     config.vector_table = Some(FLASH);
     let mut spec = config.spec();
     let inner = spec.processor.clone();
-    let shared = shared.clone();
+    let shared = fitting.core.clone();
     spec.processor = Arc::new(move |endian| Ok(Box::new(Core::new(inner(endian)?, shared.clone()))));
     let unique = UNIQUE.iter().flat_map(|word| word.to_le_bytes()).collect();
     spec.factory_images = vec![Placed::new(Path::new("unique identifier"), unique, Some(UNIQUE_AT))?];

@@ -1,7 +1,7 @@
 //! The data cache as far as bank 2 of the flash is concerned: lines keep what the memory held when they were filled.
 //!
-//! 16 KiB in 128 sets of four ways with lines of 32 bytes, as the chip's. Only reads of bank 2 fill it here, so its lines live
-//! longer than beside all other traffic: what is stale in silicon now and then is stale here every time.
+//! 16 KiB in 128 sets of four ways with lines of 32 bytes, as the chip's. Only reads of bank 2 fill it here, so its
+//! lines live longer than beside all other traffic: what is stale in silicon now and then is stale here every time.
 
 /// Bytes of a line.
 pub const LINE: u32 = 32;

@@ -44,8 +44,6 @@ pub struct Can {
     host_bus: HostBus,
     /// When the world was last asked.
     asked: Ticks,
-    /// Frames of the arm's bus that the world was given and has not told the end of.
-    outstanding: u32,
     /// A frame of the time before a reset is still on the wire.
     orphan: bool,
     /// The first frame the chip has sent, ns.
@@ -91,7 +89,6 @@ impl SharedCan {
             host,
             host_bus: HostBus::default(),
             asked: 0,
-            outstanding: 0,
             orphan: false,
             first_frame: None,
             remarks: Vec::new(),
@@ -141,8 +138,8 @@ impl Can {
         self.controllers.status(unit)
     }
 
-    /// The identifiers of standard frames that the filters of each controller let into its first queue, by the elements in
-    /// the message memory (RM0433 56.3.20).
+    /// The identifiers of standard frames that the filters of each controller let into its first queue, by the elements
+    /// in the message memory (RM0433 56.3.20).
     #[must_use]
     pub fn accepted(&self) -> [Vec<u16>; 2] {
         Unit::BOTH.map(|unit| {
@@ -169,7 +166,6 @@ impl Can {
         self.controllers.reset(now);
         self.settle(now);
         self.orphan |= self.world.withdraw(ticks(now));
-        self.outstanding = 0;
     }
 
     /// Tells both wires what the controllers offer and take back.
@@ -184,8 +180,9 @@ impl Can {
                 match event {
                     WireEvent::Offer { frame, .. } => self.offer(now, &frame),
                     WireEvent::Withdraw { .. } => {
-                        self.world.withdraw(ticks(now));
-                        self.outstanding = 0;
+                        if self.world.withdraw(ticks(now)) && !self.orphan {
+                            self.controllers.still_on_wire(Unit::One, now);
+                        }
                     }
                 }
             }
@@ -201,7 +198,6 @@ impl Can {
         let frame = CanId::new(id).and_then(|id| CanFrame::from_slice(id, frame.payload()));
         if let Some(frame) = frame {
             self.first_frame.get_or_insert(now);
-            self.outstanding += 1;
             self.frames_offered += 1;
             self.world.send(ticks(now), frame);
         }
@@ -231,7 +227,6 @@ impl Can {
             if self.orphan {
                 self.orphan = false;
             } else {
-                self.outstanding = self.outstanding.saturating_sub(1);
                 self.frames_sent += 1;
                 self.controllers.transmitted(Unit::One, now);
             }

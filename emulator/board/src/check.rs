@@ -163,6 +163,9 @@ fn rows(image: &Image, measured: &Measured, learned: &Learned) -> Vec<Row> {
     clock_rows(&mut table, measured);
     memory_rows(&mut table, image, measured);
     watchdog_rows(&mut table, measured);
+    let [session, log] = measured.priorities;
+    let found = format!("{session:#04x}, {log:#04x}");
+    table.row("priorities of the session's and the log's line", "0xe0, 0xf0", found, (session, log) == (0xE0, 0xF0));
     link_rows(&mut table, learned);
     for (item, grade) in [
         ("accesses to nothing that is modelled", Grade::Unmodelled),
@@ -243,6 +246,8 @@ fn link_rows(table: &mut Table, learned: &Learned) {
         learned.answered > 0 && lost <= 3,
     );
     let statistics = learned.statistics.unwrap_or_default();
+    let latency = f64::from(statistics.latency_worst_ticks) / 200.0;
+    table.at_most("latency of a slot", 100.0, Some(latency), " us");
     table.equal("missed deadlines", 0, statistics.missed_deadlines.into(), "");
     table.equal("lost replies", 0, statistics.lost_replies.into(), "");
     table.equal("rejected frames", 0, statistics.rejected_frames.into(), "");

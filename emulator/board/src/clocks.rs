@@ -92,8 +92,9 @@ impl Clocks {
 /// Bits of RCC.CR that switch the loops on, and where each loop's bits begin in PLLCKSELR and PLLCFGR.
 const LOOPS: [(&str, u64, u32, u32); 3] = [("PLL1", 1 << 24, 4, 0), ("PLL2", 1 << 26, 12, 4), ("PLL3", 1 << 28, 20, 8)];
 
-/// What is wrong with the loops that `written`, a value for RCC.CR, switches on and `before` had off: a reference outside
-/// what the chosen oscillator takes (DS12110 tables 137 and 138: the medium one 1 to 2 MHz, the wide one 2 to 16 MHz).
+/// What is wrong with the loops that `written`, a value for RCC.CR, switches on and `before` had off: a reference
+/// outside what the chosen oscillator takes (DS12110 tables 137 and 138: the medium one 1 to 2 MHz, the wide one 2 to
+/// 16 MHz).
 #[must_use]
 pub fn loop_flaws(registers: &RegisterFile, before: u64, written: u64) -> Vec<(&'static str, String)> {
     let (selection, configuration) = (registers.get(rcc::Register::Pllckselr), registers.get(rcc::Register::Pllcfgr));
@@ -115,8 +116,8 @@ pub fn loop_flaws(registers: &RegisterFile, before: u64, written: u64) -> Vec<(&
             if is_medium { ("medium", 1_000_000, 2_000_000) } else { ("wide", 2_000_000, 16_000_000) };
         if !(low..=high).contains(&reference) {
             let text = format!(
-                "the {kind} oscillator takes a reference of {low} to {high} Hz (DS12110 tables 137, 138; RM0433 8.5.5), \
-                 and is given {reference} Hz: out of range, it may never lock"
+                "the {kind} oscillator takes a reference of {low} to {high} Hz (DS12110 tables 137, 138; \
+                 RM0433 8.5.5), and is given {reference} Hz: out of range, it may never lock"
             );
             flaws.push((name, text));
         }

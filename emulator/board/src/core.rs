@@ -1,22 +1,23 @@
-//! The processor core with what the crate's lacks: a data cache over bank 2, damaged flash words, and orders from outside.
+//! The processor core with what the crate's lacks: a data cache over bank 2, damaged flash words, and orders from
+//! outside.
 //!
-//! Wraps the crate's processor. Every access to bank 2 is routed to the bus, where this answers it: through the cache while the
-//! protection unit or the default map makes the address cacheable, past it otherwise. The registers of cache maintenance
-//! are routed the same way.
+//! Wraps the crate's processor. Every access to bank 2 is routed to the bus, where this answers it: through the cache
+//! while the protection unit or the default map makes the address cacheable, past it otherwise. The registers of cache
+//! maintenance are routed the same way.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rigless::emulator::{
-    Access, AccessKind, BitAlias, Checked, CoreBus, DataModel, Error, Exit, HaltReason, HostCall, InterruptLine,
-    Processor, Queued,
+    Access, AccessKind, BitAlias, CoreBus, DataModel, Error, Exit, HaltReason, HostCall, Processor, Queued,
 };
 use rigless::soc::{Endian, Width};
 use rigless::time::VirtualNanos;
 
-use crate::cache::{BANK, CacheCount, DataCache, LINE, MAINTENANCE};
-use crate::image::Image;
+use crate::cache::{BANK, CacheCount, DataCache};
+use crate::cache_bus::CacheBus;
+use crate::notes::{FaultNote, Stray};
 
 /// Registers by the numbers of the crate's debugger.
 mod register {
@@ -63,70 +64,12 @@ pub enum Order {
     Poke(u32, Vec<u32>),
     /// A register of the processor's own space is written by a debugger.
     Own(u32, u32),
+    /// A register of the processor's own space is read, for [`CoreState::own`].
+    Look(u32),
     /// What a fault handler finds is noted, with this time in ns.
     Note(u64),
     /// The unused stack between these addresses is painted, up to the stack pointer.
     Paint(Range<u32>),
-}
-
-/// An access to an address where nothing is: a bus fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stray {
-    /// Where to.
-    pub address: u32,
-    /// Where the program was.
-    pub program_counter: u32,
-    /// When, ns.
-    pub at: u64,
-}
-
-/// What the handler of a fault finds when it begins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FaultNote {
-    /// When, ns.
-    pub at: u64,
-    /// Number of the exception: 3 hard fault, 4 memory management, 5 bus, 6 usage.
-    pub exception: u32,
-    /// The stack pointer.
-    pub stack: u32,
-    /// CFSR, HFSR, MMFAR, BFAR.
-    pub configurable: u32,
-    /// See above.
-    pub hard: u32,
-    /// See above.
-    pub memory_address: u32,
-    /// See above.
-    pub bus_address: u32,
-}
-
-impl FaultNote {
-    /// One line for people.
-    #[must_use]
-    pub fn line(&self, image: &Image) -> String {
-        let name = match self.exception {
-            2 => "non-maskable interrupt",
-            3 => "hard fault",
-            4 => "memory management fault",
-            5 => "bus fault",
-            6 => "usage fault",
-            _ => "unexpected exception",
-        };
-        let place = if self.stack < image.stack.start {
-            let below = image.stack.start - self.stack;
-            format!(", {below} bytes below the stack, which ends at {:#010x}", image.stack.start)
-        } else {
-            String::new()
-        };
-        format!(
-            "{name} at {} us: SP {:#010x}{place}; CFSR {:#010x}, HFSR {:#010x}, MMFAR {:#010x}, BFAR {:#010x}",
-            self.at / 1000,
-            self.stack,
-            self.configurable,
-            self.hard,
-            self.memory_address,
-            self.bus_address
-        )
-    }
 }
 
 /// What the core and the rest of the board share.
@@ -138,6 +81,8 @@ pub struct CoreState {
     pub cache: DataCache,
     /// Flash words whose check bits do not fit: reading them fails.
     pub damaged: BTreeSet<u32>,
+    /// Registers of the processor's own space as they were found.
+    pub own: BTreeMap<u32, u32>,
     /// Accesses to addresses where nothing is.
     pub strays: Vec<Stray>,
     /// Faults whose handlers have begun.
@@ -191,8 +136,8 @@ impl Core {
         self.inner.debugger_access(write, address, Width::W32, VirtualNanos(0)).unwrap_or(0)
     }
 
-    /// Whether a read of `address` now goes through the data cache: it is on, and the memory is of a cacheable kind, by the
-    /// protection unit or, where that is off or bypassed, by the default map.
+    /// Whether a read of `address` now goes through the data cache: it is on, and the memory is of a cacheable kind, by
+    /// the protection unit or, where that is off or bypassed, by the default map.
     fn is_cacheable(&mut self, address: u32) -> bool {
         if self.own(CCR, None) & DATA_CACHE == 0 {
             return false;
@@ -200,8 +145,8 @@ impl Core {
         let control = self.own(MPU_CTRL, None);
         let handler = self.register(register::XPSR) & 0x1FF;
         let negative = self.register(register::FAULTMASK) & 1 != 0 || matches!(handler, 2 | 3);
-        // Without HFNMIENA the unit is bypassed at negative priorities; the code region of the default map is normal memory,
-        // write-through (ARM DDI 0403 B3.1, B3.5).
+        // Without HFNMIENA the unit is bypassed at negative priorities; the code region of the default map is normal
+        // memory, write-through (ARM DDI 0403 B3.1, B3.5).
         if control & 1 == 0 || (negative && control & 2 == 0) {
             return true;
         }
@@ -258,6 +203,10 @@ impl Core {
                 Order::Own(address, value) => {
                     self.own(u64::from(address), Some(u64::from(value)));
                 }
+                Order::Look(address) => {
+                    let value = self.own(u64::from(address), None) as u32;
+                    self.shared.lock().own.insert(address, value);
+                }
                 Order::Note(at) => {
                     let note = self.note(at);
                     self.shared.lock().faults.push(note);
@@ -278,149 +227,6 @@ fn poke(bus: &mut dyn CoreBus, address: u32, words: &[u32]) {
     }
 }
 
-/// The bus as the processor sees it through this.
-struct CacheBus<'a> {
-    inner: &'a mut dyn CoreBus,
-    shared: &'a SharedCore,
-    /// Whether the read that was stopped before goes through the cache, once that is known: its instruction and count.
-    verdict: Option<(Option<u64>, u64, bool)>,
-    /// The read that waits for a verdict.
-    asked: Option<Access>,
-}
-
-/// Memory below the peripherals, by first and last address (RM0433 2.3.2): ITCM, flash, system memory, DTCM, AXI, the three
-/// of the second domain, that of the third, the backup memory.
-const MEMORIES: [(u64, u64); 9] = [
-    (0x0000_0000, 0x0000_FFFF),
-    (0x0800_0000, 0x081F_FFFF),
-    (0x1FF0_0000, 0x1FF1_FFFF),
-    (0x1FF4_0000, 0x1FF5_FFFF),
-    (0x2000_0000, 0x2001_FFFF),
-    (0x2400_0000, 0x2407_FFFF),
-    (0x3000_0000, 0x3004_7FFF),
-    (0x3800_0000, 0x3800_FFFF),
-    (0x3880_0000, 0x3880_0FFF),
-];
-
-/// The peripherals, and the processor's own space.
-const PERIPHERALS: [(u64, u64); 2] = [(0x4000_0000, 0x5FFF_FFFF), (0xE000_0000, 0xE00F_FFFF)];
-
-/// Whether anything answers at an address; an access elsewhere is a bus fault.
-fn exists(address: u64) -> bool {
-    MEMORIES.iter().chain(&PERIPHERALS).any(|(first, last)| (*first..=*last).contains(&address))
-}
-
-fn in_bank(address: u64) -> bool {
-    (u64::from(BANK.start)..u64::from(BANK.end)).contains(&address)
-}
-
-impl CacheBus<'_> {
-    fn verdict_for(&self, access: &Access) -> Option<bool> {
-        let (pc, count, cacheable) = self.verdict?;
-        (pc == access.program_counter && count == access.instruction_count).then_some(cacheable)
-    }
-
-    fn read_bank(&mut self, access: Access, from_code: bool) -> Option<u64> {
-        let address = access.address as u32;
-        let line = address & !(LINE - 1);
-        let mut state = self.shared.lock();
-        state.cache.count.reads += 1;
-        if state.damaged.contains(&line) {
-            state.double_error = true;
-            return None;
-        }
-        let memory = self.inner.access(access, from_code)?;
-        if self.verdict_for(&access) != Some(true) {
-            return Some(memory);
-        }
-        state.cache.count.cacheable += 1;
-        let bytes = access.width.bytes() as usize;
-        let offset = (address - line) as usize;
-        if let Some(held) = state.cache.line(address) {
-            let mut value = [0; 8];
-            value[..bytes].copy_from_slice(&held[offset..offset + bytes]);
-            let held = u64::from_le_bytes(value);
-            state.cache.count.hits += 1;
-            if held != memory {
-                state.cache.count.stale += 1;
-                state.cache.count.first_stale.get_or_insert(access.program_counter.unwrap_or(0) as u32);
-            }
-            return Some(held);
-        }
-        let mut fresh = [0; LINE as usize];
-        for (place, at) in fresh.chunks_exact_mut(4).zip((u64::from(line)..).step_by(4)) {
-            let word = self.inner.access(Access::new(AccessKind::Read, at, Width::W32, 0), false).unwrap_or(0);
-            place.copy_from_slice(&(word as u32).to_le_bytes());
-        }
-        state.cache.fill(address, fresh);
-        Some(memory)
-    }
-}
-
-impl CoreBus for CacheBus<'_> {
-    fn access(&mut self, access: Access, from_code: bool) -> Option<u64> {
-        if in_bank(access.address) {
-            if access.kind == AccessKind::Read {
-                return self.read_bank(access, from_code);
-            }
-            let bytes = access.value.to_le_bytes();
-            self.shared.lock().cache.store(access.address as u32, &bytes[..access.width.bytes() as usize]);
-        } else if (u64::from(MAINTENANCE.start)..u64::from(MAINTENANCE.end)).contains(&access.address) {
-            if access.kind == AccessKind::Write {
-                self.shared.lock().cache.maintain(access.address as u32, access.value as u32);
-            }
-            return Some(0);
-        }
-        if !exists(access.address) {
-            self.shared.lock().strays.push(Stray {
-                address: access.address as u32,
-                program_counter: access.program_counter.unwrap_or(0) as u32,
-                at: access.virtual_time.0,
-            });
-            return None;
-        }
-        self.inner.access(access, from_code)
-    }
-
-    fn time(&self, instructions: u64) -> VirtualNanos {
-        self.inner.time(instructions)
-    }
-
-    fn queued(&mut self) -> Vec<Queued> {
-        self.inner.queued()
-    }
-
-    fn carry_on(&mut self, instructions: u64, event: Option<VirtualNanos>) -> Option<u32> {
-        self.inner.carry_on(instructions, event)
-    }
-
-    fn acknowledge(&mut self, line: InterruptLine, instructions: u64) -> Option<u64> {
-        self.inner.acknowledge(line, instructions)
-    }
-
-    fn read_checked(&mut self, access: Access, report: bool) -> Option<Checked> {
-        self.inner.read_checked(access, report)
-    }
-
-    fn write_checked(&mut self, access: Access) -> Option<bool> {
-        self.inner.write_checked(access)
-    }
-
-    /// Stops before a read of bank 2 once: whether it goes through the cache depends on registers that only a stopped core
-    /// shows.
-    fn stops_before(&mut self, access: &Access) -> bool {
-        if access.kind == AccessKind::Read && in_bank(access.address) && self.verdict_for(access).is_none() {
-            self.asked = Some(*access);
-            return true;
-        }
-        self.inner.stops_before(access)
-    }
-
-    fn send_trace(&mut self, bytes: &[u8]) {
-        self.inner.send_trace(bytes);
-    }
-}
-
 impl Processor for Core {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
         if !self.routed {
@@ -432,13 +238,13 @@ impl Processor for Core {
         }
         self.obey(bus);
         let shared = self.shared.clone();
-        let mut wrapped = CacheBus { inner: bus, shared: &shared, verdict: None, asked: None };
+        let mut wrapped = CacheBus::new(bus, &shared);
         let (exit, ran) = self.inner.run(budget, &mut wrapped);
-        let Some(access) = wrapped.asked.take().filter(|_| exit == Exit::Halted) else {
+        let Some(access) = wrapped.take_asked().filter(|_| exit == Exit::Halted) else {
             return (exit, ran);
         };
         let cacheable = self.is_cacheable(access.address as u32);
-        wrapped.verdict = Some((access.program_counter, access.instruction_count, cacheable));
+        wrapped.judge(&access, cacheable);
         // The one instruction that was stopped before; then the runner decides how far to go.
         let (exit, more) = self.inner.run(1, &mut wrapped);
         (if exit == Exit::Budget { Exit::Returned } else { exit }, ran + more)

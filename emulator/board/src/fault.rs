@@ -56,8 +56,9 @@ pub struct Fault {
 }
 
 /// What the command line takes.
-pub const SYNTAX: &str = "KIND@MICROSECONDS[:ARGUMENT], KIND one of bus-off, no-acknowledge[:US], dominant[:US], power-cut:N, \
-hse-dead, nmi, panic, hard-fault, hang, stall:US, guard, below-guard, reset:pin|power|brown-out|probe";
+pub const SYNTAX: &str = "KIND@MICROSECONDS[:ARGUMENT], KIND one of bus-off, no-acknowledge[:US], dominant[:US], \
+power-cut:N, hse-dead, nmi, panic, hard-fault, hang, stall:US, guard, below-guard, \
+reset:pin|power|brown-out|probe";
 
 /// A text that names no fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -1,7 +1,7 @@
 //! The host's CAN bus: 1 Mbit/s with the chip's second controller and the host on it.
 //!
-//! Frames travel to and from the other process as records of 11 bytes (`docs/lockstep.md`). Arbitration, frame times and
-//! acknowledgement happen here.
+//! Frames travel to and from the other process as records of 11 bytes (`docs/lockstep.md`). Arbitration, frame times
+//! and acknowledgement happen here.
 
 use std::collections::VecDeque;
 
@@ -46,8 +46,8 @@ impl HostBus {
         self.free_at = self.free_at.max(if self.on_wire.is_none() && self.is_idle() { now } else { 0 });
         self.rest.extend(bytes);
         let whole = self.rest.len() / RECORD_BYTES * RECORD_BYTES;
-        for record in self.rest.drain(..whole).collect::<Vec<u8>>().chunks_exact(RECORD_BYTES) {
-            let [low, high, length, data @ ..] = record else { continue };
+        let records: Vec<u8> = self.rest.drain(..whole).collect();
+        for [low, high, length, data @ ..] in records.as_chunks::<RECORD_BYTES>().0 {
             let data = data.get(..usize::from(*length).min(8)).unwrap_or(&[]);
             self.from_host.push_back(Frame::standard(u16::from_le_bytes([*low, *high]) & 0x7FF, data));
         }
@@ -80,7 +80,7 @@ impl HostBus {
                 self.free_at = end;
                 self.finish(sender, &frame, controllers, now);
             } else {
-                self.start(now);
+                self.start(now, controllers);
             }
         }
     }
@@ -99,13 +99,16 @@ impl HostBus {
     }
 
     /// The lowest identifier begins.
-    fn start(&mut self, now: u64) {
+    fn start(&mut self, now: u64, controllers: &mut Controllers) {
         let arbitration = |queue: &VecDeque<Frame>| queue.front().map_or(u32::MAX, Frame::arbitration);
         let (sender, queue) = if arbitration(&self.from_chip) <= arbitration(&self.from_host) {
             (Sender::Chip, &mut self.from_chip)
         } else {
             (Sender::Host, &mut self.from_host)
         };
+        if sender == Sender::Chip {
+            controllers.begun(Unit::Two, now);
+        }
         if let Some(frame) = queue.pop_front() {
             self.on_wire = Some((sender, frame, now + u64::from(frame.bits()) * BIT_NS));
         }

@@ -41,7 +41,10 @@ pub enum ImageError {
         path: PathBuf,
     },
     /// Its description cannot be understood.
-    #[error("{}: the section .tactus cannot be read ({source}): the image is older or newer than this emulator of {BOARD}", path.display())]
+    #[error(
+        "{}: the section .tactus cannot be read ({source}): the image is older or newer than this emulator of {BOARD}",
+        path.display()
+    )]
     Metadata {
         /// The file.
         path: PathBuf,
@@ -73,7 +76,8 @@ pub struct Image {
     pub path: PathBuf,
     /// Its bytes.
     pub bytes: Vec<u8>,
-    /// SHA-256 in hexadecimal digits over the load segments that have content: physical address, length, content of each.
+    /// SHA-256 in hexadecimal digits over the load segments that have content: physical address, length, content of
+    /// each.
     pub hash: String,
     /// What it says of its firmware.
     pub firmware: String,
@@ -113,12 +117,8 @@ impl Image {
         let model_hash = metadata.model_hash;
         let vectors =
             file.section_by_name(".vector_table").ok_or_else(|| ImageError::Anonymous { path: path.clone() })?;
-        let vectors: Vec<u32> = vectors
-            .data()
-            .map_err(elf)?
-            .chunks_exact(4)
-            .filter_map(|word| Some(u32::from_le_bytes(word.try_into().ok()?) & !1))
-            .collect();
+        let vectors: Vec<u32> =
+            vectors.data().map_err(elf)?.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word) & !1).collect();
         let mut fault_handlers = vectors.get(2..7).unwrap_or(&[]).to_vec();
         let slot_handler = vectors.get(SLOT_VECTOR).copied().unwrap_or(0);
         fault_handlers.sort_unstable();

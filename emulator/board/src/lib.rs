@@ -3,6 +3,7 @@
 pub mod bank;
 pub mod board;
 pub mod cache;
+pub mod cache_bus;
 pub mod can;
 pub mod check;
 pub mod clocks;
@@ -13,7 +14,9 @@ pub mod findings;
 pub mod host;
 pub mod host_bus;
 pub mod image;
+mod inject;
 pub mod log;
+pub mod notes;
 pub mod part;
 pub mod report;
 pub mod run;

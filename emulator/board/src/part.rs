@@ -52,6 +52,8 @@ pub struct Fitting {
     pub watch: SharedWatch,
     /// What the core shares with the board.
     pub core: SharedCore,
+    /// Million instructions a second.
+    pub mips: u32,
     /// Revision of the silicon, REV_ID of DBGMCU.IDC: 0x2003 is V, 0x1003 is Y.
     pub revision: u16,
 }

@@ -5,9 +5,9 @@ use serde_json::{Map, Value, json};
 
 use crate::cache::CacheCount;
 use crate::clocks::Clocks;
-use crate::core::FaultNote;
 use crate::findings::Findings;
 use crate::image::Image;
+use crate::notes::FaultNote;
 use crate::stack::StackUse;
 use crate::watchdog::Watched;
 
@@ -22,6 +22,8 @@ pub struct Measured {
     pub resets: Vec<(u64, String)>,
     /// First frame on the arm's bus, ns.
     pub first_frame: Option<u64>,
+    /// The second CAN controller is on its bus.
+    pub second_bus: bool,
     /// The slot timer's first interrupt, ns.
     pub first_slot: Option<u64>,
     /// Frames sent on the arm's bus.
@@ -36,6 +38,8 @@ pub struct Measured {
     pub watchdog: Watched,
     /// Reads of bank 2.
     pub cache: CacheCount,
+    /// Priority registers of the lines that run the session and the log.
+    pub priorities: [u8; 2],
     /// Faults whose handlers began.
     pub faults: Vec<FaultNote>,
     /// Identifiers that pass the filters of the two CAN controllers.
@@ -97,6 +101,7 @@ impl Measured {
                 "first_stale_by": stale_by,
             }),
         );
+        put("priorities", json!({ "session": self.priorities[0], "log": self.priorities[1] }));
         put("faults", json!(self.faults.iter().map(|note| note.line(image)).collect::<Vec<_>>()));
         for (grade, entries) in self.findings.json() {
             put(grade, entries);

@@ -42,6 +42,8 @@ pub struct Setup {
     pub log: Option<PathBuf>,
     /// End of the run, ns; without it the run ends when the world does.
     pub until: Option<u64>,
+    /// Million instructions a second of virtual time.
+    pub mips: u32,
     /// Something that is not modelled ends the run.
     pub strict: bool,
     /// What is put in from outside.
@@ -59,12 +61,17 @@ impl Default for Setup {
             bank2: None,
             log: None,
             until: None,
+            mips: MIPS,
             strict: true,
             faults: Vec::new(),
             tells: false,
         }
     }
 }
+
+/// An instruction takes 4 ns unless somebody says otherwise: the crate's own choice for a core of some hundred
+/// megahertz.
+pub const MIPS: u32 = 250;
 
 /// Silicon of revision V, which present boards have.
 pub const REVISION_V: u16 = 0x2003;
@@ -122,8 +129,14 @@ pub fn run(image: &Arc<Image>, setup: &Setup, world: Box<dyn World>) -> Result<O
     };
     let can = SharedCan::new(options, world, serial.clone(), setup.host);
     let (watch, core) = (SharedWatch::default(), SharedCore::default());
-    let fitting =
-        Fitting { can: can.clone(), serial, watch: watch.clone(), core: core.clone(), revision: setup.revision };
+    let fitting = Fitting {
+        can: can.clone(),
+        serial,
+        watch: watch.clone(),
+        core: core.clone(),
+        revision: setup.revision,
+        mips: setup.mips,
+    };
     let board = Board::new(&fitting)?;
     let mut images = vec![Placed::new(&image.path, image.bytes.clone(), None)?];
     if let Some(path) = &setup.bank2 {

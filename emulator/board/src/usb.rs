@@ -1,8 +1,8 @@
 //! The USB controller with nothing in its socket.
 //!
-//! Without a host there is no session, no reset and no enumeration on the bus, so no flag of the controller ever rises and
-//! no interrupt comes: its registers keep what is written. The reset register, whose bits clear by themselves, is the
-//! chip's model.
+//! Without a host there is no session, no reset and no enumeration on the bus, so no flag of the controller ever rises
+//! and no interrupt comes: its registers keep what is written. The reset register, whose bits clear by themselves, is
+//! the chip's model.
 
 use rigless::device::Device;
 use rigless::soc::stm32h743::generated::{otg1_hs_device, otg1_hs_pwrclk};

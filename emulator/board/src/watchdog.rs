@@ -21,7 +21,8 @@ const PVU: u64 = 1;
 const RVU: u64 = 2;
 const WVU: u64 = 4;
 
-/// Periods of the oscillator, at the prescaler of 1, until a written register has taken effect: "up to five" (RM0433 45.4.4).
+/// Periods of the oscillator, at the prescaler of 1, until a written register has taken effect: "up to five" (RM0433
+/// 45.4.4).
 const CROSSING: u64 = 5;
 
 /// Reload value after a reset.
@@ -169,7 +170,8 @@ impl Watchdog {
             return;
         }
         // Without its oscillator nothing passes.
-        let at = if self.hz > 0 { context.now().0 + CROSSING * 1_000_000_000 / self.hz } else { u64::MAX };
+        let crossing = (CROSSING * 1_000_000_000).checked_div(self.hz);
+        let at = crossing.map_or(u64::MAX, |time| context.now().0 + time);
         self.crossing[place] = Some((value, at));
         if at < u64::MAX {
             context.schedule(VirtualNanos(at));

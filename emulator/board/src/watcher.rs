@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use fdcan_model::{Fault as WireFault, Unit};
+use fdcan_model::Unit;
 use rigless::emulator::{Access, AccessKind, Driver, Hit, Host, Settled, Stop, Watch};
 
 use rigless::session::Session;
@@ -17,7 +17,7 @@ use crate::cache::BANK;
 use crate::can::SharedCan;
 use crate::clocks::{Clocks, loop_flaws};
 use crate::core::{Order, SharedCore};
-use crate::fault::{Fault, Kind, ResetKind};
+use crate::fault::{Fault, Kind};
 use crate::findings::{Finding, Findings, Grade};
 use crate::image::Image;
 use crate::log::Log;
@@ -33,33 +33,18 @@ pub const LOOK: u64 = 1_000_000;
 const CLOCK_CONTROL: u64 = 0x5802_4400;
 const HSE_READY: u64 = 1 << 17;
 
-/// AIRCR and what a debugger writes there to reset the chip.
-const RESET_CONTROL: u32 = 0xE000_ED0C;
-const SYSTEM_RESET: u32 = 0x05FA_0004;
-
-/// RCC.RSR after power came: CPU, D1, D2, brown-out, pin, power. After a brown-out: the same without power.
-const POWER_FLAGS: u64 = 0x00FE_0000;
-const BROWN_OUT_FLAGS: u64 = 0x007E_0000;
-
-/// Where injected instructions and the place of an injected panic lie: the end of the AXI memory, which no image fills.
-const SCRATCH: u32 = 0x2407_FFC0;
-
-/// Two instructions each: branch to itself, undefined as compilers write it.
-const LOOP: u32 = 0xE7FE_E7FE;
-const UNDEFINED: u32 = 0xDEFE_DEFE;
-
-/// ICSR and its bit that makes a non-maskable interrupt pending.
-const INTERRUPT_CONTROL: u32 = 0xE000_ED04;
-const PEND_NMI: u32 = 1 << 31;
+/// The lines of software that run the session (SPI2, 36) and the log (SPI3, 51), and the words of the interrupt
+/// controller that hold their priorities.
+const PRIORITIES: [(u32, u32); 2] = [(36, 0xE000_E424), (51, 0xE000_E430)];
 
 /// An access this near below the stack is taken for one of the stack's.
 const NEAR_STACK: u32 = 128 * 1024;
 
 /// See the module.
 pub struct Watcher {
-    image: Arc<Image>,
-    can: SharedCan,
-    core: SharedCore,
+    pub(crate) image: Arc<Image>,
+    pub(crate) can: SharedCan,
+    pub(crate) core: SharedCore,
     watch: SharedWatch,
     log: Log,
     interrupt: Arc<AtomicBool>,
@@ -67,16 +52,16 @@ pub struct Watcher {
     strict: bool,
     tells: bool,
     /// Faults not yet put in, the earliest first.
-    faults: Vec<Fault>,
-    hse_dead: bool,
-    stopped_by_crystal: bool,
+    pub(crate) faults: Vec<Fault>,
+    pub(crate) hse_dead: bool,
+    pub(crate) stopped_by_crystal: bool,
     first_slot: Option<u64>,
     power_cut: Option<String>,
     /// The wire or the core is to be let go at this time.
-    release_wire: Option<u64>,
-    release_core: Option<u64>,
-    cut_at: Option<u64>,
-    bank_watch: BankWatch,
+    pub(crate) release_wire: Option<u64>,
+    pub(crate) release_core: Option<u64>,
+    pub(crate) cut_at: Option<u64>,
+    pub(crate) bank_watch: BankWatch,
     clock_control: u64,
     findings: Findings,
     told: usize,
@@ -85,7 +70,7 @@ pub struct Watcher {
     frames_at_reset: u64,
     bank2: Vec<u8>,
     over: bool,
-    cut_short: Option<String>,
+    pub(crate) cut_short: Option<String>,
     now: u64,
     instructions: u64,
 }
@@ -179,7 +164,9 @@ impl Watcher {
             let used = stack::used_since_start(host, &self.image.stack);
             self.stack.at_start = Some(used);
             let painted = self.image.stack.end - used..self.image.stack.end;
-            self.core.lock().orders.push(Order::Paint(painted));
+            let orders = &mut self.core.lock().orders;
+            orders.push(Order::Paint(painted));
+            orders.extend(PRIORITIES.map(|(_, address)| Order::Look(address)));
             self.watch.forget();
         }
     }
@@ -266,95 +253,19 @@ impl Watcher {
         }
     }
 
-    /// Puts in what is due.
-    fn put_in(&mut self, session: &mut Session<Board>, stop: Stop, host: &mut dyn Host) {
-        let now = stop.at.0;
-        if self.release_wire.take_if(|at| *at <= now).is_some() {
-            self.can.lock().set_fault(Unit::One, None, now);
-        }
-        if self.release_core.take_if(|at| *at <= now).is_some() {
-            host.hold(false);
-        }
-        while self.faults.first().is_some_and(|fault| fault.at <= now) {
-            let fault = self.faults.remove(0);
-            self.inject(fault.kind, session, stop, host);
-        }
-    }
-
-    fn inject(&mut self, kind: Kind, session: &mut Session<Board>, stop: Stop, host: &mut dyn Host) {
-        let now = stop.at.0;
-        let mut wire = |fault: WireFault, us: u64| {
-            self.can.lock().set_fault(Unit::One, Some(fault), now);
-            self.release_wire = (us > 0).then_some(now + us * 1000);
-        };
-        let jump = |pc: u32, arguments: [u32; 4]| Order::Jump { pc, arguments, masked: false };
-        match kind {
-            Kind::BusOff => wire(WireFault::BitErrors { attempts: 32 }, 0),
-            Kind::NoAcknowledge(us) => wire(WireFault::NoAcknowledge, us),
-            Kind::Dominant(us) => wire(WireFault::StuckDominant, us),
-            Kind::PowerCut(operation) => self.cut_at = Some(self.bank_watch.operations + operation + 1),
-            Kind::HseDead => self.kill_crystal(session, now, host),
-            Kind::Nmi => self.core.lock().orders.push(Order::Own(INTERRUPT_CONTROL, PEND_NMI)),
-            Kind::Panic => match self.image.function_named("core::option::unwrap_failed") {
-                Some(pc) => {
-                    // A place in the source, for the function that panics: text, its length, line, column.
-                    let text = u32::from_le_bytes(*b"put ");
-                    let place = vec![SCRATCH + 16, 8, 1, 1, text, u32::from_le_bytes(*b"in.r")];
-                    let orders = &mut self.core.lock().orders;
-                    orders.push(Order::Poke(SCRATCH, place));
-                    orders.push(jump(pc, [SCRATCH, 0, 0, 0]));
-                }
-                None => self.cut_short = Some("the image has no function that panics to jump to".into()),
-            },
-            Kind::HardFault => self.stand_on(UNDEFINED, false),
-            Kind::Hang => self.stand_on(LOOP, true),
-            Kind::Stall(us) => {
-                host.hold(true);
-                self.release_core = Some(now + us * 1000);
-            }
-            Kind::Guard => self.core.lock().orders.push(Order::Stack(self.image.stack.start)),
-            Kind::BelowGuard => self.core.lock().orders.push(Order::Stack(BELOW_MEMORY)),
-            Kind::Reset(ResetKind::Probe) => {
-                self.core.lock().orders.push(Order::Own(RESET_CONTROL, SYSTEM_RESET));
-            }
-            Kind::Reset(reset) => {
-                session.reset_by_pin(stop.at, stop.instruction_count, host);
-                let part = &mut session.board_mut().mcu.part;
-                match reset {
-                    ResetKind::Power => part.set_reset_flags(POWER_FLAGS),
-                    ResetKind::BrownOut => part.set_reset_flags(BROWN_OUT_FLAGS),
-                    _ => return,
-                }
-                scramble(host, now);
-            }
-        }
-    }
-
-    /// The core goes on at these instructions.
-    fn stand_on(&mut self, instructions: u32, masked: bool) {
-        let orders = &mut self.core.lock().orders;
-        orders.push(Order::Poke(SCRATCH, vec![instructions]));
-        orders.push(Order::Jump { pc: SCRATCH, arguments: [0; 4], masked });
-    }
-
-    /// The oscillator's input loses its clock while the chip runs from it. With the clock security system on, the chip goes
-    /// over to its inner oscillator and has a non-maskable interrupt; without, everything but the watchdog stands still.
-    fn kill_crystal(&mut self, session: &mut Session<Board>, now: u64, host: &mut dyn Host) {
-        self.hse_dead = true;
-        if session.board_mut().mcu.part.fail_crystal(VirtualNanos(now)) {
-            self.core.lock().orders.push(Order::Own(INTERRUPT_CONTROL, PEND_NMI));
-        } else {
-            host.hold(true);
-            self.stopped_by_crystal = true;
-        }
-    }
-
     /// What the run has measured.
     #[must_use]
     pub fn into_outcome(self, session: &mut Session<Board>) -> Outcome {
         let resets = session.resets().iter().map(|reset| (reset.at.0, format!("{:?}", reset.cause))).collect();
         let clocks = Clocks::of(&mut session.board_mut().mcu.part);
         let serial_baud = clocks.baud(&session.board().mcu.part);
+        let core = self.core.lock();
+        let faults = core.faults.clone();
+        let priorities = PRIORITIES.map(|(line, address)| {
+            let word = core.own.get(&address).copied().unwrap_or(0);
+            (word >> (8 * (line % 4)) & 0xFF) as u8
+        });
+        drop(core);
         let can = self.can.lock();
         let measured = Measured {
             now: self.now,
@@ -362,13 +273,15 @@ impl Watcher {
             resets,
             first_frame: can.first_frame(),
             first_slot: self.first_slot,
+            second_bus: can.status(Unit::Two).on_bus,
             frames_sent: can.frames_sent(),
             clocks,
             timing: can.status(Unit::One).timing,
             stack: self.stack,
             watchdog: self.watch.get(),
             cache: self.core.cache_count(),
-            faults: self.core.lock().faults.clone(),
+            faults,
+            priorities,
             accepted: can.accepted(),
             serial_baud,
             bank_operations: self.bank_watch.operations,
@@ -381,19 +294,6 @@ impl Watcher {
             cut_short: self.cut_short,
             power_cut: self.power_cut,
         }
-    }
-}
-
-/// An address below the guard of the stack, where nothing is.
-const BELOW_MEMORY: u32 = 0x1FFF_F000;
-
-/// Memory after power was away: random, the same for equal times.
-fn scramble(host: &mut dyn Host, seed: u64) {
-    let mut state = seed | 1;
-    for address in (0x2000_0000_u64..0x2002_0000).chain(0x2400_0000..0x2408_0000).step_by(8) {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        // Memory that cannot be written keeps what it has.
-        let _ = host.write(address, Width::W64, state);
     }
 }
 

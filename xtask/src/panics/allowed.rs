@@ -104,8 +104,9 @@ const DEPENDENCIES: &[Allowed] = &[
     row("core::fmt", &[Index, Division, Message], "numbers in the last words and the log, into buffers of fixed size"),
     real(
         "synopsys_usb_otg",
-        &[Index, Borrow, Message],
-        "a packet that does not fit its buffer is an error; numbers of endpoints are the chip's own",
+        &[Index, Borrow, Message, Unwrap],
+        "a packet that does not fit its buffer is an error; numbers of endpoints are the chip's own; the memory of our four \
+         endpoints is taken once, at the start, and every start is the same",
     ),
     real(
         "usb_device",

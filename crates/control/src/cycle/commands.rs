@@ -44,6 +44,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
+    #[inline(never)]
     pub(super) fn command(&mut self, command: Command, measured: &Measured<'_, R>) -> Result<(), Refusal> {
         let q = &measured.state.q;
         match command {

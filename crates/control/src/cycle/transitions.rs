@@ -21,7 +21,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
-    /// Prepares the law of the state that was just entered.
+    /// Prepares the law of the state that was just entered. Not inlined: it is rare, and a board may keep the code of every
+    /// cycle in a small fast memory.
+    #[inline(never)]
     pub(super) fn entered(&mut self, from: State, measured: Option<&Measured<'_, R>>) {
         let law = self.supervisor.law();
         match law {

@@ -12,7 +12,7 @@ use crate::double::{Bus, holding_with_ready_hand};
 
 /// A control cycle, us.
 const CYCLE_US: f64 = 1e6 / 300.0;
-/// What the reference allows of it in the worst case.
+/// Share of it that a full cycle may take in the worst case.
 const MOST: f64 = 0.84;
 /// From a request's end to its answers being ready, us.
 const LATENCY_US: f64 = 75.0;

@@ -1,8 +1,8 @@
 //! A small double of the arm's bus: seven pucks, a force/torque sensor, a safety module and perhaps a hand, spoken to in
 //! frames.
 //!
-//! It answers as the reference says devices answer, through the device side of the `puck` crate, and logs every frame with
-//! its time. There is no arbitration and no physics: an arm of this double stands still.
+//! It answers as docs/barrett-can.md says that devices answer, through the device side of the `puck` crate, and logs
+//! every frame with its time. There is no arbitration and no physics: an arm of this double stands still.
 
 use std::collections::VecDeque;
 

@@ -113,7 +113,7 @@ fn the_frames_of_the_start_up_are_those_of_the_reference() {
     }
     expected.push((ARM, PropertyId::MODE, 0));
     expected.push((SAFETY, safety_property(Property::Ifault), 8));
-    // The worked example of the reference: floor makes -36833 of the second and +36832 of the third.
+    // Counts of home by hand: floor makes -36833 of the second and +36832 of the third.
     for (node, counts) in Node::ARM.into_iter().zip([0, -36833, 36832, -36728, 0, 0, 0]) {
         expected.push((node.into(), PropertyId::POSITION, counts));
     }

@@ -1,9 +1,10 @@
 //! One puck of the hand (nodes 11..14): encoders, moves, streamed set-points, and HI.
 //!
-//! Positions mean nothing until HI has driven the digit to its open stop: with the main firmware the counters begin anywhere.
-//! While HI runs MODE reads 4, afterwards 0, or 3 with HOLD; any request but GET MODE ends it at once, uninitialised (wam-can 4.4,
-//! trap T12). The puck's own controllers are ideal within their torque limit, moves keep MV and stop without a ramp, and TSTOP
-//! ends every mode that drives once the motor has stood still for so many milliseconds, torque mode included.
+//! Positions mean nothing until HI has driven the digit to its open stop: with the main firmware the counters begin
+//! anywhere. While HI runs MODE reads 4, afterwards 0, or 3 with HOLD; any request but GET MODE ends it at once,
+//! uninitialised (trap T12 of docs/barrett-can.md). The puck's own controllers are ideal within their torque limit,
+//! moves keep MV and stop without a ramp, and TSTOP ends every mode that drives once the motor has stood still for so
+//! many milliseconds, torque mode included.
 
 use super::drive::Demand;
 use crate::firmware::{Firmware, Heard, Order};

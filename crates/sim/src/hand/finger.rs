@@ -8,7 +8,7 @@
 //!
 //! Worms cannot be driven back: a load can stop the motor but never turn it, and a load that would help the motor is
 //! borne by the worm. Opening moves both links, slip kept, until the inner link and then the outer one are at the open stop,
-//! where `s = 0`: the clutch is engaged again as after HI (wam-can 5.5).
+//! where `s = 0`: the clutch is engaged again as after HI (docs/arm-model.md).
 
 use super::drive::{Demand, Inertia};
 use crate::time::STEP_SECONDS;

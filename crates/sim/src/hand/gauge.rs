@@ -1,6 +1,7 @@
 //! The strain gauge of a finger: torque about the distal joint to 12-bit counts.
 //!
-//! Barrett's nominal curve, counts x to N m (wam-can 5.5): `tau = 2.754e-10 x^3 - 1.708e-6 x^2 + 0.003764 x - 2.85`. A gauge
+//! Barrett's nominal curve (docs/arm-model.md), counts x to N m:
+//! `tau = 2.754e-10 x^3 - 1.708e-6 x^2 + 0.003764 x - 2.85`. A gauge
 //! here follows it shifted to its own zero: it reads `x(tau + tau(zero))`. Counts **rise** as the finger presses on something
 //! while closing; that is the direction in which HSG stops a closing finger. A low-pass stands for the amplifier. The curve is written
 //! down again here instead of taken from `puck::gauge`: a wrong number there must not cancel itself out.

@@ -4,8 +4,9 @@
 //! torque, moves, HI --> Digit x 4 --demand--> Finger x 3, Spread --targets--> World::drive_hand
 //! P, SG <-- encoders, Gauge x 3 <------------- loads ------------------------- World::hand
 //! ```
-//! Figures of the drives: wam-can 5.5; 2.44 rad/s free and some 15 N at the tip (Barrett). How a torque command becomes that force
-//! is not published: an efficiency of 0.1 between motor and link fits both, and makes the worm self-locking.
+//! Figures of the drives: docs/arm-model.md; 2.44 rad/s free and some 15 N at the tip (Barrett). How a torque command
+//! becomes that force is not published: an efficiency of 0.1 between motor and link fits both, and makes the worm
+//! self-locking.
 
 mod digit;
 mod drive;

@@ -15,7 +15,7 @@ const WRENCHES: usize = 2;
 /// Identifiers the arm's bus has for the host.
 pub const ARM_IDS: usize = POSITIONS + PROPERTIES + WRENCHES;
 
-/// Identifier of a reply of `node` to `group` (`wam-can`: group flag, sender, group).
+/// Identifier of a reply of `node` to `group` (docs/barrett-can.md: group flag, sender, group).
 const fn reply(node: Node, group: Group) -> u16 {
     0x400 | (node.number() as u16) << 5 | group.number() as u16
 }

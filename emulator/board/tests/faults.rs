@@ -1,0 +1,155 @@
+//! What leaves on the bus when something goes wrong, and what the next start says.
+
+mod common;
+
+use common::{Story, safe_frames, tell, tell_with};
+use emulated_board::run::Setup;
+use fdcan_model::Cancellation;
+use puck::CanFrame;
+
+/// In service: the arm is ready long before.
+const SERVICE_US: u64 = 2_100_000;
+
+/// Whether the four safe frames are among `sent`, in order, with nothing but their like between the first and the last.
+fn holds_safe_frames(sent: &[(u64, CanFrame)]) -> bool {
+    let wanted = safe_frames();
+    sent.windows(wanted.len()).any(|window| window.iter().zip(wanted).all(|((_, frame), wanted)| *frame == wanted))
+}
+
+/// The next life begins with the safe frames.
+fn begins_safely(story: &Story, reset_us: u64) {
+    let sent = story.sent_since(reset_us);
+    let first: Vec<CanFrame> = sent.iter().take(4).map(|(_, frame)| *frame).collect();
+    assert_eq!(first, safe_frames(), "first frames after the restart at {reset_us} us");
+}
+
+/// The image ended by itself after a fault at `us`: four last frames, a restart, and a start that says why.
+fn ended_in_order(story: &Story, us: u64, words: &str) {
+    let resets = story.resets();
+    assert_eq!(resets.len(), 1, "{resets:?}");
+    let (reset_us, cause) = resets[0];
+    assert_eq!(cause, "Core", "by itself");
+    assert!(reset_us - us < 9_000, "{} us after the fault", reset_us - us);
+    let last: Vec<(u64, CanFrame)> = story.sent_since(us).into_iter().filter(|(at, _)| *at < reset_us).collect();
+    assert!(holds_safe_frames(&last), "{last:?}");
+    begins_safely(story, reset_us);
+    assert!(story.log_says(words), "no {words:?} in the log: {:#?}", story.log());
+}
+
+/// The watchdog ended it within its window.
+fn ended_by_watchdog(story: &Story, us: u64) {
+    let resets = story.resets();
+    assert!(!resets.is_empty(), "nothing was reset");
+    let (reset_us, cause) = resets[0];
+    assert_eq!(cause, "Model(\"IWDG\")");
+    assert!((5_000..=11_000).contains(&(reset_us - us)), "{} us after the fault", reset_us - us);
+    begins_safely(story, reset_us);
+    assert!(story.log_says("watchdog"), "{:#?}", story.log());
+}
+
+fn both_readings(seconds: f64, faults: &[&str], judge: impl Fn(&Story)) {
+    for cancellation in [Cancellation::Skipped, Cancellation::Stuck] {
+        let faults = faults.iter().map(|text| text.parse().expect("a fault")).collect();
+        judge(&tell(seconds, Setup { faults, cancellation, ..Setup::default() }));
+    }
+}
+
+#[test]
+fn a_panic_with_frames_queued_sends_the_last_frames_and_the_next_start_tells_the_words() {
+    // Instants across a whole control cycle, so that the queue is full in some of them.
+    for step in 0..3 {
+        let us = SERVICE_US + 1_300 * step;
+        both_readings(us as f64 / 1e6 + 0.1, &[&format!("panic@{us}")], |story| {
+            ended_in_order(story, us, "called `Option::unwrap()` on a `None` value");
+        });
+    }
+}
+
+#[test]
+fn a_hard_fault_sends_the_last_frames_and_records_its_cause() {
+    let story = tell_with(2.2, &["hard-fault@2100000"]);
+    ended_in_order(&story, SERVICE_US, "hard fault");
+    assert!(story.log_says("0x00010000"), "CFSR: undefined instruction; {:#?}", story.log());
+}
+
+#[test]
+fn a_stack_at_its_guard_sends_the_last_frames() {
+    let story = tell_with(2.2, &["guard@2100000"]);
+    ended_in_order(&story, SERVICE_US, "memory fault");
+}
+
+#[test]
+fn a_non_maskable_interrupt_sends_the_last_frames() {
+    let story = tell_with(2.2, &["nmi@2100000"]);
+    ended_in_order(&story, SERVICE_US, "non-maskable interrupt");
+}
+
+#[test]
+fn a_hang_ends_by_the_watchdog() {
+    ended_by_watchdog(&tell_with(2.2, &["hang@2100000"]), SERVICE_US);
+}
+
+#[test]
+fn a_hang_before_the_first_slot_ends_by_the_watchdog_as_fast() {
+    // After the clocks are set up, before the first slot.
+    ended_by_watchdog(&tell_with(0.2, &["hang@4600"]), 4_600);
+}
+
+#[test]
+fn a_core_that_stands_still_is_reset_by_the_watchdog() {
+    ended_by_watchdog(&tell_with(2.2, &["stall@2100000:20000"]), SERVICE_US);
+}
+
+#[test]
+fn after_bus_off_the_arm_is_started_up_again_and_nothing_stale_leaves() {
+    both_readings(4.2, &["bus-off@2100000"], |story| {
+        assert!(story.resets().is_empty(), "{:?}", story.resets());
+        let learned = story.learned.lock();
+        let statistics = learned.statistics.expect("statistics");
+        assert!(statistics.bus_errors > 0, "the image counts it");
+        drop(learned);
+        assert!(story.is_up(), "{:?}", story.learned.lock().status);
+    });
+}
+
+#[test]
+fn a_bus_without_another_node_is_borne_until_it_is_there_again() {
+    both_readings(4.2, &["no-acknowledge@2100000:200000"], |story| {
+        assert!(story.resets().is_empty(), "{:?}", story.resets());
+        assert!(story.is_up(), "{:?}", story.learned.lock().status);
+    });
+}
+
+#[test]
+fn a_bus_held_dominant_is_borne_until_it_is_free() {
+    both_readings(4.2, &["dominant@2100000:50000"], |story| {
+        assert!(story.resets().is_empty(), "{:?}", story.resets());
+        assert!(story.is_up(), "{:?}", story.learned.lock().status);
+    });
+}
+
+#[test]
+fn every_kind_of_reset_is_told_by_its_name() {
+    for (kind, words) in [("pin", "button"), ("power", "power"), ("brown-out", "power"), ("probe", "debug")] {
+        let story = tell_with(1.2, &[&format!("reset@1000000:{kind}")]);
+        assert_eq!(story.resets().len(), 1, "{kind}");
+        begins_safely(&story, 1_000_000);
+        let log = story.log();
+        let told = log.iter().rev().find(|line| line.contains(words));
+        assert!(told.is_some(), "{kind}: no {words:?} in {log:#?}");
+    }
+}
+
+#[test]
+fn a_crystal_that_is_dead_from_the_start_does_not_leave_the_image_waiting_for_ever() {
+    let story = tell_with(1.0, &["hse-dead@0"]);
+    assert!(!story.resets().is_empty() || !story.sent_since(0).is_empty(), "it waits for ever, dark");
+}
+
+#[test]
+fn a_crystal_that_dies_in_service_ends_the_image_and_not_the_arm() {
+    let story = tell_with(2.2, &["hse-dead@2100000"]);
+    let resets = story.resets();
+    assert!(!resets.is_empty(), "it goes on at another rate");
+    assert!(resets[0].0 - SERVICE_US < 12_000, "{resets:?}");
+}

@@ -1,0 +1,102 @@
+//! Holds the code that a control slot calls against the memory that is never waited for.
+//!
+//! The linker script names what goes there by mangled names, which change with a module or with what the compiler inlines. So
+//! the image itself is asked: everything the control slot can call lies in ITCM, or is listed here with its reason.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::code::Code;
+use crate::elf::Elf;
+use crate::thumb::Flow;
+
+/// The control slot, which must lie in ITCM itself.
+const ROOT: &str = "device::core::Core::control";
+
+/// The law of a run, which has most to compute.
+const LAW: &str = "run_primitive";
+
+/// ITCM of the STM32H743.
+const ITCM: std::ops::Range<u32> = 0..0x1_0000;
+
+/// Called by a control slot, yet not in ITCM: part of the name, and why.
+const ELSEWHERE: &[(&str, &str)] = &[
+    ("control::cycle::transitions", "once, when a state changes"),
+    ("control::supervisor", "once, when a state changes"),
+    ("control::cycle::commands", "once, when a person commands"),
+    ("control::command::Command", "once, when a person commands"),
+    ("control::run::", "once, when a run begins or its goal changes"),
+    ("control::approach", "once, when an approach begins"),
+    ("control::arm::ArmModel", "when a payload is found"),
+    ("tare_drift", "at rest, by a person's command"),
+    ("control::hand::drive::HandDrive<R>::move_to", "once, when a person moves the hand"),
+    ("control::hand::within_range", "once, when a person moves the hand"),
+    (
+        "control::cycle::laws::<impl control::cycle::Cycle<R,_>>::hold_to",
+        "the arm stands: it computes a third of a run",
+    ),
+    ("control::cycle::laws::<impl control::cycle::Cycle<R,_>>::float", "led by hand: it computes a third of a run"),
+    ("control::cycle::Cycle<R,_>::reset", "after a fault of the bus"),
+    ("device::core::Core::restart", "after a fault of the bus"),
+    ("device::startup", "a person zeroes the arm again"),
+    ("device::hand", "the hand is initialised or has failed"),
+    ("firmware::last_words", "the end"),
+    ("firmware::board::stm32h743::parts::", "the end; a frame's way into the controller"),
+    ("firmware::application::slot::SlotIo", "an event or a record for the session"),
+    ("core::", "the end: a panic"),
+    ("rust_begin_unwind", "the end: a panic"),
+    ("__aeabi_mem", "a few instructions in front of memcpy and memset, which are in ITCM"),
+    ("__aeabi_uldivmod", "time of an event"),
+    ("compiler_builtins::int", "time of an event"),
+];
+
+/// Fails if a control slot calls something outside ITCM that is not listed.
+pub(crate) fn check(image: &Path) -> Result<()> {
+    let file = fs::read(image).with_context(|| format!("cannot read {}", image.display()))?;
+    let elf = Elf::parse(&*file).with_context(|| format!("{} is not a 32-bit ELF file", image.display()))?;
+    let stray = stray(&Code::of(&elf)?)?;
+    ensure!(
+        stray.is_empty(),
+        "a control slot calls code that is not in ITCM: {}\nName it in firmware/memory/stm32h743.x, or list it with its \
+         reason in xtask/src/hot.rs",
+        stray.into_iter().collect::<Vec<_>>().join(", ")
+    );
+    Ok(())
+}
+
+/// What a control slot calls outside ITCM without a reason.
+fn stray(code: &Code) -> Result<BTreeSet<String>> {
+    let named = |name: &str| {
+        let found = code.functions().find(|(_, function)| function.names().any(|known| known.ends_with(name)));
+        found.map(|(address, _)| address).with_context(|| format!("the image has no function {name}"))
+    };
+    for name in [ROOT, LAW] {
+        let address = named(name)?;
+        ensure!(ITCM.contains(&address), "{name} lies at {address:#010x}, not in ITCM");
+    }
+    let mut stray = BTreeSet::new();
+    let mut seen = BTreeSet::new();
+    let mut open = vec![named(ROOT)?];
+    while let Some(address) = open.pop() {
+        let Some(function) = code.at(address).filter(|_| seen.insert(address)) else { continue };
+        if let Some(to) = code.beyond(function) {
+            open.push(to);
+            continue;
+        }
+        let name = function.name();
+        if !ITCM.contains(&address) {
+            if !ELSEWHERE.iter().any(|(listed, _)| name.contains(listed)) {
+                stray.insert(name);
+            }
+            continue;
+        }
+        open.extend(function.instructions.iter().filter_map(|instruction| match instruction.flow {
+            Flow::Call(to) | Flow::Jump(to) | Flow::Branch(to) => Some(to),
+            Flow::Next | Flow::Elsewhere | Flow::Abort | Flow::Unreachable => None,
+        }));
+    }
+    Ok(stray)
+}
