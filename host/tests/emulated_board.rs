@@ -99,7 +99,10 @@ fn the_power_is_off_when_the_emulator_has_written_everything() {
 
 #[test]
 fn what_the_board_says_arrives_without_delay() {
-    let folder = laboratory("nucleo-h743zi2", &format!("{}\n{}\ncat > /dev/null", ask(0), request(4, 100, &[0x5A])));
+    let folder = laboratory(
+        "nucleo-h743zi2",
+        &format!("{}\n{}\n{}\ncat > /dev/null", ask(0), request(4, 100, &[0x5A]), ask(10_000)),
+    );
     let mut board = start(&options(folder.path())).unwrap();
     let mut heard = Vec::new();
     board.receive(Duration::from_millis(1), &mut heard).unwrap();

@@ -16,6 +16,7 @@ const FINDINGS: [&str; 3] = ["unmodelled", "refused", "ignored"];
 
 /// Adds the report of a start, whose rows the emulator has judged; without any it proves nothing.
 pub(super) fn start(table: &mut Table, report: &Value, hash: &str) {
+    table.part("start");
     let text = |value: Option<&Value>| value.and_then(Value::as_str).unwrap_or("missing").to_owned();
     table.told("image", text(report.pointer("/image/revision")));
     let same = report.pointer("/image/hash").and_then(Value::as_str) == Some(hash);

@@ -86,8 +86,9 @@ pub(crate) fn check(emulator: &Path, image: &Path, tactus: &Path) -> Result<()> 
     }
     shell::step("what came of it");
     print!("{table}");
-    ensure!(ended_well, "the emulator ended the start of the image; the reasons are above");
-    table.verdict()
+    table.verdict()?;
+    ensure!(ended_well, "the emulator found the start of the image wrong; its reasons are above");
+    Ok(())
 }
 
 /// Runs a command that writes one JSON object, with its messages on our terminal; tells whether it ended well.

@@ -70,12 +70,13 @@ pub(super) fn play(table: &mut Table, emulator: &Path, image: &Path, tactus: &Pa
     shell::step("teach: a person guides the weightless arm; the image for the real board makes it so");
     shell::run(&mut bench.command(&["--device", "board:", "teach", "--output", "grasp.csv"]))?;
     shell::step("learn: the recording becomes a movement primitive");
-    shell::run(&mut bench.command(&["--quiet", "learn", "grasp.csv", "--output", "grasp.toml"]))?;
+    shell::capture(&mut bench.command(&["--quiet", "learn", "grasp.csv", "--output", "grasp.toml"]))?;
     shell::step("upload into bank 2, and run; twice with one seed");
     let begun = Instant::now();
     let (run, report) = bench.play("first")?;
     let speed = number(&report, "/virtual_seconds").unwrap_or(0.0) / begun.elapsed().as_secs_f64();
     let (again, _) = bench.play("second")?;
+    table.part("movement, uploaded into bank 2");
     movement(table, &run);
     table.told("emulation", format!("{speed:.2} x real time"));
     findings(table, &report);

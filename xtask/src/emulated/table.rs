@@ -4,7 +4,7 @@ use std::fmt;
 
 use anyhow::{Result, ensure};
 
-/// One line.
+/// One line; one without a value is a heading.
 struct Row {
     name: String,
     value: String,
@@ -18,6 +18,11 @@ struct Row {
 pub(super) struct Table(Vec<Row>);
 
 impl Table {
+    /// Begins a part of the table.
+    pub(super) fn part(&mut self, name: &str) {
+        self.told(name, "");
+    }
+
     /// A figure that is only told.
     pub(super) fn told(&mut self, name: &str, value: impl Into<String>) {
         self.0.push(Row { name: name.to_owned(), value: value.into(), wanted: String::new(), holds: true });
@@ -31,7 +36,8 @@ impl Table {
     /// A number of some unit that must not be larger; one that is missing is a failure.
     pub(super) fn at_most(&mut self, name: &str, value: Option<f64>, unit: &str, limit: f64) {
         let holds = value.is_some_and(|value| value <= limit);
-        self.checked(name, shown(value, unit), format!("at most {}", number(limit)), holds);
+        let wanted = if limit == 0.0 { "0".to_owned() } else { format!("at most {}", number(limit)) };
+        self.checked(name, shown(value, unit), wanted, holds);
     }
 
     /// Whether everything so far is as it must be.
@@ -66,6 +72,10 @@ impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for Row { name, value, wanted, holds } in &self.0 {
             let mark = if *holds { "" } else { "  <-- WRONG" };
+            if value.is_empty() && wanted.is_empty() {
+                writeln!(f, "\n{name}")?;
+                continue;
+            }
             let wanted = if wanted.is_empty() { String::new() } else { format!("({wanted})") };
             writeln!(f, "{}", format!("{name:<42} {value:<26} {wanted}{mark}").trim_end())?;
         }
@@ -80,6 +90,7 @@ mod tests {
     #[test]
     fn what_deviates_or_is_missing_fails_and_is_named() {
         let mut table = Table::default();
+        table.part("start");
         table.told("speed", "2.1");
         table.at_most("stack", Some(60.0), "%", 60.0);
         table.checked("seeds", "equal", "equal", true);
