@@ -5,6 +5,14 @@ use core::mem::MaybeUninit;
 
 use pinned_init::Init;
 
+/// Makes a value and keeps it in `place`.
+///
+/// For a value that a small stack bears once. Not inlined: the frame in which the value is made is gone when this returns.
+#[inline(never)]
+pub fn keep<T>(place: &'static mut MaybeUninit<T>, make: impl FnOnce() -> T) -> &'static mut T {
+    place.write(make())
+}
+
 /// Fills `place` and returns what is in it now.
 ///
 /// Not inlined: the frame that the compiler may need meanwhile is gone when this returns.

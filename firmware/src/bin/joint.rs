@@ -30,10 +30,10 @@ mod app {
     use firmware::application::{ReceiveTask, StackUse, TransmitTask};
     use firmware::board::device::Interrupt;
     use firmware::board::{Board, Edge, stack};
-    use firmware::joint::{self as application, Application, Queues, SessionTask, SlotTask};
+    use firmware::joint::{self as application, Application, Memory, SessionTask, SlotTask};
     use firmware::metadata;
     use firmware::meters::Meters;
-    use joint::{Core, Library};
+    use joint::Core;
 
     use super::BOARD_NAME;
 
@@ -41,7 +41,7 @@ mod app {
 
     #[shared]
     struct Shared {
-        core: Core,
+        core: &'static mut Core,
         can: <Board as Edge>::Can,
     }
 
@@ -53,14 +53,14 @@ mod app {
         session_task: SessionTask<Board>,
     }
 
-    #[init(local = [queues: Queues = Queues::new(), library: Library = Library::EMPTY])]
+    #[init(local = [memory: Memory = Memory::new()])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let board = Board::start(cx.core);
         let version = metadata::FIRMWARE;
         defmt::info!("tactus joint {=str} on {=str}", version, BOARD_NAME);
         let serial = board.serial();
         let Application { core, can, slot_task, receive_task, transmit_task, session_task } =
-            application::start(version, BOARD_NAME, serial, board.split(), cx.local.queues, cx.local.library);
+            application::start(version, BOARD_NAME, serial, board.split(), cx.local.memory);
         (Shared { core, can }, Local { slot_task, receive_task, transmit_task, session_task })
     }
 

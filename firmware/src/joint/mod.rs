@@ -5,6 +5,8 @@
 mod session;
 mod slot;
 
+use core::mem::MaybeUninit;
+
 use device::Identity;
 use heapless::spsc::Queue;
 use joint::{Command, Core, Event, Library, Session, TimedRecord};
@@ -12,6 +14,7 @@ use puck::CanFrame;
 
 use crate::application::{ReceiveTask, TransmitTask};
 use crate::board::{Clock, Edge, Parts, SlotTimer};
+use crate::in_place;
 
 pub use session::SessionTask;
 pub use slot::SlotTask;
@@ -27,8 +30,8 @@ const RECORDS: usize = 8 + 1;
 /// Events on their way to the session.
 const EVENTS: usize = 12 + 1;
 
-/// What the tasks hand to each other. Put it into a static.
-pub struct Queues {
+/// What the tasks hand to each other.
+struct Queues {
     outgoing: Queue<CanFrame, OUTGOING>,
     incoming: Queue<CanFrame, INCOMING>,
     commands: Queue<Command, COMMANDS>,
@@ -36,21 +39,35 @@ pub struct Queues {
     events: Queue<Event, EVENTS>,
 }
 
-impl Queues {
-    /// All empty.
+/// Everything that lives as long as the image: put it into a static. [`start`] fills it where it is, because no task should
+/// run above a stack on which the halves were made.
+pub struct Memory {
+    queues: Queues,
+    library: Library,
+    core: MaybeUninit<Core>,
+    session: MaybeUninit<Session<'static>>,
+}
+
+impl Memory {
+    /// Not filled yet.
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            outgoing: Queue::new(),
-            incoming: Queue::new(),
-            commands: Queue::new(),
-            records: Queue::new(),
-            events: Queue::new(),
+            queues: Queues {
+                outgoing: Queue::new(),
+                incoming: Queue::new(),
+                commands: Queue::new(),
+                records: Queue::new(),
+                events: Queue::new(),
+            },
+            library: Library::EMPTY,
+            core: MaybeUninit::uninit(),
+            session: MaybeUninit::uninit(),
         }
     }
 }
 
-impl Default for Queues {
+impl Default for Memory {
     fn default() -> Self {
         Self::new()
     }
@@ -59,7 +76,7 @@ impl Default for Queues {
 /// Everything the image consists of, for the tasks that own or share it.
 pub struct Application<E: Edge> {
     /// Shared by slot and session.
-    pub core: Core,
+    pub core: &'static mut Core,
     /// Shared by slot, receiver and transmitter.
     pub can: E::Can,
     /// On `SLOT_TIMER`.
@@ -78,28 +95,27 @@ pub fn start<E: Edge>(
     name: &'static str,
     serial: &'static str,
     parts: Parts<E>,
-    queues: &'static mut Queues,
-    library: &'static mut Library,
+    memory: &'static mut Memory,
 ) -> Application<E> {
     let identity =
         Identity { firmware, board: name, serial, simulated: E::SIMULATED, ticks_per_second: <E::Clock as Clock>::HZ };
     let Parts { clock, mut slot_timer, can, link, light, .. } = parts;
+    let Memory { queues, library, core, session } = memory;
     let (to_bus, outgoing) = queues.outgoing.split();
     let (incoming, from_bus) = queues.incoming.split();
     let (to_core, commands) = queues.commands.split();
     let (records, from_core) = queues.records.split();
     let (events, news) = queues.events.split();
+    let core = in_place::keep(core, Core::new);
+    let session = in_place::keep(session, || Session::new(identity, library));
+    // When everything is built, which takes a while: the first slot must find its task ready.
     slot_timer.start();
     Application {
-        core: Core::new(),
+        core,
         can,
         slot_task: SlotTask::new(clock, slot_timer, light, slot::Ends { from_bus, to_bus, commands, records, events }),
         receive_task: ReceiveTask::new(incoming),
         transmit_task: TransmitTask::new(outgoing),
-        session_task: SessionTask::new(
-            clock,
-            Session::new(identity, library),
-            session::Ends { port: link, to_core, from_core, news },
-        ),
+        session_task: SessionTask::new(clock, session, session::Ends { port: link, to_core, from_core, news }),
     }
 }

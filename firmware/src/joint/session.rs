@@ -23,7 +23,7 @@ pub(super) struct Ends<P> {
 /// The task that runs once a slot.
 pub struct SessionTask<E: Edge> {
     clock: E::Clock,
-    session: Session<'static>,
+    session: &'static mut Session<'static>,
     ends: Ends<E::LinkPort>,
 }
 
@@ -35,7 +35,7 @@ struct Port<'a, P, C> {
     stack: fn() -> StackUse,
 }
 
-impl<P: LinkPort, C: Mutex<T = Core>> SessionPort for Port<'_, P, C> {
+impl<P: LinkPort, C: Mutex<T = &'static mut Core>> SessionPort for Port<'_, P, C> {
     fn send(&mut self, bytes: &[u8]) {
         self.ends.port.write(bytes);
     }
@@ -77,12 +77,12 @@ impl<P: LinkPort, C: Mutex<T = Core>> SessionPort for Port<'_, P, C> {
 }
 
 impl<E: Edge> SessionTask<E> {
-    pub(super) fn new(clock: E::Clock, session: Session<'static>, ends: Ends<E::LinkPort>) -> Self {
+    pub(super) fn new(clock: E::Clock, session: &'static mut Session<'static>, ends: Ends<E::LinkPort>) -> Self {
         Self { clock, session, ends }
     }
 
     /// Takes what came over the line and does everything that is due.
-    pub fn run(&mut self, core: impl Mutex<T = Core>, meters: &Meters, stack: fn() -> StackUse) {
+    pub fn run(&mut self, core: impl Mutex<T = &'static mut Core>, meters: &Meters, stack: fn() -> StackUse) {
         let mut bytes = [0; LINK_CHUNK];
         loop {
             let count = self.ends.port.read(&mut bytes);

@@ -70,7 +70,12 @@ impl<E: Edge> SlotTask<E> {
     /// Computes one slot. Afterwards the transmitter and the session are due.
     ///
     /// What is measured as the cost of a cycle is that of its three slots together, replies and their decoding included.
-    pub fn run(&mut self, mut core: impl Mutex<T = Core>, mut can: impl Mutex<T = E::Can>, meters: &Meters) {
+    pub fn run(
+        &mut self,
+        mut core: impl Mutex<T = &'static mut Core>,
+        mut can: impl Mutex<T = E::Can>,
+        meters: &Meters,
+    ) {
         meters.slot(self.timer.acknowledge());
         let begin = self.clock.short_ticks();
         let now = self.clock.now_us();
@@ -105,7 +110,7 @@ impl<E: Edge> SlotTask<E> {
         }
         self.slot = slot.next();
         if self.timer.is_due() {
-            core.lock(Core::note_overrun);
+            core.lock(|core| core.note_overrun());
         }
     }
 }
