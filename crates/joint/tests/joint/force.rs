@@ -9,6 +9,7 @@ use dmp::Scalar;
 use joint::controller::{HandController, HandReference};
 use joint::estimate::{HandEstimator, gauge_torque};
 use joint::number::{Number, from_real};
+use pinned_init::InPlaceWrite;
 use puck::Counts;
 
 use crate::common::Random;
@@ -47,7 +48,7 @@ fn sample(tick: i32, random: &mut Random) -> HandSample {
 fn force_and_position_control_are_within_one_percent_of_full_scale_of_f64() {
     let gains = Gains::<f64>::tuned().hand;
     let mut exact_estimator = ExactEstimator::<f64>::new();
-    let mut exact = ExactController::new(&gains);
+    let Ok(mut exact) = Box::new_uninit().write_init(ExactController::init(&gains));
     let mut estimator = HandEstimator::new();
     let mut controller = HandController::new();
     let mut random = Random(7);
