@@ -270,6 +270,26 @@ fn power_that_fails_under_qemu_leaves_the_old_primitive_or_the_new_one() {
 }
 
 #[test]
+fn power_that_fails_on_the_emulated_board_leaves_the_old_primitive_or_the_new_one() {
+    let (old, new) = (image("reach", 3.0), image("reach", 5.0));
+    let folder = expect(tempfile::tempdir());
+    let bank = |name: &str| folder.path().join(name);
+    let board = |name: &str, fault: &str| {
+        system_tests::connect(&format!("board:world=simple,flash={}{fault}", bank(name).display()))
+    };
+    upload(&mut board("before", ""), &old);
+    // The same operations as under QEMU, here of the chip's own flash.
+    for (cut, expected) in [(Some(0), 3.0), (Some(100), 3.0), (Some(150), 3.0), (None, 5.0)] {
+        expect(std::fs::copy(bank("before"), bank("cut")));
+        let fault = cut.map_or(String::new(), |operation: u32| format!(",fault=power-cut@0:{operation}"));
+        let outcome = board("cut", &fault).upload(&new, |_, _, _| {});
+        assert_eq!(outcome.is_err(), cut.is_some(), "{outcome:?}");
+        let durations: Vec<f32> = expect(board("cut", "").list()).iter().map(|listing| listing.duration).collect();
+        assert_eq!(durations, [expected], "cut in operation {cut:?}");
+    }
+}
+
+#[test]
 fn a_simulated_arm_with_a_flash_file_keeps_its_primitives() {
     let folder = expect(tempfile::tempdir());
     for engine in ["sil", "sim"] {
