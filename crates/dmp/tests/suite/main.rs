@@ -1,5 +1,6 @@
 //! Tests of the library from outside, as one program: golden vectors, sign-catching checks, learning, robustness.
 
+mod bounds;
 mod common;
 mod fit;
 mod golden;

@@ -1,0 +1,47 @@
+//! Bounds of single parts: what was once accepted, or once came out, that no movement can use.
+
+use dmp::{
+    Feedback, FixedPoint, GainSchedule, Limits, OrientationError, Quaternion, SENSORS, Scalar, SensorMap, Stiffness,
+};
+
+fn feedback<T: Scalar>(limit: f64) -> Feedback<T> {
+    let f = T::from_f64;
+    Feedback::new(
+        GainSchedule::constant([T::ONE; 10]).unwrap(),
+        GainSchedule::constant([T::ONE; SENSORS]).unwrap(),
+        Limits { displacement: f(limit), rotation: f(limit), hand: f(limit) },
+    )
+    .unwrap()
+}
+
+fn stiffness<T: Scalar>() -> Stiffness<T> {
+    let k = T::from_f64(200.0);
+    Stiffness { position: k, orientation: k, hand: k, orientation_error: OrientationError::Quaternion }
+}
+
+fn norm<T: Scalar>(a: &[T]) -> f64 {
+    a.iter().map(|a| a.to_f64().powi(2)).sum::<f64>().sqrt()
+}
+
+/// The reciprocal of such a value is infinite, and 0 times it is not a number.
+#[test]
+fn an_error_too_small_for_its_reciprocal_is_no_nan() {
+    for limit in [0.0, 0.2] {
+        for error in [2e-39_f32, 1e-45, f32::MIN_POSITIVE] {
+            for axes in [[error; SENSORS], core::array::from_fn(|i| if i % 3 == 0 { error } else { 0.0 })] {
+                let zeta = feedback(limit).coupling(0.0, &axes, &SensorMap::IDENTITY, &stiffness());
+                let all = [zeta.position.as_slice(), &zeta.orientation, &zeta.hand].concat();
+                assert!(all.iter().all(|z| z.is_finite()), "limit {limit}, error {error:e}: {zeta:?}");
+                assert!(norm(&zeta.position) <= 200.0 * limit && norm(&zeta.orientation) <= 200.0 * limit, "{zeta:?}");
+            }
+        }
+        // In fixed point the reciprocal saturates instead.
+        let zeta = feedback(limit).coupling(
+            FixedPoint::ZERO,
+            &[FixedPoint::from_bits(1); SENSORS],
+            &SensorMap::IDENTITY,
+            &stiffness(),
+        );
+        assert!(norm(&zeta.position) <= 200.0 * limit, "limit {limit}: {zeta:?}");
+    }
+}
