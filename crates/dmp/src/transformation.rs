@@ -88,10 +88,16 @@ impl<T: Scalar> TransformationSystem<T> {
     }
 
     /// Largest step `h = dt/tau` with `K h^2 + 2 D h <= 4` and `D h <= 2`: where the integration stops being stable.
+    ///
+    /// The root of the first is written `4/(sqrt(D^2 + 4K) + D)`: `(sqrt(D^2 + 4K) - D)/K` cancels where D is large. Under the
+    /// root the larger of D and `2 sqrt(K)` is factored out: `D^2` saturates in fixed point from D = 46 341 on, and the step
+    /// would come out too long.
     pub fn largest_step(&self) -> T {
-        let four = T::from_f64(4.0);
-        let (k, d) = (self.stiffness, self.damping);
-        let spring = (T::sqrt(d * d + four * k) - d) / k;
+        let d = self.damping;
+        let root = T::sqrt(self.stiffness);
+        let critical = root + root;
+        let (larger, ratio) = if critical > d { (critical, d / critical) } else { (d, critical / d) };
+        let spring = T::from_f64(4.0) / (larger * T::sqrt(T::ONE + ratio * ratio) + d);
         let damper = T::from_f64(2.0) / d;
         if spring < damper { spring } else { damper }
     }

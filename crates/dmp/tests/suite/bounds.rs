@@ -2,6 +2,7 @@
 
 use dmp::{
     Feedback, FixedPoint, GainSchedule, Limits, OrientationError, Quaternion, SENSORS, Scalar, SensorMap, Stiffness,
+    TransformationSystem,
 };
 
 fn feedback<T: Scalar>(limit: f64) -> Feedback<T> {
@@ -44,4 +45,35 @@ fn an_error_too_small_for_its_reciprocal_is_no_nan() {
         );
         assert!(norm(&zeta.position) <= 200.0 * limit, "limit {limit}: {zeta:?}");
     }
+}
+
+/// `4/(sqrt(D^2 + 4K) + D)`, capped at `2/D`, in a type where `D^2` neither saturates nor swallows `4K`.
+fn largest_step(k: f64, d: f64) -> f64 {
+    (4.0 / (d.hypot(2.0 * k.sqrt()) + d)).min(2.0 / d)
+}
+
+fn check_largest_step<T: Scalar>(tolerance: f64) {
+    for (k, d) in [
+        (200.0, 28.28),
+        (1.0, 1e4),
+        (1.0, 46_341.0),
+        (1e6, 46_341.0),
+        (200.0, 1e6),
+        (1e6, 1e6),
+        (1e6, 2000.0),
+        (1e6, 0.01),
+        (1.0, 0.01),
+    ] {
+        let system = TransformationSystem::new(T::from_f64(k), T::from_f64(d)).unwrap();
+        let (found, right) = (system.largest_step().to_f64(), largest_step(k, d));
+        assert!((found / right - 1.0).abs() < tolerance, "K = {k}, D = {d}: {found:e} instead of {right:e}");
+    }
+}
+
+#[test]
+fn the_largest_stable_step_is_right_for_every_gain_in_every_number_type() {
+    check_largest_step::<f64>(1e-12);
+    check_largest_step::<f32>(1e-6);
+    // 2e-6 in units of 2.3e-10.
+    check_largest_step::<FixedPoint>(2e-4);
 }
