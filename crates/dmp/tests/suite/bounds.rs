@@ -1,9 +1,10 @@
 //! Bounds of single parts: what was once accepted, or once came out, that no movement can use.
 
 use crate::common::{ALPHA, DT};
+use dmp::fit::{experience, phase_statistics};
 use dmp::{
-    CanonicalSystem, Feedback, FixedPoint, GainSchedule, Limits, OrientationError, Phase, Quaternion, SENSORS, Scalar,
-    SensorMap, Stiffness, TransformationSystem,
+    CanonicalSystem, EXPERIENCE_CHANNELS, Feedback, FixedPoint, GainSchedule, Limits, OrientationError, Phase,
+    Quaternion, SENSORS, Scalar, SensorMap, Stiffness, TableError, TransformationSystem,
 };
 
 fn feedback<T: Scalar>(limit: f64) -> Feedback<T> {
@@ -99,5 +100,31 @@ fn the_phase_belongs_to_the_progress_at_every_speed() {
         let (single, fixed, double) = (drift::<f32>(h), drift::<FixedPoint>(h), drift::<f64>(h));
         println!("h = {h:.1e}: s is off by {single:.1e} (f32), {fixed:.1e} (fixed point), {double:.1e} (f64)");
         assert!(single < 6e-7 && fixed < 3e-8 && double < 1e-14, "h = {h}: {single:e} {fixed:e} {double:e}");
+    }
+}
+
+type Run = Vec<(f64, [f64; EXPERIENCE_CHANNELS])>;
+
+/// A run whose values fall from its very beginning.
+fn run_from(value: f64) -> Run {
+    (0..200).map(|k| f64::from(k) / 199.0).map(|u| (u, [value - u; EXPERIENCE_CHANNELS])).collect()
+}
+
+#[test]
+fn a_sample_at_no_progress_is_no_sample_at_the_end() {
+    let floor = [0.05; EXPERIENCE_CHANNELS];
+    for u in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut run = run_from(1.0);
+        run[50].0 = u;
+        assert_eq!(experience(&[&run, &run_from(1.0)], 8, &floor).err(), Some(TableError::NotFinite), "{u}");
+    }
+}
+
+#[test]
+fn a_run_without_a_usable_sample_leaves_the_others_alone() {
+    let alone = phase_statistics(&[&run_from(1.0)], 8).unwrap();
+    for stray in [vec![(1.5, [7.0; EXPERIENCE_CHANNELS]); 3], vec![(-0.5, [7.0; EXPERIENCE_CHANNELS])], vec![]] {
+        let both = phase_statistics(&[&run_from(1.0), &stray], 8).unwrap();
+        assert_eq!(both, alone, "a run of {} samples outside", stray.len());
     }
 }
