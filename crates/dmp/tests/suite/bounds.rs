@@ -1,9 +1,9 @@
 //! Bounds of single parts: what was once accepted, or once came out, that no movement can use.
 
 use crate::common::{ALPHA, DT};
-use dmp::fit::{experience, phase_statistics};
+use dmp::fit::{Demonstration, FitOptions, experience, fit, phase_statistics};
 use dmp::{
-    CanonicalSystem, EXPERIENCE_CHANNELS, Feedback, FixedPoint, GainSchedule, Limits, OrientationError, Phase,
+    Basis, CanonicalSystem, EXPERIENCE_CHANNELS, Feedback, FixedPoint, GainSchedule, Limits, OrientationError, Phase,
     Quaternion, SENSORS, Scalar, SensorMap, Stiffness, TableError, TransformationSystem,
 };
 
@@ -126,5 +126,64 @@ fn a_run_without_a_usable_sample_leaves_the_others_alone() {
     for stray in [vec![(1.5, [7.0; EXPERIENCE_CHANNELS]); 3], vec![(-0.5, [7.0; EXPERIENCE_CHANNELS])], vec![]] {
         let both = phase_statistics(&[&run_from(1.0), &stray], 8).unwrap();
         assert_eq!(both, alone, "a run of {} samples outside", stray.len());
+    }
+}
+
+/// Singular values of the design matrix `A_ki = s_k psi_i/sum psi` by one-sided Jacobi rotations: another way than the fit's.
+fn condition_of_the_design(count: usize, activation: f64, samples: usize) -> f64 {
+    let canonical = CanonicalSystem::new(ALPHA).unwrap();
+    let basis = Basis::<f64, 200>::new(&canonical, count, activation).unwrap();
+    let mut columns = vec![vec![0.0; samples]; count];
+    for k in 0..samples {
+        let active = basis.evaluate(canonical.phase_at(k as f64 / (samples - 1) as f64));
+        for i in active.active() {
+            columns[i][k] = active.factor(i);
+        }
+    }
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    for _ in 0..30 {
+        for i in 0..count {
+            for j in i + 1..count {
+                let (a, b, c) =
+                    (dot(&columns[i], &columns[i]), dot(&columns[j], &columns[j]), dot(&columns[i], &columns[j]));
+                if c.abs() <= 1e-15 * (a * b).sqrt() {
+                    continue;
+                }
+                let zeta = (b - a) / (2.0 * c);
+                let t = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
+                let (cos, sin) = (1.0 / (1.0 + t * t).sqrt(), t / (1.0 + t * t).sqrt());
+                let (left, right) = columns.split_at_mut(j);
+                for (x, y) in left[i].iter_mut().zip(&mut right[0]) {
+                    (*x, *y) = (cos * *x - sin * *y, sin * *x + cos * *y);
+                }
+            }
+        }
+    }
+    let lengths: Vec<f64> = columns.iter().map(|column| dot(column, column).sqrt()).collect();
+    let (low, high) = lengths.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), x| (low.min(*x), high.max(*x)));
+    high / low
+}
+
+fn demonstration(position: Vec<[f64; 3]>, posture: Vec<[f64; 7]>, hand: Vec<[f64; 4]>) -> Demonstration {
+    let still = vec![Quaternion::IDENTITY; position.len()];
+    Demonstration::new(DT, position, still, posture, hand).unwrap()
+}
+
+#[test]
+fn the_reported_condition_is_that_of_the_design_matrix_whatever_the_ridge() {
+    let samples = 601;
+    // Still moving at its end, so that the fit does not go on with rest and the matrix is the one of the samples.
+    let position = (0..samples).map(|k| [k as f64 * 1e-3, 0.0, 0.0]).collect();
+    let moving = demonstration(position, vec![[0.0; 7]; samples], vec![[0.0; 4]; samples]);
+    for (kernel_count, activation) in [(10, 0.7), (50, 0.7), (50, 0.9)] {
+        let right = condition_of_the_design(kernel_count, activation, samples);
+        for ridge in [1e-12, 1e-8, 1e-2] {
+            let options = FitOptions { kernel_count, activation, ridge, cutoff: None, ..FitOptions::default() };
+            let found = fit(&moving, &options).unwrap().report.condition;
+            println!(
+                "N = {kernel_count}, a = {activation}, ridge {ridge:e}: condition {found:.3e}, really {right:.3e}"
+            );
+            assert!((found / right - 1.0).abs() < 0.02, "{found:e} instead of {right:e}");
+        }
     }
 }
