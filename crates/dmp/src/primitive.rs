@@ -5,6 +5,7 @@
 
 use core::fmt;
 
+use crate::orientation::is_near_enough;
 use crate::vector::all_finite;
 use crate::{
     Basis, CanonicalSystem, ExpectedWrench, Experience, Feedback, ForcingTerm, GainError, Limits, OrientationError,
@@ -393,12 +394,12 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
         }
         let start = tables.start.normalised().ok_or(PrimitiveError::StartNotUnit)?;
         let goal = tables.goal.normalised().ok_or(PrimitiveError::GoalNotUnit)?;
-        // cos(175 degrees / 2); with an undemonstrated goal the sign is free and the angle at most 180 degrees.
-        let cosine = match tables.hemisphere {
-            Hemisphere::Demonstrated => start.orientation.dot(&goal.orientation),
-            Hemisphere::Nearest => start.orientation.dot(&goal.orientation).abs(),
+        // With an undemonstrated goal the sign is free and the angle at most 180 degrees.
+        let to = match tables.hemisphere {
+            Hemisphere::Demonstrated => goal.orientation,
+            Hemisphere::Nearest => goal.orientation.aligned_with(&start.orientation),
         };
-        if tables.orientation_error == OrientationError::Quaternion && cosine < T::from_f64(0.043_619) {
+        if tables.orientation_error == OrientationError::Quaternion && !is_near_enough(&start.orientation, &to) {
             return Err(PrimitiveError::TurnsTooFar);
         }
         Ok(Checked { canonical, basis, systems, minimum_duration, start, goal })

@@ -29,6 +29,8 @@ pub enum RolloutError {
     TooFast,
     /// A speed, rate or duration is negative, or a duration is 0.
     Negative,
+    /// The start or the new goal is more than 175 degrees away, where the error of Eq. (4) fails.
+    TurnsTooFar,
 }
 
 impl fmt::Display for RolloutError {
@@ -38,6 +40,7 @@ impl fmt::Display for RolloutError {
             Self::NotUnit => "a quaternion is not of unit norm",
             Self::TooFast => "too fast: the integration would be unstable at 300 Hz",
             Self::Negative => "a speed, rate or duration is negative",
+            Self::TurnsTooFar => "the goal is more than 175 degrees away; the rotation-vector error is needed",
         })
     }
 }
@@ -69,7 +72,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// sign that is nearest to the start.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::NotUnit`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::NotUnit`], [`RolloutError::TurnsTooFar`].
     pub fn start(primitive: &Primitive<T, N>, start: &StartState<T>) -> Result<Self, RolloutError> {
         let StartState { configuration, velocity } = start;
         if !(configuration.is_finite() && velocity.is_finite()) {
@@ -86,7 +89,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
             position: Group::new(from.position, velocity.position, tau, to.position),
             posture: Group::new(from.posture, velocity.posture, tau, to.posture),
             hand: Group::new(from.hand, velocity.hand, tau, to.hand),
-            orientation: Turn::start(primitive, &from.orientation, &velocity.orientation),
+            orientation: Turn::start(primitive, &from.orientation, &velocity.orientation)?,
             goal_filter: None,
             goal_fraction: (T::ZERO, T::ZERO),
         })
@@ -181,7 +184,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// the present orientation.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::NotUnit`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::NotUnit`], [`RolloutError::TurnsTooFar`].
     pub fn set_goal_orientation(
         &mut self,
         primitive: &Primitive<T, N>,
@@ -191,8 +194,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
             return Err(RolloutError::NotFinite);
         }
         let goal = goal.checked_unit(T::from_f64(1e-3)).ok_or(RolloutError::NotUnit)?;
-        self.orientation.command(primitive, &goal, self.goal_filter.is_some());
-        Ok(())
+        self.orientation.command(primitive, &goal, self.goal_filter.is_some())
     }
 
     /// New goal of the posture, rad.

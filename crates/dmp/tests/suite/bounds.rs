@@ -1,10 +1,11 @@
 //! Bounds of single parts: what was once accepted, or once came out, that no movement can use.
 
-use crate::common::{ALPHA, DT};
+use crate::common::{ALPHA, DT, ORIGIN, Plan};
 use dmp::fit::{Demonstration, FitOptions, experience, fit, phase_statistics};
 use dmp::{
     Basis, CanonicalSystem, EXPERIENCE_CHANNELS, Feedback, FixedPoint, GainSchedule, Limits, OrientationError, Phase,
-    Quaternion, SENSORS, Scalar, SensorMap, Stiffness, TableError, TransformationSystem,
+    Quaternion, Rollout, RolloutError, SENSORS, Scalar, SensorMap, StartState, Stiffness, TableError,
+    TransformationSystem,
 };
 
 fn feedback<T: Scalar>(limit: f64) -> Feedback<T> {
@@ -186,4 +187,33 @@ fn the_reported_condition_is_that_of_the_design_matrix_whatever_the_ridge() {
             assert!((found / right - 1.0).abs() < 0.02, "{found:e} instead of {right:e}");
         }
     }
+}
+
+#[test]
+fn a_goal_in_flight_is_no_further_away_than_one_at_the_start() {
+    let about_z = |degrees: f64| Quaternion::from_rotation_vector(&[0.0, 0.0, degrees.to_radians()]);
+    for hemisphere in [dmp::Hemisphere::Nearest, dmp::Hemisphere::Demonstrated] {
+        let mut plan = Plan::empty();
+        plan.hemisphere = hemisphere;
+        plan.goal.orientation = about_z(60.0);
+        let primitive = plan.build::<f64>();
+        let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
+        let before = rollout.clone();
+        for far in [about_z(178.0), about_z(180.0), about_z(178.0).negated()] {
+            assert_eq!(rollout.set_goal_orientation(&primitive, far), Err(RolloutError::TurnsTooFar), "{hemisphere:?}");
+            assert_eq!(rollout, before);
+        }
+        for near in [about_z(170.0), about_z(-90.0)] {
+            rollout.clone().set_goal_orientation(&primitive, near).unwrap();
+        }
+        // The same bound holds where a run begins.
+        let turned = StartState::at_rest(dmp::Configuration { orientation: about_z(-118.0), ..ORIGIN });
+        assert_eq!(Rollout::start(&primitive, &turned).err(), Some(RolloutError::TurnsTooFar), "{hemisphere:?}");
+    }
+    // Rotation vectors go any way round.
+    let mut plan = Plan::empty();
+    plan.orientation_error = OrientationError::RotationVector;
+    let primitive = plan.build::<f64>();
+    let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
+    rollout.set_goal_orientation(&primitive, about_z(180.0)).unwrap();
 }
