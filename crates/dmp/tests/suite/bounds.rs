@@ -1,7 +1,7 @@
 //! Bounds of single parts: what was once accepted, or once came out, that no movement can use.
 
 use crate::common::{ALPHA, DT, ORIGIN, Plan};
-use dmp::fit::{Demonstration, FitOptions, experience, fit, phase_statistics};
+use dmp::fit::{Demonstration, FitOptions, experience, fit, minimum_jerk, phase_statistics};
 use dmp::{
     Basis, CanonicalSystem, EXPERIENCE_CHANNELS, Feedback, FixedPoint, GainSchedule, Limits, OrientationError, Phase,
     Quaternion, Rollout, RolloutError, SENSORS, Scalar, SensorMap, StartState, Stiffness, TableError,
@@ -216,4 +216,27 @@ fn a_goal_in_flight_is_no_further_away_than_one_at_the_start() {
     let primitive = plan.build::<f64>();
     let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
     rollout.set_goal_orientation(&primitive, about_z(180.0)).unwrap();
+}
+
+/// The fit goes on with rest behind the last sample only if everything rests there. Whatever of it still moves would else be
+/// stopped short.
+#[test]
+fn a_demonstration_ends_at_rest_only_if_posture_and_hand_rest_too() {
+    let samples = 1501;
+    let position = minimum_jerk([0.1, -0.3, 0.2], [0.5, 0.1, -0.1], samples);
+    let rest = (vec![[0.2; 7]; samples], vec![[0.3; 4]; samples]);
+    // A finger that closes at its full speed to the very end, and a posture that does.
+    let closing: Vec<[f64; 4]> = (0..samples).map(|k| [0.0, 1e-3 * k as f64, 0.0, 0.0]).collect();
+    let swinging: Vec<[f64; 7]> = (0..samples).map(|k| std::array::from_fn(|_| 5e-4 * k as f64)).collect();
+    let left_behind = |posture: Vec<[f64; 7]>, hand: Vec<[f64; 4]>| {
+        let options = FitOptions { cutoff: None, ..FitOptions::default() };
+        let learned = fit(&demonstration(position.clone(), posture, hand), &options).unwrap();
+        learned.report.rows[6..].iter().map(|row| row.max).fold(0.0_f64, f64::max)
+    };
+    let (still, finger, posture) =
+        (left_behind(rest.0.clone(), rest.1.clone()), left_behind(rest.0, closing), left_behind(swinging, rest.1));
+    println!(
+        "largest distance of posture and hand: {still:.1e}, finger moving {finger:.1e}, posture moving {posture:.1e}"
+    );
+    assert!(still < 1e-9 && finger < 1e-4 && posture < 1e-4, "{still:e} {finger:e} {posture:e}");
 }
