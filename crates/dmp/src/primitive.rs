@@ -220,6 +220,7 @@ impl core::error::Error for PrimitiveError {}
 /// [`Primitive::assign`] and the other `assign_` functions.
 #[derive(Debug, PartialEq)]
 pub struct Primitive<T, const N: usize> {
+    fingerprint: u32,
     duration: T,
     rate: T,
     minimum_duration: T,
@@ -249,6 +250,7 @@ impl<T: Scalar, const N: usize> Clone for Primitive<T, N> {
     }
 
     fn clone_from(&mut self, source: &Self) {
+        self.fingerprint = source.fingerprint;
         self.duration = source.duration;
         self.rate = source.rate;
         self.minimum_duration = source.minimum_duration;
@@ -290,6 +292,7 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
             hand: [T::ZERO; HAND_ROWS],
         };
         Self {
+            fingerprint: 0,
             duration: T::ONE,
             rate: T::ONE,
             minimum_duration: T::ZERO,
@@ -331,6 +334,7 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
         if !self.forcing.assign(&checked.basis, tables.weights) {
             return Err(PrimitiveError::Weight);
         }
+        self.fingerprint = tables.fingerprint();
         self.duration = tables.duration;
         self.rate = T::ONE / tables.duration;
         self.minimum_duration = checked.minimum_duration;
@@ -403,6 +407,12 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
             return Err(PrimitiveError::TurnsTooFar);
         }
         Ok(Checked { canonical, basis, systems, minimum_duration, start, goal })
+    }
+
+    /// Tells movements apart: equal for equal tables. Feedback, expectation and experience may change under a run and do not count.
+    #[inline]
+    pub(crate) fn fingerprint(&self) -> u32 {
+        self.fingerprint
     }
 
     /// Duration tau as taught, s.
@@ -569,6 +579,29 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
 }
 
 impl<T: Scalar> PrimitiveTables<'_, T> {
+    /// FNV-1a over the values of the movement, folded to 32 bits.
+    fn fingerprint(&self) -> u32 {
+        let ends =
+            [&self.start, &self.goal].map(|end| (end.position, end.orientation.to_array(), end.posture, end.hand));
+        let ends = ends.iter().flat_map(|(position, orientation, posture, hand)| {
+            position.iter().chain(orientation).chain(posture).chain(hand)
+        });
+        let gains = self.stiffness.iter().chain(&self.damping);
+        let values =
+            [&self.duration, &self.alpha, &self.activation].into_iter().chain(gains).chain(ends).chain(self.weights);
+        let choices = [
+            self.kernel_count as u64,
+            u64::from(self.orientation_error == OrientationError::RotationVector),
+            u64::from(self.hemisphere == Hemisphere::Nearest),
+        ];
+        let words = choices.into_iter().chain(values.map(|value| value.bits()));
+        let hash = words.fold(0xcbf2_9ce4_8422_2325_u64, |hash, word| {
+            // Word by word instead of byte by byte; the rotation brings the high bits of a product back to where it mixes.
+            (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29)
+        });
+        (hash ^ (hash >> 32)) as u32
+    }
+
     fn gains(&self) -> [(T, T); 4] {
         core::array::from_fn(|i| (self.stiffness[i], self.damping[i]))
     }

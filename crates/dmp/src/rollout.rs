@@ -29,6 +29,8 @@ pub enum RolloutError {
     TooFast,
     /// A speed, rate or duration is negative, or a duration is 0.
     Negative,
+    /// The run was started with another primitive.
+    OtherPrimitive,
     /// The start or the new goal is more than 175 degrees away, where the error of Eq. (4) fails.
     TurnsTooFar,
 }
@@ -40,6 +42,7 @@ impl fmt::Display for RolloutError {
             Self::NotUnit => "a quaternion is not of unit norm",
             Self::TooFast => "too fast: the integration would be unstable at 300 Hz",
             Self::Negative => "a speed, rate or duration is negative",
+            Self::OtherPrimitive => "the run was started with another primitive",
             Self::TurnsTooFar => "the goal is more than 175 degrees away; the rotation-vector error is needed",
         })
     }
@@ -50,6 +53,8 @@ impl core::error::Error for RolloutError {}
 /// State of one run of a [`Primitive`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rollout<T, const N: usize> {
+    /// Of the primitive that it runs.
+    fingerprint: u32,
     phase: Phase<T>,
     time: T,
     time_lost: T,
@@ -82,6 +87,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
         let to = primitive.goal();
         let tau = primitive.duration();
         Ok(Self {
+            fingerprint: primitive.fingerprint(),
             phase: Phase::START,
             time: T::ZERO,
             time_lost: T::ZERO,
@@ -100,8 +106,17 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// Value, velocity and acceleration belong to the same instant, the one BEFORE the step: the first call returns
     /// the start state. `coupling` is the feedback of the same instant. A `dt` above [`CONTROL_PERIOD`] is cut to it
     /// (a late tick slows the plan down instead of making it unstable); one that is not positive advances nothing.
+    ///
+    /// # Errors
+    /// [`RolloutError::OtherPrimitive`]; nothing has changed then.
     #[inline]
-    pub fn step(&mut self, primitive: &Primitive<T, N>, dt: T, coupling: &Coupling<T>) -> Reference<T> {
+    pub fn step(
+        &mut self,
+        primitive: &Primitive<T, N>,
+        dt: T,
+        coupling: &Coupling<T>,
+    ) -> Result<Reference<T>, RolloutError> {
+        self.check(primitive)?;
         let longest = T::from_f64(CONTROL_PERIOD);
         let dt = if !(dt > T::ZERO) {
             T::ZERO
@@ -139,7 +154,13 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
         self.time_lost = (sum - self.time) - step;
         self.time = sum;
 
-        Reference { phase: tick.s, progress, time, rate, position, orientation, posture, hand }
+        Ok(Reference { phase: tick.s, progress, time, rate, position, orientation, posture, hand })
+    }
+
+    /// Weights, gains and start of one movement with the state of another would be a plan that nobody has taught.
+    #[inline]
+    fn check(&self, primitive: &Primitive<T, N>) -> Result<(), RolloutError> {
+        if self.fingerprint == primitive.fingerprint() { Ok(()) } else { Err(RolloutError::OtherPrimitive) }
     }
 
     /// `1 - exp(-a_g h)`: exact step of the goal filter, computed anew only when `h` changes.
@@ -159,16 +180,25 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     ///
     /// Loses effect when the speed differs from the one of the recording, see
     /// [`ExpectedWrench::trust`](crate::ExpectedWrench::trust).
-    pub fn coupling(&self, primitive: &Primitive<T, N>, measured: &[T; SENSORS], map: &SensorMap<T>) -> Coupling<T> {
+    ///
+    /// # Errors
+    /// [`RolloutError::OtherPrimitive`].
+    pub fn coupling(
+        &self,
+        primitive: &Primitive<T, N>,
+        measured: &[T; SENSORS],
+        map: &SensorMap<T>,
+    ) -> Result<Coupling<T>, RolloutError> {
+        self.check(primitive)?;
         let (Some(feedback), Some(expected)) = (primitive.feedback(), primitive.expected()) else {
-            return Coupling::NONE;
+            return Ok(Coupling::NONE);
         };
         let u = self.phase.progress();
         let felt = expected.at(u);
         let relative_speed = expected.recorded_duration() * primitive.rate() * self.pace.speed;
         let trust = expected.trust(relative_speed);
         let error = core::array::from_fn(|i| (measured[i] - felt[i]) * trust);
-        feedback.coupling(u, &error, map, &primitive.stiffness())
+        Ok(feedback.coupling(u, &error, map, &primitive.stiffness()))
     }
 
     /// New goal position, m. The start is never reset, so the acceleration jumps by `K dg (1-s)/tau^2`; use
@@ -184,12 +214,14 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// the present orientation.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::NotUnit`], [`RolloutError::TurnsTooFar`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::NotUnit`], [`RolloutError::TurnsTooFar`],
+    /// [`RolloutError::OtherPrimitive`].
     pub fn set_goal_orientation(
         &mut self,
         primitive: &Primitive<T, N>,
         goal: Quaternion<T>,
     ) -> Result<(), RolloutError> {
+        self.check(primitive)?;
         if !all_finite(&goal.to_array()) {
             return Err(RolloutError::NotFinite);
         }
@@ -250,8 +282,9 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// New duration tau of the whole movement, s, approached at the slew rate. The path stays the same.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`], [`RolloutError::OtherPrimitive`].
     pub fn set_duration(&mut self, primitive: &Primitive<T, N>, duration: T) -> Result<(), RolloutError> {
+        self.check(primitive)?;
         if !duration.is_finite() {
             return Err(RolloutError::NotFinite);
         }
@@ -268,8 +301,9 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// New speed relative to the taught one, approached at the slew rate: 1 = as taught, 0 = time stands still.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`], [`RolloutError::OtherPrimitive`].
     pub fn set_speed(&mut self, primitive: &Primitive<T, N>, speed: T) -> Result<(), RolloutError> {
+        self.check(primitive)?;
         if !speed.is_finite() {
             return Err(RolloutError::NotFinite);
         }

@@ -152,6 +152,11 @@ impl Scalar for f32 {
     }
 
     #[inline]
+    fn bits(self) -> u64 {
+        self.to_bits().into()
+    }
+
+    #[inline]
     fn is_finite(self) -> bool {
         f32::is_finite(self)
     }

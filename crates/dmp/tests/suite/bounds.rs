@@ -3,9 +3,9 @@
 use crate::common::{ALPHA, DT, ORIGIN, Plan};
 use dmp::fit::{Demonstration, FitOptions, experience, fit, minimum_jerk, phase_statistics};
 use dmp::{
-    Basis, CanonicalSystem, EXPERIENCE_CHANNELS, Feedback, FixedPoint, GainSchedule, Limits, OrientationError, Phase,
-    Quaternion, Rollout, RolloutError, SENSORS, Scalar, SensorMap, StartState, Stiffness, TableError,
-    TransformationSystem,
+    Basis, CanonicalSystem, Coupling, EXPERIENCE_CHANNELS, Feedback, FixedPoint, GainSchedule, Limits,
+    OrientationError, Phase, Quaternion, Rollout, RolloutError, SENSORS, Scalar, SensorMap, StartState, Stiffness,
+    TableError, TransformationSystem,
 };
 
 fn feedback<T: Scalar>(limit: f64) -> Feedback<T> {
@@ -239,4 +239,35 @@ fn a_demonstration_ends_at_rest_only_if_posture_and_hand_rest_too() {
         "largest distance of posture and hand: {still:.1e}, finger moving {finger:.1e}, posture moving {posture:.1e}"
     );
     assert!(still < 1e-9 && finger < 1e-4 && posture < 1e-4, "{still:e} {finger:e} {posture:e}");
+}
+
+#[test]
+fn a_run_goes_on_only_with_the_primitive_it_was_started_with() {
+    let plan = Plan::golden();
+    let primitive = plan.build::<f32>();
+    let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
+    rollout.step(&primitive, DT as f32, &Coupling::NONE).unwrap();
+    let before = rollout.clone();
+    let refused = Err(RolloutError::OtherPrimitive);
+    let mut others = vec![plan.clone(); 7];
+    others[0].weights[0] += 1e-6;
+    *others[1].weights.last_mut().unwrap() += 1e-6;
+    others[2].duration = 4.0;
+    others[3].stiffness = 201.0;
+    others[4].goal.hand[3] += 1e-6;
+    others[5].hemisphere = dmp::Hemisphere::Demonstrated;
+    others[6].weights.swap(3, 4);
+    for (index, other) in others.iter().enumerate() {
+        let other = other.build::<f32>();
+        assert_eq!(rollout.step(&other, DT as f32, &Coupling::NONE).err(), refused.err(), "{index}");
+        assert_eq!(rollout.coupling(&other, &[0.0; SENSORS], &SensorMap::IDENTITY).err(), refused.err(), "{index}");
+        assert_eq!(rollout.set_speed(&other, 0.5), refused, "{index}");
+        assert_eq!(rollout.set_duration(&other, 6.0), refused, "{index}");
+        assert_eq!(rollout.set_goal_orientation(&other, Quaternion::IDENTITY), refused, "{index}");
+        assert_eq!(rollout, before);
+    }
+    // A copy is the same movement, and so is one with another memory.
+    let mut copy = primitive.clone();
+    copy.set_expected(Some(&dmp::ExpectedWrench::new(&[[1.0; SENSORS]], 5.0).unwrap()));
+    rollout.step(&copy, DT as f32, &Coupling::NONE).unwrap();
 }
