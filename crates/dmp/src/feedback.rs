@@ -6,7 +6,7 @@
 //! plan would spin, therefore `|zeta_p| <= K dx_max` and `|zeta_o| <= K_o sin(theta_max/2)`.
 
 use crate::vector::{clamp, clamp_norm, cross, rotate};
-use crate::{OrientationError, PhaseTable, Scalar, TableError};
+use crate::{Entry, OrientationError, PhaseTable, Scalar, TableError, bounds};
 
 /// Sensor values: force x, y, z (N), torque x, y, z (N m), torque on finger F1, F2, F3 (N m).
 pub const SENSORS: usize = 9;
@@ -105,8 +105,8 @@ impl<T: Scalar> Feedback<T> {
     /// With sensitivity `K1` per task row, weight `K2` per sensor, and limits.
     ///
     /// # Errors
-    /// [`TableError::Negative`] for a negative gain or limit or a rotation limit above pi, [`TableError::NotFinite`]
-    /// for a limit that is not a number.
+    /// [`TableError::Negative`] for a negative gain or limit, [`TableError::TooLarge`] for one beyond [`bounds`] or a
+    /// rotation limit above pi, [`TableError::NotFinite`] for a limit that is not a number.
     pub fn new(
         sensitivity: GainSchedule<T, COUPLED_ROWS>,
         weight: GainSchedule<T, SENSORS>,
@@ -127,9 +127,24 @@ impl<T: Scalar> Feedback<T> {
             .chain(self.weight.samples().iter().flatten())
             .chain(&[displacement, rotation, hand])
             .any(|&value| value < T::ZERO)
-            || rotation > T::from_f64(core::f64::consts::PI + 1e-6)
         {
             return Err(TableError::Negative);
+        }
+        let limits = [
+            (displacement, bounds::LARGEST_DISPLACEMENT, Entry::Displacement),
+            // Pi as somebody else may have rounded it.
+            (rotation, core::f64::consts::PI + 1e-6, Entry::Rotation),
+            (hand, bounds::LARGEST_HAND_DISPLACEMENT + 1e-6, Entry::Hand),
+        ];
+        let limit = limits.into_iter().find(|(value, largest, _)| *value > T::from_f64(*largest));
+        if let Some((_, _, entry)) = limit {
+            return Err(TableError::TooLarge(entry));
+        }
+        if let Some((point, column)) = self.sensitivity.first_beyond(bounds::LARGEST_FEEDBACK_GAIN) {
+            return Err(TableError::TooLarge(Entry::Sensitivity { point, column }));
+        }
+        if let Some((point, column)) = self.weight.first_beyond(bounds::LARGEST_FEEDBACK_GAIN) {
+            return Err(TableError::TooLarge(Entry::SensorWeight { point, column }));
         }
         Ok(())
     }

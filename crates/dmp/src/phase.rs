@@ -1,9 +1,10 @@
 //! `CanonicalSystem` and `Phase`: the one clock of a movement.
 //!
-//! Eq. (3): `tau sd = -alpha s`, stepped exactly: the progress `u <- u + h`, `h = dt/tau`, and from it `s = exp(-alpha u)`. The closed
-//! form `exp(-alpha t/tau)` is refused on purpose: with it the phase jumps (even backwards) when tau changes. So is
-//! `s <- s exp(-alpha h)`: at low speed the factor is so near to 1 that its rounding, the same in every tick, lets the phase
-//! drift away from the progress (in f32 by 0.24 % at 1/60 of the speed of a movement of 5 s, in fixed point by 0.02 %).
+//! Eq. (3): `tau sd = -alpha s`, stepped exactly: the progress `u <- u + h`, `h = dt/tau`, and from it `s = exp(-alpha
+//! u)`. The closed form `exp(-alpha t/tau)` is refused on purpose: with it the phase jumps (even backwards) when tau
+//! changes. So is `s <- s exp(-alpha h)`: at low speed the factor is so near to 1 that its rounding, the same in every
+//! tick, lets the phase drift away from the progress (in f32 by 0.24 % at 1/60 of the speed of a movement of 5 s, in
+//! fixed point by 0.02 %).
 
 use crate::Scalar;
 

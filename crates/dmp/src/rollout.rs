@@ -11,10 +11,10 @@ use core::fmt;
 use crate::group::{Group, Tick};
 use crate::pace::Pace;
 use crate::turn::Turn;
-use crate::vector::all_finite;
+use crate::vector::{all_finite, clamp};
 use crate::{
     CONTROL_PERIOD, Coupling, HAND_ROWS, POSITION_ROWS, POSTURE_ROWS, Phase, Primitive, Quaternion, Reference, SENSORS,
-    Scalar, SensorMap, StartState,
+    Scalar, SensorMap, StartState, bounds,
 };
 
 /// Why a start or a change in flight is refused; the run goes on unchanged.
@@ -23,6 +23,8 @@ use crate::{
 pub enum RolloutError {
     /// A value is NaN or infinite.
     NotFinite,
+    /// A value is larger than any movement needs, see [`bounds`].
+    TooLarge,
     /// A quaternion is not of unit norm.
     NotUnit,
     /// The duration is shorter than [`Primitive::minimum_duration`], or the speed too high.
@@ -39,6 +41,7 @@ impl fmt::Display for RolloutError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::NotFinite => "a value is not a number",
+            Self::TooLarge => "a value is larger than any movement needs",
             Self::NotUnit => "a quaternion is not of unit norm",
             Self::TooFast => "too fast: the integration would be unstable at 300 Hz",
             Self::Negative => "a speed, rate or duration is negative",
@@ -77,11 +80,15 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// sign that is nearest to the start.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::NotUnit`], [`RolloutError::TurnsTooFar`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::TooLarge`], [`RolloutError::NotUnit`],
+    /// [`RolloutError::TurnsTooFar`].
     pub fn start(primitive: &Primitive<T, N>, start: &StartState<T>) -> Result<Self, RolloutError> {
         let StartState { configuration, velocity } = start;
         if !(configuration.is_finite() && velocity.is_finite()) {
             return Err(RolloutError::NotFinite);
+        }
+        if configuration.out_of_bounds().or(velocity.out_of_bounds()).is_some() {
+            return Err(RolloutError::TooLarge);
         }
         let from = configuration.normalised().ok_or(RolloutError::NotUnit)?;
         let to = primitive.goal();
@@ -105,7 +112,8 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     ///
     /// Value, velocity and acceleration belong to the same instant, the one BEFORE the step: the first call returns
     /// the start state. `coupling` is the feedback of the same instant. A `dt` above [`CONTROL_PERIOD`] is cut to it
-    /// (a late tick slows the plan down instead of making it unstable); one that is not positive advances nothing.
+    /// (a late tick slows the plan down instead of making it unstable); one that is not positive advances nothing. A
+    /// coupling beyond what any movement needs is cut to that, and one that is not a number counts as 0.
     ///
     /// # Errors
     /// [`RolloutError::OtherPrimitive`]; nothing has changed then.
@@ -141,11 +149,15 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
         let time = self.time;
 
         let [f0, f1, f2, r0, r1, r2, p0, p1, p2, p3, p4, p5, p6, h0, h1, h2, h3] = f;
-        let position = self.position.step(primitive.position(), &tick, &[f0, f1, f2], &coupling.position);
-        let orientation = self.orientation.step(primitive.orientation(), &tick, &[r0, r1, r2], &coupling.orientation);
+        let [most_position, most_orientation, _, most_hand] = *primitive.coupling_limits();
+        let zeta = coupling.position.map(|zeta| clamp(zeta, most_position));
+        let position = self.position.step(primitive.position(), &tick, &[f0, f1, f2], &zeta);
+        let zeta = coupling.orientation.map(|zeta| clamp(zeta, most_orientation));
+        let orientation = self.orientation.step(primitive.orientation(), &tick, &[r0, r1, r2], &zeta);
         let posture =
             self.posture.step(primitive.posture(), &tick, &[p0, p1, p2, p3, p4, p5, p6], &[T::ZERO; POSTURE_ROWS]);
-        let hand = self.hand.step(primitive.hand(), &tick, &[h0, h1, h2, h3], &coupling.hand);
+        let zeta = coupling.hand.map(|zeta| clamp(zeta, most_hand));
+        let hand = self.hand.step(primitive.hand(), &tick, &[h0, h1, h2, h3], &zeta);
 
         self.phase.step(primitive.canonical(), h);
         self.pace.speed = self.pace.speed + change;
@@ -205,7 +217,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// [`Rollout::set_goal_filter`] if that is too much.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::TooLarge`].
     pub fn set_goal_position(&mut self, goal: [T; POSITION_ROWS]) -> Result<(), RolloutError> {
         self.position.command(goal, self.goal_filter.is_some())
     }
@@ -232,7 +244,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// New goal of the posture, rad.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::TooLarge`].
     pub fn set_goal_posture(&mut self, goal: [T; POSTURE_ROWS]) -> Result<(), RolloutError> {
         self.posture.command(goal, self.goal_filter.is_some())
     }
@@ -240,7 +252,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// New goal of the hand, rad.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::TooLarge`].
     pub fn set_goal_hand(&mut self, goal: [T; HAND_ROWS]) -> Result<(), RolloutError> {
         self.hand.command(goal, self.goal_filter.is_some())
     }
@@ -282,7 +294,8 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// New duration tau of the whole movement, s, approached at the slew rate. The path stays the same.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`], [`RolloutError::OtherPrimitive`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`],
+    /// [`RolloutError::OtherPrimitive`].
     pub fn set_duration(&mut self, primitive: &Primitive<T, N>, duration: T) -> Result<(), RolloutError> {
         self.check(primitive)?;
         if !duration.is_finite() {
@@ -301,7 +314,8 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// New speed relative to the taught one, approached at the slew rate: 1 = as taught, 0 = time stands still.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`], [`RolloutError::OtherPrimitive`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`],
+    /// [`RolloutError::OtherPrimitive`].
     pub fn set_speed(&mut self, primitive: &Primitive<T, N>, speed: T) -> Result<(), RolloutError> {
         self.check(primitive)?;
         if !speed.is_finite() {
@@ -320,7 +334,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// Largest change of speed per second; `None` lets the speed (and with it the desired velocity) jump.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`].
     pub fn set_speed_slew(&mut self, slew: Option<T>) -> Result<(), RolloutError> {
         if let Some(slew) = slew {
             if !slew.is_finite() {
@@ -328,6 +342,9 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
             }
             if !(slew > T::ZERO) {
                 return Err(RolloutError::Negative);
+            }
+            if !(slew <= T::from_f64(bounds::FASTEST_SLEW)) {
+                return Err(RolloutError::TooFast);
             }
         }
         self.pace.update(self.pace.target, self.pace.stopped, slew);

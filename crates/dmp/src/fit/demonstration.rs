@@ -11,8 +11,8 @@ use crate::{Configuration, Quaternion};
 /// Fewest samples of a demonstration.
 const FEWEST_SAMPLES: usize = 30;
 
-/// A joint of the posture or the hand that moves no faster (rad/s) rests, whatever its highest speed was: one that never moves has only
-/// the noise of its encoder, of which no share is small. 2 mm/s at a lever of 0.1 m.
+/// A joint of the posture or the hand that moves no faster (rad/s) rests, whatever its highest speed was: one that
+/// never moves has only the noise of its encoder, of which no share is small. 2 mm/s at a lever of 0.1 m.
 const RESTING_JOINT: f64 = 0.02;
 
 /// Samples of pose, posture and hand; quaternions are unit and sign-continuous.
@@ -160,8 +160,8 @@ impl Demonstration {
         position.chain(posture).chain(hand)
     }
 
-    /// True if everything rests at the end: tool, posture and hand. At rest is what has a last speed of at most `share` of its highest
-    /// one, the tool by its linear and angular speed, the joints one by one.
+    /// True if everything rests at the end: tool, posture and hand. At rest is what has a last speed of at most
+    /// `share` of its highest one, the tool by its linear and angular speed, the joints one by one.
     pub(super) fn ends_at_rest(&self, share: f64) -> bool {
         let speed = |step: &dyn Fn(usize) -> f64| {
             let steps = (1..self.len()).map(step);

@@ -71,8 +71,8 @@ impl Ridge {
         sum.map(|sum| libm::sqrt(sum / targets.len() as f64))
     }
 
-    /// Condition number of the design matrix `A`, without the ridge: root of the ratio of the extreme eigenvalues of `A^T A`, both
-    /// by power iteration. Infinite if `A^T A` is singular in double precision, from about 1e8 on.
+    /// Condition number of the design matrix `A`, without the ridge: root of the ratio of the extreme eigenvalues of
+    /// `A^T A`, both by power iteration. Infinite if `A^T A` is singular in double precision, from about 1e8 on.
     pub(super) fn condition(&self) -> f64 {
         const ITERATIONS: usize = 30;
         let Some(factor) = cholesky(&self.gram) else {

@@ -3,9 +3,10 @@
 use crate::common::{ALPHA, DT, ORIGIN, Plan};
 use dmp::fit::{Demonstration, FitOptions, experience, fit, minimum_jerk, phase_statistics};
 use dmp::{
-    Basis, CanonicalSystem, Coupling, EXPERIENCE_CHANNELS, Feedback, FixedPoint, GainSchedule, Limits,
-    OrientationError, Phase, Quaternion, Rollout, RolloutError, SENSORS, Scalar, SensorMap, StartState, Stiffness,
-    TableError, TransformationSystem,
+    Basis, CanonicalSystem, Coupling, EXPERIENCE_CHANNELS, Entry, ExpectedWrench, Feedback, FixedPoint, GainSchedule,
+    Limits, OrientationError, Part, Phase, PointInput, PointState, Primitive, PrimitiveError, PrimitiveTables,
+    Quaternion, ROWS, Rollout, RolloutError, SENSORS, Scalar, SensorMap, StartState, Stiffness, TableError,
+    TransformationSystem, Velocity,
 };
 
 fn feedback<T: Scalar>(limit: f64) -> Feedback<T> {
@@ -50,9 +51,9 @@ fn an_error_too_small_for_its_reciprocal_is_no_nan() {
     }
 }
 
-/// `4/(sqrt(D^2 + 4K) + D)`, capped at `2/D`, in a type where `D^2` neither saturates nor swallows `4K`.
+/// The four limits of the step in a type where `D^2` neither saturates nor swallows `4K`.
 fn largest_step(k: f64, d: f64) -> f64 {
-    (4.0 / (d.hypot(2.0 * k.sqrt()) + d)).min(2.0 / d)
+    (4.0 / (d.hypot(2.0 * k.sqrt()) + d)).min(2.0 / d).min(1.0 / k.sqrt()).min(2.5 * d / k).min(1.0)
 }
 
 fn check_largest_step<T: Scalar>(tolerance: f64) {
@@ -64,8 +65,9 @@ fn check_largest_step<T: Scalar>(tolerance: f64) {
         (200.0, 1e6),
         (1e6, 1e6),
         (1e6, 2000.0),
-        (1e6, 0.01),
-        (1.0, 0.01),
+        (1e6, 1.0),
+        (1.0, 0.1),
+        (0.1, 0.1),
     ] {
         let system = TransformationSystem::new(T::from_f64(k), T::from_f64(d)).unwrap();
         let (found, right) = (system.largest_step().to_f64(), largest_step(k, d));
@@ -130,7 +132,8 @@ fn a_run_without_a_usable_sample_leaves_the_others_alone() {
     }
 }
 
-/// Singular values of the design matrix `A_ki = s_k psi_i/sum psi` by one-sided Jacobi rotations: another way than the fit's.
+/// Singular values of the design matrix `A_ki = s_k psi_i/sum psi` by one-sided Jacobi rotations: another way than the
+/// fit's.
 fn condition_of_the_design(count: usize, activation: f64, samples: usize) -> f64 {
     let canonical = CanonicalSystem::new(ALPHA).unwrap();
     let basis = Basis::<f64, 200>::new(&canonical, count, activation).unwrap();
@@ -218,8 +221,8 @@ fn a_goal_in_flight_is_no_further_away_than_one_at_the_start() {
     rollout.set_goal_orientation(&primitive, about_z(180.0)).unwrap();
 }
 
-/// The fit goes on with rest behind the last sample only if everything rests there. Whatever of it still moves would else be
-/// stopped short.
+/// The fit goes on with rest behind the last sample only if everything rests there. Whatever of it still moves would
+/// else be stopped short.
 #[test]
 fn a_demonstration_ends_at_rest_only_if_posture_and_hand_rest_too() {
     let samples = 1501;
@@ -270,4 +273,211 @@ fn a_run_goes_on_only_with_the_primitive_it_was_started_with() {
     let mut copy = primitive.clone();
     copy.set_expected(Some(&dmp::ExpectedWrench::new(&[[1.0; SENSORS]], 5.0).unwrap()));
     rollout.step(&copy, DT as f32, &Coupling::NONE).unwrap();
+}
+
+/// A tick that comes late after one that came early: each is stable alone.
+#[test]
+fn ticks_of_changing_length_are_stable_whatever_the_damping() {
+    for (ratio, short) in [(0.1, 0.325), (0.3, 0.275), (0.5, 0.4), (0.7, 0.3), (1.0, 0.3)] {
+        let k = 200.0_f64;
+        let system = TransformationSystem::new(k, 2.0 * ratio * k.sqrt()).unwrap();
+        let mut state = PointState::new(0.0, 0.0);
+        let longest = system.largest_step();
+        for tick in 0..4000 {
+            let h = if tick % 2 == 0 { longest } else { short * longest };
+            let rhs = system.right_hand_side(&state, &PointInput { start: 0.0, goal: 1.0, s: 0.0, f: 0.0, zeta: 0.0 });
+            state.step(rhs, h);
+        }
+        assert!((state.x() - 1.0).abs() < 1e-6, "damping ratio {ratio}: {}", state.x());
+    }
+}
+
+fn refused<T: Scalar>(weights: &[f64], change: impl Fn(&mut PrimitiveTables<'_, T>)) -> Option<PrimitiveError> {
+    let weights: Vec<T> = weights.iter().map(|&w| T::from_f64(w)).collect();
+    let f = T::from_f64;
+    let mut tables = PrimitiveTables {
+        duration: f(5.0),
+        alpha: f(ALPHA),
+        activation: f(0.7),
+        kernel_count: 10,
+        weights: &weights,
+        stiffness: [f(200.0); 4],
+        damping: [28.3, 20.0, 28.3, 28.3].map(f),
+        orientation_error: OrientationError::Quaternion,
+        hemisphere: dmp::Hemisphere::Demonstrated,
+        start: crate::common::configuration(&ORIGIN),
+        goal: crate::common::configuration(&ORIGIN),
+        start_velocity: Velocity::ZERO,
+        feedback: None,
+        expected: None,
+        experience: None,
+    };
+    change(&mut tables);
+    Primitive::<T, 10>::new(&tables).err()
+}
+
+fn check_weights<T: Scalar>() {
+    let weights = |at: usize, value: f64| {
+        let mut weights = vec![0.0; ROWS * 10];
+        weights[at] = value;
+        weights
+    };
+    // One of each group, at the first and the last kernel, by sign and size. Neighbours share it.
+    for (at, row, kernel) in [(0, 0, 0), (39, 3, 9), (64, 6, 4), (169, 16, 9)] {
+        for value in [1e6, -1e6, 1e30, -1e30] {
+            match refused::<T>(&weights(at, value), |_| {}) {
+                Some(PrimitiveError::WeightTooLarge { row: found, kernel: near }) => {
+                    assert_eq!(found, row);
+                    assert!(near <= kernel && near + 6 > kernel, "{near} is not near {kernel}");
+                }
+                other => panic!("{value:e} at {at}: {other:?}"),
+            }
+        }
+        assert_eq!(refused::<T>(&weights(at, 100.0), |_| {}), None);
+    }
+    assert!(refused::<T>(&[1e6; ROWS * 10], |_| {}).is_some() && refused::<T>(&[-1e6; ROWS * 10], |_| {}).is_some());
+    // At its end the phase, and with it what a weight does, is a hundredth.
+    assert_eq!(refused::<T>(&weights(39, 5000.0), |_| {}), None, "a late kernel may be larger");
+    assert!(refused::<T>(&weights(30, 5000.0), |_| {}).is_some(), "an early one may not");
+    // Large ones that cancel at each centre do not cancel half-way between them, and beyond a thousand not at all.
+    let alternating: Vec<f64> = (0..ROWS * 10).map(|i| if i % 2 == 0 { 3e5 } else { -3e5 }).collect();
+    assert!(refused::<T>(&alternating, |_| {}).is_some());
+    assert!(refused::<T>(&alternating, |tables| tables.activation = T::from_f64(0.95)).is_some());
+}
+
+#[test]
+fn a_weight_larger_than_any_movement_needs_is_refused_by_its_place() {
+    check_weights::<f64>();
+    check_weights::<f32>();
+    check_weights::<FixedPoint>();
+    let error = PrimitiveError::WeightTooLarge { row: 7, kernel: 4 };
+    assert_eq!(
+        error.to_string(),
+        "the weights of posture row 1 at kernel 4 (both from 0) are larger than any movement needs"
+    );
+}
+
+#[test]
+fn the_weights_of_real_fits_are_far_inside_the_bound() {
+    // A reach of a second and a quarter, noise of 0.2 mm that nobody filters, few and many kernels.
+    let samples = 375;
+    let mut state = 1_u64;
+    let mut noise = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 4e-4
+    };
+    let mut position = minimum_jerk([0.1, -0.3, 0.2], [0.8, 0.4, -0.3], samples);
+    position.iter_mut().flatten().for_each(|x| *x += noise());
+    let hand = minimum_jerk([0.0; 4], [0.0, 2.4, 2.4, 2.4], samples);
+    let moving = demonstration(position, vec![[0.2; 7]; samples], hand);
+    for kernel_count in [10, 50, 100] {
+        let options = FitOptions { kernel_count, cutoff: None, ..FitOptions::default() };
+        let learned = fit(&moving, &options).unwrap();
+        // Ten times these weights would still be a movement.
+        let mut larger = learned.clone();
+        larger.weights.iter_mut().for_each(|weight| *weight *= 10.0);
+        larger.primitive::<f64, 100>().unwrap();
+        let largest = learned.weights.iter().fold(0.0_f64, |largest, weight| largest.max(weight.abs()));
+        println!("{kernel_count} kernels: largest weight {largest:.1}");
+    }
+}
+
+#[test]
+fn starts_goals_and_velocities_out_of_this_world_are_refused_by_their_place() {
+    let weights = [0.0; ROWS * 10];
+    let far = |change: &dyn Fn(&mut PrimitiveTables<'_, f64>)| refused::<f64>(&weights, change);
+    let too_large = |part: Part, row: dmp::Row, index: u8| Some(PrimitiveError::TooLarge { part, row, index });
+    for value in [20.1, -1e30] {
+        assert_eq!(far(&|t| t.start.position[1] = value), too_large(Part::Start, dmp::Row::Position, 1));
+        assert_eq!(far(&|t| t.start.posture[6] = value), too_large(Part::Start, dmp::Row::Posture, 6));
+        assert_eq!(far(&|t| t.goal.hand[3] = value), too_large(Part::Goal, dmp::Row::Hand, 3));
+        let fast = 3.0 * value;
+        let part = Part::StartVelocity;
+        assert_eq!(far(&|t| t.start_velocity.position[0] = fast), too_large(part, dmp::Row::Position, 0));
+        assert_eq!(far(&|t| t.start_velocity.orientation[2] = fast), too_large(part, dmp::Row::Orientation, 2));
+        assert_eq!(far(&|t| t.start_velocity.hand[1] = fast), too_large(part, dmp::Row::Hand, 1));
+    }
+    let error = PrimitiveError::TooLarge { part: Part::StartVelocity, row: dmp::Row::Orientation, index: 2 };
+    assert_eq!(
+        error.to_string(),
+        "orientation value 2 (from 0) of the start velocity is larger than any movement needs"
+    );
+
+    // What comes in flight has the same bounds.
+    let primitive = Plan::golden().build::<f32>();
+    let demonstrated = StartState::demonstrated(&primitive);
+    let refused = Err(RolloutError::TooLarge);
+    let mut start = demonstrated;
+    start.configuration.posture[4] = 1e30;
+    assert_eq!(Rollout::start(&primitive, &start).map(|_| ()), refused);
+    let mut start = demonstrated;
+    start.velocity.orientation[0] = 51.0;
+    assert_eq!(Rollout::start(&primitive, &start).map(|_| ()), refused);
+    let mut rollout = Rollout::start(&primitive, &demonstrated).unwrap();
+    let before = rollout.clone();
+    assert_eq!(rollout.set_goal_position([0.0, 1e30, 0.0]), refused);
+    assert_eq!(rollout.set_goal_posture([21.0; 7]), refused);
+    assert_eq!(rollout.set_goal_hand([-21.0; 4]), refused);
+    assert_eq!(rollout.set_speed_slew(Some(1e30)), Err(RolloutError::TooFast));
+    assert_eq!(rollout, before);
+}
+
+fn check_tables<T: Scalar>() {
+    let f = T::from_f64;
+    let gains = |values: f64| GainSchedule::constant([f(values); 10]).unwrap();
+    let sensors = |values: f64| GainSchedule::<T, SENSORS>::constant([f(values); SENSORS]).unwrap();
+    let limits = |displacement: f64, rotation: f64, hand: f64| Limits {
+        displacement: f(displacement),
+        rotation: f(rotation),
+        hand: f(hand),
+    };
+    let feedback = |k1: f64, k2: f64, limits: Limits<T>| Feedback::new(gains(k1), sensors(k2), limits).err();
+    let too_large = |entry: Entry| Some(TableError::TooLarge(entry));
+    assert_eq!(feedback(1e4, 4.0, limits(0.5, 3.0, 3.0)), None);
+    for value in [1e30, 2.1, 1e6] {
+        assert_eq!(feedback(1.0, 1.0, limits(value, 1.0, 1.0)), too_large(Entry::Displacement), "{value}");
+    }
+    for value in [1e30, 3.15] {
+        assert_eq!(feedback(1.0, 1.0, limits(0.2, value, 1.0)), too_large(Entry::Rotation), "{value}");
+        assert_eq!(feedback(1.0, 1.0, limits(0.2, 1.0, value)), too_large(Entry::Hand), "{value}");
+    }
+    let (point, column) = (0, 0);
+    assert_eq!(feedback(1e30, 1.0, limits(0.2, 1.0, 1.0)), too_large(Entry::Sensitivity { point, column }));
+    assert_eq!(feedback(1.0, 1e30, limits(0.2, 1.0, 1.0)), too_large(Entry::SensorWeight { point, column }));
+
+    let mut samples = vec![[T::ZERO; SENSORS]; 7];
+    assert!(ExpectedWrench::new(&samples, f(5.0)).is_ok());
+    for duration in [0.0, -1.0, 4000.0, 1e30] {
+        assert_eq!(ExpectedWrench::new(&samples, f(duration)).err(), Some(TableError::Duration), "{duration}");
+    }
+    samples[4][8] = f(-1e30);
+    let entry = Entry::Expected { point: 4, column: 8 };
+    assert_eq!(ExpectedWrench::new(&samples, f(5.0)).err(), too_large(entry));
+
+    let experience = |mean: f64, spread: f64| {
+        let mut tables = [[[f(0.5); EXPERIENCE_CHANNELS]; 3]; 2];
+        (tables[0][2][11], tables[1][1][0]) = (f(mean), f(spread));
+        dmp::Experience::new(&tables[0], &tables[1], 3).err()
+    };
+    assert_eq!(experience(1.0, 1e-3), None);
+    assert_eq!(experience(1e30, 1.0), too_large(Entry::Mean { point: 2, column: 11 }));
+    assert_eq!(experience(1.0, 1e30), too_large(Entry::Spread { point: 1, column: 0 }));
+    for narrow in [0.0, 1e-7, 1e-39] {
+        assert_eq!(experience(1.0, narrow), Some(TableError::Spread), "{narrow}");
+    }
+}
+
+#[test]
+fn limits_gains_and_sensor_values_beyond_anything_real_are_refused_by_their_place() {
+    check_tables::<f64>();
+    check_tables::<f32>();
+    check_tables::<FixedPoint>();
+    assert_eq!(
+        TableError::TooLarge(Entry::Displacement).to_string(),
+        "the limit of the displacement is larger than anything real"
+    );
+    assert_eq!(
+        TableError::TooLarge(Entry::Mean { point: 2, column: 11 }).to_string(),
+        "the mean of the experience at point 2, column 11 (from 0) is larger than anything real"
+    );
 }
