@@ -141,7 +141,8 @@ impl fmt::Display for PrimitiveError {
                 let (group, row) = Row::of_weights(usize::from(*row));
                 write!(
                     f,
-                    "the weights of {group} row {row} at kernel {kernel} (both from 0) are larger than any movement needs"
+                    "the weights of {group} row {row} at kernel {kernel} (both from 0) are larger than any movement \
+                     needs"
                 )
             }
             Self::TooLarge { part, row, index } => {

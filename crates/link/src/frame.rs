@@ -8,8 +8,9 @@
 //! The CRC is CRC-32/ISCSI (polynomial 0x1EDC6F41, reflected) over everything before it: among messages of
 //! this length it finds every error of up to five bits and every burst of up to 32.
 //!
-//! A hello that cannot be read wholly, because another version has fewer fields or other ones, still tells its link version
-//! and its schema hash: both sides must be able to say that they do not fit, and a dropped hello looks like a dead line.
+//! A hello that cannot be read wholly, because another version has fewer fields or other ones, still tells its link
+//! version and its schema hash: both sides must be able to say that they do not fit, and a dropped hello looks like a
+//! dead line.
 //!
 //! Invariants: [`Decoder`] takes any bytes in any portions, never panics, needs constant memory, and counts
 //! every non-empty run between zero bytes exactly once, as accepted or under its reason.
@@ -93,8 +94,8 @@ pub trait Message: Serialize + DeserializeOwned {
     /// a later version may have more to say there, and must still be told that it is a later version.
     fn tolerates_more(&self) -> bool;
 
-    /// The hello of another version out of the bytes of a message that cannot be read: link version and schema hash, all
-    /// other fields empty. `None` for what is no hello, and for the hello of this version, which is damaged then.
+    /// The hello of another version out of the bytes of a message that cannot be read: link version and schema hash,
+    /// all other fields empty. `None` for what is no hello, and for the hello of this version, which is damaged then.
     fn foreign_hello(body: &[u8]) -> Option<Self>;
 }
 

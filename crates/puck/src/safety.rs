@@ -259,8 +259,8 @@ pub fn velocity_limits<R: Real>(table: &PropertyTable, fault: R, warning: R) -> 
 /// `units_per_newton_metre` is IPNM of the strictest puck.
 ///
 /// # Errors
-/// [`LimitError`]. A fault limit that no packed torque exceeds (8191 units and more) means "never fault" as much as 0; it is
-/// refused.
+/// [`LimitError`]. A fault limit that no packed torque exceeds (8191 units and more) means "never fault" as much as 0;
+/// it is refused.
 pub fn torque_limits<R: Real>(
     table: &PropertyTable,
     fault: R,

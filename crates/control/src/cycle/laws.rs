@@ -99,7 +99,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// Eqs (8), (9), (11), (10), (12), (13), and the hand's part for Eq (14).
     fn run_primitive(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
         let (Some(run), Some(primitive)) = (&mut self.run, self.loaded.get()) else {
-            // The state machine enters `Run` only with both, and no other primitive is loaded meanwhile; else the arm floats.
+            // The state machine enters `Run` only with both, and no other primitive is loaded meanwhile; else the arm
+            // floats.
             return self.float(measured);
         };
         let frozen = measured.state.missing > 0;

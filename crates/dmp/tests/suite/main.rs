@@ -4,6 +4,8 @@ mod bounds;
 mod common;
 mod fit;
 mod golden;
+mod groups;
 mod memory;
 mod robustness;
 mod signs;
+mod whole;

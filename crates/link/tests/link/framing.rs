@@ -173,7 +173,8 @@ const UP_TO_THE_SCHEMA: usize = 8 + 1 + 1 + 5;
 fn a_hello_of_another_version_with_fewer_fields_still_tells_its_version() {
     let whole = frame_with(&requests()[0], |payload| assert!(payload.len() > UP_TO_THE_SCHEMA + 5));
     assert_eq!(read(&mut Decoder::new(), &whole), &requests()[..1]);
-    // Without the owner, without the model hash too, cut in the middle of either, and with bytes in their place that are neither.
+    // Without the owner, without the model hash too, cut in the middle of either, and with bytes in their place that
+    // are neither.
     for kept in UP_TO_THE_SCHEMA..UP_TO_THE_SCHEMA + 5 + 10 {
         for strange in [vec![], vec![0xFF; 7]] {
             let frame = frame_with(&requests()[0], |payload| {
