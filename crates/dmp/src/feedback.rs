@@ -51,6 +51,25 @@ pub struct Coupling<T> {
 impl<T: Scalar> Coupling<T> {
     /// No feedback: the plan runs open loop.
     pub const NONE: Self = Self { position: [T::ZERO; 3], orientation: [T::ZERO; 3], hand: [T::ZERO; 4] };
+
+    /// True if no value can be beyond its limit (of position, orientation, posture, hand): the sum of all magnitudes
+    /// is within the least. A NaN makes it false.
+    #[inline]
+    pub(crate) fn is_within(&self, &[position, orientation, _, hand]: &[T; 4]) -> bool {
+        let sum = |values: &[T]| values.iter().fold(T::ZERO, |sum, value| sum + value.abs());
+        let least = |a: T, b: T| if a < b { a } else { b };
+        sum(&self.position) + sum(&self.orientation) + sum(&self.hand) <= least(least(position, orientation), hand)
+    }
+
+    /// Each value cut to its limit; one that is not a number counts as 0.
+    #[cold]
+    pub(crate) fn limited(&self, &[position, orientation, _, hand]: &[T; 4]) -> Self {
+        Self {
+            position: self.position.map(|zeta| clamp(zeta, position)),
+            orientation: self.orientation.map(|zeta| clamp(zeta, orientation)),
+            hand: self.hand.map(|zeta| clamp(zeta, hand)),
+        }
+    }
 }
 
 /// `J_sensor^T` for a wrist sensor and finger gauges: where the sensor sits relative to the controlled point.

@@ -77,6 +77,8 @@ impl<T: Scalar> Phase<T> {
         let sum = self.u + step;
         self.u_lost = (sum - self.u) - step;
         self.u = sum;
-        self.s = system.phase_at(sum);
+        // During the movement and well beyond by the faster of the two exponentials.
+        let exponent = system.alpha * sum;
+        self.s = if exponent <= T::NEGLIGIBLE_EXPONENT { T::kernel(exponent) } else { T::exp(-exponent) };
     }
 }

@@ -11,7 +11,7 @@ use core::fmt;
 use crate::group::{Group, Tick};
 use crate::pace::Pace;
 use crate::turn::Turn;
-use crate::vector::{all_finite, clamp};
+use crate::vector::all_finite;
 use crate::{
     CONTROL_PERIOD, Coupling, HAND_ROWS, POSITION_ROWS, POSTURE_ROWS, Phase, Primitive, Quaternion, Reference, SENSORS,
     Scalar, SensorMap, StartState, bounds,
@@ -149,15 +149,18 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
         let time = self.time;
 
         let [f0, f1, f2, r0, r1, r2, p0, p1, p2, p3, p4, p5, p6, h0, h1, h2, h3] = f;
-        let [most_position, most_orientation, _, most_hand] = *primitive.coupling_limits();
-        let zeta = coupling.position.map(|zeta| clamp(zeta, most_position));
-        let position = self.position.step(primitive.position(), &tick, &[f0, f1, f2], &zeta);
-        let zeta = coupling.orientation.map(|zeta| clamp(zeta, most_orientation));
-        let orientation = self.orientation.step(primitive.orientation(), &tick, &[r0, r1, r2], &zeta);
+        let limited;
+        let coupling = if coupling.is_within(primitive.coupling_limits()) {
+            coupling
+        } else {
+            limited = coupling.limited(primitive.coupling_limits());
+            &limited
+        };
+        let position = self.position.step(primitive.position(), &tick, &[f0, f1, f2], &coupling.position);
+        let orientation = self.orientation.step(primitive.orientation(), &tick, &[r0, r1, r2], &coupling.orientation);
         let posture =
             self.posture.step(primitive.posture(), &tick, &[p0, p1, p2, p3, p4, p5, p6], &[T::ZERO; POSTURE_ROWS]);
-        let zeta = coupling.hand.map(|zeta| clamp(zeta, most_hand));
-        let hand = self.hand.step(primitive.hand(), &tick, &[h0, h1, h2, h3], &zeta);
+        let hand = self.hand.step(primitive.hand(), &tick, &[h0, h1, h2, h3], &coupling.hand);
 
         self.phase.step(primitive.canonical(), h);
         self.pace.speed = self.pace.speed + change;

@@ -69,6 +69,11 @@ impl Scalar for f64 {
     }
 
     #[inline]
+    fn abs(self) -> Self {
+        f64::abs(self)
+    }
+
+    #[inline]
     fn is_finite(self) -> bool {
         f64::is_finite(self)
     }
@@ -151,6 +156,11 @@ impl Scalar for f32 {
     #[inline]
     fn atan2(self, x: Self) -> Self {
         libm::atan2f(self, x)
+    }
+
+    #[inline]
+    fn abs(self) -> Self {
+        f32::abs(self)
     }
 
     #[inline]

@@ -481,3 +481,27 @@ fn limits_gains_and_sensor_values_beyond_anything_real_are_refused_by_their_plac
         "the mean of the experience at point 2, column 11 (from 0) is larger than anything real"
     );
 }
+
+fn check_turns<T: Scalar>() {
+    for size in [1e-45, 1e-20, 0.2, 3.0, 900.0, 1.1e3, 1e4, 1e7, 1e10, 1e19, 1e20, 1e30, 3e38, 1e300] {
+        for axis in [[1.0, 0.0, 0.0], [0.6, -0.5, 0.62]] {
+            let q = Quaternion::from_rotation_vector(&axis.map(|part: f64| T::from_f64(part * size)));
+            assert!((norm(&q.to_array()) - 1.0).abs() < 1e-6, "{size:e}: {q:?}");
+        }
+        let (sin, cos) = T::from_f64(size).sin_cos();
+        let length = norm(&[sin, cos]);
+        assert!(size > f64::from(f32::MAX) || (length - 1.0).abs() < 0.1, "{size:e}: {length}");
+    }
+    for nothing in [f64::NAN, f64::INFINITY] {
+        let q = Quaternion::from_rotation_vector(&[T::from_f64(nothing), T::ZERO, T::ZERO]);
+        assert!((norm(&q.to_array()) - 1.0).abs() < 1e-6, "{nothing}: {q:?}");
+    }
+}
+
+/// Their squares overflow, and the place of their angle in a turn is lost; a rotation they still are.
+#[test]
+fn rotation_vectors_of_any_length_give_unit_quaternions() {
+    check_turns::<f64>();
+    check_turns::<f32>();
+    check_turns::<FixedPoint>();
+}
