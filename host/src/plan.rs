@@ -16,7 +16,7 @@ pub const PERIOD: f64 = 1.0 / RATE;
 pub fn roll_out(primitive: &HostPrimitive) -> Result<Vec<Reference<f64>>, RolloutError> {
     let mut rollout = Rollout::start(primitive, &StartState::demonstrated(primitive))?;
     let cycles = cycles(primitive.duration());
-    Ok((0..cycles).map(|_| rollout.step(primitive, PERIOD, &Coupling::NONE)).collect())
+    (0..cycles).map(|_| rollout.step(primitive, PERIOD, &Coupling::NONE)).collect()
 }
 
 /// Cycles of a movement of `duration` s, both ends included.

@@ -55,7 +55,7 @@ fn the_plan_stays_at_its_goal_behind_the_end_of_the_movement() {
     let primitive = learned.primitive.to_primitive().unwrap();
     let mut rollout = dmp::Rollout::start(&primitive, &dmp::StartState::demonstrated(&primitive)).unwrap();
     for cycle in 0..3600 {
-        let plan = rollout.step(&primitive, 1.0 / 300.0, &dmp::Coupling::NONE);
+        let plan = rollout.step(&primitive, 1.0 / 300.0, &dmp::Coupling::NONE).unwrap();
         if f64::from(cycle) / 300.0 > primitive.duration() {
             let away = (0..3)
                 .map(|axis| (plan.position.x[axis] - learned.primitive.goal.position[axis]).powi(2))
@@ -327,7 +327,7 @@ fn a_dwell_makes_the_movement_longer_by_exactly_that_and_rests_at_the_goal() {
     let primitive = grasp.primitive.to_primitive().unwrap();
     let mut rollout = dmp::Rollout::start(&primitive, &dmp::StartState::demonstrated(&primitive)).unwrap();
     loop {
-        let plan = rollout.step(&primitive, 1.0 / 300.0, &dmp::Coupling::NONE);
+        let plan = rollout.step(&primitive, 1.0 / 300.0, &dmp::Coupling::NONE).unwrap();
         if plan.time > plain.primitive.duration + 0.3 {
             let away = (0..3).map(|axis| plan.position.x[axis] - grasp.primitive.goal.position[axis]);
             assert!(away.map(|e| e * e).sum::<f64>().sqrt() < 3e-3, "at {} s", plan.time);

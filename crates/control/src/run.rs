@@ -145,13 +145,16 @@ impl<R: Real, const N: usize> Run<R, N> {
     }
 
     /// The plan of this tick.
+    ///
+    /// # Errors
+    /// [`RolloutError::OtherPrimitive`]: this is not the primitive that the run was started with.
     pub(crate) fn step(
         &mut self,
         primitive: &Primitive<R, N>,
         wrench: &Wrench<R>,
         gauges: Option<&[R; 3]>,
         senses: Senses,
-    ) -> Reference<R> {
+    ) -> Result<Reference<R>, RolloutError> {
         self.kept = match senses {
             Senses::Lost => self.kept.saturating_sub(1),
             _ => FADE.min(self.kept + 1),
@@ -171,7 +174,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             if !self.options.finger_feedback {
                 seen.gauges = [R::of(0.0); 3];
             }
-            self.coupling = self.rollout.coupling(primitive, &seen.sensors(), &SensorMap::IDENTITY);
+            self.coupling = self.rollout.coupling(primitive, &seen.sensors(), &SensorMap::IDENTITY)?;
         }
         // A plan that springs back tips what has just been grasped, and one that goes on giving way pulls at it.
         if bends && self.rollout.is_finished() && self.kept == FADE {
@@ -180,7 +183,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             self.settled = true;
         }
         let coupling = part(&self.coupling, self.kept());
-        let plan = self.rollout.step(primitive, R::of(PERIOD), &coupling);
+        let plan = self.rollout.step(primitive, R::of(PERIOD), &coupling)?;
         let slow =
             |speeds: &[R], limit: f64| speeds.iter().all(|speed| *speed < R::of(limit) && *speed > R::of(-limit));
         let resting = self.rollout.is_finished()
@@ -189,7 +192,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             && slow(&plan.posture.v, REST.1)
             && slow(&plan.hand.v, HAND_REST);
         self.rested = if resting { self.rested.saturating_add(1) } else { 0 };
-        plan
+        Ok(plan)
     }
 
     /// Compares what is felt with the experience of the primitive, if it has one; tells what has just become a surprise.

@@ -48,7 +48,7 @@ fn movement<T: Scalar, const N: usize>(bencher: Bencher<'_, '_>) {
     bencher.counter(divan::counter::ItemsCount::new(1500_usize)).bench_local(|| {
         let mut rollout = Rollout::start(&primitive, &start).unwrap();
         for _ in 0..1500 {
-            black_box(rollout.step(black_box(&primitive), dt, &Coupling::NONE));
+            black_box(rollout.step(black_box(&primitive), dt, &Coupling::NONE).unwrap());
         }
     });
 }

@@ -4,7 +4,7 @@
 //! rows are in the world frame: in the sensor frame a hand that is tilted by 20 degrees would fake newtons. Torque
 //! rows are in the body frame at the controlled point, finger rows are torques of the environment on each finger.
 
-use crate::{PhaseTable, SENSORS, Scalar, TableError};
+use crate::{Entry, PhaseTable, SENSORS, Scalar, TableError, bounds};
 
 /// Most samples an expectation can hold.
 pub const EXPECTED_CAPACITY: usize = 128;
@@ -26,13 +26,22 @@ impl<T: Scalar> ExpectedWrench<T> {
     /// the duration `recorded_duration` (s).
     ///
     /// # Errors
-    /// [`TableError`], with [`TableError::Duration`] for a duration that is not a positive number.
+    /// [`TableError`], with [`TableError::Duration`] for a duration that is not a positive number up to 3600 s and
+    /// [`TableError::TooLarge`] for a value that no sensor has.
     pub fn new(samples: &[[T; SENSORS]], recorded_duration: T) -> Result<Self, TableError> {
-        if !(recorded_duration > T::ZERO && recorded_duration.is_finite()) {
+        let expected = Self { table: PhaseTable::new(samples)?, recorded_duration };
+        expected.check()?;
+        Ok(expected)
+    }
+
+    fn check(&self) -> Result<(), TableError> {
+        if !(self.recorded_duration > T::ZERO && self.recorded_duration <= T::from_f64(bounds::LONGEST_DURATION)) {
             return Err(TableError::Duration);
         }
-        let table = PhaseTable::new(samples)?;
-        Ok(Self { table, recorded_duration })
+        match self.table.first_beyond(bounds::LARGEST_SENSOR_VALUE) {
+            Some((point, column)) => Err(TableError::TooLarge(Entry::Expected { point, column })),
+            None => Ok(()),
+        }
     }
 
     /// Stands for an expectation that is not there; never leaves this crate.
@@ -44,13 +53,12 @@ impl<T: Scalar> ExpectedWrench<T> {
         values: impl IntoIterator<Item = T>,
         recorded_duration: T,
     ) -> Result<(), TableError> {
-        self.clear();
-        if !(recorded_duration > T::ZERO && recorded_duration.is_finite()) {
-            return Err(TableError::Duration);
-        }
-        self.table.assign(values)?;
         self.recorded_duration = recorded_duration;
-        Ok(())
+        let result = self.table.assign(values).and_then(|()| self.check());
+        if result.is_err() {
+            self.clear();
+        }
+        result
     }
 
     pub(crate) fn copy_from(&mut self, other: &Self) {

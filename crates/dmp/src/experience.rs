@@ -7,7 +7,7 @@
 //! the inner forces of the grasp would drag the hand away whenever the object is not there); this one only watches, and
 //! comes from runs that met the object.
 
-use crate::{PhaseTable, Scalar, TableError};
+use crate::{Entry, PhaseTable, Scalar, TableError, bounds};
 
 /// Channels: force x, y, z (N, world axes), torque x, y, z (N m, tool axes at the grasp point), torque of the environment on
 /// finger F1, F2, F3 (N m), angle of finger F1, F2, F3 (rad).
@@ -30,9 +30,9 @@ impl<T: Scalar> Experience<T> {
     /// successful runs.
     ///
     /// # Errors
-    /// [`TableError::Spread`] for a spread that is not positive (the floor belongs into the table, so that no reader can
+    /// [`TableError::Spread`] for a spread below 1e-6 (the floor belongs into the table, so that no reader can
     /// forget it), [`TableError::Shape`] for tables of different length, [`TableError::Trials`] for no run at all,
-    /// otherwise as [`PhaseTable::new`].
+    /// [`TableError::TooLarge`] for a value that no sensor has, otherwise as [`PhaseTable::new`].
     pub fn new(
         mean: &[[T; EXPERIENCE_CHANNELS]],
         spread: &[[T; EXPERIENCE_CHANNELS]],
@@ -46,8 +46,18 @@ impl<T: Scalar> Experience<T> {
     fn check(&self) -> Result<(), TableError> {
         if self.mean.samples().len() != self.spread.samples().len() {
             Err(TableError::Shape)
-        } else if self.spread.samples().iter().flatten().any(|spread| !(*spread > T::ZERO)) {
+        } else if self
+            .spread
+            .samples()
+            .iter()
+            .flatten()
+            .any(|spread| !(*spread >= T::from_f64(bounds::SMALLEST_SPREAD)))
+        {
             Err(TableError::Spread)
+        } else if let Some((point, column)) = self.mean.first_beyond(bounds::LARGEST_SENSOR_VALUE) {
+            Err(TableError::TooLarge(Entry::Mean { point, column }))
+        } else if let Some((point, column)) = self.spread.first_beyond(bounds::LARGEST_SENSOR_VALUE) {
+            Err(TableError::TooLarge(Entry::Spread { point, column }))
         } else if self.trials == 0 {
             Err(TableError::Trials)
         } else {

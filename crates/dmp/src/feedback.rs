@@ -6,7 +6,7 @@
 //! plan would spin, therefore `|zeta_p| <= K dx_max` and `|zeta_o| <= K_o sin(theta_max/2)`.
 
 use crate::vector::{clamp, clamp_norm, cross, rotate};
-use crate::{OrientationError, PhaseTable, Scalar, TableError};
+use crate::{Entry, OrientationError, PhaseTable, Scalar, TableError, bounds};
 
 /// Sensor values: force x, y, z (N), torque x, y, z (N m), torque on finger F1, F2, F3 (N m).
 pub const SENSORS: usize = 9;
@@ -51,6 +51,25 @@ pub struct Coupling<T> {
 impl<T: Scalar> Coupling<T> {
     /// No feedback: the plan runs open loop.
     pub const NONE: Self = Self { position: [T::ZERO; 3], orientation: [T::ZERO; 3], hand: [T::ZERO; 4] };
+
+    /// True if no value can be beyond its limit (of position, orientation, posture, hand): the sum of all magnitudes
+    /// is within the least. A NaN makes it false.
+    #[inline]
+    pub(crate) fn is_within(&self, &[position, orientation, _, hand]: &[T; 4]) -> bool {
+        let sum = |values: &[T]| values.iter().fold(T::ZERO, |sum, value| sum + value.abs());
+        let least = |a: T, b: T| if a < b { a } else { b };
+        sum(&self.position) + sum(&self.orientation) + sum(&self.hand) <= least(least(position, orientation), hand)
+    }
+
+    /// Each value cut to its limit; one that is not a number counts as 0.
+    #[cold]
+    pub(crate) fn limited(&self, &[position, orientation, _, hand]: &[T; 4]) -> Self {
+        Self {
+            position: self.position.map(|zeta| clamp(zeta, position)),
+            orientation: self.orientation.map(|zeta| clamp(zeta, orientation)),
+            hand: self.hand.map(|zeta| clamp(zeta, hand)),
+        }
+    }
 }
 
 /// `J_sensor^T` for a wrist sensor and finger gauges: where the sensor sits relative to the controlled point.
@@ -105,8 +124,8 @@ impl<T: Scalar> Feedback<T> {
     /// With sensitivity `K1` per task row, weight `K2` per sensor, and limits.
     ///
     /// # Errors
-    /// [`TableError::Negative`] for a negative gain or limit or a rotation limit above pi, [`TableError::NotFinite`]
-    /// for a limit that is not a number.
+    /// [`TableError::Negative`] for a negative gain or limit, [`TableError::TooLarge`] for one beyond [`bounds`] or a
+    /// rotation limit above pi, [`TableError::NotFinite`] for a limit that is not a number.
     pub fn new(
         sensitivity: GainSchedule<T, COUPLED_ROWS>,
         weight: GainSchedule<T, SENSORS>,
@@ -127,9 +146,24 @@ impl<T: Scalar> Feedback<T> {
             .chain(self.weight.samples().iter().flatten())
             .chain(&[displacement, rotation, hand])
             .any(|&value| value < T::ZERO)
-            || rotation > T::from_f64(core::f64::consts::PI + 1e-6)
         {
             return Err(TableError::Negative);
+        }
+        let limits = [
+            (displacement, bounds::LARGEST_DISPLACEMENT, Entry::Displacement),
+            // Pi as somebody else may have rounded it.
+            (rotation, core::f64::consts::PI + 1e-6, Entry::Rotation),
+            (hand, bounds::LARGEST_HAND_DISPLACEMENT + 1e-6, Entry::Hand),
+        ];
+        let limit = limits.into_iter().find(|(value, largest, _)| *value > T::from_f64(*largest));
+        if let Some((_, _, entry)) = limit {
+            return Err(TableError::TooLarge(entry));
+        }
+        if let Some((point, column)) = self.sensitivity.first_beyond(bounds::LARGEST_FEEDBACK_GAIN) {
+            return Err(TableError::TooLarge(Entry::Sensitivity { point, column }));
+        }
+        if let Some((point, column)) = self.weight.first_beyond(bounds::LARGEST_FEEDBACK_GAIN) {
+            return Err(TableError::TooLarge(Entry::SensorWeight { point, column }));
         }
         Ok(())
     }

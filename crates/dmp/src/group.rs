@@ -1,7 +1,7 @@
 //! `Group`: rows of Eq. (9) that share their gains, with start, goal and goal filter.
 
 use crate::vector::all_finite;
-use crate::{PointInput, PointState, RolloutError, Scalar, Trajectory, TransformationSystem};
+use crate::{PointInput, PointState, RolloutError, Scalar, Trajectory, TransformationSystem, bounds};
 
 /// Rows that share their gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,6 +58,9 @@ impl<T: Scalar, const D: usize> Group<T, D> {
     pub(crate) fn command(&mut self, goal: [T; D], filtered: bool) -> Result<(), RolloutError> {
         if !all_finite(&goal) {
             return Err(RolloutError::NotFinite);
+        }
+        if bounds::first_beyond(&goal, bounds::LARGEST_VALUE).is_some() {
+            return Err(RolloutError::TooLarge);
         }
         self.commanded = goal;
         if !filtered {

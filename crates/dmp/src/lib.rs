@@ -6,7 +6,9 @@
 #[cfg(feature = "std")]
 extern crate std;
 
+pub mod bounds;
 mod chart;
+mod configuration;
 mod expectation;
 mod experience;
 mod feedback;
@@ -16,6 +18,7 @@ mod orientation;
 mod pace;
 mod phase;
 mod primitive;
+mod primitive_error;
 mod quaternion;
 mod reference;
 mod rollout;
@@ -29,6 +32,7 @@ mod vector;
 pub mod fit;
 
 pub use chart::RotationChart;
+pub use configuration::{Configuration, Velocity};
 pub use expectation::{EXPECTED_CAPACITY, ExpectedWrench};
 pub use experience::{EXPERIENCE_CAPACITY, EXPERIENCE_CHANNELS, Experience};
 pub use feedback::{
@@ -38,14 +42,15 @@ pub use forcing::{Activations, Basis, ForcingTerm};
 pub use orientation::{OrientationError, OrientationInput, OrientationState, OrientationSystem, orientation_error};
 pub use phase::{CanonicalSystem, Phase};
 pub use primitive::{
-    CONTROL_PERIOD, Configuration, HAND_ROWS, Hemisphere, ORIENTATION_ROWS, POSITION_ROWS, POSTURE_ROWS, Primitive,
-    PrimitiveError, PrimitiveTables, ROWS, Row, Velocity,
+    CONTROL_PERIOD, HAND_ROWS, Hemisphere, ORIENTATION_ROWS, POSITION_ROWS, POSTURE_ROWS, Primitive, PrimitiveTables,
+    ROWS,
 };
+pub use primitive_error::{Part, PrimitiveError, Row};
 pub use quaternion::Quaternion;
 pub use reference::{OrientationReference, Reference, StartState, Trajectory};
 pub use rollout::{Rollout, RolloutError};
 #[cfg(feature = "fixed")]
 pub use scalar::FixedPoint;
 pub use scalar::Scalar;
-pub use table::{PhaseTable, TableError};
+pub use table::{Entry, PhaseTable, TableError};
 pub use transformation::{GainError, PointInput, PointState, TransformationSystem};

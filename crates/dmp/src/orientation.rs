@@ -21,6 +21,17 @@ pub enum OrientationError {
     RotationVector,
 }
 
+/// Cosine of half of 175 degrees: two unit quaternions with a smaller inner product are too far apart for the error of
+/// Eq. (4), which is longest at 180 degrees and pulls ever less beyond.
+const FARTHEST_COSINE: f64 = 0.043_619_387_365_336;
+
+/// True if Eq. (4) can pull from `from` to `goal`, whose signs tell which way round: they are at most 175 degrees
+/// apart.
+#[inline]
+pub(crate) fn is_near_enough<T: Scalar>(from: &Quaternion<T>, goal: &Quaternion<T>) -> bool {
+    from.dot(goal) >= T::from_f64(FARTHEST_COSINE)
+}
+
 impl OrientationError {
     /// Damping that makes the linearised system critical: `sqrt(2 K)` for the half-angle error of Eq. (4),
     /// `2 sqrt(K)` for the rotation vector.
@@ -70,7 +81,7 @@ impl<T: Scalar> OrientationSystem<T> {
     /// Critically damped: `D_o = sqrt(2 K_o)`.
     ///
     /// # Errors
-    /// A gain that is not a positive number up to 1e6.
+    /// As [`TransformationSystem::new`].
     pub fn critically_damped(stiffness: T) -> Result<Self, GainError> {
         if !(stiffness > T::ZERO) {
             return Err(GainError::Stiffness);

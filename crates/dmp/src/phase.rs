@@ -1,8 +1,10 @@
 //! `CanonicalSystem` and `Phase`: the one clock of a movement.
 //!
-//! Eq. (3): `tau sd = -alpha s`, stepped exactly: `s <- s exp(-alpha h)`, `h = dt/tau`. The closed form
-//! `exp(-alpha t/tau)` is refused on purpose: with it the phase jumps (even backwards) when tau changes.
-//! Alongside runs the progress `u = -ln(s)/alpha`, which needs no logarithm: `u <- u + h`.
+//! Eq. (3): `tau sd = -alpha s`, stepped exactly: the progress `u <- u + h`, `h = dt/tau`, and from it `s = exp(-alpha
+//! u)`. The closed form `exp(-alpha t/tau)` is refused on purpose: with it the phase jumps (even backwards) when tau
+//! changes. So is `s <- s exp(-alpha h)`: at low speed the factor is so near to 1 that its rounding, the same in every
+//! tick, lets the phase drift away from the progress (in f32 by 0.24 % at 1/60 of the speed of a movement of 5 s, in
+//! fixed point by 0.02 %).
 
 use crate::Scalar;
 
@@ -36,12 +38,6 @@ impl<T: Scalar> CanonicalSystem<T> {
         self.alpha
     }
 
-    /// Factor `exp(-alpha h)` of one step of the scaled time `h = dt/tau`.
-    #[inline]
-    pub fn factor(&self, h: T) -> T {
-        T::exp(-self.alpha * h)
-    }
-
     /// The phase at progress `u`.
     #[inline]
     pub fn phase_at(&self, u: T) -> T {
@@ -55,13 +51,11 @@ pub struct Phase<T> {
     s: T,
     u: T,
     u_lost: T,
-    cached_h: T,
-    cached_factor: T,
 }
 
 impl<T: Scalar> Phase<T> {
     /// Start of a movement: s = 1, u = 0.
-    pub const START: Self = Self { s: T::ONE, u: T::ZERO, u_lost: T::ZERO, cached_h: T::ZERO, cached_factor: T::ONE };
+    pub const START: Self = Self { s: T::ONE, u: T::ZERO, u_lost: T::ZERO };
 
     /// Phase `s`, 1 at the start, decaying towards 0.
     #[inline]
@@ -75,18 +69,16 @@ impl<T: Scalar> Phase<T> {
         self.u
     }
 
-    /// Advances by `h = dt/tau` (not negative). The exponential is only computed when `h` changes.
+    /// Advances by `h = dt/tau` (not negative).
     #[inline]
     pub fn step(&mut self, system: &CanonicalSystem<T>, h: T) {
-        if h != self.cached_h {
-            self.cached_h = h;
-            self.cached_factor = system.factor(h);
-        }
-        self.s = self.s * self.cached_factor;
         // Compensated sum: thousands of small steps would lose 1e-5 in f32.
         let step = h - self.u_lost;
         let sum = self.u + step;
         self.u_lost = (sum - self.u) - step;
         self.u = sum;
+        // During the movement and well beyond by the faster of the two exponentials.
+        let exponent = system.alpha * sum;
+        self.s = if exponent <= T::NEGLIGIBLE_EXPONENT { T::kernel(exponent) } else { T::exp(-exponent) };
     }
 }

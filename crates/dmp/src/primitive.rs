@@ -3,12 +3,12 @@
 //! Holds position (3), orientation (3), posture (7) and hand (4) on one phase. The paper does not say how the posture
 //! is parameterised; one 1-D row per arm joint is our reading.
 
-use core::fmt;
-
+use crate::orientation::is_near_enough;
 use crate::vector::all_finite;
 use crate::{
-    Basis, CanonicalSystem, ExpectedWrench, Experience, Feedback, ForcingTerm, GainError, Limits, OrientationError,
-    Quaternion, Scalar, Stiffness, TableError, TransformationSystem,
+    Activations, Basis, CanonicalSystem, Configuration, ExpectedWrench, Experience, Feedback, ForcingTerm, Limits,
+    OrientationError, Part, PrimitiveError, Quaternion, Row, Scalar, Stiffness, TableError, TransformationSystem,
+    Velocity, bounds,
 };
 
 /// Rows of the end-effector position (x, y, z in the world frame, metres).
@@ -24,64 +24,6 @@ pub const ROWS: usize = POSITION_ROWS + ORIENTATION_ROWS + POSTURE_ROWS + HAND_R
 /// Longest control period, s (300 Hz): the integration is proven stable for it, and [`crate::Rollout::step`] cuts a
 /// longer one to it.
 pub const CONTROL_PERIOD: f64 = 1.0 / 300.0;
-
-/// A full set of values: pose of the end-effector, posture, hand.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Configuration<T> {
-    /// Position of the end-effector in the world frame, m.
-    pub position: [T; POSITION_ROWS],
-    /// Orientation of the end-effector, body -> world.
-    pub orientation: Quaternion<T>,
-    /// Default posture, rad.
-    pub posture: [T; POSTURE_ROWS],
-    /// Hand joints (spread, F1, F2, F3), rad.
-    pub hand: [T; HAND_ROWS],
-}
-
-impl<T: Scalar> Configuration<T> {
-    pub(crate) fn is_finite(&self) -> bool {
-        all_finite(&self.position)
-            && all_finite(&self.orientation.to_array())
-            && all_finite(&self.posture)
-            && all_finite(&self.hand)
-    }
-
-    /// With the quaternion made exactly unit; `None` if it is off by more than 1e-3.
-    pub(crate) fn normalised(&self) -> Option<Self> {
-        let orientation = self.orientation.checked_unit(T::from_f64(1e-3))?;
-        Some(Self { orientation, ..*self })
-    }
-}
-
-/// Physical velocities that belong to a [`Configuration`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Velocity<T> {
-    /// Linear velocity in the world frame, m/s.
-    pub position: [T; POSITION_ROWS],
-    /// Angular velocity in the BODY frame, rad/s.
-    pub orientation: [T; ORIENTATION_ROWS],
-    /// Posture velocity, rad/s.
-    pub posture: [T; POSTURE_ROWS],
-    /// Hand velocity, rad/s.
-    pub hand: [T; HAND_ROWS],
-}
-
-impl<T: Scalar> Velocity<T> {
-    /// At rest.
-    pub const ZERO: Self = Self {
-        position: [T::ZERO; POSITION_ROWS],
-        orientation: [T::ZERO; ORIENTATION_ROWS],
-        posture: [T::ZERO; POSTURE_ROWS],
-        hand: [T::ZERO; HAND_ROWS],
-    };
-
-    pub(crate) fn is_finite(&self) -> bool {
-        all_finite(&self.position)
-            && all_finite(&self.orientation)
-            && all_finite(&self.posture)
-            && all_finite(&self.hand)
-    }
-}
 
 /// How the signs of the start and goal quaternions were chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,98 +69,13 @@ pub struct PrimitiveTables<'a, T> {
     pub experience: Option<&'a Experience<T>>,
 }
 
-/// Group of rows with common gains.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Row {
-    /// Position rows.
-    Position,
-    /// Orientation rows.
-    Orientation,
-    /// Posture rows.
-    Posture,
-    /// Hand rows.
-    Hand,
-}
-
-impl fmt::Display for Row {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Position => "position",
-            Self::Orientation => "orientation",
-            Self::Posture => "posture",
-            Self::Hand => "hand",
-        })
-    }
-}
-
-/// Why tables are refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum PrimitiveError {
-    /// The duration is not a positive number up to 3600 s.
-    Duration,
-    /// `alpha` lets the phase end outside 1e-6..0.1.
-    Alpha,
-    /// Fewer than two kernels, or more than the capacity.
-    KernelCount,
-    /// The activation at the next centre is outside 0.05..0.95.
-    Activation,
-    /// Not exactly `ROWS * kernel_count` weights.
-    WeightCount,
-    /// A weight is NaN or infinite.
-    Weight,
-    /// Gains of this group are unusable.
-    Gains(Row, GainError),
-    /// The duration is too short for the gains of this group: at 300 Hz the integration would be unstable.
-    Unstable(Row),
-    /// A start value is NaN or infinite.
-    Start,
-    /// A start velocity is NaN or infinite.
-    StartVelocity,
-    /// A goal value is NaN or infinite.
-    Goal,
-    /// The start orientation is not a unit quaternion.
-    StartNotUnit,
-    /// The goal orientation is not a unit quaternion.
-    GoalNotUnit,
-    /// Start and goal are more than 175 degrees apart, where the error of Eq. (4) fails: use
-    /// [`OrientationError::RotationVector`].
-    TurnsTooFar,
-}
-
-impl fmt::Display for PrimitiveError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Duration => f.write_str("the duration is not a positive number up to 3600 s"),
-            Self::Alpha => f.write_str("alpha lets the phase end outside 1e-6..0.1"),
-            Self::KernelCount => f.write_str("fewer than two kernels or more than fit"),
-            Self::Activation => f.write_str("the kernel activation is outside 0.05..0.95"),
-            Self::WeightCount => f.write_str("the number of weights is not rows times kernels"),
-            Self::Weight => f.write_str("a weight is not a number"),
-            Self::Gains(row, error) => write!(f, "{row}: {error}"),
-            Self::Unstable(row) => {
-                write!(f, "{row}: the duration is too short for these gains at 300 Hz")
-            }
-            Self::Start => f.write_str("a start value is not a number"),
-            Self::StartVelocity => f.write_str("a start velocity is not a number"),
-            Self::Goal => f.write_str("a goal value is not a number"),
-            Self::StartNotUnit => f.write_str("the start orientation is not a unit quaternion"),
-            Self::GoalNotUnit => f.write_str("the goal orientation is not a unit quaternion"),
-            Self::TurnsTooFar => {
-                f.write_str("start and goal are more than 175 degrees apart; the rotation-vector error is needed")
-            }
-        }
-    }
-}
-
-impl core::error::Error for PrimitiveError {}
-
 /// One movement with checked parameters; `N` = kernel capacity.
 ///
 /// For f32 and N = 100 about 23 kB: keep it in a static or behind a reference on a small stack, and fill it there with
 /// [`Primitive::assign`] and the other `assign_` functions.
 #[derive(Debug, PartialEq)]
 pub struct Primitive<T, const N: usize> {
+    fingerprint: u32,
     duration: T,
     rate: T,
     minimum_duration: T,
@@ -229,6 +86,9 @@ pub struct Primitive<T, const N: usize> {
     orientation_error: OrientationError,
     posture: TransformationSystem<T>,
     hand: TransformationSystem<T>,
+    /// Largest coupling of position, orientation, posture and hand: K times the largest forcing term that the movement
+    /// can need.
+    coupling_limits: [T; 4],
     hemisphere: Hemisphere,
     start: Configuration<T>,
     goal: Configuration<T>,
@@ -248,6 +108,7 @@ impl<T: Scalar, const N: usize> Clone for Primitive<T, N> {
     }
 
     fn clone_from(&mut self, source: &Self) {
+        self.fingerprint = source.fingerprint;
         self.duration = source.duration;
         self.rate = source.rate;
         self.minimum_duration = source.minimum_duration;
@@ -258,6 +119,7 @@ impl<T: Scalar, const N: usize> Clone for Primitive<T, N> {
         self.orientation_error = source.orientation_error;
         self.posture = source.posture;
         self.hand = source.hand;
+        self.coupling_limits = source.coupling_limits;
         self.hemisphere = source.hemisphere;
         self.start = source.start;
         self.goal = source.goal;
@@ -289,6 +151,7 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
             hand: [T::ZERO; HAND_ROWS],
         };
         Self {
+            fingerprint: 0,
             duration: T::ONE,
             rate: T::ONE,
             minimum_duration: T::ZERO,
@@ -299,6 +162,7 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
             orientation_error: OrientationError::Quaternion,
             posture: system,
             hand: system,
+            coupling_limits: [T::ZERO; 4],
             hemisphere: Hemisphere::Nearest,
             start: origin,
             goal: origin,
@@ -330,11 +194,15 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
         if !self.forcing.assign(&checked.basis, tables.weights) {
             return Err(PrimitiveError::Weight);
         }
+        self.fingerprint = tables.fingerprint();
         self.duration = tables.duration;
         self.rate = T::ONE / tables.duration;
         self.minimum_duration = checked.minimum_duration;
         self.canonical = checked.canonical;
         [self.position, self.orientation, self.posture, self.hand] = checked.systems;
+        self.coupling_limits = checked
+            .systems
+            .map(|system| system.stiffness() * bounds::largest_force(&system, tables.duration, tables.kernel_count));
         self.orientation_error = tables.orientation_error;
         self.hemisphere = tables.hemisphere;
         self.start = checked.start;
@@ -357,7 +225,7 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
 
     fn check(tables: &PrimitiveTables<'_, T>) -> Result<Checked<T, N>, PrimitiveError> {
         let duration = tables.duration;
-        if !(duration > T::ZERO && duration <= T::from_f64(3600.0)) {
+        if !(duration > T::ZERO && duration <= T::from_f64(bounds::LONGEST_DURATION)) {
             return Err(PrimitiveError::Duration);
         }
         let canonical = CanonicalSystem::new(tables.alpha).ok_or(PrimitiveError::Alpha)?;
@@ -382,6 +250,7 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
                 minimum_duration = shortest;
             }
         }
+        tables.check_weights(&basis, &systems)?;
         if !tables.start.is_finite() {
             return Err(PrimitiveError::Start);
         }
@@ -391,17 +260,31 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
         if !tables.start_velocity.is_finite() {
             return Err(PrimitiveError::StartVelocity);
         }
+        let too_large = |part: Part, place: Option<(Row, u8)>| match place {
+            Some((row, index)) => Err(PrimitiveError::TooLarge { part, row, index }),
+            None => Ok(()),
+        };
+        too_large(Part::Start, tables.start.out_of_bounds())?;
+        too_large(Part::Goal, tables.goal.out_of_bounds())?;
+        too_large(Part::StartVelocity, tables.start_velocity.out_of_bounds())?;
         let start = tables.start.normalised().ok_or(PrimitiveError::StartNotUnit)?;
         let goal = tables.goal.normalised().ok_or(PrimitiveError::GoalNotUnit)?;
-        // cos(175 degrees / 2); with an undemonstrated goal the sign is free and the angle at most 180 degrees.
-        let cosine = match tables.hemisphere {
-            Hemisphere::Demonstrated => start.orientation.dot(&goal.orientation),
-            Hemisphere::Nearest => start.orientation.dot(&goal.orientation).abs(),
+        // With an undemonstrated goal the sign is free and the angle at most 180 degrees.
+        let to = match tables.hemisphere {
+            Hemisphere::Demonstrated => goal.orientation,
+            Hemisphere::Nearest => goal.orientation.aligned_with(&start.orientation),
         };
-        if tables.orientation_error == OrientationError::Quaternion && cosine < T::from_f64(0.043_619) {
+        if tables.orientation_error == OrientationError::Quaternion && !is_near_enough(&start.orientation, &to) {
             return Err(PrimitiveError::TurnsTooFar);
         }
         Ok(Checked { canonical, basis, systems, minimum_duration, start, goal })
+    }
+
+    /// Tells movements apart: equal for equal tables. Feedback, expectation and experience may change under a run and
+    /// do not count.
+    #[inline]
+    pub(crate) fn fingerprint(&self) -> u32 {
+        self.fingerprint
     }
 
     /// Duration tau as taught, s.
@@ -462,6 +345,12 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
     #[inline]
     pub fn hand(&self) -> &TransformationSystem<T> {
         &self.hand
+    }
+
+    /// Largest coupling of position, orientation, posture and hand.
+    #[inline]
+    pub(crate) fn coupling_limits(&self) -> &[T; 4] {
+        &self.coupling_limits
     }
 
     /// How quaternion signs are chosen.
@@ -568,8 +457,61 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
 }
 
 impl<T: Scalar> PrimitiveTables<'_, T> {
+    /// FNV-1a over the values of the movement, folded to 32 bits.
+    fn fingerprint(&self) -> u32 {
+        let ends =
+            [&self.start, &self.goal].map(|end| (end.position, end.orientation.to_array(), end.posture, end.hand));
+        let ends = ends.iter().flat_map(|(position, orientation, posture, hand)| {
+            position.iter().chain(orientation).chain(posture).chain(hand)
+        });
+        let gains = self.stiffness.iter().chain(&self.damping);
+        let values =
+            [&self.duration, &self.alpha, &self.activation].into_iter().chain(gains).chain(ends).chain(self.weights);
+        let choices = [
+            self.kernel_count as u64,
+            u64::from(self.orientation_error == OrientationError::RotationVector),
+            u64::from(self.hemisphere == Hemisphere::Nearest),
+        ];
+        let words = choices.into_iter().chain(values.map(|value| value.bits()));
+        let hash = words.fold(0xcbf2_9ce4_8422_2325_u64, |hash, word| {
+            // Word by word instead of byte by byte; the rotation brings the high bits of a product back to where it
+            // mixes.
+            (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29)
+        });
+        (hash ^ (hash >> 32)) as u32
+    }
+
     fn gains(&self) -> [(T, T); 4] {
         core::array::from_fn(|i| (self.stiffness[i], self.damping[i]))
+    }
+
+    /// The forcing term is nowhere larger than a movement can need. It is a mean of the weights times s, so it is
+    /// enough to look at the centres of the kernels and half-way between them.
+    fn check_weights<const N: usize>(
+        &self,
+        basis: &Basis<T, N>,
+        systems: &[TransformationSystem<T>; 4],
+    ) -> Result<(), PrimitiveError> {
+        let largest = systems.map(|system| bounds::largest_force(&system, self.duration, self.kernel_count));
+        let place = |index: usize| u8::try_from(index).unwrap_or(u8::MAX);
+        let rows = || self.weights.chunks_exact(self.kernel_count).enumerate();
+        for kernel in 0..self.kernel_count {
+            let centre = basis.centre(kernel).unwrap_or(T::ONE);
+            let half = basis.centre(kernel + 1).map_or(centre, |next| (centre + next) * T::from_f64(0.5));
+            let (at, between) = (basis.evaluate(centre), basis.evaluate(half));
+            for (row, weights) in rows() {
+                let (group, _) = Row::of_weights(row);
+                let largest = largest[group as usize];
+                let force = |activations: &Activations<T, N>| {
+                    activations.active().fold(T::ZERO, |sum, i| sum + activations.factor(i) * weights[i])
+                };
+                let alone = weights[kernel] * centre * T::from_f64(1.0 / bounds::LARGEST_CANCELLATION);
+                if [alone, force(&at), force(&between)].into_iter().any(|force| !(force.abs() <= largest)) {
+                    return Err(PrimitiveError::WeightTooLarge { row: place(row), kernel: place(kernel) });
+                }
+            }
+        }
+        Ok(())
     }
 
     fn systems(&self) -> Result<[TransformationSystem<T>; 4], PrimitiveError> {

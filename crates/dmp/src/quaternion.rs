@@ -4,7 +4,7 @@
 //! `2 log` is its inverse, continuous over `w < 0` (angles up to 2 pi) because the sign of `q` is kept.
 
 use crate::Scalar;
-use crate::vector::{cross, dot, scale};
+use crate::vector::{clamp_norm, cross, dot, scale};
 
 /// Hamilton quaternion; `R(q)` maps body to world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,7 +102,11 @@ impl<T: Scalar> Quaternion<T> {
         if self.dot(reference) < T::ZERO { self.negated() } else { *self }
     }
 
-    /// Rotation by the rotation vector `r` (radians).
+    /// Rotation vectors are shortened to this length (rad): beyond, the angle within a turn is lost to rounding, and
+    /// its square overflows in the end.
+    const LARGEST_TURN: f64 = 1000.0;
+
+    /// Rotation by the rotation vector `r` (radians); one that is not a number is no rotation.
     #[inline]
     pub fn from_rotation_vector(r: &[T; 3]) -> Self {
         let n2 = dot(r, r);
@@ -115,6 +119,9 @@ impl<T: Scalar> Quaternion<T> {
             let half_sinc =
                 f(0.5) - y * (f(1.0 / 12.0) - y * (f(1.0 / 240.0) - y * (f(1.0 / 10_080.0) - y * f(1.0 / 725_760.0))));
             return Self::from_parts(cos, scale(r, half_sinc));
+        }
+        if !(n2 <= f(Self::LARGEST_TURN * Self::LARGEST_TURN)) {
+            return Self::from_rotation_vector(&clamp_norm(r, f(0.999 * Self::LARGEST_TURN)));
         }
         let n = T::sqrt(n2);
         let (sin, cos) = T::sin_cos(n * f(0.5));

@@ -14,7 +14,7 @@ use crate::turn::Turn;
 use crate::vector::all_finite;
 use crate::{
     CONTROL_PERIOD, Coupling, HAND_ROWS, POSITION_ROWS, POSTURE_ROWS, Phase, Primitive, Quaternion, Reference, SENSORS,
-    Scalar, SensorMap, StartState,
+    Scalar, SensorMap, StartState, bounds,
 };
 
 /// Why a start or a change in flight is refused; the run goes on unchanged.
@@ -23,21 +23,30 @@ use crate::{
 pub enum RolloutError {
     /// A value is NaN or infinite.
     NotFinite,
+    /// A value is larger than any movement needs, see [`bounds`].
+    TooLarge,
     /// A quaternion is not of unit norm.
     NotUnit,
     /// The duration is shorter than [`Primitive::minimum_duration`], or the speed too high.
     TooFast,
     /// A speed, rate or duration is negative, or a duration is 0.
     Negative,
+    /// The run was started with another primitive.
+    OtherPrimitive,
+    /// The start or the new goal is more than 175 degrees away, where the error of Eq. (4) fails.
+    TurnsTooFar,
 }
 
 impl fmt::Display for RolloutError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::NotFinite => "a value is not a number",
+            Self::TooLarge => "a value is larger than any movement needs",
             Self::NotUnit => "a quaternion is not of unit norm",
             Self::TooFast => "too fast: the integration would be unstable at 300 Hz",
             Self::Negative => "a speed, rate or duration is negative",
+            Self::OtherPrimitive => "the run was started with another primitive",
+            Self::TurnsTooFar => "the goal is more than 175 degrees away; the rotation-vector error is needed",
         })
     }
 }
@@ -47,6 +56,8 @@ impl core::error::Error for RolloutError {}
 /// State of one run of a [`Primitive`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rollout<T, const N: usize> {
+    /// Of the primitive that it runs.
+    fingerprint: u32,
     phase: Phase<T>,
     time: T,
     time_lost: T,
@@ -69,16 +80,21 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// sign that is nearest to the start.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::NotUnit`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::TooLarge`], [`RolloutError::NotUnit`],
+    /// [`RolloutError::TurnsTooFar`].
     pub fn start(primitive: &Primitive<T, N>, start: &StartState<T>) -> Result<Self, RolloutError> {
         let StartState { configuration, velocity } = start;
         if !(configuration.is_finite() && velocity.is_finite()) {
             return Err(RolloutError::NotFinite);
         }
+        if configuration.out_of_bounds().or(velocity.out_of_bounds()).is_some() {
+            return Err(RolloutError::TooLarge);
+        }
         let from = configuration.normalised().ok_or(RolloutError::NotUnit)?;
         let to = primitive.goal();
         let tau = primitive.duration();
         Ok(Self {
+            fingerprint: primitive.fingerprint(),
             phase: Phase::START,
             time: T::ZERO,
             time_lost: T::ZERO,
@@ -86,7 +102,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
             position: Group::new(from.position, velocity.position, tau, to.position),
             posture: Group::new(from.posture, velocity.posture, tau, to.posture),
             hand: Group::new(from.hand, velocity.hand, tau, to.hand),
-            orientation: Turn::start(primitive, &from.orientation, &velocity.orientation),
+            orientation: Turn::start(primitive, &from.orientation, &velocity.orientation)?,
             goal_filter: None,
             goal_fraction: (T::ZERO, T::ZERO),
         })
@@ -96,9 +112,19 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     ///
     /// Value, velocity and acceleration belong to the same instant, the one BEFORE the step: the first call returns
     /// the start state. `coupling` is the feedback of the same instant. A `dt` above [`CONTROL_PERIOD`] is cut to it
-    /// (a late tick slows the plan down instead of making it unstable); one that is not positive advances nothing.
+    /// (a late tick slows the plan down instead of making it unstable); one that is not positive advances nothing. A
+    /// coupling beyond what any movement needs is cut to that, and one that is not a number counts as 0.
+    ///
+    /// # Errors
+    /// [`RolloutError::OtherPrimitive`]; nothing has changed then.
     #[inline]
-    pub fn step(&mut self, primitive: &Primitive<T, N>, dt: T, coupling: &Coupling<T>) -> Reference<T> {
+    pub fn step(
+        &mut self,
+        primitive: &Primitive<T, N>,
+        dt: T,
+        coupling: &Coupling<T>,
+    ) -> Result<Reference<T>, RolloutError> {
+        self.check(primitive)?;
         let longest = T::from_f64(CONTROL_PERIOD);
         let dt = if !(dt > T::ZERO) {
             T::ZERO
@@ -123,6 +149,13 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
         let time = self.time;
 
         let [f0, f1, f2, r0, r1, r2, p0, p1, p2, p3, p4, p5, p6, h0, h1, h2, h3] = f;
+        let limited;
+        let coupling = if coupling.is_within(primitive.coupling_limits()) {
+            coupling
+        } else {
+            limited = coupling.limited(primitive.coupling_limits());
+            &limited
+        };
         let position = self.position.step(primitive.position(), &tick, &[f0, f1, f2], &coupling.position);
         let orientation = self.orientation.step(primitive.orientation(), &tick, &[r0, r1, r2], &coupling.orientation);
         let posture =
@@ -136,7 +169,13 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
         self.time_lost = (sum - self.time) - step;
         self.time = sum;
 
-        Reference { phase: tick.s, progress, time, rate, position, orientation, posture, hand }
+        Ok(Reference { phase: tick.s, progress, time, rate, position, orientation, posture, hand })
+    }
+
+    /// Weights, gains and start of one movement with the state of another would be a plan that nobody has taught.
+    #[inline]
+    fn check(&self, primitive: &Primitive<T, N>) -> Result<(), RolloutError> {
+        if self.fingerprint == primitive.fingerprint() { Ok(()) } else { Err(RolloutError::OtherPrimitive) }
     }
 
     /// `1 - exp(-a_g h)`: exact step of the goal filter, computed anew only when `h` changes.
@@ -156,23 +195,32 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     ///
     /// Loses effect when the speed differs from the one of the recording, see
     /// [`ExpectedWrench::trust`](crate::ExpectedWrench::trust).
-    pub fn coupling(&self, primitive: &Primitive<T, N>, measured: &[T; SENSORS], map: &SensorMap<T>) -> Coupling<T> {
+    ///
+    /// # Errors
+    /// [`RolloutError::OtherPrimitive`].
+    pub fn coupling(
+        &self,
+        primitive: &Primitive<T, N>,
+        measured: &[T; SENSORS],
+        map: &SensorMap<T>,
+    ) -> Result<Coupling<T>, RolloutError> {
+        self.check(primitive)?;
         let (Some(feedback), Some(expected)) = (primitive.feedback(), primitive.expected()) else {
-            return Coupling::NONE;
+            return Ok(Coupling::NONE);
         };
         let u = self.phase.progress();
         let felt = expected.at(u);
         let relative_speed = expected.recorded_duration() * primitive.rate() * self.pace.speed;
         let trust = expected.trust(relative_speed);
         let error = core::array::from_fn(|i| (measured[i] - felt[i]) * trust);
-        feedback.coupling(u, &error, map, &primitive.stiffness())
+        Ok(feedback.coupling(u, &error, map, &primitive.stiffness()))
     }
 
     /// New goal position, m. The start is never reset, so the acceleration jumps by `K dg (1-s)/tau^2`; use
     /// [`Rollout::set_goal_filter`] if that is too much.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::TooLarge`].
     pub fn set_goal_position(&mut self, goal: [T; POSITION_ROWS]) -> Result<(), RolloutError> {
         self.position.command(goal, self.goal_filter.is_some())
     }
@@ -181,24 +229,25 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// the present orientation.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::NotUnit`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::NotUnit`], [`RolloutError::TurnsTooFar`],
+    /// [`RolloutError::OtherPrimitive`].
     pub fn set_goal_orientation(
         &mut self,
         primitive: &Primitive<T, N>,
         goal: Quaternion<T>,
     ) -> Result<(), RolloutError> {
+        self.check(primitive)?;
         if !all_finite(&goal.to_array()) {
             return Err(RolloutError::NotFinite);
         }
         let goal = goal.checked_unit(T::from_f64(1e-3)).ok_or(RolloutError::NotUnit)?;
-        self.orientation.command(primitive, &goal, self.goal_filter.is_some());
-        Ok(())
+        self.orientation.command(primitive, &goal, self.goal_filter.is_some())
     }
 
     /// New goal of the posture, rad.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::TooLarge`].
     pub fn set_goal_posture(&mut self, goal: [T; POSTURE_ROWS]) -> Result<(), RolloutError> {
         self.posture.command(goal, self.goal_filter.is_some())
     }
@@ -206,7 +255,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// New goal of the hand, rad.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::TooLarge`].
     pub fn set_goal_hand(&mut self, goal: [T; HAND_ROWS]) -> Result<(), RolloutError> {
         self.hand.command(goal, self.goal_filter.is_some())
     }
@@ -248,8 +297,10 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// New duration tau of the whole movement, s, approached at the slew rate. The path stays the same.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`],
+    /// [`RolloutError::OtherPrimitive`].
     pub fn set_duration(&mut self, primitive: &Primitive<T, N>, duration: T) -> Result<(), RolloutError> {
+        self.check(primitive)?;
         if !duration.is_finite() {
             return Err(RolloutError::NotFinite);
         }
@@ -266,8 +317,10 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// New speed relative to the taught one, approached at the slew rate: 1 = as taught, 0 = time stands still.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`],
+    /// [`RolloutError::OtherPrimitive`].
     pub fn set_speed(&mut self, primitive: &Primitive<T, N>, speed: T) -> Result<(), RolloutError> {
+        self.check(primitive)?;
         if !speed.is_finite() {
             return Err(RolloutError::NotFinite);
         }
@@ -284,7 +337,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// Largest change of speed per second; `None` lets the speed (and with it the desired velocity) jump.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`].
+    /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`].
     pub fn set_speed_slew(&mut self, slew: Option<T>) -> Result<(), RolloutError> {
         if let Some(slew) = slew {
             if !slew.is_finite() {
@@ -292,6 +345,9 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
             }
             if !(slew > T::ZERO) {
                 return Err(RolloutError::Negative);
+            }
+            if !(slew <= T::from_f64(bounds::FASTEST_SLEW)) {
+                return Err(RolloutError::TooFast);
             }
         }
         self.pace.update(self.pace.target, self.pace.stopped, slew);

@@ -5,8 +5,8 @@
 
 use core::fmt;
 
-use crate::Scalar;
 use crate::vector::all_finite;
+use crate::{Scalar, bounds};
 
 /// `COLUMNS` values at up to `CAPACITY` evenly spaced phases.
 #[derive(Clone, Copy, Debug)]
@@ -34,25 +34,90 @@ pub enum TableError {
     NotFinite,
     /// A gain or limit is negative.
     Negative,
-    /// The duration of the recording is not a positive number.
+    /// The duration of the recording is not a positive number up to 3600 s.
     Duration,
-    /// A spread is not positive: that sensor would never be allowed to differ from its mean.
+    /// A spread is below 1e-6: that sensor would never be allowed to differ from its mean.
     Spread,
     /// The number of values is no multiple of the columns, or two tables that belong together differ in length.
     Shape,
     /// Fewer recordings than it takes to tell a spread.
     Trials,
+    /// A value is larger than anything real, see [`bounds`](crate::bounds).
+    TooLarge(Entry),
+}
+
+/// A value of feedback, expectation or experience; points by phase and columns count from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Entry {
+    /// Limit of the displacement, m.
+    Displacement,
+    /// Limit of the rotation, rad.
+    Rotation,
+    /// Limit of the hand, rad.
+    Hand,
+    /// Sensitivity `K1`.
+    Sensitivity {
+        /// Point by phase.
+        point: u8,
+        /// Coupled row.
+        column: u8,
+    },
+    /// Weight `K2`.
+    SensorWeight {
+        /// Point by phase.
+        point: u8,
+        /// Sensor.
+        column: u8,
+    },
+    /// Expected sensor value.
+    Expected {
+        /// Point by phase.
+        point: u8,
+        /// Sensor.
+        column: u8,
+    },
+    /// Mean of an experience.
+    Mean {
+        /// Point by phase.
+        point: u8,
+        /// Channel.
+        column: u8,
+    },
+    /// Spread of an experience.
+    Spread {
+        /// Point by phase.
+        point: u8,
+        /// Channel.
+        column: u8,
+    },
+}
+
+impl fmt::Display for Entry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (name, point, column) = match *self {
+            Self::Displacement => return f.write_str("the limit of the displacement"),
+            Self::Rotation => return f.write_str("the limit of the rotation"),
+            Self::Hand => return f.write_str("the limit of the hand"),
+            Self::Sensitivity { point, column } => ("sensitivity", point, column),
+            Self::SensorWeight { point, column } => ("sensor weight", point, column),
+            Self::Expected { point, column } => ("expected value", point, column),
+            Self::Mean { point, column } => ("mean of the experience", point, column),
+            Self::Spread { point, column } => ("spread of the experience", point, column),
+        };
+        write!(f, "the {name} at point {point}, column {column} (from 0)")
+    }
 }
 
 impl fmt::Display for TableError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
+            Self::TooLarge(entry) => return write!(f, "{entry} is larger than anything real"),
             Self::Empty => "the table has no samples",
             Self::TooMany => "the table has more samples than fit",
             Self::NotFinite => "the table holds a value that is not a number",
             Self::Negative => "a gain or limit is negative",
-            Self::Duration => "the duration of the recording is not a positive number",
-            Self::Spread => "a spread is not positive",
+            Self::Duration => "the duration of the recording is not a positive number up to 3600 s",
+            Self::Spread => "a spread is not at least 1e-6",
             Self::Shape => "the tables do not have the sizes that belong together",
             Self::Trials => "more recordings are needed",
         })
@@ -116,6 +181,17 @@ impl<T: Scalar, const COLUMNS: usize, const CAPACITY: usize> PhaseTable<T, COLUM
         }
         self.count = count;
         Ok(())
+    }
+
+    /// Point and column of the first value whose magnitude is not at most `largest`.
+    pub(crate) fn first_beyond(&self, largest: f64) -> Option<(u8, u8)> {
+        // At most 128 points and 12 columns.
+        let place = |point: usize, column: usize| (u8::try_from(point), u8::try_from(column));
+        let beyond = |sample: &[T; COLUMNS]| bounds::first_beyond(sample, largest);
+        let (point, column) =
+            self.samples().iter().enumerate().find_map(|(point, sample)| Some((point, beyond(sample)?)))?;
+        let (point, column) = place(point, column);
+        Some((point.unwrap_or(u8::MAX), column.unwrap_or(u8::MAX)))
     }
 
     /// Takes over the samples of another table, and only those in use.

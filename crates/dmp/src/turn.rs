@@ -3,10 +3,11 @@
 //! Here the signs of start and goal are decided, once: never per tick, because a path may exceed 180 degrees.
 
 use crate::group::{Group, Tick};
+use crate::orientation::is_near_enough;
 use crate::vector::scale;
 use crate::{
     Hemisphere, ORIENTATION_ROWS, OrientationError, OrientationInput, OrientationReference, OrientationState,
-    OrientationSystem, Primitive, Quaternion, RotationChart, Scalar, TransformationSystem,
+    OrientationSystem, Primitive, Quaternion, RolloutError, RotationChart, Scalar, TransformationSystem,
 };
 
 /// The orientation in the coordinates that the primitive chose.
@@ -19,11 +20,13 @@ pub(crate) enum Turn<T> {
 }
 
 impl<T: Scalar> Turn<T> {
+    /// # Errors
+    /// [`RolloutError::TurnsTooFar`].
     pub(crate) fn start<const N: usize>(
         primitive: &Primitive<T, N>,
         from: &Quaternion<T>,
         omega: &[T; ORIENTATION_ROWS],
-    ) -> Self {
+    ) -> Result<Self, RolloutError> {
         let (demonstrated, goal) = (primitive.start().orientation, primitive.goal().orientation);
         let tau = primitive.duration();
         let nearest = primitive.hemisphere() == Hemisphere::Nearest;
@@ -32,16 +35,19 @@ impl<T: Scalar> Turn<T> {
             let chart = RotationChart::between(&demonstrated, &goal);
             let y = chart.vector(from, &chart.start());
             let dy = chart.velocity(&y, omega);
-            return Self::Vector { chart, group: Group::new(y, dy, tau, chart.goal()) };
+            return Ok(Self::Vector { chart, group: Group::new(y, dy, tau, chart.goal()) });
         }
         let (start, goal) =
             if nearest { (*from, goal.aligned_with(from)) } else { (from.aligned_with(&demonstrated), goal) };
-        Self::Quaternion {
+        if !is_near_enough(&start, &goal) {
+            return Err(RolloutError::TurnsTooFar);
+        }
+        Ok(Self::Quaternion {
             state: OrientationState { q: start, omega: scale(omega, tau) },
             start,
             goal,
             commanded: goal,
-        }
+        })
     }
 
     #[inline]
@@ -79,13 +85,24 @@ impl<T: Scalar> Turn<T> {
         }
     }
 
-    pub(crate) fn command<const N: usize>(&mut self, primitive: &Primitive<T, N>, new: &Quaternion<T>, filtered: bool) {
+    /// # Errors
+    /// [`RolloutError::TurnsTooFar`]; the goal stays as it was.
+    pub(crate) fn command<const N: usize>(
+        &mut self,
+        primitive: &Primitive<T, N>,
+        new: &Quaternion<T>,
+        filtered: bool,
+    ) -> Result<(), RolloutError> {
         match self {
             Self::Quaternion { state, goal, commanded, .. } => {
-                *commanded = match primitive.hemisphere() {
+                let new = match primitive.hemisphere() {
                     Hemisphere::Demonstrated => new.aligned_with(&primitive.goal().orientation),
                     Hemisphere::Nearest => new.aligned_with(&state.q),
                 };
+                if !is_near_enough(&state.q, &new) {
+                    return Err(RolloutError::TurnsTooFar);
+                }
+                *commanded = new;
                 if !filtered {
                     *goal = *commanded;
                 }
@@ -97,6 +114,7 @@ impl<T: Scalar> Turn<T> {
                 }
             }
         }
+        Ok(())
     }
 
     pub(crate) fn arrive(&mut self) {

@@ -31,7 +31,7 @@ pub(crate) fn rotate<T: Scalar>(m: &[[T; 3]; 3], a: &[T; 3]) -> [T; 3] {
     [dot(&m[0], a), dot(&m[1], a), dot(&m[2], a)]
 }
 
-/// `a` shortened to the norm `limit` if it is longer; 0 if it is not a number.
+/// `a` shortened to the norm `limit` (not negative) if it is longer; 0 if it is not a number.
 pub(crate) fn clamp_norm<T: Scalar>(a: &[T; 3], limit: T) -> [T; 3] {
     // The largest component first: squares of large values would overflow in f32 and fixed point.
     let mut largest = T::ZERO;
@@ -43,10 +43,16 @@ pub(crate) fn clamp_norm<T: Scalar>(a: &[T; 3], limit: T) -> [T; 3] {
             largest = a.abs();
         }
     }
-    if largest <= T::ZERO {
+    // The norm is at most sqrt(3) times the largest component.
+    if largest + largest <= limit {
         return *a;
     }
-    let unit = scale(a, T::ONE / largest);
+    let reciprocal = T::ONE / largest;
+    if !(reciprocal < T::MAX) {
+        // So small a value (below 3e-39 in f32) has no reciprocal, and the limit is even smaller.
+        return [T::ZERO; 3];
+    }
+    let unit = scale(a, reciprocal);
     let norm = T::sqrt(dot(&unit, &unit));
     if largest * norm > limit { scale(&unit, limit / norm) } else { *a }
 }

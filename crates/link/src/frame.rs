@@ -8,6 +8,10 @@
 //! The CRC is CRC-32/ISCSI (polynomial 0x1EDC6F41, reflected) over everything before it: among messages of
 //! this length it finds every error of up to five bits and every burst of up to 32.
 //!
+//! A hello that cannot be read wholly, because another version has fewer fields or other ones, still tells its link
+//! version and its schema hash: both sides must be able to say that they do not fit, and a dropped hello looks like a
+//! dead line.
+//!
 //! Invariants: [`Decoder`] takes any bytes in any portions, never panics, needs constant memory, and counts
 //! every non-empty run between zero bytes exactly once, as accepted or under its reason.
 
@@ -17,8 +21,10 @@ use crc::{CRC_32_ISCSI, Crc};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::message::{Reply, Request};
+use crate::message::{DeviceHello, HostHello, Reply, Request};
+use crate::name::Text;
 use crate::report::LinkCounters;
+use crate::schema::{LINK_VERSION, SCHEMA_HASH};
 
 /// Bytes of the envelope in front of the message.
 pub const ENVELOPE_BYTES: usize = 8;
@@ -87,17 +93,63 @@ pub trait Message: Serialize + DeserializeOwned {
     /// Whether bytes after the message are to be ignored instead of refused. True for the hellos alone:
     /// a later version may have more to say there, and must still be told that it is a later version.
     fn tolerates_more(&self) -> bool;
+
+    /// The hello of another version out of the bytes of a message that cannot be read: link version and schema hash,
+    /// all other fields empty. `None` for what is no hello, and for the hello of this version, which is damaged then.
+    fn foreign_hello(body: &[u8]) -> Option<Self>;
+}
+
+/// Number of the hello among the requests and among the replies. Frozen.
+const HELLO: u32 = 0;
+
+/// Link version and schema hash from the front of `fields`, if they are of another version than this one.
+fn foreign_version(fields: &[u8]) -> Option<(u16, u32)> {
+    let (link_version, rest) = postcard::take_from_bytes::<u16>(fields).ok()?;
+    let (schema_hash, _) = postcard::take_from_bytes::<u32>(rest).ok()?;
+    (link_version != LINK_VERSION || schema_hash != SCHEMA_HASH).then_some((link_version, schema_hash))
 }
 
 impl Message for Request {
     fn tolerates_more(&self) -> bool {
         matches!(self, Self::Hello(_))
     }
+
+    fn foreign_hello(body: &[u8]) -> Option<Self> {
+        let (HELLO, fields) = postcard::take_from_bytes::<u32>(body).ok()? else {
+            return None;
+        };
+        let (link_version, schema_hash) = foreign_version(fields)?;
+        Some(Self::Hello(HostHello { link_version, schema_hash, model_hash: 0, owner: Text::new("") }))
+    }
 }
 
 impl Message for Reply {
     fn tolerates_more(&self) -> bool {
         matches!(self, Self::Hello { .. })
+    }
+
+    fn foreign_hello(body: &[u8]) -> Option<Self> {
+        let (HELLO, fields) = postcard::take_from_bytes::<u32>(body).ok()? else {
+            return None;
+        };
+        let (of, fields) = postcard::take_from_bytes::<u16>(fields).ok()?;
+        let (link_version, schema_hash) = foreign_version(fields)?;
+        let hello = DeviceHello {
+            link_version,
+            schema_hash,
+            model_hash: 0,
+            image_schema: 0,
+            maximum_kernels: 0,
+            slots: 0,
+            slot_bytes: 0,
+            cycles_per_second: 0,
+            ticks_per_second: 0,
+            simulated: false,
+            firmware: Text::new(""),
+            board: Text::new(""),
+            serial: Text::new(""),
+        };
+        Some(Self::Hello { of, hello })
     }
 }
 
@@ -235,10 +287,11 @@ impl<const N: usize> Decoder<N> {
             return Err(Drop::Crc);
         }
         let (envelope, body) = covered.split_first_chunk::<ENVELOPE_BYTES>().ok_or(Drop::Undecodable)?;
-        let (message, rest) = postcard::take_from_bytes::<M>(body).map_err(|_| Drop::Undecodable)?;
-        if !rest.is_empty() && !message.tolerates_more() {
-            return Err(Drop::Undecodable);
-        }
+        let message = match postcard::take_from_bytes::<M>(body) {
+            Ok((message, rest)) if rest.is_empty() || message.tolerates_more() => message,
+            Ok(_) => return Err(Drop::Undecodable),
+            Err(_) => M::foreign_hello(body).ok_or(Drop::Undecodable)?,
+        };
         Ok(Frame { envelope: Envelope::from_bytes(*envelope), message })
     }
 }

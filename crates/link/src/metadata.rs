@@ -32,6 +32,7 @@ const BOARD_AT: usize = FIRMWARE_AT + FIRMWARE_BYTES;
 const BOARD_BYTES: usize = 32;
 const CRC_AT: usize = BOARD_AT + BOARD_BYTES;
 const SIMULATED: u16 = 1;
+const KNOWN_FLAGS: u16 = SIMULATED;
 
 /// The chip on a real board, by the name under which debug probes' tools know it; `None` for boards that have none.
 #[must_use]
@@ -92,7 +93,9 @@ pub enum MetadataError {
     Layout(u16),
     /// Its check sum is wrong.
     Crc,
-    /// Its names are not text.
+    /// It has flags this version does not know.
+    Flags(u16),
+    /// Its names are not text, or not padded with zeros.
     Text,
 }
 
@@ -105,6 +108,12 @@ impl fmt::Display for MetadataError {
                 write!(f, "the description of the image has layout {layout}; this version reads {LAYOUT}")
             }
             Self::Crc => f.write_str("the description of the image is damaged"),
+            Self::Flags(flags) => {
+                write!(
+                    f,
+                    "the description of the image has flags {flags:#06x}, of which this version does not know all"
+                )
+            }
             Self::Text => f.write_str("the description of the image holds names that are not text"),
         }
     }
@@ -157,10 +166,14 @@ impl<'a> ImageMetadata<'a> {
         if CRC.checksum(block.get(..CRC_AT).unwrap_or(&[])) != word(block, CRC_AT) {
             return Err(MetadataError::Crc);
         }
+        let flags = half(block, 10);
+        if flags & !KNOWN_FLAGS != 0 {
+            return Err(MetadataError::Flags(flags));
+        }
         let store = MemoryRegion { start: word(block, 28), length: word(block, 32) };
         Ok(Self {
             link_version: half(block, 8),
-            simulated: half(block, 10) & SIMULATED != 0,
+            simulated: flags & SIMULATED != 0,
             schema_hash: word(block, 12),
             model_hash: word(block, 16),
             image: MemoryRegion { start: word(block, 20), length: word(block, 24) },
@@ -193,5 +206,9 @@ fn word(block: &[u8], at: usize) -> u32 {
 fn text(block: &[u8], at: usize, length: usize) -> Result<&str, MetadataError> {
     let field = block.get(at..at + length).ok_or(MetadataError::Short)?;
     let end = field.iter().position(|byte| *byte == 0).unwrap_or(length);
-    core::str::from_utf8(field.get(..end).unwrap_or(&[])).map_err(|_| MetadataError::Text)
+    let (name, padding) = field.split_at_checked(end).ok_or(MetadataError::Text)?;
+    if padding.iter().any(|byte| *byte != 0) {
+        return Err(MetadataError::Text);
+    }
+    core::str::from_utf8(name).map_err(|_| MetadataError::Text)
 }

@@ -126,6 +126,11 @@ pub struct PropertyTable {
 /// for 200. A version beyond one byte was never seen, and a wrong table moves HOLD onto EN.
 pub const NEWEST_FIRMWARE: u8 = 255;
 
+/// Oldest motor firmware that has a table. Before 61 torque was property 9 or 10, and [`PropertyId::TORQUE`] (42), with
+/// which every way out sends zero torque, was a digital output: such a puck must not be driven, and without a table
+/// nobody can.
+pub const OLDEST_MOTOR_FIRMWARE: u8 = 61;
+
 /// A firmware version without a property table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnknownFirmware {
@@ -150,9 +155,9 @@ impl PropertyTable {
     /// The table of a motor puck (arm or hand) in STAT 2 with this VERS.
     ///
     /// # Errors
-    /// [`UnknownFirmware`] below 1 and above [`NEWEST_FIRMWARE`].
+    /// [`UnknownFirmware`] below [`OLDEST_MOTOR_FIRMWARE`] and above [`NEWEST_FIRMWARE`].
     pub const fn motor(version: i32) -> Result<PropertyTable, UnknownFirmware> {
-        PropertyTable::versioned(List::Motor, version)
+        PropertyTable::versioned(List::Motor, version, OLDEST_MOTOR_FIRMWARE)
     }
 
     /// The table of a safety module in STAT 2 with this VERS.
@@ -160,7 +165,8 @@ impl PropertyTable {
     /// # Errors
     /// [`UnknownFirmware`] below 1 and above [`NEWEST_FIRMWARE`].
     pub const fn safety(version: i32) -> Result<PropertyTable, UnknownFirmware> {
-        PropertyTable::versioned(List::Safety, version)
+        // 0 is what an unprogrammed puck would report; no firmware has it.
+        PropertyTable::versioned(List::Safety, version, 1)
     }
 
     /// The table of a force/torque sensor. There is one: some sensors report no usable VERS or ROLE, so choose it by node 8.
@@ -168,9 +174,8 @@ impl PropertyTable {
         PropertyTable { list: List::ForceTorque, version: 0 }
     }
 
-    const fn versioned(list: List, version: i32) -> Result<PropertyTable, UnknownFirmware> {
-        // 0 is what an unprogrammed puck would report; no firmware has it.
-        if version < 1 || version > NEWEST_FIRMWARE as i32 {
+    const fn versioned(list: List, version: i32, oldest: u8) -> Result<PropertyTable, UnknownFirmware> {
+        if version < oldest as i32 || version > NEWEST_FIRMWARE as i32 {
             return Err(UnknownFirmware { version });
         }
         Ok(PropertyTable { list, version: version as u8 })

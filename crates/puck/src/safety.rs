@@ -7,7 +7,7 @@ use core::fmt;
 use crate::can::{CanFrame, Node};
 use crate::message::set;
 use crate::property::{Property, PropertyTable};
-use crate::units::{NotFinite, Real};
+use crate::units::{NotFinite, PACKED_TORQUE_LIMIT, Real};
 
 /// MODE of the safety module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -218,6 +218,8 @@ pub enum LimitError {
     Order,
     /// The value does not fit into the 16 bits of the property.
     Range,
+    /// No torque that can be commanded exceeds the fault limit: the fault could never trip.
+    NeverExceeded,
     /// The safety module's firmware has no such property.
     Property,
 }
@@ -229,6 +231,7 @@ impl fmt::Display for LimitError {
             LimitError::NotPositive => "fault limit is zero or negative: that would switch the supervision off",
             LimitError::Order => "warning limit is negative or above the fault limit",
             LimitError::Range => "limit does not fit into 16 bits",
+            LimitError::NeverExceeded => "no torque that can be commanded exceeds the fault limit: it would never trip",
             LimitError::Property => "the safety module has no such property",
         })
     }
@@ -256,14 +259,19 @@ pub fn velocity_limits<R: Real>(table: &PropertyTable, fault: R, warning: R) -> 
 /// `units_per_newton_metre` is IPNM of the strictest puck.
 ///
 /// # Errors
-/// [`LimitError`].
+/// [`LimitError`]. A fault limit that no packed torque exceeds (8191 units and more) means "never fault" as much as 0;
+/// it is refused.
 pub fn torque_limits<R: Real>(
     table: &PropertyTable,
     fault: R,
     warning: R,
     units_per_newton_metre: i32,
 ) -> Result<[CanFrame; 2], LimitError> {
-    limits(table, [Property::Tl2, Property::Tl1], fault, warning, R::from_i32(units_per_newton_metre))
+    let scale = R::from_i32(units_per_newton_metre);
+    if fault.is_finite() && (fault * scale).to_i32() >= PACKED_TORQUE_LIMIT as i32 {
+        return Err(LimitError::NeverExceeded);
+    }
+    limits(table, [Property::Tl2, Property::Tl1], fault, warning, scale)
 }
 
 /// Both limits in bus units, truncated as the library does, fault first.

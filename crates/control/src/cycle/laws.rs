@@ -99,7 +99,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// Eqs (8), (9), (11), (10), (12), (13), and the hand's part for Eq (14).
     fn run_primitive(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
         let (Some(run), Some(primitive)) = (&mut self.run, self.loaded.get()) else {
-            // The state machine enters `Run` only with both; without them the arm floats.
+            // The state machine enters `Run` only with both, and no other primitive is loaded meanwhile; else the arm
+            // floats.
             return self.float(measured);
         };
         let frozen = measured.state.missing > 0;
@@ -111,7 +112,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let options = run.options;
         let tracking = self.gains.tracking(options.compliant);
         let gauges = self.hand.answering().filter(HandState::feels).map(|state| state.gauges);
-        let plan = run.step(primitive, &measured.wrench, gauges.as_ref(), senses);
+        let Ok(plan) = run.step(primitive, &measured.wrench, gauges.as_ref(), senses) else {
+            return self.float(measured);
+        };
         if senses == Senses::Fresh {
             let hand = self.hand.answering().filter(HandState::feels);
             if let Some(surprise) = run.watch(primitive, &measured.wrench, hand.as_ref()) {

@@ -10,7 +10,7 @@ use link::image::{
 };
 
 use super::upload::Refused;
-use super::wire::{PrimitiveTrouble, TROUBLE_EXPECTATION, TROUBLE_EXPERIENCE, TROUBLE_FEEDBACK};
+use super::wire::PrimitiveTrouble;
 use crate::port::{FitPrimitive, StoredPrimitive};
 use crate::recorded_filter::{self, OtherFilter};
 
@@ -99,16 +99,16 @@ pub(crate) fn build<'a>(
     if !content.k1.is_empty() {
         let clamps = &content.clamps;
         let limits = Limits { displacement: clamps.position, rotation: clamps.orientation, hand: clamps.hand };
-        primitive.assign_feedback(content.k1.iter(), content.k2.iter(), limits).map_err(|_| TROUBLE_FEEDBACK)?;
+        primitive.assign_feedback(content.k1.iter(), content.k2.iter(), limits).map_err(PrimitiveTrouble::feedback)?;
     }
     if !content.expected_mean.is_empty() {
         primitive
             .assign_expected(content.expected_mean.iter(), content.marks.recorded_duration)
-            .map_err(|_| TROUBLE_EXPECTATION)?;
+            .map_err(PrimitiveTrouble::expectation)?;
     }
     if !content.experience_mean.is_empty() {
         let (mean, spread) = (content.experience_mean.iter(), content.experience_spread.iter());
-        primitive.assign_experience(mean, spread, content.experience_trials).map_err(|_| TROUBLE_EXPERIENCE)?;
+        primitive.assign_experience(mean, spread, content.experience_trials).map_err(PrimitiveTrouble::experience)?;
     }
     load::check(model, primitive).map_err(|error| PrimitiveTrouble::from(error).into())
 }

@@ -6,7 +6,7 @@ use core::fmt;
 
 use control::CalibrationError;
 use control::load::{End, LoadError};
-use dmp::{GainError, PrimitiveError, Row};
+use dmp::{Entry, GainError, Part, PrimitiveError, Row, TableError};
 use link::{Event as LinkEvent, EventKind as LinkKind, HandStage, Refusal as LinkRefusal, Telemetry};
 use puck::Node;
 
@@ -201,12 +201,68 @@ const PLAIN: [PrimitiveError; 12] = [
     PrimitiveError::TurnsTooFar,
 ];
 
+const PARTS: [Part; 3] = [Part::Start, Part::Goal, Part::StartVelocity];
+
 /// Codes of the tables beside the primitive itself.
-pub(crate) const TROUBLE_FEEDBACK: PrimitiveTrouble = PrimitiveTrouble::FEEDBACK;
-pub(crate) const TROUBLE_EXPECTATION: PrimitiveTrouble = PrimitiveTrouble::EXPECTATION;
-pub(crate) const TROUBLE_EXPERIENCE: PrimitiveTrouble = PrimitiveTrouble([10, 0]);
+const TROUBLE_FEEDBACK: PrimitiveTrouble = PrimitiveTrouble::FEEDBACK;
+const TROUBLE_EXPECTATION: PrimitiveTrouble = PrimitiveTrouble::EXPECTATION;
+const TROUBLE_EXPERIENCE: PrimitiveTrouble = PrimitiveTrouble([10, 0]);
+
+/// Code of a value that is larger than anything real; its place is in the detail.
+const TABLE_VALUE: u32 = 13;
 
 impl PrimitiveTrouble {
+    /// What is wrong with the feedback.
+    pub(crate) fn feedback(error: TableError) -> Self {
+        Self::value(error).unwrap_or(TROUBLE_FEEDBACK)
+    }
+
+    /// What is wrong with the expectation.
+    pub(crate) fn expectation(error: TableError) -> Self {
+        Self::value(error).unwrap_or(TROUBLE_EXPECTATION)
+    }
+
+    /// What is wrong with the experience.
+    pub(crate) fn experience(error: TableError) -> Self {
+        Self::value(error).unwrap_or(TROUBLE_EXPERIENCE)
+    }
+
+    fn value(error: TableError) -> Option<Self> {
+        let TableError::TooLarge(entry) = error else {
+            return None;
+        };
+        let (kind, point, column) = match entry {
+            Entry::Displacement => (0, 0, 0),
+            Entry::Rotation => (1, 0, 0),
+            Entry::Hand => (2, 0, 0),
+            Entry::Sensitivity { point, column } => (3, point, column),
+            Entry::SensorWeight { point, column } => (4, point, column),
+            Entry::Expected { point, column } => (5, point, column),
+            Entry::Mean { point, column } => (6, point, column),
+            Entry::Spread { point, column } => (7, point, column),
+        };
+        Some(Self([TABLE_VALUE, kind << 16 | u32::from(point) << 8 | u32::from(column)]))
+    }
+
+    /// The value that is too large.
+    fn entry(self) -> Option<Entry> {
+        let Self([TABLE_VALUE, detail]) = self else {
+            return None;
+        };
+        let [column, point, kind, _] = detail.to_le_bytes();
+        Some(match kind {
+            0 => Entry::Displacement,
+            1 => Entry::Rotation,
+            2 => Entry::Hand,
+            3 => Entry::Sensitivity { point, column },
+            4 => Entry::SensorWeight { point, column },
+            5 => Entry::Expected { point, column },
+            6 => Entry::Mean { point, column },
+            7 => Entry::Spread { point, column },
+            _ => return None,
+        })
+    }
+
     /// The gains of the feedback.
     pub const FEEDBACK: PrimitiveTrouble = PrimitiveTrouble([8, 0]);
     /// The expectation.
@@ -232,6 +288,12 @@ impl From<LoadError> for PrimitiveTrouble {
                 [2, place(&ROWS, &row) * 2 + place(&GAINS, &gain)]
             }
             LoadError::Primitive(PrimitiveError::Unstable(row)) => [3, place(&ROWS, &row)],
+            LoadError::Primitive(PrimitiveError::WeightTooLarge { row, kernel }) => {
+                [11, u32::from(row) << 8 | u32::from(kernel)]
+            }
+            LoadError::Primitive(PrimitiveError::TooLarge { part, row, index }) => {
+                [12, place(&PARTS, &part) << 16 | place(&ROWS, &row) << 8 | u32::from(index)]
+            }
             LoadError::Primitive(plain) => [1, place(&PLAIN, &plain)],
             LoadError::Duration => [4, 0],
             LoadError::Posture(which, joint) => [5, end(which) << 8 | u32::from(joint)],
@@ -253,6 +315,15 @@ impl PrimitiveTrouble {
             5 => LoadError::Posture(end(detail >> 8), u8::try_from(detail & 0xFF).ok()?),
             6 => LoadError::OutOfReach(end(detail)),
             7 => LoadError::Inconsistent(end(detail)),
+            11 => {
+                let [kernel, row, _, _] = detail.to_le_bytes();
+                LoadError::Primitive(PrimitiveError::WeightTooLarge { row, kernel })
+            }
+            12 => {
+                let [index, row, part, _] = detail.to_le_bytes();
+                let (part, row) = (item(&PARTS, part.into())?, item(&ROWS, row.into())?);
+                LoadError::Primitive(PrimitiveError::TooLarge { part, row, index })
+            }
             _ => return None,
         })
     }
@@ -260,13 +331,18 @@ impl PrimitiveTrouble {
 
 impl fmt::Display for PrimitiveTrouble {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(entry) = self.entry() {
+            return TableError::TooLarge(entry).fmt(f);
+        }
         match (self.error(), *self) {
             (Some(error), _) => error.fmt(f),
             (None, TROUBLE_FEEDBACK) => f.write_str("a gain or clamp of the feedback is negative or too large"),
             (None, TROUBLE_EXPERIENCE) => {
-                f.write_str("a spread of the experience is not positive, or no run is behind it")
+                f.write_str("a spread of the experience is below 1e-6, or no run is behind it")
             }
-            (None, TROUBLE_EXPECTATION) => f.write_str("the recorded duration of the expectation is not positive"),
+            (None, TROUBLE_EXPECTATION) => {
+                f.write_str("the recorded duration of the expectation is not positive or too long")
+            }
             (None, Self([code, detail])) => write!(f, "unknown reason {code} ({detail:#x})"),
         }
     }

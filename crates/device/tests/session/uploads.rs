@@ -191,6 +191,88 @@ fn a_primitive_outside_the_limits_of_the_arm_is_refused_in_words() {
     assert!(words(experience).contains("experience"), "no run behind it");
 }
 
+/// Values that no robot needs, each told by its place.
+#[test]
+fn a_primitive_beyond_all_bounds_is_refused_with_the_value_that_is() {
+    let mut rig = Rig::greeted();
+    let mut words = |change: fn(&mut link::image::ImageContent<&[f32]>)| {
+        let (reason, detail) = refused(&mut rig, "reach", &image_with("reach", 3.0, 10, change));
+        assert_eq!(reason, Refusal::PrimitiveInvalid);
+        PrimitiveTrouble(detail).to_string()
+    };
+    static HUGE: [f32; 170] = [1e30; 170];
+    static LARGE: [f32; 170] = [1e6; 170];
+    let weights = "the weights of position row 0 at kernel 0 (both from 0) are larger than any movement needs";
+    assert_eq!(words(|content| content.weights = &HUGE), weights);
+    assert_eq!(words(|content| content.weights = &LARGE), weights);
+    static ONE_OF_HAND: [f32; 170] = {
+        let mut weights = [0.0; 170];
+        weights[164] = -1e6;
+        weights
+    };
+    assert!(words(|content| content.weights = &ONE_OF_HAND).starts_with("the weights of hand row 3 at kernel "));
+    assert_eq!(
+        words(|content| content.start_velocity.posture[6] = 1e30),
+        "posture value 6 (from 0) of the start velocity is larger than any movement needs"
+    );
+    static ONE_PER_ROW: [f32; 10] = [1.0; 10];
+    static ENDLESS: [f32; 10] = [1e30; 10];
+    assert_eq!(
+        words(|content| {
+            (content.k1, content.k2) = (&ONE_PER_ROW, &NINE);
+            content.clamps.position = 1e30;
+        }),
+        "the limit of the displacement is larger than anything real"
+    );
+    assert_eq!(
+        words(|content| (content.k1, content.k2) = (&ENDLESS, &NINE)),
+        "the sensitivity at point 0, column 0 (from 0) is larger than anything real"
+    );
+    static FELT: [f32; 18] = {
+        let mut felt = [1.0; 18];
+        felt[16] = 1e30;
+        felt
+    };
+    static SPREAD: [f32; 18] = [1.0; 18];
+    assert_eq!(
+        words(|content| {
+            (content.expected_mean, content.expected_spread) = (&FELT, &SPREAD);
+            (content.marks.recorded_duration, content.marks.filter_cutoff) = (3.0, 15.0);
+        }),
+        "the expected value at point 1, column 7 (from 0) is larger than anything real"
+    );
+    static KNOWN: [f32; 12] = {
+        let mut known = [1.0; 12];
+        known[11] = 1e30;
+        known
+    };
+    assert_eq!(
+        words(|content| {
+            (content.experience_mean, content.experience_spread, content.experience_trials) = (&KNOWN, &TWELVE, 3);
+            content.marks.filter_cutoff = 15.0;
+        }),
+        "the mean of the experience at point 0, column 11 (from 0) is larger than anything real"
+    );
+}
+
+#[test]
+fn every_place_of_a_value_survives_its_two_numbers() {
+    use control::load::LoadError;
+    use dmp::{Part, PrimitiveError, Row};
+    for row in 0..17 {
+        for kernel in [0, 1, 99] {
+            let error = LoadError::Primitive(PrimitiveError::WeightTooLarge { row, kernel });
+            assert_eq!(PrimitiveTrouble::from(error).to_string(), error.to_string());
+        }
+    }
+    for part in [Part::Start, Part::Goal, Part::StartVelocity] {
+        for row in [Row::Position, Row::Orientation, Row::Posture, Row::Hand] {
+            let error = LoadError::Primitive(PrimitiveError::TooLarge { part, row, index: 6 });
+            assert_eq!(PrimitiveTrouble::from(error).to_string(), error.to_string());
+        }
+    }
+}
+
 static TWELVE: [f32; 12] = [1.0; 12];
 static NINE: [f32; 9] = [1.0; 9];
 

@@ -11,6 +11,10 @@ use crate::{Configuration, Quaternion};
 /// Fewest samples of a demonstration.
 const FEWEST_SAMPLES: usize = 30;
 
+/// A joint of the posture or the hand that moves no faster (rad/s) rests, whatever its highest speed was: one that
+/// never moves has only the noise of its encoder, of which no share is small. 2 mm/s at a lever of 0.1 m.
+const RESTING_JOINT: f64 = 0.02;
+
 /// Samples of pose, posture and hand; quaternions are unit and sign-continuous.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Demonstration {
@@ -156,7 +160,8 @@ impl Demonstration {
         position.chain(posture).chain(hand)
     }
 
-    /// Whether the tool is at rest at the end: its last speed, linear and angular, is at most `share` of its highest one.
+    /// True if everything rests at the end: tool, posture and hand. At rest is what has a last speed of at most
+    /// `share` of its highest one, the tool by its linear and angular speed, the joints one by one.
     pub(super) fn ends_at_rest(&self, share: f64) -> bool {
         let speed = |step: &dyn Fn(usize) -> f64| {
             let steps = (1..self.len()).map(step);
@@ -174,7 +179,15 @@ impl Demonstration {
             let [x, y, z] = crate::orientation_error(&self.orientation[i - 1], &self.orientation[i]);
             libm::sqrt(x * x + y * y + z * z)
         });
-        last <= share * highest && last_turn <= share * highest_turn
+        let resting = RESTING_JOINT * self.period;
+        let joint_rests = |at: &dyn Fn(usize) -> f64| {
+            let (last, highest) = speed(&|i| (at(i) - at(i - 1)).abs());
+            last <= (share * highest).max(resting)
+        };
+        last <= share * highest
+            && last_turn <= share * highest_turn
+            && (0..7).all(|joint| joint_rests(&|i| self.posture[i][joint]))
+            && (0..4).all(|joint| joint_rests(&|i| self.hand[i][joint]))
     }
 
     /// Without noise; the same demonstration if there is no filter.

@@ -89,7 +89,7 @@ pub(super) fn replay(
         let squares: f64 = raw.iter().zip(&smooth).map(|(a, b)| (a - b) * (a - b)).sum();
         report.rows[row].removed_rms = libm::sqrt(squares / raw.len() as f64);
     }
-    // The demonstrated start of a checked primitive is always accepted.
+    // The demonstrated start of a checked primitive is always accepted, and so is each step with that primitive.
     let Ok(mut rollout) = Rollout::start(primitive, &StartState::demonstrated(primitive)) else {
         return report;
     };
@@ -100,9 +100,13 @@ pub(super) fn replay(
     let mut turn = Distance::default();
     let mut orientations = Vec::with_capacity(count);
     for k in 0..count {
-        let row = rollout.step(primitive, dt, &Coupling::NONE);
+        let Ok(row) = rollout.step(primitive, dt, &Coupling::NONE) else {
+            return report;
+        };
         for _ in 1..steps as usize {
-            rollout.step(primitive, dt, &Coupling::NONE);
+            if rollout.step(primitive, dt, &Coupling::NONE).is_err() {
+                return report;
+            }
         }
         let demonstrated = demonstration.configuration(k);
         let linear = (0..3)

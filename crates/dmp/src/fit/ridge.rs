@@ -15,7 +15,7 @@ pub(super) struct Ridge {
     activations: Vec<Activations<f64, FIT_CAPACITY>>,
     /// Lower triangle of the Cholesky factor, row by row.
     factor: Vec<Vec<f64>>,
-    /// `A^T A + lambda I`, lower triangle.
+    /// `A^T A`, lower triangle.
     gram: Vec<Vec<f64>>,
 }
 
@@ -36,10 +36,11 @@ impl Ridge {
         }
         let trace: f64 = gram.iter().enumerate().map(|(i, row)| row[i]).sum();
         let lambda = ridge * trace / count as f64;
-        for (i, row) in gram.iter_mut().enumerate() {
+        let mut regularised = gram.clone();
+        for (i, row) in regularised.iter_mut().enumerate() {
             row[i] += lambda;
         }
-        let factor = cholesky(&gram)?;
+        let factor = cholesky(&regularised)?;
         Some(Self { count, activations, factor, gram })
     }
 
@@ -51,7 +52,7 @@ impl Ridge {
                 add_scaled(&mut x[i], target, a.factor(i));
             }
         }
-        self.back_substitute(&mut x);
+        back_substitute(&self.factor, &mut x);
         x
     }
 
@@ -70,10 +71,13 @@ impl Ridge {
         sum.map(|sum| libm::sqrt(sum / targets.len() as f64))
     }
 
-    /// Condition number of the design matrix: root of the ratio of the extreme eigenvalues of the normal equations,
-    /// both by power iteration.
+    /// Condition number of the design matrix `A`, without the ridge: root of the ratio of the extreme eigenvalues of
+    /// `A^T A`, both by power iteration. Infinite if `A^T A` is singular in double precision, from about 1e8 on.
     pub(super) fn condition(&self) -> f64 {
         const ITERATIONS: usize = 30;
+        let Some(factor) = cholesky(&self.gram) else {
+            return f64::INFINITY;
+        };
         let start = || -> Vec<[f64; 1]> {
             // Alternating signs are far from the smooth eigenvector of the largest value and near that of the smallest;
             // the slope keeps a part of both.
@@ -96,7 +100,7 @@ impl Ridge {
         }
         let (mut smallest, mut x) = (1.0, start());
         for _ in 0..ITERATIONS {
-            self.back_substitute(&mut x);
+            back_substitute(&factor, &mut x);
             let length = norm(&x);
             smallest = 1.0 / length;
             for [x] in &mut x {
@@ -105,22 +109,22 @@ impl Ridge {
         }
         libm::sqrt(largest / smallest)
     }
+}
 
-    /// Solves `L L^T y = x` in place for all columns at once.
-    fn back_substitute<const D: usize>(&self, x: &mut [[f64; D]]) {
-        for i in 0..self.count {
-            let mut value = x[i];
-            for (j, l) in self.factor[i][..i].iter().enumerate() {
-                add_scaled(&mut value, &x[j], -l);
-            }
-            x[i] = value.map(|value| value / self.factor[i][i]);
+/// Solves `L L^T y = x` in place for all columns at once.
+fn back_substitute<const D: usize>(factor: &[Vec<f64>], x: &mut [[f64; D]]) {
+    for i in 0..factor.len() {
+        let mut value = x[i];
+        for (j, l) in factor[i][..i].iter().enumerate() {
+            add_scaled(&mut value, &x[j], -l);
         }
-        for i in (0..self.count).rev() {
-            let value = x[i].map(|value| value / self.factor[i][i]);
-            x[i] = value;
-            for (j, l) in self.factor[i][..i].iter().enumerate() {
-                add_scaled(&mut x[j], &value, -l);
-            }
+        x[i] = value.map(|value| value / factor[i][i]);
+    }
+    for i in (0..factor.len()).rev() {
+        let value = x[i].map(|value| value / factor[i][i]);
+        x[i] = value;
+        for (j, l) in factor[i][..i].iter().enumerate() {
+            add_scaled(&mut x[j], &value, -l);
         }
     }
 }

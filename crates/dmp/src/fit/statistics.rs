@@ -47,11 +47,16 @@ pub fn phase_statistics<const CHANNELS: usize>(
     }
     let nothing = Entry { values: [0.0; CHANNELS], squares: [0.0; CHANNELS], weight: 0.0 };
     let mut entries = std::vec![nothing; count];
-    for trial in trials {
-        let within = trial.iter().filter(|(u, _)| (0.0..=1.0).contains(u)).count();
+    // A run without a sample within the movement has nothing to share out: dividing by their number would be 0/0.
+    let counted: Vec<_> = trials
+        .iter()
+        .map(|trial| (trial.iter().filter(|(u, _)| (0.0..=1.0).contains(u)).count(), trial))
+        .filter(|(within, _)| *within > 0)
+        .collect();
+    for (within, trial) in &counted {
         for (u, values) in trial.iter() {
             for (entry, share) in places(*u, last) {
-                let share = share / within as f64;
+                let share = share / *within as f64;
                 entries[entry].weight += share;
                 for (sum, value) in entries[entry].values.iter_mut().zip(values) {
                     *sum += share * value;
@@ -60,12 +65,11 @@ pub fn phase_statistics<const CHANNELS: usize>(
         }
     }
     let mean = fill(&entries, |entry| entry.values.map(|sum| sum / entry.weight))?;
-    for trial in trials {
-        let within = trial.iter().filter(|(u, _)| (0.0..=1.0).contains(u)).count();
+    for (within, trial) in &counted {
         for (u, values) in trial.iter() {
             let between: [(usize, f64); 2] = places(*u, last);
             for (entry, share) in between {
-                let weight = share / within as f64;
+                let weight = share / *within as f64;
                 for (channel, value) in values.iter().enumerate() {
                     let expected: f64 = between.iter().map(|(i, share)| share * mean[*i][channel]).sum();
                     entries[entry].squares[channel] += weight * (value - expected) * (value - expected);
@@ -73,7 +77,7 @@ pub fn phase_statistics<const CHANNELS: usize>(
             }
         }
     }
-    let runs = trials.iter().filter(|trial| trial.iter().any(|(u, _)| (0.0..=1.0).contains(u))).count();
+    let runs = counted.len();
     let correction = if runs > 1 { runs as f64 / (runs - 1) as f64 } else { 1.0 };
     let spread = fill(&entries, |entry| entry.squares.map(|sum| libm::sqrt(correction * sum / entry.weight)))?;
     Ok(PhaseStatistics { mean, spread, trials: runs })
@@ -111,6 +115,10 @@ pub fn experience(
     let means = trials
         .iter()
         .map(|trial| {
+            // `min` would turn a NaN into the end.
+            if trial.iter().any(|(u, _)| !u.is_finite()) {
+                return Err(TableError::NotFinite);
+            }
             let held: Vec<_> = trial.iter().map(|(u, values)| (u.min(1.0), *values)).collect();
             phase_statistics(&[held.as_slice()], count).map(|run| run.mean)
         })

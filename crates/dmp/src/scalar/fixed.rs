@@ -273,6 +273,11 @@ impl Scalar for FixedPoint {
     }
 
     #[inline]
+    fn bits(self) -> u64 {
+        self.to_bits().cast_unsigned()
+    }
+
+    #[inline]
     fn is_finite(self) -> bool {
         true
     }

@@ -69,6 +69,11 @@ impl Scalar for f64 {
     }
 
     #[inline]
+    fn abs(self) -> Self {
+        f64::abs(self)
+    }
+
+    #[inline]
     fn is_finite(self) -> bool {
         f64::is_finite(self)
     }
@@ -133,7 +138,9 @@ impl Scalar for f32 {
         const PART_2: f32 = 4.837_513e-4;
         const PART_3: f32 = 7.549_79e-8;
         let n = libm::rintf(self * core::f32::consts::FRAC_2_PI);
-        let r = ((self - n * PART_1) - n * PART_2) - n * PART_3;
+        // Within pi/4, but for angles of more than about 1000, whose place in the turn is lost: the result stays near
+        // the circle.
+        let r = (((self - n * PART_1) - n * PART_2) - n * PART_3).clamp(-0.8, 0.8);
         let r2 = r * r;
         let sin = r * (1.0 - r2 * (1.0 / 6.0 - r2 * (1.0 / 120.0 - r2 * (1.0 / 5_040.0 - r2 * (1.0 / 362_880.0)))));
         let cos = 1.0 - r2 * (1.0 / 2.0 - r2 * (1.0 / 24.0 - r2 * (1.0 / 720.0 - r2 * (1.0 / 40_320.0))));
@@ -149,6 +156,16 @@ impl Scalar for f32 {
     #[inline]
     fn atan2(self, x: Self) -> Self {
         libm::atan2f(self, x)
+    }
+
+    #[inline]
+    fn abs(self) -> Self {
+        f32::abs(self)
+    }
+
+    #[inline]
+    fn bits(self) -> u64 {
+        self.to_bits().into()
     }
 
     #[inline]

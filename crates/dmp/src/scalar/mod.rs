@@ -64,6 +64,12 @@ pub trait Scalar:
     /// Integer part as an index; 0 for negative numbers and NaN, saturated above.
     fn to_index(self) -> usize;
 
+    /// The value as a pattern of bits, equal for equal values (0 and -0 may differ): what fingerprints are made of.
+    #[inline]
+    fn bits(self) -> u64 {
+        self.to_f64().to_bits()
+    }
+
     /// |self|.
     #[inline]
     fn abs(self) -> Self {

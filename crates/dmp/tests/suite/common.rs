@@ -193,7 +193,7 @@ pub(crate) fn run<T: Scalar>(
     (0..ticks)
         .map(|tick| {
             let coupling = before(tick, &mut rollout);
-            rollout.step(primitive, T::from_f64(dt), &coupling)
+            rollout.step(primitive, T::from_f64(dt), &coupling).unwrap()
         })
         .collect()
 }

@@ -196,7 +196,7 @@ fn forgetting_tau_in_the_target_is_far_off() {
     let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
     let mut worst = 0.0_f64;
     for x in right.position() {
-        let row = rollout.step(&primitive, DT, &Coupling::NONE);
+        let row = rollout.step(&primitive, DT, &Coupling::NONE).unwrap();
         worst = worst.max((row.position.x[0] - x[0]).abs());
     }
     assert!(worst > 0.1, "{worst}");
@@ -264,7 +264,7 @@ fn noise_is_filtered_before_it_is_differentiated() {
             .position()
             .iter()
             .map(|x| {
-                let row = rollout.step(&primitive, clean.period(), &Coupling::NONE);
+                let row = rollout.step(&primitive, clean.period(), &Coupling::NONE).unwrap();
                 (row.position.x[0] - x[0]).powi(2)
             })
             .sum();
@@ -387,7 +387,7 @@ fn recordings_cut_from_a_motion_replay_from_their_own_velocity() {
             let mut rollout = Rollout::start(&primitive, &start).unwrap();
             let mut from_rest = 0.0_f64;
             for x in demonstration.position() {
-                let row = rollout.step(&primitive, DT, &Coupling::NONE);
+                let row = rollout.step(&primitive, DT, &Coupling::NONE).unwrap();
                 for (planned, x) in row.position.x.iter().zip(x) {
                     from_rest += (planned - x).powi(2);
                 }
@@ -453,7 +453,7 @@ fn the_plan_of_a_demonstration_that_ends_at_rest_stays_at_its_goal() {
     let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
     let mut worst = 0.0_f64;
     for k in 0..3 * samples {
-        let reference = rollout.step(&primitive, period, &Coupling::NONE);
+        let reference = rollout.step(&primitive, period, &Coupling::NONE).unwrap();
         if k >= samples {
             for axis in 0..3 {
                 worst = worst.max((reference.position.x[axis] - learned.goal.position[axis]).abs());

@@ -1,8 +1,11 @@
 //! Tests of the library from outside, as one program: golden vectors, sign-catching checks, learning, robustness.
 
+mod bounds;
 mod common;
 mod fit;
 mod golden;
+mod groups;
 mod memory;
 mod robustness;
 mod signs;
+mod whole;

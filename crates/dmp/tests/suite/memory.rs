@@ -155,7 +155,7 @@ fn tables<'a>(weights: &'a [f64], goal: f64) -> PrimitiveTables<'a, f64> {
 
 fn path(primitive: &Primitive<f64, 30>) -> Vec<f64> {
     let mut rollout = Rollout::start(primitive, &StartState::demonstrated(primitive)).unwrap();
-    (0..900).map(|_| rollout.step(primitive, DT, &Coupling::NONE).position.x[0]).collect()
+    (0..900).map(|_| rollout.step(primitive, DT, &Coupling::NONE).unwrap().position.x[0]).collect()
 }
 
 #[test]

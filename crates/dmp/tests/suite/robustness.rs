@@ -93,7 +93,7 @@ fn changes_in_flight_are_refused_without_touching_the_run() {
     let plan = Plan::golden();
     let primitive = plan.build::<f64>();
     let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
-    rollout.step(&primitive, DT, &Coupling::NONE);
+    rollout.step(&primitive, DT, &Coupling::NONE).unwrap();
     let before = rollout.clone();
     let nan = f64::NAN;
     assert_eq!(rollout.set_goal_position([nan; 3]), Err(RolloutError::NotFinite));
@@ -145,16 +145,18 @@ fn late_or_senseless_ticks_do_not_move_the_plan_too_far() {
     let mut normal = Rollout::start(&primitive, &start).unwrap();
     let mut late = normal.clone();
     let mut senseless = normal.clone();
-    normal.step(&primitive, DT, &Coupling::NONE);
-    late.step(&primitive, 0.5, &Coupling::NONE);
+    normal.step(&primitive, DT, &Coupling::NONE).unwrap();
+    late.step(&primitive, 0.5, &Coupling::NONE).unwrap();
     assert_eq!(normal, late);
     for dt in [0.0, -1.0, f64::NAN] {
-        senseless.step(&primitive, dt, &Coupling::NONE);
+        senseless.step(&primitive, dt, &Coupling::NONE).unwrap();
     }
     let fresh = Rollout::start(&primitive, &start).unwrap();
     assert_eq!([senseless.progress(), senseless.phase()], [0.0, 1.0]);
-    let (a, b) =
-        (senseless.clone().step(&primitive, DT, &Coupling::NONE), fresh.clone().step(&primitive, DT, &Coupling::NONE));
+    let (a, b) = (
+        senseless.clone().step(&primitive, DT, &Coupling::NONE).unwrap(),
+        fresh.clone().step(&primitive, DT, &Coupling::NONE).unwrap(),
+    );
     assert_eq!((a.position, a.time), (b.position, b.time));
 }
 
@@ -197,7 +199,7 @@ fn start_turned_past_a_full_turn_still_goes_the_demonstrated_way() {
         let mut turned = 0.0;
         let mut last = from;
         for _ in 0..9000 {
-            let q = rollout.step(&primitive, DT, &Coupling::NONE).orientation.quaternion;
+            let q = rollout.step(&primitive, DT, &Coupling::NONE).unwrap().orientation.quaternion;
             turned += last.conjugate().product(&q.aligned_with(&last)).rotation_vector()[2];
             last = q;
         }
@@ -324,7 +326,7 @@ proptest! {
             let mut rollout = Rollout::start(&primitive, &start).unwrap();
             for i in 0..200 {
                 let coupling = Coupling { position: [values[i % 40]; 3], ..Coupling::NONE };
-                let row = rollout.step(&primitive, values[(i * 7) % 40], &coupling);
+                let row = rollout.step(&primitive, values[(i * 7) % 40], &coupling).unwrap();
                 prop_assert!(row.phase > 0.0 && row.phase <= 1.0);
             }
         }

@@ -235,19 +235,19 @@ fn pushes_of_the_environment_move_the_plan_along_and_are_clamped() {
     let rollout =
         |primitive: &_| dmp::Rollout::<f64, 100>::start(primitive, &dmp::StartState::demonstrated(primitive)).unwrap();
     // Without an expectation there is nothing to compare with: open loop.
-    let open = rollout(&primitive).coupling(&primitive, &push, &SensorMap::IDENTITY);
+    let open = rollout(&primitive).coupling(&primitive, &push, &SensorMap::IDENTITY).unwrap();
     assert_eq!(open, Coupling::NONE);
     let expected = dmp::ExpectedWrench::new(&[[0.0; SENSORS], [1.0; SENSORS]], 5.0).unwrap();
     primitive.set_expected(Some(&expected));
     let run = rollout(&primitive);
-    let zeta = run.coupling(&primitive, &push, &SensorMap::IDENTITY);
+    let zeta = run.coupling(&primitive, &push, &SensorMap::IDENTITY).unwrap();
     assert_eq!(zeta.position, [12.0, 0.0, 0.0]);
     assert_eq!(zeta.orientation, [0.0, 0.0, 4.5]);
     // The spread has no gauge.
     assert_eq!(zeta.hand, [0.0, 20.0, 0.0, 0.0]);
     // A blow, an infinite and an undefined value stay bounded.
     for blow in [1e6, -1e30, f64::INFINITY, f64::NAN] {
-        let zeta = run.coupling(&primitive, &[blow; SENSORS], &SensorMap::IDENTITY);
+        let zeta = run.coupling(&primitive, &[blow; SENSORS], &SensorMap::IDENTITY).unwrap();
         let norm = |a: &[f64]| a.iter().map(|a| a * a).sum::<f64>().sqrt();
         assert!(norm(&zeta.position) <= K * 0.23 * (1.0 + 1e-12));
         assert!(norm(&zeta.orientation) <= K * 0.2_f64.sin() * (1.0 + 1e-12));
@@ -289,7 +289,7 @@ fn norm_after_a_million_ticks<T: Scalar>(error: OrientationError) -> f64 {
     let spin = Coupling { orientation: [300_000.0, 200_000.0, -100_000.0].map(T::from_f64), ..Coupling::NONE };
     let mut worst = 0.0_f64;
     for _ in 0..1_000_000 {
-        let q = rollout.step(&primitive, dt, &spin).orientation.quaternion;
+        let q = rollout.step(&primitive, dt, &spin).unwrap().orientation.quaternion;
         worst = worst.max((q.dot(&q).to_f64().sqrt() - 1.0).abs());
     }
     worst

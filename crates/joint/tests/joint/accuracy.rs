@@ -23,9 +23,11 @@ fn error(movement: &Movement, speed: f64, gauges: impl Fn(f64) -> [f64; 3]) -> [
     for tick in 0..ticks {
         let felt = gauges(tick as f64 / 300.0);
         let [a, b, c] = felt;
-        let coupling = reference.coupling(&exact, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, a, b, c], &SensorMap::IDENTITY);
+        let coupling = reference
+            .coupling(&exact, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, a, b, c], &SensorMap::IDENTITY)
+            .expect("its own");
         let coupling = Coupling { hand: coupling.hand, ..Coupling::NONE };
-        let wanted = reference.step(&exact, 1.0 / 300.0, &coupling);
+        let wanted = reference.step(&exact, 1.0 / 300.0, &coupling).expect("its own");
         let zeta = rollout.feedback(&fixed, &felt.map(|torque| from_real(torque as f32)), ONE);
         let found = rollout.step(&fixed, &zeta);
         for digit in 0..4 {

@@ -2,8 +2,8 @@
 
 use crate::samples::{replies, requests};
 use link::frame::{self, Decoder, EncodeError, Envelope, FRAME_BYTES, MESSAGE_BYTES, Message, PAYLOAD_BYTES};
-use link::message::ChunkData;
-use link::{LinkCounters, Name, Reply, Request, Text};
+use link::message::{ChunkData, HostHello};
+use link::{LINK_VERSION, LinkCounters, Name, Reply, Request, SCHEMA_HASH, Text};
 use proptest::prelude::*;
 
 const ENVELOPE: Envelope = Envelope { session: 0xA0B1, sequence: 0xC2D3, time_ms: 0x0102_0304 };
@@ -143,24 +143,76 @@ fn each_reason_has_its_counter() {
     assert_eq!(read(&mut decoder, &frame_of(&Request::Ping)), [Request::Ping], "and it still works");
 }
 
+/// The frame of a message whose payload (envelope and message) was changed, with a check sum that is right again.
+fn frame_with(message: &impl Message, change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
+    let mut payload = frame_of(message);
+    payload.pop();
+    let length = cobs::decode_in_place(&mut payload).unwrap();
+    payload.truncate(length - 4);
+    change(&mut payload);
+    let crc = frame::CRC.checksum(&payload);
+    payload.extend(crc.to_le_bytes());
+    let mut stuffed = vec![0; FRAME_BYTES];
+    let length = cobs::encode(&payload, &mut stuffed);
+    stuffed.truncate(length + 1);
+    stuffed
+}
+
 #[test]
 fn a_hello_of_a_later_version_with_more_fields_is_still_understood() {
-    let longer = |request: &Request| {
-        let mut payload = frame_of(request);
-        payload.pop();
-        let length = cobs::decode_in_place(&mut payload).unwrap();
-        payload.truncate(length - 4);
-        payload.extend([1, 2, 3]);
-        let crc = frame::CRC.checksum(&payload);
-        payload.extend(crc.to_le_bytes());
-        let mut stuffed = vec![0; FRAME_BYTES];
-        let length = cobs::encode(&payload, &mut stuffed);
-        stuffed.truncate(length + 1);
-        stuffed
-    };
+    let longer = |request: &Request| frame_with(request, |payload| payload.extend([1, 2, 3]));
     let mut decoder = Decoder::new();
     assert_eq!(read(&mut decoder, &longer(&requests()[0])), &requests()[..1]);
     assert_eq!(read(&mut decoder, &longer(&Request::Ping)), [], "any other message must end where it ends");
+}
+
+/// Bytes of the envelope, the number of the message, the link version and the schema hash of the sample hello.
+const UP_TO_THE_SCHEMA: usize = 8 + 1 + 1 + 5;
+
+#[test]
+fn a_hello_of_another_version_with_fewer_fields_still_tells_its_version() {
+    let whole = frame_with(&requests()[0], |payload| assert!(payload.len() > UP_TO_THE_SCHEMA + 5));
+    assert_eq!(read(&mut Decoder::new(), &whole), &requests()[..1]);
+    // Without the owner, without the model hash too, cut in the middle of either, and with bytes in their place that
+    // are neither.
+    for kept in UP_TO_THE_SCHEMA..UP_TO_THE_SCHEMA + 5 + 10 {
+        for strange in [vec![], vec![0xFF; 7]] {
+            let frame = frame_with(&requests()[0], |payload| {
+                payload.truncate(kept);
+                payload.extend(&strange);
+            });
+            let mut decoder = Decoder::new();
+            let messages = read(&mut decoder, &frame);
+            let [Request::Hello(hello)] = messages.as_slice() else { panic!("{kept} bytes: {messages:?}") };
+            assert_eq!((hello.link_version, hello.schema_hash), (1, 0x1234_5678));
+            assert_eq!(decoder.counters().accepted, 1);
+        }
+    }
+    // The device's hello has the number of the request in front.
+    let Some(hello) = replies().into_iter().find(|reply| matches!(reply, Reply::Hello { .. })) else {
+        panic!("no hello")
+    };
+    let of = hello.answers();
+    for kept in UP_TO_THE_SCHEMA + 1..UP_TO_THE_SCHEMA + 20 {
+        let frame = frame_with(&hello, |payload| payload.truncate(kept));
+        let found = Decoder::<FRAME_BYTES>::new().next::<Reply>(&mut frame.as_slice()).map(|frame| frame.message);
+        let Some(Reply::Hello { of: answered, hello }) = found else { panic!("{kept} bytes: {found:?}") };
+        assert_eq!((Some(answered), hello.link_version, hello.schema_hash), (of, 1, 0x1234_5678));
+    }
+}
+
+#[test]
+fn a_damaged_hello_of_this_version_and_every_other_short_message_is_dropped() {
+    let Request::Hello(sample) = &requests()[0] else { panic!("no hello") };
+    let ours = Request::Hello(HostHello { link_version: LINK_VERSION, schema_hash: SCHEMA_HASH, ..sample.clone() });
+    for (message, fewer) in [(&ours, 1..15), (&requests()[9], 1..20)] {
+        for fewer in fewer {
+            let frame = frame_with(message, |payload| payload.truncate(payload.len() - fewer));
+            let mut decoder = Decoder::new();
+            assert_eq!(read(&mut decoder, &frame), [], "{fewer} bytes fewer");
+            assert_eq!(decoder.counters().undecodable, 1);
+        }
+    }
 }
 
 #[test]
@@ -267,17 +319,11 @@ proptest! {
 
 #[test]
 fn a_bad_name_does_not_come_in_over_the_wire() {
-    let mut payload = frame_of(&Request::Delete { name: Name::new("abcdefghij").unwrap() });
-    payload.pop();
-    let length = cobs::decode_in_place(&mut payload).unwrap();
-    payload.truncate(length - 4);
-    let at = payload.windows(3).position(|window| window == b"abc").unwrap();
-    payload[at..at + 3].copy_from_slice(b"../");
-    let crc = frame::CRC.checksum(&payload);
-    payload.extend(crc.to_le_bytes());
-    let mut stuffed = vec![0; FRAME_BYTES];
-    let length = cobs::encode(&payload, &mut stuffed);
+    let frame = frame_with(&Request::Delete { name: Name::new("abcdefghij").unwrap() }, |payload| {
+        let at = payload.windows(3).position(|window| window == b"abc").unwrap();
+        payload[at..at + 3].copy_from_slice(b"../");
+    });
     let mut decoder = Decoder::new();
-    assert_eq!(read(&mut decoder, &stuffed[..=length]), []);
+    assert_eq!(read(&mut decoder, &frame), []);
     assert_eq!(decoder.counters().undecodable, 1);
 }

@@ -1,5 +1,6 @@
 //! Tests of the link in one binary, because they share their samples.
 
+mod codes;
 mod framing;
 mod golden;
 mod image;

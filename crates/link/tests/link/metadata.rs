@@ -1,5 +1,6 @@
 //! What a firmware image says about itself.
 
+use link::frame::CRC;
 use link::metadata::{METADATA_BYTES, MemoryRegion, MetadataError};
 use link::{ImageMetadata, LINK_VERSION, SCHEMA_HASH};
 
@@ -38,6 +39,31 @@ fn every_flipped_bit_is_noticed() {
         let mut block = BLOCK;
         block[bit / 8] ^= 1 << (bit % 8);
         assert!(ImageMetadata::decode(&block).is_err(), "bit {bit}");
+    }
+}
+
+/// The block with other bytes at a place and a check sum that is right again.
+fn block_with(at: usize, bytes: &[u8]) -> [u8; METADATA_BYTES] {
+    let mut block = BLOCK;
+    block[at..at + bytes.len()].copy_from_slice(bytes);
+    let (covered, crc) = block.split_at_mut(METADATA_BYTES - 4);
+    crc.copy_from_slice(&CRC.checksum(covered).to_le_bytes());
+    block
+}
+
+#[test]
+fn flags_that_this_version_does_not_know_are_refused_by_name() {
+    for flags in (1..16).map(|bit| 1_u16 << bit) {
+        let block = block_with(10, &flags.to_le_bytes());
+        assert_eq!(ImageMetadata::decode(&block), Err(MetadataError::Flags(flags)));
+    }
+}
+
+#[test]
+fn names_are_padded_with_zeros_and_nothing_else() {
+    // Places 36 (48 bytes) and 84 (32 bytes).
+    for last in [83, 115] {
+        assert_eq!(ImageMetadata::decode(&block_with(last, b"x")), Err(MetadataError::Text));
     }
 }
 

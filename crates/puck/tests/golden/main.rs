@@ -4,5 +4,6 @@ mod arm;
 mod frames;
 mod hand;
 mod properties;
+mod states;
 mod transcripts;
 mod vectors;

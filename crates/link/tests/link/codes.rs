@@ -1,0 +1,116 @@
+//! What a request or a reply is taken for, and numbers that are never given to another reason: pinned one by one.
+
+use crate::samples::{replies, request_index, requests};
+use link::{ImageError, Refusal, Request};
+
+/// Whether a request can move the arm. One that does, and is old, is refused: forget one here and a host that was
+/// suspended moves an arm that somebody stands beside by now.
+fn can_move(request: &Request) -> bool {
+    match request {
+        Request::Zero { .. }
+        | Request::Gravity
+        | Request::Hold
+        | Request::Approach { .. }
+        | Request::Run { .. }
+        | Request::ClearFault
+        | Request::SetGoal(_)
+        | Request::SetSpeed { .. }
+        | Request::Release
+        | Request::Tare
+        | Request::InitialiseHand
+        | Request::MoveHand { .. } => true,
+        // Stopping must not depend on age; the others only talk, or change what a later request uses.
+        Request::Hello(_)
+        | Request::Goodbye
+        | Request::Ping
+        | Request::Status
+        | Request::Statistics
+        | Request::List { .. }
+        | Request::Stop
+        | Request::Telemetry { .. }
+        | Request::UploadBegin { .. }
+        | Request::UploadChunk { .. }
+        | Request::UploadCommit
+        | Request::UploadAbort
+        | Request::Delete { .. }
+        | Request::Read { .. }
+        | Request::Calibration
+        | Request::Calibrate { .. }
+        | Request::ForgetCalibration => false,
+    }
+}
+
+#[test]
+fn every_request_that_can_move_the_arm_is_known_as_such() {
+    let moving: Vec<usize> = requests().iter().filter(|request| request.moves()).map(request_index).collect();
+    assert_eq!(moving, [6, 7, 8, 9, 10, 12, 13, 14, 22, 23, 24, 25]);
+    for request in requests() {
+        assert_eq!(request.moves(), can_move(&request), "{request:?}");
+    }
+}
+
+#[test]
+fn every_request_has_a_word_of_its_own() {
+    let words: std::collections::BTreeSet<&str> = requests().iter().map(Request::word).collect();
+    assert_eq!(words.len(), requests().len());
+    assert_eq!(Request::Stop.word(), "stop");
+    assert_eq!(Request::SetSpeed { factor: 1.0 }.word(), "set speed");
+}
+
+#[test]
+fn every_reply_names_the_request_it_answers_and_the_unasked_ones_name_none() {
+    let answers: Vec<Option<u16>> = replies().iter().map(|reply| reply.answers()).collect();
+    let expected = [Some(1), Some(300), Some(3), Some(4), Some(5), Some(6), Some(7), None, None, Some(9)];
+    assert_eq!(answers, expected);
+}
+
+#[test]
+fn the_code_of_an_image_error_is_never_given_to_another() {
+    let errors = [
+        (ImageError::TooShort { length: 101 }, 101),
+        (ImageError::Magic, 0),
+        (ImageError::Schema { found: 103 }, 103),
+        (ImageError::Length { expected: 1, found: 104 }, 104),
+        (ImageError::Crc { computed: 105, stored: 2 }, 105),
+        (ImageError::Name, 0),
+        (ImageError::Flags { found: 107 }, 107),
+        (ImageError::Kernels { found: 108 }, 108),
+        (ImageError::GainPoints { found: 109 }, 109),
+        (ImageError::ExpectationPoints { found: 110 }, 110),
+        (ImageError::NotFinite { real: 111 }, 111),
+        (ImageError::Shape, 0),
+        (ImageError::ExperiencePoints { found: 113 }, 113),
+    ];
+    for (code, (error, number)) in (1..).zip(errors) {
+        assert_eq!((error.code(), error.number()), (code, number), "{error:?}");
+        // Exhaustive: a new error does not compile here, and so is not forgotten above.
+        let at = match error {
+            ImageError::TooShort { .. } => 0,
+            ImageError::Magic => 1,
+            ImageError::Schema { .. } => 2,
+            ImageError::Length { .. } => 3,
+            ImageError::Crc { .. } => 4,
+            ImageError::Name => 5,
+            ImageError::Flags { .. } => 6,
+            ImageError::Kernels { .. } => 7,
+            ImageError::GainPoints { .. } => 8,
+            ImageError::ExpectationPoints { .. } => 9,
+            ImageError::NotFinite { .. } => 10,
+            ImageError::Shape => 11,
+            ImageError::ExperiencePoints { .. } => 12,
+        };
+        assert_eq!(errors[at].0, error);
+    }
+}
+
+#[test]
+fn the_code_of_a_refusal_is_its_place_on_the_wire() {
+    for refusal in Refusal::ALL {
+        let mut buffer = [0; 4];
+        let bytes = postcard::to_slice(&refusal, &mut buffer).unwrap();
+        assert_eq!(bytes, [refusal.code() as u8], "{refusal:?}");
+    }
+    // The frozen ones, by which two versions find out that they do not fit.
+    let frozen = [Refusal::LinkVersion, Refusal::Schema, Refusal::Model, Refusal::NoSession, Refusal::Busy];
+    assert_eq!(frozen.map(|refusal| refusal.code() as u32), [0, 1, 2, 3, 4]);
+}
