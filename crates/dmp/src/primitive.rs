@@ -502,10 +502,11 @@ impl<T: Scalar> PrimitiveTables<'_, T> {
             for (row, weights) in rows() {
                 let (group, _) = Row::of_weights(row);
                 let largest = largest[group as usize];
+                let weight = |i: usize| weights.get(i).copied().unwrap_or(T::ZERO);
                 let force = |activations: &Activations<T, N>| {
-                    activations.active().fold(T::ZERO, |sum, i| sum + activations.factor(i) * weights[i])
+                    activations.active().fold(T::ZERO, |sum, i| sum + activations.factor(i) * weight(i))
                 };
-                let alone = weights[kernel] * centre * T::from_f64(1.0 / bounds::LARGEST_CANCELLATION);
+                let alone = weight(kernel) * centre * T::from_f64(1.0 / bounds::LARGEST_CANCELLATION);
                 if [alone, force(&at), force(&between)].into_iter().any(|force| !(force.abs() <= largest)) {
                     return Err(PrimitiveError::WeightTooLarge { row: place(row), kernel: place(kernel) });
                 }

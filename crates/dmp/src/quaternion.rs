@@ -120,12 +120,18 @@ impl<T: Scalar> Quaternion<T> {
                 f(0.5) - y * (f(1.0 / 12.0) - y * (f(1.0 / 240.0) - y * (f(1.0 / 10_080.0) - y * f(1.0 / 725_760.0))));
             return Self::from_parts(cos, scale(r, half_sinc));
         }
-        if !(n2 <= f(Self::LARGEST_TURN * Self::LARGEST_TURN)) {
-            return Self::from_rotation_vector(&clamp_norm(r, f(0.999 * Self::LARGEST_TURN)));
+        let (r, n2) = if n2 <= f(Self::LARGEST_TURN * Self::LARGEST_TURN) {
+            (*r, n2)
+        } else {
+            let shorter = clamp_norm(r, f(0.999 * Self::LARGEST_TURN));
+            (shorter, dot(&shorter, &shorter))
+        };
+        if !(n2 > T::ZERO) {
+            return Self::IDENTITY;
         }
         let n = T::sqrt(n2);
         let (sin, cos) = T::sin_cos(n * f(0.5));
-        Self::from_parts(cos, scale(r, sin / n))
+        Self::from_parts(cos, scale(&r, sin / n))
     }
 
     /// Rotation vector `2 log(q)` (radians), of length 0..2 pi: beyond pi it goes on growing instead of flipping over.
