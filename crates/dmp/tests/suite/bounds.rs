@@ -138,8 +138,8 @@ fn condition_of_the_design(count: usize, activation: f64, samples: usize) -> f64
     let canonical = CanonicalSystem::new(ALPHA).unwrap();
     let basis = Basis::<f64, 200>::new(&canonical, count, activation).unwrap();
     let mut columns = vec![vec![0.0; samples]; count];
-    for k in 0..samples {
-        let active = basis.evaluate(canonical.phase_at(k as f64 / (samples - 1) as f64));
+    let at = |k: usize| basis.evaluate(canonical.phase_at(k as f64 / (samples - 1) as f64));
+    for (k, active) in (0..samples).map(at).enumerate() {
         for i in active.active() {
             columns[i][k] = active.factor(i);
         }

@@ -108,7 +108,7 @@ fn the_code_of_a_refusal_is_its_place_on_the_wire() {
     for refusal in Refusal::ALL {
         let mut buffer = [0; 4];
         let bytes = postcard::to_slice(&refusal, &mut buffer).unwrap();
-        assert_eq!(bytes, [refusal.code() as u8], "{refusal:?}");
+        assert_eq!(bytes, [refusal.code()], "{refusal:?}");
     }
     // The frozen ones, by which two versions find out that they do not fit.
     let frozen = [Refusal::LinkVersion, Refusal::Schema, Refusal::Model, Refusal::NoSession, Refusal::Busy];
