@@ -8,15 +8,9 @@ use core::panic::PanicInfo;
 
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::{ExceptionFrame, exception};
-use puck::{CanFrame, Group, MotorMode, PropertyId, set, zero_torques};
+use puck::stop_frames;
 
 use crate::board::{Board, Edge};
-
-fn last_frames() -> [CanFrame; 4] {
-    let [arm, wrist] = zero_torques();
-    let idle = MotorMode::Idle.value();
-    [arm, wrist, set(Group::ARM, PropertyId::MODE, idle), set(Group::HAND, PropertyId::MODE, idle)]
-}
 
 #[panic_handler]
 fn panicked(information: &PanicInfo<'_>) -> ! {
@@ -26,7 +20,7 @@ fn panicked(information: &PanicInfo<'_>) -> ! {
 /// The end, for a reason that the board has found.
 pub fn stop(reason: fmt::Arguments<'_>) -> ! {
     cortex_m::interrupt::disable();
-    Board::stop(&last_frames(), reason)
+    Board::stop(&stop_frames(), reason)
 }
 
 /// What the processor's fault registers say.

@@ -5,6 +5,7 @@
 
 use crate::can::{CanFrame, CanId, Destination, Group, Node};
 use crate::property::PropertyId;
+use crate::state::MotorMode;
 use crate::units::PuckTorque;
 
 /// Bit 7 of byte 0: this frame sets (or replies) rather than asks.
@@ -46,6 +47,14 @@ pub fn packed_torques(group: Group, property: PropertyId, torques: [PuckTorque; 
     let fields = torques.iter().fold(0_u64, |packed, torque| packed << 14 | torque.bits());
     let [_, b1, b2, b3, b4, b5, b6, b7] = fields.to_be_bytes();
     CanFrame::with_payload(CanId::encode(Node::HOST, group), [SET_BIT | property.number(), b1, b2, b3, b4, b5, b6, b7])
+}
+
+/// What takes the torque off, whatever was commanded before: zero torque to arm and wrist, then MODE IDLE to the arm's pucks
+/// and to the hand's. A device begins with these frames, and ends with them.
+pub fn stop_frames() -> [CanFrame; 4] {
+    let [arm, wrist] = zero_torques();
+    let idle = |group| set(group, PropertyId::MODE, MotorMode::Idle.value());
+    [arm, wrist, idle(Group::ARM), idle(Group::HAND)]
 }
 
 /// Explicit zero torque for all seven motors. A puck is believed to keep its last torque until told otherwise, so every

@@ -1,6 +1,6 @@
 //! The first half of the start-up: from an unknown bus to pucks that are awake, checked and read.
 
-use puck::{Group, MotorMode, Node, PropertyId, SafetyMode, Status, get, set, zero_torques};
+use puck::{Node, PropertyId, SafetyMode, Status, get, set, stop_frames};
 
 use super::exchange::Answer;
 use super::sequence::{ENUMERATED, Next, POLL_US, Startup, Step, after};
@@ -17,17 +17,10 @@ const WAKE_SILENCE_US: u64 = 1_000_000;
 
 impl Startup {
     pub(super) fn hush(&self, frame: u8, outlet: &mut impl Outlet) -> Next {
-        let [arm, wrist] = zero_torques();
-        let (content, next) = match frame {
-            0 => (arm, Step::Hush { frame: 1 }),
-            1 => (wrist, Step::Hush { frame: 2 }),
-            2 => (set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value()), Step::Hush { frame: 3 }),
-            _ => (
-                set(Group::HAND, PropertyId::MODE, MotorMode::Idle.value()),
-                Step::Enumerate { node: *ENUMERATED.start(), powered: false },
-            ),
-        };
-        after(outlet.send(content), next)
+        match stop_frames().get(usize::from(frame)) {
+            Some(content) => after(outlet.send(*content), Step::Hush { frame: frame + 1 }),
+            None => Next::Go(Step::Enumerate { node: *ENUMERATED.start(), powered: false }),
+        }
     }
 
     pub(super) fn enumerate(&mut self, number: u8, powered: bool, outlet: &mut impl Outlet) -> Next {

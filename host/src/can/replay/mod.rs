@@ -97,11 +97,11 @@ pub enum ReplayError {
     NoDevice,
     /// It begins in the middle.
     #[error(
-        "the log begins in the middle: the first frame of the co-controller is `{first}` instead of `GET STAT` to puck 1"
+        "the log begins in the middle: a co-controller that starts sends zero torques and MODE IDLE first, and not `{frame}`"
     )]
     Middle {
-        /// The first frame, in words.
-        first: String,
+        /// The frame in their place, in words.
+        frame: String,
     },
 }
 
@@ -122,8 +122,12 @@ pub struct Replay {
     to_device: Reassembler,
     engine: Engine,
     clock: Option<LogClock>,
-    /// Lines before the first frame of the device: only then is the clock known.
-    early: Vec<LogLine>,
+    /// Lines and their places until the device has sent the frames it begins with: only then is the clock known.
+    early: Vec<(u64, LogLine)>,
+    /// The first frame of the device and its time in the log.
+    first: Option<(CanFrame, u64)>,
+    /// How many of the frames with which a device begins have been seen.
+    begun: usize,
     line: u64,
     first_us: Option<u64>,
     last_us: u64,
@@ -145,6 +149,8 @@ impl Default for Replay {
             engine: Engine::new(),
             clock: None,
             early: Vec::new(),
+            first: None,
+            begun: 0,
             line: 0,
             first_us: None,
             last_us: 0,
@@ -162,7 +168,7 @@ impl Replay {
     /// Takes the next line of the log. `number`: its place in the file.
     ///
     /// # Errors
-    /// [`ReplayError::Middle`] when the first frame of the device shows that the log begins too late.
+    /// [`ReplayError::Middle`] when the first frames of the device show that the log begins too late.
     pub fn take(&mut self, number: u64, line: LogLine) -> Result<(), ReplayError> {
         self.line = number;
         self.first_us.get_or_insert(line.time_us);
@@ -174,26 +180,29 @@ impl Replay {
         Ok(())
     }
 
-    /// Waits for the first frame of the device.
+    /// Waits for the frames with which a device begins. All of them: a log may also begin at a zero torque of an idle arm.
     fn begin(&mut self, line: LogLine) -> Result<(), ReplayError> {
         let AnyFrame::Data(frame) = line.frame else {
             return Ok(());
         };
         let (meaning, interface) = self.reader.read(&line);
-        let first_of_device = interface.kind() == BusKind::Arm && frame.can_id().sender() == Node::HOST;
-        if first_of_device {
-            let [first, ..] = Node::ARM;
-            if frame != get(first, PropertyId::STAT) {
-                return Err(ReplayError::Middle { first: meaning.sentence() });
+        let is_of_device = interface.kind() == BusKind::Arm && frame.can_id().sender() == Node::HOST;
+        let begins_with = puck::stop_frames();
+        if is_of_device {
+            if begins_with.get(self.begun) != Some(&frame) {
+                return Err(ReplayError::Middle { frame: meaning.sentence() });
             }
-            self.clock = Some(LogClock::from_first_frame(&frame, line.time_us));
+            self.first.get_or_insert((frame, line.time_us));
+            self.begun += 1;
+        }
+        self.early.push((self.line, line));
+        if let Some((first, time_us)) = self.first.filter(|_| self.begun == begins_with.len()) {
+            self.clock = Some(LogClock::from_first_frame(&first, time_us));
             self.reader = Reader::default();
-            for early in std::mem::take(&mut self.early) {
+            for (number, early) in std::mem::take(&mut self.early) {
+                self.line = number;
                 self.play(&early);
             }
-            self.play(&line);
-        } else {
-            self.early.push(line);
         }
         Ok(())
     }
