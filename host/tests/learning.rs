@@ -291,7 +291,7 @@ fn an_experience_that_is_changed_cut_or_impossible_is_refused() {
     let mut certain = full();
     certain.experience.as_mut().unwrap().spread[10][2] = 0.0;
     let error = certain.to_primitive().unwrap_err();
-    assert!(error.to_string().contains("spread is not positive"), "{error}");
+    assert!(error.to_string().contains("a spread is not at least 1e-6"), "{error}");
 }
 
 #[test]
