@@ -95,17 +95,17 @@ pub enum PrimitiveError {
     /// The goal orientation is not a unit quaternion.
     GoalNotUnit,
     /// Start and goal are more than 175 degrees apart, where the error of Eq. (4) fails: use
-    /// [`OrientationError::RotationVector`].
+    /// [`OrientationError::RotationVector`](crate::OrientationError::RotationVector).
     TurnsTooFar,
     /// The weights give a larger forcing term than any movement of this duration with these gains needs, see
-    /// [`bounds`].
+    /// [`bounds`](crate::bounds).
     WeightTooLarge {
         /// Row of weights, 0 to 16.
         row: u8,
         /// Kernel at whose centre, or behind it, the term is too large, from 0.
         kernel: u8,
     },
-    /// A value is larger than any movement needs, see [`bounds`].
+    /// A value is larger than any movement needs, see [`bounds`](crate::bounds).
     TooLarge {
         /// Where it is.
         part: Part,
