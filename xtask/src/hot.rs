@@ -37,9 +37,9 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("control::hand::within_range", "once, when a person moves the hand"),
     (
         "control::cycle::laws::<impl control::cycle::Cycle<R,_>>::hold_to",
-        "the arm stands: it computes a third of a run",
+        "the arm stands: no plan and no feedback is computed",
     ),
-    ("control::cycle::laws::<impl control::cycle::Cycle<R,_>>::float", "led by hand: it computes a third of a run"),
+    ("control::cycle::laws::<impl control::cycle::Cycle<R,_>>::float", "led by hand: no plan and no feedback is computed"),
     ("control::cycle::Cycle<R,_>::reset", "after a fault of the bus"),
     ("device::core::Core::restart", "after a fault of the bus"),
     ("device::startup", "a person zeroes the arm again"),
