@@ -39,7 +39,10 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "control::cycle::laws::<impl control::cycle::Cycle<R,_>>::hold_to",
         "the arm stands: no plan and no feedback is computed",
     ),
-    ("control::cycle::laws::<impl control::cycle::Cycle<R,_>>::float", "led by hand: no plan and no feedback is computed"),
+    (
+        "control::cycle::laws::<impl control::cycle::Cycle<R,_>>::float",
+        "led by hand: no plan and no feedback is computed",
+    ),
     ("control::cycle::Cycle<R,_>::reset", "after a fault of the bus"),
     ("device::core::Core::restart", "after a fault of the bus"),
     ("device::startup", "a person zeroes the arm again"),
