@@ -45,8 +45,6 @@ const OURS: &[Allowed] = &[
     row("dmp::forcing", &[Index], "a basis has 2 <= count <= N kernels by its constructor: every slice of it exists"),
     row("dmp::forcing::ForcingTerm::assign", &[Message], "chunks of count weights, and count is at least 2"),
     row("dmp::table::PhaseTable::at", &[Index], "the sample on the left is at most the last but one, by `min`"),
-    row("control::calibration::Calibration::nominal", &[Unwrap], "the scales of the model file, which a test builds"),
-    row("control::cycle::laws::bounded", &[Index], "three rows from row 0 and from row 3 of six"),
     row("control::kinematics::Factor::new", &[Index], "rows of a 6 x 6 array by an iterator over six"),
     row("control::limit", &[Index], "a group is a constant list of motors"),
     row("device::storage", &[Resumed], "each is awaited once, by the library's task, which never ends"),
