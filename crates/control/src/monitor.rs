@@ -64,6 +64,9 @@ impl<R: Real> Monitor<R> {
         if state.age > SILENCE_CYCLES {
             return Some((Trigger::HardFault, Fault::RepliesLostForLong));
         }
+        if state.displaced {
+            return Some((Trigger::SoftFault, Fault::ImplausiblePosition));
+        }
         if state.age > COAST_CYCLES {
             let fault = if state.implausible { Fault::ImplausiblePosition } else { Fault::RepliesLost };
             return Some((Trigger::SoftFault, fault));

@@ -9,4 +9,5 @@ mod losses;
 mod postures;
 mod primitives;
 mod rig;
+mod shoves;
 mod tracking;

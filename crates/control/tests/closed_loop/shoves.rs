@@ -1,0 +1,108 @@
+//! A person shoves the arm, harder and faster than any limit of its own movements.
+
+use std::collections::VecDeque;
+
+use control::command::{Command, RunOptions};
+use control::{Fault, State};
+
+use crate::primitives::{Design, GOAL, START, primitive};
+use crate::rig::Rig;
+
+/// Speed of the hand that counts as braked (m/s): the reduced speed of the standards for work beside a person.
+const BRAKED: f64 = 0.25;
+
+/// Length of what the velocity filter still remembers (control periods).
+const FILTER_CYCLES: usize = 9;
+
+/// What came of one shove.
+#[derive(Debug)]
+struct Outcome {
+    /// Fastest hand while it was pushed, and afterwards (m/s).
+    pushed: f64,
+    after: f64,
+    /// Speed of the hand 0.3 s after the push (m/s).
+    braked: f64,
+    /// Largest distance of a reported joint speed from those that the joint had in the last 30 ms (rad/s).
+    unseen: f64,
+    state: State,
+    fault: Fault,
+}
+
+fn hand_speed(rig: &Rig<f32>) -> f64 {
+    let twist = rig.plant.frames().jacobian().twist(&rig.plant.dq);
+    twist.fixed_rows::<3>(0).norm()
+}
+
+/// Pushes the hand of an arm in this state with `force` (N) along `direction` for `seconds`.
+fn shove(rig: &mut Rig<f32>, direction: [f64; 3], force: f64, seconds: f64) -> Outcome {
+    let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let mut outcome =
+        Outcome { pushed: 0.0, after: 0.0, braked: 0.0, unseen: 0.0, state: State::Idle, fault: Fault::None };
+    let mut recent = VecDeque::from([rig.plant.dq]);
+    let push = (seconds * 300.0).round() as usize;
+    for cycle in 0..push + 240 {
+        let pushing = cycle < push;
+        let share = if pushing { force / length } else { 0.0 };
+        rig.plant.push = [direction[0] * share, direction[1] * share, direction[2] * share, 0.0, 0.0, 0.0];
+        let output = rig.tick(None);
+        assert!(output.record.state.has_torque(), "cycle {cycle} at {:.2} m/s: {:?}", hand_speed(rig), output.record);
+        let speed = hand_speed(rig);
+        let part = if pushing { &mut outcome.pushed } else { &mut outcome.after };
+        *part = part.max(speed);
+        if cycle == push + 90 {
+            outcome.braked = speed;
+        }
+        recent.push_back(rig.plant.dq);
+        if recent.len() > FILTER_CYCLES {
+            recent.pop_front();
+        }
+        for (joint, seen) in output.record.dq.into_iter().enumerate() {
+            let had = recent.iter().map(|dq| dq[joint]);
+            let (low, high) = had.fold((f64::MAX, f64::MIN), |(low, high), dq| (low.min(dq), high.max(dq)));
+            outcome.unseen = outcome.unseen.max(low - f64::from(seen)).max(f64::from(seen) - high);
+        }
+    }
+    outcome.state = rig.cycle.state();
+    outcome.fault = rig.cycle.fault();
+    outcome
+}
+
+fn in_state(state: State, seconds: f64) -> Rig<f32> {
+    let mut rig = Rig::<f32>::new(if state == State::Run { START } else { GOAL }, 1);
+    rig.load(&primitive(&Design { duration: 3.0, ..Design::default() })).expect("loads");
+    match state {
+        State::Gravity => rig.command(Command::Gravity),
+        _ => rig.command(Command::Hold),
+    };
+    rig.run_for(1.0);
+    if state == State::Run {
+        rig.command(Command::Run(RunOptions::default()));
+    }
+    rig.run_for(seconds);
+    rig
+}
+
+/// Numbers in 0..1 that look random: the fractional parts of multiples of an irrational number.
+fn fraction(index: usize, of: f64) -> f64 {
+    ((index + 1) as f64 * of).fract()
+}
+
+#[test]
+fn g1_a_shove_of_up_to_10_n_s_in_teach_hold_and_run_is_braked_with_torque_and_seen() {
+    for index in 0..201 {
+        let state = [State::Gravity, State::Hold, State::Run][index % 3];
+        let force = 10.0 + 70.0 * fraction(index, 0.618_034);
+        let seconds = (0.05 + 0.45 * fraction(index, 0.754_878)).min(10.0 / force);
+        let direction = [0.569_84, 0.802_95, 0.324_72].map(|step| fraction(index, step) - 0.5);
+        let moment = 1.5 * fraction(index, 0.430_16);
+        let mut rig = in_state(state, moment);
+        let outcome = shove(&mut rig, direction, force, seconds);
+        let what = format!("{index}: {state:?}, {force:.0} N for {seconds:.2} s along {direction:.2?}: {outcome:?}");
+        println!("{what}");
+        if std::env::var("ALL").is_ok() { continue; }
+        assert!(outcome.braked < BRAKED, "{what}");
+        assert!(outcome.after <= outcome.pushed * 1.1 + 0.05, "{what}");
+        assert!(outcome.unseen < 0.5, "{what}");
+        assert_eq!(outcome.state == State::SoftStop, outcome.fault != Fault::None, "{what}");
+    }
+}
