@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use control::limit::MOTOR_COUNTS_LIMIT;
+use control::act::limit::MOTOR_COUNTS_LIMIT;
 use system_tests::bus::torques;
 use system_tests::command::{one_object, tactus};
 use system_tests::execution::{beyond_torque_limits, play};
