@@ -2,8 +2,8 @@
 //!
 //! Here the signs of start and goal are decided, once: never per tick, because a path may exceed 180 degrees.
 
-use crate::group::{Group, Tick};
 use crate::orientation::is_near_enough;
+use crate::point_rows::{Group, Tick};
 use crate::vector::scale;
 use crate::{
     Hemisphere, ORIENTATION_ROWS, OrientationError, OrientationInput, OrientationReference, OrientationState,
