@@ -10,8 +10,8 @@ use control::model;
 use control::units::{JointAccelerations, JointPositions, JointVelocities, Vector7};
 use puck::Counts;
 
-use crate::arm;
-use crate::plan::PERIOD;
+use lab::arm;
+use lab::plan::PERIOD;
 
 /// Sub-steps of one control period.
 const SUB_STEPS: usize = 4;
