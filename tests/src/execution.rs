@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use control::State;
+use lab::arm;
+use lab::demonstration::Recording;
+use lab::primitive_file::PrimitiveFile;
+use lab::procedure::{self, Recorder, Take};
+use lab::tracking::Tracking;
 use link::{EventKind, Name, RunOptions, Statistics, Telemetry};
 use sim::BusTrace;
-use tactus::arm;
-use tactus::demonstration::Recording;
-use tactus::primitive_file::PrimitiveFile;
-use tactus::procedure::{self, Recorder, Take};
-use tactus::tracking::Tracking;
 
 use crate::{Arm, expect, simulation};
 

@@ -8,10 +8,10 @@ use control::{BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, 
 use puck::SafetyMode;
 
 use super::plant::Plant;
-use crate::arm;
-use crate::boxed::boxed;
-use crate::plan::PERIOD;
-use crate::primitive_file::HostPrimitive;
+use lab::arm;
+use lab::boxed::boxed;
+use lab::plan::PERIOD;
+use lab::primitive_file::HostPrimitive;
 
 /// Cycles in which the arm is taken up and comes to rest before the run begins: 1.5 s.
 const SETTLING: u64 = 450;

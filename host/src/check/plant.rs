@@ -8,8 +8,8 @@ use control::model::{ArmModel, Calibration, Frames};
 use control::units::{JointAccelerations, JointPositions, JointVelocities, Vector7};
 use puck::Counts;
 
-use crate::arm;
-use crate::plan::PERIOD;
+use lab::arm;
+use lab::plan::PERIOD;
 
 /// Sub-steps of one control period.
 const SUB_STEPS: usize = 4;
