@@ -91,7 +91,7 @@ fn old_words_are_found_where_they_are_old() {
         ("crates/device/src/a.rs", "struct CoreRegisters; use core::fmt;"),
         ("emulator/board/src/core.rs", "struct Core;"),
         ("a.md", "Core values of a person"),
-        ("docs/decisions/0001-a.md", "`FitPrimitive`"),
+        ("docs/decisions/NNNN-a.md", "`FitPrimitive`"),
     ] {
         assert_eq!(check(path, text), [""; 0], "{path}");
     }
