@@ -160,7 +160,7 @@ impl Config {
         let cells: Vec<String> = self.grid.cells.iter().map(Cell::to_string).collect();
         let engine = match &self.engine {
             Engine::InProcess => "in this process".to_owned(),
-            Engine::Qemu { image } | Engine::Joint { image } => format!("{} under QEMU", firmware(image)),
+            Engine::Qemu { image } | Engine::Hand { image } => format!("{} under QEMU", firmware(image)),
             Engine::Board(board) => {
                 let given =
                     if board.chip == ChipOptions::default() { String::new() } else { format!(", {:?}", board.chip) };

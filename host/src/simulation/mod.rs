@@ -18,8 +18,8 @@ mod words;
 pub use board::BoardEngine;
 pub use error::SimulationError;
 pub use options::{
-    BOARD_EMULATOR_VARIABLE, BOARD_IMAGE_VARIABLE, DEFAULT_SEED, Engine, FlashSource, GRIPPED, IMAGE_VARIABLE,
-    JOINT_IMAGE_VARIABLE, SimulationOptions, WorldKind, built_image,
+    BOARD_EMULATOR_VARIABLE, BOARD_IMAGE_VARIABLE, DEFAULT_SEED, Engine, FlashSource, GRIPPED, HAND_IMAGE_VARIABLE,
+    IMAGE_VARIABLE, SimulationOptions, WorldKind, built_image,
 };
 
 use std::time::Duration;
@@ -65,9 +65,9 @@ impl Simulation {
                 let log = options.firmware_log.as_deref();
                 Box::new(Qemu::spawn(qemu::ARM_MACHINE, image, log, options.flash.chip()?)?)
             }
-            Engine::Joint { image } => {
+            Engine::Hand { image } => {
                 let log = options.firmware_log.as_deref();
-                Box::new(Qemu::spawn(qemu::JOINT_MACHINE, image, log, options.flash.chip()?)?)
+                Box::new(Qemu::spawn(qemu::HAND_MACHINE, image, log, options.flash.chip()?)?)
             }
             Engine::Board(engine) => Box::new(EmulatedBoard::spawn(engine, options, &mut plant)?),
         };

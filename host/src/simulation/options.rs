@@ -15,8 +15,8 @@ use crate::transport::{LineKind, SimulatorKind, SimulatorOptions};
 /// Environment variable that names the firmware image for QEMU.
 pub const IMAGE_VARIABLE: &str = "TACTUS_IMAGE";
 
-/// Environment variable that names the joint image for QEMU.
-pub const JOINT_IMAGE_VARIABLE: &str = "TACTUS_JOINT_IMAGE";
+/// Environment variable that names the hand image for QEMU.
+pub const HAND_IMAGE_VARIABLE: &str = "TACTUS_HAND_IMAGE";
 
 /// Environment variable that names the emulator of the board.
 pub const BOARD_EMULATOR_VARIABLE: &str = "TACTUS_BOARD_EMULATOR";
@@ -42,8 +42,8 @@ pub enum Engine {
         /// The image, an ELF file.
         image: PathBuf,
     },
-    /// The joint image under QEMU, on a smaller machine.
-    Joint {
+    /// The hand image under QEMU, on a smaller machine.
+    Hand {
         /// The image, an ELF file.
         image: PathBuf,
     },
@@ -141,7 +141,7 @@ impl SimulationOptions {
                 image: find(BOARD_IMAGE_VARIABLE, "arm-stm32h743.elf").map_err(SimulationError::NoBoardImage)?,
                 chip: options.board.chip.clone(),
             }),
-            SimulatorKind::Joint => return Self::joint(options),
+            SimulatorKind::Hand => return Self::hand(options),
         };
         let world = match options.world.as_deref() {
             Some("simple") => WorldKind::Simple,
@@ -163,14 +163,13 @@ impl SimulationOptions {
     }
 
     /// A hand alone, with power, and something springy between its fingers.
-    fn joint(options: &SimulatorOptions) -> Result<Self, SimulationError> {
+    fn hand(options: &SimulatorOptions) -> Result<Self, SimulationError> {
         let grip = match options.world.as_deref() {
             None => [GRIPPED; 3],
             Some("empty") => [FingerObstacle::NOTHING; 3],
             Some(other) => return Err(SimulationError::UnknownWorld(other.to_owned())),
         };
-        let engine =
-            Engine::Joint { image: find(JOINT_IMAGE_VARIABLE, "joint.elf").map_err(SimulationError::NoImage)? };
+        let engine = Engine::Hand { image: find(HAND_IMAGE_VARIABLE, "hand.elf").map_err(SimulationError::NoImage)? };
         Ok(Self {
             bus_log: options.bus.clone(),
             line: options.line,

@@ -15,8 +15,8 @@ use super::{Execute, SimulationError};
 /// The machine of the arm image.
 pub(super) const ARM_MACHINE: &str = "mps2-an500";
 
-/// The machine of the joint image: a Cortex-M3.
-pub(super) const JOINT_MACHINE: &str = "mps2-an385";
+/// The machine of the hand image: a Cortex-M3.
+pub(super) const HAND_MACHINE: &str = "mps2-an385";
 
 /// The machine, with everything QEMU would add by itself switched off.
 ///

@@ -4,7 +4,7 @@
 //! sim:[options]          the firmware under QEMU, with simulated bus and world
 //! sil:[options]          the same application in this process
 //! board:[options]        the image for the STM32H743 on an emulated board, with simulated bus and world
-//! joint:[options]        the joint image under QEMU, with a hand alone on the simulated bus and something to grip
+//! hand:[options]         the hand image under QEMU, with a hand alone on the simulated bus and something to grip
 //! tcp:HOST:PORT          a socket
 //! unix:PATH              a Unix socket
 //! serial:PORT[@BAUD]     a serial port, 921600 baud unless said otherwise
@@ -29,8 +29,8 @@ pub enum SimulatorKind {
     Qemu,
     /// `sil:`, the application in this process.
     InProcess,
-    /// `joint:`, the joint image under QEMU: a hand alone on its bus.
-    Joint,
+    /// `hand:`, the hand image under QEMU: a hand alone on its bus.
+    Hand,
     /// `board:`, the image for the STM32H743 on the emulated board.
     Board,
 }
@@ -65,7 +65,7 @@ pub enum Address {
 pub enum AddressError {
     /// The part before the colon names no kind of device.
     #[error(
-        "'{0}' names no kind of device; there are sim:, sil:, board:, joint:, tcp:HOST:PORT, unix:PATH, serial:PORT[@BAUD] and can:INTERFACE[/N]"
+        "'{0}' names no kind of device; there are sim:, sil:, board:, hand:, tcp:HOST:PORT, unix:PATH, serial:PORT[@BAUD] and can:INTERFACE[/N]"
     )]
     Kind(String),
     /// Something is missing behind the colon.
@@ -97,7 +97,7 @@ impl FromStr for Address {
         match kind {
             "sim" => simulated(SimulatorKind::Qemu, rest),
             "sil" => simulated(SimulatorKind::InProcess, rest),
-            "joint" => simulated(SimulatorKind::Joint, rest),
+            "hand" => simulated(SimulatorKind::Hand, rest),
             "board" => simulated(SimulatorKind::Board, rest),
             "tcp" => match rest.rsplit_once(':') {
                 Some((host, port)) if !host.is_empty() => match port.parse::<u16>() {
@@ -143,7 +143,7 @@ impl fmt::Display for Address {
                 f.write_str(match kind {
                     SimulatorKind::Qemu => "sim:",
                     SimulatorKind::InProcess => "sil:",
-                    SimulatorKind::Joint => "joint:",
+                    SimulatorKind::Hand => "hand:",
                     SimulatorKind::Board => "board:",
                 })?;
                 write!(f, "{options}")
@@ -173,7 +173,7 @@ mod tests {
             "sil:",
             "sim:seed=7,world=simple",
             "sil:world=mujoco",
-            "joint:seed=3",
+            "hand:seed=3",
             "tcp:localhost:3333",
             "tcp:[::1]:3333",
             "unix:/run/tactus.sock",

@@ -2,7 +2,7 @@
 
 use control::{Fault, State};
 use dmp::Scalar;
-use joint::number::real;
+use hand::number::real;
 use link::{EventKind, HandStage, Name, Refusal, Reply, Request, RunOptions};
 use puck::device::reply32;
 use puck::{Action, MotorMode, Node, PropertyId, Status};

@@ -1,6 +1,6 @@
-//! The bodies of the joint image's tasks, for any board: the hand alone, in fixed point.
+//! The bodies of the hand image's tasks, for any board: the hand alone, in fixed point.
 //!
-//! As [`crate::application`], with the halves of the crate `joint` and without storage: the library lives in memory.
+//! As [`crate::application`], with the halves of the crate `hand` and without storage: the library lives in memory.
 
 mod session;
 mod slot;
@@ -8,8 +8,8 @@ mod slot;
 use core::mem::MaybeUninit;
 
 use device::Identity;
+use hand::{Command, Core, Event, Library, Session, TimedRecord};
 use heapless::spsc::Queue;
-use joint::{Command, Core, Event, Library, Session, TimedRecord};
 use puck::CanFrame;
 
 use crate::application::{ReceiveTask, TransmitTask};

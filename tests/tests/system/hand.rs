@@ -1,4 +1,4 @@
-//! The joint image on its Cortex-M3 under QEMU: a hand alone on its bus, from power-up to a grip with the expected force, and what it costs.
+//! The hand image on its Cortex-M3 under QEMU: a hand alone on its bus, from power-up to a grip with the expected force, and what it costs.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use system_tests::{Arm, boot, connect, expect, simulation, taught};
 use tactus::error::HostError;
 use tactus::image_file::ImageFile;
 use tactus::procedure;
-use tactus::simulation::{JOINT_IMAGE_VARIABLE, built_image};
+use tactus::simulation::{HAND_IMAGE_VARIABLE, built_image};
 
 /// Name of the movement.
 const GRIP: &str = "grip";
@@ -140,8 +140,8 @@ fn force_error(account: &Account) -> f32 {
 }
 
 #[test]
-fn joint_image_grips_with_the_expected_force_within_half_of_a_72_mhz_cycle() {
-    let account = grip("joint:seed=31", adapt());
+fn hand_image_grips_with_the_expected_force_within_half_of_a_72_mhz_cycle() {
+    let account = grip("hand:seed=31", adapt());
     assert_eq!(account.stages, [HandStage::Absent, HandStage::Ready]);
     let last = account.telemetry.last().expect("telemetry");
     assert_eq!((State::from_code(last.state), last.fault), (Some(State::Hold), 0), "it holds what it gripped");
@@ -166,7 +166,7 @@ fn joint_image_grips_with_the_expected_force_within_half_of_a_72_mhz_cycle() {
     assert!(worst < BOUND, "a control cycle takes {worst} instructions");
     assert_eq!((missed_deadlines, account.statistics.hand_lost_replies), (0, 0));
     assert_eq!(account.trace.invalid, 0, "{:?}", account.trace.invalid_examples);
-    let blind = grip("joint:seed=31", RunOptions::default());
+    let blind = grip("hand:seed=31", RunOptions::default());
     let (felt, unfelt) = (force_error(&account), force_error(&blind));
     println!("force error at the end    {felt:>8.3} N m with feedback and force control, {unfelt:.3} without");
     assert!(felt < 0.05 && felt < 0.5 * unfelt, "the force is not tracked: {felt} N m, {unfelt} without");
@@ -178,18 +178,18 @@ fn share(instructions: u32, clocks: f64) -> f64 {
 }
 
 #[test]
-fn joint_runs_are_equal_bit_by_bit_for_equal_seeds() {
-    let (once, again) = (grip("joint:seed=32", adapt()), grip("joint:seed=32", adapt()));
-    println!("joint: with one seed: {:016x} and {:016x}", once.trace.hash, again.trace.hash);
+fn hand_runs_are_equal_bit_by_bit_for_equal_seeds() {
+    let (once, again) = (grip("hand:seed=32", adapt()), grip("hand:seed=32", adapt()));
+    println!("hand: with one seed: {:016x} and {:016x}", once.trace.hash, again.trace.hash);
     assert_eq!(once.trace.hash, again.trace.hash, "other frames, or other times of frames");
     assert!(once.telemetry == again.telemetry, "other telemetry");
     assert_eq!(once.statistics, again.statistics);
-    assert_ne!(once.trace.hash, grip("joint:seed=33", adapt()).trace.hash, "the seed does nothing");
+    assert_ne!(once.trace.hash, grip("hand:seed=33", adapt()).trace.hash, "the seed does nothing");
 }
 
 #[test]
-fn joint_run_stops_on_command_and_lets_the_worms_hold() {
-    let (mut hand, _) = begin("joint:seed=34");
+fn hand_run_stops_on_command_and_lets_the_worms_hold() {
+    let (mut hand, _) = begin("hand:seed=34");
     expect(hand.run(&name(), adapt()));
     let running: Vec<_> = expect(hand.telemetry(1)).take(900).map(expect).collect();
     assert_eq!(running.last().and_then(|cycle| State::from_code(cycle.state)), Some(State::Run));
@@ -202,8 +202,8 @@ fn joint_run_stops_on_command_and_lets_the_worms_hold() {
 }
 
 #[test]
-fn joint_device_refuses_what_needs_an_arm() {
-    let (mut hand, _) = begin("joint:seed=35");
+fn hand_device_refuses_what_needs_an_arm() {
+    let (mut hand, _) = begin("hand:seed=35");
     for request in
         [Request::Gravity, Request::Zero { home: [0.0; 7] }, Request::Approach { q: [0.0; 7], duration: 1.0 }]
     {
@@ -223,14 +223,14 @@ fn joint_device_refuses_what_needs_an_arm() {
 }
 
 #[test]
-fn joint_run_reports_its_fingers_and_no_tool() {
+fn hand_run_reports_its_fingers_and_no_tool() {
     let folder = expect(tempfile::tempdir());
     let folder = folder.path();
     let mut file = taught().clone();
     file.start.hand = [0.0; 4];
     file.goal.hand = [0.3, 0.8, 0.7, 0.6];
     expect(file.write(&folder.join("primitive.toml")));
-    let device = ["--device", "joint:seed=37,world=empty"];
+    let device = ["--device", "hand:seed=37,world=empty"];
     let run = tactus(folder, &[&["--json"], &device[..], &["run", "primitive.toml"]].concat()).success();
     let report = one_object(&run.get_output().stdout);
     assert!(report.get("tracking").is_none(), "{report}");
@@ -250,13 +250,13 @@ fn joint_run_reports_its_fingers_and_no_tool() {
 }
 
 #[test]
-fn joint_image_says_in_its_file_what_it_says_when_it_runs_and_is_not_flashed() {
-    let path = match std::env::var_os(JOINT_IMAGE_VARIABLE) {
+fn hand_image_says_in_its_file_what_it_says_when_it_runs_and_is_not_flashed() {
+    let path = match std::env::var_os(HAND_IMAGE_VARIABLE) {
         Some(path) => std::path::PathBuf::from(path),
-        None => built_image("joint.elf").expect("`cargo xtask build --image joint` leaves the image"),
+        None => built_image("hand.elf").expect("`cargo xtask build --image hand` leaves the image"),
     };
     let image = ImageFile::read(&path).unwrap_or_else(|error| panic!("{error}"));
-    let hand = connect("joint:seed=38");
+    let hand = connect("hand:seed=38");
     let (file, device) = (&image.description, hand.hello());
     assert_eq!((device.board.as_str(), device.firmware.as_str()), (file.board.as_str(), file.firmware.as_str()));
     assert_eq!((device.link_version, device.schema_hash), (file.link_version, file.schema_hash));
@@ -268,8 +268,8 @@ fn joint_image_says_in_its_file_what_it_says_when_it_runs_and_is_not_flashed() {
 }
 
 #[test]
-fn nothing_moves_on_the_joint_bus_before_a_persons_word() {
-    let mut hand = expect(tactus::client::Client::connect(boot("joint:seed=36"), "system test"));
+fn nothing_moves_on_the_hand_bus_before_a_persons_word() {
+    let mut hand = expect(tactus::client::Client::connect(boot("hand:seed=36"), "system test"));
     let until = hand.now() + Duration::from_secs(4);
     while hand.now() < until {
         expect(hand.next(Duration::from_millis(100)));

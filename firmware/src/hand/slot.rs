@@ -2,8 +2,8 @@
 
 use device::Slot;
 use embedded_hal::digital::{OutputPin, PinState};
+use hand::{Command, Core, CoreIo, Event, Record, TimedRecord};
 use heapless::spsc::{Consumer, Producer};
-use joint::{Command, Core, CoreIo, Event, Record, TimedRecord};
 use puck::CanFrame;
 use rtic_core::Mutex;
 

@@ -1,4 +1,4 @@
-//! The joint image: a hand on a CAN bus of its own, in fixed point, for a Cortex-M3 (QEMU's mps2-an385).
+//! The hand image: a hand on a CAN bus of its own, in fixed point, for a Cortex-M3 (QEMU's mps2-an385).
 
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
@@ -10,7 +10,7 @@ fn main() {}
 #[cfg(target_os = "none")]
 const BOARD_NAME: &str = "mps2-an385";
 
-/// The flash of the part whose sizes the image keeps to (`memory/joint.x`).
+/// The flash of the part whose sizes the image keeps to (`memory/hand.x`).
 #[cfg(target_os = "none")]
 const IMAGE: link::metadata::MemoryRegion = link::metadata::MemoryRegion { start: 0, length: 256 * 1024 };
 
@@ -30,10 +30,10 @@ mod app {
     use firmware::application::{ReceiveTask, StackUse, TransmitTask};
     use firmware::board::device::Interrupt;
     use firmware::board::{Board, Edge, stack};
-    use firmware::joint::{self as application, Application, Memory, SessionTask, SlotTask};
+    use firmware::hand::{self as application, Application, Memory, SessionTask, SlotTask};
     use firmware::metadata;
     use firmware::meters::Meters;
-    use joint::Core;
+    use hand::Core;
 
     use super::BOARD_NAME;
 
@@ -57,7 +57,7 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let board = Board::start(cx.core);
         let version = metadata::FIRMWARE;
-        defmt::info!("tactus joint {=str} on {=str}", version, BOARD_NAME);
+        defmt::info!("tactus hand {=str} on {=str}", version, BOARD_NAME);
         let serial = board.serial();
         let Application { core, can, slot_task, receive_task, transmit_task, session_task } =
             application::start(version, BOARD_NAME, serial, board.split(), cx.local.memory);

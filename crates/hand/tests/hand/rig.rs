@@ -1,11 +1,9 @@
-//! A hand alone on the simulated bus, with the whole joint application in this process.
+//! A hand alone on the simulated bus, with the whole application of the hand in this process.
 
 use std::collections::VecDeque;
 
 use device::{Identity, QueueFull, Slot, Timing};
-use joint::{
-    Command, Core, CoreIo, Event, FingerPrimitive, Health, Library, Record, Session, SessionPort, TimedRecord,
-};
+use hand::{Command, Core, CoreIo, Event, FingerPrimitive, Health, Library, Record, Session, SessionPort, TimedRecord};
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
 use link::{HostHello, LINK_VERSION, Reply, Request, SCHEMA_HASH, Text};
 use puck::CanFrame;

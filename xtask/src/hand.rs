@@ -1,7 +1,7 @@
-//! The joint image: built for a Cortex-M3, measured under QEMU, held against the part it is for.
+//! The hand image: built for a Cortex-M3, measured under QEMU, held against the part it is for.
 //!
 //! What is counted are instructions: one tick of the image's clock is five. A Cortex-M3 needs more than one clock for some of them
-//! (docs/joint.md), which is why the bound is half a cycle.
+//! (docs/hand.md), which is why the bound is half a cycle.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -12,7 +12,7 @@ use anyhow::{Context, Result, ensure};
 use crate::board::Board;
 use crate::code::{Code, Function};
 use crate::elf::{Elf, Sizes};
-use crate::setup::{JOINT, Machine};
+use crate::setup::{HAND, Machine};
 use crate::thumb::Flow;
 use crate::{build, shell};
 
@@ -22,7 +22,7 @@ const PART_FLASH: u32 = 256 * 1024;
 const PART_RAM: u32 = 64 * 1024;
 
 /// File name of the image beside the tools.
-pub(crate) const FILE: &str = "joint.elf";
+pub(crate) const FILE: &str = "hand.elf";
 
 /// Stack that must be left.
 const STACK_RESERVE: u32 = 16 * 1024;
@@ -36,18 +36,18 @@ const SESSION_HANDLER: &str = "DISPATCH_SESSION";
 /// Functions of the compiler's library that compute with floating-point numbers begin so.
 const FLOATING: [&str; 2] = ["__aeabi_f", "__aeabi_d"];
 
-/// Builds the joint image; returns the path under which the host tools look for it.
+/// Builds the hand image; returns the path under which the host tools look for it.
 pub(crate) fn image(machine: &Machine) -> Result<PathBuf> {
-    shell::step("building the joint image for QEMU's mps2-an385");
-    let mut cargo = machine.toolchain.cargo("build", JOINT)?;
+    shell::step("building the hand image for QEMU's mps2-an385");
+    let mut cargo = machine.toolchain.cargo("build", HAND)?;
     let features = if machine.qemu.may_sleep() { "board-mps2,wfi" } else { "board-mps2" };
-    cargo.args(["--package", "firmware", "--bin", "joint", "--profile", "firmware"]).args([
+    cargo.args(["--package", "firmware", "--bin", "hand", "--profile", "firmware"]).args([
         "--no-default-features",
         "--features",
         features,
     ]);
     shell::run(&mut cargo)?;
-    let built = machine.toolchain.output(JOINT, "firmware").join("joint");
+    let built = machine.toolchain.output(HAND, "firmware").join("hand");
     let folder = shell::target_dir().join("images");
     fs::create_dir_all(&folder)?;
     let image = folder.join(FILE);
@@ -90,13 +90,13 @@ pub(crate) fn run(machine: &Machine) -> Result<()> {
     image(machine)?;
     // The tests run the command as well, in the build that all tests share.
     build::host()?;
-    shell::step("the joint image under QEMU: start-up, grip, costs");
+    shell::step("the hand image under QEMU: start-up, grip, costs");
     let mut system = shell::cargo();
-    system.args(["test", "--release", "--package", "system-tests", "--test", "system", "joint"]);
+    system.args(["test", "--release", "--package", "system-tests", "--test", "system", "hand::"]);
     system.args(["--features", build::WORLD]);
     shell::run(system.args(["--", "--nocapture", "--test-threads", "1"]))?;
     shell::step("accuracy against f64, saturation, ladder (development profile: integers that wrap are errors)");
-    shell::run(shell::cargo().args(["test", "--package", "joint", "--", "--nocapture", "--test-threads", "1"]))
+    shell::run(shell::cargo().args(["test", "--package", "hand", "--", "--nocapture", "--test-threads", "1"]))
 }
 
 /// Which function calls which, by the branch instructions of an image.

@@ -1,8 +1,8 @@
-//! Talks with the host, for the joint image.
+//! Talks with the host, for the hand image.
 
 use device::{QueueFull, Timing};
+use hand::{Command, Core, Event, FingerPrimitive, Health, Session, SessionPort, TimedRecord};
 use heapless::spsc::{Consumer, Producer};
-use joint::{Command, Core, Event, FingerPrimitive, Health, Session, SessionPort, TimedRecord};
 use rtic_core::Mutex;
 
 use crate::application::StackUse;

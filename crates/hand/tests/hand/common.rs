@@ -1,8 +1,8 @@
 //! What the tests share: primitives as images, in fixed point and in f64.
 
 use dmp::{Configuration, Hemisphere, OrientationError, Primitive, PrimitiveTables, Quaternion, ROWS, Velocity};
-use joint::FingerPrimitive;
-use joint::image::ImageReader;
+use hand::FingerPrimitive;
+use hand::image::ImageReader;
 use link::Name;
 use link::image::{
     ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity,

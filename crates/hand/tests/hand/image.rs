@@ -1,7 +1,7 @@
 //! The reader that never holds an image against the one that does.
 
-use joint::FingerPrimitive;
-use joint::image::{ImageReader, Summary};
+use hand::FingerPrimitive;
+use hand::image::{ImageReader, Summary};
 use link::image::{PrimitiveImage, stored_crc};
 use link::{Name, Refusal};
 

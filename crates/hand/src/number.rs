@@ -1,7 +1,7 @@
 //! `Number`, the fixed-point number of the control path, and what it lacks for that path.
 //!
 //! 64 bits, 32 of them behind the point ([`dmp::FixedPoint`]): range +-2.1e9, resolution 2.3e-10, every operation saturates and none
-//! wraps (`docs/decisions/0050-numbers-of-the-joint-image.md`).
+//! wraps (`docs/decisions/0050-numbers-of-the-hand-image.md`).
 
 use dmp::{FixedPoint, Scalar};
 

@@ -1,8 +1,8 @@
 //! Trajectories in fixed point against the same equations in f64, and against the golden vectors.
 
 use dmp::{Coupling, Scalar, SensorMap, StartState};
-use joint::number::{Number, ONE, ZERO, from_real};
-use joint::{Rollout, forcing};
+use hand::number::{Number, ONE, ZERO, from_real};
+use hand::{Rollout, forcing};
 
 use crate::common::Movement;
 

@@ -6,9 +6,9 @@ use control::hand::{
     HandController as ExactController, HandEstimator as ExactEstimator, HandReference as ExactReference,
 };
 use dmp::Scalar;
-use joint::controller::{HandController, HandReference};
-use joint::estimate::{HandEstimator, gauge_torque};
-use joint::number::{Number, from_real};
+use hand::controller::{HandController, HandReference};
+use hand::estimate::{HandEstimator, gauge_torque};
+use hand::number::{Number, from_real};
 use pinned_init::InPlaceWrite;
 use puck::Counts;
 

@@ -2,13 +2,13 @@
 
 use control::HandSample;
 use dmp::Scalar;
-use joint::controller::{HandController, HandReference};
-use joint::estimate::{HandEstimator, HandState};
-use joint::filter::{GAUGE, LowPass};
-use joint::limit::{HandLimiter, Scales};
-use joint::motion::HandMotion;
-use joint::number::{Number, share, within};
-use joint::{Rollout, forcing};
+use hand::controller::{HandController, HandReference};
+use hand::estimate::{HandEstimator, HandState};
+use hand::filter::{GAUGE, LowPass};
+use hand::limit::{HandLimiter, Scales};
+use hand::motion::HandMotion;
+use hand::number::{Number, share, within};
+use hand::{Rollout, forcing};
 use puck::Counts;
 
 use crate::common::{Movement, Random};
