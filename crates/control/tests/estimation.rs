@@ -254,6 +254,26 @@ fn after_the_bridge_the_estimate_stands_still() {
 }
 
 #[test]
+fn g1_a_joint_that_runs_into_its_stop_at_any_speed_is_believed() {
+    let calibration = nominal::<f64>();
+    for joint in 0..7 {
+        for (speed, thrown_back) in [(20.0, 0.0), (-20.0, 0.4), (30.0, 0.3)] {
+            let mut estimator = JointEstimator::<f64>::new(&nominal());
+            let mut q = 0.0;
+            for cycle in 0..60 {
+                // Up to the speed in 0.1 s, then at a stop.
+                let now = if cycle < 30 { speed * f64::from(cycle) / 30.0 } else { -speed * thrown_back };
+                q += now / RATE;
+                let mut angles = [0.1; 7];
+                angles[joint] += q;
+                let state = estimator.update(&replies(&calibration, angles), true).expect("complete");
+                assert_eq!((state.missing, state.displaced), (0, false), "J{}, cycle {cycle}", joint + 1);
+            }
+        }
+    }
+}
+
+#[test]
 fn the_filter_has_unit_gain_at_rest_and_half_power_at_its_cut_off() {
     let gain = |frequency: f64| {
         let mut filter = LowPass::<f64, 1>::new(Butterworth::new(50.0, RATE));

@@ -7,6 +7,7 @@ use crate::law::force::ForceController;
 use crate::law::hand::HandReference;
 use crate::law::joint::JointReference;
 use crate::law::operational::TaskReference;
+use crate::model::arm::{at_least, at_most, within};
 use crate::model::kinematics::Frames;
 use crate::plan::run::Senses;
 use crate::real::Real;
@@ -15,6 +16,16 @@ use crate::units::{JointPositions, JointTorques, Pose, Vector6, Vector7, Wrench}
 
 /// Length of the damping that carries the arm while gravity torque builds up after arming (control periods): 0.5 s.
 const ARMING: u16 = 150;
+
+/// Speed at which a held posture returns after somebody pushed the arm away from it (rad/s).
+const RETURN_SPEED: f64 = 0.2;
+
+/// Speed of the hand up to which the arm floats freely (m/s).
+const TAUGHT_SPEED: f64 = 0.18;
+
+/// Speed of the hand from which it is damped as in a soft stop (m/s); in between the damping rises. 0.25 m/s, the reduced
+/// speed of the standards for work beside a person, lies in between: an arm that was shoved falls below it by itself.
+const BRAKED_SPEED: f64 = 0.30;
 
 /// What the law of a state asks for, besides the torque.
 pub(super) struct Demand<R: Real> {
@@ -33,13 +44,16 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let mut demand = match self.supervisor.law() {
             State::Idle | State::Fault | State::Coast => return None,
             State::Gravity => self.float(measured),
-            State::Hold => self.hold_to(measured, JointReference::at_rest(self.hold)),
+            State::Hold => {
+                let reference = JointReference::at_rest(self.yield_to(&measured.state.q));
+                self.hold_to(measured, reference)
+            }
             State::Approach => {
                 let reference = match &mut self.approach {
                     Some(approach) => approach.step(),
                     None => JointReference::at_rest(self.hold),
                 };
-                self.hold = reference.q;
+                (self.hold, self.held) = (reference.q, reference.q);
                 self.hold_to(measured, reference)
             }
             State::Run => self.run_primitive(measured),
@@ -60,12 +74,16 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
-    /// Gravity compensation; damped while it builds up after arming.
+    /// Gravity compensation; damped while it builds up after arming, and while the hand is faster than a person teaches.
     fn float(&self, measured: &Measured<'_, R>) -> Demand<R> {
         let mut torque = self.model.gravity_torque(measured.frames).0;
+        let mut share = (hand_speed(measured) - R::of(TAUGHT_SPEED)) * R::of(1.0 / (BRAKED_SPEED - TAUGHT_SPEED));
         if self.armed_for < ARMING {
-            let share = R::from_counts(i32::from(ARMING - self.armed_for)) / R::from_counts(i32::from(ARMING));
-            torque -= self.gains.stop_damping.component_mul(&measured.state.dq.0) * share;
+            let arming = R::from_counts(i32::from(ARMING - self.armed_for)) / R::from_counts(i32::from(ARMING));
+            share = at_least(share, arming);
+        }
+        if share > R::of(0.0) {
+            torque -= self.gains.stop_damping.component_mul(&measured.state.dq.0) * at_most(share, R::of(1.0));
         }
         self.plain(measured, torque)
     }
@@ -78,6 +96,21 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let gravity = self.model.gravity_torque(measured.frames).0;
         let damping = self.gains.stop_damping.component_mul(&measured.state.dq.0);
         self.plain(measured, gravity + rest * share - damping)
+    }
+
+    /// The posture that is held now: where it shall be, unless the arm was pushed away from there by more than the clamp of its
+    /// gains. Then it gives way, and comes back slowly once it is let go.
+    fn yield_to(&mut self, q: &JointPositions<R>) -> JointPositions<R> {
+        let step = R::of(RETURN_SPEED * PERIOD);
+        let back = (self.hold.0 - self.held.0).map(|way| within(way, step));
+        let away = (self.held.0 + back - q.0).zip_map(&self.gains.stiff.clamp, within);
+        let held = q.0 + away;
+        // Exactly, where nobody pushes: a sum of differences is not.
+        self.held = JointPositions(held.zip_map(&self.hold.0, |held, hold| {
+            let rest = held - hold;
+            if rest < step && rest > -step { hold } else { held }
+        }));
+        self.held
     }
 
     /// Eq (10) along a joint reference, with the integral that takes away what friction leaves.
@@ -168,9 +201,14 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         torque.0 += rest * (R::from_counts(i32::from(left)) * R::of(1.0 / f64::from(HANDOVER)));
         self.handover.1 = left.saturating_sub(1);
         let offset = task.pose.position - measured.pose.position;
-        self.tracking = offset.dot(&offset).square_root();
+        self.tracking = (offset.dot(&offset).square_root(), self.operational.lag());
         Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, flags: set }
     }
+}
+
+/// Speed of the hand (m/s).
+fn hand_speed<R: Real>(measured: &Measured<'_, R>) -> R {
+    measured.frames.jacobian().twist(&measured.state.dq.0).fixed_rows::<3>(0).norm_squared().square_root()
 }
 
 /// The command with its force and its torque cut to these magnitudes (N, N m), their directions kept.

@@ -87,6 +87,8 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     approach: Option<Approach<R>>,
     /// Desired posture of `Hold` (rad).
     hold: JointPositions<R>,
+    /// Where that posture has given way to (rad).
+    held: JointPositions<R>,
     /// Torque beyond gravity when a soft stop began (N m), and the control periods left of its ramp.
     rest: (Vector7<R>, u16),
     /// Torque beyond what the arm itself needs when a compliant run began (N m), and the control periods left of its ramp.
@@ -99,7 +101,8 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     saturated: bool,
     /// Whether the last torque was cut at all, to the rate limit included.
     limited: bool,
-    tracking: R,
+    /// Distance (m) and speed (m/s) of the tool against the plan.
+    tracking: (R, R),
     pending: Option<Event>,
     /// Whether the caller reports a fault of its own in this cycle.
     outside_fault: bool,
@@ -137,6 +140,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             run: None,
             approach: None,
             hold: home,
+            held: home,
             rest: (Vector7::zeros(), 0),
             handover: (Vector7::zeros(), 0),
             safety: None,
@@ -144,7 +148,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             zero_cycles: 0,
             saturated: false,
             limited: false,
-            tracking: R::of(0.0),
+            tracking: (R::of(0.0), R::of(0.0)),
             pending: None,
             outside_fault: false,
             calibration,

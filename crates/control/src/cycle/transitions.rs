@@ -62,6 +62,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                     State::Approach => {}
                     _ => self.hold = q,
                 }
+                self.held = self.hold;
             }
             State::Run => {
                 // From what the feedback is drawn to while holding, so that the torque against friction stays.
@@ -75,7 +76,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 };
                 self.operational = OperationalController::new(JointPositions(start));
                 self.force.restart(self.gains.tracking(compliant).force_window);
-                self.tracking = R::of(0.0);
+                self.tracking = (R::of(0.0), R::of(0.0));
             }
             State::SoftStop => {
                 let gravity = self.model.gravity_torque(measured.frames);
@@ -125,7 +126,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.rest = (Vector7::zeros(), 0);
         self.handover = (Vector7::zeros(), 0);
         self.hand.release();
-        self.tracking = R::of(0.0);
+        self.tracking = (R::of(0.0), R::of(0.0));
         self.saturated = false;
         self.limited = false;
         self.zero_cycles = ZERO_CYCLES;

@@ -16,6 +16,9 @@ const STOP_DISTANCE: f64 = 0.02;
 /// Stiffness of the push back beyond a bound (N m/rad): several N m before the stop, so that a person feels it coming.
 const STIFFNESS: [f64; JOINTS] = [100.0, 150.0, 80.0, 60.0, 25.0, 40.0, 8.0];
 
+/// Speed of a return at which nothing pushes any more (rad/s). Without it the push gives back as speed what the way out cost.
+const RETURN_SPEED: f64 = 0.5;
+
 /// Damping while moving further out (N m s/rad).
 const DAMPING: [f64; JOINTS] = [15.0, 25.0, 4.5, 4.0, 0.22, 0.6, 0.06];
 
@@ -60,11 +63,18 @@ impl<R: Real> JointBounds<R> {
             let above = at_least(q.0[joint] - self.max[joint], zero);
             let below = at_least(self.min[joint] - q.0[joint], zero);
             if above > zero {
-                torque[joint] = -above * R::of(STIFFNESS[joint]) - at_least(dq.0[joint], zero) * R::of(DAMPING[joint]);
+                torque[joint] = -push_back(joint, above, dq.0[joint]);
             } else if below > zero {
-                torque[joint] = below * R::of(STIFFNESS[joint]) - at_most(dq.0[joint], zero) * R::of(DAMPING[joint]);
+                torque[joint] = push_back(joint, below, -dq.0[joint]);
             }
         }
         JointTorques(torque)
     }
+}
+
+/// Torque towards the inside (N m) on a joint that is this far out (rad) and moves further out at this speed (rad/s).
+fn push_back<R: Real>(joint: usize, distance: R, outward: R) -> R {
+    let zero = R::of(0.0);
+    let share = at_most(at_least(R::of(1.0) + outward * R::of(1.0 / RETURN_SPEED), zero), R::of(1.0));
+    distance * R::of(STIFFNESS[joint]) * share + at_least(outward, zero) * R::of(DAMPING[joint])
 }

@@ -25,6 +25,9 @@ const FORCE_CYCLES: u8 = 2;
 /// Largest distance between plan and tool (m); a plan farther away has lost its arm.
 pub(crate) const TRACKING_LIMIT: f64 = 0.30;
 
+/// Largest speed of the tool against its plan (m/s). Somebody who pushes harder is not followed; a loop that swings is stopped.
+const LAG_LIMIT: f64 = 0.5;
+
 /// Cycles without positions after which torque goes off: 200 ms.
 const SILENCE_CYCLES: u8 = 60;
 
@@ -41,8 +44,8 @@ pub(crate) struct Observation<'a, R: Real> {
     pub(crate) bounds: &'a JointBounds<R>,
     /// Magnitude of the unfiltered, tared force (N).
     pub(crate) force: R,
-    /// Distance between plan and tool in the last cycle (m).
-    pub(crate) tracking: R,
+    /// Distance (m) and speed (m/s) of the tool against the plan in the last cycle.
+    pub(crate) tracking: (R, R),
     /// Whether the run depends on the wrench, and it is gone.
     pub(crate) wrench_lost: bool,
     /// Whether the sensor has been at full scale: in a force, or in a torque that the run depends on.
@@ -80,7 +83,9 @@ impl<R: Real> Monitor<R> {
             Some(Fault::JointLimit)
         } else if law == State::Run && seen.wrench_lost {
             Some(Fault::WrenchLost)
-        } else if law == State::Run && seen.tracking > R::of(TRACKING_LIMIT) {
+        } else if law == State::Run && seen.tracking.0 > R::of(TRACKING_LIMIT) {
+            Some(Fault::TrackingError)
+        } else if law == State::Run && seen.tracking.1 > R::of(LAG_LIMIT) {
             Some(Fault::TrackingError)
         } else if state.dq.0.iter().zip(&self.speed_limit).any(|(dq, limit)| *dq > *limit || *dq < -*limit) {
             Some(Fault::JointSpeed)

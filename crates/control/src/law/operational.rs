@@ -21,6 +21,10 @@ use crate::units::{JOINTS, JointAccelerations, JointPositions, JointVelocities, 
 /// Cut-off of the differentiated acceleration (Hz).
 const ACCELERATION_CUT_OFF: f64 = 15.0;
 
+/// Fastest return to the plan, added to the speed of the plan itself (m/s, rad/s): an arm that was pushed far off does not
+/// snap back.
+const CORRECTION_SPEED: (f64, f64) = (0.2, 1.0);
+
 /// What the tool should do at one tick, and which posture the rest of the arm should prefer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TaskReference<R: Real> {
@@ -43,6 +47,7 @@ pub struct OperationalController<R: Real> {
     dq_d: JointVelocities<R>,
     derivative: LowPass<R, JOINTS>,
     clamped: bool,
+    lag: R,
 }
 
 impl<R: Real> OperationalController<R> {
@@ -53,6 +58,7 @@ impl<R: Real> OperationalController<R> {
             dq_d: JointVelocities::zero(),
             derivative: LowPass::new(Butterworth::new(ACCELERATION_CUT_OFF, RATE)),
             clamped: false,
+            lag: R::of(0.0),
         }
     }
 
@@ -64,6 +70,11 @@ impl<R: Real> OperationalController<R> {
     /// Whether the anti-windup clamp acted in the last tick.
     pub fn is_clamped(&self) -> bool {
         self.clamped
+    }
+
+    /// Speed of the tool against that of the plan in the last tick (m/s).
+    pub fn lag(&self) -> R {
+        self.lag
     }
 
     /// One tick. `frames` are those of the measured posture.
@@ -92,14 +103,19 @@ impl<R: Real> OperationalController<R> {
             Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
         };
 
-        let correction = gain(task.pose.position - pose.position, pose.orientation.error_to(&task.pose.orientation));
+        let (offset, turn) = (task.pose.position - pose.position, pose.orientation.error_to(&task.pose.orientation));
+        let correction = gain(
+            within_length(offset, R::of(CORRECTION_SPEED.0) / gains.position),
+            within_length(turn, R::of(CORRECTION_SPEED.1) / gains.orientation),
+        );
         // The posture term uses the measured q in either case, so that the null space does not integrate blindly.
         let preferred = (task.posture - state.q.0) * gains.posture;
         let dq_d = inverse.resolve(&(task.velocity + correction), &preferred);
 
+        let rate = task.velocity - jacobian.twist(&dq.0);
+        self.lag = rate.fixed_rows::<3>(0).norm_squared().square_root();
         let ddq_d = match acceleration {
             AccelerationSource::Analytic => {
-                let rate = task.velocity - jacobian.twist(&dq.0);
                 let damping = gain(rate.fixed_rows::<3>(0).into(), rate.fixed_rows::<3>(3).into());
                 let wanted = task.acceleration + damping - frames.velocity_product(dq).to_vector();
                 inverse.resolve(&wanted, &((task.posture_velocity - state.dq.0) * gains.posture))
@@ -127,6 +143,12 @@ impl<R: Real> OperationalController<R> {
         self.q_d = JointPositions(q_d);
         JointReference { q: self.q_d, dq: self.dq_d, ddq: JointAccelerations(ddq_d) }
     }
+}
+
+/// The vector, shortened to this length if it is longer.
+fn within_length<R: Real>(vector: Vector3<R>, longest: R) -> Vector3<R> {
+    let squared = vector.norm_squared();
+    if squared <= longest * longest { vector } else { vector * (longest / squared.square_root()) }
 }
 
 impl<R: Real> TaskReference<R> {

@@ -6,8 +6,9 @@
 //! 0.031 rad/s; the noise of differencing lies near half the sampling rate, and behind the 50 Hz filter it is 8 times smaller.
 //! At 30 Hz the delay would already cost the wrist its damping (stiff gains, three cycles of delay).
 //!
-//! A reply is believed if it lies where the motor can have turned to: at its last speed, changed by at most 1.5 times its
-//! speed limit a cycle. A person who shoves the arm stays within that at any speed; a puck that begins to count anew does not.
+//! A reply is believed if it lies where the motor can have turned to: at its last speed, stopped dead, or in between, changed
+//! by at most 1.5 times its speed limit a cycle. A person who shoves the arm stays within that at any speed, into a mechanical
+//! stop too; a puck that begins to count anew does not.
 //! Two replies that agree with each other but not with the ones before are a jump: the position goes on from where the motor
 //! was carried to, the speed is measured, and the joint state says that the zero is lost ([`JointState::displaced`]).
 //! Missing motors are carried on at the velocity estimated last, for at most [`COAST_CYCLES`]; then they stand still.
@@ -164,7 +165,14 @@ impl<R: Real> JointEstimator<R> {
             self.rates = motor_speeds.component_mul(&self.counts_per_radian) * R::of(PERIOD);
         }
         let displaced = self.displaced;
-        Some(JointState { q: JointPositions::from_array(q), dq: JointVelocities(dq), missing, age, implausible, displaced })
+        Some(JointState {
+            q: JointPositions::from_array(q),
+            dq: JointVelocities(dq),
+            missing,
+            age,
+            implausible,
+            displaced,
+        })
     }
 
     /// The first complete set of replies.
@@ -199,13 +207,13 @@ impl Motor {
         let moved = counts.0.wrapping_sub(self.counts.0);
         let bridged = i32::from(elapsed.min(COAST_CYCLES + 1));
         let carried = self.step.saturating_mul(i32::from(elapsed.min(COAST_CYCLES)));
-        if is_near(moved, carried, gate.saturating_mul(bridged)) {
+        if is_within(moved, carried, gate.saturating_mul(bridged)) {
             let cycles = i32::from(elapsed);
             *self = Motor { counts, step: moved / cycles, age: 0, doubtful: None, ..*self };
             return Some(Believed { rate: R::from_counts(moved) / R::from_counts(cycles), jumped: false });
         }
         let since = self.doubtful.replace(counts).map(|doubtful| counts.0.wrapping_sub(doubtful.0));
-        let step = since.filter(|step| is_near(*step, self.step, gate))?;
+        let step = since.filter(|step| is_within(*step, self.step, gate))?;
         let can_have_turned = moved.unsigned_abs() <= gate.unsigned_abs().saturating_mul(u32::from(elapsed));
         let counts = if torque_on && !can_have_turned { Counts(self.counts.0.wrapping_add(carried)) } else { counts };
         let shift = counts.0.wrapping_sub(self.counts.0.wrapping_add(moved));
@@ -214,6 +222,10 @@ impl Motor {
     }
 }
 
-fn is_near(value: i32, expected: i32, tolerance: i32) -> bool {
-    value.wrapping_sub(expected).unsigned_abs() <= tolerance.unsigned_abs()
+/// True if a motor that was to move by `carried` can have moved by `moved`: stopped dead by an obstacle and thrown back by
+/// half, going on, or anything in between, and that changed by `gate`.
+fn is_within(moved: i32, carried: i32, gate: i32) -> bool {
+    let thrown_back = -(carried / 2);
+    let (low, high) = if carried < 0 { (carried, thrown_back) } else { (thrown_back, carried) };
+    moved >= low.saturating_sub(gate) && moved <= high.saturating_add(gate)
 }

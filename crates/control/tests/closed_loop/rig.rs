@@ -129,6 +129,16 @@ impl Plant {
         self.torque = self.queue.pop_front().expect("just pushed");
     }
 
+    /// Torque of the mechanical stops on joints that have run into them: as stiff and as damped as one step of time allows.
+    fn stops(&self, mass: &SMatrix<f64, 7, 7>, dt: f64) -> Vector7<f64> {
+        Vector7::from_fn(|joint, _| {
+            let (q, dq) = (self.q[joint], self.dq[joint]);
+            let past = (q - model::POSITION_MAX[joint]).max(0.0) + (q - model::POSITION_MIN[joint]).min(0.0);
+            let outward = if past * dq > 0.0 { dq } else { 0.0 };
+            if past == 0.0 { 0.0 } else { -mass[(joint, joint)] * (0.02 * past / dt + 0.3 * outward) / dt }
+        })
+    }
+
     /// One control period of physics.
     pub(crate) fn advance(&mut self) {
         let dt = control::PERIOD / SUBSTEPS as f64;
@@ -141,7 +151,8 @@ impl Plant {
             let external = frames.jacobian().transpose_times(&environment);
             let damped = mass + SMatrix::<f64, 7, 7>::from_diagonal(&(self.viscous * dt));
             let inverse = damped.try_inverse().expect("a mass matrix");
-            let free = inverse * (mass * self.dq + (self.torque - bias + external) * dt);
+            let stops = self.stops(&mass, dt);
+            let free = inverse * (mass * self.dq + (self.torque - bias + external + stops) * dt);
             // Dry friction: impulses that stop each joint, or as much of that as friction can give.
             let mut impulse = Vector7::zeros();
             let mut velocity = free;
