@@ -125,7 +125,7 @@ fn g1_a_shove_of_up_to_10_n_s_in_teach_hold_and_run_is_braked_with_torque_and_se
         println!("{what}");
         // A run moves by itself, too, and a hold gives back what its spring took up.
         assert!(outcome.energy <= outcome.work.max(0.0) + 0.5, "{what}");
-        assert!(outcome.unseen < 0.1, "{what}");
+        assert!(outcome.unseen < 0.2, "{what}");
         assert_eq!(outcome.state == State::SoftStop, outcome.fault != Fault::None, "{what}");
         worst = worst.max(outcome.braked);
         late += usize::from(outcome.braked >= BRAKED);
