@@ -3,8 +3,7 @@
 use puck::{Action, Group, PropertyId, Request};
 use sim::{Passage, Ticks};
 
-/// Ticks of one control cycle: three slots.
-pub const CYCLE_TICKS: Ticks = 3 * sim::SLOT_TICKS;
+pub use lab::simulation::CYCLE_TICKS;
 
 /// The starts of all position requests to the whole arm.
 #[must_use]

@@ -21,7 +21,7 @@ use crate::operator::{Operator, OperatorConfig, PendantAction};
 use crate::puck_model::{Puck, PuckConfig};
 use crate::safety::{SafetyConfig, SafetyModule};
 use crate::speed::SpeedMonitor;
-use crate::time::{CYCLE_TICKS, STEP_TICKS, TICKS_PER_SECOND, Ticks};
+use crate::time::{STEP_TICKS, TICKS_PER_SECOND, Ticks};
 use crate::trace::BusTrace;
 use crate::world::World;
 use puck::{
@@ -53,8 +53,8 @@ pub struct PlantConfig {
     pub started: bool,
     /// The hand stands alone on the bus, with power: no arm, no sensor, no safety module, and nobody at a pendant.
     pub hand_alone: bool,
-    /// Whole control cycles by which packed torques, arm's and hand's, come late to the motors. The safety module judges them at once.
-    pub torque_delay_cycles: u8,
+    /// Delay of packed torques, arm's and hand's, on their way to the motors. The safety module judges them at once.
+    pub torque_delay: Ticks,
 }
 
 impl Default for PlantConfig {
@@ -69,7 +69,7 @@ impl Default for PlantConfig {
             operator: OperatorConfig::default(),
             started: false,
             hand_alone: false,
-            torque_delay_cycles: 0,
+            torque_delay: 0,
         }
     }
 }
@@ -181,7 +181,7 @@ impl Plant {
             force_torque: ForceTorque::new(config.force_torque, boot_noise, stream(Node::HOST)),
             hand: hand.transpose()?,
             operator: Operator::new(operator),
-            torque_delay: Ticks::from(config.torque_delay_cycles) * CYCLE_TICKS,
+            torque_delay: config.torque_delay,
             late_torques: VecDeque::new(),
             link: Box::new(SerialLine::default()),
             hand_alone: config.hand_alone,

@@ -80,7 +80,7 @@ fn squeeze(master: &mut Master, units: [i16; 4], milliseconds: u64) {
     let until = master.now + milliseconds * TICKS_PER_MILLISECOND;
     while master.now < until {
         master.send(torques(units));
-        master.wait(3 * sim::SLOT_TICKS);
+        master.wait(common::CYCLE_TICKS);
     }
 }
 

@@ -28,7 +28,7 @@ fn squeeze(master: &mut Master, units: i16, milliseconds: u64) -> Vec<HandState>
     (0..milliseconds * 3 / 10)
         .map(|_| {
             master.send(frame);
-            master.wait(sim::CYCLE_TICKS);
+            master.wait(common::CYCLE_TICKS);
             master.plant.world().hand()
         })
         .collect()

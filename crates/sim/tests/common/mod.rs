@@ -15,6 +15,12 @@ use sim::{FreeJoints, HOME, Plant, PlantConfig, TICKS_PER_MILLISECOND, Ticks, Wo
 /// Firmware of the simulated pucks.
 pub const VERSION: i32 = 200;
 
+/// One slot of a master with a control rate of 300 Hz, three a cycle.
+pub const SLOT_TICKS: Ticks = sim::period_ticks(900);
+
+/// One control cycle of that master.
+pub const CYCLE_TICKS: Ticks = 3 * SLOT_TICKS;
+
 pub struct Master {
     pub plant: Plant,
     pub now: Ticks,
@@ -111,7 +117,7 @@ impl Master {
         let until = self.now + milliseconds * TICKS_PER_MILLISECOND;
         while self.now < until {
             self.send(get(Group::ARM, PropertyId::POSITION));
-            self.wait(3 * sim::SLOT_TICKS);
+            self.wait(CYCLE_TICKS);
         }
     }
 
