@@ -3,7 +3,7 @@
 //! Damped least squares on the geometric Jacobian of the controller's model. The redundancy is left alone: the posture
 //! found is the one that the shortest way from the given posture ends in.
 
-use control::kinematics::Frames;
+use control::model::Frames;
 use control::units::{JointPositions, Vector6};
 use nalgebra::{Quaternion, SMatrix, UnitQuaternion, Vector3};
 

@@ -2,10 +2,8 @@
 
 use std::sync::LazyLock;
 
-use control::arm::ArmModel;
-use control::calibration::{Calibration, Payload};
-use control::kinematics::Frames;
-use control::limit::TorqueLimiter;
+use control::act::TorqueLimiter;
+use control::model::{ArmModel, Calibration, Frames, Payload};
 use control::units::JointPositions;
 
 /// What is mounted on every arm that Tactus moves: force/torque sensor and hand; the tool frame is the grasp point.

@@ -6,7 +6,7 @@ use std::io::Write as _;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-use control::arm::ArmModel;
+use control::model::ArmModel;
 use control::{CycleRecord, LoadRefusal, Payload, State};
 use device::{
     Command, Counters, Event, EventKind, FitPrimitive, Health, Identity, QueueFull, RamStore, Session, SessionPort,
@@ -187,7 +187,7 @@ fn image(name: &str, duration: f32) -> Vec<u8> {
     let posture = [0.0, 0.5, 0.0, 1.5, 0.0, 0.5, 0.0];
     let model = ArmModel::<f32>::new(Payload::SensorAndHand);
     let q = control::units::JointPositions::from_array(posture);
-    let [x, y, z, w, i, j, k] = control::kinematics::Frames::new(&model, &q).tool_pose().to_f32();
+    let [x, y, z, w, i, j, k] = control::model::Frames::new(&model, &q).tool_pose().to_f32();
     let there = Waypoint { position: [x, y, z], orientation: [w, i, j, k], posture, hand: [0.0; 4] };
     let content: ImageContent<&[f32]> = ImageContent {
         model_hash: control::MODEL_HASH,

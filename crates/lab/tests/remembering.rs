@@ -98,7 +98,7 @@ fn successes_become_an_experience_that_ends_with_the_next_rehearsal() {
 /// The largest statistic of the device's watch over a recording, judged by the experience of a primitive.
 fn watched(file: &PrimitiveFile, recording: &Recording) -> f64 {
     let primitive = file.to_primitive().unwrap();
-    let mut watch = control::watch::Watch::<f64>::new();
+    let mut watch = control::guard::Watch::<f64>::new();
     let run = recording.running();
     let (phase, wrench, gauges, hand) =
         (run.phase.unwrap(), run.wrench.unwrap(), run.gauges.unwrap(), run.hand.unwrap());

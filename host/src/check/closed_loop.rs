@@ -1,9 +1,10 @@
 //! The primitive played by the control code itself on an ideal arm: every margin that counts before motion.
 
-use control::calibration::Calibration;
-use control::controller::Gains;
+use control::law::Gains;
+use control::model::Calibration;
+use control::plan::load;
 use control::units::{JointVelocities, Vector7};
-use control::{BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, RunOptions, State, flags, load};
+use control::{BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, RunOptions, State, flags};
 use puck::SafetyMode;
 
 use super::plant::Plant;
@@ -150,7 +151,7 @@ fn sample(plant: &Plant, time: f64, record: CycleRecord) -> Sample {
         time,
         q: plant.q.into(),
         dq: plant.dq.into(),
-        elbow_speeds: frames.elbow_speeds(&dq, control::approach::TIP_REACH),
+        elbow_speeds: frames.elbow_speeds(&dq, control::plan::approach::TIP_REACH),
         tool_speed: twist.fixed_rows::<3>(0).norm(),
         position: pose.position.into(),
         orientation: pose.orientation.0,

@@ -7,9 +7,9 @@
 mod closed_loop;
 mod plant;
 
-use control::load::{REACH, within_reach};
+use control::guard::monitor::TIP_SPEED_LIMIT;
 use control::model::{SOFT_MAX, SOFT_MIN, VELOCITY_MAX};
-use control::monitor::TIP_SPEED_LIMIT;
+use control::plan::load::{REACH, within_reach};
 use serde::Serialize;
 
 use closed_loop::{ClosedLoop, Ending, Sample};

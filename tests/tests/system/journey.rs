@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use control::limit::MOTOR_COUNTS_LIMIT;
+use control::act::limit::MOTOR_COUNTS_LIMIT;
 use lab::demonstration::Recording;
 use lab::primitive_file::PrimitiveFile;
 use system_tests::bus::torques;

@@ -2,8 +2,7 @@
 
 use std::time::Duration;
 
-use control::arm::ArmModel;
-use control::kinematics::Frames;
+use control::model::{ArmModel, Frames};
 use control::units::JointPositions;
 use control::{Payload, State};
 use device::Stage;

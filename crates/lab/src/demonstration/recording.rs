@@ -56,7 +56,7 @@ pub struct Recording {
     pub orientation_d: Option<Vec<[f64; 4]>>,
     /// Wrench of the environment on the robot: force N (world axes), torque N m.
     pub wrench: Option<Vec<[f64; 6]>>,
-    /// Flag bits of each cycle, see `control::record::flags`.
+    /// Flag bits of each cycle, see `control::cycle::record::flags`.
     pub flags: Option<Vec<u32>>,
     /// Measured hand: spread and fingers 1 to 3, rad.
     pub hand: Option<Vec<[f64; 4]>>,

@@ -1,6 +1,7 @@
 //! How wide the band of an experience must be: the device's own watch goes over the runs that it was made from.
 
-use control::watch::{FIRST_FINGER, LIMIT, Watch};
+use control::guard::Watch;
+use control::guard::watch::{FIRST_FINGER, LIMIT};
 use dmp::fit::{FEWEST_TRIALS, experience};
 use dmp::{EXPERIENCE_CAPACITY, EXPERIENCE_CHANNELS, Experience, TableError};
 

@@ -24,7 +24,7 @@ const SPREAD_FLOOR: f64 = 0.5;
 /// joints scatters by a tenth of a newton where a movement is slow; without this floor K2 would make the arm four times
 /// deafer there than at its end.
 const RESOLUTION: [f64; SENSORS] = {
-    let (f, n) = (control::deviation::FORCE_DEAD_BAND, control::deviation::TORQUE_DEAD_BAND);
+    let (f, n) = (control::sense::deviation::FORCE_DEAD_BAND, control::sense::deviation::TORQUE_DEAD_BAND);
     [f, f, f, n, n, n, 0.05, 0.05, 0.05]
 };
 
@@ -164,7 +164,7 @@ pub fn remember_rehearsals(
         recorded_duration: duration,
         payload_mass: payload.mass,
         payload_centre: payload.centre,
-        filter_cutoff: control::wrench::WRENCH_CUT_OFF,
+        filter_cutoff: control::sense::wrench::WRENCH_CUT_OFF,
         trials,
         spread_floor: SPREAD_FLOOR,
         mean: rows(&statistics.mean),
