@@ -10,7 +10,7 @@ use control::State;
 use serde_json::json;
 use sim::person::Lesson;
 
-use super::{Exit, Failure, Global, connection};
+use super::{ErrorCode, Failure, Global, connection};
 use lab::client::Client;
 use lab::device::Device;
 use lab::procedure::{self, ProcedureError, Recorder, Take};
@@ -92,21 +92,17 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let alone = global.non_interactive && command.duration.is_none();
     if alone && default_posture(&mut client, command.lesson).is_none() {
         return Err(Failure::new(
-            Exit::Usage,
-            "E205",
+            ErrorCode::NobodyToAsk,
             DOING,
             "nobody may be asked to press Enter when the movement is shown",
-        )
-        .help("say how long to record with `--duration SECONDS`"));
+        ));
     }
     if command.from.is_some() && default_posture(&mut client, command.lesson).is_some() {
         return Err(Failure::new(
-            Exit::Usage,
-            "E206",
+            ErrorCode::StartIsFixed,
             DOING,
             "the simulated person knows one movement, and where it begins",
-        )
-        .help("leave out `--from`"));
+        ));
     }
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let failed = |error| connection::failure(error, DOING);
