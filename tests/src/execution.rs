@@ -19,7 +19,7 @@ const AFTERGLOW: usize = 300;
 /// Cycles after which a movement that has not arrived is a failure.
 const PATIENCE: usize = 30 * 300;
 
-/// What one run came to.
+/// Result of one run.
 pub struct Execution {
     /// Every cycle from the start of the run.
     pub telemetry: Vec<Telemetry>,
@@ -31,9 +31,9 @@ pub struct Execution {
     pub tracking: Tracking,
     /// Telemetry messages that the link lost.
     pub gaps: u32,
-    /// What the device counted since it was switched on.
+    /// Counters of the device since it was switched on.
     pub statistics: Statistics,
-    /// What the bus counted since then.
+    /// Counters of the bus since then.
     pub trace: BusTrace,
     /// Where the grasp point really is at the end, m.
     pub grasp_point: [f64; 3],

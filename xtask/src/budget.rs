@@ -21,8 +21,8 @@ const CYCLE_BOUND: f64 = 60_000.0;
 /// What a control cycle should stay below.
 const CYCLE_AIM: f64 = 30_000.0;
 
-/// Deepest use of the stack. 29.4 kB today: the halves of the application are built in their place, piece by piece. What the
-/// image may use at most is computed when it is built (`cargo xtask stack`); this is what a run does use.
+/// Deepest use of the stack. 29.4 kB today: the halves of the application are built in their place, piece by piece.
+/// What the image may use at most is computed when it is built (`cargo xtask stack`); this is what a run does use.
 const STACK_BOUND: f64 = 36.0 * 1024.0;
 
 /// Prints the table and fails if a bound is crossed.

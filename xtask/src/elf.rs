@@ -15,6 +15,9 @@ use sha2::{Digest as _, Sha256};
 /// Part of the name of every function of a memory allocator.
 const ALLOCATOR: &str = "__rust_alloc";
 
+/// Vectors in front of the interrupt lines.
+pub(crate) const CORE_VECTORS: usize = 16;
+
 /// An ELF file of the kind every image is.
 pub(crate) type Elf<'a> = ElfFile32<'a, LittleEndian>;
 
@@ -118,8 +121,8 @@ impl fmt::Display for Sizes {
     }
 }
 
-/// SHA-256, in hexadecimal digits, of what flashing an image writes: of every load segment with content its physical address, its
-/// length (u32 each, little-endian) and its bytes.
+/// SHA-256, in hexadecimal digits, of what flashing an image writes: of every load segment with content its physical
+/// address, its length (u32 each, little-endian) and its bytes.
 ///
 /// # Errors
 /// If the file cannot be read or is not a 32-bit little-endian ELF file.

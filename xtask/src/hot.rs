@@ -1,7 +1,8 @@
 //! Holds the code that a control slot calls against the memory that is never waited for.
 //!
-//! The linker script names what goes there by mangled names, which change with a module or with what the compiler inlines. So
-//! the image itself is asked: everything the control slot can call lies in ITCM, or is listed here with its reason.
+//! The linker script names what goes there by mangled names, which change with a module or with what the compiler
+//! inlines. So the image itself is asked: everything the control slot can call lies in ITCM, or is listed here with its
+//! reason.
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -15,6 +15,8 @@ const SENDER_SHIFT: u16 = 5;
 
 /// One participant of the bus, 0..=31.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Node(u8);
 
 impl Node {
@@ -56,6 +58,8 @@ impl Node {
 
 /// A multicast address, 0..=31.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Group(u8);
 
 impl Group {
@@ -96,14 +100,16 @@ impl Group {
         self.0
     }
 
-    /// Whether only replies travel to this group, never requests.
+    /// True if only replies travel to this group, never requests.
     pub const fn carries_only_replies(self) -> bool {
         self.0 == 3 || (self.0 >= 6 && self.0 <= 12)
     }
 }
 
-/// Where a frame goes.
+/// Destination of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Destination {
     /// One node.
     Node(Node),
@@ -125,6 +131,8 @@ impl From<Group> for Destination {
 
 /// An eleven-bit identifier. A smaller one wins arbitration.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CanId(u16);
 
 impl CanId {
@@ -179,7 +187,18 @@ impl From<CanId> for Id {
 }
 
 /// A classic data frame: eleven-bit identifier, up to eight bytes. Nothing else travels on the arm's bus.
+///
+/// Use it where frames are stored or built; the decoders take any driver's [`Frame`] as it is.
+///
+/// ```
+/// use puck::{CanFrame, CanId, Group, Node};
+///
+/// let id = CanId::encode(Node::HOST, Group::ARM);
+/// let frame = CanFrame::from_slice(id, &[48]).expect("at most eight bytes");
+/// assert_eq!((frame.can_id().raw(), frame.payload()), (0x404, &[48][..]));
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CanFrame {
     id: CanId,
     length: u8,
@@ -206,7 +225,7 @@ impl CanFrame {
         Some(CanFrame { id, length: payload.len() as u8, data })
     }
 
-    /// Our copy of any driver's frame; `None` for extended and remote frames and for more than eight bytes.
+    /// A copy of any driver's frame; `None` for extended and remote frames and for more than eight bytes.
     pub fn copy_of(frame: &impl Frame) -> Option<CanFrame> {
         if frame.is_remote_frame() {
             return None;

@@ -14,8 +14,11 @@ pub const NEWTON_METRE_PER_COUNT: f64 = 1.0 / 4096.0;
 /// Unit of acceleration per count. The library's header says m/s^2; this was never verified.
 pub const ACCELERATION_PER_COUNT: f64 = 1.0 / 1024.0;
 
-/// Status of the strain gauges since the last tare: `R B G5..G0`, appended to the torque frame only when a gauge saturated.
+/// Status of the strain gauges since the last tare: `R B G5..G0`, appended to the torque frame only when a gauge
+/// saturated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct GaugeStatus(pub u8);
 
 impl GaugeStatus {
@@ -37,6 +40,8 @@ impl GaugeStatus {
 
 /// One sample of the sensor in counts: the wrench of the environment on the robot's tool side, in the sensor frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct RawWrench {
     /// x, y, z; 1/256 N per count.
     pub force: [i16; 3],

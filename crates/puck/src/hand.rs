@@ -1,8 +1,8 @@
 //! The BarrettHand BH8-280: encoder counts to finger angles, and the commands that move it.
 //!
-//! A finger has one motor and two links. Motor and inner link are geared 125:1, the secondary encoder sits on the worm at
-//! 50:1, the outer link moves by 1/375 relative to the inner one until the TorqueSwitch breaks away. The spread is 17.5:1.
-//! Integers are *truncated toward zero* here, as in Barrett's library, except torques, which are rounded down.
+//! A finger has one motor and two links. Motor and inner link are geared 125:1, the secondary encoder sits on the worm
+//! at 50:1, the outer link moves by 1/375 relative to the inner one until the TorqueSwitch breaks away. The spread is
+//! 17.5:1. Integers are *truncated toward zero* here, as in Barrett's library, except torques, which are rounded down.
 
 use crate::can::{CanFrame, Group, Node};
 use crate::message::{packed_torques, set};
@@ -30,6 +30,8 @@ const RATIOS: [f64; 4] = [INNER_LINK_RATIO, INNER_LINK_RATIO, INNER_LINK_RATIO, 
 
 /// Values of CMD.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[repr(u8)]
 pub enum HandCommand {
     /// 0.
@@ -82,6 +84,8 @@ pub enum HandCommand {
 
 /// Angles of the hand, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct HandAngles<R> {
     /// Inner link of each finger, 0 open.
     pub inner: [R; 3],
@@ -121,8 +125,10 @@ pub fn finger_counts<R: Real>(inner: R) -> (Counts, Counts) {
     (counts(INNER_LINK_RATIO), counts(SECONDARY_RATIO))
 }
 
-/// Why no hand command was built.
+/// Reason for which no hand command was built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum HandError {
     /// A value is NaN or infinite.
     NotFinite,
@@ -149,6 +155,7 @@ impl From<NotFinite> for HandError {
 
 /// The frames that command a hand whose four pucks share one firmware generation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct HandCommander {
     command: PropertyId,
     end_point: PropertyId,

@@ -1,8 +1,8 @@
 //! Position frames: 22-bit two's complement counts, big-endian, three bytes each.
 //!
-//! Byte 0 (and 3) carry flags in bits 7..6. Barrett's own parsers want bit 7 set, its manual draws it clear: a master masks
-//! both bits off, a device sends bit 7. A puck with a secondary encoder answers with six bytes instead of three; both may
-//! occur among the replies to one request.
+//! Byte 0 (and 3) carry flags in bits 7..6. Barrett's own parsers want bit 7 set, its manual draws it clear: a master
+//! masks both bits off, a device sends bit 7. A puck with a secondary encoder answers with six bytes instead of three;
+//! both may occur among the replies to one request.
 
 use crate::can::{CanFrame, CanId, Group, Node};
 use crate::units::Counts;

@@ -11,6 +11,8 @@ use crate::units::{NotFinite, PACKED_TORQUE_LIMIT, Real};
 
 /// MODE of the safety module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum SafetyMode {
     /// 0: motor power is cut, the pucks vanish from the bus.
     EStop,
@@ -37,8 +39,10 @@ impl SafetyMode {
     }
 }
 
-/// What the safety module thinks of one supervised quantity.
+/// The safety module's judgement of one supervised quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Health {
     /// 1: within limits.
     Safe,
@@ -69,6 +73,8 @@ impl Health {
 
 /// The button a person holds down on a pendant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Button {
     /// 00: the emergency stop.
     EmergencyStop,
@@ -80,8 +86,18 @@ pub enum Button {
     None,
 }
 
-/// Both pendants: five supervised quantities, display, lights and buttons.
+/// Both pendants: five supervised quantities, display, lights and buttons. The mode is not among them: read MODE.
+///
+/// ```
+/// use puck::PendantState;
+///
+/// let all_safe = 1 | 1 << 3 | 1 << 6 | 1 << 9 | 1 << 12;
+/// assert!(PendantState::from_value(all_safe)?.all_safe());
+/// # Ok::<(), puck::safety::InvalidPendant>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PendantState {
     /// Velocity of the arm.
     pub velocity: Health,
@@ -105,6 +121,7 @@ pub struct PendantState {
 
 /// A pendant word in which a supervised quantity is not exactly one of safe, warning and fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct InvalidPendant;
 
 impl fmt::Display for InvalidPendant {
@@ -207,8 +224,10 @@ impl PendantState {
 /// VL1, VL2: counts per m/s (Q4.12).
 pub const VELOCITY_UNITS_PER_METRE_PER_SECOND: f64 = 4096.0;
 
-/// Why no limit was encoded.
+/// Reason for which no limit was encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum LimitError {
     /// The limit is NaN or infinite.
     NotFinite,

@@ -2,6 +2,8 @@
 
 /// STAT: what a puck is running.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Status {
     /// 0: the boot loader ("monitor"); only properties 0..=7 answer.
     Reset,
@@ -30,6 +32,8 @@ impl Status {
 
 /// MODE of a motor puck.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum MotorMode {
     /// 0: windings shorted, the motor brakes; torques are ignored.
     Idle,
@@ -67,6 +71,8 @@ impl MotorMode {
 
 /// ROLE: the low five bits say what a puck is, the high bits what it is fitted with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Role(pub u16);
 
 impl Role {

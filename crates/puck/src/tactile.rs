@@ -10,6 +10,7 @@ pub const CELLS: usize = 24;
 
 /// TACT: which frames a tactile puck sends. Setting it also triggers one reply at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TactileFormat {
     /// 0: nothing.
     Off,
@@ -30,6 +31,8 @@ impl TactileFormat {
 
 /// One of the five frames of a full tactile reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct TactileBlock {
     /// 0..=4: the block holds cells `5 * sequence` and following.
     pub sequence: u8,
@@ -38,7 +41,7 @@ pub struct TactileBlock {
 }
 
 impl TactileBlock {
-    /// How many of the cells exist: five, and four in the last block.
+    /// Number of cells that exist: five, and four in the last block.
     pub const fn cell_count(&self) -> usize {
         if self.sequence == 4 { 4 } else { 5 }
     }
@@ -66,9 +69,11 @@ impl TactileBlock {
 
 /// The ten highest cells of one array.
 ///
-/// Which bit of the map is cell 0 is disputed between two drivers (most significant, or least significant first): this type
+/// Two drivers disagree on which bit of the map is cell 0 (most significant, or least significant first): this type
 /// keeps the map as sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct TactileTop {
     /// Bytes 0..=2, the first in bits 23..16: a set bit for each cell that has a value below.
     pub map: u32,

@@ -18,6 +18,8 @@ pub const JOINTS: usize = 7;
 
 /// Gear ratios. N5 and N6 depend on the wrist's cable generation (9.48, 9.68 and 9.7 are documented): configure them.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Ratios {
     /// N1, N2, N3/n3, N4, N5, N6 n6, N7: the coefficients of the matrix above, all positive.
     pub coefficients: [f64; JOINTS],
@@ -34,8 +36,10 @@ impl Ratios {
     }
 }
 
-/// Why no transmission was built.
+/// Reason for which no transmission was built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum TransmissionError {
     /// A ratio is NaN, infinite, zero or negative.
     Ratio,
@@ -67,8 +71,19 @@ impl fmt::Display for TransmissionError {
 
 impl core::error::Error for TransmissionError {}
 
-/// The cable transmission between motors and joints.
+/// The cable transmission between motors and joints, generic over `f32` and `f64`. Bus units are the matter of
+/// [`Drives`].
+///
+/// ```
+/// use puck::{Ratios, Transmission};
+///
+/// let transmission: Transmission<f64> = Transmission::new(&Ratios::WAM7)?;
+/// let motors = transmission.motor_from_joint(&[0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+/// assert_eq!(motors[0], -21.0);
+/// # Ok::<(), puck::TransmissionError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transmission<R> {
     ratios: [R; JOINTS],
     /// 1/ratio: the rounding of Barrett's library, which multiplies by an inverse matrix. It also spares divisions.
@@ -131,8 +146,12 @@ impl<R: Real> Transmission<R> {
     }
 }
 
-/// What each puck reports of its drive. Units differ by up to 30 % between arms: read them, never assume them.
+/// Encoder and torque units of the seven motors, as the pucks report them. They differ by up to 30 % between arms: read
+/// them, never assume them.
+///
+/// This turns bus units into motor units; [`Transmission`] turns motors into joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Drives {
     counts_per_revolution: [i32; JOINTS],
     units_per_newton_metre: [i32; JOINTS],

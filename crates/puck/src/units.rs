@@ -9,11 +9,20 @@ pub const PACKED_TORQUE_LIMIT: i16 = 8191;
 pub const POSITION_BITS: u32 = 22;
 
 /// A position in encoder counts (of the motor, or of the secondary encoder), as far as it has been unwrapped.
+///
+/// ```
+/// use puck::Counts;
+///
+/// let sent = Counts(2_100_000).wrapped();
+/// assert_eq!(sent.unwrapped_near(Counts(2_099_000)), Counts(2_100_000));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Counts(pub i32);
 
 impl Counts {
-    /// What 22 bits keep of this position: the value a puck sends.
+    /// The low 22 bits of this position, sign extended: the value a puck sends.
     pub const fn wrapped(self) -> Counts {
         let unused = 32 - POSITION_BITS;
         Counts((self.0 << unused) >> unused)
@@ -30,6 +39,8 @@ impl Counts {
 
 /// A motor torque in current units of the puck ("IPNM units"), 14 bits: -8192..=8191.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PuckTorque(i16);
 
 impl PuckTorque {
@@ -78,6 +89,7 @@ impl PuckTorque {
 
 /// A value that must become an integer of the bus is NaN or infinite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NotFinite;
 
 impl fmt::Display for NotFinite {

@@ -12,7 +12,8 @@ use crate::findings::Grade;
 use crate::host::{Inquirer, Learned, SharedLearned};
 use crate::image::Image;
 use crate::report::Measured;
-use crate::run::{Outcome, RunError, Setup, run};
+use crate::run::{RunError, run};
+use crate::setup::{Outcome, Setup};
 use crate::world::InProcess;
 
 /// Most findings told in sentences.

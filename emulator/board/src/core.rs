@@ -5,6 +5,8 @@
 //! while the protection unit or the default map makes the address cacheable, past it otherwise. The registers of cache
 //! maintenance are routed the same way.
 
+mod cache_bus;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -16,8 +18,8 @@ use rigless::soc::{Endian, Width};
 use rigless::time::VirtualNanos;
 
 use crate::cache::{BANK, CacheCount, DataCache};
-use crate::cache_bus::CacheBus;
 use crate::notes::{FaultNote, Stray};
+use cache_bus::CacheBus;
 
 /// Registers by the numbers of the crate's debugger.
 mod register {

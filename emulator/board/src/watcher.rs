@@ -22,7 +22,7 @@ use crate::findings::{Finding, Findings, Grade};
 use crate::image::Image;
 use crate::log::Log;
 use crate::report::Measured;
-use crate::run::{Outcome, Setup};
+use crate::setup::{Outcome, Setup};
 use crate::stack::{self, StackUse};
 use crate::watchdog::SharedWatch;
 

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Story, safe_frames, tell, tell_with};
-use emulated_board::run::Setup;
+use emulated_board::setup::Setup;
 use fdcan_model::Cancellation;
 use puck::CanFrame;
 

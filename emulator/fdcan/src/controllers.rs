@@ -1,6 +1,7 @@
 //! Both controllers and the memory they share: the model's public face.
 
 use crate::Nanoseconds;
+use crate::controller::wire::{Fault, WireEvent};
 use crate::controller::{Bus, Controller};
 use crate::errors::BusError;
 use crate::frame::Frame;
@@ -9,33 +10,10 @@ use crate::random::Random;
 use crate::remark::{Remark, RemarkKind};
 use crate::timing::BitTiming;
 use crate::transmit::Cancellation;
-use crate::wire::{Fault, WireEvent};
+use crate::unit::Unit;
 
 /// With the erratum, one read of the message memory in this many is wrong. The errata sheet gives no rate.
 const WRONG_READ_IN: u32 = 64;
-
-/// One of the two controllers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unit {
-    /// FDCAN1.
-    One,
-    /// FDCAN2.
-    Two,
-}
-
-impl Unit {
-    /// Both.
-    pub const BOTH: [Self; 2] = [Self::One, Self::Two];
-
-    /// Name in the manual.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::One => "FDCAN1",
-            Self::Two => "FDCAN2",
-        }
-    }
-}
 
 /// One of a controller's two interrupt lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! A remark: something a program did that the controller ignored, or that deserves a look.
 
 use crate::Nanoseconds;
-use crate::controllers::Unit;
+use crate::unit::Unit;
 use std::fmt;
 
 /// The kind of a remark.

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use link::RunOptions;
 use serde::{Deserialize, Serialize};
-use sim::person::Lesson;
+use sim::teacher::TaughtMovement;
 
 use super::grid::Grid;
 use super::mode::Mode;
@@ -39,12 +39,12 @@ impl Scenario {
     }
 
     /// What a person teaches for it.
-    pub fn lesson(self) -> Lesson {
+    pub fn lesson(self) -> TaughtMovement {
         match self {
-            Scenario::Flashlight => Lesson::Flashlight,
-            Scenario::Cup | Scenario::Fingers => Lesson::Cup,
-            Scenario::Bottle => Lesson::Bottle,
-            Scenario::Lift => Lesson::Lift,
+            Scenario::Flashlight => TaughtMovement::Flashlight,
+            Scenario::Cup | Scenario::Fingers => TaughtMovement::Cup,
+            Scenario::Bottle => TaughtMovement::Bottle,
+            Scenario::Lift => TaughtMovement::Lift,
         }
     }
 

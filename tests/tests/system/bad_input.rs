@@ -1,4 +1,4 @@
-//! What a device does with noise, strangers and bad primitives: it drops, refuses with a reason, and goes on.
+//! A device answers noise, unknown hosts and bad primitives as it should: it drops, refuses with a reason, and goes on.
 
 use link::frame::LINK_TIMEOUT_MS;
 use link::{DeviceHello, HostHello, LINK_VERSION, LinkCounters, Name, Refusal, Reply, Request, SCHEMA_HASH, Text};

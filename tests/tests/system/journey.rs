@@ -10,7 +10,7 @@ use system_tests::{expect, ready, simulation};
 use tactus::demonstration::Recording;
 use tactus::primitive_file::PrimitiveFile;
 
-/// What the flashlight may lean after the run: it still stands.
+/// Largest lean of the flashlight after the run: it still stands.
 const UPRIGHT: f64 = 2.0;
 
 /// Every sample came over the link, one a cycle, while the arm was weightless.

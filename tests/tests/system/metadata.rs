@@ -1,4 +1,4 @@
-//! What an image says about itself in its file, and what it says when it runs.
+//! Metadata of an image in its file, and in its hello when it runs.
 
 use system_tests::connect;
 use tactus::image_file::ImageFile;

@@ -1,4 +1,5 @@
-//! What the emulator's reports must say: the start as `emulated-board check` judges it, and what must hold after any run.
+//! What the emulator's reports must say: the start as `emulated-board check` judges it, and what must hold after any
+//! run.
 
 use serde_json::Value;
 

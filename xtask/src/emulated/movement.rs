@@ -1,4 +1,5 @@
-//! The demonstration's movement on the emulated board: taught, learned, uploaded into bank 2, played twice, found after a restart.
+//! The demonstration's movement on the emulated board: taught, learned, uploaded into bank 2, played twice, found after
+//! a restart.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
-//! The compiler of the emulator of the board, which is newer than the product's. Nothing is skipped where it cannot be had.
+//! The compiler of the emulator of the board, which is newer than the product's. Nothing is skipped where it cannot be
+//! had.
 
 use std::path::PathBuf;
 use std::process::Command;

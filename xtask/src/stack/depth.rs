@@ -223,8 +223,8 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// A search for ways from a function, in which some functions are so deep, whatever they call. Pointers may have been
-    /// made by the functions it reaches, or kept somewhere by others that ran before.
+    /// A search for ways from a function, in which some functions are so deep, whatever they call. Pointers may have
+    /// been made by the functions it reaches, or kept somewhere by others that ran before.
     pub(super) fn new(calls: &'a Calls, function: u32, before: &[u32], ends: BTreeMap<u32, u32>) -> Self {
         let roots: Vec<u32> = before.iter().copied().chain([function]).collect();
         let behind =

@@ -1,8 +1,8 @@
 //! How deep a function goes by itself, and how deep it is at each of its calls.
 //!
-//! The stack pointer is followed along every way through the function. A function is refused, by name, where two ways meet
-//! with different stack pointers, where it returns with another one than it began with, where the stack pointer changes in
-//! a way that is not read, and where code is never reached although it is none.
+//! The stack pointer is followed along every way through the function. A function is refused, by name, where two ways
+//! meet with different stack pointers, where it returns with another one than it began with, where the stack pointer
+//! changes in a way that is not read, and where code is never reached although it is none.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -58,8 +58,8 @@ pub(super) struct Frame {
     pub(super) unmasked: Option<u32>,
     /// Its calls.
     pub(super) calls: Vec<Call>,
-    /// Where it has put the stack pointer, if it takes another stack, and the most bytes it has in use on that one. All its
-    /// calls happen there.
+    /// Where it has put the stack pointer, if it takes another stack, and the most bytes it has in use on that one. All
+    /// its calls happen there.
     pub(super) other_stack: Option<u32>,
 }
 
@@ -204,7 +204,8 @@ impl Walk<'_> {
             Way::Table { base, entry } => self.table(index, base, entry, after)?,
             Way::Unknown => bail!("nobody can read where it goes on after {at:#010x}"),
         }
-        // Behind a call that never returns and a branch that is always taken the compiler may end a function as it likes.
+        // Behind a call that never returns and a branch that is always taken the compiler may end a function as it
+        // likes.
         let may_end = called.is_some() || matches!(instruction.flow, Flow::Branch(_));
         if goes_on && !(may_end && self.is_last(index)) {
             self.go(at + instruction.bytes, next, at, is_true)?;
@@ -346,8 +347,8 @@ impl Walk<'_> {
         Ok(())
     }
 
-    /// A table of ways to go on. Behind the instruction it ends where code begins again, or with a zero, which would lead to
-    /// the table itself; elsewhere constants may follow.
+    /// A table of ways to go on. Behind the instruction it ends where code begins again, or with a zero, which would
+    /// lead to the table itself; elsewhere constants may follow.
     fn table(&mut self, index: usize, base: u32, entry: u32, state: State) -> Result<()> {
         let instruction = self.all[index];
         let counted = instruction.address + instruction.bytes;

@@ -14,7 +14,8 @@ pub(super) struct Kind {
     pub(super) name: &'static str,
     /// A function is of this kind if its name contains one of these.
     functions: &'static [&'static str],
-    /// A function calls only this kind, and others that list it too, through pointers, if its name contains one of these.
+    /// A function calls only this kind, and others that list it too, through pointers, if its name contains one of
+    /// these.
     callers: &'static [&'static str],
     /// How many calls of this kind may be inside one another; `None` if they never are. Checked in both cases.
     pub(super) nested: Option<usize>,
@@ -22,8 +23,8 @@ pub(super) struct Kind {
     pub(super) why: &'static str,
 }
 
-/// Kinds of functions behind pointers. A call by a function that no row lists may lead to any function whose address has been
-/// made, of whatever kind.
+/// Kinds of functions behind pointers. A call by a function that no row lists may lead to any function whose address
+/// has been made, of whatever kind.
 pub(super) const KINDS: [Kind; 5] = [
     Kind {
         name: "a value's text",
@@ -78,8 +79,8 @@ pub(super) struct Pointers {
 }
 
 impl Pointers {
-    /// Finds every address that code makes, and follows it through the data. Constants that only happen to be equal to the
-    /// address of a function count as well.
+    /// Finds every address that code makes, and follows it through the data. Constants that only happen to be equal to
+    /// the address of a function count as well.
     pub(super) fn of(code: &Code, memory: &Memory) -> Self {
         let values: BTreeMap<u32, BTreeSet<u32>> = code
             .functions()

@@ -1,5 +1,5 @@
-//! What one instruction does to the stack pointer, and what it knows of a register: Thumb-2 as the architecture's manual
-//! encodes it (ARM DDI 0403, A5 and A7.7).
+//! What one instruction does to the stack pointer, and what it knows of a register: Thumb-2 as the architecture's
+//! manual encodes it (ARM DDI 0403, A5 and A7.7).
 //!
 //! Every encoding that can write the stack pointer is either read here or [`Effect::Unknown`]; no other changes it.
 

@@ -7,7 +7,8 @@ use std::sync::{Arc, Mutex};
 
 use emulated_board::host::{Inquirer, READY, SharedLearned};
 use emulated_board::image::Image;
-use emulated_board::run::{Outcome, Setup, run};
+use emulated_board::run::run;
+use emulated_board::setup::{Outcome, Setup};
 use emulated_board::world::{Host, InProcess};
 use puck::{CanFrame, Group, MotorMode, Node, PropertyId, set, zero_torques};
 use sim::{

@@ -6,8 +6,9 @@ use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 
 use crate::cache::{BANK, LINE, MAINTENANCE};
-use crate::core::SharedCore;
 use crate::notes::Stray;
+
+use super::SharedCore;
 
 /// The bus as the processor sees it through this.
 pub(crate) struct CacheBus<'a> {

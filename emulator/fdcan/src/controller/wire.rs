@@ -4,7 +4,7 @@
 //! but for a frame that has begun. Frames leave in the order in which they were offered.
 
 use crate::Nanoseconds;
-use crate::controller::{Bus, Controller, IDLE_BITS, RECOVERY_SEQUENCES};
+use super::{Bus, Controller, IDLE_BITS, RECOVERY_SEQUENCES};
 use crate::errors::BusError;
 use crate::filter::{Verdict, verdict};
 use crate::frame::{Frame, INTERMISSION_BITS, Id};
