@@ -11,7 +11,7 @@ use crate::setup::{ARM, Machine, Toolchain};
 use crate::{hot, panics, shell, stack};
 
 /// Features of the host packages with the MuJoCo world and its pictures.
-pub(crate) const WORLD: &str = "tactus/mujoco,sim/mujoco,sim/render,system-tests/mujoco";
+pub(crate) const WORLD: &str = "tactus/mujoco,lab/mujoco,experiment/mujoco,sim/mujoco,sim/render,system-tests/mujoco";
 
 /// File name of the hand's image beside the tools.
 pub(crate) const HAND: &str = "hand.elf";
