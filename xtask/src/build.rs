@@ -57,7 +57,7 @@ fn board_image(toolchain: Toolchain, board: Board, may_sleep: bool) -> Result<Pa
     Ok(image)
 }
 
-/// What no image may contain: an allocator, panics but those that are known, a way deeper than its stack allows.
+/// Fails if an image contains what none may: an allocator, unknown panics, a path deeper than its stack.
 pub(crate) fn nothing_forbidden(image: &Path, board: Board) -> Result<()> {
     ensure!(!Sizes::of(image)?.allocates(), "the image allocates memory, which nothing on a device may");
     panics::check(image, board)?;

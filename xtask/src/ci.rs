@@ -1,4 +1,4 @@
-//! What a change must pass, in the order in which failures are cheapest.
+//! Checks that a change must pass, in the order in which failures are cheapest.
 
 use anyhow::Result;
 

@@ -1,4 +1,4 @@
-//! What an image takes and says about itself, from the section table of its ELF file (32 bit, little-endian).
+//! Memory and metadata of an image, from the section table of its ELF file (32 bit, little-endian).
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -46,7 +46,7 @@ impl Section {
         self.bytes
     }
 
-    /// Whether all of it lies in a stretch of memory.
+    /// True if all of it lies in a stretch of memory.
     pub(crate) fn lies_in(&self, start: u32, length: u32) -> bool {
         self.address >= start && u64::from(self.address) + u64::from(self.bytes) <= u64::from(start) + u64::from(length)
     }
@@ -85,12 +85,12 @@ impl Sizes {
         self.symbols.get(name).copied()
     }
 
-    /// What the image says about itself (`link::metadata`), undecoded.
+    /// Metadata of the image (`link::metadata`), undecoded.
     pub(crate) fn description(&self) -> Option<&[u8]> {
         self.description.as_deref()
     }
 
-    /// Whether the image contains a memory allocator.
+    /// True if the image contains a memory allocator.
     pub(crate) fn allocates(&self) -> bool {
         self.symbols.keys().any(|name| name.contains(ALLOCATOR))
     }

@@ -1,6 +1,6 @@
 //! The hand image: built for a Cortex-M3, measured under QEMU, held against the part it is for.
 //!
-//! What is counted are instructions: one tick of the image's clock is five. A Cortex-M3 needs more than one clock for
+//! Instructions are counted: one tick of the image's clock is five. A Cortex-M3 needs more than one clock for
 //! some of them (docs/hand.md), which is why the bound is half a cycle.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -72,7 +72,7 @@ pub(crate) fn check(image: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What a control slot calls outside ITCM without a reason.
+/// Functions that a control slot calls outside ITCM without a listed reason.
 fn stray(code: &Code) -> Result<BTreeSet<String>> {
     let named = |name: &str| {
         let found = code.functions().find(|(_, function)| function.names().any(|known| known.ends_with(name)));

@@ -113,6 +113,7 @@ impl Property {
 
 /// The list that a puck uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum List {
     Monitor,
     Safety,

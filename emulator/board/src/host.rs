@@ -24,7 +24,7 @@ const PATIENCE: Ticks = 200 * TICKS_PER_MILLISECOND;
 /// Frames kept from the beginning.
 const FIRST: usize = 5;
 
-/// What the host has learned.
+/// Knowledge of the host.
 #[derive(Debug, Default)]
 pub struct Learned {
     /// Who the device is.
@@ -54,7 +54,7 @@ pub struct Learned {
 pub struct SharedLearned(Arc<Mutex<Learned>>);
 
 impl SharedLearned {
-    /// What the host has learned.
+    /// Knowledge of the host.
     pub fn lock(&self) -> MutexGuard<'_, Learned> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -86,7 +86,7 @@ impl Inquirer {
         }
     }
 
-    /// What to ask next.
+    /// The next question.
     fn question(&mut self) -> Request {
         let learned = self.learned.lock();
         if learned.hello.is_none() {

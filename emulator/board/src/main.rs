@@ -43,7 +43,7 @@ enum Command {
         /// Where the report goes.
         #[arg(long)]
         report: Option<PathBuf>,
-        /// What the CAN controller does with a cancelled place of its transmit queue.
+        /// Effect of a cancelled place in the transmit queue of the CAN controller.
         #[arg(long, value_enum, default_value_t = Reading::Skipped)]
         cancellation: Reading,
         /// Revision of the silicon, REV_ID of DBGMCU.IDC.

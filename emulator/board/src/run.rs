@@ -40,7 +40,7 @@ pub enum RunError {
     /// The emulation.
     #[error(transparent)]
     Emulator(#[from] emulator::Error),
-    /// What is placed in memory.
+    /// The image that is placed in memory.
     #[error(transparent)]
     Image(#[from] rigless::image::Error),
     /// A file.

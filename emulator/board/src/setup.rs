@@ -27,7 +27,7 @@ pub struct Setup {
     pub mips: u32,
     /// Something that is not modelled ends the run.
     pub strict: bool,
-    /// What is put in from outside.
+    /// Faults that are put in from outside.
     pub faults: Vec<Fault>,
     /// Findings are told on standard error while it runs.
     pub tells: bool,

@@ -253,7 +253,7 @@ impl Watcher {
         }
     }
 
-    /// What the run has measured.
+    /// Measurements of the run.
     #[must_use]
     pub fn into_outcome(self, session: &mut Session<Board>) -> Outcome {
         let resets = session.resets().iter().map(|reset| (reset.at.0, format!("{:?}", reset.cause))).collect();

@@ -1,4 +1,4 @@
-//! What leaves on the bus when something goes wrong, and what the next start says.
+//! Frames that leave on the bus when something goes wrong, and the report of the next start.
 
 mod common;
 
@@ -10,7 +10,7 @@ use puck::CanFrame;
 /// In service: the arm is ready long before.
 const SERVICE_US: u64 = 2_100_000;
 
-/// Whether the four safe frames are among `sent`, in order, with nothing but their like between the first and the last.
+/// True if the four safe frames are among `sent`, in order, with nothing but their like between the first and the last.
 fn holds_safe_frames(sent: &[(u64, CanFrame)]) -> bool {
     let wanted = safe_frames();
     sent.windows(wanted.len()).any(|window| window.iter().zip(wanted).all(|((_, frame), wanted)| *frame == wanted))

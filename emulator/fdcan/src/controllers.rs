@@ -29,7 +29,7 @@ pub enum Line {
 pub struct Options {
     /// Decides the memory's content after power-up and the reads that the erratum spoils.
     pub seed: u64,
-    /// What a cancelled place of the transmit FIFO does to the get index.
+    /// Effect of a cancelled place in the transmit FIFO on the get index.
     pub cancellation: Cancellation,
     /// ES0392 2.24.2, revisions Y and W: with both controllers at work, reads of the message memory may be wrong.
     pub erratum: bool,
@@ -115,7 +115,7 @@ impl Controllers {
         self.units[unit as usize].write(offset, value, &self.memory);
     }
 
-    /// What a read would return at the time last reached, without its effects.
+    /// Returns the value of a read at the time last reached, without its effects.
     #[must_use]
     pub fn peek(&self, unit: Unit, offset: u32) -> u32 {
         self.units[unit as usize].peek(offset)

@@ -36,7 +36,7 @@ pub struct Remark {
     pub offset: u32,
     /// The value written or read.
     pub value: u32,
-    /// What happened.
+    /// Description.
     pub text: &'static str,
 }
 

@@ -1,4 +1,4 @@
-//! How deep a function goes by itself, and how deep it is at each of its calls.
+//! Stack depth of a function by itself, and at each of its calls.
 //!
 //! The stack pointer is followed along every way through the function. A function is refused, by name, where two ways
 //! meet with different stack pointers, where it returns with another one than it began with, where the stack pointer
@@ -27,7 +27,7 @@ pub(super) const MASK: u16 = 0xB672;
 /// Unmasks interrupts: CPSIE i.
 pub(super) const UNMASK: u16 = 0xB662;
 
-/// What a call leads to.
+/// Target of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Target {
     /// The function at an address.
@@ -43,9 +43,9 @@ pub(super) struct Call {
     pub(super) address: u32,
     /// Bytes of stack in use there.
     pub(super) depth: u32,
-    /// Whether interrupts may have been unmasked on the way there.
+    /// True if interrupts may have been unmasked on the way there.
     pub(super) unmasked: bool,
-    /// What is called.
+    /// Function that is called.
     pub(super) target: Target,
 }
 
@@ -89,7 +89,7 @@ impl Frame {
     }
 }
 
-/// What is known before an instruction.
+/// State known before an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct State {
     /// Bytes in use.
@@ -213,7 +213,7 @@ impl Walk<'_> {
         Ok(())
     }
 
-    /// Whether nothing but filling follows until the function or this piece of its code ends.
+    /// True if nothing but filling follows until the function or this piece of its code ends.
     fn is_last(&self, index: usize) -> bool {
         let mut end = self.all[index].address + self.all[index].bytes;
         for next in self.all.iter().skip(index + 1) {
@@ -228,12 +228,12 @@ impl Walk<'_> {
         true
     }
 
-    /// What a register points to that is called.
+    /// Target of a register that is called.
     fn pointed(&self, index: usize, register: u32) -> Target {
         self.constant(index, register).map_or(Target::Pointer, |to| Target::Function(to & !1))
     }
 
-    /// What is known after an instruction.
+    /// State known after an instruction.
     fn after(&mut self, index: usize, before: State) -> Result<State> {
         let instruction = &self.all[index];
         let at = instruction.address;
@@ -410,7 +410,7 @@ impl Walk<'_> {
     }
 }
 
-/// Whether an instruction does nothing, or ends everything: what is put between pieces of code.
+/// True if an instruction does nothing, or ends everything: what is put between pieces of code.
 fn is_filling(instruction: &Instruction) -> bool {
     matches!(instruction.halves, (0xBF00 | 0, 0) | (0xF3AF, 0x8000))
         || matches!(instruction.flow, Flow::Abort | Flow::Unreachable)

@@ -29,7 +29,7 @@ pub(super) struct OtherStack {
     pub(super) handlers: &'static [&'static str],
 }
 
-/// What interrupts what on a board, and what is below its stack.
+/// The interrupt levels of a board, and the memory below its stack.
 pub(super) struct Layout {
     /// Name of the board in the image's description.
     pub(super) board: &'static str,

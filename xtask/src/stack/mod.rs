@@ -1,4 +1,4 @@
-//! How deep the stack of an image goes, computed from its instructions: every function's frame, every call, every
+//! Stack depth of an image, computed from its instructions: every function's frame, every call, every
 //! interrupt that may come on top.
 //!
 //! Two figures. *At start*: from reset until the idle task, with interrupts masked but for the very end. *In service*:
@@ -57,7 +57,7 @@ pub(crate) struct Depth {
     /// The stack of its own that one handler has, with its size.
     other: Option<(u32, Ways)>,
     largest: Vec<Stop>,
-    /// How many functions of each kind may be behind a pointer; last those of none.
+    /// Number of functions of each kind that a pointer may lead to; last those of none.
     behind_pointers: Vec<usize>,
 }
 
