@@ -68,6 +68,7 @@ pub enum Action {
 
 impl Action {
     /// The value for the puck with this PIDX (1..=4) in a packed frame; `None` otherwise.
+    #[must_use]
     pub fn torque_for(&self, place: u8) -> Option<PuckTorque> {
         match self {
             Action::PackedTorques { torques, .. } => torques.get(usize::from(place).checked_sub(1)?).copied(),
@@ -151,6 +152,7 @@ impl Request {
 /// The safety module's broadcast when the person presses Activate (`Torque`) or Idle (`Idle`): 0x540.
 ///
 /// The best reading of undocumented frames: SET MODE to all motor pucks.
+#[must_use]
 pub fn safety_broadcast(mode: MotorMode) -> CanFrame {
     short(CanId::encode(Node::SAFETY_MODULE, Group::ALL_MOTORS), PropertyId::MODE, mode.value() as i16)
 }

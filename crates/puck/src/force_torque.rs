@@ -23,16 +23,19 @@ pub struct GaugeStatus(pub u8);
 
 impl GaugeStatus {
     /// A new tare is suggested (bit 7).
+    #[must_use]
     pub const fn suggests_tare(self) -> bool {
         self.0 & 0x80 != 0
     }
 
     /// The data of this very sample are bad (bit 6).
+    #[must_use]
     pub const fn is_bad(self) -> bool {
         self.0 & 0x40 != 0
     }
 
     /// Gauges that have saturated since the last tare, bit 0 = gauge 1.
+    #[must_use]
     pub const fn saturated_gauges(self) -> u8 {
         self.0 & 0x3F
     }
@@ -53,17 +56,20 @@ pub struct RawWrench {
 
 impl RawWrench {
     /// The force in N, sensor frame.
+    #[must_use]
     pub fn newtons<R: Real>(&self) -> [R; 3] {
         scaled_counts(self.force, NEWTON_PER_COUNT)
     }
 
     /// The torque in N m, sensor frame.
+    #[must_use]
     pub fn newton_metres<R: Real>(&self) -> [R; 3] {
         scaled_counts(self.torque, NEWTON_METRE_PER_COUNT)
     }
 }
 
 /// Counts times their unit. The units are powers of two: exact in both types.
+#[must_use]
 pub fn scaled_counts<R: Real>(counts: [i16; 3], unit: f64) -> [R; 3] {
     counts.map(|count| R::from_i32(count as i32) * R::from_f64(unit))
 }
@@ -77,16 +83,19 @@ pub fn quantise<R: Real>(value: R, unit: f64) -> i16 {
 }
 
 /// Ask for one force and torque sample: two frames will answer.
+#[must_use]
 pub fn get_wrench() -> CanFrame {
     get(Node::FORCE_TORQUE, PropertyId::FORCE_TORQUE)
 }
 
 /// Ask for the acceleration: one frame will answer.
+#[must_use]
 pub fn get_acceleration() -> CanFrame {
     get(Node::FORCE_TORQUE, PropertyId::ACCELERATION)
 }
 
 /// Make the present load the zero. No reply; throw the first sample after it away.
+#[must_use]
 pub fn tare() -> CanFrame {
     set(Node::FORCE_TORQUE, PropertyId::FORCE_TORQUE, 0)
 }
@@ -104,11 +113,13 @@ pub(crate) fn decode(payload: &[u8]) -> Option<([i16; 3], Option<GaugeStatus>)> 
 }
 
 /// Device side: the force frame, x, y, z in 1/256 N.
+#[must_use]
 pub fn force_frame(force: [i16; 3]) -> CanFrame {
     six_bytes(Group::FORCE_REPLIES, force)
 }
 
 /// Device side: the torque frame, x, y, z in 1/4096 N m, with the status byte if there is one.
+#[must_use]
 pub fn torque_frame(torque: [i16; 3], status: Option<GaugeStatus>) -> CanFrame {
     match status {
         None => six_bytes(Group::TORQUE_REPLIES, torque),
@@ -120,6 +131,7 @@ pub fn torque_frame(torque: [i16; 3], status: Option<GaugeStatus>) -> CanFrame {
 }
 
 /// Device side: the acceleration frame, x, y, z in 1/1024.
+#[must_use]
 pub fn acceleration_frame(acceleration: [i16; 3]) -> CanFrame {
     six_bytes(Group::ACCELERATION_REPLIES, acceleration)
 }

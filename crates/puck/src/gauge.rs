@@ -38,6 +38,7 @@ pub fn torque<R: Real>(counts: R) -> R {
 }
 
 /// Device side: the counts at which [`torque`] is `torque` (N m), 0 to 4095.
+#[must_use]
 pub fn counts(torque_wanted: f64) -> f64 {
     let (mut low, mut high) = (0.0, LARGEST as f64);
     for _ in 0..HALVINGS {

@@ -98,6 +98,7 @@ pub struct HandAngles<R> {
 /// Angles from the positions of the four pucks, in the order of [`Node::HAND`].
 ///
 /// A finger without a secondary position gets `outer = inner / 3`, which holds only before breakaway.
+#[must_use]
 pub fn angles<R: Real>(primary: &[Counts; 4], secondary: &[Option<Counts>; 3]) -> HandAngles<R> {
     let scale = |counts: Counts, factor: f64| R::from_i32(counts.0) * R::from_f64(factor);
     let mut inner = [R::from_f64(0.0); 3];
@@ -181,11 +182,13 @@ impl HandCommander {
     }
 
     /// A command to one digit.
+    #[must_use]
     pub fn command(&self, digit: Node, command: HandCommand) -> CanFrame {
         set(digit, self.command, command as i32)
     }
 
     /// A mode for all four digits.
+    #[must_use]
     pub fn mode(&self, mode: MotorMode) -> CanFrame {
         set(Group::HAND, PropertyId::MODE, mode.value())
     }

@@ -43,6 +43,7 @@ pub(crate) fn short(id: CanId, property: PropertyId, value: i16) -> CanFrame {
 /// Bytes 1..=7 are one big-endian integer `A<<42 | B<<28 | C<<14 | D` of four 14-bit fields. `property` is T of the
 /// group's firmware ([`PropertyId::TORQUE`] from 61 on). Call this from one place only, with torques that a limiter has
 /// passed: the pucks apply whatever arrives.
+#[must_use]
 pub fn packed_torques(group: Group, property: PropertyId, torques: [PuckTorque; 4]) -> CanFrame {
     let fields = torques.iter().fold(0_u64, |packed, torque| packed << 14 | torque.bits());
     let [_, b1, b2, b3, b4, b5, b6, b7] = fields.to_be_bytes();
@@ -53,6 +54,7 @@ pub fn packed_torques(group: Group, property: PropertyId, torques: [PuckTorque; 
 /// hand's.
 ///
 /// A master sends them first and last. To keep the arm in torque mode, send [`zero_torques`] instead.
+#[must_use]
 pub fn stop_frames() -> [CanFrame; 4] {
     let [arm, wrist] = zero_torques();
     let idle = |group| set(group, PropertyId::MODE, MotorMode::Idle.value());
@@ -61,6 +63,7 @@ pub fn stop_frames() -> [CanFrame; 4] {
 
 /// Explicit zero torque for all seven motors. A puck is believed to keep its last torque until told otherwise, so send
 /// these whenever control ends.
+#[must_use]
 pub fn zero_torques() -> [CanFrame; 2] {
     [Group::ARM_TORQUES, Group::WRIST_TORQUES]
         .map(|group| packed_torques(group, PropertyId::TORQUE, [PuckTorque::ZERO; 4]))

@@ -31,6 +31,7 @@ impl PropertyId {
     pub const ACCELERATION: PropertyId = PropertyId(64);
 
     /// A property by number; `None` above 127.
+    #[must_use]
     pub const fn new(number: u8) -> Option<PropertyId> {
         if number <= 127 { Some(PropertyId(number)) } else { None }
     }
@@ -41,6 +42,7 @@ impl PropertyId {
     }
 
     /// The number, 0..=127.
+    #[must_use]
     pub const fn number(self) -> u8 {
         self.0
     }
@@ -101,11 +103,13 @@ pub use table::Property;
 
 impl Property {
     /// Barrett's mnemonic, in capitals.
+    #[must_use]
     pub const fn mnemonic(self) -> &'static str {
         self.row().mnemonic
     }
 
     /// True if an ordinary reply carries 32 bits (DLC 6) instead of 16 (DLC 4).
+    #[must_use]
     pub const fn is_wide(self) -> bool {
         self.row().is_wide
     }
@@ -166,6 +170,7 @@ impl core::error::Error for UnknownFirmware {}
 
 impl PropertyTable {
     /// The table of any puck in STAT 0.
+    #[must_use]
     pub const fn monitor() -> PropertyTable {
         PropertyTable { list: List::Monitor, version: 0 }
     }
@@ -189,6 +194,7 @@ impl PropertyTable {
 
     /// The table of a force/torque sensor. There is one: some sensors report no usable VERS or ROLE, so choose it by
     /// node 8.
+    #[must_use]
     pub const fn force_torque() -> PropertyTable {
         PropertyTable { list: List::ForceTorque, version: 0 }
     }
@@ -201,6 +207,7 @@ impl PropertyTable {
     }
 
     /// The number of a property on this puck; `None` if it has no such property.
+    #[must_use]
     pub fn id(&self, property: Property) -> Option<PropertyId> {
         let row = property.row();
         let changes = match self.list {
@@ -215,6 +222,7 @@ impl PropertyTable {
     }
 
     /// The property that has this number on this puck; `None` if there is none.
+    #[must_use]
     pub fn property(&self, id: PropertyId) -> Option<Property> {
         Property::ALL.iter().copied().find(|property| self.id(*property) == Some(id))
     }

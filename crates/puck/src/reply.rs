@@ -199,11 +199,13 @@ pub(crate) fn decode_property(payload: &[u8]) -> Result<(PropertyId, i32), Reply
 }
 
 /// Device side: an ordinary reply of 16 bits.
+#[must_use]
 pub fn reply16(node: Node, property: PropertyId, value: i16) -> CanFrame {
     short(CanId::encode(node, Group::PROPERTY_REPLIES), property, value)
 }
 
 /// Device side: an ordinary reply of 32 bits.
+#[must_use]
 pub fn reply32(node: Node, property: PropertyId, value: i32) -> CanFrame {
     wide(CanId::encode(node, Group::PROPERTY_REPLIES), property, value)
 }

@@ -24,6 +24,7 @@ pub enum SafetyMode {
 
 impl SafetyMode {
     /// From the value of MODE; `None` for a value that no document names.
+    #[must_use]
     pub const fn from_value(value: i32) -> Option<SafetyMode> {
         match value {
             0 => Some(SafetyMode::EStop),
@@ -34,6 +35,7 @@ impl SafetyMode {
     }
 
     /// The value of MODE.
+    #[must_use]
     pub const fn value(self) -> i32 {
         self as i32
     }
@@ -168,6 +170,7 @@ impl PendantState {
     }
 
     /// Device side: the value of PEN.
+    #[must_use]
     pub const fn value(&self) -> i32 {
         let button = match self.button {
             Button::EmergencyStop => 0,
@@ -187,6 +190,7 @@ impl PendantState {
     }
 
     /// The character on the seven-segment display; `None` for a pattern that no document names.
+    #[must_use]
     pub const fn display(&self) -> Option<char> {
         Some(match self.segments {
             0x3F => '0',
@@ -206,16 +210,19 @@ impl PendantState {
     }
 
     /// The five supervised quantities, velocity first.
+    #[must_use]
     pub const fn health(&self) -> [Health; 5] {
         [self.velocity, self.torque, self.voltage, self.heartbeat, self.other]
     }
 
     /// Neither warning nor fault anywhere.
+    #[must_use]
     pub fn all_safe(&self) -> bool {
         self.health().iter().all(|health| *health == Health::Safe)
     }
 
     /// A fault somewhere.
+    #[must_use]
     pub fn has_faults(&self) -> bool {
         self.health().contains(&Health::Fault)
     }

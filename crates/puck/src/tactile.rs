@@ -24,6 +24,7 @@ pub enum TactileFormat {
 
 impl TactileFormat {
     /// The value of TACT.
+    #[must_use]
     pub const fn value(self) -> i32 {
         self as i32
     }
@@ -42,11 +43,13 @@ pub struct TactileBlock {
 
 impl TactileBlock {
     /// Number of cells that exist: five, and four in the last block.
+    #[must_use]
     pub const fn cell_count(&self) -> usize {
         if self.sequence == 4 { 4 } else { 5 }
     }
 
     /// The pressures in N/cm^2.
+    #[must_use]
     pub fn pressures<R: Real>(&self) -> [R; 5] {
         self.cells.map(|cell| R::from_i32(cell as i32) * R::from_f64(NEWTON_PER_SQUARE_CENTIMETRE_PER_COUNT))
     }
@@ -60,6 +63,7 @@ impl TactileBlock {
     }
 
     /// Device side: the frame. Sequence and cells are cut to four and twelve bits.
+    #[must_use]
     pub fn frame(&self, node: Node) -> CanFrame {
         let bits =
             self.cells.iter().fold((self.sequence & 0xF) as u64, |bits, cell| bits << 12 | (*cell & 0xFFF) as u64);
@@ -93,6 +97,7 @@ impl TactileTop {
     }
 
     /// Device side: the frame. Map and values are cut to 24 and four bits.
+    #[must_use]
     pub fn frame(&self, node: Node) -> CanFrame {
         let map = (self.map & 0xFF_FFFF) as u64;
         let bits = self.values.iter().fold(map, |bits, value| bits << 4 | (*value & 0xF) as u64);

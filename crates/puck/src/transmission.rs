@@ -30,6 +30,7 @@ impl Ratios {
     pub const WAM7: Ratios = Ratios { coefficients: [42.0, 28.25, 16.8155, 18.0, 9.7, 9.7, 14.93] };
 
     /// From N1..N7 and the ratios of the two differentials, as Barrett's manual lists them.
+    #[must_use]
     pub const fn from_gears(gears: [f64; JOINTS], shoulder_differential: f64, wrist_differential: f64) -> Ratios {
         let [n1, n2, n3, n4, n5, n6, n7] = gears;
         Ratios { coefficients: [n1, n2, n3 / shoulder_differential, n4, n5, n6 * wrist_differential, n7] }
@@ -176,11 +177,13 @@ impl Drives {
     }
 
     /// CTS of each motor: counts per revolution.
+    #[must_use]
     pub const fn counts_per_revolution(&self) -> &[i32; JOINTS] {
         &self.counts_per_revolution
     }
 
     /// IPNM of each motor: current units per N m.
+    #[must_use]
     pub const fn units_per_newton_metre(&self) -> &[i32; JOINTS] {
         &self.units_per_newton_metre
     }
@@ -202,6 +205,7 @@ impl Drives {
     }
 
     /// Unwrapped counts to motor angles in rad.
+    #[must_use]
     pub fn motor_angles<R: Real>(&self, counts: &[Counts; JOINTS]) -> [R; JOINTS] {
         let mut angles = [R::from_f64(0.0); JOINTS];
         for ((angle, count), cts) in angles.iter_mut().zip(counts).zip(self.counts_per_revolution) {
@@ -223,6 +227,7 @@ impl Drives {
     }
 
     /// Puck units to motor torques in N m.
+    #[must_use]
     pub fn motor_torques<R: Real>(&self, torques: &[PuckTorque; JOINTS]) -> [R; JOINTS] {
         let mut motor = [R::from_f64(0.0); JOINTS];
         for ((torque, units), ipnm) in motor.iter_mut().zip(torques).zip(self.units_per_newton_metre) {

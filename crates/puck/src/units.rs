@@ -23,6 +23,7 @@ pub struct Counts(pub i32);
 
 impl Counts {
     /// The low 22 bits of this position, sign extended: the value a puck sends.
+    #[must_use]
     pub const fn wrapped(self) -> Counts {
         let unused = 32 - POSITION_BITS;
         Counts((self.0 << unused) >> unused)
@@ -31,6 +32,7 @@ impl Counts {
     /// The position nearest to `previous` whose 22 low bits equal those of `self`.
     ///
     /// Exact as long as the motor turned by less than 256 revolutions (at 4096 counts) since `previous`.
+    #[must_use]
     pub const fn unwrapped_near(self, previous: Counts) -> Counts {
         let moved = Counts(self.0.wrapping_sub(previous.0)).wrapped();
         Counts(previous.0.wrapping_add(moved.0))
@@ -48,6 +50,7 @@ impl PuckTorque {
     pub const ZERO: PuckTorque = PuckTorque(0);
 
     /// A torque from its integer value; `None` if it does not fit into 14 bits.
+    #[must_use]
     pub const fn new(units: i16) -> Option<PuckTorque> {
         if units >= -PACKED_TORQUE_LIMIT - 1 && units <= PACKED_TORQUE_LIMIT { Some(PuckTorque(units)) } else { None }
     }
@@ -72,6 +75,7 @@ impl PuckTorque {
     }
 
     /// The integer value, current units of the puck.
+    #[must_use]
     pub const fn units(self) -> i16 {
         self.0
     }
