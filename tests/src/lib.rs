@@ -97,7 +97,7 @@ pub fn simulation(device: &mut Device) -> &mut Simulation {
     device.simulation().expect("the tests open simulated devices only")
 }
 
-/// The primitive that every test plays: shown by the simulated person, recorded over the link, learned; all by the
+/// The primitive that every test plays: shown by the simulated teacher, recorded over the link, learned; all by the
 /// command.
 ///
 /// It is taught to `sil:`, because that is fast; the journey teaches the firmware itself.

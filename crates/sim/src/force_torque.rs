@@ -56,7 +56,7 @@ impl Default for ForceTorqueConfig {
     }
 }
 
-/// An error that comes up by and by and stays, such as that of a sensor that warms.
+/// An error that comes up slowly and stays, such as that of a sensor that warms.
 #[derive(Clone, Copy, Debug)]
 struct Creep {
     error: [f64; 6],

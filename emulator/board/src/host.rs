@@ -19,7 +19,7 @@ pub const READY: u8 = 10;
 const PACE: Ticks = 20 * TICKS_PER_MILLISECOND;
 
 /// Time after which an answer is not waited for any longer.
-const PATIENCE: Ticks = 200 * TICKS_PER_MILLISECOND;
+const TIMEOUT: Ticks = 200 * TICKS_PER_MILLISECOND;
 
 /// Frames kept from the beginning.
 const FIRST: usize = 5;
@@ -135,7 +135,7 @@ impl Host for Inquirer {
         while let Some(frame) = self.decoder.next::<Reply>(&mut rest) {
             self.hear(now, frame.message, frame.envelope.time_ms);
         }
-        let wait = if self.waiting { PATIENCE } else { PACE };
+        let wait = if self.waiting { TIMEOUT } else { PACE };
         if now < self.asked_at + wait {
             return Vec::new();
         }
