@@ -13,7 +13,7 @@ const ADDRESS_MASK: u16 = 0x1F;
 /// Position of the sender field.
 const SENDER_SHIFT: u16 = 5;
 
-/// One participant of the bus, 0..=31.
+/// One participant of the bus, 0..=31. To reach several at once, send to a [`Group`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -60,7 +60,7 @@ impl Node {
     }
 }
 
-/// A multicast address, 0..=31.
+/// A multicast address, 0..=31. A puck belongs to up to three; replies travel to groups of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]

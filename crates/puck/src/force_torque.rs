@@ -42,6 +42,16 @@ impl GaugeStatus {
 }
 
 /// One sample of the sensor in counts: the wrench of the environment on the robot's tool side, in the sensor frame.
+///
+/// On the bus it is two frames, [`Reply::Force`](crate::Reply::Force) and [`Reply::Torque`](crate::Reply::Torque); put them together
+/// only if they answer the same request.
+///
+/// ```
+/// use puck::RawWrench;
+///
+/// let sample = RawWrench { force: [256, 0, -512], ..RawWrench::default() };
+/// assert_eq!(sample.newtons::<f32>(), [1.0, 0.0, -2.0]);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]

@@ -154,7 +154,16 @@ impl From<NotFinite> for HandError {
     }
 }
 
-/// The frames that command a hand whose four pucks share one firmware generation.
+/// The frames that command a hand whose four pucks share one firmware generation. Angles are read by [`angles`].
+///
+/// ```
+/// use puck::{PropertyTable, hand::{HandCommand, HandCommander}, Node};
+///
+/// let hand = HandCommander::new(&PropertyTable::motor(200)?)?;
+/// let frame = hand.command(Node::FINGERS[0], HandCommand::Initialise);
+/// let frames = hand.trapezoidal_move(&[1.0, 1.0, 1.0, 0.0])?; // rad; four targets, then the mode
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct HandCommander {
