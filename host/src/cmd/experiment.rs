@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use sim::world::ObjectKind;
 
 use super::{ErrorCode, Failure, Global};
-use experiment::{Grid, Mode, Object, PlantKind, Scenario, Variation};
+use experiment::{Grid, Mode, PlantKind, Scenario, Variation};
 
 /// Options of `experiment`.
 #[derive(Debug, Clone, Args)]
@@ -41,8 +43,8 @@ pub struct Cmd {
     #[arg(long, value_name = "NAME=VALUE,...", default_value = "")]
     pub vary: Variation,
     /// What stands on the table instead of the usual object
-    #[arg(long, value_enum)]
-    pub object: Option<Object>,
+    #[arg(long, value_parser = object_kinds())]
+    pub object: Option<ObjectKind>,
     /// Simulations at a time [default: one for each processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=512))]
     pub jobs: Option<u16>,
@@ -61,6 +63,12 @@ pub struct Cmd {
     /// Write the telemetry of every trial into the folder `recordings`
     #[arg(long)]
     pub keep_recordings: bool,
+}
+
+/// Names of the objects, each with its description in the help.
+fn object_kinds() -> impl TypedValueParser<Value = ObjectKind> {
+    let value = |kind: ObjectKind| PossibleValue::new(kind.name()).help(kind.row().description);
+    PossibleValuesParser::new(ObjectKind::ALL.map(value)).try_map(|name| name.parse::<ObjectKind>())
 }
 
 /// Carries an experiment through.
