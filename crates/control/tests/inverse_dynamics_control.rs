@@ -1,7 +1,8 @@
 //! Eq (10) is the printed sum, with the rotors in its mass matrix.
 
-use control::law::{Gains, JointController, JointReference};
+use control::law::{Gains, JointController};
 use control::model::{ArmModel, Frames};
+use control::plan::JointReference;
 use control::sense::JointState;
 use control::units::{JointAccelerations, JointPositions, JointVelocities, Vector7};
 use control::{Payload, model};
@@ -16,6 +17,7 @@ fn the_torque_is_inertia_bias_feedback_and_friction() {
         missing: 0,
         age: 0,
         implausible: false,
+        displaced: false,
     };
     let reference = JointReference {
         q: JointPositions(state.q.0 + Vector7::from([0.01, -0.02, 0.01, 0.02, -0.03, 0.01, 0.02])),

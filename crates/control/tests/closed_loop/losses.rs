@@ -2,7 +2,7 @@
 
 use control::act::limit::STEP_LIMIT;
 use control::command::{Command, RunOptions};
-use control::{Fault, State};
+use control::{Fault, RATE_HZ, State};
 
 use crate::primitives::{Design, START, primitive};
 use crate::rig::Rig;
@@ -115,7 +115,7 @@ fn a4_random_loss_of_one_percent_does_not_disturb_the_run() {
             assert!((record.tau[joint] - last[joint]).abs() <= STEP_LIMIT[joint] as f32 * 1.0001);
         }
         last = record.tau;
-        assert!(rig.number < 300 * 30);
+        assert!(rig.number < u64::from(RATE_HZ) * 30);
     }
 }
 
@@ -135,5 +135,33 @@ fn while_replies_are_missing_the_feedback_is_frozen() {
         assert_eq!(record.state, State::Coast);
         let change = (record.tau[0] - before.tau[0]).abs();
         assert!(change < 0.02, "{change} N m from a position that nobody measured");
+    }
+}
+
+#[test]
+fn a7_a_motor_that_begins_to_count_anew_stops_the_arm_softly_without_a_step_and_for_good() {
+    for (motor, jump) in [(0, 30_000), (1, -5_000), (3, 1 << 20), (4, 2_000), (6, -100_000)] {
+        let mut rig = running(0.9);
+        rig.jump[motor] = jump;
+        let mut last = rig.last.expect("ran").record.tau;
+        for cycle in 0..600 {
+            let record = rig.tick(None).record;
+            let state = if cycle == 0 { State::Coast } else { State::SoftStop };
+            assert_eq!(record.state, state, "M{} by {jump}, cycle {cycle}", motor + 1);
+            for joint in 0..7 {
+                let step = (record.tau[joint] - last[joint]).abs();
+                assert!(step <= STEP_LIMIT[joint] as f32 * 1.0001, "J{}: {step}", joint + 1);
+                // The posture is still the one that the arm has, so that gravity is carried.
+                let error = f64::from(record.q[joint]) - rig.plant.q[joint];
+                assert!(error.abs() < 0.01, "M{} by {jump}, cycle {cycle}, J{}: {error}", motor + 1, joint + 1);
+            }
+            last = record.tau;
+        }
+        assert_eq!(rig.cycle.fault(), Fault::ImplausiblePosition);
+        assert!(rig.plant.dq.amax() < 1e-3, "{}", rig.plant.dq);
+        // A cleared fault comes back: nobody knows where zero is.
+        rig.command(Command::Clear);
+        rig.tick(None);
+        assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::SoftStop, Fault::ImplausiblePosition));
     }
 }

@@ -13,7 +13,7 @@ use control::model::{ArmModel, Frames};
 use control::plan::load;
 use control::units::{JointPositions, JointVelocities, Vector7};
 use control::{
-    BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, LoadRefusal, Payload, Real, State, model,
+    BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, LoadRefusal, Payload, RATE, Real, State, model,
 };
 use dmp::Primitive;
 use nalgebra::{SMatrix, Vector3};
@@ -186,6 +186,8 @@ pub(crate) struct Rig<R: Real> {
     pub(crate) number: u64,
     /// Replies to leave out in the next cycle.
     pub(crate) lose: [bool; 7],
+    /// Counts by which the replies of each motor have jumped.
+    pub(crate) jump: [i32; 7],
     pub(crate) last: Option<CycleOutput>,
 }
 
@@ -197,6 +199,7 @@ impl<R: Real> Rig<R> {
             safety: SafetyMode::Active,
             number: 0,
             lose: [false; 7],
+            jump: [0; 7],
             last: None,
         }
     }
@@ -208,10 +211,8 @@ impl<R: Real> Rig<R> {
 
     pub(crate) fn tick(&mut self, command: Option<Command>) -> CycleOutput {
         let mut positions = self.plant.counts();
-        for (position, lose) in positions.iter_mut().zip(self.lose) {
-            if lose {
-                *position = None;
-            }
+        for ((position, lose), jump) in positions.iter_mut().zip(self.lose).zip(self.jump) {
+            *position = position.filter(|_| !lose).map(|counts| Counts(counts.0 + jump).wrapped());
         }
         let sample = BusSample {
             positions,
@@ -239,14 +240,14 @@ impl<R: Real> Rig<R> {
     }
 
     pub(crate) fn run_for(&mut self, seconds: f64) {
-        for _ in 0..(seconds * 300.0).round() as usize {
+        for _ in 0..(seconds * RATE).round() as usize {
             self.tick(None);
         }
     }
 
     /// Runs until the state is left; fails after `seconds`.
     pub(crate) fn until(&mut self, state: State, seconds: f64) {
-        for _ in 0..(seconds * 300.0) as usize {
+        for _ in 0..(seconds * RATE) as usize {
             if self.tick(None).record.state == state {
                 return;
             }
