@@ -160,7 +160,7 @@ fn a7_a_motor_that_begins_to_count_anew_stops_the_arm_softly_without_a_step_and_
         assert_eq!(rig.cycle.fault(), Fault::ImplausiblePosition);
         assert!(rig.plant.dq.amax() < 1e-3, "{}", rig.plant.dq);
         // A cleared fault comes back: nobody knows where zero is.
-        rig.command(Command::Clear);
+        rig.command(Command::ClearFault);
         rig.tick(None);
         assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::SoftStop, Fault::ImplausiblePosition));
     }
