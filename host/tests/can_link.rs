@@ -227,7 +227,7 @@ fn devices_on_a_bus_hear_only_what_is_meant_for_them() {
     let port = lab::transport::SimulatedCan::attach(*simulation, DeviceNumber::FIRST);
     let line = lab::transport::CanTransport::new(port, DeviceNumber::new(3).unwrap());
     let error = Client::connect(line, "test").err().unwrap();
-    assert_eq!(error.code(), "E702", "{error}");
+    assert_eq!(error.code().to_string(), "E702", "{error}");
 }
 
 #[test]

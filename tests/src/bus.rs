@@ -1,4 +1,4 @@
-//! What went over the simulated bus, read with the device side of the protocol.
+//! Frames of the simulated bus, read with the device side of the protocol.
 
 use puck::{Action, Group, PropertyId, Request};
 use sim::{Passage, Ticks};

@@ -1,4 +1,5 @@
-//! The hand's drives and the links of the MuJoCo world work together: no chatter, the worm locks, the gauge feels the object.
+//! The hand's drives and the links of the MuJoCo world work together: no chatter, the worm locks, the gauge feels the
+//! object.
 #![cfg(feature = "mujoco")]
 
 mod common;

@@ -91,7 +91,7 @@ impl Simulation {
     pub fn flashlight_tilt(&mut self) -> Option<f64> {
         #[cfg(feature = "mujoco")]
         {
-            use sim::person::GuidedWorld;
+            use sim::teacher::GuidedWorld;
             use sim::world::mujoco::MujocoWorld;
             let world: &dyn std::any::Any = self.plant.world();
             let mujoco = world

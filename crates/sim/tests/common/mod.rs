@@ -174,12 +174,12 @@ pub fn safety_id(property: Property) -> PropertyId {
     PropertyTable::safety(VERSION).unwrap().id(property).unwrap()
 }
 
-/// What the encoders should read at home.
+/// Expected readings of the encoders at home.
 pub fn home_counts() -> [Counts; 7] {
     counts_at(&HOME)
 }
 
-/// What zeroed encoders should read at these joint angles.
+/// Expected readings of zeroed encoders at these joint angles.
 pub fn counts_at(q: &[f64; 7]) -> [Counts; 7] {
     let motors = Transmission::new(&Ratios::WAM7).unwrap().motor_from_joint(q);
     Drives::new([4096; 7], [2472; 7]).unwrap().counts(&motors).unwrap()
