@@ -14,6 +14,7 @@
 
 use control::controller::Gains;
 use control::{Calibration, Cycle, CycleInput, CycleRecord, Fault, LoadRefusal, Payload, State};
+use link::HandStage;
 use pinned_init::{Init, init};
 use puck::{CanFrame, MotorMode, Node, PropertyId, Reply, SafetyMode, Status, set, zero_torques};
 
@@ -204,6 +205,7 @@ impl Core {
             pendant: self.pendant,
             temperatures: self.temperatures,
             hand: self.hand.stage(),
+            hand_moves: self.hand.stage() == HandStage::Initialising || self.cycle.moves_hand(),
             hand_temperatures: self.hand_temperatures,
             counters: self.counters,
         }

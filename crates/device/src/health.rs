@@ -75,6 +75,8 @@ pub struct Health {
     pub temperatures: [Option<i16>; 7],
     /// How far the hand has come.
     pub hand: HandStage,
+    /// The hand moves by itself, outside a run: its initialisation, or a move that a person asked for.
+    pub hand_moves: bool,
     /// Latest temperature of each hand puck (F1, F2, F3, spread), degree Celsius.
     pub hand_temperatures: [Option<i16>; 4],
     /// Counters.

@@ -159,7 +159,8 @@ impl<S: Store> Session<S> {
         self.drop_unanswered(now_ms, port);
         self.settle(now_ms, port);
         let opening = self.is_opening(now_ms);
-        while !opening && port.room() >= 2 * ANSWER_ROOM {
+        // The time-out is served before each request: no host inherits the motion of another.
+        while self.watch_host(now_ms, port) && !opening && port.room() >= 2 * ANSWER_ROOM {
             let Some(frame) = self.inbox.pop_front() else {
                 break;
             };
@@ -168,7 +169,6 @@ impl<S: Store> Session<S> {
         // A store in memory is done at once.
         self.settle(now_ms, port);
         self.forward_records(now_ms, port);
-        self.watch_host(now_ms, port);
     }
 
     /// Events of the control half: answers to commands, and news.
@@ -250,27 +250,30 @@ impl<S: Store> Session<S> {
         }
     }
 
-    /// Stops a motion whose host has fallen silent or gone, and ends its session: what it says next may be stale.
-    fn watch_host(&mut self, now_ms: u32, port: &mut impl SessionPort) {
+    /// Stops a motion whose host has fallen silent or gone, and ends its session: what it says next may be stale. False if the stop
+    /// found no room: nothing else may happen before it has.
+    fn watch_host(&mut self, now_ms: u32, port: &mut impl SessionPort) -> bool {
         let silence = self.owner.as_ref().map(|owner| owner.silence(now_ms));
         if silence.is_some_and(|silence| silence < LINK_TIMEOUT_MS) {
-            return;
+            return true;
         }
         let health = port.health();
-        let moving = matches!(health.state, State::Gravity | State::Approach | State::Run | State::Coast);
+        let active = matches!(health.state, State::Gravity | State::Approach | State::Run | State::Coast);
+        let moving = active || health.hand_moves;
         // Without a host the stop may be on its way already.
         if !moving || (silence.is_none() && !self.pending.is_empty()) {
-            return;
+            return true;
         }
         if port.command(control::Command::Stop.into()).is_err() {
             // Tried again in the next poll: the session stays open until the stop is on its way.
-            return;
+            return false;
         }
         self.pending.push(Asker::Device, now_ms);
         self.link_timeouts = self.link_timeouts.wrapping_add(1);
         let (cycle, detail) = (wire::cycle(health.cycle), silence.unwrap_or(0));
         self.tell(now_ms, Event { cycle, kind: EventKind::LinkTimeout, code: 0, detail }, port);
         self.close();
+        true
     }
 
     /// Ends the session of the present host.

@@ -49,6 +49,8 @@ pub(crate) struct Bench {
     pub(crate) state: State,
     /// Its latched fault.
     pub(crate) fault: Fault,
+    /// The hand moves by itself.
+    pub(crate) hand_moves: bool,
     /// What is mounted on its arm.
     pub(crate) payload: Payload,
     /// Where its arm was zeroed.
@@ -106,6 +108,7 @@ impl SessionPort for Bench {
             pendant: Some(0x0F3F_1249),
             temperatures: [Some(30), None, None, None, None, None, Some(35)],
             hand: HandStage::NotInitialised,
+            hand_moves: self.hand_moves,
             hand_temperatures: [Some(31), None, None, Some(34)],
             counters: self.counters,
         }
@@ -167,6 +170,7 @@ impl<S: device::Store> Rig<S> {
             load: Ok(()),
             state: State::Hold,
             fault: Fault::None,
+            hand_moves: false,
             payload: Payload::SensorAndHand,
             zeroed_at: None,
             counters: Counters::default(),

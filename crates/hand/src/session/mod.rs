@@ -10,7 +10,7 @@ use control::State;
 use device::{Asker, Identity, Owner, Pending, QueueFull, Timing};
 use heapless::Deque;
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame, LINK_TIMEOUT_MS};
-use link::{Event as LinkEvent, EventKind, Name, Refusal, Reply, Request, Statistics, Telemetry};
+use link::{Event as LinkEvent, EventKind, HandStage, Name, Refusal, Reply, Request, Statistics, Telemetry};
 
 use crate::command::{Command, Refused};
 use crate::core::{Event, Health};
@@ -123,14 +123,14 @@ impl<'a> Session<'a> {
         let now_ms = (now_us / 1000) as u32;
         self.forward_events(now_ms, port);
         self.drop_unanswered(now_ms, port);
-        while port.room() >= 2 * FRAME_BYTES {
+        // The time-out is served before each request: no host inherits the motion of another.
+        while self.watch_host(now_ms, port) && port.room() >= 2 * FRAME_BYTES {
             let Some(frame) = self.inbox.pop_front() else {
                 break;
             };
             self.handle(now_ms, frame, port);
         }
         self.forward_records(now_ms, port);
-        self.watch_host(now_ms, port);
     }
 
     fn forward_events(&mut self, now_ms: u32, port: &mut impl SessionPort) {
@@ -195,21 +195,23 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Stops a motion whose host has fallen silent or gone, and ends its session: what it says next may be stale.
-    fn watch_host(&mut self, now_ms: u32, port: &mut impl SessionPort) {
+    /// Stops a motion whose host has fallen silent or gone, and ends its session: what it says next may be stale. False if the stop
+    /// found no room: nothing else may happen before it has.
+    fn watch_host(&mut self, now_ms: u32, port: &mut impl SessionPort) -> bool {
         let silence = self.owner.as_ref().map(|owner| owner.silence(now_ms));
         if silence.is_some_and(|silence| silence < LINK_TIMEOUT_MS) {
-            return;
+            return true;
         }
         let health = port.health();
-        let moving = matches!(health.state, State::Approach | State::Run | State::Coast);
+        let active = matches!(health.state, State::Approach | State::Run | State::Coast);
+        let moving = active || health.hand == HandStage::Initialising;
         // Without a host the stop may be on its way already.
         if !moving || (silence.is_none() && !self.pending.is_empty()) {
-            return;
+            return true;
         }
         if port.command(Command::Stop).is_err() {
             // Tried again in the next poll: the session stays open until the stop is on its way.
-            return;
+            return false;
         }
         self.pending.push(Asker::Device, now_ms);
         self.link_timeouts = self.link_timeouts.wrapping_add(1);
@@ -217,6 +219,7 @@ impl<'a> Session<'a> {
             LinkEvent { cycle: health.cycle, kind: EventKind::LinkTimeout, code: 0, detail: silence.unwrap_or(0) };
         self.tell(now_ms, news, port);
         self.close();
+        true
     }
 
     /// Ends the session of the present host.

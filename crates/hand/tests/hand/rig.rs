@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use device::{Identity, QueueFull, Slot, Timing};
 use hand::{Command, Core, CoreIo, Event, FingerPrimitive, Health, Library, Record, Session, SessionPort, TimedRecord};
-use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
+use link::frame::{self, Decoder, Envelope, FRAME_BYTES, LINK_TIMEOUT_MS};
 use link::{HostHello, LINK_VERSION, Reply, Request, SCHEMA_HASH, Text};
 use puck::CanFrame;
 use sim::{FingerObstacle, FreeJoints, HOME, Plant, PlantConfig, SLOT_TICKS, TICKS_PER_MICROSECOND};
@@ -78,6 +78,16 @@ impl SessionPort for Port<'_> {
 /// Whether a frame that is through at this time is lost.
 type Loss = Box<dyn FnMut(&CanFrame, u64) -> bool>;
 
+/// A hello that fits.
+fn hello() -> Request {
+    Request::Hello(HostHello {
+        link_version: LINK_VERSION,
+        schema_hash: SCHEMA_HASH,
+        model_hash: control::MODEL_HASH,
+        owner: Text::new("rig"),
+    })
+}
+
 /// Device, bus and host in one.
 pub(crate) struct Rig {
     pub(crate) plant: Plant,
@@ -94,6 +104,8 @@ pub(crate) struct Rig {
     pub(crate) heard: Vec<Reply>,
     /// Every record.
     pub(crate) records: Vec<Record>,
+    /// Every frame the device sent.
+    pub(crate) sent: Vec<CanFrame>,
     /// Frames from the bus that this takes away do not arrive.
     pub(crate) lose: Loss,
 }
@@ -119,15 +131,10 @@ impl Rig {
             alive: true,
             heard: Vec::new(),
             records: Vec::new(),
+            sent: Vec::new(),
             lose: Box::new(|_, _| false),
         };
-        let hello = HostHello {
-            link_version: LINK_VERSION,
-            schema_hash: SCHEMA_HASH,
-            model_hash: control::MODEL_HASH,
-            owner: Text::new("rig"),
-        };
-        assert!(matches!(rig.ask(Request::Hello(hello)), Reply::Hello { .. }));
+        assert!(matches!(rig.ask(hello()), Reply::Hello { .. }));
         rig
     }
 
@@ -172,6 +179,7 @@ impl Rig {
             self.heard.push(frame.message);
         }
         for frame in self.queues.sent.drain(..) {
+            self.sent.push(frame);
             self.plant.submit(now, frame);
         }
         self.slot = self.slot.next();
@@ -218,6 +226,19 @@ impl Rig {
         self.put(Envelope { session: 999, sequence: OF, time_ms: 0 }, &request);
         self.run(0.1);
         self.heard.iter().find(|reply| reply.answers() == Some(OF)).expect("an answer").clone()
+    }
+
+    /// The host says its last word. Another one says hello just when the half second has passed in which the first was silent.
+    pub(crate) fn change_hosts(&mut self) {
+        self.alive = false;
+        let milliseconds = |rig: &Rig| (rig.ticks / TICKS_PER_MICROSECOND / 1000) as u32;
+        let last = milliseconds(self);
+        self.accept(Request::Ping);
+        while milliseconds(self) < last + LINK_TIMEOUT_MS {
+            self.step();
+        }
+        let time_ms = milliseconds(self);
+        self.put(Envelope { session: 8, sequence: 1, time_ms }, &hello());
     }
 
     fn put(&mut self, envelope: Envelope, request: &Request) {
