@@ -1,7 +1,7 @@
 //! The hand: found, woken, initialised by a person alone, read and driven in every cycle, and lost without the arm.
 
 use control::{Command as Control, State, flags};
-use device::{Command, EventKind, HandTrouble, Refusal, Slot, Stage};
+use device::{Command, Controller, EventKind, HandTrouble, Refusal, Slot, Stage};
 use link::HandStage;
 use puck::hand::angles;
 use puck::{

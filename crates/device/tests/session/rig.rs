@@ -7,8 +7,8 @@ use control::kinematics::Frames;
 use control::units::JointPositions;
 use control::{CycleRecord, Fault, LoadRefusal, Payload, State};
 use device::{
-    Command, Counters, Event, EventKind, FitPrimitive, Health, Identity, QueueFull, RamStore, Session, SessionPort,
-    Stage, StoredPrimitive, TimedRecord, Timing,
+    Command, Counters, DeviceController, Event, EventKind, FitPrimitive, Health, Identity, QueueFull, RamStore,
+    Session, SessionPort, Stage, StoredPrimitive, TimedRecord, Timing,
 };
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame};
 use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
@@ -59,7 +59,7 @@ pub(crate) struct Bench {
     pub(crate) counters: Counters,
 }
 
-impl SessionPort for Bench {
+impl SessionPort<DeviceController> for Bench {
     fn send(&mut self, bytes: &[u8]) {
         assert!(bytes.len() <= self.room, "the session sent more than there was room for");
         self.line.extend_from_slice(bytes);
@@ -120,7 +120,7 @@ impl SessionPort for Bench {
 }
 
 /// A session with its bench and one host.
-pub(crate) struct Rig<S = Store> {
+pub(crate) struct Rig<S: device::Store = Store> {
     /// The session under test.
     pub(crate) session: Box<Session<S>>,
     /// What is around it.

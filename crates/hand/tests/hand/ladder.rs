@@ -153,7 +153,7 @@ fn lost_replies_are_bridged_for_five_cycles_and_end_the_torque_in_the_sixth() {
     for (cycles, survives) in [(1, true), (5, true), (7, false)] {
         let mut rig = gripping(adapt());
         rig.run(1.0);
-        let from = rig.health().cycle;
+        let from = rig.health().cycle as u32;
         let before = rig.now().torque;
         let left = std::cell::Cell::new(0);
         let begin = std::cell::OnceCell::new();
@@ -259,6 +259,23 @@ fn a_puck_that_reports_its_reset_is_a_fault_that_ends_with_clearing_and_initiali
     rig.wait(20.0, |rig| rig.health().hand == HandStage::Ready);
     rig.accept(run(adapt()));
     rig.wait(6.0, |rig| rig.health().state == State::Hold);
+}
+
+#[test]
+fn a10_bus_off_ends_the_torque_of_a_hand_alone_and_latches() {
+    let mut rig = gripping(adapt());
+    rig.run(1.0);
+    rig.bus_off();
+    rig.plant.record_bus();
+    rig.run(0.02);
+    assert_eq!((rig.health().state, rig.health().fault), (State::Fault, Fault::BusFault));
+    assert!(torques(&rig).iter().all(|units| *units == [0; 4]) && !torques(&rig).is_empty(), "zeros, then silence");
+    let told = rig.heard.iter().any(|reply| {
+        matches!(reply, Reply::Event(event) if event.kind == EventKind::State && event.detail == Fault::BusFault.code().into())
+    });
+    assert!(told, "the host hears of it");
+    rig.accept(Request::ClearFault);
+    rig.accept(Request::MoveHand { q: [0.0; 4], duration: 1.0 });
 }
 
 #[test]

@@ -2,10 +2,14 @@
 
 use std::collections::VecDeque;
 
-use device::{Identity, QueueFull, Slot, Timing};
-use hand::{Command, Core, CoreIo, Event, FingerPrimitive, Health, Library, Record, Session, SessionPort, TimedRecord};
+use control::LoadRefusal;
+use device::{
+    Controller, ControllerIo, Health, HostSession, Identity, Message, QueueFull, SessionPort, Slot, TimedRecord, Timing,
+};
+use hand::{Command, DeviceController, FingerPrimitive, HandApplication, Library, Record, Session};
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, LINK_TIMEOUT_MS};
 use link::{HostHello, LINK_VERSION, Reply, Request, SCHEMA_HASH, Text};
+use pinned_init::InPlaceWrite;
 use puck::CanFrame;
 use sim::{FingerObstacle, FreeJoints, HOME, Plant, PlantConfig, SLOT_TICKS, TICKS_PER_MICROSECOND};
 
@@ -18,11 +22,11 @@ struct Queues {
     received: VecDeque<CanFrame>,
     sent: Vec<CanFrame>,
     commands: VecDeque<Command>,
-    records: VecDeque<TimedRecord>,
-    events: VecDeque<Event>,
+    records: VecDeque<TimedRecord<Record>>,
+    events: VecDeque<Message>,
 }
 
-impl CoreIo for Queues {
+impl ControllerIo<DeviceController> for Queues {
     fn receive(&mut self) -> Option<CanFrame> {
         self.received.pop_front()
     }
@@ -36,18 +40,18 @@ impl CoreIo for Queues {
     fn record(&mut self, record: Record) {
         self.records.push_back(TimedRecord { record, cost_ticks: 0 });
     }
-    fn event(&mut self, event: Event) {
+    fn event(&mut self, event: Message) {
         self.events.push_back(event);
     }
 }
 
 struct Port<'a> {
     queues: &'a mut Queues,
-    core: &'a mut Core,
+    core: &'a mut DeviceController,
     line: &'a mut Vec<u8>,
 }
 
-impl SessionPort for Port<'_> {
+impl SessionPort<DeviceController> for Port<'_> {
     fn send(&mut self, bytes: &[u8]) {
         self.line.extend_from_slice(bytes);
     }
@@ -58,13 +62,13 @@ impl SessionPort for Port<'_> {
         self.queues.commands.push_back(command);
         Ok(())
     }
-    fn load(&mut self, primitive: &FingerPrimitive) -> bool {
+    fn load(&mut self, primitive: &FingerPrimitive) -> Result<(), LoadRefusal> {
         self.core.load(primitive)
     }
-    fn record(&mut self) -> Option<TimedRecord> {
+    fn record(&mut self) -> Option<TimedRecord<Record>> {
         self.queues.records.pop_front()
     }
-    fn event(&mut self) -> Option<Event> {
+    fn event(&mut self) -> Option<Message> {
         self.queues.events.pop_front()
     }
     fn health(&mut self) -> Health {
@@ -91,8 +95,8 @@ fn hello() -> Request {
 /// Device, bus and host in one.
 pub(crate) struct Rig {
     pub(crate) plant: Plant,
-    core: Core,
-    session: Session<'static>,
+    core: DeviceController,
+    session: Box<Session<'static>>,
     queues: Queues,
     slot: Slot,
     ticks: u64,
@@ -119,10 +123,11 @@ impl Rig {
         let identity =
             Identity { firmware: "test", board: "test", serial: "test", simulated: true, ticks_per_second: 25_000_000 };
         let library: &'static mut Library = Box::leak(Box::new(Library::EMPTY));
+        let Ok(session) = Box::new_uninit().write_init(HostSession::over(identity, HandApplication::new(library)));
         let mut rig = Rig {
             plant: Plant::new(config, Box::new(world)),
-            core: Core::new(),
-            session: Session::new(identity, library),
+            core: DeviceController::new(),
+            session,
             queues: Queues::default(),
             slot: Slot::Request,
             ticks: 10 * SLOT_TICKS,
@@ -192,6 +197,11 @@ impl Rig {
     /// A frame arrives beside those of the simulated bus, in the next slot.
     pub(crate) fn hear(&mut self, frame: CanFrame) {
         self.queues.received.push_back(frame);
+    }
+
+    /// The CAN controller leaves the bus, and comes back at once.
+    pub(crate) fn bus_off(&mut self) {
+        self.core.note_bus_error(true);
     }
 
     /// So many seconds.
