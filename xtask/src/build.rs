@@ -11,7 +11,7 @@ use crate::setup::{ARM, Machine, Toolchain};
 use crate::{hand, hot, panics, shell, stack};
 
 /// Features of the host packages with the MuJoCo world and its pictures.
-pub(crate) const WORLD: &str = "tactus/mujoco,sim/mujoco,sim/render,system-tests/mujoco";
+pub(crate) const WORLD: &str = "tactus/mujoco,lab/mujoco,experiment/mujoco,sim/mujoco,sim/render,system-tests/mujoco";
 
 /// Builds the `tactus` command with the MuJoCo world, optimised; returns its path.
 pub(crate) fn host() -> Result<PathBuf> {

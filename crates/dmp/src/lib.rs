@@ -7,38 +7,37 @@
 extern crate std;
 
 pub mod bounds;
-mod chart;
 mod configuration;
-mod expectation;
-mod experience;
-mod feedback;
+mod coupling;
+mod expected_sensors;
 mod forcing;
-mod group;
+mod log_map;
 mod orientation;
-mod pace;
+mod orientation_rows;
 mod phase;
+mod point_rows;
 mod primitive;
 mod primitive_error;
 mod quaternion;
 mod reference;
 mod rollout;
 mod scalar;
+mod sensor_statistics;
 mod table;
+mod time_scale;
 mod transformation;
-mod turn;
 mod vector;
 
 #[cfg(feature = "std")]
 pub mod fit;
 
-pub use chart::RotationChart;
 pub use configuration::{Configuration, Velocity};
-pub use expectation::{EXPECTED_CAPACITY, ExpectedWrench};
-pub use experience::{EXPERIENCE_CAPACITY, EXPERIENCE_CHANNELS, Experience};
-pub use feedback::{
+pub use coupling::{
     COUPLED_ROWS, Coupling, Feedback, GAIN_CAPACITY, GainSchedule, Limits, SENSORS, SensorMap, Stiffness,
 };
+pub use expected_sensors::{EXPECTED_CAPACITY, ExpectedWrench};
 pub use forcing::{Activations, Basis, ForcingTerm};
+pub use log_map::RotationChart;
 pub use orientation::{OrientationError, OrientationInput, OrientationState, OrientationSystem, orientation_error};
 pub use phase::{CanonicalSystem, Phase};
 pub use primitive::{
@@ -52,5 +51,6 @@ pub use rollout::{Rollout, RolloutError};
 #[cfg(feature = "fixed")]
 pub use scalar::FixedPoint;
 pub use scalar::Scalar;
+pub use sensor_statistics::{EXPERIENCE_CAPACITY, EXPERIENCE_CHANNELS, Experience};
 pub use table::{Entry, PhaseTable, TableError};
 pub use transformation::{GainError, PointInput, PointState, TransformationSystem};

@@ -8,9 +8,9 @@
 
 use core::fmt;
 
-use crate::group::{Group, Tick};
-use crate::pace::Pace;
-use crate::turn::Turn;
+use crate::orientation_rows::Turn;
+use crate::point_rows::{Group, Tick};
+use crate::time_scale::Pace;
 use crate::vector::all_finite;
 use crate::{
     CONTROL_PERIOD, Coupling, HAND_ROWS, POSITION_ROWS, POSTURE_ROWS, Phase, Primitive, Quaternion, Reference, SENSORS,

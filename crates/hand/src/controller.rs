@@ -1,9 +1,9 @@
-//! `HandController`: Eq (14) in fixed point, the law of `control::hand::HandController` with its gains.
+//! `HandController`: Eq (14) in fixed point, the law of `control::law::HandController` with its gains.
 //!
 //! `tau_finger = PD(position) - (P e + K_i integral_{t-Dt}^{t} e dt)`, `e = F_expected - F`, `F` the torque of the environment on the
 //! finger. The window's sum is exact: integers are added and taken away, nothing drifts.
 
-use control::controller::gains::{HAND_COULOMB, HAND_DAMPING, HAND_FORCE, HAND_STIFFNESS, HAND_VISCOUS};
+use control::law::gains::{HAND_COULOMB, HAND_DAMPING, HAND_FORCE, HAND_STIFFNESS, HAND_VISCOUS};
 
 use crate::estimate::HandState;
 use crate::number::{Number, ZERO, constant, constants, magnitude, share};

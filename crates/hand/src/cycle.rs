@@ -11,7 +11,7 @@
 //! It goes down by itself and up by a person's command, except from Coast to Run. No state needs torque to be safe: the worms cannot
 //! be driven back.
 
-use control::hand::motion::LONGEST;
+use control::plan::hand::LONGEST;
 use control::{Fault, HandSample, State, flags};
 use device::Refused;
 use link::Refusal;

@@ -1,6 +1,6 @@
 //! `HandEstimator`: counts to angles, velocities and gauge torques in fixed point, through lost and implausible replies.
 //!
-//! The rules are those of `control::hand::estimate`; the gates are the same.
+//! The rules are those of `control::sense::hand`; the gates are the same.
 
 use control::HandSample;
 use puck::Counts;

@@ -1,8 +1,8 @@
-//! `LowPass`: the Butterworth filter of `control::filter`, in fixed point.
+//! `LowPass`: the Butterworth filter of `control::sense::filter`, in fixed point.
 
 use crate::number::{Number, ONE, ZERO, constant};
 
-/// Coefficients, see `control::filter`.
+/// Coefficients, see `control::sense::filter`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Coefficients {
     gain: Number,
@@ -70,13 +70,13 @@ impl<const D: usize> LowPass<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use control::filter::{Butterworth, LowPass as Reference};
+    use control::sense::filter::{Butterworth, LowPass as Reference};
     use nalgebra::SVector;
 
     #[test]
     fn the_filters_are_those_of_the_arm() {
         for (coefficients, cut_off) in
-            [(GAUGE, control::wrench::WRENCH_CUT_OFF), (VELOCITY, control::estimate::VELOCITY_CUT_OFF)]
+            [(GAUGE, control::sense::wrench::WRENCH_CUT_OFF), (VELOCITY, control::sense::joints::VELOCITY_CUT_OFF)]
         {
             let mut fixed = LowPass::<1>::new(coefficients);
             let mut exact = Reference::<f64, 1>::new(Butterworth::new(cut_off, control::RATE));

@@ -40,7 +40,8 @@ pub const FINGERS: usize = 3;
 /// Most kernels of a row.
 pub const KERNELS: usize = link::image::KERNEL_LIMIT;
 
-/// Control periods in a row that may pass without a reply of a digit before torque ends, and that a gauge is believed: 17 ms.
+/// Control periods in a row that may pass without a reply of a digit before torque ends, and that a gauge is believed: 17 ms, as
+/// for the positions of an arm (A3). Behind an arm it is `control::sense::hand::LOST_CYCLES`, for the reason given there.
 pub const LOST_CYCLES: u8 = 5;
 
 /// Ranges of the digits (rad).

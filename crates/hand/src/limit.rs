@@ -1,7 +1,7 @@
 //! `HandLimiter`: the only maker of [`LimitedTorques`], and with it the only way to the hand's motors.
 
-use control::hand::EFFICIENCY;
-use control::hand::limit::TORQUE_LIMIT;
+use control::act::hand::TORQUE_LIMIT;
+use control::model::hand::EFFICIENCY;
 use puck::hand::{INNER_LINK_RATIO, SPREAD_RATIO};
 use puck::units::PACKED_TORQUE_LIMIT;
 use puck::{CanFrame, Group, PropertyId, PuckTorque, packed_torques};

@@ -1,4 +1,4 @@
-//! `HandMotion`: a move of the hand along a minimum-jerk path, as `control::hand::HandMotion`, in fixed point.
+//! `HandMotion`: a move of the hand along a minimum-jerk path, as `control::plan::HandMotion`, in fixed point.
 
 use dmp::Scalar;
 
@@ -7,7 +7,7 @@ use crate::controller::HandReference;
 use crate::number::{Number, ONE, ZERO, at_least, at_most, constant, constants, magnitude, share, whole};
 
 /// Longest move (s).
-const LONGEST: Number = constant(control::hand::motion::LONGEST);
+const LONGEST: Number = constant(control::plan::hand::LONGEST);
 /// Shortest move (s).
 const SHORTEST: Number = constant(0.3);
 

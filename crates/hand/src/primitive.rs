@@ -2,7 +2,7 @@
 //!
 //! Made from the real numbers of an image while it is uploaded ([`crate::image`]); nothing here computes on the control path.
 
-use control::load::{LONGEST, LoadError, SHORTEST};
+use control::plan::load::{LONGEST, LoadError, SHORTEST};
 use device::PrimitiveTrouble;
 use device::recorded_filter::{self, OtherFilter};
 use dmp::{GainError, PrimitiveError, Row, TransformationSystem};

@@ -3,6 +3,10 @@
 use std::time::Duration;
 
 use control::State;
+use lab::error::HostError;
+use lab::image_file::ImageFile;
+use lab::procedure;
+use lab::simulation::{HAND_IMAGE_VARIABLE, built_image};
 use link::image::{
     ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity,
 };
@@ -10,10 +14,6 @@ use link::{EventKind, HandStage, Name, Refusal, Request, RunOptions, Statistics,
 use sim::BusTrace;
 use system_tests::command::{one_object, stderr, stdout, tactus};
 use system_tests::{Arm, boot, connect, expect, simulation, taught};
-use tactus::error::HostError;
-use tactus::image_file::ImageFile;
-use tactus::procedure;
-use tactus::simulation::{HAND_IMAGE_VARIABLE, built_image};
 
 /// Name of the movement.
 const GRIP: &str = "grip";
@@ -269,7 +269,7 @@ fn hand_image_says_in_its_file_what_it_says_when_it_runs_and_is_not_flashed() {
 
 #[test]
 fn nothing_moves_on_the_hand_bus_before_a_persons_word() {
-    let mut hand = expect(tactus::client::Client::connect(boot("hand:seed=36"), "system test"));
+    let mut hand = expect(lab::client::Client::connect(boot("hand:seed=36"), "system test"));
     let until = hand.now() + Duration::from_secs(4);
     while hand.now() < until {
         expect(hand.next(Duration::from_millis(100)));

@@ -1,7 +1,8 @@
 //! `ArmApplication`: the primitives of an arm with its hand, and the requests that only it knows.
 
-use control::arm::ArmModel;
-use control::{Command as Control, LoadRefusal, Payload, RunOptions, State, load};
+use control::model::ArmModel;
+use control::plan::load;
+use control::{Command as Control, LoadRefusal, Payload, RunOptions, State};
 use link::image::ImageError;
 use link::message::{AccelerationSource, CHUNK_BYTES, ChunkData, Goal, PoseFeedback};
 use link::{Listing, Name, PrimitiveImage, Refusal, Reply, Request};

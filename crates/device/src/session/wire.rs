@@ -4,7 +4,7 @@
 
 use core::fmt;
 
-use control::load::{End, LoadError};
+use control::plan::load::{End, LoadError};
 use control::{CalibrationError, CycleRecord};
 use dmp::{Entry, GainError, Part, PrimitiveError, Row, TableError};
 use link::{Event as LinkEvent, EventKind as LinkKind, HandStage, Refusal as LinkRefusal, Telemetry};

@@ -271,7 +271,7 @@ fn a10_bus_off_ends_the_torque_of_a_hand_alone_and_latches() {
     assert_eq!((rig.health().state, rig.health().fault), (State::Fault, Fault::BusFault));
     assert!(torques(&rig).iter().all(|units| *units == [0; 4]) && !torques(&rig).is_empty(), "zeros, then silence");
     let told = rig.heard.iter().any(|reply| {
-        matches!(reply, Reply::Event(event) if event.kind == EventKind::State && event.detail == Fault::BusFault.code().into())
+        matches!(reply, Reply::Event(event) if event.kind == EventKind::State && event.detail == u32::from(Fault::BusFault.code()))
     });
     assert!(told, "the host hears of it");
     rig.accept(Request::ClearFault);

@@ -78,7 +78,7 @@ fn a_million_random_samples_and_references_leave_every_torque_within_its_limit()
         let (limited, _) = limiter.limit(&wanted);
         let now = limited.torques().map(Scalar::to_f64);
         for digit in 0..4 {
-            let limit = control::hand::limit::TORQUE_LIMIT[digit];
+            let limit = control::act::hand::TORQUE_LIMIT[digit];
             assert!(now[digit].abs() <= limit, "{now:?}");
             assert!((now[digit] - last[digit]).abs() <= limit / 15.0 + 1e-9, "{last:?} to {now:?}");
         }
