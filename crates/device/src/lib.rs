@@ -17,6 +17,7 @@ mod mailbox;
 pub mod recorded_filter;
 mod round;
 pub mod startup;
+pub mod time;
 
 pub use application::{
     Action, Application, Controller, ControllerIo, CycleReport, Message, QueueFull, Refused, Saved, SessionPort, Slot,

@@ -72,7 +72,7 @@ pub(super) fn from_table(text: &str) -> Arrows {
     arrows
 }
 
-/// What stands in code spans.
+/// Returns the texts of the code spans.
 fn names(cell: &str) -> Vec<&str> {
     cell.split('`').skip(1).step_by(2).collect()
 }

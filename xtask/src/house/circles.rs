@@ -3,7 +3,8 @@
 //! Modules of one folder must have an order: none may be reached from itself along "names something in". What happens
 //! below a module counts as its own, so `cycle/laws.rs` and `cycle/record.rs` are both `cycle` to the modules beside
 //! `cycle`, and are told apart where the folder `cycle` is checked. A folder is one room: its `mod.rs` (or the file of
-//! the same name) and the files in it may name each other, because splitting a noun over files is what the folder is for.
+//! the same name) and the files in it may name each other, because splitting a noun over files is what the folder is
+//! for.
 
 use std::collections::{BTreeMap, BTreeSet};
 

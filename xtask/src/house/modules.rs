@@ -1,7 +1,7 @@
 //! The modules of a crate, and which module names which, read from its source with `syn`.
 //!
-//! A path is followed through imports and re-exports to the module that defines the item, so that `use crate::RATE` is a
-//! reference to the module that `RATE` is re-exported from. Modules and items under `cfg(test)` are left out. An
+//! A path is followed through imports and re-exports to the module that defines the item, so that `use crate::RATE` is
+//! a reference to the module that `RATE` is re-exported from. Modules and items under `cfg(test)` are left out. An
 //! inline module belongs to the module of its file.
 
 use std::collections::BTreeMap;
@@ -117,7 +117,8 @@ impl Modules {
                     self.resolve(&to, &[&["self".to_owned()], rest].concat(), depth + 1)
                 };
                 let found = module.globs.iter().find_map(behind);
-                // What a macro defines is not seen; a path that begins at a module of the crate ends in it all the same.
+                // What a macro defines is not seen; a path that begins at a module of the crate ends in it all the
+                // same.
                 return found.or_else(|| matches!(first.as_str(), "crate" | "self" | "super").then_some(at));
             }
             rest = after;

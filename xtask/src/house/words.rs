@@ -23,13 +23,13 @@ use Kind::{Name, Phrase};
 type Old = (Kind, &'static str, &'static str, &'static [&'static str]);
 
 /// The device's crates and what talks to it.
-const DEVICE: &[&str] = &["crates/device", "crates/hand", "crates/joint", "firmware", "host", "tests"];
+const DEVICE: &[&str] = &["crates/device", "crates/hand", "firmware", "host", "crates/lab", "tests"];
 /// The host's tools.
-const HOST: &[&str] = &["host", "crates/experiment", "crates/canlog", "tests"];
+const HOST: &[&str] = &["host", "crates/experiment", "crates/canlog", "crates/lab", "tests"];
 /// The primitive and what runs it.
-const PRIMITIVE: &[&str] = &["crates/dmp", "crates/control", "crates/joint", "crates/hand", "crates/device", "host"];
+const PRIMITIVE: &[&str] = &["crates/dmp", "crates/control", "crates/hand", "crates/device", "crates/lab", "host"];
 /// The simulator and what uses it.
-const SIMULATOR: &[&str] = &["crates/sim", "host", "crates/experiment", "tests"];
+const SIMULATOR: &[&str] = &["crates/sim", "host", "crates/experiment", "crates/lab", "tests"];
 
 /// All old words.
 const OLD: &[Old] = &[
@@ -51,7 +51,7 @@ const OLD: &[Old] = &[
     (Name, "Shelf", "PrimitiveLibrary", &[]),
     (Name, "Dialogue", "HostSession", &[]),
     (Name, "SoundFlash", "JournaledFlash", &[]),
-    (Name, "Account", "JournalState", DEVICE),
+    (Name, "Account", "JournalState", &["crates/device", "firmware"]),
     (Name, "Told", "PollReply", DEVICE),
     (Name, "Taken", "bool", DEVICE),
     (Name, "SlowPoll", "BackgroundPoll", &[]),
@@ -87,7 +87,7 @@ const OLD: &[Old] = &[
     (Name, "whole_below", "floor", &[]),
     (Name, "felt", "expected or measured", PRIMITIVE),
     // The simulator.
-    (Name, "Lesson", "Demonstration", SIMULATOR),
+    (Name, "Lesson", "TaughtMovement", SIMULATOR),
     (Phrase, "lesson", "demonstration", SIMULATOR),
     (Name, "Person", "Teacher", &["crates/sim"]),
     (Phrase, "sim::person", "sim::teacher", &[]),
@@ -101,7 +101,7 @@ const OLD: &[Old] = &[
     (Phrase, "wakes nobody", "wakes no task", &[]),
     (Phrase, "so long after", "this long after", &[]),
     (Phrase, "by and by", "slowly", &[]),
-    (Phrase, "the word of", "the value of", &[]),
+    (Phrase, "the word of", "the value of", DEVICE),
     (Phrase, "its own word", "its own value", &[]),
 ];
 

@@ -11,8 +11,8 @@
 
 use dmp::{EXPERIENCE_CHANNELS, Experience};
 
-use crate::cycle::PERIOD;
 use crate::real::Real;
+use crate::time::PERIOD;
 
 /// Time over which a deviation is averaged (s).
 pub const MEMORY: f64 = 0.1;

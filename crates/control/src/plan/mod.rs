@@ -3,7 +3,9 @@
 pub mod approach;
 pub mod hand;
 pub mod load;
+pub mod reference;
 pub(crate) mod run;
 
 pub use approach::Approach;
 pub use hand::HandMotion;
+pub use reference::{HandReference, JointReference, TaskReference};

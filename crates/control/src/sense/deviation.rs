@@ -3,9 +3,9 @@
 use dmp::SENSORS;
 use nalgebra::Vector3;
 
-use crate::cycle::RATE;
 use crate::real::Real;
 use crate::sense::filter::{Butterworth, LowPass};
+use crate::time::RATE;
 use crate::units::{Vector6, Wrench};
 
 /// Force (N) that counts as none: the bias and hysteresis of the sensor that a tare leaves would otherwise move the plan by

@@ -175,7 +175,7 @@ impl<A: Application> HostSession<A> {
             maximum_kernels: u16::try_from(link::image::KERNEL_LIMIT).unwrap_or(u16::MAX),
             slots: self.application.places(),
             slot_bytes: self.application.place_bytes(),
-            cycles_per_second: 300,
+            cycles_per_second: control::RATE_HZ as u16,
             ticks_per_second: self.identity.ticks_per_second,
             simulated: self.identity.simulated,
             firmware: Text::new(self.identity.firmware),
