@@ -149,6 +149,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.calibration.payload
     }
 
+    /// True while the hand makes a move of its own, outside a run.
+    pub fn moves_hand(&self) -> bool {
+        self.hand.is_moving()
+    }
+
     /// Whether the wrench has a zero; see [`WrenchEstimator::is_tared`].
     pub fn is_wrench_zeroed(&self) -> bool {
         self.wrench.is_tared()
