@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use sim::person::Lesson;
 
 use super::grid::Grid;
-use super::mode::Mode;
+use lab::procedure::Mode;
 
 /// An experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
