@@ -25,9 +25,9 @@ const BOARDS: [Board; 2] = [
     Board { feature: "CARGO_FEATURE_BOARD_STM32H743", memory: "stm32h743.x", interrupts: &[] },
 ];
 
-/// Target of the joint image: a core without floating point, and with the memory of the smallest part the image is for.
-const JOINT_TARGET: &str = "thumbv7m-none-eabi";
-const JOINT_MEMORY: &str = "joint.x";
+/// Target of the hand image: a core without floating point, and with the memory of the smallest part the image is for.
+const HAND_TARGET: &str = "thumbv7m-none-eabi";
+const HAND_MEMORY: &str = "hand.x";
 
 fn main() -> Result<(), Box<dyn Error>> {
     let manifest = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?);
@@ -49,7 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let out = PathBuf::from(env::var("OUT_DIR")?);
     fs::copy(manifest.join("../memory.x"), out.join("memory.x"))?;
     let script = |name: &str| fs::read_to_string(manifest.join("memory").join(name));
-    let memory = if env::var("TARGET")? == JOINT_TARGET { JOINT_MEMORY } else { board.memory };
+    let memory = if env::var("TARGET")? == HAND_TARGET { HAND_MEMORY } else { board.memory };
     // `memory.x` at the root includes it.
     fs::write(out.join("board.x"), script(memory)? + &script("metadata.x")?)?;
     if !board.interrupts.is_empty() {

@@ -10,8 +10,8 @@ pub mod application;
 pub mod board;
 #[cfg(target_os = "none")]
 pub mod defmt_log;
+pub mod hand;
 pub mod in_place;
-pub mod joint;
 #[cfg(target_os = "none")]
 pub mod last_words;
 pub mod line;

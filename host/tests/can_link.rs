@@ -1,5 +1,6 @@
 //! The link over a CAN bus: the same upload and the same run as over the serial line, at the speed of the line.
 
+#[path = "../../crates/lab/tests/common/mod.rs"]
 mod common;
 
 use std::path::Path;
@@ -8,17 +9,17 @@ use std::time::Duration;
 use assert_cmd::Command;
 use control::State;
 use embedded_can::Frame as _;
+use lab::client::{Client, Incoming, UploadOutcome};
+use lab::device::Device;
+use lab::primitive_file::PrimitiveFile;
+use lab::procedure;
+use lab::transport::Address;
+use lab::transport::can::CanPort as _;
 use link::can::{BITS_PER_SECOND, DeviceNumber, Direction, LINE_BYTES_PER_SECOND, SEGMENT_BYTES, Segmenter};
 use link::frame::{self, Envelope, FRAME_BYTES};
 use link::message::{CHUNK_BYTES, ChunkData};
 use link::{Name, Request, RunOptions, Telemetry};
 use puck::{CanFrame, CanId};
-use tactus::client::{Client, Incoming, UploadOutcome};
-use tactus::device::Device;
-use tactus::primitive_file::PrimitiveFile;
-use tactus::procedure;
-use tactus::transport::Address;
-use tactus::transport::can::CanPort as _;
 
 /// A primitive with as many kernels as a device takes: the longest upload there is.
 fn primitive(folder: &Path, kernels: &str) -> PrimitiveFile {
@@ -222,8 +223,8 @@ fn devices_on_a_bus_hear_only_what_is_meant_for_them() {
     // The simulated device is number 0; a host that means number 3 must not reach it.
     let address: Address = "sil:world=simple".parse().unwrap();
     let Device::Simulated(simulation) = Device::open(&address, |_| {}).unwrap() else { panic!("a serial line") };
-    let port = tactus::transport::SimulatedCan::attach(*simulation, DeviceNumber::FIRST);
-    let line = tactus::transport::CanTransport::new(port, DeviceNumber::new(3).unwrap());
+    let port = lab::transport::SimulatedCan::attach(*simulation, DeviceNumber::FIRST);
+    let line = lab::transport::CanTransport::new(port, DeviceNumber::new(3).unwrap());
     let error = Client::connect(line, "test").err().unwrap();
     assert_eq!(error.code(), "E702", "{error}");
 }

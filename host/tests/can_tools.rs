@@ -1,5 +1,6 @@
 //! `tactus can` on logs of simulated arms, of the golden transcripts, and of nobody.
 
+#[path = "../../crates/lab/tests/common/mod.rs"]
 mod common;
 
 use std::path::{Path, PathBuf};
@@ -7,8 +8,8 @@ use std::sync::OnceLock;
 
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
+use canlog::{Account, BusKind, Kind, LogLine, Reader};
 use serde_json::Value;
-use tactus::can::{Account, BusKind, Kind, LogLine, Reader};
 use tempfile::TempDir;
 
 fn tactus(folder: &Path, arguments: &[&str]) -> Assert {

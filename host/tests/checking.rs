@@ -1,13 +1,14 @@
 //! Checking: what an arm can do passes, what it cannot do is refused with the limit, the joint and the time.
 
+#[path = "../../crates/lab/tests/common/mod.rs"]
 mod common;
 
 use std::path::Path;
 
+use lab::demonstration::Recording;
+use lab::learn::{LearnOptions, learn};
+use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
 use tactus::check::{CheckReport, Limit, check};
-use tactus::demonstration::Recording;
-use tactus::learn::{LearnOptions, learn};
-use tactus::primitive_file::{PrimitiveFile, PrimitiveFileError};
 
 fn reach(duration: f64) -> PrimitiveFile {
     let text = common::text(&common::rows(duration));

@@ -1,5 +1,6 @@
 //! The commands as a user or a script sees them: exit codes, what is said where, JSON.
 
+#[path = "../../crates/lab/tests/common/mod.rs"]
 mod common;
 
 use std::path::Path;
@@ -133,7 +134,7 @@ fn a_changed_primitive_ends_with_6_and_another_model_with_4() {
     let failed = tactus(folder.path(), &["check", "demo.toml"]).failure().code(6);
     assert!(stderr(&failed).starts_with("error[E632]"), "{}", stderr(&failed));
     let hash = format!("0x{:08x}", control::MODEL_HASH);
-    let mut other = tactus::primitive_file::PrimitiveFile::parse(&file, &text).unwrap();
+    let mut other = lab::primitive_file::PrimitiveFile::parse(&file, &text).unwrap();
     other.model_hash ^= 0xff;
     other.write(&file).unwrap();
     let failed = tactus(folder.path(), &["check", "demo.toml"]).failure().code(4);

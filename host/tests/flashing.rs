@@ -1,6 +1,7 @@
 //! `tactus flash` and `tactus logs`, with a stand-in for probe-rs that writes down what it was asked to do.
 #![cfg(unix)]
 
+#[path = "../../crates/lab/tests/elf/mod.rs"]
 mod elf;
 
 use std::fs;

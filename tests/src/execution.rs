@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use control::State;
+use lab::arm;
+use lab::demonstration::Recording;
+use lab::primitive_file::PrimitiveFile;
+use lab::procedure::{self, Recorder, Take};
+use lab::tracking::Tracking;
 use link::{EventKind, Name, RunOptions, Statistics, Telemetry};
 use sim::BusTrace;
-use tactus::arm;
-use tactus::demonstration::Recording;
-use tactus::primitive_file::PrimitiveFile;
-use tactus::procedure::{self, Recorder, Take};
-use tactus::tracking::Tracking;
 
 use crate::{Arm, expect, simulation};
 
@@ -144,7 +144,9 @@ pub fn beyond_torque_limits(telemetry: &[Telemetry]) -> Option<&Telemetry> {
 #[must_use]
 pub fn largest_torque_step(telemetry: &[Telemetry]) -> f64 {
     let steps = telemetry.windows(2).flat_map(|pair| {
-        (0..7).map(|joint| f64::from(pair[1].tau[joint] - pair[0].tau[joint]).abs() / control::limit::STEP_LIMIT[joint])
+        (0..7).map(|joint| {
+            f64::from(pair[1].tau[joint] - pair[0].tau[joint]).abs() / control::act::limit::STEP_LIMIT[joint]
+        })
     });
     steps.fold(0.0, f64::max)
 }

@@ -1,10 +1,10 @@
 //! Primitive images with one thing wrong, and an upload that does not look at them first.
 
+use lab::error::HostError;
 use link::frame::CRC;
 use link::image::{WEIGHT_ROWS, stored_crc};
 use link::message::{CHUNK_BYTES, ChunkData};
 use link::{Name, Request};
-use tactus::error::HostError;
 
 use crate::{Arm, expect};
 

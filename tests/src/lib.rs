@@ -15,11 +15,11 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use device::Stage;
-use tactus::client::Client;
-use tactus::device::Device;
-use tactus::primitive_file::PrimitiveFile;
-use tactus::procedure;
-use tactus::simulation::Simulation;
+use lab::client::Client;
+use lab::device::Device;
+use lab::primitive_file::PrimitiveFile;
+use lab::procedure;
+use lab::simulation::Simulation;
 
 /// A conversation with a simulated device.
 pub type Arm = Client<Device>;

@@ -1,11 +1,11 @@
-//! A host that does not keep to the rules: frames by hand, on a device without a [`Client`](tactus::client::Client).
+//! A host that does not keep to the rules: frames by hand, on a device without a [`Client`](lab::client::Client).
 
 use std::time::Duration;
 
+use lab::device::Device;
+use lab::transport::Transport;
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
 use link::{Reply, Request};
-use tactus::device::Device;
-use tactus::transport::Transport;
 
 use crate::expect;
 

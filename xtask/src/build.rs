@@ -8,10 +8,10 @@ use anyhow::{Context, Result, ensure};
 use crate::board::{self, Board};
 use crate::elf::Sizes;
 use crate::setup::{ARM, Machine, Toolchain};
-use crate::{hot, joint, panics, shell, stack};
+use crate::{hand, hot, panics, shell, stack};
 
 /// Features of the host packages with the MuJoCo world and its pictures.
-pub(crate) const WORLD: &str = "tactus/mujoco,sim/mujoco,sim/render,system-tests/mujoco";
+pub(crate) const WORLD: &str = "tactus/mujoco,lab/mujoco,experiment/mujoco,sim/mujoco,sim/render,system-tests/mujoco";
 
 /// Builds the `tactus` command with the MuJoCo world, optimised; returns its path.
 pub(crate) fn host() -> Result<PathBuf> {
@@ -76,13 +76,9 @@ pub(crate) fn stacks() -> Result<()> {
 fn images() -> Result<Vec<(PathBuf, Board)>> {
     let folder = shell::target_dir().join("images");
     let mut images: Vec<_> = Board::ALL.map(|board| (folder.join(board.file()), board)).into();
-    images.push((folder.join(joint::FILE), Board::Mps2));
+    images.push((folder.join(hand::FILE), Board::Mps2));
     for (image, _) in &images {
-        ensure!(
-            image.exists(),
-            "{} is not built: cargo xtask build, --board stm32h743, --image joint",
-            image.display()
-        );
+        ensure!(image.exists(), "{} is not built: cargo xtask build, --board stm32h743, --image hand", image.display());
     }
     Ok(images)
 }

@@ -3,8 +3,8 @@
 use anyhow::Result;
 
 use crate::board::Board;
-use crate::setup::{self, ARM, JOINT, Machine};
-use crate::{budget, build, docs, emulated, joint, shell, test};
+use crate::setup::{self, ARM, HAND, Machine};
+use crate::{budget, build, docs, emulated, hand, shell, test};
 
 /// Runs every check; the first failure ends it.
 pub(crate) fn run() -> Result<()> {
@@ -22,7 +22,7 @@ pub(crate) fn run() -> Result<()> {
     test::run(&machine)?;
     build::documentation()?;
     budget::run(&machine)?;
-    joint::run(&machine)?;
+    hand::run(&machine)?;
     build::panics()
 }
 
@@ -54,9 +54,9 @@ fn lint_firmware(machine: &Machine) -> Result<()> {
             .args(["--", "-D", "warnings"]);
         shell::run(&mut clippy)?;
     }
-    let mut clippy = machine.toolchain.cargo("clippy", JOINT)?;
+    let mut clippy = machine.toolchain.cargo("clippy", HAND)?;
     clippy
-        .args(["--package", "firmware", "--bin", "joint", "--profile", "firmware"])
+        .args(["--package", "firmware", "--bin", "hand", "--profile", "firmware"])
         .args(["--no-default-features", "--features", Board::Mps2.features(true)])
         .args(["--", "-D", "warnings"]);
     shell::run(&mut clippy)
@@ -65,7 +65,7 @@ fn lint_firmware(machine: &Machine) -> Result<()> {
 /// The movement primitives must stay usable on any Cortex-M, with and without floating point, by strangers.
 fn libraries_without_std(machine: &Machine) -> Result<()> {
     shell::step("crates/dmp without std on Cortex-M4F and Cortex-M3");
-    for target in [ARM, JOINT] {
+    for target in [ARM, HAND] {
         for features in [&[][..], &["--features", "fixed"]] {
             let mut check = machine.toolchain.cargo("check", target)?;
             check.args(["--package", "dmp", "--no-default-features"]).args(features);

@@ -25,16 +25,16 @@ const ITCM: std::ops::Range<u32> = 0..0x1_0000;
 /// Called by a control slot, yet not in ITCM: part of the name, and why.
 const ELSEWHERE: &[(&str, &str)] = &[
     ("control::cycle::transitions", "once, when a state changes"),
-    ("control::supervisor", "once, when a state changes"),
+    ("control::guard::supervisor", "once, when a state changes"),
     ("control::cycle::commands", "once, when a person commands"),
     ("control::command::Command", "once, when a person commands"),
-    ("control::run::", "once, when a run begins or its goal changes"),
-    ("control::approach", "once, when an approach begins"),
-    ("control::arm::ArmModel", "when a payload is found"),
+    ("control::plan::run::", "once, when a run begins or its goal changes"),
+    ("control::plan::approach", "once, when an approach begins"),
+    ("control::model::arm::ArmModel", "when a payload is found"),
     ("dmp::coupling::Coupling<T>::limited", "feedback beyond its limit: not in a run of a primitive that was accepted"),
     ("tare_drift", "at rest, by a person's command"),
-    ("control::hand::drive::HandDrive<R>::move_to", "once, when a person moves the hand"),
-    ("control::hand::within_range", "once, when a person moves the hand"),
+    ("control::cycle::hand::HandDrive<R>::move_to", "once, when a person moves the hand"),
+    ("control::model::hand::within_range", "once, when a person moves the hand"),
     (
         "control::cycle::laws::<impl control::cycle::Cycle<R,_>>::hold_to",
         "the arm stands: no plan and no feedback is computed",

@@ -9,8 +9,8 @@ mod demo;
 mod docs;
 mod elf;
 mod emulated;
+mod hand;
 mod hot;
-mod joint;
 mod origin;
 mod panics;
 mod qemu;
@@ -33,8 +33,8 @@ cargo xtask <verb>
   setup    install what is missing: QEMU, Cortex-M target, MuJoCo library, EGL
   build    build everything: host tools with the MuJoCo world, the image for the emulated board
            --board stm32h743 | mps2: the image for one board alone, with what it takes of each memory
-           --image joint: the joint image (Cortex-M3, fixed point), with its sizes
-  joint    build, run and measure the joint image: instructions per cycle, accuracy, sizes
+           --image hand: the hand image (Cortex-M3, fixed point), with its sizes
+  hand    build, run and measure the hand image: instructions per cycle, accuracy, sizes
            --check IMAGE: sizes and control path of an image that is there
   board    run the unmodified image for the STM32H743 on an emulated one: start, clocks, stack, a taught movement, a restart
            --build: only make what `--device board:` needs; --image FILE: run that image
@@ -85,9 +85,9 @@ fn dispatch(words: &[&str]) -> Result<()> {
                 build::real_board(setup::compiler()?, board)?;
             }
         }
-        ["build", "--image", "joint"] => drop(joint::image(&setup::all()?)?),
-        ["joint"] => joint::run(&setup::all()?)?,
-        ["joint", "--check", image] => joint::check(image.as_ref())?,
+        ["build", "--image", "hand"] => drop(hand::image(&setup::all()?)?),
+        ["hand"] => hand::run(&setup::all()?)?,
+        ["hand", "--check", image] => hand::check(image.as_ref())?,
         ["board"] => emulated::run(None)?,
         ["board", "--build"] => drop(emulated::build(setup::compiler()?)?),
         ["board", "--image", image] => emulated::run(Some(image.as_ref()))?,

@@ -3,12 +3,12 @@
 use anyhow::Result;
 
 use crate::setup::Machine;
-use crate::{build, emulated, joint, shell};
+use crate::{build, emulated, hand, shell};
 
 /// Builds what the tests need and runs all of them.
 pub(crate) fn run(machine: &Machine) -> Result<()> {
     build::image(machine)?;
-    joint::image(machine)?;
+    hand::image(machine)?;
     emulated::build(machine.toolchain)?;
     build::host()?;
     shell::step("tests of all packages, whole-system tests included");

@@ -65,7 +65,7 @@ joint_quantity!(
 );
 joint_quantity!(
     /// Joint torques (N m), positive about the joint axis. Nothing in this type says that they are within limits:
-    /// only [`LimitedTorques`](crate::limit::LimitedTorques) can be sent.
+    /// only [`LimitedTorques`](crate::act::limit::LimitedTorques) can be sent.
     JointTorques
 );
 

@@ -1,7 +1,7 @@
 //! Joint estimation: wrap, loss, implausible replies, noise of quantisation; and the wrench filter.
 
-use control::estimate::JointEstimator;
-use control::filter::{Butterworth, LowPass};
+use control::sense::JointEstimator;
+use control::sense::filter::{Butterworth, LowPass};
 use control::units::{JointPositions, Vector7};
 use control::{Calibration, Payload, RATE, Real, model};
 use nalgebra::SVector;

@@ -1,6 +1,6 @@
 //! Eq (12): golden vectors, the two sign checks, and what they look like with the wrong sign.
 
-use control::controller::ForceController;
+use control::law::ForceController;
 use control::units::Vector6;
 use control::{PERIOD, Real};
 use pinned_init::InPlaceWrite;
@@ -26,7 +26,7 @@ where
     let (expected, felt, command) = (columns("Fdes"), columns("F"), columns("u"));
     let torque = [0, 1, 2, 3, 4, 5, 6].map(|joint| column(format!("tau{joint}")));
     // J[a][b] = c_a sin(0.7 a + 1.3 b + 0.2), as the file's header gives it.
-    let jacobian = control::kinematics::Jacobian(nalgebra::SMatrix::<R, 6, 7>::from_fn(|a, b| {
+    let jacobian = control::model::Jacobian(nalgebra::SMatrix::<R, 6, 7>::from_fn(|a, b| {
         let scale = if a < 3 { 0.6 } else { 1.0 };
         R::of(scale * (0.7 * a as f64 + 1.3 * b as f64 + 0.2).sin())
     }));

@@ -1,8 +1,7 @@
 //! What the gains have to satisfy in every posture.
 
-use control::arm::ArmModel;
-use control::controller::Gains;
-use control::kinematics::Frames;
+use control::law::Gains;
+use control::model::{ArmModel, Frames};
 use control::units::JointPositions;
 use control::{Payload, model};
 use nalgebra::SMatrix;

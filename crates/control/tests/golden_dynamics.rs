@@ -1,7 +1,6 @@
 //! Kinematics and dynamics against the golden vectors (Pinocchio on the same model file).
 
-use control::arm::ArmModel;
-use control::kinematics::Frames;
+use control::model::{ArmModel, Frames};
 use control::units::{JointAccelerations, JointPositions, JointVelocities};
 use control::{Payload, Real};
 

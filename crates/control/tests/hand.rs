@@ -1,10 +1,11 @@
 //! The hand's estimator, Eq (14) and limits, each alone.
 
-use control::controller::Gains;
-use control::controller::gains::HandGains;
-use control::hand::estimate::{HandState, LOST_CYCLES};
-use control::hand::limit::TORQUE_LIMIT;
-use control::hand::{HandController, HandEstimator, HandLimiter, HandMotion, HandReference};
+use control::act::HandLimiter;
+use control::act::hand::TORQUE_LIMIT;
+use control::law::{Gains, HandController, HandGains, HandReference};
+use control::plan::HandMotion;
+use control::sense::hand::LOST_CYCLES;
+use control::sense::{HandEstimator, HandState};
 use control::{HandSample, PERIOD};
 use pinned_init::InPlaceWrite;
 use proptest::prelude::*;

@@ -1,11 +1,12 @@
 //! B1, E4: whatever comes in, every emitted torque is finite and within limits, and nothing panics.
 
-use control::arm::ArmModel;
+use control::act::hand::TORQUE_LIMIT as HAND_LIMIT;
+use control::act::limit::STEP_LIMIT;
 use control::command::{AccelerationSource, Command, Goal, PoseFeedback, RunOptions};
-use control::controller::Gains;
-use control::hand::limit::TORQUE_LIMIT as HAND_LIMIT;
-use control::limit::STEP_LIMIT;
-use control::load::{self, End, LoadError};
+use control::law::Gains;
+use control::model::ArmModel;
+use control::plan::load;
+use control::plan::load::{End, LoadError};
 use control::{BusSample, Calibration, Cycle, CycleInput, Event, Fault, HandSample, Payload, Refusal, State, flags};
 use dmp::{
     Configuration, ExpectedWrench, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, PrimitiveTables,
@@ -28,7 +29,7 @@ fn counts(q: [f64; 7]) -> [Option<Counts>; 7] {
 
 fn configuration(q: [f64; 7]) -> Configuration<f32> {
     let model = ArmModel::<f64>::new(Payload::SensorAndHand);
-    let pose = control::kinematics::Frames::new(&model, &control::units::JointPositions::from_array(q)).tool_pose();
+    let pose = control::model::Frames::new(&model, &control::units::JointPositions::from_array(q)).tool_pose();
     let [w, x, y, z] = pose.orientation.0.map(|value| value as f32);
     Configuration {
         position: [0, 1, 2].map(|axis| pose.position[axis] as f32),

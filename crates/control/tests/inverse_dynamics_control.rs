@@ -1,9 +1,8 @@
 //! Eq (10) is the printed sum, with the rotors in its mass matrix.
 
-use control::arm::ArmModel;
-use control::controller::{Gains, JointController, JointReference};
-use control::estimate::JointState;
-use control::kinematics::Frames;
+use control::law::{Gains, JointController, JointReference};
+use control::model::{ArmModel, Frames};
+use control::sense::JointState;
 use control::units::{JointAccelerations, JointPositions, JointVelocities, Vector7};
 use control::{Payload, model};
 

@@ -1,7 +1,6 @@
 //! Frames and signs of the kinematics that the golden vectors cannot show: derivatives, pseudo-inverse, orientation error.
 
-use control::arm::ArmModel;
-use control::kinematics::Frames;
+use control::model::{ArmModel, Frames};
 use control::units::{JointPositions, JointVelocities, Orientation, Vector6, Vector7};
 use control::{Payload, Real};
 use nalgebra::{Rotation3, Vector3};

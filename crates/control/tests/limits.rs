@@ -1,8 +1,8 @@
 //! Torque limits leave room for what the arm weighs, and nothing finite or not gets past them.
 
-use control::arm::ArmModel;
-use control::kinematics::Frames;
-use control::limit::{LimitReport, MOTOR_COUNTS_LIMIT, STEP_LIMIT, TorqueLimiter, WORST_GRAVITY};
+use control::act::TorqueLimiter;
+use control::act::limit::{LimitReport, MOTOR_COUNTS_LIMIT, STEP_LIMIT, WORST_GRAVITY};
+use control::model::{ArmModel, Frames};
 use control::units::{JointPositions, JointTorques};
 use control::{Calibration, Payload, model};
 use proptest::prelude::*;

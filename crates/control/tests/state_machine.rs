@@ -1,6 +1,7 @@
 //! E1: every trigger in every state.
 
-use control::supervisor::{Supervisor, Transition, Trigger, transition};
+use control::guard::supervisor::{Transition, transition};
+use control::guard::{Supervisor, Trigger};
 use control::{Fault, Refusal, State};
 
 /// How much may happen in a state: nothing, floating or stopping, moving.

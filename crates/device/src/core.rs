@@ -12,7 +12,7 @@
 //! No torque but zero leaves before the start-up is over, a person has activated the arm, and a person has commanded it:
 //! the frames of a cycle come from [`control::Actuation`] or are zero.
 
-use control::controller::Gains;
+use control::law::Gains;
 use control::{Calibration, Cycle, CycleInput, CycleRecord, Fault, LoadRefusal, Payload, State};
 use pinned_init::{Init, init};
 use puck::{CanFrame, MotorMode, Node, PropertyId, Reply, SafetyMode, Status, set, zero_torques};

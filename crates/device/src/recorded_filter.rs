@@ -5,7 +5,7 @@
 use link::Refusal;
 
 /// Cut-off of the device's filter on wrench and gauges, Hz.
-const CUT_OFF: f32 = control::wrench::WRENCH_CUT_OFF as f32;
+const CUT_OFF: f32 = control::sense::wrench::WRENCH_CUT_OFF as f32;
 
 /// How much another cut-off may differ from it, of one.
 const TOLERANCE: f32 = 0.01;

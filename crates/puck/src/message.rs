@@ -41,7 +41,7 @@ pub(crate) fn short(id: CanId, property: PropertyId, value: i16) -> CanFrame {
 /// Torques for up to four pucks of a group in one frame, in the order of their PIDX 1..=4. Always DLC 8.
 ///
 /// Bytes 1..=7 are one big-endian integer `A<<42 | B<<28 | C<<14 | D` of four 14-bit fields. `property` is T of the
-/// group's firmware ([`PropertyId::TORQUE`] from 61 on). Only `control::actuation` may call this with torques other than
+/// group's firmware ([`PropertyId::TORQUE`] from 61 on). Only `control::act::actuation` may call this with torques other than
 /// zero: everything else could put an unlimited torque on the bus.
 pub fn packed_torques(group: Group, property: PropertyId, torques: [PuckTorque; 4]) -> CanFrame {
     let fields = torques.iter().fold(0_u64, |packed, torque| packed << 14 | torque.bits());

@@ -7,8 +7,7 @@ use std::rc::Rc;
 use std::task::{Context, Poll, Waker};
 
 use control::Payload;
-use control::arm::ArmModel;
-use control::kinematics::Frames;
+use control::model::{ArmModel, Frames};
 use control::units::JointPositions;
 use device::storage::Opening;
 use device::{Core, Store};

@@ -1,16 +1,17 @@
 //! The primitive played by the control code itself on an ideal arm: every margin that counts before motion.
 
-use control::calibration::Calibration;
-use control::controller::Gains;
+use control::law::Gains;
+use control::model::Calibration;
+use control::plan::load;
 use control::units::{JointVelocities, Vector7};
-use control::{BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, RunOptions, State, flags, load};
+use control::{BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, RunOptions, State, flags};
 use puck::SafetyMode;
 
 use super::plant::Plant;
-use crate::arm;
-use crate::boxed::boxed;
-use crate::plan::PERIOD;
-use crate::primitive_file::HostPrimitive;
+use lab::arm;
+use lab::boxed::boxed;
+use lab::plan::PERIOD;
+use lab::primitive_file::HostPrimitive;
 
 /// Cycles in which the arm is taken up and comes to rest before the run begins: 1.5 s.
 const SETTLING: u64 = 450;
@@ -150,7 +151,7 @@ fn sample(plant: &Plant, time: f64, record: CycleRecord) -> Sample {
         time,
         q: plant.q.into(),
         dq: plant.dq.into(),
-        elbow_speeds: frames.elbow_speeds(&dq, control::approach::TIP_REACH),
+        elbow_speeds: frames.elbow_speeds(&dq, control::plan::approach::TIP_REACH),
         tool_speed: twist.fixed_rows::<3>(0).norm(),
         position: pose.position.into(),
         orientation: pose.orientation.0,

@@ -7,17 +7,17 @@
 mod closed_loop;
 mod plant;
 
-use control::load::{REACH, within_reach};
+use control::guard::monitor::TIP_SPEED_LIMIT;
 use control::model::{SOFT_MAX, SOFT_MIN, VELOCITY_MAX};
-use control::monitor::TIP_SPEED_LIMIT;
+use control::plan::load::{REACH, within_reach};
 use serde::Serialize;
 
-use crate::arm::TORQUE_LIMITS;
-use crate::demonstration::angle_between;
-use crate::plan;
-use crate::primitive_file::{PrimitiveFile, PrimitiveFileError};
-use crate::table::Table;
 use closed_loop::{ClosedLoop, Ending, Sample};
+use lab::arm::TORQUE_LIMITS;
+use lab::demonstration::angle_between;
+use lab::plan;
+use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
+use lab::table::Table;
 
 /// Largest distance of the arm from the goal when the run is over, m.
 pub const GOAL_DISTANCE: f64 = 3e-3;
@@ -174,7 +174,7 @@ pub fn check(file: &PrimitiveFile, speed: f64, progress: impl FnMut(f64)) -> Res
         name: file.name.clone(),
         checksum: format!("0x{:08x}", file.checksum()),
         model_hash: format!("0x{:08x}", file.model_hash),
-        image: (image.len(), format!("0x{:08x}", crate::demonstration::recording::checksum(&image))),
+        image: (image.len(), format!("0x{:08x}", lab::demonstration::recording::checksum(&image))),
         kernels: file.kernels(),
         duration_s: file.duration,
         speed,
@@ -203,7 +203,7 @@ pub fn check(file: &PrimitiveFile, speed: f64, progress: impl FnMut(f64)) -> Res
 }
 
 /// The plan alone: finite everywhere, within reach, ending at its goal.
-fn check_plan(primitive: &crate::primitive_file::HostPrimitive, report: &mut CheckReport) {
+fn check_plan(primitive: &lab::primitive_file::HostPrimitive, report: &mut CheckReport) {
     let references = match plan::roll_out(primitive) {
         Ok(references) => references,
         Err(error) => {

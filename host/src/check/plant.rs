@@ -3,15 +3,13 @@
 //! `ddq = M(q)^-1 (tau - c(q, dq) - g(q) - friction(dq))`, semi-implicit Euler in four sub-steps of a control period.
 //! No noise, no lost frames, no delay: what fails here fails on every arm.
 
-use control::arm::ArmModel;
-use control::calibration::Calibration;
-use control::kinematics::Frames;
 use control::model;
+use control::model::{ArmModel, Calibration, Frames};
 use control::units::{JointAccelerations, JointPositions, JointVelocities, Vector7};
 use puck::Counts;
 
-use crate::arm;
-use crate::plan::PERIOD;
+use lab::arm;
+use lab::plan::PERIOD;
 
 /// Sub-steps of one control period.
 const SUB_STEPS: usize = 4;

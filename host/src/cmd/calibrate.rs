@@ -5,10 +5,10 @@ use link::{Calibration, Refusal};
 use serde_json::{Value, json};
 
 use super::{Failure, Global, Table, connection, learn};
-use crate::client::Client;
-use crate::device::Device;
-use crate::error::HostError;
-use crate::procedure::{self, HomeCorrection};
+use lab::client::Client;
+use lab::device::Device;
+use lab::error::HostError;
+use lab::procedure::{self, HomeCorrection};
 
 /// Options of `calibrate`.
 #[derive(Debug, Clone, Args)]

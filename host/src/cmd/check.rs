@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{Exit, Failure, Global};
 use crate::check;
-use crate::primitive_file::{PrimitiveFile, PrimitiveFileError};
+use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
 
 /// Options of `check`.
 #[derive(Debug, Clone, Args)]

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{Exit, Failure, Global};
-use crate::demonstration::Recording;
-use crate::difference::Difference;
+use lab::demonstration::Recording;
+use lab::difference::Difference;
 
 /// Options of `compare`.
 #[derive(Debug, Clone, Args)]

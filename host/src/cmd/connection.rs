@@ -7,12 +7,12 @@ use device::Stage;
 use link::HomeSource;
 
 use super::{Exit, Failure, Global, Output};
-use crate::client::{Client, Halted, Interrupt};
-use crate::device::{Device, OpenError};
-use crate::error::HostError;
-use crate::procedure::{self, ProcedureError, Readiness};
-use crate::simulation::{SimulationError, SimulationOptions};
-use crate::transport::Address;
+use lab::client::{Client, Halted, Interrupt};
+use lab::device::{Device, OpenError};
+use lab::error::HostError;
+use lab::procedure::{self, ProcedureError, Readiness};
+use lab::simulation::{SimulationError, SimulationOptions};
+use lab::transport::Address;
 
 /// Opens the device that the options name and says hello. Ctrl-C then stops the arm and ends the command.
 ///

@@ -6,8 +6,8 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Exit, Failure, Global, rehearse, upload};
-use crate::demonstration::Recording;
-use crate::learn::memory::remember_successes;
+use lab::demonstration::Recording;
+use lab::learn::memory::remember_successes;
 
 /// Options of `experience`.
 #[derive(Debug, Clone, Args)]

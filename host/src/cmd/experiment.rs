@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{Exit, Failure, Global};
-use crate::experiment::{Grid, Mode, Object, PlantKind, Scenario, Variation};
+use experiment::{Grid, Mode, Object, PlantKind, Scenario, Variation};
 
 /// Options of `experiment`.
 #[derive(Debug, Clone, Args)]
@@ -78,7 +78,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 /// Always: experiments need the MuJoCo world.
 #[cfg(not(feature = "mujoco"))]
 pub fn run(_command: &Cmd, _global: &Global) -> Result<(), Failure> {
-    Err(Failure::new(Exit::NoDevice, "E310", "experiment", crate::simulation::SimulationError::WithoutMujoco)
+    Err(Failure::new(Exit::NoDevice, "E310", "experiment", lab::simulation::SimulationError::WithoutMujoco)
         .help("`cargo xtask build`"))
 }
 
@@ -88,15 +88,15 @@ mod work {
     use std::time::Instant;
 
     use super::{Cmd, Exit, Failure, Global};
-    use crate::client::Interrupt;
     use crate::cmd::{Output, connection, upload};
-    use crate::experiment::lesson::{self, LessonError};
-    use crate::experiment::lift::{self, Case};
-    use crate::experiment::trial::TrialError;
-    use crate::experiment::{Comparison, Config, Experiment, ExperimentError, Progress, Scenario, figures, map};
-    use crate::primitive_file::PrimitiveFile;
-    use crate::simulation::{Engine, SimulationOptions};
-    use crate::transport::Address;
+    use experiment::lesson::{self, LessonError};
+    use experiment::lift::{self, Case};
+    use experiment::trial::TrialError;
+    use experiment::{Comparison, Config, Experiment, ExperimentError, Progress, Scenario, figures, map};
+    use lab::client::Interrupt;
+    use lab::primitive_file::PrimitiveFile;
+    use lab::simulation::{Engine, SimulationOptions};
+    use lab::transport::Address;
 
     const DOING: &str = "experiment";
     /// Where the device is simulated unless said otherwise.
@@ -140,7 +140,7 @@ mod work {
     fn carry(config: &Config, interrupt: &Interrupt, output: Output) -> Result<(Experiment, f64), Failure> {
         let started = Instant::now();
         let bar = output.bar(config.keys().len() as u64, "trials");
-        let carried = crate::experiment::run(config, interrupt, &mut |progress| match progress {
+        let carried = experiment::run(config, interrupt, &mut |progress| match progress {
             Progress::Begin { all, done } => {
                 bar.set_length(all as u64);
                 bar.set_position(done as u64);
@@ -196,7 +196,7 @@ mod work {
     }
 
     /// The modes that are asked for, if any are.
-    fn modes(command: &Cmd) -> Option<Vec<crate::experiment::Mode>> {
+    fn modes(command: &Cmd) -> Option<Vec<experiment::Mode>> {
         let mut modes = command.modes.clone();
         modes.sort_unstable();
         modes.dedup();
@@ -206,7 +206,7 @@ mod work {
     fn engine(global: &Global) -> Result<Engine, Failure> {
         let text = global.device.as_deref().unwrap_or(DEVICE);
         let address: Address =
-            text.parse().map_err(|error| crate::error::HostError::Address(error).into_failure(DOING))?;
+            text.parse().map_err(|error| lab::error::HostError::Address(error).into_failure(DOING))?;
         let Address::Simulated(kind, options) = address else {
             return Err(Failure::new(Exit::Usage, "E204", DOING, format!("'{text}' is not a simulated device"))
                 .help("`--device sil:`, or `--device sim:` for the firmware under QEMU, or `--device board:` for it on the emulated board"));
@@ -301,7 +301,7 @@ mod work {
     }
 
     fn failure(error: ExperimentError, out: &Path) -> Failure {
-        use crate::experiment::results::ResultsError;
+        use experiment::results::ResultsError;
         let refused = "experiment refused";
         match error {
             ExperimentError::OutOfReach(_) => Failure::new(Exit::Invalid, "E660", refused, error)

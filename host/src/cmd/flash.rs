@@ -6,9 +6,9 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Exit, Failure, Global, Table, connection};
-use crate::image_file::{ImageFile, ImageFileError};
 use crate::probe::{INSTALL_PROBE_RS, Line, ProbeError};
-use crate::simulation::built_image;
+use lab::image_file::{ImageFile, ImageFileError};
+use lab::simulation::built_image;
 
 /// File that `cargo xtask build --board stm32h743` leaves.
 const IMAGE: &str = "arm-stm32h743.elf";

@@ -5,9 +5,9 @@ use link::HandStage;
 use serde_json::json;
 
 use super::{Exit, Failure, Global, connection};
-use crate::client::Client;
-use crate::device::Device;
-use crate::procedure::{self, HandReach, ProcedureError};
+use lab::client::Client;
+use lab::device::Device;
+use lab::procedure::{self, HandReach, ProcedureError};
 
 /// Fingers open, spread as it stands, rad. A tenth off the stops, which the drives need not press.
 const OPEN: f32 = 0.1;

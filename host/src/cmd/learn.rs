@@ -6,11 +6,11 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Exit, Failure, Global};
-use crate::demonstration::{Preparation, Recording};
-use crate::learn::feedback::FeedbackOptions;
-use crate::learn::hand::HandMotion;
-use crate::learn::{self, LearnError, LearnOptions};
-use crate::primitive_file::OrientationErrorKind;
+use lab::demonstration::{Preparation, Recording};
+use lab::learn::feedback::FeedbackOptions;
+use lab::learn::hand::HandMotion;
+use lab::learn::{self, LearnError, LearnOptions};
+use lab::primitive_file::OrientationErrorKind;
 
 /// Options of `learn`.
 #[derive(Debug, Clone, Args)]
@@ -129,7 +129,7 @@ fn failure(error: LearnError, command: &Cmd) -> Failure {
         LearnError::TurnsTooFar { rotation_vector_helps: true, .. } => {
             Some(format!("tactus learn --rotation-vector {demonstration}"))
         }
-        LearnError::Demonstration(crate::demonstration::DemonstrationError::Still { .. }) => {
+        LearnError::Demonstration(lab::demonstration::DemonstrationError::Still { .. }) => {
             Some(format!("tactus learn --no-trim {demonstration}"))
         }
         _ => None,

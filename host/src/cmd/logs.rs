@@ -7,9 +7,9 @@ use clap::Args;
 
 use super::flash::{image_failure, open_image, probe_failure};
 use super::{Exit, Failure, Global};
-use crate::image_file::ImageFile;
 use crate::probe::Line;
-use crate::simulation::{IMAGE_VARIABLE, built_image};
+use lab::image_file::ImageFile;
+use lab::simulation::{IMAGE_VARIABLE, built_image};
 
 /// File that `cargo xtask build` leaves for the emulator.
 const EMULATED_IMAGE: &str = "arm.elf";

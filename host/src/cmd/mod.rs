@@ -30,8 +30,8 @@ use clap::{Args, Parser, Subcommand};
 
 pub use output::Output;
 
-use crate::failure::{Exit, Failure};
-use crate::table::Table;
+use lab::failure::{Exit, Failure};
+use lab::table::Table;
 
 /// Teach, learn, check, upload, run and watch movement primitives on a Barrett WAM.
 ///

@@ -6,11 +6,11 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Exit, Failure, Global};
-use crate::demonstration::{Demonstration, Preparation, Recording};
-use crate::plan;
-use crate::plot::{self, Movement, movement::PosePath};
-use crate::primitive_file::PrimitiveFile;
-use crate::tracking::Tracking;
+use lab::demonstration::{Demonstration, Preparation, Recording};
+use lab::plan;
+use lab::plot::{self, Movement, movement::PosePath};
+use lab::primitive_file::PrimitiveFile;
+use lab::tracking::Tracking;
 
 /// Options of `plot`.
 #[derive(Debug, Clone, Args)]

@@ -9,7 +9,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Failure, Global, connection, teach};
-use crate::procedure::{ProcedureError, Recorder};
+use lab::procedure::{ProcedureError, Recorder};
 
 /// Options of `record`.
 #[derive(Debug, Clone, Args)]
@@ -37,7 +37,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     let failed = |error| connection::failure(error, DOING);
     let file = File::create(&command.output).map_err(|cause| failed(ProcedureError::Recording(cause)))?;
-    let wanted = (command.duration * crate::demonstration::RATE).round() as usize;
+    let wanted = (command.duration * lab::demonstration::RATE).round() as usize;
     let bar = output.bar(wanted as u64, "recording");
     let mut recorder =
         Recorder::start(&mut client, BufWriter::new(file), "Tactus recording, 300 Hz").map_err(failed)?;

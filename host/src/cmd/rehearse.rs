@@ -8,12 +8,12 @@ use link::RunOptions;
 use serde::Serialize;
 
 use super::{Exit, Failure, Global, Table, connection, upload};
-use crate::client::Client;
-use crate::demonstration::{RATE, Recording};
-use crate::device::Device;
-use crate::learn::memory::{MemoryError, MemorySummary, Payload, remember_rehearsals};
-use crate::primitive_file::PrimitiveFile;
-use crate::procedure::{self, CHANNELS, FlagCounts, Mode, ProcedureError, RunRequest, recording_text};
+use lab::client::Client;
+use lab::demonstration::{RATE, Recording};
+use lab::device::Device;
+use lab::learn::memory::{MemoryError, MemorySummary, Payload, remember_rehearsals};
+use lab::primitive_file::PrimitiveFile;
+use lab::procedure::{self, CHANNELS, FlagCounts, Mode, ProcedureError, RunRequest, recording_text};
 
 /// Options of `rehearse`.
 #[derive(Debug, Clone, Args)]
@@ -162,7 +162,7 @@ fn play(
 ) -> Result<(Vec<u8>, FlagCounts), ProcedureError> {
     procedure::go_to_start(client, &movement.start, |_| {})?;
     let name =
-        link::Name::new(&movement.name).map_err(|error| crate::transport::TransportError::other(error.to_string()))?;
+        link::Name::new(&movement.name).map_err(|error| lab::transport::TransportError::other(error.to_string()))?;
     // The same gains and the same pose feedback as in the runs that will compare themselves with this one.
     let options = RunOptions { speed: speed as f32, ..Mode::Open.options() };
     let mut cycles = Vec::new();
@@ -234,7 +234,7 @@ pub(super) fn memory_table(memory: &MemorySummary) -> Table {
 
 /// Clears the surroundings of a simulated arm.
 #[cfg(feature = "mujoco")]
-fn surround(options: &mut crate::simulation::SimulationOptions, surroundings: Surroundings) {
+fn surround(options: &mut lab::simulation::SimulationOptions, surroundings: Surroundings) {
     use sim::world::mujoco::Scene;
     match surroundings {
         Surroundings::Table => options.scene = Scene::EMPTY,
@@ -245,7 +245,7 @@ fn surround(options: &mut crate::simulation::SimulationOptions, surroundings: Su
 
 /// Nothing stands around an arm without MuJoCo.
 #[cfg(not(feature = "mujoco"))]
-fn surround(_options: &mut crate::simulation::SimulationOptions, _surroundings: Surroundings) {}
+fn surround(_options: &mut lab::simulation::SimulationOptions, _surroundings: Surroundings) {}
 
 /// A mass, or a mass and its centre.
 fn payload(text: &str) -> Result<Payload, String> {

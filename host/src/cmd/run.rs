@@ -11,14 +11,14 @@ use link::{Goal, RunOptions, Statistics};
 use serde::Serialize;
 
 use super::{Exit, Failure, Global, Output, Table, connection, upload};
-use crate::client::Client;
-use crate::demonstration::{RATE, Recording};
-use crate::device::Device;
-use crate::primitive_file::PrimitiveFile;
-use crate::procedure::{
+use lab::client::Client;
+use lab::demonstration::{RATE, Recording};
+use lab::device::Device;
+use lab::primitive_file::PrimitiveFile;
+use lab::procedure::{
     self, Change, ChangeKind, FlagCounts, Mode, ProcedureError, RunOutcome, RunRequest, Surprise, recording_text,
 };
-use crate::tracking::{HandTracking, Tracking};
+use lab::tracking::{HandTracking, Tracking};
 
 /// Rest that is recorded at the goal, s.
 const AFTERGLOW: f64 = 1.0;
@@ -183,8 +183,7 @@ fn play(
     });
     spinner.finish_and_clear();
     at_start?;
-    let name =
-        link::Name::new(&file.name).map_err(|error| crate::transport::TransportError::other(error.to_string()))?;
+    let name = link::Name::new(&file.name).map_err(|error| lab::transport::TransportError::other(error.to_string()))?;
     let goal = Goal { position: command.goal.map(|goal| goal.map(|value| value as f32)), orientation: None };
     let usual = command.mode.options();
     let options = RunOptions {

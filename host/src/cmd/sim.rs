@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 use clap::Args;
 
 use super::{Exit, Failure, Global, connection};
-use crate::client::Interrupt;
-use crate::device::Device;
-use crate::transport::{Address, Transport, TransportError};
+use lab::client::Interrupt;
+use lab::device::Device;
+use lab::transport::{Address, Transport, TransportError};
 
 /// Virtual time simulated between two looks at the socket: a human does not notice, a link time-out neither.
 const STRIDE: Duration = Duration::from_millis(5);
@@ -120,7 +120,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         // Left behind it would only confuse the next one.
         let _ = std::fs::remove_file(path);
     }
-    served.map_err(|error| crate::error::HostError::Transport(error).into_failure(DOING))?;
+    served.map_err(|error| lab::error::HostError::Transport(error).into_failure(DOING))?;
     let seconds = device.now().as_secs_f64();
     output.result(&serde_json::json!({ "simulated_s": seconds }), format!("{seconds:.1} s simulated"))
 }

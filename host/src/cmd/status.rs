@@ -7,7 +7,7 @@ use link::{HandStage, HomeSource, Status};
 use serde_json::json;
 
 use super::{Failure, Global, Table, connection};
-use crate::error::{HostError, explain_blocked};
+use lab::error::{HostError, explain_blocked};
 
 /// Options of `status`.
 #[derive(Debug, Clone, Args)]

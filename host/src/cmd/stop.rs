@@ -5,8 +5,8 @@ use control::{Fault, State};
 use serde_json::json;
 
 use super::{Failure, Global, connection};
-use crate::client::{Client, Halted};
-use crate::device::Device;
+use lab::client::{Client, Halted};
+use lab::device::Device;
 
 /// Options of `stop`.
 #[derive(Debug, Clone, Args)]

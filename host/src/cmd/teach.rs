@@ -11,10 +11,10 @@ use serde_json::json;
 use sim::person::Lesson;
 
 use super::{Exit, Failure, Global, connection};
-use crate::client::Client;
-use crate::device::Device;
-use crate::procedure::{self, ProcedureError, Recorder, Take};
-use crate::simulation::DEFAULT_SEED;
+use lab::client::Client;
+use lab::device::Device;
+use lab::procedure::{self, ProcedureError, Recorder, Take};
+use lab::simulation::DEFAULT_SEED;
 
 /// Rest that is recorded after a simulated person has let go, s.
 const AFTERGLOW: f64 = 0.5;
@@ -200,9 +200,9 @@ mod person {
     use sim::person::{GuidedWorld, Lesson, Stage};
     use sim::world::mujoco::{MujocoWorld, Scene};
 
-    use crate::client::Client;
-    use crate::device::Device;
-    use crate::simulation::SimulationOptions;
+    use lab::client::Client;
+    use lab::device::Device;
+    use lab::simulation::SimulationOptions;
 
     type Guided = GuidedWorld<MujocoWorld>;
 
@@ -242,9 +242,9 @@ mod person {
 /// Without MuJoCo nobody stands beside the arm.
 #[cfg(not(feature = "mujoco"))]
 mod person {
-    use crate::client::Client;
-    use crate::device::Device;
-    use crate::simulation::SimulationOptions;
+    use lab::client::Client;
+    use lab::device::Device;
+    use lab::simulation::SimulationOptions;
 
     pub(super) fn clear_the_table(_options: &mut SimulationOptions) {}
 

@@ -7,9 +7,9 @@ use serde_json::json;
 
 use super::{Exit, Failure, Global, Output, connection};
 use crate::check;
-use crate::client::{Client, UploadOutcome, UploadPhase};
-use crate::device::Device;
-use crate::primitive_file::PrimitiveFile;
+use lab::client::{Client, UploadOutcome, UploadPhase};
+use lab::device::Device;
+use lab::primitive_file::PrimitiveFile;
 
 /// Options of `upload`.
 #[derive(Debug, Clone, Args)]

@@ -1,5 +1,8 @@
 //! What a device does with noise, strangers and bad primitives: it drops, refuses with a reason, and goes on.
 
+use lab::client::{Client, UploadOutcome};
+use lab::error::HostError;
+use lab::transport::Transport as _;
 use link::frame::LINK_TIMEOUT_MS;
 use link::{DeviceHello, HostHello, LINK_VERSION, LinkCounters, Name, Refusal, Reply, Request, SCHEMA_HASH, Text};
 use std::io::Read as _;
@@ -8,9 +11,6 @@ use std::time::{Duration, Instant};
 use system_tests::command::{one_object, stderr, tactus};
 use system_tests::image::{self, Real};
 use system_tests::{Arm, boot, connect, expect, raw, taught};
-use tactus::client::{Client, UploadOutcome};
-use tactus::error::HostError;
-use tactus::transport::Transport as _;
 
 /// The firmware; the world plays no part here.
 const DEVICE: &str = "sim:world=simple";

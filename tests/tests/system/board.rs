@@ -3,12 +3,12 @@
 use std::fs;
 use std::path::Path;
 
+use lab::device::Device;
+use lab::simulation::{FlashSource, SimulationError, built_image};
 use link::image::stored_crc;
 use system_tests::command::{one_object, program, stderr, tactus};
 use system_tests::execution::{Execution, beyond_torque_limits, distance, grasp_point, play};
 use system_tests::{Arm, PRIMITIVE, expect, ready, simulation, taught};
-use tactus::device::Device;
-use tactus::simulation::{FlashSource, SimulationError, built_image};
 
 /// A run of the taught primitive on a board whose bank 2 and report are files in the folder; the board is switched off afterwards.
 fn run_in(folder: &Path, seed: u64) -> (Execution, u64) {

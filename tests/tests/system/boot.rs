@@ -4,12 +4,12 @@ use std::cell::RefCell;
 
 use control::State;
 use device::Stage;
+use lab::client::Client;
+use lab::procedure;
 use sim::FrameClass;
 use system_tests::bus::{CYCLE_TICKS, position_requests, torques};
 use system_tests::execution::{distance, watch};
 use system_tests::{at_rest, boot, expect, ready, simulation};
-use tactus::client::Client;
-use tactus::procedure;
 
 /// How far the start of a position request may wander, ticks: interrupt and round (10 us) behind the rest of the longest
 /// frame that may be on the wire (135 us).

@@ -2,14 +2,14 @@
 
 use control::State;
 use device::Stage;
+use lab::client::Client;
+use lab::device::Device;
+use lab::error::HostError;
+use lab::procedure;
+use lab::simulation::FlashSource;
 use link::{HomeSource, Refusal};
 use sim::flash::{Flash, FlashChip, FlashTimes};
 use system_tests::{Arm, command, expect, simulation};
-use tactus::client::Client;
-use tactus::device::Device;
-use tactus::error::HostError;
-use tactus::procedure;
-use tactus::simulation::FlashSource;
 
 /// How far this arm's home is from the model's, rad: two to six degrees.
 const BESIDE: [f64; 7] = [0.06, 0.09, -0.05, -0.08, 0.1, 0.04, -0.07];

@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use control::State;
+use lab::procedure::{self, Recorder};
 use system_tests::execution::{play, watch};
 use system_tests::load::Load;
 use system_tests::{Arm, expect, ready, simulation, taught};
-use tactus::procedure::{self, Recorder};
 
 /// A posture a little beside home, rad; home itself leans on the stops, outside the soft limits.
 const NEAR_HOME: [f32; 7] = [0.05, -1.85, 0.05, 2.95, 0.05, 0.05, 0.05];

@@ -4,13 +4,13 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use lab::client::Client;
+use lab::device::Device;
+use lab::error::HostError;
+use lab::simulation::{Engine, SimulationError};
+use lab::transport::TransportError;
 use system_tests::command::{signal, start, tactus};
 use system_tests::expect;
-use tactus::client::Client;
-use tactus::device::Device;
-use tactus::error::HostError;
-use tactus::simulation::{Engine, SimulationError};
-use tactus::transport::TransportError;
 
 /// What a conversation ended with, if it was the end of the simulated firmware.
 fn ended(error: HostError) -> Option<String> {

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use control::limit::MOTOR_COUNTS_LIMIT;
+use control::act::limit::MOTOR_COUNTS_LIMIT;
+use lab::demonstration::Recording;
+use lab::primitive_file::PrimitiveFile;
 use system_tests::bus::torques;
 use system_tests::command::{one_object, tactus};
 use system_tests::execution::{beyond_torque_limits, play};
 use system_tests::{expect, ready, simulation};
-use tactus::demonstration::Recording;
-use tactus::primitive_file::PrimitiveFile;
 
 /// What the flashlight may lean after the run: it still stands.
 const UPRIGHT: f64 = 2.0;

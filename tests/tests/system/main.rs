@@ -7,7 +7,7 @@ mod calibration;
 mod command_line;
 mod determinism;
 mod firmware_ends;
-mod joint;
+mod hand;
 mod journey;
 mod metadata;
 mod served_arm;

@@ -1,8 +1,8 @@
 //! What an image says about itself in its file, and what it says when it runs.
 
+use lab::image_file::ImageFile;
+use lab::simulation::{IMAGE_VARIABLE, built_image};
 use system_tests::connect;
-use tactus::image_file::ImageFile;
-use tactus::simulation::{IMAGE_VARIABLE, built_image};
 
 #[test]
 fn the_running_image_says_the_same_as_its_file() {

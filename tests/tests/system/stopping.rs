@@ -4,14 +4,14 @@ use std::time::Duration;
 
 use control::State;
 use device::Stage;
+use lab::client::Incoming;
+use lab::transport::Transport as _;
 use link::frame::{Decoder, LINK_TIMEOUT_MS};
 use link::{EventKind, HostHello, Reply, Request, Telemetry, Text};
 use sim::{PendantAction, TICKS_PER_SECOND};
 use system_tests::bus::{CYCLE_TICKS, torques};
 use system_tests::execution::{begin, beyond_torque_limits, largest_torque_step, prepare};
 use system_tests::{Arm, expect, raw, ready, simulation, taught};
-use tactus::client::Incoming;
-use tactus::transport::Transport as _;
 
 /// Rounding of single precision on the torque steps of the limiter.
 const ROUNDING: f64 = 1e-4;

@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
-use control::arm::ArmModel;
-use control::kinematics::Frames;
+use control::model::{ArmModel, Frames};
 use control::units::JointPositions;
 use control::{Payload, State};
 use device::Stage;
+use lab::client::{Client, Incoming};
+use lab::device::Device;
+use lab::simulation::FlashSource;
 use link::image::{
     FeedbackClamps, HemisphereKind, IMAGE_BYTES_LIMIT, ImageContent, KERNEL_LIMIT, OrientationErrorKind, Waypoint,
     WaypointVelocity,
@@ -16,9 +18,6 @@ use link::{Name, Telemetry};
 use sim::flash::{Flash, FlashChip, FlashTimes};
 use system_tests::bus::{CYCLE_TICKS, torques};
 use system_tests::{Arm, command, expect, simulation};
-use tactus::client::{Client, Incoming};
-use tactus::device::Device;
-use tactus::simulation::FlashSource;
 
 /// A straight movement of the forearm that takes `duration` seconds, in as many kernels as a device takes.
 fn image(name: &str, duration: f32) -> Vec<u8> {
@@ -240,7 +239,7 @@ fn a_restart_under_qemu_finds_the_library_again_and_what_was_deleted_is_gone() {
     assert_eq!(names(&mut arm), ["two"]);
     // The very same bytes: the device says so itself, and nothing is sent.
     let again = expect(arm.upload(&image("two", 4.0), |_, _, _| {}));
-    assert!(matches!(again, tactus::client::UploadOutcome::AlreadyThere(_)), "{again:?}");
+    assert!(matches!(again, lab::client::UploadOutcome::AlreadyThere(_)), "{again:?}");
 }
 
 #[test]

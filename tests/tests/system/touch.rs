@@ -4,20 +4,20 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use control::{Fault, RATE, State};
+use experiment::plant::{self, Arm};
+use experiment::{Config, Experiment, Grid, Mode, Outcome, PlantKind, Scenario, Variation, lesson};
+use lab::client::{Client, Interrupt};
+use lab::demonstration::Recording;
+use lab::device::Device;
+use lab::difference::Difference;
+use lab::error::HostError;
+use lab::primitive_file::PrimitiveFile;
+use lab::procedure::{self, ProcedureError, RunRequest};
+use lab::simulation::{Engine, Simulation, SimulationOptions};
 use link::{Name, Refusal};
 use sim::TICKS_PER_SECOND;
 use sim::world::mujoco::Scene;
 use system_tests::expect;
-use tactus::client::{Client, Interrupt};
-use tactus::demonstration::Recording;
-use tactus::device::Device;
-use tactus::difference::Difference;
-use tactus::error::HostError;
-use tactus::experiment::plant::{self, Arm};
-use tactus::experiment::{Config, Experiment, Grid, Mode, Outcome, PlantKind, Scenario, Variation, lesson};
-use tactus::primitive_file::PrimitiveFile;
-use tactus::procedure::{self, ProcedureError, RunRequest};
-use tactus::simulation::{Engine, Simulation, SimulationOptions};
 
 /// Of twelve cells over the paper's whole grid, with the force controller and adaptation: all but the one beyond the hand's reach (4 cm
 /// farther, 12 cm aside), and one that contact may decide otherwise when something harmless changes.
@@ -57,7 +57,7 @@ fn primitive() -> &'static PrimitiveFile {
 }
 
 fn carried_through(config: &Config) -> Experiment {
-    expect(tactus::experiment::run(config, &Interrupt::never(), &mut |_| {}))
+    expect(experiment::run(config, &Interrupt::never(), &mut |_| {}))
 }
 
 fn outcomes(experiment: &Experiment) -> Vec<(String, Mode, Outcome)> {
@@ -123,7 +123,7 @@ fn planned_a_cycle_later(mut recording: Recording) -> Recording {
 }
 
 fn engine(address: &str) -> Engine {
-    let tactus::transport::Address::Simulated(kind, options) = expect(address.parse()) else { panic!("{address}") };
+    let lab::transport::Address::Simulated(kind, options) = expect(address.parse()) else { panic!("{address}") };
     expect(SimulationOptions::from_address(kind, &options)).engine
 }
 

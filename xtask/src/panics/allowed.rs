@@ -45,12 +45,12 @@ const OURS: &[Allowed] = &[
     row("dmp::forcing", &[Index], "a basis has 2 <= count <= N kernels by its constructor: every slice of it exists"),
     row("dmp::forcing::ForcingTerm::assign", &[Message], "chunks of count weights, and count is at least 2"),
     row("dmp::table::PhaseTable::at", &[Index], "the sample on the left is at most the last but one, by `min`"),
-    row("control::kinematics::Factor::new", &[Index], "rows of a 6 x 6 array by an iterator over six"),
-    row("control::limit", &[Index], "a group is a constant list of motors"),
+    row("control::model::kinematics::Factor::new", &[Index], "rows of a 6 x 6 array by an iterator over six"),
+    row("control::act::limit", &[Index], "a group is a constant list of motors"),
     row("device::storage", &[Resumed], "each is awaited once, by the library's task, which never ends"),
-    row("joint::image::ImageReader::real", &[Division], "a header with fewer than two kernels is refused"),
+    row("hand::image::ImageReader::real", &[Division], "a header with fewer than two kernels is refused"),
     row("arm::app", &[Resumed], "RTIC makes a task anew each time it is spawned"),
-    row("joint::app", &[Resumed], "RTIC makes a task anew each time it is spawned"),
+    row("hand::app", &[Resumed], "RTIC makes a task anew each time it is spawned"),
 ];
 
 /// The boards' code below the application.
@@ -64,7 +64,7 @@ const BOARDS: &[Allowed] = &[
         "the emulated controller's lock (`can::with`), three of its uses joined by the compiler",
     ),
     emulated(
-        "firmware::joint::slot",
+        "firmware::hand::slot",
         &[Borrow, Message],
         "the emulated controller's lock (`can::with`), three of its uses joined by the compiler",
     ),
@@ -120,7 +120,7 @@ pub(super) fn all() -> impl Iterator<Item = &'static Allowed> {
 }
 
 /// Crates of ours that must not panic for any input.
-pub(super) const LIBRARIES: [&str; 6] = ["dmp", "puck", "link", "control", "device", "joint"];
+pub(super) const LIBRARIES: [&str; 6] = ["dmp", "puck", "link", "control", "device", "hand"];
 
 #[cfg(test)]
 mod tests {

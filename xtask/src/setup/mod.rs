@@ -14,7 +14,7 @@ use anyhow::Result;
 
 pub(crate) use emulator::{emulator_cargo, emulator_compiler, emulator_lints, emulator_target};
 pub(crate) use qemu::Qemu;
-pub(crate) use toolchain::{ARM, JOINT, Toolchain};
+pub(crate) use toolchain::{ARM, HAND, Toolchain};
 
 use crate::shell;
 

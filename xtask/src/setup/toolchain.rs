@@ -14,8 +14,8 @@ use crate::shell;
 /// Target of the arm image: Cortex-M4F and M7, hardware floating point.
 pub(crate) const ARM: &str = "thumbv7em-none-eabihf";
 
-/// Target of a joint board: Cortex-M3, no floating point.
-pub(crate) const JOINT: &str = "thumbv7m-none-eabi";
+/// Target of a hand board: Cortex-M3, no floating point.
+pub(crate) const HAND: &str = "thumbv7m-none-eabi";
 
 /// Patience with rustup; a machine that cannot reach its server often hangs instead of failing.
 const RUSTUP_LIMIT: Duration = Duration::from_secs(120);
@@ -85,7 +85,7 @@ pub(super) fn ensure() -> Result<Toolchain> {
         }
         Some("rustup") if has_targets() || add_targets() => Toolchain::Rustup,
         Some("rustup") => {
-            bail!("rustup cannot fetch them; to repeat: rustup target add {ARM} {JOINT}")
+            bail!("rustup cannot fetch them; to repeat: rustup target add {ARM} {HAND}")
         }
         Some("debian") => debian()?,
         Some(other) => bail!("TACTUS_TOOLCHAIN is '{other}'; it may be 'rustup' or 'debian'"),
@@ -117,13 +117,13 @@ fn sysroot() -> Result<PathBuf> {
 fn has_targets() -> bool {
     let Ok(sysroot) = sysroot() else { return false };
     let library = sysroot.join("lib").join("rustlib");
-    [ARM, JOINT].iter().all(|target| library.join(target).join("lib").is_dir())
+    [ARM, HAND].iter().all(|target| library.join(target).join("lib").is_dir())
 }
 
 fn add_targets() -> bool {
-    shell::note(&format!("rustup target add {ARM} {JOINT}"));
+    shell::note(&format!("rustup target add {ARM} {HAND}"));
     let mut command = Command::new("rustup");
-    command.args(["target", "add", ARM, JOINT]).current_dir(shell::root());
+    command.args(["target", "add", ARM, HAND]).current_dir(shell::root());
     shell::succeeds_within(&mut command, RUSTUP_LIMIT) && has_targets()
 }
 

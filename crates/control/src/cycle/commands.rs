@@ -3,16 +3,17 @@
 use dmp::Primitive;
 use nalgebra::Vector3;
 
-use crate::approach::{Approach, LONGEST};
 use crate::command::{Command, Refusal};
 use crate::cycle::{Cycle, Measured, WRENCH_AGE};
-use crate::fault::Fault;
-use crate::hand;
+use crate::guard::fault::Fault;
+use crate::guard::supervisor::{State, Trigger};
+use crate::model::hand;
+use crate::plan;
+use crate::plan::approach::{Approach, LONGEST};
+use crate::plan::run::Run;
 use crate::real::Real;
-use crate::run::Run;
-use crate::supervisor::{State, Trigger};
+use crate::sense::wrench::REST_FORCE;
 use crate::units::JointPositions;
-use crate::wrench::REST_FORCE;
 
 /// Below this joint speed (rad/s) the arm counts as standing, for leaving a stop.
 pub(super) const STANDING: f64 = 0.05;
@@ -131,7 +132,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if self.hand.answering().is_none() {
             return Err(Refusal::NoHand);
         }
-        let timely = duration >= 0.0 && f64::from(duration) <= hand::motion::LONGEST;
+        let timely = duration >= 0.0 && f64::from(duration) <= plan::hand::LONGEST;
         if !timely || !hand::within_range(q) {
             return Err(Refusal::OutOfRange);
         }

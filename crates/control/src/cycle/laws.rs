@@ -1,13 +1,16 @@
 //! The laws of the states: from what is measured to the torque that is wanted.
 
-use crate::controller::{ForceController, JointReference, TaskReference};
+use crate::cycle::record::{Event, flags};
 use crate::cycle::{Cycle, HANDOVER, Measured, PERIOD, STOP_RAMP, WRENCH_AGE};
-use crate::hand::{HandReference, HandState};
-use crate::kinematics::Frames;
+use crate::guard::supervisor::State;
+use crate::law::force::ForceController;
+use crate::law::hand::HandReference;
+use crate::law::joint::JointReference;
+use crate::law::operational::TaskReference;
+use crate::model::kinematics::Frames;
+use crate::plan::run::Senses;
 use crate::real::Real;
-use crate::record::{Event, flags};
-use crate::run::Senses;
-use crate::supervisor::State;
+use crate::sense::hand::HandState;
 use crate::units::{JointPositions, JointTorques, Pose, Vector6, Vector7, Wrench};
 
 /// Length of the damping that carries the arm while gravity torque builds up after arming (control periods): 0.5 s.

@@ -7,33 +7,40 @@
 //! ```
 
 mod commands;
+pub mod hand;
 mod laws;
+pub mod record;
 mod transitions;
 
 use dmp::Primitive;
 use pinned_init::{Init, init};
 use puck::SafetyMode;
 
-use crate::actuation::Actuation;
-use crate::approach::Approach;
-use crate::arm::ArmModel;
-use crate::calibration::{Calibration, Payload};
+use crate::act::actuation::Actuation;
+use crate::act::limit::{LimitReport, TorqueLimiter};
 use crate::command::Refusal;
-use crate::controller::{ForceController, Gains, JointBounds, JointController, OperationalController, PostureIntegral};
 use crate::cycle::commands::STANDING;
-use crate::estimate::{JointEstimator, JointState};
-use crate::fault::Fault;
-use crate::hand::HandDrive;
-use crate::kinematics::Frames;
-use crate::limit::{LimitReport, TorqueLimiter};
-use crate::load::{Fit, LoadRefusal, Loaded};
-use crate::monitor::{Monitor, Observation};
+use crate::cycle::hand::HandDrive;
+use crate::cycle::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
+use crate::guard::fault::Fault;
+use crate::guard::joint_limits::JointBounds;
+use crate::guard::monitor::{Monitor, Observation};
+use crate::guard::supervisor::{State, Supervisor, Trigger};
+use crate::law::force::ForceController;
+use crate::law::gains::Gains;
+use crate::law::integral::PostureIntegral;
+use crate::law::joint::JointController;
+use crate::law::operational::OperationalController;
+use crate::model::arm::ArmModel;
+use crate::model::calibration::{Calibration, Payload};
+use crate::model::kinematics::Frames;
+use crate::plan::approach::Approach;
+use crate::plan::load::{Fit, LoadRefusal, Loaded};
+use crate::plan::run::{FADE, Run};
 use crate::real::Real;
-use crate::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
-use crate::run::{FADE, Run};
-use crate::supervisor::{State, Supervisor, Trigger};
+use crate::sense::joints::{JointEstimator, JointState};
+use crate::sense::wrench::WrenchEstimator;
 use crate::units::{JointPositions, Pose, Vector7, Wrench};
-use crate::wrench::WrenchEstimator;
 
 /// Control period (s).
 pub const PERIOD: f64 = 1.0 / 300.0;

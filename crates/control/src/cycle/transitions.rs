@@ -2,13 +2,15 @@
 
 use dmp::Primitive;
 
-use crate::arm::within;
-use crate::controller::{ForceController, JointBounds, OperationalController};
 use crate::cycle::{Cycle, HANDOVER, Measured, STOP_RAMP, ZERO_CYCLES};
-use crate::deviation::Deviation;
-use crate::fault::Fault;
+use crate::guard::fault::Fault;
+use crate::guard::joint_limits::JointBounds;
+use crate::guard::supervisor::{State, Trigger};
+use crate::law::force::ForceController;
+use crate::law::operational::OperationalController;
+use crate::model::arm::within;
 use crate::real::Real;
-use crate::supervisor::{State, Trigger};
+use crate::sense::deviation::Deviation;
 use crate::units::{JointAccelerations, JointPositions, Vector7, Wrench};
 
 impl<R: Real, const N: usize> Cycle<R, N> {

@@ -1,9 +1,9 @@
 //! What the feedback of Eq (8) and the force controller do to a run, and what they must never do (faults B2 to B7).
 
+use control::act::limit::STEP_LIMIT;
 use control::command::{Command, PoseFeedback, RunOptions};
-use control::controller::Gains;
-use control::kinematics::Frames;
-use control::limit::STEP_LIMIT;
+use control::law::Gains;
+use control::model::Frames;
 use control::units::JointPositions;
 use control::{CycleRecord, Event, Fault, Refusal, State, flags};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
@@ -87,8 +87,8 @@ fn a_push_along_a_world_axis_moves_the_plan_along_it_in_any_orientation_of_the_h
     }
 }
 
-fn rig_model() -> control::arm::ArmModel<f64> {
-    control::arm::ArmModel::new(control::Payload::SensorAndHand)
+fn rig_model() -> control::model::ArmModel<f64> {
+    control::model::ArmModel::new(control::Payload::SensorAndHand)
 }
 
 #[test]
@@ -485,7 +485,7 @@ fn a_wall_is_pressed_with_the_force_that_statics_predicts() {
     let normal: Matrix6<f64> = jacobian * jacobian.transpose();
     let lent: Vector6<f64> = normal.try_inverse().expect("regular") * (jacobian * spring);
     // Dead band: the error is 0.3 N smaller than it is.
-    let band = control::deviation::FORCE_DEAD_BAND;
+    let band = control::sense::deviation::FORCE_DEAD_BAND;
     let predicted = expected + (gain * -band * (expected - truth).signum() - lent[0]) / (1.0 + gain);
     println!("felt {felt} N, predicted {predicted} N, springs lend {} N, G {gain}", lent[0]);
     assert!((felt - predicted).abs() < 0.25, "{felt} {predicted}");

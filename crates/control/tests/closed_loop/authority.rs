@@ -1,7 +1,7 @@
 //! Who may have torque, and how it comes and goes.
 
+use control::act::limit::STEP_LIMIT;
 use control::command::{Command, Refusal, RunOptions};
-use control::limit::STEP_LIMIT;
 use control::units::{JointPositions, Vector7};
 use control::{Event, Fault, State};
 use puck::SafetyMode;
@@ -51,7 +51,7 @@ fn gravity_mode_hardly_drifts_without_any_friction() {
 fn the_first_torque_after_arming_is_gravity_with_a_limited_onset() {
     let mut rig = Rig::<f32>::new(GOAL, 0);
     rig.run_for(0.1);
-    let gravity = rig.cycle.model().gravity_torque(&control::kinematics::Frames::new(
+    let gravity = rig.cycle.model().gravity_torque(&control::model::Frames::new(
         rig.cycle.model(),
         &JointPositions::from_f32(GOAL.map(|q| q as f32)),
     ));

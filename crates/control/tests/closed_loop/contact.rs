@@ -1,7 +1,7 @@
 //! The wrench with its sign and frames, and what the plan and the force controller do with it.
 
 use control::command::{Command, RunOptions};
-use control::deviation::TORQUE_DEAD_BAND;
+use control::sense::deviation::TORQUE_DEAD_BAND;
 use control::{Fault, Real, State, flags};
 
 use crate::primitives::{Design, GOAL, START, configuration, primitive};

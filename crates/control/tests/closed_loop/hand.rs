@@ -1,7 +1,7 @@
 //! The hand in the control cycle: who drives it, how it follows, and what it does with what it feels.
 
 use control::command::{Command, RunOptions};
-use control::hand::estimate::LOST_CYCLES;
+use control::sense::hand::LOST_CYCLES;
 use control::{Event, Refusal, State, flags};
 
 use crate::hand_plant::Hand;

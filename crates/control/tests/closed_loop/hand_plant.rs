@@ -3,7 +3,7 @@
 //! A finger's drive has the reflected inertia of its rotor, viscous and Coulomb friction, and a worm: a load can stop it but
 //! never turn it. Objects are springs that each inner link runs into; TorqueSwitch and outer links are left to the simulator.
 
-use control::hand::EFFICIENCY;
+use control::model::hand::EFFICIENCY;
 use control::{HandSample, PERIOD};
 use puck::hand::{INNER_LINK_RATIO, SPREAD_RATIO};
 use puck::{Action, CanFrame, Counts, Group, Request, gauge};

@@ -1,7 +1,7 @@
 //! Lost replies: the bridge, and what happens when it ends.
 
+use control::act::limit::STEP_LIMIT;
 use control::command::{Command, RunOptions};
-use control::limit::STEP_LIMIT;
 use control::{Fault, State};
 
 use crate::primitives::{Design, START, primitive};

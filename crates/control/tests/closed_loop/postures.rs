@@ -1,10 +1,11 @@
 //! How exactly a posture is held, under friction that nobody knows exactly.
 
-use control::approach::{Approach, SETTLING};
+use control::act::limit::STEP_LIMIT;
 use control::command::{Command, RunOptions};
-use control::controller::Gains;
-use control::controller::integral::TOLERANCE;
-use control::limit::STEP_LIMIT;
+use control::law::Gains;
+use control::law::integral::TOLERANCE;
+use control::plan::Approach;
+use control::plan::approach::SETTLING;
 use control::units::{JointPositions, Vector7};
 use control::{Event, RATE, State, flags, model};
 

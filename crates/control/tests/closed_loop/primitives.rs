@@ -1,10 +1,10 @@
 //! Movements for the tests: between two postures, with a bent path.
 
+use control::Payload;
 use control::Real;
-use control::arm::ArmModel;
-use control::kinematics::Frames;
+use control::model::{ArmModel, Frames};
+use control::plan::load;
 use control::units::JointPositions;
-use control::{Payload, load};
 use dmp::{
     Configuration, ExpectedWrench, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, Primitive,
     PrimitiveTables, Quaternion, Velocity,

@@ -7,13 +7,13 @@
 use std::collections::VecDeque;
 
 use crate::hand_plant::Hand;
-use control::arm::ArmModel;
 use control::command::Command;
-use control::controller::Gains;
-use control::kinematics::Frames;
+use control::law::Gains;
+use control::model::{ArmModel, Frames};
+use control::plan::load;
 use control::units::{JointPositions, JointVelocities, Vector7};
 use control::{
-    BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, LoadRefusal, Payload, Real, State, load, model,
+    BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, LoadRefusal, Payload, Real, State, model,
 };
 use dmp::Primitive;
 use nalgebra::{SMatrix, Vector3};

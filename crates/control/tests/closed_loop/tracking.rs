@@ -1,7 +1,7 @@
 //! How well the arm follows: hold, approach, run.
 
-use control::arm::ArmModel;
 use control::command::{AccelerationSource, Command, Goal, PoseFeedback, RunOptions};
+use control::model::ArmModel;
 use control::units::{JointVelocities, Orientation, Vector7};
 use control::{CycleRecord, Payload, Real, State, flags, model};
 

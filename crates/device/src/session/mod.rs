@@ -20,7 +20,7 @@ mod saving;
 mod upload;
 mod wire;
 
-use control::arm::ArmModel;
+use control::model::ArmModel;
 use control::{Payload, State};
 use heapless::Deque;
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame, LINK_TIMEOUT_MS};

@@ -1,7 +1,8 @@
 //! From an image in the store to the primitive the control half runs.
 
-use control::arm::ArmModel;
-use control::load::{self, LoadError};
+use control::model::ArmModel;
+use control::plan::load;
+use control::plan::load::LoadError;
 use dmp::{Configuration, Hemisphere, Limits, OrientationError, PrimitiveTables, Quaternion, Velocity};
 use link::Refusal;
 use link::image::{

@@ -1,6 +1,7 @@
 //! One request: who may ask it, when, and what it does.
 
-use control::{Command as Control, LoadRefusal, RunOptions, State, load};
+use control::plan::load;
+use control::{Command as Control, LoadRefusal, RunOptions, State};
 use link::frame::{Frame, REQUEST_AGE_LIMIT_MS};
 use link::message::{AccelerationSource, CHUNK_BYTES, ChunkData, Goal, PoseFeedback};
 use link::{

@@ -5,7 +5,7 @@
 use core::fmt;
 
 use control::CalibrationError;
-use control::load::{End, LoadError};
+use control::plan::load::{End, LoadError};
 use dmp::{Entry, GainError, Part, PrimitiveError, Row, TableError};
 use link::{Event as LinkEvent, EventKind as LinkKind, HandStage, Refusal as LinkRefusal, Telemetry};
 use puck::Node;

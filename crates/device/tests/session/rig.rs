@@ -2,8 +2,7 @@
 
 use std::collections::VecDeque;
 
-use control::arm::ArmModel;
-use control::kinematics::Frames;
+use control::model::{ArmModel, Frames};
 use control::units::JointPositions;
 use control::{CycleRecord, Fault, LoadRefusal, Payload, State};
 use device::{

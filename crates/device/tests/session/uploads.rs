@@ -257,7 +257,7 @@ fn a_primitive_beyond_all_bounds_is_refused_with_the_value_that_is() {
 
 #[test]
 fn every_place_of_a_value_survives_its_two_numbers() {
-    use control::load::LoadError;
+    use control::plan::load::LoadError;
     use dmp::{Part, PrimitiveError, Row};
     for row in 0..17 {
         for kernel in [0, 1, 99] {
@@ -291,7 +291,7 @@ fn an_expectation_recorded_through_another_filter_is_refused_with_both() {
             other => panic!("{other:?}"),
         }
     };
-    let device = control::wrench::WRENCH_CUT_OFF as f32;
+    let device = control::sense::wrench::WRENCH_CUT_OFF as f32;
     assert_eq!(through(device), Ok(()));
     assert_eq!(through(0.5 * device), Err((Refusal::ImageFilter, [500 * device as u32, 1000 * device as u32])));
     assert_eq!(through(0.0), Err((Refusal::ImageFilter, [0, 1000 * device as u32])));
@@ -304,7 +304,7 @@ fn expectation_and_experience_reach_the_control_half() {
         (content.expected_mean, content.expected_spread) = (&NINE, &NINE);
         (content.experience_mean, content.experience_spread, content.experience_trials) = (&TWELVE, &TWELVE, 5);
         content.marks.recorded_duration = 3.0;
-        content.marks.filter_cutoff = control::wrench::WRENCH_CUT_OFF as f32;
+        content.marks.filter_cutoff = control::sense::wrench::WRENCH_CUT_OFF as f32;
     };
     rig.store("felt", &image_with("felt", 3.0, 10, whole));
     rig.store("plain", &image("plain", 4.0, 10));

@@ -9,7 +9,8 @@ use serde_json::json;
 
 use super::source::Source;
 use super::{Exit, Failure, Global, Output, connection};
-use crate::can::{Account, BusKind, Interface, LogLine, Meaning, Reader, Summary};
+use canlog::{Account, BusKind, Interface, LogLine, Meaning, Reader, Summary};
+use lab::table::Table;
 
 /// Options of `can decode`.
 ///
@@ -131,7 +132,7 @@ impl Printer {
         } else {
             for (place, (summary, (gaps, bad))) in summaries.iter().zip(damage).enumerate() {
                 let before = if self.lines || place > 0 { "\n" } else { "" };
-                self.write(format!("{before}{summary}").trim_end_matches('\n'))?;
+                self.write(format!("{before}{}", summary_text(summary)).trim_end_matches('\n'))?;
                 if gaps + bad > 0 {
                     self.write(&format!("host link: {gaps} gaps between segments, {bad} damaged messages"))?;
                 }
@@ -164,4 +165,57 @@ impl Printer {
 
 fn broken(cause: Box<dyn std::error::Error + Send + Sync>) -> Failure {
     Failure::new(Exit::Internal, "E101", "writing the result", cause)
+}
+
+/// The summary of one interface for a terminal.
+fn summary_text(summary: &Summary) -> String {
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let mut text = format!(
+        "{}: {} frames in {:.3} s, bus load {} (busiest 0.1 s: {}), {}\n",
+        summary.interface,
+        summary.frames,
+        summary.seconds,
+        percent(summary.load),
+        percent(summary.load_busiest),
+        match summary.unnamed {
+            0 => "every frame named".to_owned(),
+            count => format!("{count} frames without a name"),
+        }
+    );
+    let mut table = Table::new(["kind", "frames", "per second", "load"]);
+    for kind in &summary.kinds {
+        let rate = format!("{:.1}", kind.per_second);
+        table.row([kind.kind.word().to_owned(), kind.frames.to_string(), rate, percent(kind.load)]);
+    }
+    text += &format!("\n{table}");
+    if !summary.nodes.is_empty() {
+        let mut table =
+            Table::new(["node", "firmware", "replies owed", "came", "lost", "unasked", "delay mean", "worst"]);
+        for node in &summary.nodes {
+            table.row([
+                node.name.clone(),
+                node.firmware.map_or("-".to_owned(), |version| version.to_string()),
+                node.asked.to_string(),
+                node.answered.to_string(),
+                node.lost.to_string(),
+                node.unasked.to_string(),
+                format!("{:.0} us", node.delay_mean_us),
+                format!("{} us", node.delay_worst_us),
+            ]);
+        }
+        text += &format!("\n{table}");
+    }
+    if let Some(cycle) = &summary.cycle {
+        text += &format!(
+            "\ncontrol cycle: {} cycles, {:.2} us ({:.2} Hz), deviation {:.2} us, {} to {} us, 99 % within {} us\n",
+            cycle.cycles,
+            cycle.mean_us,
+            1e6 / cycle.mean_us,
+            cycle.deviation_us,
+            cycle.shortest_us,
+            cycle.longest_us,
+            cycle.p99_us
+        );
+    }
+    text
 }

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::source::Source;
 use super::{Exit, Failure, Global, connection};
-use crate::can::replay::{Difference, DifferenceKind, Outcome, Replay, ReplayError};
+use lab::replay::{Difference, DifferenceKind, Outcome, Replay, ReplayError};
 
 /// Options of `can replay`.
 ///

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
 use super::{Exit, Failure};
-use crate::can::{LineError, LogLine};
-use crate::client::Interrupt;
-use crate::error::HostError;
-use crate::transport::SocketCan;
+use canlog::{LineError, LogLine};
+use lab::client::Interrupt;
+use lab::error::HostError;
+use lab::transport::SocketCan;
 
 /// Lines that are reported one by one; of more only the number.
 const REPORTED: u64 = 20;

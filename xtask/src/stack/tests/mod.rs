@@ -5,7 +5,7 @@ mod tiny;
 
 use super::frame::{MASK, UNMASK};
 use super::total::sum;
-use tiny::{BACK, Call, Data, JOINT, Jump, NEVER, POP, PUSH, Piece, REAL, Tiny, board, code, framed, main, priorities};
+use tiny::{BACK, Call, Data, HAND, Jump, NEVER, POP, PUSH, Piece, REAL, Tiny, board, code, framed, main, priorities};
 
 fn bytes(tiny: &Tiny, name: &str) -> u32 {
     tiny.deepest(name).expect("a depth").bytes
@@ -274,7 +274,7 @@ fn texts_that_hand_out_each_other_deeper_than_listed_are_refused() {
         "<g as core::fmt::Debug>::fmt",
     ];
     let chain = |texts: &[&'static str], last: &'static str| {
-        let mut tiny = board(JOINT);
+        let mut tiny = board(HAND);
         for text in TEXTS {
             tiny = tiny.with(text, vec![code(&[BACK])]);
         }
@@ -285,7 +285,7 @@ fn texts_that_hand_out_each_other_deeper_than_listed_are_refused() {
             next = text;
         }
         let address = tiny.address(next);
-        tiny.with("stranger", making(address)).depth(JOINT)
+        tiny.with("stranger", making(address)).depth(HAND)
     };
     chain(&TEXTS[..4], TEXTS[4]).expect("five and one that passes them on are six");
     let said = refusal(chain(&TEXTS[..5], TEXTS[5]));
@@ -295,16 +295,16 @@ fn texts_that_hand_out_each_other_deeper_than_listed_are_refused() {
 
 #[test]
 fn start_and_service_are_told_apart_and_interrupts_come_on_top() {
-    let tiny = board(JOINT);
-    let depth = tiny.depth(JOINT).expect("a depth");
+    let tiny = board(HAND);
+    let depth = tiny.depth(HAND).expect("a depth");
     let interrupts = 4 * (36 + 48);
     assert_eq!(depth.in_service(), 8 + 108 + interrupts);
     assert_eq!(depth.at_start(), 8 + 8 + 408, "deeper than what waits until interrupts are unmasked");
     assert_eq!(depth.faults(), [""; 0]);
-    let idle = tiny.clone().with("idle", framed(1000, &[])).depth(JOINT).expect("a depth");
+    let idle = tiny.clone().with("idle", framed(1000, &[])).depth(HAND).expect("a depth");
     assert_eq!(idle.at_start(), depth.at_start(), "what runs later is not the start");
     assert_eq!(idle.in_service(), 8 + 1008 + interrupts);
-    let deep = tiny.clone().with("deep", framed(8, &[])).depth(JOINT).expect("a depth");
+    let deep = tiny.clone().with("deep", framed(8, &[])).depth(HAND).expect("a depth");
     assert_eq!(deep.at_start(), 8 + 8 + interrupts, "interrupts on top of what unmasked them");
     // What may end there: a panic in the slot, a fault above everything.
     let fault = 36 + 48;
@@ -313,75 +313,75 @@ fn start_and_service_are_told_apart_and_interrupts_come_on_top() {
 
 #[test]
 fn handlers_of_one_level_do_not_add_up_and_those_of_two_do() {
-    let service = |tiny: Tiny| tiny.depth(JOINT).expect("a depth").in_service();
-    let none = service(board(JOINT));
-    assert_eq!(service(board(JOINT).with("CAN_RECEIVE", framed(60, &[]))), none + 20);
+    let service = |tiny: Tiny| tiny.depth(HAND).expect("a depth").in_service();
+    let none = service(board(HAND));
+    assert_eq!(service(board(HAND).with("CAN_RECEIVE", framed(60, &[]))), none + 20);
     assert_eq!(
-        service(board(JOINT).with("CAN_RECEIVE", framed(60, &[])).with("CAN_TRANSMIT", framed(60, &[]))),
+        service(board(HAND).with("CAN_RECEIVE", framed(60, &[])).with("CAN_TRANSMIT", framed(60, &[]))),
         none + 20
     );
     assert_eq!(
-        service(board(JOINT).with("CAN_RECEIVE", framed(60, &[])).with("SLOT_TIMER", framed(60, &[]))),
+        service(board(HAND).with("CAN_RECEIVE", framed(60, &[])).with("SLOT_TIMER", framed(60, &[]))),
         none + 40
     );
 }
 
 #[test]
 fn a_panic_counts_with_its_last_words_once() {
-    let tiny = board(JOINT).with("SLOT_TIMER", framed(40, &["rust_begin_unwind"]));
-    let depth = tiny.depth(JOINT).expect("a depth");
+    let tiny = board(HAND).with("SLOT_TIMER", framed(40, &["rust_begin_unwind"]));
+    let depth = tiny.depth(HAND).expect("a depth");
     let below = 8 + 108 + 2 * 84;
     assert_eq!(depth.in_service(), below + 36 + 48 + 8 + 84, "the end of a panic without what it calls");
-    let depth = tiny.with("deep", framed(2000, &[])).depth(JOINT).expect("a depth");
+    let depth = tiny.with("deep", framed(2000, &[])).depth(HAND).expect("a depth");
     assert_eq!(sum(&depth.end), below + 36 + 48 + 8 + 2008);
 }
 
 #[test]
 fn a_handler_that_no_row_lists_is_refused_and_so_is_a_row_without_handler() {
-    let said = refusal(board(JOINT).with("USART3", framed(8, &[])).depth(JOINT));
+    let said = refusal(board(HAND).with("USART3", framed(8, &[])).depth(HAND));
     assert!(said.contains("USART3") && said.contains("has no priority"), "{said}");
-    let mut tiny = board(JOINT);
+    let mut tiny = board(HAND);
     tiny.functions.retain(|(name, _)| *name != "BUS_WIRE");
-    assert!(refusal(tiny.depth(JOINT)).contains("BUS_WIRE"));
-    assert!(refusal(board(JOINT).depth("arduino")).contains("arduino"));
+    assert!(refusal(tiny.depth(HAND)).contains("BUS_WIRE"));
+    assert!(refusal(board(HAND).depth("arduino")).contains("arduino"));
 }
 
 #[test]
 fn a_priority_that_is_not_the_one_in_the_table_is_refused() {
-    let mut other = priorities(JOINT);
+    let mut other = priorities(HAND);
     other[0] = 3;
-    let said = refusal(board(JOINT).with("main", main(&other)).depth(JOINT));
+    let said = refusal(board(HAND).with("main", main(&other)).depth(HAND));
     assert!(said.contains("DISPATCH_SESSION has priority 2") && said.contains("but 3 in the image"), "{said}");
-    let said = refusal(board(JOINT).with("main", main(&other[..0])).depth(JOINT));
+    let said = refusal(board(HAND).with("main", main(&other[..0])).depth(HAND));
     assert!(said.contains("none that can be read"), "{said}");
 }
 
 #[test]
 fn a_panic_that_leaves_interrupts_on_is_refused() {
-    let tiny = board(JOINT).with("rust_begin_unwind", vec![code(&[PUSH]), Call("deep"), code(&[MASK, NEVER])]);
-    assert!(refusal(tiny.depth(JOINT)).contains("does not mask interrupts"));
+    let tiny = board(HAND).with("rust_begin_unwind", vec![code(&[PUSH]), Call("deep"), code(&[MASK, NEVER])]);
+    assert!(refusal(tiny.depth(HAND)).contains("does not mask interrupts"));
     // The one it calls may do it.
-    let tiny = board(JOINT)
+    let tiny = board(HAND)
         .with("rust_begin_unwind", vec![code(&[PUSH]), Call("stranger"), code(&[NEVER])])
         .with("stranger", vec![code(&[PUSH, PUSH, MASK]), Call("deep"), code(&[NEVER])])
         .with("SLOT_TIMER", framed(40, &["rust_begin_unwind"]));
-    let depth = tiny.depth(JOINT).expect("a depth");
+    let depth = tiny.depth(HAND).expect("a depth");
     assert_eq!(depth.in_service(), 8 + 108 + 2 * 84 + 36 + 48 + 8 + 16 + 84);
 }
 
 #[test]
 fn a_start_or_a_service_that_is_too_deep_fails() {
     // 16 KiB: at most 9830 B at start, 6553 B in service.
-    let start = |bytes| board(JOINT).with("deep", framed(bytes, &["idle"])).depth(JOINT).expect("a depth");
+    let start = |bytes| board(HAND).with("deep", framed(bytes, &["idle"])).depth(HAND).expect("a depth");
     assert_eq!(start(4000).faults(), [""; 0]);
-    let three = board(JOINT)
+    let three = board(HAND)
         .with("deep", framed(4000, &["stranger"]))
         .with("stranger", framed(4000, &["idle"]))
         .with("idle", framed(2000, &[]));
-    let said = three.depth(JOINT).expect("a depth").faults().join("; ");
+    let said = three.depth(HAND).expect("a depth").faults().join("; ");
     assert!(said.contains("the start takes 10040 B") && said.contains("60 %"), "{said}");
-    let service = board(JOINT).with("idle", framed(4000, &["stranger"])).with("stranger", framed(2500, &[]));
-    let said = service.depth(JOINT).expect("a depth").faults().join("; ");
+    let service = board(HAND).with("idle", framed(4000, &["stranger"])).with("stranger", framed(2500, &[]));
+    let said = service.depth(HAND).expect("a depth").faults().join("; ");
     assert!(said.contains("the service takes") && said.contains("40 %"), "{said}");
 }
 
@@ -394,7 +394,7 @@ fn a_frame_larger_than_the_guard_fails_where_there_is_a_guard() {
     }
     let said = large(REAL).depth(REAL).expect("a depth").faults().join("; ");
     assert!(said.contains("idle has a frame of 65544 B") && said.contains("guard of 65536 B"), "{said}");
-    assert!(large(JOINT).depth(JOINT).expect("a depth").faults().iter().all(|fault| !fault.contains("guard")));
+    assert!(large(HAND).depth(HAND).expect("a depth").faults().iter().all(|fault| !fault.contains("guard")));
 }
 
 #[test]

@@ -230,5 +230,5 @@ pub(super) fn board(name: &str) -> Tiny {
     tiny
 }
 
-pub(super) const JOINT: &str = "mps2-an385";
+pub(super) const HAND: &str = "mps2-an385";
 pub(super) const REAL: &str = "nucleo-h743zi2";

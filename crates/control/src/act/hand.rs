@@ -1,0 +1,62 @@
+//! `HandLimiter`: the only maker of [`LimitedHandTorques`], and with it the only way to the hand's motors.
+
+use crate::model::arm::within;
+use crate::model::hand::DIGITS;
+use crate::model::wam7::{FINGER_TORQUE_MAX, SPREAD_TORQUE_MAX};
+use crate::real::Real;
+
+/// Largest torques (N m at the spread and at the inner links).
+pub const TORQUE_LIMIT: [f64; DIGITS] = [SPREAD_TORQUE_MAX, FINGER_TORQUE_MAX, FINGER_TORQUE_MAX, FINGER_TORQUE_MAX];
+
+/// Full scale in this many control periods: 50 ms.
+const FULL_SCALE_CYCLES: f64 = 15.0;
+
+/// Torques of spread, F1, F2, F3 within every limit. No public constructor: the limiter makes them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LimitedHandTorques<R: Real>([R; DIGITS]);
+
+impl<R: Real> LimitedHandTorques<R> {
+    /// The torques (N m), spread first.
+    pub fn torques(&self) -> &[R; DIGITS] {
+        &self.0
+    }
+}
+
+/// Cuts torques to what the drives of the hand bear.
+#[derive(Clone, Debug)]
+pub struct HandLimiter<R: Real> {
+    last: [R; DIGITS],
+}
+
+impl<R: Real> HandLimiter<R> {
+    /// A limiter at zero torque.
+    pub fn new() -> Self {
+        HandLimiter { last: [R::of(0.0); DIGITS] }
+    }
+
+    /// Back to zero torque at once: nothing is being sent.
+    pub fn reset(&mut self) {
+        self.last = [R::of(0.0); DIGITS];
+    }
+
+    /// The torques of the last cycle (N m).
+    pub fn last(&self) -> &[R; DIGITS] {
+        &self.last
+    }
+
+    /// Cuts the wanted torques (N m) of one cycle to magnitude and rate. What is not finite counts as zero: the worm holds.
+    pub fn limit(&mut self, wanted: &[R; DIGITS]) -> LimitedHandTorques<R> {
+        for ((last, wanted), limit) in self.last.iter_mut().zip(wanted).zip(TORQUE_LIMIT) {
+            let finite = if wanted.is_finite_number() { *wanted } else { R::of(0.0) };
+            let step = within(finite, R::of(limit)) - *last;
+            *last = within(*last + within(step, R::of(limit / FULL_SCALE_CYCLES)), R::of(limit));
+        }
+        LimitedHandTorques(self.last)
+    }
+}
+
+impl<R: Real> Default for HandLimiter<R> {
+    fn default() -> Self {
+        HandLimiter::new()
+    }
+}

@@ -1,0 +1,184 @@
+//! `HandDrive`: where the hand is to go, and whether it is driven at all.
+
+use pinned_init::{Init, init};
+
+use crate::act::hand::{HandLimiter, LimitedHandTorques, TORQUE_LIMIT};
+use crate::cycle::record::HandSample;
+use crate::law::gains::HandGains;
+use crate::law::hand::{HandController, HandReference};
+use crate::model::hand::{DIGITS, FINGERS, ranges};
+use crate::plan::hand::HandMotion;
+use crate::real::Real;
+use crate::sense::hand::{HandEstimator, HandState};
+
+/// Control periods for which the hand is still driven after a move that nothing follows: 0.5 s.
+const SETTLING: u16 = 150;
+
+/// What the hand is after.
+#[derive(Clone, Copy, Debug)]
+enum Aim<R: Real> {
+    /// Nothing: the worms hold.
+    None,
+    /// A move that a person asked for, and the control periods since its end.
+    Move(HandMotion<R>, u16),
+    /// A reference: that of the run, or the last one.
+    Follow(HandReference<R>),
+}
+
+/// The hand from its replies to its torques.
+#[derive(Clone, Debug)]
+pub struct HandDrive<R: Real> {
+    estimator: HandEstimator<R>,
+    state: Option<HandState<R>>,
+    controller: HandController<R>,
+    limiter: HandLimiter<R>,
+    aim: Aim<R>,
+    /// Gauges that Eq (14) should see (N m); `None` controls position alone.
+    expected: Option<[R; FINGERS]>,
+    /// Whether a finger torque was cut to its limit in the last tick.
+    saturated: bool,
+    driven: bool,
+}
+
+impl<R: Real> HandDrive<R> {
+    /// Makes, in its place, a drive that knows no hand and drives nothing.
+    pub fn init(gains: &HandGains<R>) -> impl Init<Self> + use<R> {
+        let controller = HandController::init(gains);
+        init!(HandDrive {
+            estimator: HandEstimator::new(),
+            state: None,
+            controller <- controller,
+            limiter: HandLimiter::new(),
+            aim: Aim::None,
+            expected: None,
+            saturated: false,
+            driven: false,
+        })
+    }
+
+    /// Takes what the hand told since the last cycle.
+    pub fn update(&mut self, sample: Option<&HandSample>) {
+        self.state = self.estimator.update(sample);
+        if self.state.is_none() {
+            self.release();
+        }
+    }
+
+    /// What is known about the hand; `None` without an initialised one.
+    pub fn state(&self) -> Option<HandState<R>> {
+        self.state
+    }
+
+    /// The state of a hand that answers.
+    pub fn answering(&self) -> Option<HandState<R>> {
+        self.state.filter(|state| !state.is_lost())
+    }
+
+    /// Takes the present gauges as zero.
+    pub fn tare(&mut self) {
+        self.estimator.tare();
+    }
+
+    /// Takes what a gauge drifts away as zero.
+    pub fn tare_drift(&mut self) {
+        self.estimator.tare_drift();
+    }
+
+    /// Forgets every aim: no torque from now on, the worms hold.
+    pub fn release(&mut self) {
+        self.aim = Aim::None;
+        self.expected = None;
+        self.stop_driving();
+    }
+
+    /// Moves to `goal` (rad) in `duration` (s) or longer, from where the hand is held, or is. Position alone is controlled.
+    pub fn move_to(&mut self, goal: &[R; DIGITS], duration: R) {
+        let Some(state) = self.state else { return };
+        let from = match &self.aim {
+            Aim::None => state.q,
+            Aim::Move(motion, _) if motion.is_finished() => motion.goal(),
+            Aim::Move(..) => state.q,
+            Aim::Follow(reference) => reference.q,
+        };
+        self.expected = None;
+        self.controller.reset();
+        self.aim = Aim::Move(HandMotion::new(&from, goal, duration), 0);
+    }
+
+    /// Begins to follow a run.
+    pub fn begin_run(&mut self) {
+        self.expected = None;
+        self.controller.reset();
+    }
+
+    /// Follows the plan of a run, kept within the range of the digits; with `expected` gauges (N m) also in force.
+    pub fn follow(&mut self, reference: &HandReference<R>, expected: Option<[R; FINGERS]>) {
+        let mut reference = *reference;
+        for ((q, dq), [min, max]) in reference.q.iter_mut().zip(&mut reference.dq).zip(ranges()) {
+            let kept = crate::model::arm::at_least(crate::model::arm::at_most(*q, R::of(max)), R::of(min));
+            if kept != *q {
+                *q = kept;
+                *dq = R::of(0.0);
+            }
+        }
+        self.aim = Aim::Follow(reference);
+        self.expected = expected;
+    }
+
+    /// Keeps the last reference, at rest: what is gripped stays gripped.
+    pub fn stay(&mut self) {
+        if let Aim::Follow(reference) = self.aim {
+            self.aim = Aim::Follow(HandReference::at_rest(reference.q));
+        }
+    }
+
+    /// Where the hand should be (rad); where it is, if nothing is desired; zero without a hand.
+    pub fn desired(&self) -> [R; DIGITS] {
+        match (&self.aim, self.state) {
+            (Aim::Follow(reference), _) => reference.q,
+            (Aim::Move(motion, _), _) => motion.now().q,
+            (Aim::None, Some(state)) => state.q,
+            (Aim::None, None) => [R::of(0.0); DIGITS],
+        }
+    }
+
+    /// The torques of one tick; `None` where the hand is not driven. `keeps` tells whether a finished move is held on to.
+    pub fn step(&mut self, gains: &HandGains<R>, keeps: bool) -> Option<LimitedHandTorques<R>> {
+        let reference = match &mut self.aim {
+            Aim::None => None,
+            Aim::Follow(reference) => Some(*reference),
+            Aim::Move(motion, settled) => {
+                let reference = motion.step();
+                if motion.is_finished() && !keeps {
+                    *settled = settled.saturating_add(1);
+                }
+                (*settled <= SETTLING).then_some(reference)
+            }
+        };
+        let (Some(reference), Some(state)) = (reference, self.state) else {
+            self.release();
+            return None;
+        };
+        if state.is_lost() {
+            self.stop_driving();
+            return None;
+        }
+        let wanted = self.controller.torque(gains, &state, &reference, self.expected.as_ref(), self.saturated);
+        self.driven = true;
+        let limited = self.limiter.limit(&wanted);
+        self.saturated = wanted.iter().zip(TORQUE_LIMIT).skip(1).any(|(torque, limit)| {
+            // A NaN counts as saturated.
+            !(*torque <= R::of(limit) && *torque >= R::of(-limit))
+        });
+        Some(limited)
+    }
+
+    fn stop_driving(&mut self) {
+        if self.driven {
+            self.controller.reset();
+            self.limiter.reset();
+            self.saturated = false;
+            self.driven = false;
+        }
+    }
+}

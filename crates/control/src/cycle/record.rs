@@ -1,0 +1,184 @@
+//! What goes into one control cycle and what comes out of it.
+
+use puck::{Counts, RawWrench, SafetyMode};
+
+use crate::act::actuation::Actuation;
+use crate::command::{Command, Refusal};
+use crate::guard::fault::Fault;
+use crate::guard::supervisor::State;
+
+/// What the hand's pucks told since the last cycle, in the order F1, F2, F3, spread.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HandSample {
+    /// Motor positions of the four pucks; `None` where the reply was lost or malformed.
+    pub primary: [Option<Counts>; 4],
+    /// Positions of the fingers' worm encoders; `None` where they were lost or do not exist.
+    pub secondary: [Option<Counts>; 3],
+    /// Raw counts of the fingers' strain gauges; `None` where the reply was lost.
+    pub gauges: [Option<u16>; 3],
+}
+
+/// What the bus round of one cycle brought in.
+///
+/// Only replies of this cycle belong here: the caller empties its mailboxes before it sends the requests, so a late
+/// reply is a missing one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BusSample {
+    /// Motor positions of pucks 1 to 7; `None` where the reply was lost or malformed.
+    pub positions: [Option<Counts>; 7],
+    /// Wrist wrench; `None` where one of its two frames was lost or the sensor marked it bad.
+    pub wrench: Option<RawWrench>,
+    /// Latest mode of the safety module, where it was polled since the last cycle.
+    pub safety: Option<SafetyMode>,
+    /// What the hand told since the last cycle; `None` without a hand, or while it is not initialised.
+    pub hand: Option<HandSample>,
+}
+
+/// The input of one control cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CycleInput {
+    /// Number of this cycle, one up per 1/300 s.
+    pub cycle: u64,
+    /// Replies of this cycle.
+    pub sample: BusSample,
+    /// A person's command, if one is waiting.
+    pub command: Option<Command>,
+    /// A fault that the caller found outside the cycle (bus-off, puck reset, overrun); `None` otherwise.
+    pub external_fault: Option<Fault>,
+}
+
+/// The output of one control cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CycleOutput {
+    /// What to send to the motors.
+    pub actuation: Actuation,
+    /// What the cycle measured and decided.
+    pub record: CycleRecord,
+    /// Something a person should hear of, at most one per cycle.
+    pub event: Option<Event>,
+}
+
+/// Something that happened in a cycle and is worth a message.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// A command was taken up.
+    Accepted,
+    /// A command was refused.
+    Refused(Refusal),
+    /// The state changed; the fault is the reason, or `Fault::None`.
+    Entered(State, Fault),
+    /// The movement ended and the arm holds the goal.
+    Arrived,
+    /// The run does not go as the successful ones did.
+    Surprised {
+        /// Progress of the movement, 0 to 1.
+        phase: f32,
+        /// The channel that stands out most: force x, y, z, torque x, y, z, gauges F1 to F3, fingers F1 to F3.
+        channel: u8,
+    },
+}
+
+/// Flags of a [`CycleRecord`], one bit each.
+pub mod flags {
+    /// A joint torque was cut by its joint limit.
+    pub const JOINT_LIMITED: u32 = 1 << 0;
+    /// The torques were scaled because a motor reached its limit.
+    pub const MOTOR_LIMITED: u32 = 1 << 1;
+    /// A torque was cut by its rate limit.
+    pub const RATE_LIMITED: u32 = 1 << 2;
+    /// A torque was not finite and was replaced.
+    pub const NOT_FINITE: u32 = 1 << 3;
+    /// At least one position of this cycle was extrapolated.
+    pub const COASTING: u32 = 1 << 4;
+    /// The wrench of this cycle is older than the cycle.
+    pub const WRENCH_STALE: u32 = 1 << 5;
+    /// The desired joint position reached the anti-windup clamp.
+    pub const CLAMPED: u32 = 1 << 6;
+    /// The repulsion of a joint limit acts.
+    pub const NEAR_LIMIT: u32 = 1 << 7;
+    /// Sensory feedback bends the plan.
+    pub const FEEDBACK: u32 = 1 << 8;
+    /// The force controller adds torque.
+    pub const FORCE_CONTROL: u32 = 1 << 9;
+    /// The movement has ended; the arm holds its goal.
+    pub const ARRIVED: u32 = 1 << 10;
+    /// The safety module reports ACTIVE.
+    pub const SAFETY_ACTIVE: u32 = 1 << 11;
+    /// All joint positions have been measured at least once.
+    pub const POSITIONS_KNOWN: u32 = 1 << 12;
+    /// The wrench has been tared.
+    pub const TARED: u32 = 1 << 13;
+    /// The wrist sensor is at its full scale, or one of its gauges has saturated since its last own tare.
+    pub const SENSOR_SATURATED: u32 = 1 << 14;
+    /// The hand is initialised and its positions are known.
+    pub const HAND_READY: u32 = 1 << 15;
+    /// The feedback is derated or fades out: another duration than recorded, a silent sensor, or the end of the run.
+    pub const FEEDBACK_FADED: u32 = 1 << 16;
+    /// This run does not go as the successful ones did.
+    pub const SURPRISE: u32 = 1 << 17;
+    /// Replies of the hand were lost for so long that its drives are left alone.
+    pub const HAND_LOST: u32 = 1 << 18;
+}
+
+/// Everything one cycle measured and decided, of constant size; the source of telemetry and fault records.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CycleRecord {
+    /// Number of the cycle.
+    pub cycle: u64,
+    /// State after the cycle.
+    pub state: State,
+    /// Latched fault.
+    pub fault: Fault,
+    /// Bits of [`flags`].
+    pub flags: u32,
+    /// Phase of the movement, 1 at its start, towards 0 at its end; 0 outside a run.
+    pub phase: f32,
+    /// Measured joint positions (rad).
+    pub q: [f32; 7],
+    /// Filtered joint velocities (rad/s).
+    pub dq: [f32; 7],
+    /// Desired joint positions (rad); the measured ones where nothing is desired.
+    pub q_d: [f32; 7],
+    /// Joint torques sent (N m), after all limits.
+    pub tau: [f32; 7],
+    /// Desired tool pose: position (m), orientation (w, x, y, z); the measured one where nothing is desired.
+    pub pose_d: [f32; 7],
+    /// Measured tool pose: position (m), orientation (w, x, y, z).
+    pub pose: [f32; 7],
+    /// Filtered, tared wrench of the environment on the robot at the grasp point: force in world axes (N), torque in
+    /// tool axes (N m).
+    pub wrench: [f32; 6],
+    /// Measured hand: spread, F1, F2, F3 of the inner links (rad); 0 without a hand.
+    pub hand: [f32; 4],
+    /// Desired hand in the same order (rad); the measured one where nothing is desired.
+    pub hand_d: [f32; 4],
+    /// Filtered, tared torque of the environment on the fingers F1, F2, F3 (N m): negative when closing on an object.
+    pub gauges: [f32; 3],
+    /// Statistic of the watch for unusual runs; 0 without one.
+    pub surprise: f32,
+    /// Position replies lost in this cycle (0 to 7).
+    pub lost_replies: u8,
+}
+
+impl CycleRecord {
+    /// A record of nothing, for buffers.
+    pub const EMPTY: CycleRecord = CycleRecord {
+        cycle: 0,
+        state: State::Idle,
+        fault: Fault::None,
+        flags: 0,
+        phase: 0.0,
+        q: [0.0; 7],
+        dq: [0.0; 7],
+        q_d: [0.0; 7],
+        tau: [0.0; 7],
+        pose_d: [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+        pose: [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+        wrench: [0.0; 6],
+        hand: [0.0; 4],
+        hand_d: [0.0; 4],
+        gauges: [0.0; 3],
+        surprise: 0.0,
+        lost_replies: 0,
+    };
+}

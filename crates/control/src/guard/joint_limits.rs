@@ -1,0 +1,70 @@
+//! `JointBounds`: soft joint limits that push back, and the bounds beyond which a movement is stopped.
+//!
+//! The arm rests outside its soft limits when it is switched on (its home posture touches two stops). A bound therefore
+//! starts at the posture the arm is armed in, if that lies outside, and tightens as the arm comes in; it never widens.
+
+use crate::model::arm::{ArmModel, at_least, at_most};
+use crate::real::Real;
+use crate::units::{JOINTS, JointPositions, JointTorques, JointVelocities, Vector7};
+
+/// Slack beyond the posture the arm was armed in (rad).
+const SLACK: f64 = 0.01;
+
+/// Distance beyond a bound at which a movement is stopped (rad); the stops lie 0.05 rad beyond the soft limits.
+const STOP_DISTANCE: f64 = 0.02;
+
+/// Stiffness of the push back beyond a bound (N m/rad): several N m before the stop, so that a person feels it coming.
+const STIFFNESS: [f64; JOINTS] = [100.0, 150.0, 80.0, 60.0, 25.0, 40.0, 8.0];
+
+/// Damping while moving further out (N m s/rad).
+const DAMPING: [f64; JOINTS] = [15.0, 25.0, 4.5, 4.0, 0.22, 0.6, 0.06];
+
+/// The bounds of the joints.
+#[derive(Clone, Copy, Debug)]
+pub struct JointBounds<R: Real> {
+    min: [R; JOINTS],
+    max: [R; JOINTS],
+}
+
+impl<R: Real> JointBounds<R> {
+    /// The soft limits, widened to the posture `q` the arm is armed in.
+    pub fn around(model: &ArmModel<R>, q: &JointPositions<R>) -> Self {
+        let mut bounds = JointBounds { min: model.soft_min, max: model.soft_max };
+        for joint in 0..JOINTS {
+            bounds.min[joint] = at_most(q.0[joint] - R::of(SLACK), bounds.min[joint]);
+            bounds.max[joint] = at_least(q.0[joint] + R::of(SLACK), bounds.max[joint]);
+        }
+        bounds
+    }
+
+    /// Follows the arm in: never beyond the widest of soft limit and present posture, never wider than before.
+    pub fn tighten(&mut self, model: &ArmModel<R>, q: &JointPositions<R>) {
+        let now = JointBounds::around(model, q);
+        for joint in 0..JOINTS {
+            self.min[joint] = at_least(now.min[joint], self.min[joint]);
+            self.max[joint] = at_most(now.max[joint], self.max[joint]);
+        }
+    }
+
+    /// Whether a joint is beyond its bound by more than `STOP_DISTANCE`.
+    pub fn violated(&self, q: &JointPositions<R>) -> bool {
+        let distance = R::of(STOP_DISTANCE);
+        (0..JOINTS).any(|joint| q.0[joint] > self.max[joint] + distance || q.0[joint] < self.min[joint] - distance)
+    }
+
+    /// Torque that pushes joints back inside; zero within the bounds.
+    pub fn repulsion(&self, q: &JointPositions<R>, dq: &JointVelocities<R>) -> JointTorques<R> {
+        let zero = R::of(0.0);
+        let mut torque = Vector7::zeros();
+        for joint in 0..JOINTS {
+            let above = at_least(q.0[joint] - self.max[joint], zero);
+            let below = at_least(self.min[joint] - q.0[joint], zero);
+            if above > zero {
+                torque[joint] = -above * R::of(STIFFNESS[joint]) - at_least(dq.0[joint], zero) * R::of(DAMPING[joint]);
+            } else if below > zero {
+                torque[joint] = below * R::of(STIFFNESS[joint]) - at_most(dq.0[joint], zero) * R::of(DAMPING[joint]);
+            }
+        }
+        JointTorques(torque)
+    }
+}

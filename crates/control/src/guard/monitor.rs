@@ -1,0 +1,95 @@
+//! `Monitor`: watches the measured state and says when torque authority has to go down.
+
+use crate::guard::fault::Fault;
+use crate::guard::joint_limits::JointBounds;
+use crate::guard::supervisor::{State, Trigger};
+use crate::model::kinematics::Frames;
+use crate::model::wam7;
+use crate::plan::approach::TIP_REACH;
+use crate::real::Real;
+use crate::sense::joints::{COAST_CYCLES, JointState};
+use crate::units::JOINTS;
+
+/// Largest speed of elbow and forearm in any state with torque (m/s); the safety module faults at 1.0.
+pub const TIP_SPEED_LIMIT: f64 = 0.8;
+
+/// A joint may exceed its speed limit by this factor before it is stopped: noise and overshoot.
+const SPEED_MARGIN: f64 = 1.2;
+
+/// Contact force that stops a movement (N): the lowest permissible quasi-static one (face) of the collaboration standards.
+pub(crate) const FORCE_LIMIT: f64 = 65.0;
+
+/// Cycles in a row above the force limit.
+const FORCE_CYCLES: u8 = 2;
+
+/// Largest distance between plan and tool (m); a plan farther away has lost its arm.
+pub(crate) const TRACKING_LIMIT: f64 = 0.30;
+
+/// Cycles without positions after which torque goes off: 200 ms.
+const SILENCE_CYCLES: u8 = 60;
+
+/// Watches limits.
+#[derive(Clone, Debug)]
+pub(crate) struct Monitor<R: Real> {
+    speed_limit: [R; JOINTS],
+    pressed: u8,
+}
+
+/// What the monitor looks at besides the joint state.
+pub(crate) struct Observation<'a, R: Real> {
+    pub(crate) frames: &'a Frames<R>,
+    pub(crate) bounds: &'a JointBounds<R>,
+    /// Magnitude of the unfiltered, tared force (N).
+    pub(crate) force: R,
+    /// Distance between plan and tool in the last cycle (m).
+    pub(crate) tracking: R,
+    /// Whether the run depends on the wrench, and it is gone.
+    pub(crate) wrench_lost: bool,
+    /// Whether the sensor has been at full scale: in a force, or in a torque that the run depends on.
+    pub(crate) full_scale: bool,
+}
+
+impl<R: Real> Monitor<R> {
+    pub(crate) fn new() -> Self {
+        Monitor { speed_limit: wam7::VELOCITY_MAX.map(|limit| R::of(limit * SPEED_MARGIN)), pressed: 0 }
+    }
+
+    /// The most severe finding of this cycle in a state with torque.
+    pub(crate) fn check(
+        &mut self,
+        law: State,
+        state: &JointState<R>,
+        seen: &Observation<'_, R>,
+    ) -> Option<(Trigger, Fault)> {
+        if state.age > SILENCE_CYCLES {
+            return Some((Trigger::HardFault, Fault::RepliesLostForLong));
+        }
+        if state.age > COAST_CYCLES {
+            let fault = if state.implausible { Fault::ImplausiblePosition } else { Fault::RepliesLost };
+            return Some((Trigger::SoftFault, fault));
+        }
+        let pressed = seen.force > R::of(FORCE_LIMIT) || seen.full_scale;
+        self.pressed = if pressed { self.pressed.saturating_add(1) } else { 0 };
+        let moving_by_itself = matches!(law, State::Hold | State::Approach | State::Run);
+        let finding = if moving_by_itself && self.pressed >= FORCE_CYCLES {
+            Some(Fault::ContactForce)
+        } else if moving_by_itself && seen.bounds.violated(&state.q) {
+            Some(Fault::JointLimit)
+        } else if law == State::Run && seen.wrench_lost {
+            Some(Fault::WrenchLost)
+        } else if law == State::Run && seen.tracking > R::of(TRACKING_LIMIT) {
+            Some(Fault::TrackingError)
+        } else if state.dq.0.iter().zip(&self.speed_limit).any(|(dq, limit)| *dq > *limit || *dq < -*limit) {
+            Some(Fault::JointSpeed)
+        } else {
+            let [elbow, tip] = seen.frames.elbow_speeds(&state.dq, R::of(TIP_REACH));
+            let limit = R::of(TIP_SPEED_LIMIT);
+            (elbow > limit || tip > limit).then_some(Fault::TipSpeed)
+        };
+        if let Some(fault) = finding {
+            return Some((Trigger::SoftFault, fault));
+        }
+        let trigger = if state.missing > 0 { Trigger::RepliesMissing } else { Trigger::RepliesBack };
+        Some((trigger, Fault::None))
+    }
+}

@@ -1,0 +1,94 @@
+//! `HandController`: position and force of the digits.
+//!
+//! Eq (14): `tau_finger = PD(position) + PI(force)`, the force from the finger's strain gauge, with the sign of Eq (12):
+//! `PI = -(P e + K_i integral_{t-Dt}^{t} e dt)`, `e = F_expected - F`, `F` the torque of the environment on the finger, negative
+//! when closing on an object. A finger that presses harder than expected (`F < F_expected`) is driven open, one that misses
+//! what it should press on is driven shut. The spread is controlled in position alone.
+
+use nalgebra::SVector;
+use pinned_init::{Init, init};
+
+use crate::cycle::PERIOD;
+use crate::law::gains::HandGains;
+use crate::law::window::Window;
+use crate::model::hand::{DIGITS, FINGERS};
+use crate::real::Real;
+use crate::sense::hand::HandState;
+
+/// Desired speed at which half of the Coulomb friction is fed forward (rad/s).
+const FRICTION_SPEED: f64 = 0.05;
+
+/// Longest window (control periods): 0.2 s.
+pub const WINDOW_CAPACITY: usize = 60;
+
+/// What the digits should do at one tick, spread first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HandReference<R: Real> {
+    /// Desired angles (rad).
+    pub q: [R; DIGITS],
+    /// Desired velocities (rad/s).
+    pub dq: [R; DIGITS],
+}
+
+impl<R: Real> HandReference<R> {
+    /// To stand still at `q`.
+    pub fn at_rest(q: [R; DIGITS]) -> Self {
+        HandReference { q, dq: [R::of(0.0); DIGITS] }
+    }
+}
+
+/// Eq (14).
+#[derive(Clone, Debug)]
+pub struct HandController<R: Real> {
+    window: Window<R, FINGERS, WINDOW_CAPACITY>,
+    /// Torque of the position part at each digit's last reply (N m).
+    feedback: [R; DIGITS],
+}
+
+impl<R: Real> HandController<R> {
+    /// Makes a controller without history in its place.
+    pub fn init(gains: &HandGains<R>) -> impl Init<Self> + use<R> {
+        let length = gains.force_window;
+        init!(HandController { window <- Window::init(length), feedback: [R::of(0.0); DIGITS] })
+    }
+
+    /// Forgets everything.
+    pub fn reset(&mut self) {
+        self.window.reset();
+        self.feedback = [R::of(0.0); DIGITS];
+    }
+
+    /// The torques of one tick (N m, spread first).
+    ///
+    /// A digit whose reply is missing keeps the position feedback of its last one. With `expected` gauges (N m) the PI acts;
+    /// `frozen` (a torque saturates) keeps its window as it is, and so do gauges that are not measured.
+    pub fn torque(
+        &mut self,
+        gains: &HandGains<R>,
+        state: &HandState<R>,
+        reference: &HandReference<R>,
+        expected: Option<&[R; FINGERS]>,
+        frozen: bool,
+    ) -> [R; DIGITS] {
+        for digit in 0..DIGITS {
+            if state.age[digit] == 0 {
+                let rate = reference.dq[digit];
+                let magnitude = if rate < R::of(0.0) { -rate } else { rate };
+                self.feedback[digit] = gains.stiffness[digit] * (reference.q[digit] - state.q[digit])
+                    + gains.damping[digit] * (reference.dq[digit] - state.dq[digit])
+                    + gains.viscous[digit] * rate
+                    + gains.coulomb[digit] * rate / (magnitude + R::of(FRICTION_SPEED));
+            }
+        }
+        let [spread, f1, f2, f3] = self.feedback;
+        let Some(expected) = expected.filter(|_| state.feels()) else {
+            return self.feedback;
+        };
+        let error = SVector::from(*expected) - SVector::from(state.gauges);
+        if !frozen && state.gauge_age == 0 {
+            self.window.push(&error);
+        }
+        let force = error * gains.force_proportional + self.window.sum() * (gains.force_integral * R::of(PERIOD));
+        [spread, f1 - force[0], f2 - force[1], f3 - force[2]]
+    }
+}

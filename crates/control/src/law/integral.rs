@@ -1,0 +1,87 @@
+//! `PostureIntegral`: the slow part of holding a posture, which takes away what friction leaves.
+//!
+//! Eq (10) alone rests wherever `K_p (q_d - q)` is less than the Coulomb friction: up to 0.04 rad at J7. While the arm holds
+//! or approaches, the desired posture is therefore shifted towards the error, joint by joint, until the joint moves:
+//!
+//! * at a constant rate, the whole clamp in [`RISE`], so that friction is overcome in the same time however small the error;
+//!   the joint then slides at that rate, at most 0.08 rad/s (J7);
+//! * from an error of three quarters of [`TOLERANCE`] on, until it is less than half of it; in between nothing changes, which
+//!   is why it does not hunt;
+//! * within a clamp worth 1.5 times the friction of the model: an obstacle feels that much more, and no more with time.
+
+use crate::cycle::PERIOD;
+use crate::law::gains::Gains;
+use crate::model::arm::within;
+use crate::real::Real;
+use crate::units::{JOINTS, JointPositions, Vector7};
+
+/// How exactly a posture is held under the friction of the model, 30 % more or less (rad).
+pub const TOLERANCE: [f64; JOINTS] = [0.004, 0.004, 0.004, 0.004, 0.008, 0.008, 0.008];
+
+/// Time from zero to the clamp (s).
+pub const RISE: f64 = 0.8;
+
+/// Fractions of the tolerance beyond which a joint begins to be shifted, and below which it is left alone again.
+const BAND: (f64, f64) = (0.75, 0.5);
+
+/// Integral action on the posture that is held.
+#[derive(Clone, Debug)]
+pub struct PostureIntegral<R: Real> {
+    /// Shift of the desired posture (rad).
+    shift: Vector7<R>,
+    /// Joints that are being shifted.
+    seeking: [bool; JOINTS],
+}
+
+impl<R: Real> PostureIntegral<R> {
+    /// Without a shift.
+    pub fn new() -> Self {
+        PostureIntegral { shift: Vector7::zeros(), seeking: [false; JOINTS] }
+    }
+
+    /// Back to no shift.
+    pub fn reset(&mut self) {
+        *self = PostureIntegral::new();
+    }
+
+    /// Shift of the desired posture (rad); times `K_p` it is the torque of the integral.
+    pub fn shift(&self) -> &Vector7<R> {
+        &self.shift
+    }
+
+    /// Takes over from a law whose torque, beyond what the arm itself needs, equals `K_p offset`: as much of the offset (rad)
+    /// as the clamp allows becomes shift, so that the torque makes no step. Returns the posture to hold: `q` where friction
+    /// and the error of the model alone are in the way.
+    pub fn take_over(&mut self, gains: &Gains<R>, offset: &Vector7<R>, q: &JointPositions<R>) -> JointPositions<R> {
+        self.reset();
+        self.shift = offset.zip_map(&gains.settling, within);
+        JointPositions(q.0 + offset - self.shift)
+    }
+
+    /// Whether every joint was close enough to be left alone in the last control period.
+    pub fn is_settled(&self) -> bool {
+        !self.seeking.contains(&true)
+    }
+
+    /// One control period towards the posture `q_d`, measured at `q`; the caller leaves it out where a torque could not be
+    /// given in full or a position is not measured.
+    pub fn step(&mut self, gains: &Gains<R>, q_d: &JointPositions<R>, q: &JointPositions<R>) {
+        let errors = q_d.0 - q.0;
+        let joints = self.shift.iter_mut().zip(&mut self.seeking).zip(errors.iter()).zip(gains.settling.iter());
+        for ((((shift, seeking), error), clamp), tolerance) in joints.zip(TOLERANCE) {
+            let zero = R::of(0.0);
+            let (sign, magnitude) = if *error < zero { (R::of(-1.0), -*error) } else { (R::of(1.0), *error) };
+            let bound = if *seeking { BAND.1 } else { BAND.0 };
+            *seeking = magnitude > R::of(bound * tolerance);
+            if *seeking {
+                *shift = within(*shift + sign * *clamp * R::of(PERIOD / RISE), *clamp);
+            }
+        }
+    }
+}
+
+impl<R: Real> Default for PostureIntegral<R> {
+    fn default() -> Self {
+        PostureIntegral::new()
+    }
+}

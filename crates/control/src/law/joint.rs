@@ -1,0 +1,89 @@
+//! `JointController`: inverse dynamics with joint feedback.
+//!
+//! Eq (10): `tau = M ddq_d + h + K_p (q_d - q) + K_d (dq_d - dq)`, with `M` including the rotors and `h` Coriolis,
+//! centrifugal and gravity torque at the measured state. Friction is fed forward along the *desired* velocity: along the
+//! measured one it would be positive feedback. External forces are deliberately absent, Eq (12) deals with them.
+
+use crate::law::gains::Tracking;
+use crate::model::arm::ArmModel;
+use crate::model::kinematics::Frames;
+use crate::real::Real;
+use crate::sense::joints::JointState;
+use crate::units::{JointAccelerations, JointPositions, JointTorques, JointVelocities, Vector7};
+
+/// Desired speed at which half of the Coulomb friction is fed forward (rad/s): smooths the sign, so that a plan at rest
+/// does not chatter.
+const FRICTION_SPEED: f64 = 0.01;
+
+/// What the joints should do at one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointReference<R: Real> {
+    /// Desired positions (rad).
+    pub q: JointPositions<R>,
+    /// Desired velocities (rad/s).
+    pub dq: JointVelocities<R>,
+    /// Desired accelerations (rad/s^2).
+    pub ddq: JointAccelerations<R>,
+}
+
+impl<R: Real> JointReference<R> {
+    /// To stand still at `q`.
+    pub fn at_rest(q: JointPositions<R>) -> Self {
+        JointReference { q, dq: JointVelocities::zero(), ddq: JointAccelerations::zero() }
+    }
+}
+
+/// Eq (10).
+#[derive(Clone, Debug)]
+pub struct JointController<R: Real> {
+    /// Feedback torque of the last good cycle (N m).
+    feedback: Vector7<R>,
+}
+
+impl<R: Real> JointController<R> {
+    /// A controller without history.
+    pub fn new() -> Self {
+        JointController { feedback: Vector7::zeros() }
+    }
+
+    /// Forgets the feedback of the last cycle.
+    pub fn reset(&mut self) {
+        self.feedback = Vector7::zeros();
+    }
+
+    /// The torque of one tick. With `frozen` feedback (a reply is missing, `state` is extrapolated) the feedback torque of
+    /// the last good tick is kept, while the feed-forward follows the extrapolated posture.
+    pub fn torque(
+        &mut self,
+        model: &ArmModel<R>,
+        gains: &Tracking<R>,
+        frames: &Frames<R>,
+        state: &JointState<R>,
+        reference: &JointReference<R>,
+        frozen: bool,
+    ) -> JointTorques<R> {
+        if !frozen {
+            self.feedback = gains.stiffness.component_mul(&(reference.q.0 - state.q.0))
+                + gains.damping.component_mul(&(reference.dq.0 - state.dq.0));
+        }
+        let inertial = model.inverse_dynamics(frames, &state.dq, &reference.ddq).0;
+        let rotors = model.rotor_torque(&reference.ddq).0;
+        JointTorques(inertial + rotors + friction(gains, &reference.dq) + self.feedback)
+    }
+}
+
+impl<R: Real> Default for JointController<R> {
+    fn default() -> Self {
+        JointController::new()
+    }
+}
+
+/// Friction expected at the desired velocity (N m).
+fn friction<R: Real>(gains: &Tracking<R>, dq_d: &JointVelocities<R>) -> Vector7<R> {
+    let mut torque = gains.viscous.component_mul(&dq_d.0);
+    for ((torque, coulomb), rate) in torque.iter_mut().zip(gains.coulomb.iter()).zip(dq_d.0.iter()) {
+        let magnitude = if *rate < R::of(0.0) { -*rate } else { *rate };
+        *torque += *coulomb * *rate / (magnitude + R::of(FRICTION_SPEED));
+    }
+    torque
+}

@@ -1,0 +1,18 @@
+//! The controllers: Eq (11) in [`operational`], Eq (10) in [`joint`], Eq (12) in [`force`]; their sum is Eq (13). Beside
+//! them [`integral`], for the postures that are held, and Eq (14) in [`hand`].
+
+pub mod force;
+pub mod gains;
+pub mod hand;
+pub mod integral;
+pub mod joint;
+pub mod operational;
+pub mod window;
+
+pub use force::ForceController;
+pub use gains::{Gains, HandGains, Tracking};
+pub use hand::{HandController, HandReference};
+pub use integral::PostureIntegral;
+pub use joint::{JointController, JointReference};
+pub use operational::{OperationalController, TaskReference};
+pub use window::Window;

@@ -1,0 +1,151 @@
+//! `OperationalController`: the plan of the tool becomes a plan of the joints.
+//!
+//! Eq (11): `dq_d = J^+ (dx_d + K_x (x_d - x)) + K_post (I - J^+ J)(q_post - q)`, `J^+` damped. `q_d` is its integral, kept
+//! within a clamp of the measured `q` (anti-windup: blocked by contact, the integral would grow without bound). `ddq_d` is
+//! `J^+ (ddx_d + K_x (dx_d - dx) - dJ dq) + (I - J^+ J) K_post (dq_post - dq)`, or the low-passed derivative of `dq_d`.
+//! The orientation error is `2 vec(q_d (x) conj(q))`, sign-aligned, in world axes, as the Jacobian's angular rows are.
+
+use nalgebra::Vector3;
+
+use crate::command::{AccelerationSource, PoseFeedback};
+use crate::cycle::{PERIOD, RATE};
+use crate::law::gains::Tracking;
+use crate::law::joint::JointReference;
+use crate::model::arm::{ArmModel, at_least, at_most};
+use crate::model::kinematics::Frames;
+use crate::real::Real;
+use crate::sense::filter::{Butterworth, LowPass};
+use crate::sense::joints::JointState;
+use crate::units::{JOINTS, JointAccelerations, JointPositions, JointVelocities, Orientation, Pose, Vector6, Vector7};
+
+/// Cut-off of the differentiated acceleration (Hz).
+const ACCELERATION_CUT_OFF: f64 = 15.0;
+
+/// What the tool should do at one tick, and which posture the rest of the arm should prefer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TaskReference<R: Real> {
+    /// Desired position (m) and orientation.
+    pub pose: Pose<R>,
+    /// Desired velocity (m/s) and angular velocity (rad/s), world axes.
+    pub velocity: Vector6<R>,
+    /// Desired acceleration (m/s^2) and angular acceleration (rad/s^2), world axes.
+    pub acceleration: Vector6<R>,
+    /// Preferred posture `q_post` (rad).
+    pub posture: Vector7<R>,
+    /// Velocity of the preferred posture (rad/s).
+    pub posture_velocity: Vector7<R>,
+}
+
+/// Eq (11), with `q_d` as its state.
+#[derive(Clone, Debug)]
+pub struct OperationalController<R: Real> {
+    q_d: JointPositions<R>,
+    dq_d: JointVelocities<R>,
+    derivative: LowPass<R, JOINTS>,
+    clamped: bool,
+}
+
+impl<R: Real> OperationalController<R> {
+    /// Starts where the arm is: `q_d = q`, `dq_d = 0`.
+    pub fn new(q: JointPositions<R>) -> Self {
+        OperationalController {
+            q_d: q,
+            dq_d: JointVelocities::zero(),
+            derivative: LowPass::new(Butterworth::new(ACCELERATION_CUT_OFF, RATE)),
+            clamped: false,
+        }
+    }
+
+    /// The desired joint positions of the last tick (rad).
+    pub fn q_d(&self) -> &JointPositions<R> {
+        &self.q_d
+    }
+
+    /// Whether the anti-windup clamp acted in the last tick.
+    pub fn is_clamped(&self) -> bool {
+        self.clamped
+    }
+
+    /// One tick. `frames` are those of the measured posture.
+    pub fn step(
+        &mut self,
+        model: &ArmModel<R>,
+        gains: &Tracking<R>,
+        frames: &Frames<R>,
+        state: &JointState<R>,
+        task: &TaskReference<R>,
+        (feedback, acceleration): (PoseFeedback, AccelerationSource),
+    ) -> JointReference<R> {
+        let planned;
+        let (frames, dq) = match feedback {
+            PoseFeedback::Measured => (frames, &state.dq),
+            PoseFeedback::Planned => {
+                planned = Frames::new(model, &self.q_d);
+                (&planned, &self.dq_d)
+            }
+        };
+        let jacobian = frames.jacobian();
+        let inverse = jacobian.damped(gains.inverse_damping);
+        let pose = frames.tool_pose();
+        let gain = |linear: Vector3<R>, angular: Vector3<R>| {
+            let (linear, angular) = (linear * gains.position, angular * gains.orientation);
+            Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+        };
+
+        let correction = gain(task.pose.position - pose.position, pose.orientation.error_to(&task.pose.orientation));
+        // The posture term uses the measured q in either case, so that the null space does not integrate blindly.
+        let preferred = (task.posture - state.q.0) * gains.posture;
+        let dq_d = inverse.resolve(&(task.velocity + correction), &preferred);
+
+        let ddq_d = match acceleration {
+            AccelerationSource::Analytic => {
+                let rate = task.velocity - jacobian.twist(&dq.0);
+                let damping = gain(rate.fixed_rows::<3>(0).into(), rate.fixed_rows::<3>(3).into());
+                let wanted = task.acceleration + damping - frames.velocity_product(dq).to_vector();
+                inverse.resolve(&wanted, &((task.posture_velocity - state.dq.0) * gains.posture))
+            }
+            AccelerationSource::Differentiated => self.derivative.step(&((dq_d - self.dq_d.0) * R::of(RATE))),
+        };
+
+        self.dq_d = JointVelocities(dq_d);
+        self.clamped = false;
+        let mut q_d = self.q_d.0 + dq_d * R::of(PERIOD);
+        for ((desired, measured), clamp) in q_d.iter_mut().zip(state.q.0.iter()).zip(gains.clamp.iter()) {
+            let kept = at_most(at_least(*desired, *measured - *clamp), *measured + *clamp);
+            self.clamped |= kept != *desired;
+            *desired = kept;
+        }
+        // What feedback asks for beyond a soft limit is not wanted of this joint: the arm gives way as far as it can, and does not stop.
+        let limits = model.soft_min.iter().zip(&model.soft_max);
+        for ((desired, rate), (min, max)) in q_d.iter_mut().zip(self.dq_d.0.iter_mut()).zip(limits) {
+            let kept = at_most(at_least(*desired, *min), *max);
+            if kept != *desired {
+                (*desired, *rate) = (kept, R::of(0.0));
+                self.clamped = true;
+            }
+        }
+        self.q_d = JointPositions(q_d);
+        JointReference { q: self.q_d, dq: self.dq_d, ddq: JointAccelerations(ddq_d) }
+    }
+}
+
+impl<R: Real> TaskReference<R> {
+    /// From the plan of a primitive, whose angular quantities are in body axes.
+    pub fn from_plan(plan: &dmp::Reference<R>) -> Self {
+        let orientation = &plan.orientation;
+        let [vx, vy, vz] = plan.position.v;
+        let [ax, ay, az] = plan.position.a;
+        let [wx, wy, wz] = orientation.omega_world();
+        let [bx, by, bz] = orientation.domega_world();
+        TaskReference {
+            pose: Pose {
+                position: Vector3::from(plan.position.x),
+                orientation: Orientation(orientation.quaternion.to_array()),
+            },
+            velocity: Vector6::new(vx, vy, vz, wx, wy, wz),
+            acceleration: Vector6::new(ax, ay, az, bx, by, bz),
+            posture: Vector7::from(plan.posture.x),
+            posture_velocity: Vector7::from(plan.posture.v),
+        }
+    }
+}

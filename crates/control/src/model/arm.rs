@@ -1,0 +1,160 @@
+//! `ArmModel`: the parameters of the arm with its payload, in the number type of the control code.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::model::calibration::Payload;
+use crate::model::kinematics::Frames;
+use crate::model::wam7;
+use crate::model::wam7::{BodyTable, PayloadTable};
+use crate::real::Real;
+use crate::units::{JOINTS, JointPositions, Vector6};
+
+/// Mass properties of one link.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Body<R: Real> {
+    pub(crate) mass: R,
+    /// Centre of mass in the link frame (m).
+    pub(crate) centre: Vector3<R>,
+    /// Inertia about the centre of mass, axes of the link frame (kg m^2).
+    pub(crate) inertia: Matrix3<R>,
+}
+
+/// The arm with what is mounted on it.
+#[derive(Clone, Debug)]
+pub struct ArmModel<R: Real> {
+    pub(crate) link_length: [R; JOINTS],
+    pub(crate) link_offset: [R; JOINTS],
+    pub(crate) twist_cosine: [R; JOINTS],
+    pub(crate) twist_sine: [R; JOINTS],
+    pub(crate) bodies: [Body<R>; JOINTS],
+    pub(crate) reflected_inertia: [R; JOINTS],
+    pub(crate) reflected_inertia_j5_j6: R,
+    pub(crate) tool_height: R,
+    pub(crate) tool_cosine: R,
+    pub(crate) tool_sine: R,
+    pub(crate) sensor_origin: Vector3<R>,
+    /// Mass of what hangs on the wrist sensor (kg).
+    pub(crate) hanging_mass: R,
+    /// Its centre of mass from the sensor's origin, sensor axes (m).
+    pub(crate) hanging_centre: Vector3<R>,
+    /// Acceleration that a body at rest must be given to stand still in gravity: -g (m/s^2, world axes).
+    pub(crate) base_acceleration: Vector3<R>,
+    /// Lower soft limits (rad).
+    pub(crate) soft_min: [R; JOINTS],
+    /// Upper soft limits (rad).
+    pub(crate) soft_max: [R; JOINTS],
+}
+
+impl<R: Real> ArmModel<R> {
+    /// The arm of `model/wam7.toml` with this payload.
+    pub fn new(payload: Payload) -> Self {
+        ArmModel::with(payload, 1.0, 0.0)
+    }
+
+    /// The same arm with every link mass and inertia scaled and extra mass at the tool: for tests of robustness against a
+    /// model that is not the plant.
+    pub fn disturbed(payload: Payload, inertia_scale: f64, extra_mass: f64) -> Self {
+        ArmModel::with(payload, inertia_scale, extra_mass)
+    }
+
+    fn with(payload: Payload, scale: f64, extra_mass: f64) -> Self {
+        let mounted = match payload {
+            Payload::None => wam7::PAYLOAD_NONE,
+            Payload::SensorAndHand => wam7::PAYLOAD_HAND,
+        };
+        let mut tables = wam7::LINKS;
+        for table in &mut tables {
+            table.mass *= scale;
+            table.inertia = table.inertia.map(|value| value * scale);
+        }
+        let extra = BodyTable { mass: extra_mass, centre: [0.0, 0.0, mounted.tool_z], inertia: [0.0; 6] };
+        let [first, second, third, fourth, fifth, sixth, last] = tables;
+        let last = merged(merged(last, mounted.body), extra);
+        let real = |values: [f64; JOINTS]| values.map(R::of);
+        let PayloadTable { tool_z, tool_cosine, tool_sine, .. } = mounted;
+        ArmModel {
+            link_length: real(wam7::DH_A),
+            link_offset: real(wam7::DH_D),
+            twist_cosine: real(wam7::DH_COSINE),
+            twist_sine: real(wam7::DH_SINE),
+            bodies: [first, second, third, fourth, fifth, sixth, last].map(body),
+            reflected_inertia: real(wam7::REFLECTED_INERTIA),
+            reflected_inertia_j5_j6: R::of(wam7::REFLECTED_INERTIA_J5_J6),
+            tool_height: R::of(tool_z),
+            tool_cosine: R::of(tool_cosine),
+            tool_sine: R::of(tool_sine),
+            sensor_origin: Vector3::from(wam7::SENSOR_ORIGIN.map(R::of)),
+            hanging_mass: R::of(match payload {
+                Payload::None => 0.0,
+                Payload::SensorAndHand => wam7::HAND_MASS,
+            }),
+            hanging_centre: Vector3::from(wam7::HAND_CENTRE.map(R::of)),
+            base_acceleration: -Vector3::from(wam7::GRAVITY.map(R::of)),
+            soft_min: real(wam7::SOFT_MIN),
+            soft_max: real(wam7::SOFT_MAX),
+        }
+    }
+
+    /// What the wrist sensor feels of the hand alone while the arm is at rest: its weight, as force (N) and torque about the
+    /// sensor's origin (N m), in sensor axes.
+    pub fn hanging_weight(&self, frames: &Frames<R>) -> Vector6<R> {
+        let force = frames.sensor_to_world().tr_mul(&self.base_acceleration) * -self.hanging_mass;
+        let torque = self.hanging_centre.cross(&force);
+        Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
+    }
+
+    /// Whether every joint lies within its soft limits. False for a NaN.
+    pub fn within_soft_limits(&self, q: &JointPositions<R>) -> bool {
+        q.0.iter().zip(self.soft_min.iter().zip(&self.soft_max)).all(|(q, (min, max))| q >= min && q <= max)
+    }
+}
+
+/// The larger of two numbers; `bound` for a NaN.
+#[inline]
+pub(crate) fn at_least<R: Real>(value: R, bound: R) -> R {
+    if value > bound { value } else { bound }
+}
+
+/// The smaller of two numbers; `bound` for a NaN.
+#[inline]
+pub(crate) fn at_most<R: Real>(value: R, bound: R) -> R {
+    if value < bound { value } else { bound }
+}
+
+/// `value` within plus or minus `bound`; `-bound` for a NaN.
+#[inline]
+pub(crate) fn within<R: Real>(value: R, bound: R) -> R {
+    at_most(at_least(value, -bound), bound)
+}
+
+/// Two rigid bodies as one (parallel-axis theorem), in the same frame.
+fn merged(one: BodyTable, other: BodyTable) -> BodyTable {
+    let mass = one.mass + other.mass;
+    if other.mass == 0.0 {
+        return one;
+    }
+    let mut centre = [0.0; 3];
+    for (centre, (a, b)) in centre.iter_mut().zip(one.centre.iter().zip(&other.centre)) {
+        *centre = (one.mass * a + other.mass * b) / mass;
+    }
+    let mut inertia = [0.0; 6];
+    for part in [one, other] {
+        let [x, y, z] = part.centre;
+        let [cx, cy, cz] = centre;
+        let (x, y, z) = (x - cx, y - cy, z - cz);
+        let shift = [y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z];
+        for (sum, (own, shift)) in inertia.iter_mut().zip(part.inertia.iter().zip(shift)) {
+            *sum += own + part.mass * shift;
+        }
+    }
+    BodyTable { mass, centre, inertia }
+}
+
+fn body<R: Real>(table: BodyTable) -> Body<R> {
+    let [xx, yy, zz, xy, xz, yz] = table.inertia.map(R::of);
+    Body {
+        mass: R::of(table.mass),
+        centre: Vector3::from(table.centre.map(R::of)),
+        inertia: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
+    }
+}

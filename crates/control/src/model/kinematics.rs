@@ -1,0 +1,255 @@
+//! Forward kinematics, geometric Jacobian and its damped pseudo-inverse.
+//!
+//! `T(j-1 -> j) = Rz(q_j) Tz(d_j) Tx(a_j) Rx(alpha_j)`; joint j turns about z of frame j-1. The Jacobian is geometric: rows
+//! 0..3 give the velocity of the tool origin, rows 3..6 the angular velocity, both in world axes. The pseudo-inverse of
+//! Eq (11) is `J^T (J J^T + lambda I)^-1`, by an `L D L^T` factorisation that needs no square root.
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+
+use crate::model::arm::{ArmModel, at_least};
+use crate::real::Real;
+use crate::units::{JOINTS, JointPositions, JointVelocities, Orientation, Pose, Twist, Vector6, Vector7};
+
+/// The geometric Jacobian: 6 rows (linear, angular; world axes), one column per joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jacobian<R: Real>(pub SMatrix<R, 6, JOINTS>);
+
+impl<R: Real> Jacobian<R> {
+    /// Twist of the tool that belongs to joint velocities: `J dq`.
+    pub fn twist(&self, dq: &Vector7<R>) -> Vector6<R> {
+        let mut twist = Vector6::zeros();
+        for (column, rate) in self.0.column_iter().zip(dq.iter()) {
+            for (sum, entry) in twist.iter_mut().zip(column.iter()) {
+                *sum += *entry * *rate;
+            }
+        }
+        twist
+    }
+
+    /// Joint vector that belongs to a wrench or to the multipliers of the pseudo-inverse: `J^T w`.
+    pub fn transpose_times(&self, w: &Vector6<R>) -> Vector7<R> {
+        let mut joints = Vector7::zeros();
+        for (joint, column) in joints.iter_mut().zip(self.0.column_iter()) {
+            for (entry, component) in column.iter().zip(w.iter()) {
+                *joint += *entry * *component;
+            }
+        }
+        joints
+    }
+
+    /// Factorises `J J^T + damping I`. A positive `damping` (m^2, rad^2) keeps the inverse bounded at a singularity.
+    pub fn damped(&self, damping: R) -> DampedInverse<'_, R> {
+        let mut gram = [[R::of(0.0); 6]; 6];
+        for column in self.0.column_iter() {
+            for (row, gram_row) in gram.iter_mut().enumerate() {
+                let left = column[row];
+                for (entry, right) in gram_row.iter_mut().zip(column.iter()).take(row + 1) {
+                    *entry += left * *right;
+                }
+            }
+        }
+        for (index, row) in gram.iter_mut().enumerate() {
+            row[index] += damping;
+        }
+        DampedInverse { jacobian: self, factor: Factor::new(gram, damping) }
+    }
+}
+
+/// `L D L^T` of a symmetric positive definite 6x6 matrix.
+struct Factor<R: Real> {
+    lower: [[R; 6]; 6],
+    pivot_inverse: [R; 6],
+}
+
+impl<R: Real> Factor<R> {
+    /// Factorises the lower triangle of `matrix`. Every eigenvalue is at least `floor`, and so is every pivot: rounding
+    /// below it is lifted back, so that no division by zero is possible.
+    fn new(mut matrix: [[R; 6]; 6], floor: R) -> Self {
+        let mut pivot_inverse = [R::of(0.0); 6];
+        for column in 0..6 {
+            let pivot = at_least(matrix[column][column], floor);
+            let inverse = R::of(1.0) / pivot;
+            pivot_inverse[column] = inverse;
+            // The column below the pivot, before it is divided by it.
+            let below = matrix.map(|row| row[column]);
+            for (row, entries) in matrix.iter_mut().enumerate().skip(column + 1) {
+                let scaled = below[row] * inverse;
+                for (entry, value) in entries.iter_mut().zip(&below).take(row + 1).skip(column + 1) {
+                    *entry -= scaled * *value;
+                }
+                entries[column] = scaled;
+            }
+        }
+        Factor { lower: matrix, pivot_inverse }
+    }
+
+    fn solve(&self, right: &Vector6<R>) -> Vector6<R> {
+        let mut x = *right;
+        for row in 0..6 {
+            for column in 0..row {
+                let update = self.lower[row][column] * x[column];
+                x[row] -= update;
+            }
+        }
+        for (value, inverse) in x.iter_mut().zip(&self.pivot_inverse) {
+            *value *= *inverse;
+        }
+        for row in (0..6).rev() {
+            for below in row + 1..6 {
+                let update = self.lower[below][row] * x[below];
+                x[row] -= update;
+            }
+        }
+        x
+    }
+}
+
+/// The damped pseudo-inverse of one Jacobian, factorised once and used for velocity and acceleration.
+pub struct DampedInverse<'a, R: Real> {
+    jacobian: &'a Jacobian<R>,
+    factor: Factor<R>,
+}
+
+impl<R: Real> DampedInverse<'_, R> {
+    /// `J^+ task + (I - J^+ J) bias`: the joint vector that does the task and comes as near to `bias` as the task allows.
+    pub fn resolve(&self, task: &Vector6<R>, bias: &Vector7<R>) -> Vector7<R> {
+        let remaining = task - self.jacobian.twist(bias);
+        bias + self.jacobian.transpose_times(&self.factor.solve(&remaining))
+    }
+}
+
+/// All frames of the arm at one posture, with the sines and cosines that dynamics need again.
+#[derive(Clone, Copy, Debug)]
+pub struct Frames<R: Real> {
+    pub(crate) sine: [R; JOINTS],
+    pub(crate) cosine: [R; JOINTS],
+    /// z axes of frames 0 to 6: the joint axes, world axes.
+    axes: [Vector3<R>; JOINTS],
+    /// Origins of frames 0 to 6 (m).
+    origins: [Vector3<R>; JOINTS],
+    /// Origin of frame 7 (m).
+    plate: Vector3<R>,
+    /// Frame 7 to world.
+    plate_to_world: Matrix3<R>,
+    tool: Vector3<R>,
+    tool_to_world: Matrix3<R>,
+    sensor: Vector3<R>,
+}
+
+impl<R: Real> Frames<R> {
+    /// The frames at posture `q`.
+    pub fn new(model: &ArmModel<R>, q: &JointPositions<R>) -> Self {
+        let (zero, one) = (R::of(0.0), R::of(1.0));
+        let mut sine = [zero; JOINTS];
+        let mut cosine = [zero; JOINTS];
+        let mut axes = [Vector3::zeros(); JOINTS];
+        let mut origins = [Vector3::zeros(); JOINTS];
+        let mut x = Vector3::new(one, zero, zero);
+        let mut y = Vector3::new(zero, one, zero);
+        let mut z = Vector3::new(zero, zero, one);
+        let mut origin = Vector3::zeros();
+        for joint in 0..JOINTS {
+            let (s, c) = q.0[joint].sine_cosine();
+            sine[joint] = s;
+            cosine[joint] = c;
+            axes[joint] = z;
+            origins[joint] = origin;
+            let turned_x = x * c + y * s;
+            let turned_y = y * c - x * s;
+            origin += z * model.link_offset[joint] + turned_x * model.link_length[joint];
+            x = turned_x;
+            y = turned_y * model.twist_cosine[joint] + z * model.twist_sine[joint];
+            z = z * model.twist_cosine[joint] - turned_y * model.twist_sine[joint];
+        }
+        let plate_to_world = Matrix3::from_columns(&[x, y, z]);
+        let tool_x = x * model.tool_cosine + y * model.tool_sine;
+        let tool_y = y * model.tool_cosine - x * model.tool_sine;
+        Frames {
+            sine,
+            cosine,
+            axes,
+            origins,
+            plate: origin,
+            plate_to_world,
+            tool: origin + z * model.tool_height,
+            tool_to_world: Matrix3::from_columns(&[tool_x, tool_y, z]),
+            sensor: origin + plate_to_world * model.sensor_origin,
+        }
+    }
+
+    /// Pose of the tool frame.
+    pub fn tool_pose(&self) -> Pose<R> {
+        Pose { position: self.tool, orientation: Orientation::from_matrix(&self.tool_to_world) }
+    }
+
+    /// Rotation matrix of the tool, tool to world.
+    pub fn tool_to_world(&self) -> &Matrix3<R> {
+        &self.tool_to_world
+    }
+
+    /// Rotation matrix of the force/torque sensor, sensor to world (its axes are those of frame 7).
+    pub fn sensor_to_world(&self) -> &Matrix3<R> {
+        &self.plate_to_world
+    }
+
+    /// From the tool origin to the measurement origin of the force/torque sensor (m, world axes).
+    pub fn tool_to_sensor(&self) -> Vector3<R> {
+        self.sensor - self.tool
+    }
+
+    /// Geometric Jacobian of the tool.
+    pub fn jacobian(&self) -> Jacobian<R> {
+        self.jacobian_at(&self.tool)
+    }
+
+    fn jacobian_at(&self, point: &Vector3<R>) -> Jacobian<R> {
+        let mut jacobian = SMatrix::<R, 6, JOINTS>::zeros();
+        for (mut column, (axis, origin)) in jacobian.column_iter_mut().zip(self.axes.iter().zip(&self.origins)) {
+            let linear = axis.cross(&(point - origin));
+            column[0] = linear.x;
+            column[1] = linear.y;
+            column[2] = linear.z;
+            column[3] = axis.x;
+            column[4] = axis.y;
+            column[5] = axis.z;
+        }
+        Jacobian(jacobian)
+    }
+
+    /// Acceleration of the tool while the joints do not accelerate: `dJ/dt dq` (m/s^2, rad/s^2, world axes).
+    pub fn velocity_product(&self, dq: &JointVelocities<R>) -> Twist<R> {
+        let mut omega = Vector3::zeros();
+        let mut angular = Vector3::zeros();
+        let mut linear = Vector3::zeros();
+        for joint in 0..JOINTS {
+            let spin = self.axes[joint] * dq.0[joint];
+            angular += omega.cross(&spin);
+            omega += spin;
+            // The next origin, and at last the tool, rides on the link that this joint turns.
+            let end = if joint + 1 < JOINTS { self.origins[joint + 1] } else { self.tool };
+            let arm = end - self.origins[joint];
+            linear += angular.cross(&arm) + omega.cross(&omega.cross(&arm));
+        }
+        Twist { linear, angular }
+    }
+
+    /// Speeds (m/s) of the elbow and of the point `reach` beyond it along the forearm: what the safety module watches.
+    pub fn elbow_speeds(&self, dq: &JointVelocities<R>, reach: R) -> [R; 2] {
+        // The elbow is the axis of J4 (origin of frame 3); the forearm points along z of frame 4, the axis of J5.
+        let elbow = self.origins[3];
+        let tip = elbow + self.axes[4] * reach;
+        let speed = |point: Vector3<R>, joints: usize| {
+            let mut velocity = Vector3::zeros();
+            for joint in 0..joints {
+                velocity += self.axes[joint].cross(&(point - self.origins[joint])) * dq.0[joint];
+            }
+            velocity.dot(&velocity).square_root()
+        };
+        [speed(elbow, 3), speed(tip, 4)]
+    }
+
+    /// Origin of frame 7, the face of the tool plate (m).
+    pub fn tool_plate(&self) -> &Vector3<R> {
+        &self.plate
+    }
+}

@@ -1,0 +1,13 @@
+//! What is known of the arm before anything is measured: its numbers, kinematics, dynamics, and what is mounted on it.
+
+pub mod arm;
+pub mod calibration;
+pub mod dynamics;
+pub mod hand;
+pub mod kinematics;
+pub mod wam7;
+
+pub use arm::ArmModel;
+pub use calibration::{Calibration, CalibrationError, Payload};
+pub use kinematics::{Frames, Jacobian};
+pub use wam7::*;

@@ -1,0 +1,121 @@
+//! `Approach`: a joint-space move along a minimum-jerk path.
+//!
+//! `q(u) = q_0 + (q_1 - q_0)(10 u^3 - 15 u^4 + 6 u^5)`, `u = t/T`. The duration is long enough that no joint exceeds half of
+//! its speed limit and neither the elbow nor the point 0.35 m beyond it exceeds 0.35 m/s; the safety module faults at 1.0 m/s.
+
+use crate::cycle::{PERIOD, RATE};
+use crate::law::joint::JointReference;
+use crate::model::arm::ArmModel;
+use crate::model::kinematics::Frames;
+use crate::model::wam7;
+use crate::real::Real;
+use crate::units::{JointAccelerations, JointPositions, JointVelocities, Vector7};
+
+/// Largest speed of the elbow and of the point beyond it during an approach (m/s).
+pub const TIP_SPEED: f64 = 0.35;
+
+/// Distance beyond the elbow at which the safety module watches the speed (m).
+pub const TIP_REACH: f64 = 0.35;
+
+/// Part of the joint speed limits that an approach uses.
+const SPEED_FRACTION: f64 = 0.5;
+
+/// Postures along the path at which the tip speed is computed.
+const SAMPLES: usize = 8;
+
+/// Allowance for peaks between the samples.
+const SAMPLE_MARGIN: f64 = 1.05;
+
+/// Longest approach that may be asked for (s).
+pub const LONGEST: f64 = 120.0;
+
+/// Longest time that the arm may take to close in on the target after the path has ended (control periods): 1 s.
+pub const SETTLING: u16 = 300;
+
+/// Shortest approach (s), so that a move over no distance still begins and ends.
+const SHORTEST: f64 = 0.5;
+
+/// A joint-space move in progress.
+#[derive(Clone, Copy, Debug)]
+pub struct Approach<R: Real> {
+    start: Vector7<R>,
+    way: Vector7<R>,
+    /// Control periods of the whole move.
+    length: i32,
+    /// Control periods passed.
+    passed: i32,
+    /// Control periods at the target since then, saturating.
+    settled: u16,
+    /// 1/T (1/s).
+    rate: R,
+}
+
+impl<R: Real> Approach<R> {
+    /// A move from `start` to `goal` in `duration` (s) or, where the speed limits ask for it, longer.
+    pub fn new(model: &ArmModel<R>, start: &JointPositions<R>, goal: &JointPositions<R>, duration: R) -> Self {
+        let way = goal.0 - start.0;
+        let mut needed = crate::model::arm::at_least(duration, R::of(SHORTEST));
+        for (way, limit) in way.iter().zip(&wam7::VELOCITY_MAX) {
+            // The peak speed of a minimum jerk is 1.875 times the mean.
+            let magnitude = if *way < R::of(0.0) { -*way } else { *way };
+            needed = crate::model::arm::at_least(needed, magnitude * R::of(1.875 / (SPEED_FRACTION * limit)));
+        }
+        for sample in 0..SAMPLES {
+            let u = (sample as f64 + 0.5) / SAMPLES as f64;
+            let (position, speed, _) = minimum_jerk(R::of(u));
+            let frames = Frames::new(model, &JointPositions(start.0 + way * position));
+            let [elbow, tip] = frames.elbow_speeds(&JointVelocities(way * speed), R::of(TIP_REACH));
+            let scale = R::of(SAMPLE_MARGIN / TIP_SPEED);
+            needed = crate::model::arm::at_least(needed, crate::model::arm::at_least(elbow, tip) * scale);
+        }
+        let longest = R::of(LONGEST);
+        let needed = crate::model::arm::at_most(needed, longest);
+        let length = (needed * R::of(RATE)).whole_below().to_whole() + 1;
+        Approach { start: start.0, way, length, passed: 0, settled: 0, rate: R::of(RATE) / R::from_counts(length) }
+    }
+
+    /// Duration of the move (s).
+    pub fn duration(&self) -> R {
+        R::from_counts(self.length) * R::of(PERIOD)
+    }
+
+    /// Fraction of the time passed, 0 to 1.
+    pub fn progress(&self) -> R {
+        R::from_counts(self.passed) / R::from_counts(self.length)
+    }
+
+    /// Whether the path has ended at the target.
+    pub fn is_finished(&self) -> bool {
+        self.passed >= self.length
+    }
+
+    /// Whether the arm has had all the time to settle there that it gets.
+    pub fn is_overdue(&self) -> bool {
+        self.settled >= SETTLING
+    }
+
+    /// Where the arm should be now; then one control period passes.
+    pub fn step(&mut self) -> JointReference<R> {
+        let (position, speed, acceleration) = minimum_jerk(self.progress());
+        if self.passed < self.length {
+            self.passed += 1;
+        } else {
+            self.settled = self.settled.saturating_add(1);
+        }
+        JointReference {
+            q: JointPositions(self.start + self.way * position),
+            dq: JointVelocities(self.way * (speed * self.rate)),
+            ddq: JointAccelerations(self.way * (acceleration * self.rate * self.rate)),
+        }
+    }
+}
+
+/// Minimum-jerk path over unit time: position and its first two derivatives.
+pub(crate) fn minimum_jerk<R: Real>(u: R) -> (R, R, R) {
+    let n = R::of;
+    let rest = n(1.0) - u;
+    let position = u * u * u * (n(10.0) - u * (n(15.0) - u * n(6.0)));
+    let speed = n(30.0) * u * u * rest * rest;
+    let acceleration = n(60.0) * u * rest * (n(1.0) - u * n(2.0));
+    (position, speed, acceleration)
+}

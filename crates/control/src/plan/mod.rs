@@ -1,0 +1,9 @@
+//! Where the arm and the hand are to go: moves in joint space, and the run of a primitive.
+
+pub mod approach;
+pub mod hand;
+pub mod load;
+pub(crate) mod run;
+
+pub use approach::Approach;
+pub use hand::HandMotion;

@@ -1,0 +1,300 @@
+//! `Run`: the loaded primitive in motion: its rollout, the options of this run, and the decision that it is over.
+
+use dmp::{Configuration, Coupling, Primitive, Quaternion, Reference, Rollout, RolloutError, SensorMap, StartState};
+use nalgebra::Vector3;
+
+use crate::command::{Goal, Refusal, RunOptions};
+use crate::cycle::PERIOD;
+use crate::guard::watch::{Surprise, Watch};
+use crate::plan::load::within_reach;
+use crate::real::Real;
+use crate::sense::deviation::{Deviation, SmoothedWrench};
+use crate::sense::hand::HandState;
+use crate::units::{JointPositions, Pose, Wrench};
+
+/// Largest distance of any joint from the start posture of the primitive (rad).
+pub(crate) const START_DISTANCE: f64 = 0.05;
+
+/// Allowed speed factors.
+pub(crate) const SPEEDS: (f32, f32) = (0.1, 2.0);
+
+/// The plan counts as at rest below these speeds (m/s, rad/s).
+const REST: (f64, f64) = (2e-3, 1e-2);
+
+/// The hand rows count as at rest below this speed (rad/s).
+const HAND_REST: f64 = 5e-2;
+
+/// Control periods that the plan stays at rest before the run is over: three time constants of the pose feedback of
+/// Eq (11), so that the arm has closed the last millimetres.
+const SETTLING: u16 = 300;
+
+/// Progress beyond which a plan that never comes to rest (feedback still bends it) is over as well.
+const LATEST: f64 = 1.5;
+
+/// The same for a run that the feedback bends: it never comes to rest while something presses.
+const LATEST_WITH_FEEDBACK: f64 = 1.15;
+
+/// Control periods in which the feedback fades out when the sensor falls silent: 100 ms.
+pub(crate) const FADE: u16 = 30;
+
+/// Largest distance of a digit of the hand from where the primitive starts (rad).
+const HAND_DISTANCE: f64 = 0.15;
+
+/// How well this tick's sensors can be believed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Senses {
+    /// All values are of this tick.
+    Fresh,
+    /// Something is missing in this tick: what was computed last stays.
+    Frozen,
+    /// The wrench has been silent for too long: the feedback fades.
+    Lost,
+}
+
+/// A run in progress.
+#[derive(Clone, Debug)]
+pub(crate) struct Run<R: Real, const N: usize> {
+    rollout: Rollout<R, N>,
+    pub(crate) options: RunOptions,
+    /// Feedback as computed last, before it fades.
+    coupling: Coupling<R>,
+    deviation: Option<Deviation<R>>,
+    /// What a compliant run bends by.
+    smoothed: SmoothedWrench<R>,
+    watch: Watch<R>,
+    /// Control periods of fading left: `FADE` in full, 0 gone.
+    kept: u16,
+    /// The movement has ended, and the plan stays as the feedback has bent it.
+    settled: bool,
+    rested: u16,
+}
+
+impl<R: Real, const N: usize> Run<R, N> {
+    /// Puts a run into its place that begins at the measured pose and posture, at rest; a refused one leaves the place as it was.
+    /// In place, because moving it out of a result costs 6000 instructions in the cycle that has most to do.
+    pub(crate) fn start(
+        place: &mut Option<Self>,
+        primitive: &Primitive<R, N>,
+        q: &JointPositions<R>,
+        pose: &Pose<R>,
+        hand: Option<&HandState<R>>,
+        options: RunOptions,
+    ) -> Result<(), Refusal> {
+        let taught = primitive.start();
+        let far = |(q, start): (&R, &R)| {
+            let distance = *q - *start;
+            !(distance <= R::of(START_DISTANCE) && distance >= R::of(-START_DISTANCE))
+        };
+        if q.0.iter().zip(&taught.posture).any(far) {
+            return Err(Refusal::StartTooFar);
+        }
+        let hand = match hand {
+            Some(state) => {
+                let far = |(q, start): (&R, &R)| {
+                    let distance = *q - *start;
+                    !(distance <= R::of(HAND_DISTANCE) && distance >= R::of(-HAND_DISTANCE))
+                };
+                if state.q.iter().zip(&taught.hand).any(far) {
+                    return Err(Refusal::HandTooFar);
+                }
+                state.q
+            }
+            None => taught.hand,
+        };
+        let [w, x, y, z] = pose.orientation.0;
+        let start = StartState::at_rest(Configuration {
+            position: pose.position.into(),
+            orientation: Quaternion::new(w, x, y, z),
+            posture: q.0.into(),
+            hand,
+        });
+        let mut rollout = Rollout::start(primitive, &start).map_err(reason)?;
+        // The first speed acts at once; later ones are approached at the rollout's slew rate.
+        rollout.set_speed_slew(None).map_err(reason)?;
+        set_speed(&mut rollout, primitive, options.speed)?;
+        rollout.set_speed_slew(Some(R::of(Rollout::<R, N>::DEFAULT_SLEW))).map_err(reason)?;
+        if options.goal != Goal::STORED {
+            set_goal(&mut rollout, primitive, &options.goal)?;
+        }
+        *place = Some(Run {
+            rollout,
+            options,
+            coupling: Coupling::NONE,
+            deviation: None,
+            smoothed: SmoothedWrench::new(),
+            watch: Watch::new(),
+            kept: FADE,
+            settled: false,
+            rested: 0,
+        });
+        Ok(())
+    }
+
+    /// Takes a new goal, or leaves everything as it was.
+    pub(crate) fn set_goal(&mut self, primitive: &Primitive<R, N>, goal: &Goal) -> Result<(), Refusal> {
+        if *goal != Goal::STORED {
+            set_goal(&mut self.rollout, primitive, goal)?;
+            self.rested = 0;
+        }
+        Ok(())
+    }
+
+    /// Takes a new speed factor.
+    pub(crate) fn set_speed(&mut self, primitive: &Primitive<R, N>, factor: f32) -> Result<(), Refusal> {
+        set_speed(&mut self.rollout, primitive, factor)
+    }
+
+    /// The plan of this tick.
+    ///
+    /// # Errors
+    /// [`RolloutError::OtherPrimitive`]: this is not the primitive that the run was started with.
+    pub(crate) fn step(
+        &mut self,
+        primitive: &Primitive<R, N>,
+        wrench: &Wrench<R>,
+        gauges: Option<&[R; 3]>,
+        senses: Senses,
+    ) -> Result<Reference<R>, RolloutError> {
+        self.kept = match senses {
+            Senses::Lost => self.kept.saturating_sub(1),
+            _ => FADE.min(self.kept + 1),
+        };
+        if senses == Senses::Fresh {
+            let progress = self.rollout.progress();
+            self.deviation =
+                primitive.expected().map(|expected| Deviation::new(&expected.at(progress), wrench, gauges));
+            if let Some(deviation) = self.deviation.as_ref().filter(|_| self.options.compliant) {
+                self.smoothed.step(wrench, &deviation.expected);
+            }
+        }
+        let bends = self.options.feedback && !self.settled;
+        if let Some(deviation) = self.deviation.filter(|_| bends && senses == Senses::Fresh) {
+            // What swings is an arm that follows softly; a stiff one meets hard things, where each millisecond counts.
+            let mut seen = if self.options.compliant { deviation.smoothed(&self.smoothed) } else { deviation };
+            if !self.options.finger_feedback {
+                seen.gauges = [R::of(0.0); 3];
+            }
+            self.coupling = self.rollout.coupling(primitive, &seen.sensors(), &SensorMap::IDENTITY)?;
+        }
+        // A plan that springs back tips what has just been grasped, and one that goes on giving way pulls at it.
+        if bends && self.rollout.is_finished() && self.kept == FADE {
+            self.rollout.settle();
+            self.coupling = Coupling::NONE;
+            self.settled = true;
+        }
+        let coupling = part(&self.coupling, self.kept());
+        let plan = self.rollout.step(primitive, R::of(PERIOD), &coupling)?;
+        let slow =
+            |speeds: &[R], limit: f64| speeds.iter().all(|speed| *speed < R::of(limit) && *speed > R::of(-limit));
+        let resting = self.rollout.is_finished()
+            && slow(&plan.position.v, REST.0)
+            && slow(&plan.orientation.omega, REST.1)
+            && slow(&plan.posture.v, REST.1)
+            && slow(&plan.hand.v, HAND_REST);
+        self.rested = if resting { self.rested.saturating_add(1) } else { 0 };
+        Ok(plan)
+    }
+
+    /// Compares what is felt with the experience of the primitive, if it has one; tells what has just become a surprise.
+    pub(crate) fn watch(
+        &mut self,
+        primitive: &Primitive<R, N>,
+        wrench: &Wrench<R>,
+        hand: Option<&HandState<R>>,
+    ) -> Option<Surprise> {
+        let experience = primitive.experience()?;
+        let (f, n) = (&wrench.force, &wrench.torque);
+        let zero = [R::of(0.0); 3];
+        let [g1, g2, g3] = hand.map_or(zero, |hand| hand.gauges);
+        let [q1, q2, q3] = hand.map_or(zero, |hand| {
+            let [_spread, fingers @ ..] = hand.q;
+            fingers
+        });
+        let values = [f.x, f.y, f.z, n.x, n.y, n.z, g1, g2, g3, q1, q2, q3];
+        self.watch.step(experience, self.rollout.progress(), &values, hand.is_some())
+    }
+
+    /// The largest deviation from the experience, 1 at the limit of a surprise; 0 without an experience.
+    pub(crate) fn surprise(&self) -> R {
+        self.watch.statistic()
+    }
+
+    /// Share of the feedback that has not faded: 1 unless the sensor is silent.
+    pub(crate) fn kept(&self) -> R {
+        R::from_counts(i32::from(self.kept)) * R::of(1.0 / FADE as f64)
+    }
+
+    /// Whether the feedback or the force controller acts with less than it would: the sensor is silent, or the run takes
+    /// another time than the recording of the expectation.
+    pub(crate) fn is_faded(&self, primitive: &Primitive<R, N>) -> bool {
+        let uses_force = self.options.feedback || self.options.force_control;
+        let derated = self.options.feedback
+            && primitive.expected().is_some_and(|expected| {
+                let relative = expected.recorded_duration() / primitive.duration() * self.rollout.speed();
+                expected.trust(relative) < R::of(1.0)
+            });
+        (uses_force && self.kept < FADE) || derated
+    }
+
+    /// Whether the movement is over.
+    pub(crate) fn is_over(&self) -> bool {
+        let latest = if self.options.feedback { LATEST_WITH_FEEDBACK } else { LATEST };
+        self.rested >= SETTLING || self.rollout.progress() > R::of(latest)
+    }
+
+    /// What is expected and what is felt beyond it, as of the last complete tick; `None` without an expectation.
+    pub(crate) fn deviation(&self) -> Option<&Deviation<R>> {
+        self.deviation.as_ref()
+    }
+}
+
+/// Takes a new goal, or leaves everything as it was.
+fn set_goal<R: Real, const N: usize>(
+    rollout: &mut Rollout<R, N>,
+    primitive: &Primitive<R, N>,
+    goal: &Goal,
+) -> Result<(), Refusal> {
+    let mut next = rollout.clone();
+    if let Some(position) = goal.position {
+        if position.iter().any(|value| !value.is_finite()) {
+            return Err(Refusal::OutOfRange);
+        }
+        let position = position.map(|value| R::of(f64::from(value)));
+        if !within_reach(&Vector3::from(position)) {
+            return Err(Refusal::OutsideWorkspace);
+        }
+        next.set_goal_position(position).map_err(reason)?;
+    }
+    if let Some(orientation) = goal.orientation {
+        let [w, x, y, z] = orientation.map(|value| R::of(f64::from(value)));
+        next.set_goal_orientation(primitive, Quaternion::new(w, x, y, z)).map_err(reason)?;
+    }
+    *rollout = next;
+    Ok(())
+}
+
+/// Takes a new speed factor; what the rollout refuses as too fast is out of range as well.
+fn set_speed<R: Real, const N: usize>(
+    rollout: &mut Rollout<R, N>,
+    primitive: &Primitive<R, N>,
+    factor: f32,
+) -> Result<(), Refusal> {
+    if !(factor >= SPEEDS.0 && factor <= SPEEDS.1) {
+        return Err(Refusal::OutOfRange);
+    }
+    rollout.set_speed(primitive, R::of(f64::from(factor))).map_err(reason)
+}
+
+/// A share of a feedback.
+fn part<R: Real>(of: &Coupling<R>, share: R) -> Coupling<R> {
+    Coupling {
+        position: of.position.map(|value| value * share),
+        orientation: of.orientation.map(|value| value * share),
+        hand: of.hand.map(|value| value * share),
+    }
+}
+
+/// Every reason a rollout gives is a number out of range.
+fn reason(_: RolloutError) -> Refusal {
+    Refusal::OutOfRange
+}

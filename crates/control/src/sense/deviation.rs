@@ -1,0 +1,103 @@
+//! `Deviation`: how what is felt differs from what is expected, the one input of Eq (8), Eq (12) and Eq (14).
+
+use dmp::SENSORS;
+use nalgebra::Vector3;
+
+use crate::cycle::RATE;
+use crate::real::Real;
+use crate::sense::filter::{Butterworth, LowPass};
+use crate::units::{Vector6, Wrench};
+
+/// Force (N) that counts as none: the bias and hysteresis of the sensor that a tare leaves would otherwise move the plan by
+/// centimetres.
+pub const FORCE_DEAD_BAND: f64 = 0.3;
+
+/// Torque (N m) that counts as none.
+pub const TORQUE_DEAD_BAND: f64 = 0.02;
+
+/// Cut-off of the filter between the deviation and the plan (Hz). The plan's acceleration is fed forward, the hand's inertia is
+/// felt by the wrist sensor, and the sum bends the plan again: with K1/K = 0.8 m/N that loop has a gain of 3 above its
+/// resonance and swings at 20 Hz as soon as a bias comes near the dead band.
+pub const FEEDBACK_CUT_OFF: f64 = 8.0;
+
+/// What is expected at one tick, and what is felt beyond it. `F` is what the environment does to the robot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deviation<R: Real> {
+    /// Expected wrench at the grasp point.
+    pub expected: Wrench<R>,
+    /// Expected torque on F1, F2, F3 (N m).
+    pub expected_gauges: [R; 3],
+    /// `F - F_expected` beyond the dead band.
+    pub wrench: Wrench<R>,
+    /// The same of the fingers, without a dead band; zero where no gauge is measured.
+    pub gauges: [R; 3],
+}
+
+impl<R: Real> Deviation<R> {
+    /// From the expected sensor values (force world axes, torque tool axes, gauges) and the felt ones.
+    pub fn new(expected: &[R; SENSORS], felt: &Wrench<R>, felt_gauges: Option<&[R; 3]>) -> Self {
+        let [fx, fy, fz, nx, ny, nz, expected_gauges @ ..] = *expected;
+        let expected = Wrench { force: Vector3::new(fx, fy, fz), torque: Vector3::new(nx, ny, nz) };
+        let wrench = Wrench {
+            force: shrunk(felt.force - expected.force, R::of(FORCE_DEAD_BAND)),
+            torque: shrunk(felt.torque - expected.torque, R::of(TORQUE_DEAD_BAND)),
+        };
+        let gauges = match felt_gauges {
+            Some(felt) => core::array::from_fn(|finger| felt[finger] - expected_gauges[finger]),
+            None => [R::of(0.0); 3],
+        };
+        Deviation { expected, expected_gauges, wrench, gauges }
+    }
+
+    /// The same with the smoothed deviation of the wrench.
+    pub fn smoothed(&self, wrench: &SmoothedWrench<R>) -> Self {
+        Deviation { wrench: wrench.beyond_dead_band(), ..*self }
+    }
+
+    /// The sensor values that Eq (8) is to see: what is expected, plus the deviation beyond the dead band.
+    pub fn sensors(&self) -> [R; SENSORS] {
+        let force = self.expected.force + self.wrench.force;
+        let torque = self.expected.torque + self.wrench.torque;
+        let [f1, f2, f3]: [R; 3] = core::array::from_fn(|finger| self.expected_gauges[finger] + self.gauges[finger]);
+        [force.x, force.y, force.z, torque.x, torque.y, torque.z, f1, f2, f3]
+    }
+}
+
+/// The deviation of the wrench through a low-pass of [`FEEDBACK_CUT_OFF`], before its dead band.
+#[derive(Clone, Debug)]
+pub struct SmoothedWrench<R: Real> {
+    filter: LowPass<R, 6>,
+}
+
+impl<R: Real> SmoothedWrench<R> {
+    /// No deviation so far.
+    pub fn new() -> Self {
+        SmoothedWrench { filter: LowPass::new(Butterworth::new(FEEDBACK_CUT_OFF, RATE)) }
+    }
+
+    /// Takes what is felt in this control period beyond the expected wrench.
+    pub fn step(&mut self, felt: &Wrench<R>, expected: &Wrench<R>) {
+        let (force, torque) = (felt.force - expected.force, felt.torque - expected.torque);
+        self.filter.step(&Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z));
+    }
+
+    /// What is beyond the dead bands.
+    fn beyond_dead_band(&self) -> Wrench<R> {
+        let smoothed = self.filter.output();
+        let force = Vector3::new(smoothed[0], smoothed[1], smoothed[2]);
+        let torque = Vector3::new(smoothed[3], smoothed[4], smoothed[5]);
+        Wrench { force: shrunk(force, R::of(FORCE_DEAD_BAND)), torque: shrunk(torque, R::of(TORQUE_DEAD_BAND)) }
+    }
+}
+
+impl<R: Real> Default for SmoothedWrench<R> {
+    fn default() -> Self {
+        SmoothedWrench::new()
+    }
+}
+
+/// The vector made shorter by `band`, without a step; nothing if it is not longer.
+fn shrunk<R: Real>(vector: Vector3<R>, band: R) -> Vector3<R> {
+    let length = vector.dot(&vector).square_root();
+    if length > band { vector * ((length - band) / length) } else { Vector3::zeros() }
+}

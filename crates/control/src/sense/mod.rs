@@ -1,0 +1,12 @@
+//! From the replies of the bus to what is known: joints, wrench, hand, and how they deviate from what is expected.
+
+pub mod deviation;
+pub mod filter;
+pub mod hand;
+pub mod joints;
+pub mod wrench;
+
+pub use deviation::Deviation;
+pub use hand::{HandEstimator, HandState};
+pub use joints::{JointEstimator, JointState};
+pub use wrench::WrenchEstimator;

@@ -1,0 +1,246 @@
+//! `WrenchEstimator`: raw force/torque counts to the wrench of the environment on the robot at the grasp point.
+//!
+//! The sensor reports what is mounted on it: the wrench of the hand on the sensor, in sensor axes, about the sensor's origin.
+//! The weight of the hand is known from the model in every orientation and is taken off first; what the environment does to
+//! the hand remains, with the hand's inertia, which the expectation of a primitive contains as well. Filter (second-order
+//! Butterworth, 15 Hz, the same live and recorded) and tare act in sensor axes, and because the weight is gone the tare is the
+//! sensor's bias and nothing else: it holds in every orientation. Then the force is turned into world axes and the torque is
+//! moved to the grasp point, `n_g = n_s + (p_s - p_g) x f`, and turned into tool axes: the frames of the position and
+//! orientation rows of Eq (8).
+
+use nalgebra::Vector3;
+use puck::RawWrench;
+
+use crate::cycle::RATE;
+use crate::model::kinematics::Frames;
+use crate::model::wam7;
+use crate::real::Real;
+use crate::sense::filter::{Butterworth, LowPass};
+use crate::units::{Vector6, Wrench};
+
+/// Cut-off of the wrench filter (Hz).
+pub const WRENCH_CUT_OFF: f64 = 15.0;
+
+/// Largest believed change from one sample to the next (N, N m). A larger one is believed when the next sample confirms it:
+/// one corrupt sample must not bend the plan.
+const LARGEST_STEP: [f64; 6] = [20.0, 20.0, 20.0, 1.0, 1.0, 1.0];
+
+/// Half of the time over which a resting wrench is averaged for the tare (control periods): 0.15 s.
+const REST_HALF: u16 = 45;
+
+/// Largest drift (N) that an automatic tare takes away once the wrench has been tared: what is more is a load or a contact.
+const DRIFT: f64 = 1.0;
+
+/// Largest force at rest (N) with which a run that uses force begins.
+pub const REST_FORCE: f64 = 5.0;
+
+/// Part of the sensor's range from which on a sample counts as full scale.
+const FULL_SCALE: f64 = 0.99;
+
+/// Largest force that a frame can carry (N).
+const LARGEST_FORCE: f64 = 32_767.0 / 256.0;
+
+/// How many samples in a row were at full scale.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FullScale {
+    /// In a force.
+    pub force: u8,
+    /// In a torque.
+    pub torque: u8,
+}
+
+/// Mean of the last 0.15 to 0.3 s at rest, from two blocks of samples.
+#[derive(Clone, Copy, Debug)]
+struct RestMean<R: Real> {
+    sum: Vector6<R>,
+    count: u16,
+    /// Sum of the last whole block.
+    block: Option<Vector6<R>>,
+}
+
+impl<R: Real> RestMean<R> {
+    fn new() -> Self {
+        RestMean { sum: Vector6::zeros(), count: 0, block: None }
+    }
+
+    fn push(&mut self, sample: &Vector6<R>) {
+        self.sum += sample;
+        self.count += 1;
+        if self.count >= REST_HALF {
+            *self = RestMean { sum: Vector6::zeros(), count: 0, block: Some(self.sum) };
+        }
+    }
+
+    fn mean(&self) -> Option<Vector6<R>> {
+        let samples = R::from_counts(i32::from(self.count + REST_HALF));
+        self.block.map(|block| (block + self.sum) / samples)
+    }
+}
+
+/// Filters, tares and places the measured wrench.
+#[derive(Clone, Debug)]
+pub struct WrenchEstimator<R: Real> {
+    doubtful: bool,
+    filter: LowPass<R, 6>,
+    tare: Vector6<R>,
+    tared: bool,
+    /// Last believed sample, as the sensor gave it.
+    last: Vector6<R>,
+    /// The same without the weight of the hand.
+    felt: Vector6<R>,
+    /// Whether the filter has had an input without the weight.
+    placed: bool,
+    rest: RestMean<R>,
+    saturated: bool,
+    full_scale: FullScale,
+    age: Option<u8>,
+}
+
+impl<R: Real> WrenchEstimator<R> {
+    /// An estimator that has not seen a wrench yet.
+    pub fn new() -> Self {
+        WrenchEstimator {
+            doubtful: false,
+            filter: LowPass::new(Butterworth::new(WRENCH_CUT_OFF, RATE)),
+            tare: Vector6::zeros(),
+            tared: false,
+            last: Vector6::zeros(),
+            felt: Vector6::zeros(),
+            placed: false,
+            rest: RestMean::new(),
+            saturated: false,
+            full_scale: FullScale::default(),
+            age: None,
+        }
+    }
+
+    /// Takes the sample of one cycle; a lost or bad one is bridged by the last.
+    ///
+    /// `weight` is what the hand alone does to the sensor in the present posture
+    /// ([`ArmModel::hanging_weight`](crate::model::arm::ArmModel::hanging_weight)); without a posture only the age is kept.
+    pub fn update(&mut self, sample: Option<&RawWrench>, weight: Option<&Vector6<R>>, at_rest: bool) {
+        let believed = sample.filter(|raw| !raw.status.is_some_and(|status| status.is_bad()));
+        match believed {
+            Some(raw) => self.take(raw),
+            None => self.age = self.age.map(|age| age.saturating_add(1)),
+        }
+        let (Some(weight), Some(age)) = (weight, self.age) else { return };
+        self.felt = self.last - weight;
+        if !self.placed {
+            // Not a step from zero: a bias is there from the first sample on.
+            self.filter.settle(&self.felt);
+            self.placed = true;
+        }
+        self.filter.step(&self.felt);
+        if !at_rest {
+            self.rest = RestMean::new();
+        } else if age == 0 {
+            self.rest.push(&self.felt);
+        }
+    }
+
+    fn take(&mut self, raw: &RawWrench) {
+        let [fx, fy, fz] = raw.newtons::<R>();
+        let [nx, ny, nz] = raw.newton_metres::<R>();
+        let sample = Vector6::new(fx, fy, fz, nx, ny, nz);
+        let beyond = |value: &R, limit: f64| *value > R::of(limit) || *value < R::of(-limit);
+        let step = sample - self.last;
+        let jumped = self.age.is_some() && step.iter().zip(&LARGEST_STEP).any(|(step, limit)| beyond(step, *limit));
+        self.doubtful = jumped && !self.doubtful;
+        if !self.doubtful {
+            self.last = sample;
+        }
+        let at_end = |values: &[R], ranges: &[f64; 3]| {
+            values.iter().zip(ranges).any(|(value, range)| beyond(value, FULL_SCALE * range.min(LARGEST_FORCE)))
+        };
+        let count = |so_far: u8, now: bool| if now { so_far.saturating_add(1) } else { 0 };
+        self.full_scale.force = count(self.full_scale.force, at_end(&[fx, fy, fz], &wam7::SENSOR_FORCE_RANGE));
+        self.full_scale.torque = count(self.full_scale.torque, at_end(&[nx, ny, nz], &wam7::SENSOR_TORQUE_RANGE));
+        self.saturated = raw.status.is_some_and(|status| status.saturated_gauges() != 0);
+        self.age = Some(0);
+    }
+
+    /// What a tare would take as zero: the mean at rest, or the filtered value where the arm has just moved.
+    fn offset(&self) -> Vector6<R> {
+        self.rest.mean().unwrap_or(*self.filter.output())
+    }
+
+    /// Takes the present wrench, less the weight of the hand, as zero. False if none has been measured in a known posture.
+    pub fn tare(&mut self) -> bool {
+        if self.age.is_none() || !self.placed {
+            return false;
+        }
+        self.tare = self.offset();
+        self.tared = true;
+        true
+    }
+
+    /// Tares at the first rest after start-up; later ones are asked for.
+    pub fn tare_first(&mut self) {
+        if !self.tared && self.rest.mean().is_some() {
+            self.tare();
+        }
+    }
+
+    /// Tares, unless the wrench has been tared already and differs from that by more than a sensor drifts: then the hand holds
+    /// or touches something, which must stay in the wrench.
+    pub fn tare_drift(&mut self) {
+        let drift = self.rest_force();
+        if !self.tared || drift.dot(&drift) <= R::of(DRIFT * DRIFT) {
+            self.tare();
+        }
+    }
+
+    /// The force at rest (N, sensor axes), tared.
+    pub fn rest_force(&self) -> Vector3<R> {
+        (self.offset() - self.tare).fixed_rows::<3>(0).into_owned()
+    }
+
+    /// Whether the wrench has been tared.
+    pub fn is_tared(&self) -> bool {
+        self.tared
+    }
+
+    /// Whether the last sample is at the end of the sensor's range, or a gauge has saturated since the sensor's own tare.
+    pub fn is_saturated(&self) -> bool {
+        self.saturated || self.full_scale != FullScale::default()
+    }
+
+    /// How many samples in a row were at full scale.
+    pub fn full_scale(&self) -> FullScale {
+        self.full_scale
+    }
+
+    /// Cycles since the last believed sample; `None` if there never was one.
+    pub fn age(&self) -> Option<u8> {
+        self.age
+    }
+
+    /// Magnitude of the last sample's force, unfiltered, without the weight of the hand, tared (N): for the contact threshold,
+    /// which cannot wait for a filter.
+    pub fn raw_force(&self) -> R {
+        if !self.placed {
+            return R::of(0.0);
+        }
+        let felt = self.felt.fixed_rows::<3>(0) - self.tare.fixed_rows::<3>(0);
+        felt.dot(&felt).square_root()
+    }
+
+    /// The wrench of the environment on the robot at the grasp point; zero if none has been measured.
+    pub fn wrench(&self, frames: &Frames<R>) -> Wrench<R> {
+        if !self.placed {
+            return Wrench::zero();
+        }
+        let felt = self.filter.output() - self.tare;
+        let to_world = frames.sensor_to_world();
+        let force = to_world * Vector3::new(felt[0], felt[1], felt[2]);
+        let torque = to_world * Vector3::new(felt[3], felt[4], felt[5]) + frames.tool_to_sensor().cross(&force);
+        Wrench { force, torque: frames.tool_to_world().tr_mul(&torque) }
+    }
+}
+
+impl<R: Real> Default for WrenchEstimator<R> {
+    fn default() -> Self {
+        WrenchEstimator::new()
+    }
+}

@@ -1,0 +1,211 @@
+//! Open loop against adaptation, trial by trial: the same cell, the same arm, the same noise.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::mode::Mode;
+use super::outcome::Measures;
+use super::results::{Report, Results};
+use super::scenario::Scenario;
+use super::statistics::quantile;
+
+/// Something that should be smaller with adaptation.
+#[derive(Debug, Clone, Copy)]
+pub struct Quantity {
+    /// What it is.
+    pub name: &'static str,
+    /// Its unit in tables and figures.
+    pub unit: &'static str,
+    /// Factor from the measure to that unit.
+    pub scale: f64,
+    /// Share of open loop below which adaptation should stay.
+    pub bar: f64,
+    /// Its value in a trial, SI.
+    pub value: fn(&Measures) -> f64,
+}
+
+const PUSH: Quantity = Quantity {
+    name: "pushed before the fingers close",
+    unit: "cm",
+    scale: 100.0,
+    bar: 1.0 / 3.0,
+    value: |measures| measures.push_m,
+};
+const CONTACT: Quantity = Quantity {
+    name: "mean force on the object from touch until the fingers close",
+    unit: "N",
+    scale: 1.0,
+    bar: 0.5,
+    value: |measures| measures.contact_mean_n,
+};
+const TABLE: Quantity = Quantity {
+    name: "force of the hand on the table",
+    unit: "N",
+    scale: 1.0,
+    bar: 0.25,
+    value: |measures| measures.table_peak_n,
+};
+
+/// What an experiment compares; the first quantities decide.
+pub fn quantities(scenario: Scenario) -> &'static [Quantity] {
+    match scenario {
+        Scenario::Flashlight | Scenario::Cup => &[PUSH, CONTACT],
+        Scenario::Bottle => &[TABLE],
+        Scenario::Lift | Scenario::Fingers => &[],
+    }
+}
+
+/// One quantity, adaptation relative to open loop.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Ratio {
+    /// What it is.
+    pub name: &'static str,
+    /// Share of open loop below which adaptation should stay.
+    pub bar: f64,
+    /// Share of the trials in which it does.
+    pub below: f64,
+    /// Median of the ratio.
+    pub median: f64,
+    /// Its largest value.
+    pub max: f64,
+    /// Median in open loop and with adaptation, SI.
+    pub medians: [f64; 2],
+    /// Ratio of each trial that is compared: cell, seed, ratio.
+    pub trials: Vec<(String, u64, f64)>,
+}
+
+/// Open loop against adaptation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Pairs of trials that are compared.
+    pub pairs: usize,
+    /// Pairs that are left out because nothing is met in open loop.
+    pub left_out: usize,
+    /// Each quantity.
+    pub ratios: Vec<Ratio>,
+    /// Share of the pairs in which all quantities stay below their bars.
+    pub all_below: f64,
+}
+
+impl Comparison {
+    /// Compares; `None` if there is nothing to compare.
+    pub fn of(results: &Results, scenario: Scenario) -> Option<Comparison> {
+        let quantities = quantities(scenario);
+        let pairs: Vec<(&Report, &Report)> = results
+            .of(Mode::OpenLoop)
+            .filter_map(|open| {
+                let same = |report: &&Report| (report.key.index, report.key.seed) == (open.key.index, open.key.seed);
+                results.of(Mode::Adaptive).find(same).map(|adapted| (open, adapted))
+            })
+            .collect();
+        let all = pairs.len();
+        let pairs: Vec<_> = pairs.into_iter().filter(|(open, _)| meets(open, scenario)).collect();
+        if pairs.is_empty() || quantities.is_empty() {
+            return None;
+        }
+        let share = |count: usize| count as f64 / pairs.len() as f64;
+        let ratio = |quantity: &Quantity, (open, adapted): &(&Report, &Report)| {
+            (quantity.value)(&adapted.measures) / (quantity.value)(&open.measures).max(f64::MIN_POSITIVE)
+        };
+        let ratios = quantities.iter().map(|quantity| {
+            let values: Vec<f64> = pairs.iter().map(|pair| ratio(quantity, pair)).collect();
+            let median = |values: &[f64]| quantile(values, 0.5).unwrap_or(0.0);
+            let of = |pick: fn(&(&Report, &Report)) -> Measures| {
+                median(&pairs.iter().map(|pair| (quantity.value)(&pick(pair))).collect::<Vec<_>>())
+            };
+            Ratio {
+                name: quantity.name,
+                bar: quantity.bar,
+                below: share(values.iter().filter(|value| **value < quantity.bar).count()),
+                median: median(&values),
+                max: values.iter().copied().fold(0.0, f64::max),
+                medians: [of(|(open, _)| open.measures), of(|(_, adapted)| adapted.measures)],
+                trials: pairs
+                    .iter()
+                    .zip(&values)
+                    .map(|((open, _), value)| (open.key.cell.to_string(), open.key.seed, *value))
+                    .collect(),
+            }
+        });
+        let below = |pair: &&(&Report, &Report)| quantities.iter().all(|quantity| ratio(quantity, pair) < quantity.bar);
+        Some(Comparison {
+            pairs: pairs.len(),
+            left_out: all - pairs.len(),
+            ratios: ratios.collect(),
+            all_below: share(pairs.iter().filter(below).count()),
+        })
+    }
+}
+
+/// Whether open loop meets at all what the comparison is about.
+fn meets(open: &Report, scenario: Scenario) -> bool {
+    let measures = &open.measures;
+    match scenario {
+        Scenario::Bottle => measures.table_peak_n > 0.0,
+        _ => measures.touch_s.is_some_and(|touch| touch < measures.closing_s),
+    }
+}
+
+impl fmt::Display for Comparison {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let left_out = match self.left_out {
+            0 => String::new(),
+            1 => "; 1 is left out because open loop meets nothing there".to_owned(),
+            n => format!("; {n} are left out because open loop meets nothing there"),
+        };
+        writeln!(formatter, "(c) relative to (a), {} pairs of trials{left_out}", self.pairs)?;
+        for ratio in &self.ratios {
+            writeln!(
+                formatter,
+                "  {}: below {:.2} of (a) in {:.0} % of the pairs; median {:.2}, largest {:.2}",
+                ratio.name,
+                ratio.bar,
+                100.0 * ratio.below,
+                ratio.median,
+                ratio.max
+            )?;
+        }
+        if self.ratios.len() > 1 {
+            writeln!(formatter, "  all of these: {:.0} % of the pairs", 100.0 * self.all_below)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made_up;
+
+    #[test]
+    fn what_open_loop_does_not_meet_is_left_out_and_said_so() {
+        let mut results = made_up::results(&[1]);
+        for report in &mut results.reports {
+            let adapted = report.key.mode == Mode::Adaptive;
+            report.measures.push_m = if adapted { 0.01 } else { 0.04 };
+            report.measures.contact_mean_n = match (adapted, report.key.index) {
+                (false, _) => 10.0,
+                (true, 1) => 6.0,
+                (true, _) => 4.0,
+            };
+            if report.key.index == 0 && !adapted {
+                report.measures.touch_s = None;
+            }
+        }
+        let comparison = Comparison::of(&results, Scenario::Cup).unwrap();
+        assert_eq!((comparison.pairs, comparison.left_out), (47, 1));
+        assert_eq!(comparison.ratios[0].below, 1.0);
+        assert!((comparison.ratios[0].median - 0.25).abs() < 1e-12);
+        assert!((comparison.all_below - 46.0 / 47.0).abs() < 1e-12, "one cell is touched too hard");
+        let text = comparison.to_string();
+        assert!(text.contains("1 is left out") && text.contains("median 0.40, largest 0.60"), "{text}");
+    }
+
+    #[test]
+    fn one_mode_alone_is_compared_with_nothing() {
+        let mut results = made_up::results(&[1]);
+        results.reports.retain(|report| report.key.mode == Mode::Adaptive);
+        assert_eq!(Comparison::of(&results, Scenario::Cup), None);
+    }
+}

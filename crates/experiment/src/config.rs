@@ -1,0 +1,202 @@
+//! What an experiment consists of, and the hash by which its results are known.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use sim::world::mujoco::{ObjectKind, ObjectSpec, TABLE_TOP};
+
+use super::grid::{ApproachFrame, Cell, Grid};
+use super::mode::Mode;
+use super::outcome::Rule;
+use super::results::{Header, Key};
+use super::scenario::{Object, PlantKind, Scenario};
+use super::seed;
+use super::variation::Variation;
+use lab::demonstration::recording::checksum;
+use lab::plan;
+use lab::primitive_file::PrimitiveFile;
+use lab::simulation::Engine;
+use lab::transport::ChipOptions;
+
+/// Version of what a trial is: results of another one cannot be continued.
+const VERSION: u32 = 1;
+
+/// An experiment.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// Which.
+    pub scenario: Scenario,
+    /// What stands on the table.
+    pub object: Object,
+    /// Where.
+    pub grid: Grid,
+    /// How the primitive is played.
+    pub modes: Vec<Mode>,
+    /// With which seeds.
+    pub seeds: Vec<u64>,
+    /// What executes the co-controller's application.
+    pub engine: Engine,
+    /// How well the model fits.
+    pub plant: PlantKind,
+    /// What differs from that plant.
+    pub variation: Variation,
+    /// The primitive.
+    pub primitive: PrimitiveFile,
+    /// Simulations at a time.
+    pub jobs: usize,
+    /// Folder of the results; `None` keeps them in memory.
+    pub out: Option<PathBuf>,
+    /// Go on with the results that are there.
+    pub resume: bool,
+    /// Take the results that are there for all: no trials.
+    pub as_it_is: bool,
+    /// Keep what pictures and time series need of the first seed's trials.
+    pub keep_traces: bool,
+    /// Write every trial's telemetry into the folder.
+    pub keep_recordings: bool,
+}
+
+impl Config {
+    /// The scenario as it is meant: all modes, seed 1, in this process, the honest plant, all processors, nothing on disk.
+    pub fn new(scenario: Scenario, primitive: PrimitiveFile) -> Config {
+        Config {
+            scenario,
+            object: scenario.object(),
+            grid: scenario.grid(),
+            modes: scenario.modes(),
+            seeds: vec![1],
+            engine: Engine::InProcess,
+            plant: PlantKind::Honest,
+            variation: Variation::default(),
+            primitive,
+            jobs: std::thread::available_parallelism().map_or(1, usize::from),
+            out: None,
+            resume: false,
+            as_it_is: false,
+            keep_traces: false,
+            keep_recordings: false,
+        }
+    }
+
+    /// All trials, in the order in which they are tried: cell by cell, so that a broken off experiment has complete cells.
+    pub fn keys(&self) -> Vec<Key> {
+        let cells = || self.grid.cells.iter().copied().enumerate();
+        let trial = |seed: u64| {
+            cells().flat_map(move |(index, cell)| self.modes.iter().map(move |&mode| Key { index, cell, mode, seed }))
+        };
+        self.seeds.iter().flat_map(|&seed| trial(seed)).collect()
+    }
+
+    /// The frame of the approach: its goal is where the primitive ends (where its fingers close, for one that lifts), its direction that of
+    /// the hand's z axis there; of a grasp from above, where the hand comes from.
+    ///
+    /// `None` for a primitive that cannot be played.
+    pub fn frame(&self) -> Option<ApproachFrame> {
+        let [x, y, _] = self.primitive.goal.position;
+        let [w, a, b, c] = self.primitive.goal.orientation;
+        // The third column of the rotation matrix.
+        let axis = [2.0 * (a * c + w * b), 2.0 * (b * c - w * a)];
+        let direction = if axis[0].hypot(axis[1]) > 0.5 {
+            axis
+        } else {
+            let start = self.primitive.start.position;
+            [x - start[0], y - start[1]]
+        };
+        // The object's place in the lesson: the grasp point need not end in its axis.
+        let short = self.scenario.lesson().short_of_object() / direction[0].hypot(direction[1]);
+        ApproachFrame::new([x + short * direction[0], y + short * direction[1]], direction)
+    }
+
+    /// The object in a cell.
+    pub fn object_at(&self, frame: &ApproachFrame, cell: Cell) -> ObjectSpec {
+        let usual = ObjectSpec::new(match self.object {
+            Object::Flashlight => ObjectKind::Flashlight,
+            Object::SmallTorch => ObjectKind::SmallTorch,
+            Object::Cup => ObjectKind::Cup,
+            Object::Bottle => ObjectKind::Bottle,
+            Object::Weight => ObjectKind::Weight,
+            Object::PaperCup => ObjectKind::PaperCup,
+        });
+        ObjectSpec {
+            mass: usual.mass * self.variation.mass,
+            table_friction: usual.table_friction * self.variation.table_friction,
+            finger_friction: usual.finger_friction * self.variation.finger_friction,
+            ..usual.at(frame.world(cell))
+        }
+    }
+
+    /// By what a trial is judged.
+    pub fn rule(&self) -> Rule {
+        Rule { upright: self.object != Object::Bottle }
+    }
+
+    /// Horizontal force at the height of the grasp that tips the object over, N; `None` for what lies, or slides before it tips.
+    pub fn tipping_force(&self) -> Option<f64> {
+        let object = self.object_at(&self.frame()?, Cell::default());
+        let tips = object.toppling_force(self.grasp_height());
+        (self.rule().upright && tips < object.table_friction * object.mass * 9.81).then_some(tips)
+    }
+
+    /// Height over the table at which the hand meets the object, m.
+    fn grasp_height(&self) -> f64 {
+        (self.closing_position()[2] - TABLE_TOP).max(0.01)
+    }
+
+    /// Where the plan is when the fingers begin to close, m: the goal, but for a movement that goes on from there.
+    fn closing_position(&self) -> [f64; 3] {
+        let goal = self.primitive.goal;
+        let start = self.primitive.start.hand;
+        let references = self.primitive.to_primitive().ok().and_then(|primitive| plan::roll_out(&primitive).ok());
+        let closing = references
+            .unwrap_or_default()
+            .into_iter()
+            .find(|reference| (1..4).any(|finger| (reference.hand.x[finger] - start[finger]).abs() > 0.05));
+        closing.map_or(goal.position, |reference| reference.position.x)
+    }
+
+    /// What the results belong to. Modes and seeds do not count: more of them may be added later.
+    pub fn header(&self) -> Header {
+        let frame = self.frame().unwrap_or(ApproachFrame { goal: [0.0; 2], direction: [1.0, 0.0] });
+        let cells: Vec<String> = self.grid.cells.iter().map(Cell::to_string).collect();
+        let engine = match &self.engine {
+            Engine::InProcess => "in this process".to_owned(),
+            Engine::Qemu { image } | Engine::Hand { image } => format!("{} under QEMU", firmware(image)),
+            Engine::Board(board) => {
+                let given =
+                    if board.chip == ChipOptions::default() { String::new() } else { format!(", {:?}", board.chip) };
+                format!("{} on the emulated board{given}", firmware(&board.image))
+            }
+        };
+        let variation = self.variation.to_string();
+        let described: BTreeMap<String, String> = [
+            ("object", self.object.name().to_owned()),
+            ("cells", cells.join(" ")),
+            ("engine", engine),
+            ("plant", self.plant.name().to_owned()),
+            ("variation", if variation.is_empty() { "none".to_owned() } else { variation }),
+            ("primitive", format!("{} 0x{:08x}", self.primitive.name, self.primitive.checksum())),
+            ("goal", format!("{:.4} {:.4}", frame.goal[0], frame.goal[1])),
+            ("model", format!("0x{:08x}", control::MODEL_HASH)),
+            ("program", format!("{} trial {VERSION}", env!("CARGO_PKG_VERSION"))),
+        ]
+        .into_iter()
+        .map(|(name, value)| (name.to_owned(), value))
+        .collect();
+        let text = described.iter().map(|(name, value)| format!("{name}={value}\n")).collect::<String>();
+        Header {
+            experiment: self.scenario.name().to_owned(),
+            configuration: format!("{:08x}", checksum(text.as_bytes())),
+            described,
+        }
+    }
+
+    /// Seed of a trial.
+    pub fn trial_seed(&self, key: &Key) -> u64 {
+        seed::of_trial(key.seed, key.cell)
+    }
+}
+
+/// The image by its checksum.
+fn firmware(image: &Path) -> String {
+    format!("firmware 0x{:08x}", checksum(&std::fs::read(image).unwrap_or_default()))
+}

@@ -1,0 +1,322 @@
+//! A free page for figures that are no panels of curves: shapes and text in pixels, and frames with axes in the data's units.
+//!
+//! The look is that of `plot::canvas`: white page, thin open axes, grey grid, the font shipped with the plotting crate, and the Okabe-Ito
+//! colours that people with any kind of colour blindness tell apart. These two files are the only ones that know the plotting crate.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use kuva::backend::raster::RasterBackend;
+use kuva::backend::svg::SvgBackend;
+use kuva::render::color::Color;
+use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
+
+use crate::mode::Mode;
+use lab::plot::PlotError;
+
+/// A colour as `#rrggbb`.
+pub type Colour = &'static str;
+
+/// Text and marks.
+pub const INK: Colour = "#222222";
+/// Axes, secondary text.
+pub const GREY: Colour = "#666666";
+/// Grid lines.
+pub const GRID: Colour = "#e6e6e6";
+/// Nothing was achieved here.
+pub const PALE: Colour = "#ededed";
+/// Expected range.
+pub const BAND: Colour = "#d9d9d9";
+/// Limits.
+pub const LIMIT: Colour = "#000000";
+
+/// The colour of a mode, the same in every figure.
+pub fn colour(mode: Mode) -> Colour {
+    match mode {
+        Mode::OpenLoop => "#D55E00",
+        Mode::ForceControl => "#E9B44C",
+        Mode::Adaptive => "#0072B2",
+        Mode::RigidFingers => "#009E73",
+    }
+}
+
+/// Where a text stands relative to its point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Anchor {
+    /// It begins there.
+    Start,
+    /// Its middle is there.
+    Middle,
+    /// It ends there.
+    End,
+}
+
+/// A page in the making; pixels, y downwards.
+pub struct Drawing {
+    scene: Scene,
+}
+
+impl Drawing {
+    /// An empty white page.
+    pub fn new(width: f64, height: f64) -> Drawing {
+        Drawing { scene: Scene::new(width, height) }
+    }
+
+    /// A filled rectangle without outline.
+    pub fn rectangle(&mut self, [x, y]: [f64; 2], [width, height]: [f64; 2], fill: Colour) {
+        self.scene.elements.push(Primitive::Rect {
+            x,
+            y,
+            width,
+            height,
+            fill: fill.into(),
+            stroke: None,
+            stroke_width: None,
+            opacity: None,
+        });
+    }
+
+    /// A disc, or a ring if `fill` is `None`.
+    pub fn circle(&mut self, [cx, cy]: [f64; 2], r: f64, fill: Option<Colour>, outline: Option<(Colour, f64)>) {
+        self.scene.elements.push(Primitive::Circle {
+            cx,
+            cy,
+            r,
+            fill: fill.unwrap_or("#ffffff").into(),
+            fill_opacity: fill.is_none().then_some(0.0),
+            stroke: outline.map(|(colour, _)| colour.into()),
+            stroke_width: outline.map(|(_, width)| width),
+        });
+    }
+
+    /// A line through points.
+    pub fn line(&mut self, points: &[[f64; 2]], colour: Colour, width: f64) {
+        self.scene.elements.push(Primitive::PolyLine {
+            points: points.iter().map(|[x, y]| (*x, *y)).collect(),
+            stroke: colour.into(),
+            stroke_width: width,
+            stroke_dasharray: None,
+        });
+    }
+
+    /// A dashed line through points, cut into dashes here: the plotting crate would begin the pattern anew at every point.
+    pub fn dashed(&mut self, points: &[[f64; 2]], colour: Colour, width: f64, pattern: [f64; 2]) {
+        let (mut piece, mut drawing, mut left) = (Vec::new(), true, pattern[0]);
+        piece.extend(points.first().copied());
+        for pair in points.windows(2) {
+            let (from, to) = (pair[0], pair[1]);
+            let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+            let mut done = 0.0;
+            while length - done > left {
+                done += left;
+                let at = [0, 1].map(|axis| from[axis] + done / length * (to[axis] - from[axis]));
+                if drawing {
+                    piece.push(at);
+                    self.line(&std::mem::take(&mut piece), colour, width);
+                } else {
+                    piece = vec![at];
+                }
+                drawing = !drawing;
+                left = if drawing { pattern[0] } else { pattern[1] };
+            }
+            left -= length - done;
+            if drawing {
+                piece.push(to);
+            }
+        }
+        if drawing && piece.len() > 1 {
+            self.line(&piece, colour, width);
+        }
+    }
+
+    /// A filled polygon.
+    pub fn polygon(&mut self, points: &[[f64; 2]], fill: Colour) {
+        let mut d = String::new();
+        for (index, [x, y]) in points.iter().enumerate() {
+            // Writing into a String cannot fail.
+            let _ = write!(d, "{}{x:.2} {y:.2} ", if index == 0 { "M " } else { "L " });
+        }
+        d.push('Z');
+        self.scene.elements.push(Primitive::Path(Box::new(PathData {
+            d,
+            fill: Some(fill.into()),
+            stroke: Color::None,
+            stroke_width: 0.0,
+            opacity: None,
+            stroke_dasharray: None,
+        })));
+    }
+
+    /// An arrow with a filled head.
+    pub fn arrow(&mut self, from: [f64; 2], to: [f64; 2], colour: Colour, width: f64) {
+        let length = (to[0] - from[0]).hypot(to[1] - from[1]).max(1e-9);
+        let [c, s] = [(to[0] - from[0]) / length, (to[1] - from[1]) / length];
+        let (head, half) = (5.0 * width, 2.2 * width);
+        let neck = [to[0] - head * c, to[1] - head * s];
+        self.line(&[from, neck], colour, width);
+        self.polygon(&[to, [neck[0] - half * s, neck[1] + half * c], [neck[0] + half * s, neck[1] - half * c]], colour);
+    }
+
+    /// A cross.
+    pub fn cross(&mut self, [x, y]: [f64; 2], half: f64, colour: Colour, width: f64) {
+        self.line(&[[x - half, y - half], [x + half, y + half]], colour, width);
+        self.line(&[[x - half, y + half], [x + half, y - half]], colour, width);
+    }
+
+    /// A line of text on the baseline `y`.
+    pub fn text(&mut self, [x, y]: [f64; 2], content: impl Into<String>, size: u32, anchor: Anchor, colour: Colour) {
+        self.put_text([x, y], content.into(), size, anchor, colour, None);
+    }
+
+    /// A line of text that reads upwards, its middle at the point.
+    pub fn upward_text(&mut self, at: [f64; 2], content: impl Into<String>, size: u32, colour: Colour) {
+        self.put_text(at, content.into(), size, Anchor::Middle, colour, Some(-90.0));
+    }
+
+    fn put_text(
+        &mut self,
+        [x, y]: [f64; 2],
+        content: String,
+        size: u32,
+        anchor: Anchor,
+        colour: Colour,
+        rotate: Option<f64>,
+    ) {
+        let anchor = match anchor {
+            Anchor::Start => TextAnchor::Start,
+            Anchor::Middle => TextAnchor::Middle,
+            Anchor::End => TextAnchor::End,
+        };
+        let color = Some(colour.into());
+        self.scene.elements.push(Primitive::Text { x, y, content, size, anchor, rotate, bold: false, color });
+    }
+
+    /// The page as SVG with its font inside.
+    pub fn to_svg(&self) -> String {
+        SvgBackend::new().with_embedded_font(true).render_scene(&self.scene)
+    }
+
+    /// Writes the page as `NAME.svg` and `NAME.png` into `folder`.
+    ///
+    /// # Errors
+    /// [`PlotError`]
+    pub fn write(&self, folder: &Path, name: &str) -> Result<(), PlotError> {
+        let png = folder.join(format!("{name}.png"));
+        let pixels = RasterBackend::new()
+            .with_scale(1.5)
+            .render_scene(&self.scene)
+            .map_err(|reason| PlotError::Encode { file: png.clone(), reason })?;
+        for (file, bytes) in [(folder.join(format!("{name}.svg")), self.to_svg().into_bytes()), (png, pixels)] {
+            std::fs::write(&file, bytes).map_err(|cause| PlotError::Write { file, cause })?;
+        }
+        Ok(())
+    }
+}
+
+/// A rectangle of the page with the axes of data.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Upper left corner on the page, px.
+    pub corner: [f64; 2],
+    /// Width and height on the page, px.
+    pub size: [f64; 2],
+    /// Range of x.
+    pub x: [f64; 2],
+    /// Range of y, upwards.
+    pub y: [f64; 2],
+}
+
+impl Frame {
+    /// Point on the page of a point of the data.
+    pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [
+            self.corner[0] + (x - self.x[0]) / (self.x[1] - self.x[0]) * self.size[0],
+            self.corner[1] + (self.y[1] - y) / (self.y[1] - self.y[0]) * self.size[1],
+        ]
+    }
+
+    /// A curve of the data on the page, kept inside the frame.
+    pub fn curve(&self, points: impl IntoIterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
+        points
+            .into_iter()
+            .filter(|[x, y]| y.is_finite() && (self.x[0]..=self.x[1]).contains(x))
+            .map(|[x, y]| self.at([x, y.clamp(self.y[0], self.y[1])]))
+            .collect()
+    }
+
+    /// Grid lines at round values, and what they are.
+    pub fn grid(&self, drawing: &mut Drawing, size: u32, count: [usize; 2]) {
+        for tick in ticks(self.x, count[0]) {
+            let [x, _] = self.at([tick, self.y[0]]);
+            drawing.line(&[[x, self.corner[1]], [x, self.bottom()]], GRID, 1.0);
+            drawing.text([x, self.bottom() + f64::from(size) + 5.0], plain(tick), size, Anchor::Middle, GREY);
+        }
+        for tick in ticks(self.y, count[1]) {
+            let [_, y] = self.at([self.x[0], tick]);
+            drawing.line(&[[self.corner[0], y], [self.right(), y]], GRID, 1.0);
+            drawing.text([self.corner[0] - 7.0, y + 0.36 * f64::from(size)], plain(tick), size, Anchor::End, GREY);
+        }
+    }
+
+    /// The open axes: left and bottom.
+    pub fn axes(&self, drawing: &mut Drawing) {
+        let foot = [self.corner[0], self.bottom()];
+        drawing.line(&[self.corner, foot, [self.right(), self.bottom()]], "#444444", 1.2);
+    }
+
+    /// Right end, px.
+    pub fn right(&self) -> f64 {
+        self.corner[0] + self.size[0]
+    }
+
+    /// Lower end, px.
+    pub fn bottom(&self) -> f64 {
+        self.corner[1] + self.size[1]
+    }
+}
+
+/// Round values within a range, about `count` of them.
+pub fn ticks([low, high]: [f64; 2], count: usize) -> Vec<f64> {
+    let raw = (high - low).max(f64::MIN_POSITIVE) / count.max(1) as f64;
+    let power = 10_f64.powf(raw.log10().floor());
+    let step =
+        [1.0, 2.0, 5.0, 10.0].into_iter().map(|part| part * power).find(|step| *step >= raw * 0.999).unwrap_or(raw);
+    let first = (low / step - 1e-9).ceil() as i64;
+    let last = (high / step + 1e-9).floor() as i64;
+    (first..=last).map(|index| index as f64 * step).collect()
+}
+
+/// A number without exponent and needless zeros, with a real minus sign.
+pub fn plain(value: f64) -> String {
+    let text = format!("{value:.4}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.replace('-', "\u{2212}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        assert_eq!(ticks([-2.6, 4.2], 4), [-2.0, 0.0, 2.0, 4.0]);
+        assert_eq!(ticks([0.0, 12.0], 6), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0]);
+        assert!(ticks([0.003, 0.0042], 3).iter().all(|tick| (0.003..=0.0042).contains(tick)));
+    }
+
+    #[test]
+    fn up_in_the_data_is_up_on_the_page() {
+        let frame = Frame { corner: [10.0, 20.0], size: [100.0, 50.0], x: [-1.0, 1.0], y: [0.0, 5.0] };
+        assert_eq!(frame.at([-1.0, 5.0]), [10.0, 20.0]);
+        assert_eq!(frame.at([1.0, 0.0]), [110.0, 70.0]);
+        let curve = frame.curve([[0.0, 9.0], [3.0, 1.0], [0.5, f64::NAN], [1.0, 1.0]]);
+        assert_eq!(curve, [[60.0, 20.0], [110.0, 60.0]], "cut at the top, nothing beside the frame");
+    }
+
+    #[test]
+    fn numbers_are_plain() {
+        assert_eq!(plain(-0.25), "\u{2212}0.25");
+        assert_eq!(plain(-0.0), "0");
+        assert_eq!(plain(12.0), "12");
+    }
+}

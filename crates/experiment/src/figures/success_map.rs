@@ -1,0 +1,164 @@
+//! Where the object could stand and was still grasped: the paper's figure 5, with three regions.
+
+use super::drawing::{Anchor, Colour, Drawing, Frame, GREY, INK, PALE, colour, plain};
+use crate::grid::Grid;
+use crate::map::short;
+use crate::mode::Mode;
+use crate::results::Results;
+
+/// Pixels per millimetre of the grid.
+const SCALE: f64 = 2.75;
+/// White between two cells, px.
+const GAP: f64 = 3.0;
+const LEFT: f64 = 150.0;
+const TOP: f64 = 110.0;
+const LEGEND: f64 = 470.0;
+
+/// The map of an experiment; `title` says what was grasped, `radius` is the object's, m.
+///
+/// A cell is filled by the simplest mode that held the object there; where the seeds differ it is divided in their proportion.
+pub fn draw(results: &Results, grid: &Grid, title: &str, radius: f64) -> Drawing {
+    let (columns, rows) = (grid.columns(), grid.rows());
+    let pitch = [pitch(&columns), pitch(&rows)];
+    let range = |values: &[i32], pitch: f64| {
+        let (low, high) = values.iter().fold((i32::MAX, i32::MIN), |(low, high), &v| (low.min(v), high.max(v)));
+        [f64::from(low) - 0.5 * pitch, f64::from(high) + 0.5 * pitch]
+    };
+    let (x, y) = (range(&columns, pitch[0]), range(&rows, pitch[1]));
+    let size = [(x[1] - x[0]) * SCALE, (y[1] - y[0]) * SCALE];
+    let frame = Frame { corner: [LEFT, TOP], size, x, y };
+    let mut drawing = Drawing::new(LEFT + size[0] + LEGEND, (TOP + size[1] + 90.0).max(TOP + 350.0));
+    drawing.text([LEFT, 48.0], title, 26, Anchor::Start, INK);
+    let seeds = results.seeds().len();
+    let tried = format!(
+        "{} positions, {} modes, {seeds} {}",
+        grid.cells.len(),
+        results.modes().len(),
+        if seeds == 1 { "seed" } else { "seeds" }
+    );
+    drawing.text([LEFT, 78.0], tried, 16, Anchor::Start, GREY);
+    for (index, cell) in grid.cells.iter().enumerate() {
+        let middle = frame.at([f64::from(cell.along_mm), f64::from(cell.sideways_mm)]);
+        let side = pitch.map(|pitch| pitch * SCALE - GAP);
+        let mut left = middle[0] - side[0] / 2.0;
+        for (share, fill) in parts(results, index) {
+            drawing.rectangle([left, middle[1] - side[1] / 2.0], [share * side[0], side[1]], fill);
+            left += share * side[0];
+        }
+    }
+    axis_labels(&mut drawing, &frame, &columns, &rows);
+    goal(&mut drawing, &frame, radius);
+    let arrow = frame.at([frame.x[0], 0.0]);
+    drawing.arrow([arrow[0] - 112.0, arrow[1]], [arrow[0] - 62.0, arrow[1]], INK, 4.0);
+    legend(&mut drawing, results, grid, [frame.right() + 44.0, TOP + 6.0]);
+    drawing
+}
+
+/// Largest side of a cell, mm: where cells are farther apart, nothing is known of what is between them.
+const LARGEST: i32 = 40;
+
+/// Distance between neighbouring columns or rows, mm.
+fn pitch(values: &[i32]) -> f64 {
+    let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    f64::from(steps.min().unwrap_or(LARGEST).min(LARGEST))
+}
+
+/// Shares of a cell by the simplest mode that holds there, and what is left.
+fn parts(results: &Results, index: usize) -> Vec<(f64, Colour)> {
+    let mut parts = Vec::new();
+    let mut done = 0.0;
+    for mode in results.modes() {
+        let share = results.success_share(mode, index).unwrap_or(0.0);
+        if share > done + 1e-9 {
+            parts.push((share - done, colour(mode)));
+            done = share;
+        }
+    }
+    if done < 1.0 - 1e-9 {
+        parts.push((1.0 - done, PALE));
+    }
+    parts
+}
+
+fn axis_labels(drawing: &mut Drawing, frame: &Frame, columns: &[i32], rows: &[i32]) {
+    let cm = |millimetres: i32| plain(f64::from(millimetres) * 0.1);
+    for &column in columns.iter() {
+        let [x, _] = frame.at([f64::from(column), 0.0]);
+        drawing.text([x, frame.bottom() + 24.0], cm(column), 16, Anchor::Middle, GREY);
+    }
+    for &row in rows {
+        let [_, y] = frame.at([0.0, f64::from(row)]);
+        drawing.text([frame.corner[0] - 10.0, y + 6.0], cm(row), 16, Anchor::End, GREY);
+    }
+    let middle = frame.corner[0] + frame.size[0] / 2.0;
+    drawing.text([middle, frame.bottom() + 54.0], "object along the approach, cm", 17, Anchor::Middle, INK);
+    drawing.upward_text([26.0, frame.corner[1] + frame.size[1] / 2.0], "object sideways, cm", 17, INK);
+}
+
+/// The object where the primitive expects it.
+fn goal(drawing: &mut Drawing, frame: &Frame, radius: f64) {
+    let at = frame.at([0.0, 0.0]);
+    drawing.circle(at, radius * 1e3 * SCALE, None, Some(("#ffffff", 5.0)));
+    drawing.circle(at, radius * 1e3 * SCALE, None, Some((INK, 2.2)));
+    drawing.circle(at, 4.0, Some(INK), None);
+}
+
+fn legend(drawing: &mut Drawing, results: &Results, grid: &Grid, [x, top]: [f64; 2]) {
+    let text = x + 40.0;
+    let mut y = top;
+    drawing.text([x, y + 16.0], "held after lifting by 10 cm for 2 s", 17, Anchor::Start, INK);
+    y += 38.0;
+    for (rank, mode) in results.modes().into_iter().enumerate() {
+        drawing.rectangle([x, y], [28.0, 28.0], colour(mode));
+        let words = match (mode, rank) {
+            (Mode::OpenLoop, _) => "already in open loop",
+            (Mode::ForceControl, _) => "with force control",
+            (Mode::Adaptive, _) => "only with adaptation of the movement",
+            (Mode::RigidFingers, _) => "only if the fingers do not adapt",
+        };
+        drawing.text([text, y + 13.0], words, 16, Anchor::Start, INK);
+        let count = format!("this mode: {} of {}", short(results.success_count(mode)), grid.cells.len());
+        drawing.text([text, y + 32.0], count, 15, Anchor::Start, GREY);
+        y += 54.0;
+    }
+    drawing.rectangle([x, y], [28.0, 28.0], PALE);
+    drawing.text([text, y + 19.0], "in no mode", 16, Anchor::Start, INK);
+    y += 50.0;
+    drawing.circle([x + 14.0, y + 8.0], 14.0, None, Some((INK, 2.2)));
+    drawing.circle([x + 14.0, y + 8.0], 3.5, Some(INK), None);
+    drawing.text([text, y + 14.0], "where the primitive expects the object", 16, Anchor::Start, INK);
+    y += 40.0;
+    drawing.arrow([x - 2.0, y + 8.0], [x + 30.0, y + 8.0], INK, 3.0);
+    drawing.text([text, y + 14.0], "direction in which the hand arrives", 16, Anchor::Start, INK);
+    if results.seeds().len() > 1 {
+        drawing.text([x, y + 50.0], "Where seeds differ a cell is divided in proportion.", 14, Anchor::Start, GREY);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made_up;
+    use crate::outcome::Outcome;
+
+    #[test]
+    fn a_cell_goes_to_the_simplest_mode_and_is_divided_where_seeds_differ() {
+        let mut results = made_up::results(&[1, 2]);
+        for report in results.reports.iter_mut().filter(|report| report.key.index == 5) {
+            let held = match report.key.mode {
+                Mode::OpenLoop => false,
+                Mode::ForceControl => report.key.seed == 1,
+                Mode::Adaptive | Mode::RigidFingers => true,
+            };
+            report.outcome = if held { Outcome::Held } else { Outcome::Missed };
+        }
+        assert_eq!(parts(&results, 5), [(0.5, colour(Mode::ForceControl)), (0.5, colour(Mode::Adaptive))]);
+        assert_eq!(parts(&results, 999), [(1.0, PALE)]);
+    }
+
+    #[test]
+    fn the_map_is_a_picture() {
+        let svg = draw(&made_up::results(&[1, 2]), &Grid::paper(), "Torch", 0.028).to_svg();
+        assert!(svg.contains("object along the approach, cm") && svg.contains("of 48"));
+    }
+}

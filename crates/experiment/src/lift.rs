@@ -1,0 +1,136 @@
+//! The experiment with a weight: what is expected to be heavy is carried as high as what is light.
+//!
+//! One movement, two memories: rehearsed with the usual weight, and with one that is 0.3 kg heavier. Each is then carried with the
+//! memory of it, and the heavier one also with the memory of the usual one: what that sags is what the memory is good for.
+
+use serde::Serialize;
+
+use super::config::Config;
+use super::lesson::{self, LessonError};
+use super::results::Results;
+use super::statistics::quantile;
+use lab::client::Interrupt;
+use lab::primitive_file::PrimitiveFile;
+use lab::table::Table;
+use sim::world::mujoco::{ObjectKind, ObjectSpec};
+
+/// How much heavier the heavier one is, kg.
+pub const EXTRA: f64 = 0.3;
+
+/// A weight that is carried, and the weight that is remembered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Case {
+    /// The usual weight, as rehearsed.
+    Usual,
+    /// The heavier one, as rehearsed.
+    Heavier,
+    /// The heavier one, rehearsed with the usual one.
+    Unexpected,
+}
+
+impl Case {
+    /// All cases.
+    pub const ALL: [Case; 3] = [Case::Usual, Case::Heavier, Case::Unexpected];
+
+    /// Its name in folders and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Case::Usual => "usual",
+            Case::Heavier => "heavier",
+            Case::Unexpected => "unexpected",
+        }
+    }
+
+    /// Factors on the usual mass: the remembered and the carried one.
+    fn factors(self) -> [f64; 2] {
+        let usual = ObjectSpec::new(ObjectKind::Weight).mass;
+        let heavier = (usual + EXTRA) / usual;
+        match self {
+            Case::Usual => [1.0, 1.0],
+            Case::Heavier => [heavier, heavier],
+            Case::Unexpected => [1.0, heavier],
+        }
+    }
+
+    /// The experiment of this case; `primitive` is the one rehearsed for it, and `config` that of the usual weight.
+    pub fn config(self, config: &Config, primitive: PrimitiveFile) -> Config {
+        let [_, carried] = self.factors();
+        let mut case = Config { primitive, ..config.clone() };
+        case.variation.mass *= carried;
+        case.out = config.out.as_deref().map(|folder| folder.join(self.name()));
+        case
+    }
+
+    /// The primitive of this case: the same movement, rehearsed with the weight that shall be remembered.
+    ///
+    /// # Errors
+    /// [`LessonError`]
+    pub fn rehearsed(self, config: &Config, interrupt: &Interrupt) -> Result<PrimitiveFile, LessonError> {
+        let [remembered, _] = self.factors();
+        let mut rehearsal = config.clone();
+        rehearsal.variation.mass *= remembered;
+        lesson::rehearsed(&rehearsal, interrupt)
+    }
+
+    /// The case whose rehearsals this one shares.
+    pub fn rehearsed_as(self) -> Case {
+        if self == Case::Unexpected { Case::Usual } else { self }
+    }
+}
+
+/// What one case came to in one mode.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Carried {
+    /// The case.
+    pub case: &'static str,
+    /// Mass that is remembered, kg.
+    pub remembered_kg: f64,
+    /// Mass that is carried, kg.
+    pub carried_kg: f64,
+    /// The mode.
+    pub mode: super::Mode,
+    /// Trials.
+    pub trials: usize,
+    /// Trials in which it was held.
+    pub held: usize,
+    /// How far the hand is below its plan when it has lifted, m: median over the trials.
+    pub sag_median_m: f64,
+    /// The same, the worst trial.
+    pub sag_max_m: f64,
+}
+
+/// The figures of a case, mode by mode.
+pub fn carried(case: Case, results: &Results) -> Vec<Carried> {
+    let usual = ObjectSpec::new(ObjectKind::Weight).mass;
+    let [remembered_kg, carried_kg] = case.factors().map(|factor| factor * usual);
+    let of_mode = |mode| {
+        let sags: Vec<f64> = results.of(mode).map(|report| report.sag_m).collect();
+        Carried {
+            case: case.name(),
+            remembered_kg,
+            carried_kg,
+            mode,
+            trials: sags.len(),
+            held: results.of(mode).filter(|report| report.outcome.is_success()).count(),
+            sag_median_m: quantile(&sags, 0.5).unwrap_or(0.0),
+            sag_max_m: quantile(&sags, 1.0).unwrap_or(0.0),
+        }
+    };
+    results.modes().into_iter().map(of_mode).collect()
+}
+
+/// As a table.
+pub fn table(rows: &[Carried]) -> String {
+    let mut table = Table::new(["mode", "remembered", "carried", "held", "sag, median", "sag, largest"]);
+    for row in rows {
+        table.row([
+            row.mode.to_string(),
+            format!("{:.1} kg", row.remembered_kg),
+            format!("{:.1} kg", row.carried_kg),
+            format!("{} of {}", row.held, row.trials),
+            format!("{:.1} mm", row.sag_median_m * 1e3),
+            format!("{:.1} mm", row.sag_max_m * 1e3),
+        ]);
+    }
+    table.to_string()
+}

@@ -1,0 +1,463 @@
+//! What came out: one report a trial, written as it comes, and read back when an experiment is resumed.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io::{self, BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::grid::Cell;
+use super::mode::Mode;
+use super::outcome::{Measures, Outcome};
+
+/// File of the reports, one a line, in the order in which the trials ended.
+pub const LINES: &str = "results.jsonl";
+
+/// Which trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Key {
+    /// Number of the cell in the grid, from 0.
+    pub index: usize,
+    /// Where the object stands.
+    #[serde(flatten)]
+    pub cell: Cell,
+    /// How the primitive is played.
+    pub mode: Mode,
+    /// Seed of the experiment.
+    pub seed: u64,
+}
+
+/// A surprise that the device reported.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Surprise {
+    /// Phase of the movement.
+    pub phase: f64,
+    /// Sensor channel: force 0 to 2, torque 3 to 5, gauges 6 to 8, fingers 9 to 11.
+    pub channel: u8,
+    /// Time after the start of the movement, s.
+    pub time_s: f64,
+}
+
+/// The way of the hand and of its plan, seen from above, every 0.1 s.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Path2 {
+    /// Measured grasp point, world x and y, m.
+    pub measured: Vec<[f64; 2]>,
+    /// Planned grasp point, world x and y, m.
+    pub planned: Vec<[f64; 2]>,
+}
+
+/// One trial.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// Which trial.
+    #[serde(flatten)]
+    pub key: Key,
+    /// Seed of its plant and noise.
+    pub trial_seed: u64,
+    /// Where the object stood, world x and y, m.
+    pub object: [f64; 2],
+    /// How it ended.
+    #[serde(flatten)]
+    pub outcome: Outcome,
+    /// What happened.
+    #[serde(flatten)]
+    pub measures: Measures,
+    /// Largest displacement of the plan from the taught one, m.
+    pub adaptation_m: f64,
+    /// Largest turn of the plan from the taught one, degrees.
+    pub adaptation_deg: f64,
+    /// How far the hand is below its plan when it has lifted, mean over 1 s, m.
+    pub sag_m: f64,
+    /// First surprise that the device reported.
+    pub surprise: Option<Surprise>,
+    /// Paths.
+    #[serde(default)]
+    pub path: Path2,
+    /// Virtual time of the trial, s.
+    pub virtual_s: f64,
+    /// Time it took on this machine, s; only in `results.jsonl`, because it differs from run to run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wall_s: Option<f64>,
+}
+
+/// First line of the file of reports: what the trials belong to.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Header {
+    /// Name of the experiment.
+    pub experiment: String,
+    /// Hash of everything that decides how a trial ends: only equal ones may share a file.
+    pub configuration: String,
+    /// The configuration in words, for the message when it differs.
+    pub described: BTreeMap<String, String>,
+}
+
+/// Why results cannot be kept.
+#[derive(Debug, thiserror::Error)]
+pub enum ResultsError {
+    /// There are results already, and nobody said to go on with them.
+    #[error("{} holds {trials} trials already", file.display())]
+    Exists {
+        /// The file.
+        file: PathBuf,
+        /// How many.
+        trials: usize,
+    },
+    /// The results that are there belong to another configuration.
+    #[error("{} belongs to another configuration: {}", file.display(), differences.join(", "))]
+    OtherConfiguration {
+        /// The file.
+        file: PathBuf,
+        /// What differs, `was -> is`.
+        differences: Vec<String>,
+    },
+    /// A line is no report.
+    #[error("{}: line {line} is no report: {cause}", file.display())]
+    Line {
+        /// The file.
+        file: PathBuf,
+        /// Its number.
+        line: usize,
+        /// What the reader says.
+        cause: serde_json::Error,
+    },
+    /// The file cannot be read or written.
+    #[error("{}: {cause}", file.display())]
+    File {
+        /// The file.
+        file: PathBuf,
+        /// What the operating system says.
+        #[source]
+        cause: io::Error,
+    },
+}
+
+/// The file of reports, open for more.
+pub struct Log {
+    path: PathBuf,
+    file: File,
+}
+
+impl Log {
+    /// Opens the file in `folder`; gives what it holds if `resume` allows that.
+    ///
+    /// A last line that broke off when the program was ended is cut away: that trial is tried again.
+    ///
+    /// # Errors
+    /// [`ResultsError`]
+    pub fn open(folder: &Path, header: &Header, resume: bool) -> Result<(Log, Vec<Report>), ResultsError> {
+        let path = folder.join(LINES);
+        let failed = |cause| ResultsError::File { file: path.clone(), cause };
+        std::fs::create_dir_all(folder).map_err(failed)?;
+        let (reports, length) = match File::open(&path) {
+            Ok(file) => read(&path, file, header)?,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => (Vec::new(), 0),
+            Err(cause) => return Err(failed(cause)),
+        };
+        if !resume && !reports.is_empty() {
+            return Err(ResultsError::Exists { file: path, trials: reports.len() });
+        }
+        let file = OpenOptions::new().create(true).append(true).open(&path).map_err(failed)?;
+        file.set_len(length).map_err(failed)?;
+        let mut log = Log { path: path.clone(), file };
+        if length == 0 {
+            log.line(header)?;
+        }
+        Ok((log, reports))
+    }
+
+    /// Adds a report. It is on the disk's way when this returns: an ended program loses at most the trials it was in.
+    ///
+    /// # Errors
+    /// [`ResultsError::File`]
+    pub fn add(&mut self, report: &Report) -> Result<(), ResultsError> {
+        self.line(report)
+    }
+
+    fn line(&mut self, content: &impl Serialize) -> Result<(), ResultsError> {
+        let failed = |cause| ResultsError::File { file: self.path.clone(), cause };
+        let mut line = serde_json::to_string(content).map_err(|error| failed(error.into()))?;
+        line.push('\n');
+        self.file.write_all(line.as_bytes()).and_then(|()| self.file.flush()).map_err(failed)
+    }
+}
+
+/// The reports of a file, and the length of the sound part of it.
+fn read(path: &Path, file: File, header: &Header) -> Result<(Vec<Report>, u64), ResultsError> {
+    let mut reader = BufReader::new(file);
+    let mut reports = Vec::new();
+    let (mut text, mut number, mut length) = (String::new(), 0, 0);
+    loop {
+        text.clear();
+        number += 1;
+        let read = reader.read_line(&mut text).map_err(|cause| ResultsError::File { file: path.to_owned(), cause })?;
+        if !text.ends_with('\n') {
+            return Ok((reports, length));
+        }
+        let broken = |cause| ResultsError::Line { file: path.to_owned(), line: number, cause };
+        if number == 1 {
+            let found: Header = serde_json::from_str(&text).map_err(broken)?;
+            if found.configuration != header.configuration || found.experiment != header.experiment {
+                return Err(ResultsError::OtherConfiguration {
+                    file: path.to_owned(),
+                    differences: differences(&found, header),
+                });
+            }
+        } else {
+            reports.push(serde_json::from_str(&text).map_err(broken)?);
+        }
+        length += read as u64;
+    }
+}
+
+fn differences(was: &Header, is: &Header) -> Vec<String> {
+    let none = "-".to_owned();
+    let mut names: Vec<&String> = was.described.keys().chain(is.described.keys()).collect();
+    names.sort();
+    names.dedup();
+    let mut found: Vec<String> = names
+        .into_iter()
+        .map(|name| (name, was.described.get(name).unwrap_or(&none), is.described.get(name).unwrap_or(&none)))
+        .filter(|(_, was, is)| was != is)
+        .map(|(name, was, is)| format!("{name} was {was}, is {is}"))
+        .collect();
+    if was.experiment != is.experiment {
+        found.insert(0, format!("the experiment was {}, is {}", was.experiment, is.experiment));
+    }
+    found
+}
+
+/// All reports of an experiment, in the order of their keys: the same whatever order they came in.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Results {
+    /// The reports.
+    pub reports: Vec<Report>,
+}
+
+impl Results {
+    /// Sorts reports.
+    pub fn new(mut reports: Vec<Report>) -> Results {
+        reports.sort_by_key(|report| report.key);
+        Results { reports }
+    }
+
+    /// The reports of one mode.
+    pub fn of(&self, mode: Mode) -> impl Iterator<Item = &Report> + Clone {
+        self.reports.iter().filter(move |report| report.key.mode == mode)
+    }
+
+    /// The modes that were tried.
+    pub fn modes(&self) -> Vec<Mode> {
+        Mode::ALL.into_iter().filter(|mode| self.of(*mode).next().is_some()).collect()
+    }
+
+    /// The seeds that were tried, ascending.
+    pub fn seeds(&self) -> Vec<u64> {
+        let mut seeds: Vec<u64> = self.reports.iter().map(|report| report.key.seed).collect();
+        seeds.sort_unstable();
+        seeds.dedup();
+        seeds
+    }
+
+    /// Cells in which a mode succeeded, in the mean over the seeds.
+    pub fn success_count(&self, mode: Mode) -> f64 {
+        let successes = self.of(mode).filter(|report| report.outcome.is_success()).count();
+        successes as f64 / self.seeds().len().max(1) as f64
+    }
+
+    /// Share of the seeds with which a mode succeeded in a cell; `None` if it was not tried there.
+    pub fn success_share(&self, mode: Mode, index: usize) -> Option<f64> {
+        let (mut tried, mut held) = (0.0, 0.0);
+        for report in self.of(mode).filter(|report| report.key.index == index) {
+            tried += 1.0;
+            held += f64::from(u8::from(report.outcome.is_success()));
+        }
+        (tried > 0.0).then(|| held / tried)
+    }
+
+    /// The same for a file that shall be equal whenever the experiment is repeated.
+    #[must_use]
+    pub fn without_wall_times(&self) -> Results {
+        let reports = self.reports.iter().map(|report| Report { wall_s: None, ..report.clone() });
+        Results { reports: reports.collect() }
+    }
+
+    /// Writes `results.csv`: one trial a line, a header of names and units.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_csv(&self, file: &Path) -> Result<(), csv::Error> {
+        let mut writer = csv::Writer::from_path(file)?;
+        writer.write_record([
+            "cell",
+            "along_m",
+            "sideways_m",
+            "mode",
+            "seed",
+            "outcome",
+            "fault",
+            "object_x_m",
+            "object_y_m",
+            "lift_m",
+            "tilt_deg",
+            "push_m",
+            "adaptation_m",
+            "adaptation_deg",
+            "contact_peak_n",
+            "contact_sustained_n",
+            "contact_median_n",
+            "contact_mean_n",
+            "finger1_n",
+            "finger2_n",
+            "finger3_n",
+            "table_peak_n",
+            "finger_peak_n",
+            "sag_m",
+            "touch_s",
+            "closing_s",
+            "lift_s",
+            "failure_s",
+            "surprise_s",
+            "surprise_phase",
+            "surprise_channel",
+            "virtual_s",
+        ])?;
+        let optional = |value: Option<f64>| value.map(number).unwrap_or_default();
+        for report in &self.reports {
+            let (key, m) = (&report.key, &report.measures);
+            let fault = if let Outcome::Stopped(fault) = &report.outcome { fault.as_str() } else { "" };
+            writer.write_record([
+                key.index.to_string(),
+                number(key.cell.along()),
+                number(key.cell.sideways()),
+                key.mode.to_string(),
+                key.seed.to_string(),
+                report.outcome.word().to_owned(),
+                fault.to_owned(),
+                number(report.object[0]),
+                number(report.object[1]),
+                number(m.lift_m),
+                number(m.tilt_deg),
+                number(m.push_m),
+                number(report.adaptation_m),
+                number(report.adaptation_deg),
+                number(m.contact_peak_n),
+                number(m.contact_sustained_n),
+                number(m.contact_median_n),
+                number(m.contact_mean_n),
+                number(m.finger_n[0]),
+                number(m.finger_n[1]),
+                number(m.finger_n[2]),
+                number(m.table_peak_n),
+                number(m.finger_peak_n),
+                number(report.sag_m),
+                optional(m.touch_s),
+                number(m.closing_s),
+                number(m.lift_s),
+                optional(m.failure_s),
+                optional(report.surprise.map(|surprise| surprise.time_s)),
+                optional(report.surprise.map(|surprise| surprise.phase)),
+                report.surprise.map(|surprise| surprise.channel.to_string()).unwrap_or_default(),
+                number(report.virtual_s),
+            ])?;
+        }
+        writer.flush()?;
+        Ok(())
+    }
+}
+
+/// Six digits are more than any of these quantities is worth.
+fn number(value: f64) -> String {
+    let text = format!("{value:.6}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made_up;
+
+    fn header(object: &str) -> Header {
+        Header {
+            experiment: "flashlight".to_owned(),
+            configuration: object.to_owned(),
+            described: BTreeMap::from([
+                ("object".to_owned(), object.to_owned()),
+                ("plant".to_owned(), "honest".to_owned()),
+            ]),
+        }
+    }
+
+    #[test]
+    fn an_experiment_goes_on_where_it_was_ended_even_in_the_middle_of_a_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let made = made_up::results(&[1]).reports;
+        let (mut log, before) = Log::open(folder.path(), &header("torch"), false).unwrap();
+        assert!(before.is_empty());
+        made[..5].iter().for_each(|report| log.add(report).unwrap());
+        drop(log);
+        let file = folder.path().join(LINES);
+        let text = std::fs::read(&file).unwrap();
+        std::fs::write(&file, &text[..text.len() - 40]).unwrap();
+        let (mut log, before) = Log::open(folder.path(), &header("torch"), true).unwrap();
+        assert_eq!(before, made[..4]);
+        log.add(&made[4]).unwrap();
+        drop(log);
+        assert_eq!(std::fs::read(&file).unwrap(), text);
+    }
+
+    #[test]
+    fn results_are_not_added_to_unasked_nor_to_those_of_another_configuration() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut log, _) = Log::open(folder.path(), &header("torch"), false).unwrap();
+        log.add(&made_up::results(&[1]).reports[0]).unwrap();
+        drop(log);
+        let again = Log::open(folder.path(), &header("torch"), false).err().unwrap();
+        assert!(matches!(again, ResultsError::Exists { trials: 1, .. }), "{again}");
+        let other = Log::open(folder.path(), &header("cup"), true).err().unwrap().to_string();
+        assert!(other.contains("object was torch, is cup") && !other.contains("plant"), "{other}");
+    }
+
+    #[test]
+    fn a_line_that_is_no_report_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        drop(Log::open(folder.path(), &header("torch"), false).unwrap());
+        let file = folder.path().join(LINES);
+        let text = std::fs::read_to_string(&file).unwrap();
+        std::fs::write(&file, format!("{text}{{\"cell\": 1}}\n")).unwrap();
+        let error = Log::open(folder.path(), &header("torch"), true).err().unwrap();
+        assert!(matches!(error, ResultsError::Line { line: 2, .. }), "{error}");
+    }
+
+    #[test]
+    fn results_do_not_depend_on_the_order_in_which_trials_end() {
+        let ordered = made_up::results(&[1, 2]);
+        let mut reversed = ordered.reports.clone();
+        reversed.reverse();
+        assert_eq!(Results::new(reversed), ordered);
+    }
+
+    #[test]
+    fn the_table_has_a_line_for_every_trial_and_a_value_in_every_column() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("results.csv");
+        let results = made_up::results(&[1]);
+        results.write_csv(&file).unwrap();
+        let mut reader = csv::Reader::from_path(&file).unwrap();
+        let names = reader.headers().unwrap().clone();
+        let lines: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+        assert_eq!(lines.len(), results.reports.len());
+        let column = |name: &str| names.iter().position(|head| head == name).unwrap();
+        assert_eq!(&lines[0][column("along_m")], "-0.24");
+        assert_eq!(&lines[0][column("outcome")], "knocked over");
+        assert_eq!(&lines[0][column("virtual_s")], "20");
+    }
+
+    #[test]
+    fn wall_times_are_left_out_of_what_shall_be_repeatable() {
+        let results = made_up::results(&[1]).without_wall_times();
+        assert!(!serde_json::to_string(&results).unwrap().contains("wall_s"));
+    }
+}

@@ -1,0 +1,233 @@
+//! Carries an experiment through: trials in parallel, results written as they come.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError, mpsc};
+
+use super::config::Config;
+use super::grid::Cell;
+use super::mode::Mode;
+use super::reach;
+use super::results::{Key, Log, Report, Results, ResultsError};
+use super::statistics::Summary;
+use super::trial::{self, Prepared, Trial, TrialError};
+use lab::client::Interrupt;
+use lab::procedure::recording_text;
+
+/// Why an experiment ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum ExperimentError {
+    /// Objects would stand where they cannot, or out of the arm's reach.
+    #[error("{}", explain(.0))]
+    OutOfReach(Vec<(Cell, reach::Trouble)>),
+    /// The primitive cannot be played.
+    #[error(transparent)]
+    Primitive(TrialError),
+    /// A trial could not be carried through.
+    #[error("trial {mode} in cell {cell}, seed {seed}: {cause}", mode = key.mode, cell = key.cell, seed = key.seed)]
+    Trial {
+        /// Which.
+        key: Key,
+        /// Why.
+        cause: TrialError,
+    },
+    /// Results cannot be kept.
+    #[error(transparent)]
+    Results(#[from] ResultsError),
+    /// A file cannot be written.
+    #[error("{}: {cause}", file.display())]
+    File {
+        /// The file.
+        file: std::path::PathBuf,
+        /// What the operating system says.
+        #[source]
+        cause: std::io::Error,
+    },
+    /// The user interrupted.
+    #[error("interrupted; {done} of {all} trials are kept")]
+    Interrupted {
+        /// Trials done.
+        done: usize,
+        /// Trials wanted.
+        all: usize,
+    },
+}
+
+fn explain(troubles: &[(Cell, reach::Trouble)]) -> String {
+    let cells: Vec<String> = troubles.iter().map(|(cell, trouble)| format!("{cell} ({trouble})")).collect();
+    format!("{} of the objects cannot be reached or do not stand on the table: {}", cells.len(), cells.join(", "))
+}
+
+/// What happens while an experiment runs.
+#[derive(Debug)]
+pub enum Progress<'a> {
+    /// So many trials are wanted, and so many are there from before.
+    Begin {
+        /// Trials wanted.
+        all: usize,
+        /// Trials there from before.
+        done: usize,
+    },
+    /// A trial ended.
+    Done(&'a Report),
+}
+
+/// An experiment that was carried through.
+#[derive(Debug, Clone)]
+pub struct Experiment {
+    /// All reports.
+    pub results: Results,
+    /// Trials of the first seed with everything that was seen, if the configuration asks for it; those that were there from before are missing.
+    pub trials: Vec<Trial>,
+    /// What all trials shared.
+    pub prepared: Prepared,
+}
+
+impl Experiment {
+    /// Cells in which a mode succeeded, in the mean over the seeds.
+    pub fn success_count(&self, mode: Mode) -> f64 {
+        self.results.success_count(mode)
+    }
+
+    /// The figures of each mode.
+    pub fn summaries(&self, config: &Config) -> Vec<Summary> {
+        let tipping = config.tipping_force();
+        self.results.modes().into_iter().map(|mode| Summary::of(&self.results, mode, tipping)).collect()
+    }
+}
+
+/// Carries an experiment through. The results do not depend on the number of jobs nor on the order in which trials end.
+///
+/// # Errors
+/// [`ExperimentError`]. What was done until then is in the folder, and [`Config::resume`] goes on from there.
+pub fn run(
+    config: &Config,
+    interrupt: &Interrupt,
+    progress: &mut dyn FnMut(Progress<'_>),
+) -> Result<Experiment, ExperimentError> {
+    let prepared = Prepared::of(config).map_err(ExperimentError::Primitive)?;
+    let troubles = reach::check(config, &prepared.frame);
+    if !troubles.is_empty() {
+        return Err(ExperimentError::OutOfReach(troubles));
+    }
+    let resume = config.resume || config.as_it_is;
+    let opened = config.out.as_deref().map(|folder| Log::open(folder, &config.header(), resume)).transpose()?;
+    let (mut log, mut reports) = opened.map_or((None, Vec::new()), |(log, reports)| (Some(log), reports));
+    let keys = config.keys();
+    let all = keys.len();
+    let wanted: Vec<Key> = keys
+        .iter()
+        .copied()
+        .filter(|key| !config.as_it_is && !reports.iter().any(|report| report.key == *key))
+        .collect();
+    // Results of modes and seeds that are not asked for this time stay in the file, but are not counted.
+    reports.retain(|report| keys.contains(&report.key));
+    progress(Progress::Begin { all, done: reports.len() });
+    let mut trials = Vec::new();
+    let first_seed = config.seeds.first().copied();
+    let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let failure: Mutex<Option<ExperimentError>> = Mutex::new(None);
+    let fail = |error| {
+        stop.store(true, Ordering::SeqCst);
+        failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+    };
+    std::thread::scope(|scope| {
+        let (sender, receiver) = mpsc::sync_channel::<Trial>(config.jobs.max(1));
+        for _ in 0..config.jobs.clamp(1, wanted.len().max(1)) {
+            let (sender, prepared, wanted, next, stop, fail) =
+                (sender.clone(), &prepared, &wanted, &next, &stop, &fail);
+            scope.spawn(move || {
+                while let Some(&key) = wanted.get(next.fetch_add(1, Ordering::SeqCst)) {
+                    if stop.load(Ordering::SeqCst) || interrupt.is_raised() {
+                        return;
+                    }
+                    match trial::run(config, prepared, key, interrupt) {
+                        Ok(trial) => {
+                            if sender.send(trial).is_err() {
+                                return;
+                            }
+                        }
+                        // An interrupted trial is no failed one.
+                        Err(_) if interrupt.is_raised() => return,
+                        Err(cause) => return fail(ExperimentError::Trial { key, cause }),
+                    }
+                }
+            });
+        }
+        drop(sender);
+        for mut trial in receiver {
+            let kept = log.as_mut().map_or(Ok(()), |log| log.add(&trial.report)).map_err(ExperimentError::from);
+            let recorded = kept.and_then(|()| match config.out.as_deref().filter(|_| config.keep_recordings) {
+                Some(folder) => record(folder, &trial),
+                None => Ok(()),
+            });
+            if let Err(error) = recorded {
+                fail(error);
+            }
+            progress(Progress::Done(&trial.report));
+            reports.push(trial.report.clone());
+            if config.keep_traces && Some(trial.report.key.seed) == first_seed {
+                // The telemetry is in the trace already.
+                trial.telemetry = Vec::new();
+                trials.push(trial);
+            }
+        }
+    });
+    if let Some(error) = failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        return Err(error);
+    }
+    if interrupt.is_raised() {
+        return Err(ExperimentError::Interrupted { done: reports.len(), all });
+    }
+    let results = Results::new(reports);
+    if config.keep_traces {
+        // What was there from before has left no trace, but a trial can be repeated: the same key, the same trial.
+        for key in telling(&results) {
+            if !trials.iter().any(|trial| trial.report.key == key) {
+                trials.push(
+                    trial::run(config, &prepared, key, interrupt)
+                        .map_err(|cause| ExperimentError::Trial { key, cause })?,
+                );
+            }
+        }
+    }
+    trials.sort_by_key(|trial| trial.report.key);
+    Ok(Experiment { results, trials, prepared })
+}
+
+/// One trial of each mode, first seed, in the cell that tells most: the adapted one held the object and another mode did not; the middle
+/// of all such cells by distance, neither the easiest nor the hardest.
+pub(super) fn telling(results: &Results) -> Vec<Key> {
+    let seed = results.seeds().first().copied();
+    let reports = || results.reports.iter().filter(|report| Some(report.key.seed) == seed);
+    let held = |index: usize, mode: Mode| {
+        let report = reports().find(|report| report.key.index == index && report.key.mode == mode);
+        report.map(|report| report.outcome.is_success())
+    };
+    let mut cells: Vec<(f64, usize)> = reports().map(|report| (report.key.cell.distance(), report.key.index)).collect();
+    cells.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    cells.dedup();
+    let tells = |index: usize| {
+        let others = [Mode::OpenLoop, Mode::RigidFingers];
+        held(index, Mode::Adaptive) == Some(true) && others.iter().any(|mode| held(index, *mode) == Some(false))
+    };
+    let telling: Vec<usize> = cells.iter().map(|(_, index)| *index).filter(|index| tells(*index)).collect();
+    let chosen = telling.get(telling.len() / 2).or(cells.get(cells.len() / 2).map(|(_, index)| index));
+    let of_cell = |index: usize| reports().filter(move |report| report.key.index == index).map(|report| report.key);
+    chosen.map(|index| of_cell(*index).collect()).unwrap_or_default()
+}
+
+/// Writes the telemetry of a trial into the folder `recordings`, in the layout of every recording.
+fn record(folder: &Path, trial: &Trial) -> Result<(), ExperimentError> {
+    let folder = folder.join("recordings");
+    let key = &trial.report.key;
+    let file = folder.join(format!("cell{:02}-{}-seed{}.csv", key.index, key.mode, key.seed));
+    let failed = |cause| ExperimentError::File { file: file.clone(), cause };
+    std::fs::create_dir_all(&folder).map_err(failed)?;
+    let notes = format!(
+        "Tactus recording of an experiment, cell {}, mode {}, seed {}: {}",
+        key.cell, key.mode, key.seed, trial.report.outcome
+    );
+    let text = recording_text(&trial.telemetry, &notes).map_err(failed)?;
+    std::fs::write(&file, text).map_err(failed)
+}

@@ -1,0 +1,277 @@
+//! What the trials of one mode say together.
+
+use serde::Serialize;
+
+use super::mode::Mode;
+use super::outcome::Outcome;
+use super::results::{Report, Results};
+
+/// The value below which a share of the values lies, interpolated; `None` of nothing.
+pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let at = share.clamp(0.0, 1.0) * sorted.len().checked_sub(1)? as f64;
+    let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
+    Some(low + (high - low) * at.fract())
+}
+
+/// A quantity over trials.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Spread {
+    /// Median.
+    pub median: f64,
+    /// 95 % lie below.
+    pub p95: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+impl Spread {
+    fn of(values: &[f64]) -> Spread {
+        let at = |share| quantile(values, share).unwrap_or(0.0);
+        Spread { median: at(0.5), p95: at(0.95), max: at(1.0) }
+    }
+}
+
+/// Failures of one kind, and how many of them the device told before the lift.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Told {
+    /// Trials that failed in this way.
+    pub failures: usize,
+    /// Of these, how many were reported before the lift.
+    pub before_lift: usize,
+}
+
+/// How well the device's watch tells failures.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Detection {
+    /// Trials that succeeded.
+    pub successes: usize,
+    /// Of these, how many were reported as surprising, at any time.
+    pub false_alarms: usize,
+    /// Trials that failed, but for those that a fault of the arm stopped.
+    pub failures: usize,
+    /// Of these, how many were reported before the lift.
+    pub flagged_before_lift: usize,
+    /// Those in which the object was knocked over.
+    pub knocked_over: Told,
+    /// Those in which the fingers closed beside it.
+    pub missed: Told,
+    /// Those in which it was pushed away.
+    pub pushed_away: Told,
+    /// Those in which it was raised and lost; what slips only then cannot be told before.
+    pub dropped: Told,
+    /// Those in which it was crushed.
+    pub crushed: Told,
+    /// Median time from the beginning of the failure in the world ([`failure_s`](super::outcome::Measures::failure_s)) to the report, s;
+    /// negative: reported before. A failure that was not reported before the lift counts as reported at the lift, so that silence does not
+    /// pass for speed. What was dropped is left out.
+    pub median_delay_s: Option<f64>,
+}
+
+impl Detection {
+    /// Share of successes that were reported.
+    pub fn false_alarm_rate(&self) -> f64 {
+        self.false_alarms as f64 / self.successes.max(1) as f64
+    }
+
+    /// Share of failures that were reported before the lift.
+    pub fn detection_rate(&self) -> f64 {
+        self.flagged_before_lift as f64 / self.failures.max(1) as f64
+    }
+
+    /// From the reports of trials.
+    pub fn of<'a>(reports: impl Iterator<Item = &'a Report>) -> Detection {
+        let mut detection = Detection::default();
+        let mut delays = Vec::new();
+        for report in reports {
+            let alarm = report.surprise.map(|surprise| surprise.time_s);
+            let told = match report.outcome {
+                Outcome::Held => {
+                    detection.successes += 1;
+                    detection.false_alarms += usize::from(alarm.is_some());
+                    continue;
+                }
+                // A fault of the arm reports itself.
+                Outcome::Stopped(_) => continue,
+                Outcome::KnockedOver => &mut detection.knocked_over,
+                Outcome::Missed => &mut detection.missed,
+                Outcome::PushedAway => &mut detection.pushed_away,
+                Outcome::Dropped => &mut detection.dropped,
+                Outcome::Crushed => &mut detection.crushed,
+            };
+            let lift = report.measures.lift_s;
+            let in_time = alarm.filter(|alarm| *alarm < lift);
+            told.failures += 1;
+            told.before_lift += usize::from(in_time.is_some());
+            detection.failures += 1;
+            detection.flagged_before_lift += usize::from(in_time.is_some());
+            if report.outcome != Outcome::Dropped {
+                delays.extend(report.measures.failure_s.map(|failure| in_time.unwrap_or(lift) - failure));
+            }
+        }
+        detection.median_delay_s = quantile(&delays, 0.5);
+        detection
+    }
+}
+
+/// What the trials of one mode say together.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// The mode.
+    pub mode: Mode,
+    /// Cells.
+    pub cells: usize,
+    /// Seeds.
+    pub seeds: usize,
+    /// Cells in which it succeeded, mean over the seeds.
+    pub success: f64,
+    /// Cells in which it succeeded, seed by seed.
+    pub success_by_seed: Vec<usize>,
+    /// Objects that were knocked over, mean over the seeds; and so on.
+    pub knocked_over: f64,
+    /// Missed.
+    pub missed: f64,
+    /// Pushed away.
+    pub pushed_away: f64,
+    /// Dropped.
+    pub dropped: f64,
+    /// Crushed.
+    pub crushed: f64,
+    /// Stopped by a fault.
+    pub stopped: f64,
+    /// Largest displacement with success in at least half of the seeds, m.
+    pub farthest_success_m: f64,
+    /// Largest adaptation of a trial that succeeded, m.
+    pub adaptation_m: f64,
+    /// Largest adaptation of a trial that succeeded, degrees.
+    pub adaptation_deg: f64,
+    /// Peak force on the object before the fingers close, N.
+    pub contact_peak_n: Spread,
+    /// Share of the trials in which that peak, averaged over 100 ms, stays below the tipping force; `None` where nothing can tip.
+    pub below_tipping: Option<f64>,
+    /// Way the object was pushed before the fingers close, m.
+    pub push_m: Spread,
+    /// Peak force of one finger on the object, N.
+    pub finger_peak_n: Spread,
+    /// Peak force of hand on table, N.
+    pub table_peak_n: Spread,
+    /// How far the hand is below its plan when it has lifted, m.
+    pub sag_m: Spread,
+    /// Failure detection.
+    pub detection: Detection,
+}
+
+impl Summary {
+    /// The trials of `mode`; `tipping` is the horizontal force that tips the object over, N.
+    pub fn of(results: &Results, mode: Mode, tipping: Option<f64>) -> Summary {
+        let reports: Vec<&Report> = results.of(mode).collect();
+        let seeds = results.seeds();
+        let mut cells: Vec<usize> = reports.iter().map(|report| report.key.index).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        let count = |test: &dyn Fn(&Report) -> bool| reports.iter().filter(|report| test(report)).count();
+        let mean = |word: &str| count(&|report| report.outcome.word() == word) as f64 / seeds.len().max(1) as f64;
+        let spread =
+            |value: fn(&Report) -> f64| Spread::of(&reports.iter().map(|report| value(report)).collect::<Vec<_>>());
+        let successes = || reports.iter().filter(|report| report.outcome.is_success());
+        let farthest = reports
+            .iter()
+            .filter(|report| results.success_share(mode, report.key.index).is_some_and(|share| share >= 0.5))
+            .map(|report| report.key.cell.distance());
+        Summary {
+            mode,
+            cells: cells.len(),
+            seeds: seeds.len(),
+            success: results.success_count(mode),
+            success_by_seed: seeds
+                .iter()
+                .map(|seed| count(&|report| report.key.seed == *seed && report.outcome.is_success()))
+                .collect(),
+            knocked_over: mean("knocked over"),
+            missed: mean("missed"),
+            pushed_away: mean("pushed away"),
+            dropped: mean("dropped"),
+            crushed: mean("crushed"),
+            stopped: mean("stopped"),
+            farthest_success_m: farthest.fold(0.0, f64::max),
+            adaptation_m: successes().map(|report| report.adaptation_m).fold(0.0, f64::max),
+            adaptation_deg: successes().map(|report| report.adaptation_deg).fold(0.0, f64::max),
+            contact_peak_n: spread(|report| report.measures.contact_peak_n),
+            below_tipping: tipping.map(|limit| {
+                count(&|report| report.measures.contact_sustained_n < limit) as f64 / reports.len().max(1) as f64
+            }),
+            push_m: spread(|report| report.measures.push_m),
+            finger_peak_n: spread(|report| report.measures.finger_peak_n),
+            table_peak_n: spread(|report| report.measures.table_peak_n),
+            sag_m: spread(|report| report.sag_m),
+            detection: Detection::of(reports.iter().copied()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made_up;
+    use crate::results::Surprise;
+
+    #[test]
+    fn quantiles_are_interpolated_and_ignore_what_is_no_number() {
+        assert_eq!(quantile(&[4.0, 1.0, f64::NAN, 3.0, 2.0], 0.5), Some(2.5));
+        assert_eq!(quantile(&[7.0], 0.95), Some(7.0));
+        assert_eq!(quantile(&[], 0.5), None);
+    }
+
+    #[test]
+    fn successes_are_counted_per_seed() {
+        let results = made_up::results(&[1, 2, 3]);
+        let summary = Summary::of(&results, Mode::Adaptive, Some(2.0));
+        assert_eq!((summary.cells, summary.seeds), (48, 3));
+        let by_seed: f64 = summary.success_by_seed.iter().map(|count| *count as f64).sum();
+        assert!((summary.success - by_seed / 3.0).abs() < 1e-12 && summary.success > 40.0);
+        let all = summary.success
+            + summary.knocked_over
+            + summary.missed
+            + summary.pushed_away
+            + summary.dropped
+            + summary.stopped;
+        assert!((all - 48.0).abs() < 1e-9);
+        assert!((summary.farthest_success_m - 0.268).abs() < 1e-3);
+    }
+
+    #[test]
+    fn an_alarm_after_the_lift_began_comes_too_late() {
+        let mut reports = made_up::results(&[1]).reports;
+        reports.iter_mut().for_each(|report| report.surprise = None);
+        let held = reports.iter().position(|report| report.outcome == Outcome::Held).unwrap();
+        let fallen: Vec<usize> =
+            (0..reports.len()).filter(|index| reports[*index].outcome == Outcome::KnockedOver).collect();
+        let at = |time_s| Some(Surprise { phase: 0.5, channel: 0, time_s });
+        reports[held].surprise = at(3.0);
+        let three: Vec<Report> = [(fallen[0], 0.4), (fallen[1], 1.0), (fallen[2], 99.0)]
+            .map(|(index, time)| {
+                reports[index].surprise = at(reports[index].measures.failure_s.unwrap() + time);
+                reports[index].clone()
+            })
+            .to_vec();
+        let detection = Detection::of(reports.iter());
+        assert_eq!((detection.false_alarms, detection.flagged_before_lift), (1, 2));
+        assert_eq!((detection.knocked_over.before_lift, detection.knocked_over.failures), (2, fallen.len()));
+        assert!(detection.detection_rate() < 0.1 && detection.false_alarm_rate() > 0.0);
+        // Those that were told late or never count as told at the lift.
+        let alone = Detection::of(three.iter());
+        assert!((alone.median_delay_s.unwrap() - 1.0).abs() < 1e-12);
+        let silent = detection.median_delay_s.unwrap();
+        assert!(silent > 1.0, "{silent}");
+    }
+
+    #[test]
+    fn what_was_dropped_is_a_failure_and_what_the_arm_stopped_is_none_of_the_watch() {
+        let mut reports = made_up::results(&[1]).reports;
+        reports.truncate(2);
+        (reports[0].outcome, reports[1].outcome) = (Outcome::Dropped, Outcome::Stopped("torque limit".into()));
+        let detection = Detection::of(reports.iter());
+        assert_eq!((detection.failures, detection.dropped.failures, detection.median_delay_s), (1, 1, None));
+    }
+}

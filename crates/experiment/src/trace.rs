@@ -1,0 +1,139 @@
+//! What the device told about a run, cycle by cycle: the material of the time series and of the adaptation.
+
+use lab::demonstration::RATE;
+
+/// Sensor channels of an expectation: force (world axes), torque (tool axes), gauges of F1 to F3.
+pub const CHANNELS: usize = 9;
+
+/// One control cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cycle {
+    /// Time after the primitive started, s.
+    pub time: f64,
+    /// Measured grasp point, world, m.
+    pub position: [f64; 3],
+    /// Measured orientation, tool to world (w, x, y, z).
+    pub orientation: [f64; 4],
+    /// Planned grasp point, world, m.
+    pub position_d: [f64; 3],
+    /// Planned orientation (w, x, y, z).
+    pub orientation_d: [f64; 4],
+    /// What the sensors feel: force (world, N), torque (tool axes, N m), gauges (N m).
+    pub felt: [f64; CHANNELS],
+    /// Measured spread and fingers 1 to 3, rad.
+    pub hand: [f64; 4],
+    /// Planned spread and fingers 1 to 3, rad.
+    pub hand_d: [f64; 4],
+    /// Joint angles, rad.
+    pub q: [f64; 7],
+    /// Statistic of the watch.
+    pub surprise: f64,
+}
+
+/// A run as the device told it; what the link lost is missing.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Trace {
+    /// Cycles in order of time.
+    pub cycles: Vec<Cycle>,
+}
+
+impl Trace {
+    /// Largest distance (m) and angle (degrees) of the plan from the taught one, up to `end` (s).
+    ///
+    /// `taught` is the plan without feedback at 300 Hz from the start of the movement.
+    pub fn adaptation(&self, taught: &[([f64; 3], [f64; 4])], end: f64) -> (f64, f64) {
+        let Some(last) = taught.last() else {
+            return (0.0, 0.0);
+        };
+        let mut largest = (0.0_f64, 0.0_f64);
+        for cycle in self.cycles.iter().filter(|cycle| (0.0..=end).contains(&cycle.time)) {
+            let (position, orientation) = taught.get((cycle.time * RATE).round() as usize).unwrap_or(last);
+            let distance = (0..3).map(|axis| (cycle.position_d[axis] - position[axis]).powi(2)).sum::<f64>().sqrt();
+            let angle = lab::demonstration::angle_between(&cycle.orientation_d, orientation).to_degrees();
+            largest = (largest.0.max(distance), largest.1.max(angle));
+        }
+        largest
+    }
+
+    /// Mean distance of the hand below its plan between two times, m; negative where it is above.
+    pub fn sag(&self, from: f64, to: f64) -> f64 {
+        let cycles = self.cycles.iter().filter(|cycle| (from..=to).contains(&cycle.time));
+        let (sum, count) =
+            cycles.fold((0.0, 0.0), |(sum, count), cycle| (sum + cycle.position_d[2] - cycle.position[2], count + 1.0));
+        sum / f64::max(count, 1.0)
+    }
+}
+
+impl Cycle {
+    /// From what came over the link; `first` is the first cycle of the run.
+    pub fn of(telemetry: &link::Telemetry, first: u32) -> Cycle {
+        let q = telemetry.q.map(f64::from);
+        let (position, orientation) = lab::arm::tool_pose(&q);
+        let [x, y, z, w, a, b, c] = telemetry.pose_d.map(f64::from);
+        // The counter may have wrapped between the two.
+        let cycles = telemetry.cycle.wrapping_sub(first) as i32;
+        Cycle {
+            time: f64::from(cycles) / RATE,
+            position,
+            orientation,
+            position_d: [x, y, z],
+            orientation_d: [w, a, b, c],
+            felt: std::array::from_fn(|channel| {
+                let value = if channel < 6 { telemetry.wrench[channel] } else { telemetry.gauges[channel - 6] };
+                f64::from(value)
+            }),
+            hand: telemetry.hand.map(f64::from),
+            hand_d: telemetry.hand_d.map(f64::from),
+            q,
+            surprise: f64::from(telemetry.surprise),
+        }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) fn cycle(time: f64) -> Cycle {
+        Cycle {
+            time,
+            position: [0.7, 0.2, 0.0],
+            orientation: [1.0, 0.0, 0.0, 0.0],
+            position_d: [0.7, 0.2, 0.0],
+            orientation_d: [1.0, 0.0, 0.0, 0.0],
+            felt: [0.0; CHANNELS],
+            hand: [0.0; 4],
+            hand_d: [0.0; 4],
+            q: [0.0; 7],
+            surprise: 0.0,
+        }
+    }
+
+    #[test]
+    fn adaptation_is_the_distance_of_the_plans_not_of_the_hand() {
+        let taught: Vec<_> = (0..300).map(|k| ([0.7, 0.2 + f64::from(k) * 1e-3, 0.0], [1.0, 0.0, 0.0, 0.0])).collect();
+        let mut trace = Trace { cycles: (0..600).map(|k| cycle(f64::from(k) / RATE)).collect() };
+        for (index, cycle) in trace.cycles.iter_mut().enumerate() {
+            cycle.position_d = taught[index.min(299)].0;
+            cycle.position[0] = 0.1;
+        }
+        assert_eq!(trace.adaptation(&taught, 9.0), (0.0, 0.0));
+        trace.cycles[200].position_d[0] += 0.05;
+        let half = 5.0_f64.to_radians();
+        trace.cycles[550].orientation_d = [half.cos(), half.sin(), 0.0, 0.0];
+        let (distance, angle) = trace.adaptation(&taught, 9.0);
+        assert!((distance - 0.05).abs() < 1e-12 && (angle - 10.0).abs() < 1e-6);
+        // After the movement the plan is another one: the lift is no adaptation.
+        assert!(trace.adaptation(&taught, 1.0).1 < 1e-9);
+    }
+
+    #[test]
+    fn sag_is_what_the_hand_is_below_its_plan_in_the_mean() {
+        let mut trace = Trace { cycles: vec![cycle(1.0), cycle(2.0), cycle(3.0)] };
+        trace.cycles[0].position_d[2] = 0.5;
+        trace.cycles[1].position_d[2] = 0.004;
+        trace.cycles[2].position[2] = 0.02;
+        assert!((trace.sag(1.5, 2.5) - 0.004).abs() < 1e-12);
+        assert!((trace.sag(1.5, 3.5) + 0.008).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,519 @@
+//! A recording: what was measured at each instant, read from CSV and checked value by value.
+//!
+//! Reading parses, it does not merely validate: a `Recording` that exists has strictly increasing time, finite
+//! numbers, whole groups of columns and unit quaternions whose sign does not jump.
+
+use std::path::{Path, PathBuf};
+
+use super::error::{Place, RecordingError};
+use super::layout;
+
+/// Samples that a recording must have at least: 0.2 s at 300 Hz, the shortest movement that can be filtered at
+/// 7.5 Hz and differentiated twice. Fewer would be fitted by chance.
+pub const FEWEST_SAMPLES: usize = 60;
+
+/// Largest distance of a quaternion's norm from 1. Recordings print about 5 digits; an error above this value is
+/// not rounding but a wrong column or a wrong convention.
+pub const QUATERNION_NORM_TOLERANCE: f64 = 5e-3;
+
+/// Two samples further apart than this many typical sample periods have a gap between them.
+const GAP_FACTOR: f64 = 1.5;
+
+/// Everything that was recorded, one entry per line of the file in each column that exists.
+#[derive(Clone, PartialEq)]
+pub struct Recording {
+    /// The file it was read from.
+    pub file: PathBuf,
+    /// CRC-32/ISCSI of the file's bytes.
+    pub checksum: u32,
+    /// Line of the header in the file, from 1.
+    pub header_line: u64,
+    /// Number of columns in the header.
+    pub columns: usize,
+    /// Line of each sample in the file, from 1.
+    pub lines: Vec<u64>,
+    /// Time of each sample, s, strictly increasing.
+    pub time: Vec<f64>,
+    /// Number of the control cycle.
+    pub cycle: Option<Vec<u32>>,
+    /// State of the supervisor, a word.
+    pub state: Option<Vec<String>>,
+    /// Phase of the movement, 1.
+    pub phase: Option<Vec<f64>>,
+    /// Joint angles, rad.
+    pub q: Option<Vec<[f64; layout::JOINTS]>>,
+    /// Joint velocities, rad/s.
+    pub dq: Option<Vec<[f64; layout::JOINTS]>>,
+    /// Joint torques commanded on the bus, N m.
+    pub tau: Option<Vec<[f64; layout::JOINTS]>>,
+    /// Measured position of the tool frame, world, m.
+    pub position: Option<Vec<[f64; 3]>>,
+    /// Measured orientation, unit quaternion (w, x, y, z) tool to world, sign-continuous.
+    pub orientation: Option<Vec<[f64; 4]>>,
+    /// Desired position, world, m.
+    pub position_d: Option<Vec<[f64; 3]>>,
+    /// Desired orientation, unit quaternion, sign-continuous.
+    pub orientation_d: Option<Vec<[f64; 4]>>,
+    /// Wrench of the environment on the robot: force N (world axes), torque N m.
+    pub wrench: Option<Vec<[f64; 6]>>,
+    /// Flag bits of each cycle, see `control::cycle::record::flags`.
+    pub flags: Option<Vec<u32>>,
+    /// Measured hand: spread and fingers 1 to 3, rad.
+    pub hand: Option<Vec<[f64; 4]>>,
+    /// Desired hand: spread and fingers 1 to 3, rad.
+    pub hand_d: Option<Vec<[f64; 4]>>,
+    /// Torque of the environment on fingers 1 to 3, N m.
+    pub gauges: Option<Vec<[f64; 3]>>,
+    /// Statistic of the watch for unusual runs, 1.
+    pub surprise: Option<Vec<f64>>,
+    /// Gaps: places where samples are missing.
+    pub gaps: usize,
+    /// Samples that are missing in all gaps together.
+    pub missing_samples: usize,
+    /// The longest distance in time between two neighbours, s, and the index of the later one.
+    pub longest_gap: (f64, usize),
+}
+
+impl Recording {
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with its line and column.
+    pub fn read(file: &Path) -> Result<Recording, RecordingError> {
+        let bytes = std::fs::read(file).map_err(|cause| RecordingError::Unreadable { file: file.to_owned(), cause })?;
+        Recording::parse(file, &bytes)
+    }
+
+    /// Checks bytes that were read from `file`.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with its line and column.
+    pub fn parse(file: &Path, bytes: &[u8]) -> Result<Recording, RecordingError> {
+        let table = Table::parse(file, bytes)?;
+        let time_column = table.column(layout::TIME);
+        let mut missing: Vec<String> = Vec::new();
+        if time_column.is_none() {
+            missing.push(layout::TIME.to_owned());
+        }
+        let q = table.group(&layout::joint_positions(), &mut missing);
+        let dq = table.group(&layout::joint_velocities(), &mut missing);
+        let tau = table.group(&layout::joint_torques(), &mut missing);
+        let position_names = if layout::POSITION_ALIAS.iter().any(|name| table.column(name).is_some()) {
+            layout::POSITION_ALIAS
+        } else {
+            layout::POSITION
+        };
+        let position = table.group(&position_names, &mut missing);
+        let orientation = table.group(&layout::ORIENTATION, &mut missing);
+        let position_d = table.group(&layout::POSITION_D, &mut missing);
+        let orientation_d = table.group(&layout::ORIENTATION_D, &mut missing);
+        let wrench = table.group(&layout::WRENCH, &mut missing);
+        let hand = table.group(&layout::HAND, &mut missing);
+        let hand_d = table.group(&layout::HAND_D, &mut missing);
+        let gauges = table.group(&layout::GAUGES, &mut missing);
+        // A position without an orientation (or the reverse) is half a pose: say which half is missing.
+        match (&position, &orientation) {
+            (Some(_), None) if missing.is_empty() => {
+                missing.extend(layout::ORIENTATION.map(String::from));
+            }
+            (None, Some(_)) if missing.is_empty() => {
+                missing.extend(layout::POSITION.map(String::from));
+            }
+            _ => {}
+        }
+        let (Some(time_column), true) = (time_column, missing.is_empty()) else {
+            return Err(RecordingError::MissingColumns {
+                file: file.to_owned(),
+                line: table.header_line,
+                column: table.names.len() + 1,
+                missing: missing.join(", "),
+            });
+        };
+        if table.rows.len() < FEWEST_SAMPLES {
+            return Err(RecordingError::TooFewSamples {
+                file: file.to_owned(),
+                line: table.lines.last().copied().unwrap_or(table.header_line),
+                found: table.rows.len(),
+                needed: FEWEST_SAMPLES,
+            });
+        }
+        let time: Vec<f64> = table.rows.iter().map(|row| row[time_column]).collect();
+        for index in 1..time.len() {
+            if time[index] <= time[index - 1] {
+                return Err(RecordingError::TimeRunsBackwards {
+                    place: table.place(index, time_column),
+                    time: time[index],
+                    before: time[index - 1],
+                });
+            }
+        }
+        let cycle = match table.column(layout::CYCLE) {
+            None => None,
+            Some(column) => Some(table.whole_numbers(column)?),
+        };
+        let flags = table.column(layout::FLAGS).map(|column| table.whole_numbers(column)).transpose()?;
+        let orientation = orientation.map(|columns| table.quaternions(columns)).transpose()?;
+        let orientation_d = orientation_d.map(|columns| table.quaternions(columns)).transpose()?;
+        let (gaps, missing_samples, longest_gap) = count_gaps(&time, cycle.as_deref());
+        Ok(Recording {
+            file: file.to_owned(),
+            checksum: checksum(bytes),
+            header_line: table.header_line,
+            columns: table.names.len(),
+            phase: table.column(layout::PHASE).map(|column| table.numbers(column)),
+            surprise: table.column(layout::SURPRISE).map(|column| table.numbers(column)),
+            q: q.map(|columns| table.vectors(columns)),
+            dq: dq.map(|columns| table.vectors(columns)),
+            tau: tau.map(|columns| table.vectors(columns)),
+            position: position.map(|columns| table.vectors(columns)),
+            position_d: position_d.map(|columns| table.vectors(columns)),
+            wrench: wrench.map(|columns| table.vectors(columns)),
+            hand: hand.map(|columns| table.vectors(columns)),
+            hand_d: hand_d.map(|columns| table.vectors(columns)),
+            gauges: gauges.map(|columns| table.vectors(columns)),
+            flags,
+            state: table.states,
+            lines: table.lines,
+            time,
+            cycle,
+            orientation,
+            orientation_d,
+            gaps,
+            missing_samples,
+            longest_gap,
+        })
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.time.len()
+    }
+
+    /// Whether there are no samples; a recording that was read is never empty.
+    pub fn is_empty(&self) -> bool {
+        self.time.is_empty()
+    }
+
+    /// The part in which a plan was played (states `run` and `coast`), as a recording of its own; the whole
+    /// recording if it has no states.
+    ///
+    /// A run is recorded from before the arm moves until it holds at the goal: comparing it with its plan needs the
+    /// part in between.
+    pub fn running(&self) -> Recording {
+        let Some(states) = &self.state else {
+            return self.clone();
+        };
+        let names = [control::State::Run.name(), control::State::Coast.name()];
+        let keep: Vec<usize> = (0..self.len()).filter(|index| names.contains(&states[*index].as_str())).collect();
+        self.select(&keep)
+    }
+
+    fn select(&self, keep: &[usize]) -> Recording {
+        fn pick<T: Clone>(values: &[T], keep: &[usize]) -> Vec<T> {
+            keep.iter().map(|index| values[*index].clone()).collect()
+        }
+        let time = pick(&self.time, keep);
+        let cycle = self.cycle.as_ref().map(|values| pick(values, keep));
+        let (gaps, missing_samples, longest_gap) = count_gaps(&time, cycle.as_deref());
+        Recording {
+            file: self.file.clone(),
+            checksum: self.checksum,
+            header_line: self.header_line,
+            columns: self.columns,
+            lines: pick(&self.lines, keep),
+            state: self.state.as_ref().map(|values| pick(values, keep)),
+            phase: self.phase.as_ref().map(|values| pick(values, keep)),
+            q: self.q.as_ref().map(|values| pick(values, keep)),
+            dq: self.dq.as_ref().map(|values| pick(values, keep)),
+            tau: self.tau.as_ref().map(|values| pick(values, keep)),
+            position: self.position.as_ref().map(|values| pick(values, keep)),
+            orientation: self.orientation.as_ref().map(|values| pick(values, keep)),
+            position_d: self.position_d.as_ref().map(|values| pick(values, keep)),
+            orientation_d: self.orientation_d.as_ref().map(|values| pick(values, keep)),
+            wrench: self.wrench.as_ref().map(|values| pick(values, keep)),
+            hand: self.hand.as_ref().map(|values| pick(values, keep)),
+            hand_d: self.hand_d.as_ref().map(|values| pick(values, keep)),
+            gauges: self.gauges.as_ref().map(|values| pick(values, keep)),
+            flags: self.flags.as_ref().map(|values| pick(values, keep)),
+            surprise: self.surprise.as_ref().map(|values| pick(values, keep)),
+            time,
+            cycle,
+            gaps,
+            missing_samples,
+            longest_gap,
+        }
+    }
+
+    /// The place of one sample in the file.
+    pub fn place(&self, sample: usize, column: usize, name: &str) -> Place {
+        Place {
+            file: self.file.clone(),
+            line: self.lines.get(sample).copied().unwrap_or_default(),
+            column,
+            name: name.to_owned(),
+        }
+    }
+}
+
+/// Short: a recording has ten thousands of numbers, and nobody reads them in a message.
+impl std::fmt::Debug for Recording {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("Recording")
+            .field("file", &self.file)
+            .field("samples", &self.len())
+            .field("gaps", &self.gaps)
+            .finish_non_exhaustive()
+    }
+}
+
+/// CRC-32/ISCSI of a file's bytes, the same polynomial that guards the link and the primitive image.
+pub fn checksum(bytes: &[u8]) -> u32 {
+    link::frame::CRC.checksum(bytes)
+}
+
+/// Number of gaps, samples missing in them, and the longest step with the index of its later end.
+fn count_gaps(time: &[f64], cycle: Option<&[u32]>) -> (usize, usize, (f64, usize)) {
+    let steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mut sorted = steps.clone();
+    sorted.sort_by(f64::total_cmp);
+    let typical = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let longest = steps.iter().enumerate().fold(
+        (0.0, 0),
+        |best, (index, step)| {
+            if *step > best.0 { (*step, index + 1) } else { best }
+        },
+    );
+    let lost = |index: usize| -> usize {
+        match cycle {
+            // The counter knows exactly what is missing; time only lets one guess.
+            Some(cycle) => (cycle[index + 1].wrapping_sub(cycle[index]) as usize).saturating_sub(1),
+            None if steps[index] > GAP_FACTOR * typical => {
+                ((steps[index] / typical).round() as usize).saturating_sub(1)
+            }
+            None => 0,
+        }
+    };
+    let losses: Vec<usize> = (0..steps.len()).map(lost).filter(|count| *count > 0).collect();
+    (losses.len(), losses.iter().sum(), longest)
+}
+
+/// The numbers of a file with the names of their columns.
+struct Table<'a> {
+    file: &'a Path,
+    header_line: u64,
+    names: Vec<String>,
+    lines: Vec<u64>,
+    rows: Vec<Vec<f64>>,
+    states: Option<Vec<String>>,
+}
+
+impl<'a> Table<'a> {
+    fn parse(file: &'a Path, bytes: &[u8]) -> Result<Table<'a>, RecordingError> {
+        let mut reader = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .flexible(true)
+            .has_headers(false)
+            .trim(csv::Trim::All)
+            .from_reader(bytes);
+        let mut table =
+            Table { file, header_line: 0, names: Vec::new(), lines: Vec::new(), rows: Vec::new(), states: None };
+        let mut record = csv::ByteRecord::new();
+        let mut newlines = Newlines::new(bytes);
+        loop {
+            match reader.read_byte_record(&mut record) {
+                Ok(true) => {}
+                Ok(false) => break,
+                Err(cause) => {
+                    return Err(RecordingError::Unreadable { file: file.to_owned(), cause: cause.into() });
+                }
+            }
+            // The reader's own line is that of the last byte it skipped, notes included: count from the offset.
+            let offset = record.position().map_or(0, csv::Position::byte);
+            let line = newlines.line_at(offset as usize);
+            if table.names.is_empty() {
+                table.read_header(line, &record)?;
+            } else {
+                table.read_row(line, &record)?;
+            }
+        }
+        if table.names.is_empty() {
+            return Err(RecordingError::Empty { file: file.to_owned() });
+        }
+        Ok(table)
+    }
+
+    fn read_header(&mut self, line: u64, record: &csv::ByteRecord) -> Result<(), RecordingError> {
+        self.header_line = line;
+        for (index, field) in record.iter().enumerate() {
+            let name = String::from_utf8_lossy(field).trim_start_matches('\u{feff}').to_owned();
+            let place = Place { file: self.file.to_owned(), line, column: index + 1, name: name.clone() };
+            if self.names.contains(&name) {
+                return Err(RecordingError::DuplicateColumn { place });
+            }
+            if let Some(expected) = layout::intended(&name) {
+                return Err(RecordingError::WrongUnit { place, expected });
+            }
+            self.names.push(name);
+        }
+        if self.names.iter().any(|name| name == layout::STATE) {
+            self.states = Some(Vec::new());
+        }
+        Ok(())
+    }
+
+    fn read_row(&mut self, line: u64, record: &csv::ByteRecord) -> Result<(), RecordingError> {
+        let place = |column: usize, names: &[String]| Place {
+            file: self.file.to_owned(),
+            line,
+            column: column + 1,
+            name: names.get(column).cloned().unwrap_or_default(),
+        };
+        if record.len() != self.names.len() {
+            return Err(RecordingError::Ragged {
+                place: place(record.len().min(self.names.len()), &self.names),
+                found: record.len(),
+                expected: self.names.len(),
+            });
+        }
+        let mut row = Vec::with_capacity(record.len());
+        for (column, field) in record.iter().enumerate() {
+            let text = String::from_utf8_lossy(field);
+            if self.names[column] == layout::STATE {
+                if let Some(states) = &mut self.states {
+                    states.push(text.into_owned());
+                }
+                row.push(0.0);
+                continue;
+            }
+            let value: f64 = text.parse().map_err(|_| RecordingError::NotANumber {
+                place: place(column, &self.names),
+                text: text.chars().take(40).collect(),
+            })?;
+            if !value.is_finite() {
+                return Err(RecordingError::NotFinite { place: place(column, &self.names), value });
+            }
+            row.push(value);
+        }
+        self.lines.push(line);
+        self.rows.push(row);
+        Ok(())
+    }
+
+    fn column(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|known| known == name)
+    }
+
+    /// The columns of a group; `None` if the header has none of them. If it has some, the others go to `missing`.
+    fn group<const SIZE: usize>(
+        &self,
+        names: &[impl AsRef<str>; SIZE],
+        missing: &mut Vec<String>,
+    ) -> Option<[usize; SIZE]> {
+        let found: Vec<Option<usize>> = names.iter().map(|name| self.column(name.as_ref())).collect();
+        if found.iter().all(Option::is_none) {
+            return None;
+        }
+        for (name, column) in names.iter().zip(&found) {
+            if column.is_none() {
+                missing.push(name.as_ref().to_owned());
+            }
+        }
+        let columns: Option<Vec<usize>> = found.into_iter().collect();
+        columns.and_then(|columns| columns.try_into().ok())
+    }
+
+    fn vectors<const SIZE: usize>(&self, columns: [usize; SIZE]) -> Vec<[f64; SIZE]> {
+        self.rows.iter().map(|row| columns.map(|column| row[column])).collect()
+    }
+
+    fn quaternions(&self, columns: [usize; 4]) -> Result<Vec<[f64; 4]>, RecordingError> {
+        let mut values = self.vectors(columns);
+        for (index, value) in values.iter_mut().enumerate() {
+            let norm = value.iter().map(|part| part * part).sum::<f64>().sqrt();
+            if (norm - 1.0).abs() > QUATERNION_NORM_TOLERANCE {
+                return Err(RecordingError::NotAUnitQuaternion { place: self.place(index, columns[0]), norm });
+            }
+            for part in value {
+                *part /= norm;
+            }
+        }
+        make_sign_continuous(&mut values);
+        Ok(values)
+    }
+
+    fn numbers(&self, column: usize) -> Vec<f64> {
+        self.rows.iter().map(|row| row[column]).collect()
+    }
+
+    fn whole_numbers(&self, column: usize) -> Result<Vec<u32>, RecordingError> {
+        self.rows
+            .iter()
+            .enumerate()
+            .map(|(index, row)| {
+                let value = row[column];
+                if value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value) {
+                    Ok(value as u32)
+                } else {
+                    Err(RecordingError::NotANumber { place: self.place(index, column), text: format!("{value}") })
+                }
+            })
+            .collect()
+    }
+
+    fn place(&self, sample: usize, column: usize) -> Place {
+        Place {
+            file: self.file.to_owned(),
+            line: self.lines[sample],
+            column: column + 1,
+            name: self.names[column].clone(),
+        }
+    }
+}
+
+/// Turns each quaternion to the side of the one before it: q and -q are the same orientation, a jump between them
+/// would be differentiated into an angular velocity of hundreds of rad/s.
+pub fn make_sign_continuous(quaternions: &mut [[f64; 4]]) {
+    for index in 1..quaternions.len() {
+        let before = quaternions[index - 1];
+        let dot: f64 = before.iter().zip(&quaternions[index]).map(|(a, b)| a * b).sum();
+        if dot < 0.0 {
+            quaternions[index] = quaternions[index].map(|part| -part);
+        }
+    }
+}
+
+/// Line numbers for increasing byte offsets.
+struct Newlines<'a> {
+    bytes: &'a [u8],
+    offset: usize,
+    line: u64,
+}
+
+impl<'a> Newlines<'a> {
+    fn new(bytes: &'a [u8]) -> Newlines<'a> {
+        Newlines { bytes, offset: 0, line: 1 }
+    }
+
+    /// The line of the record that starts at or behind `offset`: notes and blank lines before it are passed over.
+    fn line_at(&mut self, offset: usize) -> u64 {
+        self.advance_to(offset);
+        loop {
+            let rest = &self.bytes[self.offset..];
+            let end = rest.iter().position(|byte| *byte == b'\n');
+            let text = &rest[..end.unwrap_or(rest.len())];
+            let skipped = text.first() == Some(&b'#') || text.iter().all(|byte| *byte == b'\r');
+            match end {
+                Some(end) if skipped => self.advance_to(self.offset + end + 1),
+                _ => return self.line,
+            }
+        }
+    }
+
+    fn advance_to(&mut self, offset: usize) {
+        let offset = offset.clamp(self.offset, self.bytes.len());
+        let passed = &self.bytes[self.offset..offset];
+        self.line += passed.iter().filter(|byte| **byte == b'\n').count() as u64;
+        self.offset = offset;
+    }
+}

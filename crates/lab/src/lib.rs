@@ -1,0 +1,21 @@
+//! What the lab tool does with a device, without its command line: connect, teach, learn, upload, run, record, simulate.
+
+pub mod arm;
+pub mod boxed;
+pub mod client;
+pub mod demonstration;
+pub mod device;
+pub mod difference;
+pub mod error;
+pub mod failure;
+pub mod image_file;
+pub mod learn;
+pub mod plan;
+pub mod plot;
+pub mod primitive_file;
+pub mod procedure;
+pub mod replay;
+pub mod simulation;
+pub mod table;
+pub mod tracking;
+pub mod transport;

@@ -1,0 +1,362 @@
+//! A log played to the device's application: what the pucks and the host said is said again, and what the device then says is
+//! compared with what it said in the log.
+//!
+//! The application is the real one, `device::Core` and `device::Session`. It begins at power-up, so the log must too. Orders of a
+//! person come from the host; a log that holds the host's bus as well as the arm's holds them all.
+
+mod clock;
+mod engine;
+
+use std::collections::{BTreeMap, VecDeque};
+
+use link::Telemetry;
+use link::can::{DeviceNumber, Direction, Heading, Reassembler};
+use link::frame::{self, FRAME_BYTES};
+use puck::{CanFrame, Group, Node, PropertyId, get};
+use serde::Serialize;
+use sim::{SLOT_TICKS, Ticks};
+
+use canlog::{AnyFrame, LogLine};
+use canlog::{BusKind, Reader};
+use canlog::{HostLink, Message};
+use clock::LogClock;
+use engine::Engine;
+
+/// A frame of the log for which the device has nothing to show after so many slots was not sent by it.
+const PATIENCE_SLOTS: Ticks = 6;
+
+/// Frames that are looked through for the one in the log before the rest counts as different.
+const LOOK_AHEAD: usize = 16;
+
+/// Differences that are kept; of more only the number.
+const KEPT: usize = 16;
+
+/// How a frame differs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DifferenceKind {
+    /// The device sent another one instead.
+    Other,
+    /// The device did not send it.
+    NotSent,
+    /// The device sent it and the log has it not.
+    NotInLog,
+}
+
+/// A frame of the device that is not as in the log.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Difference {
+    /// How.
+    pub kind: DifferenceKind,
+    /// Time in the log, s.
+    pub time_s: f64,
+    /// Line of the log, 0 for a frame that it has not.
+    pub line: u64,
+    /// Control cycle of the device.
+    pub cycle: u64,
+    /// What the log has, in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub logged: Option<String>,
+    /// What the device sent, in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sent: Option<String>,
+}
+
+/// What a replay came to.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Outcome {
+    /// Time of the log, s.
+    pub seconds: f64,
+    /// Slots of the device.
+    pub slots: u64,
+    /// Its control cycles.
+    pub cycles: u64,
+    /// Frames of pucks, sensor and hand that it was given.
+    pub given: u64,
+    /// Frames of the device in the log.
+    pub logged: u64,
+    /// Frames of the device that were the same.
+    pub same: u64,
+    /// Requests of the host that it was given.
+    pub requests: u64,
+    /// Telemetry of cycles that both told, and how many of those were the same; how long computing took is left out.
+    pub telemetry: (u64, u64),
+    /// Whether the log holds the host's bus.
+    pub has_host: bool,
+    /// How many frames were not the same.
+    pub different: u64,
+    /// The first of them.
+    pub differences: Vec<Difference>,
+}
+
+/// Why a log cannot be replayed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ReplayError {
+    /// No frame of a co-controller is in it.
+    #[error("the log holds no frame that a co-controller has sent")]
+    NoDevice,
+    /// It begins in the middle.
+    #[error(
+        "the log begins in the middle: a co-controller that starts sends zero torques and MODE IDLE first, and not `{frame}`"
+    )]
+    Middle {
+        /// The frame in their place, in words.
+        frame: String,
+    },
+}
+
+/// A frame of the device in the log, to be matched.
+struct Logged {
+    at: Ticks,
+    time_us: u64,
+    line: u64,
+    frame: CanFrame,
+    words: String,
+}
+
+/// Plays a log, line after line.
+pub struct Replay {
+    reader: Reader,
+    host: HostLink,
+    /// The stream of the host to device 0, for the session to read.
+    to_device: Reassembler,
+    engine: Engine,
+    clock: Option<LogClock>,
+    /// Lines and their places until the device has sent the frames it begins with: only then is the clock known.
+    early: Vec<(u64, LogLine)>,
+    /// The first frame of the device and its time in the log.
+    first: Option<(CanFrame, u64)>,
+    /// How many of the frames with which a device begins have been seen.
+    begun: usize,
+    line: u64,
+    first_us: Option<u64>,
+    last_us: u64,
+    logged: VecDeque<Logged>,
+    sent: VecDeque<(Ticks, CanFrame)>,
+    /// Bytes that the device has handed over, less those that the log shows on the host's bus.
+    backlog: usize,
+    told: frame::Decoder<FRAME_BYTES>,
+    telemetry: BTreeMap<u32, Telemetry>,
+    outcome: Outcome,
+}
+
+impl Default for Replay {
+    fn default() -> Self {
+        Self {
+            reader: Reader::default(),
+            host: HostLink::default(),
+            to_device: Reassembler::new(Direction::ToDevice, DeviceNumber::FIRST),
+            engine: Engine::new(),
+            clock: None,
+            early: Vec::new(),
+            first: None,
+            begun: 0,
+            line: 0,
+            first_us: None,
+            last_us: 0,
+            logged: VecDeque::new(),
+            sent: VecDeque::new(),
+            backlog: 0,
+            told: frame::Decoder::new(),
+            telemetry: BTreeMap::new(),
+            outcome: Outcome::default(),
+        }
+    }
+}
+
+impl Replay {
+    /// Takes the next line of the log. `number`: its place in the file.
+    ///
+    /// # Errors
+    /// [`ReplayError::Middle`] when the first frames of the device show that the log begins too late.
+    pub fn take(&mut self, number: u64, line: LogLine) -> Result<(), ReplayError> {
+        self.line = number;
+        self.first_us.get_or_insert(line.time_us);
+        self.last_us = self.last_us.max(line.time_us);
+        if self.clock.is_none() {
+            return self.begin(line);
+        }
+        self.play(&line);
+        Ok(())
+    }
+
+    /// Waits for the frames with which a device begins. All of them: a log may also begin at a zero torque of an idle arm.
+    fn begin(&mut self, line: LogLine) -> Result<(), ReplayError> {
+        let AnyFrame::Data(frame) = line.frame else {
+            return Ok(());
+        };
+        let (meaning, interface) = self.reader.read(&line);
+        let is_of_device = interface.kind() == BusKind::Arm && frame.can_id().sender() == Node::HOST;
+        let begins_with = puck::stop_frames();
+        if is_of_device {
+            if begins_with.get(self.begun) != Some(&frame) {
+                return Err(ReplayError::Middle { frame: meaning.sentence() });
+            }
+            self.first.get_or_insert((frame, line.time_us));
+            self.begun += 1;
+        }
+        self.early.push((self.line, line));
+        if let Some((first, time_us)) = self.first.filter(|_| self.begun == begins_with.len()) {
+            self.clock = Some(LogClock::from_first_frame(&first, time_us));
+            self.reader = Reader::default();
+            for (number, early) in std::mem::take(&mut self.early) {
+                self.line = number;
+                self.play(&early);
+            }
+        }
+        Ok(())
+    }
+
+    fn play(&mut self, line: &LogLine) {
+        let (Some(clock), AnyFrame::Data(frame)) = (self.clock, &line.frame) else {
+            return;
+        };
+        let at = clock.device_time(line.time_us);
+        // What arrives at the very moment of a slot comes after it.
+        while self.engine.next_slot() <= at {
+            self.slot();
+        }
+        let (meaning, interface) = self.reader.read(line);
+        match interface.kind() {
+            BusKind::Host => self.host_frame(frame),
+            BusKind::Arm if frame.can_id().sender() == Node::HOST => {
+                self.outcome.logged += 1;
+                let words = format!("{} > {}: {}", meaning.from, meaning.to, meaning.sentence());
+                self.logged.push_back(Logged { at, time_us: line.time_us, line: self.line, frame: *frame, words });
+                self.compare();
+            }
+            BusKind::Arm => {
+                self.outcome.given += 1;
+                self.engine.receive(*frame);
+            }
+        }
+    }
+
+    /// A segment on the host's bus: what the host said is said again, what the device said is compared.
+    fn host_frame(&mut self, frame: &CanFrame) {
+        self.outcome.has_host = true;
+        let id = frame.can_id().raw();
+        if Heading::parse(id).is_some_and(|heading| heading.direction == Direction::ToDevice) {
+            let bytes = self.to_device.take(id, frame.payload());
+            self.engine.hear(&bytes);
+        } else {
+            self.backlog = self.backlog.saturating_sub(frame.payload().len());
+        }
+        let Some((_, messages)) = self.host.take(frame) else {
+            return;
+        };
+        for message in messages {
+            match message {
+                Message::Request(_) => self.outcome.requests += 1,
+                Message::Reply(link::Reply::Telemetry(logged)) => {
+                    if let Some(told) = self.telemetry.remove(&logged.cycle) {
+                        self.outcome.telemetry.0 += 1;
+                        let same = Telemetry { cost_ticks: logged.cost_ticks, ..told } == logged;
+                        self.outcome.telemetry.1 += u64::from(same);
+                    }
+                }
+                Message::Reply(_) => {}
+            }
+        }
+    }
+
+    /// One slot of the device.
+    fn slot(&mut self) {
+        let at = self.engine.next_slot();
+        let (frames, bytes) = self.engine.run_slot(self.backlog);
+        self.sent.extend(frames.into_iter().map(|frame| (at, frame)));
+        self.backlog += bytes.len();
+        let mut rest = bytes.as_slice();
+        while let Some(frame) = self.told.next::<link::Reply>(&mut rest) {
+            if let link::Reply::Telemetry(telemetry) = frame.message {
+                self.telemetry.insert(telemetry.cycle, telemetry);
+            }
+        }
+        self.compare();
+        // What the log says and the device does not.
+        while let Some(logged) = self.logged.pop_front_if(|logged| logged.at + PATIENCE_SLOTS * SLOT_TICKS < at) {
+            self.differ(DifferenceKind::NotSent, Some(&logged), None);
+        }
+        // Without a host's bus nobody takes the bytes away.
+        if !self.outcome.has_host {
+            self.backlog = 0;
+        }
+    }
+
+    /// Matches what both have.
+    fn compare(&mut self) {
+        while let (Some(logged), Some((slot, sent))) = (self.logged.front(), self.sent.front()) {
+            if logged.frame == *sent {
+                self.outcome.same += 1;
+                if *sent == get(Group::ARM, PropertyId::POSITION)
+                    && let Some(clock) = &mut self.clock
+                {
+                    clock.follow(sent, logged.time_us, *slot);
+                }
+            } else if logged.frame.can_id() == sent.can_id() && logged.frame.payload().first() == sent.payload().first()
+            {
+                // The same kind of frame with other contents.
+                let (Some(logged), Some((_, sent))) = (self.logged.pop_front(), self.sent.pop_front()) else {
+                    return;
+                };
+                self.differ(DifferenceKind::Other, Some(&logged), Some(sent));
+                continue;
+            } else if let Some(place) = self.sent.iter().take(LOOK_AHEAD).position(|(_, sent)| *sent == logged.frame) {
+                let extra: Vec<_> = self.sent.drain(..place).collect();
+                for (_, sent) in extra {
+                    self.differ(DifferenceKind::NotInLog, None, Some(sent));
+                }
+                continue;
+            } else {
+                let Some(logged) = self.logged.pop_front() else {
+                    return;
+                };
+                self.differ(DifferenceKind::NotSent, Some(&logged), None);
+                continue;
+            }
+            self.logged.pop_front();
+            self.sent.pop_front();
+        }
+    }
+
+    fn differ(&mut self, kind: DifferenceKind, logged: Option<&Logged>, sent: Option<CanFrame>) {
+        self.outcome.different += 1;
+        if self.outcome.differences.len() >= KEPT {
+            return;
+        }
+        let time_us = logged.map_or(self.last_us, |logged| logged.time_us);
+        let sent = sent.map(|frame| self.words(frame));
+        self.outcome.differences.push(Difference {
+            kind,
+            time_s: time_us.saturating_sub(self.first_us.unwrap_or(0)) as f64 * 1e-6,
+            line: logged.map_or(0, |logged| logged.line),
+            cycle: self.engine.cycles(),
+            logged: logged.map(|logged| logged.words.clone()),
+            sent,
+        });
+    }
+
+    /// A frame of the device in words, read with what the log has told of the pucks.
+    fn words(&self, frame: CanFrame) -> String {
+        let arm = self.reader.interfaces().iter().find(|interface| interface.kind() == BusKind::Arm);
+        let mut decoder = arm.map(|interface| interface.decoder.clone()).unwrap_or_default();
+        let meaning = decoder.read(&AnyFrame::Data(frame));
+        format!("{} > {}: {}", meaning.from, meaning.to, meaning.sentence())
+    }
+
+    /// The log has ended.
+    ///
+    /// # Errors
+    /// [`ReplayError::NoDevice`]
+    pub fn finish(mut self) -> Result<Outcome, ReplayError> {
+        if self.clock.is_none() {
+            return Err(ReplayError::NoDevice);
+        }
+        // What the device sent last may have been on its way when the log ended; what the log has must have been sent.
+        for logged in std::mem::take(&mut self.logged) {
+            self.differ(DifferenceKind::NotSent, Some(&logged), None);
+        }
+        let seconds = self.last_us.saturating_sub(self.first_us.unwrap_or(0)) as f64 * 1e-6;
+        Ok(Outcome { seconds, slots: self.engine.slots(), cycles: self.engine.cycles(), ..self.outcome })
+    }
+}

@@ -1,0 +1,219 @@
+//! Where a device is: the text behind `--device` and in `TACTUS_DEVICE`.
+//!
+//! ```text
+//! sim:[options]          the firmware under QEMU, with simulated bus and world
+//! sil:[options]          the same application in this process
+//! board:[options]        the image for the STM32H743 on an emulated board, with simulated bus and world
+//! hand:[options]         the hand image under QEMU, with a hand alone on the simulated bus and something to grip
+//! tcp:HOST:PORT          a socket
+//! unix:PATH              a Unix socket
+//! serial:PORT[@BAUD]     a serial port, 921600 baud unless said otherwise
+//! can:INTERFACE[/N]      device number N (0 unless said otherwise) on a CAN interface
+//! options: seed=7,world=simple|mujoco,line=serial|can,bus=FILE,flash=FILE, separated by commas
+//! of board: also report=FILE,cancellation=skipped|stuck,revision=0xNNNN,fault=KIND@MICROSECONDS[:ARGUMENT]
+//! ```
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use link::can::DeviceNumber;
+
+use super::options::SimulatorOptions;
+use super::serial::DEFAULT_BAUD;
+
+/// Which simulated device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SimulatorKind {
+    /// `sim:`, the firmware image under QEMU.
+    Qemu,
+    /// `sil:`, the application in this process.
+    InProcess,
+    /// `hand:`, the hand image under QEMU: a hand alone on its bus.
+    Hand,
+    /// `board:`, the image for the STM32H743 on the emulated board.
+    Board,
+}
+
+/// Where a device is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Address {
+    /// A simulated device, started on connecting.
+    Simulated(SimulatorKind, SimulatorOptions),
+    /// `host:port`.
+    Tcp(String),
+    /// Path of a socket.
+    Unix(PathBuf),
+    /// A serial port.
+    Serial {
+        /// Its name, e.g. `/dev/ttyACM0`.
+        port: String,
+        /// Its speed.
+        baud: u32,
+    },
+    /// A CAN interface of this system.
+    Can {
+        /// Its name, e.g. `can0`.
+        interface: String,
+        /// Which of the devices on its bus.
+        device: DeviceNumber,
+    },
+}
+
+/// Why a text is no address.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum AddressError {
+    /// The part before the colon names no kind of device.
+    #[error(
+        "'{0}' names no kind of device; there are sim:, sil:, board:, hand:, tcp:HOST:PORT, unix:PATH, serial:PORT[@BAUD] and can:INTERFACE[/N]"
+    )]
+    Kind(String),
+    /// Something is missing behind the colon.
+    #[error("'{0}' is incomplete; it should look like {1}")]
+    Incomplete(String, &'static str),
+    /// An option of a simulator that there is not.
+    #[error(
+        "simulated devices have the options seed=NUMBER, world=NAME, line=serial|can, bus=FILE and flash=FILE, not '{0}'"
+    )]
+    Option(String),
+    /// An option of the emulated board that there is not.
+    #[error(
+        "board: has the options of the other simulated devices, and report=FILE, cancellation=skipped|stuck, revision=0xNNNN and fault=KIND@MICROSECONDS[:ARGUMENT], not '{0}'"
+    )]
+    BoardOption(String),
+    /// A value that is no number.
+    #[error("'{0}' is not a whole number")]
+    Number(String),
+    /// A device number that there is not.
+    #[error("devices on a CAN bus have the numbers 0 to 15, not '{0}'")]
+    DeviceNumber(String),
+}
+
+impl FromStr for Address {
+    type Err = AddressError;
+
+    fn from_str(text: &str) -> Result<Self, AddressError> {
+        let (kind, rest) = text.split_once(':').ok_or_else(|| AddressError::Kind(text.to_owned()))?;
+        match kind {
+            "sim" => simulated(SimulatorKind::Qemu, rest),
+            "sil" => simulated(SimulatorKind::InProcess, rest),
+            "hand" => simulated(SimulatorKind::Hand, rest),
+            "board" => simulated(SimulatorKind::Board, rest),
+            "tcp" => match rest.rsplit_once(':') {
+                Some((host, port)) if !host.is_empty() => match port.parse::<u16>() {
+                    Ok(_) => Ok(Self::Tcp(rest.to_owned())),
+                    Err(_) => Err(AddressError::Number(port.to_owned())),
+                },
+                _ => Err(AddressError::Incomplete(text.to_owned(), "tcp:localhost:3333")),
+            },
+            "unix" if rest.is_empty() => Err(AddressError::Incomplete(text.to_owned(), "unix:/run/tactus.sock")),
+            "unix" => Ok(Self::Unix(PathBuf::from(rest))),
+            "serial" => {
+                let (port, baud) = match rest.rsplit_once('@') {
+                    Some((port, baud)) => (port, baud.parse().map_err(|_| AddressError::Number(baud.to_owned()))?),
+                    None => (rest, DEFAULT_BAUD),
+                };
+                if port.is_empty() || baud == 0 {
+                    return Err(AddressError::Incomplete(text.to_owned(), "serial:/dev/ttyACM0"));
+                }
+                Ok(Self::Serial { port: port.to_owned(), baud })
+            }
+            "can" => {
+                let (interface, number) = rest.split_once('/').unwrap_or((rest, "0"));
+                if interface.is_empty() {
+                    return Err(AddressError::Incomplete(text.to_owned(), "can:can0 or can:can0/1"));
+                }
+                let device = number.parse().ok().and_then(DeviceNumber::new);
+                let device = device.ok_or_else(|| AddressError::DeviceNumber(number.to_owned()))?;
+                Ok(Self::Can { interface: interface.to_owned(), device })
+            }
+            _ => Err(AddressError::Kind(text.to_owned())),
+        }
+    }
+}
+
+fn simulated(kind: SimulatorKind, options: &str) -> Result<Address, AddressError> {
+    Ok(Address::Simulated(kind, SimulatorOptions::parse(options, kind == SimulatorKind::Board)?))
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Simulated(kind, options) => {
+                f.write_str(match kind {
+                    SimulatorKind::Qemu => "sim:",
+                    SimulatorKind::InProcess => "sil:",
+                    SimulatorKind::Hand => "hand:",
+                    SimulatorKind::Board => "board:",
+                })?;
+                write!(f, "{options}")
+            }
+            Self::Tcp(address) => write!(f, "tcp:{address}"),
+            Self::Unix(path) => write!(f, "unix:{}", path.display()),
+            Self::Serial { port, baud: DEFAULT_BAUD } => write!(f, "serial:{port}"),
+            Self::Serial { port, baud } => write!(f, "serial:{port}@{baud}"),
+            Self::Can { interface, device: DeviceNumber::FIRST } => write!(f, "can:{interface}"),
+            Self::Can { interface, device } => write!(f, "can:{interface}/{device}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Address, AddressError> {
+        text.parse()
+    }
+
+    #[test]
+    fn every_kind_of_address_reads_as_it_is_written() {
+        for text in [
+            "sim:",
+            "sil:",
+            "sim:seed=7,world=simple",
+            "sil:world=mujoco",
+            "hand:seed=3",
+            "tcp:localhost:3333",
+            "tcp:[::1]:3333",
+            "unix:/run/tactus.sock",
+            "serial:/dev/ttyACM0",
+            "serial:/dev/ttyACM0@115200",
+            "can:can0",
+            "can:slcan1/15",
+            "sil:seed=3,line=can,bus=run.log",
+            "board:",
+            "board:seed=3,flash=bank2.bin,report=board.json,cancellation=stuck,revision=0x1003,fault=bus-off@5000000,fault=hang@7:2",
+        ] {
+            assert_eq!(parse(text).unwrap().to_string(), text);
+        }
+        let port = "COM3".to_owned();
+        assert_eq!(parse("serial:COM3"), Ok(Address::Serial { port, baud: 921_600 }));
+    }
+
+    #[test]
+    fn bad_addresses_say_what_is_wrong() {
+        assert_eq!(parse("/dev/ttyACM0"), Err(AddressError::Kind("/dev/ttyACM0".into())));
+        assert_eq!(parse("usb:1"), Err(AddressError::Kind("usb:1".into())));
+        assert!(matches!(parse("tcp:localhost"), Err(AddressError::Incomplete(..))));
+        assert!(matches!(parse("tcp::80"), Err(AddressError::Incomplete(..))));
+        assert_eq!(parse("tcp:localhost:http"), Err(AddressError::Number("http".into())));
+        assert!(matches!(parse("unix:"), Err(AddressError::Incomplete(..))));
+        assert!(matches!(parse("serial:"), Err(AddressError::Incomplete(..))));
+        assert_eq!(parse("serial:COM3@fast"), Err(AddressError::Number("fast".into())));
+        assert!(matches!(parse("can:"), Err(AddressError::Incomplete(..))));
+        assert_eq!(parse("can:can0/16"), Err(AddressError::DeviceNumber("16".into())));
+        assert_eq!(parse("can:can0/"), Err(AddressError::DeviceNumber(String::new())));
+        assert_eq!(parse("sil:line=tin"), Err(AddressError::Option("line=tin".into())));
+        assert_eq!(parse("sil:bus="), Err(AddressError::Option("bus=".into())));
+        assert_eq!(parse("sil:flash="), Err(AddressError::Option("flash=".into())));
+        assert_eq!(parse("sim:speed=2"), Err(AddressError::Option("speed=2".into())));
+        assert_eq!(parse("sim:world="), Err(AddressError::Option("world=".into())));
+        assert_eq!(parse("sim:fault=hang@1"), Err(AddressError::Option("fault=hang@1".into())));
+        assert_eq!(parse("sil:report=a.json"), Err(AddressError::Option("report=a.json".into())));
+        for part in ["speed=2", "fault=", "report", "cancellation=maybe", "revision=2003", "revision=0x12345"] {
+            assert_eq!(parse(&format!("board:seed=1,{part}")), Err(AddressError::BoardOption(part.into())));
+        }
+        assert_eq!(parse("sim:seed=-1"), Err(AddressError::Number("-1".into())));
+    }
+}

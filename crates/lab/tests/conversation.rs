@@ -1,0 +1,588 @@
+//! The client against the device's own session: handshake, loss, silence, uploads, stopping.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::io::Write as _;
+use std::rc::Rc;
+use std::time::{Duration, Instant};
+
+use control::model::ArmModel;
+use control::{CycleRecord, LoadRefusal, Payload, State};
+use device::{
+    Command, Counters, Event, EventKind, FitPrimitive, Health, Identity, QueueFull, RamStore, Session, SessionPort,
+    Stage, TimedRecord, Timing,
+};
+use lab::client::{Client, Halted, Incoming, Interrupt, UploadOutcome, UploadPhase};
+use lab::error::HostError;
+use lab::transport::{StreamTransport, Transport, TransportError};
+use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
+use link::{LINK_VERSION, Name, Refusal, Request, SCHEMA_HASH};
+use pinned_init::InPlaceWrite;
+
+/// One step of the virtual clock: a third of a control cycle.
+const STEP: Duration = Duration::from_nanos(1_111_111);
+
+/// A control half that takes every command and does what it says at once.
+struct Half {
+    state: State,
+    commands: Vec<Command>,
+    events: VecDeque<Event>,
+    records: VecDeque<TimedRecord>,
+    line: Vec<u8>,
+}
+
+impl SessionPort for Half {
+    fn send(&mut self, bytes: &[u8]) {
+        self.line.extend_from_slice(bytes);
+    }
+
+    fn command(&mut self, command: Command) -> Result<(), QueueFull> {
+        self.commands.push(command);
+        if let Command::Control(command) = command {
+            self.state = match command {
+                control::Command::Gravity => State::Gravity,
+                control::Command::Run(_) => State::Run,
+                control::Command::Stop => State::SoftStop,
+                _ => State::Hold,
+            };
+        }
+        self.events.push_back(Event { cycle: 0, kind: EventKind::Accepted });
+        Ok(())
+    }
+
+    fn load(&mut self, _fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
+        Ok(())
+    }
+
+    fn record(&mut self) -> Option<TimedRecord> {
+        self.records.pop_front()
+    }
+
+    fn event(&mut self) -> Option<Event> {
+        self.events.pop_front()
+    }
+
+    fn health(&mut self) -> Health {
+        Health {
+            cycle: 0,
+            stage: Stage::Ready,
+            blocked: None,
+            state: self.state,
+            fault: control::Fault::None,
+            zeroed: true,
+            zeroed_at: None,
+            payload: Payload::SensorAndHand,
+            wrench_zeroed: Some(true),
+            safety_mode: None,
+            pendant: None,
+            temperatures: [None; 7],
+            hand: link::HandStage::Absent,
+            hand_temperatures: [None; 4],
+            counters: Counters::default(),
+        }
+    }
+
+    fn timing(&mut self) -> Timing {
+        Timing::default()
+    }
+}
+
+/// A device in virtual time, with a line that can be cut or lose frames.
+struct Device {
+    session: Box<Session<RamStore<3, 4096>>>,
+    half: Half,
+    steps: u32,
+    /// Every so many portions from the host are lost; 0: none.
+    lose_every: u32,
+    /// Every so many portions to the host are lost; 0: none.
+    lose_answers_every: u32,
+    portions: u32,
+    answers: u32,
+    /// The device is dead.
+    dead: bool,
+    /// The cable is out.
+    unplugged: bool,
+}
+
+impl Device {
+    fn new() -> Self {
+        let identity =
+            Identity { firmware: "1.2.3", board: "test", serial: "T-1", simulated: true, ticks_per_second: 25_000_000 };
+        let Ok(session) = Box::new_uninit().write_init(Session::init(identity, RamStore::new()));
+        Self {
+            session,
+            half: Half {
+                state: State::Hold,
+                commands: Vec::new(),
+                events: VecDeque::new(),
+                records: VecDeque::new(),
+                line: Vec::new(),
+            },
+            steps: 0,
+            lose_every: 0,
+            lose_answers_every: 0,
+            portions: 0,
+            answers: 0,
+            dead: false,
+            unplugged: false,
+        }
+    }
+
+    fn step(&mut self) {
+        self.steps += 1;
+        if self.steps.is_multiple_of(3) {
+            let cycle = u64::from(self.steps / 3);
+            let record = CycleRecord { cycle, state: self.half.state, ..CycleRecord::EMPTY };
+            self.half.records.push_back(TimedRecord { record, cost_ticks: 7 });
+        }
+        if !self.dead {
+            self.session.poll((STEP * self.steps).as_micros() as u64, &mut self.half);
+        }
+    }
+}
+
+/// Whether the present one of a series is one that gets lost.
+fn is_lost(every: u32, count: &mut u32) -> bool {
+    *count += 1;
+    every > 0 && count.is_multiple_of(every)
+}
+
+impl Transport for Device {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
+        if self.unplugged {
+            return Err(TransportError::Closed);
+        }
+        if !is_lost(self.lose_every, &mut self.portions) {
+            self.session.receive(bytes);
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
+        let until = self.now() + timeout;
+        while self.half.line.is_empty() && self.now() < until {
+            self.step();
+        }
+        let bytes = std::mem::take(&mut self.half.line);
+        if !bytes.is_empty() && !is_lost(self.lose_answers_every, &mut self.answers) {
+            out.extend_from_slice(&bytes);
+        }
+        Ok(())
+    }
+
+    fn now(&self) -> Duration {
+        STEP * self.steps
+    }
+
+    fn is_virtual(&self) -> bool {
+        true
+    }
+}
+
+fn connected() -> Client<Device> {
+    Client::connect(Device::new(), "test").unwrap()
+}
+
+fn image(name: &str, duration: f32) -> Vec<u8> {
+    let posture = [0.0, 0.5, 0.0, 1.5, 0.0, 0.5, 0.0];
+    let model = ArmModel::<f32>::new(Payload::SensorAndHand);
+    let q = control::units::JointPositions::from_array(posture);
+    let [x, y, z, w, i, j, k] = control::model::Frames::new(&model, &q).tool_pose().to_f32();
+    let there = Waypoint { position: [x, y, z], orientation: [w, i, j, k], posture, hand: [0.0; 4] };
+    let content: ImageContent<&[f32]> = ImageContent {
+        model_hash: control::MODEL_HASH,
+        duration,
+        alpha: 4.605,
+        activation: 0.7,
+        stiffness: [200.0; 4],
+        damping: [28.28, 20.0, 28.28, 28.28],
+        orientation_error: OrientationErrorKind::QuaternionDifference,
+        hemisphere: HemisphereKind::Demonstrated,
+        start: there,
+        start_velocity: WaypointVelocity::default(),
+        goal: there,
+        clamps: FeedbackClamps { position: 0.2, orientation: 0.5, hand: 0.5 },
+        marks: Default::default(),
+        kernels: 20,
+        k1: &[],
+        k2: &[],
+        weights: &[0.0; 17 * 20],
+        expected_mean: &[],
+        expected_spread: &[],
+        experience_trials: 0,
+        experience_mean: &[],
+        experience_spread: &[],
+    };
+    let mut bytes = vec![0; 4096];
+    let length = content.encode(&Name::new(name).unwrap(), &mut bytes).unwrap();
+    bytes.truncate(length);
+    bytes
+}
+
+#[test]
+fn connecting_compares_versions_within_200_ms() {
+    let client = connected();
+    assert!(client.now() < Duration::from_millis(200), "{:?}", client.now());
+    assert_eq!(client.hello().serial.as_str(), "T-1");
+}
+
+#[test]
+fn c7_versions_that_differ_are_named_on_both_sides_and_nothing_else_is_sent() {
+    let Err(error) = Client::connect_as(Device::new(), "test", 99, SCHEMA_HASH) else { panic!() };
+    let text = error.to_string();
+    assert!(text.contains("version 99") && text.contains(&format!("version {LINK_VERSION}")), "{text}");
+    assert_eq!((error.exit() as u8, error.code()), (4, "E401"));
+    assert!(error.help().unwrap().contains("flash"));
+
+    let Err(error) = Client::connect_as(Device::new(), "test", LINK_VERSION, 0xBAD) else { panic!() };
+    let text = error.to_string();
+    assert!(text.contains("0x00000bad") && text.contains(&format!("{SCHEMA_HASH:#010x}")), "{text}");
+    assert_eq!(error.code(), "E402");
+}
+
+/// A device on a line on which every host hears everything it says, and what each has not heard yet.
+struct Party {
+    device: Device,
+    unheard: Vec<Vec<u8>>,
+}
+
+/// One of these hosts.
+struct Guest {
+    party: Rc<RefCell<Party>>,
+    place: usize,
+}
+
+impl Guest {
+    fn join(party: &Rc<RefCell<Party>>) -> Self {
+        let mut inner = party.borrow_mut();
+        inner.unheard.push(Vec::new());
+        Self { party: Rc::clone(party), place: inner.unheard.len() - 1 }
+    }
+}
+
+fn party() -> Rc<RefCell<Party>> {
+    Rc::new(RefCell::new(Party { device: Device::new(), unheard: Vec::new() }))
+}
+
+impl Transport for Guest {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
+        self.party.borrow_mut().device.send(bytes)
+    }
+
+    fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
+        let Party { device, unheard } = &mut *self.party.borrow_mut();
+        if unheard[self.place].is_empty() {
+            let mut said = Vec::new();
+            device.receive(timeout, &mut said)?;
+            unheard.iter_mut().for_each(|host| host.extend(&said));
+        }
+        out.append(&mut unheard[self.place]);
+        Ok(())
+    }
+
+    fn now(&self) -> Duration {
+        self.party.borrow().device.now()
+    }
+
+    /// Each host draws a session number of its own.
+    fn is_virtual(&self) -> bool {
+        false
+    }
+}
+
+#[test]
+fn a_second_host_stops_the_arm_of_the_first_and_gets_nothing_else() {
+    let party = party();
+    let mut first = Client::connect(Guest::join(&party), "first").unwrap();
+    first.gravity().unwrap();
+    let before = first.now();
+    let Ok(Halted::Others(error)) = Client::halt(Guest::join(&party), "second") else { panic!("not refused") };
+    assert!(first.now() - before < Duration::from_millis(50), "it took {:?}", first.now() - before);
+    assert_eq!(error.code(), "E504");
+    assert_eq!(party.borrow().device.half.state, State::SoftStop);
+    // The first keeps its session, and all of its messages are accounted for.
+    first.status().unwrap();
+    assert_eq!(first.gaps().messages, 0, "what was said to the second counts as lost");
+}
+
+#[test]
+fn a_halt_of_a_device_that_nobody_has_opens_a_conversation() {
+    let party = party();
+    let Ok(Halted::Ours(mut client)) = Client::halt(Guest::join(&party), "test") else { panic!("not ours") };
+    assert!(matches!(party.borrow().device.half.commands[..], [Command::Control(control::Command::Stop)]));
+    client.status().unwrap();
+    party.borrow_mut().device.dead = true;
+    let Err(error) = Client::halt(Guest::join(&party), "test") else { panic!("a dead device has stopped nothing") };
+    assert!(matches!(error, HostError::NoAnswer { request: "stop", .. }), "{error}");
+}
+
+#[test]
+fn a_device_that_does_not_answer_is_given_up_after_two_seconds() {
+    let mut device = Device::new();
+    device.dead = true;
+    let Err(error) = Client::connect(device, "test") else { panic!() };
+    assert!(matches!(error, HostError::NoAnswer { request: "hello", .. }), "{error}");
+    assert_eq!(error.exit() as u8, 7);
+
+    let mut client = connected();
+    let started = client.now();
+    client.transport().dead = true;
+    assert!(matches!(client.status(), Err(HostError::NoAnswer { request: "status", .. })));
+    let waited = client.now() - started;
+    assert!(waited >= Duration::from_secs(2) && waited < Duration::from_millis(2100), "{waited:?}");
+}
+
+#[test]
+fn a_socket_behind_which_nobody_answers_is_given_up_in_two_seconds_of_wall_time() {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let started = Instant::now();
+    let result = Client::connect(StreamTransport::tcp(&address).unwrap(), "test");
+    let waited = started.elapsed();
+    assert!(matches!(result.err(), Some(HostError::NoAnswer { .. })));
+    // How exactly it keeps to two seconds is tested in virtual time; the rest is for a computer that does something else as well.
+    assert!(waited > Duration::from_millis(1900) && waited < Duration::from_secs(10), "{waited:?}");
+}
+
+#[test]
+fn a_closed_socket_and_a_missing_one_are_told_apart() {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let transport = StreamTransport::tcp(&address).unwrap();
+    drop(listener.accept().unwrap());
+    drop(listener);
+    let closed = Client::connect(transport, "test").err().unwrap();
+    assert_eq!((closed.code(), closed.exit() as u8), ("E701", 7));
+    let missing = HostError::from(StreamTransport::tcp(&address).err().unwrap());
+    assert_eq!((missing.code(), missing.exit() as u8), ("E301", 3));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_unix_socket_carries_bytes_both_ways() {
+    let path = std::env::temp_dir().join(format!("tactus-stream-{}", std::process::id()));
+    let listener = std::os::unix::net::UnixListener::bind(&path).unwrap();
+    let mut transport = StreamTransport::unix(&path).unwrap();
+    let (mut other, _) = listener.accept().unwrap();
+    std::fs::remove_file(&path).unwrap();
+    let mut out = Vec::new();
+    transport.receive(Duration::from_millis(5), &mut out).unwrap();
+    assert!(out.is_empty(), "a time-out is no error");
+    other.write_all(&[1, 0, 2]).unwrap();
+    transport.receive(Duration::from_secs(1), &mut out).unwrap();
+    assert_eq!(out, [1, 0, 2]);
+    transport.send(&[3, 4]).unwrap();
+    let mut back = [0; 2];
+    std::io::Read::read_exact(&mut other, &mut back).unwrap();
+    assert_eq!(back, [3, 4]);
+}
+
+#[test]
+fn lost_requests_and_answers_are_repeated_and_done_once() {
+    let mut device = Device::new();
+    (device.lose_every, device.lose_answers_every) = (3, 4);
+    let mut client = Client::connect(device, "test").unwrap();
+    for _ in 0..20 {
+        client.hold().unwrap();
+    }
+    assert!(client.round_trips().repeated > 5);
+    let holds = client.transport().half.commands.len();
+    assert_eq!(holds, 20, "each was done exactly once");
+}
+
+#[test]
+fn noise_between_the_frames_is_counted_and_harmless() {
+    let mut client = connected();
+    client.transport().half.line.extend_from_slice(&[7, 7, 7, 0, 3, 9, 0]);
+    client.status().unwrap();
+    let counters = client.counters();
+    assert_eq!(counters.bad_cobs + counters.bad_crc, 2);
+}
+
+#[test]
+fn telemetry_arrives_whole_and_keeps_the_session_alive() {
+    let mut client = connected();
+    client.gravity().unwrap();
+    let mut stream = client.telemetry(1).unwrap();
+    let cycles: Vec<u32> = (0..900).map(|_| stream.next().unwrap().unwrap().cycle).collect();
+    assert!(cycles.windows(2).all(|pair| pair[1] == pair[0] + 1));
+    drop(stream);
+    assert_eq!((client.gaps().telemetry, client.gaps().messages), (0, 0));
+    assert_eq!(client.transport().half.state, State::Gravity, "three seconds without a time-out");
+    assert_eq!(client.next(Duration::from_millis(50)).unwrap(), None, "the stream was switched off");
+}
+
+#[test]
+fn gaps_in_the_telemetry_are_counted() {
+    let mut client = connected();
+    client.set_telemetry(1).unwrap();
+    client.transport().lose_answers_every = 5;
+    let mut received = 0;
+    while received < 100 {
+        if let Some(Incoming::Telemetry(_)) = client.next(Duration::from_secs(1)).unwrap() {
+            received += 1;
+        }
+    }
+    let gaps = client.gaps();
+    assert!((15..=40).contains(&gaps.telemetry), "{gaps:?}");
+    assert!(gaps.messages >= gaps.telemetry);
+}
+
+#[test]
+fn a_host_that_stops_listening_lets_the_device_stop_the_arm() {
+    let mut client = connected();
+    client.gravity().unwrap();
+    let device = client.transport();
+    (0..540).for_each(|_| device.step());
+    assert_eq!(device.half.state, State::SoftStop, "600 ms of silence");
+    let refused = client.gravity();
+    assert!(
+        matches!(refused, Err(HostError::Refused { reason: Refusal::NoSession, .. })),
+        "a host that was suspended does not start where it left: {refused:?}"
+    );
+}
+
+#[test]
+fn an_interrupt_stops_the_arm_before_the_command_ends() {
+    let mut client = connected();
+    let interrupt = Interrupt::never();
+    client.set_interrupt(interrupt.clone());
+    client.gravity().unwrap();
+    interrupt.raise();
+    let started = client.now();
+    let error = client.next(Duration::from_secs(10)).unwrap_err();
+    assert!(matches!(error, HostError::Interrupted));
+    assert_eq!(error.exit() as u8, 130);
+    assert!(client.now() - started <= Duration::from_millis(200));
+    assert_eq!(client.transport().half.state, State::SoftStop);
+}
+
+#[test]
+fn dropping_a_client_that_moved_the_arm_says_stop() {
+    let mut seen = Vec::new();
+    /// Remembers what was sent.
+    struct Spy<'a>(Device, &'a mut Vec<u8>);
+    impl Transport for Spy<'_> {
+        fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
+            self.1.extend_from_slice(bytes);
+            self.0.send(bytes)
+        }
+        fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
+            self.0.receive(timeout, out)
+        }
+        fn now(&self) -> Duration {
+            self.0.now()
+        }
+        fn is_virtual(&self) -> bool {
+            true
+        }
+    }
+    let mut client = Client::connect(Spy(Device::new(), &mut seen), "test").unwrap();
+    client.gravity().unwrap();
+    drop(client);
+    let mut decoder = link::frame::Decoder::<{ link::frame::FRAME_BYTES }>::new();
+    let mut bytes = seen.as_slice();
+    let sent: Vec<Request> =
+        std::iter::from_fn(|| decoder.next::<Request>(&mut bytes)).map(|frame| frame.message).collect();
+    assert_eq!(sent[sent.len() - 2..], [Request::Stop, Request::Goodbye]);
+}
+
+#[test]
+fn an_upload_is_sent_checked_stored_and_read_back() {
+    let mut client = connected();
+    let image = image("reach", 3.0);
+    let mut phases = Vec::new();
+    let outcome = client
+        .upload(&image, |phase, done, all| {
+            assert!(done <= all);
+            if phases.last() != Some(&phase) {
+                phases.push(phase);
+            }
+        })
+        .unwrap();
+    assert!(matches!(outcome, UploadOutcome::Stored(ref listing) if listing.name.as_str() == "reach"));
+    assert_eq!(phases, [UploadPhase::Send, UploadPhase::Commit, UploadPhase::Verify]);
+    assert_eq!(client.read_image(&Name::new("reach").unwrap(), |_| {}).unwrap(), image);
+    assert_eq!(client.list().unwrap().len(), 1);
+
+    let again = client.upload(&image, |_, _, _| panic!("nothing should be sent")).unwrap();
+    assert!(matches!(again, UploadOutcome::AlreadyThere(_)));
+    client.delete(&Name::new("reach").unwrap()).unwrap();
+    assert!(client.list().unwrap().is_empty());
+}
+
+#[test]
+fn an_upload_over_a_lossy_line_arrives_whole() {
+    let mut device = Device::new();
+    (device.lose_every, device.lose_answers_every) = (7, 5);
+    let mut client = Client::connect(device, "test").unwrap();
+    let outcome = client.upload(&image("reach", 3.0), |_, _, _| {}).unwrap();
+    assert!(matches!(outcome, UploadOutcome::Stored(_)));
+}
+
+#[test]
+fn c4_a_cable_pulled_at_any_chunk_leaves_the_old_primitive() {
+    let (old, new) = (image("reach", 3.0), image("reach", 5.0));
+    for cut in 0..new.len().div_ceil(192) {
+        let mut client = connected();
+        client.upload(&old, |_, _, _| {}).unwrap();
+        // The progress callback pulls the plug through a shared switch: the transport is the client's own.
+        let mut parts = 0;
+        let name = Name::new("reach").unwrap();
+        let crc = link::image::stored_crc(&new);
+        client.request(&Request::UploadBegin { name, length: new.len() as u32, crc }).unwrap();
+        for part in new.chunks(192).take(cut) {
+            let data = link::message::ChunkData::from_slice(part).unwrap();
+            client.request(&Request::UploadChunk { offset: parts, data }).unwrap();
+            parts += part.len() as u32;
+        }
+        client.transport().unplugged = true;
+        let error = client.upload(&new, |_, _, _| {}).unwrap_err();
+        assert_eq!(error.code(), "E701");
+        let device = client.transport();
+        (0..600).for_each(|_| device.step());
+        assert_eq!(device::Store::image(device.session.store(), 0), Some(old.as_slice()), "after {cut} chunks");
+    }
+}
+
+#[test]
+fn what_is_no_image_is_not_even_sent() {
+    let mut client = connected();
+    let mut damaged = image("reach", 3.0);
+    damaged[100] ^= 1;
+    let before = client.round_trips().count;
+    let error = client.upload(&damaged, |_, _, _| {}).unwrap_err();
+    assert_eq!((error.code(), error.exit() as u8), ("E651", 6));
+    assert_eq!(client.round_trips().count, before);
+}
+
+#[test]
+fn a_refusal_names_request_reason_and_remedy() {
+    let mut client = connected();
+    let run = client.run(&Name::new("nothing").unwrap(), link::RunOptions::default());
+    let error = run.unwrap_err();
+    assert_eq!(error.to_string(), "the device refused 'run': the device stores no primitive of that name");
+    assert_eq!((error.exit() as u8, error.code()), (5, "E513"));
+    let failure = error.into_failure("run refused").to_string();
+    assert!(failure.contains("help: `tactus list`"), "{failure}");
+}
+
+#[test]
+fn a_second_client_waits_for_the_first_to_be_gone() {
+    // The first one was killed: it said nothing, and its session lives on for half a second.
+    let mut device = Device::new();
+    let mut buffer = [0; link::frame::FRAME_BYTES];
+    let hello = link::HostHello {
+        link_version: LINK_VERSION,
+        schema_hash: SCHEMA_HASH,
+        model_hash: control::MODEL_HASH,
+        owner: link::Text::new("killed"),
+    };
+    let envelope = link::frame::Envelope { session: 999, sequence: 1, time_ms: 0 };
+    let length = link::frame::encode(envelope, &Request::Hello(hello), &mut buffer).unwrap();
+    device.session.receive(&buffer[..length]);
+    device.step();
+    let client = Client::connect(device, "test").unwrap();
+    let waited = client.now();
+    assert!(waited > Duration::from_millis(490) && waited < Duration::from_millis(800), "{waited:?}");
+}

@@ -1,0 +1,391 @@
+//! Learning: a demonstration becomes a primitive that does the same, a file that reads back as it was, and an image.
+
+mod common;
+
+use std::path::Path;
+
+use lab::demonstration::{Preparation, Recording};
+use lab::learn::feedback::FeedbackOptions;
+use lab::learn::{LearnError, LearnOptions, Learned, hand::HandMotion, learn};
+use lab::primitive_file::{
+    ExpectationTable, ExperienceTable, FeedbackTables, OrientationErrorKind, PrimitiveFile, PrimitiveFileError,
+};
+
+/// The plan has to end this near to its goal, m: the bound of `tactus check`.
+const GOAL_DISTANCE: f64 = 3e-3;
+
+fn taught(duration: f64) -> Recording {
+    let text = common::text(&common::rows(duration));
+    Recording::parse(Path::new("demo.csv"), text.as_bytes()).unwrap()
+}
+
+fn learned(recording: &Recording, options: &LearnOptions) -> Result<Learned, LearnError> {
+    learn(recording, Path::new("reach.toml"), options)
+}
+
+fn foreign(turn: f64) -> Recording {
+    Recording::parse(Path::new("other.csv"), common::foreign(turn).as_bytes()).unwrap()
+}
+
+#[test]
+fn a_taught_movement_is_reproduced() {
+    let recording = taught(5.0);
+    let learned = learned(&recording, &LearnOptions::named("reach")).unwrap();
+    let report = &learned.report;
+    assert!(report.position_rms_m < 5e-4, "{} m", report.position_rms_m);
+    assert!(report.position_relative < 2e-3, "{}", report.position_relative);
+    assert!(report.orientation_rms_rad.to_degrees() < 0.1, "{}", report.orientation_rms_rad.to_degrees());
+    assert!((report.orientation_path_ratio - 1.0).abs() < 0.01, "{}", report.orientation_path_ratio);
+    for row in &report.rows[6..13] {
+        assert!(row.rms < 1e-3, "{row:?}");
+    }
+    assert_eq!(report.kernels, 50);
+    assert!((report.phase.1 - 0.01).abs() < 1e-12);
+    assert_eq!(report.wrench[1].mean, -0.25);
+    assert!(report.warnings.is_empty(), "{:?}", report.warnings);
+    // It starts and ends where the movement did, not where the recording did.
+    let primitive = &learned.primitive;
+    for joint in 0..7 {
+        assert!((primitive.start.posture[joint] - common::START[joint]).abs() < 5e-3);
+        assert!((primitive.goal.posture[joint] - common::GOAL[joint]).abs() < 5e-3);
+    }
+    assert!((primitive.duration - 5.0).abs() < 0.5);
+}
+
+#[test]
+fn the_plan_stays_at_its_goal_behind_the_end_of_the_movement() {
+    let learned = learned(&taught(5.0), &LearnOptions::named("reach")).unwrap();
+    let primitive = learned.primitive.to_primitive().unwrap();
+    let mut rollout = dmp::Rollout::start(&primitive, &dmp::StartState::demonstrated(&primitive)).unwrap();
+    for cycle in 0..3600 {
+        let plan = rollout.step(&primitive, 1.0 / 300.0, &dmp::Coupling::NONE).unwrap();
+        if f64::from(cycle) / 300.0 > primitive.duration() {
+            let away = (0..3)
+                .map(|axis| (plan.position.x[axis] - learned.primitive.goal.position[axis]).powi(2))
+                .sum::<f64>()
+                .sqrt();
+            assert!(away < GOAL_DISTANCE, "{away} m at {} s", plan.time);
+        }
+    }
+}
+
+#[test]
+fn more_kernels_fit_better() {
+    let recording = taught(5.0);
+    let error = |kernels| {
+        let options = LearnOptions { kernels, ..LearnOptions::named("reach") };
+        learned(&recording, &options).unwrap().report.position_rms_m
+    };
+    assert!(error(50) < 0.3 * error(15));
+}
+
+#[test]
+fn learning_again_gives_the_same_primitive() {
+    let recording = taught(3.0);
+    let options = LearnOptions::named("reach");
+    let first = learned(&recording, &options).unwrap().primitive;
+    learned(&taught(4.0), &options).unwrap();
+    let again = learned(&recording, &options).unwrap().primitive;
+    assert_eq!(first, again);
+}
+
+#[test]
+fn poses_alone_can_be_learned_and_a_wide_turn_is_followed_in_every_axis() {
+    let turn = 2.5; // 143 degrees
+    let learned = learned(&foreign(turn), &LearnOptions::named("turn")).unwrap();
+    let report = &learned.report;
+    assert!((report.largest_angle_rad - turn).abs() < 0.2, "{}", report.largest_angle_rad);
+    assert!(report.orientation_rms_rad.to_degrees() < 0.1, "{}", report.orientation_rms_rad.to_degrees());
+    assert!((report.orientation_path_ratio - 1.0).abs() < 0.01, "{}", report.orientation_path_ratio);
+    assert!(report.warnings.iter().any(|warning| warning.contains("no joint angles")));
+}
+
+#[test]
+fn a_turn_beyond_150_degrees_is_warned_of_and_beyond_175_refused_with_its_line() {
+    let recording = foreign(2.75); // 158 degrees, a little more with the ripples
+    let report = learned(&recording, &LearnOptions::named("turn")).unwrap().report;
+    assert!(report.warnings.iter().any(|warning| warning.contains("rotation-vector")), "{:?}", report.warnings);
+
+    let recording = foreign(3.3); // 189 degrees
+    let error = learned(&recording, &LearnOptions::named("turn")).unwrap_err();
+    assert!(matches!(error, LearnError::TurnsTooFar { rotation_vector_helps: true, .. }), "{error}");
+    assert!(error.to_string().contains("other.csv: line "), "{error}");
+}
+
+#[test]
+fn with_the_rotation_vector_a_turn_of_more_than_half_a_revolution_is_followed() {
+    let options =
+        LearnOptions { orientation_error: OrientationErrorKind::RotationVector, ..LearnOptions::named("turn") };
+    let learned = learned(&foreign(5.0), &options).unwrap();
+    let report = &learned.report;
+    assert!(report.orientation_max_rad.to_degrees() < 0.5, "{}", report.orientation_max_rad.to_degrees());
+    assert!((report.orientation_path_ratio - 1.0).abs() < 0.01, "{}", report.orientation_path_ratio);
+}
+
+#[test]
+fn fingers_follow_their_generated_movement() {
+    let options = LearnOptions {
+        hand: HandMotion { start: [0.0; 4], goal: [0.0, 2.1, 2.1, 2.1], window: (0.5, 1.0) },
+        ..LearnOptions::named("grasp")
+    };
+    let learned = learned(&taught(4.0), &options).unwrap();
+    for row in &learned.report.rows[14..17] {
+        assert!(row.rms < 5e-3, "{row:?}");
+    }
+    assert!((learned.primitive.goal.hand[2] - 2.1).abs() < 1e-3);
+    let options = LearnOptions { hand: HandMotion { window: (0.8, 0.2), ..options.hand }, ..options };
+    assert!(matches!(learn(&taught(4.0), Path::new("x.toml"), &options).unwrap_err(), LearnError::Option { .. }));
+}
+
+#[test]
+fn a_recording_cut_out_of_a_motion_keeps_its_initial_velocity() {
+    let mut rows = common::rows(4.0);
+    rows.drain(..500);
+    let text = common::text(&rows);
+    let recording = Recording::parse(Path::new("cut.csv"), text.as_bytes()).unwrap();
+    let options = LearnOptions { preparation: Preparation { still_speed: None }, ..LearnOptions::named("cut") };
+    let learned = learned(&recording, &options).unwrap();
+    let velocity = learned.primitive.start_velocity.posture;
+    let expected = rows[0].dq;
+    for joint in 0..7 {
+        assert!((velocity[joint] - f64::from(expected[joint])).abs() < 0.02, "{velocity:?} {expected:?}");
+    }
+    assert!(learned.report.position_relative < 0.015, "{}", learned.report.position_relative);
+    assert!(learned.report.warnings[0].contains("begins in motion"), "{:?}", learned.report.warnings);
+}
+
+/// A primitive with everything a file can hold.
+fn full() -> PrimitiveFile {
+    let mut primitive = learned(&taught(3.0), &LearnOptions::named("full.1")).unwrap().primitive;
+    let row = |seed: usize, size: usize| -> Vec<f64> {
+        (0..size).map(|index| ((seed * 31 + index) as f64 * 0.7).sin() / 3.0).collect()
+    };
+    primitive.feedback = Some(FeedbackTables {
+        clamps: [0.23, 0.35, 0.1],
+        k1: vec![row(1, 10).iter().map(|value| value.abs()).collect()],
+        k2: (0..3).map(|point| row(point, 9).iter().map(|value| value.abs()).collect()).collect(),
+    });
+    primitive.expectation = Some(ExpectationTable {
+        model_hash: control::MODEL_HASH,
+        recorded_duration: 3.1,
+        payload_mass: 0.1,
+        payload_centre: [0.0, 0.01, 1e-7],
+        filter_cutoff: 15.0,
+        trials: 4,
+        spread_floor: 0.05,
+        mean: (0..50).map(|point| row(point, 9)).collect(),
+        spread: (0..50).map(|point| row(point + 7, 9).iter().map(|value| value.abs()).collect()).collect(),
+    });
+    primitive.experience = Some(ExperienceTable {
+        trials: 5,
+        mean: (0..64).map(|point| row(point, 12)).collect(),
+        spread: (0..64).map(|point| row(point, 12).iter().map(|value| value.abs() + 0.01).collect()).collect(),
+    });
+    primitive
+}
+
+#[test]
+fn a_file_reads_back_bit_for_bit() {
+    let mut primitive = full();
+    primitive.weights[0][0] = f64::MIN_POSITIVE;
+    primitive.weights[1][1] = 0.1 + 0.2;
+    primitive.weights[2][2] = -1e300;
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("reach.toml");
+    primitive.write(&file).unwrap();
+    let again = PrimitiveFile::read(&file).unwrap();
+    primitive.file = file;
+    assert_eq!(primitive, again);
+    for (a, b) in primitive.weights.concat().iter().zip(again.weights.concat()) {
+        assert_eq!(a.to_bits(), b.to_bits());
+    }
+}
+
+#[test]
+fn comments_may_be_changed_but_a_number_may_not() {
+    let text = full().to_text();
+    let parse = |text: &str| PrimitiveFile::parse(Path::new("reach.toml"), text);
+    let commented = text.replace("# Movement primitive of Tactus.", "# My reach.\n# With a note.");
+    assert!(parse(&commented).is_ok());
+    let position = text.find("stiffness = 200.0").unwrap();
+    let mut changed = text.clone();
+    changed.replace_range(position..position + 17, "stiffness = 200.1");
+    assert!(matches!(parse(&changed).unwrap_err(), PrimitiveFileError::Checksum { .. }));
+    let renamed = text.replace("name = \"full.1\"", "name = \"other\"");
+    assert!(matches!(parse(&renamed).unwrap_err(), PrimitiveFileError::Checksum { .. }));
+}
+
+#[test]
+fn a_wrong_file_is_refused_with_the_reason() {
+    let text = full().to_text();
+    let refused = |text: &str| PrimitiveFile::parse(Path::new("reach.toml"), text).unwrap_err();
+    let replaced = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        refused(&text.replacen(from, to, 1))
+    };
+    assert!(matches!(replaced("tactus-primitive/1", "tactus-primitive/9"), PrimitiveFileError::Schema { .. }));
+    assert!(matches!(replaced("kernels = 50", "kernels = 40"), PrimitiveFileError::Shape { .. }));
+    assert!(matches!(replaced("clamp_hand_rad = 0.1", "clamp_hand_rad = nan"), PrimitiveFileError::NotFinite { .. }));
+    assert!(matches!(replaced("\"demonstrated\"", "\"far\""), PrimitiveFileError::Word { .. }));
+    assert!(matches!(replaced("\"full.1\"", "\"a name\""), PrimitiveFileError::Word { .. }));
+    let error = replaced("duration_s = ", "duration_s = ten # ");
+    assert!(matches!(error, PrimitiveFileError::Syntax { .. }));
+    assert!(error.to_string().contains("line 9"), "{error}");
+    let error = replaced("[goal]", "[target]").to_string();
+    assert!(error.contains("target") || error.contains("goal"), "{error}");
+    assert!(matches!(refused(&text[..text.len() / 2]), PrimitiveFileError::Syntax { .. }));
+    assert!(matches!(refused(""), PrimitiveFileError::Syntax { .. }));
+}
+
+#[test]
+fn what_is_not_finite_is_not_written() {
+    let mut primitive = full();
+    primitive.weights[4][3] = f64::NAN;
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("reach.toml");
+    let error = primitive.write(&file).unwrap_err();
+    assert!(error.to_string().contains("weights.orientation, row 2: entry 4"), "{error}");
+    assert!(!file.exists());
+}
+
+#[test]
+fn the_image_holds_the_same_primitive_in_single_precision() {
+    let primitive = full();
+    let bytes = primitive.to_image().unwrap();
+    let image = link::PrimitiveImage::parse(&bytes).unwrap();
+    assert_eq!(image.name().as_str(), "full.1");
+    let content = image.content();
+    assert_eq!(content.model_hash, control::MODEL_HASH);
+    assert_eq!(content.kernels, 50);
+    assert_eq!(content.duration, primitive.duration as f32);
+    assert_eq!(content.goal.orientation, primitive.goal.orientation.map(|value| value as f32));
+    for (index, weight) in primitive.weights.concat().iter().enumerate() {
+        assert_eq!(content.weights.get(index), Some(*weight as f32));
+    }
+    assert_eq!(content.expected_mean.len(), 50 * 9);
+    assert_eq!(content.clamps.position, 0.23);
+    assert_eq!((content.experience_trials, content.experience_mean.len()), (5, 64 * 12));
+    let experience = primitive.experience.unwrap();
+    for (index, value) in experience.spread.concat().iter().enumerate() {
+        assert_eq!(content.experience_spread.get(index), Some(*value as f32));
+    }
+}
+
+#[test]
+fn an_experience_that_is_changed_cut_or_impossible_is_refused() {
+    let text = full().to_text();
+    let parse = |text: &str| PrimitiveFile::parse(Path::new("reach.toml"), text);
+    let section = text.find("[experience]").unwrap();
+    let (head, tail) = text.split_at(section);
+    let changed = format!("{head}{}", tail.replacen("trials = 5", "trials = 6", 1));
+    assert!(matches!(parse(&changed).unwrap_err(), PrimitiveFileError::Checksum { .. }));
+    let unknown = format!("{head}{}", tail.replacen("trials = 5", "runs = 5", 1));
+    let error = parse(&unknown).unwrap_err().to_string();
+    assert!(error.contains("line ") && error.contains("runs"), "{error}");
+
+    let mut short = full();
+    short.experience.as_mut().unwrap().spread.pop();
+    let error = PrimitiveFile::parse(Path::new("reach.toml"), &short.to_text()).unwrap_err();
+    assert!(error.to_string().contains("experience.spread"), "{error}");
+    let mut narrow = full();
+    narrow.experience.as_mut().unwrap().mean[3].pop();
+    let error = PrimitiveFile::parse(Path::new("reach.toml"), &narrow.to_text()).unwrap_err();
+    assert!(error.to_string().contains("experience.mean"), "{error}");
+    let mut certain = full();
+    certain.experience.as_mut().unwrap().spread[10][2] = 0.0;
+    let error = certain.to_primitive().unwrap_err();
+    assert!(error.to_string().contains("a spread is not at least 1e-6"), "{error}");
+}
+
+#[test]
+fn an_expectation_of_another_speed_or_another_model_is_refused() {
+    let mut slow = full();
+    slow.expectation.as_mut().unwrap().recorded_duration = slow.duration / 1.51;
+    for error in [slow.to_primitive().map(|_| ()).unwrap_err(), slow.to_image().map(|_| ()).unwrap_err()] {
+        assert!(matches!(error, PrimitiveFileError::ExpectationDuration { .. }), "{error}");
+        assert!(error.to_string().contains("more than 50 % apart"), "{error}");
+    }
+    slow.expectation.as_mut().unwrap().recorded_duration = slow.duration / 1.45;
+    assert!(slow.to_image().is_ok());
+    let mut foreign = full();
+    foreign.expectation.as_mut().unwrap().model_hash ^= 1;
+    let error = foreign.to_image().unwrap_err();
+    assert!(matches!(error, PrimitiveFileError::ExpectationModel { .. }), "{error}");
+    // Such a file can still be read, so that it can be rehearsed again.
+    let again = PrimitiveFile::parse(Path::new("reach.toml"), &foreign.to_text()).unwrap();
+    assert!(again.without_memory().to_image().is_ok());
+}
+
+#[test]
+fn a_dwell_makes_the_movement_longer_by_exactly_that_and_rests_at_the_goal() {
+    let plain = learned(&taught(4.0), &LearnOptions::named("reach")).unwrap();
+    let options = LearnOptions {
+        dwell: 2.5,
+        hand: HandMotion { start: [0.0; 4], goal: [0.0, 2.0, 2.0, 2.0], window: (0.65, 0.95) },
+        ..LearnOptions::named("grasp")
+    };
+    let grasp = learned(&taught(4.0), &options).unwrap();
+    assert!((grasp.primitive.duration - plain.primitive.duration - 2.5).abs() < 1e-12);
+    assert_eq!(grasp.demonstration.len(), plain.demonstration.len() + 750);
+    let primitive = grasp.primitive.to_primitive().unwrap();
+    let mut rollout = dmp::Rollout::start(&primitive, &dmp::StartState::demonstrated(&primitive)).unwrap();
+    loop {
+        let plan = rollout.step(&primitive, 1.0 / 300.0, &dmp::Coupling::NONE).unwrap();
+        if plan.time > plain.primitive.duration + 0.3 {
+            let away = (0..3).map(|axis| plan.position.x[axis] - grasp.primitive.goal.position[axis]);
+            assert!(away.map(|e| e * e).sum::<f64>().sqrt() < 3e-3, "at {} s", plan.time);
+        }
+        if plan.time > grasp.primitive.duration {
+            assert!((plan.hand.x[1] - 2.0).abs() < 0.02, "{:?}", plan.hand.x);
+            break;
+        }
+    }
+    for dwell in [-1.0, f64::NAN, 1e9] {
+        let options = LearnOptions { dwell, ..LearnOptions::named("x") };
+        assert!(matches!(learned(&taught(4.0), &options).unwrap_err(), LearnError::Option { option: "--dwell", .. }));
+    }
+}
+
+#[test]
+fn gains_that_the_user_gives_are_taken_and_explained_and_a_heavy_plan_is_warned_of() {
+    let feedback = |k1: [f64; 10], stiffness: f64| LearnOptions {
+        feedback: FeedbackOptions {
+            stiffness: Some(stiffness),
+            orientation_stiffness: None,
+            hand_stiffness: None,
+            sensitivity: Some(k1),
+            limits: Some([0.2, 30.0, 0.5]),
+        },
+        ..LearnOptions::named("reach")
+    };
+    let mut k1 = [0.0; 10];
+    (k1[0], k1[5]) = (5.0, 100.0);
+    let soft = learned(&taught(5.0), &feedback(k1, 300.0)).unwrap();
+    let tables = soft.primitive.feedback.as_ref().unwrap();
+    assert_eq!((tables.k1[0].as_slice(), tables.k2[0].as_slice()), (k1.as_slice(), [1.0; 9].as_slice()));
+    assert_eq!(tables.clamps[1], 30_f64.to_radians());
+    assert_eq!(soft.primitive.gains[0].stiffness, 300.0);
+    assert!((soft.primitive.gains[0].damping - 2.0 * 300_f64.sqrt()).abs() < 1e-12);
+    let report = soft.report.feedback.as_ref().unwrap();
+    let row = report.rows[0];
+    // 0.2 m against a spring of K/K1 = 60 N/m; tau^2/K1.
+    assert!((row.load_at_limit - 12.0).abs() < 1e-9, "{row:?}");
+    assert!((row.inertia - soft.primitive.duration.powi(2) / 5.0).abs() < 1e-9, "{row:?}");
+    assert_eq!((report.rows.len(), report.rows[1].row), (2, "rotation z"));
+    assert!(soft.report.warnings.iter().any(|warning| warning.contains("2 kg")), "{:?}", soft.report.warnings);
+    k1[1] = -1.0;
+    let error = learned(&taught(5.0), &feedback(k1, 300.0)).unwrap_err();
+    assert!(matches!(error, LearnError::Option { option: "--k1", .. }), "{error}");
+    let error = learned(&taught(5.0), &feedback([1.0; 10], f64::NAN)).unwrap_err();
+    assert!(matches!(error, LearnError::Option { option: "--stiffness", .. }), "{error}");
+}
+
+#[test]
+fn more_kernels_than_a_device_holds_are_refused() {
+    let mut primitive = full();
+    for row in &mut primitive.weights {
+        row.resize(101, 0.0);
+    }
+    assert!(matches!(primitive.to_image().unwrap_err(), PrimitiveFileError::Image { .. }));
+    assert!(matches!(primitive.to_primitive().unwrap_err(), PrimitiveFileError::Invalid { .. }));
+}

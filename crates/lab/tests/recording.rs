@@ -1,0 +1,347 @@
+//! Recordings: what is wrong is named with file, line and column; what is right comes back as it was.
+
+mod common;
+
+use std::path::Path;
+
+use lab::demonstration::{Demonstration, DemonstrationError, Preparation, Recording, RecordingError, layout};
+
+const FILE: &str = "folder/demo.csv";
+
+fn parse(text: &str) -> Result<Recording, RecordingError> {
+    Recording::parse(Path::new(FILE), text.as_bytes())
+}
+
+/// The lines of a good recording; line numbers in the tests count from 1, the header is line 2.
+fn good() -> Vec<String> {
+    common::text(&common::rows(2.0)).lines().map(String::from).collect()
+}
+
+fn column(name: &str) -> usize {
+    layout::header().iter().position(|known| known == name).expect("a column of the layout")
+}
+
+/// Replaces one field; `line` and the column as people count them.
+fn with_field(line: usize, name: &str, value: &str) -> String {
+    let mut lines = good();
+    let mut fields: Vec<&str> = lines[line - 1].split(',').collect();
+    fields[column(name)] = value;
+    lines[line - 1] = fields.join(",");
+    lines.join("\n")
+}
+
+/// Asserts that the message names the file, the line and the column.
+fn names(error: &impl std::fmt::Display, line: u64, column: usize) {
+    let text = error.to_string();
+    assert!(text.contains(FILE), "{text}");
+    assert!(text.contains(&format!("line {line}, column {column}")), "{text}");
+}
+
+#[test]
+fn nan_is_refused_with_its_place() {
+    let error = parse(&with_field(40, "q3_rad", "NaN")).unwrap_err();
+    assert!(matches!(error, RecordingError::NotFinite { .. }), "{error}");
+    names(&error, 40, column("q3_rad") + 1);
+    assert!(error.to_string().contains("(q3_rad)"));
+}
+
+#[test]
+fn infinity_is_refused_with_its_place() {
+    let error = parse(&with_field(41, "fx_N", "inf")).unwrap_err();
+    assert!(matches!(error, RecordingError::NotFinite { .. }), "{error}");
+    names(&error, 41, column("fx_N") + 1);
+}
+
+#[test]
+fn text_in_a_number_is_refused_with_its_place() {
+    let error = parse(&with_field(7, "x_m", "0.3m")).unwrap_err();
+    assert!(matches!(error, RecordingError::NotANumber { .. }), "{error}");
+    names(&error, 7, column("x_m") + 1);
+    let error = parse(&with_field(8, "tau2_Nm", "")).unwrap_err();
+    names(&error, 8, column("tau2_Nm") + 1);
+}
+
+#[test]
+fn time_that_runs_backwards_or_stands_still_is_refused_with_its_place() {
+    for time in ["0.01", "0.16"] {
+        // Line 52 is sample 49 at 0.1633 s; line 51 is at 0.16 s.
+        let error = parse(&with_field(52, "t_s", time)).unwrap_err();
+        assert!(matches!(error, RecordingError::TimeRunsBackwards { .. }), "{error}");
+        names(&error, 52, column("t_s") + 1);
+    }
+}
+
+#[test]
+fn missing_columns_are_named() {
+    let text: Vec<String> = good()
+        .into_iter()
+        .map(|line| {
+            if line.starts_with('#') {
+                return line;
+            }
+            let mut fields: Vec<&str> = line.split(',').collect();
+            fields.remove(column("q4_rad"));
+            fields.join(",")
+        })
+        .collect();
+    let error = parse(&text.join("\n")).unwrap_err();
+    assert!(matches!(error, RecordingError::MissingColumns { .. }), "{error}");
+    assert!(error.to_string().contains("q4_rad"), "{error}");
+    names(&error, 2, layout::header().len());
+    let error = parse("x_m,y_m,z_m\n0,0,0\n").unwrap_err().to_string();
+    assert!(error.contains("t_s") && error.contains("line 1"), "{error}");
+    let error = parse("t_s,x_m,y_m,z_m\n0,0,0,0\n").unwrap_err().to_string();
+    assert!(error.contains("qw, qx, qy, qz"), "{error}");
+}
+
+#[test]
+fn a_known_quantity_in_another_unit_is_refused() {
+    let text = good().join("\n").replacen("q2_rad", "q2_deg", 1);
+    let error = parse(&text).unwrap_err();
+    assert!(matches!(error, RecordingError::WrongUnit { .. }), "{error}");
+    names(&error, 2, column("q2_rad") + 1);
+    assert!(error.to_string().contains("expected `q2_rad`"), "{error}");
+}
+
+#[test]
+fn a_column_given_twice_is_refused() {
+    let text = good().join("\n").replacen("dq1_rad_s", "q1_rad", 1);
+    let error = parse(&text).unwrap_err();
+    assert!(matches!(error, RecordingError::DuplicateColumn { .. }), "{error}");
+    names(&error, 2, column("dq1_rad_s") + 1);
+}
+
+#[test]
+fn a_quaternion_that_is_no_unit_is_refused_with_its_place() {
+    let error = parse(&with_field(90, "qw", "1.2")).unwrap_err();
+    assert!(matches!(error, RecordingError::NotAUnitQuaternion { .. }), "{error}");
+    names(&error, 90, column("qw") + 1);
+    let error = parse(&with_field(91, "qw_d", "-0.9")).unwrap_err();
+    names(&error, 91, column("qw_d") + 1);
+}
+
+#[test]
+fn ragged_lines_are_refused_with_their_place() {
+    let columns = layout::header().len();
+    let mut lines = good();
+    lines[9].push_str(",7");
+    let error = parse(&lines.join("\n")).unwrap_err();
+    assert!(matches!(error, RecordingError::Ragged { .. }), "{error}");
+    names(&error, 10, columns + 1);
+    let mut lines = good();
+    let cut = lines[10].rfind(',').expect("several fields");
+    lines[10].truncate(cut);
+    names(&parse(&lines.join("\n")).unwrap_err(), 11, columns);
+}
+
+#[test]
+fn too_few_samples_are_refused() {
+    let text = good()[..50].join("\n");
+    let error = parse(&text).unwrap_err();
+    assert!(matches!(error, RecordingError::TooFewSamples { found: 48, .. }), "{error}");
+    names(&error, 50, 1);
+    let error = parse(&good()[..2].join("\n")).unwrap_err();
+    assert!(matches!(error, RecordingError::TooFewSamples { found: 0, .. }), "{error}");
+}
+
+#[test]
+fn empty_files_and_folders_are_refused() {
+    for text in ["", "\n\n", "# only a note\n"] {
+        let error = parse(text).unwrap_err();
+        assert!(matches!(error, RecordingError::Empty { .. }), "{error}");
+        names(&error, 1, 1);
+    }
+    let error = Recording::read(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap_err();
+    assert!(matches!(error, RecordingError::Unreadable { .. }), "{error}");
+}
+
+#[test]
+fn bytes_that_are_no_text_are_refused_and_never_panic() {
+    let mut state = 1_u32;
+    for length in [10, 1000, 20_000] {
+        let bytes: Vec<u8> = (0..length)
+            .map(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (state >> 24) as u8
+            })
+            .collect();
+        let error = Recording::parse(Path::new(FILE), &bytes).unwrap_err();
+        assert!(error.to_string().contains(FILE), "{error}");
+    }
+}
+
+#[test]
+fn notes_and_blank_lines_do_not_shift_line_numbers() {
+    let mut lines = good();
+    lines.insert(20, "# a note in the middle".to_owned());
+    lines.insert(21, String::new());
+    // What was line 40 is now line 42.
+    let mut fields: Vec<&str> = lines[41].split(',').collect();
+    fields[column("q1_rad")] = "x";
+    lines[41] = fields.join(",");
+    names(&parse(&lines.join("\n")).unwrap_err(), 42, column("q1_rad") + 1);
+    // Line ends of another system.
+    names(&parse(&lines.join("\r\n")).unwrap_err(), 42, column("q1_rad") + 1);
+}
+
+#[test]
+fn what_was_written_is_read() {
+    let rows = common::rows(2.0);
+    let recording = parse(&common::text(&rows)).unwrap();
+    assert_eq!(recording.len(), rows.len());
+    assert_eq!((recording.gaps, recording.missing_samples), (0, 0));
+    for (index, row) in rows.iter().enumerate() {
+        assert_eq!(recording.time[index], row.time);
+        assert_eq!(recording.cycle.as_ref().unwrap()[index], row.cycle);
+        assert_eq!(recording.state.as_ref().unwrap()[index], row.state);
+        assert_eq!(recording.q.as_ref().unwrap()[index].map(|value| value as f32), row.q);
+        assert_eq!(recording.dq.as_ref().unwrap()[index].map(|value| value as f32), row.dq);
+        assert_eq!(recording.tau.as_ref().unwrap()[index].map(|value| value as f32), row.tau);
+        assert_eq!(recording.wrench.as_ref().unwrap()[index].map(|value| value as f32), row.wrench);
+        assert_eq!(recording.position.as_ref().unwrap()[index], row.pose[..3]);
+        assert_eq!(recording.lines[index], index as u64 + 3);
+    }
+}
+
+#[test]
+fn recordings_of_the_time_before_the_hand_are_read() {
+    let old = layout::header().iter().position(|name| name == layout::HAND[0]).unwrap();
+    let cut: Vec<String> =
+        good()
+            .iter()
+            .map(|line| {
+                if line.starts_with('#') {
+                    line.clone()
+                } else {
+                    line.split(',').take(old).collect::<Vec<_>>().join(",")
+                }
+            })
+            .collect();
+    let recording = parse(&cut.join("\n")).unwrap();
+    assert!(recording.hand.is_none() && recording.gauges.is_none() && recording.surprise.is_none());
+    assert!(recording.wrench.is_some() && recording.flags.is_some());
+    let now = parse(&good().join("\n")).unwrap();
+    assert_eq!(now.hand.unwrap()[0], [0.0, 0.25, 0.5, 0.75]);
+    assert_eq!(now.hand_d.unwrap()[0], [0.0, 0.25, 0.5, 1.0]);
+    assert_eq!(now.gauges.unwrap()[0], [0.0, -0.5, 0.125]);
+    assert_eq!(now.surprise.unwrap()[0], 1.5);
+}
+
+#[test]
+fn lost_samples_are_counted_by_the_cycle_counter_and_by_time() {
+    let mut rows = common::rows(2.0);
+    rows.drain(100..103);
+    rows.drain(200..201);
+    let recording = parse(&common::text(&rows)).unwrap();
+    assert_eq!((recording.gaps, recording.missing_samples), (2, 4));
+    // The same without the counter.
+    let text = common::foreign(1.0);
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines.drain(300..305);
+    let recording = parse(&lines.join("\n")).unwrap();
+    assert_eq!((recording.gaps, recording.missing_samples), (1, 5));
+}
+
+#[test]
+fn a_gap_that_hides_movement_is_refused_with_its_place() {
+    let mut rows = common::rows(2.0);
+    rows.drain(100..140);
+    let recording = parse(&common::text(&rows)).unwrap();
+    let error = Demonstration::prepare(&recording, &Preparation::default()).unwrap_err();
+    assert!(matches!(error, DemonstrationError::Recording(RecordingError::GapTooLong { .. })), "{error}");
+    names(&error, 103, column("t_s") + 1);
+}
+
+#[test]
+fn rest_before_and_behind_the_movement_is_cut_off() {
+    let recording = parse(&common::text(&common::rows(3.0))).unwrap();
+    let trimmed = Demonstration::prepare(&recording, &Preparation::default()).unwrap();
+    let (before, behind) = trimmed.trimmed;
+    assert!((0.2..0.6).contains(&before) && (0.2..0.6).contains(&behind), "{before} {behind}");
+    assert!((before + behind + trimmed.duration() - 4.0).abs() < 1e-9);
+    let whole = Demonstration::prepare(&recording, &Preparation { still_speed: None }).unwrap();
+    assert_eq!(whole.len(), recording.len());
+}
+
+#[test]
+fn an_arm_that_does_not_move_is_no_demonstration() {
+    let mut rows = common::rows(2.0);
+    let first = rows[0].clone();
+    for row in &mut rows {
+        (row.q, row.pose) = (first.q, first.pose);
+    }
+    let recording = parse(&common::text(&rows)).unwrap();
+    let error = Demonstration::prepare(&recording, &Preparation::default()).unwrap_err();
+    assert!(matches!(error, DemonstrationError::Still { .. }), "{error}");
+    assert!(error.to_string().contains(FILE) && error.to_string().contains("lines 3 to"), "{error}");
+}
+
+#[test]
+fn the_pose_comes_from_the_joint_angles_where_there_are_any() {
+    let recording = parse(&common::text(&common::rows(2.0))).unwrap();
+    let demonstration = Demonstration::prepare(&recording, &Preparation { still_speed: None }).unwrap();
+    let index = 200;
+    let (position, _) = lab::arm::tool_pose(&recording.q.as_ref().unwrap()[index]);
+    for (computed, expected) in demonstration.position[index].iter().zip(position) {
+        assert!((computed - expected).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn other_rates_are_resampled_to_300_hz() {
+    let text = common::foreign(1.0);
+    // Every third sample: 100 Hz.
+    let (head, samples): (Vec<_>, Vec<_>) = text.lines().enumerate().partition(|(index, _)| *index < 2);
+    let thinned: Vec<&str> =
+        head.iter().map(|(_, line)| *line).chain(samples.iter().step_by(3).map(|(_, line)| *line)).collect();
+    let full = parse(&text).unwrap();
+    let recording = parse(&thinned.join("\n")).unwrap();
+    let preparation = Preparation { still_speed: None };
+    let a = Demonstration::prepare(&full, &preparation).unwrap();
+    let b = Demonstration::prepare(&recording, &preparation).unwrap();
+    assert_eq!((a.len(), b.len()), (1201, 1201));
+    for (a, b) in a.position.iter().zip(&b.position) {
+        for axis in 0..3 {
+            assert!((a[axis] - b[axis]).abs() < 2e-5, "{a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn quaternions_of_either_sign_give_the_same_demonstration() {
+    let text = common::foreign(2.5);
+    let flipped: Vec<String> = text
+        .lines()
+        .enumerate()
+        .map(|(index, line)| {
+            if index < 2 || index % 7 < 4 {
+                return line.to_owned();
+            }
+            let mut fields: Vec<String> = line.split(',').map(String::from).collect();
+            for field in &mut fields[4..8] {
+                *field = (-field.parse::<f64>().unwrap()).to_string();
+            }
+            fields.join(",")
+        })
+        .collect();
+    let preparation = Preparation { still_speed: None };
+    let a = Demonstration::prepare(&parse(&text).unwrap(), &preparation).unwrap();
+    let b = Demonstration::prepare(&parse(&flipped.join("\n")).unwrap(), &preparation).unwrap();
+    for (a, b) in a.orientation.iter().zip(&b.orientation) {
+        for part in 0..4 {
+            assert!((a[part] - b[part]).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn the_document_names_every_column_in_its_order() {
+    let document = include_str!("../../../docs/recording-format.md");
+    let mut rest = document;
+    for name in layout::header() {
+        let quoted = format!("`{name}`");
+        // q1_rad..q7_rad are documented as one line each group.
+        let found = rest.find(&quoted).unwrap_or_else(|| panic!("{quoted} is missing or out of order"));
+        rest = &rest[found..];
+    }
+}

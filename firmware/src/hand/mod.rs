@@ -1,0 +1,121 @@
+//! The bodies of the hand image's tasks, for any board: the hand alone, in fixed point.
+//!
+//! As [`crate::application`], with the halves of the crate `hand` and without storage: the library lives in memory.
+
+mod session;
+mod slot;
+
+use core::mem::MaybeUninit;
+
+use device::Identity;
+use hand::{Command, Core, Event, Library, Session, TimedRecord};
+use heapless::spsc::Queue;
+use puck::CanFrame;
+
+use crate::application::{ReceiveTask, TransmitTask};
+use crate::board::{Clock, Edge, Parts, SlotTimer};
+use crate::in_place;
+
+pub use session::SessionTask;
+pub use slot::SlotTask;
+
+/// Frames on their way to the controller: a cycle sends four.
+const OUTGOING: usize = 8 + 1;
+/// Frames on their way to the core: eight replies a cycle, and what a start-up brings.
+const INCOMING: usize = 24 + 1;
+/// Commands on their way to the core, which takes one per control cycle; a host waits for each answer.
+const COMMANDS: usize = 4 + 1;
+/// Records on their way to the session: 27 ms.
+const RECORDS: usize = 8 + 1;
+/// Events on their way to the session.
+const EVENTS: usize = 12 + 1;
+
+/// What the tasks hand to each other.
+struct Queues {
+    outgoing: Queue<CanFrame, OUTGOING>,
+    incoming: Queue<CanFrame, INCOMING>,
+    commands: Queue<Command, COMMANDS>,
+    records: Queue<TimedRecord, RECORDS>,
+    events: Queue<Event, EVENTS>,
+}
+
+/// Everything that lives as long as the image: put it into a static. [`start`] fills it where it is, because no task should
+/// run above a stack on which the halves were made.
+pub struct Memory {
+    queues: Queues,
+    library: Library,
+    core: MaybeUninit<Core>,
+    session: MaybeUninit<Session<'static>>,
+}
+
+impl Memory {
+    /// Not filled yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            queues: Queues {
+                outgoing: Queue::new(),
+                incoming: Queue::new(),
+                commands: Queue::new(),
+                records: Queue::new(),
+                events: Queue::new(),
+            },
+            library: Library::EMPTY,
+            core: MaybeUninit::uninit(),
+            session: MaybeUninit::uninit(),
+        }
+    }
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Everything the image consists of, for the tasks that own or share it.
+pub struct Application<E: Edge> {
+    /// Shared by slot and session.
+    pub core: &'static mut Core,
+    /// Shared by slot, receiver and transmitter.
+    pub can: E::Can,
+    /// On `SLOT_TIMER`.
+    pub slot_task: SlotTask<E>,
+    /// On `CAN_RECEIVE`.
+    pub receive_task: ReceiveTask,
+    /// On `CAN_TRANSMIT`.
+    pub transmit_task: TransmitTask,
+    /// After every slot.
+    pub session_task: SessionTask<E>,
+}
+
+/// Joins the application to the pieces of a board called `name`, and starts the timer of the slots.
+pub fn start<E: Edge>(
+    firmware: &'static str,
+    name: &'static str,
+    serial: &'static str,
+    parts: Parts<E>,
+    memory: &'static mut Memory,
+) -> Application<E> {
+    let identity =
+        Identity { firmware, board: name, serial, simulated: E::SIMULATED, ticks_per_second: <E::Clock as Clock>::HZ };
+    let Parts { clock, mut slot_timer, can, link, light, .. } = parts;
+    let Memory { queues, library, core, session } = memory;
+    let (to_bus, outgoing) = queues.outgoing.split();
+    let (incoming, from_bus) = queues.incoming.split();
+    let (to_core, commands) = queues.commands.split();
+    let (records, from_core) = queues.records.split();
+    let (events, news) = queues.events.split();
+    let core = in_place::keep(core, Core::new);
+    let session = in_place::keep(session, || Session::new(identity, library));
+    // When everything is built, which takes a while: the first slot must find its task ready.
+    slot_timer.start();
+    Application {
+        core,
+        can,
+        slot_task: SlotTask::new(clock, slot_timer, light, slot::Ends { from_bus, to_bus, commands, records, events }),
+        receive_task: ReceiveTask::new(incoming),
+        transmit_task: TransmitTask::new(outgoing),
+        session_task: SessionTask::new(clock, session, session::Ends { port: link, to_core, from_core, news }),
+    }
+}
