@@ -1,7 +1,7 @@
 //! What the low-priority half ([`crate::Session`]) needs from the world: the line, and the queues to the control half.
 
+use control::plan::primitive::Primitive;
 use control::{CycleRecord, Fit, LoadRefusal};
-use dmp::Primitive;
 
 use crate::command::Command;
 use crate::event::Event;

@@ -8,6 +8,7 @@ use crate::law::hand::HandReference;
 use crate::law::joint::JointReference;
 use crate::law::operational::TaskReference;
 use crate::model::kinematics::Frames;
+use crate::plan::primitive::posture_and_hand;
 use crate::plan::run::Senses;
 use crate::real::Real;
 use crate::sense::hand::HandState;
@@ -126,7 +127,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         let deviation = run.deviation().filter(|_| options.force_control);
         let expected_gauges = deviation.map(|deviation| deviation.expected_gauges);
-        self.hand.follow(&HandReference { q: plan.hand.x, dq: plan.hand.v }, expected_gauges);
+        self.hand.follow(
+            &HandReference { q: posture_and_hand(&plan.points.x).1, dq: posture_and_hand(&plan.points.v).1 },
+            expected_gauges,
+        );
         let task = TaskReference::from_plan(&plan);
         let reference = self.operational.step(
             &self.model,

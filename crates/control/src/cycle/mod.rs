@@ -12,7 +12,6 @@ mod laws;
 pub mod record;
 mod transitions;
 
-use dmp::Primitive;
 use pinned_init::{Init, init};
 use puck::SafetyMode;
 
@@ -36,6 +35,7 @@ use crate::model::calibration::{Calibration, Payload};
 use crate::model::kinematics::Frames;
 use crate::plan::approach::Approach;
 use crate::plan::load::{Fit, LoadRefusal, Loaded};
+use crate::plan::primitive::Primitive;
 use crate::plan::run::{FADE, Run};
 use crate::real::Real;
 use crate::sense::joints::{JointEstimator, JointState};

@@ -1,7 +1,5 @@
 //! Transitions: what a state inherits from the one before it, so that no torque makes a step.
 
-use dmp::Primitive;
-
 use crate::cycle::{Cycle, HANDOVER, Measured, STOP_RAMP, ZERO_CYCLES};
 use crate::guard::fault::Fault;
 use crate::guard::joint_limits::JointBounds;
@@ -9,6 +7,7 @@ use crate::guard::supervisor::{State, Trigger};
 use crate::law::force::ForceController;
 use crate::law::operational::OperationalController;
 use crate::model::arm::within;
+use crate::plan::primitive::Primitive;
 use crate::real::Real;
 use crate::sense::deviation::Deviation;
 use crate::units::{JointAccelerations, JointPositions, Vector7, Wrench};

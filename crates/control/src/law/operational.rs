@@ -5,6 +5,7 @@
 //! `J^+ (ddx_d + K_x (dx_d - dx) - dJ dq) + (I - J^+ J) K_post (dq_post - dq)`, or the low-passed derivative of `dq_d`.
 //! The orientation error is `2 vec(q_d (x) conj(q))`, sign-aligned, in world axes, as the Jacobian's angular rows are.
 
+use dmp::PoseReference;
 use nalgebra::Vector3;
 
 use crate::command::{AccelerationSource, PoseFeedback};
@@ -13,6 +14,7 @@ use crate::law::gains::Tracking;
 use crate::law::joint::JointReference;
 use crate::model::arm::{ArmModel, at_least, at_most};
 use crate::model::kinematics::Frames;
+use crate::plan::primitive::{Reference, posture_and_hand};
 use crate::real::Real;
 use crate::sense::filter::{Butterworth, LowPass};
 use crate::sense::joints::JointState;
@@ -131,21 +133,21 @@ impl<R: Real> OperationalController<R> {
 
 impl<R: Real> TaskReference<R> {
     /// From the plan of a primitive, whose angular quantities are in body axes.
-    pub fn from_plan(plan: &dmp::Reference<R>) -> Self {
-        let orientation = &plan.orientation;
-        let [vx, vy, vz] = plan.position.v;
-        let [ax, ay, az] = plan.position.a;
+    pub fn from_plan(plan: &Reference<R>) -> Self {
+        let [PoseReference { position, orientation }] = &plan.poses;
+        let [vx, vy, vz] = position.v;
+        let [ax, ay, az] = position.a;
         let [wx, wy, wz] = orientation.omega_world();
         let [bx, by, bz] = orientation.domega_world();
         TaskReference {
             pose: Pose {
-                position: Vector3::from(plan.position.x),
+                position: Vector3::from(position.x),
                 orientation: Orientation(orientation.quaternion.to_array()),
             },
             velocity: Vector6::new(vx, vy, vz, wx, wy, wz),
             acceleration: Vector6::new(ax, ay, az, bx, by, bz),
-            posture: Vector7::from(plan.posture.x),
-            posture_velocity: Vector7::from(plan.posture.v),
+            posture: Vector7::from(posture_and_hand(&plan.points.x).0),
+            posture_velocity: Vector7::from(posture_and_hand(&plan.points.v).0),
         }
     }
 }

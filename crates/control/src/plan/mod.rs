@@ -3,6 +3,7 @@
 pub mod approach;
 pub mod hand;
 pub mod load;
+pub mod primitive;
 pub(crate) mod run;
 
 pub use approach::Approach;
