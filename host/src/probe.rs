@@ -12,9 +12,6 @@ use std::process::{Command, ExitStatus, Stdio};
 /// Name of the program.
 pub const PROBE_RS: &str = "probe-rs";
 
-/// How to get it.
-pub const INSTALL_PROBE_RS: &str = "cargo install probe-rs-tools --locked";
-
 /// A program and its arguments.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Line {

@@ -13,6 +13,7 @@ use lab::client::{Client, Incoming, UploadOutcome};
 use lab::device::Device;
 use lab::primitive_file::PrimitiveFile;
 use lab::procedure;
+use lab::simulation::{CYCLE_TICKS, SLOT_TICKS};
 use lab::transport::Address;
 use lab::transport::can::CanPort as _;
 use link::can::{BITS_PER_SECOND, DeviceNumber, Direction, LINE_BYTES_PER_SECOND, SEGMENT_BYTES, Segmenter};
@@ -39,8 +40,8 @@ fn arm(address: &str) -> Client<Device> {
 
 /// Waits until this time of the simulated arm, shortly after a control slot: what is sent now reaches the next one whatever the line.
 fn wait_until(client: &mut Client<Device>, seconds: f64) {
-    let cycle = (seconds * 300.0).round();
-    let behind_control_slot = cycle * sim::seconds(sim::CYCLE_TICKS) + sim::seconds(sim::SLOT_TICKS) + 0.1e-3;
+    let cycle = (seconds * control::RATE).round();
+    let behind_control_slot = cycle * sim::seconds(CYCLE_TICKS) + sim::seconds(SLOT_TICKS) + 0.1e-3;
     let until = Duration::from_secs_f64(behind_control_slot);
     while client.now() < until {
         let _ = client.next(until - client.now()).unwrap();
@@ -226,7 +227,7 @@ fn devices_on_a_bus_hear_only_what_is_meant_for_them() {
     let port = lab::transport::SimulatedCan::attach(*simulation, DeviceNumber::FIRST);
     let line = lab::transport::CanTransport::new(port, DeviceNumber::new(3).unwrap());
     let error = Client::connect(line, "test").err().unwrap();
-    assert_eq!(error.code(), "E702", "{error}");
+    assert_eq!(error.code().to_string(), "E702", "{error}");
 }
 
 #[test]

@@ -133,7 +133,7 @@ fn a_lost_reply_is_counted_where_it_was_owed() {
 #[test]
 fn every_frame_of_the_golden_transcripts_has_a_name() {
     for name in ["transcript_safety_ctor.csv", "transcript_hand_init.csv"] {
-        let path = format!(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/vectors/{}"), name);
+        let path = format!(concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/puck/tests/vectors/{}"), name);
         let text = std::fs::read_to_string(path).unwrap();
         let mut reader = Reader::default();
         let mut said = Vec::new();

@@ -1,10 +1,9 @@
-//! What went over the simulated bus, read with the device side of the protocol.
+//! Frames of the simulated bus, read with the device side of the protocol.
 
 use puck::{Action, Group, PropertyId, Request};
 use sim::{Passage, Ticks};
 
-/// Ticks of one control cycle: three slots.
-pub const CYCLE_TICKS: Ticks = 3 * sim::SLOT_TICKS;
+pub use lab::simulation::CYCLE_TICKS;
 
 /// The starts of all position requests to the whole arm.
 #[must_use]

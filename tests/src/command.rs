@@ -62,7 +62,8 @@ impl Running {
         self.0.as_ref().map_or(0, process::Child::id)
     }
 
-    /// Waits until the command says these words on stderr; what it said until then is not in [`Running::finish`]'s output.
+    /// Waits until the command says these words on stderr; what it said until then is not in [`Running::finish`]'s
+    /// output.
     ///
     /// # Panics
     /// It ends without having said them.
@@ -116,13 +117,13 @@ pub fn signal(process: u32, signal: &str) {
     assert!(status.expect("kill is part of every system").success(), "no process {process}");
 }
 
-/// What a command wrote to stdout.
+/// The stdout of a command.
 #[must_use]
 pub fn stdout(assert: &Assert) -> String {
     String::from_utf8_lossy(&assert.get_output().stdout).into_owned()
 }
 
-/// What a command wrote to stderr.
+/// The stderr of a command.
 #[must_use]
 pub fn stderr(assert: &Assert) -> String {
     String::from_utf8_lossy(&assert.get_output().stderr).into_owned()

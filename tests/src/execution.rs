@@ -14,12 +14,12 @@ use sim::BusTrace;
 use crate::{Arm, expect, simulation};
 
 /// Cycles recorded behind the arrival at the goal.
-const AFTERGLOW: usize = 300;
+const POST_ROLL: usize = 300;
 
 /// Cycles after which a movement that has not arrived is a failure.
-const PATIENCE: usize = 30 * 300;
+const TIMEOUT: usize = 30 * 300;
 
-/// What one run came to.
+/// Result of one run.
 pub struct Execution {
     /// Every cycle from the start of the run.
     pub telemetry: Vec<Telemetry>,
@@ -31,9 +31,9 @@ pub struct Execution {
     pub tracking: Tracking,
     /// Telemetry messages that the link lost.
     pub gaps: u32,
-    /// What the device counted since it was switched on.
+    /// Counters of the device since it was switched on.
     pub statistics: Statistics,
-    /// What the bus counted since then.
+    /// Counters of the bus since then.
     pub trace: BusTrace,
     /// Where the grasp point really is at the end, m.
     pub grasp_point: [f64; 3],
@@ -78,18 +78,18 @@ pub fn play(arm: &mut Arm, file: &PrimitiveFile) -> Execution {
     arm.take_events();
     begin(arm, file);
     let mut telemetry = Vec::new();
-    let mut end = PATIENCE;
+    let mut end = TIMEOUT;
     while telemetry.len() < end {
         match expect(recorder.take(arm)) {
             Take::Cycle(cycle) => telemetry.push(cycle),
             Take::Event(event) => match event.kind {
-                EventKind::Arrived => end = telemetry.len() + AFTERGLOW,
+                EventKind::Arrived => end = telemetry.len() + POST_ROLL,
                 EventKind::State => expect(procedure::after(event.code, event.detail)),
                 _ => {}
             },
         }
     }
-    assert!(end < PATIENCE, "the movement never arrived");
+    assert!(end < TIMEOUT, "the movement never arrived");
     let bytes = expect(recorder.finish(arm));
     let recording = expect(Recording::parse(Path::new("run"), &bytes));
     let statistics = expect(arm.statistics());

@@ -90,7 +90,7 @@ pub fn with_kernels(image: &[u8], kernels: u16) -> Vec<u8> {
 /// Uploads bytes as they are, announced with the check sum of what is sent.
 ///
 /// # Errors
-/// What the device refuses, and with which reason.
+/// Asserts that the device refuses, and with which reason.
 pub fn upload_unseen(arm: &mut Arm, name: &str, image: &[u8]) -> Result<(), HostError> {
     let length = image.len() as u32;
     arm.request(&Request::UploadBegin { name: expect(Name::new(name)), length, crc: stored_crc(image) })?;

@@ -1,4 +1,4 @@
-//! What the whole-system tests share: a simulated device, a primitive that was taught, an execution, the command.
+//! Common parts of the whole-system tests: a simulated device, a primitive that was taught, an execution, the command.
 //!
 //! Nothing here is skipped where something is missing. A test without firmware image, QEMU or MuJoCo fails, and the
 //! message names the command that sets it up.
@@ -70,7 +70,8 @@ pub fn ready(address: &str) -> Arm {
     arm
 }
 
-/// Boots a simulated device and waits until it is up, with torque off: nobody has commanded anything, not even the hand's initialisation.
+/// Boots a simulated device and waits until it is up, with torque off: nobody has commanded anything, not even the
+/// hand's initialisation.
 ///
 /// # Panics
 /// It does not get there.
@@ -96,7 +97,8 @@ pub fn simulation(device: &mut Device) -> &mut Simulation {
     device.simulation().expect("the tests open simulated devices only")
 }
 
-/// The primitive that every test plays: shown by the simulated person, recorded over the link, learned; all by the command.
+/// The primitive that every test plays: shown by the simulated teacher, recorded over the link, learned; all by the
+/// command.
 ///
 /// It is taught to `sil:`, because that is fast; the journey teaches the firmware itself.
 ///

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::elf::{Section, Sizes};
+use crate::elf::{CORE_VECTORS, Section, Sizes};
 use crate::stack::{Depth, START_PERCENT, share};
 
 /// A board.
@@ -24,9 +24,6 @@ struct Block {
     length: u32,
     budget: u32,
 }
-
-/// Vectors in front of the interrupt lines.
-pub(crate) const CORE_VECTORS: usize = 16;
 
 /// Which handler belongs to which line of the STM32H743.
 const HANDLERS: [(usize, &str); 8] = [
@@ -144,8 +141,8 @@ pub(crate) fn print_sizes(image: &Path) -> Result<()> {
     check_layout(&sizes)
 }
 
-/// The chip's interrupt lines by the handler that must stand there, and memory the start-up code clears and copies: what the
-/// linker script says in the chip's words, seen in the image it made.
+/// The chip's interrupt lines by the handler that must stand there, and memory the start-up code clears and copies:
+/// what the linker script says in the chip's words, seen in the image it made.
 fn check_layout(sizes: &Sizes) -> Result<()> {
     let stack = STM32H743.iter().find(|block| block.name == STACK).context("no stack in the table")?;
     let top = *sizes.vectors().first().context("the image has no vector table")?;

@@ -1,4 +1,4 @@
-//! What the image costs, measured by itself while it runs a movement under QEMU, and the bounds that a change must not
+//! Costs of the image, measured by itself while it runs a movement under QEMU, and the bounds that a change must not
 //! cross.
 //!
 //! Under `-icount shift=3` the emulated core executes 125 million instructions per virtual second and the image's clock
@@ -18,11 +18,11 @@ use crate::{build, demo, elf, shell};
 /// 480 MHz part with three cycles per instruction a third of that slot.
 const CYCLE_BOUND: f64 = 60_000.0;
 
-/// What a control cycle should stay below.
+/// Bound of a control cycle.
 const CYCLE_AIM: f64 = 30_000.0;
 
-/// Deepest use of the stack. 29.4 kB today: the halves of the application are built in their place, piece by piece. What the
-/// image may use at most is computed when it is built (`cargo xtask stack`); this is what a run does use.
+/// Deepest use of the stack. 29.4 kB today: the halves of the application are built in their place, piece by piece.
+/// Stack that a run uses; the most that the image may use is computed when it is built (`cargo xtask stack`).
 const STACK_BOUND: f64 = 36.0 * 1024.0;
 
 /// Prints the table and fails if a bound is crossed.

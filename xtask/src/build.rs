@@ -8,10 +8,13 @@ use anyhow::{Context, Result, ensure};
 use crate::board::{self, Board};
 use crate::elf::Sizes;
 use crate::setup::{ARM, Machine, Toolchain};
-use crate::{hand, hot, panics, shell, stack};
+use crate::{hot, panics, shell, stack};
 
 /// Features of the host packages with the MuJoCo world and its pictures.
 pub(crate) const WORLD: &str = "tactus/mujoco,lab/mujoco,experiment/mujoco,sim/mujoco,sim/render,system-tests/mujoco";
+
+/// File name of the hand's image beside the tools.
+pub(crate) const HAND: &str = "hand.elf";
 
 /// Builds the `tactus` command with the MuJoCo world, optimised; returns its path.
 pub(crate) fn host() -> Result<PathBuf> {
@@ -54,7 +57,7 @@ fn board_image(toolchain: Toolchain, board: Board, may_sleep: bool) -> Result<Pa
     Ok(image)
 }
 
-/// What no image may contain: an allocator, panics but those that are known, a way deeper than its stack allows.
+/// Fails if an image contains what none may: an allocator, unknown panics, a path deeper than its stack.
 pub(crate) fn nothing_forbidden(image: &Path, board: Board) -> Result<()> {
     ensure!(!Sizes::of(image)?.allocates(), "the image allocates memory, which nothing on a device may");
     panics::check(image, board)?;
@@ -76,7 +79,7 @@ pub(crate) fn stacks() -> Result<()> {
 fn images() -> Result<Vec<(PathBuf, Board)>> {
     let folder = shell::target_dir().join("images");
     let mut images: Vec<_> = Board::ALL.map(|board| (folder.join(board.file()), board)).into();
-    images.push((folder.join(hand::FILE), Board::Mps2));
+    images.push((folder.join(HAND), Board::Mps2));
     for (image, _) in &images {
         ensure!(image.exists(), "{} is not built: cargo xtask build, --board stm32h743, --image hand", image.display());
     }

@@ -1,10 +1,10 @@
-//! What a change must pass, in the order in which failures are cheapest.
+//! Checks that a change must pass, in the order in which failures are cheapest.
 
 use anyhow::Result;
 
 use crate::board::Board;
 use crate::setup::{self, ARM, HAND, Machine};
-use crate::{budget, build, docs, emulated, hand, shell, test};
+use crate::{budget, build, docs, emulated, hand, package, shell, test};
 
 /// Runs every check; the first failure ends it.
 pub(crate) fn run() -> Result<()> {
@@ -17,6 +17,7 @@ pub(crate) fn run() -> Result<()> {
     lint_firmware(&machine)?;
     libraries_without_std(&machine)?;
     plain_root()?;
+    package::run()?;
     emulated::lint()?;
     emulated::run(None)?;
     test::run(&machine)?;
@@ -68,7 +69,7 @@ fn libraries_without_std(machine: &Machine) -> Result<()> {
     for target in [ARM, HAND] {
         for features in [&[][..], &["--features", "fixed"]] {
             let mut check = machine.toolchain.cargo("check", target)?;
-            check.args(["--package", "dmp", "--no-default-features"]).args(features);
+            check.args(["--package", "movement-primitives", "--no-default-features"]).args(features);
             shell::run(&mut check)?;
         }
     }

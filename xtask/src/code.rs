@@ -30,7 +30,7 @@ impl Function {
         self.names.first().map(|name| readable(name)).unwrap_or_default()
     }
 
-    /// Whether it is a linker's bridge.
+    /// True if it is a linker's bridge.
     pub(crate) fn is_bridge(&self) -> bool {
         self.names.iter().any(|name| name.contains(FAR))
     }
@@ -113,7 +113,7 @@ impl Code {
         self.address(meant)
     }
 
-    /// Whether an address lies in a function, between its first instruction and its last.
+    /// True if an address lies in a function, between its first instruction and its last.
     pub(crate) fn is_inside(&self, address: u32) -> bool {
         let function = self.0.range(..=address).next_back().and_then(|(_, function)| function.instructions.last());
         function.is_some_and(|last| address < last.address + last.bytes)

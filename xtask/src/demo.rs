@@ -37,7 +37,7 @@ const RUN: Step = Step {
     words: &["--json", "--device", "sim:", "run", "grasp.toml", "--record", "run.csv"],
 };
 
-/// What people look at.
+/// The pictures for readers.
 const PLOT: Step = Step {
     sentence: "plot: demonstration, plan and execution; and a picture of the arm",
     words: &[
@@ -67,13 +67,13 @@ const LEARN_LARGEST: Step = Step {
     words: &["learn", "grasp.csv", "--kernels", "100", "--output", LARGEST],
 };
 
-/// What it should feel like, so that a run may use all its senses.
+/// Records expected sensor values, so that a run may use all its sensors.
 const REHEARSE_LARGEST: Step = Step {
     sentence: "rehearse: what that movement feels like",
     words: &["--device", "sil:", "rehearse", LARGEST, "--trials", "3", "--record-dir", "rehearsals"],
 };
 
-/// How far successful runs differ, so that the device watches the run.
+/// Records the spread of successful runs, so that the device watches the run.
 const REMEMBER_LARGEST: Step = Step {
     sentence: "experience: by what the device watches its runs",
     words: &["experience", LARGEST, "rehearsals/largest-1.csv", "rehearsals/largest-2.csv", "rehearsals/largest-3.csv"],

@@ -11,11 +11,10 @@ mod scan;
 mod tests;
 
 use std::collections::BTreeSet;
-use std::process::Command;
 
 use anyhow::{Result, bail};
 
-use crate::shell;
+use crate::{files, shell};
 use facts::Facts;
 
 /// Files whose text is not ours or not prose: licences, lock files, and the made-up files of the tests of this check.
@@ -36,18 +35,8 @@ struct Dead {
 /// Checks all files; the error lists every dead word with its place.
 pub(crate) fn run() -> Result<()> {
     shell::step("documents: links, paths, decisions, test names, fault identifiers");
-    let mut list = Command::new("git");
-    list.current_dir(shell::root()).args(["ls-files", "--cached", "--others", "--exclude-standard"]);
-    let mut files = Vec::new();
-    for path in shell::capture(&mut list)?.lines() {
-        // A file that was deleted but not committed yet is listed; one that is no text has nothing to check.
-        let absolute = shell::root().join(path);
-        if absolute.is_file() {
-            let is_prose = !NOT_READ.iter().any(|start| path.starts_with(start)) && !path.ends_with(".csv");
-            let text = if is_prose { std::fs::read_to_string(absolute).unwrap_or_default() } else { String::new() };
-            files.push((path.to_owned(), text));
-        }
-    }
+    let is_prose = |path: &str| !NOT_READ.iter().any(|start| path.starts_with(start)) && !path.ends_with(".csv");
+    let files = files::all(is_prose)?;
     let dead = check(&files);
     if dead.is_empty() {
         return Ok(());

@@ -1,4 +1,4 @@
-//! What an image takes and says about itself, from the section table of its ELF file (32 bit, little-endian).
+//! Memory and metadata of an image, from the section table of its ELF file (32 bit, little-endian).
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -14,6 +14,9 @@ use sha2::{Digest as _, Sha256};
 
 /// Part of the name of every function of a memory allocator.
 const ALLOCATOR: &str = "__rust_alloc";
+
+/// Vectors in front of the interrupt lines.
+pub(crate) const CORE_VECTORS: usize = 16;
 
 /// An ELF file of the kind every image is.
 pub(crate) type Elf<'a> = ElfFile32<'a, LittleEndian>;
@@ -43,7 +46,7 @@ impl Section {
         self.bytes
     }
 
-    /// Whether all of it lies in a stretch of memory.
+    /// True if all of it lies in a stretch of memory.
     pub(crate) fn lies_in(&self, start: u32, length: u32) -> bool {
         self.address >= start && u64::from(self.address) + u64::from(self.bytes) <= u64::from(start) + u64::from(length)
     }
@@ -82,12 +85,12 @@ impl Sizes {
         self.symbols.get(name).copied()
     }
 
-    /// What the image says about itself (`link::metadata`), undecoded.
+    /// Metadata of the image (`link::metadata`), undecoded.
     pub(crate) fn description(&self) -> Option<&[u8]> {
         self.description.as_deref()
     }
 
-    /// Whether the image contains a memory allocator.
+    /// True if the image contains a memory allocator.
     pub(crate) fn allocates(&self) -> bool {
         self.symbols.keys().any(|name| name.contains(ALLOCATOR))
     }
@@ -118,8 +121,8 @@ impl fmt::Display for Sizes {
     }
 }
 
-/// SHA-256, in hexadecimal digits, of what flashing an image writes: of every load segment with content its physical address, its
-/// length (u32 each, little-endian) and its bytes.
+/// SHA-256, in hexadecimal digits, of what flashing an image writes: of every load segment with content its physical
+/// address, its length (u32 each, little-endian) and its bytes.
 ///
 /// # Errors
 /// If the file cannot be read or is not a 32-bit little-endian ELF file.

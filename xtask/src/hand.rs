@@ -1,7 +1,7 @@
 //! The hand image: built for a Cortex-M3, measured under QEMU, held against the part it is for.
 //!
-//! What is counted are instructions: one tick of the image's clock is five. A Cortex-M3 needs more than one clock for some of them
-//! (docs/hand.md), which is why the bound is half a cycle.
+//! Instructions are counted: one tick of the image's clock is five. A Cortex-M3 needs more than one clock for
+//! some of them (docs/hand.md), which is why the bound is half a cycle.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -20,9 +20,6 @@ use crate::{build, shell};
 const PART: &str = "STM32F105RC";
 const PART_FLASH: u32 = 256 * 1024;
 const PART_RAM: u32 = 64 * 1024;
-
-/// File name of the image beside the tools.
-pub(crate) const FILE: &str = "hand.elf";
 
 /// Stack that must be left.
 const STACK_RESERVE: u32 = 16 * 1024;
@@ -50,7 +47,7 @@ pub(crate) fn image(machine: &Machine) -> Result<PathBuf> {
     let built = machine.toolchain.output(HAND, "firmware").join("hand");
     let folder = shell::target_dir().join("images");
     fs::create_dir_all(&folder)?;
-    let image = folder.join(FILE);
+    let image = folder.join(build::HAND);
     fs::copy(&built, &image).with_context(|| format!("cannot copy {}", built.display()))?;
     shell::note(&format!("image: {}", image.display()));
     check(&image)?;

@@ -1,7 +1,8 @@
 //! Holds the code that a control slot calls against the memory that is never waited for.
 //!
-//! The linker script names what goes there by mangled names, which change with a module or with what the compiler inlines. So
-//! the image itself is asked: everything the control slot can call lies in ITCM, or is listed here with its reason.
+//! The linker script names what goes there by mangled names, which change with a module or with what the compiler
+//! inlines. So the image itself is asked: everything the control slot can call lies in ITCM, or is listed here with its
+//! reason.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -71,7 +72,7 @@ pub(crate) fn check(image: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What a control slot calls outside ITCM without a reason.
+/// Functions that a control slot calls outside ITCM without a listed reason.
 fn stray(code: &Code) -> Result<BTreeSet<String>> {
     let named = |name: &str| {
         let found = code.functions().find(|(_, function)| function.names().any(|known| known.ends_with(name)));

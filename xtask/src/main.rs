@@ -9,9 +9,12 @@ mod demo;
 mod docs;
 mod elf;
 mod emulated;
+mod files;
 mod hand;
 mod hot;
+mod house;
 mod origin;
+mod package;
 mod panics;
 mod qemu;
 mod runner;
@@ -50,6 +53,8 @@ cargo xtask <verb>
   run-image IMAGE   run an image where it belongs: QEMU, or a board through probe-rs (cargo's runner)
   doc      documentation of all crates
   docs     dead links, paths, test names and fault identifiers in any file
+  package  packages for strangers: packed, unpacked outside the repository, tested there
+  house    module circles, sizes, old words, arrows between crates; cargo xtask house RULE: one of the rules
 
 Every verb does the set-up it needs. Environment:
   TACTUS_TOOLCHAIN=rustup|debian   force one of the two ways to compile for Cortex-M";
@@ -106,6 +111,9 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["qemu", rest @ ..] => qemu::run(rest)?,
         ["doc"] => build::documentation()?,
         ["docs"] => docs::run()?,
+        ["package"] => package::run()?,
+        ["house"] => house::run(None)?,
+        ["house", rule] => house::run(Some(rule))?,
         [] | ["help" | "--help" | "-h"] => {
             println!("{HELP}");
             return Ok(());

@@ -1,7 +1,7 @@
 //! Whose source an instruction comes from, through every function that was inlined there: the debug information of an
 //! image (DWARF).
 //!
-//! What the linker dropped keeps its debug information, moved to address 0, where on some boards real code lies: only
+//! Dropped functions keep their debug information, moved to address 0, where on some boards real code lies: only
 //! functions that are in the symbol table count, and only line tables that do not begin at 0.
 
 use std::borrow::Cow;
@@ -38,7 +38,7 @@ pub(crate) struct Frame {
     pub(crate) line: String,
 }
 
-/// What is known of a function: its own path, or where its declaration is.
+/// Origin of a function: its own path, or that of its declaration.
 struct Declaration {
     path: String,
     means: Option<DebugInfoOffset>,
@@ -99,7 +99,7 @@ impl Origins {
         path
     }
 
-    /// Whether the compiler joined the code of several places into this instruction, so that its path is only what they
+    /// True if the compiler joined the code of several places into this instruction, so that its path is only what they
     /// share.
     pub(crate) fn is_joined(&self, address: u32) -> bool {
         self.lines.range(..=address).next_back().and_then(|(_, place)| *place).is_some_and(|place| place.line == 0)

@@ -1,7 +1,7 @@
 //! Runs an image where it belongs: the `runner` of cargo for Cortex-M targets.
 //!
-//! The image says which board it is for. One for an emulated board starts in QEMU; one for a real board is written to the
-//! chip by probe-rs, started, and its log shown until Ctrl-C.
+//! The image says which board it is for. One for an emulated board starts in QEMU; one for a real board is written to
+//! the chip by probe-rs, started, and its log shown until Ctrl-C.
 
 use std::path::Path;
 use std::process::Command;

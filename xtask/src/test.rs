@@ -1,4 +1,5 @@
-//! Every test: unit and property tests, golden vectors, the MuJoCo world, whole systems under QEMU and on the emulated board.
+//! Every test: unit and property tests, golden vectors, the MuJoCo world, whole systems under QEMU and on the emulated
+//! board.
 
 use anyhow::Result;
 

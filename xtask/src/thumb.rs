@@ -3,7 +3,7 @@
 //!
 //! Everything else is only told apart by its length. Branches through a register lead nowhere that can be read here.
 
-/// What an instruction does with the flow of control.
+/// Effect of an instruction on the flow of control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Flow {
     /// The next instruction follows, a call through a register included.

@@ -13,13 +13,16 @@ pub mod model;
 pub mod plan;
 pub mod real;
 pub mod sense;
+pub mod time;
 pub mod units;
 
 pub use act::Actuation;
 pub use command::{AccelerationSource, Command, Goal, PoseFeedback, Refusal, RunOptions};
-pub use cycle::record::{BusSample, CycleInput, CycleOutput, CycleRecord, Event, HandSample, flags};
-pub use cycle::{Cycle, MAX_KERNELS, PERIOD, RATE};
+pub use cycle::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
+pub use cycle::{Cycle, MAX_KERNELS};
 pub use guard::{Fault, State};
 pub use model::{Calibration, CalibrationError, MODEL_HASH, Payload};
 pub use plan::load::{Fit, LoadError, LoadRefusal};
 pub use real::Real;
+pub use sense::{BusSample, HandSample};
+pub use time::{PERIOD, RATE, RATE_HZ};

@@ -130,3 +130,21 @@ impl Real for f64 {
         f64::is_finite(self)
     }
 }
+
+/// The larger of two numbers; `bound` for a NaN.
+#[inline]
+pub(crate) fn at_least<R: Real>(value: R, bound: R) -> R {
+    if value > bound { value } else { bound }
+}
+
+/// The smaller of two numbers; `bound` for a NaN.
+#[inline]
+pub(crate) fn at_most<R: Real>(value: R, bound: R) -> R {
+    if value < bound { value } else { bound }
+}
+
+/// `value` within plus or minus `bound`; `-bound` for a NaN.
+#[inline]
+pub(crate) fn within<R: Real>(value: R, bound: R) -> R {
+    at_most(at_least(value, -bound), bound)
+}

@@ -1,11 +1,14 @@
 //! Eq (12): golden vectors, the two sign checks, and what they look like with the wrong sign.
 
+use control::Real;
 use control::law::ForceController;
 use control::units::Vector6;
-use control::{PERIOD, Real};
 use pinned_init::InPlaceWrite;
 
 const AXES: [&str; 6] = ["fx", "fy", "fz", "tx", "ty", "tz"];
+
+/// Period of the vectors (s): they are of 300 Hz.
+const PERIOD: f64 = 1.0 / 300.0;
 
 /// A controller with an empty window of 60 control periods.
 fn controller<R: Real>() -> Box<ForceController<R>> {

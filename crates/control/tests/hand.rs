@@ -2,8 +2,9 @@
 
 use control::act::HandLimiter;
 use control::act::hand::TORQUE_LIMIT;
-use control::law::{Gains, HandController, HandGains, HandReference};
+use control::law::{Gains, HandController, HandGains};
 use control::plan::HandMotion;
+use control::plan::HandReference;
 use control::sense::hand::LOST_CYCLES;
 use control::sense::{HandEstimator, HandState};
 use control::{HandSample, PERIOD};
@@ -147,7 +148,7 @@ fn a_step_of_the_gauge_ramps_through_the_window_and_then_stays() {
     let at = [0.4, 0.7, 0.8, 0.9];
     let reference = HandReference::at_rest(at);
     let felt = [-0.5, 0.0, 0.3];
-    for tick in 0..200usize {
+    for tick in 0..2 * gains.force_window {
         let torque = controller.torque(&gains, &state_of(at, felt), &reference, Some(&[-0.1, 0.0, 0.0]), false);
         let filled = (tick + 1).min(gains.force_window) as f64;
         let factor = gains.force_proportional + gains.force_integral * filled * PERIOD;

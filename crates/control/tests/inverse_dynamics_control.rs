@@ -1,7 +1,8 @@
 //! Eq (10) is the printed sum, with the rotors in its mass matrix.
 
-use control::law::{Gains, JointController, JointReference};
+use control::law::{Gains, JointController};
 use control::model::{ArmModel, Frames};
+use control::plan::JointReference;
 use control::sense::JointState;
 use control::units::{JointAccelerations, JointPositions, JointVelocities, Vector7};
 use control::{Payload, model};

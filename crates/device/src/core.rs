@@ -13,6 +13,7 @@
 //! the frames of a cycle come from [`control::Actuation`] or are zero.
 
 use control::law::Gains;
+use control::time::periods;
 use control::{Calibration, Cycle, CycleInput, CycleRecord, Fault, LoadRefusal, Payload, State};
 use pinned_init::{Init, init};
 use puck::{CanFrame, MotorMode, Node, PropertyId, Reply, SafetyMode, Status, set, zero_torques};
@@ -63,19 +64,19 @@ pub trait CoreIo {
     fn event(&mut self, event: Event);
 }
 
-/// Control cycles that a puck may be silent before the bus is started anew: 1 s, long after the supervisor has taken the
-/// torque off.
-const SILENT_CYCLES: u16 = 300;
-/// Unanswered questions to the safety module that mean it is gone: 100 ms at 150 Hz.
-const SAFETY_SILENCE: u16 = 15;
+/// Time that a puck may be silent before the bus is started anew: 1 s, in control periods; long after the supervisor has
+/// taken the torque off.
+const SILENT_CYCLES: u16 = periods(1.0);
+/// Unanswered questions to the safety module that mean it is gone: 100 ms, one question in two control periods.
+const SAFETY_SILENCE: u16 = periods(0.1) / 2;
 /// Cycles between a fault of the bus and the new start-up: three of zero torque, and time to ask the safety module for IDLE.
 const LAST_CYCLES: u8 = 6;
 /// Cycles in a row whose torque frames could not be sent, after which the bus counts as failed.
 const REFUSED_CYCLES: u8 = 6;
 /// Answers in a row of a braking puck 1 under an ACTIVE safety module that mean IDLE: one may be older than the activation.
 const BRAKING_ANSWERS: u8 = 2;
-/// Slow slots between two requests to the safety module to go IDLE.
-const IDLE_REQUEST_SLOTS: u16 = 75;
+/// Time between two requests to the safety module to go IDLE: 0.25 s, in slow slots.
+const IDLE_REQUEST_SLOTS: u16 = periods(0.25);
 
 /// How much an overrun counts against the cycles without one.
 const OVERRUN_WEIGHT: u16 = 50;

@@ -16,6 +16,7 @@ pub mod recorded_filter;
 mod round;
 mod slow;
 pub mod startup;
+pub mod time;
 
 pub use self::core::{Core, CoreIo, Slot};
 pub use calibration::{Home, HomeError, StoredHome};

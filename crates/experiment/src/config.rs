@@ -9,7 +9,7 @@ use super::grid::{ApproachFrame, Cell, Grid};
 use super::mode::Mode;
 use super::outcome::Rule;
 use super::results::{Header, Key};
-use super::scenario::{Object, PlantKind, Scenario};
+use super::scenario::{PlantKind, Scenario};
 use super::seed;
 use super::variation::Variation;
 use lab::demonstration::recording::checksum;
@@ -27,7 +27,7 @@ pub struct Config {
     /// Which.
     pub scenario: Scenario,
     /// What stands on the table.
-    pub object: Object,
+    pub object: ObjectKind,
     /// Where.
     pub grid: Grid,
     /// How the primitive is played.
@@ -109,14 +109,7 @@ impl Config {
 
     /// The object in a cell.
     pub fn object_at(&self, frame: &ApproachFrame, cell: Cell) -> ObjectSpec {
-        let usual = ObjectSpec::new(match self.object {
-            Object::Flashlight => ObjectKind::Flashlight,
-            Object::SmallTorch => ObjectKind::SmallTorch,
-            Object::Cup => ObjectKind::Cup,
-            Object::Bottle => ObjectKind::Bottle,
-            Object::Weight => ObjectKind::Weight,
-            Object::PaperCup => ObjectKind::PaperCup,
-        });
+        let usual = ObjectSpec::new(self.object);
         ObjectSpec {
             mass: usual.mass * self.variation.mass,
             table_friction: usual.table_friction * self.variation.table_friction,
@@ -127,7 +120,7 @@ impl Config {
 
     /// By what a trial is judged.
     pub fn rule(&self) -> Rule {
-        Rule { upright: self.object != Object::Bottle }
+        Rule { upright: !self.object.row().lies }
     }
 
     /// Horizontal force at the height of the grasp that tips the object over, N; `None` for what lies, or slides before it tips.

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use sim::person::{GuidedWorld, Stage};
+use sim::teacher::{GuidedWorld, Stage};
 use sim::world::mujoco::{MujocoWorld, Scene};
 
 use super::config::Config;
@@ -204,7 +204,7 @@ fn teach(scenario: Scenario, arm: &Arm, interrupt: &Interrupt) -> Result<Recordi
         Vec::new(),
         "Tactus recording of a demonstration by hand, 300 Hz (simulated arm, simulated person)",
     )?;
-    person(&mut client).ok_or(LessonError::Person("nobody stands beside the arm"))?.person_mut().begin();
+    person(&mut client).ok_or(LessonError::Person("nobody stands beside the arm"))?.teacher_mut().begin();
     let mut done_at = None;
     loop {
         let Take::Cycle(telemetry) = recorder.take(&mut client)? else { continue };
@@ -212,7 +212,7 @@ fn teach(scenario: Scenario, arm: &Arm, interrupt: &Interrupt) -> Result<Recordi
             return Err(LessonError::Person("the arm stopped"));
         }
         let seconds = recorder.rows() as f64 / lab::demonstration::RATE;
-        if done_at.is_none() && person(&mut client).is_some_and(|world| world.person().stage() == Stage::Done) {
+        if done_at.is_none() && person(&mut client).is_some_and(|world| world.teacher().stage() == Stage::Done) {
             done_at = Some(seconds + AFTERGLOW);
         }
         if seconds > LONGEST {

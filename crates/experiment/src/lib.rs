@@ -48,6 +48,6 @@ pub use outcome::Outcome;
 pub use results::Results;
 #[cfg(feature = "mujoco")]
 pub use runner::{Experiment, ExperimentError, Progress, run};
-pub use scenario::{Object, PlantKind, Scenario};
+pub use scenario::{PlantKind, Scenario};
 pub use statistics::Summary;
 pub use variation::Variation;

@@ -7,7 +7,7 @@ use super::observed::ObservedWorld;
 use super::scenario::PlantKind;
 use super::seed;
 use super::variation::Variation;
-use lab::simulation::{Engine, SimulationOptions, WorldKind};
+use lab::simulation::{CYCLE_TICKS, Engine, SimulationOptions, WorldKind};
 
 /// Error of the force sensor of the honest plant, N; a variation of the bias takes its place.
 const HONEST_BIAS: f64 = 0.1;
@@ -53,7 +53,7 @@ pub fn options(arm: &Arm, noise_seed: u64, posture: [f64; 7], scene: Scene) -> S
     options.plant = PlantConfig {
         started: true,
         operator: OperatorConfig { holds_until_active_for: Some(LET_GO), ..OperatorConfig::prompt() },
-        torque_delay_cycles: variation.delay,
+        torque_delay: Ticks::from(variation.delay) * CYCLE_TICKS,
         force_torque: ForceTorqueConfig {
             noise_scale: variation.noise,
             force_hysteresis: honest * HONEST_HYSTERESIS[0],
@@ -114,7 +114,7 @@ mod tests {
         let varied = arm(PlantKind::Honest, "joint-friction=1.3,noise=3,delay=1,bias=0.2", 1);
         let ratio = varied.imperfections.friction[2] / usual.imperfections.friction[2];
         assert!((ratio - 1.3).abs() < 1e-12 && varied.imperfections.links == usual.imperfections.links);
-        assert_eq!((varied.plant.torque_delay_cycles, varied.plant.force_torque.noise_scale), (1, 3.0));
+        assert_eq!((varied.plant.torque_delay, varied.plant.force_torque.noise_scale), (CYCLE_TICKS, 3.0));
         assert!((bias_of(PlantKind::Honest, "bias=0.2") - 0.2).abs() < 1e-12);
     }
 }

@@ -1,11 +1,11 @@
 //! The experiments there are: what is grasped, how it is taught, and by what a trial is judged.
 
 use std::fmt;
-use std::str::FromStr;
 
 use link::RunOptions;
 use serde::{Deserialize, Serialize};
-use sim::person::Lesson;
+use sim::teacher::TaughtMovement;
+use sim::world::ObjectKind;
 
 use super::grid::Grid;
 use super::mode::Mode;
@@ -39,23 +39,23 @@ impl Scenario {
     }
 
     /// What a person teaches for it.
-    pub fn lesson(self) -> Lesson {
+    pub fn lesson(self) -> TaughtMovement {
         match self {
-            Scenario::Flashlight => Lesson::Flashlight,
-            Scenario::Cup | Scenario::Fingers => Lesson::Cup,
-            Scenario::Bottle => Lesson::Bottle,
-            Scenario::Lift => Lesson::Lift,
+            Scenario::Flashlight => TaughtMovement::Flashlight,
+            Scenario::Cup | Scenario::Fingers => TaughtMovement::Cup,
+            Scenario::Bottle => TaughtMovement::Bottle,
+            Scenario::Lift => TaughtMovement::Lift,
         }
     }
 
     /// The object unless another one is asked for.
-    pub fn object(self) -> Object {
+    pub fn object(self) -> ObjectKind {
         match self {
-            Scenario::Flashlight => Object::Flashlight,
-            Scenario::Cup => Object::Cup,
-            Scenario::Bottle => Object::Bottle,
-            Scenario::Lift => Object::Weight,
-            Scenario::Fingers => Object::PaperCup,
+            Scenario::Flashlight => ObjectKind::Flashlight,
+            Scenario::Cup => ObjectKind::Cup,
+            Scenario::Bottle => ObjectKind::Bottle,
+            Scenario::Lift => ObjectKind::Weight,
+            Scenario::Fingers => ObjectKind::PaperCup,
         }
     }
 
@@ -100,58 +100,6 @@ impl fmt::Display for Scenario {
     }
 }
 
-/// An object that can be grasped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum Object {
-    /// An upright flashlight of metal, head down: 0.86 kg, 313 mm
-    Flashlight,
-    /// An upright torch: 0.4 kg, radius 22 mm, 250 mm
-    SmallTorch,
-    /// A cup: 0.2 kg, radius 40 mm, 100 mm
-    Cup,
-    /// A lying bottle: 0.5 kg, radius 32 mm, 220 mm
-    Bottle,
-    /// A can whose weight is the matter: 0.6 kg, radius 30 mm, 160 mm
-    Weight,
-    /// A cup of paper that a finger can crush: 0.05 kg
-    PaperCup,
-}
-
-impl Object {
-    /// Its name in options and files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Object::Flashlight => "flashlight",
-            Object::SmallTorch => "small-torch",
-            Object::Cup => "cup",
-            Object::Bottle => "bottle",
-            Object::Weight => "weight",
-            Object::PaperCup => "paper-cup",
-        }
-    }
-
-    /// What it is called in a title.
-    pub fn title(self) -> &'static str {
-        match self {
-            Object::Flashlight => "Flashlight",
-            Object::SmallTorch => "Small torch",
-            Object::Cup => "Cup",
-            Object::Bottle => "Lying bottle",
-            Object::Weight => "Weight",
-            Object::PaperCup => "Paper cup",
-        }
-    }
-}
-
-impl FromStr for Object {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Object, String> {
-        <Object as clap::ValueEnum>::from_str(text, false)
-    }
-}
-
 /// How well the controller's model fits the plant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
@@ -183,14 +131,5 @@ mod tests {
             assert!(!grid.cells.is_empty() && grid.cells.iter().all(|cell| cell.distance() < 0.3), "{scenario}");
         }
         assert_eq!((Scenario::Flashlight.grid().cells.len(), Scenario::Bottle.grid().cells.len()), (48, 10));
-    }
-
-    #[test]
-    fn names_are_those_of_the_command_line() {
-        for object in
-            [Object::Flashlight, Object::SmallTorch, Object::Cup, Object::Bottle, Object::Weight, Object::PaperCup]
-        {
-            assert_eq!(object.name().parse(), Ok(object));
-        }
     }
 }

@@ -2,9 +2,11 @@
 
 use std::time::{Duration, Instant};
 
+use control::time::periods;
+use lab::simulation::{CYCLE_TICKS, SLOT_TICKS};
 use link::EventKind;
 use sim::world::mujoco::Scene;
-use sim::{CYCLE_TICKS, SLOT_TICKS, TICKS_PER_MILLISECOND, Ticks};
+use sim::{TICKS_PER_MILLISECOND, Ticks};
 
 use super::config::Config;
 use super::grid::ApproachFrame;
@@ -45,9 +47,9 @@ const RISEN: f64 = 0.005;
 /// Times that a move is asked for, a rest apart, while the arm still swings.
 const CALMING: usize = 10;
 /// What moves the arm is asked for at multiples of so many control cycles, 0.1 s.
-const BEAT: Ticks = 30 * CYCLE_TICKS;
+const BEAT: Ticks = periods(0.1) as Ticks * CYCLE_TICKS;
 /// An upload is followed by a longer one, 0.5 s: it takes 0.35 s, and on a board, which has to check it, 0.05 s more.
-const BEAT_OF_UPLOAD: Ticks = 150 * CYCLE_TICKS;
+const BEAT_OF_UPLOAD: Ticks = periods(0.5) as Ticks * CYCLE_TICKS;
 /// So long after the cycle began: the request reaches the device before the next cycle does, even if the engine overruns this by a slot.
 const AFTER_BEAT: Ticks = TICKS_PER_MILLISECOND / 2;
 /// One tick, ns.

@@ -22,8 +22,8 @@ use crate::primitive::FingerPrimitive;
 use crate::record::Record;
 use crate::startup::{FoundHand, Phase, Progress, Startup};
 
-/// Cycles in a row that a puck may be silent before the hand is given up: 0.2 s.
-const SILENT_CYCLES: u16 = 60;
+/// Time that a puck may be silent before the hand is given up: 0.2 s, in control periods.
+const SILENT_CYCLES: u16 = control::time::periods(0.2);
 
 /// The property TEMP of every motor firmware from VERS 61.
 const TEMPERATURE: PropertyId = match PropertyId::new(9) {

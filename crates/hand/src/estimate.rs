@@ -38,7 +38,7 @@ const MOTOR_ANGLE: i64 = angle_per_count(INNER_LINK_RATIO);
 const WORM_ANGLE: i64 = angle_per_count(SECONDARY_RATIO);
 const SPREAD_ANGLE: i64 = angle_per_count(SPREAD_RATIO);
 
-/// 300 Hz over 1 to 256 control periods.
+/// The control rate over 1 to 256 control periods (Hz).
 const RATES: [Number; 256] = {
     let mut rates = [ZERO; 256];
     let mut index = 0;

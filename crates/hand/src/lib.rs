@@ -38,8 +38,8 @@ pub const FINGERS: usize = 3;
 /// Most kernels of a row.
 pub const KERNELS: usize = link::image::KERNEL_LIMIT;
 
-/// Control periods in a row that may pass without a reply of a digit before torque ends, and that a gauge is believed: 17 ms.
-pub const LOST_CYCLES: u8 = 5;
+/// Time without a reply of a digit before torque ends, and that a gauge is believed: 17 ms, in control periods.
+pub const LOST_CYCLES: u8 = control::time::few_periods(1.0 / 60.0);
 
 /// Ranges of the digits (rad).
 pub const RANGES: [[f64; 2]; DIGITS] = {

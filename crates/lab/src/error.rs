@@ -1,13 +1,12 @@
-//! Why a conversation with a device failed, with exit code, stable number and remedy.
-//!
-//! Numbers: the hundreds are the exit code; 500 and up are the refusals of the link, in their order.
+//! Why a conversation with a device failed, with its number.
 
 use std::time::Duration;
 
 use device::{HomeError, PrimitiveTrouble, StartupTrouble};
 use link::{ImageError, Refusal};
 
-use crate::failure::{Exit, Failure};
+use crate::error_code::ErrorCode;
+use crate::failure::Failure;
 use crate::transport::{AddressError, TransportError};
 
 /// Why a conversation with a device failed.
@@ -128,90 +127,38 @@ pub fn explain_blocked(numbers: [u32; 2]) -> String {
     StartupTrouble(numbers).to_string()
 }
 
-/// Numbers of the refusals, by their code.
-const REFUSAL_CODES: [&str; Refusal::ALL.len()] = [
-    "E500", "E501", "E502", "E503", "E504", "E505", "E506", "E507", "E508", "E509", "E510", "E511", "E512", "E513",
-    "E514", "E515", "E516", "E517", "E518", "E519", "E520", "E521", "E522", "E523", "E524", "E525", "E526", "E527",
-    "E528", "E529", "E530", "E531", "E532", "E533", "E534", "E535", "E536", "E537", "E538", "E539", "E540", "E541",
-    "E542", "E543", "E544", "E545", "E546",
-];
-
 impl HostError {
-    /// Exit code of a command that fails with this.
-    #[must_use]
-    pub fn exit(&self) -> Exit {
-        match self {
-            Self::Address(_) => Exit::Usage,
-            Self::Transport(TransportError::NotFound { .. } | TransportError::Permission { .. }) => Exit::NoDevice,
-            Self::Transport(TransportError::Can(trouble)) => trouble.exit(),
-            Self::Transport(TransportError::Other(_)) => Exit::Internal,
-            Self::Transport(TransportError::Closed | TransportError::Io(_))
-            | Self::NoAnswer { .. }
-            | Self::NotStopped { .. } => Exit::LinkLost,
-            Self::Incompatible { .. } => Exit::Incompatible,
-            Self::Refused { .. } => Exit::Refused,
-            Self::Image(_) | Self::ReadBack { .. } => Exit::Invalid,
-            Self::WrongAnswer { .. } => Exit::Internal,
-            Self::Interrupted => Exit::Interrupted,
-        }
-    }
-
     /// Stable number.
     #[must_use]
-    pub fn code(&self) -> &'static str {
+    pub fn code(&self) -> ErrorCode {
         match self {
-            Self::WrongAnswer { .. } => "E101",
+            Self::WrongAnswer { .. } => ErrorCode::WrongAnswer,
             Self::Transport(TransportError::Can(trouble)) => trouble.code(),
-            Self::Transport(TransportError::Other(_)) => "E102",
-            Self::Address(_) => "E201",
-            Self::Transport(TransportError::NotFound { .. }) => "E301",
-            Self::Transport(TransportError::Permission { .. }) => "E302",
-            Self::Incompatible { what: Refusal::Schema, .. } => "E402",
-            Self::Incompatible { what: Refusal::Model, .. } => "E403",
-            Self::Incompatible { .. } => "E401",
-            Self::Refused { reason, .. } => REFUSAL_CODES.get(usize::from(reason.code())).copied().unwrap_or("E500"),
-            Self::Image(_) => "E651",
-            Self::ReadBack { .. } => "E652",
-            Self::Transport(TransportError::Closed | TransportError::Io(_)) => "E701",
-            Self::NoAnswer { .. } => "E702",
-            Self::NotStopped { .. } => "E703",
-            Self::Interrupted => "E130",
+            Self::Transport(TransportError::Other(_)) => ErrorCode::LineFailed,
+            Self::Address(_) => ErrorCode::AddressInvalid,
+            Self::Transport(TransportError::NotFound { .. }) => ErrorCode::DeviceNotFound,
+            Self::Transport(TransportError::Permission { .. }) => ErrorCode::PermissionDenied,
+            Self::Incompatible { what: Refusal::Schema, .. } => ErrorCode::LinkSchema,
+            Self::Incompatible { what: Refusal::Model, .. } => ErrorCode::RobotModel,
+            Self::Incompatible { .. } => ErrorCode::LinkVersion,
+            Self::Refused { reason, .. } => ErrorCode::Refused(*reason),
+            Self::Image(_) => ErrorCode::ImageInvalid,
+            Self::ReadBack { .. } => ErrorCode::ReadBackDiffers,
+            Self::Transport(TransportError::Closed | TransportError::Io(_)) => ErrorCode::LineClosed,
+            Self::NoAnswer { .. } => ErrorCode::NoAnswer,
+            Self::NotStopped { .. } => ErrorCode::NotStopped,
+            Self::Interrupted => ErrorCode::Interrupted,
         }
-    }
-
-    /// What the user can do about it.
-    #[must_use]
-    pub fn help(&self) -> Option<String> {
-        let help = match self {
-            Self::Address(_) => "for a simulated arm use `--device sim:`",
-            Self::Transport(TransportError::NotFound { .. }) => {
-                "check cable and name of the device; for a simulated arm use `--device sim:`"
-            }
-            Self::Transport(TransportError::Permission { .. }) => {
-                "let your user open serial ports: `sudo usermod -aG dialout $USER`, then log in again"
-            }
-            Self::Transport(TransportError::Closed | TransportError::Io(_)) => {
-                "check the cable; the device stops the arm by itself after half a second"
-            }
-            Self::Transport(TransportError::Can(trouble)) => return Some(trouble.help()),
-            Self::Transport(TransportError::Other(_)) | Self::WrongAnswer { .. } | Self::Interrupted => return None,
-            Self::Incompatible { what, .. } => what.remedy(),
-            Self::NoAnswer { .. } => {
-                "check that the device has power, that its firmware runs, and that no other program is connected to it; then try again"
-            }
-            Self::Refused { reason, .. } => reason.remedy(),
-            Self::Image(_) => "make the primitive again with `tactus learn`",
-            Self::ReadBack { .. } => "upload again; if it persists the device's storage is worn out",
-            Self::NotStopped { .. } => "press the emergency stop",
-        };
-        Some(help.to_owned())
     }
 
     /// The error as the failure of a command that was `doing` something.
     #[must_use]
     pub fn into_failure(self, doing: impl Into<String>) -> Failure {
-        let help = self.help();
-        let failure = Failure::new(self.exit(), self.code(), doing, self);
+        let help = match &self {
+            Self::Transport(TransportError::Can(problem)) => problem.help(),
+            _ => None,
+        };
+        let failure = Failure::new(self.code(), doing, self);
         match help {
             Some(help) => failure.help(help),
             None => failure,
@@ -227,20 +174,10 @@ mod tests {
     fn every_refusal_has_a_number_of_its_own_in_order() {
         for reason in Refusal::ALL {
             let error = HostError::Refused { request: "run", reason, detail: [0, 0] };
-            assert_eq!(error.code(), format!("E{}", 500 + u16::from(reason.code())));
-            assert!(error.help().is_some() && error.to_string().starts_with("the device refused 'run': "));
+            assert_eq!(error.code().to_string(), format!("E{}", 500 + u16::from(reason.code())));
+            assert!(error.to_string().starts_with("the device refused 'run': "));
+            assert!(error.into_failure("run").help.is_some());
         }
-    }
-
-    #[test]
-    fn the_hundreds_of_a_number_are_its_exit_code() {
-        let closed = HostError::from(TransportError::Closed);
-        let silent = HostError::NoAnswer { request: "status", after: Duration::from_secs(2) };
-        let differs = HostError::Incompatible { what: Refusal::Schema, host: "1".into(), device: "2".into() };
-        for error in [closed, silent, differs, ImageError::Magic.into(), HostError::ReadBack { offset: 3 }] {
-            assert_eq!(error.code().as_bytes()[1] - b'0', error.exit() as u8, "{error}");
-        }
-        assert_eq!(HostError::Interrupted.exit() as u8, 130);
     }
 
     #[test]

@@ -5,35 +5,13 @@ use std::fmt::{self, Write as _};
 
 use serde_json::json;
 
-/// Exit codes of `tactus`; scripts rely on them, they are never renumbered.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Exit {
-    /// A defect of the tool itself.
-    Internal = 1,
-    /// The command line is wrong.
-    Usage = 2,
-    /// No such device, or no permission to use it.
-    NoDevice = 3,
-    /// Host and device, or tool and file, are of versions that do not fit.
-    Incompatible = 4,
-    /// The device refused or is faulted.
-    Refused = 5,
-    /// Something was checked and found wrong: limits, check sums, input files, fit.
-    Invalid = 6,
-    /// The link was lost or the device did not answer in time.
-    LinkLost = 7,
-    /// Interrupted by the user after a confirmed stop.
-    Interrupted = 130,
-}
+use crate::error_code::ErrorCode;
 
 /// A failed command.
 #[derive(Debug)]
 pub struct Failure {
-    /// Exit code of the process.
-    pub exit: Exit,
-    /// Stable number of the reason, `E601` and so on; the hundreds are the exit code.
-    pub code: &'static str,
+    /// The numbered reason; it says the exit code of the process as well.
+    pub code: ErrorCode,
     /// What was being done, `learn refused` for example.
     pub doing: String,
     /// Why it failed.
@@ -45,17 +23,13 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// A failure with its reason.
-    pub fn new(
-        exit: Exit,
-        code: &'static str,
-        doing: impl Into<String>,
-        cause: impl Into<Box<dyn Error + Send + Sync>>,
-    ) -> Failure {
-        Failure { exit, code, doing: doing.into(), cause: cause.into(), help: None, data: None }
+    /// A failure with its reason; its help is what the code advises.
+    pub fn new(code: ErrorCode, doing: impl Into<String>, cause: impl Into<Box<dyn Error + Send + Sync>>) -> Failure {
+        let help = Some(code.remedy()).filter(|remedy| !remedy.is_empty()).map(str::to_owned);
+        Failure { code, doing: doing.into(), cause: cause.into(), help, data: None }
     }
 
-    /// The same with a hint.
+    /// The same with a hint that knows more than the code.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Failure {
         self.help = Some(help.into());
@@ -73,8 +47,8 @@ impl Failure {
     pub fn to_json(&self) -> serde_json::Value {
         let mut object = json!({
             "error": {
-                "exit": self.exit as u8,
-                "code": self.code,
+                "exit": self.code.exit() as u8,
+                "code": self.code.to_string(),
                 "message": format!("{}: {}", self.doing, self.cause),
                 "causes": self.causes(),
                 "help": self.help,

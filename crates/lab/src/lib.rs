@@ -7,6 +7,7 @@ pub mod demonstration;
 pub mod device;
 pub mod difference;
 pub mod error;
+pub mod error_code;
 pub mod failure;
 pub mod image_file;
 pub mod learn;

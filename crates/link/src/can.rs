@@ -1,20 +1,22 @@
 //! The link's bytes over classic CAN frames: eight of them a frame, their order in the identifier.
 //!
-//! The stream that a serial line carries ([`crate::frame`]) is cut into segments of one to eight bytes. All eight bytes of a
-//! frame are the stream's; what the receiver needs besides stands in the identifier:
+//! The stream that a serial line carries ([`crate::frame`]) is cut into segments of one to eight bytes. All eight bytes
+//! of a frame are the stream's; what the receiver needs besides stands in the identifier:
 //!
 //! ```text
 //! bit    10   9          8..5            4   3..0
 //!        0    direction  device number   1   sequence number
 //!             0 to the device, 1 to the host
 //! ```
-//! Device 0 is sent to with identifiers 0x010 to 0x01F and answers with 0x210 to 0x21F. To the device comes first in arbitration,
-//! so a stop overtakes telemetry on the wire. Bit 10 clear and bit 4 set is what Barrett's pucks read as "to node 16 to 31": on the
-//! arm's bus, where such frames never belong, no puck of a WAM would take one for an order (nodes 1 to 14).
+//! Device 0 is sent to with identifiers 0x010 to 0x01F and answers with 0x210 to 0x21F. To the device comes first in
+//! arbitration, so a stop overtakes telemetry on the wire. Bit 10 clear and bit 4 set is what Barrett's pucks read as
+//! "to node 16 to 31": on the arm's bus, where such frames never belong, no puck of a WAM would take one for an order
+//! (nodes 1 to 14).
 //!
-//! The sequence number goes up by one with every segment of a sender and a direction. So a receiver sees a lost, a doubled and
-//! an overtaken segment; see [`Reassembler`] for what it then does. A sender must let its frames leave in the order in which they
-//! were cut: a controller that sends its mailboxes by priority of identifiers must be set to send first in, first out.
+//! The sequence number goes up by one with every segment of a sender and a direction. So a receiver sees a lost, a
+//! doubled and an overtaken segment; see [`Reassembler`] for what it then does. A sender must let its frames leave in
+//! the order in which they were cut: a controller that sends its mailboxes by priority of identifiers must be set to
+//! send first in, first out.
 
 use core::fmt;
 use core::ops::Deref;
@@ -28,7 +30,8 @@ pub const BITS_PER_SECOND: u32 = 1_000_000;
 /// Bits of a frame of eight bytes with its interframe space and without stuff bits: the shortest there is.
 pub const FULL_FRAME_BITS: u32 = 47 + 8 * SEGMENT_BYTES as u32;
 
-/// Payload of back-to-back full frames, byte/s: the rate of the line, which throughputs are shares of. 72 kB/s, 57.7 % of the bits.
+/// Payload of back-to-back full frames, byte/s: the rate of the line, which throughputs are shares of. 72 kB/s, 57.7 %
+/// of the bits.
 pub const LINE_BYTES_PER_SECOND: f64 = BITS_PER_SECOND as f64 * SEGMENT_BYTES as f64 / FULL_FRAME_BITS as f64;
 
 const DIRECTION_BIT: u16 = 0x200;
@@ -63,7 +66,7 @@ impl fmt::Display for DeviceNumber {
     }
 }
 
-/// Which way a segment goes.
+/// Direction of a segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Direction {
     /// From the host.
@@ -72,10 +75,10 @@ pub enum Direction {
     ToHost,
 }
 
-/// What the identifier of a segment says.
+/// Content of a segment's identifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Heading {
-    /// Which way it goes.
+    /// Its direction.
     pub direction: Direction,
     /// The device that sends it or is meant.
     pub device: DeviceNumber,
@@ -94,7 +97,7 @@ impl Heading {
         direction | (self.device.0 as u16) << DEVICE_SHIFT | SEGMENT_BIT | (self.sequence as u16 & FOUR_BITS)
     }
 
-    /// What an identifier says; `None` if it is not that of a segment.
+    /// Decodes an identifier; `None` if it is not that of a segment.
     #[must_use]
     pub const fn parse(id: u16) -> Option<Self> {
         if id & !(DIRECTION_BIT | FOUR_BITS << DEVICE_SHIFT | FOUR_BITS) != SEGMENT_BIT {
@@ -162,8 +165,8 @@ impl Segmenter {
 
     /// Takes up to eight bytes off the front of `bytes`; `None` if there are none.
     ///
-    /// Segments know nothing of messages: one may hold the end of one and the beginning of the next. Cutting as late as possible,
-    /// when the controller has room for a frame, fills the frames while the line is busy.
+    /// Segments know nothing of messages: one may hold the end of one and the beginning of the next. Cutting as late as
+    /// possible, when the controller has room for a frame, fills the frames while the line is busy.
     pub fn cut(&mut self, bytes: &mut &[u8]) -> Option<Segment> {
         let (head, rest) = bytes.split_at_checked(bytes.len().min(SEGMENT_BYTES))?;
         let segment = Segment::new(self.next, head)?;
@@ -173,7 +176,7 @@ impl Segmenter {
     }
 }
 
-/// What a reassembler counted.
+/// Counters of a reassembler.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SegmentCounters {
     /// Segments that came in their turn.
@@ -215,13 +218,15 @@ impl Deref for Piece {
 
 /// Puts a stream together again.
 ///
-/// As long as every segment comes in its turn, the bytes are those that were cut. A segment that comes a second time right after
-/// the first (a sender repeats a frame whose acknowledgement it missed) is dropped. At a gap the message under way is lost: the
-/// reassembler ends it with a zero byte, so that what comes later cannot be taken for its continuation, and drops the rest up to
-/// the next zero byte of the stream, so that a tail without its head cannot be taken for a message. A message of the link is thus
-/// delivered whole, or its check sum sees that it is not; the host repeats what was not answered.
+/// As long as every segment comes in its turn, the bytes are those that were cut. A segment that comes a second time
+/// right after the first (a sender repeats a frame whose acknowledgement it missed) is dropped. At a gap the message
+/// under way is lost: the reassembler ends it with a zero byte, so that what comes later cannot be taken for its
+/// continuation, and drops the rest up to the next zero byte of the stream, so that a tail without its head cannot be
+/// taken for a message. A message of the link is thus delivered whole, or its check sum sees that it is not; the host
+/// repeats what was not answered.
 ///
-/// Sixteen segments lost in a row go unnoticed here. The check sum of the message then sees it, as it does on a serial line.
+/// Sixteen segments lost in a row go unnoticed here. The check sum of the message then sees it, as it does on a serial
+/// line.
 #[derive(Debug, Clone)]
 pub struct Reassembler {
     direction: Direction,
@@ -243,7 +248,7 @@ impl Reassembler {
         Self { direction, device, last: None, inside: false, skipping: false, counters }
     }
 
-    /// What was counted so far.
+    /// Counters so far.
     #[must_use]
     pub const fn counters(&self) -> SegmentCounters {
         self.counters

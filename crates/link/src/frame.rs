@@ -50,7 +50,7 @@ pub const LINK_TIMEOUT_MS: u32 = 500;
 /// The check sum of frames and images, CRC-32/ISCSI.
 pub const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
-/// What stands in front of every message. Its layout is frozen, as is that of `Hello`.
+/// Header of every message. Its layout is frozen, as is that of `Hello`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Envelope {
     /// Number the host chose for its session with `Hello`; the device's messages repeat it. 0 is no session.
@@ -82,15 +82,15 @@ impl Envelope {
 /// A message that came in a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame<M> {
-    /// What stood in front of it.
+    /// Its header.
     pub envelope: Envelope,
     /// The message.
     pub message: M,
 }
 
-/// What a frame may carry: [`Request`] and [`Reply`].
+/// Content of a frame: [`Request`] and [`Reply`].
 pub trait Message: Serialize + DeserializeOwned {
-    /// Whether bytes after the message are to be ignored instead of refused. True for the hellos alone:
+    /// True if bytes after the message are to be ignored instead of refused. True for the hellos alone:
     /// a later version may have more to say there, and must still be told that it is a later version.
     fn tolerates_more(&self) -> bool;
 
@@ -230,7 +230,7 @@ impl<const N: usize> Decoder<N> {
         }
     }
 
-    /// What was counted so far.
+    /// Counters so far.
     #[must_use]
     pub const fn counters(&self) -> LinkCounters {
         self.counters

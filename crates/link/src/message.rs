@@ -1,4 +1,4 @@
-//! What host and device say to each other.
+//! Messages between host and device.
 //!
 //! Both enums are **append-only**: postcard numbers variants and fields by position, so a variant or
 //! field that moved would be read as another one. Never change or remove, only add at the end, and raise
@@ -76,7 +76,7 @@ pub struct Goal {
     pub orientation: Option<[f32; 4]>,
 }
 
-/// Which pose closes the position loop of Eq (11).
+/// The pose that closes the position loop of Eq (11).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum PoseFeedback {
     /// The measured pose: no steady-state error.
@@ -96,7 +96,7 @@ pub enum AccelerationSource {
     Differentiated,
 }
 
-/// How a primitive shall be run. The default is the first run of a new primitive: as taught, open loop.
+/// Options of a run. The default is the first run of a new primitive: as taught, open loop.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RunOptions {
     /// Goals that replace the taught ones.
@@ -170,9 +170,9 @@ pub enum Request {
     },
     /// Runs a stored primitive.
     Run {
-        /// Which.
+        /// Name of the primitive.
         name: Name,
-        /// How.
+        /// Options of the run.
         options: RunOptions,
     },
     /// Ends any motion: soft stop. Accepted in every state, and from anybody: it needs no session.
@@ -213,12 +213,12 @@ pub enum Request {
     UploadAbort,
     /// Removes a primitive from the store.
     Delete {
-        /// Which.
+        /// Name of the primitive.
         name: Name,
     },
     /// Reads a stored image back. Answer: [`Reply::Chunk`].
     Read {
-        /// Which.
+        /// Name of the primitive.
         name: Name,
         /// Position of the first byte.
         offset: u32,
@@ -238,8 +238,8 @@ pub enum Request {
     },
     /// Asks for [`Reply::Calibration`].
     Calibration,
-    /// Keeps a home of this arm's own, for every zeroing from now on; refused while the arm has torque. Answered when it is
-    /// durable.
+    /// Keeps a home of this arm's own, for every zeroing from now on; refused while the arm has torque. Answered when
+    /// it is durable.
     Calibrate {
         /// Joint angles at which the arm stands when it is zeroed, rad.
         home: [f32; 7],
@@ -249,7 +249,7 @@ pub enum Request {
 }
 
 impl Request {
-    /// Whether the request can set the arm in motion or change a motion. Such a request is refused when it
+    /// True if the request can set the arm in motion or change a motion. Such a request is refused when it
     /// is older than [`crate::frame::REQUEST_AGE_LIMIT_MS`], so that a host that was suspended does not
     /// move an arm somebody now stands beside.
     #[must_use]
@@ -371,7 +371,7 @@ pub enum Reply {
     Listing {
         /// Request answered.
         of: u16,
-        /// What is stored there; `None` if the place is empty.
+        /// The primitive that is stored there; `None` if the place is empty.
         listing: Option<Listing>,
     },
     /// Answer to [`Request::Read`].

@@ -1,6 +1,6 @@
 //! Who a firmware image is: a block of fixed layout in a section of its own of the ELF file.
 //!
-//! What the file says and what the running device says in its hello come from the same constants, so a host can tell
+//! The file and the hello of the running device take their values from the same constants, so a host can tell
 //! before flashing whether it will be able to talk to the image, and afterwards whether the device runs that image.
 //!
 //! ```text
@@ -53,14 +53,14 @@ pub struct MemoryRegion {
 }
 
 impl MemoryRegion {
-    /// Whether `length` bytes from `start` on lie inside.
+    /// True if `length` bytes from `start` on lie inside.
     #[must_use]
     pub const fn contains(&self, start: u32, length: u32) -> bool {
         start >= self.start && (start - self.start) as u64 + length as u64 <= self.length as u64
     }
 }
 
-/// What an image says about itself.
+/// The description of an image, in its own file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImageMetadata<'a> {
     /// [`crate::LINK_VERSION`] of the image.
@@ -73,8 +73,8 @@ pub struct ImageMetadata<'a> {
     pub model_hash: u32,
     /// Where the image lies in the flash, and may be erased and written by whoever flashes it.
     pub image: MemoryRegion,
-    /// Where the device keeps its primitives; whoever flashes an image must leave it alone. `None` if that is not in the
-    /// device's address space.
+    /// Where the device keeps its primitives; whoever flashes an image must leave it alone. `None` if that is not in
+    /// the device's address space.
     pub store: Option<MemoryRegion>,
     /// Firmware version and git revision, at most 48 bytes.
     pub firmware: &'a str,

@@ -100,8 +100,8 @@ pub enum Refusal {
     HandBusy,
     /// The device drives a hand alone: it has no arm to do this with.
     NoArm,
-    /// A home posture is not that of this arm. `detail` = joint (0 for J1), and what is wrong with its angle: 0 not a number,
-    /// 1 outside the joint's range, 2 too far from the model's home.
+    /// A home posture is not that of this arm. `detail` = joint (0 for J1), and what is wrong with its angle: 0 not a
+    /// number, 1 outside the joint's range, 2 too far from the model's home.
     HomeImplausible,
     /// The arm has torque. `detail` = state code.
     HasTorque,
@@ -165,7 +165,7 @@ impl Refusal {
         self as u8
     }
 
-    /// What is wrong, in one sentence without full stop.
+    /// Returns the reason, in one sentence without full stop.
     #[must_use]
     pub const fn explanation(self) -> &'static str {
         match self {
@@ -219,7 +219,7 @@ impl Refusal {
         }
     }
 
-    /// What the user can do about it, as an instruction.
+    /// Returns the remedy, as an instruction to the user.
     #[must_use]
     pub const fn remedy(self) -> &'static str {
         match self {

@@ -1,4 +1,4 @@
-//! What the device reports about itself: status, statistics, listing, telemetry, events.
+//! Reports of the device: status, statistics, listing, telemetry, events.
 //!
 //! Codes (`state`, `fault`, start-up stage) are numbers of `control` and `device`, which name and explain
 //! them; this crate only carries them.
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::name::Name;
 
-/// How far the hand has come. Append-only.
+/// Stage of the hand's start-up. Append-only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 pub enum HandStage {
     /// Not all four pucks of the hand answer: the arm is used without it.
@@ -87,7 +87,7 @@ pub struct Status {
     pub telemetry_every: u8,
     /// Bytes of the upload under way that have arrived.
     pub upload_received: Option<u32>,
-    /// How far the hand has come.
+    /// Stage of the hand's start-up.
     pub hand_stage: HandStage,
     /// Spread and fingers F1 to F3 as measured, rad; 0 unless the hand is ready.
     pub hand: [f32; 4],
@@ -131,12 +131,12 @@ pub struct Calibration {
     pub home: [f32; 7],
     /// Whose these are.
     pub source: HomeSource,
-    /// Joint angles at which the last zeroing took the arm to stand, rad; `None` if the device has not zeroed it since its bus was
-    /// started.
+    /// Joint angles at which the last zeroing took the arm to stand, rad; `None` if the device has not zeroed it since
+    /// its bus was started.
     pub zeroed_at: Option<[f32; 7]>,
 }
 
-/// What the receiving end of a link counted. Every byte that arrived is accounted for in one of these.
+/// Counters of the receiving end of a link. Every byte that arrived is accounted for in one of these.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct LinkCounters {
     /// Frames that were good.
@@ -192,7 +192,7 @@ pub struct Statistics {
     pub events_dropped: u32,
     /// Motions stopped because the host fell silent.
     pub link_timeouts: u32,
-    /// What the device's end of the link counted.
+    /// Counters of the device's end of the link.
     pub link: LinkCounters,
     /// Stack never used so far, bytes; 0 where it is not measured.
     pub stack_free: u32,
@@ -258,11 +258,11 @@ pub struct Telemetry {
     /// Torque of the environment on fingers F1 to F3 about their outer joints, by the strain gauges, N m: negative when
     /// they close on an object.
     pub gauges: [f32; 3],
-    /// How much this run differs from the successful ones before it; 0 when nothing is compared.
+    /// Difference between this run and the successful ones before it (z-score); 0 when nothing is compared.
     pub surprise: f32,
 }
 
-/// What kind of thing happened. Append-only.
+/// Kind of an event. Append-only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum EventKind {
     /// The supervisor entered a state: `code` is the state, `detail` the fault that led there, 0 for none.
@@ -284,8 +284,8 @@ pub enum EventKind {
     /// The run no longer goes as the successful ones before it: `code` is the channel of the experience, `detail` how
     /// far the movement has come, 0 to 1000.
     Surprise,
-    /// The hand reached a stage: `code` is [`HandStage`]. `detail`: the CAN node that caused it in the low 8 bits and the
-    /// number of the reason (`device`) above them; 0 for none.
+    /// The hand reached a stage: `code` is [`HandStage`]. `detail`: the CAN node that caused it in the low 8 bits and
+    /// the number of the reason (`device`) above them; 0 for none.
     Hand,
 }
 

@@ -13,8 +13,10 @@ const ADDRESS_MASK: u16 = 0x1F;
 /// Position of the sender field.
 const SENDER_SHIFT: u16 = 5;
 
-/// One participant of the bus, 0..=31.
+/// One participant of the bus, 0..=31. To reach several at once, send to a [`Group`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Node(u8);
 
 impl Node {
@@ -34,28 +36,34 @@ impl Node {
     pub const HAND: [Node; 4] = [Node(11), Node(12), Node(13), Node(14)];
 
     /// A node by number; `None` above 31.
+    #[must_use]
     pub const fn new(number: u8) -> Option<Node> {
         if number as u16 <= ADDRESS_MASK { Some(Node(number)) } else { None }
     }
 
     /// The number, 0..=31.
+    #[must_use]
     pub const fn number(self) -> u8 {
         self.0
     }
 
     /// Index 0..=6 of an arm motor puck; `None` for every other node.
+    #[must_use]
     pub const fn arm_index(self) -> Option<usize> {
         if self.0 >= 1 && self.0 <= 7 { Some(self.0 as usize - 1) } else { None }
     }
 
     /// Index 0..=3 of a hand puck; `None` for every other node.
+    #[must_use]
     pub const fn hand_index(self) -> Option<usize> {
         if self.0 >= 11 && self.0 <= 14 { Some(self.0 as usize - 11) } else { None }
     }
 }
 
-/// A multicast address, 0..=31.
+/// A multicast address, 0..=31. A puck belongs to up to three; replies travel to groups of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Group(u8);
 
 impl Group {
@@ -87,23 +95,28 @@ impl Group {
     pub const ACCELERATION_REPLIES: Group = Group(12);
 
     /// A group by number; `None` above 31.
+    #[must_use]
     pub const fn new(number: u8) -> Option<Group> {
         if number as u16 <= ADDRESS_MASK { Some(Group(number)) } else { None }
     }
 
     /// The number, 0..=31.
+    #[must_use]
     pub const fn number(self) -> u8 {
         self.0
     }
 
-    /// Whether only replies travel to this group, never requests.
+    /// True if only replies travel to this group, never requests.
+    #[must_use]
     pub const fn carries_only_replies(self) -> bool {
         self.0 == 3 || (self.0 >= 6 && self.0 <= 12)
     }
 }
 
-/// Where a frame goes.
+/// Destination of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Destination {
     /// One node.
     Node(Node),
@@ -125,10 +138,13 @@ impl From<Group> for Destination {
 
 /// An eleven-bit identifier. A smaller one wins arbitration.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CanId(u16);
 
 impl CanId {
     /// An identifier from its raw value; `None` above 0x7FF.
+    #[must_use]
     pub const fn new(raw: u16) -> Option<CanId> {
         if raw <= 0x7FF { Some(CanId(raw)) } else { None }
     }
@@ -143,16 +159,19 @@ impl CanId {
     }
 
     /// The raw value, 0..=0x7FF.
+    #[must_use]
     pub const fn raw(self) -> u16 {
         self.0
     }
 
     /// The node that sent the frame.
+    #[must_use]
     pub const fn sender(self) -> Node {
         Node(((self.0 >> SENDER_SHIFT) & ADDRESS_MASK) as u8)
     }
 
     /// The node or group the frame is for.
+    #[must_use]
     pub const fn destination(self) -> Destination {
         let address = (self.0 & ADDRESS_MASK) as u8;
         if self.0 & GROUP_BIT != 0 { Destination::Group(Group(address)) } else { Destination::Node(Node(address)) }
@@ -179,7 +198,18 @@ impl From<CanId> for Id {
 }
 
 /// A classic data frame: eleven-bit identifier, up to eight bytes. Nothing else travels on the arm's bus.
+///
+/// Use it where frames are stored or built; the decoders take any driver's [`Frame`] as it is.
+///
+/// ```
+/// use puck::{CanFrame, CanId, Group, Node};
+///
+/// let id = CanId::encode(Node::HOST, Group::ARM);
+/// let frame = CanFrame::from_slice(id, &[48]).expect("at most eight bytes");
+/// assert_eq!((frame.can_id().raw(), frame.payload()), (0x404, &[48][..]));
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CanFrame {
     id: CanId,
     length: u8,
@@ -188,6 +218,7 @@ pub struct CanFrame {
 
 impl CanFrame {
     /// A frame with the first `N` bytes of payload. Does not compile for more than eight.
+    #[must_use]
     pub const fn with_payload<const N: usize>(id: CanId, payload: [u8; N]) -> CanFrame {
         const { assert!(N <= 8, "a classic CAN frame carries at most eight bytes") };
         let mut data = [0; 8];
@@ -200,13 +231,14 @@ impl CanFrame {
     }
 
     /// A frame with a payload of run-time length; `None` if it is longer than eight bytes.
+    #[must_use]
     pub fn from_slice(id: CanId, payload: &[u8]) -> Option<CanFrame> {
         let mut data = [0; 8];
         data.get_mut(..payload.len())?.copy_from_slice(payload);
         Some(CanFrame { id, length: payload.len() as u8, data })
     }
 
-    /// Our copy of any driver's frame; `None` for extended and remote frames and for more than eight bytes.
+    /// A copy of any driver's frame; `None` for extended and remote frames and for more than eight bytes.
     pub fn copy_of(frame: &impl Frame) -> Option<CanFrame> {
         if frame.is_remote_frame() {
             return None;
@@ -215,16 +247,19 @@ impl CanFrame {
     }
 
     /// The same frame as a driver's type; `None` only if that driver refuses it.
+    #[must_use]
     pub fn convert<F: Frame>(&self) -> Option<F> {
         F::new(self.id, self.payload())
     }
 
     /// The identifier.
+    #[must_use]
     pub const fn can_id(&self) -> CanId {
         self.id
     }
 
     /// The bytes in bus order.
+    #[must_use]
     pub fn payload(&self) -> &[u8] {
         // `length` never exceeds eight; `get` spares the panic path.
         self.data.get(..self.length as usize).unwrap_or(&[])

@@ -1,4 +1,4 @@
-//! The device side of requests: what a puck, the safety module or a simulator reads off the bus.
+//! The device side of requests, for a puck, the safety module or a simulator.
 //!
 //! The replies are built by [`crate::reply`], [`crate::position`], [`crate::force_torque`] and [`crate::tactile`].
 
@@ -17,30 +17,44 @@ pub use crate::force_torque::{acceleration_frame, force_frame, quantise, torque_
 pub use crate::position::{position_frame, secondary_position_frame};
 pub use crate::reply::{reply16, reply32};
 
-/// A frame that asks something of one device or of a group.
+/// A frame that asks something of one device or of a group, decoded. The master builds such frames with
+/// [`get`](crate::get), [`set`](crate::set) and [`packed_torques`](crate::packed_torques); what it receives is a
+/// [`Reply`](crate::Reply).
+///
+/// ```
+/// use puck::{Action, Group, PropertyId, Request, get};
+///
+/// let heard = Request::decode(&get(Group::ARM, PropertyId::POSITION))?;
+/// assert_eq!(heard.action, Action::Get { property: PropertyId::POSITION });
+/// # Ok::<(), puck::RequestError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Request {
-    /// Who asks: the host, or the safety module setting modes.
+    /// The sender: the host, or the safety module that sets modes.
     pub sender: Node,
-    /// Who is asked.
+    /// The node or group that is asked.
     pub to: Destination,
-    /// What is asked.
+    /// The request itself.
     pub action: Action,
 }
 
-/// What a request asks.
+/// The content of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Action {
     /// Send the value of a property.
     Get {
-        /// Which.
+        /// The property.
         property: PropertyId,
     },
     /// Change a property. No reply.
     Set {
-        /// Which.
+        /// The property.
         property: PropertyId,
-        /// To what, sign extended.
+        /// The new value, sign extended.
         value: i32,
     },
     /// Four values of one property in one frame, by PIDX. Only T is ever sent that way.
@@ -54,6 +68,7 @@ pub enum Action {
 
 impl Action {
     /// The value for the puck with this PIDX (1..=4) in a packed frame; `None` otherwise.
+    #[must_use]
     pub fn torque_for(&self, place: u8) -> Option<PuckTorque> {
         match self {
             Action::PackedTorques { torques, .. } => torques.get(usize::from(place).checked_sub(1)?).copied(),
@@ -62,8 +77,10 @@ impl Action {
     }
 }
 
-/// Why a frame is no request.
+/// Reason for which a frame is no request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum RequestError {
     /// Extended identifier or remote frame: not Barrett's protocol.
     NotClassic,
@@ -92,7 +109,7 @@ impl fmt::Display for RequestError {
 impl core::error::Error for RequestError {}
 
 impl Request {
-    /// Read any frame from the bus.
+    /// Decodes any frame from the bus.
     ///
     /// # Errors
     /// [`RequestError`]: the frame is malformed, or not a request at all.
@@ -135,6 +152,7 @@ impl Request {
 /// The safety module's broadcast when the person presses Activate (`Torque`) or Idle (`Idle`): 0x540.
 ///
 /// The best reading of undocumented frames: SET MODE to all motor pucks.
+#[must_use]
 pub fn safety_broadcast(mode: MotorMode) -> CanFrame {
     short(CanId::encode(Node::SAFETY_MODULE, Group::ALL_MOTORS), PropertyId::MODE, mode.value() as i16)
 }

@@ -5,7 +5,7 @@
 
 use crate::units::Real;
 
-/// What an unloaded gauge reads, about.
+/// Reading of an unloaded gauge, about.
 pub const UNLOADED: u16 = 2000;
 /// Largest reading of a gauge.
 pub const LARGEST: u16 = 4095;
@@ -18,8 +18,8 @@ const CURVE: [f64; 4] = [2.754e-10, -1.708e-6, 0.003764, -2.85];
 /// Halvings that find a count: the interval of 4096 counts ends below 1e-6 of one.
 const HALVINGS: usize = 32;
 
-/// The torque that the finger exerts about its outer joint (N m), positive when it presses in closing, as the curve gives it
-/// for these counts (cut to 0..=4095). It grows with the counts everywhere.
+/// The torque that the finger exerts about its outer joint (N m), positive when it presses in closing, as the curve
+/// gives it for these counts (cut to 0..=4095). It grows with the counts everywhere.
 pub fn torque<R: Real>(counts: R) -> R {
     let (zero, largest) = (R::from_f64(0.0), R::from_i32(LARGEST as i32));
     // A NaN ends at zero.
@@ -38,6 +38,7 @@ pub fn torque<R: Real>(counts: R) -> R {
 }
 
 /// Device side: the counts at which [`torque`] is `torque` (N m), 0 to 4095.
+#[must_use]
 pub fn counts(torque_wanted: f64) -> f64 {
     let (mut low, mut high) = (0.0, LARGEST as f64);
     for _ in 0..HALVINGS {

@@ -1,8 +1,8 @@
 //! The BarrettHand BH8-280: encoder counts to finger angles, and the commands that move it.
 //!
-//! A finger has one motor and two links. Motor and inner link are geared 125:1, the secondary encoder sits on the worm at
-//! 50:1, the outer link moves by 1/375 relative to the inner one until the TorqueSwitch breaks away. The spread is 17.5:1.
-//! Integers are *truncated toward zero* here, as in Barrett's library, except torques, which are rounded down.
+//! A finger has one motor and two links. Motor and inner link are geared 125:1, the secondary encoder sits on the worm
+//! at 50:1, the outer link moves by 1/375 relative to the inner one until the TorqueSwitch breaks away. The spread is
+//! 17.5:1. Integers are *truncated toward zero* here, as in Barrett's library, except torques, which are rounded down.
 
 use crate::can::{CanFrame, Group, Node};
 use crate::message::{packed_torques, set};
@@ -30,6 +30,8 @@ const RATIOS: [f64; 4] = [INNER_LINK_RATIO, INNER_LINK_RATIO, INNER_LINK_RATIO, 
 
 /// Values of CMD.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[repr(u8)]
 pub enum HandCommand {
     /// 0.
@@ -82,6 +84,8 @@ pub enum HandCommand {
 
 /// Angles of the hand, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct HandAngles<R> {
     /// Inner link of each finger, 0 open.
     pub inner: [R; 3],
@@ -94,6 +98,7 @@ pub struct HandAngles<R> {
 /// Angles from the positions of the four pucks, in the order of [`Node::HAND`].
 ///
 /// A finger without a secondary position gets `outer = inner / 3`, which holds only before breakaway.
+#[must_use]
 pub fn angles<R: Real>(primary: &[Counts; 4], secondary: &[Option<Counts>; 3]) -> HandAngles<R> {
     let scale = |counts: Counts, factor: f64| R::from_i32(counts.0) * R::from_f64(factor);
     let mut inner = [R::from_f64(0.0); 3];
@@ -121,8 +126,10 @@ pub fn finger_counts<R: Real>(inner: R) -> (Counts, Counts) {
     (counts(INNER_LINK_RATIO), counts(SECONDARY_RATIO))
 }
 
-/// Why no hand command was built.
+/// Reason for which no hand command was built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum HandError {
     /// A value is NaN or infinite.
     NotFinite,
@@ -147,8 +154,18 @@ impl From<NotFinite> for HandError {
     }
 }
 
-/// The frames that command a hand whose four pucks share one firmware generation.
+/// The frames that command a hand whose four pucks share one firmware generation. Angles are read by [`angles`].
+///
+/// ```
+/// use puck::{PropertyTable, hand::{HandCommand, HandCommander}, Node};
+///
+/// let hand = HandCommander::new(&PropertyTable::motor(200)?)?;
+/// let frame = hand.command(Node::FINGERS[0], HandCommand::Initialise);
+/// let frames = hand.trapezoidal_move(&[1.0, 1.0, 1.0, 0.0])?; // rad; four targets, then the mode
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct HandCommander {
     command: PropertyId,
     end_point: PropertyId,
@@ -174,11 +191,13 @@ impl HandCommander {
     }
 
     /// A command to one digit.
+    #[must_use]
     pub fn command(&self, digit: Node, command: HandCommand) -> CanFrame {
         set(digit, self.command, command as i32)
     }
 
     /// A mode for all four digits.
+    #[must_use]
     pub fn mode(&self, mode: MotorMode) -> CanFrame {
         set(Group::HAND, PropertyId::MODE, mode.value())
     }

@@ -1,14 +1,14 @@
-//! What the master sends: GET, SET and packed torques.
+//! Frames of the master: GET, SET and packed torques.
 //!
-//! There is no acknowledgement to a SET. A puck that gets several without a GET in between may drop some, and the safety
-//! module wants 10 ms between two: see the start-up in `device`.
+//! There is no acknowledgement to a SET. A puck that gets several without a GET in between may drop some, and the
+//! safety module wants 10 ms between two.
 
 use crate::can::{CanFrame, CanId, Destination, Group, Node};
 use crate::property::PropertyId;
 use crate::state::MotorMode;
 use crate::units::PuckTorque;
 
-/// Bit 7 of byte 0: this frame sets (or replies) rather than asks.
+/// Bit 7 of byte 0: set in a SET and in a reply, clear in a GET.
 pub(crate) const SET_BIT: u8 = 0x80;
 
 /// Ask one puck, or every member of a group, for a property. DLC 1.
@@ -41,24 +41,29 @@ pub(crate) fn short(id: CanId, property: PropertyId, value: i16) -> CanFrame {
 /// Torques for up to four pucks of a group in one frame, in the order of their PIDX 1..=4. Always DLC 8.
 ///
 /// Bytes 1..=7 are one big-endian integer `A<<42 | B<<28 | C<<14 | D` of four 14-bit fields. `property` is T of the
-/// group's firmware ([`PropertyId::TORQUE`] from 61 on). Only `control::act::actuation` may call this with torques other than
-/// zero: everything else could put an unlimited torque on the bus.
+/// group's firmware ([`PropertyId::TORQUE`] from 61 on). Call this from one place only, with torques that a limiter has
+/// passed: the pucks apply whatever arrives.
+#[must_use]
 pub fn packed_torques(group: Group, property: PropertyId, torques: [PuckTorque; 4]) -> CanFrame {
     let fields = torques.iter().fold(0_u64, |packed, torque| packed << 14 | torque.bits());
     let [_, b1, b2, b3, b4, b5, b6, b7] = fields.to_be_bytes();
     CanFrame::with_payload(CanId::encode(Node::HOST, group), [SET_BIT | property.number(), b1, b2, b3, b4, b5, b6, b7])
 }
 
-/// What takes the torque off, whatever was commanded before: zero torque to arm and wrist, then MODE IDLE to the arm's pucks
-/// and to the hand's. A device begins with these frames, and ends with them.
+/// The frames that take the torque off: zero torque to arm and wrist, then MODE IDLE to the arm's pucks and to the
+/// hand's.
+///
+/// A master sends them first and last. To keep the arm in torque mode, send [`zero_torques`] instead.
+#[must_use]
 pub fn stop_frames() -> [CanFrame; 4] {
     let [arm, wrist] = zero_torques();
     let idle = |group| set(group, PropertyId::MODE, MotorMode::Idle.value());
     [arm, wrist, idle(Group::ARM), idle(Group::HAND)]
 }
 
-/// Explicit zero torque for all seven motors. A puck is believed to keep its last torque until told otherwise, so every
-/// way out sends these. Anybody may: no torque can do no harm that a torque left standing would not do first.
+/// Explicit zero torque for all seven motors. A puck is believed to keep its last torque until told otherwise, so send
+/// these whenever control ends.
+#[must_use]
 pub fn zero_torques() -> [CanFrame; 2] {
     [Group::ARM_TORQUES, Group::WRIST_TORQUES]
         .map(|group| packed_torques(group, PropertyId::TORQUE, [PuckTorque::ZERO; 4]))

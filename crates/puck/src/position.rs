@@ -1,8 +1,8 @@
 //! Position frames: 22-bit two's complement counts, big-endian, three bytes each.
 //!
-//! Byte 0 (and 3) carry flags in bits 7..6. Barrett's own parsers want bit 7 set, its manual draws it clear: a master masks
-//! both bits off, a device sends bit 7. A puck with a secondary encoder answers with six bytes instead of three; both may
-//! occur among the replies to one request.
+//! Byte 0 (and 3) carry flags in bits 7..6. Barrett's own parsers want bit 7 set, its manual draws it clear: a master
+//! masks both bits off, a device sends bit 7. A puck with a secondary encoder answers with six bytes instead of three;
+//! both may occur among the replies to one request.
 
 use crate::can::{CanFrame, CanId, Group, Node};
 use crate::units::Counts;
@@ -43,6 +43,7 @@ pub(crate) fn decode_secondary(payload: &[u8]) -> Option<Counts> {
 }
 
 /// Device side: the reply to GET P. What exceeds 22 bits wraps, as on the puck.
+#[must_use]
 pub fn position_frame(node: Node, primary: Counts, secondary: Option<Counts>) -> CanFrame {
     let id = CanId::encode(node, Group::POSITION_REPLIES);
     let [a, b, c] = pack(primary);
@@ -56,6 +57,7 @@ pub fn position_frame(node: Node, primary: Counts, secondary: Option<Counts>) ->
 }
 
 /// Device side: the reply to GET JP, the secondary position alone.
+#[must_use]
 pub fn secondary_position_frame(node: Node, secondary: Counts) -> CanFrame {
     CanFrame::with_payload(CanId::encode(node, Group::SECONDARY_POSITION_REPLIES), pack(secondary))
 }

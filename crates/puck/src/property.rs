@@ -1,4 +1,4 @@
-//! Puck properties: what they are called, and which number a name has on which firmware.
+//! Puck properties: their names, and their numbers on each firmware.
 //!
 //! A number means nothing without the type of the puck and its firmware version: 77 is EN before VERS 132 and HOLD from
 //! there on. Read STAT and VERS first, choose a [`PropertyTable`], and let it translate. In STAT 0 (monitor) every puck
@@ -8,6 +8,8 @@ use core::fmt;
 
 /// The number of a property on the wire, 0..=127.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PropertyId(u8);
 
 impl PropertyId {
@@ -29,6 +31,7 @@ impl PropertyId {
     pub const ACCELERATION: PropertyId = PropertyId(64);
 
     /// A property by number; `None` above 127.
+    #[must_use]
     pub const fn new(number: u8) -> Option<PropertyId> {
         if number <= 127 { Some(PropertyId(number)) } else { None }
     }
@@ -39,6 +42,7 @@ impl PropertyId {
     }
 
     /// The number, 0..=127.
+    #[must_use]
     pub const fn number(self) -> u8 {
         self.0
     }
@@ -64,6 +68,9 @@ macro_rules! properties {
     ($($(#[$doc:meta])* $name:ident $mnemonic:literal $width:ident { $($list:ident: [$($change:expr),*]),* })*) => {
         /// A property by name. The names are Barrett's mnemonics: manuals, logs and tables use nothing else.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+        #[non_exhaustive]
         pub enum Property { $($(#[$doc])* $name),* }
 
         impl Property {
@@ -96,18 +103,21 @@ pub use table::Property;
 
 impl Property {
     /// Barrett's mnemonic, in capitals.
+    #[must_use]
     pub const fn mnemonic(self) -> &'static str {
         self.row().mnemonic
     }
 
-    /// Whether an ordinary reply carries 32 bits (DLC 6) instead of 16 (DLC 4).
+    /// True if an ordinary reply carries 32 bits (DLC 6) instead of 16 (DLC 4).
+    #[must_use]
     pub const fn is_wide(self) -> bool {
         self.row().is_wide
     }
 }
 
-/// Which list a puck uses.
+/// The list that a puck uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum List {
     Monitor,
     Safety,
@@ -115,15 +125,26 @@ enum List {
     ForceTorque,
 }
 
-/// The translation between names and numbers for one puck.
+/// The translation between names and numbers for one puck. For VERS, ROLE, STAT and MODE, which have the same number
+/// almost everywhere, the constants of [`PropertyId`] do; everything else needs the table of the firmware.
+///
+/// ```
+/// use puck::{Property, PropertyTable};
+///
+/// let table = PropertyTable::motor(200)?;
+/// assert_eq!(table.id(Property::T).map(|id| id.number()), Some(42));
+/// assert!(PropertyTable::motor(60).is_err(), "older firmware has another T");
+/// # Ok::<(), puck::UnknownFirmware>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PropertyTable {
     list: List,
     version: u8,
 }
 
-/// Newest firmware version the tables are taken to cover. The library's list is open-ended from 175; its own programs ask
-/// for 200. A version beyond one byte was never seen, and a wrong table moves HOLD onto EN.
+/// Newest firmware version the tables are taken to cover. The library's list is open-ended from 175; its own programs
+/// ask for 200. A version beyond one byte was never seen, and a wrong table moves HOLD onto EN.
 pub const NEWEST_FIRMWARE: u8 = 255;
 
 /// Oldest motor firmware that has a table. Before 61 torque was property 9 or 10, and [`PropertyId::TORQUE`] (42), with
@@ -133,6 +154,7 @@ pub const OLDEST_MOTOR_FIRMWARE: u8 = 61;
 
 /// A firmware version without a property table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct UnknownFirmware {
     /// VERS as the puck reported it.
     pub version: i32,
@@ -148,6 +170,7 @@ impl core::error::Error for UnknownFirmware {}
 
 impl PropertyTable {
     /// The table of any puck in STAT 0.
+    #[must_use]
     pub const fn monitor() -> PropertyTable {
         PropertyTable { list: List::Monitor, version: 0 }
     }
@@ -169,7 +192,9 @@ impl PropertyTable {
         PropertyTable::versioned(List::Safety, version, 1)
     }
 
-    /// The table of a force/torque sensor. There is one: some sensors report no usable VERS or ROLE, so choose it by node 8.
+    /// The table of a force/torque sensor. There is one: some sensors report no usable VERS or ROLE, so choose it by
+    /// node 8.
+    #[must_use]
     pub const fn force_torque() -> PropertyTable {
         PropertyTable { list: List::ForceTorque, version: 0 }
     }
@@ -182,6 +207,7 @@ impl PropertyTable {
     }
 
     /// The number of a property on this puck; `None` if it has no such property.
+    #[must_use]
     pub fn id(&self, property: Property) -> Option<PropertyId> {
         let row = property.row();
         let changes = match self.list {
@@ -196,6 +222,7 @@ impl PropertyTable {
     }
 
     /// The property that has this number on this puck; `None` if there is none.
+    #[must_use]
     pub fn property(&self, id: PropertyId) -> Option<Property> {
         Property::ALL.iter().copied().find(|property| self.id(*property) == Some(id))
     }

@@ -1,4 +1,4 @@
-//! What the master receives, and how a device says it.
+//! Replies: decoding for the master, encoding for a device.
 //!
 //! Replies never go to the host's node number but to a group that names the format: 3 positions, 6 ordinary properties,
 //! 7 secondary position, 8 and 9 tactile, 10..12 force/torque sensor. The group, not the request, decides how to read.
@@ -15,21 +15,33 @@ use crate::property::PropertyId;
 use crate::tactile::{TactileBlock, TactileTop};
 use crate::units::Counts;
 
-/// One frame from a device, read.
+/// One frame from a device, decoded. Requests on the same bus are [`Request`](crate::Request)s; a frame that is neither
+/// is an error.
+///
+/// ```
+/// use puck::{Node, PropertyId, Reply, device};
+///
+/// let frame = device::reply16(Node::ARM[0], PropertyId::STAT, 2);
+/// let reply = Reply::decode(&frame)?;
+/// assert_eq!(reply, Reply::Property { node: Node::ARM[0], property: PropertyId::STAT, value: 2 });
+/// # Ok::<(), puck::ReplyError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Reply {
     /// The value of a property.
     Property {
-        /// Who answers.
+        /// The node that answers.
         node: Node,
-        /// Which property.
+        /// The property.
         property: PropertyId,
         /// Its value, sign extended.
         value: i32,
     },
     /// The position of a motor.
     Position {
-        /// Who answers.
+        /// The node that answers.
         node: Node,
         /// Motor encoder, 22 bits.
         primary: Counts,
@@ -38,14 +50,14 @@ pub enum Reply {
     },
     /// The position of the secondary encoder alone.
     SecondaryPosition {
-        /// Who answers.
+        /// The node that answers.
         node: Node,
         /// Secondary encoder, 22 bits.
         secondary: Counts,
     },
     /// The first half of a force/torque sample, 1/256 N.
     Force {
-        /// Who answers.
+        /// The node that answers.
         node: Node,
         /// x, y, z.
         counts: [i16; 3],
@@ -54,7 +66,7 @@ pub enum Reply {
     },
     /// The second half of a force/torque sample, 1/4096 N m.
     Torque {
-        /// Who answers.
+        /// The node that answers.
         node: Node,
         /// x, y, z.
         counts: [i16; 3],
@@ -63,7 +75,7 @@ pub enum Reply {
     },
     /// Acceleration, 1/1024.
     Acceleration {
-        /// Who answers.
+        /// The node that answers.
         node: Node,
         /// x, y, z.
         counts: [i16; 3],
@@ -72,24 +84,27 @@ pub enum Reply {
     },
     /// A fifth of a full tactile reply.
     TactileFull {
-        /// Who answers.
+        /// The node that answers.
         node: Node,
         /// Five cells.
         block: TactileBlock,
     },
     /// The ten highest tactile cells.
     TactileTop {
-        /// Who answers.
+        /// The node that answers.
         node: Node,
         /// Map and values.
         top: TactileTop,
     },
-    /// The safety module spoke to all motors (0x540) unasked, presumably setting their MODE. Payload undocumented: ignore.
+    /// The safety module spoke to all motors (0x540) unasked, presumably setting their MODE. Payload undocumented:
+    /// ignore.
     SafetyBroadcast,
 }
 
-/// Why a frame is no reply.
+/// Reason for which a frame is no reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum ReplyError {
     /// Extended identifier or remote frame: not Barrett's protocol.
     NotClassic,
@@ -124,7 +139,7 @@ impl fmt::Display for ReplyError {
 impl core::error::Error for ReplyError {}
 
 impl Reply {
-    /// Read any frame from the bus.
+    /// Decodes any frame from the bus.
     ///
     /// # Errors
     /// [`ReplyError`]: the frame is malformed, or not a reply at all.
@@ -184,11 +199,13 @@ pub(crate) fn decode_property(payload: &[u8]) -> Result<(PropertyId, i32), Reply
 }
 
 /// Device side: an ordinary reply of 16 bits.
+#[must_use]
 pub fn reply16(node: Node, property: PropertyId, value: i16) -> CanFrame {
     short(CanId::encode(node, Group::PROPERTY_REPLIES), property, value)
 }
 
 /// Device side: an ordinary reply of 32 bits.
+#[must_use]
 pub fn reply32(node: Node, property: PropertyId, value: i32) -> CanFrame {
     wide(CanId::encode(node, Group::PROPERTY_REPLIES), property, value)
 }

@@ -11,6 +11,8 @@ use crate::units::{NotFinite, PACKED_TORQUE_LIMIT, Real};
 
 /// MODE of the safety module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum SafetyMode {
     /// 0: motor power is cut, the pucks vanish from the bus.
     EStop,
@@ -22,6 +24,7 @@ pub enum SafetyMode {
 
 impl SafetyMode {
     /// From the value of MODE; `None` for a value that no document names.
+    #[must_use]
     pub const fn from_value(value: i32) -> Option<SafetyMode> {
         match value {
             0 => Some(SafetyMode::EStop),
@@ -32,13 +35,16 @@ impl SafetyMode {
     }
 
     /// The value of MODE.
+    #[must_use]
     pub const fn value(self) -> i32 {
         self as i32
     }
 }
 
-/// What the safety module thinks of one supervised quantity.
+/// The safety module's judgement of one supervised quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Health {
     /// 1: within limits.
     Safe,
@@ -69,6 +75,8 @@ impl Health {
 
 /// The button a person holds down on a pendant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Button {
     /// 00: the emergency stop.
     EmergencyStop,
@@ -80,8 +88,18 @@ pub enum Button {
     None,
 }
 
-/// Both pendants: five supervised quantities, display, lights and buttons.
+/// Both pendants: five supervised quantities, display, lights and buttons. The mode is not among them: read MODE.
+///
+/// ```
+/// use puck::PendantState;
+///
+/// let all_safe = 1 | 1 << 3 | 1 << 6 | 1 << 9 | 1 << 12;
+/// assert!(PendantState::from_value(all_safe)?.all_safe());
+/// # Ok::<(), puck::safety::InvalidPendant>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PendantState {
     /// Velocity of the arm.
     pub velocity: Health,
@@ -105,6 +123,7 @@ pub struct PendantState {
 
 /// A pendant word in which a supervised quantity is not exactly one of safe, warning and fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct InvalidPendant;
 
 impl fmt::Display for InvalidPendant {
@@ -151,6 +170,7 @@ impl PendantState {
     }
 
     /// Device side: the value of PEN.
+    #[must_use]
     pub const fn value(&self) -> i32 {
         let button = match self.button {
             Button::EmergencyStop => 0,
@@ -170,6 +190,7 @@ impl PendantState {
     }
 
     /// The character on the seven-segment display; `None` for a pattern that no document names.
+    #[must_use]
     pub const fn display(&self) -> Option<char> {
         Some(match self.segments {
             0x3F => '0',
@@ -189,16 +210,19 @@ impl PendantState {
     }
 
     /// The five supervised quantities, velocity first.
+    #[must_use]
     pub const fn health(&self) -> [Health; 5] {
         [self.velocity, self.torque, self.voltage, self.heartbeat, self.other]
     }
 
     /// Neither warning nor fault anywhere.
+    #[must_use]
     pub fn all_safe(&self) -> bool {
         self.health().iter().all(|health| *health == Health::Safe)
     }
 
     /// A fault somewhere.
+    #[must_use]
     pub fn has_faults(&self) -> bool {
         self.health().contains(&Health::Fault)
     }
@@ -207,8 +231,10 @@ impl PendantState {
 /// VL1, VL2: counts per m/s (Q4.12).
 pub const VELOCITY_UNITS_PER_METRE_PER_SECOND: f64 = 4096.0;
 
-/// Why no limit was encoded.
+/// Reason for which no limit was encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum LimitError {
     /// The limit is NaN or infinite.
     NotFinite,

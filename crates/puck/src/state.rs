@@ -2,6 +2,8 @@
 
 /// STAT: what a puck is running.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Status {
     /// 0: the boot loader ("monitor"); only properties 0..=7 answer.
     Reset,
@@ -13,6 +15,7 @@ pub enum Status {
 
 impl Status {
     /// From the value of STAT; `None` for a value that no document names.
+    #[must_use]
     pub const fn from_value(value: i32) -> Option<Status> {
         match value {
             0 => Some(Status::Reset),
@@ -23,6 +26,7 @@ impl Status {
     }
 
     /// The value of STAT. Setting `Ready` wakes a puck, setting `Reset` reboots it into the monitor.
+    #[must_use]
     pub const fn value(self) -> i32 {
         self as i32
     }
@@ -30,6 +34,8 @@ impl Status {
 
 /// MODE of a motor puck.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum MotorMode {
     /// 0: windings shorted, the motor brakes; torques are ignored.
     Idle,
@@ -47,6 +53,7 @@ pub enum MotorMode {
 
 impl MotorMode {
     /// From the value of MODE; `None` for a value that no document names.
+    #[must_use]
     pub const fn from_value(value: i32) -> Option<MotorMode> {
         match value {
             0 => Some(MotorMode::Idle),
@@ -60,6 +67,7 @@ impl MotorMode {
     }
 
     /// The value of MODE.
+    #[must_use]
     pub const fn value(self) -> i32 {
         self as i32
     }
@@ -67,6 +75,8 @@ impl MotorMode {
 
 /// ROLE: the low five bits say what a puck is, the high bits what it is fitted with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Role(pub u16);
 
 impl Role {
@@ -80,31 +90,37 @@ impl Role {
     pub const FORCE_TORQUE: u16 = 6;
 
     /// From the value of ROLE: the low 16 bits.
+    #[must_use]
     pub const fn from_value(value: i32) -> Role {
         Role(value as u16)
     }
 
     /// The low five bits: 0 motor, 1 gimbals, 2 safety, 3 wraptor, 4 trigger, 5 hand, 6 force/torque.
+    #[must_use]
     pub const fn kind(self) -> u16 {
         self.0 & 0x1F
     }
 
     /// 0x0100, 0x0200, 0x0400: an absolute magnetic encoder, on the serial, Hall or encoder input.
+    #[must_use]
     pub const fn has_magnetic_encoder(self) -> bool {
         self.0 & 0x0700 != 0
     }
 
     /// 0x0800: strain gauge.
+    #[must_use]
     pub const fn has_strain_gauge(self) -> bool {
         self.0 & 0x0800 != 0
     }
 
     /// 0x1000: tactile array (by the library; one driver reads this bit as the inertial unit).
+    #[must_use]
     pub const fn has_tactile_array(self) -> bool {
         self.0 & 0x1000 != 0
     }
 
     /// 0x4000: optical (joint) encoder: position replies carry a secondary position.
+    #[must_use]
     pub const fn has_joint_encoder(self) -> bool {
         self.0 & 0x4000 != 0
     }

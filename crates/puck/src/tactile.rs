@@ -10,6 +10,7 @@ pub const CELLS: usize = 24;
 
 /// TACT: which frames a tactile puck sends. Setting it also triggers one reply at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TactileFormat {
     /// 0: nothing.
     Off,
@@ -23,6 +24,7 @@ pub enum TactileFormat {
 
 impl TactileFormat {
     /// The value of TACT.
+    #[must_use]
     pub const fn value(self) -> i32 {
         self as i32
     }
@@ -30,6 +32,8 @@ impl TactileFormat {
 
 /// One of the five frames of a full tactile reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct TactileBlock {
     /// 0..=4: the block holds cells `5 * sequence` and following.
     pub sequence: u8,
@@ -38,12 +42,14 @@ pub struct TactileBlock {
 }
 
 impl TactileBlock {
-    /// How many of the cells exist: five, and four in the last block.
+    /// Number of cells that exist: five, and four in the last block.
+    #[must_use]
     pub const fn cell_count(&self) -> usize {
         if self.sequence == 4 { 4 } else { 5 }
     }
 
     /// The pressures in N/cm^2.
+    #[must_use]
     pub fn pressures<R: Real>(&self) -> [R; 5] {
         self.cells.map(|cell| R::from_i32(cell as i32) * R::from_f64(NEWTON_PER_SQUARE_CENTIMETRE_PER_COUNT))
     }
@@ -57,6 +63,7 @@ impl TactileBlock {
     }
 
     /// Device side: the frame. Sequence and cells are cut to four and twelve bits.
+    #[must_use]
     pub fn frame(&self, node: Node) -> CanFrame {
         let bits =
             self.cells.iter().fold((self.sequence & 0xF) as u64, |bits, cell| bits << 12 | (*cell & 0xFFF) as u64);
@@ -66,9 +73,11 @@ impl TactileBlock {
 
 /// The ten highest cells of one array.
 ///
-/// Which bit of the map is cell 0 is disputed between two drivers (most significant, or least significant first): this type
+/// Two drivers disagree on which bit of the map is cell 0 (most significant, or least significant first): this type
 /// keeps the map as sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct TactileTop {
     /// Bytes 0..=2, the first in bits 23..16: a set bit for each cell that has a value below.
     pub map: u32,
@@ -88,6 +97,7 @@ impl TactileTop {
     }
 
     /// Device side: the frame. Map and values are cut to 24 and four bits.
+    #[must_use]
     pub fn frame(&self, node: Node) -> CanFrame {
         let map = (self.map & 0xFF_FFFF) as u64;
         let bits = self.values.iter().fold(map, |bits, value| bits << 4 | (*value & 0xF) as u64);

@@ -18,6 +18,8 @@ pub const JOINTS: usize = 7;
 
 /// Gear ratios. N5 and N6 depend on the wrist's cable generation (9.48, 9.68 and 9.7 are documented): configure them.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Ratios {
     /// N1, N2, N3/n3, N4, N5, N6 n6, N7: the coefficients of the matrix above, all positive.
     pub coefficients: [f64; JOINTS],
@@ -28,14 +30,17 @@ impl Ratios {
     pub const WAM7: Ratios = Ratios { coefficients: [42.0, 28.25, 16.8155, 18.0, 9.7, 9.7, 14.93] };
 
     /// From N1..N7 and the ratios of the two differentials, as Barrett's manual lists them.
+    #[must_use]
     pub const fn from_gears(gears: [f64; JOINTS], shoulder_differential: f64, wrist_differential: f64) -> Ratios {
         let [n1, n2, n3, n4, n5, n6, n7] = gears;
         Ratios { coefficients: [n1, n2, n3 / shoulder_differential, n4, n5, n6 * wrist_differential, n7] }
     }
 }
 
-/// Why no transmission was built.
+/// Reason for which no transmission was built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum TransmissionError {
     /// A ratio is NaN, infinite, zero or negative.
     Ratio,
@@ -67,8 +72,19 @@ impl fmt::Display for TransmissionError {
 
 impl core::error::Error for TransmissionError {}
 
-/// The cable transmission between motors and joints.
+/// The cable transmission between motors and joints, generic over `f32` and `f64`. Bus units are the matter of
+/// [`Drives`].
+///
+/// ```
+/// use puck::{Ratios, Transmission};
+///
+/// let transmission: Transmission<f64> = Transmission::new(&Ratios::WAM7)?;
+/// let motors = transmission.motor_from_joint(&[0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+/// assert_eq!(motors[0], -21.0);
+/// # Ok::<(), puck::TransmissionError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transmission<R> {
     ratios: [R; JOINTS],
     /// 1/ratio: the rounding of Barrett's library, which multiplies by an inverse matrix. It also spares divisions.
@@ -131,8 +147,12 @@ impl<R: Real> Transmission<R> {
     }
 }
 
-/// What each puck reports of its drive. Units differ by up to 30 % between arms: read them, never assume them.
+/// Encoder and torque units of the seven motors, as the pucks report them. They differ by up to 30 % between arms: read
+/// them, never assume them.
+///
+/// This turns bus units into motor units; [`Transmission`] turns motors into joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Drives {
     counts_per_revolution: [i32; JOINTS],
     units_per_newton_metre: [i32; JOINTS],
@@ -157,11 +177,13 @@ impl Drives {
     }
 
     /// CTS of each motor: counts per revolution.
+    #[must_use]
     pub const fn counts_per_revolution(&self) -> &[i32; JOINTS] {
         &self.counts_per_revolution
     }
 
     /// IPNM of each motor: current units per N m.
+    #[must_use]
     pub const fn units_per_newton_metre(&self) -> &[i32; JOINTS] {
         &self.units_per_newton_metre
     }
@@ -183,6 +205,7 @@ impl Drives {
     }
 
     /// Unwrapped counts to motor angles in rad.
+    #[must_use]
     pub fn motor_angles<R: Real>(&self, counts: &[Counts; JOINTS]) -> [R; JOINTS] {
         let mut angles = [R::from_f64(0.0); JOINTS];
         for ((angle, count), cts) in angles.iter_mut().zip(counts).zip(self.counts_per_revolution) {
@@ -204,6 +227,7 @@ impl Drives {
     }
 
     /// Puck units to motor torques in N m.
+    #[must_use]
     pub fn motor_torques<R: Real>(&self, torques: &[PuckTorque; JOINTS]) -> [R; JOINTS] {
         let mut motor = [R::from_f64(0.0); JOINTS];
         for ((torque, units), ipnm) in motor.iter_mut().zip(torques).zip(self.units_per_newton_metre) {

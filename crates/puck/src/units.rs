@@ -9,11 +9,21 @@ pub const PACKED_TORQUE_LIMIT: i16 = 8191;
 pub const POSITION_BITS: u32 = 22;
 
 /// A position in encoder counts (of the motor, or of the secondary encoder), as far as it has been unwrapped.
+///
+/// ```
+/// use puck::Counts;
+///
+/// let sent = Counts(2_100_000).wrapped();
+/// assert_eq!(sent.unwrapped_near(Counts(2_099_000)), Counts(2_100_000));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Counts(pub i32);
 
 impl Counts {
-    /// What 22 bits keep of this position: the value a puck sends.
+    /// The low 22 bits of this position, sign extended: the value a puck sends.
+    #[must_use]
     pub const fn wrapped(self) -> Counts {
         let unused = 32 - POSITION_BITS;
         Counts((self.0 << unused) >> unused)
@@ -22,6 +32,7 @@ impl Counts {
     /// The position nearest to `previous` whose 22 low bits equal those of `self`.
     ///
     /// Exact as long as the motor turned by less than 256 revolutions (at 4096 counts) since `previous`.
+    #[must_use]
     pub const fn unwrapped_near(self, previous: Counts) -> Counts {
         let moved = Counts(self.0.wrapping_sub(previous.0)).wrapped();
         Counts(previous.0.wrapping_add(moved.0))
@@ -30,6 +41,8 @@ impl Counts {
 
 /// A motor torque in current units of the puck ("IPNM units"), 14 bits: -8192..=8191.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PuckTorque(i16);
 
 impl PuckTorque {
@@ -37,6 +50,7 @@ impl PuckTorque {
     pub const ZERO: PuckTorque = PuckTorque(0);
 
     /// A torque from its integer value; `None` if it does not fit into 14 bits.
+    #[must_use]
     pub const fn new(units: i16) -> Option<PuckTorque> {
         if units >= -PACKED_TORQUE_LIMIT - 1 && units <= PACKED_TORQUE_LIMIT { Some(PuckTorque(units)) } else { None }
     }
@@ -61,6 +75,7 @@ impl PuckTorque {
     }
 
     /// The integer value, current units of the puck.
+    #[must_use]
     pub const fn units(self) -> i16 {
         self.0
     }
@@ -78,6 +93,7 @@ impl PuckTorque {
 
 /// A value that must become an integer of the bus is NaN or infinite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NotFinite;
 
 impl fmt::Display for NotFinite {

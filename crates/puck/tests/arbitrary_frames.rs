@@ -95,8 +95,8 @@ proptest! {
         let reply = Reply::decode(&frame);
         let request = Request::decode(&frame);
         let _ = PendantState::from_value(word).map(|state| state.display());
-        // Nothing is both: a simulator and a master on one bus never mistake each other. The safety module's own broadcast
-        // is the exception by its nature.
+        // Nothing is both: a simulator and a master on one bus never mistake each other. The safety module's own
+        // broadcast is the exception by its nature.
         prop_assert!(
             reply.is_err() || request.is_err() || frame.can_id().raw() == 0x540,
             "{frame:?} is both {reply:?} and {request:?}"

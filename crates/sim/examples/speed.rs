@@ -5,8 +5,11 @@
 use puck::{
     CanFrame, Group, Node, Property, PropertyId, PropertyTable, PuckTorque, force_torque, get, packed_torques, set,
 };
-use sim::{FrameClass, FreeJoints, HOME, Plant, PlantConfig, SLOT_TICKS, TICKS_PER_MILLISECOND, Ticks, seconds};
+use sim::{FrameClass, FreeJoints, HOME, Plant, PlantConfig, TICKS_PER_MILLISECOND, Ticks, period_ticks, seconds};
 use std::time::Instant;
+
+/// A third of a control cycle of 300 Hz.
+const SLOT_TICKS: Ticks = period_ticks(900);
 
 /// Lets virtual time pass as a co-controller does that has nothing to do: from event to event.
 fn wait(plant: &mut Plant, until: Ticks) -> u64 {

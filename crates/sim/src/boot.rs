@@ -1,4 +1,4 @@
-//! How a puck comes to life: power, monitor (boot loader), main firmware, and the silences between.
+//! Start of a puck: power, monitor (boot loader), main firmware, and the silences between.
 //!
 //! ```text
 //! power on --20 ms--> Monitor (STAT 0) --SET STAT 2--> still there for 10 ms --> silent 0.3..1.0 s --> Ready (STAT 2)
@@ -18,7 +18,7 @@ const LEAVE_TIME: Ticks = 10 * TICKS_PER_MILLISECOND;
 /// Shortest and longest silence of a waking puck, s.
 const WAKE_SECONDS: (f64, f64) = (0.3, 1.0);
 
-/// What answers, if anything.
+/// The program that answers, if any.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Presence {
     /// Nothing: no power, starting or waking.
@@ -50,7 +50,7 @@ impl Boot {
         Self { phase: Phase::Off, noise }
     }
 
-    /// What answers at time `now`.
+    /// Returns the program that answers at time `now`.
     pub(crate) fn presence(&self, now: Ticks) -> Presence {
         match self.phase {
             Phase::Off => Presence::Absent,
@@ -67,7 +67,7 @@ impl Boot {
         self.phase = Phase::Starting { until: now + START_TIME };
     }
 
-    /// The main firmware has been running since before the story begins.
+    /// The main firmware runs from time 0 on.
     pub(crate) fn run(&mut self) {
         self.phase = Phase::Running;
     }

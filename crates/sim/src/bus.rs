@@ -8,9 +8,9 @@
 //! The interframe space is part of a frame's time on the wire, and delivery happens at its end: 3 us later than a
 //! real controller's interrupt, in exchange for one event per frame instead of two.
 
-use crate::time::{TICKS_PER_BIT, Ticks};
+use crate::time::Ticks;
 use crate::trace::BusTrace;
-use crate::wire::{INTERFRAME_BITS, frame_ticks};
+use crate::wire::{Passage, frame_ticks};
 use puck::{CanFrame, Node};
 use std::collections::VecDeque;
 
@@ -20,27 +20,6 @@ struct Waiting {
     ready: Ticks,
     sequence: u64,
     frame: CanFrame,
-}
-
-/// A frame on the wire, or one that has just left it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Passage {
-    /// Start of frame.
-    pub start: Ticks,
-    /// End of the interframe space: the bus is free again.
-    pub end: Ticks,
-    /// Who transmits. The host is [`Node::HOST`].
-    pub sender: Node,
-    /// What is transmitted.
-    pub frame: CanFrame,
-}
-
-impl Passage {
-    /// When every receiver has the frame: end of frame, three bits before the bus is free.
-    #[must_use]
-    pub fn received_at(&self) -> Ticks {
-        self.end - Ticks::from(INTERFRAME_BITS) * TICKS_PER_BIT
-    }
 }
 
 /// One transmit queue for each of the 32 node numbers.
@@ -91,7 +70,8 @@ impl Bus {
 
     /// If the bus is free, starts the winner among the frames that are ready; `true` if one was started.
     ///
-    /// `now` must be a time the co-controller has reached, and everything else that happens at `now` must have been done.
+    /// `now` must be a time the co-controller has reached, and everything else that happens at `now` must have been
+    /// done.
     pub fn arbitrate(&mut self, now: Ticks) -> bool {
         if self.on_wire.is_some() || now < self.free_at {
             return false;
@@ -115,7 +95,7 @@ impl Bus {
         true
     }
 
-    /// Whether a frame is on the wire.
+    /// True while a frame is on the wire.
     #[must_use]
     pub fn is_busy(&self) -> bool {
         self.on_wire.is_some()
@@ -127,7 +107,7 @@ impl Bus {
         self.on_wire.map(|passage| passage.sender)
     }
 
-    /// What went over the bus so far; the frame on the wire counts from its start.
+    /// Statistics of the bus so far; the frame on the wire counts from its start.
     #[must_use]
     pub fn trace(&self) -> &BusTrace {
         &self.trace

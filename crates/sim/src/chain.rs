@@ -1,7 +1,7 @@
 //! The WAM's kinematic chain: standard Denavit-Hartenberg frames, `T(j-1 -> j) = Rz(q) Tz(d) Tx(a) Rx(alpha)`.
 //!
-//! Numbers: `crates/control/model/wam7.toml` (from Barrett's published configuration). They are written down again here because
-//! the simulator may not depend on `control`: a wrong number there must not cancel itself out in a test here.
+//! Numbers: `crates/control/model/wam7.toml` (from Barrett's published configuration). They are written down again here
+//! because the simulator may not depend on `control`: a wrong number there must not cancel itself out in a test here.
 //! Sines come from `libm`, so that every platform computes the same bits.
 
 use crate::rotation::from_matrix;

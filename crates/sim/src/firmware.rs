@@ -1,4 +1,5 @@
-//! What every motor puck has, on the arm and in the hand: power, boot loader, groups, receive buffer, stored properties.
+//! The common part of all motor pucks, on the arm and in the hand: power, boot loader, groups, receive buffer, stored
+//! properties.
 //!
 //! A device on top of it says what is special: encoders, torque, commands. Rules: docs/barrett-can.md.
 
@@ -27,7 +28,7 @@ const READ_ONLY: &[Property] = &[
     Property::Jp,
 ];
 
-/// What became of a frame on the bus.
+/// Effect of a frame on a puck.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Heard {
     /// Not for this puck, or it has no power.
@@ -38,23 +39,23 @@ pub(crate) enum Heard {
     Torque(i32),
 }
 
-/// What the device has to do about a request.
+/// The device's task after a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Order {
     /// Nothing but sending this, if there is anything to send.
     Answer(Option<CanFrame>),
     /// Tell the value of a property; the shared part has stored values of most.
     Get {
-        /// Which.
+        /// The property.
         property: Property,
         /// Its number on the wire.
         id: PropertyId,
     },
     /// Change a property that [`Firmware::store`] alone does not cover.
     Set {
-        /// Which.
+        /// The property.
         property: Property,
-        /// To what, cut to the property's width.
+        /// The new value, cut to the property's width.
         value: i32,
     },
     /// The main firmware begins or ends: state is lost.
@@ -98,7 +99,7 @@ impl Firmware {
         })
     }
 
-    /// Which node this is.
+    /// The node number.
     pub(crate) fn node(&self) -> Node {
         self.node
     }
@@ -119,7 +120,7 @@ impl Firmware {
         self.forget();
     }
 
-    /// Whether the main firmware runs at `now`.
+    /// True if the main firmware runs at `now`.
     pub(crate) fn is_ready(&self, now: Ticks) -> bool {
         self.boot.presence(now) == Presence::Ready
     }

@@ -1,10 +1,11 @@
 //! The wrist force/torque sensor (node 8): GET FT answers with a force frame and a torque frame.
 //!
-//! The wrench is that of the environment (hand and payload) **on** the sensor, sensor frame, as its elastic element gives it away:
-//! lagging by its hysteresis, plus seeded noise, minus what that was at the last tare; then bias
-//! and drift, which are what the tare did *not* catch; quantised and saturated to 16 bits. Hysteresis is that of play: the output
-//! stays while the input turns back by less than twice the half-width. After an overload the torque frame carries a status byte
-//! until the next tare. The sensor boots like a motor puck and loses power with them (assumed: docs/barrett-can.md).
+//! The wrench is that of the environment (hand and payload) **on** the sensor, sensor frame, as its elastic element
+//! gives it away: lagging by its hysteresis, plus seeded noise, minus what that was at the last tare; then bias and
+//! drift, which are what the tare did *not* catch; quantised and saturated to 16 bits. Hysteresis is that of play: the
+//! output stays while the input turns back by less than twice the half-width. After an overload the torque frame
+//! carries a status byte until the next tare. The sensor boots like a motor puck and loses power with them (assumed:
+//! docs/barrett-can.md).
 
 use crate::boot::{Boot, Presence};
 use crate::inbox::{Inbox, SET_TIME};
@@ -15,10 +16,10 @@ use puck::device::{acceleration_frame, force_frame, quantise, reply16, torque_fr
 use puck::force_torque::{NEWTON_METRE_PER_COUNT, NEWTON_PER_COUNT};
 use puck::{Action, CanFrame, Destination, GaugeStatus, Node, Property, PropertyTable, Request, Role, Status};
 
-/// How the sensor is set up.
+/// Set-up of the sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForceTorqueConfig {
-    /// Whether the arm has the sensor at all; without it node 8 never answers.
+    /// True if the arm has the sensor; without it node 8 never answers.
     pub fitted: bool,
     /// Standard deviation of each force axis, N.
     pub force_noise: f64,
@@ -55,7 +56,7 @@ impl Default for ForceTorqueConfig {
     }
 }
 
-/// An error that comes up by and by and stays, such as that of a sensor that warms.
+/// An error that comes up slowly and stays, such as that of a sensor that warms.
 #[derive(Clone, Copy, Debug)]
 struct Creep {
     error: [f64; 6],
@@ -86,7 +87,7 @@ pub(crate) struct ForceTorque {
     tare: [f64; 6],
     tared_at: Ticks,
     creep: Option<Creep>,
-    /// What the elastic element gives away, N and N m; `None` before it has been asked.
+    /// Output of the elastic element, N and N m; `None` before the first sample.
     strained: Option<[f64; 6]>,
     numbers: [Numbers; 2],
     /// Gauges that have saturated since the last tare. Which axis strains which gauge is not documented: one each.
@@ -110,7 +111,8 @@ impl ForceTorque {
         }
     }
 
-    /// From `from` on the samples become wrong by `error` (N and N m), all of it at `to`: what no earlier tare can catch.
+    /// From `from` on the samples become wrong by `error` (N and N m), all of it at `to`: what no earlier tare can
+    /// catch.
     pub(crate) fn creep(&mut self, error: [f64; 6], from: Ticks, to: Ticks) {
         self.creep = Some(Creep { error, from, to });
     }
@@ -124,12 +126,12 @@ impl ForceTorque {
         }));
     }
 
-    /// Whether every step of physics matters to the sensor.
+    /// True if the sensor needs every step of physics.
     pub(crate) fn has_memory(&self) -> bool {
         self.config.force_hysteresis != 0.0 || self.config.torque_hysteresis != 0.0
     }
 
-    /// Awake since before the story begins.
+    /// Starts with the main firmware running.
     pub(crate) fn run(&mut self) {
         if self.config.fitted {
             self.boot.run();
@@ -226,7 +228,7 @@ impl ForceTorque {
         self.saturated = gauges_beyond_range(wrench);
     }
 
-    /// What the gauges give away, with this sample's noise.
+    /// Output of the gauges, with this sample's noise.
     fn felt(&mut self, wrench: &[f64; 6]) -> [f64; 6] {
         self.follow(wrench);
         let strained = self.strained.unwrap_or(*wrench);

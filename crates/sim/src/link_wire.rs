@@ -1,8 +1,9 @@
 //! The line between host and co-controller in virtual time: any [`LinkLine`], the serial one, 921 600 baud 8N1, and one
 //! without delay.
 //!
-//! On the serial line, towards the device, bytes are handed over in chunks of at most 64, as a UART with DMA and an idle-line interrupt does: one
-//! event per chunk instead of one per byte. A chunk becomes due when its last byte has arrived.
+//! On the serial line, towards the device, bytes are handed over in chunks of at most 64, as a UART with DMA and an
+//! idle-line interrupt does: one event per chunk instead of one per byte. A chunk becomes due when its last byte has
+//! arrived.
 
 use crate::time::Ticks;
 use std::collections::VecDeque;
@@ -29,7 +30,7 @@ pub trait LinkLine: Send {
     /// Bytes that have reached the device by `now`, at most [`CHUNK`] of them.
     fn take_to_device(&mut self, now: Ticks) -> Vec<u8>;
 
-    /// What the host has received by `now`.
+    /// Returns the bytes that the host has received by `now`.
     fn take_from_device(&mut self, now: Ticks) -> Vec<u8>;
 
     /// Bytes that the device has handed over and that have not left by `now`.

@@ -1,8 +1,8 @@
 //! The simulator's end of the lock step with the firmware under QEMU.
 //!
-//! The firmware writes one request and waits for one reply on two byte streams (QEMU's stdout and stdin). Its virtual clock
-//! stands still meanwhile, so neither side can overtake the other, however slow the computer is. Layout, timing rule and
-//! the reasons: `docs/lockstep.md`.
+//! The firmware writes one request and waits for one reply on two byte streams (QEMU's stdout and stdin). Its virtual
+//! clock stands still meanwhile, so neither side can overtake the other, however slow the computer is. Layout, timing
+//! rule and the reasons: `docs/lockstep.md`.
 
 use crate::flash::{FlashChip, FlashError, WORD_BYTES};
 use crate::link_wire::CHUNK;
@@ -20,7 +20,7 @@ pub const REPLY_LENGTH: usize = 32;
 /// Most bytes of the flash in one reply.
 pub const FLASH_READ_LIMIT: u32 = 4096;
 
-/// What a reply says instead of a tick if no event will come by itself.
+/// Stands in a reply instead of a tick if no event will come by itself.
 pub const NEVER: Ticks = Ticks::MAX;
 
 /// Why the lock step ended other than by a good-bye. The stream is out of step after any of these: kill the firmware.
@@ -69,7 +69,7 @@ pub enum LockstepError {
     PowerFailed,
 }
 
-/// What one call of [`Lockstep::serve_one`] did.
+/// Result of one call of [`Lockstep::serve_one`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Served {
     /// The firmware handed over a frame for the bus.
@@ -89,7 +89,7 @@ pub enum Served {
 }
 
 impl Served {
-    /// Whether there will be no further request.
+    /// True if there will be no further request.
     #[must_use]
     pub fn is_last(self) -> bool {
         matches!(self, Self::Bye | Self::EndOfStream)
@@ -107,7 +107,7 @@ enum Request {
     Withdraw,
 }
 
-/// What the firmware asks of its flash.
+/// A request of the firmware to its flash.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum FlashRequest {
     Read { address: u32, count: u32 },
@@ -115,7 +115,7 @@ enum FlashRequest {
     Erase { address: u32 },
 }
 
-/// What the flash answers.
+/// The answer of the flash.
 #[derive(Clone, Debug, Default)]
 struct FlashReply {
     ready: Ticks,
@@ -149,7 +149,8 @@ impl<R: Read, W: Write> Lockstep<R, W> {
     /// Virtual time stands still between two calls: the moment to look at the world or to feed the host link.
     ///
     /// # Errors
-    /// [`LockstepError`]; the streams are then out of step and the firmware must be killed (it ignores SIGTERM while it waits).
+    /// [`LockstepError`]; the streams are then out of step and the firmware must be killed (it ignores SIGTERM while it
+    /// waits).
     pub fn serve_one(&mut self, plant: &mut Plant) -> Result<Served, LockstepError> {
         let Some((t, request)) = self.read()? else {
             return Ok(Served::EndOfStream);

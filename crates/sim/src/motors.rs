@@ -1,12 +1,13 @@
 //! Seven motors between pucks and joints: torque in, angles out, and the clock of physics.
 //!
 //! Physics advances in steps of half a slot. The torque of a step is the time average of what the pucks applied during
-//! it, so that a command in the middle of a step counts from its own instant. Encoders sit on the motors: with elastic cables
-//! all angles here are those of the motor side. Between two steps they are extrapolated with the velocity of the last one: that is what an encoder shows at the latch.
+//! it, so that a command in the middle of a step counts from its own instant. Encoders sit on the motors: with elastic
+//! cables all angles here are those of the motor side. Between two steps they are extrapolated with the velocity of the
+//! last one: that is what an encoder shows at the latch.
 //!
 //! A puck that is not in torque mode shorts the windings: `tau = -b dtheta`, with b = J/2 ms from the rotor inertia J.
-//! Barrett publishes no figure for the brake; with this one the arm sinks from home at some tenths of rad/s, and the explicit
-//! step stays far from instability (step / time constant = 0.28).
+//! Barrett publishes no figure for the brake; with this one the arm sinks from home at some tenths of rad/s, and the
+//! explicit step stays far from instability (step / time constant = 0.28).
 
 use crate::puck_model::Drive;
 use crate::steady_hand::SteadyHand;
@@ -29,8 +30,8 @@ pub(crate) struct Motors {
     stepped_at: Ticks,
     /// True torque constant of each motor: current units per N m. What a puck *reports* as IPNM is its own affair.
     units_per_newton_metre: [i32; 7],
-    /// Torque times time since the last step, current units times ticks. Whole numbers, so that the sum does not depend on
-    /// how often somebody looks.
+    /// Torque times time since the last step, current units times ticks. Whole numbers, so that the sum does not depend
+    /// on how often somebody looks.
     impulse: [i64; 7],
     /// Time spent braking since the last step.
     braked: [Ticks; 7],
@@ -59,7 +60,7 @@ impl Motors {
         }
     }
 
-    /// Whether motor power is on.
+    /// True while motor power is on.
     pub(crate) fn are_powered(&self) -> bool {
         self.are_powered
     }

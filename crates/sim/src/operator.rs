@@ -1,4 +1,4 @@
-//! The person at the pendant: releases the E-stop, presses Shift-Idle and Shift-Activate, or follows a script.
+//! The operator at the pendant: releases the E-stop, presses Shift-Idle and Shift-Activate, or follows a script.
 //!
 //! Only a person can raise the arm's mode (docs/barrett-can.md), therefore a run without a person never moves. By
 //! default this one brings the arm to IDLE after a moment and to ACTIVE once the arm is zeroed and positions have been
@@ -7,7 +7,7 @@
 use crate::time::{TICKS_PER_MILLISECOND, Ticks};
 use puck::SafetyMode;
 
-/// What a person does at the pendant.
+/// An action of the operator at the pendant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PendantAction {
     /// Hits the E-stop button; it latches. Motor power is cut at once.
@@ -20,17 +20,17 @@ pub enum PendantAction {
     ShiftActivate,
 }
 
-/// How the operator behaves.
+/// Behaviour of the operator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OperatorConfig {
-    /// When to release the E-stop and press Shift-Idle; `None`: never by himself.
+    /// Time at which the E-stop is released and Shift-Idle pressed; `None`: only by the script.
     pub idle_at: Option<Ticks>,
-    /// How long the arm must have been zeroed, and positions been flowing, before he presses Shift-Activate; `None`: never by himself.
-    /// He does so once after every release of the E-stop. What comes after a fault or a Shift-Idle of his own is a decision,
-    /// and therefore a matter of the script.
+    /// Time for which the arm must have been zeroed, and positions been flowing, before Shift-Activate is pressed;
+    /// `None`: only by the script. This happens once after every release of the E-stop. After a fault or another
+    /// Shift-Idle the script decides.
     pub activate_after: Option<Ticks>,
-    /// He holds the arm at its first pose and lets go this long after it has become active for the first time; `None`: he
-    /// does not touch it, and a sensor or hand at the wrist sinks before the arm is zeroed.
+    /// He holds the arm at its first pose and lets go this long after it has become active for the first time; `None`:
+    /// he does not touch it, and a sensor or hand at the wrist sinks before the arm is zeroed.
     pub holds_until_active_for: Option<Ticks>,
     /// Further actions at given times, in any order; equal times in the order given.
     pub script: Vec<(Ticks, PendantAction)>,
@@ -62,7 +62,7 @@ impl OperatorConfig {
     }
 }
 
-/// What the operator can see on the pendant and on his screen.
+/// The part of the arm's state that the operator can see on pendant and screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct PendantView {
     /// Mode of the safety module.
@@ -73,7 +73,7 @@ pub(crate) struct PendantView {
     pub(crate) positions_since: Option<Ticks>,
 }
 
-/// The person at the pendant.
+/// The operator at the pendant.
 #[derive(Clone, Debug)]
 pub(crate) struct Operator {
     /// Pending actions in the order they will happen.
@@ -96,12 +96,12 @@ impl Operator {
         Self { script, activate_after: config.activate_after, means_to_activate: false }
     }
 
-    /// The E-stop was released and Shift-Idle pressed before the story begins: he means to activate the arm.
+    /// The E-stop was released and Shift-Idle pressed before time 0: Shift-Activate comes next.
     pub(crate) fn resume(&mut self) {
         self.means_to_activate = true;
     }
 
-    /// When he acts next, as far as he knows now.
+    /// Time of the next action, as far as it is known now.
     #[must_use]
     pub(crate) fn next_time(&self, view: &PendantView) -> Option<Ticks> {
         let scripted = self.script.first().map(|(at, _)| *at);

@@ -6,12 +6,12 @@
 //!               <--link--> host        +----> world, one step every half slot
 //! ```
 //!
-//! Time moves only when the co-controller says how far it has come ([`Plant::advance`], [`Plant::submit`], [`Plant::event`]).
-//! Everything due until then happens in order of time; at equal times physics first, then the end of a frame, the devices,
-//! the safety module, the operator, and arbitration last, when all who compete have spoken. Nothing here looks at a
-//! clock of the computer, and no order depends on a hash: equal calls give equal runs.
+//! Time moves only when the co-controller says how far it has come ([`Plant::advance`], [`Plant::submit`],
+//! [`Plant::event`]). Everything due until then happens in order of time; at equal times physics first, then the end of
+//! a frame, the devices, the safety module, the operator, and arbitration last, when all who compete have spoken.
+//! Nothing here looks at a clock of the computer, and no order depends on a hash: equal calls give equal runs.
 
-use crate::bus::{Bus, Passage};
+use crate::bus::Bus;
 use crate::force_torque::{ForceTorque, ForceTorqueConfig};
 use crate::hand::{Hand, HandConfig};
 use crate::link_wire::{LinkLine, SerialLine};
@@ -21,8 +21,9 @@ use crate::operator::{Operator, OperatorConfig, PendantAction};
 use crate::puck_model::{Puck, PuckConfig};
 use crate::safety::{SafetyConfig, SafetyModule};
 use crate::speed::SpeedMonitor;
-use crate::time::{CYCLE_TICKS, STEP_TICKS, TICKS_PER_SECOND, Ticks};
+use crate::time::{STEP_TICKS, TICKS_PER_SECOND, Ticks};
 use crate::trace::BusTrace;
+use crate::wire::Passage;
 use crate::world::World;
 use puck::{
     Action, CanFrame, Drives, Node, PendantState, Ratios, Request, SafetyMode, Transmission, TransmissionError,
@@ -30,7 +31,7 @@ use puck::{
 };
 use std::collections::VecDeque;
 
-/// How a plant is set up. The default is a healthy seven-joint arm with a sensor and an obliging operator.
+/// Set-up of a plant. The default is a healthy seven-joint arm with a sensor and an obliging operator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlantConfig {
     /// Seed of everything random: wake delays and sensor noise.
@@ -45,16 +46,16 @@ pub struct PlantConfig {
     pub force_torque: ForceTorqueConfig,
     /// The hand; `None`: the world may have one, but nobody answers for it on the bus.
     pub hand: Option<HandConfig>,
-    /// The person at the pendant.
+    /// The operator at the pendant.
     pub operator: OperatorConfig,
-    /// The arm was started and zeroed before the story begins: pucks, sensor and hand run, the hand is initialised, positions are the
-    /// true ones, the safety module is in IDLE. The operator presses Shift-Activate as he is set up to; see
-    /// [`OperatorConfig::prompt`] for one who does not tarry.
+    /// True if the arm was started and zeroed before time 0: pucks, sensor and hand run, the hand is initialised,
+    /// positions are the true ones, the safety module is in IDLE. The operator presses Shift-Activate as configured;
+    /// with [`OperatorConfig::prompt`] without delay.
     pub started: bool,
     /// The hand stands alone on the bus, with power: no arm, no sensor, no safety module, and nobody at a pendant.
     pub hand_alone: bool,
-    /// Whole control cycles by which packed torques, arm's and hand's, come late to the motors. The safety module judges them at once.
-    pub torque_delay_cycles: u8,
+    /// Delay of packed torques, arm's and hand's, on their way to the motors. The safety module judges them at once.
+    pub torque_delay: Ticks,
 }
 
 impl Default for PlantConfig {
@@ -69,7 +70,7 @@ impl Default for PlantConfig {
             operator: OperatorConfig::default(),
             started: false,
             hand_alone: false,
-            torque_delay_cycles: 0,
+            torque_delay: 0,
         }
     }
 }
@@ -97,7 +98,7 @@ impl From<UnknownFirmware> for PlantError {
     }
 }
 
-/// What the co-controller's interrupt finds at one event.
+/// Result of one event for the co-controller's interrupt.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Event {
     /// A frame from another node.
@@ -119,7 +120,8 @@ struct Delivery {
 /// Bus, pucks 1 to 7, safety module, force/torque sensor, hand, operator, world, and the wire of the host link.
 pub struct Plant {
     now: Ticks,
-    /// When anything but physics happens next: [`Plant::look_ahead`] as of the last change. Asked several times per event.
+    /// When anything but physics happens next: [`Plant::look_ahead`] as of the last change. Asked several times per
+    /// event.
     next_happening: Option<Ticks>,
     bus: Bus,
     pucks: [Puck; 7],
@@ -181,7 +183,7 @@ impl Plant {
             force_torque: ForceTorque::new(config.force_torque, boot_noise, stream(Node::HOST)),
             hand: hand.transpose()?,
             operator: Operator::new(operator),
-            torque_delay: Ticks::from(config.torque_delay_cycles) * CYCLE_TICKS,
+            torque_delay: config.torque_delay,
             late_torques: VecDeque::new(),
             link: Box::new(SerialLine::default()),
             hand_alone: config.hand_alone,
@@ -216,8 +218,8 @@ impl Plant {
         self.arbitrate();
     }
 
-    /// The co-controller takes back every frame that has not begun on the wire, at time `t`: it cancels them, has left the bus
-    /// or is reset. Whether one of its frames has begun, whose end [`Plant::event`] has still to tell.
+    /// The co-controller takes back every frame that has not begun on the wire, at time `t`: it cancels them, has left
+    /// the bus or is reset. Whether one of its frames has begun, whose end [`Plant::event`] has still to tell.
     pub fn withdraw(&mut self, t: Ticks) -> bool {
         self.run_to(t);
         self.bus.withdraw(Node::HOST);
@@ -236,7 +238,8 @@ impl Plant {
         [waiting, on_bus, self.link.next_time()].into_iter().flatten().min()
     }
 
-    /// What the co-controller finds at time `t`. One frame at a time: ask [`Plant::next_event`] again afterwards.
+    /// Returns what the co-controller finds at time `t`. One frame at a time: ask [`Plant::next_event`] again
+    /// afterwards.
     pub fn event(&mut self, t: Ticks) -> Event {
         self.run_to(t);
         let delivery = self.deliveries.pop_front();
@@ -312,7 +315,7 @@ impl Plant {
         arm + self.hand.as_ref().map_or(0, Hand::lost_requests)
     }
 
-    /// What went over the bus so far.
+    /// Statistics of the bus so far.
     #[must_use]
     pub fn trace(&self) -> BusTrace {
         self.bus.trace().clone()
@@ -334,8 +337,8 @@ impl Plant {
         self.bus.take_recorded()
     }
 
-    /// From now on the force/torque sensor errs by more and more, after `over` by `error` (N and N m, sensor axes), and stays so: an
-    /// error that no tare before it can catch.
+    /// From now on the force/torque sensor errs by more and more, after `over` by `error` (N and N m, sensor axes), and
+    /// stays so: an error that no tare before it can catch.
     pub fn creep_force_torque(&mut self, error: [f64; 6], over: Ticks) {
         self.force_torque.creep(error, self.now, self.now + over);
     }

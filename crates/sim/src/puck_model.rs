@@ -1,8 +1,9 @@
 //! One motor puck of the arm (node 1..7): properties, boot, encoder, torque.
 //!
-//! The encoder counts `floor(theta CTS / 2 pi) + offset`; SET P chooses the offset, power and wake-up lose it. Torque acts
-//! only in MODE 2, is clipped to MT, and stays applied until it is changed or the mode changes (docs/barrett-can.md:
-//! no public source knows of a time-out in the puck). In every other mode the puck shorts its windings and brakes.
+//! The encoder counts `floor(theta CTS / 2 pi) + offset`; SET P chooses the offset, power and wake-up lose it. Torque
+//! acts only in MODE 2, is clipped to MT, and stays applied until it is changed or the mode changes
+//! (docs/barrett-can.md: no public source knows of a time-out in the puck). In every other mode the puck shorts its
+//! windings and brakes.
 
 use crate::firmware::{Firmware, Heard, Order};
 use crate::noise::Noise;
@@ -11,7 +12,7 @@ use puck::device::position_frame;
 use puck::{CanFrame, Counts, Group, MotorMode, Node, Property, Request, Role, UnknownFirmware};
 use std::f64::consts::TAU;
 
-/// What distinguishes the pucks of one arm from those of another.
+/// Figures in which the pucks of two arms differ.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PuckConfig {
     /// VERS of the boot loader; differs from the main firmware's, so that a master must read it again after waking.
@@ -27,7 +28,8 @@ pub struct PuckConfig {
 }
 
 impl Default for PuckConfig {
-    /// Firmware 200, 4096 counts, and the IPNM and MT that one laboratory fitted to its arm (`wam7.toml` `[arm.drive]`).
+    /// Firmware 200, 4096 counts, and the IPNM and MT that one laboratory fitted to its arm (`wam7.toml`
+    /// `[arm.drive]`).
     fn default() -> Self {
         Self {
             monitor_version: 16,
@@ -39,7 +41,7 @@ impl Default for PuckConfig {
     }
 }
 
-/// What a puck does to its motor.
+/// Action of a puck on its motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Drive {
     /// Shorted windings: a torque against the motor's velocity.
@@ -152,7 +154,7 @@ impl Puck {
         }
     }
 
-    /// What the puck does to its motor at `now`.
+    /// Returns the puck's action on its motor at `now`.
     pub(crate) fn drive(&self, now: Ticks) -> Drive {
         if self.firmware.value(Property::Mode) != MotorMode::Torque.value() || !self.firmware.is_ready(now) {
             return Drive::Brake;

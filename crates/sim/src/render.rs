@@ -1,7 +1,8 @@
-//! Pictures of the MuJoCo world, off screen: one scene, ghosts of earlier postures, trails of the grasp point, film strips.
+//! Pictures of the MuJoCo world, off screen: one scene, ghosts of earlier postures, trails of the grasp point, film
+//! strips.
 //!
-//! Needs EGL (Debian: `libegl1 libegl-mesa0 libgl1-mesa-dri`), no display and no GPU. Ghosts and trails are geoms added to
-//! a copy of the model that exists only for the picture, so physics never sees them.
+//! Needs EGL (Debian: `libegl1 libegl-mesa0 libgl1-mesa-dri`), no display and no GPU. Ghosts and trails are geoms added
+//! to a copy of the model that exists only for the picture, so physics never sees them.
 
 use crate::Pose;
 use crate::world::mujoco::{self, MujocoOptions, MujocoWorld, WorldError};
@@ -60,7 +61,7 @@ pub struct Trail {
     pub radius: f64,
 }
 
-/// How a picture is made.
+/// Settings of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
     /// Width, pixels; at most 2560.
@@ -82,7 +83,7 @@ impl Default for RenderOptions {
     }
 }
 
-/// What a picture shows: where everything is.
+/// The state that a picture shows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     setting: mujoco::Scene,

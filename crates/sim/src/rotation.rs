@@ -1,4 +1,4 @@
-//! The little rotation algebra that the person and the worlds share.
+//! The little rotation algebra that the teacher and the worlds share.
 //!
 //! Hamilton quaternions `[w, x, y, z]` that turn body vectors into world vectors; rotation vectors in rad.
 

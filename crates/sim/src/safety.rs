@@ -1,8 +1,8 @@
 //! The safety module (node 10): it alone decides whether the arm may be driven.
 //!
 //! It has its own supply, so it always answers. It listens to torques (groups 1 and 2) and position replies (group 3),
-//! and lowers the mode when a limit is passed; only the person at the pendant raises it. On entering ACTIVE and IDLE it sets
-//! the MODE of all motor pucks by a broadcast on 0x540. Rules: docs/barrett-can.md; each assumption is marked.
+//! and lowers the mode when a limit is passed; only the operator at the pendant raises it. On entering ACTIVE and IDLE
+//! it sets the MODE of all motor pucks by a broadcast on 0x540. Rules: docs/barrett-can.md; each assumption is marked.
 
 use crate::inbox::Inbox;
 use crate::operator::{PendantAction, PendantView};
@@ -16,13 +16,13 @@ use puck::{
     Request, Role, SafetyMode, Status, UnknownFirmware,
 };
 
-/// How the safety module is set up.
+/// Set-up of the safety module.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SafetyConfig {
     /// VERS; from 197 on software may lower the mode.
     pub version: i16,
-    /// Longest time without a full set of position replies while ACTIVE; after it the mode falls to IDLE.
-    /// **Assumed**: one driver reports a fault after at most 100 ms, the rule itself is not documented. `None`: not supervised.
+    /// Longest time without a full set of position replies while ACTIVE; after it the mode falls to IDLE. **Assumed**:
+    /// one driver reports a fault after at most 100 ms, the rule itself is not documented. `None`: not supervised.
     pub heartbeat: Option<Ticks>,
 }
 
@@ -32,7 +32,8 @@ impl Default for SafetyConfig {
     }
 }
 
-/// Time to carry out a SET. **Assumed**, so that SETs 10 ms apart, as the wiki asks, are safe and more than four at once are lost.
+/// Time to carry out a SET. **Assumed**, so that SETs 10 ms apart, as the wiki asks, are safe and more than four at
+/// once are lost.
 const SET_TIME: Ticks = 2 * TICKS_PER_MILLISECOND;
 
 /// Still too fast this long after a velocity fault: E-STOP.
@@ -67,7 +68,7 @@ pub(crate) struct SafetyModule {
     button_latched: bool,
     zeroed_since: Option<Ticks>,
     limits: Values,
-    /// How many velocity faults are still to be ignored (IFAULT).
+    /// Number of velocity faults that are still to be ignored (IFAULT).
     ignored_faults: i32,
     speed: SpeedMonitor,
     velocity_fault: bool,
@@ -104,7 +105,7 @@ impl SafetyModule {
         })
     }
 
-    /// In IDLE with a zeroed arm since before the story begins.
+    /// Starts in IDLE with a zeroed arm.
     pub(crate) fn resume(&mut self) {
         self.mode = SafetyMode::Idle;
         self.button_latched = false;
@@ -116,7 +117,7 @@ impl SafetyModule {
         self.mode
     }
 
-    /// What the operator sees.
+    /// The operator's view of the pendant.
     pub(crate) fn view(&self) -> PendantView {
         PendantView {
             mode: self.mode,
@@ -145,7 +146,7 @@ impl SafetyModule {
         }
     }
 
-    /// The person does something at the pendant.
+    /// The operator acts at the pendant.
     pub(crate) fn press(&mut self, now: Ticks, action: PendantAction) {
         match action {
             PendantAction::PressEStop => {
@@ -208,7 +209,7 @@ impl SafetyModule {
         std::mem::take(&mut self.outgoing)
     }
 
-    /// How long ago positions may have stopped before the flow counts as broken.
+    /// Longest pause between positions before the flow counts as broken.
     fn positions_stale_at(&self) -> Option<Ticks> {
         const GAP: Ticks = 100 * TICKS_PER_MILLISECOND;
         self.positions.map(|(_, latest)| latest + GAP)

@@ -1,10 +1,10 @@
-//! How fast the safety module believes the arm to move, from the position replies it overhears.
+//! Speed of the arm as the safety module estimates it from the position replies on the bus.
 //!
 //! Zeroed arm: the larger Cartesian speed of the elbow (0.55 m up the upper arm) and of a point 0.35 m beyond it; the
-//! wrist is not counted. Arm not zeroed: the largest joint velocity of joints 1..4 (compared with the same limit, read as
-//! rad/s: assumed). The speed spans the last five full sets, the history that the library reckons with when it asks for five
-//! faults to be ignored. A pause between two sets counts as at most 10 ms: that reproduces the documented trap that an arm moved
-//! by hand while nobody polls faults at the first poll (docs/barrett-can.md).
+//! wrist is not counted. Arm not zeroed: the largest joint velocity of joints 1..4 (compared with the same limit, read
+//! as rad/s: assumed). The speed spans the last five full sets, the history that the library reckons with when it asks
+//! for five faults to be ignored. A pause between two sets counts as at most 10 ms: that reproduces the documented trap
+//! that an arm moved by hand while nobody polls faults at the first poll (docs/barrett-can.md).
 
 use crate::chain::{self, Vector, add, subtract};
 use crate::rotation::norm;

@@ -1,21 +1,22 @@
 //! The operator's hands, which hold the arm at home until it is active.
 //!
 //! Zeroing tells the pucks "this is home" (docs/barrett-can.md), and it is the operator who puts the arm there. The
-//! brake of idle motors alone would let the wrist sink under the hand's weight before the pucks are awake. He lets go,
-//! gently, a moment after the arm has become active. He does not come back: after an E-stop the arm lies where it fell.
+//! brake of idle motors alone would let the wrist sink under the hand's weight before the pucks are awake. The hands
+//! let go slowly, some time after the arm has become active, and do not come back: after an E-stop the arm lies where
+//! it fell.
 //!
 //! `tau = kp e + kd de + ki int e` per joint, with gains from one frequency and the joint's mean inertia.
 
 use crate::time::{STEP_SECONDS, TICKS_PER_MILLISECOND, Ticks, seconds};
 
-/// How stiffly he holds, rad/s. Assumed; the integral part removes the sag whatever the stiffness.
+/// Stiffness of the hold as a frequency, rad/s. Assumed; the integral part removes the sag whatever the stiffness.
 const FREQUENCY: f64 = 100.0;
 
-/// Error below which he leaves the joint alone, rad: half a motor count at the wrist. Without it friction and the integral
+/// Error that is not corrected, rad: half a motor count at the wrist. Without it friction and the integral
 /// part would hunt for ever.
 const CLOSE_ENOUGH: f64 = 4e-5;
 
-/// How long it takes him to let go.
+/// Duration of letting go.
 const FADE: Ticks = 200 * TICKS_PER_MILLISECOND;
 
 /// Mean inertia about each joint, kg m^2: order of magnitude is enough.
@@ -26,30 +27,30 @@ const INERTIA: [f64; 7] = [1.6, 2.4, 0.26, 0.36, 0.019, 0.03, 0.0033];
 pub(crate) struct SteadyHand {
     home: [f64; 7],
     error_sum: [f64; 7],
-    /// How long after ACTIVE he begins to let go; `None` once he holds nothing at all.
-    patience: Option<Ticks>,
+    /// Time from ACTIVE to the beginning of letting go; `None` once nothing is held.
+    holds_for: Option<Ticks>,
     lets_go_at: Option<Ticks>,
 }
 
 impl SteadyHand {
-    /// Hands at the arm in pose `home`, rad, that let go `patience` after ACTIVE; `None`: nobody holds the arm.
-    pub(crate) fn new(home: [f64; 7], patience: Option<Ticks>) -> Self {
-        Self { home, error_sum: [0.0; 7], patience, lets_go_at: None }
+    /// Hands at the arm in pose `home`, rad, that let go `holds_for` after ACTIVE; `None`: nobody holds the arm.
+    pub(crate) fn new(home: [f64; 7], holds_for: Option<Ticks>) -> Self {
+        Self { home, error_sum: [0.0; 7], holds_for, lets_go_at: None }
     }
 
     /// The arm has become active.
     pub(crate) fn see_active(&mut self, now: Ticks) {
-        self.lets_go_at = self.lets_go_at.or(self.patience.map(|patience| now + patience));
+        self.lets_go_at = self.lets_go_at.or(self.holds_for.map(|holds_for| now + holds_for));
     }
 
     /// Torque of the hands on each joint for the step that ends at `now`, N m.
     pub(crate) fn torques(&mut self, now: Ticks, q: &[f64; 7], dq: &[f64; 7]) -> [f64; 7] {
-        if self.patience.is_none() {
+        if self.holds_for.is_none() {
             return [0.0; 7];
         }
         let grip = match self.lets_go_at {
             Some(at) if now >= at + FADE => {
-                self.patience = None;
+                self.holds_for = None;
                 return [0.0; 7];
             }
             Some(at) => 1.0 - seconds(now.saturating_sub(at)) / seconds(FADE),

@@ -19,17 +19,17 @@ pub const TICKS_PER_MILLISECOND: Ticks = 25_000;
 /// One bit on the wire at 1 Mbit/s (docs/barrett-can.md).
 pub const TICKS_PER_BIT: Ticks = 25;
 
-/// One slot of the 900 Hz schedule, rounded to ticks (25 MHz / 900 Hz = 27 777.8); three make a 300 Hz control cycle.
-pub const SLOT_TICKS: Ticks = 27_778;
-
-/// One control cycle: three slots.
-pub const CYCLE_TICKS: Ticks = 3 * SLOT_TICKS;
-
-/// One physics step: half a slot, so that six steps fit one control cycle exactly.
-pub const STEP_TICKS: Ticks = SLOT_TICKS / 2;
+/// One physics step. Six fit one control cycle of 300 Hz exactly; with another rate a response is seen up to one step late.
+pub const STEP_TICKS: Ticks = 13_889;
 
 /// One physics step in seconds (0.555 56 ms).
 pub const STEP_SECONDS: f64 = STEP_TICKS as f64 / TICKS_PER_SECOND as f64;
+
+/// Returns the ticks of one period of a frequency (Hz), to the nearest.
+#[must_use]
+pub const fn period_ticks(hertz: u32) -> Ticks {
+    (TICKS_PER_SECOND + hertz as Ticks / 2) / hertz as Ticks
+}
 
 /// A duration in seconds, from ticks.
 #[must_use]

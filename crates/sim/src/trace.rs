@@ -1,7 +1,7 @@
 //! The account of what went over the bus: counts per class, load, invalid frames, and a hash that two equal runs share.
 
-use crate::bus::Passage;
 use crate::time::{Ticks, seconds};
+use crate::wire::Passage;
 use puck::{CanFrame, Destination, Group, Node, Reply, Request};
 use std::fmt;
 
@@ -10,7 +10,7 @@ const FNV_OFFSET: u64 = 0xCBF2_9CE4_8422_2325;
 /// Prime of FNV-1a, 64 bits.
 const FNV_PRIME: u64 = 0x0000_0100_0000_01B3;
 
-/// What a frame is, judged by its identifier alone.
+/// Class of a frame, by its identifier alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FrameClass {
     /// Host to one node: directed GET or SET.
@@ -81,7 +81,7 @@ impl fmt::Display for FrameClass {
     }
 }
 
-/// What went over the bus since the start.
+/// Statistics of the bus since the start.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BusTrace {
     /// FNV-1a-64 over (start tick u64 LE, id u16 LE, dlc u8, data) of every frame in order.
@@ -103,7 +103,7 @@ impl Default for BusTrace {
 }
 
 impl BusTrace {
-    /// How many invalid frames are kept as examples.
+    /// Number of invalid frames that are kept as examples.
     const EXAMPLES: usize = 8;
 
     /// Number of frames of one class.
@@ -148,7 +148,7 @@ impl BusTrace {
     }
 }
 
-/// Whether `crates/puck` accepts the frame: as a request if the host or the safety module sent it, else as a reply.
+/// True if `crates/puck` accepts the frame: as a request if the host or the safety module sent it, else as a reply.
 fn is_valid(frame: &CanFrame) -> bool {
     let is_reply = Reply::decode(frame).is_ok();
     match frame.can_id().sender() {

@@ -1,4 +1,4 @@
-//! How long a classic CAN frame occupies the wire: the real bits, counted.
+//! Duration of a classic CAN frame on the wire: the real bits, counted.
 //!
 //! Stuffing depends on the content, so a bound or a mean would shift every later frame of a run.
 //! SOF, identifier, control, data and CRC-15 are written out and stuffed: after five equal bits the
@@ -8,7 +8,7 @@
 //! Source: Bosch CAN 2.0 part A; lengths agree with the table of docs/barrett-can.md (47 + 8n + stuff bits).
 
 use crate::time::{TICKS_PER_BIT, Ticks};
-use puck::CanFrame;
+use puck::{CanFrame, Node};
 
 /// Generator polynomial of classic CAN's CRC: x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1.
 const CRC_POLYNOMIAL: u16 = 0x4599;
@@ -25,7 +25,7 @@ const HEADER_BITS: u32 = 19;
 /// Bits of the checksum.
 const CRC_BITS: u32 = 15;
 
-/// What one byte does to the checksum, for each value of the register's upper eight bits combined with it.
+/// Effect of one byte on the checksum, for each value of the register's upper eight bits combined with it.
 const CRC_TABLE: [u16; 256] = {
     let mut table = [0; 256];
     let mut index = 0;
@@ -42,6 +42,27 @@ const CRC_TABLE: [u16; 256] = {
     }
     table
 };
+
+/// A frame on the wire, or one that has just left it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Passage {
+    /// Start of frame.
+    pub start: Ticks,
+    /// End of the interframe space: the bus is free again.
+    pub end: Ticks,
+    /// Who transmits. The host is [`Node::HOST`].
+    pub sender: Node,
+    /// The frame.
+    pub frame: CanFrame,
+}
+
+impl Passage {
+    /// When every receiver has the frame: end of frame, three bits before the bus is free.
+    #[must_use]
+    pub fn received_at(&self) -> Ticks {
+        self.end - Ticks::from(INTERFRAME_BITS) * TICKS_PER_BIT
+    }
+}
 
 /// SOF, identifier, control: the first bits on the wire, dominant = 0, as a number.
 fn header(frame: &CanFrame) -> u32 {
@@ -68,7 +89,8 @@ fn stuffed_region(frame: &CanFrame) -> (u128, u32) {
     (bits << (u128::BITS - length), length)
 }
 
-/// The wire as the stuffing rule sees it: the last level times 5, plus how many bits have had it (0: before SOF; at most 4).
+/// The wire as the stuffing rule sees it: the last level times 5, plus how many bits have had it (0: before SOF; at
+/// most 4).
 type Run = u8;
 
 /// A recessive wire before SOF.
@@ -104,7 +126,8 @@ const STUFFING: [[(Run, u8); 256]; 10] = {
     table
 };
 
-/// How many stuff bits the transmitter inserts into `length` bits, which start at the upper end of `bits`.
+/// Returns the number of stuff bits that the transmitter inserts into `length` bits, which start at the upper end of
+/// `bits`.
 fn stuff_bits(bits: u128, length: u32) -> u32 {
     let (mut run, mut inserted) = (AT_REST, 0);
     let odd = length % 8;

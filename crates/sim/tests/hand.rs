@@ -80,7 +80,7 @@ fn squeeze(master: &mut Master, units: [i16; 4], milliseconds: u64) {
     let until = master.now + milliseconds * TICKS_PER_MILLISECOND;
     while master.now < until {
         master.send(torques(units));
-        master.wait(3 * sim::SLOT_TICKS);
+        master.wait(common::CYCLE_TICKS);
     }
 }
 
@@ -146,12 +146,13 @@ fn hand_pucks_boot_like_the_arms_and_tell_what_they_are() {
 
 #[test]
 fn frames_of_the_start_up_are_those_of_the_library_transcript() {
-    // The transcript was taken from pucks of VERS 175 after waking; the sequence of requests is replayed, the replies compared.
+    // The transcript was taken from pucks of VERS 175 after waking; the sequence of requests is replayed, the replies
+    // compared.
     let hand = HandConfig { version: 175, monitor_version: 175, ..HandConfig::default() };
     let mut master =
         Master::with_world(PlantConfig { hand: Some(hand), ..PlantConfig::default() }, FreeJoints::new(HOME));
     master.wait_ms(100);
-    let text = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/vectors/transcript_hand_init.csv"));
+    let text = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../puck/tests/vectors/transcript_hand_init.csv"));
     let rows = text.lines().filter(|line| !line.starts_with('#')).skip(1);
     let mut expected: Vec<CanFrame> = Vec::new();
     let mut sent: Option<CanFrame> = None;
@@ -164,7 +165,8 @@ fn frames_of_the_start_up_are_those_of_the_library_transcript() {
         master.send(request);
         master.wait_ms(if is_wake { 1050 } else { 2 });
         let heard: Vec<CanFrame> = master.heard.iter().map(|(_, frame)| *frame).collect();
-        // HI takes its time here and none there: 4 instead of 0 is the one difference, and the monitor knows ROLE without options.
+        // HI takes its time here and none there: 4 instead of 0 is the one difference, and the monitor knows ROLE
+        // without options.
         assert_eq!(heard.len(), expected.len(), "{request:?}");
         for (mine, theirs) in heard.iter().zip(expected.iter()) {
             assert_eq!((mine.can_id(), mine.payload().len()), (theirs.can_id(), theirs.payload().len()));
@@ -250,7 +252,7 @@ fn t12_any_other_request_breaks_hi() {
 #[test]
 fn combined_positions_convert_like_the_golden_vectors() {
     // Rows m, s, inner, outer of the vectors whose fingers lie within the hand's range before or after breakaway.
-    let text = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/vectors/hand_position.csv"));
+    let text = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../puck/tests/vectors/hand_position.csv"));
     let mut compared = 0;
     for line in text.lines().filter(|line| !line.starts_with('#')).skip(1) {
         let fields: Vec<&str> = line.split(',').collect();

@@ -1,4 +1,5 @@
-//! The hand's drives and the links of the MuJoCo world work together: no chatter, the worm locks, the gauge feels the object.
+//! The hand's drives and the links of the MuJoCo world work together: no chatter, the worm locks, the gauge feels the
+//! object.
 #![cfg(feature = "mujoco")]
 
 mod common;
@@ -28,7 +29,7 @@ fn squeeze(master: &mut Master, units: i16, milliseconds: u64) -> Vec<HandState>
     (0..milliseconds * 3 / 10)
         .map(|_| {
             master.send(frame);
-            master.wait(sim::CYCLE_TICKS);
+            master.wait(common::CYCLE_TICKS);
             master.plant.world().hand()
         })
         .collect()

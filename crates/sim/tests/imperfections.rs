@@ -1,7 +1,7 @@
 //! The imperfect arm differs from the nominal one as it says, and in nothing else.
 #![cfg(feature = "mujoco")]
 
-use sim::person::{DEMONSTRATION_GOAL, DEMONSTRATION_START};
+use sim::teacher::{DEMONSTRATION_GOAL, DEMONSTRATION_START};
 use sim::world::mujoco::{Cables, Imperfections, MujocoOptions, MujocoWorld, Scene};
 use sim::{Noise, STEP_SECONDS, World};
 

@@ -1,7 +1,7 @@
 //! The MuJoCo world obeys the arm's data and the conventions: frames, signs, units, friction, stops, determinism.
 #![cfg(feature = "mujoco")]
 
-use sim::person::{DEMONSTRATION_GOAL, DEMONSTRATION_START};
+use sim::teacher::{DEMONSTRATION_GOAL, DEMONSTRATION_START};
 use sim::world::mujoco::{
     Cables, Imperfections, Kinematics, MujocoOptions, MujocoWorld, ObjectKind, ObjectSpec, Scene, WorldError,
 };
@@ -130,7 +130,7 @@ fn a_push_appears_in_the_sensor_with_its_own_sign_and_its_lever_arm() {
         world.push(force, [0.0, 0.0, 0.02]);
         float(&mut world, 0.5);
         let after = wrench_in_world(&world);
-        // Torque about the sensor: the person's own, plus lever arm (along the hand's z) times force.
+        // Torque about the sensor: the teacher's own, plus lever arm (along the hand's z) times force.
         let arm = axes(world.grasp_pose().quaternion)[2].map(|x| SENSOR_TO_GRASP * x);
         let torque = [
             arm[1] * force[2] - arm[2] * force[1],

@@ -1,18 +1,9 @@
 //! Objects obey the physics that their figures promise: toppling, sliding, contact forces, and grasps by the hand.
 #![cfg(feature = "mujoco")]
 
-use sim::person::Lesson;
+use sim::teacher::TaughtMovement;
 use sim::world::mujoco::{ContactForces, MujocoOptions, MujocoWorld, ObjectKind, ObjectSpec, Scene, TABLE_TOP};
 use sim::{HandTargets, STEP_SECONDS, World};
-
-const KINDS: [ObjectKind; 6] = [
-    ObjectKind::SmallTorch,
-    ObjectKind::Flashlight,
-    ObjectKind::Cup,
-    ObjectKind::Bottle,
-    ObjectKind::Weight,
-    ObjectKind::PaperCup,
-];
 
 fn steps(seconds: f64) -> usize {
     (seconds / STEP_SECONDS) as usize
@@ -51,7 +42,7 @@ fn push_until_it_moves(object: ObjectSpec, height: f64, direction: f64) -> (f64,
 
 #[test]
 fn every_object_rests_where_it_was_put() {
-    for kind in KINDS {
+    for kind in ObjectKind::ALL {
         let object = ObjectSpec { yaw: 0.3, ..ObjectSpec::new(kind) };
         let mut world = world_with(object);
         let start = position(&world);
@@ -134,16 +125,16 @@ fn what_the_object_exerts_on_the_table_balances_its_weight_and_the_push() {
 /// The arm held stiffly at a posture, the fingers closed at 2 rad/s until they press, then the hand raised by 5 cm.
 /// Gives the mean contact forces at the end, how far the object rose, and the world.
 fn grasp_and_lift(object: ObjectSpec, fingers: f64) -> (ContactForces, f64, MujocoWorld) {
-    let lesson = Lesson::Lift;
+    let movement = TaughtMovement::Lift;
     let scene = Scene::with(object);
-    let options = MujocoOptions { scene, posture: lesson.goal(), ..MujocoOptions::default() };
+    let options = MujocoOptions { scene, posture: movement.goal(), ..MujocoOptions::default() };
     let mut mechanism = sim::world::mujoco::Kinematics::new(&options).expect("it loads");
-    let top = mechanism.grasp_pose(&lesson.goal());
+    let top = mechanism.grasp_pose(&movement.goal());
     let mut low = top;
     low.position[2] -= 0.10;
     let mut raised = low;
     raised.position[2] += 0.05;
-    let below = mechanism.inverse(&low, &lesson.goal()).expect("reachable");
+    let below = mechanism.inverse(&low, &movement.goal()).expect("reachable");
     let above = mechanism.inverse(&raised, &below).expect("reachable");
     let mut world = MujocoWorld::new(&MujocoOptions { posture: below, ..options }).expect("it loads");
     let start = position(&world)[2];

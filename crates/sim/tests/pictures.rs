@@ -2,9 +2,9 @@
 #![cfg(feature = "render")]
 
 use sim::HOME;
-use sim::person::Lesson;
-use sim::person::{DEMONSTRATION_GOAL, DEMONSTRATION_START, side_grasp_path};
 use sim::render::{RenderError, RenderOptions, Scene, Trail, render_png, render_strip};
+use sim::teacher::TaughtMovement;
+use sim::teacher::{DEMONSTRATION_GOAL, DEMONSTRATION_START, side_grasp_path};
 use sim::world::mujoco::{self, MujocoOptions, MujocoWorld, ObjectKind, ObjectSpec};
 use std::path::PathBuf;
 
@@ -76,8 +76,11 @@ fn every_object_has_its_own_picture_and_scenes_of_different_objects_share_a_stri
         kinds.map(|kind| mujoco::Scene::with(ObjectSpec::new(kind))).into_iter().chain([mujoco::Scene::EMPTY]);
     let scenes: Vec<Scene> = settings
         .map(|scene| {
-            let posture =
-                if scene.object.is_some_and(|object| object.lies()) { Lesson::Bottle } else { Lesson::Flashlight };
+            let posture = if scene.object.is_some_and(|object| object.lies()) {
+                TaughtMovement::Bottle
+            } else {
+                TaughtMovement::Flashlight
+            };
             let posture = posture.start();
             Scene::set_up(&MujocoOptions { scene, posture, ..MujocoOptions::default() }).expect("the scene loads")
         })
@@ -102,7 +105,7 @@ fn every_object_has_its_own_picture_and_scenes_of_different_objects_share_a_stri
 fn a_stored_configuration_gives_the_picture_of_the_world_it_came_from() {
     let small = RenderOptions { width: 320, height: 200, ..RenderOptions::default() };
     for scene in [mujoco::Scene::with(ObjectSpec::new(ObjectKind::Cup)), mujoco::Scene::EMPTY] {
-        let posture = Lesson::Cup.start();
+        let posture = TaughtMovement::Cup.start();
         let world = MujocoWorld::new(&MujocoOptions { scene, posture, ..MujocoOptions::default() }).expect("it loads");
         let stored = Scene::stored(&scene, world.configuration()).expect("it fits");
         assert_eq!(stored, Scene::of(&world));

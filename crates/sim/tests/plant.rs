@@ -2,10 +2,10 @@
 
 mod common;
 
-use common::Master;
+use common::{Master, SLOT_TICKS};
 use proptest::prelude::*;
 use puck::{CanFrame, Group, Node, PropertyId, PuckTorque, get, packed_torques, set};
-use sim::{BusTrace, FreeJoints, HOME, Plant, PlantConfig, SLOT_TICKS, Ticks, World};
+use sim::{BusTrace, FreeJoints, HOME, Plant, PlantConfig, Ticks, World};
 use std::any::Any;
 
 /// Torques that change from cycle to cycle.

@@ -303,8 +303,8 @@ fn a_pull_on_the_hand_is_felt_with_the_sign_of_the_environment_on_the_robot() {
     let mut master = awake();
     master.ask(force_torque::tare());
     master.wait_ms(5);
-    // At home q = (0, -2, 0, 3.13, ...) the plate's axes follow from the golden kinematics; pull along each world axis and
-    // compare the length and, through the grasp pose, the direction.
+    // At home q = (0, -2, 0, 3.13, ...) the plate's axes follow from the golden kinematics; pull along each world axis
+    // and compare the length and, through the grasp pose, the direction.
     for pull in [[6.0, 0.0, 0.0], [0.0, 6.0, 0.0], [0.0, 0.0, 6.0]] {
         master.plant.world().push(pull, [0.0; 3]);
         let [Reply::Force { counts, .. }, _] = master.ask(force_torque::get_wrench())[..] else { panic!() };

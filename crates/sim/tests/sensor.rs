@@ -34,7 +34,8 @@ fn tare(master: &mut Master) {
     master.wait_ms(5);
 }
 
-/// What is felt along z while the hand is pushed there with each of these forces in turn; the sensor's z is the world's.
+/// Returns the measured force along z while the hand is pushed there with each of these forces in turn; the sensor's z
+/// is the world's.
 fn pushed_through(master: &mut Master, forces: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
     forces
         .map(|force| {

@@ -2,12 +2,10 @@
 
 mod common;
 
-use common::Master;
+use common::{CYCLE_TICKS, Master};
 use puck::hand::angles;
 use puck::{Counts, Group, Node, Property, PropertyId, PuckTorque, Reply, SafetyMode, get, packed_torques};
-use sim::{
-    CYCLE_TICKS, FreeJoints, HOME, HandTargets, OperatorConfig, PendantAction, PlantConfig, SafetyConfig, Ticks, World,
-};
+use sim::{FreeJoints, HOME, HandTargets, OperatorConfig, PendantAction, PlantConfig, SafetyConfig, Ticks, World};
 
 fn started() -> PlantConfig {
     PlantConfig { started: true, operator: OperatorConfig::prompt(), ..PlantConfig::default() }
@@ -71,7 +69,7 @@ fn a_started_arm_loses_everything_in_an_emergency_stop_like_any_other() {
 /// When joint 1 first moves after a packed torque was handed over, in ticks.
 fn response_time(cycles: u8) -> Ticks {
     let config = PlantConfig {
-        torque_delay_cycles: cycles,
+        torque_delay: Ticks::from(cycles) * CYCLE_TICKS,
         safety: SafetyConfig { heartbeat: None, ..SafetyConfig::default() },
         operator: OperatorConfig { holds_until_active_for: None, ..OperatorConfig::prompt() },
         ..started()

@@ -43,12 +43,12 @@ fn cycle(master: &mut Master) -> usize {
     master.heard.clear();
     master.send(get(Group::ARM, PropertyId::POSITION));
     master.send(force_torque::get_wrench());
-    master.wait(2 * sim::SLOT_TICKS - sim::SLOT_TICKS / 2);
+    master.wait(2 * common::SLOT_TICKS - common::SLOT_TICKS / 2);
     let zero = [PuckTorque::ZERO; 4];
     for group in [Group::ARM_TORQUES, Group::WRIST_TORQUES] {
         master.send(packed_torques(group, PropertyId::TORQUE, zero));
     }
-    master.wait(sim::SLOT_TICKS + sim::SLOT_TICKS / 2);
+    master.wait(common::SLOT_TICKS + common::SLOT_TICKS / 2);
     master.heard.iter().filter(|(_, frame)| !matches!(Reply::decode(frame), Ok(Reply::SafetyBroadcast))).count()
 }
 

@@ -1,7 +1,9 @@
-//! A person teaches the simulated arm: the path is reachable, and guiding the arm under gravity compensation works.
+//! A teacher teaches the simulated arm: the path is reachable, and guiding the arm under gravity compensation works.
 #![cfg(feature = "mujoco")]
 
-use sim::person::{DEMONSTRATION_GOAL, DEMONSTRATION_START, GuidedWorld, Person, PersonConfig, Stage, side_grasp_path};
+use sim::teacher::{
+    DEMONSTRATION_GOAL, DEMONSTRATION_START, GuidedWorld, Stage, Teacher, TeacherConfig, side_grasp_path,
+};
 use sim::world::mujoco::{Kinematics, MujocoOptions, MujocoWorld};
 use sim::{HOME, Pose, STEP_SECONDS, World};
 
@@ -127,7 +129,7 @@ fn the_straight_way_from_home_to_the_start_touches_nothing() {
     }
 }
 
-/// What a demonstration looked like.
+/// Record of a demonstration.
 #[derive(Debug)]
 struct Demonstration {
     distance: f64,
@@ -150,11 +152,11 @@ fn demonstrate(seed: u64) -> Demonstration {
     let options = MujocoOptions { posture: DEMONSTRATION_START, ..MujocoOptions::default() };
     let world = MujocoWorld::new(&options).expect("the scene loads");
     let flashlight = world.object_pose().expect("a torch").position;
-    let person = Person::new(PersonConfig { seed, ..PersonConfig::default() }, side_grasp_path());
-    let mut guided = GuidedWorld::new(world, person);
+    let teacher = Teacher::new(TeacherConfig { seed, ..TeacherConfig::default() }, side_grasp_path());
+    let mut guided = GuidedWorld::new(world, teacher);
     let mut mechanism = kinematics();
     let ranges = mechanism.joint_ranges();
-    guided.person_mut().begin();
+    guided.teacher_mut().begin();
     let mut d = Demonstration {
         distance: 0.0,
         turn: 0.0,
@@ -171,9 +173,9 @@ fn demonstrate(seed: u64) -> Demonstration {
         seconds: 0.0,
     };
     let mut steps = 0_u32;
-    while guided.person().stage() != Stage::Done {
-        // What the person is about to pull: the same person, one step ahead of the world.
-        let (force, torque) = guided.person().clone().pull(&guided.grasp_pose());
+    while guided.teacher().stage() != Stage::Done {
+        // What the teacher is about to pull: the same teacher, one step ahead of the world.
+        let (force, torque) = guided.teacher().clone().pull(&guided.grasp_pose());
         let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
         d.force = d.force.max(length(force));
         d.torque = d.torque.max(length(torque));
@@ -190,7 +192,7 @@ fn demonstrate(seed: u64) -> Demonstration {
             let time = f64::from(steps) * STEP_SECONDS - 1.5;
             d.departure = d.departure.max(apart(&guided.grasp_pose(), &side_grasp_path().pose(time)).0);
         }
-        assert!(steps < 40_000, "the person never lets go");
+        assert!(steps < 40_000, "the teacher never lets go");
     }
     let (distance, turn) = apart(&guided.grasp_pose(), &side_grasp_path().goal());
     (d.distance, d.turn) = (distance, turn.to_degrees());
@@ -203,7 +205,7 @@ fn demonstrate(seed: u64) -> Demonstration {
 }
 
 #[test]
-fn a_person_guides_the_arm_to_the_grasp_under_gravity_compensation() {
+fn the_teacher_guides_the_arm_to_the_grasp_under_gravity_compensation() {
     for seed in 0..5 {
         let d = demonstrate(seed);
         println!("{seed} {d:.4?}");
@@ -224,35 +226,35 @@ fn the_same_seed_gives_the_same_demonstration_to_the_bit_and_another_seed_anothe
 }
 
 #[test]
-fn a_person_who_was_not_told_to_begin_does_not_touch_the_arm() {
-    let mut person = Person::new(PersonConfig::default(), side_grasp_path());
+fn a_teacher_who_was_not_told_to_begin_does_not_touch_the_arm() {
+    let mut teacher = Teacher::new(TeacherConfig::default(), side_grasp_path());
     let hand = side_grasp_path().goal();
     for _ in 0..100 {
-        assert_eq!(person.pull(&hand), ([0.0; 3], [0.0; 3]));
+        assert_eq!(teacher.pull(&hand), ([0.0; 3], [0.0; 3]));
     }
-    assert_eq!(person.stage(), Stage::Watching);
+    assert_eq!(teacher.stage(), Stage::Watching);
 }
 
 #[test]
-fn a_person_pulls_harder_at_what_stays_wrong_but_only_after_their_reaction_time() {
-    let config = PersonConfig {
+fn the_teacher_pulls_harder_at_what_stays_wrong_but_only_after_their_reaction_time() {
+    let config = TeacherConfig {
         tremor_force: 0.0,
         tremor_torque: 0.0,
         drift: 0.0,
         rotation_drift: 0.0,
-        ..PersonConfig::default()
+        ..TeacherConfig::default()
     };
     // The moment the hand is firmly held; from then on it follows the path, but 5 mm too low.
     let taken = config.pause + 0.5;
     let spring = config.stiffness * 0.005;
-    let mut person = Person::new(config, side_grasp_path());
-    person.begin();
+    let mut teacher = Teacher::new(config, side_grasp_path());
+    teacher.begin();
     let mut pulls = Vec::new();
     for step in 0..6000 {
         let time = f64::from(step) * STEP_SECONDS - taken;
         let mut hand = side_grasp_path().pose(time);
         hand.position[2] -= if time > 0.0 { 0.005 } else { 0.0 };
-        let (force, _) = person.pull(&hand);
+        let (force, _) = teacher.pull(&hand);
         if time > 0.0 {
             pulls.push(force[2]);
         }
@@ -264,11 +266,11 @@ fn a_person_pulls_harder_at_what_stays_wrong_but_only_after_their_reaction_time(
 }
 
 #[test]
-fn a_person_pulls_towards_the_path_and_never_beyond_their_strength() {
+fn the_teacher_pulls_towards_the_path_and_never_beyond_their_strength() {
     let config =
-        PersonConfig { tremor_force: 0.0, tremor_torque: 0.0, drift: 0.0, rotation_drift: 0.0, ..Default::default() };
-    let mut person = Person::new(config, side_grasp_path());
-    person.begin();
+        TeacherConfig { tremor_force: 0.0, tremor_torque: 0.0, drift: 0.0, rotation_drift: 0.0, ..Default::default() };
+    let mut teacher = Teacher::new(config, side_grasp_path());
+    teacher.begin();
     // The hand is held back 20 cm below the start and turned by 1 rad about the vertical.
     let start = side_grasp_path().start();
     let mut hand = start;
@@ -278,7 +280,7 @@ fn a_person_pulls_towards_the_path_and_never_beyond_their_strength() {
     hand.quaternion = [c * q[0] - s * q[3], c * q[1] - s * q[2], c * q[2] + s * q[1], c * q[3] + s * q[0]];
     let mut last = ([0.0; 3], [0.0; 3]);
     for _ in 0..2600 {
-        last = person.pull(&hand);
+        last = teacher.pull(&hand);
         let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
         assert!(length(last.0) <= 30.0 + 1e-9 && length(last.1) <= 5.0 + 1e-9);
     }

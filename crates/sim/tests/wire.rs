@@ -53,8 +53,8 @@ proptest! {
     }
 }
 
-/// GET P, seven positions, two torque frames; and with sensor: GET FT, force, torque. Bits per cycle of 2000 cycles with
-/// joints anywhere within their limits, torques within the library's limits, forces to 20 N and torques to 1 N m.
+/// GET P, seven positions, two torque frames; and with sensor: GET FT, force, torque. Bits per cycle of 2000 cycles
+/// with joints anywhere within their limits, torques within the library's limits, forces to 20 N and torques to 1 N m.
 fn mean_cycle(with_sensor: bool) -> f64 {
     let transmission = Transmission::new(&Ratios::WAM7).unwrap();
     let drives = Drives::new([4096; 7], [2700, 2700, 2700, 2700, 6500, 6500, 17474]).unwrap();

@@ -26,7 +26,7 @@ struct Held {
     bytes: [u8; LINE as usize],
 }
 
-/// What the cache has seen.
+/// Counters of the cache.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CacheCount {
     /// Reads of bank 2.
@@ -47,7 +47,7 @@ pub struct DataCache {
     sets: Vec<[Option<Held>; WAYS]>,
     /// The way that is replaced next, of each set.
     next: Vec<usize>,
-    /// What was seen.
+    /// Counters so far.
     pub count: CacheCount,
 }
 

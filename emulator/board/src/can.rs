@@ -57,7 +57,7 @@ pub struct Can {
 /// Offset of SIDFC.
 const STANDARD_FILTERS: u32 = 0x84;
 
-/// Whether a filter element stores a standard identifier in the first queue.
+/// True if a filter element stores a standard identifier in the first queue.
 fn passes(element: u32, id: u16) -> bool {
     let (first, second) = ((element >> 16 & 0x7FF) as u16, (element & 0x7FF) as u16);
     element >> 27 & 7 == 1
@@ -108,7 +108,7 @@ fn ticks(nanoseconds: u64) -> Ticks {
 }
 
 impl Can {
-    /// Whether the other side has ended.
+    /// True if the other side has ended.
     #[must_use]
     pub fn is_gone(&self) -> bool {
         self.world.is_gone()
@@ -150,7 +150,7 @@ impl Can {
         })
     }
 
-    /// What the controllers found worth a remark since the last call.
+    /// Remarks of the controllers since the last call.
     pub fn take_remarks(&mut self) -> Vec<Remark> {
         std::mem::take(&mut self.remarks)
     }

@@ -12,7 +12,8 @@ use crate::findings::Grade;
 use crate::host::{Inquirer, Learned, SharedLearned};
 use crate::image::Image;
 use crate::report::Measured;
-use crate::run::{Outcome, RunError, Setup, run};
+use crate::run::{RunError, run};
+use crate::setup::{Outcome, Setup};
 use crate::world::InProcess;
 
 /// Most findings told in sentences.
@@ -27,13 +28,13 @@ const UNTIL: u64 = 3_500_000_000;
 /// One row of the table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Row {
-    /// What is looked at.
+    /// Name of the check.
     pub item: &'static str,
-    /// What must be.
+    /// Expected value.
     pub expected: String,
-    /// What is.
+    /// Value found.
     pub found: String,
-    /// Whether they agree.
+    /// True if they agree.
     pub is_right: bool,
 }
 
@@ -44,12 +45,12 @@ pub struct Checked {
     pub rows: Vec<Row>,
     /// The report of the run.
     pub report: Map<String, Value>,
-    /// What went wrong, in sentences.
+    /// Reasons of a failure, in sentences.
     pub reasons: Vec<String>,
 }
 
 impl Checked {
-    /// Whether everything is as it must be.
+    /// True if everything is as it must be.
     #[must_use]
     pub fn is_right(&self) -> bool {
         self.rows.iter().all(|row| row.is_right)
@@ -91,7 +92,7 @@ pub fn check(image: &Arc<Image>) -> Result<Checked, RunError> {
     Ok(Checked { rows, report, reasons: reasons(image, &outcome) })
 }
 
-/// What the image sends first: zero torques and idle to arm and hand, then it asks the first motor how it is.
+/// First frames of the image: zero torques and idle to arm and hand, then it asks the first motor how it is.
 fn first_frames() -> Vec<CanFrame> {
     let [arm, wrist] = zero_torques();
     let idle = |group| set(group, PropertyId::MODE, MotorMode::Idle.value());
@@ -104,7 +105,7 @@ fn in_words(frames: &[CanFrame]) -> String {
     words.join(" ")
 }
 
-/// What went wrong, as one would say it.
+/// Reasons of a failure, in sentences.
 fn reasons(image: &Image, outcome: &Outcome) -> Vec<String> {
     let measured = &outcome.measured;
     let mut reasons = Vec::new();

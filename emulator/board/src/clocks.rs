@@ -92,7 +92,7 @@ impl Clocks {
 /// Bits of RCC.CR that switch the loops on, and where each loop's bits begin in PLLCKSELR and PLLCFGR.
 const LOOPS: [(&str, u64, u32, u32); 3] = [("PLL1", 1 << 24, 4, 0), ("PLL2", 1 << 26, 12, 4), ("PLL3", 1 << 28, 20, 8)];
 
-/// What is wrong with the loops that `written`, a value for RCC.CR, switches on and `before` had off: a reference
+/// Faults of the loops that `written`, a value for RCC.CR, switches on and `before` had off: a reference
 /// outside what the chosen oscillator takes (DS12110 tables 137 and 138: the medium one 1 to 2 MHz, the wide one 2 to
 /// 16 MHz).
 #[must_use]

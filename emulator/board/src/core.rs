@@ -5,6 +5,8 @@
 //! while the protection unit or the default map makes the address cacheable, past it otherwise. The registers of cache
 //! maintenance are routed the same way.
 
+mod cache_bus;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -16,8 +18,8 @@ use rigless::soc::{Endian, Width};
 use rigless::time::VirtualNanos;
 
 use crate::cache::{BANK, CacheCount, DataCache};
-use crate::cache_bus::CacheBus;
 use crate::notes::{FaultNote, Stray};
+use cache_bus::CacheBus;
 
 /// Registers by the numbers of the crate's debugger.
 mod register {
@@ -43,10 +45,10 @@ const MPU_RASR: u64 = 0xE000_EDA0;
 /// CCR.DC: the data cache is on.
 const DATA_CACHE: u64 = 1 << 16;
 
-/// What a word under the stack holds that nothing has touched since service began.
+/// Content of a word under the stack that nothing has touched since service began.
 pub const SERVICE_PAINT: u32 = 0xA5A5_A5A5;
 
-/// What somebody outside the chip does to the core, before its next instruction.
+/// An action on the core from outside the chip, before its next instruction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Order {
     /// The core goes on at this address.
@@ -66,13 +68,13 @@ pub enum Order {
     Own(u32, u32),
     /// A register of the processor's own space is read, for [`CoreState::own`].
     Look(u32),
-    /// What a fault handler finds is noted, with this time in ns.
+    /// The state that a fault handler finds is noted, with this time in ns.
     Note(u64),
     /// The unused stack between these addresses is painted, up to the stack pointer.
     Paint(Range<u32>),
 }
 
-/// What the core and the rest of the board share.
+/// State that the core and the rest of the board share.
 #[derive(Debug, Default)]
 pub struct CoreState {
     /// Orders not yet carried out, oldest first.
@@ -101,7 +103,7 @@ impl SharedCore {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What the cache has seen.
+    /// Counters of the cache.
     #[must_use]
     pub fn cache_count(&self) -> CacheCount {
         self.lock().cache.count
@@ -136,7 +138,7 @@ impl Core {
         self.inner.debugger_access(write, address, Width::W32, VirtualNanos(0)).unwrap_or(0)
     }
 
-    /// Whether a read of `address` now goes through the data cache: it is on, and the memory is of a cacheable kind, by
+    /// True if a read of `address` now goes through the data cache: it is on, and the memory is of a cacheable kind, by
     /// the protection unit or, where that is off or bypassed, by the default map.
     fn is_cacheable(&mut self, address: u32) -> bool {
         if self.own(CCR, None) & DATA_CACHE == 0 {

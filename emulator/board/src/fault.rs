@@ -33,7 +33,7 @@ pub enum Kind {
     Reset(ResetKind),
 }
 
-/// What pulls the reset.
+/// Cause of the reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetKind {
     /// The reset pin.
@@ -49,13 +49,13 @@ pub enum ResetKind {
 /// A fault and its time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// Which.
+    /// The kind of the fault.
     pub kind: Kind,
-    /// When, ns since power-up.
+    /// Time, ns since power-up.
     pub at: u64,
 }
 
-/// What the command line takes.
+/// Forms that the command line takes.
 pub const SYNTAX: &str = "KIND@MICROSECONDS[:ARGUMENT], KIND one of bus-off, no-acknowledge[:US], dominant[:US], \
 power-cut:N, hse-dead, nmi, panic, hard-fault, hang, stall:US, guard, below-guard, \
 reset:pin|power|brown-out|probe";

@@ -1,4 +1,4 @@
-//! What the image did that the emulator must report: accesses that nothing models, that the chip refuses or ignores.
+//! Findings of the emulator about the image: accesses that nothing models, that the chip refuses or ignores.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use crate::board::Board;
 use crate::excuses;
 use crate::image::Image;
 
-/// How bad a finding is.
+/// Grade of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Grade {
     /// Nothing models it: the run proves nothing about what follows.
@@ -43,7 +43,7 @@ impl Grade {
 /// One finding; the same one again is counted, not repeated.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
-    /// How bad.
+    /// Grade.
     pub grade: Grade,
     /// Instance and register.
     pub register: String,
@@ -51,7 +51,7 @@ pub struct Finding {
     pub address: Option<u64>,
     /// Function of the image, where it was an access.
     pub function: Option<String>,
-    /// What is wrong.
+    /// Description.
     pub text: String,
     /// When it was first seen, ns.
     pub at: u64,
@@ -84,7 +84,7 @@ impl Finding {
 #[derive(Debug, Default)]
 pub struct Findings {
     list: Vec<Finding>,
-    /// How much of each of the session's lists has been seen.
+    /// Number of entries of each of the session's lists that have been read.
     seen: Seen,
 }
 
@@ -219,7 +219,7 @@ impl Findings {
         }
     }
 
-    /// What the CAN controllers remarked during the last access.
+    /// Remarks of the CAN controllers during the last access.
     pub fn note_remarks(&mut self, remarks: Vec<Remark>, image: &Image, settled: &Settled) {
         let pc = match settled {
             Settled::Access { access, .. } => access.program_counter,
@@ -244,7 +244,7 @@ impl Findings {
         }
     }
 
-    /// How many of each grade, with the first entries, for the report.
+    /// Number of findings of each grade, with the first entries, for the report.
     #[must_use]
     pub fn json(&self) -> BTreeMap<&'static str, Value> {
         let grades = [Grade::Unmodelled, Grade::Refused, Grade::Ignored, Grade::Excused, Grade::Noted];

@@ -19,12 +19,12 @@ pub const READY: u8 = 10;
 const PACE: Ticks = 20 * TICKS_PER_MILLISECOND;
 
 /// Time after which an answer is not waited for any longer.
-const PATIENCE: Ticks = 200 * TICKS_PER_MILLISECOND;
+const TIMEOUT: Ticks = 200 * TICKS_PER_MILLISECOND;
 
 /// Frames kept from the beginning.
 const FIRST: usize = 5;
 
-/// What the host has learned.
+/// Knowledge of the host.
 #[derive(Debug, Default)]
 pub struct Learned {
     /// Who the device is.
@@ -54,7 +54,7 @@ pub struct Learned {
 pub struct SharedLearned(Arc<Mutex<Learned>>);
 
 impl SharedLearned {
-    /// What the host has learned.
+    /// Knowledge of the host.
     pub fn lock(&self) -> MutexGuard<'_, Learned> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -86,7 +86,7 @@ impl Inquirer {
         }
     }
 
-    /// What to ask next.
+    /// The next question.
     fn question(&mut self) -> Request {
         let learned = self.learned.lock();
         if learned.hello.is_none() {
@@ -135,7 +135,7 @@ impl Host for Inquirer {
         while let Some(frame) = self.decoder.next::<Reply>(&mut rest) {
             self.hear(now, frame.message, frame.envelope.time_ms);
         }
-        let wait = if self.waiting { PATIENCE } else { PACE };
+        let wait = if self.waiting { TIMEOUT } else { PACE };
         if now < self.asked_at + wait {
             return Vec::new();
         }

@@ -79,7 +79,7 @@ pub struct Image {
     /// SHA-256 in hexadecimal digits over the load segments that have content: physical address, length, content of
     /// each.
     pub hash: String,
-    /// What it says of its firmware.
+    /// Metadata of its firmware.
     pub firmware: String,
     /// End of the stack (its highest address) and its lowest address.
     pub stack: std::ops::Range<u32>,

@@ -3,7 +3,6 @@
 pub mod bank;
 pub mod board;
 pub mod cache;
-pub mod cache_bus;
 pub mod can;
 pub mod check;
 pub mod clocks;
@@ -21,6 +20,7 @@ pub mod part;
 pub mod report;
 pub mod run;
 pub mod serial;
+pub mod setup;
 pub mod stack;
 pub mod usb;
 pub mod watchdog;

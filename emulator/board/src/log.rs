@@ -16,7 +16,7 @@ const READ: u64 = 40;
 const MARK: u64 = 0x4747_4553;
 
 /// Longest buffer believed.
-const LONGEST: u64 = 1 << 20;
+const MOST_LINE_BYTES: u64 = 1 << 20;
 
 /// Where the log goes: a file, and memory for tests and last words.
 #[derive(Debug, Default)]
@@ -44,7 +44,7 @@ impl Log {
         }
         let (buffer, size, write) = (word(at(BUFFER)), word(at(SIZE)), word(at(WRITE)));
         let mut read = word(at(READ));
-        if size == 0 || size > LONGEST || write >= size || read >= size || read == write {
+        if size == 0 || size > MOST_LINE_BYTES || write >= size || read >= size || read == write {
             return;
         }
         let from = self.bytes.len();

@@ -10,7 +10,8 @@ use clap::{Parser, Subcommand, ValueEnum};
 use emulated_board::can::HostLine;
 use emulated_board::fault::{Fault, SYNTAX};
 use emulated_board::image::Image;
-use emulated_board::run::{MIPS, REVISION_V, Setup, run};
+use emulated_board::run::run;
+use emulated_board::setup::{MIPS, REVISION_V, Setup};
 use emulated_board::world::Lockstep;
 use fdcan_model::Cancellation;
 use serde_json::Value;
@@ -42,7 +43,7 @@ enum Command {
         /// Where the report goes.
         #[arg(long)]
         report: Option<PathBuf>,
-        /// What the CAN controller does with a cancelled place of its transmit queue.
+        /// Effect of a cancelled place in the transmit queue of the CAN controller.
         #[arg(long, value_enum, default_value_t = Reading::Skipped)]
         cancellation: Reading,
         /// Revision of the silicon, REV_ID of DBGMCU.IDC.

@@ -1,4 +1,4 @@
-//! What the core ran into: accesses to where nothing is, and faults whose handlers have begun.
+//! Notes of the core: accesses to where nothing is, and faults whose handlers have begun.
 
 use crate::image::Image;
 
@@ -13,7 +13,7 @@ pub struct Stray {
     pub at: u64,
 }
 
-/// What the handler of a fault finds when it begins.
+/// State that the handler of a fault finds when it begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FaultNote {
     /// When, ns.

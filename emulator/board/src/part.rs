@@ -41,7 +41,7 @@ struct Slots {
     usb: [usize; 2],
 }
 
-/// What the board hands the part.
+/// Inputs of the part from the board.
 #[derive(Debug, Clone)]
 pub struct Fitting {
     /// CAN.
@@ -50,7 +50,7 @@ pub struct Fitting {
     pub serial: SharedLine,
     /// Where the watchdog tells what it sees.
     pub watch: SharedWatch,
-    /// What the core shares with the board.
+    /// State that the core shares with the board.
     pub core: SharedCore,
     /// Million instructions a second.
     pub mips: u32,

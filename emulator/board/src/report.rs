@@ -1,4 +1,4 @@
-//! What a run says about itself, the same for equal runs.
+//! Report of a run, the same for equal runs.
 
 use fdcan_model::BitTiming;
 use serde_json::{Map, Value, json};
@@ -11,7 +11,7 @@ use crate::notes::FaultNote;
 use crate::stack::StackUse;
 use crate::watchdog::Watched;
 
-/// What was measured.
+/// Measurements.
 #[derive(Debug, Default)]
 pub struct Measured {
     /// Virtual time, ns.
@@ -48,7 +48,7 @@ pub struct Measured {
     pub serial_baud: u64,
     /// Operations of bank 2.
     pub bank_operations: u64,
-    /// What must be reported.
+    /// Findings.
     pub findings: Findings,
 }
 

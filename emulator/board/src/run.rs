@@ -23,58 +23,10 @@ use crate::log::Log;
 use crate::part::Fitting;
 use crate::report::Measured;
 use crate::serial::SharedLine;
+use crate::setup::{Outcome, Setup};
 use crate::watchdog::SharedWatch;
 use crate::watcher::{LOOK, Watcher};
 use crate::world::World;
-
-/// How a run is set up.
-#[derive(Clone, Debug)]
-pub struct Setup {
-    /// The line the host is on.
-    pub host: HostLine,
-    /// How the CAN controller takes cancelled places of its transmit queue.
-    pub cancellation: Cancellation,
-    /// Revision of the silicon, REV_ID.
-    pub revision: u16,
-    /// Content of bank 2 before and after.
-    pub bank2: Option<PathBuf>,
-    /// Where the log goes.
-    pub log: Option<PathBuf>,
-    /// End of the run, ns; without it the run ends when the world does.
-    pub until: Option<u64>,
-    /// Million instructions a second of virtual time.
-    pub mips: u32,
-    /// Something that is not modelled ends the run.
-    pub strict: bool,
-    /// What is put in from outside.
-    pub faults: Vec<Fault>,
-    /// Findings are told on standard error while it runs.
-    pub tells: bool,
-}
-
-impl Default for Setup {
-    fn default() -> Self {
-        Self {
-            host: HostLine::Serial,
-            cancellation: Cancellation::Skipped,
-            revision: REVISION_V,
-            bank2: None,
-            log: None,
-            until: None,
-            mips: MIPS,
-            strict: true,
-            faults: Vec::new(),
-            tells: false,
-        }
-    }
-}
-
-/// An instruction takes 4 ns unless somebody says otherwise: the crate's own choice for a core of some hundred
-/// megahertz.
-pub const MIPS: u32 = 250;
-
-/// Silicon of revision V, which present boards have.
-pub const REVISION_V: u16 = 0x2003;
 
 /// First revision without the erratum of the message memory (ES0392 2.24.2).
 const FIRST_SOUND_REVISION: u16 = 0x2001;
@@ -88,7 +40,7 @@ pub enum RunError {
     /// The emulation.
     #[error(transparent)]
     Emulator(#[from] emulator::Error),
-    /// What is placed in memory.
+    /// The image that is placed in memory.
     #[error(transparent)]
     Image(#[from] rigless::image::Error),
     /// A file.
@@ -99,21 +51,6 @@ pub enum RunError {
         /// Why.
         source: io::Error,
     },
-}
-
-/// What a run leaves.
-#[derive(Debug)]
-pub struct Outcome {
-    /// Measurements and findings.
-    pub measured: Measured,
-    /// The log.
-    pub log: Vec<u8>,
-    /// Bank 2.
-    pub bank2: Vec<u8>,
-    /// Why the run ended before the world and the time did.
-    pub cut_short: Option<String>,
-    /// The operation of bank 2 in which power failed, which ended the run.
-    pub power_cut: Option<String>,
 }
 
 /// Runs an image.

@@ -70,7 +70,7 @@ impl SharedLine {
         self.lock().to_chip.extend(bytes);
     }
 
-    /// What the chip has sent since the last call.
+    /// Bytes that the chip has sent since the last call.
     #[must_use]
     pub fn take(&self) -> Vec<u8> {
         std::mem::take(&mut self.lock().from_chip)
@@ -164,7 +164,7 @@ impl Serial {
     }
 }
 
-/// Whether the flags of `status` interrupt with the enables as they are.
+/// True if the flags of `status` interrupt with the enables as they are.
 fn interrupts(status: u64, registers: &RegisterFile) -> bool {
     let (first, third) = (registers.get(Register::Cr1), registers.get(Register::Cr3));
     CAUSES

@@ -1,4 +1,5 @@
-//! How deep the stack was used, from what nothing has overwritten: the image's own paint at start-up, ours in service.
+//! Depth of stack that was used, from the paint that nothing has overwritten: the image's own paint at start-up, ours
+//! in service.
 
 use std::ops::Range;
 
@@ -7,7 +8,7 @@ use rigless::soc::Width;
 
 use crate::core::SERVICE_PAINT;
 
-/// What the image fills its stack with before main.
+/// Word with which the image fills its stack before main.
 const START_PAINT: u32 = 0xCCCC_CCCC;
 
 /// Bytes used at most.

@@ -28,7 +28,7 @@ const CROSSING: u64 = 5;
 /// Reload value after a reset.
 const FULL: u64 = 0xFFF;
 
-/// What was seen of the watchdog, for the report.
+/// Counters of the watchdog, for the report.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Watched {
     /// Time from a feeding to a reset, ns, as it is now; 0 before it is started.
@@ -54,7 +54,7 @@ impl SharedWatch {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What was seen.
+    /// Counters so far.
     #[must_use]
     pub fn get(&self) -> Watched {
         *self.lock()

@@ -22,7 +22,7 @@ use crate::findings::{Finding, Findings, Grade};
 use crate::image::Image;
 use crate::log::Log;
 use crate::report::Measured;
-use crate::run::{Outcome, Setup};
+use crate::setup::{Outcome, Setup};
 use crate::stack::{self, StackUse};
 use crate::watchdog::SharedWatch;
 
@@ -253,7 +253,7 @@ impl Watcher {
         }
     }
 
-    /// What the run has measured.
+    /// Measurements of the run.
     #[must_use]
     pub fn into_outcome(self, session: &mut Session<Board>) -> Outcome {
         let resets = session.resets().iter().map(|reset| (reset.at.0, format!("{:?}", reset.cause))).collect();

@@ -10,18 +10,18 @@ use sim::{Event, PlainLine, Plant, Ticks};
 /// Nanoseconds of a tick of the lock step.
 pub const TICK_NS: u64 = 40;
 
-/// What the chip's first CAN controller and its host line are connected to.
+/// The other side of the chip's first CAN controller and of its host line.
 ///
 /// Times are ticks since power-up. Every call names the time the chip has reached.
 pub trait World: Send + fmt::Debug {
     /// The controller offers a frame to the bus.
     fn send(&mut self, now: Ticks, frame: CanFrame);
 
-    /// What the controller has offered and what has not begun on the wire is taken back. Whether a frame of its own has
-    /// begun, whose end [`World::event`] has still to tell.
+    /// Frames that the controller has offered and that have not begun on the wire are taken back. Whether a frame of
+    /// its own has begun, whose end [`World::event`] has still to tell.
     fn withdraw(&mut self, now: Ticks) -> bool;
 
-    /// What has happened by `at`: one frame at most.
+    /// Returns the event that has happened by `at`: one frame at most.
     fn event(&mut self, at: Ticks) -> Event;
 
     /// The chip's host line has carried these bytes.
@@ -30,7 +30,7 @@ pub trait World: Send + fmt::Debug {
     /// When [`World::event`] must be called next.
     fn next(&self) -> Option<Ticks>;
 
-    /// Whether the other side has ended: power is off.
+    /// True if the other side has ended: power is off.
     fn is_gone(&self) -> bool;
 }
 

@@ -4,7 +4,7 @@ mod common;
 
 use common::{image, tell};
 use emulated_board::check::check;
-use emulated_board::run::Setup;
+use emulated_board::setup::Setup;
 
 #[test]
 fn the_image_does_what_it_must() {

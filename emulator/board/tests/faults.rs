@@ -1,16 +1,16 @@
-//! What leaves on the bus when something goes wrong, and what the next start says.
+//! Frames that leave on the bus when something goes wrong, and the report of the next start.
 
 mod common;
 
 use common::{Story, safe_frames, tell, tell_with};
-use emulated_board::run::Setup;
+use emulated_board::setup::Setup;
 use fdcan_model::Cancellation;
 use puck::CanFrame;
 
 /// In service: the arm is ready long before.
 const SERVICE_US: u64 = 2_100_000;
 
-/// Whether the four safe frames are among `sent`, in order, with nothing but their like between the first and the last.
+/// True if the four safe frames are among `sent`, in order, with nothing but their like between the first and the last.
 fn holds_safe_frames(sent: &[(u64, CanFrame)]) -> bool {
     let wanted = safe_frames();
     sent.windows(wanted.len()).any(|window| window.iter().zip(wanted).all(|((_, frame), wanted)| *frame == wanted))

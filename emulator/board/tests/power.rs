@@ -5,7 +5,7 @@ mod common;
 use std::fs;
 
 use common::{Story, tell};
-use emulated_board::run::Setup;
+use emulated_board::setup::Setup;
 
 /// Operations of the first start, which makes an empty library, that power is cut in: each of them would take too long
 /// here.

@@ -1,14 +1,16 @@
 //! One controller: its state, and what happens in it as time goes on.
 
+pub(crate) mod wire;
+
 use crate::Nanoseconds;
-use crate::controllers::Unit;
 use crate::errors::{BusError, Errors};
 use crate::receive::{self, ReceiveFifo};
 use crate::registers::{self, NBTP, RXESC, RXF0C, RXF1C, TXBC, TXESC, WORDS, cccr};
 use crate::remark::{Remark, RemarkKind};
 use crate::timing::BitTiming;
 use crate::transmit::{self, Cancellation, Transmit};
-use crate::wire::{Fault, Link};
+use crate::unit::Unit;
+use wire::{Fault, Link};
 
 /// Ticks of the kernel clock until a written INIT can be read back. The manual says "a delay". [M]
 const SYNCHRONISATION_TICKS: u64 = 8;

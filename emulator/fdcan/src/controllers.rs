@@ -1,6 +1,7 @@
 //! Both controllers and the memory they share: the model's public face.
 
 use crate::Nanoseconds;
+use crate::controller::wire::{Fault, WireEvent};
 use crate::controller::{Bus, Controller};
 use crate::errors::BusError;
 use crate::frame::Frame;
@@ -9,33 +10,10 @@ use crate::random::Random;
 use crate::remark::{Remark, RemarkKind};
 use crate::timing::BitTiming;
 use crate::transmit::Cancellation;
-use crate::wire::{Fault, WireEvent};
+use crate::unit::Unit;
 
 /// With the erratum, one read of the message memory in this many is wrong. The errata sheet gives no rate.
 const WRONG_READ_IN: u32 = 64;
-
-/// One of the two controllers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unit {
-    /// FDCAN1.
-    One,
-    /// FDCAN2.
-    Two,
-}
-
-impl Unit {
-    /// Both.
-    pub const BOTH: [Self; 2] = [Self::One, Self::Two];
-
-    /// Name in the manual.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::One => "FDCAN1",
-            Self::Two => "FDCAN2",
-        }
-    }
-}
 
 /// One of a controller's two interrupt lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +29,7 @@ pub enum Line {
 pub struct Options {
     /// Decides the memory's content after power-up and the reads that the erratum spoils.
     pub seed: u64,
-    /// What a cancelled place of the transmit FIFO does to the get index.
+    /// Effect of a cancelled place in the transmit FIFO on the get index.
     pub cancellation: Cancellation,
     /// ES0392 2.24.2, revisions Y and W: with both controllers at work, reads of the message memory may be wrong.
     pub erratum: bool,
@@ -137,7 +115,7 @@ impl Controllers {
         self.units[unit as usize].write(offset, value, &self.memory);
     }
 
-    /// What a read would return at the time last reached, without its effects.
+    /// Returns the value of a read at the time last reached, without its effects.
     #[must_use]
     pub fn peek(&self, unit: Unit, offset: u32) -> u32 {
         self.units[unit as usize].peek(offset)

@@ -79,7 +79,7 @@ pub(crate) fn verdict(register: impl Fn(u32) -> u32, memory: &Memory, frame: &Fr
     Verdict { fifo, unwritten, ..Verdict::DROPPED }
 }
 
-/// What the action of the first matching element asks for.
+/// Decision of the first matching element.
 fn matched(action: u32, element: u32, unwritten: Option<u32>) -> Verdict {
     let priority = (PRIORITY..TO_BUFFER).contains(&action);
     let fifo = match if priority { action - PRIORITY } else { action } {

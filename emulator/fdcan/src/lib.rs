@@ -14,16 +14,17 @@ mod registers;
 mod remark;
 mod timing;
 mod transmit;
-mod wire;
+mod unit;
 
-pub use controllers::{Controllers, Line, Options, Status, Unit};
+pub use controller::wire::{Fault, WireEvent};
+pub use controllers::{Controllers, Line, Options, Status};
 pub use errors::BusError;
 pub use frame::{Frame, Id};
 pub use memory::WORDS as MEMORY_WORDS;
 pub use remark::{Remark, RemarkKind};
 pub use timing::BitTiming;
 pub use transmit::Cancellation;
-pub use wire::{Fault, WireEvent};
+pub use unit::Unit;
 
 /// Virtual time: nanoseconds since power-up.
 pub type Nanoseconds = u64;

@@ -23,7 +23,7 @@ impl Memory {
         self.words.get(word as usize).copied().unwrap_or(0)
     }
 
-    /// Whether the word exists and has been written since power-up.
+    /// True if the word exists and has been written since power-up.
     pub(crate) fn is_written(&self, word: u32) -> bool {
         self.written.get(word as usize).copied().unwrap_or(false)
     }

@@ -15,7 +15,7 @@ pub(crate) const EXTENDED: u32 = 1 << 30;
 /// First word of an element: a remote frame.
 pub(crate) const REMOTE: u32 = 1 << 29;
 
-/// How a FIFO is configured.
+/// Configuration of a FIFO.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Layout {
     start: u32,
@@ -39,7 +39,7 @@ impl Layout {
     }
 }
 
-/// What became of a frame that was to be stored.
+/// Result of storing a frame.
 pub(crate) struct Stored {
     /// Flags of IR, as for FIFO 0.
     pub(crate) flags: u32,

@@ -1,7 +1,7 @@
 //! A remark: something a program did that the controller ignored, or that deserves a look.
 
 use crate::Nanoseconds;
-use crate::controllers::Unit;
+use crate::unit::Unit;
 use std::fmt;
 
 /// The kind of a remark.
@@ -36,7 +36,7 @@ pub struct Remark {
     pub offset: u32,
     /// The value written or read.
     pub value: u32,
-    /// What happened.
+    /// Description.
     pub text: &'static str,
 }
 

@@ -47,7 +47,7 @@ impl BitTiming {
         1000 * (1 + self.before_sample) / self.quanta()
     }
 
-    /// How long `count` bits last.
+    /// Duration of `count` bits.
     #[must_use]
     pub fn bits(&self, count: u32) -> Nanoseconds {
         let ticks = u64::from(count) * u64::from(self.prescaler * self.quanta());

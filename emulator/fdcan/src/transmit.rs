@@ -7,7 +7,7 @@ use crate::memory::Memory;
 use crate::receive::{ELEMENT_WORDS, EXTENDED, REMOTE};
 use crate::registers::ir;
 
-/// What a cancelled place of the FIFO does to the get index. The manual says that cancellation "is not intended" for a
+/// Effect of a cancelled place in the FIFO on the get index. The manual says that cancellation "is not intended" for a
 /// FIFO, and in another place that the get index goes on to the next place with a pending request when its own place is
 /// cancelled. Software should be right under both readings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,7 +19,7 @@ pub enum Cancellation {
     Stuck,
 }
 
-/// How the transmit buffers are configured.
+/// Configuration of the transmit buffers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Layout {
     start: u32,
@@ -69,12 +69,12 @@ pub(crate) struct Transmit {
     index: u32,
     /// FIFO: places from the get index to the put index.
     fill: u32,
-    /// What each buffer held when its transmission was requested.
+    /// Content of each buffer when its transmission was requested.
     frames: [Frame; 32],
     policy: Cancellation,
 }
 
-/// What a request (TXBAR) came to.
+/// Result of a request (TXBAR).
 #[derive(Default)]
 pub(crate) struct Requested {
     /// Bits of buffers that are not configured, or whose request is pending.
@@ -97,7 +97,7 @@ impl Transmit {
         *self = Self::new(self.policy);
     }
 
-    /// What a buffer held when its transmission was requested.
+    /// Content of a buffer when its transmission was requested.
     pub(crate) fn frame(&self, buffer: u8) -> Frame {
         self.frames[usize::from(buffer & 31)]
     }

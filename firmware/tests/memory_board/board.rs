@@ -5,12 +5,16 @@ use std::collections::VecDeque;
 use std::convert::Infallible;
 use std::rc::Rc;
 
+use device::time::SLOT_HZ;
 use embedded_can::nb;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use firmware::board::{self, CanStatus, Edge, LinkPort, Parts};
 use puck::CanFrame;
 use sim::flash::FlashPort;
-use sim::{SLOT_TICKS, TICKS_PER_SECOND, Ticks};
+use sim::{TICKS_PER_SECOND, Ticks};
+
+/// Ticks of one slot.
+pub(crate) const SLOT_TICKS: Ticks = sim::period_ticks(SLOT_HZ);
 
 /// Frames the controller takes before it says "would block".
 const MAILBOXES: usize = 3;

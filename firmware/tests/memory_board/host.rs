@@ -23,9 +23,9 @@ use link::message::{ChunkData, HostHello};
 use link::{Event, LINK_VERSION, Name, PrimitiveImage, Reply, Request, SCHEMA_HASH, Status, Text};
 use rtic_core::Mutex;
 use sim::flash::{FlashChip, FlashPort, VirtualClock};
-use sim::{FreeJoints, HOME, Plant, PlantConfig, SLOT_TICKS, TICKS_PER_SECOND, Ticks};
+use sim::{FreeJoints, HOME, Plant, PlantConfig, TICKS_PER_SECOND, Ticks};
 
-use crate::board::{Can, MemoryBoard, Shared, set_now};
+use crate::board::{Can, MemoryBoard, SLOT_TICKS, Shared, set_now};
 
 /// Something two tasks share.
 struct Lock<T>(Rc<RefCell<T>>);

@@ -152,7 +152,7 @@ fn sample(plant: &Plant, time: f64, record: CycleRecord) -> Sample {
         time,
         q: plant.q.into(),
         dq: plant.dq.into(),
-        elbow_speeds: frames.elbow_speeds(&dq, control::plan::approach::TIP_REACH),
+        elbow_speeds: frames.elbow_speeds(&dq, control::guard::monitor::TIP_REACH),
         tool_speed: twist.fixed_rows::<3>(0).norm(),
         position: pose.position.into(),
         orientation: pose.orientation.0,

@@ -4,7 +4,7 @@ use clap::{ArgGroup, Args, Subcommand};
 use link::{Calibration, Refusal};
 use serde_json::{Value, json};
 
-use super::{Failure, Global, Table, connection, learn};
+use super::{ErrorCode, Failure, Global, Table, connection, learn};
 use lab::client::Client;
 use lab::device::Device;
 use lab::error::HostError;
@@ -77,7 +77,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             global.output().result(&data(&correction), format!("{}stored in the device", table(&correction)))
         }
         Action::Home(Home { here: None, set: None, .. }) => {
-            Err(Failure::new(super::Exit::Usage, "E222", DOING, "no angles are given").help("`--here` or `--set`"))
+            Err(Failure::new(ErrorCode::NoAngles, DOING, "no angles are given"))
         }
     }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Exit, Failure, Global};
+use super::{ErrorCode, Failure, Global};
 use crate::check;
 use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
 
@@ -37,8 +37,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     if !global.json {
         output.result(&report, report.to_text())?;
     }
-    let failure = Failure::new(Exit::Invalid, "E631", format!("check failed: {}", command.primitive.display()), reason)
-        .help("run it more slowly (`--speed 0.5`), or show the movement farther from the limits and learn it again");
+    let failure =
+        Failure::new(ErrorCode::CheckFailed, format!("check failed: {}", command.primitive.display()), reason);
     Err(match serde_json::to_value(&report) {
         Ok(data) => failure.data(data),
         Err(_) => failure,
@@ -47,25 +47,18 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 
 /// The failure of a command that was `doing` something with a primitive file.
 pub(super) fn failure(cause: PrimitiveFileError, path: &Path, doing: &str) -> Failure {
-    let (exit, code, help) = match &cause {
-        PrimitiveFileError::Model { .. } => (Exit::Incompatible, "E430", "learn the primitive again with this version"),
+    let code = match &cause {
+        PrimitiveFileError::Model { .. } => ErrorCode::PrimitiveModel,
         PrimitiveFileError::ExpectationModel { .. } | PrimitiveFileError::ExpectationDuration { .. } => {
-            let help = format!("record it again: `tactus rehearse {}`", path.display());
-            return Failure::new(Exit::Invalid, "E634", format!("{doing} refused {}", path.display()), cause)
-                .help(help);
+            return Failure::new(ErrorCode::ExpectationStale, format!("{doing} refused {}", path.display()), cause)
+                .help(format!("record it again: `tactus rehearse {}`", path.display()));
         }
-        PrimitiveFileError::Schema { .. } => {
-            (Exit::Incompatible, "E431", "learn the primitive again with this version")
-        }
-        PrimitiveFileError::Checksum { .. } => {
-            (Exit::Invalid, "E632", "the file was changed or damaged: learn the primitive again from its demonstration")
-        }
-        PrimitiveFileError::Image { .. } | PrimitiveFileError::Invalid { .. } => {
-            (Exit::Invalid, "E633", "learn the primitive again, see `tactus learn --help`")
-        }
-        _ => (Exit::Invalid, "E630", "`tactus learn DEMO -o FILE` writes a primitive"),
+        PrimitiveFileError::Schema { .. } => ErrorCode::PrimitiveSchema,
+        PrimitiveFileError::Checksum { .. } => ErrorCode::PrimitiveChecksum,
+        PrimitiveFileError::Image { .. } | PrimitiveFileError::Invalid { .. } => ErrorCode::PrimitiveInvalid,
+        _ => ErrorCode::PrimitiveUnreadable,
     };
-    Failure::new(exit, code, format!("{doing} refused {}", path.display()), cause).help(help)
+    Failure::new(code, format!("{doing} refused {}", path.display()), cause)
 }
 
 /// A speed factor the device takes.

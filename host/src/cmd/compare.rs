@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Exit, Failure, Global};
+use super::{ErrorCode, Failure, Global};
 use lab::demonstration::Recording;
 use lab::difference::Difference;
 
@@ -27,10 +27,8 @@ pub struct Cmd {
 /// # Errors
 /// A recording cannot be read, or lacks what is compared.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
-    let invalid = |cause: Box<dyn std::error::Error + Send + Sync>| {
-        Failure::new(Exit::Invalid, "E613", "compare", cause)
-            .help("tactus run PRIMITIVE --record FILE makes a recording")
-    };
+    let invalid =
+        |cause: Box<dyn std::error::Error + Send + Sync>| Failure::new(ErrorCode::CompareInput, "compare", cause);
     let one = Recording::read(&command.one).map_err(|cause| invalid(cause.into()))?;
     let other = Recording::read(&command.other).map_err(|cause| invalid(cause.into()))?;
     let difference = Difference::between(&one, &other, command.contact).map_err(|cause| invalid(cause.into()))?;

@@ -6,7 +6,7 @@ use std::time::Instant;
 use device::Stage;
 use link::HomeSource;
 
-use super::{Exit, Failure, Global, Output};
+use super::{ErrorCode, Failure, Global, Output};
 use lab::client::{Client, Halted, Interrupt};
 use lab::device::{Device, OpenError};
 use lab::error::HostError;
@@ -53,8 +53,7 @@ fn reach(
     adjust: impl FnOnce(&mut SimulationOptions),
 ) -> Result<(Device, String), Failure> {
     let Some(text) = &global.device else {
-        return Err(Failure::new(Exit::Usage, "E202", doing, "no device is named")
-            .help("add `--device sim:` for a simulated arm, or `--device serial:/dev/ttyACM0`, or set TACTUS_DEVICE"));
+        return Err(Failure::new(ErrorCode::NoDeviceNamed, doing, "no device is named"));
     };
     let address: Address = text.parse().map_err(|error| HostError::Address(error).into_failure(doing))?;
     let device = Device::open(&address, adjust).map_err(|error| match error {
@@ -134,60 +133,42 @@ pub(super) fn tell_speed(client: &Client<Device>, started: Instant, output: Outp
 
 /// The failure of a procedure.
 pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
-    let (exit, code, help) = match error {
+    let code = match error {
         ProcedureError::Host(error) => return error.into_failure(doing),
-        ProcedureError::NotReady(_) => (Exit::Refused, "E590", "check the pendant and the cables, then try again"),
-        ProcedureError::NotZeroed => {
-            (Exit::Refused, "E591", "bring the arm to its home pose by hand and add `--at-home`")
-        }
-        ProcedureError::ZeroOfOthers => {
-            (Exit::Refused, "E598", "emergency stop, then bring the arm home and zero it again with `--at-home`")
-        }
-        ProcedureError::Moves { .. } => (Exit::Refused, "E597", "press Shift-Idle, let the arm rest, and try again"),
-        ProcedureError::Stopped(_) => {
-            (Exit::Refused, "E592", "find and remove the cause, then `tactus stop --clear-fault`")
-        }
-        ProcedureError::Diverted(_) => {
-            (Exit::Refused, "E593", "somebody else may have stopped it with `tactus stop`; look, then try again")
-        }
-        ProcedureError::TooLong { .. } => (Exit::Refused, "E594", "look what holds the arm"),
-        ProcedureError::Hand(_) => (Exit::Refused, "E595", "free the fingers, then `tactus hand init`"),
-        ProcedureError::Recording(_) => (Exit::Internal, "E121", "check the disk and the rights of the folder"),
+        ProcedureError::NotReady(_) => ErrorCode::NotReady,
+        ProcedureError::NotZeroed => ErrorCode::NotZeroed,
+        ProcedureError::ZeroOfOthers => ErrorCode::ZeroUnknown,
+        ProcedureError::Moves { .. } => ErrorCode::ArmMoves,
+        ProcedureError::Stopped(_) => ErrorCode::ArmStopped,
+        ProcedureError::Diverted(_) => ErrorCode::Diverted,
+        ProcedureError::TooLong { .. } => ErrorCode::TooLong,
+        ProcedureError::Hand(_) => ErrorCode::HandNotReady,
+        ProcedureError::Recording(_) => ErrorCode::RecordingNotWritten,
     };
-    Failure::new(exit, code, doing, error).help(help)
+    Failure::new(code, doing, error)
 }
 
+/// The failure of a simulated device.
 pub(super) fn simulation_failure(error: SimulationError, doing: &str) -> Failure {
-    let (exit, code, help) = match &error {
-        SimulationError::UnknownWorld(_) => (Exit::Usage, "E203", "for example `--device sim:world=mujoco`"),
-        SimulationError::WithoutMujoco => {
-            (Exit::NoDevice, "E310", "`cargo xtask build`, or `--device sil:world=simple`")
+    let code = match &error {
+        SimulationError::UnknownWorld(_) => ErrorCode::UnknownWorld,
+        SimulationError::WithoutMujoco => ErrorCode::WithoutMujoco,
+        SimulationError::NoImage(_) => ErrorCode::NoQemuImage,
+        SimulationError::NoQemu(_) => ErrorCode::NoQemu,
+        SimulationError::NoEmulator(_) => ErrorCode::NoEmulator,
+        SimulationError::NoBoardImage(_) => ErrorCode::NoBoardImage,
+        SimulationError::BoardImage(_) => ErrorCode::BoardImageUnreadable,
+        SimulationError::OtherBoard { .. } => ErrorCode::ImageOfOtherBoard,
+        SimulationError::BoardRefused(_) => ErrorCode::BoardOption,
+        SimulationError::BoardEnded { .. } => {
+            return Failure::new(ErrorCode::SimulatorFailed, doing, error)
+                .help("`cargo xtask board` checks emulator and image");
         }
-        SimulationError::NoImage(_) => (Exit::NoDevice, "E311", "`cargo xtask build`"),
-        SimulationError::NoQemu(_) => (Exit::NoDevice, "E312", "`cargo xtask setup`"),
-        SimulationError::NoEmulator(_) => (Exit::NoDevice, "E313", "`cargo xtask board --build`"),
-        SimulationError::NoBoardImage(_) => (Exit::NoDevice, "E314", "`cargo xtask board --build`"),
-        SimulationError::BoardImage(_) => {
-            (Exit::Invalid, "E685", "`cargo xtask board --build` makes the image for the emulated board")
-        }
-        SimulationError::OtherBoard { .. } => (
-            Exit::Incompatible,
-            "E414",
-            "`cargo xtask board --build` makes the image for the emulated board; images for QEMU belong to `--device sim:`",
-        ),
-        SimulationError::BoardRefused(_) => {
-            (Exit::Usage, "E212", "the options of `--device board:` are in docs/board-stm32h743.md")
-        }
-        SimulationError::BoardEnded { .. } => (Exit::Internal, "E110", "`cargo xtask board` checks emulator and image"),
-        SimulationError::BusLog(..) => {
-            (Exit::Usage, "E208", "name a file in a folder that can be written, for example `sil:bus=run.log`")
-        }
-        SimulationError::Flash(..) => {
-            (Exit::Usage, "E209", "name a file of an earlier simulation, or one that does not exist yet")
-        }
-        _ => (Exit::Internal, "E110", "`cargo xtask setup` repairs the set-up of the simulator"),
+        SimulationError::BusLog(..) => ErrorCode::BusLogFile,
+        SimulationError::Flash(..) => ErrorCode::FlashFile,
+        _ => ErrorCode::SimulatorFailed,
     };
-    Failure::new(exit, code, doing, error).help(help)
+    Failure::new(code, doing, error)
 }
 
 /// Who this is, for people who find the device busy. Nobody else finds a simulated device of this process, and what is said to it
@@ -207,7 +188,7 @@ pub(super) fn interrupt() -> Interrupt {
     // Registered first, acts last: ends the process only if the flag was already raised.
     let registered = signal_hook::flag::register_conditional_shutdown(
         signal_hook::consts::SIGINT,
-        Exit::Interrupted as i32,
+        lab::error_code::Exit::Interrupted as i32,
         Arc::clone(&flag),
     )
     .and_then(|_| signal_hook::flag::register(signal_hook::consts::SIGINT, flag));
@@ -224,8 +205,7 @@ pub(super) fn interrupt() -> Interrupt {
 pub(super) fn simulated(text: &str, doing: &str) -> Result<(Device, Interrupt), Failure> {
     let address: Address = text.parse().map_err(|error| HostError::Address(error).into_failure(doing))?;
     if !matches!(address, Address::Simulated(..)) {
-        return Err(Failure::new(Exit::Usage, "E204", doing, format!("'{text}' is not a simulated device"))
-            .help("`--device sim:`, `--device sil:` or `--device board:`"));
+        return Err(Failure::new(ErrorCode::NotSimulated, doing, format!("'{text}' is not a simulated device")));
     }
     let device = Device::open(&address, |_| {}).map_err(|error| match error {
         OpenError::Transport(error) => HostError::Transport(error).into_failure(doing),

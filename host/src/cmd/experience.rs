@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use super::{Exit, Failure, Global, rehearse, upload};
+use super::{ErrorCode, Failure, Global, rehearse, upload};
 use lab::demonstration::Recording;
 use lab::learn::memory::remember_successes;
 
@@ -47,8 +47,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let bar = output.bar(command.recordings.len() as u64, "reading");
     let mut recordings = Vec::new();
     for path in &command.recordings {
-        let recording =
-            Recording::read(path).map_err(|cause| Failure::new(Exit::Invalid, "E620", "experience refused", cause))?;
+        let recording = Recording::read(path)
+            .map_err(|cause| Failure::new(ErrorCode::RecordingInvalid, "experience refused", cause))?;
         recordings.push(recording);
         bar.inc(1);
     }

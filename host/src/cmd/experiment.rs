@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use sim::world::ObjectKind;
 
-use super::{Exit, Failure, Global};
-use experiment::{Grid, Mode, Object, PlantKind, Scenario, Variation};
+use super::{ErrorCode, Failure, Global};
+use experiment::{Grid, Mode, PlantKind, Scenario, Variation};
 
 /// Options of `experiment`.
 #[derive(Debug, Clone, Args)]
@@ -41,8 +43,8 @@ pub struct Cmd {
     #[arg(long, value_name = "NAME=VALUE,...", default_value = "")]
     pub vary: Variation,
     /// What stands on the table instead of the usual object
-    #[arg(long, value_enum)]
-    pub object: Option<Object>,
+    #[arg(long, value_parser = object_kinds())]
+    pub object: Option<ObjectKind>,
     /// Simulations at a time [default: one for each processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=512))]
     pub jobs: Option<u16>,
@@ -63,6 +65,12 @@ pub struct Cmd {
     pub keep_recordings: bool,
 }
 
+/// Names of the objects, each with its description in the help.
+fn object_kinds() -> impl TypedValueParser<Value = ObjectKind> {
+    let value = |kind: ObjectKind| PossibleValue::new(kind.name()).help(kind.row().description);
+    PossibleValuesParser::new(ObjectKind::ALL.map(value)).try_map(|name| name.parse::<ObjectKind>())
+}
+
 /// Carries an experiment through.
 ///
 /// # Errors
@@ -78,7 +86,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 /// Always: experiments need the MuJoCo world.
 #[cfg(not(feature = "mujoco"))]
 pub fn run(_command: &Cmd, _global: &Global) -> Result<(), Failure> {
-    Err(Failure::new(Exit::NoDevice, "E310", "experiment", lab::simulation::SimulationError::WithoutMujoco)
+    Err(Failure::new(ErrorCode::WithoutMujoco, "experiment", lab::simulation::SimulationError::WithoutMujoco)
         .help("`cargo xtask build`"))
 }
 
@@ -87,7 +95,7 @@ mod work {
     use std::path::Path;
     use std::time::Instant;
 
-    use super::{Cmd, Exit, Failure, Global};
+    use super::{Cmd, ErrorCode, Failure, Global};
     use crate::cmd::{Output, connection, upload};
     use experiment::lesson::{self, LessonError};
     use experiment::lift::{self, Case};
@@ -185,12 +193,12 @@ mod work {
         }
         let file = out.join("figures");
         figures::write_lift(&rows, config.grid.cells.len() * config.seeds.len(), &file)
-            .map_err(|cause| Failure::new(Exit::Internal, "E123", "experiment: a figure cannot be made", cause))?;
+            .map_err(|cause| Failure::new(ErrorCode::ExperimentFigure, "experiment: a figure cannot be made", cause))?;
         output.say(format!("wrote {}", file.join("sag.png").display()));
         let data = serde_json::json!({ "experiment": config.scenario, "folder": out, "cases": rows });
         let file = out.join("results.json");
-        let json =
-            serde_json::to_string_pretty(&data).map_err(|cause| Failure::new(Exit::Internal, "E101", DOING, cause))?;
+        let json = serde_json::to_string_pretty(&data)
+            .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
         std::fs::write(&file, json).map_err(|cause| unwritable(&file, cause))?;
         output.result(&data, lift::table(&rows))
     }
@@ -208,7 +216,7 @@ mod work {
         let address: Address =
             text.parse().map_err(|error| lab::error::HostError::Address(error).into_failure(DOING))?;
         let Address::Simulated(kind, options) = address else {
-            return Err(Failure::new(Exit::Usage, "E204", DOING, format!("'{text}' is not a simulated device"))
+            return Err(Failure::new(ErrorCode::NotSimulated, DOING, format!("'{text}' is not a simulated device"))
                 .help("`--device sil:`, or `--device sim:` for the firmware under QEMU, or `--device board:` for it on the emulated board"));
         };
         let options = SimulationOptions::from_address(kind, &options)
@@ -265,13 +273,13 @@ mod work {
             "modes": summaries, "comparison": comparison, "trials": results.reports,
         });
         let file = out.join("results.json");
-        let text =
-            serde_json::to_string_pretty(&data).map_err(|cause| Failure::new(Exit::Internal, "E101", DOING, cause))?;
+        let text = serde_json::to_string_pretty(&data)
+            .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
         std::fs::write(&file, text).map_err(|cause| unwritable(&file, cause))?;
         let file = out.join("results.csv");
         results.write_csv(&file).map_err(|cause| unwritable(&file, cause))?;
         let figures = figures::write(config, experiment, &out.join("figures"), render)
-            .map_err(|cause| Failure::new(Exit::Internal, "E123", "experiment: a figure cannot be made", cause))?;
+            .map_err(|cause| Failure::new(ErrorCode::ExperimentFigure, "experiment: a figure cannot be made", cause))?;
         for figure in figures.iter().filter(|file| file.extension().is_some_and(|kind| kind == "png")) {
             output.say(format!("wrote {}", figure.display()));
         }
@@ -296,33 +304,31 @@ mod work {
     }
 
     fn unwritable(file: &Path, cause: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Failure {
-        Failure::new(Exit::Internal, "E124", format!("experiment: {} cannot be written", file.display()), cause)
-            .help("check the disk and the rights of the folder")
+        Failure::new(ErrorCode::ResultsNotWritten, format!("experiment: {} cannot be written", file.display()), cause)
     }
 
     fn failure(error: ExperimentError, out: &Path) -> Failure {
         use experiment::results::ResultsError;
         let refused = "experiment refused";
         match error {
-            ExperimentError::OutOfReach(_) => Failure::new(Exit::Invalid, "E660", refused, error)
-                .help("leave these cells out, for example with `--grid 4x3` or a list of `--cells`"),
-            ExperimentError::Results(ResultsError::Exists { .. }) => Failure::new(Exit::Usage, "E207", refused, error)
-                .help("`--resume` goes on with them; `--out FOLDER` begins anew elsewhere"),
+            ExperimentError::OutOfReach(_) => Failure::new(ErrorCode::OutOfReach, refused, error),
+            ExperimentError::Results(ResultsError::Exists { .. }) => {
+                Failure::new(ErrorCode::ResultsExist, refused, error)
+            }
             ExperimentError::Results(ResultsError::OtherConfiguration { .. }) => {
-                Failure::new(Exit::Incompatible, "E404", refused, error)
+                Failure::new(ErrorCode::OtherExperiment, refused, error)
                     .help(format!("choose another folder with `--out`, or remove {}", out.display()))
             }
             ExperimentError::Results(ResultsError::Line { .. }) => {
-                Failure::new(Exit::Invalid, "E661", refused, error).help("choose another folder with `--out`")
+                Failure::new(ErrorCode::ResultsDamaged, refused, error)
             }
             ExperimentError::Interrupted { .. } => {
-                Failure::new(Exit::Interrupted, "E130", DOING, error).help("`--resume` goes on from here")
+                Failure::new(ErrorCode::Interrupted, DOING, error).help("`--resume` goes on from here")
             }
             ExperimentError::Primitive(cause) => trial_failure(cause),
-            ExperimentError::Trial { .. } => Failure::new(Exit::Refused, "E596", DOING, error)
-                .help("`--resume` goes on from here when the reason is gone"),
+            ExperimentError::Trial { .. } => Failure::new(ErrorCode::TrialFailed, DOING, error),
             ExperimentError::Results(ResultsError::File { .. }) | ExperimentError::File { .. } => {
-                Failure::new(Exit::Internal, "E124", DOING, error).help("check the disk and the rights of the folder")
+                Failure::new(ErrorCode::ResultsNotWritten, DOING, error)
             }
         }
     }
@@ -332,7 +338,7 @@ mod work {
             TrialError::Simulation(error) => connection::simulation_failure(error, DOING),
             TrialError::Procedure(error) => connection::failure(error, DOING),
             error @ (TrialError::Primitive(_) | TrialError::Movement(_)) => {
-                Failure::new(Exit::Invalid, "E631", "experiment refused", error)
+                Failure::new(ErrorCode::CheckFailed, "experiment refused", error)
                     .help("`tactus check` tells what is wrong with a primitive")
             }
         }
@@ -341,8 +347,7 @@ mod work {
     fn lesson_failure(error: LessonError) -> Failure {
         match error {
             LessonError::Trial(error) => trial_failure(error),
-            error => Failure::new(Exit::Invalid, "E662", "experiment: no primitive was made", error)
-                .help("make one with `tactus teach`, `learn` and `rehearse`, and give it with `--primitive`"),
+            error => Failure::new(ErrorCode::NotTaught, "experiment: no primitive was made", error),
         }
     }
 }

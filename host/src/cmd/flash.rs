@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use super::{Exit, Failure, Global, Table, connection};
-use crate::probe::{INSTALL_PROBE_RS, Line, ProbeError};
+use super::{ErrorCode, Failure, Global, Table, connection};
+use crate::probe::{Line, ProbeError};
 use lab::image_file::{ImageFile, ImageFileError};
 use lab::simulation::built_image;
 
@@ -75,10 +75,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 pub(super) fn open_image(named: Option<&PathBuf>, doing: &str) -> Result<ImageFile, Failure> {
     let path = match named {
         Some(path) => path.clone(),
-        None => built_image(IMAGE).ok_or_else(|| {
-            Failure::new(Exit::Invalid, "E680", doing, format!("no image {IMAGE} was built"))
-                .help("build it with `cargo xtask build --board stm32h743`, or name one with `--image`")
-        })?,
+        None => built_image(IMAGE)
+            .ok_or_else(|| Failure::new(ErrorCode::ImageMissing, doing, format!("no image {IMAGE} was built")))?,
     };
     ImageFile::read(&path).map_err(|error| image_failure(error, doing))
 }
@@ -116,37 +114,29 @@ fn confirm(image: &ImageFile, global: &Global, doing: &str) -> Result<(), Failur
         return Ok(());
     }
     let text = format!("the device runs {} on {}, not {} on {}", found[0], found[1], expected.firmware, expected.board);
-    Err(Failure::new(Exit::Incompatible, "E413", doing, text)
-        .help("check that `--device` is the board the debug probe is connected to"))
+    Err(Failure::new(ErrorCode::OtherImageRuns, doing, text))
 }
 
 /// An image that cannot be used, as a failure.
 pub(super) fn image_failure(error: ImageFileError, doing: &str) -> Failure {
-    let (code, help) = match &error {
-        ImageFileError::Emulated { .. } => {
-            ("E682", "build one with `cargo xtask build --board stm32h743`; for the emulator use `--device sim:`")
+    let code = match &error {
+        ImageFileError::UnknownBoard { .. } => {
+            return Failure::new(ErrorCode::ImageOfNoBoard, doing, error)
+                .help("use a `tactus` built from the same sources as the image");
         }
-        ImageFileError::UnknownBoard { .. } => ("E682", "use a `tactus` built from the same sources as the image"),
-        ImageFileError::Outside { .. } | ImageFileError::OverStore { .. } => {
-            ("E683", "the image is damaged or was linked for something else: build it again; nothing was written")
-        }
-        _ => ("E681", "build an image with `cargo xtask build --board stm32h743`"),
+        ImageFileError::Emulated { .. } => ErrorCode::ImageOfNoBoard,
+        ImageFileError::Outside { .. } | ImageFileError::OverStore { .. } => ErrorCode::ImageOutOfPlace,
+        _ => ErrorCode::ImageUnreadable,
     };
-    Failure::new(Exit::Invalid, code, doing, error).help(help)
+    Failure::new(code, doing, error)
 }
 
 /// A debug probe that did not do it, as a failure.
 pub(super) fn probe_failure(error: ProbeError, doing: &str) -> Failure {
-    let (code, help) = match &error {
-        ProbeError::Missing { program: "defmt-print" } => {
-            ("E332", "install it with `cargo install defmt-print --locked`".to_owned())
-        }
-        ProbeError::Missing { .. } => ("E330", format!("install it with `{INSTALL_PROBE_RS}`")),
-        ProbeError::NotStarted { .. } | ProbeError::Failed { .. } => (
-            "E331",
-            "check the USB cable to the ST-LINK connector, the board's power, and with `probe-rs list` that the probe is seen"
-                .to_owned(),
-        ),
+    let code = match &error {
+        ProbeError::Missing { program: "defmt-print" } => ErrorCode::DefmtPrintMissing,
+        ProbeError::Missing { .. } => ErrorCode::ProbeRsMissing,
+        ProbeError::NotStarted { .. } | ProbeError::Failed { .. } => ErrorCode::ProbeFailed,
     };
-    Failure::new(Exit::NoDevice, code, doing, error).help(help)
+    Failure::new(code, doing, error)
 }

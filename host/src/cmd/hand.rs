@@ -4,7 +4,7 @@ use clap::{Args, Subcommand};
 use link::HandStage;
 use serde_json::json;
 
-use super::{Exit, Failure, Global, connection};
+use super::{ErrorCode, Failure, Global, connection};
 use lab::client::Client;
 use lab::device::Device;
 use lab::procedure::{self, HandReach, ProcedureError};
@@ -57,8 +57,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let status = client.status().map_err(|error| error.into_failure(DOING))?;
     if status.hand_stage != HandStage::Ready {
-        return Err(Failure::new(Exit::Refused, "E596", DOING, "the arm has no hand that works")
-            .help("check the hand's cable; its four pucks are looked for when the arm's bus starts"));
+        return Err(Failure::new(ErrorCode::NoHand, DOING, "the arm has no hand that works"));
     }
     let spread = status.hand[0];
     let target = match command.action {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use super::{Exit, Failure, Global};
+use super::{ErrorCode, Failure, Global};
 use lab::demonstration::{Preparation, Recording};
 use lab::learn::feedback::FeedbackOptions;
 use lab::learn::hand::HandMotion;
@@ -81,8 +81,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         None => file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
     };
     if let Err(error) = link::Name::new(&name) {
-        return Err(Failure::new(Exit::Usage, "E220", format!("learn: the name `{name}`"), error)
-            .help("give a name with `--name NAME`"));
+        return Err(Failure::new(ErrorCode::NameInvalid, format!("learn: the name `{name}`"), error));
     }
     let options = LearnOptions {
         name,
@@ -106,12 +105,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     };
     let spinner = output.spinner("learning");
     let recording = Recording::read(&command.demonstration)
-        .map_err(|cause| Failure::new(Exit::Invalid, "E620", "learn refused", cause))?;
+        .map_err(|cause| Failure::new(ErrorCode::RecordingInvalid, "learn refused", cause))?;
     let learned = learn::learn(&recording, &file, &options).map_err(|error| failure(error, command))?;
-    learned
-        .primitive
-        .write(&file)
-        .map_err(|cause| Failure::new(Exit::Internal, "E120", "learn: the primitive cannot be written", cause))?;
+    learned.primitive.write(&file).map_err(|cause| {
+        Failure::new(ErrorCode::PrimitiveNotWritten, "learn: the primitive cannot be written", cause)
+    })?;
     spinner.finish_and_clear();
     for warning in &learned.report.warnings {
         output.warn(warning);
@@ -134,14 +132,14 @@ fn failure(error: LearnError, command: &Cmd) -> Failure {
         }
         _ => None,
     };
-    let (exit, code) = match &error {
-        LearnError::Option { .. } => (Exit::Usage, "E221"),
-        LearnError::Demonstration(_) => (Exit::Invalid, "E621"),
-        LearnError::TurnsTooFar { .. } => (Exit::Invalid, "E622"),
-        LearnError::Fit { .. } => (Exit::Invalid, "E623"),
-        LearnError::Primitive(_) => (Exit::Invalid, "E624"),
+    let code = match &error {
+        LearnError::Option { .. } => ErrorCode::LearnOption,
+        LearnError::Demonstration(_) => ErrorCode::NoDemonstration,
+        LearnError::TurnsTooFar { .. } => ErrorCode::TurnsTooFar,
+        LearnError::Fit { .. } => ErrorCode::FitFailed,
+        LearnError::Primitive(_) => ErrorCode::LearnedInvalid,
     };
-    let failure = Failure::new(exit, code, "learn refused", error);
+    let failure = Failure::new(code, "learn refused", error);
     match help {
         Some(help) => failure.help(help),
         None => failure,

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::flash::{image_failure, open_image, probe_failure};
-use super::{Exit, Failure, Global};
+use super::{ErrorCode, Failure, Global};
 use crate::probe::Line;
 use lab::image_file::ImageFile;
 use lab::simulation::{IMAGE_VARIABLE, built_image};
@@ -46,7 +46,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let (line, input) = match &command.file {
         Some(path) => {
             let input = File::open(path).map_err(|error| {
-                Failure::new(Exit::Invalid, "E684", DOING, format!("cannot read {}: {error}", path.display()))
+                Failure::new(ErrorCode::LogFileUnreadable, DOING, format!("cannot read {}: {error}", path.display()))
             })?;
             (Line::print(&emulated_image(command, DOING)?.path), Some(input))
         }
@@ -62,10 +62,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     if command.file.is_none() && !command.attach_may_reset {
         let text = "attaching the debug probe halts the board for a moment, and its watchdog may restart it";
-        return Err(Failure::new(Exit::Usage, "E223", DOING, text.to_owned()).help(
-            "take the torque from the arm (Shift-Idle), then `tactus logs --attach-may-reset`; better, start it before \
-             the arm is switched on: once attached it only reads",
-        ));
+        return Err(Failure::new(ErrorCode::AttachMayReset, DOING, text.to_owned()));
     }
     line.run(input).map_err(|error| probe_failure(error, DOING))
 }
@@ -74,7 +71,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 fn emulated_image(command: &Cmd, doing: &str) -> Result<ImageFile, Failure> {
     let named = command.image.clone().or_else(|| std::env::var_os(IMAGE_VARIABLE).map(PathBuf::from));
     let path = named.or_else(|| built_image(EMULATED_IMAGE)).ok_or_else(|| {
-        Failure::new(Exit::Invalid, "E680", doing, format!("no image {EMULATED_IMAGE} was built"))
+        Failure::new(ErrorCode::ImageMissing, doing, format!("no image {EMULATED_IMAGE} was built"))
             .help("build it with `cargo xtask build`, or name one with `--image`")
     })?;
     ImageFile::read(&path).map_err(|error| image_failure(error, doing))

@@ -30,7 +30,8 @@ use clap::{Args, Parser, Subcommand};
 
 pub use output::Output;
 
-use lab::failure::{Exit, Failure};
+use lab::error_code::ErrorCode;
+use lab::failure::Failure;
 use lab::table::Table;
 
 /// Teach, learn, check, upload, run and watch movement primitives on a Barrett WAM.
@@ -153,7 +154,7 @@ pub fn run(cli: Cli) -> ExitCode {
                 println!("{}", failure.to_json());
             }
             eprintln!("{failure}");
-            ExitCode::from(failure.exit as u8)
+            ExitCode::from(failure.code.exit() as u8)
         }
     }
 }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::{Exit, Failure};
+use super::{ErrorCode, Failure};
 
 /// Where the output of one command goes.
 #[derive(Debug, Clone, Copy, Default)]
@@ -37,7 +37,7 @@ impl Output {
     /// The output was closed, or the data cannot be expressed in JSON.
     pub fn result(&self, data: &impl Serialize, text: impl AsRef<str>) -> Result<(), Failure> {
         let broken = |cause: Box<dyn std::error::Error + Send + Sync>| {
-            Failure::new(Exit::Internal, "E101", "writing the result", cause)
+            Failure::new(ErrorCode::ResultNotWritten, "writing the result", cause)
         };
         let line: Cow<'_, str> = if self.json {
             serde_json::to_string(data).map_err(|cause| broken(cause.into()))?.into()

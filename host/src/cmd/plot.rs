@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use super::{Exit, Failure, Global};
+use super::{ErrorCode, Failure, Global};
 use lab::demonstration::{Demonstration, Preparation, Recording};
 use lab::plan;
 use lab::plot::{self, Movement, movement::PosePath};
@@ -45,7 +45,7 @@ pub struct Cmd {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let doing = "plot";
-    let invalid = |cause: Box<dyn std::error::Error + Send + Sync>| Failure::new(Exit::Invalid, "E610", doing, cause);
+    let invalid = |cause: Box<dyn std::error::Error + Send + Sync>| Failure::new(ErrorCode::PlotInput, doing, cause);
     let demonstration = match &command.demonstration {
         None => None,
         Some(file) => {
@@ -84,16 +84,13 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         plan,
         execution: execution.map(|recording| recording.running()),
     };
-    let page = movement.page().map_err(|cause| {
-        Failure::new(Exit::Usage, "E210", doing, cause)
-            .help("tactus plot --demonstration demo.csv --primitive reach.toml --run run.csv --output figure.png")
-    })?;
+    let page = movement.page().map_err(|cause| Failure::new(ErrorCode::NothingToDraw, doing, cause))?;
     let spinner = output.spinner("drawing");
     for file in &command.output {
         plot::write(&page, file).map_err(|cause| {
-            let exit = if matches!(cause, plot::PlotError::Format { .. }) { Exit::Usage } else { Exit::Internal };
-            let code = if exit == Exit::Usage { "E211" } else { "E111" };
-            Failure::new(exit, code, doing, cause)
+            let is_format = matches!(cause, plot::PlotError::Format { .. });
+            let code = if is_format { ErrorCode::FigureFormat } else { ErrorCode::FigureNotWritten };
+            Failure::new(code, doing, cause)
         })?;
     }
     if let (Some(file), Some(run)) = (&command.picture, &movement.execution) {
@@ -121,12 +118,13 @@ fn picture(run: &Recording, file: &std::path::Path) -> Result<(), Failure> {
     const DOT_EVERY: usize = 15;
 
     let doing = "plot: the picture";
-    let failed = |cause: Box<dyn std::error::Error + Send + Sync>| Failure::new(Exit::Internal, "E112", doing, cause);
+    let failed =
+        |cause: Box<dyn std::error::Error + Send + Sync>| Failure::new(ErrorCode::PictureNotRendered, doing, cause);
     let (Some(postures), Some(path)) = (&run.q, &run.position) else {
-        return Err(Failure::new(Exit::Invalid, "E611", doing, "the run has no joint angles or no positions"));
+        return Err(Failure::new(ErrorCode::RunWithoutPath, doing, "the run has no joint angles or no positions"));
     };
     let Some(last) = postures.last() else {
-        return Err(Failure::new(Exit::Invalid, "E612", doing, "the run has no samples"));
+        return Err(Failure::new(ErrorCode::RunEmpty, doing, "the run has no samples"));
     };
     let ghosts = (0..GHOSTS).map(|ghost| postures[ghost * postures.len() / (GHOSTS + 1)]).collect();
     let trail = Trail {
@@ -143,6 +141,6 @@ fn picture(run: &Recording, file: &std::path::Path) -> Result<(), Failure> {
 /// Without MuJoCo there is nothing to see.
 #[cfg(not(feature = "mujoco"))]
 fn picture(_run: &Recording, _file: &std::path::Path) -> Result<(), Failure> {
-    Err(Failure::new(Exit::NoDevice, "E310", "plot: the picture", "this tactus was built without the MuJoCo world")
+    Err(Failure::new(ErrorCode::WithoutMujoco, "plot: the picture", "this tactus was built without the MuJoCo world")
         .help("`cargo xtask build`"))
 }

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use link::RunOptions;
 use serde::Serialize;
 
-use super::{Exit, Failure, Global, Table, connection, upload};
+use super::{ErrorCode, Failure, Global, Table, connection, upload};
 use lab::client::Client;
 use lab::demonstration::{RATE, Recording};
 use lab::device::Device;
@@ -115,8 +115,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
                 path
             }
         };
-        let recording = Recording::parse(&path, &bytes)
-            .map_err(|cause| Failure::new(Exit::Internal, "E122", "rehearse: the recording reads back wrong", cause))?;
+        let recording = Recording::parse(&path, &bytes).map_err(|cause| {
+            Failure::new(ErrorCode::RecordingReadsBackWrong, "rehearse: the recording reads back wrong", cause)
+        })?;
         recordings.push(recording);
         marks.push(flags);
     }
@@ -177,8 +178,9 @@ fn play(
 
 /// Writes a primitive that has learned something.
 pub(super) fn write(file: &PrimitiveFile, target: &Path, doing: &str) -> Result<(), Failure> {
-    let failed =
-        |cause| Failure::new(Exit::Internal, "E120", format!("{doing}: the primitive cannot be written"), cause);
+    let failed = |cause| {
+        Failure::new(ErrorCode::PrimitiveNotWritten, format!("{doing}: the primitive cannot be written"), cause)
+    };
     // What a device would refuse is not written.
     file.to_image().map_err(|cause| super::check::failure(cause, target, doing))?;
     file.write(target).map_err(failed)
@@ -197,7 +199,7 @@ pub(super) fn memory_failure(cause: MemoryError, doing: &str) -> Failure {
         MemoryError::Duration { .. } => "give recordings of this primitive, all at the same speed",
         MemoryError::Table(_) => "give other recordings",
     };
-    Failure::new(Exit::Invalid, "E640", doing, cause).help(help)
+    Failure::new(ErrorCode::NotRemembered, doing, cause).help(help)
 }
 
 impl Report {

@@ -10,7 +10,7 @@ use embedded_can::Frame as _;
 use link::{Goal, RunOptions, Statistics};
 use serde::Serialize;
 
-use super::{Exit, Failure, Global, Output, Table, connection, upload};
+use super::{ErrorCode, Failure, Global, Output, Table, connection, upload};
 use lab::client::Client;
 use lab::demonstration::{RATE, Recording};
 use lab::device::Device;
@@ -248,8 +248,7 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
     let help = format!("tactus rehearse {}", file.file.display());
     let Some(expectation) = &file.expectation else {
         return Err(Failure::new(
-            Exit::Invalid,
-            "E635",
+            ErrorCode::NoExpectation,
             doing,
             format!("{}: the primitive does not know what it should feel", file.file.display()),
         )
@@ -260,8 +259,7 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
     let trust = primitive.expected().map_or(0.0, |expected| expected.trust(relative));
     if trust <= 0.0 {
         return Err(Failure::new(
-            Exit::Invalid,
-            "E636",
+            ErrorCode::ExpectationSpeed,
             doing,
             format!(
                 "the expectation was recorded at {:.2} s, this run would take {:.2} s: more than 50 % apart",

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 
-use super::{Exit, Failure, Global, connection};
+use super::{ErrorCode, Failure, Global, connection};
 use lab::client::Interrupt;
 use lab::device::Device;
 use lab::transport::{Address, Transport, TransportError};
@@ -111,8 +111,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     let (mut device, interrupt) = connection::simulated(&device, DOING)?;
     let listener = listen(&command.listen).map_err(|cause| {
-        Failure::new(Exit::NoDevice, "E320", format!("sim: cannot listen on {}", command.listen), cause)
-            .help("choose another address with `--listen`")
+        Failure::new(ErrorCode::CannotListen, format!("sim: cannot listen on {}", command.listen), cause)
     })?;
     output.say(format!("a simulated arm listens; in another terminal: `tactus --device {} list`", command.listen));
     let served = serve(command, &mut device, &listener, &interrupt);

@@ -8,9 +8,9 @@ use std::time::Instant;
 use clap::Args;
 use control::State;
 use serde_json::json;
-use sim::person::Lesson;
+use sim::teacher::TaughtMovement;
 
-use super::{Exit, Failure, Global, connection};
+use super::{ErrorCode, Failure, Global, connection};
 use lab::client::Client;
 use lab::device::Device;
 use lab::procedure::{self, ProcedureError, Recorder, Take};
@@ -62,13 +62,13 @@ pub enum LessonName {
 }
 
 impl LessonName {
-    fn lesson(self) -> Lesson {
+    fn lesson(self) -> TaughtMovement {
         match self {
-            LessonName::Demonstration => Lesson::Demonstration,
-            LessonName::Flashlight => Lesson::Flashlight,
-            LessonName::Cup => Lesson::Cup,
-            LessonName::Bottle => Lesson::Bottle,
-            LessonName::Lift => Lesson::Lift,
+            LessonName::Demonstration => TaughtMovement::SmallTorch,
+            LessonName::Flashlight => TaughtMovement::Flashlight,
+            LessonName::Cup => TaughtMovement::Cup,
+            LessonName::Bottle => TaughtMovement::Bottle,
+            LessonName::Lift => TaughtMovement::Lift,
         }
     }
 }
@@ -92,21 +92,17 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let alone = global.non_interactive && command.duration.is_none();
     if alone && default_posture(&mut client, command.lesson).is_none() {
         return Err(Failure::new(
-            Exit::Usage,
-            "E205",
+            ErrorCode::NobodyToAsk,
             DOING,
             "nobody may be asked to press Enter when the movement is shown",
-        )
-        .help("say how long to record with `--duration SECONDS`"));
+        ));
     }
     if command.from.is_some() && default_posture(&mut client, command.lesson).is_some() {
         return Err(Failure::new(
-            Exit::Usage,
-            "E206",
+            ErrorCode::StartIsFixed,
             DOING,
             "the simulated person knows one movement, and where it begins",
-        )
-        .help("leave out `--from`"));
+        ));
     }
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let failed = |error| connection::failure(error, DOING);
@@ -197,7 +193,7 @@ fn wait_for_enter() -> std::thread::JoinHandle<()> {
 mod person {
     use std::any::Any;
 
-    use sim::person::{GuidedWorld, Lesson, Stage};
+    use sim::teacher::{GuidedWorld, Stage, TaughtMovement};
     use sim::world::mujoco::{MujocoWorld, Scene};
 
     use lab::client::Client;
@@ -214,7 +210,7 @@ mod person {
     /// The way is shown without the object: a person who leads the hand would push it over, and what is shown is the way. The
     /// first lesson keeps it, because its grasp ends beside it.
     pub(super) fn clear_the_table(options: &mut SimulationOptions) {
-        if options.lesson != Lesson::Demonstration {
+        if options.lesson != TaughtMovement::SmallTorch {
             options.scene = Scene::EMPTY;
         }
     }
@@ -224,12 +220,12 @@ mod person {
         let Some(world) = guided(client) else {
             return false;
         };
-        world.person_mut().begin();
+        world.teacher_mut().begin();
         true
     }
 
     pub(super) fn guiding_is_over(client: &mut Client<Device>) -> bool {
-        guided(client).is_some_and(|world| world.person().stage() == Stage::Done)
+        guided(client).is_some_and(|world| world.teacher().stage() == Stage::Done)
     }
 
     /// Where the simulated person's path begins.

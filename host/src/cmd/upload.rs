@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use super::{Exit, Failure, Global, Output, connection};
+use super::{ErrorCode, Failure, Global, Output, connection};
 use crate::check;
 use lab::client::{Client, UploadOutcome, UploadPhase};
 use lab::device::Device;
@@ -71,7 +71,7 @@ pub(super) fn precheck(file: &PrimitiveFile, speed: f64, output: Output, doing: 
     match report.violations.first() {
         None => Ok(()),
         Some(first) => {
-            Err(Failure::new(Exit::Invalid, "E631", format!("{doing} refused: the check failed"), first.to_string())
+            Err(Failure::new(ErrorCode::CheckFailed, format!("{doing} refused: the check failed"), first.to_string())
                 .help(format!("tactus check {}", file.file.display())))
         }
     }

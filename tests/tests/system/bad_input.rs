@@ -1,4 +1,4 @@
-//! What a device does with noise, strangers and bad primitives: it drops, refuses with a reason, and goes on.
+//! A device answers noise, unknown hosts and bad primitives as it should: it drops, refuses with a reason, and goes on.
 
 use lab::client::{Client, UploadOutcome};
 use lab::error::HostError;

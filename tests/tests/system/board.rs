@@ -10,7 +10,8 @@ use system_tests::command::{one_object, program, stderr, tactus};
 use system_tests::execution::{Execution, beyond_torque_limits, distance, grasp_point, play};
 use system_tests::{Arm, PRIMITIVE, expect, ready, simulation, taught};
 
-/// A run of the taught primitive on a board whose bank 2 and report are files in the folder; the board is switched off afterwards.
+/// A run of the taught primitive on a board whose bank 2 and report are files in the folder; the board is switched off
+/// afterwards.
 fn run_in(folder: &Path, seed: u64) -> (Execution, u64) {
     let (bank, report) = (folder.join("bank2"), folder.join("report.json"));
     let mut arm = ready(&format!("board:seed={seed},flash={},report={}", bank.display(), report.display()));
@@ -19,12 +20,12 @@ fn run_in(folder: &Path, seed: u64) -> (Execution, u64) {
     (execution, hash)
 }
 
-/// What the emulator reported when the board was switched off.
+/// Report of the emulator when the board was switched off.
 fn report(folder: &Path) -> serde_json::Value {
     expect(serde_json::from_slice(&expect(fs::read(folder.join("report.json")))))
 }
 
-/// What a device stores: names, and checksums of the images.
+/// Content of a device's library: names, and checksums of the images.
 fn stored(arm: &mut Arm) -> Vec<(String, u32)> {
     expect(arm.list()).into_iter().map(|listing| (listing.name.as_str().to_owned(), listing.crc)).collect()
 }

@@ -11,7 +11,7 @@ use system_tests::bus::{CYCLE_TICKS, position_requests, torques};
 use system_tests::execution::{distance, watch};
 use system_tests::{at_rest, boot, expect, ready, simulation};
 
-/// How far the start of a position request may wander, ticks: interrupt and round (10 us) behind the rest of the longest
+/// Largest spread of the start of a position request, ticks: interrupt and round (10 us) behind the rest of the longest
 /// frame that may be on the wire (135 us).
 const JITTER: u64 = 145 * sim::TICKS_PER_MICROSECOND;
 

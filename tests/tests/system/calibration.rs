@@ -1,4 +1,5 @@
-//! An arm whose home is not the model's: wrong by that in every angle until it is calibrated, right for ever afterwards.
+//! An arm whose home is not the model's: wrong by that in every angle until it is calibrated, right for ever
+//! afterwards.
 
 use control::State;
 use device::Stage;
@@ -11,11 +12,11 @@ use link::{HomeSource, Refusal};
 use sim::flash::{Flash, FlashChip, FlashTimes};
 use system_tests::{Arm, command, expect, simulation};
 
-/// How far this arm's home is from the model's, rad: two to six degrees.
+/// Distance of this arm's home from the model's, rad: two to six degrees.
 const BESIDE: [f64; 7] = [0.06, 0.09, -0.05, -0.08, 0.1, 0.04, -0.07];
 
-/// What zeroing may be wrong by, rad: a motor's count is at most 0.11 mrad of a joint, J5 and J6 hang on two motors, and two
-/// zeroings are compared.
+/// Largest error of zeroing, rad: a motor's count is at most 0.11 mrad of a joint, J5 and J6 hang on two motors, and
+/// two zeroings are compared.
 const COUNTS: f64 = 3e-4;
 
 /// An arm that stands at its own home, whose device has this flash; zeroed, torque off.
@@ -35,7 +36,7 @@ fn truth(arm: &mut Arm) -> [f64; 7] {
     simulation(arm.transport()).world().joint_positions()
 }
 
-/// What the arm says minus where it is, and how far it sinks while this is found out, rad: brakes hold it, but not quite.
+/// Reported minus true joint angles, and the sag while they are measured, rad: brakes hold it, but not quite.
 fn errors(arm: &mut Arm) -> ([f64; 7], [f64; 7]) {
     let before = truth(arm);
     let read = expect(procedure::correct_home(arm, before)).read;

@@ -14,8 +14,8 @@ const NEAR_HOME: [f32; 7] = [0.05, -1.85, 0.05, 2.95, 0.05, 0.05, 0.05];
 /// Hash of the bus and bytes of the recording.
 type Account = (u64, Vec<u8>);
 
-/// Holds for a second: the simulated operator lets go of the arm half a second after it became active, and an arm that is
-/// moved against his hand jumps when he does.
+/// Holds for a second: the simulated operator lets go of the arm half a second after it became active, and an arm that
+/// is moved against his hand jumps when he does.
 fn carry_itself(arm: &mut Arm) {
     expect(arm.hold());
     watch(arm, 300);
@@ -46,7 +46,7 @@ fn hash(arm: &mut Arm) -> u64 {
     simulation(arm.transport()).plant().trace().hash
 }
 
-/// Whether two accounts are the same, without printing a megabyte when they are not.
+/// Asserts that two accounts are the same, without printing a megabyte when they are not.
 #[track_caller]
 fn assert_same(one: &Account, other: &Account, what: &str) {
     println!("{what}: {:016x} and {:016x}", one.0, other.0);

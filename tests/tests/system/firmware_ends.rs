@@ -12,7 +12,7 @@ use lab::transport::TransportError;
 use system_tests::command::{signal, start, tactus};
 use system_tests::expect;
 
-/// What a conversation ended with, if it was the end of the simulated firmware.
+/// Returns the error that ended a conversation, if it was the end of the simulated firmware.
 fn ended(error: HostError) -> Option<String> {
     let HostError::Transport(TransportError::Other(cause)) = error else {
         return None;

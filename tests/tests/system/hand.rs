@@ -1,4 +1,5 @@
-//! The hand image on its Cortex-M3 under QEMU: a hand alone on its bus, from power-up to a grip with the expected force, and what it costs.
+//! The hand image on its Cortex-M3 under QEMU: a hand alone on its bus, from power-up to a grip with the expected
+//! force, and what it costs.
 
 use std::time::Duration;
 
@@ -21,10 +22,11 @@ const GRIP: &str = "grip";
 /// Kernels of the movement: the most there can be.
 const KERNELS: usize = 100;
 
-/// What the gauges should feel at the end, N m: the fingers press.
+/// Expected gauge torque at the end, N m: the fingers press.
 const EXPECTED: [f32; 3] = [-0.25, -0.28, -0.22];
 
-/// Instructions of a control cycle, all three slots, that must not be exceeded: half a cycle of 72 MHz at one per clock.
+/// Instructions of a control cycle, all three slots, that must not be exceeded: half a cycle of 72 MHz at one per
+/// clock.
 const BOUND: u32 = 120_000;
 
 /// Instructions per tick of the image's clock: 125 million a second over 25 MHz.

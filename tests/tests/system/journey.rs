@@ -10,7 +10,7 @@ use system_tests::command::{one_object, tactus};
 use system_tests::execution::{beyond_torque_limits, play};
 use system_tests::{expect, ready, simulation};
 
-/// What the flashlight may lean after the run: it still stands.
+/// Largest lean of the flashlight after the run: it still stands.
 const UPRIGHT: f64 = 2.0;
 
 /// Every sample came over the link, one a cycle, while the arm was weightless.

@@ -1,4 +1,5 @@
-//! The whole system: firmware under QEMU or on the emulated board, bus, world, link, host tools. One program, so that all share what was taught.
+//! The whole system: firmware under QEMU or on the emulated board, bus, world, link, host tools. One program, so that
+//! all share what was taught.
 
 mod bad_input;
 mod board;

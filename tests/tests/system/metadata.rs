@@ -1,4 +1,4 @@
-//! What an image says about itself in its file, and what it says when it runs.
+//! Metadata of an image in its file, and in its hello when it runs.
 
 use lab::image_file::ImageFile;
 use lab::simulation::{IMAGE_VARIABLE, built_image};

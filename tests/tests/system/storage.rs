@@ -82,8 +82,8 @@ fn names(arm: &mut Arm) -> Vec<String> {
     expect(arm.list()).into_iter().map(|listing| listing.name.as_str().to_owned()).collect()
 }
 
-/// Content of a flash that holds `images` and a "filler" and has been written all around, so that the next upload must copy
-/// images and erase a sector before it can be durable.
+/// Content of a flash that holds `images` and a "filler" and has been written all around, so that the next upload must
+/// copy images and erase a sector before it can be durable.
 fn crowded(images: &[Vec<u8>]) -> Vec<u8> {
     let chip = FlashChip::new(Flash::blank(FlashTimes::NONE));
     let mut arm = connect("sil:world=simple", &chip);
@@ -134,7 +134,7 @@ fn to_the_start(arm: &mut Arm) {
     }
 }
 
-/// How far the starts of the torque frames of these cycles wander, ticks: latest minus earliest place in the cycle.
+/// Spread of the starts of the torque frames of these cycles, ticks: latest minus earliest place in the cycle.
 fn torque_jitter(starts: &[u64]) -> u64 {
     let places: Vec<u64> = starts.iter().map(|start| start % CYCLE_TICKS).collect();
     places.iter().max().zip(places.iter().min()).map_or(0, |(most, least)| most - least)
@@ -157,8 +157,9 @@ fn an_upload_with_an_erase_during_a_run_delays_no_control_cycle() {
     let chip = FlashChip::new(Flash::with_content(crowded(&kept), FlashTimes::SLOW));
     let mut arm = connect("sim:world=simple", &chip);
     to_the_start(&mut arm);
-    // Every third cycle, which the line carries beside the upload. With every cycle (about 66 of its 92 kB/s) it is full while the
-    // image is read back, and telemetry gives way to answers, erase or no erase: the second upload below tells how often.
+    // Every third cycle, which the line carries beside the upload. With every cycle (about 66 of its 92 kB/s) it is
+    // full while the image is read back, and telemetry gives way to answers, erase or no erase: the second upload below
+    // tells how often.
     expect(arm.set_telemetry(3));
     expect(arm.run(&name_of("long"), RunOptions { feedback: false, ..RunOptions::default() }));
     let quiet_from = simulation(arm.transport()).ticks();
@@ -214,8 +215,8 @@ fn an_upload_with_an_erase_during_a_run_delays_no_control_cycle() {
     assert_eq!(crowded_line.missed_deadlines, 0);
     assert_eq!(crowded_line.lost_replies, before.lost_replies);
     assert_eq!(after.telemetry_dropped, before.telemetry_dropped, "telemetry was dropped");
-    // The primitive of the run was taken over before it, under the lock of the control half: a copy of 23 kB, 53 us. Checking it there
-    // took 20 us more, and building the first one beside its place 270.
+    // The primitive of the run was taken over before it, under the lock of the control half: a copy of 23 kB, 53 us.
+    // Checking it there took 20 us more, and building the first one beside its place 270.
     assert!(
         before.latency_worst_ticks <= 75 * 25,
         "loading a primitive is more than a copy: {}",

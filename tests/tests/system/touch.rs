@@ -19,8 +19,8 @@ use sim::TICKS_PER_SECOND;
 use sim::world::mujoco::Scene;
 use system_tests::expect;
 
-/// Of twelve cells over the paper's whole grid, with the force controller and adaptation: all but the one beyond the hand's reach (4 cm
-/// farther, 12 cm aside), and one that contact may decide otherwise when something harmless changes.
+/// Of twelve cells over the paper's whole grid, with the force controller and adaptation: all but the one beyond the
+/// hand's reach (4 cm farther, 12 cm aside), and one that contact may decide otherwise when something harmless changes.
 const HELD_BY_TOUCH: f64 = 10.0;
 
 /// The same twelve in open loop: no more than stand within the reach of an open hand.
@@ -32,13 +32,14 @@ const CELLS_OF_FIRMWARE: &str = "0:0,-8:4,-16:8";
 /// Force that counts as the first touch, N: the feet of a leaning flashlight come and go below a newton.
 const TOUCH: f64 = 0.5;
 
-/// How far the planned positions of the same trial may lie apart until contact, m: less than they move in a cycle.
+/// Largest distance between planned positions of the same trial until contact, m: less than they move in a cycle.
 const SAME_PLAN: f64 = 8e-5;
 
-/// What the sensor was wrong by in the rehearsals, N: within the dead band of 0.3 N, to which the arm's own error of 0.1 N comes.
+/// Error of the sensor in the rehearsals, N: within the dead band of 0.3 N, to which the arm's own error of 0.1 N
+/// comes.
 const DEAD_BAND_ERROR: f64 = 0.26;
 
-/// How far an error within the dead band may move the plan, m: its noise reaches beyond now and then.
+/// Largest displacement of the plan by an error within the dead band, m: its noise reaches beyond now and then.
 const ASTRAY: f64 = 0.01;
 
 /// The movement until the fingers begin to close, s.
@@ -94,8 +95,8 @@ fn firmware_grasps_what_the_application_in_this_process_grasps() {
     let found = (outcomes(&carried_through(&in_process)), outcomes(&carried_through(&firmware)));
     println!("{:?}", found.0);
     assert_eq!(found.0, found.1);
-    // Until something is touched they agree to a few encoder counts (docs/experiments.md), and the plans to less than they
-    // move in a cycle: a primitive that began a cycle later would be noticed, as is seen here.
+    // Until something is touched they agree to a few encoder counts (docs/experiments.md), and the plans to less than
+    // they move in a cycle: a primitive that began a cycle later would be noticed, as is seen here.
     let files = expect(std::fs::read_dir(folder.path().join("sil/recordings")));
     let names: Vec<_> = files.map(|file| expect(file).file_name()).collect();
     assert_eq!(names.len(), found.0.len());
@@ -150,9 +151,9 @@ fn request(primitive: &PrimitiveFile) -> RunRequest {
 
 #[test]
 fn a_sensor_error_within_the_dead_band_neither_moves_the_plan_nor_makes_the_hand_swing() {
-    // The hand's inertia is felt, what is felt accelerates the plan, and the plan's acceleration is fed forward. Without the filter
-    // between them an arm whose cables give way swings at 20 Hz as soon as the sensor's error comes near the dead band, and the
-    // peaks carry the plan away by centimetres.
+    // The hand's inertia is felt, what is felt accelerates the plan, and the plan's acceleration is fed forward.
+    // Without the filter between them an arm whose cables give way swings at 20 Hz as soon as the sensor's error comes
+    // near the dead band, and the peaks carry the plan away by centimetres.
     let mut primitive = primitive().clone();
     for row in primitive.expectation.iter_mut().flat_map(|expectation| &mut expectation.mean) {
         row[0] += DEAD_BAND_ERROR;

@@ -1,4 +1,4 @@
-//! What there is to point at: files, folders, headings, functions, decisions, fault identifiers.
+//! Targets that a word can point at: files, folders, headings, functions, decisions, fault identifiers.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -55,7 +55,7 @@ impl Facts {
         facts
     }
 
-    /// Whether a link of this file leads somewhere.
+    /// True if a link of this file leads somewhere.
     ///
     /// # Errors
     /// Why it does not.
@@ -149,7 +149,7 @@ fn alternatives(path: &str) -> Vec<String> {
     choices.split(',').flat_map(|choice| alternatives(&format!("{before}{choice}{after}"))).collect()
 }
 
-/// Whether a path fits a pattern whose stars stand for anything but a slash.
+/// True if a path fits a pattern whose stars stand for anything but a slash.
 fn fits(pattern: &str, path: &str) -> bool {
     let Some((before, after)) = pattern.split_once('*') else { return pattern == path };
     let Some(rest) = path.strip_prefix(before) else { return false };

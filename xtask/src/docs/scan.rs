@@ -56,7 +56,7 @@ pub(super) fn decisions(line: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Whether a code span is the name of a test: lower case, at least five words.
+/// True if a code span is the name of a test: lower case, at least five words.
 pub(super) fn is_test_name(span: &str) -> bool {
     span.split('_').count() >= 5
         && span.starts_with(|c: char| c.is_ascii_lowercase())

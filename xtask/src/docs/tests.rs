@@ -25,7 +25,7 @@ fn repository(more: &[(&str, String)]) -> Vec<(String, String)> {
     files
 }
 
-/// What is found in a file with this text.
+/// Returns the findings in a file with this text.
 fn found(path: &str, text: impl Into<String>) -> Vec<String> {
     check(&repository(&[(path, text.into())])).into_iter().map(|dead| dead.text).collect()
 }

@@ -1,4 +1,5 @@
-//! What the emulator's reports must say: the start as `emulated-board check` judges it, and what must hold after any run.
+//! Contents that the emulator's reports must have: the start as `emulated-board check` judges it, and what must hold
+//! after any run.
 
 use serde_json::Value;
 
@@ -11,7 +12,7 @@ const STACK: [(&str, &str, f64); 2] =
 /// Nearest the watchdog may come to the end of its time in service, us: half of its 10 ms.
 const WATCHDOG_NEAREST: f64 = 5000.0;
 
-/// What the emulator must not have found.
+/// Findings that the emulator must not report.
 const FINDINGS: [&str; 3] = ["unmodelled", "refused", "ignored"];
 
 /// Adds the report of a start, whose rows the emulator has judged; without any it proves nothing.

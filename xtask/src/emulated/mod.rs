@@ -1,5 +1,5 @@
-//! The flashed bytes, executed: builds the emulator of the board and the image, boots the image, plays the demonstration's movement on
-//! it, and prints what came of it in one table. Anything but what is expected is a failure.
+//! The flashed bytes, executed: builds the emulator of the board and the image, boots the image, plays the
+//! demonstration's movement on it, and prints what came of it in one table. Anything but what is expected is a failure.
 
 mod expected;
 mod movement;

@@ -1,4 +1,5 @@
-//! The demonstration's movement on the emulated board: taught, learned, uploaded into bank 2, played twice, found after a restart.
+//! The demonstration's movement on the emulated board: taught, learned, uploaded into bank 2, played twice, found after
+//! a restart.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,7 +25,7 @@ const TRACKING: [(&str, &str, &str, f64); 4] = [
     ("error at the goal", "/tracking/orientation_end_rad", "deg", 1.0),
 ];
 
-/// What must not happen in a run.
+/// Events that must not happen in a run.
 const NONE: [(&str, &str); 5] = [
     ("missed deadlines", "/missed_deadlines"),
     ("lost replies", "/lost_replies"),
@@ -119,7 +120,7 @@ fn restart(table: &mut Table, bench: &Bench<'_>) -> Result<()> {
     Ok(())
 }
 
-/// What a command reports; one that fails is an error.
+/// Returns the report of a command; one that fails is an error.
 fn object(command: &mut Command) -> Result<Value> {
     let (ended_well, value) = report(command)?;
     anyhow::ensure!(ended_well, "to repeat: {}", shell::line(command));

@@ -8,7 +8,7 @@ use anyhow::{Result, ensure};
 struct Row {
     name: String,
     value: String,
-    /// What it must be; empty: told, not checked.
+    /// Expected value; empty: told, not checked.
     wanted: String,
     holds: bool,
 }
@@ -40,7 +40,7 @@ impl Table {
         self.checked(name, shown(value, unit), wanted, holds);
     }
 
-    /// Whether everything so far is as it must be.
+    /// True while everything is as it must be.
     pub(super) fn holds(&self) -> bool {
         self.0.iter().all(|row| row.holds)
     }

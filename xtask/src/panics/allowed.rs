@@ -19,7 +19,7 @@ pub(super) struct Allowed {
 }
 
 impl Allowed {
-    /// Whether it is about this function.
+    /// True if it is about this function.
     pub(super) fn covers(&self, function: &str, kind: Kind, board: Board) -> bool {
         let below = function.strip_prefix(self.who).is_some_and(|rest| rest.is_empty() || rest.starts_with("::"));
         below && self.kinds.contains(&kind) && self.board.is_none_or(|only| only == board)

@@ -1,6 +1,6 @@
 //! Where an image can panic, held against the list of places that may.
 //!
-//! What counts is whose source a panic comes from, through all inlining, and of which kind it is; how often the
+//! Panics are told apart by the source they come from, through all inlining, and by kind; how often the
 //! compiler repeats it does not, so that the same list serves other compilers and optimisation levels.
 
 mod allowed;
@@ -80,7 +80,7 @@ fn sites(image: &Path) -> Result<Vec<Site>> {
     Ok(sites)
 }
 
-/// What to say of a site that is not allowed.
+/// Message for a site that is not allowed.
 fn unknown(site: &Site, board: Board) -> Option<String> {
     let is_known = |origin: &&Origin| allowed::all().any(|row| row.covers(&origin.function, origin.kind, board));
     let unknown = site.origins.iter().filter(|origin| !is_known(origin));

@@ -19,7 +19,7 @@ const TOOLS: [&str; 6] = ["core", "alloc", "compiler_builtins", "nalgebra", "sim
 /// Whose assertions are about indices.
 const MATRICES: &str = "nalgebra";
 
-/// How far joined code is followed back.
+/// Most steps for which joined code is followed back.
 const JOINS: usize = 4;
 
 /// A place at which the image can give up.

@@ -8,12 +8,12 @@ use anyhow::{Context, Result, bail};
 
 use crate::shell;
 
-/// Whether this machine has apt at all.
+/// True if this machine has apt at all.
 pub(super) fn is_present() -> bool {
     shell::succeeds(Command::new("apt-get").arg("--version"))
 }
 
-/// Whether a package is installed.
+/// True if a package is installed.
 pub(super) fn is_installed(package: &str) -> bool {
     Command::new("dpkg-query")
         .args(["--show", "--showformat=${db:Status-Status}", package])

@@ -1,4 +1,5 @@
-//! The compiler of the emulator of the board, which is newer than the product's. Nothing is skipped where it cannot be had.
+//! The compiler of the emulator of the board, which is newer than the product's. Nothing is skipped where it cannot be
+//! had.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -10,7 +11,7 @@ use crate::shell;
 /// The emulator's compiler; `emulator/Cargo.toml` says at least which it needs.
 pub(crate) const EMULATOR_RUST: &str = "1.98.0";
 
-/// What the cargo that runs this program says about itself. Another cargo would take it for its own.
+/// Variables that the cargo that runs this program sets. Another cargo would take them for its own.
 const INHERITED: [&str; 5] = ["CARGO", "RUSTC", "RUSTDOC", "RUSTUP_TOOLCHAIN", "RUSTC_WORKSPACE_WRAPPER"];
 
 /// Build folder of the emulator: two compilers must not share one.

@@ -18,11 +18,11 @@ pub(crate) use toolchain::{ARM, HAND, Toolchain};
 
 use crate::shell;
 
-/// What a prepared machine offers.
+/// Tools of a prepared machine.
 pub(crate) struct Machine {
     /// The emulator the images run on.
     pub(crate) qemu: Qemu,
-    /// How Cortex-M code is compiled here.
+    /// Way of compiling Cortex-M code.
     pub(crate) toolchain: Toolchain,
 }
 

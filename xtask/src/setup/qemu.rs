@@ -25,7 +25,7 @@ pub(crate) struct Qemu {
 }
 
 impl Qemu {
-    /// Whether the image may sleep while idle.
+    /// True if the image may sleep while idle.
     pub(crate) fn may_sleep(&self) -> bool {
         self.major >= SLEEPING_VERSION
     }

@@ -29,7 +29,7 @@ const OLDEST_RUSTC: &str = env!("CARGO_PKG_RUST_VERSION");
 /// Where Debian's compiler stands, whatever else is on the PATH.
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 
-/// How Cortex-M code is compiled on this machine.
+/// Way of compiling Cortex-M code on this machine.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Toolchain {
     /// The active toolchain has the targets.
@@ -68,7 +68,7 @@ impl Toolchain {
         })
     }
 
-    /// Whether clippy can check Cortex-M code: its driver must match the compiler of the library.
+    /// True if clippy can check Cortex-M code: its driver must match the compiler of the library.
     pub(crate) fn has_clippy(self) -> bool {
         self == Self::Rustup
     }
@@ -143,7 +143,7 @@ fn debian() -> Result<Toolchain> {
     Ok(Toolchain::Debian)
 }
 
-/// Whether `rustc 1.96.0 (...)` is at least [`OLDEST_RUSTC`].
+/// True if `rustc 1.96.0 (...)` is at least [`OLDEST_RUSTC`].
 fn is_recent(version: &str) -> bool {
     let numbers = |text: &str| -> Option<(u32, u32)> {
         let mut parts = text.split('.');

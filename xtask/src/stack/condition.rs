@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::thumb::Instruction;
 
-/// Whether the next instructions are executed on a condition (IT).
+/// True if the next instructions are executed on a condition (IT).
 pub(super) fn is_it(instruction: &Instruction) -> bool {
     let code = instruction.halves.0;
     instruction.bytes == 2 && code & 0xFF00 == 0xBF00 && code & 15 != 0

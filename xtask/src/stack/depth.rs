@@ -18,9 +18,9 @@ const END: &str = "rust_begin_unwind";
 pub(super) enum Part {
     /// All of it.
     Whole,
-    /// What runs before interrupts are unmasked.
+    /// Code that runs before interrupts are unmasked.
     Masked,
-    /// What runs after interrupts have been unmasked.
+    /// Code that runs after interrupts have been unmasked.
     Unmasked,
 }
 
@@ -101,7 +101,7 @@ impl Calls {
         self.pointers.check_nesting(called, &|function| self.name(function))
     }
 
-    /// How many functions of each kind may be behind a pointer.
+    /// Number of functions of each kind that a pointer may lead to.
     pub(super) fn behind_pointers(&self) -> Vec<usize> {
         self.pointers.counts()
     }
@@ -156,7 +156,7 @@ impl Calls {
         Ok(deepest)
     }
 
-    /// What a function calls, but through pointers.
+    /// Direct calls of a function.
     fn called(&self, function: u32) -> Vec<u32> {
         let calls = self.frame(function).map(|frame| frame.calls.as_slice()).unwrap_or_default();
         let called = calls.iter().filter_map(|call| match call.target {
@@ -177,7 +177,7 @@ impl Calls {
     }
 }
 
-/// Whether a function masks interrupts before it calls another.
+/// True if a function masks interrupts before it calls another.
 fn masks_first(function: &Function) -> bool {
     let position = |wanted: &dyn Fn(&crate::thumb::Instruction) -> bool| function.instructions.iter().position(wanted);
     let masks = position(&|instruction| instruction.halves.0 == frame::MASK);
@@ -214,7 +214,7 @@ fn unmasking(code: &Code) -> BTreeSet<u32> {
 /// A search for the deepest ways that begin at some functions.
 pub(super) struct Search<'a> {
     calls: &'a Calls,
-    /// What may be behind a pointer.
+    /// Functions that a pointer may lead to.
     behind: Behind,
     /// Functions that count as so deep, whatever they call.
     ends: BTreeMap<u32, u32>,
@@ -223,8 +223,8 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// A search for ways from a function, in which some functions are so deep, whatever they call. Pointers may have been
-    /// made by the functions it reaches, or kept somewhere by others that ran before.
+    /// A search for ways from a function, in which some functions are so deep, whatever they call. Pointers may have
+    /// been made by the functions it reaches, or kept somewhere by others that ran before.
     pub(super) fn new(calls: &'a Calls, function: u32, before: &[u32], ends: BTreeMap<u32, u32>) -> Self {
         let roots: Vec<u32> = before.iter().copied().chain([function]).collect();
         let behind =
@@ -296,7 +296,7 @@ impl<'a> Search<'a> {
         Ok(deepest.0)
     }
 
-    /// What a call leads to, as far as it belongs to this part of the function.
+    /// Target of a call, as far as it belongs to this part of the function.
     fn called(&self, (function, part, left): Key, call: &Call) -> Result<Vec<Key>> {
         let part = match (part, call.target) {
             (Part::Whole, _) => Part::Whole,

@@ -1,8 +1,8 @@
-//! How deep a function goes by itself, and how deep it is at each of its calls.
+//! Stack depth of a function by itself, and at each of its calls.
 //!
-//! The stack pointer is followed along every way through the function. A function is refused, by name, where two ways meet
-//! with different stack pointers, where it returns with another one than it began with, where the stack pointer changes in
-//! a way that is not read, and where code is never reached although it is none.
+//! The stack pointer is followed along every way through the function. A function is refused, by name, where two ways
+//! meet with different stack pointers, where it returns with another one than it began with, where the stack pointer
+//! changes in a way that is not read, and where code is never reached although it is none.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -27,7 +27,7 @@ pub(super) const MASK: u16 = 0xB672;
 /// Unmasks interrupts: CPSIE i.
 pub(super) const UNMASK: u16 = 0xB662;
 
-/// What a call leads to.
+/// Target of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Target {
     /// The function at an address.
@@ -43,9 +43,9 @@ pub(super) struct Call {
     pub(super) address: u32,
     /// Bytes of stack in use there.
     pub(super) depth: u32,
-    /// Whether interrupts may have been unmasked on the way there.
+    /// True if interrupts may have been unmasked on the way there.
     pub(super) unmasked: bool,
-    /// What is called.
+    /// Function that is called.
     pub(super) target: Target,
 }
 
@@ -58,8 +58,8 @@ pub(super) struct Frame {
     pub(super) unmasked: Option<u32>,
     /// Its calls.
     pub(super) calls: Vec<Call>,
-    /// Where it has put the stack pointer, if it takes another stack, and the most bytes it has in use on that one. All its
-    /// calls happen there.
+    /// Where it has put the stack pointer, if it takes another stack, and the most bytes it has in use on that one. All
+    /// its calls happen there.
     pub(super) other_stack: Option<u32>,
 }
 
@@ -89,7 +89,7 @@ impl Frame {
     }
 }
 
-/// What is known before an instruction.
+/// State known before an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct State {
     /// Bytes in use.
@@ -204,7 +204,8 @@ impl Walk<'_> {
             Way::Table { base, entry } => self.table(index, base, entry, after)?,
             Way::Unknown => bail!("nobody can read where it goes on after {at:#010x}"),
         }
-        // Behind a call that never returns and a branch that is always taken the compiler may end a function as it likes.
+        // Behind a call that never returns and a branch that is always taken the compiler may end a function as it
+        // likes.
         let may_end = called.is_some() || matches!(instruction.flow, Flow::Branch(_));
         if goes_on && !(may_end && self.is_last(index)) {
             self.go(at + instruction.bytes, next, at, is_true)?;
@@ -212,7 +213,7 @@ impl Walk<'_> {
         Ok(())
     }
 
-    /// Whether nothing but filling follows until the function or this piece of its code ends.
+    /// True if nothing but filling follows until the function or this piece of its code ends.
     fn is_last(&self, index: usize) -> bool {
         let mut end = self.all[index].address + self.all[index].bytes;
         for next in self.all.iter().skip(index + 1) {
@@ -227,12 +228,12 @@ impl Walk<'_> {
         true
     }
 
-    /// What a register points to that is called.
+    /// Target of a register that is called.
     fn pointed(&self, index: usize, register: u32) -> Target {
         self.constant(index, register).map_or(Target::Pointer, |to| Target::Function(to & !1))
     }
 
-    /// What is known after an instruction.
+    /// State known after an instruction.
     fn after(&mut self, index: usize, before: State) -> Result<State> {
         let instruction = &self.all[index];
         let at = instruction.address;
@@ -346,8 +347,8 @@ impl Walk<'_> {
         Ok(())
     }
 
-    /// A table of ways to go on. Behind the instruction it ends where code begins again, or with a zero, which would lead to
-    /// the table itself; elsewhere constants may follow.
+    /// A table of ways to go on. Behind the instruction it ends where code begins again, or with a zero, which would
+    /// lead to the table itself; elsewhere constants may follow.
     fn table(&mut self, index: usize, base: u32, entry: u32, state: State) -> Result<()> {
         let instruction = self.all[index];
         let counted = instruction.address + instruction.bytes;
@@ -409,7 +410,7 @@ impl Walk<'_> {
     }
 }
 
-/// Whether an instruction does nothing, or ends everything: what is put between pieces of code.
+/// True if an instruction does nothing, or ends everything: what is put between pieces of code.
 fn is_filling(instruction: &Instruction) -> bool {
     matches!(instruction.halves, (0xBF00 | 0, 0) | (0xF3AF, 0x8000))
         || matches!(instruction.flow, Flow::Abort | Flow::Unreachable)

@@ -1,15 +1,15 @@
-//! Which handlers may interrupt which, for every board; the image sets these priorities at run time, and its code is held
-//! against this table.
+//! Which handlers may interrupt which, for every board; the image sets these priorities at run time, and its code is
+//! held against this table.
 //!
-//! Handlers of one level never interrupt each other, those of a higher level (a larger number) interrupt those of a lower
-//! one. Level 0 is the idle task.
+//! Handlers of one level never interrupt each other, those of a higher level (a larger number) interrupt those of a
+//! lower one. Level 0 is the idle task.
 
 use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
 
 use super::depth::Calls;
-use crate::board::CORE_VECTORS;
+use crate::elf::CORE_VECTORS;
 
 /// Handlers of one priority.
 pub(super) struct Level {
@@ -29,12 +29,12 @@ pub(super) struct OtherStack {
     pub(super) handlers: &'static [&'static str],
 }
 
-/// What interrupts what on a board, and what is below its stack.
+/// The interrupt levels of a board, and the memory below its stack.
 pub(super) struct Layout {
     /// Name of the board in the image's description.
     pub(super) board: &'static str,
-    /// Bytes the processor puts on the stack for an exception, at most: eight words, with floating point 18 more, and one
-    /// to align them.
+    /// Bytes the processor puts on the stack for an exception, at most: eight words, with floating point 18 more, and
+    /// one to align them.
     pub(super) exception: u32,
     /// The levels, the lowest first.
     pub(super) levels: &'static [Level],
@@ -103,8 +103,8 @@ impl Layout {
         known.with_context(|| format!("no priorities are known for the board '{board}' (xtask/src/stack/levels.rs)"))
     }
 
-    /// Fails if a handler in the vector table is not in this table, or the other way round, or if the image gives it another
-    /// priority: `stored` has those by line.
+    /// Fails if a handler in the vector table is not in this table, or the other way round, or if the image gives it
+    /// another priority: `stored` has those by line.
     pub(super) fn check(&self, calls: &Calls, vectors: &[u32], stored: &BTreeMap<u32, u32>) -> Result<()> {
         let listed = || {
             let levels = self.levels.iter().flat_map(|level| level.handlers);

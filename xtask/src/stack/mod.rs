@@ -1,9 +1,9 @@
-//! How deep the stack of an image goes, computed from its instructions: every function's frame, every call, every interrupt
-//! that may come on top.
+//! Stack depth of an image, computed from its instructions: every function's frame, every call, every
+//! interrupt that may come on top.
 //!
-//! Two figures. *At start*: from reset until the idle task, with interrupts masked but for the very end. *In service*: the
-//! idle task, and on top of it the deepest handler of every priority. In both, what a panic or a fault does last is counted
-//! apart: it comes once, on top of everything, and only has to fit.
+//! Two figures. *At start*: from reset until the idle task, with interrupts masked but for the very end. *In service*:
+//! the idle task, and on top of it the deepest handler of every priority. In both, what a panic or a fault does last is
+//! counted apart: it comes once, on top of everything, and only has to fit.
 
 mod condition;
 mod depth;
@@ -57,7 +57,7 @@ pub(crate) struct Depth {
     /// The stack of its own that one handler has, with its size.
     other: Option<(u32, Ways)>,
     largest: Vec<Stop>,
-    /// How many functions of each kind may be behind a pointer; last those of none.
+    /// Number of functions of each kind that a pointer may lead to; last those of none.
     behind_pointers: Vec<usize>,
 }
 
@@ -179,8 +179,8 @@ pub(crate) fn check(image: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Computes and prints the depth of every image, and fails if one is too deep or a row of the list of pointers means nothing
-/// in any of them.
+/// Computes and prints the depth of every image, and fails if one is too deep or a row of the list of pointers means
+/// nothing in any of them.
 ///
 /// # Errors
 /// Of the images as [`check`].

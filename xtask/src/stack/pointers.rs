@@ -14,16 +14,17 @@ pub(super) struct Kind {
     pub(super) name: &'static str,
     /// A function is of this kind if its name contains one of these.
     functions: &'static [&'static str],
-    /// A function calls only this kind, and others that list it too, through pointers, if its name contains one of these.
+    /// A function calls only this kind, and others that list it too, through pointers, if its name contains one of
+    /// these.
     callers: &'static [&'static str],
-    /// How many calls of this kind may be inside one another; `None` if they never are. Checked in both cases.
+    /// Most nested calls of this kind; `None` if they never nest. Checked in both cases.
     pub(super) nested: Option<usize>,
     /// Why that is so.
     pub(super) why: &'static str,
 }
 
-/// Kinds of functions behind pointers. A call by a function that no row lists may lead to any function whose address has been
-/// made, of whatever kind.
+/// Kinds of functions behind pointers. A call by a function that no row lists may lead to any function whose address
+/// has been made, of whatever kind.
 pub(super) const KINDS: [Kind; 5] = [
     Kind {
         name: "a value's text",
@@ -78,8 +79,8 @@ pub(super) struct Pointers {
 }
 
 impl Pointers {
-    /// Finds every address that code makes, and follows it through the data. Constants that only happen to be equal to the
-    /// address of a function count as well.
+    /// Finds every address that code makes, and follows it through the data. Constants that only happen to be equal to
+    /// the address of a function count as well.
     pub(super) fn of(code: &Code, memory: &Memory) -> Self {
         let values: BTreeMap<u32, BTreeSet<u32>> = code
             .functions()
@@ -99,7 +100,7 @@ impl Pointers {
         Self { made, kinds }
     }
 
-    /// How many there are of each kind; last those of none.
+    /// Number of each kind; last those of none.
     pub(super) fn counts(&self) -> Vec<usize> {
         (0..=KINDS.len()).map(|kind| self.kinds.values().filter(|known| **known == kind).count()).collect()
     }
@@ -159,7 +160,7 @@ impl Pointers {
     }
 }
 
-/// How deep calls of one kind are inside one another by what they hand out themselves: a function hands out those whose
+/// Depth of nested calls of one kind, from what they hand out themselves: a function hands out those whose
 /// address it makes, or a function it calls makes.
 struct Chain<'a> {
     handed: BTreeMap<u32, BTreeSet<u32>>,
@@ -187,7 +188,7 @@ impl Chain<'_> {
 pub(super) struct Behind(Vec<Vec<u32>>);
 
 impl Behind {
-    /// What a function may call through a pointer: the number of the kind, and the function.
+    /// Calls through a pointer: the number of the kind, and the function.
     pub(super) fn called_by(&self, caller: &[String]) -> Vec<(usize, u32)> {
         let listed: Vec<usize> = (0..KINDS.len()).filter(|kind| contains(caller, KINDS[*kind].callers)).collect();
         let kinds = if listed.is_empty() { (0..=KINDS.len()).collect() } else { listed };

@@ -13,8 +13,8 @@ const REGISTERS: std::ops::Range<u32> = 0xE000_E400..0xE000_E4F0;
 /// Priority levels are the upper bits of a byte: this many.
 const BITS: u32 = 4;
 
-/// Logical priorities by line, as constant code stores them. A priority that is computed, or stored through a table, is not
-/// seen.
+/// Logical priorities by line, as constant code stores them. A priority that is computed, or stored through a table, is
+/// not seen.
 pub(super) fn stored(code: &Code, memory: &Memory) -> BTreeMap<u32, u32> {
     code.functions().flat_map(|(_, function)| stores(function, memory)).collect()
 }

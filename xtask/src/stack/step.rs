@@ -1,5 +1,5 @@
-//! What one instruction does to the stack pointer, and what it knows of a register: Thumb-2 as the architecture's manual
-//! encodes it (ARM DDI 0403, A5 and A7.7).
+//! Effect of one instruction on the stack pointer and on known registers: Thumb-2 as the architecture's
+//! manual encodes it (ARM DDI 0403, A5 and A7.7).
 //!
 //! Every encoding that can write the stack pointer is either read here or [`Effect::Unknown`]; no other changes it.
 
@@ -10,7 +10,7 @@ const SP: u32 = 13;
 /// Number of the program counter.
 const PC: u32 = 15;
 
-/// What happens to the stack pointer.
+/// Effect on the stack pointer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Effect {
     /// Nothing.
@@ -51,7 +51,7 @@ pub(super) enum Way {
     Unknown,
 }
 
-/// How a register gets its value.
+/// Origin of a register's value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Source {
     /// A number.
@@ -68,7 +68,7 @@ pub(super) enum Source {
     Aligned(u32),
 }
 
-/// What the instruction does to the stack pointer.
+/// Effect of the instruction on the stack pointer.
 pub(super) fn effect(instruction: &Instruction) -> Effect {
     let (first, second) = (u32::from(instruction.halves.0), u32::from(instruction.halves.1));
     if instruction.bytes == 2 { narrow(first) } else { wide(first, second) }
@@ -87,7 +87,7 @@ fn narrow(code: u32) -> Effect {
     }
 }
 
-/// Whether a field of four bits names the stack pointer.
+/// True if a field of four bits names the stack pointer.
 fn is_sp(code: u32, shift: u32) -> bool {
     code >> shift & 15 == SP
 }

@@ -123,7 +123,7 @@ impl Image<'_> {
         Search::new(self.calls, function, &before, ends.clone()).deepest(function, part)
     }
 
-    /// What a panic does last.
+    /// Last actions of a panic.
     fn last_words(&self) -> Result<Way> {
         let end = self.calls.end()?;
         let frame = self.calls.frame(end).context("the end of a panic has no frame")?;
@@ -140,7 +140,7 @@ impl Image<'_> {
         Ok(deepest)
     }
 
-    /// What runs with interrupts unmasked: the end of the start, or the service.
+    /// Code that runs with interrupts unmasked: the end of the start, or the service.
     fn thread(&self, ends: &BTreeMap<u32, u32>, thread: Thread) -> Result<Way> {
         let (reset, main) = (self.calls.address(RESET)?, self.calls.address(MAIN)?);
         let frame = |address| self.calls.frame(address).context("a function has no frame");
@@ -172,7 +172,7 @@ impl Image<'_> {
     }
 }
 
-/// What runs with interrupts unmasked.
+/// Code that runs with interrupts unmasked.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Thread {
     /// The functions of the start that have unmasked them and not returned yet.

@@ -1,15 +1,15 @@
 //! `HandLimiter`: the only maker of [`LimitedHandTorques`], and with it the only way to the hand's motors.
 
-use crate::model::arm::within;
 use crate::model::hand::DIGITS;
 use crate::model::wam7::{FINGER_TORQUE_MAX, SPREAD_TORQUE_MAX};
-use crate::real::Real;
+use crate::real::{Real, within};
+use crate::time::periods;
 
 /// Largest torques (N m at the spread and at the inner links).
 pub const TORQUE_LIMIT: [f64; DIGITS] = [SPREAD_TORQUE_MAX, FINGER_TORQUE_MAX, FINGER_TORQUE_MAX, FINGER_TORQUE_MAX];
 
-/// Full scale in this many control periods: 50 ms.
-const FULL_SCALE_CYCLES: f64 = 15.0;
+/// Time in which a torque may go from zero to full scale: 50 ms, in control periods.
+const FULL_SCALE_CYCLES: f64 = periods(0.05) as f64;
 
 /// Torques of spread, F1, F2, F3 within every limit. No public constructor: the limiter makes them.
 #[derive(Clone, Copy, Debug, PartialEq)]

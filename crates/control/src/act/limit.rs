@@ -10,17 +10,24 @@
 
 use puck::Transmission;
 
-use crate::model::arm::within;
 use crate::model::calibration::Calibration;
 use crate::model::wam7;
-use crate::real::Real;
+use crate::real::{Real, within};
+use crate::time::periods;
 use crate::units::{JOINTS, JointTorques, Vector7};
 
 /// Worst gravity torque over all postures, with sensor and hand (N m), rounded up. A test recomputes it.
 pub const WORST_GRAVITY: [f64; JOINTS] = [0.0, 41.5, 13.0, 11.0, 1.9, 1.9, 0.2];
 
-/// Largest change of torque (N m per control period): the manufacturer's full scale in 50 ms.
-pub const STEP_LIMIT: [f64; JOINTS] = [25.0 / 15.0, 20.0 / 15.0, 1.0, 1.0, 5.0 / 15.0, 5.0 / 15.0, 5.0 / 15.0];
+/// The manufacturer's full scale (N m).
+const FULL_SCALE: [f64; JOINTS] = [25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0];
+
+/// Largest change of torque (N m per control period): [`FULL_SCALE`] in 50 ms.
+pub const STEP_LIMIT: [f64; JOINTS] = {
+    let [j1, j2, j3, j4, j5, j6, j7] = FULL_SCALE;
+    let cycles = periods(0.05) as f64;
+    [j1 / cycles, j2 / cycles, j3 / cycles, j4 / cycles, j5 / cycles, j6 / cycles, j7 / cycles]
+};
 
 /// Largest torque of a puck (counts of its torque unit): below the safety module's warning of 4731 and its limit of 5204.
 pub const MOTOR_COUNTS_LIMIT: f64 = 4600.0;

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::command::{Command, Refusal};
-use crate::cycle::{Cycle, Measured, WRENCH_AGE};
+use crate::cycle::{Cycle, Measured, STANDING, WRENCH_AGE};
 use crate::guard::fault::Fault;
 use crate::guard::supervisor::{State, Trigger};
 use crate::model::hand;
@@ -14,9 +14,6 @@ use crate::plan::run::Run;
 use crate::real::Real;
 use crate::sense::wrench::REST_FORCE;
 use crate::units::JointPositions;
-
-/// Below this joint speed (rad/s) the arm counts as standing, for leaving a stop.
-pub(super) const STANDING: f64 = 0.05;
 
 /// Below this joint speed (rad/s) a movement may begin.
 const CALM: f64 = 0.2;

@@ -3,16 +3,18 @@
 use pinned_init::{Init, init};
 
 use crate::act::hand::{HandLimiter, LimitedHandTorques, TORQUE_LIMIT};
-use crate::cycle::record::HandSample;
 use crate::law::gains::HandGains;
-use crate::law::hand::{HandController, HandReference};
+use crate::law::hand::HandController;
 use crate::model::hand::{DIGITS, FINGERS, ranges};
 use crate::plan::hand::HandMotion;
+use crate::plan::reference::HandReference;
 use crate::real::Real;
 use crate::sense::hand::{HandEstimator, HandState};
+use crate::sense::sample::HandSample;
+use crate::time::periods;
 
-/// Control periods for which the hand is still driven after a move that nothing follows: 0.5 s.
-const SETTLING: u16 = 150;
+/// Time for which the hand is still driven after a move that nothing follows: 0.5 s, in control periods.
+const SETTLING: u16 = periods(0.5);
 
 /// What the hand is after.
 #[derive(Clone, Copy, Debug)]
@@ -115,7 +117,7 @@ impl<R: Real> HandDrive<R> {
     pub fn follow(&mut self, reference: &HandReference<R>, expected: Option<[R; FINGERS]>) {
         let mut reference = *reference;
         for ((q, dq), [min, max]) in reference.q.iter_mut().zip(&mut reference.dq).zip(ranges()) {
-            let kept = crate::model::arm::at_least(crate::model::arm::at_most(*q, R::of(max)), R::of(min));
+            let kept = crate::real::at_least(crate::real::at_most(*q, R::of(max)), R::of(min));
             if kept != *q {
                 *q = kept;
                 *dq = R::of(0.0);

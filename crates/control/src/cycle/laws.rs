@@ -1,21 +1,22 @@
 //! The laws of the states: from what is measured to the torque that is wanted.
 
 use crate::cycle::record::{Event, flags};
-use crate::cycle::{Cycle, HANDOVER, Measured, PERIOD, STOP_RAMP, WRENCH_AGE};
+use crate::cycle::{Cycle, HANDOVER, Measured, STOP_RAMP, WRENCH_AGE};
 use crate::guard::supervisor::State;
 use crate::law::force::ForceController;
-use crate::law::hand::HandReference;
-use crate::law::joint::JointReference;
-use crate::law::operational::TaskReference;
 use crate::model::kinematics::Frames;
 use crate::plan::primitive::posture_and_hand;
+use crate::plan::reference::HandReference;
+use crate::plan::reference::JointReference;
+use crate::plan::reference::TaskReference;
 use crate::plan::run::Senses;
 use crate::real::Real;
 use crate::sense::hand::HandState;
+use crate::time::{PERIOD, periods};
 use crate::units::{JointPositions, JointTorques, Pose, Vector6, Vector7, Wrench};
 
-/// Length of the damping that carries the arm while gravity torque builds up after arming (control periods): 0.5 s.
-const ARMING: u16 = 150;
+/// Length of the damping that carries the arm while gravity torque builds up after arming: 0.5 s, in control periods.
+const ARMING: u16 = periods(0.5);
 
 /// What the law of a state asks for, besides the torque.
 pub(super) struct Demand<R: Real> {

@@ -18,7 +18,6 @@ use puck::SafetyMode;
 use crate::act::actuation::Actuation;
 use crate::act::limit::{LimitReport, TorqueLimiter};
 use crate::command::Refusal;
-use crate::cycle::commands::STANDING;
 use crate::cycle::hand::HandDrive;
 use crate::cycle::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
 use crate::guard::fault::Fault;
@@ -40,31 +39,29 @@ use crate::plan::run::{FADE, Run};
 use crate::real::Real;
 use crate::sense::joints::{JointEstimator, JointState};
 use crate::sense::wrench::WrenchEstimator;
+use crate::time::{few_periods, periods};
 use crate::units::{JointPositions, Pose, Vector7, Wrench};
-
-/// Control period (s).
-pub const PERIOD: f64 = 1.0 / 300.0;
-
-/// Control rate (Hz).
-pub const RATE: f64 = 300.0;
 
 /// Kernels per row that a stored primitive may have.
 pub const MAX_KERNELS: usize = 100;
 
-/// Cycles of zero torque after torque went off: one lost frame must not leave a motor pulling.
+/// Frames of zero torque, one a cycle, after torque went off: one lost frame must not leave a motor pulling.
 const ZERO_CYCLES: u8 = 3;
 
-/// Age at which the mode of the safety module is no longer believed (control periods): 1 s.
-const SAFETY_AGE: u16 = 300;
+/// Age at which the mode of the safety module is no longer believed: 1 s, in control periods.
+const SAFETY_AGE: u16 = periods(1.0);
 
-/// Age at which a wrench no longer carries a run that depends on it (control periods).
-const WRENCH_AGE: u8 = 5;
+/// Age at which a wrench no longer carries a run that depends on it: 16.7 ms, in control periods.
+const WRENCH_AGE: u8 = few_periods(1.0 / 60.0);
 
-/// Length of the ramp that takes all but gravity and damping away in a soft stop (control periods): 100 ms.
-const STOP_RAMP: u16 = 30;
+/// Length of the ramp that takes all but gravity and damping away in a soft stop: 100 ms, in control periods.
+const STOP_RAMP: u16 = periods(0.1);
 
-/// Length of the ramp that takes away what a compliant run inherits from the stiff hold before it (control periods): 1 s.
-const HANDOVER: u16 = 300;
+/// Length of the ramp that takes away what a compliant run inherits from the stiff hold before it: 1 s, in control periods.
+const HANDOVER: u16 = periods(1.0);
+
+/// Below this joint speed (rad/s) the arm counts as standing, for leaving a stop.
+const STANDING: f64 = 0.05;
 
 /// The control code of one arm. `N` is the number of kernels per row that its primitive may have.
 pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
@@ -235,7 +232,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
-    /// Advances one control period (1/300 s).
+    /// Advances one control period.
     pub fn step(&mut self, input: &CycleInput) -> CycleOutput {
         // A bridged reply is no news: the law stays.
         let before = (self.supervisor.law(), self.supervisor.fault());

@@ -1,43 +1,15 @@
 //! What goes into one control cycle and what comes out of it.
 
-use puck::{Counts, RawWrench, SafetyMode};
-
 use crate::act::actuation::Actuation;
 use crate::command::{Command, Refusal};
 use crate::guard::fault::Fault;
 use crate::guard::supervisor::State;
-
-/// What the hand's pucks told since the last cycle, in the order F1, F2, F3, spread.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct HandSample {
-    /// Motor positions of the four pucks; `None` where the reply was lost or malformed.
-    pub primary: [Option<Counts>; 4],
-    /// Positions of the fingers' worm encoders; `None` where they were lost or do not exist.
-    pub secondary: [Option<Counts>; 3],
-    /// Raw counts of the fingers' strain gauges; `None` where the reply was lost.
-    pub gauges: [Option<u16>; 3],
-}
-
-/// What the bus round of one cycle brought in.
-///
-/// Only replies of this cycle belong here: the caller empties its mailboxes before it sends the requests, so a late
-/// reply is a missing one.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BusSample {
-    /// Motor positions of pucks 1 to 7; `None` where the reply was lost or malformed.
-    pub positions: [Option<Counts>; 7],
-    /// Wrist wrench; `None` where one of its two frames was lost or the sensor marked it bad.
-    pub wrench: Option<RawWrench>,
-    /// Latest mode of the safety module, where it was polled since the last cycle.
-    pub safety: Option<SafetyMode>,
-    /// What the hand told since the last cycle; `None` without a hand, or while it is not initialised.
-    pub hand: Option<HandSample>,
-}
+use crate::sense::sample::BusSample;
 
 /// The input of one control cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CycleInput {
-    /// Number of this cycle, one up per 1/300 s.
+    /// Number of this cycle, one up per control period.
     pub cycle: u64,
     /// Replies of this cycle.
     pub sample: BusSample,

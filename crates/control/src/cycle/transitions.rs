@@ -6,9 +6,8 @@ use crate::guard::joint_limits::JointBounds;
 use crate::guard::supervisor::{State, Trigger};
 use crate::law::force::ForceController;
 use crate::law::operational::OperationalController;
-use crate::model::arm::within;
 use crate::plan::primitive::Primitive;
-use crate::real::Real;
+use crate::real::{Real, within};
 use crate::sense::deviation::Deviation;
 use crate::units::{JointAccelerations, JointPositions, Vector7, Wrench};
 

@@ -3,8 +3,8 @@
 //! The arm rests outside its soft limits when it is switched on (its home posture touches two stops). A bound therefore
 //! starts at the posture the arm is armed in, if that lies outside, and tightens as the arm comes in; it never widens.
 
-use crate::model::arm::{ArmModel, at_least, at_most};
-use crate::real::Real;
+use crate::model::arm::ArmModel;
+use crate::real::{Real, at_least, at_most};
 use crate::units::{JOINTS, JointPositions, JointTorques, JointVelocities, Vector7};
 
 /// Slack beyond the posture the arm was armed in (rad).

@@ -5,13 +5,16 @@ use crate::guard::joint_limits::JointBounds;
 use crate::guard::supervisor::{State, Trigger};
 use crate::model::kinematics::Frames;
 use crate::model::wam7;
-use crate::plan::approach::TIP_REACH;
 use crate::real::Real;
 use crate::sense::joints::{COAST_CYCLES, JointState};
+use crate::time::few_periods;
 use crate::units::JOINTS;
 
 /// Largest speed of elbow and forearm in any state with torque (m/s); the safety module faults at 1.0.
 pub const TIP_SPEED_LIMIT: f64 = 0.8;
+
+/// Distance beyond the elbow at which the safety module watches the speed (m).
+pub const TIP_REACH: f64 = 0.35;
 
 /// A joint may exceed its speed limit by this factor before it is stopped: noise and overshoot.
 const SPEED_MARGIN: f64 = 1.2;
@@ -19,14 +22,14 @@ const SPEED_MARGIN: f64 = 1.2;
 /// Contact force that stops a movement (N): the lowest permissible quasi-static one (face) of the collaboration standards.
 pub(crate) const FORCE_LIMIT: f64 = 65.0;
 
-/// Cycles in a row above the force limit.
+/// Samples in a row above the force limit: one corrupt sample stops no movement.
 const FORCE_CYCLES: u8 = 2;
 
 /// Largest distance between plan and tool (m); a plan farther away has lost its arm.
 pub(crate) const TRACKING_LIMIT: f64 = 0.30;
 
-/// Cycles without positions after which torque goes off: 200 ms.
-const SILENCE_CYCLES: u8 = 60;
+/// Time without positions after which torque goes off: 200 ms, in control periods.
+const SILENCE_CYCLES: u8 = few_periods(0.2);
 
 /// Watches limits.
 #[derive(Clone, Debug)]

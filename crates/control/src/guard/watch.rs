@@ -9,9 +9,17 @@
 //! Each is told once per run. The watch only tells; it never touches a torque, since a wrong alarm must not stop an arm
 //! that holds something.
 
-use crate::cycle::PERIOD;
-use crate::plan::primitive::{STATISTICS_CHANNELS, SensorStatistics};
 use crate::real::Real;
+use crate::time::PERIOD;
+
+/// Channels: the nine sensor values, then the angles of fingers F1, F2, F3 (rad).
+pub const STATISTICS_CHANNELS: usize = 12;
+
+/// Most points of the statistics.
+pub const STATISTICS_CAPACITY: usize = 64;
+
+/// Mean and spread of the sensor values of successful runs.
+pub type SensorStatistics<T> = dmp::SensorStatistics<T, STATISTICS_CHANNELS, STATISTICS_CAPACITY>;
 
 /// Time over which a deviation is averaged (s).
 pub const MEMORY: f64 = 0.1;

@@ -11,10 +11,11 @@ use pinned_init::{Init, init};
 use crate::law::window::Window;
 use crate::model::kinematics::Jacobian;
 use crate::real::Real;
+use crate::time::periods;
 use crate::units::{JointTorques, Vector6};
 
-/// Longest window (control periods): 0.5 s.
-pub const WINDOW_CAPACITY: usize = 150;
+/// Longest window: 0.5 s, in control periods.
+pub const WINDOW_CAPACITY: usize = periods(0.5) as usize;
 
 /// Eq (12).
 #[derive(Clone, Debug)]

@@ -6,6 +6,7 @@
 
 use crate::model::wam7;
 use crate::real::Real;
+use crate::time::periods;
 use crate::units::Vector7;
 
 /// Numbers of one way to track, before they are turned into the number type of the control code.
@@ -31,7 +32,7 @@ const STIFF: Numbers = Numbers {
     posture: 1.0,
     force: (1.0, 2.0),
     moment_share: 1.0,
-    force_window: 60,
+    force_window: periods(0.2) as usize,
     force_limit: (10.0, 1.0),
 };
 
@@ -44,7 +45,7 @@ const COMPLIANT: Numbers = Numbers {
     posture: 1.0,
     force: (1.0, 8.0),
     moment_share: 0.4,
-    force_window: 150,
+    force_window: periods(0.5) as usize,
     force_limit: (10.0, 1.0),
 };
 
@@ -72,7 +73,7 @@ pub const HAND_COULOMB: [f64; 4] = [0.05, 0.08, 0.08, 0.08];
 
 /// Proportional and integral gain (1/s) of the gauges, and their window (control periods). The finger is stiff behind its gauge:
 /// with the delay of filter and bus a proportional gain of 1 is close to ringing.
-pub const HAND_FORCE: (f64, f64, usize) = (0.5, 2.0, 60);
+pub const HAND_FORCE: (f64, f64, usize) = (0.5, 2.0, periods(0.2) as usize);
 
 /// How the arm follows a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,34 +8,19 @@
 use nalgebra::SVector;
 use pinned_init::{Init, init};
 
-use crate::cycle::PERIOD;
 use crate::law::gains::HandGains;
 use crate::law::window::Window;
 use crate::model::hand::{DIGITS, FINGERS};
+use crate::plan::reference::HandReference;
 use crate::real::Real;
 use crate::sense::hand::HandState;
+use crate::time::{PERIOD, periods};
 
 /// Desired speed at which half of the Coulomb friction is fed forward (rad/s).
 const FRICTION_SPEED: f64 = 0.05;
 
-/// Longest window (control periods): 0.2 s.
-pub const WINDOW_CAPACITY: usize = 60;
-
-/// What the digits should do at one tick, spread first.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HandReference<R: Real> {
-    /// Desired angles (rad).
-    pub q: [R; DIGITS],
-    /// Desired velocities (rad/s).
-    pub dq: [R; DIGITS],
-}
-
-impl<R: Real> HandReference<R> {
-    /// To stand still at `q`.
-    pub fn at_rest(q: [R; DIGITS]) -> Self {
-        HandReference { q, dq: [R::of(0.0); DIGITS] }
-    }
-}
+/// Longest window: 0.2 s, in control periods.
+pub const WINDOW_CAPACITY: usize = periods(0.2) as usize;
 
 /// Eq (14).
 #[derive(Clone, Debug)]

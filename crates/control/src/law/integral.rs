@@ -9,10 +9,9 @@
 //!   is why it does not hunt;
 //! * within a clamp worth 1.5 times the friction of the model: an obstacle feels that much more, and no more with time.
 
-use crate::cycle::PERIOD;
 use crate::law::gains::Gains;
-use crate::model::arm::within;
-use crate::real::Real;
+use crate::real::{Real, within};
+use crate::time::PERIOD;
 use crate::units::{JOINTS, JointPositions, Vector7};
 
 /// How exactly a posture is held under the friction of the model, 30 % more or less (rad).

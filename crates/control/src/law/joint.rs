@@ -7,31 +7,14 @@
 use crate::law::gains::Tracking;
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
+use crate::plan::reference::JointReference;
 use crate::real::Real;
 use crate::sense::joints::JointState;
-use crate::units::{JointAccelerations, JointPositions, JointTorques, JointVelocities, Vector7};
+use crate::units::{JointTorques, JointVelocities, Vector7};
 
 /// Desired speed at which half of the Coulomb friction is fed forward (rad/s): smooths the sign, so that a plan at rest
 /// does not chatter.
 const FRICTION_SPEED: f64 = 0.01;
-
-/// What the joints should do at one tick.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JointReference<R: Real> {
-    /// Desired positions (rad).
-    pub q: JointPositions<R>,
-    /// Desired velocities (rad/s).
-    pub dq: JointVelocities<R>,
-    /// Desired accelerations (rad/s^2).
-    pub ddq: JointAccelerations<R>,
-}
-
-impl<R: Real> JointReference<R> {
-    /// To stand still at `q`.
-    pub fn at_rest(q: JointPositions<R>) -> Self {
-        JointReference { q, dq: JointVelocities::zero(), ddq: JointAccelerations::zero() }
-    }
-}
 
 /// Eq (10).
 #[derive(Clone, Debug)]

@@ -11,8 +11,8 @@ pub mod window;
 
 pub use force::ForceController;
 pub use gains::{Gains, HandGains, Tracking};
-pub use hand::{HandController, HandReference};
+pub use hand::HandController;
 pub use integral::PostureIntegral;
-pub use joint::{JointController, JointReference};
-pub use operational::{OperationalController, TaskReference};
+pub use joint::JointController;
+pub use operational::OperationalController;
 pub use window::Window;

@@ -5,38 +5,21 @@
 //! `J^+ (ddx_d + K_x (dx_d - dx) - dJ dq) + (I - J^+ J) K_post (dq_post - dq)`, or the low-passed derivative of `dq_d`.
 //! The orientation error is `2 vec(q_d (x) conj(q))`, sign-aligned, in world axes, as the Jacobian's angular rows are.
 
-use dmp::PoseReference;
 use nalgebra::Vector3;
 
 use crate::command::{AccelerationSource, PoseFeedback};
-use crate::cycle::{PERIOD, RATE};
 use crate::law::gains::Tracking;
-use crate::law::joint::JointReference;
-use crate::model::arm::{ArmModel, at_least, at_most};
+use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
-use crate::plan::primitive::{Reference, posture_and_hand};
-use crate::real::Real;
+use crate::plan::reference::{JointReference, TaskReference};
+use crate::real::{Real, at_least, at_most};
 use crate::sense::filter::{Butterworth, LowPass};
 use crate::sense::joints::JointState;
-use crate::units::{JOINTS, JointAccelerations, JointPositions, JointVelocities, Orientation, Pose, Vector6, Vector7};
+use crate::time::{PERIOD, RATE};
+use crate::units::{JOINTS, JointAccelerations, JointPositions, JointVelocities, Vector6};
 
 /// Cut-off of the differentiated acceleration (Hz).
 const ACCELERATION_CUT_OFF: f64 = 15.0;
-
-/// What the tool should do at one tick, and which posture the rest of the arm should prefer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TaskReference<R: Real> {
-    /// Desired position (m) and orientation.
-    pub pose: Pose<R>,
-    /// Desired velocity (m/s) and angular velocity (rad/s), world axes.
-    pub velocity: Vector6<R>,
-    /// Desired acceleration (m/s^2) and angular acceleration (rad/s^2), world axes.
-    pub acceleration: Vector6<R>,
-    /// Preferred posture `q_post` (rad).
-    pub posture: Vector7<R>,
-    /// Velocity of the preferred posture (rad/s).
-    pub posture_velocity: Vector7<R>,
-}
 
 /// Eq (11), with `q_d` as its state.
 #[derive(Clone, Debug)]
@@ -128,26 +111,5 @@ impl<R: Real> OperationalController<R> {
         }
         self.q_d = JointPositions(q_d);
         JointReference { q: self.q_d, dq: self.dq_d, ddq: JointAccelerations(ddq_d) }
-    }
-}
-
-impl<R: Real> TaskReference<R> {
-    /// From the plan of a primitive, whose angular quantities are in body axes.
-    pub fn from_plan(plan: &Reference<R>) -> Self {
-        let [PoseReference { position, orientation }] = &plan.poses;
-        let [vx, vy, vz] = position.v;
-        let [ax, ay, az] = position.a;
-        let [wx, wy, wz] = orientation.omega_world();
-        let [bx, by, bz] = orientation.domega_world();
-        TaskReference {
-            pose: Pose {
-                position: Vector3::from(position.x),
-                orientation: Orientation(orientation.quaternion.to_array()),
-            },
-            velocity: Vector6::new(vx, vy, vz, wx, wy, wz),
-            acceleration: Vector6::new(ax, ay, az, bx, by, bz),
-            posture: Vector7::from(posture_and_hand(&plan.points.x).0),
-            posture_velocity: Vector7::from(posture_and_hand(&plan.points.v).0),
-        }
     }
 }

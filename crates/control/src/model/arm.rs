@@ -3,11 +3,10 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::model::calibration::Payload;
-use crate::model::kinematics::Frames;
 use crate::model::wam7;
 use crate::model::wam7::{BodyTable, PayloadTable};
 use crate::real::Real;
-use crate::units::{JOINTS, JointPositions, Vector6};
+use crate::units::{JOINTS, JointPositions};
 
 /// Mass properties of one link.
 #[derive(Clone, Copy, Debug)]
@@ -95,36 +94,10 @@ impl<R: Real> ArmModel<R> {
         }
     }
 
-    /// What the wrist sensor feels of the hand alone while the arm is at rest: its weight, as force (N) and torque about the
-    /// sensor's origin (N m), in sensor axes.
-    pub fn hanging_weight(&self, frames: &Frames<R>) -> Vector6<R> {
-        let force = frames.sensor_to_world().tr_mul(&self.base_acceleration) * -self.hanging_mass;
-        let torque = self.hanging_centre.cross(&force);
-        Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
-    }
-
     /// Whether every joint lies within its soft limits. False for a NaN.
     pub fn within_soft_limits(&self, q: &JointPositions<R>) -> bool {
         q.0.iter().zip(self.soft_min.iter().zip(&self.soft_max)).all(|(q, (min, max))| q >= min && q <= max)
     }
-}
-
-/// The larger of two numbers; `bound` for a NaN.
-#[inline]
-pub(crate) fn at_least<R: Real>(value: R, bound: R) -> R {
-    if value > bound { value } else { bound }
-}
-
-/// The smaller of two numbers; `bound` for a NaN.
-#[inline]
-pub(crate) fn at_most<R: Real>(value: R, bound: R) -> R {
-    if value < bound { value } else { bound }
-}
-
-/// `value` within plus or minus `bound`; `-bound` for a NaN.
-#[inline]
-pub(crate) fn within<R: Real>(value: R, bound: R) -> R {
-    at_most(at_least(value, -bound), bound)
 }
 
 /// Two rigid bodies as one (parallel-axis theorem), in the same frame.

@@ -10,9 +10,17 @@ use nalgebra::{SMatrix, Vector3};
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
 use crate::real::Real;
-use crate::units::{JOINTS, JointAccelerations, JointTorques, JointVelocities, Vector7};
+use crate::units::{JOINTS, JointAccelerations, JointTorques, JointVelocities, Vector6, Vector7};
 
 impl<R: Real> ArmModel<R> {
+    /// What the wrist sensor feels of the hand alone while the arm is at rest: its weight, as force (N) and torque about the
+    /// sensor's origin (N m), in sensor axes.
+    pub fn hanging_weight(&self, frames: &Frames<R>) -> Vector6<R> {
+        let force = frames.sensor_to_world().tr_mul(&self.base_acceleration) * -self.hanging_mass;
+        let torque = self.hanging_centre.cross(&force);
+        Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
+    }
+
     /// Torque that holds the arm still: `g(q)` (N m).
     pub fn gravity_torque(&self, frames: &Frames<R>) -> JointTorques<R> {
         JointTorques(self.newton_euler::<false>(frames, &Vector7::zeros(), &Vector7::zeros(), self.base_acceleration))

@@ -6,8 +6,8 @@
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use crate::model::arm::{ArmModel, at_least};
-use crate::real::Real;
+use crate::model::arm::ArmModel;
+use crate::real::{Real, at_least};
 use crate::units::{JOINTS, JointPositions, JointVelocities, Orientation, Pose, Twist, Vector6, Vector7};
 
 /// The geometric Jacobian: 6 rows (linear, angular; world axes), one column per joint.

@@ -3,19 +3,17 @@
 //! `q(u) = q_0 + (q_1 - q_0)(10 u^3 - 15 u^4 + 6 u^5)`, `u = t/T`. The duration is long enough that no joint exceeds half of
 //! its speed limit and neither the elbow nor the point 0.35 m beyond it exceeds 0.35 m/s; the safety module faults at 1.0 m/s.
 
-use crate::cycle::{PERIOD, RATE};
-use crate::law::joint::JointReference;
+use crate::guard::monitor::TIP_REACH;
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
 use crate::model::wam7;
+use crate::plan::reference::JointReference;
 use crate::real::Real;
+use crate::time::{PERIOD, RATE, periods};
 use crate::units::{JointAccelerations, JointPositions, JointVelocities, Vector7};
 
 /// Largest speed of the elbow and of the point beyond it during an approach (m/s).
 pub const TIP_SPEED: f64 = 0.35;
-
-/// Distance beyond the elbow at which the safety module watches the speed (m).
-pub const TIP_REACH: f64 = 0.35;
 
 /// Part of the joint speed limits that an approach uses.
 const SPEED_FRACTION: f64 = 0.5;
@@ -29,8 +27,8 @@ const SAMPLE_MARGIN: f64 = 1.05;
 /// Longest approach that may be asked for (s).
 pub const LONGEST: f64 = 120.0;
 
-/// Longest time that the arm may take to close in on the target after the path has ended (control periods): 1 s.
-pub const SETTLING: u16 = 300;
+/// Longest time that the arm may take to close in on the target after the path has ended: 1 s, in control periods.
+pub const SETTLING: u16 = periods(1.0);
 
 /// Shortest approach (s), so that a move over no distance still begins and ends.
 const SHORTEST: f64 = 0.5;
@@ -54,11 +52,11 @@ impl<R: Real> Approach<R> {
     /// A move from `start` to `goal` in `duration` (s) or, where the speed limits ask for it, longer.
     pub fn new(model: &ArmModel<R>, start: &JointPositions<R>, goal: &JointPositions<R>, duration: R) -> Self {
         let way = goal.0 - start.0;
-        let mut needed = crate::model::arm::at_least(duration, R::of(SHORTEST));
+        let mut needed = crate::real::at_least(duration, R::of(SHORTEST));
         for (way, limit) in way.iter().zip(&wam7::VELOCITY_MAX) {
             // The peak speed of a minimum jerk is 1.875 times the mean.
             let magnitude = if *way < R::of(0.0) { -*way } else { *way };
-            needed = crate::model::arm::at_least(needed, magnitude * R::of(1.875 / (SPEED_FRACTION * limit)));
+            needed = crate::real::at_least(needed, magnitude * R::of(1.875 / (SPEED_FRACTION * limit)));
         }
         for sample in 0..SAMPLES {
             let u = (sample as f64 + 0.5) / SAMPLES as f64;
@@ -66,10 +64,10 @@ impl<R: Real> Approach<R> {
             let frames = Frames::new(model, &JointPositions(start.0 + way * position));
             let [elbow, tip] = frames.elbow_speeds(&JointVelocities(way * speed), R::of(TIP_REACH));
             let scale = R::of(SAMPLE_MARGIN / TIP_SPEED);
-            needed = crate::model::arm::at_least(needed, crate::model::arm::at_least(elbow, tip) * scale);
+            needed = crate::real::at_least(needed, crate::real::at_least(elbow, tip) * scale);
         }
         let longest = R::of(LONGEST);
-        let needed = crate::model::arm::at_most(needed, longest);
+        let needed = crate::real::at_most(needed, longest);
         let length = (needed * R::of(RATE)).whole_below().to_whole() + 1;
         Approach { start: start.0, way, length, passed: 0, settled: 0, rate: R::of(RATE) / R::from_counts(length) }
     }

@@ -1,11 +1,10 @@
 //! `HandMotion`: a move of the hand along a minimum-jerk path.
 
-use crate::cycle::RATE;
-use crate::law::hand::HandReference;
-use crate::model::arm::{at_least, at_most};
 use crate::model::hand::DIGITS;
 use crate::plan::approach::minimum_jerk;
-use crate::real::Real;
+use crate::plan::reference::HandReference;
+use crate::real::{Real, at_least, at_most};
+use crate::time::RATE;
 
 /// Longest move that may be asked for (s).
 pub const LONGEST: f64 = 60.0;

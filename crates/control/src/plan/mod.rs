@@ -4,7 +4,9 @@ pub mod approach;
 pub mod hand;
 pub mod load;
 pub mod primitive;
+pub mod reference;
 pub(crate) mod run;
 
 pub use approach::Approach;
 pub use hand::HandMotion;
+pub use reference::{HandReference, JointReference, TaskReference};

@@ -4,13 +4,13 @@ use dmp::{Quaternion, RolloutError};
 use nalgebra::Vector3;
 
 use crate::command::{Goal, Refusal, RunOptions};
-use crate::cycle::PERIOD;
 use crate::guard::watch::{Surprise, Watch};
 use crate::plan::load::within_reach;
 use crate::plan::primitive::{Coupling, Primitive, Reference, Rollout, StartState, configuration, posture_and_hand};
 use crate::real::Real;
 use crate::sense::deviation::{Deviation, SmoothedWrench};
 use crate::sense::hand::HandState;
+use crate::time::{PERIOD, periods};
 use crate::units::{JointPositions, Pose, Wrench};
 
 /// Largest distance of any joint from the start posture of the primitive (rad).
@@ -25,9 +25,9 @@ const REST: (f64, f64) = (2e-3, 1e-2);
 /// The hand rows count as at rest below this speed (rad/s).
 const HAND_REST: f64 = 5e-2;
 
-/// Control periods that the plan stays at rest before the run is over: three time constants of the pose feedback of
+/// Time that the plan stays at rest before the run is over: 1 s, in control periods. It is three time constants of the pose feedback of
 /// Eq (11), so that the arm has closed the last millimetres.
-const SETTLING: u16 = 300;
+const SETTLING: u16 = periods(1.0);
 
 /// Progress beyond which a plan that never comes to rest (feedback still bends it) is over as well.
 const LATEST: f64 = 1.5;
@@ -35,8 +35,8 @@ const LATEST: f64 = 1.5;
 /// The same for a run that the feedback bends: it never comes to rest while something presses.
 const LATEST_WITH_FEEDBACK: f64 = 1.15;
 
-/// Control periods in which the feedback fades out when the sensor falls silent: 100 ms.
-pub(crate) const FADE: u16 = 30;
+/// Time in which the feedback fades out when the sensor falls silent: 100 ms, in control periods.
+pub(crate) const FADE: u16 = periods(0.1);
 
 /// Largest distance of a digit of the hand from where the primitive starts (rad).
 const HAND_DISTANCE: f64 = 0.15;

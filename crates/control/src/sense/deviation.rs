@@ -2,11 +2,14 @@
 
 use nalgebra::Vector3;
 
-use crate::cycle::RATE;
-use crate::plan::primitive::SENSORS;
 use crate::real::Real;
 use crate::sense::filter::{Butterworth, LowPass};
+use crate::time::RATE;
 use crate::units::{Vector6, Wrench};
+
+/// Sensor values: force x, y, z (N, world axes), torque x, y, z (N m, tool axes at the grasp point), torque of the
+/// environment on finger F1, F2, F3 (N m).
+pub const SENSORS: usize = 9;
 
 /// Force (N) that counts as none: the bias and hysteresis of the sensor that a tare leaves would otherwise move the plan by
 /// centimetres.

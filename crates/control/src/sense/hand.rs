@@ -3,22 +3,32 @@
 use nalgebra::SVector;
 use puck::{Counts, gauge};
 
-use crate::cycle::RATE;
-use crate::cycle::record::HandSample;
 use crate::model::hand::{DIGITS, FINGERS, from_pucks};
 use crate::real::Real;
 use crate::sense::filter::{Butterworth, LowPass};
 use crate::sense::joints::VELOCITY_CUT_OFF;
+use crate::sense::sample::HandSample;
 use crate::sense::wrench::WRENCH_CUT_OFF;
+use crate::time::{PERIOD, RATE, few_periods};
 
-/// Control periods without a reply after which the hand counts as lost.
-pub const LOST_CYCLES: u8 = 10;
+/// Time without a reply after which the hand counts as lost: 33 ms, in control periods.
+pub const LOST_CYCLES: u8 = few_periods(1.0 / 30.0);
 
 /// Largest believed motion per control period (counts): three times the no-load speeds of 2.44 rad/s (inner link) and
 /// 6.3 rad/s (spread). A larger one is believed when the next reply confirms it.
-const MOTOR_GATE: [i32; DIGITS] = [1990, 1990, 1990, 720];
+const MOTOR_GATE: [i32; DIGITS] = [
+    counts_per_period(597_000.0),
+    counts_per_period(597_000.0),
+    counts_per_period(597_000.0),
+    counts_per_period(216_000.0),
+];
 /// The same of the worm encoders.
-const WORM_GATE: i32 = 800;
+const WORM_GATE: i32 = counts_per_period(240_000.0);
+
+/// Counts in one control period at a speed (counts/s), to the nearest.
+const fn counts_per_period(speed: f64) -> i32 {
+    (speed * PERIOD + 0.5) as i32
+}
 
 /// Largest believed change of a gauge from one sample to the next (N m), unless the next sample confirms it.
 const GAUGE_STEP: f64 = 1.0;

@@ -11,15 +11,15 @@
 
 use puck::{Counts, Transmission};
 
-use crate::cycle::{PERIOD, RATE};
 use crate::model::calibration::Calibration;
 use crate::model::wam7;
 use crate::real::Real;
 use crate::sense::filter::{Butterworth, LowPass};
+use crate::time::{PERIOD, RATE, few_periods};
 use crate::units::{JOINTS, JointPositions, JointVelocities, Vector7};
 
-/// Cycles without a reply that are bridged by extrapolation: 16.7 ms.
-pub const COAST_CYCLES: u8 = 5;
+/// Time without a reply that is bridged by extrapolation: 16.7 ms, in control periods.
+pub const COAST_CYCLES: u8 = few_periods(1.0 / 60.0);
 
 /// Cut-off of the velocity filter (Hz).
 pub const VELOCITY_CUT_OFF: f64 = 50.0;

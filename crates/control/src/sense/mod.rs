@@ -4,9 +4,11 @@ pub mod deviation;
 pub mod filter;
 pub mod hand;
 pub mod joints;
+pub mod sample;
 pub mod wrench;
 
 pub use deviation::Deviation;
 pub use hand::{HandEstimator, HandState};
 pub use joints::{JointEstimator, JointState};
+pub use sample::{BusSample, HandSample};
 pub use wrench::WrenchEstimator;

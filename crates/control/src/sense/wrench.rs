@@ -11,11 +11,11 @@
 use nalgebra::Vector3;
 use puck::RawWrench;
 
-use crate::cycle::RATE;
 use crate::model::kinematics::Frames;
 use crate::model::wam7;
 use crate::real::Real;
 use crate::sense::filter::{Butterworth, LowPass};
+use crate::time::{RATE, periods};
 use crate::units::{Vector6, Wrench};
 
 /// Cut-off of the wrench filter (Hz).
@@ -25,8 +25,8 @@ pub const WRENCH_CUT_OFF: f64 = 15.0;
 /// one corrupt sample must not bend the plan.
 const LARGEST_STEP: [f64; 6] = [20.0, 20.0, 20.0, 1.0, 1.0, 1.0];
 
-/// Half of the time over which a resting wrench is averaged for the tare (control periods): 0.15 s.
-const REST_HALF: u16 = 45;
+/// Half of the time over which a resting wrench is averaged for the tare: 0.15 s, in control periods.
+const REST_HALF: u16 = periods(0.15);
 
 /// Largest drift (N) that an automatic tare takes away once the wrench has been tared: what is more is a load or a contact.
 const DRIFT: f64 = 1.0;

@@ -4,8 +4,9 @@ use control::act::limit::STEP_LIMIT;
 use control::command::{Command, PoseFeedback, RunOptions};
 use control::law::Gains;
 use control::model::Frames;
+use control::time::periods;
 use control::units::JointPositions;
-use control::{CycleRecord, Event, Fault, Refusal, State, flags};
+use control::{CycleRecord, Event, Fault, RATE, Refusal, State, flags};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
 
 use crate::primitives::{DISPLACEMENT, Design, GOAL, ROTATION, START, primitive};
@@ -154,8 +155,8 @@ fn stuck(force: Vector3<f64>, torque: Vector3<f64>, options: RunOptions) -> (f64
     let start = rig.last.expect("ran").record;
     let (mut farthest, mut widest) = (0.0f64, 0.0f64);
     let calm = rig.plant.wrench();
-    for cycle in 0..3000 {
-        if cycle > 150 {
+    for cycle in 0..periods(10.0) {
+        if cycle > periods(0.5) {
             let counts =
                 |now: [i16; 3], by: Vector3<f64>, scale: f64| [0, 1, 2].map(|i| now[i] + (by[i] * scale) as i16);
             rig.plant.stuck = Some(puck::RawWrench {
@@ -223,14 +224,14 @@ fn b4_a_silent_sensor_fades_the_feedback_before_the_arm_stops_softly() {
         }
         faded += usize::from(record.flags & flags::FEEDBACK_FADED != 0);
         if record.state == State::Run {
-            let now = (position(&record) - position(&last)) * 300.0;
+            let now = (position(&record) - position(&last)) * RATE;
             if let Some(before) = velocity {
-                jerk = jerk.max((now - before).norm() * 300.0);
+                jerk = jerk.max((now - before).norm() * RATE);
             }
             velocity = Some(now);
         }
         last = record;
-        assert!(rig.number < 3000);
+        assert!(rig.number < u64::from(periods(10.0)));
     }
     assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::SoftStop, Fault::WrenchLost));
     assert!((29..=31).contains(&faded), "100 ms: {faded} cycles");
@@ -386,11 +387,11 @@ fn a_run_that_something_keeps_bending_ends_all_the_same() {
     rig.command(Command::Run(FEELING));
     let began = rig.number;
     while rig.cycle.state() == State::Run {
-        let phase = rig.number as f64 / 300.0;
+        let phase = rig.number as f64 / RATE;
         rig.plant.push[1] = 4.0 * (3.0 * phase).sin();
         rig.tick(None);
     }
-    let seconds = (rig.number - began) as f64 / 300.0;
+    let seconds = (rig.number - began) as f64 / RATE;
     assert!(seconds < 4.0 * 1.16, "{seconds} s of a movement of 4 s");
 }
 
@@ -409,7 +410,7 @@ fn from_stiff_to_compliant_and_back_the_torque_makes_no_step_and_the_arm_no_jump
         let (mut largest, mut next) = (0.0f32, Some(Command::Run(options)));
         let mut held = 0;
         let mut arrived = None;
-        while held < 600 {
+        while held < periods(2.0) {
             let record = rig.tick(next.take()).record;
             assert!([State::Run, State::Hold].contains(&record.state), "{:?} {:?}", record.state, record.fault);
             for ((now, before), limit) in record.tau.iter().zip(last.tau).zip(STEP_LIMIT) {
@@ -474,7 +475,7 @@ fn a_wall_is_pressed_with_the_force_that_statics_predicts() {
     // The desired posture is where the controller has it; what remains are seven equations for q - q_0 and the wall's F = -k x.
     let tracking = gains.compliant;
     let proportional = f64::from(tracking.force_proportional);
-    let window = tracking.force_window as f64 / 300.0;
+    let window = tracking.force_window as f64 / RATE;
     let gain = proportional + f64::from(tracking.force_integral) * window;
     let frames = Frames::new(&rig_model(), &JointPositions::from_f32(record.q));
     let jacobian: SMatrix<f64, 6, 7> = frames.jacobian().0;

@@ -2,6 +2,7 @@
 
 use control::command::{Command, RunOptions};
 use control::sense::deviation::TORQUE_DEAD_BAND;
+use control::time::periods;
 use control::{Fault, Real, State, flags};
 
 use crate::primitives::{Design, GOAL, START, configuration, primitive};
@@ -154,7 +155,7 @@ fn b2_one_outlier_of_the_force_sensor_moves_the_plan_by_less_than_a_millimetre()
         rig.tick(None);
         rig.plant.glitch = 0.0;
         let mut positions = Vec::new();
-        for _ in 0..150 {
+        for _ in 0..periods(0.5) {
             positions.push(f64::from(rig.tick(None).record.pose_d[0]));
         }
         positions

@@ -2,6 +2,7 @@
 
 use control::command::{Command, RunOptions};
 use control::sense::hand::LOST_CYCLES;
+use control::time::periods;
 use control::{Event, Refusal, State, flags};
 
 use crate::hand_plant::Hand;
@@ -209,10 +210,10 @@ fn a_hand_that_falls_silent_is_bridged_then_left_to_its_worms_and_taken_up_again
     assert_eq!(rig.cycle.state(), State::Hold, "the arm is not concerned");
     let mut torque = 0.0f64;
     rig.plant.hand.as_mut().expect("fitted").silent = false;
-    for _ in 0..600 {
+    for _ in 0..periods(2.0) {
         rig.tick(None);
         let step = (hand(&rig).torque[1] - torque).abs();
-        assert!(step < 1.2 / 15.0 + 1e-3, "{step} N m in one cycle");
+        assert!(step < 1.2 / f64::from(periods(0.05)) + 1e-3, "{step} N m in one cycle");
         torque = hand(&rig).torque[1];
     }
     assert!((hand(&rig).q[1] - 1.2).abs() < 0.05, "{:?}", hand(&rig).q);

@@ -2,7 +2,7 @@
 
 use control::act::limit::STEP_LIMIT;
 use control::command::{Command, RunOptions};
-use control::{Fault, State};
+use control::{Fault, RATE_HZ, State};
 
 use crate::primitives::{Design, START, primitive};
 use crate::rig::Rig;
@@ -115,7 +115,7 @@ fn a4_random_loss_of_one_percent_does_not_disturb_the_run() {
             assert!((record.tau[joint] - last[joint]).abs() <= STEP_LIMIT[joint] as f32 * 1.0001);
         }
         last = record.tau;
-        assert!(rig.number < 300 * 30);
+        assert!(rig.number < u64::from(RATE_HZ) * 30);
     }
 }
 

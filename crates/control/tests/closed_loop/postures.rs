@@ -6,6 +6,7 @@ use control::law::Gains;
 use control::law::integral::TOLERANCE;
 use control::plan::Approach;
 use control::plan::approach::SETTLING;
+use control::time::periods;
 use control::units::{JointPositions, Vector7};
 use control::{Event, RATE, State, flags, model};
 
@@ -58,7 +59,7 @@ fn an_approach_ends_within_tolerance_and_without_hunting_whatever_friction_and_d
                 assert!(worst(&rig, &target) <= 1.0, "delay {delay}, friction {scale}: {}", rig.plant.q);
                 rig.run_for(2.0);
                 let rest = rig.plant.q;
-                for _ in 0..300 {
+                for _ in 0..periods(1.0) {
                     rig.tick(None);
                     assert!(rig.plant.dq.amax() < 5e-3, "delay {delay}, friction {scale}: {}", rig.plant.dq);
                 }
@@ -103,7 +104,7 @@ fn a_frictionless_arm_is_held_steadily_as_well() {
         for target in TARGETS.into_iter().skip(2) {
             approach(&mut rig, &target);
             rig.run_for(2.0);
-            for _ in 0..300 {
+            for _ in 0..periods(1.0) {
                 rig.tick(None);
                 assert!(worst(&rig, &target) <= 1.0, "delay {delay}: {}", rig.plant.q);
             }
@@ -117,7 +118,7 @@ fn an_obstacle_feels_no_more_than_one_and_a_half_times_the_friction_in_addition(
     rig.plant.push[1] = 25.0;
     let stiffness = f64::from(Gains::<f32>::tuned().stiff.stiffness[0]);
     let mut most = 0.0f64;
-    for _ in 0..3000 {
+    for _ in 0..periods(10.0) {
         let record = rig.tick(None).record;
         // Gravity has no part in the torque of J1; what the spring and the damper do not explain is the integral's.
         let spring = stiffness * f64::from(record.q_d[0] - record.q[0]);
@@ -198,14 +199,14 @@ fn from_approach_to_hold_to_run_and_back_the_torque_makes_no_step() {
         let mut next = Some(command);
         // Through the movement and two seconds into the hold that follows it.
         let mut held = 0;
-        while held < 600 {
+        while held < periods(2.0) {
             let record = rig.tick(next.take()).record;
             assert!([first, State::Hold].contains(&record.state), "{:?}", record.state);
             assert_eq!(record.flags & flags::RATE_LIMITED, 0);
             for ((now, before), limit) in record.tau.iter().zip(last.tau).zip(STEP_LIMIT) {
                 largest = largest.max((now - before).abs() / limit as f32);
             }
-            held += u32::from(record.state == State::Hold);
+            held += u16::from(record.state == State::Hold);
             last = record;
         }
     }

@@ -14,7 +14,7 @@ use control::plan::load;
 use control::plan::primitive::Primitive;
 use control::units::{JointPositions, JointVelocities, Vector7};
 use control::{
-    BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, LoadRefusal, Payload, Real, State, model,
+    BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, LoadRefusal, Payload, RATE, Real, State, model,
 };
 use nalgebra::{SMatrix, Vector3};
 use pinned_init::InPlaceWrite;
@@ -228,14 +228,14 @@ impl<R: Real> Rig<R> {
     }
 
     pub(crate) fn run_for(&mut self, seconds: f64) {
-        for _ in 0..(seconds * 300.0).round() as usize {
+        for _ in 0..(seconds * RATE).round() as usize {
             self.tick(None);
         }
     }
 
     /// Runs until the state is left; fails after `seconds`.
     pub(crate) fn until(&mut self, state: State, seconds: f64) {
-        for _ in 0..(seconds * 300.0) as usize {
+        for _ in 0..(seconds * RATE) as usize {
             if self.tick(None).record.state == state {
                 return;
             }

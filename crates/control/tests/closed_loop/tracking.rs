@@ -2,8 +2,9 @@
 
 use control::command::{AccelerationSource, Command, Goal, PoseFeedback, RunOptions};
 use control::model::ArmModel;
+use control::time::periods;
 use control::units::{JointVelocities, Orientation, Vector7};
-use control::{CycleRecord, Payload, Real, State, flags, model};
+use control::{CycleRecord, Payload, RATE, RATE_HZ, Real, State, flags, model};
 
 use crate::primitives::{Design, GOAL, START, configuration, primitive};
 use crate::rig::{Plant, Rig};
@@ -58,7 +59,7 @@ fn run_disturbed<R: Real>(rig: &mut Rig<R>, options: RunOptions, change: impl Fn
         }
         last = record;
         count += 1.0;
-        assert!(count < 300.0 * 30.0, "the run ends");
+        assert!(count < RATE * 30.0, "the run ends");
     }
     rig.run_for(1.0);
     let pose = rig.plant.frames().tool_pose();
@@ -118,7 +119,7 @@ fn the_loop_is_stable_on_a_frictionless_arm_with_two_cycles_of_delay() {
     rig.run_for(4.0);
     // Half a second later nothing moves: what is left is the quantisation.
     let mut fastest = 0.0f64;
-    for _ in 0..150 {
+    for _ in 0..periods(0.5) {
         rig.tick(None);
         fastest = fastest.max(rig.plant.dq.amax());
     }
@@ -147,9 +148,9 @@ fn approach_arrives_slowly_enough_and_holds() {
         assert!(matches!(rig.cycle.state(), State::Approach | State::Hold), "{:?}", rig.last);
         let speeds = rig.plant.frames().elbow_speeds(&JointVelocities(rig.plant.dq), 0.35);
         fastest = fastest.max(speeds[0].max(speeds[1]));
-        assert!(rig.number < 300 * 60);
+        assert!(rig.number < u64::from(RATE_HZ) * 60);
     }
-    let seconds = (rig.number - begin) as f64 / 300.0;
+    let seconds = (rig.number - begin) as f64 / RATE;
     assert!(fastest < 0.36, "{fastest} m/s");
     assert!(seconds < 25.0, "{seconds} s is longer than the limits ask for");
     rig.run_for(1.0);

@@ -32,8 +32,8 @@ pub use initialise::{Initialisation, Outcome};
 pub use round::HandRound;
 pub use trouble::HandTrouble;
 
-/// Rounds in a row that a puck may be silent before the hand is given up: 0.2 s.
-const SILENT_ROUNDS: u16 = 60;
+/// Time that a puck may be silent before the hand is given up: 0.2 s, in rounds, one a control period.
+const SILENT_ROUNDS: u16 = control::time::periods(0.2);
 
 /// The hand.
 #[derive(Clone, Copy, Debug)]

@@ -311,7 +311,7 @@ impl<S: Store> Session<S> {
             maximum_kernels: u16::try_from(link::image::KERNEL_LIMIT).unwrap_or(u16::MAX),
             slots: self.directory.places(),
             slot_bytes: u32::try_from(self.store.slot_bytes()).unwrap_or(u32::MAX),
-            cycles_per_second: 300,
+            cycles_per_second: control::RATE_HZ as u16,
             ticks_per_second: self.identity.ticks_per_second,
             simulated: self.identity.simulated,
             firmware: Text::new(self.identity.firmware),

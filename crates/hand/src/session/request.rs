@@ -292,7 +292,7 @@ impl Session<'_> {
             maximum_kernels: u16::try_from(KERNELS).unwrap_or(u16::MAX),
             slots: u8::try_from(PLACES).unwrap_or(u8::MAX),
             slot_bytes: u32::try_from(IMAGE_BYTES_LIMIT).unwrap_or(u32::MAX),
-            cycles_per_second: 300,
+            cycles_per_second: control::RATE_HZ as u16,
             ticks_per_second: self.identity.ticks_per_second,
             simulated: self.identity.simulated,
             firmware: Text::new(self.identity.firmware),

@@ -1,7 +1,8 @@
 //! Eq (14) from counts to torque in fixed point against the arm's code in f64.
 
 use control::HandSample;
-use control::law::{Gains, HandController as ExactController, HandReference as ExactReference};
+use control::law::{Gains, HandController as ExactController};
+use control::plan::HandReference as ExactReference;
 use control::sense::HandEstimator as ExactEstimator;
 use dmp::Scalar;
 use hand::controller::{HandController, HandReference};

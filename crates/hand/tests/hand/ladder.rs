@@ -9,7 +9,7 @@ use puck::{Action, MotorMode, Node, PropertyId, Status};
 use sim::FingerObstacle;
 
 use crate::common::Movement;
-use crate::rig::{OBJECT, Rig};
+use crate::rig::{CYCLE_TICKS, OBJECT, Rig, SLOT_TICKS};
 
 fn grip() -> Movement {
     let mut movement =
@@ -129,7 +129,7 @@ fn lost_replies_are_bridged_for_five_cycles_and_end_the_torque_in_the_sixth() {
             let first = *begin.get_or_init(|| at);
             let _ = &left;
             // Whole cycles of replies of one finger.
-            let lost = (at - first) / sim::CYCLE_TICKS < cycles;
+            let lost = (at - first) / CYCLE_TICKS < cycles;
             lost && frame.can_id().raw() >> 5 & 0x1F == u16::from(Node::FINGERS[1].number())
         });
         rig.run(0.2);
@@ -343,17 +343,17 @@ fn replies_are_in_before_the_control_slot_and_the_bus_has_room() {
             cycles += 1;
         }
         let from_digit = passage.sender.hand_index().is_some();
-        if cycles > 0 && from_digit && passage.end - begin < sim::CYCLE_TICKS / 2 {
+        if cycles > 0 && from_digit && passage.end - begin < CYCLE_TICKS / 2 {
             longest = longest.max(passage.end - begin);
         }
         busy += passage.end - passage.start;
     }
     let microseconds = |ticks: u64| ticks as f64 / sim::TICKS_PER_MICROSECOND as f64;
-    let load = busy as f64 / (cycles * sim::CYCLE_TICKS) as f64;
+    let load = busy as f64 / (cycles * CYCLE_TICKS) as f64;
     println!("all replies in after {:.0} us, bus load {:.1} %", microseconds(longest), 100.0 * load);
-    assert!(longest < sim::SLOT_TICKS, "{} us", microseconds(longest));
+    assert!(longest < SLOT_TICKS, "{} us", microseconds(longest));
     // By the bit counts, worst stuffing: two requests, three positions of 6 bytes and one of 3, four gauges, and 75 us.
     let worst = 2 * 65 + 3 * 115 + 85 + 4 * 95 + 75;
-    assert!(worst * sim::TICKS_PER_MICROSECOND < sim::SLOT_TICKS, "{worst} us");
+    assert!(worst * sim::TICKS_PER_MICROSECOND < SLOT_TICKS, "{worst} us");
     assert!(load < 0.45);
 }

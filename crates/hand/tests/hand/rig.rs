@@ -2,12 +2,19 @@
 
 use std::collections::VecDeque;
 
+use device::time::{CYCLE_SLOTS, SLOT_HZ};
 use device::{Identity, QueueFull, Slot, Timing};
 use hand::{Command, Core, CoreIo, Event, FingerPrimitive, Health, Library, Record, Session, SessionPort, TimedRecord};
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
 use link::{HostHello, LINK_VERSION, Reply, Request, SCHEMA_HASH, Text};
 use puck::CanFrame;
-use sim::{FingerObstacle, FreeJoints, HOME, Plant, PlantConfig, SLOT_TICKS, TICKS_PER_MICROSECOND};
+use sim::{FingerObstacle, FreeJoints, HOME, Plant, PlantConfig, TICKS_PER_MICROSECOND, Ticks};
+
+/// Ticks of one slot.
+pub(crate) const SLOT_TICKS: Ticks = sim::period_ticks(SLOT_HZ);
+
+/// Ticks of one control cycle.
+pub(crate) const CYCLE_TICKS: Ticks = CYCLE_SLOTS as Ticks * SLOT_TICKS;
 
 /// What is between the fingers unless told otherwise.
 pub(crate) const OBJECT: FingerObstacle = FingerObstacle { inner: f64::INFINITY, outer: 0.45, stiffness: 2.0 };
@@ -188,13 +195,13 @@ impl Rig {
 
     /// So many seconds.
     pub(crate) fn run(&mut self, seconds: f64) {
-        (0..(seconds * 900.0) as usize).for_each(|_| self.step());
+        (0..(seconds * f64::from(SLOT_HZ)) as usize).for_each(|_| self.step());
     }
 
     /// Until something is so, at most `seconds`.
     #[track_caller]
     pub(crate) fn wait(&mut self, seconds: f64, mut done: impl FnMut(&Rig) -> bool) {
-        for _ in 0..(seconds * 900.0) as usize {
+        for _ in 0..(seconds * f64::from(SLOT_HZ)) as usize {
             if done(self) {
                 return;
             }

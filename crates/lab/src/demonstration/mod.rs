@@ -17,7 +17,7 @@ pub use writer::{RecordingRow, RecordingWriter};
 use crate::arm;
 
 /// Rate at which a primitive is learned and played, Hz. Another value would change what 7.5 Hz means to the filter.
-pub const RATE: f64 = 300.0;
+pub const RATE: f64 = control::RATE;
 
 /// Longest gap that is bridged by a straight line, s. A hand can change direction within a tenth of a second; what
 /// happened in a longer gap is not known.

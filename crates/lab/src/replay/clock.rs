@@ -5,9 +5,9 @@
 
 use puck::CanFrame;
 use sim::wire::frame_bits;
-use sim::{SLOT_TICKS, TICKS_PER_BIT, TICKS_PER_MICROSECOND, Ticks};
+use sim::{TICKS_PER_BIT, TICKS_PER_MICROSECOND, Ticks};
 
-use crate::simulation::halves::FIRST_SLOT;
+use crate::simulation::halves::{FIRST_SLOT, SLOT_TICKS};
 
 /// From the beginning of a slot to its first frame on an idle bus, us: what the application takes to begin.
 const LATENCY_US: i64 = 10;

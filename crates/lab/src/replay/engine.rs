@@ -3,10 +3,10 @@
 use device::{Core, Identity, RamStore, STORE_SLOTS, Session, Slot};
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
-use sim::{SLOT_TICKS, TICKS_PER_MICROSECOND, Ticks};
+use sim::{TICKS_PER_MICROSECOND, Ticks};
 
 use crate::boxed::boxed;
-use crate::simulation::halves::{FIRST_SLOT, LINE_ROOM, Port, Queues};
+use crate::simulation::halves::{FIRST_SLOT, LINE_ROOM, Port, Queues, SLOT_TICKS};
 
 /// The application of a device at power-up, and the time of its next slot.
 pub(super) struct Engine {

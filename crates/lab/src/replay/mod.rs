@@ -14,10 +14,12 @@ use link::can::{DeviceNumber, Direction, Heading, Reassembler};
 use link::frame::{self, FRAME_BYTES};
 use puck::{CanFrame, Group, Node, PropertyId, get};
 use serde::Serialize;
-use sim::{SLOT_TICKS, Ticks};
+use sim::Ticks;
 
 use canlog::{AnyFrame, LogLine};
 use canlog::{BusKind, Reader};
+
+use crate::simulation::SLOT_TICKS;
 use canlog::{HostLink, Message};
 use clock::LogClock;
 use engine::Engine;

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use control::{CycleRecord, LoadRefusal};
+use device::time::{CYCLE_SLOTS, SLOT_HZ};
 use device::{Command, Core, CoreIo, Event, FitPrimitive, Health, QueueFull, SessionPort, TimedRecord, Timing};
 use puck::CanFrame;
 use sim::Ticks;
@@ -13,6 +14,12 @@ const COMMANDS: usize = 8;
 const RECORDS: usize = 16;
 /// Bytes that may wait for the line before telemetry is left out; the firmware's port has the same room.
 pub(crate) const LINE_ROOM: usize = 2048;
+
+/// Ticks of one slot of the device.
+pub const SLOT_TICKS: Ticks = sim::period_ticks(SLOT_HZ);
+
+/// Ticks of one control cycle.
+pub const CYCLE_TICKS: Ticks = CYCLE_SLOTS as Ticks * SLOT_TICKS;
 
 /// The first slot of a device, in slots since its power-up, as on the board (`docs/lockstep.md`).
 pub(crate) const FIRST_SLOT: Ticks = 10;

@@ -15,9 +15,9 @@ use device::{Core, Identity, Session, Slot, StoreError};
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
 use sim::flash::{FlashChip, FlashPort, VirtualClock};
-use sim::{Plant, SLOT_TICKS, TICKS_PER_MICROSECOND, Ticks};
+use sim::{Plant, TICKS_PER_MICROSECOND, Ticks};
 
-use super::halves::{FIRST_SLOT, LINE_ROOM, Port, Queues};
+use super::halves::{FIRST_SLOT, LINE_ROOM, Port, Queues, SLOT_TICKS};
 use super::{Execute, SimulationError};
 use crate::boxed::boxed;
 

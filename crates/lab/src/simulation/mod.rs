@@ -17,6 +17,7 @@ mod words;
 
 pub use board::BoardEngine;
 pub use error::SimulationError;
+pub use halves::{CYCLE_TICKS, SLOT_TICKS};
 pub use options::{
     BOARD_EMULATOR_VARIABLE, BOARD_IMAGE_VARIABLE, DEFAULT_SEED, Engine, FlashSource, GRIPPED, HAND_IMAGE_VARIABLE,
     IMAGE_VARIABLE, SimulationOptions, WorldKind, built_image,
@@ -90,7 +91,7 @@ impl Simulation {
     pub fn flashlight_tilt(&mut self) -> Option<f64> {
         #[cfg(feature = "mujoco")]
         {
-            use sim::person::GuidedWorld;
+            use sim::teacher::GuidedWorld;
             use sim::world::mujoco::MujocoWorld;
             let world: &dyn std::any::Any = self.plant.world();
             let mujoco = world

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use sim::flash::{Flash, FlashChip, FlashTimes};
-use sim::person::Lesson;
+use sim::teacher::TaughtMovement;
 use sim::world::HOME;
 #[cfg(feature = "mujoco")]
 use sim::world::mujoco::{Imperfections, MujocoWorld, Scene};
@@ -99,7 +99,7 @@ pub struct SimulationOptions {
     /// Seed of the person who teaches; `None`: nobody stands beside the arm.
     pub person: Option<u64>,
     /// What that person teaches.
-    pub lesson: Lesson,
+    pub lesson: TaughtMovement,
     /// Bus, pucks, sensor, hand and operator; its seed is not used, [`seed`](Self::seed) is.
     pub plant: PlantConfig,
     /// Table and object.
@@ -188,7 +188,7 @@ impl SimulationOptions {
             world,
             posture: HOME,
             person: None,
-            lesson: Lesson::Demonstration,
+            lesson: TaughtMovement::SmallTorch,
             plant: PlantConfig::default(),
             #[cfg(feature = "mujoco")]
             scene: Scene::default(),
@@ -218,7 +218,7 @@ impl SimulationOptions {
             WorldKind::Simple => Ok(Box::new(FreeJoints::new(self.posture))),
             #[cfg(feature = "mujoco")]
             WorldKind::Mujoco => {
-                use sim::person::{GuidedWorld, Person, PersonConfig};
+                use sim::teacher::{GuidedWorld, Teacher, TeacherConfig};
                 use sim::world::mujoco::MujocoOptions;
                 let world = MujocoWorld::new(&MujocoOptions {
                     posture: self.posture,
@@ -228,7 +228,8 @@ impl SimulationOptions {
                 })?;
                 Ok(match (self.person, self.dress) {
                     (Some(seed), _) => {
-                        let person = Person::new(PersonConfig { seed, ..PersonConfig::default() }, self.lesson.path());
+                        let person =
+                            Teacher::new(TeacherConfig { seed, ..TeacherConfig::default() }, self.lesson.path());
                         Box::new(GuidedWorld::new(world, person))
                     }
                     (None, Some(dress)) => dress(world),

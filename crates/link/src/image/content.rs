@@ -1,6 +1,6 @@
-//! What an image holds: plain numbers with their units, not yet judged.
+//! Content of an image: plain numbers with their units, not yet checked.
 
-/// Which orientation error the orientation system uses.
+/// The orientation error that the orientation system uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum OrientationErrorKind {
     /// Eq (4): the vector part of the quaternion difference.
@@ -10,7 +10,7 @@ pub enum OrientationErrorKind {
     RotationVector,
 }
 
-/// What the signs of the start and goal quaternions mean.
+/// Meaning of the signs of the start and goal quaternions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum HemisphereKind {
     /// They come from a sign-continuous demonstration.
@@ -57,7 +57,7 @@ pub struct FeedbackClamps {
     pub hand: f32,
 }
 
-/// How the expected wrench was recorded.
+/// Circumstances in which the expected wrench was recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ExpectationMarks {
     /// Duration of the recorded runs, s. The inertial part of a wrench goes with its square.
@@ -101,26 +101,26 @@ pub struct ImageContent<F> {
     pub goal: Waypoint,
     /// Clamps of the feedback.
     pub clamps: FeedbackClamps,
-    /// How the expectation was recorded; all zero without one.
+    /// Circumstances in which the expectation was recorded; all zero without one.
     pub marks: ExpectationMarks,
     /// Successful runs behind the experience; 0 without one.
     pub experience_trials: u16,
     /// Kernels of each row.
     pub kernels: usize,
-    /// K1 of Eq (8) by phase: points x [`COUPLED_ROWS`](super::COUPLED_ROWS), point after point, first at the start. Empty: no
-    /// feedback. One point: constant.
+    /// K1 of Eq (8) by phase: points x [`COUPLED_ROWS`](super::COUPLED_ROWS), point after point, first at the start.
+    /// Empty: no feedback. One point: constant.
     pub k1: F,
     /// K2 of Eq (8) by phase: points x [`SENSOR_ROWS`](super::SENSOR_ROWS).
     pub k2: F,
     /// Weights, [`WEIGHT_ROWS`](super::WEIGHT_ROWS) x kernels, row after row.
     pub weights: F,
-    /// Expected sensor values by phase: points x [`SENSOR_ROWS`](super::SENSOR_ROWS), environment on robot. Force N in world axes,
-    /// torque N m in hand axes at the grasp point, fingers N m. May be empty.
+    /// Expected sensor values by phase: points x [`SENSOR_ROWS`](super::SENSOR_ROWS), environment on robot. Force N in
+    /// world axes, torque N m in hand axes at the grasp point, fingers N m. May be empty.
     pub expected_mean: F,
     /// Their standard deviations, same shape.
     pub expected_spread: F,
-    /// What successful runs felt and did, by phase: points x [`EXPERIENCE_ROWS`](super::EXPERIENCE_ROWS): the sensor values as
-    /// in `expected_mean`, then the angles of fingers F1 to F3, rad. May be empty.
+    /// Sensor statistics of successful runs, by phase: points x [`EXPERIENCE_ROWS`](super::EXPERIENCE_ROWS): the sensor
+    /// values as in `expected_mean`, then the angles of fingers F1 to F3, rad. May be empty.
     pub experience_mean: F,
     /// Their standard deviations, same shape.
     pub experience_spread: F,

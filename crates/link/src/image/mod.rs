@@ -11,6 +11,7 @@
 //! arm (limits, stability, unit quaternions) is checked by `dmp` and `control`, not here.
 
 mod content;
+mod counts;
 mod error;
 mod layout;
 mod read;

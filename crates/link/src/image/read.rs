@@ -3,10 +3,11 @@
 use super::content::{
     ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity,
 };
+use super::counts::{Counts, clip};
 use super::error::ImageError;
 use super::layout::{
-    COUPLED_ROWS, CRC_BYTES, Counts, EXPERIENCE_ROWS, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES,
-    IMAGE_SCHEMA, KNOWN_FLAGS, MAGIC, REAL_BYTES, SENSOR_ROWS, WEIGHT_ROWS, clip,
+    COUPLED_ROWS, CRC_BYTES, EXPERIENCE_ROWS, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES,
+    IMAGE_SCHEMA, KNOWN_FLAGS, MAGIC, REAL_BYTES, SENSOR_ROWS, WEIGHT_ROWS,
 };
 use crate::frame::CRC;
 use crate::name::{NAME_BYTES, Name};
@@ -16,13 +17,13 @@ use crate::name::{NAME_BYTES, Name};
 pub struct Reals<'a>(&'a [u8]);
 
 impl<'a> Reals<'a> {
-    /// How many.
+    /// The number of reals.
     #[must_use]
     pub const fn len(&self) -> usize {
         self.0.len() / REAL_BYTES
     }
 
-    /// Whether there are none.
+    /// True if there are none.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.len() == 0
@@ -133,19 +134,19 @@ impl<'a> PrimitiveImage<'a> {
         self.bytes
     }
 
-    /// What it holds.
+    /// Returns its content.
     #[must_use]
     pub fn content(&self) -> &ImageContent<Reals<'a>> {
         &self.content
     }
 
-    /// Whether it has a table of expected sensor values.
+    /// True if it has a table of expected sensor values.
     #[must_use]
     pub fn has_expectation(&self) -> bool {
         !self.content.expected_mean.is_empty()
     }
 
-    /// Whether it has a table of what successful runs were like.
+    /// True if it has sensor statistics of successful runs.
     #[must_use]
     pub fn has_experience(&self) -> bool {
         !self.content.experience_mean.is_empty()

@@ -1,10 +1,11 @@
 //! Plain numbers to an image.
 
 use super::content::{HemisphereKind, ImageContent, OrientationErrorKind, Waypoint};
+use super::counts::{Counts, clip};
 use super::error::ImageError;
 use super::layout::{
-    COUPLED_ROWS, Counts, EXPERIENCE_ROWS, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES, IMAGE_SCHEMA,
-    MAGIC, REAL_BYTES, SENSOR_ROWS, WEIGHT_ROWS, clip,
+    COUPLED_ROWS, EXPERIENCE_ROWS, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES, IMAGE_SCHEMA, MAGIC,
+    REAL_BYTES, SENSOR_ROWS, WEIGHT_ROWS,
 };
 use crate::frame::CRC;
 use crate::name::{NAME_BYTES, Name};
@@ -13,8 +14,9 @@ impl ImageContent<&[f32]> {
     /// Writes the image to the front of `out` and returns its length.
     ///
     /// # Errors
-    /// [`ImageError::Shape`] if a table does not fit the counts or `out` is too small ([`image_bytes`](super::image_bytes)); the
-    /// same errors as [`PrimitiveImage::parse`](super::PrimitiveImage::parse) for counts and reals that could not be read back.
+    /// [`ImageError::Shape`] if a table does not fit the counts or `out` is too small
+    /// ([`image_bytes`](super::image_bytes)); the same errors as
+    /// [`PrimitiveImage::parse`](super::PrimitiveImage::parse) for counts and reals that could not be read back.
     pub fn encode(&self, name: &Name, out: &mut [u8]) -> Result<usize, ImageError> {
         let counts = Counts {
             kernels: self.kernels,

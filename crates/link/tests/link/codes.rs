@@ -1,9 +1,9 @@
-//! What a request or a reply is taken for, and numbers that are never given to another reason: pinned one by one.
+//! Classes of requests and replies, and numbers that never change their meaning: pinned one by one.
 
 use crate::samples::{replies, request_index, requests};
 use link::{ImageError, Refusal, Request};
 
-/// Whether a request can move the arm. One that does, and is old, is refused: forget one here and a host that was
+/// True if a request can move the arm. One that does, and is old, is refused: forget one here and a host that was
 /// suspended moves an arm that somebody stands beside by now.
 fn can_move(request: &Request) -> bool {
     match request {

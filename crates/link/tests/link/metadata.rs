@@ -1,4 +1,4 @@
-//! What a firmware image says about itself.
+//! The metadata of a firmware image.
 
 use link::frame::CRC;
 use link::metadata::{METADATA_BYTES, MemoryRegion, MetadataError};

@@ -40,7 +40,7 @@ fn conversation(count: usize) -> (Vec<u8>, Vec<Request>) {
     (stream, requests)
 }
 
-/// What a device makes of the bytes: number and message.
+/// Returns the device's reading of the bytes: number and message.
 fn read(bytes: &[u8]) -> Vec<(u16, Request)> {
     let (mut decoder, mut rest) = (Decoder::<FRAME_BYTES>::new(), bytes);
     std::iter::from_fn(|| decoder.next::<Request>(&mut rest))
@@ -177,7 +177,7 @@ fn frames_of_others_and_malformed_ones_bring_nothing() {
     assert_eq!(receiver.counters().malformed, 2);
 }
 
-/// What may happen to a segment on a bad bus.
+/// Disturbances of a segment on a bad bus.
 #[derive(Debug, Clone, Copy)]
 enum Fate {
     Arrives,

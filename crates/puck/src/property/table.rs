@@ -1,7 +1,7 @@
 //! Property numbers per puck type and firmware generation, as data.
 //!
-//! One entry per property: Barrett's mnemonic, the width of its replies, and per list the firmware versions at which its
-//! number changed. Lists of motors begin with [`OLDEST_MOTOR_FIRMWARE`](super::OLDEST_MOTOR_FIRMWARE). Source: the
+//! One entry per property: Barrett's mnemonic, the width of its replies, and per list the firmware versions at which
+//! its number changed. Lists of motors begin with [`OLDEST_MOTOR_FIRMWARE`](super::OLDEST_MOTOR_FIRMWARE). Source: the
 //! manufacturer's property list; the test `every_property_number_equals_the_vectors` compares every cell. Mnemonics
 //! that share a number (AP with P, TORQ with T, B with FET0, TENSION with FET1) appear once.
 

@@ -84,7 +84,8 @@ fn seven() -> impl Strategy<Value = [f64; 7]> {
 }
 
 proptest! {
-    /// Mechanical power is the same at joints and motors: catches a torque mapped by the inverse instead of the transpose.
+    /// Mechanical power is the same at joints and motors: catches a torque mapped by the inverse instead of the
+    /// transpose.
     #[test]
     fn power_is_conserved(velocity in seven(), torque in seven(), n5 in 9.0..11.0_f64, n6 in 0.8..1.2_f64) {
         let ratios = Ratios::from_gears([42.0, 28.25, 28.25, 18.0, n5, n5, 14.93], 1.68, n6);

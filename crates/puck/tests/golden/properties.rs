@@ -34,7 +34,7 @@ fn canonical(name: &str) -> &str {
 fn every_property_number_equals_the_vectors() {
     let by_name: BTreeMap<_, _> = Property::ALL.iter().map(|property| (property.mnemonic(), *property)).collect();
     assert_eq!(by_name.len(), Property::ALL.len(), "a mnemonic occurs twice");
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/vectors/property_ids.csv");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/vectors/property_ids.csv");
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(path).expect("the vector file");
     let header = reader.headers().expect("a header").clone();
     let (mut cells, mut refused) = (0, 0);

@@ -1,5 +1,5 @@
-//! Whole conversations of the manufacturer's library, spoken by our encoders: the constructor of its safety driver and the
-//! initialisation of the hand. Checks identifiers, order and property numbers together.
+//! Whole conversations of the manufacturer's library, spoken by our encoders: the constructor of its safety driver and
+//! the initialisation of the hand. Checks identifiers, order and property numbers together.
 
 use crate::vectors::rows;
 use puck::device::{reply16, reply32};

@@ -67,7 +67,7 @@ pub(crate) fn can_id(text: &str) -> CanId {
 
 /// All rows of a vector file. Panics when it has none: an empty file would pass every test.
 pub(crate) fn rows(name: &str) -> Vec<Row> {
-    let path = format!("{}/../../tests/vectors/{name}.csv", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/tests/vectors/{name}.csv", env!("CARGO_MANIFEST_DIR"));
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(&path).expect("the vector file");
     let header = reader.headers().expect("a header").clone();
     let rows: Vec<Row> = reader

@@ -1,8 +1,8 @@
 //! A simulated NOR flash: bank 2 of the STM32H743, with its times, its rules, and a power supply that can fail.
 //!
 //! Bits are written from 1 to 0, a word of 32 bytes at a time and each word once, and set back to 1 by erasing a whole
-//! sector. An operation takes virtual time. [`Flash::cut_power_at`] chooses one operation (a word or a sector) in the middle
-//! of which power fails: what it leaves behind is drawn from a seed, and afterwards nothing answers.
+//! sector. An operation takes virtual time. [`Flash::cut_power_at`] chooses one operation (a word or a sector) in the
+//! middle of which power fails: what it leaves behind is drawn from a seed, and afterwards nothing answers.
 
 mod port;
 
@@ -42,8 +42,8 @@ pub struct FlashTimes {
 }
 
 impl FlashTimes {
-    /// An old STM32H743 on a bad day: 0.2 ms a word and 4 s a sector, the longest its data sheet allows for a sector (8-bit
-    /// parallelism); typical are half of both and less.
+    /// An old STM32H743 on a bad day: 0.2 ms a word and 4 s a sector, the longest its data sheet allows for a sector
+    /// (8-bit parallelism); typical are half of both and less.
     pub const SLOW: Self = Self { word: TICKS_PER_SECOND / 5000, sector: 4 * TICKS_PER_SECOND };
 
     /// What the data sheet calls typical at 64-bit parallelism: 0.1 ms a word and 1 s a sector.
@@ -135,8 +135,8 @@ impl Flash {
         Ok(Self { file: Some(file), ..Self::with_content(bytes, times) })
     }
 
-    /// Lets power fail in the middle of the operation of this number, counted from now: 0 is the next one. `seed` decides
-    /// what that operation leaves behind.
+    /// Lets power fail in the middle of the operation of this number, counted from now: 0 is the next one. `seed`
+    /// decides what that operation leaves behind.
     pub fn cut_power_at(&mut self, operation: u64, seed: u64) {
         self.cut = Some((self.operations + operation, seed));
     }
@@ -265,8 +265,8 @@ fn place(address: u32) -> Result<usize, FlashError> {
     usize::try_from(address).map_err(|_| FlashError::Place)
 }
 
-/// A word in which only some of the bits that should become 0 have become 0: none, all, a share of them, or those of the
-/// first bytes.
+/// A word in which only some of the bits that should become 0 have become 0: none, all, a share of them, or those of
+/// the first bytes.
 fn tear_write(seed: u64, target: &mut [u8], word: &[u8]) {
     let mut random = Rand64::new(u128::from(seed));
     let kind = random.rand_range(0..4);
@@ -282,8 +282,8 @@ fn tear_write(seed: u64, target: &mut [u8], word: &[u8]) {
     }
 }
 
-/// A sector in which some bits have become 1 again: none, all, a share of them everywhere, or all those of a part of it; or
-/// in which the erase had first written zeros, as some flashes do.
+/// A sector in which some bits have become 1 again: none, all, a share of them everywhere, or all those of a part of
+/// it; or in which the erase had first written zeros, as some flashes do.
 fn tear_erase(seed: u64, target: &mut [u8]) {
     let mut random = Rand64::new(u128::from(seed));
     let kind = random.rand_range(0..6);

@@ -44,8 +44,8 @@ impl VirtualClock {
     }
 }
 
-/// The device's end. An operation that has not ended yet is pending: ask again when time has passed. One that power failed in never
-/// ends.
+/// The device's end. An operation that has not ended yet is pending: ask again when time has passed. One that power
+/// failed in never ends.
 #[derive(Clone, Debug)]
 pub struct FlashPort {
     chip: FlashChip,

@@ -54,7 +54,7 @@ pub(crate) struct Digit {
     ratio: f64,
     /// True torque constant, whatever IPNM says.
     units_per_newton_metre: f64,
-    /// What the counters add to the true counts: motor, worm.
+    /// Offset of the counters from the true counts: motor, worm.
     offsets: [i64; 2],
     /// T as the master set it; what acts is clipped to MT.
     commanded: i32,
@@ -136,7 +136,7 @@ impl Digit {
         })
     }
 
-    /// Which node this is.
+    /// The node number.
     pub(crate) fn node(&self) -> Node {
         self.firmware.node()
     }
@@ -204,7 +204,7 @@ impl Digit {
         }
     }
 
-    /// What the puck wants of its drive during the step that begins at `now`.
+    /// Returns the puck's demand on its drive during the step that begins at `now`.
     pub(crate) fn demand(&mut self, now: Ticks, motion: &Motion) -> Demand {
         if !self.firmware.is_ready(now) {
             return Demand::Idle;

@@ -1,18 +1,19 @@
-//! What finger and spread drives have in common: a reflected inertia with friction, and what a puck wants of it.
+//! The common part of finger and spread drives: a reflected inertia with friction, and the puck's demand.
 //!
-//! `v = (I v + h tau) / (I + h b)`; then Coulomb friction, and with a worm the load, take up to `h c / (I + h b)` from `|v|` and
-//! never turn its sign: `I` inertia, `b` viscous and `c` Coulomb friction, `h` step.
+//! `v = (I v + h tau) / (I + h b)`; then Coulomb friction, and with a worm the load, take up to `h c / (I + h b)` from
+//! `|v|` and never turn its sign: `I` inertia, `b` viscous and `c` Coulomb friction, `h` step.
 
 use crate::time::STEP_SECONDS;
 
-/// What a puck wants its drive to do during the next step, at the link.
+/// Demand of a puck on its drive during the next step, at the link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Demand {
     /// Nothing: windings shorted.
     Idle,
     /// A torque, N m.
     Torque(f64),
-    /// A velocity, rad/s, with at most this torque, N m. The puck's own controllers are taken as ideal within their torque limit.
+    /// A velocity, rad/s, with at most this torque, N m. The puck's own controllers are taken as ideal within their
+    /// torque limit.
     Velocity(f64, f64),
 }
 

@@ -1,14 +1,15 @@
 //! The drive of one finger: a motor, two worms, and the TorqueSwitch clutch between them.
 //!
-//! With the motor's angle reflected to the inner link, `d = m / 125`, the distal worm keeps `inner + outer = 4/3 d` (1/93.75 =
-//! 4/3 x 1/125), always. The proximal worm turns with the motor through a clutch: `inner = d - s`, with the slip `s` constant
-//! until, on closing, the torque through the clutch passes the threshold; then the inner link stays where it is and `s` grows.
-//! The power balance gives what the drive feels: `inner_load + outer_load / 3` with the clutch engaged, `4/3 outer_load` slipping;
-//! and the clutch carries `inner_load - outer_load`, because the distal path holds the outer link against the palm.
+//! With the motor's angle reflected to the inner link, `d = m / 125`, the distal worm keeps `inner + outer = 4/3 d`
+//! (1/93.75 = 4/3 x 1/125), always. The proximal worm turns with the motor through a clutch: `inner = d - s`, with the
+//! slip `s` constant until, on closing, the torque through the clutch passes the threshold; then the inner link stays
+//! where it is and `s` grows. The power balance gives what the drive feels: `inner_load + outer_load / 3` with the
+//! clutch engaged, `4/3 outer_load` slipping; and the clutch carries `inner_load - outer_load`, because the distal path
+//! holds the outer link against the palm.
 //!
 //! Worms cannot be driven back: a load can stop the motor but never turn it, and a load that would help the motor is
-//! borne by the worm. Opening moves both links, slip kept, until the inner link and then the outer one are at the open stop,
-//! where `s = 0`: the clutch is engaged again as after HI (docs/arm-model.md).
+//! borne by the worm. Opening moves both links, slip kept, until the inner link and then the outer one are at the open
+//! stop, where `s = 0`: the clutch is engaged again as after HI (docs/arm-model.md).
 
 use super::drive::{Demand, Inertia};
 use crate::time::STEP_SECONDS;

@@ -1,10 +1,10 @@
 //! The strain gauge of a finger: torque about the distal joint to 12-bit counts.
 //!
-//! Barrett's nominal curve (docs/arm-model.md), counts x to N m:
-//! `tau = 2.754e-10 x^3 - 1.708e-6 x^2 + 0.003764 x - 2.85`. A gauge
-//! here follows it shifted to its own zero: it reads `x(tau + tau(zero))`. Counts **rise** as the finger presses on something
-//! while closing; that is the direction in which HSG stops a closing finger. A low-pass stands for the amplifier. The curve is written
-//! down again here instead of taken from `puck::gauge`: a wrong number there must not cancel itself out.
+//! Barrett's nominal curve (docs/arm-model.md), counts x to N m: `tau = 2.754e-10 x^3 - 1.708e-6 x^2 + 0.003764 x -
+//! 2.85`. A gauge here follows it shifted to its own zero: it reads `x(tau + tau(zero))`. Counts **rise** as the finger
+//! presses on something while closing; that is the direction in which HSG stops a closing finger. A low-pass stands for
+//! the amplifier. The curve is written down again here instead of taken from `puck::gauge`: a wrong number there must
+//! not cancel itself out.
 
 use crate::noise::Noise;
 use crate::time::STEP_SECONDS;
@@ -27,7 +27,8 @@ pub(crate) fn torque(counts: f64) -> f64 {
 fn counts(wanted: f64) -> f64 {
     let [_, linear, square, cube] = CURVE;
     let mut x = 2000.0;
-    // The slope is never below 0.00023 N m per count, so that Newton's steps are bounded; from the middle seven are plenty.
+    // The slope is never below 0.00023 N m per count, so that Newton's steps are bounded; from the middle seven are
+    // plenty.
     for _ in 0..12 {
         let slope = linear + x * (2.0 * square + x * 3.0 * cube);
         let step = (torque(x) - wanted) / slope;

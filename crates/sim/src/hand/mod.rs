@@ -24,14 +24,14 @@ use gauge::Gauge;
 use puck::{CanFrame, Node, Request, UnknownFirmware};
 use spread::Spread;
 
-/// Motor, gears and worm of a finger at the inner link. The inertia is the motor's times 125^2; viscous friction such that
-/// 1.3 N m drive a free finger at 2.44 rad/s.
+/// Motor, gears and worm of a finger at the inner link. The inertia is the motor's times 125^2; viscous friction such
+/// that 1.3 N m drive a free finger at 2.44 rad/s.
 const FINGER: Inertia = Inertia { inertia: 0.0022, viscous: 1.2 / 2.44, coulomb: 0.1 };
 
 /// Motor and gears of the spread at the fingers' bases; all assumed.
 const SPREAD: Inertia = Inertia { inertia: 4e-4, viscous: 0.1, coulomb: 0.1 };
 
-/// How the hand is set up. Digits in the order F1, F2, F3, spread.
+/// Set-up of the hand. Digits in the order F1, F2, F3, spread.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandConfig {
     /// VERS of the boot loader.
@@ -123,7 +123,7 @@ impl Hand {
         self.digits.iter_mut().for_each(|digit| digit.power_on(now));
     }
 
-    /// Awake and initialised since before the story begins.
+    /// Starts with the main firmware running and the hand initialised.
     pub(crate) fn run(&mut self) {
         self.digits.iter_mut().for_each(Digit::run);
     }
@@ -206,7 +206,7 @@ fn finger_motion(finger: &Finger, ahead: f64) -> Motion {
     }
 }
 
-/// What arrives at the link.
+/// Torque that arrives at the link.
 fn derated(demand: Demand, efficiency: f64) -> Demand {
     match demand {
         Demand::Idle => Demand::Idle,

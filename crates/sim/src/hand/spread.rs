@@ -6,7 +6,8 @@ use crate::time::STEP_SECONDS;
 /// Full spread, 180 degrees, rad.
 const RANGE: f64 = std::f64::consts::PI;
 
-/// Viscous friction of the shorted motor, N m s/rad at the spread. Assumed, from the rotor's inertia as for the arm's motors.
+/// Viscous friction of the shorted motor, N m s/rad at the spread. Assumed, from the rotor's inertia as for the arm's
+/// motors.
 const BRAKE: f64 = 0.02;
 
 /// Drive of the spread.

@@ -2,13 +2,14 @@
 //!
 //! Simplified on purpose, so that unit tests and runs without MuJoCo need no physics engine. **True**: kinematics, the
 //! gravity torque of every link and of the hand, the torque of a push at the grasp point, joint stops, viscous and
-//! Coulomb friction. **Simplified**: the mass matrix is a constant diagonal (reflected rotor inertia plus the mean of the
-//! link inertia over the arm's work space), hence no coupling and no Coriolis torque; the hand is rigid and the wrist
-//! wrench is quasi-static; there is nothing to touch but springs in the way of the fingers ([`FingerObstacle`]), whose links are
-//! where their drives hold them otherwise, without inertia. Do not judge a controller's tracking by it.
+//! Coulomb friction. **Simplified**: the mass matrix is a constant diagonal (reflected rotor inertia plus the mean of
+//! the link inertia over the arm's work space), hence no coupling and no Coriolis torque; the hand is rigid and the
+//! wrist wrench is quasi-static; there is nothing to touch but springs in the way of the fingers ([`FingerObstacle`]),
+//! whose links are where their drives hold them otherwise, without inertia. Do not judge a controller's tracking by it.
 //!
-//! `v = (I v + h tau) / (I + h b)`, then Coulomb friction takes at most `h c / (I + h b)` from `|v|` and never turns its sign,
-//! so that a joint at rest stays at rest whatever the step: `I` inertia, `b` viscous, `c` Coulomb friction, `h` step.
+//! `v = (I v + h tau) / (I + h b)`, then Coulomb friction takes at most `h c / (I + h b)` from `|v|` and never turns
+//! its sign, so that a joint at rest stays at rest whatever the step: `I` inertia, `b` viscous, `c` Coulomb friction,
+//! `h` step.
 
 use super::{HandState, HandTargets, Pose, World};
 use crate::chain::{self, Frame, Vector, add, dot, subtract};
@@ -32,14 +33,14 @@ const LINKS: [(f64, Vector); 7] = [
 /// Force/torque sensor and hand together: mass (kg), centre of mass in frame 7 (m), `[payload.wam7_bh280_ft]`.
 const PAYLOAD: (f64, Vector) = (1.337308, [-6.029705722242e-05, -0.009027260457134806, 0.0673508537777823]);
 
-/// What the sensor carries: the hand alone, mass (kg), centre of mass in frame 7 (m) = hand frame turned by pi, 12 mm out.
+/// Load of the sensor: the hand alone, mass (kg), centre of mass in frame 7 (m) = hand frame turned by pi, 12 mm out.
 const HAND: (f64, Vector) = (1.201308, [-6.71232831213989e-05, -0.010049236022244114, 0.074296379915774]);
 
 /// Where the sensor measures, frame 7, m (`[ft_sensor] origin_in_frame7`); its axes are those of frame 7.
 const SENSOR_ORIGIN: Vector = [0.0, 0.0, 0.006];
 
-/// Rotor inertia reflected to the joints, kg m^2 (`reflected_diag`), plus the mean diagonal of the link mass matrix with
-/// sensor and hand over the 100 states of `tests/vectors/dyn_wam7_bh280_ft.csv`.
+/// Rotor inertia reflected to the joints, kg m^2 (`reflected_diag`), plus the mean diagonal of the link mass matrix
+/// with sensor and hand over the 100 states of `tests/vectors/dyn_wam7_bh280_ft.csv`.
 const INERTIA: [f64; 7] = [
     0.20517084 + MEAN_LINK_INERTIA[0],
     0.18883754875 + MEAN_LINK_INERTIA[1],
@@ -120,7 +121,8 @@ impl FreeJoints {
         Self { hand, ..self }
     }
 
-    /// Puts a spring in the way of finger `finger` (0..=2), or takes it away ([`FingerObstacle::NOTHING`]); other numbers do nothing.
+    /// Puts a spring in the way of finger `finger` (0..=2), or takes it away ([`FingerObstacle::NOTHING`]); other
+    /// numbers do nothing.
     pub fn obstruct(&mut self, finger: usize, obstacle: FingerObstacle) {
         if let Some(place) = self.obstacles.get_mut(finger) {
             *place = obstacle;
@@ -307,7 +309,8 @@ mod tests {
 
     #[test]
     fn the_sensor_feels_weight_downwards_and_its_moment_about_the_sensor() {
-        // Arm straight up: the sensor's z is the world's; the weight pulls along -z and has no lever but the hand's offset.
+        // Arm straight up: the sensor's z is the world's; the weight pulls along -z and has no lever but the hand's
+        // offset.
         let wrench = FreeJoints::new([0.0; 7]).wrist_wrench();
         assert!((wrench[2] + HAND.0 * 9.81).abs() < 1e-9);
         assert!((wrench[3] - HAND.1[1] * wrench[2]).abs() < 1e-9);

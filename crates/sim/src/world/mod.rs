@@ -8,8 +8,10 @@ use std::any::Any;
 mod free_joints;
 #[cfg(feature = "mujoco")]
 pub mod mujoco;
+mod object;
 
 pub use free_joints::{FingerObstacle, FreeJoints, HOME};
+pub use object::{ObjectKind, ObjectRow, UnknownObject};
 
 /// A rigid pose in the world frame: origin where the axes of joints 1 and 2 meet, z up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +64,8 @@ pub trait World: Any + Send {
     /// Joint velocities dq, rad/s.
     fn joint_velocities(&self) -> [f64; 7];
 
-    /// Angles at the motor side of the cables, reflected to the joints, rad: what the encoders see. Rigid cables: the joints' own.
+    /// Angles at the motor side of the cables, reflected to the joints, rad: what the encoders see. Rigid cables: the
+    /// joints' own.
     fn motor_positions(&self) -> [f64; 7] {
         self.joint_positions()
     }
@@ -74,10 +77,12 @@ pub trait World: Any + Send {
 
     /// Advances physics by one step of [`STEP_TICKS`](crate::STEP_TICKS) under joint torques, N m.
     ///
-    /// The torques include the brake of idle motors and the operator's hold at start-up, but not friction, gravity or contact: those are the world's.
+    /// The torques include the brake of idle motors and the operator's hold at start-up, but not friction, gravity or
+    /// contact: those are the world's.
     fn step(&mut self, torques: &[f64; 7]);
 
-    /// Force (N) then torque (N m) of the environment (the hand and all it touches) **on** the wrist sensor, sensor frame.
+    /// Force (N) then torque (N m) of the environment (the hand and all it touches) **on** the wrist sensor, sensor
+    /// frame.
     fn wrist_wrench(&self) -> [f64; 6];
 
     /// Pose of the grasp point (0.132 m beyond the tool plate, turned by pi about z).

@@ -1,13 +1,14 @@
 //! The MuJoCo world: the WAM with force/torque sensor and hand at a table, and an object.
 //!
-//! The model is `model/wam7_bh280.xml`. One physics step lasts [`STEP_SECONDS`]. The seven motors
-//! take joint torques; the links of the hand are held where they are told to be. Physics has no randomness: the same inputs
-//! give the same bits on the same machine. Seeds belong to the sensors (the plant), to the
-//! [`Person`](crate::person::Person) and to [`Imperfections::drawn`].
+//! The model is `model/wam7_bh280.xml`. One physics step lasts [`STEP_SECONDS`]. The seven motors take joint torques;
+//! the links of the hand are held where they are told to be. Physics has no randomness: the same inputs give the same
+//! bits on the same machine. Seeds belong to the sensors (the plant), to the [`Teacher`](crate::teacher::Teacher) and
+//! to [`Imperfections::drawn`].
 
 mod addresses;
 mod cables;
 mod contacts;
+mod error;
 mod imperfections;
 mod kinematics;
 mod object;
@@ -23,11 +24,13 @@ use contacts::Parts;
 use mujoco_rs::prelude::{MjData, MjModel};
 use std::collections::VecDeque;
 
+pub use super::object::ObjectKind;
 pub use contacts::ContactForces;
+pub use error::WorldError;
 pub use imperfections::{Cables, Imperfections};
 pub use kinematics::{Kinematics, Unreachable};
-pub use object::{ObjectKind, ObjectSpec, TABLE_TOP};
-pub use options::{MujocoOptions, WorldError};
+pub use object::{ObjectSpec, TABLE_TOP};
+pub use options::MujocoOptions;
 pub use scene::Scene;
 
 /// Steps over which [`MujocoWorld::mean_contact_forces`] takes the mean: 10 ms, three cycles of control.
@@ -46,7 +49,7 @@ pub struct MujocoWorld {
     crush: Crush,
 }
 
-/// Whether a finger pressed harder than the object bears.
+/// True after a finger pressed harder than the object bears.
 #[derive(Clone, Copy, Debug, Default)]
 struct Crush {
     /// Force of the finger that presses hardest, N, smoothed over some 10 ms.
@@ -113,18 +116,19 @@ impl MujocoWorld {
         Some(Pose { position: [q[0], q[1], q[2]], quaternion: [q[3], q[4], q[5], q[6]] })
     }
 
-    /// How far the object's axis has left the vertical (of what stood) or the horizontal (of what lay), rad; `None` without an object.
+    /// Angle between the object's axis and the vertical (of what stood) or the horizontal (of what lay), rad; `None`
+    /// without an object.
     #[must_use]
     pub fn object_tilt(&self) -> Option<f64> {
         let [_, x, y, _] = self.object_pose()?.quaternion;
-        // The turned z axis has the vertical component 1 - 2 (x^2 + y^2) = cos(tilt) for a unit quaternion; the half angle
-        // keeps the precision that acos loses near 1.
+        // The turned z axis has the vertical component 1 - 2 (x^2 + y^2) = cos(tilt) for a unit quaternion; the half
+        // angle keeps the precision that acos loses near 1.
         let from_vertical = 2.0 * x.hypot(y).min(1.0).asin();
         let lay = self.scene.object.is_some_and(|object| object.lies());
         Some(if lay { (from_vertical - std::f64::consts::FRAC_PI_2).abs() } else { from_vertical })
     }
 
-    /// Whether a finger has pressed harder than the object bears ([`ObjectSpec::crush_force`]).
+    /// True after a finger has pressed harder than the object bears ([`ObjectSpec::crush_force`]).
     #[must_use]
     pub fn object_crushed(&self) -> bool {
         self.crush.crushed
@@ -157,8 +161,8 @@ impl MujocoWorld {
 
     /// Hands the push to MuJoCo as a wrench at the palm's centre of mass, moved there from the grasp point.
     ///
-    /// Not as generalized forces: MuJoCo's force sensor takes only wrenches on bodies into account, and the wrist sensor
-    /// must feel the person.
+    /// Not as generalized forces: MuJoCo's force sensor takes only wrenches on bodies into account, and the wrist
+    /// sensor must feel the teacher.
     fn apply_push(&mut self) {
         let (force, torque) = self.push;
         let palm = self.addresses.palm;
@@ -169,8 +173,8 @@ impl MujocoWorld {
         self.data.xfrc_applied_mut()[palm] = [fx, fy, fz, tx, ty, tz];
     }
 
-    /// Sets the force (N) that somebody applies to the object at a point (m), both in world axes; it lasts until it is set again.
-    /// Does nothing without an object.
+    /// Sets the force (N) that somebody applies to the object at a point (m), both in world axes; it lasts until it is
+    /// set again. Does nothing without an object.
     pub fn push_object(&mut self, force: [f64; 3], point: [f64; 3]) {
         let Some(body) = self.addresses.object_body else {
             return;

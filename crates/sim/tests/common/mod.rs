@@ -15,6 +15,12 @@ use sim::{FreeJoints, HOME, Plant, PlantConfig, TICKS_PER_MILLISECOND, Ticks, Wo
 /// Firmware of the simulated pucks.
 pub const VERSION: i32 = 200;
 
+/// One slot of a master with a control rate of 300 Hz, three a cycle.
+pub const SLOT_TICKS: Ticks = sim::period_ticks(900);
+
+/// One control cycle of that master.
+pub const CYCLE_TICKS: Ticks = 3 * SLOT_TICKS;
+
 pub struct Master {
     pub plant: Plant,
     pub now: Ticks,
@@ -111,7 +117,7 @@ impl Master {
         let until = self.now + milliseconds * TICKS_PER_MILLISECOND;
         while self.now < until {
             self.send(get(Group::ARM, PropertyId::POSITION));
-            self.wait(3 * sim::SLOT_TICKS);
+            self.wait(CYCLE_TICKS);
         }
     }
 
@@ -168,12 +174,12 @@ pub fn safety_id(property: Property) -> PropertyId {
     PropertyTable::safety(VERSION).unwrap().id(property).unwrap()
 }
 
-/// What the encoders should read at home.
+/// Expected readings of the encoders at home.
 pub fn home_counts() -> [Counts; 7] {
     counts_at(&HOME)
 }
 
-/// What zeroed encoders should read at these joint angles.
+/// Expected readings of zeroed encoders at these joint angles.
 pub fn counts_at(q: &[f64; 7]) -> [Counts; 7] {
     let motors = Transmission::new(&Ratios::WAM7).unwrap().motor_from_joint(q);
     Drives::new([4096; 7], [2472; 7]).unwrap().counts(&motors).unwrap()

@@ -1,4 +1,4 @@
-//! What the tests share: the image, an arm, a chip in this process or in another, and a reader of the log.
+//! Common parts of the tests: the image, an arm, a chip in this process or in another, and a reader of the log.
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
 use std::path::PathBuf;
@@ -7,7 +7,8 @@ use std::sync::{Arc, Mutex};
 
 use emulated_board::host::{Inquirer, READY, SharedLearned};
 use emulated_board::image::Image;
-use emulated_board::run::{Outcome, Setup, run};
+use emulated_board::run::run;
+use emulated_board::setup::{Outcome, Setup};
 use emulated_board::world::{Host, InProcess};
 use puck::{CanFrame, Group, MotorMode, Node, PropertyId, set, zero_torques};
 use sim::{
@@ -71,17 +72,17 @@ impl Story {
         self.outcome.measured.resets.iter().map(|(at, cause)| (at / 1000, cause.as_str())).collect()
     }
 
-    /// Whether the log holds this text.
+    /// True if the log holds this text.
     pub(crate) fn log_says(&self, text: &str) -> bool {
         self.log().iter().any(|line| line.contains(text))
     }
 
-    /// What can be read of the log.
+    /// The readable part of the log.
     pub(crate) fn log(&self) -> Vec<String> {
         self.outcome.log.split(|byte| *byte == 0).map(readable).collect()
     }
 
-    /// Whether the start-up of the arm's bus has come to its end again; a person activates the arm, not the image.
+    /// True if the start-up of the arm's bus has come to its end again; a person activates the arm, not the image.
     pub(crate) fn is_up(&self) -> bool {
         let learned = self.learned.lock();
         learned.status.as_ref().is_some_and(|status| matches!(status.startup_stage, WAITING_FOR_ACTIVE | READY))

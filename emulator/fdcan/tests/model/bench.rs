@@ -204,7 +204,7 @@ impl Bench {
         self.can.set_fault(Unit::One, fault, self.now);
     }
 
-    /// What the wire was told since the last call.
+    /// Events that the wire was told since the last call.
     pub(crate) fn told(&mut self) -> Vec<Told> {
         let told = |event| match event {
             WireEvent::Offer { frame: Frame { id: Id::Standard(id), .. }, .. } => Told::Offer(id.into()),

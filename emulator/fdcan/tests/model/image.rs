@@ -3,8 +3,8 @@
 use crate::bench::*;
 use fdcan_model::{Options, Unit};
 
-/// What the arm has for the host: positions (3) and properties (6) of the motors 1 to 7 and 11 to 14, properties of the
-/// force/torque sensor (8) and the safety module (10), force (10) and torque (11) of the sensor.
+/// Frames of the arm for the host: positions (3) and properties (6) of the motors 1 to 7 and 11 to 14, properties of
+/// the force/torque sensor (8) and the safety module (10), force (10) and torque (11) of the sensor.
 fn identifiers() -> Vec<u16> {
     let motors = (1..=7).chain(11..=14);
     let reply = |node: u16, group: u16| 0x400 | node << 5 | group;

@@ -75,7 +75,7 @@ fn fdcan2_passes_the_sixteen_segments_of_its_device() {
     assert_eq!(passed, (0x010..0x020).collect::<Vec<u16>>());
 }
 
-/// How many of many reads of a written word are wrong.
+/// Number of reads of a written word, of many, that are wrong.
 fn wrong_reads(bench: &mut Bench) -> usize {
     bench.set(0x2000, 0x1234_5678);
     bench.remarks();

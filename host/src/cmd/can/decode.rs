@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::source::Source;
-use super::{Exit, Failure, Global, Output, connection};
+use super::{ErrorCode, Failure, Global, Output, connection};
 use canlog::{Account, BusKind, Interface, LogLine, Meaning, Reader, Summary};
 use lab::table::Table;
 
@@ -80,7 +80,7 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         None => Ok(()),
         Some(first) => {
             let cause = format!("{} lines are none of candump's, the first is line {first}", garbage.lines);
-            Err(Failure::new(Exit::Invalid, "E671", DOING, cause).help("make logs with `candump -L`"))
+            Err(Failure::new(ErrorCode::LogLines, DOING, cause))
         }
     }
 }
@@ -164,7 +164,7 @@ impl Printer {
 }
 
 fn broken(cause: Box<dyn std::error::Error + Send + Sync>) -> Failure {
-    Failure::new(Exit::Internal, "E101", "writing the result", cause)
+    Failure::new(ErrorCode::ResultNotWritten, "writing the result", cause)
 }
 
 /// The summary of one interface for a terminal.

@@ -6,7 +6,7 @@ mod source;
 
 use clap::{Args, Subcommand};
 
-use super::{Exit, Failure, Global, Output, connection};
+use super::{ErrorCode, Failure, Global, Output, connection};
 
 /// Options of `can`.
 #[derive(Debug, Clone, Args)]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::source::Source;
-use super::{Exit, Failure, Global, connection};
+use super::{ErrorCode, Failure, Global, connection};
 use lab::replay::{Difference, DifferenceKind, Outcome, Replay, ReplayError};
 
 /// Options of `can replay`.
@@ -25,10 +25,7 @@ pub struct Cmd {
 /// It cannot be read or begins in the middle, or the device does something else than in the log.
 pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "can replay";
-    let refused = |error: ReplayError| {
-        Failure::new(Exit::Invalid, "E673", DOING, error)
-            .help("record from before power-up; of a simulated arm: `tactus --device sil:line=can,bus=bus.log ...`")
-    };
+    let refused = |error: ReplayError| Failure::new(ErrorCode::ReplayImpossible, DOING, error);
     let output = global.output();
     let source = Source::open(Some(&command.log), None, false, DOING)?;
     let interrupt = connection::interrupt();
@@ -44,7 +41,7 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     output.result(&outcome, text(&outcome))?;
     if let Some(first) = garbage.first {
         let cause = format!("{} lines are none of candump's, the first is line {first}", garbage.lines);
-        return Err(Failure::new(Exit::Invalid, "E671", DOING, cause).help("make logs with `candump -L`"));
+        return Err(Failure::new(ErrorCode::LogLines, DOING, cause));
     }
     match outcome.differences.first() {
         None => Ok(()),
@@ -52,8 +49,7 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             let frames =
                 if outcome.different == 1 { "frame of the device differs" } else { "frames of the device differ" };
             let cause = format!("{} {frames}, first: {}", outcome.different, told(first));
-            Err(Failure::new(Exit::Invalid, "E672", DOING, cause)
-                .help("the log is of another version or of other parameters, or something could not be reproduced"))
+            Err(Failure::new(ErrorCode::ReplayDiffers, DOING, cause))
         }
     }
 }

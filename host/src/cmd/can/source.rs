@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Stdin};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
-use super::{Exit, Failure};
+use super::{ErrorCode, Failure};
 use canlog::{LineError, LogLine};
 use lab::client::Interrupt;
 use lab::error::HostError;
@@ -66,8 +66,7 @@ impl Source {
             (Some(path), _) if path == Path::new("-") => Ok(Self::Input(BufReader::new(std::io::stdin()))),
             (Some(path), _) => {
                 let file = File::open(path).map_err(|cause| {
-                    Failure::new(Exit::Invalid, "E670", format!("{doing}: cannot read {}", path.display()), cause)
-                        .help("`candump -L can0 > bus.log` makes such a file, and `--device sil:bus=bus.log` of a simulated arm")
+                    Failure::new(ErrorCode::LogUnreadable, format!("{doing}: cannot read {}", path.display()), cause)
                 })?;
                 Ok(Self::File { reader: BufReader::new(file), path: path.to_owned(), follow })
             }
@@ -76,8 +75,7 @@ impl Source {
                     SocketCan::open_listener(name).map_err(|error| HostError::Transport(error).into_failure(doing))?;
                 Ok(Self::Interface { port, name: name.to_owned() })
             }
-            (None, None) => Err(Failure::new(Exit::Usage, "E209", doing, "neither a log nor an interface is named")
-                .help("`tactus can decode bus.log`, or live: `tactus can decode --interface can0`")),
+            (None, None) => Err(Failure::new(ErrorCode::NoLogNamed, doing, "neither a log nor an interface is named")),
         }
     }
 
@@ -105,13 +103,17 @@ impl Source {
                 }
                 Self::File { reader, path, follow } => {
                     let count = reader.read_until(b'\n', &mut text).map_err(|cause| {
-                        Failure::new(Exit::Invalid, "E670", format!("{doing}: cannot read {}", path.display()), cause)
+                        Failure::new(
+                            ErrorCode::LogUnreadable,
+                            format!("{doing}: cannot read {}", path.display()),
+                            cause,
+                        )
                     })?;
                     (count, *follow)
                 }
                 Self::Input(reader) => {
                     let count = reader.read_until(b'\n', &mut text).map_err(|cause| {
-                        Failure::new(Exit::Invalid, "E670", format!("{doing}: cannot read standard input"), cause)
+                        Failure::new(ErrorCode::LogUnreadable, format!("{doing}: cannot read standard input"), cause)
                     })?;
                     (count, false)
                 }

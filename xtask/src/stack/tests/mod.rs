@@ -96,7 +96,8 @@ fn a_way_back_on_a_condition_goes_on_with_the_frame() {
 #[test]
 fn a_table_elsewhere_is_found_by_the_register_that_points_to_it() {
     let tiny = Tiny::default()
-        // push; adr r2, the table; tbb [r2, r0]; bl small; pop; bl inner; pop; two entries (zero: behind the instruction)
+        // push; adr r2, the table; tbb [r2, r0]; bl small; pop; bl inner; pop; two entries (zero: behind the
+        // instruction)
         .with(
             "table",
             vec![

@@ -8,9 +8,8 @@ use super::super::Depth;
 use super::super::depth::{Calls, Part, Search, Way};
 use super::super::levels::Layout;
 use super::super::memory::Memory;
-use crate::board::CORE_VECTORS;
 use crate::code::Code;
-use crate::elf::Elf;
+use crate::elf::{CORE_VECTORS, Elf};
 
 /// Distance between the functions of a tiny image.
 const STRIDE: u32 = 0x40;
@@ -198,7 +197,8 @@ pub(super) fn priorities(board: &str) -> Vec<u32> {
     layout.levels.iter().flat_map(|level| level.handlers.iter().map(|_| level.priority)).collect()
 }
 
-/// push; cpsid i; movw r0, #0xe400; movt r0, #0xe000; for every line movs r1, #level; strb r1, [r0, #line]; start; serve
+/// push; cpsid i; movw r0, #0xe400; movt r0, #0xe000; for every line movs r1, #level; strb r1, [r0, #line]; start;
+/// serve
 pub(super) fn main(priorities: &[u32]) -> Vec<Piece> {
     let stores = priorities.iter().zip(0..).flat_map(|(priority, line)| {
         let level = (16 - *priority as u16) << 4;

@@ -12,21 +12,17 @@ pub use rows::{
     limits, points, posture_and_hand, velocity,
 };
 
+pub use crate::guard::watch::{STATISTICS_CAPACITY, STATISTICS_CHANNELS, SensorStatistics};
+pub use crate::sense::deviation::SENSORS;
+
 use dmp::{CouplingGains, PhaseTable, PoseCoupling, PrimitiveError, RolloutError, Scalar, TableError};
 
-/// Sensor values: force x, y, z (N, world axes), torque x, y, z (N m, tool axes at the grasp point), torque of the
-/// environment on finger F1, F2, F3 (N m).
-pub const SENSORS: usize = 9;
 /// Rows with feedback: position 3, orientation 3, hand 4 (the spread has no gauge).
 pub const COUPLED_ROWS: usize = 10;
 /// Most samples of a gain over the phase.
 pub const GAIN_CAPACITY: usize = 32;
 /// Most samples of an expectation.
 pub const EXPECTED_CAPACITY: usize = 128;
-/// Channels of the statistics: the sensor values, then the angles of fingers F1, F2, F3 (rad).
-pub const STATISTICS_CHANNELS: usize = 12;
-/// Most points of the statistics.
-pub const STATISTICS_CAPACITY: usize = 64;
 /// Channels of the statistics that are judged upwards only: a finger that closes too far holds nothing, one that stops
 /// early has met something.
 pub const ONE_SIDED_CHANNELS: [bool; STATISTICS_CHANNELS] =
@@ -36,9 +32,6 @@ pub const ONE_SIDED_CHANNELS: [bool; STATISTICS_CHANNELS] =
 pub type GainSchedule<T, const COLUMNS: usize> = PhaseTable<T, COLUMNS, GAIN_CAPACITY>;
 /// Sensor values that a successful run measures (`F_des`).
 pub type ExpectedWrench<T> = dmp::ExpectedSensors<T, SENSORS, EXPECTED_CAPACITY>;
-/// Mean and spread of the sensor values of successful runs.
-pub type SensorStatistics<T> = dmp::SensorStatistics<T, STATISTICS_CHANNELS, STATISTICS_CAPACITY>;
-
 /// Gains and limits of the sensory feedback, Eq (8).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Feedback<T> {

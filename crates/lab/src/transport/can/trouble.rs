@@ -1,6 +1,6 @@
 //! What is wrong with a CAN interface, each with the command that mends it.
 
-use crate::failure::Exit;
+use crate::error_code::ErrorCode;
 
 /// Why an interface cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -60,52 +60,36 @@ fn switch_on(interface: &str) -> String {
 }
 
 impl CanTrouble {
-    /// Exit code of a command that fails with this.
-    #[must_use]
-    pub fn exit(&self) -> Exit {
-        match self {
-            Self::NoInterface { .. } | Self::NotCan { .. } | Self::Down { .. } | Self::Unsupported(_) => Exit::NoDevice,
-            Self::BusOff { .. } | Self::NotSent { .. } => Exit::LinkLost,
-        }
-    }
-
     /// Stable number.
     #[must_use]
-    pub fn code(&self) -> &'static str {
+    pub fn code(&self) -> ErrorCode {
         match self {
-            Self::NoInterface { .. } => "E303",
-            Self::NotCan { .. } => "E304",
-            Self::Down { .. } => "E305",
-            Self::Unsupported(_) => "E306",
-            Self::BusOff { .. } => "E704",
-            Self::NotSent { .. } => "E705",
+            Self::NoInterface { .. } => ErrorCode::NoCanInterface,
+            Self::NotCan { .. } => ErrorCode::NotACanInterface,
+            Self::Down { .. } => ErrorCode::CanInterfaceDown,
+            Self::Unsupported(_) => ErrorCode::NoSocketCan,
+            Self::BusOff { .. } => ErrorCode::BusOff,
+            Self::NotSent { .. } => ErrorCode::FramesNotSent,
         }
     }
 
-    /// What mends it.
+    /// What mends it here, where more is known than the code advises.
     #[must_use]
-    pub fn help(&self) -> String {
+    pub fn help(&self) -> Option<String> {
         match self {
-            Self::NoInterface { known, .. } | Self::NotCan { known, .. } => match known.first() {
-                Some(other) => format!("`--device can:{other}`"),
-                None => {
-                    "plug the CAN adapter in and load its driver; `ip -details link show type can` lists what is there"
-                        .to_owned()
-                }
-            },
-            Self::Down { interface } => switch_on(interface),
-            Self::BusOff { interface } => format!(
+            Self::NoInterface { known, .. } | Self::NotCan { known, .. } => {
+                known.first().map(|other| format!("`--device can:{other}`"))
+            }
+            Self::Down { interface } => Some(switch_on(interface)),
+            Self::BusOff { interface } => Some(format!(
                 "check bit rate, termination (120 ohm at both ends) and wiring, then `sudo ip link set {interface} down` and {}",
                 switch_on(interface)
-            ),
-            Self::NotSent { interface, .. } => format!(
+            )),
+            Self::NotSent { interface, .. } => Some(format!(
                 "check that the device has power and that its bit rate is the same; `ip -details link show {interface}` \
                  tells the state of the controller"
-            ),
-            Self::Unsupported(_) => {
-                "load the kernel's CAN modules: `sudo modprobe can_raw`; on other systems use the serial line"
-                    .to_owned()
-            }
+            )),
+            Self::Unsupported(_) => None,
         }
     }
 }
@@ -116,25 +100,8 @@ mod tests {
 
     #[test]
     fn an_interface_that_is_down_prints_the_command_that_switches_it_on() {
-        let help = CanTrouble::Down { interface: "can7".into() }.help();
+        let help = CanTrouble::Down { interface: "can7".into() }.help().expect("a command");
         assert!(help.contains("sudo ip link set can7 type can bitrate 1000000"), "{help}");
         assert!(help.contains("sudo ip link set can7 txqueuelen 256 up"), "{help}");
-    }
-
-    #[test]
-    fn the_hundreds_of_a_number_are_its_exit_code() {
-        let interface = || "can0".to_owned();
-        let io = || std::io::Error::from(std::io::ErrorKind::Unsupported);
-        for trouble in [
-            CanTrouble::NoInterface { interface: interface(), known: vec![] },
-            CanTrouble::NotCan { interface: interface(), known: vec!["can1".into()] },
-            CanTrouble::Down { interface: interface() },
-            CanTrouble::BusOff { interface: interface() },
-            CanTrouble::NotSent { interface: interface(), seconds: 1 },
-            CanTrouble::Unsupported(io()),
-        ] {
-            assert_eq!(trouble.code().as_bytes()[1] - b'0', trouble.exit() as u8, "{trouble}");
-            assert!(trouble.help().contains('`'), "{trouble}");
-        }
     }
 }

@@ -1,6 +1,6 @@
 //! Where the parts of the model lie in MuJoCo's arrays, looked up once by name.
 
-use super::WorldError;
+use super::error::WorldError;
 use mujoco_rs::prelude::{MjModel, MjtObjBase};
 
 /// Indices into MuJoCo's arrays.

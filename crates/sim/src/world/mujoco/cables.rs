@@ -1,14 +1,14 @@
 //! Motors that turn the joints through elastic cables: two inertias with a spring between them for each joint.
 //!
-//! All quantities are reflected to the joint. The motor of joint i obeys `J dw = tau - s - B w - Coulomb friction`, the joint
-//! gets `s = k (theta - q) + d (w - dq)`. The joint loses its armature to the motor. Of the friction, all of the viscous part
-//! and 70 % of the dry part act at the motor (brushes, bearings and the fast first stage of the cables), 30 % of the dry part
-//! at the joint (its bearings, the cables' last turn). The coupled pairs (joints 2 and 3, 5 and 6 share two motors) are taken
-//! joint by joint: their common stiffness is not known better than that.
+//! All quantities are reflected to the joint. The motor of joint i obeys `J dw = tau - s - B w - Coulomb friction`, the
+//! joint gets `s = k (theta - q) + d (w - dq)`. The joint loses its armature to the motor. Of the friction, all of the
+//! viscous part and 70 % of the dry part act at the motor (brushes, bearings and the fast first stage of the cables),
+//! 30 % of the dry part at the joint (its bearings, the cables' last turn). The coupled pairs (joints 2 and 3, 5 and 6
+//! share two motors) are taken joint by joint: their common stiffness is not known better than that.
 //!
-//! Integrated with the physics step, semi-implicitly on both sides, so that energy neither grows nor leaks as long as an
-//! oscillation turns by less than two radians in a step; the fastest, of joint 7, turns by 0.4. Dry friction is solved
-//! exactly for one motor: it takes at most `h c` from its momentum and never turns its sign.
+//! Integrated with the physics step, semi-implicitly on both sides, so that energy neither grows nor leaks as long as
+//! an oscillation turns by less than two radians in a step; the fastest, of joint 7, turns by 0.4. Dry friction is
+//! solved exactly for one motor: it takes at most `h c` from its momentum and never turns its sign.
 
 use super::Addresses;
 use super::imperfections::Cables;
@@ -34,7 +34,8 @@ pub(super) struct Motors {
 }
 
 impl Motors {
-    /// Takes armature and the motor's share of friction out of the model's joints. To be called before anything is computed.
+    /// Takes armature and the motor's share of friction out of the model's joints. To be called before anything is
+    /// computed.
     pub(super) fn take_from(model: &mut MjModel, addresses: &Addresses, cables: &Cables) -> Self {
         let at = addresses.velocities;
         let inertia = at.map(|i| std::mem::take(&mut model.dof_armature_mut()[i]));

@@ -1,6 +1,6 @@
 //! Who presses on whom: contact forces, summed by pairs of parts.
 
-use super::WorldError;
+use super::error::WorldError;
 use crate::rotation::norm;
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase};
 
@@ -11,9 +11,9 @@ use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase};
 pub struct ContactForces {
     /// Net force of the robot (hand and arm) on the object, world axes, N.
     pub hand_on_object: [f64; 3],
-    /// How hard F1, F2, F3 press on the object: sum of the magnitudes over the contacts of each finger, N.
+    /// Force of F1, F2, F3 on the object: sum of the magnitudes over the contacts of each finger, N.
     pub fingers_on_object: [f64; 3],
-    /// How hard the palm with the fingers' knuckles presses on the object, N.
+    /// Force of the palm with the fingers' knuckles on the object, N.
     pub palm_on_object: f64,
     /// Net force of the robot on the table (and the floor), world axes, N.
     pub hand_on_table: [f64; 3],
@@ -36,7 +36,7 @@ impl ContactForces {
     }
 }
 
-/// What a geom belongs to.
+/// Owner of a geom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
     /// Table or floor.
@@ -104,7 +104,8 @@ impl Parts {
             };
             let [along, across, aside, ..] = data.contact_force(i);
             let f = &contact.frame;
-            // Rows of the contact frame: normal from the first geom to the second, two tangents. The force acts on the second.
+            // Rows of the contact frame: normal from the first geom to the second, two tangents. The force acts on the
+            // second.
             let on_second: [f64; 3] = std::array::from_fn(|k| f[k] * along + f[k + 3] * across + f[k + 6] * aside);
             let on_first = on_second.map(|x| -x);
             for (on, by, force) in [(first, second, on_first), (second, first, on_second)] {

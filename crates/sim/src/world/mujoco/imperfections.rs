@@ -1,6 +1,6 @@
-//! How the simulated arm differs from the one that the controller's model describes.
+//! Differences between the simulated arm and the controller's model.
 
-use super::WorldError;
+use super::error::WorldError;
 use crate::Noise;
 use mujoco_rs::prelude::{MjModel, MjtObjBase};
 
@@ -30,12 +30,12 @@ pub struct Cables {
 }
 
 impl Cables {
-    /// What we take a WAM to have; Barrett publishes no figures.
+    /// Assumed for a WAM; Barrett publishes no figures.
     ///
-    /// Order of magnitude from the geometry: the 2.4 mm steel cables of joint 1 to 4 have some 0.4 MN over a free length of
-    /// 0.3 to 0.5 m and act on pulleys of 60 to 90 mm (k = 2 E A r^2 / L); the wrist's are thinner on pulleys of 20 to 30 mm.
-    /// It puts the first resonance of the stretched arm with locked motors near 7 Hz, and lets gravity bend the shoulder
-    /// by 5 to 8 mrad. A few per cent of critical damping is what stranded steel has.
+    /// Order of magnitude from the geometry: the 2.4 mm steel cables of joint 1 to 4 have some 0.4 MN over a free
+    /// length of 0.3 to 0.5 m and act on pulleys of 60 to 90 mm (k = 2 E A r^2 / L); the wrist's are thinner on pulleys
+    /// of 20 to 30 mm. It puts the first resonance of the stretched arm with locked motors near 7 Hz, and lets gravity
+    /// bend the shoulder by 5 to 8 mrad. A few per cent of critical damping is what stranded steel has.
     pub const WAM: Self =
         Self { stiffness: [4000.0, 4000.0, 2500.0, 2000.0, 350.0, 350.0, 120.0], damping_ratio: 0.05 };
 }
@@ -44,8 +44,8 @@ impl Imperfections {
     /// The nominal arm.
     pub const NONE: Self = Self { links: [1.0; 7], hand: 1.0, friction: [1.0; 7], cables: None };
 
-    /// An arm as it might stand in a laboratory: link masses within 10 %, the hand's within 3 %, friction within 30 %, cables
-    /// within 20 % of [`Cables::WAM`]. The same seed, the same arm.
+    /// An arm as it might stand in a laboratory: link masses within 10 %, the hand's within 3 %, friction within 30 %,
+    /// cables within 20 % of [`Cables::WAM`]. The same seed, the same arm.
     #[must_use]
     pub fn drawn(seed: u64) -> Self {
         let mut noise = Noise::new(seed, NOISE_STREAM);
@@ -57,7 +57,7 @@ impl Imperfections {
         Self { links, hand, friction, cables: Some(Cables { stiffness, ..Cables::WAM }) }
     }
 
-    /// Whatever passes here can be simulated.
+    /// Refuses what cannot be simulated.
     pub(super) fn check(&self) -> Result<(), WorldError> {
         let factors = self.links.iter().chain(&self.friction).chain([&self.hand]);
         let cables = self.cables.iter();
@@ -80,8 +80,8 @@ impl Imperfections {
         Ok(())
     }
 
-    /// Makes links and hand heavier or lighter; says whether it changed anything. The caller then lets MuJoCo derive anew what
-    /// follows from masses. Nothing, not even a rounding, changes where all factors are 1.
+    /// Makes links and hand heavier or lighter; says whether it changed anything. The caller then lets MuJoCo derive
+    /// anew what follows from masses. Nothing, not even a rounding, changes where all factors are 1.
     pub(super) fn weigh(&self, model: &mut MjModel) -> Result<bool, WorldError> {
         if self.links == Self::NONE.links && self.hand == Self::NONE.hand {
             return Ok(false);

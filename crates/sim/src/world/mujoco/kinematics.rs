@@ -119,7 +119,7 @@ impl Kinematics {
         if position < 1e-6 && rotation < 1e-6 { Ok(q) } else { Err(Unreachable { position, rotation }) }
     }
 
-    /// What is left to the target: metres, then a rotation vector in world axes.
+    /// Remaining distance to the target: metres, then a rotation vector in world axes.
     fn gap(&mut self, target: &Pose, q: &[f64; 7]) -> [f64; 6] {
         let pose = self.grasp_pose(q);
         let [x, y, z] = add_scaled(target.position, -1.0, pose.position);

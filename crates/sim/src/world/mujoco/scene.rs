@@ -1,7 +1,8 @@
-//! What the arm works in: table and object, and the model's text that goes with them.
+//! The arm's surroundings: table and object, and the text of the model that goes with them.
 
-use super::WorldError;
-use super::object::{ObjectKind, ObjectSpec};
+use super::error::WorldError;
+use super::object::ObjectSpec;
+use crate::world::ObjectKind;
 
 /// The model of arm and table, read at compile time: the simulator needs no file at run time.
 const MODEL: &str = include_str!("../../../model/wam7_bh280.xml");
@@ -21,7 +22,7 @@ const TABLE_HALF_EXTENT: [f64; 2] = [0.35, 0.55];
 pub struct Scene {
     /// The object; `None` leaves the table empty.
     pub object: Option<ObjectSpec>,
-    /// Whether arm and hand meet the table. An object has its own ground in either case.
+    /// True if arm and hand collide with the table. An object has its own ground in either case.
     pub table: bool,
 }
 
@@ -45,7 +46,7 @@ impl Scene {
         Self { object: Some(object), table: true }
     }
 
-    /// Whatever passes here can be simulated.
+    /// Refuses what cannot be simulated.
     pub(super) fn check(&self) -> Result<(), WorldError> {
         let Some(object) = &self.object else {
             return Ok(());
@@ -58,8 +59,8 @@ impl Scene {
         object.check()
     }
 
-    /// The whole model in MuJoCo's language, with or without the geoms that are only looked at: they would cost an eighth
-    /// of the time of a step.
+    /// The whole model in MuJoCo's language, with or without the geoms that are only looked at: they would cost an
+    /// eighth of the time of a step.
     pub(crate) fn model(&self, looks: bool) -> String {
         let mut text = String::with_capacity(MODEL.len() + 4096);
         let mut in_table = false;

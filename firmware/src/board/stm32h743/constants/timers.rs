@@ -2,11 +2,7 @@
 
 use super::clocks::{LSI_HZ, TIMER_HZ};
 
-/// Slots per second: three a control cycle of 1/300 s.
-pub const SLOT_HZ: u32 = 900;
-
-/// Slots of a control cycle.
-pub const CYCLE_SLOTS: u32 = 3;
+pub use device::time::{CYCLE_SLOTS, SLOT_HZ};
 
 /// Ticks of the slot timer (TIM2) in one slot, rounded to the nearest. 200 MHz / 900 is not whole: 222 222 ticks make
 /// 900.0009 Hz, one millionth too fast, a tenth of what the crystal itself may be off.

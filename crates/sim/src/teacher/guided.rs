@@ -1,47 +1,47 @@
-//! A world with a person in it.
+//! A world with a teacher in it.
 
-use super::Person;
+use super::Teacher;
 use crate::rotation::add_scaled;
 use crate::{HandState, HandTargets, Pose, World};
 
-/// A world in which a [`Person`] stands beside the arm: before every physics step they pull at the grasp point.
+/// A world in which a [`Teacher`] stands beside the arm: before every physics step they pull at the grasp point.
 ///
-/// To the plant it is a world like any other. Whoever owns the plant reaches the person by upcasting
-/// `plant.world()` to `Any` and tells them to [`begin`](Person::begin).
+/// To the plant it is a world like any other. Whoever owns the plant reaches the teacher by upcasting
+/// `plant.world()` to `Any` and tells them to [`begin`](Teacher::begin).
 #[derive(Debug)]
 pub struct GuidedWorld<W: World> {
     world: W,
-    person: Person,
+    teacher: Teacher,
     outside: ([f64; 3], [f64; 3]),
 }
 
 impl<W: World> GuidedWorld<W> {
-    /// Puts the person into the world.
+    /// Puts the teacher into the world.
     #[must_use]
-    pub fn new(world: W, person: Person) -> Self {
-        Self { world, person, outside: ([0.0; 3], [0.0; 3]) }
+    pub fn new(world: W, teacher: Teacher) -> Self {
+        Self { world, teacher, outside: ([0.0; 3], [0.0; 3]) }
     }
 
-    /// The world without the person.
+    /// The world without the teacher.
     #[must_use]
     pub fn world(&self) -> &W {
         &self.world
     }
 
-    /// The world without the person, to change it.
+    /// The world without the teacher, to change it.
     pub fn world_mut(&mut self) -> &mut W {
         &mut self.world
     }
 
-    /// The person.
+    /// The teacher.
     #[must_use]
-    pub fn person(&self) -> &Person {
-        &self.person
+    pub fn teacher(&self) -> &Teacher {
+        &self.teacher
     }
 
-    /// The person, to tell them to begin.
-    pub fn person_mut(&mut self) -> &mut Person {
-        &mut self.person
+    /// The teacher, to tell them to begin.
+    pub fn teacher_mut(&mut self) -> &mut Teacher {
+        &mut self.teacher
     }
 }
 
@@ -63,7 +63,7 @@ impl<W: World> World for GuidedWorld<W> {
     }
 
     fn step(&mut self, torques: &[f64; 7]) {
-        let (force, torque) = self.person.pull(&self.world.grasp_pose());
+        let (force, torque) = self.teacher.pull(&self.world.grasp_pose());
         self.world.push(add_scaled(self.outside.0, 1.0, force), add_scaled(self.outside.1, 1.0, torque));
         self.world.step(torques);
     }
@@ -76,7 +76,7 @@ impl<W: World> World for GuidedWorld<W> {
         self.world.grasp_pose()
     }
 
-    /// Somebody else's push, added to the person's.
+    /// Somebody else's push, added to the teacher's.
     fn push(&mut self, force: [f64; 3], torque: [f64; 3]) {
         self.outside = (force, torque);
     }

@@ -1,4 +1,4 @@
-//! The involuntary part of a person's pull: seeded noise, shaped.
+//! The involuntary part of a teacher's pull: seeded noise, shaped.
 
 use crate::{Noise, STEP_SECONDS};
 use std::f64::consts::PI;
@@ -18,7 +18,8 @@ impl Tremor {
     pub(super) fn new() -> Self {
         let stages = [BandPass::new(Self::CENTRE_HERTZ, Self::WIDTH_HERTZ); 2];
         let mut probe = stages;
-        // The power of the output to unit white noise is the energy of the impulse response; 20 000 samples are its all.
+        // The power of the output to unit white noise is the energy of the impulse response; 20 000 samples are its
+        // all.
         let energy: f64 = (0..20_000).map(|n| filter(&mut probe, if n == 0 { 1.0 } else { 0.0 }).powi(2)).sum();
         Self { gain: 1.0 / energy.sqrt(), stages }
     }
@@ -56,7 +57,7 @@ impl BandPass {
     }
 }
 
-/// Slow wandering of what a person aims at: an Ornstein-Uhlenbeck process with unit power.
+/// Slow wandering of what a teacher aims at: an Ornstein-Uhlenbeck process with unit power.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Drift {
     value: f64,
@@ -69,7 +70,8 @@ impl Drift {
 
     pub(super) fn next(&mut self, noise: &mut Noise) -> f64 {
         let a = STEP_SECONDS / Self::TIME_CONSTANT;
-        // Two equal low-passes halve the power of the one: the factor 2 restores it. One alone would have no smooth velocity.
+        // Two equal low-passes halve the power of the one: the factor 2 restores it. One alone would have no smooth
+        // velocity.
         self.velocity += -a * self.velocity + (2.0 * a).sqrt() * noise.gaussian(1.0);
         self.value += a * (std::f64::consts::SQRT_2 * self.velocity - self.value);
         self.value

@@ -1,13 +1,13 @@
-//! The way along which a person guides the hand: a curve for the grasp point and a turn about several axes.
+//! The way along which a teacher guides the hand: a curve for the grasp point and a turn about several axes.
 
 use crate::Pose;
 use crate::rotation::{add_scaled, exponential, multiply, norm};
 
 /// A smooth way of the grasp point through one or several legs, at rest between them.
 ///
-/// Position is a cubic Bezier curve in each leg; orientation is the goal's, from which two turns in the hand's frame fade away
-/// one after the other, so that the axis of rotation changes on the way. Time runs by minimum jerk in each leg, or at a constant
-/// speed between soft ends, as people do who take care not to bump into something.
+/// Position is a cubic Bezier curve in each leg; orientation is the goal's, from which two turns in the hand's frame
+/// fade away one after the other, so that the axis of rotation changes on the way. Time runs by minimum jerk in each
+/// leg, or at a constant speed between soft ends, as people do who take care not to bump into something.
 #[derive(Clone, Debug)]
 pub struct GuidePath {
     goal: [f64; 4],
@@ -155,8 +155,9 @@ pub fn side_grasp_path() -> GuidePath {
     let arrive = add_scaled(goal, -0.14, approach);
     let towards = add_scaled(arrive, -1.0, start);
     let leave = add_scaled(add_scaled(add_scaled(start, 0.35, towards), 0.03, left), 0.05, [0.0, 0.0, 1.0]);
-    // Palm level: hand z along the approach, hand x straight up (F1 and F2 above one another, the fingers close sideways).
-    // A half turn about the bisector of x and z swaps those two axes; then the whole hand turns to the approach.
+    // Palm level: hand z along the approach, hand x straight up (F1 and F2 above one another, the fingers close
+    // sideways). A half turn about the bisector of x and z swaps those two axes; then the whole hand turns to the
+    // approach.
     let half = 0.5_f64.sqrt();
     let goal_quaternion = multiply(exponential([0.0, 0.0, 30.0_f64.to_radians()]), [0.0, half, 0.0, half]);
     let turns = [[0.0, -30.0_f64.to_radians(), -25.0_f64.to_radians()], [-25.0_f64.to_radians(), 0.0, 0.0]];

@@ -3,8 +3,8 @@
 //! The wire keeps a queue for each controller. [`WireEvent::Offer`] appends to it; [`WireEvent::Withdraw`] empties it
 //! but for a frame that has begun. Frames leave in the order in which they were offered.
 
+use super::{Bus, Controller, IDLE_BITS, RECOVERY_SEQUENCES};
 use crate::Nanoseconds;
-use crate::controller::{Bus, Controller, IDLE_BITS, RECOVERY_SEQUENCES};
 use crate::errors::BusError;
 use crate::filter::{Verdict, verdict};
 use crate::frame::{Frame, INTERMISSION_BITS, Id};
@@ -22,7 +22,7 @@ const TO_ACKNOWLEDGE_BITS: u32 = 2;
 /// A burst of disturbance hits the first dominant bit behind the identifier: start of frame 1, identifier 11, that bit.
 const TO_DISTURBED_BIT: u32 = 13;
 
-/// What the wire must be told.
+/// Event that the wire must be told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WireEvent {
     /// A frame waits to be sent, behind those offered before.
@@ -48,7 +48,7 @@ pub enum Fault {
     NoAcknowledge,
     /// The next `attempts` attempts to send are disturbed.
     BitErrors {
-        /// How many attempts are left; 32 from a clean state end in bus-off.
+        /// Attempts that are left; 32 from a clean state end in bus-off.
         attempts: u32,
     },
     /// The bus is dominant and stays so.
@@ -63,7 +63,7 @@ struct Attempt {
     ends: Nanoseconds,
 }
 
-/// What the wire knows of this controller.
+/// The wire's knowledge of this controller.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Link {
     /// Buffers offered, oldest first.

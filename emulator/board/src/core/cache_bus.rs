@@ -6,14 +6,15 @@ use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 
 use crate::cache::{BANK, LINE, MAINTENANCE};
-use crate::core::SharedCore;
 use crate::notes::Stray;
+
+use super::SharedCore;
 
 /// The bus as the processor sees it through this.
 pub(crate) struct CacheBus<'a> {
     inner: &'a mut dyn CoreBus,
     shared: &'a SharedCore,
-    /// Whether the read that was stopped before goes through the cache, once that is known: its instruction and count.
+    /// True if the read that was stopped before goes through the cache, once that is known: its instruction and count.
     verdict: Option<(Option<u64>, u64, bool)>,
     /// The read that waits for a verdict.
     asked: Option<Access>,
@@ -36,7 +37,7 @@ const MEMORIES: [(u64, u64); 9] = [
 /// The peripherals, and the processor's own space.
 const PERIPHERALS: [(u64, u64); 2] = [(0x4000_0000, 0x5FFF_FFFF), (0xE000_0000, 0xE00F_FFFF)];
 
-/// Whether anything answers at an address; an access elsewhere is a bus fault.
+/// True if anything answers at an address; an access elsewhere is a bus fault.
 fn exists(address: u64) -> bool {
     MEMORIES.iter().chain(&PERIPHERALS).any(|(first, last)| (*first..=*last).contains(&address))
 }
@@ -56,7 +57,7 @@ impl<'a> CacheBus<'a> {
         self.asked.take()
     }
 
-    /// What the stopped core's registers say of that read.
+    /// Registers of the stopped core at that read.
     pub(crate) fn judge(&mut self, access: &Access, cacheable: bool) {
         self.verdict = Some((access.program_counter, access.instruction_count, cacheable));
     }

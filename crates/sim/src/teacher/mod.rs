@@ -1,15 +1,15 @@
-//! A simulated person who teaches: takes the hand of the arm, guides it compliantly along a path, and lets go.
+//! The simulated teacher: takes the hand of the arm, guides it compliantly along a path, and lets go.
 //!
-//! The person holds only the hand, at the grasp point. The rest of the arm, the elbow above all, follows its own
+//! The teacher holds only the hand, at the grasp point. The rest of the arm, the elbow above all, follows its own
 //! dynamics under gravity compensation, as with a real teacher. The pull is
 //!
-//! `f = g(t) [k (x_aim - x) - d dx] + tremor`, shortened to the person's strength (the same for rotation),
+//! `f = g(t) [k (x_aim - x) - d dx] + tremor`, shortened to the teacher's strength (the same for rotation),
 //!
-//! with `x_aim` the path plus slow drift plus a correction: what the person sees of the error, a reaction time late,
+//! with `x_aim` the path plus slow drift plus a correction: what the teacher sees of the error, a reaction time late,
 //! is integrated until it is gone. `g` fades in when the hand is taken and out when it is let go.
 
 mod guided;
-mod lesson;
+mod movement;
 mod path;
 mod tremor;
 
@@ -19,7 +19,7 @@ use std::collections::VecDeque;
 use tremor::{Drift, Tremor};
 
 pub use guided::GuidedWorld;
-pub use lesson::Lesson;
+pub use movement::TaughtMovement;
 pub use path::{GuidePath, side_grasp_path};
 
 /// Joint posture in which the demonstration begins, rad: the grasp point is at the start of [`side_grasp_path`].
@@ -29,15 +29,16 @@ pub use path::{GuidePath, side_grasp_path};
 /// The straight way in joint space from the home posture to here touches nothing.
 pub const DEMONSTRATION_START: [f64; 7] = [-0.8713, 0.6359, 0.4817, 1.8822, -0.6786, -0.5848, -0.4608];
 
-/// A joint posture that reaches the goal of [`side_grasp_path`], rad; the arm being redundant, a demonstration ends near it.
+/// A joint posture that reaches the goal of [`side_grasp_path`], rad; the arm being redundant, a demonstration ends
+/// near it.
 pub const DEMONSTRATION_GOAL: [f64; 7] = [-0.5501, 1.1622, 0.7957, 1.7611, -0.6966, -0.8446, -0.3368];
 
-/// What kind of person guides the arm.
+/// Properties of the teacher.
 #[derive(Clone, Debug)]
-pub struct PersonConfig {
+pub struct TeacherConfig {
     /// Seed of tremor and drift: the same seed, the same movements of the hand.
     pub seed: u64,
-    /// Pause between [`Person::begin`] and taking the hand, s.
+    /// Pause between [`Teacher::begin`] and taking the hand, s.
     pub pause: f64,
     /// Stiffness of the pull, N/m.
     pub stiffness: f64,
@@ -59,15 +60,15 @@ pub struct PersonConfig {
     pub drift: f64,
     /// Slow wandering of the aimed orientation, root mean square per axis, rad.
     pub rotation_drift: f64,
-    /// Reaction time: how old what the person sees is, s.
+    /// Reaction time: how old what the teacher sees is, s.
     pub reaction_time: f64,
     /// Rate at which a seen error is corrected, 1/s.
     pub correction_rate: f64,
-    /// How long the hand is held at the goal before it is let go, s.
+    /// Time for which the hand is held at the goal before it is let go, s.
     pub settle: f64,
 }
 
-impl Default for PersonConfig {
+impl Default for TeacherConfig {
     /// A careful adult: arm stiffness 450 N/m, at most 30 N and 5 N m, 0.7 N of tremor, 4 mm of drift.
     fn default() -> Self {
         Self {
@@ -90,10 +91,10 @@ impl Default for PersonConfig {
     }
 }
 
-/// What the person is doing.
+/// Stage of the demonstration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Not touching the arm: [`Person::begin`] was not called yet.
+    /// Not touching the arm: [`Teacher::begin`] was not called yet.
     Watching,
     /// Told to begin, not touching the arm yet.
     Pausing,
@@ -109,13 +110,13 @@ pub enum Stage {
     Done,
 }
 
-/// Stream of random numbers that no part of the plant uses, so that a plant and a person may share a seed.
+/// Stream of random numbers that no part of the plant uses, so that a plant and a teacher may share a seed.
 const NOISE_STREAM: u64 = 0x7065_7273_6f6e;
 
 /// Duration of taking the hand and of letting it go, s: no pull begins or ends with a jerk.
 const GRIP_SECONDS: f64 = 0.5;
 
-/// Time constant with which the person feels the speed of the hand, s.
+/// Time constant with which the teacher feels the speed of the hand, s.
 const SPEED_FILTER_SECONDS: f64 = 0.005;
 
 /// Errors smaller than this are not corrected, m: nobody sees a millimetre or two at arm's length.
@@ -130,10 +131,10 @@ const CORRECTION_LIMIT: f64 = 0.05;
 /// Longest correction of the aimed orientation, rad.
 const ROTATION_CORRECTION_LIMIT: f64 = 0.3;
 
-/// A person with a seed, a path to follow, and a memory of the last fraction of a second.
+/// A teacher with a seed, a path to follow, and a memory of the last fraction of a second.
 #[derive(Clone, Debug)]
-pub struct Person {
-    config: PersonConfig,
+pub struct Teacher {
+    config: TeacherConfig,
     path: GuidePath,
     /// Time since `begin`, s; `None` while watching.
     time: Option<f64>,
@@ -147,10 +148,10 @@ pub struct Person {
     correction: [[f64; 3]; 2],
 }
 
-impl Person {
-    /// A person who watches until told to [`begin`](Self::begin).
+impl Teacher {
+    /// A teacher who watches until told to [`begin`](Self::begin).
     #[must_use]
-    pub fn new(config: PersonConfig, path: GuidePath) -> Self {
+    pub fn new(config: TeacherConfig, path: GuidePath) -> Self {
         let noise = Noise::new(config.seed, NOISE_STREAM);
         Self {
             config,
@@ -166,18 +167,18 @@ impl Person {
         }
     }
 
-    /// Tells the person to start: after the pause they take the hand. Does nothing once begun.
+    /// Tells the teacher to start: after the pause they take the hand. Does nothing once begun.
     pub fn begin(&mut self) {
         self.time.get_or_insert(0.0);
     }
 
-    /// The path the person follows.
+    /// The path the teacher follows.
     #[must_use]
     pub fn path(&self) -> &GuidePath {
         &self.path
     }
 
-    /// What the person is doing.
+    /// Stage of the demonstration.
     #[must_use]
     pub fn stage(&self) -> Stage {
         let Some(time) = self.time else {
@@ -201,14 +202,14 @@ impl Person {
         self.time.unwrap_or(0.0) - self.config.pause - GRIP_SECONDS
     }
 
-    /// How firmly the hand is held, 0 to 1.
+    /// Firmness of the hold, 0 to 1.
     fn grip(&self) -> f64 {
         let rise = (self.path_time() + GRIP_SECONDS) / GRIP_SECONDS;
         let fall = (self.path.duration() + self.config.settle + GRIP_SECONDS - self.path_time()) / GRIP_SECONDS;
         rise.min(fall).clamp(0.0, 1.0)
     }
 
-    /// One physics step: the force (N) and torque (N m) of the person at the grasp point, world axes.
+    /// One physics step: the force (N) and torque (N m) of the teacher at the grasp point, world axes.
     ///
     /// Call it once per physics step with the pose of the grasp point; time advances by [`STEP_SECONDS`].
     pub fn pull(&mut self, hand: &Pose) -> ([f64; 3], [f64; 3]) {
@@ -254,7 +255,7 @@ impl Person {
         }
     }
 
-    /// Where the person aims: the path, plus drift, plus the correction of what they saw a reaction time ago.
+    /// Where the teacher aims: the path, plus drift, plus the correction of what they saw a reaction time ago.
     fn aim(&mut self, hand: &Pose) -> Pose {
         let wanted = self.path.pose(self.path_time());
         self.seen.push_back([
