@@ -15,7 +15,7 @@ use crate::elf::Elf;
 use crate::thumb::Flow;
 
 /// The control slot, which must lie in ITCM itself.
-const ROOT: &str = "device::core::Core::control";
+const ROOT: &str = "device::controller::DeviceController::control";
 
 /// The law of a run, which has most to compute.
 const LAW: &str = "run_primitive";
@@ -45,7 +45,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "led by hand: no plan and no feedback is computed",
     ),
     ("control::cycle::Cycle<R,_>::reset", "after a fault of the bus"),
-    ("device::core::Core::restart", "after a fault of the bus"),
+    ("device::controller::DeviceController::restart", "after a fault of the bus"),
     ("device::startup", "a person zeroes the arm again"),
     ("device::hand", "the hand is initialised or has failed"),
     ("firmware::last_words", "the end"),

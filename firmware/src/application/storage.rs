@@ -9,7 +9,7 @@ use device::storage::{Desk, Opening, Work, keep};
 use embedded_storage_async::nor_flash::NorFlash;
 use rtic_core::Mutex;
 
-use super::{Dialogue, Log, StorageRoom};
+use super::{ArmSession, Log, StorageRoom};
 
 /// The library behind the session's lock: each call holds it for one copy of an image at most.
 struct SharedDesk<M, L> {
@@ -17,7 +17,7 @@ struct SharedDesk<M, L> {
     log: L,
 }
 
-impl<M: Mutex<T = &'static mut Dialogue>, L: Log> Desk for SharedDesk<M, L> {
+impl<M: Mutex<T = &'static mut ArmSession>, L: Log> Desk for SharedDesk<M, L> {
     fn restore(&mut self, slot: u8, image: &[u8]) {
         self.session.lock(|session| session.store_mut().restore(slot, image));
     }
@@ -44,7 +44,7 @@ impl<M: Mutex<T = &'static mut Dialogue>, L: Log> Desk for SharedDesk<M, L> {
 pub async fn keep_library<F: NorFlash>(
     flash: F,
     room: &mut StorageRoom,
-    session: impl Mutex<T = &'static mut Dialogue>,
+    session: impl Mutex<T = &'static mut ArmSession>,
     log: impl Log,
 ) -> Infallible {
     keep(flash, room, &mut SharedDesk { session, log }).await

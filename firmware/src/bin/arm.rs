@@ -19,9 +19,9 @@ static METADATA: [u8; link::metadata::METADATA_BYTES] = {
 #[cfg(target_os = "none")]
 #[rtic::app(device = firmware::board::device, peripherals = false, dispatchers = [DISPATCH_LOG, DISPATCH_SESSION])]
 mod app {
-    use device::Core;
+    use device::DeviceController;
     use firmware::application::{
-        self, Application, CorePlace, Dialogue, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse,
+        self, Application, ArmSession, CorePlace, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse,
         StorageRoom, TransmitTask,
     };
     use firmware::board::device::Interrupt;
@@ -34,17 +34,17 @@ mod app {
 
     #[shared]
     struct Shared {
-        core: &'static mut Core,
+        core: &'static mut DeviceController,
         can: <Board as Edge>::Can,
-        session: &'static mut Dialogue,
+        session: &'static mut ArmSession,
     }
 
     #[local]
     struct Local {
-        slot_task: SlotTask<Board>,
+        slot_task: SlotTask<Board, DeviceController>,
         receive_task: ReceiveTask,
         transmit_task: TransmitTask,
-        session_task: SessionTask<Board>,
+        session_task: SessionTask<Board, DeviceController>,
         log_task: LogTask,
         flash: <Board as Edge>::Flash,
     }

@@ -10,9 +10,9 @@ use control::Payload;
 use control::model::{ArmModel, Frames};
 use control::units::JointPositions;
 use device::storage::Opening;
-use device::{Core, Store};
+use device::{DeviceController, Store};
 use firmware::application::{
-    self, Application, CorePlace, Dialogue, Log, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse,
+    self, Application, ArmSession, CorePlace, Log, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse,
     StorageRoom, TransmitTask,
 };
 use firmware::board::Edge;
@@ -79,13 +79,13 @@ pub(crate) struct Host {
     plant: Plant,
     silicon: Shared,
     now: Ticks,
-    core: Lock<&'static mut Core>,
+    core: Lock<&'static mut DeviceController>,
     can: Lock<Can>,
-    session: Lock<&'static mut Dialogue>,
-    slot_task: SlotTask<MemoryBoard>,
+    session: Lock<&'static mut ArmSession>,
+    slot_task: SlotTask<MemoryBoard, DeviceController>,
     receive_task: ReceiveTask,
     transmit_task: TransmitTask,
-    session_task: SessionTask<MemoryBoard>,
+    session_task: SessionTask<MemoryBoard, DeviceController>,
     log_task: LogTask,
     storage_task: Pin<Box<dyn Future<Output = Infallible>>>,
     flash_clock: VirtualClock,

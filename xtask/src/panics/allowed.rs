@@ -63,11 +63,6 @@ const BOARDS: &[Allowed] = &[
         &[Borrow, Message],
         "the emulated controller's lock (`can::with`), three of its uses joined by the compiler",
     ),
-    emulated(
-        "firmware::hand::slot",
-        &[Borrow, Message],
-        "the emulated controller's lock (`can::with`), three of its uses joined by the compiler",
-    ),
     emulated("semihosting", &[Message], "files of QEMU's own; printing the last words"),
     real("firmware::board::stm32h743", &[Resumed], "each is awaited once, by the library's task"),
     real(

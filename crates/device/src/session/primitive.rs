@@ -10,10 +10,10 @@ use link::image::{
     ImageContent, KERNEL_LIMIT, OrientationErrorKind, Reals, WEIGHT_ROWS, Waypoint,
 };
 
-use super::upload::Refused;
-use super::wire::PrimitiveTrouble;
+use crate::application::Refused;
 use crate::port::{FitPrimitive, StoredPrimitive};
 use crate::recorded_filter::{self, OtherFilter};
+use crate::session::wire::PrimitiveTrouble;
 
 // The image's limits must not exceed what the control half can hold; a table that does not fit would be refused
 // only after its upload.
@@ -23,8 +23,8 @@ const _: () = assert!(EXPECTATION_POINTS_LIMIT <= dmp::EXPECTED_CAPACITY);
 const _: () = assert!(EXPERIENCE_POINTS_LIMIT <= dmp::EXPERIENCE_CAPACITY);
 const _: () = assert!(EXPERIENCE_ROWS == dmp::EXPERIENCE_CHANNELS);
 
-/// Room to copy the weights into, because those of an image are not aligned.
-pub(crate) type WeightRoom = [f32; WEIGHT_ROWS * KERNEL_LIMIT];
+/// Buffer to copy the weights into, because those of an image are not aligned.
+pub(crate) type WeightBuffer = [f32; WEIGHT_ROWS * KERNEL_LIMIT];
 
 /// Why an image is not a primitive for this device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,14 +58,14 @@ impl From<Unfit> for Refused {
 pub(crate) fn build<'a>(
     model: &ArmModel<f32>,
     content: &ImageContent<Reals<'_>>,
-    room: &mut WeightRoom,
+    weights_buffer: &mut WeightBuffer,
     primitive: &'a mut StoredPrimitive,
 ) -> Result<FitPrimitive<'a>, Unfit> {
     let recorded = !content.expected_mean.is_empty() || !content.experience_mean.is_empty();
     if recorded {
         recorded_filter::check(content.marks.filter_cutoff).map_err(Unfit::Filter)?;
     }
-    let weights = content.weights.copy_to(room).unwrap_or_default();
+    let weights = content.weights.copy_to(weights_buffer).unwrap_or_default();
     let velocity = &content.start_velocity;
     let tables = PrimitiveTables {
         duration: content.duration,

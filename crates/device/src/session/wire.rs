@@ -4,8 +4,8 @@
 
 use core::fmt;
 
-use control::CalibrationError;
 use control::plan::load::{End, LoadError};
+use control::{CalibrationError, CycleRecord};
 use dmp::{Entry, GainError, Part, PrimitiveError, Row, TableError};
 use link::{Event as LinkEvent, EventKind as LinkKind, HandStage, Refusal as LinkRefusal, Telemetry};
 use puck::Node;
@@ -13,11 +13,10 @@ use puck::Node;
 use crate::command::Refusal;
 use crate::event::{Event, EventKind};
 use crate::health::Health;
-use crate::port::TimedRecord;
 use crate::startup::{Stage, StartupError};
 
 /// A cycle number as it goes over the link, where it wraps after 165 days.
-pub(crate) const fn cycle(number: u64) -> u32 {
+const fn cycle(number: u64) -> u32 {
     number as u32
 }
 
@@ -87,9 +86,8 @@ fn thousandths(share: f32) -> u32 {
     (share.clamp(0.0, 1.0) * 1000.0 + 0.5) as u32
 }
 
-/// A cycle record as telemetry.
-pub(crate) fn telemetry(timed: &TimedRecord) -> Telemetry {
-    let record = &timed.record;
+/// A cycle record as telemetry, without its cost.
+pub(crate) fn telemetry(record: &CycleRecord) -> Telemetry {
     Telemetry {
         cycle: cycle(record.cycle),
         state: record.state.code(),
@@ -102,7 +100,7 @@ pub(crate) fn telemetry(timed: &TimedRecord) -> Telemetry {
         pose_d: record.pose_d,
         wrench: record.wrench,
         lost_replies: record.lost_replies,
-        cost_ticks: timed.cost_ticks,
+        cost_ticks: 0,
         hand: record.hand,
         hand_d: record.hand_d,
         gauges: record.gauges,

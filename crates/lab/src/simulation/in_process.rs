@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 
 use device::storage::{Desk, Library, Opening, Room, Work, keep, value_bytes};
-use device::{Core, Identity, Session, Slot, StoreError};
+use device::{Controller, DeviceController, Identity, Session, Slot, StoreError};
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
 use sim::flash::{FlashChip, FlashPort, VirtualClock};
@@ -101,7 +101,7 @@ impl Keeper {
 
 /// The application and the time of its next slot.
 pub(super) struct InProcess {
-    core: Box<Core>,
+    core: Box<DeviceController>,
     session: SharedSession,
     keeper: Keeper,
     queues: Queues,
@@ -125,7 +125,7 @@ impl InProcess {
         let session = boxed(Session::init(identity, Library::new()));
         let session = SharedSession(Arc::new(Mutex::new(session)));
         Self {
-            core: boxed(Core::init()),
+            core: boxed(DeviceController::init()),
             keeper: Keeper::new(flash, session.clone()),
             session,
             queues: Queues::default(),
