@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use sim::world::mujoco::{ObjectKind, ObjectSpec, TABLE_TOP};
 
 use super::grid::{ApproachFrame, Cell, Grid};
-use super::mode::Mode;
 use super::outcome::Rule;
 use super::results::{Header, Key};
 use super::scenario::{PlantKind, Scenario};
@@ -15,6 +14,7 @@ use super::variation::Variation;
 use lab::demonstration::recording::checksum;
 use lab::plan;
 use lab::primitive_file::PrimitiveFile;
+use lab::procedure::Mode;
 use lab::simulation::Engine;
 use lab::transport::ChipOptions;
 

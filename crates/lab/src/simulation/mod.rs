@@ -6,6 +6,7 @@
 //! the load of the machine.
 
 mod board;
+mod board_can;
 mod bus_log;
 mod error;
 pub(crate) mod halves;
@@ -13,15 +14,17 @@ mod in_process;
 mod options;
 mod qemu;
 mod seat;
+mod simulated_can;
 mod words;
 
-pub use board::BoardEngine;
+pub use board_can::BoardCan;
 pub use error::SimulationError;
 pub use halves::{CYCLE_TICKS, SLOT_TICKS};
 pub use options::{
-    BOARD_EMULATOR_VARIABLE, BOARD_IMAGE_VARIABLE, DEFAULT_SEED, Engine, FlashSource, GRIPPED, HAND_IMAGE_VARIABLE,
-    IMAGE_VARIABLE, SimulationOptions, WorldKind, built_image,
+    BOARD_EMULATOR_VARIABLE, BOARD_IMAGE_VARIABLE, BoardEngine, DEFAULT_SEED, Engine, FlashSource, GRIPPED,
+    HAND_IMAGE_VARIABLE, IMAGE_VARIABLE, SimulationOptions, WorldKind, built_image,
 };
+pub use simulated_can::{HostBus, SimulatedCan};
 
 use std::time::Duration;
 
