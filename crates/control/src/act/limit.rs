@@ -59,6 +59,13 @@ pub struct LimitReport {
     pub not_finite: bool,
 }
 
+impl LimitReport {
+    /// True if a limit cut the torque: of a joint, a motor, or the rate.
+    pub const fn is_cut(&self) -> bool {
+        self.joint || self.motor || self.rate
+    }
+}
+
 /// Cuts torques to what joints, motors and cables bear.
 #[derive(Clone, Debug)]
 pub struct TorqueLimiter<R: Real> {

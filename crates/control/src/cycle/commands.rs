@@ -1,16 +1,17 @@
 //! Commands: their conditions, and what they start.
 
-use dmp::Primitive;
 use nalgebra::Vector3;
 
 use crate::command::{Command, Refusal};
+use crate::cycle::law::{Law, Running};
 use crate::cycle::{Cycle, Measured, STANDING, WRENCH_AGE};
 use crate::guard::fault::Fault;
 use crate::guard::supervisor::{State, Trigger};
 use crate::model::hand;
 use crate::plan;
 use crate::plan::approach::{Approach, LONGEST};
-use crate::plan::run::Run;
+use crate::plan::primitive::Primitive;
+use crate::plan::run;
 use crate::real::Real;
 use crate::sense::wrench::REST_FORCE;
 use crate::units::JointPositions;
@@ -51,7 +52,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Command::ClearFault => {
                 let waits = matches!(self.supervisor.state(), State::SoftStop | State::Fault);
                 let moving = self.fastest(measured) > R::of(STANDING);
-                if waits && (self.outside_fault || measured.state.missing > 0 || moving) {
+                if waits && (measured.outside_fault || measured.state.missing > 0 || moving) {
                     return Err(Refusal::CauseRemains);
                 }
                 self.change(Trigger::Clear, measured)
@@ -78,9 +79,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 }
                 self.may_move(measured)?;
                 // From the posture that is held, so that the torque against friction stays.
-                let from = if self.supervisor.law() == State::Hold { self.hold } else { *q };
-                self.approach = Some(Approach::new(&self.model, &from, &target, R::of(f64::from(duration))));
-                self.change(Trigger::Approach, measured)
+                let from = if let Law::Posture(posture) = &self.law { posture.q } else { *q };
+                let approach = Approach::new(&self.model, &from, &target, R::of(f64::from(duration)));
+                self.supervisor.take(Trigger::Approach, Fault::None)?;
+                self.begin_approach(approach, measured);
+                Ok(())
             }
             Command::Run(options) => {
                 self.may_begin(measured)?;
@@ -91,17 +94,19 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                     self.may_use_force(primitive, measured)?;
                 }
                 let hand = self.hand.answering();
-                Run::start(&mut self.run, primitive, q, &measured.pose, hand.as_ref(), options)?;
+                let rollout = run::start(primitive, q, &measured.pose, hand.as_ref(), &options)?;
+                self.supervisor.take(Trigger::Run, Fault::None)?;
                 self.wrench.tare_drift();
                 self.hand.tare_drift();
-                self.change(Trigger::Run, measured)
+                self.begin_run(rollout, options, measured);
+                Ok(())
             }
-            Command::SetGoal(goal) => match (&mut self.run, self.loaded.get()) {
-                (Some(run), Some(primitive)) => run.set_goal(primitive, &goal),
+            Command::SetGoal(goal) => match (&mut self.law, self.loaded.get()) {
+                (Law::Run(Running { run, .. }), Some(primitive)) => run.set_goal(primitive, &goal),
                 _ => Err(Refusal::WrongState),
             },
-            Command::SetSpeed { factor } => match (&mut self.run, self.loaded.get()) {
-                (Some(run), Some(primitive)) => run.set_speed(primitive, factor),
+            Command::SetSpeed { factor } => match (&mut self.law, self.loaded.get()) {
+                (Law::Run(Running { run, .. }), Some(primitive)) => run.set_speed(primitive, factor),
                 _ => Err(Refusal::WrongState),
             },
         }
@@ -142,7 +147,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if !self.is_active() {
             return Err(Refusal::SafetyNotActive);
         }
-        if self.outside_fault {
+        if measured.outside_fault {
             return Err(Refusal::CauseRemains);
         }
         if measured.state.missing > 0 {
@@ -168,9 +173,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
 
     /// Takes a person's trigger.
     fn change(&mut self, trigger: Trigger, measured: &Measured<'_, R>) -> Result<(), Refusal> {
-        let from = self.supervisor.law();
         if self.supervisor.take(trigger, Fault::None)? {
-            self.entered(from, Some(measured));
+            self.entered(Some(measured));
         }
         Ok(())
     }

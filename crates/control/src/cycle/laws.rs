@@ -1,24 +1,20 @@
 //! The laws of the states: from what is measured to the torque that is wanted.
 
+use crate::cycle::law::{Lag, Law, Running};
 use crate::cycle::record::{Event, flags};
-use crate::cycle::{Cycle, HANDOVER, Measured, STOP_RAMP, WRENCH_AGE};
-use crate::guard::supervisor::State;
+use crate::cycle::{Cycle, Measured, WRENCH_AGE};
 use crate::law::force::ForceController;
 use crate::model::kinematics::Frames;
-use crate::plan::reference::HandReference;
-use crate::plan::reference::JointReference;
-use crate::plan::reference::TaskReference;
+use crate::plan::primitive::posture_and_hand;
+use crate::plan::reference::{HandReference, JointReference, TaskReference};
 use crate::plan::run::Senses;
-use crate::real::{Real, at_least, at_most, within};
+use crate::real::{Real, at_least, at_most};
 use crate::sense::hand::HandState;
 use crate::time::{PERIOD, periods};
 use crate::units::{JointPositions, JointTorques, Pose, Vector6, Vector7, Wrench};
 
 /// Length of the damping that carries the arm while gravity torque builds up after arming: 0.5 s, in control periods.
 const ARMING: u16 = periods(0.5);
-
-/// Speed at which a held posture returns after somebody pushed the arm away from it (rad/s).
-const RETURN_SPEED: f64 = 0.2;
 
 /// Speed of the hand up to which the arm floats freely (m/s).
 const TAUGHT_SPEED: f64 = 0.18;
@@ -33,6 +29,8 @@ pub(super) struct Demand<R: Real> {
     pub(super) q_d: JointPositions<R>,
     pub(super) pose_d: Pose<R>,
     pub(super) phase: R,
+    /// Statistic of the watch for unusual runs.
+    pub(super) surprise: R,
     pub(super) flags: u32,
 }
 
@@ -41,23 +39,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     pub(super) fn demand(&mut self, measured: &Measured<'_, R>) -> Option<Demand<R>> {
         let repulsion = self.bounds.repulsion(&measured.state.q, &measured.state.dq);
         let near = if repulsion.0.amax() > R::of(0.0) { flags::NEAR_LIMIT } else { 0 };
-        let mut demand = match self.supervisor.law() {
-            State::Idle | State::Fault | State::Coast => return None,
-            State::Gravity => self.float(measured),
-            State::Hold => {
-                let reference = JointReference::at_rest(self.yield_to(&measured.state.q));
-                self.hold_to(measured, reference)
-            }
-            State::Approach => {
-                let reference = match &mut self.approach {
-                    Some(approach) => approach.step(),
-                    None => JointReference::at_rest(self.hold),
-                };
-                (self.hold, self.held) = (reference.q, reference.q);
-                self.hold_to(measured, reference)
-            }
-            State::Run => self.run_primitive(measured),
-            State::SoftStop => self.stop(measured),
+        let mut demand = match &self.law {
+            Law::Off { .. } => return None,
+            Law::Gravity => self.float(measured),
+            Law::Posture(_) => self.hold_to(measured),
+            Law::Run(_) => self.run_primitive(measured),
+            Law::SoftStop(_) => self.stop(measured),
         };
         demand.torque.0 += repulsion.0;
         demand.flags |= near;
@@ -70,6 +57,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             q_d: measured.state.q,
             pose_d: measured.pose,
             phase: R::of(0.0),
+            surprise: R::of(0.0),
             flags: 0,
         }
     }
@@ -90,37 +78,23 @@ impl<R: Real, const N: usize> Cycle<R, N> {
 
     /// Gravity compensation and damping; what else was there is ramped away.
     fn stop(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
-        let (rest, left) = self.rest;
-        self.rest.1 = left.saturating_sub(1);
-        let share = R::from_counts(i32::from(left)) / R::from_counts(i32::from(STOP_RAMP));
+        let Law::SoftStop(ramp) = &mut self.law else { return self.float(measured) };
+        let rest = ramp.step();
         let gravity = self.model.gravity_torque(measured.frames).0;
         let damping = self.gains.stop_damping.component_mul(&measured.state.dq.0);
-        self.plain(measured, gravity + rest * share - damping)
-    }
-
-    /// The posture that is held now: where it shall be, unless the arm was pushed away from there by more than the clamp of its
-    /// gains. Then it gives way, and comes back slowly once it is let go.
-    fn yield_to(&mut self, q: &JointPositions<R>) -> JointPositions<R> {
-        let step = R::of(RETURN_SPEED * PERIOD);
-        let back = (self.hold.0 - self.held.0).map(|way| within(way, step));
-        let away = (self.held.0 + back - q.0).zip_map(&self.gains.stiff.clamp, within);
-        let held = q.0 + away;
-        // Exactly, where nobody pushes: a sum of differences is not.
-        self.held = JointPositions(held.zip_map(&self.hold.0, |held, hold| {
-            let rest = held - hold;
-            if rest < step && rest > -step { hold } else { held }
-        }));
-        self.held
+        self.plain(measured, gravity + rest - damping)
     }
 
     /// Eq (10) along a joint reference, with the integral that takes away what friction leaves.
-    fn hold_to(&mut self, measured: &Measured<'_, R>, reference: JointReference<R>) -> Demand<R> {
+    fn hold_to(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
+        let Law::Posture(posture) = &mut self.law else { return self.float(measured) };
+        let reference = posture.reference(&measured.state.q, &self.gains.stiff.clamp);
         let frozen = measured.state.missing > 0;
-        if !frozen && !self.limited {
-            self.integral.step(&self.gains, &reference.q, &measured.state.q);
+        if !frozen && !self.cut.is_cut() {
+            posture.integral.step(&self.gains, &reference.q, &measured.state.q);
         }
-        let shifted = JointReference { q: JointPositions(reference.q.0 + self.integral.shift()), ..reference };
-        let torque = self.joint_controller.torque(
+        let shifted = JointReference { q: JointPositions(reference.q.0 + posture.integral.shift()), ..reference };
+        let torque = posture.controller.torque(
             &self.model,
             &self.gains.stiff,
             measured.frames,
@@ -129,16 +103,16 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             frozen,
         );
         let pose_d = Frames::new(&self.model, &reference.q).tool_pose();
-        Demand { torque, q_d: reference.q, pose_d, phase: R::of(0.0), flags: 0 }
+        Demand { torque, q_d: reference.q, pose_d, ..self.plain(measured, Vector7::zeros()) }
     }
 
     /// Eqs (8), (9), (11), (10), (12), (13), and the hand's part for Eq (14).
     fn run_primitive(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
-        let (Some(run), Some(primitive)) = (&mut self.run, self.loaded.get()) else {
-            // The state machine enters `Run` only with both, and no other primitive is loaded meanwhile; else the arm
-            // floats.
+        let (Law::Run(running), Some(primitive)) = (&mut self.law, self.loaded.get()) else {
+            // A run begins with a primitive, and no other is loaded meanwhile; else the arm floats.
             return self.float(measured);
         };
+        let Running { run, operational, controller, handover, lag } = running;
         let frozen = measured.state.missing > 0;
         let senses = match self.wrench.age() {
             Some(0) if !frozen => Senses::Fresh,
@@ -159,9 +133,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         let deviation = run.deviation().filter(|_| options.force_control);
         let expected_gauges = deviation.map(|deviation| deviation.expected_gauges);
-        self.hand.follow(&HandReference { q: plan.hand.x, dq: plan.hand.v }, expected_gauges);
+        self.hand.follow(
+            &HandReference { q: posture_and_hand(&plan.points.x).1, dq: posture_and_hand(&plan.points.v).1 },
+            expected_gauges,
+        );
         let task = TaskReference::from_plan(&plan);
-        let reference = self.operational.step(
+        let reference = operational.step(
             &self.model,
             tracking,
             measured.frames,
@@ -169,8 +146,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             &task,
             (options.pose_feedback, options.acceleration),
         );
-        let mut torque =
-            self.joint_controller.torque(&self.model, tracking, measured.frames, measured.state, &reference, frozen);
+        let mut torque = controller.torque(&self.model, tracking, measured.frames, measured.state, &reference, frozen);
         let mut set = if options.feedback { flags::FEEDBACK } else { 0 };
         if let Some(deviation) = deviation {
             let to_world = measured.frames.tool_to_world();
@@ -180,7 +156,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 tracking.force_proportional,
                 tracking.force_integral,
                 R::of(PERIOD),
-                self.saturated || senses != Senses::Fresh,
+                self.cut.joint || self.cut.motor || senses != Senses::Fresh,
             );
             let bounded = bounded(&command, tracking.force_limit) * run.kept();
             // What the primitive expects to carry or to press is fed forward: the integral has a finite gain.
@@ -194,15 +170,13 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if run.is_faded(primitive) {
             set |= flags::FEEDBACK_FADED;
         }
-        if self.operational.is_clamped() {
+        if operational.is_clamped() {
             set |= flags::CLAMPED;
         }
-        let (rest, left) = self.handover;
-        torque.0 += rest * (R::from_counts(i32::from(left)) * R::of(1.0 / f64::from(HANDOVER)));
-        self.handover.1 = left.saturating_sub(1);
+        torque.0 += handover.step();
         let offset = task.pose.position - measured.pose.position;
-        self.tracking = (offset.dot(&offset).square_root(), self.operational.lag());
-        Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, flags: set }
+        *lag = Lag { distance: offset.dot(&offset).square_root(), speed: operational.lag() };
+        Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, surprise: run.surprise(), flags: set }
     }
 }
 

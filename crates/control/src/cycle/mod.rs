@@ -8,11 +8,11 @@
 
 mod commands;
 pub mod hand;
+mod law;
 mod laws;
 pub mod record;
 mod transitions;
 
-use dmp::Primitive;
 use pinned_init::{Init, init};
 use puck::SafetyMode;
 
@@ -20,6 +20,7 @@ use crate::act::actuation::Actuation;
 use crate::act::limit::{LimitReport, TorqueLimiter};
 use crate::command::Refusal;
 use crate::cycle::hand::HandDrive;
+use crate::cycle::law::{Lag, Law, Posture, Running};
 use crate::cycle::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
 use crate::guard::fault::Fault;
 use crate::guard::joint_limits::JointBounds;
@@ -27,20 +28,17 @@ use crate::guard::monitor::{Monitor, Observation};
 use crate::guard::supervisor::{State, Supervisor, Trigger};
 use crate::law::force::ForceController;
 use crate::law::gains::Gains;
-use crate::law::integral::PostureIntegral;
-use crate::law::joint::JointController;
-use crate::law::operational::OperationalController;
 use crate::model::arm::ArmModel;
 use crate::model::calibration::{Calibration, Payload};
 use crate::model::kinematics::Frames;
-use crate::plan::approach::Approach;
 use crate::plan::load::{Fit, LoadRefusal, Loaded};
-use crate::plan::run::{FADE, Run};
+use crate::plan::primitive::Primitive;
+use crate::plan::run::FADE;
 use crate::real::Real;
 use crate::sense::joints::{JointEstimator, JointState};
 use crate::sense::wrench::WrenchEstimator;
 use crate::time::{few_periods, periods};
-use crate::units::{JointPositions, Pose, Vector7, Wrench};
+use crate::units::{JointPositions, Pose, Wrench};
 
 /// Kernels per row that a stored primitive may have.
 pub const MAX_KERNELS: usize = 100;
@@ -74,35 +72,17 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     wrench: WrenchEstimator<R>,
     limiter: TorqueLimiter<R>,
     bounds: JointBounds<R>,
-    joint_controller: JointController<R>,
-    operational: OperationalController<R>,
+    law: Law<R, N>,
+    /// Force controller of a run. Not in its law: the window is large, and stays where it is.
     force: ForceController<R>,
-    integral: PostureIntegral<R>,
     hand: HandDrive<R>,
     loaded: Loaded<R, N>,
-    run: Option<Run<R, N>>,
-    approach: Option<Approach<R>>,
-    /// Desired posture of `Hold` (rad).
-    hold: JointPositions<R>,
-    /// Where that posture has given way to (rad).
-    held: JointPositions<R>,
-    /// Torque beyond gravity when a soft stop began (N m), and the control periods left of its ramp.
-    rest: (Vector7<R>, u16),
-    /// Torque beyond what the arm itself needs when a compliant run began (N m), and the control periods left of its ramp.
-    handover: (Vector7<R>, u16),
     safety: Option<(SafetyMode, u16)>,
     /// Control periods since torque came on, saturating.
     armed_for: u16,
-    zero_cycles: u8,
-    /// Whether the last torque was cut to a joint or motor limit.
-    saturated: bool,
-    /// Whether the last torque was cut at all, to the rate limit included.
-    limited: bool,
-    /// Distance (m) and speed (m/s) of the tool against the plan.
-    tracking: (R, R),
+    /// How the last torque was cut.
+    cut: LimitReport,
     pending: Option<Event>,
-    /// Whether the caller reports a fault of its own in this cycle.
-    outside_fault: bool,
 }
 
 /// What is measured in one cycle.
@@ -111,6 +91,8 @@ struct Measured<'a, R: Real> {
     frames: &'a Frames<R>,
     pose: Pose<R>,
     wrench: Wrench<R>,
+    /// True while the caller reports a fault of its own.
+    outside_fault: bool,
 }
 
 impl<R: Real, const N: usize> Cycle<R, N> {
@@ -128,26 +110,14 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             joints: JointEstimator::new(&calibration),
             wrench: WrenchEstimator::new(),
             limiter: TorqueLimiter::new(&calibration),
-            joint_controller: JointController::new(),
-            operational: OperationalController::new(home),
+            law: Law::Off { zero_cycles: 0 },
             force <- ForceController::init(gains.stiff.force_window),
-            integral: PostureIntegral::new(),
             hand <- HandDrive::init(&gains.hand),
             loaded <- Loaded::init(),
-            run: None,
-            approach: None,
-            hold: home,
-            held: home,
-            rest: (Vector7::zeros(), 0),
-            handover: (Vector7::zeros(), 0),
             safety: None,
             armed_for: 0,
-            zero_cycles: 0,
-            saturated: false,
-            limited: false,
-            tracking: (R::of(0.0), R::of(0.0)),
+            cut: LimitReport::default(),
             pending: None,
-            outside_fault: false,
             calibration,
             model,
             gains,
@@ -177,6 +147,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// What is mounted on the arm this cycle controls.
     pub fn payload(&self) -> Payload {
         self.calibration.payload
+    }
+
+    /// True while the hand makes a move of its own, outside a run.
+    pub fn moves_hand(&self) -> bool {
+        self.hand.is_moving()
     }
 
     /// Whether the wrench has a zero; see [`WrenchEstimator::is_tared`].
@@ -241,7 +216,6 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         // A bridged reply is no news: the law stays.
         let before = (self.supervisor.law(), self.supervisor.fault());
         self.watch_safety(input.sample.safety);
-        self.outside_fault = input.external_fault.is_some();
         if let Some(fault) = input.external_fault {
             let trigger = if fault == Fault::Overrun { Trigger::SoftFault } else { Trigger::HardFault };
             self.trigger(trigger, fault, None);
@@ -277,6 +251,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                     frames: &frames,
                     pose: frames.tool_pose(),
                     wrench: self.wrench.wrench(&frames),
+                    outside_fault: input.external_fault.is_some(),
                 };
                 self.monitor(&measured);
                 answer = input.command.map(|command| self.command(command, &measured)).or(answer);
@@ -320,12 +295,15 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             return;
         }
         self.bounds.tighten(&self.model, &measured.state.q);
-        let depends = self.run.as_ref().is_some_and(|run| run.options.feedback || run.options.force_control);
+        let (depends, lag) = match &self.law {
+            Law::Run(Running { run, lag, .. }) => (run.options.feedback || run.options.force_control, *lag),
+            _ => (false, Lag::none()),
+        };
         let seen = Observation {
             frames: measured.frames,
             bounds: &self.bounds,
             force: self.wrench.raw_force(),
-            tracking: self.tracking,
+            lag: (lag.distance, lag.speed),
             // The feedback fades in the meantime.
             wrench_lost: depends && self.wrench.age().is_none_or(|age| u16::from(age) > u16::from(WRENCH_AGE) + FADE),
             full_scale: self.wrench.full_scale().force > 0 || (depends && self.wrench.full_scale().torque > 0),
@@ -357,13 +335,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             return self.actuate_without_torque();
         };
         let (torques, report) = self.limiter.limit(&demand.torque);
-        self.saturated = report.joint || report.motor;
-        self.limited = self.saturated || report.rate;
+        self.cut = report;
         self.armed_for = self.armed_for.saturating_add(1);
         record.q_d = demand.q_d.to_f32();
         record.pose_d = demand.pose_d.to_f32();
         record.phase = demand.phase.single();
-        record.surprise = self.run.as_ref().map_or(0.0, |run| run.surprise().single());
+        record.surprise = demand.surprise.single();
         record.flags |= demand.flags | limit_flags(report);
         if report.not_finite {
             // A soft stop computes with less; if that is not finite either, nothing is left but zero.
@@ -391,20 +368,26 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     }
 
     fn is_over(&self, measured: &Measured<'_, R>) -> bool {
-        match self.supervisor.state() {
-            State::Run => self.run.as_ref().is_some_and(Run::is_over),
-            State::Approach => self.approach.as_ref().is_some_and(|approach| {
-                let rests = self.integral.is_settled() && self.fastest(measured) < R::of(STANDING);
+        // A bridged state does not end.
+        if self.supervisor.state() == State::Coast {
+            return false;
+        }
+        match &self.law {
+            Law::Run(running) => running.run.is_over(),
+            Law::Posture(Posture { approach: Some(approach), integral, .. }) => {
+                let rests = integral.is_settled() && self.fastest(measured) < R::of(STANDING);
                 approach.is_overdue() || (approach.is_finished() && rests)
-            }),
+            }
             _ => false,
         }
     }
 
     fn actuate_without_torque(&mut self) -> Actuation {
         self.limiter.reset();
-        if self.zero_cycles > 0 {
-            self.zero_cycles -= 1;
+        if let Law::Off { zero_cycles } = &mut self.law
+            && *zero_cycles > 0
+        {
+            *zero_cycles -= 1;
             return Actuation::zero();
         }
         match self.supervisor.state() {

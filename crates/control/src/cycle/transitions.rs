@@ -1,13 +1,18 @@
 //! Transitions: what a state inherits from the one before it, so that no torque makes a step.
 
-use dmp::Primitive;
-
+use crate::act::limit::LimitReport;
+use crate::command::RunOptions;
+use crate::cycle::law::{Lag, Law, Posture, Ramp, Running};
 use crate::cycle::{Cycle, HANDOVER, Measured, STOP_RAMP, ZERO_CYCLES};
 use crate::guard::fault::Fault;
 use crate::guard::joint_limits::JointBounds;
 use crate::guard::supervisor::{State, Trigger};
 use crate::law::force::ForceController;
+use crate::law::joint::JointController;
 use crate::law::operational::OperationalController;
+use crate::plan::approach::Approach;
+use crate::plan::primitive::{Primitive, Rollout};
+use crate::plan::run::Run;
 use crate::real::{Real, within};
 use crate::sense::deviation::Deviation;
 use crate::units::{JointAccelerations, JointPositions, Vector7, Wrench};
@@ -15,84 +20,94 @@ use crate::units::{JointAccelerations, JointPositions, Vector7, Wrench};
 impl<R: Real, const N: usize> Cycle<R, N> {
     /// Takes a trigger that no person caused.
     pub(super) fn trigger(&mut self, trigger: Trigger, fault: Fault, measured: Option<&Measured<'_, R>>) {
-        let from = self.supervisor.law();
         // Only commands can be refused.
         if let Ok(true) = self.supervisor.take(trigger, fault) {
-            self.entered(from, measured);
+            self.entered(measured);
         }
     }
 
-    /// Prepares the law of the state that was just entered. Not inlined: it is rare, and a board may keep the code of every
-    /// cycle in a small fast memory.
+    /// Begins the law of the state that was just entered; an approach and a run are begun by [`Cycle::begin_approach`] and
+    /// [`Cycle::begin_run`]. Not inlined: it is rare, and a board may keep the code of every cycle in a small fast memory.
     #[inline(never)]
-    pub(super) fn entered(&mut self, from: State, measured: Option<&Measured<'_, R>>) {
-        let law = self.supervisor.law();
-        match law {
-            State::Hold | State::Approach => self.hand.stay(),
-            State::Run => self.hand.begin_run(),
-            _ => self.hand.release(),
+    pub(super) fn entered(&mut self, measured: Option<&Measured<'_, R>>) {
+        let state = self.supervisor.law();
+        if state == State::Hold {
+            self.hand.stay()
+        } else {
+            self.hand.release()
         }
-        let Some(measured) = measured.filter(|_| law.has_torque()) else {
+        let Some(measured) = measured.filter(|_| state.has_torque()) else {
             // Without a measurement there is nothing to hold or to stop with: only states without torque can follow, or a
             // soft stop whose ramp has nothing to take away.
-            self.rest = (Vector7::zeros(), 0);
-            if !law.has_torque() {
+            if state.has_torque() {
+                self.law = Law::SoftStop(Ramp::none());
+            } else {
                 self.leave_torque();
             }
             return;
         };
-        let q = measured.state.q;
-        if !from.has_torque() {
-            self.bounds = JointBounds::around(&self.model, &q);
+        if matches!(self.law, Law::Off { .. }) {
+            self.bounds = JointBounds::around(&self.model, &measured.state.q);
             self.limiter.reset();
             self.armed_for = 0;
         }
-        match law {
-            State::Hold => {
-                match from {
-                    // What Eq (11) has put between q_d and q against friction becomes the integral's.
-                    State::Run => {
-                        let offset = self.torque_beyond_model(measured)
-                            + self.gains.stiff.damping.component_mul(&measured.state.dq.0);
-                        let offset =
-                            offset.component_div(&self.gains.stiff.stiffness).zip_map(&self.gains.stiff.clamp, within);
-                        self.hold = self.integral.take_over(&self.gains, &offset, &q);
-                    }
-                    State::Approach => {}
-                    _ => self.hold = q,
-                }
-                self.held = self.hold;
-            }
-            State::Run => {
-                // From what the feedback is drawn to while holding, so that the torque against friction stays.
-                let compliant = self.run.as_ref().is_some_and(|run| run.options.compliant);
-                let held = from == State::Hold && !compliant;
-                let start = if held { self.hold.0 + self.integral.shift() } else { q.0 };
-                self.handover = if compliant {
-                    (self.torque_beyond_model(measured) - self.load_expected_first(measured), HANDOVER)
-                } else {
-                    (Vector7::zeros(), 0)
-                };
-                self.operational = OperationalController::new(JointPositions(start));
-                self.force.restart(self.gains.tracking(compliant).force_window);
-                self.tracking = (R::of(0.0), R::of(0.0));
-            }
-            State::SoftStop => {
+        match (state, &mut self.law) {
+            (State::Hold, Law::Posture(posture)) => posture.follow(None),
+            (State::Hold, Law::Run(_)) => self.law = Law::Posture(self.after_run(measured)),
+            (State::Hold, _) => self.law = Law::Posture(Posture::at(measured.state.q)),
+            (State::SoftStop, _) => {
                 let gravity = self.model.gravity_torque(measured.frames);
-                self.rest = (self.limiter.last().torques().0 - gravity.0, STOP_RAMP);
+                self.law = Law::SoftStop(Ramp::new(self.limiter.last().torques().0 - gravity.0, STOP_RAMP));
             }
-            _ => {}
+            _ => self.law = Law::Gravity,
         }
-        if !matches!(law, State::Hold | State::Approach) {
-            self.integral.reset();
+    }
+
+    /// Begins a move in joint space, after the supervisor has allowed it.
+    pub(super) fn begin_approach(&mut self, approach: Approach<R>, measured: &Measured<'_, R>) {
+        self.hand.stay();
+        if !matches!(self.law, Law::Posture(_)) {
+            self.law = Law::Posture(Posture::at(measured.state.q));
         }
-        if law != State::Run {
-            self.run = None;
+        if let Law::Posture(posture) = &mut self.law {
+            posture.follow(Some(approach));
         }
-        if law != State::Approach {
-            self.approach = None;
-        }
-        self.joint_controller.reset();
+    }
+
+    /// Begins a run, after the supervisor has allowed it.
+    #[inline(never)]
+    pub(super) fn begin_run(&mut self, rollout: Rollout<R, N>, options: RunOptions, measured: &Measured<'_, R>) {
+        self.hand.begin_run();
+        // From what the feedback is drawn to while holding, so that the torque against friction stays.
+        let start = match &self.law {
+            Law::Posture(posture) if !options.compliant => JointPositions(posture.q.0 + posture.integral.shift()),
+            _ => measured.state.q,
+        };
+        let handover = if options.compliant {
+            let load = if options.force_control { self.load_expected_first(measured) } else { Vector7::zeros() };
+            Ramp::new(self.torque_beyond_model(measured) - load, HANDOVER)
+        } else {
+            Ramp::none()
+        };
+        self.force.restart(self.gains.tracking(options.compliant).force_window);
+        self.law = Law::Run(Running {
+            run: Run::new(rollout, options),
+            operational: OperationalController::new(start),
+            controller: JointController::new(),
+            handover,
+            lag: Lag::none(),
+        });
+    }
+
+    /// The posture to hold after a run: what Eq (11) has put between q_d and q against friction becomes the integral's.
+    fn after_run(&self, measured: &Measured<'_, R>) -> Posture<R> {
+        let stiff = &self.gains.stiff;
+        let torque = self.torque_beyond_model(measured) + stiff.damping.component_mul(&measured.state.dq.0);
+        let offset = torque.component_div(&stiff.stiffness).zip_map(&stiff.clamp, within);
+        let mut posture = Posture::at(measured.state.q);
+        let held = posture.integral.take_over(&self.gains, &offset, &measured.state.q);
+        posture.shift_to(held);
+        posture
     }
 
     /// What the last torque has beyond what the arm itself needs at rest in its motion (N m): friction, contact, and what the
@@ -104,8 +119,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
 
     /// Torque that the force controller will feed forward for what the primitive expects at its start (N m).
     fn load_expected_first(&self, measured: &Measured<'_, R>) -> Vector7<R> {
-        let controls_force = self.run.as_ref().is_some_and(|run| run.options.force_control);
-        match self.loaded.get().and_then(Primitive::expected).filter(|_| controls_force) {
+        match self.loaded.get().and_then(Primitive::expected) {
             Some(expected) => {
                 let expected = Deviation::new(&expected.at(R::of(0.0)), &Wrench::zero(), None).expected;
                 let load = -expected.in_world(measured.frames.tool_to_world());
@@ -115,19 +129,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
+    /// No torque from now on.
     pub(super) fn leave_torque(&mut self) {
+        self.law = Law::Off { zero_cycles: ZERO_CYCLES };
         self.limiter.reset();
-        self.joint_controller.reset();
-        self.force.reset();
-        self.integral.reset();
-        self.run = None;
-        self.approach = None;
-        self.rest = (Vector7::zeros(), 0);
-        self.handover = (Vector7::zeros(), 0);
         self.hand.release();
-        self.tracking = (R::of(0.0), R::of(0.0));
-        self.saturated = false;
-        self.limited = false;
-        self.zero_cycles = ZERO_CYCLES;
+        self.cut = LimitReport::default();
     }
 }

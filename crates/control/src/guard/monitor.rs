@@ -48,7 +48,7 @@ pub(crate) struct Observation<'a, R: Real> {
     /// Magnitude of the unfiltered, tared force (N).
     pub(crate) force: R,
     /// Distance (m) and speed (m/s) of the tool against the plan in the last cycle.
-    pub(crate) tracking: (R, R),
+    pub(crate) lag: (R, R),
     /// Whether the run depends on the wrench, and it is gone.
     pub(crate) wrench_lost: bool,
     /// Whether the sensor has been at full scale: in a force, or in a torque that the run depends on.
@@ -86,9 +86,9 @@ impl<R: Real> Monitor<R> {
             Some(Fault::JointLimit)
         } else if law == State::Run && seen.wrench_lost {
             Some(Fault::WrenchLost)
-        } else if law == State::Run && seen.tracking.0 > R::of(TRACKING_LIMIT) {
+        } else if law == State::Run && seen.lag.0 > R::of(TRACKING_LIMIT) {
             Some(Fault::TrackingError)
-        } else if law == State::Run && seen.tracking.1 > R::of(LAG_LIMIT) {
+        } else if law == State::Run && seen.lag.1 > R::of(LAG_LIMIT) {
             Some(Fault::TrackingError)
         } else if state.dq.0.iter().zip(&self.speed_limit).any(|(dq, limit)| *dq > *limit || *dq < -*limit) {
             Some(Fault::JointSpeed)

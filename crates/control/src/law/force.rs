@@ -30,11 +30,6 @@ impl<R: Real> ForceController<R> {
         init!(ForceController { window <- Window::init(length) })
     }
 
-    /// Empties the window.
-    pub fn reset(&mut self) {
-        self.window.reset();
-    }
-
     /// Empties the window and gives it `length` control periods.
     pub fn restart(&mut self, length: usize) {
         self.window.restart(length);

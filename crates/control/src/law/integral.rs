@@ -38,11 +38,6 @@ impl<R: Real> PostureIntegral<R> {
         PostureIntegral { shift: Vector7::zeros(), seeking: [false; JOINTS] }
     }
 
-    /// Back to no shift.
-    pub fn reset(&mut self) {
-        *self = PostureIntegral::new();
-    }
-
     /// Shift of the desired posture (rad); times `K_p` it is the torque of the integral.
     pub fn shift(&self) -> &Vector7<R> {
         &self.shift
@@ -52,8 +47,7 @@ impl<R: Real> PostureIntegral<R> {
     /// as the clamp allows becomes shift, so that the torque makes no step. Returns the posture to hold: `q` where friction
     /// and the error of the model alone are in the way.
     pub fn take_over(&mut self, gains: &Gains<R>, offset: &Vector7<R>, q: &JointPositions<R>) -> JointPositions<R> {
-        self.reset();
-        self.shift = offset.zip_map(&gains.settling, within);
+        *self = PostureIntegral { shift: offset.zip_map(&gains.settling, within), seeking: [false; JOINTS] };
         JointPositions(q.0 + offset - self.shift)
     }
 
