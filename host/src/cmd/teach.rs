@@ -12,6 +12,7 @@ use sim::teacher::TaughtMovement;
 
 use super::{ErrorCode, Failure, Global, connection};
 use lab::client::Client;
+use lab::demonstration::RATE;
 use lab::device::Device;
 use lab::procedure::{self, ProcedureError, Recorder, Take};
 use lab::simulation::DEFAULT_SEED;
@@ -132,8 +133,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     connection::tell_speed(&client, started, output);
     output.say(format!("wrote {}", command.output.display()));
     output.result(
-        &json!({ "file": command.output, "samples": rows, "duration_s": rows as f64 / 300.0, "gaps": gaps }),
-        format!("{rows} samples, {:.1} s, {gaps} lost", rows as f64 / 300.0),
+        &json!({ "file": command.output, "samples": rows, "duration_s": rows as f64 / RATE, "gaps": gaps }),
+        format!("{rows} samples, {:.1} s, {gaps} lost", rows as f64 / RATE),
     )
 }
 
@@ -162,7 +163,7 @@ fn record(
             let fault = control::Fault::from_code(telemetry.fault).unwrap_or(control::Fault::None);
             return Err(ProcedureError::Stopped(fault));
         }
-        let seconds = recorder.rows() as f64 / 300.0;
+        let seconds = recorder.rows() as f64 / RATE;
         spinner.set_message(format!("recording, {seconds:.1} s"));
         let person_done = guided && guiding_is_over(client);
         let entered = enter.as_ref().is_some_and(|enter| enter.is_finished());

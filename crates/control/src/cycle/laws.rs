@@ -15,7 +15,7 @@ use crate::units::{JointPositions, JointTorques, Pose, Vector6, Vector7, Wrench}
 /// Length of the damping that carries the arm while gravity torque builds up after arming: 0.5 s, in control periods.
 const ARMING: u16 = periods(0.5);
 
-/// What the law of a state asks for, besides the torque.
+/// Output of a law: the torque wanted, and values for the record.
 pub(super) struct Demand<R: Real> {
     pub(super) torque: JointTorques<R>,
     pub(super) q_d: JointPositions<R>,
@@ -144,7 +144,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.cut.joint || self.cut.motor || senses != Senses::Fresh,
             );
             let bounded = bounded(&command, tracking.force_limit) * run.kept();
-            // What the primitive expects to carry or to press is fed forward: the integral has a finite gain.
+            // The expected wrench is fed forward, because the gain of the integral is finite.
             let wanted = bounded - deviation.expected.in_world(to_world);
             torque.0 += ForceController::torque(&measured.frames.jacobian(), &wanted).0;
             set |= flags::FORCE_CONTROL;

@@ -46,7 +46,7 @@ impl<R: Real> JointBounds<R> {
         }
     }
 
-    /// Whether a joint is beyond its bound by more than `STOP_DISTANCE`.
+    /// True if a joint is beyond its bound by more than `STOP_DISTANCE`.
     pub fn violated(&self, q: &JointPositions<R>) -> bool {
         let distance = R::of(STOP_DISTANCE);
         (0..JOINTS).any(|joint| q.0[joint] > self.max[joint] + distance || q.0[joint] < self.min[joint] - distance)

@@ -19,7 +19,8 @@ pub const TIP_REACH: f64 = 0.35;
 /// A joint may exceed its speed limit by this factor before it is stopped: noise and overshoot.
 const SPEED_MARGIN: f64 = 1.2;
 
-/// Contact force that stops a movement (N): the lowest permissible quasi-static one (face) of the collaboration standards.
+/// Contact force that stops a movement (N): the lowest permissible quasi-static one (face) of the collaboration
+/// standards.
 pub(crate) const FORCE_LIMIT: f64 = 65.0;
 
 /// Samples in a row above the force limit: one corrupt sample stops no movement.
@@ -38,7 +39,7 @@ pub(crate) struct Monitor<R: Real> {
     pressed: u8,
 }
 
-/// What the monitor looks at besides the joint state.
+/// Input of the monitor besides the joint state.
 pub(crate) struct Observation<'a, R: Real> {
     pub(crate) frames: &'a Frames<R>,
     pub(crate) bounds: &'a JointBounds<R>,
@@ -46,9 +47,9 @@ pub(crate) struct Observation<'a, R: Real> {
     pub(crate) force: R,
     /// Distance between plan and tool in the last cycle (m).
     pub(crate) tracking: R,
-    /// Whether the run depends on the wrench, and it is gone.
+    /// True if the run depends on the wrench, and it is gone.
     pub(crate) wrench_lost: bool,
-    /// Whether the sensor has been at full scale: in a force, or in a torque that the run depends on.
+    /// True if the sensor has been at full scale: in a force, or in a torque that the run depends on.
     pub(crate) full_scale: bool,
 }
 

@@ -282,7 +282,7 @@ mod tests {
     fn pushed(then: f64, finger: f64) -> (Option<(u8, f64)>, f64) {
         let (experience, mut watch) = (indifferent(), Watch::new());
         let mut told = None;
-        for tick in 0..1500 {
+        for tick in 0..crate::time::periods(5.0) {
             let time = f64::from(tick) * PERIOD;
             let force = if time < 1.0 {
                 0.0

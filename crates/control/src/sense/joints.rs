@@ -1,13 +1,15 @@
 //! `JointEstimator`: motor counts to joint positions and velocities, through lost and implausible replies.
 //!
-//! Positions come from the unwrapped counts of each motor. Velocities are the difference of whole counts over the time that
-//! really passed since the last reply, through the transmission, low-passed at 50 Hz (second-order Butterworth, delay 4.5 ms).
-//! One count is 3.7e-5 rad at J1 and 1.0e-4 rad at J7, which plain differencing at 300 Hz turns into steps of 0.011 and
-//! 0.031 rad/s; the noise of differencing lies near half the sampling rate, and behind the 50 Hz filter it is 8 times smaller.
-//! At 30 Hz the delay would already cost the wrist its damping (stiff gains, three cycles of delay).
+//! Positions come from the unwrapped counts of each motor. Velocities are the difference of whole counts over the time
+//! that really passed since the last reply, through the transmission, low-passed at 50 Hz (second-order Butterworth,
+//! delay 4.5 ms). One count is 3.7e-5 rad at J1 and 1.0e-4 rad at J7, which plain differencing at 300 Hz turns into
+//! steps of 0.011 and
+//! 0.031 rad/s; the noise of differencing lies near half the sampling rate, and behind the 50 Hz filter it is 8 times
+//! smaller. At 30 Hz the delay would already cost the wrist its damping (stiff gains, three cycles of delay).
 //!
-//! A reply is believed if the motor cannot have moved farther: 1.5 times its speed limit, per cycle since the last reply.
-//! Missing motors are carried on at the velocity estimated last, for at most [`COAST_CYCLES`]; then they stand still.
+//! A reply is believed if the motor cannot have moved farther: 1.5 times its speed limit, per cycle since the last
+//! reply. Missing motors are carried on at the velocity estimated last, for at most [`COAST_CYCLES`]; then they stand
+//! still.
 
 use puck::{Counts, Transmission};
 
@@ -27,7 +29,7 @@ pub const VELOCITY_CUT_OFF: f64 = 50.0;
 /// A motor is not believed to move faster than this many times its speed limit.
 const PLAUSIBLE_SPEED: f64 = 1.5;
 
-/// What is known of one motor.
+/// State of one motor.
 #[derive(Clone, Copy, Debug)]
 struct Motor {
     /// Unwrapped counts of the last reply believed.
@@ -49,7 +51,7 @@ pub struct JointState<R: Real> {
     pub missing: u8,
     /// Largest number of cycles since a believed reply.
     pub age: u8,
-    /// Whether a reply of this cycle was implausible.
+    /// True if a reply of this cycle was implausible.
     pub implausible: bool,
 }
 
@@ -76,7 +78,8 @@ impl<R: Real> JointEstimator<R> {
             let counts = f64::from(calibration.drives.counts_per_revolution()[motor]);
             radians_per_count[motor] = R::of(core::f64::consts::TAU / counts);
             counts_per_radian[motor] = R::of(counts / core::f64::consts::TAU);
-            // Joint limits through the absolute values of the transmission: the fastest this motor can be asked to turn.
+            // Joint limits through the absolute values of the transmission: the fastest this motor can be asked to
+            // turn.
             let fastest: f64 = wam7::JOINT_TO_MOTOR[motor]
                 .iter()
                 .zip(&wam7::VELOCITY_MAX)

@@ -1,8 +1,8 @@
 //! A rigid-body arm in f64 behind the real interface: counts in, torque frames out.
 //!
-//! The plant is built from the crate's own dynamics, which `golden_dynamics` proves against an independent library; what it
-//! adds is what the controller does not have: dry friction with true sticking, encoder quantisation and delay. The whole
-//! path through counts, frames and 14-bit torques is part of every test.
+//! The plant is built from the crate's own dynamics, which `golden_dynamics` proves against an independent library;
+//! what it adds is what the controller does not have: dry friction with true sticking, encoder quantisation and delay.
+//! The whole path through counts, frames and 14-bit torques is part of every test.
 
 use std::collections::VecDeque;
 
