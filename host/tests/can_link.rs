@@ -224,7 +224,7 @@ fn devices_on_a_bus_hear_only_what_is_meant_for_them() {
     // The simulated device is number 0; a host that means number 3 must not reach it.
     let address: Address = "sil:world=simple".parse().unwrap();
     let Device::Simulated(simulation) = Device::open(&address, |_| {}).unwrap() else { panic!("a serial line") };
-    let port = lab::transport::SimulatedCan::attach(*simulation, DeviceNumber::FIRST);
+    let port = lab::simulation::SimulatedCan::attach(*simulation, DeviceNumber::FIRST);
     let line = lab::transport::CanTransport::new(port, DeviceNumber::new(3).unwrap());
     let error = Client::connect(line, "test").err().unwrap();
     assert_eq!(error.code().to_string(), "E702", "{error}");

@@ -15,7 +15,7 @@ use crate::elf::Elf;
 use crate::thumb::Flow;
 
 /// The control slot, which must lie in ITCM itself.
-const ROOT: &str = "device::core::Core::control";
+const ROOT: &str = "device::controller::DeviceController::control";
 
 /// The law of a run, which has most to compute.
 const LAW: &str = "run_primitive";
@@ -32,7 +32,10 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("control::plan::run::", "once, when a run begins or its goal changes"),
     ("control::plan::approach", "once, when an approach begins"),
     ("control::model::arm::ArmModel", "when a payload is found"),
-    ("dmp::coupling::Coupling<T>::limited", "feedback beyond its limit: not in a run of a primitive that was accepted"),
+    (
+        "dmp::coupling::Coupling<T,_,_>::limited",
+        "a coupling beyond its limit: not in a run of a primitive that was accepted",
+    ),
     ("tare_drift", "at rest, by a person's command"),
     ("control::cycle::hand::HandDrive<R>::move_to", "once, when a person moves the hand"),
     ("control::model::hand::within_range", "once, when a person moves the hand"),
@@ -45,10 +48,10 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "led by hand: no plan and no feedback is computed",
     ),
     ("control::cycle::Cycle<R,_>::reset", "after a fault of the bus"),
-    ("device::core::Core::restart", "after a fault of the bus"),
+    ("device::controller::DeviceController::restart", "after a fault of the bus"),
     ("device::startup", "a person zeroes the arm again"),
     ("device::hand", "the hand is initialised or has failed"),
-    ("firmware::last_words", "the end"),
+    ("firmware::panic_stop", "the end"),
     ("firmware::board::stm32h743::parts::", "the end; a frame's way into the controller"),
     ("firmware::application::slot::SlotIo", "an event or a record for the session"),
     ("core::", "the end: a panic"),

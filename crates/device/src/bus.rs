@@ -2,7 +2,8 @@
 
 use puck::CanFrame;
 
-use crate::core::CoreIo;
+use crate::application::ControllerIo;
+use crate::controller::DeviceController;
 use crate::health::Counters;
 use crate::startup::Pacer;
 
@@ -15,7 +16,7 @@ pub trait Outlet {
 }
 
 /// The outlet of one slot.
-pub(crate) struct SlotOutlet<'a, I: CoreIo> {
+pub(crate) struct SlotOutlet<'a, I: ControllerIo<DeviceController>> {
     pub(crate) io: &'a mut I,
     pub(crate) counters: &'a mut Counters,
     pub(crate) pacer: &'a mut Pacer,
@@ -24,7 +25,7 @@ pub(crate) struct SlotOutlet<'a, I: CoreIo> {
     pub(crate) cyclic: bool,
 }
 
-impl<I: CoreIo> Outlet for SlotOutlet<'_, I> {
+impl<I: ControllerIo<DeviceController>> Outlet for SlotOutlet<'_, I> {
     fn now_us(&self) -> u64 {
         self.now_us
     }

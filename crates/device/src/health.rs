@@ -11,7 +11,7 @@ use crate::startup::{Stage, StartupError};
 pub struct Counters {
     /// Control cycles.
     pub cycles: u32,
-    /// Control cycles that the board began late, see [`crate::Core::note_overrun`].
+    /// Control cycles that the board began late, see [`crate::Controller::note_overrun`].
     pub overruns: u32,
     /// Position and wrench replies that had not come when the cycle needed them.
     pub lost_replies: u32,
@@ -31,7 +31,7 @@ pub struct Counters {
     pub frames_refused: u32,
     /// Cycles in which only one of the two torque frames could be sent.
     pub torque_mismatches: u32,
-    /// Bus errors the board reported, see [`crate::Core::note_bus_error`].
+    /// Bus errors the board reported, see [`crate::Controller::note_bus_error`].
     pub bus_errors: u32,
     /// Times the start-up began anew.
     pub restarts: u32,
@@ -44,6 +44,21 @@ impl Counters {
     pub fn count(counter: &mut u32) {
         *counter = counter.wrapping_add(1);
     }
+}
+
+/// What only the board can measure about its own processor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Timing {
+    /// Longest control computation, ticks.
+    pub cost_worst_ticks: u32,
+    /// Mean control computation, ticks.
+    pub cost_mean_ticks: u32,
+    /// Longest delay from the slot timer to the control task, ticks.
+    pub latency_worst_ticks: u32,
+    /// Stack never used so far, bytes; 0 where it is not measured.
+    pub stack_free: u32,
+    /// Size of the stack, bytes; 0 where it is not measured.
+    pub stack_size: u32,
 }
 
 /// The state of the control half at one moment.
@@ -59,7 +74,7 @@ pub struct Health {
     pub state: State,
     /// The latched fault.
     pub fault: Fault,
-    /// The encoders count from a known pose, by the word of the safety module.
+    /// The encoders count from a known pose, as the safety module says. False for a hand alone, as for all that is only an arm's.
     pub zeroed: bool,
     /// The posture (rad) at which the arm was told to stand when it was zeroed; `None` if that was before the bus was started.
     pub zeroed_at: Option<[f32; 7]>,
@@ -75,6 +90,8 @@ pub struct Health {
     pub temperatures: [Option<i16>; 7],
     /// How far the hand has come.
     pub hand: HandStage,
+    /// The hand moves by itself, outside a run: its initialisation, or a move that a person asked for.
+    pub hand_moves: bool,
     /// Latest temperature of each hand puck (F1, F2, F3, spread), degree Celsius.
     pub hand_temperatures: [Option<i16>; 4],
     /// Counters.

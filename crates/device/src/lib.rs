@@ -4,26 +4,31 @@
 #![recursion_limit = "256"]
 #![forbid(unsafe_code)]
 
+mod application;
+mod background;
 mod bus;
 pub mod calibration;
 pub mod command;
-pub mod core;
+pub mod controller;
 pub mod event;
 pub mod hand;
 pub mod health;
 mod mailbox;
 pub mod recorded_filter;
 mod round;
-mod slow;
 pub mod startup;
 pub mod time;
 
-pub use self::core::{Core, CoreIo, Slot};
+pub use application::{
+    Action, Application, Controller, ControllerIo, CycleReport, Message, QueueFull, Refused, Saved, SessionPort, Slot,
+    TimedRecord, finite,
+};
 pub use calibration::{Home, HomeError, StoredHome};
 pub use command::{Command, Refusal};
+pub use controller::DeviceController;
 pub use event::{Event, EventKind};
 pub use hand::HandTrouble;
-pub use health::{Counters, Health};
+pub use health::{Counters, Health, Timing};
 pub use startup::{Stage, StartupError};
 
 mod port;
@@ -31,6 +36,6 @@ mod session;
 pub mod storage;
 mod store;
 
-pub use port::{FitPrimitive, QueueFull, SessionPort, StoredPrimitive, TimedRecord, Timing};
-pub use session::{Asker, Identity, Owner, Pending, PrimitiveTrouble, Session, StartupTrouble, Turn};
+pub use port::{FitPrimitive, StoredPrimitive};
+pub use session::{ArmApplication, HostSession, Identity, PrimitiveTrouble, Session, StartupTrouble};
 pub use store::{RamStore, STORE_SLOT_BYTES, STORE_SLOTS, Store, StoreError};

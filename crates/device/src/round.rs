@@ -35,15 +35,6 @@ pub(crate) struct Round {
     missed: [u16; 7],
 }
 
-/// Whether a reply belongs to rounds at all.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Taken {
-    /// It was taken, or discarded as late.
-    Yes,
-    /// Somebody else must look at it.
-    No,
-}
-
 impl Round {
     /// The rounds of an arm with or without a force/torque sensor, which has just been tared: its first sample is void.
     pub(crate) fn new(has_sensor: bool) -> Round {
@@ -64,12 +55,12 @@ impl Round {
         self.open
     }
 
-    /// A reply has come in.
-    pub(crate) fn take(&mut self, reply: &Reply, counters: &mut Counters) -> Taken {
+    /// A reply has come in. False if it belongs to no round: somebody else must look at it.
+    pub(crate) fn take(&mut self, reply: &Reply, counters: &mut Counters) -> bool {
         let repeats = match *reply {
             Reply::Position { node, primary, .. } => {
                 let Some(slot) = node.arm_index().and_then(|joint| self.positions.get_mut(joint)) else {
-                    return Taken::No;
+                    return false;
                 };
                 self.open && slot.put(primary)
             }
@@ -77,12 +68,12 @@ impl Round {
             Reply::Torque { node: Node::FORCE_TORQUE, counts, status } => {
                 self.open && self.torque.put((counts, status))
             }
-            _ => return Taken::No,
+            _ => return false,
         };
         if repeats || !self.open {
             Counters::count(&mut counters.late_replies);
         }
-        Taken::Yes
+        true
     }
 
     /// Closes the round and hands over what it brought.
@@ -139,7 +130,7 @@ mod tests {
         let (mut round, mut counters) = (Round::new(false), Counters::default());
         round.open();
         round.close(&mut counters);
-        assert_eq!(round.take(&position(0, 1), &mut counters), Taken::Yes);
+        assert!(round.take(&position(0, 1), &mut counters));
         round.open();
         assert_eq!(round.close(&mut counters).positions, [None; 7]);
         assert_eq!((counters.late_replies, counters.lost_replies), (1, 14));

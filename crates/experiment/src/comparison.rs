@@ -4,11 +4,11 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::mode::Mode;
 use super::outcome::Measures;
+use super::quantile::quantile;
 use super::results::{Report, Results};
 use super::scenario::Scenario;
-use super::statistics::quantile;
+use lab::procedure::Mode;
 
 /// Something that should be smaller with adaptation.
 #[derive(Debug, Clone, Copy)]

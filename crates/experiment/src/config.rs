@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use sim::world::mujoco::{ObjectKind, ObjectSpec, TABLE_TOP};
 
 use super::grid::{ApproachFrame, Cell, Grid};
-use super::mode::Mode;
 use super::outcome::Rule;
 use super::results::{Header, Key};
 use super::scenario::{PlantKind, Scenario};
@@ -15,6 +14,7 @@ use super::variation::Variation;
 use lab::demonstration::recording::checksum;
 use lab::plan;
 use lab::primitive_file::PrimitiveFile;
+use lab::procedure::Mode;
 use lab::simulation::Engine;
 use lab::transport::ChipOptions;
 
@@ -143,8 +143,8 @@ impl Config {
         let closing = references
             .unwrap_or_default()
             .into_iter()
-            .find(|reference| (1..4).any(|finger| (reference.hand.x[finger] - start[finger]).abs() > 0.05));
-        closing.map_or(goal.position, |reference| reference.position.x)
+            .find(|reference| (1..4).any(|finger| (reference.points.x[7 + finger] - start[finger]).abs() > 0.05));
+        closing.map_or(goal.position, |reference| reference.poses[0].position.x)
     }
 
     /// What the results belong to. Modes and seeds do not count: more of them may be added later.

@@ -3,35 +3,35 @@
 
 use std::path::Path;
 
-use sim::teacher::{GuidedWorld, Stage};
-use sim::world::mujoco::{MujocoWorld, Scene};
+use sim::world::mujoco::Scene;
 
 use super::config::Config;
 use super::grid::{Cell, Grid};
-use super::mode::Mode;
 use super::plant::{self, Arm};
 use super::results::Key;
 use super::scenario::{PlantKind, Scenario};
 use super::trial::{self, Prepared, TrialError};
 use super::variation::Variation;
-use lab::client::{Client, Interrupt};
+use lab::client::Interrupt;
 use lab::demonstration::error::RecordingError;
 use lab::demonstration::{Demonstration, DemonstrationError, Preparation, Recording};
-use lab::device::Device;
 use lab::learn::feedback::FeedbackOptions;
 use lab::learn::hand::HandMotion;
 use lab::learn::memory::{MemoryError, Payload, remember_rehearsals, remember_successes};
 use lab::learn::{self, LearnError, LearnOptions};
 use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
-use lab::procedure::{self, ProcedureError, Recorder, RunRequest, Take, recording_text};
+use lab::procedure::Mode;
+use lab::procedure::{self, ProcedureError, Recorder, record_demonstration, recording_text, teacher};
 use lab::simulation::Engine;
 
 /// Seed of arm, noise and person while a primitive is made. Experiments begin with 1, so their arms are others.
 const LESSON_SEED: u64 = 0;
-/// Rest recorded after the person has let go, s.
-const AFTERGLOW: f64 = 0.5;
-/// Longest lesson, s.
-const LONGEST: f64 = 60.0;
+/// Rest recorded after the simulated teacher has let go, s.
+const POST_ROLL: f64 = 0.5;
+/// Longest demonstration, s.
+const LONGEST_DEMONSTRATION: f64 = 60.0;
+/// Note at the head of recordings that are not kept.
+const NOTES: &str = "Tactus recording, 300 Hz (simulated arm)";
 /// Opening of the fingers before the grasp, rad.
 const OPEN: f64 = 0.25;
 /// The same for an object that may stand beside the palm: as wide as the fingers go without touching their stops, 12 cm to either side.
@@ -45,7 +45,7 @@ const REHEARSALS: u64 = 3;
 
 /// How a scenario's hand closes and gives way: one set for all its cells and modes, chosen for what it meets.
 #[derive(Debug, Clone, Copy)]
-struct Handling {
+struct GraspTuning {
     /// Time for the fingers to close where the hand rests, s.
     closing: f64,
     /// Where the fingers close to if nothing stops them, rad.
@@ -58,20 +58,20 @@ struct Handling {
     fingers: Option<[f64; 2]>,
 }
 
-impl Handling {
-    fn of(scenario: Scenario) -> Handling {
-        let usual = Handling { closing: 3.5, closed: 2.35, compliance: None, turns: true, fingers: None };
+impl GraspTuning {
+    fn of(scenario: Scenario) -> GraspTuning {
+        let usual = GraspTuning { closing: 3.5, closed: 2.35, compliance: None, turns: true, fingers: None };
         // A light cup slides at 1 N: half of that must bend the plan by its whole reach, and 0.3 N of it are the dead band.
         let light = Some([2.0, 0.0]);
         match scenario {
             Scenario::Flashlight | Scenario::Lift => usual,
-            Scenario::Cup => Handling { compliance: light, ..usual },
+            Scenario::Cup => GraspTuning { compliance: light, ..usual },
             // What is in the way is below: the hand gives way upwards and nowhere else. Fingers that sweep along a table take their time.
-            Scenario::Bottle => Handling { closing: 7.0, compliance: Some([0.0, 0.5]), turns: false, ..usual },
+            Scenario::Bottle => GraspTuning { closing: 7.0, compliance: Some([0.0, 0.5]), turns: false, ..usual },
             // What a finger can crush is touched slowly, and the plan of the fingers is quick enough (K) and gives way enough (K1) to end
             // where they touch. They close to 0.4 rad beyond the cup, in both modes.
             Scenario::Fingers => {
-                Handling { closing: 7.0, closed: 1.95, compliance: light, fingers: Some([2400.0, 3.0]), ..usual }
+                GraspTuning { closing: 7.0, closed: 1.95, compliance: light, fingers: Some([2400.0, 3.0]), ..usual }
             }
         }
     }
@@ -100,7 +100,7 @@ pub enum LessonError {
     File(#[from] PrimitiveFileError),
     /// Nobody was there to teach, or the lesson did not end.
     #[error("the lesson failed: {0}")]
-    Person(&'static str),
+    Teacher(&'static str),
 }
 
 impl From<ProcedureError> for LessonError {
@@ -150,7 +150,7 @@ pub fn rehearsed(config: &Config, interrupt: &Interrupt) -> Result<PrimitiveFile
     let scene = match config.scenario {
         // What shall be expected is the weight, in its place.
         Scenario::Lift => {
-            let frame = config.frame().ok_or(LessonError::Person("the movement arrives from nowhere"))?;
+            let frame = config.frame().ok_or(LessonError::Teacher("the movement arrives from nowhere"))?;
             Scene::with(config.object_at(&frame, Cell::default()))
         }
         // The hand shall give way to the table: so it is not expected.
@@ -164,7 +164,7 @@ pub fn rehearsed(config: &Config, interrupt: &Interrupt) -> Result<PrimitiveFile
     let seeds: Vec<u64> = (1..=REHEARSALS).collect();
     // A weight is only felt where it is lifted: an arm that gives way would leave it on the table.
     let exact = config.scenario == Scenario::Lift;
-    let options = if exact { procedure::Mode::Track.options() } else { config.scenario.options(Mode::OpenLoop) };
+    let options = if exact { Mode::Track.options() } else { config.scenario.options(Mode::OpenLoop) };
     let runs = in_parallel(config.jobs, &seeds, |seed| rehearsal(&movement, &arm, scene, *seed, options, interrupt));
     let recordings = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
     remember_rehearsals(&mut primitive, &recordings, movement.duration, Payload::default(), true)?;
@@ -199,59 +199,41 @@ fn teach(scenario: Scenario, arm: &Arm, interrupt: &Interrupt) -> Result<Recordi
     procedure::make_ready(&mut client, true, |_| {})?;
     procedure::travel(&mut client, lesson.start().map(|angle| angle as f32), |_| {})?;
     client.gravity()?;
-    let mut recorder = Recorder::start(
-        &mut client,
-        Vec::new(),
-        "Tactus recording of a demonstration by hand, 300 Hz (simulated arm, simulated person)",
-    )?;
-    person(&mut client).ok_or(LessonError::Person("nobody stands beside the arm"))?.teacher_mut().begin();
-    let mut done_at = None;
-    loop {
-        let Take::Cycle(telemetry) = recorder.take(&mut client)? else { continue };
-        if control::State::from_code(telemetry.state) != Some(control::State::Gravity) {
-            return Err(LessonError::Person("the arm stopped"));
-        }
-        let seconds = recorder.rows() as f64 / lab::demonstration::RATE;
-        if done_at.is_none() && person(&mut client).is_some_and(|world| world.teacher().stage() == Stage::Done) {
-            done_at = Some(seconds + AFTERGLOW);
-        }
-        if seconds > LONGEST {
-            return Err(LessonError::Person("the person did not come to an end"));
-        }
-        if done_at.is_some_and(|at| seconds >= at) {
-            break;
-        }
+    let notes = "Tactus recording of a demonstration by hand, 300 Hz (simulated arm, simulated person)";
+    let recorder = Recorder::start(&mut client, Vec::new(), notes)?;
+    if !teacher::begin(&mut client) {
+        return Err(LessonError::Teacher("nobody stands beside the arm"));
     }
-    let bytes = recorder.finish(&mut client)?;
+    let shown = record_demonstration(&mut client, recorder, LONGEST_DEMONSTRATION, POST_ROLL, |client, _| {
+        teacher::has_finished(client)
+    })?;
+    if !shown.is_complete {
+        return Err(LessonError::Teacher("the simulated teacher did not come to an end"));
+    }
     client.hold()?;
-    Ok(Recording::parse(Path::new("demonstration.csv"), &bytes)?)
-}
-
-fn person(client: &mut Client<Device>) -> Option<&mut GuidedWorld<MujocoWorld>> {
-    let world: &mut dyn std::any::Any = client.transport().simulation()?.world();
-    world.downcast_mut()
+    Ok(Recording::parse(Path::new("demonstration.csv"), &shown.output)?)
 }
 
 /// Movement of the arm as shown, with fingers that close where the hand rests.
 fn learn(scenario: Scenario, recording: &Recording, file: &Path) -> Result<PrimitiveFile, LessonError> {
     let shown = Demonstration::prepare(recording, &Preparation::default())?.duration();
-    let handling = Handling::of(scenario);
-    let dwell = if scenario.lifts_itself() { 0.0 } else { handling.closing };
+    let tuning = GraspTuning::of(scenario);
+    let dwell = if scenario.lifts_itself() { 0.0 } else { tuning.closing };
     let lesson = scenario.lesson();
     // Within the lesson the hand rests from its arrival on; people need a moment longer than the path that they follow.
     let arrival = lesson.arrival() / lesson.path().duration() * shown;
-    let closes = CLOSING.map(|share| (arrival + share * handling.closing) / (shown + dwell));
+    let closes = CLOSING.map(|share| (arrival + share * tuning.closing) / (shown + dwell));
     let fingers = |angle: f64| [0.0, angle, angle, angle];
     let usual = LearnOptions::named(scenario.name());
     let options = LearnOptions {
         dwell,
         hand: HandMotion {
             start: fingers(if scenario == Scenario::Flashlight { WIDE_OPEN } else { OPEN }),
-            goal: fingers(handling.closed),
+            goal: fingers(tuning.closed),
             window: (closes[0], closes[1].min(1.0)),
         },
         feedback: FeedbackOptions {
-            hand_stiffness: handling.fingers.map(|[stiffness, _]| stiffness),
+            hand_stiffness: tuning.fingers.map(|[stiffness, _]| stiffness),
             ..FeedbackOptions::default()
         },
         // A movement that arrives, waits and lifts has more to say in its last part than the usual kernels can.
@@ -262,13 +244,13 @@ fn learn(scenario: Scenario, recording: &Recording, file: &Path) -> Result<Primi
     let [position, _, _, hand] = primitive.gains.map(|gain| gain.stiffness);
     if let Some(feedback) = &mut primitive.feedback {
         for row in &mut feedback.k1 {
-            if let (Some([sideways, upwards]), [x, y, z, ..]) = (handling.compliance, row.as_mut_slice()) {
+            if let (Some([sideways, upwards]), [x, y, z, ..]) = (tuning.compliance, row.as_mut_slice()) {
                 (*x, *y, *z) = (sideways * position, sideways * position, upwards * position);
             }
-            if let (false, Some(rotation)) = (handling.turns, row.get_mut(3..6)) {
+            if let (false, Some(rotation)) = (tuning.turns, row.get_mut(3..6)) {
                 rotation.fill(0.0);
             }
-            if let (Some([_, compliance]), Some(fingers)) = (handling.fingers, row.get_mut(7..)) {
+            if let (Some([_, compliance]), Some(fingers)) = (tuning.fingers, row.get_mut(7..)) {
                 fingers.fill(compliance * hand);
             }
         }
@@ -285,21 +267,16 @@ fn rehearsal(
     options_of_rehearsal: link::RunOptions,
     interrupt: &Interrupt,
 ) -> Result<Recording, LessonError> {
-    let name = link::Name::new(&movement.name).map_err(|_| LessonError::Person("the primitive has no name"))?;
     let options = plant::options(arm, seed, movement.start.posture, scene);
     let mut client = trial::connect(&options, interrupt)?;
     client.upload(&movement.to_image()?, |_, _, _| {})?;
     procedure::make_ready(&mut client, true, |_| {})?;
-    procedure::go_to_start(&mut client, &movement.start, |_| {})?;
-    let request = RunRequest::new(name, movement.duration, options_of_rehearsal);
-    let mut cycles = Vec::new();
-    procedure::play(&mut client, &request, &mut |cycle| cycles.push(*cycle))?;
-    parse(&cycles, &format!("rehearsal {seed}"))
+    let (bytes, _) = procedure::play_once(&mut client, movement, options_of_rehearsal, NOTES, &mut |_| {})?;
+    Ok(Recording::parse(Path::new(&format!("rehearsal {seed}")), &bytes)?)
 }
 
 fn parse(cycles: &[link::Telemetry], name: &str) -> Result<Recording, LessonError> {
-    let bytes =
-        recording_text(cycles, "Tactus recording, 300 Hz (simulated arm)").map_err(ProcedureError::Recording)?;
+    let bytes = recording_text(cycles, NOTES).map_err(ProcedureError::Recording)?;
     Ok(Recording::parse(Path::new(name), &bytes)?)
 }
 

@@ -19,13 +19,13 @@ pub mod lift;
 #[cfg(test)]
 pub mod made_up;
 pub mod map;
-pub mod mode;
 pub mod observation;
 #[cfg(feature = "mujoco")]
 pub mod observed;
 pub mod outcome;
 #[cfg(feature = "mujoco")]
 pub mod plant;
+mod quantile;
 #[cfg(feature = "mujoco")]
 pub mod reach;
 pub mod results;
@@ -43,7 +43,7 @@ pub use comparison::Comparison;
 #[cfg(feature = "mujoco")]
 pub use config::Config;
 pub use grid::{Cell, Grid};
-pub use mode::Mode;
+pub use lab::procedure::Mode;
 pub use outcome::Outcome;
 pub use results::Results;
 #[cfg(feature = "mujoco")]

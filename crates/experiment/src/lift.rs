@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::config::Config;
 use super::lesson::{self, LessonError};
+use super::quantile::quantile;
 use super::results::Results;
-use super::statistics::quantile;
 use lab::client::Interrupt;
 use lab::primitive_file::PrimitiveFile;
 use lab::table::Table;

@@ -1,10 +1,10 @@
 //! Made-up results for the tests of tables, maps and figures: shaped as the prototype found them.
 
 use super::grid::{ApproachFrame, Grid};
-use super::mode::Mode;
 use super::outcome::{Measures, Outcome};
 use super::results::{Key, Path2, Report, Results, Surprise};
 use super::seed;
+use lab::procedure::Mode;
 
 /// Letters row by row as the prototype's maps print them.
 const MAPS: [&str; 3] = [
@@ -58,10 +58,10 @@ pub fn results(seeds: &[u64]) -> Results {
                         closing_s: 8.2,
                         lift_s: 12.5,
                         failure_s: (!held).then_some(6.0 + chance),
-                        contact_peak_n: [2.5, 1.8, 1.2][mode as usize] * (0.6 + chance),
-                        contact_sustained_n: [2.2, 1.6, 0.9][mode as usize] * (0.6 + chance),
+                        contact_peak_n: [2.5, 1.8, 1.2][mode as usize - 1] * (0.6 + chance),
+                        contact_sustained_n: [2.2, 1.6, 0.9][mode as usize - 1] * (0.6 + chance),
                         contact_median_n: 1.0,
-                        contact_mean_n: [1.0, 0.8, 0.4][mode as usize],
+                        contact_mean_n: [1.0, 0.8, 0.4][mode as usize - 1],
                         finger_n: [6.0, 6.0, 8.0],
                         table_peak_n: 0.0,
                         finger_peak_n: 8.0,

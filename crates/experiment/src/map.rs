@@ -1,9 +1,9 @@
 //! The outcomes as a map of letters for the terminal, and the figures of each mode as a table.
 
 use super::grid::Grid;
-use super::mode::Mode;
 use super::results::Results;
 use super::statistics::Summary;
+use lab::procedure::Mode;
 use lab::table::Table;
 
 /// Space between the maps of two modes.
@@ -83,7 +83,7 @@ pub fn short(value: f64) -> String {
 /// The figures of each mode as a table.
 pub fn table(summaries: &[Summary]) -> String {
     let mut heading = vec!["mean over the seeds".to_owned()];
-    heading.extend(summaries.iter().map(|summary| format!("({}) {}", summary.mode, summary.mode.name())));
+    heading.extend(summaries.iter().map(|summary| format!("({}) {}", summary.mode, summary.mode.title())));
     let mut table = Table::new(heading);
     let mut row = |name: &str, value: &dyn Fn(&Summary) -> String| {
         let cells = std::iter::once(name.to_owned()).chain(summaries.iter().map(value));

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::observation::{Marks, Observation, SAMPLE_SECONDS, Sample};
-use super::statistics::quantile;
+use super::quantile::quantile;
 
 /// An object that leaned farther than this before the grasp closed counts as knocked over.
 pub const TILT_LIMIT: f64 = 30.0 * std::f64::consts::PI / 180.0;

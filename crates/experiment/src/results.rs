@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::grid::Cell;
-use super::mode::Mode;
 use super::outcome::{Measures, Outcome};
+use lab::procedure::Mode;
 
 /// File of the reports, one a line, in the order in which the trials ended.
 pub const LINES: &str = "results.jsonl";
@@ -249,7 +249,7 @@ impl Results {
 
     /// The modes that were tried.
     pub fn modes(&self) -> Vec<Mode> {
-        Mode::ALL.into_iter().filter(|mode| self.of(*mode).next().is_some()).collect()
+        Mode::COMPARED.into_iter().filter(|mode| self.of(*mode).next().is_some()).collect()
     }
 
     /// The seeds that were tried, ascending.

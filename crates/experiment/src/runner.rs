@@ -6,12 +6,12 @@ use std::sync::{Mutex, PoisonError, mpsc};
 
 use super::config::Config;
 use super::grid::Cell;
-use super::mode::Mode;
 use super::reach;
 use super::results::{Key, Log, Report, Results, ResultsError};
 use super::statistics::Summary;
 use super::trial::{self, Prepared, Trial, TrialError};
 use lab::client::Interrupt;
+use lab::procedure::Mode;
 use lab::procedure::recording_text;
 
 /// Why an experiment ended early.

@@ -8,7 +8,7 @@ use sim::teacher::TaughtMovement;
 use sim::world::ObjectKind;
 
 use super::grid::Grid;
-use super::mode::Mode;
+use lab::procedure::Mode;
 
 /// An experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]

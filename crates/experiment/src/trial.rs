@@ -35,7 +35,7 @@ const CORRECTIONS: usize = 2;
 /// Duration of such a correction, s.
 const CORRECTION_SECONDS: f64 = 0.7;
 /// How long the arm may take to settle after a part of the lift, s.
-const PATIENCE_SECONDS: f64 = 2.0;
+const SETTLING_SECONDS: f64 = 2.0;
 /// How long it then holds, s.
 const HOLD_SECONDS: f64 = 2.0;
 /// Time over which the height of a lifted hand is averaged, s.
@@ -50,7 +50,8 @@ const CALMING: usize = 10;
 const BEAT: Ticks = periods(0.1) as Ticks * CYCLE_TICKS;
 /// An upload is followed by a longer one, 0.5 s: it takes 0.35 s, and on a board, which has to check it, 0.05 s more.
 const BEAT_OF_UPLOAD: Ticks = periods(0.5) as Ticks * CYCLE_TICKS;
-/// So long after the cycle began: the request reaches the device before the next cycle does, even if the engine overruns this by a slot.
+/// Time from the beginning of a cycle to the request, ticks. The request reaches the device before the next cycle begins,
+/// even if the engine overruns this by a slot.
 const AFTER_BEAT: Ticks = TICKS_PER_MILLISECOND / 2;
 /// One tick, ns.
 const NANOSECONDS_PER_TICK: u128 = 40;
@@ -123,8 +124,10 @@ impl Prepared {
     pub fn of(config: &Config) -> Result<Prepared, TrialError> {
         let primitive = config.primitive.to_primitive()?;
         let references = lab::plan::roll_out(&primitive).map_err(|_| TrialError::Movement("it has no valid start"))?;
-        let taught =
-            references.iter().map(|reference| (reference.position.x, lab::plan::orientation(reference))).collect();
+        let taught = references
+            .iter()
+            .map(|reference| (reference.poses[0].position.x, lab::plan::orientation(reference)))
+            .collect();
         Ok(Prepared {
             image: config.primitive.to_image()?,
             name: link::Name::new(&config.primitive.name)
@@ -236,14 +239,7 @@ fn wait_for_beat(client: &mut Client<Device>, beat: Ticks) -> Result<(), Procedu
     let phase = SLOT_TICKS + AFTER_BEAT;
     let next = (now.saturating_sub(phase) / beat + 1) * beat + phase;
     let until = Duration::from_nanos(next * NANOSECONDS_PER_TICK as u64);
-    while client.now() < until {
-        if let Some(Incoming::Event(event)) = client.next(until.saturating_sub(client.now()))?
-            && event.kind == EventKind::State
-        {
-            procedure::after(event.code, event.detail)?;
-        }
-    }
-    Ok(())
+    procedure::pass(client, until.saturating_sub(client.now()), procedure::Ends::OnAnyStop)
 }
 
 /// The name of what stopped the arm, or the error that is none of the arm's.
@@ -292,7 +288,7 @@ impl Attempt<'_> {
                 break;
             }
             // An arm that does not settle, under a load or against something, takes no further command.
-            if !self.arrive(seconds + PATIENCE_SECONDS)? {
+            if !self.arrive(seconds + SETTLING_SECONDS)? {
                 break;
             }
             let ([_, _, reached], _) = lab::arm::tool_pose(&self.posture()?);

@@ -1,12 +1,7 @@
-//! What a person may ask of the hand, already in fixed point, and why it may be refused.
-
-use link::Refusal;
+//! What a person may ask of the hand, already in fixed point.
 
 use crate::DIGITS;
 use crate::number::Number;
-
-/// A refusal with the numbers that belong to it.
-pub type Refused = (Refusal, [u32; 2]);
 
 /// How a primitive shall be run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,10 +13,11 @@
 
 use control::plan::hand::LONGEST;
 use control::{Fault, HandSample, State, flags};
+use device::Refused;
 use link::Refusal;
 use puck::CanFrame;
 
-use crate::command::{Command, Refused, RunOptions};
+use crate::command::{Command, RunOptions};
 use crate::controller::{HandController, HandReference};
 use crate::estimate::{HandEstimator, HandState};
 use crate::limit::{HandLimiter, Scales};
@@ -71,6 +72,8 @@ pub struct Cycle {
     count: u32,
     state: State,
     fault: Fault,
+    /// State and fault after the last cycle: what the device finds between two cycles is told with the next.
+    told: (State, Fault),
     estimator: HandEstimator,
     controller: HandController,
     limiter: HandLimiter,
@@ -89,6 +92,7 @@ impl Cycle {
             count: 0,
             state: State::Idle,
             fault: Fault::None,
+            told: (State::Idle, Fault::None),
             estimator: HandEstimator::new(),
             controller: HandController::new(),
             limiter: HandLimiter::new(),
@@ -139,7 +143,6 @@ impl Cycle {
     /// One control period: takes what the hand told (`None`: it is not ready) and a command.
     pub fn step(&mut self, sample: Option<&HandSample>, command: Option<Command>) -> Output {
         self.count = self.count.wrapping_add(1);
-        let before = (self.state, self.fault);
         let hand = self.estimator.update(sample);
         if hand.is_none() && !matches!(self.aim, Aim::None) {
             self.hand_failed();
@@ -165,7 +168,8 @@ impl Cycle {
         record.state = self.state;
         record.fault = self.fault;
         let now = (self.state, self.fault);
-        Output { frame, record, entered: (now != before).then_some(now), arrived, answer }
+        let entered = (now != core::mem::replace(&mut self.told, now)).then_some(now);
+        Output { frame, record, entered, arrived, answer }
     }
 
     /// What is measured, for the record.

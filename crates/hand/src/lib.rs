@@ -2,15 +2,17 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod application;
 pub mod command;
 pub mod controller;
-pub mod core;
 pub mod cycle;
+pub mod device_controller;
 pub mod estimate;
 mod exponential;
 pub mod filter;
 pub mod forcing;
 pub mod image;
+pub mod library;
 pub mod limit;
 pub mod motion;
 pub mod number;
@@ -18,16 +20,16 @@ pub mod primitive;
 pub mod profile;
 pub mod record;
 pub mod rollout;
-pub mod session;
 pub mod startup;
 
-pub use self::core::{Core, CoreIo, Event, Health};
+pub use application::{HandApplication, Session};
 pub use command::Command;
+pub use device_controller::DeviceController;
+pub use library::Library;
 pub use number::Number;
 pub use primitive::FingerPrimitive;
-pub use record::{Record, TimedRecord};
+pub use record::Record;
 pub use rollout::Rollout;
-pub use session::{Library, Session, SessionPort};
 
 /// Digits of the hand: spread, F1, F2, F3.
 pub const DIGITS: usize = 4;
@@ -38,7 +40,8 @@ pub const FINGERS: usize = 3;
 /// Most kernels of a row.
 pub const KERNELS: usize = link::image::KERNEL_LIMIT;
 
-/// Time without a reply of a digit before torque ends, and that a gauge is believed: 17 ms, in control periods.
+/// Time without a reply of a digit before torque ends, and that a gauge is believed: 17 ms, in control periods, as for the
+/// positions of an arm (A3). Behind an arm it is `control::sense::hand::LOST_CYCLES`, for the reason given there.
 pub const LOST_CYCLES: u8 = control::time::few_periods(1.0 / 60.0);
 
 /// Ranges of the digits (rad).

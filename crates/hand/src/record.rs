@@ -1,8 +1,10 @@
 //! `Record`: what one control cycle measured and decided, in fixed point. The session makes telemetry of it.
 
 use control::{Fault, State};
+use device::CycleReport;
+use link::Telemetry;
 
-use crate::number::{Number, ZERO};
+use crate::number::{Number, ZERO, real};
 use crate::{DIGITS, FINGERS};
 
 /// One cycle. Digits: spread, F1, F2, F3.
@@ -46,11 +48,35 @@ impl Record {
     };
 }
 
-/// A record with what only its caller can measure.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TimedRecord {
-    /// The record.
-    pub record: Record,
-    /// How long the cycle took, ticks of the board's clock.
-    pub cost_ticks: u32,
+impl CycleReport for Record {
+    fn number(&self) -> u32 {
+        self.cycle
+    }
+
+    fn state(&self) -> State {
+        self.state
+    }
+
+    fn flags(&self) -> u32 {
+        self.flags
+    }
+
+    /// The hand's torques stand in the first four places of `tau`: spread, F1, F2, F3; the arm's fields are 0.
+    fn telemetry(&self) -> Telemetry {
+        let [spread, f1, f2, f3] = self.torque.map(real);
+        Telemetry {
+            cycle: self.cycle,
+            state: self.state.code(),
+            fault: self.fault.code(),
+            flags: self.flags,
+            phase: real(self.phase),
+            tau: [spread, f1, f2, f3, 0.0, 0.0, 0.0],
+            pose_d: [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+            lost_replies: self.lost,
+            hand: self.q.map(real),
+            hand_d: self.q_d.map(real),
+            gauges: self.gauges.map(real),
+            ..Telemetry::default()
+        }
+    }
 }

@@ -4,7 +4,7 @@
 
 use device::hand::{Answer, Exchange, HandProperties, HandTrouble, Outlet};
 use puck::hand::{COUNTS_PER_REVOLUTION, HandCommander};
-use puck::{Group, MotorMode, Node, Property, PropertyId, PropertyTable, Role, Status, get, set};
+use puck::{Group, Node, Property, PropertyId, PropertyTable, Role, Status, get, hand_stop_frames, set};
 
 use crate::DIGITS;
 
@@ -30,8 +30,10 @@ const ARM_GROUPS: core::ops::RangeInclusive<i32> = 1..=4;
 /// How far it has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
-    /// MODE IDLE to whatever was driven before this device started.
-    Hush,
+    /// Take off what torque may still be applied: the frames of [`hand_stop_frames`] from this one on.
+    ZeroTorques {
+        frame: usize,
+    },
     Enumerate {
         digit: usize,
     },
@@ -113,7 +115,7 @@ impl Startup {
     /// At its beginning.
     pub fn new() -> Startup {
         Startup {
-            step: Step::Hush,
+            step: Step::ZeroTorques { frame: 0 },
             exchange: Exchange::default(),
             enumerations: 0,
             status: [None; DIGITS],
@@ -125,9 +127,11 @@ impl Startup {
     /// The phase it is in.
     pub fn phase(&self) -> Phase {
         match self.step {
-            Step::Hush | Step::Enumerate { .. } | Step::Listen { .. } | Step::Role { .. } | Step::Rest { .. } => {
-                Phase::Enumerating
-            }
+            Step::ZeroTorques { .. }
+            | Step::Enumerate { .. }
+            | Step::Listen { .. }
+            | Step::Role { .. }
+            | Step::Rest { .. } => Phase::Enumerating,
             Step::Wake { .. } | Step::Silence { .. } | Step::Status { .. } => Phase::Waking,
             Step::Version { .. } | Step::Read { .. } => Phase::Reading,
             Step::Done => Phase::Done,
@@ -163,11 +167,14 @@ impl Startup {
 
     fn attempt(&mut self, now_us: u64, outlet: &mut impl Outlet) -> Result<Option<FoundHand>, (Node, HandTrouble)> {
         match self.step {
-            Step::Hush => {
-                if outlet.send(set(Group::HAND, PropertyId::MODE, MotorMode::Idle.value())) {
-                    self.step = Step::Enumerate { digit: 0 };
+            Step::ZeroTorques { frame } => match hand_stop_frames().get(frame) {
+                Some(content) => {
+                    if outlet.send(*content) {
+                        self.step = Step::ZeroTorques { frame: frame + 1 };
+                    }
                 }
-            }
+                None => self.step = Step::Enumerate { digit: 0 },
+            },
             Step::Enumerate { digit } => match Node::HAND.get(digit) {
                 Some(node) => {
                     if outlet.send(get(*node, PropertyId::STAT)) {

@@ -4,10 +4,9 @@ use std::time::Duration;
 
 use link::can::DeviceNumber;
 
-use crate::simulation::{Engine, Simulation, SimulationError, SimulationOptions};
+use crate::simulation::{BoardCan, Engine, SimulatedCan, Simulation, SimulationError, SimulationOptions};
 use crate::transport::{
-    Address, BoardCan, CanTransport, LineKind, SerialTransport, SimulatedCan, SocketCan, StreamTransport, Transport,
-    TransportError,
+    Address, CanTransport, LineKind, SerialTransport, SocketCan, StreamTransport, Transport, TransportError,
 };
 
 /// A way to a device that is simulated here, or reached over a line.

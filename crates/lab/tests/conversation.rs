@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 use control::model::ArmModel;
 use control::{CycleRecord, LoadRefusal, Payload, State};
 use device::{
-    Command, Counters, Event, EventKind, FitPrimitive, Health, Identity, QueueFull, RamStore, Session, SessionPort,
-    Stage, TimedRecord, Timing,
+    Command, Counters, DeviceController, Event, EventKind, FitPrimitive, Health, Identity, QueueFull, RamStore,
+    Session, SessionPort, Stage, TimedRecord, Timing,
 };
 use lab::client::{Client, Halted, Incoming, Interrupt, UploadOutcome, UploadPhase};
 use lab::error::HostError;
@@ -31,7 +31,7 @@ struct Half {
     line: Vec<u8>,
 }
 
-impl SessionPort for Half {
+impl SessionPort<DeviceController> for Half {
     fn send(&mut self, bytes: &[u8]) {
         self.line.extend_from_slice(bytes);
     }
@@ -77,6 +77,7 @@ impl SessionPort for Half {
             pendant: None,
             temperatures: [None; 7],
             hand: link::HandStage::Absent,
+            hand_moves: false,
             hand_temperatures: [None; 4],
             counters: Counters::default(),
         }

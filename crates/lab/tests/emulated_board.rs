@@ -9,9 +9,11 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use elf::{elf, real};
-use lab::simulation::{BoardEngine, Engine, FlashSource, Simulation, SimulationError, SimulationOptions, WorldKind};
+use lab::simulation::{
+    BoardCan, BoardEngine, Engine, FlashSource, Simulation, SimulationError, SimulationOptions, WorldKind,
+};
 use lab::transport::can::CanPort;
-use lab::transport::{BoardCan, Cancellation, ChipOptions, LineKind, Transport};
+use lab::transport::{Cancellation, ChipOptions, LineKind, Transport};
 use link::ImageMetadata;
 use sim::lockstep::REPLY_LENGTH;
 

@@ -21,7 +21,7 @@ pub mod units;
 pub use can::{CanFrame, CanId, Destination, Group, Node};
 pub use device::{Action, Request, RequestError};
 pub use force_torque::{GaugeStatus, RawWrench};
-pub use message::{get, packed_torques, set, set_short, stop_frames, zero_torques};
+pub use message::{get, hand_stop_frames, packed_torques, set, set_short, stop_frames, zero_torques};
 pub use property::{Property, PropertyId, PropertyTable, UnknownFirmware};
 pub use reply::{Reply, ReplyError};
 pub use safety::{PendantState, SafetyMode};

@@ -61,6 +61,13 @@ pub fn stop_frames() -> [CanFrame; 4] {
     [arm, wrist, idle(Group::ARM), idle(Group::HAND)]
 }
 
+/// The same for the four pucks of a hand alone: zero torque, then MODE IDLE.
+#[must_use]
+pub fn hand_stop_frames() -> [CanFrame; 2] {
+    let zero = packed_torques(Group::HAND, PropertyId::TORQUE, [PuckTorque::ZERO; 4]);
+    [zero, set(Group::HAND, PropertyId::MODE, MotorMode::Idle.value())]
+}
+
 /// Explicit zero torque for all seven motors. A puck is believed to keep its last torque until told otherwise, so send
 /// these whenever control ends.
 #[must_use]

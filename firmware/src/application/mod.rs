@@ -1,7 +1,7 @@
 //! The bodies of the tasks, for any board.
 //!
 //! ```text
-//! SLOT_TIMER 900 Hz ─> slot (12): Core ─commands<─┐      ┌─ session (2): Session <─> link port
+//! SLOT_TIMER 900 Hz ─> slot (12): controller ─commands<─┐      ┌─ session (2): Session <─> link port
 //!                        │  ^           ─records>──┼──────┤        │ library
 //!              frames out│  │frames in  ─events>───┘      └─ log (1) │
 //!                        v  │                                 idle (0): flash
@@ -22,19 +22,21 @@ mod storage;
 
 use core::mem::MaybeUninit;
 
-use device::storage::{Library, Room, value_bytes};
-use device::{Command, Core, Event, Identity, Session, TimedRecord};
+use device::storage::{Library, Scratch, value_bytes};
+use device::{Command, DeviceController, Event, Identity, Session, TimedRecord};
 use heapless::spsc::Queue;
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
 
-use crate::board::{Clock, Edge, Parts, SlotTimer};
+use crate::board::{Board, Clock, Parts, SlotTimer};
 use crate::in_place;
 
 pub use bus::{ReceiveTask, TransmitTask};
 pub use log::{Log, LogTask};
+pub(crate) use session::SessionQueues;
 pub use session::{SessionTask, StackUse};
 pub use slot::SlotTask;
+pub(crate) use slot::{Cost, SlotQueues};
 pub use storage::{keep_library, rest};
 
 /// Frames on their way to the controller. A cycle sends at most 8, of these 5 in its control slot (torques of arm, wrist
@@ -53,13 +55,13 @@ const EVENTS: usize = 16 + 1;
 pub const PRIMITIVES: usize = 4;
 
 /// The library in memory.
-pub type Shelf = Library<PRIMITIVES, IMAGE_BYTES_LIMIT>;
+pub type PrimitiveLibrary = Library<PRIMITIVES, IMAGE_BYTES_LIMIT>;
 
 /// The session of this application.
-pub type Dialogue = Session<&'static mut Shelf>;
+pub type ArmSession = Session<&'static mut PrimitiveLibrary>;
 
 /// Memory of the task that keeps the library on the flash.
-pub type StorageRoom = Room<IMAGE_BYTES_LIMIT, { value_bytes(IMAGE_BYTES_LIMIT) }>;
+pub type StorageScratch = Scratch<IMAGE_BYTES_LIMIT, { value_bytes(IMAGE_BYTES_LIMIT) }>;
 
 /// What the tasks hand to each other.
 struct Queues {
@@ -76,12 +78,12 @@ struct Queues {
 /// small processor.
 pub struct Memory {
     queues: Queues,
-    shelf: Shelf,
-    session: MaybeUninit<Dialogue>,
+    shelf: PrimitiveLibrary,
+    session: MaybeUninit<ArmSession>,
 }
 
 /// The place of the control half. Put it into a static too, in the memory that is never waited for; nobody need clear it.
-pub type CorePlace = MaybeUninit<Core>;
+pub type CorePlace = MaybeUninit<DeviceController>;
 
 impl Memory {
     /// Not filled yet.
@@ -96,7 +98,7 @@ impl Memory {
                 events: Queue::new(),
                 log: Queue::new(),
             },
-            shelf: Shelf::new(),
+            shelf: PrimitiveLibrary::new(),
             session: MaybeUninit::uninit(),
         }
     }
@@ -109,42 +111,42 @@ impl Default for Memory {
 }
 
 /// Everything an image consists of, for the tasks that own or share it.
-pub struct Application<E: Edge> {
+pub struct Application<B: Board> {
     /// Shared by slot and session.
-    pub core: &'static mut Core,
+    pub core: &'static mut DeviceController,
     /// Shared by slot, receiver and transmitter.
-    pub can: E::Can,
+    pub can: B::Can,
     /// Shared by session and storage.
-    pub session: &'static mut Dialogue,
+    pub session: &'static mut ArmSession,
     /// On `SLOT_TIMER`.
-    pub slot_task: SlotTask<E>,
+    pub slot_task: SlotTask<B, DeviceController>,
     /// On `CAN_RECEIVE`.
     pub receive_task: ReceiveTask,
     /// On `CAN_TRANSMIT`.
     pub transmit_task: TransmitTask,
     /// After every slot.
-    pub session_task: SessionTask<E>,
+    pub session_task: SessionTask<B, DeviceController>,
     /// When there is something to tell.
     pub log_task: LogTask,
     /// For [`keep_library`], when nothing else is to be done.
-    pub flash: E::Flash,
+    pub flash: B::Flash,
 }
 
 /// Joins the application to the pieces of a board, and starts the timer of the slots: the first comes a slot later at the
 /// earliest. `firmware` is the version of the image, for people; `serial` tells this board from others of its kind.
-pub fn start<E: Edge>(
+pub fn start<B: Board>(
     firmware: &'static str,
     serial: &'static str,
-    parts: Parts<E>,
+    parts: Parts<B>,
     memory: &'static mut Memory,
     core: &'static mut CorePlace,
-) -> Application<E> {
+) -> Application<B> {
     let identity = Identity {
         firmware,
-        board: E::NAME,
+        board: B::NAME,
         serial,
-        simulated: E::SIMULATED,
-        ticks_per_second: <E::Clock as Clock>::HZ,
+        simulated: B::SIMULATED,
+        ticks_per_second: <B::Clock as Clock>::HZ,
     };
     let Memory { queues, shelf, session } = memory;
     let Parts { clock, mut slot_timer, can, link, light, flash } = parts;
@@ -154,18 +156,20 @@ pub fn start<E: Edge>(
     let (records, from_core) = queues.records.split();
     let (events, news) = queues.events.split();
     let (to_log, to_tell) = queues.log.split();
-    let core = in_place::build(core, Core::init());
+    let core = in_place::build(core, DeviceController::init());
     let session = in_place::build(session, Session::init(identity, shelf));
+    let slot_queues = SlotQueues { from_bus, to_bus, commands, records, events };
+    let session_queues = SessionQueues { port: link, to_core, from_core, news, to_log: Some(to_log) };
     // When everything is built, which takes a while: the first slot must find its task ready.
     slot_timer.start();
     Application {
         core,
         can,
         session,
-        slot_task: SlotTask::new(clock, slot_timer, light, slot::Ends { from_bus, to_bus, commands, records, events }),
+        slot_task: SlotTask::new(clock, slot_timer, light, slot_queues, Cost::ControlSlot),
         receive_task: ReceiveTask::new(incoming),
         transmit_task: TransmitTask::new(outgoing),
-        session_task: SessionTask::new(clock, session::Ends { port: link, to_core, from_core, news, to_log }),
+        session_task: SessionTask::new(clock, session_queues),
         log_task: LogTask::new(to_tell),
         flash,
     }

@@ -1,24 +1,24 @@
 //! Talks with the host.
 
 use control::LoadRefusal;
-use device::{Command, Core, Event, FitPrimitive, Health, QueueFull, SessionPort, TimedRecord, Timing};
+use device::{Application, Controller, Health, HostSession, QueueFull, SessionPort, TimedRecord, Timing};
 use heapless::spsc::{Consumer, Producer};
 use rtic_core::Mutex;
 
-use super::Dialogue;
-use crate::board::{Clock, Edge, LinkPort};
+use crate::board::{Board, Clock, LinkPort};
 use crate::meters::Meters;
 
 /// Bytes taken from the line at a time; the rest waits in the port.
 const LINK_CHUNK: usize = 128;
 
 /// The session's ends of the queues, and its line.
-pub(super) struct Ends<P> {
-    pub(super) port: P,
-    pub(super) to_core: Producer<'static, Command>,
-    pub(super) from_core: Consumer<'static, TimedRecord>,
-    pub(super) news: Consumer<'static, Event>,
-    pub(super) to_log: Producer<'static, Event>,
+pub(crate) struct SessionQueues<P, C: Controller> {
+    pub(crate) port: P,
+    pub(crate) to_core: Producer<'static, C::Command>,
+    pub(crate) from_core: Consumer<'static, TimedRecord<C::Record>>,
+    pub(crate) news: Consumer<'static, C::Event>,
+    /// What people are told, where there is a log.
+    pub(crate) to_log: Option<Producer<'static, C::Event>>,
 }
 
 /// How much of its stack the image has used.
@@ -31,44 +31,46 @@ pub struct StackUse {
 }
 
 /// The task that runs once a slot.
-pub struct SessionTask<E: Edge> {
-    clock: E::Clock,
-    ends: Ends<E::LinkPort>,
+pub struct SessionTask<B: Board, C: Controller> {
+    clock: B::Clock,
+    queues: SessionQueues<B::LinkPort, C>,
 }
 
 /// The world of the session during one poll.
-struct Port<'a, P, C> {
-    ends: &'a mut Ends<P>,
-    core: C,
+struct Port<'a, P, C: Controller, M> {
+    queues: &'a mut SessionQueues<P, C>,
+    core: M,
     meters: &'a Meters,
     stack: fn() -> StackUse,
 }
 
-impl<P: LinkPort, C: Mutex<T = &'static mut Core>> SessionPort for Port<'_, P, C> {
+impl<P: LinkPort, C: Controller, M: Mutex<T = &'static mut C>> SessionPort<C> for Port<'_, P, C, M> {
     fn send(&mut self, bytes: &[u8]) {
-        self.ends.port.write(bytes);
+        self.queues.port.write(bytes);
     }
 
     fn room(&self) -> usize {
-        self.ends.port.room()
+        self.queues.port.room()
     }
 
-    fn command(&mut self, command: Command) -> Result<(), QueueFull> {
-        self.ends.to_core.enqueue(command).map_err(|_| QueueFull)
+    fn command(&mut self, command: C::Command) -> Result<(), QueueFull> {
+        self.queues.to_core.enqueue(command).map_err(|_| QueueFull)
     }
 
-    fn load(&mut self, fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
-        self.core.lock(|core| core.load(fit))
+    fn load(&mut self, primitive: C::Primitive<'_>) -> Result<(), LoadRefusal> {
+        self.core.lock(|core| core.load(primitive))
     }
 
-    fn record(&mut self) -> Option<TimedRecord> {
-        self.ends.from_core.dequeue()
+    fn record(&mut self) -> Option<TimedRecord<C::Record>> {
+        self.queues.from_core.dequeue()
     }
 
-    fn event(&mut self) -> Option<Event> {
-        let event = self.ends.news.dequeue()?;
-        // The log is for people; if it lags, the link still has every event.
-        let _ = self.ends.to_log.enqueue(event);
+    fn event(&mut self) -> Option<C::Event> {
+        let event = self.queues.news.dequeue()?;
+        if let Some(log) = &mut self.queues.to_log {
+            // The log is for people; if it lags, the link still has every event.
+            let _ = log.enqueue(event);
+        }
         Some(event)
     }
 
@@ -88,29 +90,29 @@ impl<P: LinkPort, C: Mutex<T = &'static mut Core>> SessionPort for Port<'_, P, C
     }
 }
 
-impl<E: Edge> SessionTask<E> {
-    pub(super) fn new(clock: E::Clock, ends: Ends<E::LinkPort>) -> Self {
-        Self { clock, ends }
+impl<B: Board, C: Controller> SessionTask<B, C> {
+    pub(crate) fn new(clock: B::Clock, queues: SessionQueues<B::LinkPort, C>) -> Self {
+        Self { clock, queues }
     }
 
-    /// Takes what came over the line and does everything that is due. Whether there is something to tell people afterwards.
-    /// `stack` measures the stack, asked only when the host wants to know.
-    pub fn run(
+    /// Takes what came over the line and does everything that is due. Returns true if there is something to tell people
+    /// afterwards. `stack` measures the stack, asked only when the host wants to know.
+    pub fn run<A: Application<Controller = C>>(
         &mut self,
-        session: &mut Dialogue,
-        core: impl Mutex<T = &'static mut Core>,
+        session: &mut HostSession<A>,
+        core: impl Mutex<T = &'static mut C>,
         meters: &Meters,
         stack: fn() -> StackUse,
     ) -> bool {
         let mut bytes = [0; LINK_CHUNK];
         loop {
-            let count = self.ends.port.read(&mut bytes);
+            let count = self.queues.port.read(&mut bytes);
             session.receive(bytes.get(..count).unwrap_or(&[]));
             if count < LINK_CHUNK {
                 break;
             }
         }
-        session.poll(self.clock.now_us(), &mut Port { ends: &mut self.ends, core, meters, stack });
-        !self.ends.to_log.is_empty()
+        session.poll(self.clock.now_us(), &mut Port { queues: &mut self.queues, core, meters, stack });
+        self.queues.to_log.as_ref().is_some_and(|log| !log.is_empty())
     }
 }

@@ -1,79 +1,91 @@
 //! A slot begins: one third of a control cycle.
 
-use control::CycleRecord;
-use device::{Command, Core, CoreIo, Event, Slot, TimedRecord};
+use device::{Controller, ControllerIo, CycleReport, Slot, TimedRecord};
 use embedded_hal::digital::{OutputPin, PinState};
 use heapless::spsc::{Consumer, Producer};
 use puck::CanFrame;
 use rtic_core::Mutex;
 
-use crate::board::{CanStatus, Clock, Edge, SlotTimer};
+use crate::board::{Board, CanStatus, Clock, SlotTimer};
 use crate::meters::Meters;
 
-/// The slot task's ends of the queues.
-pub(super) struct Ends {
-    pub(super) from_bus: Consumer<'static, CanFrame>,
-    pub(super) to_bus: Producer<'static, CanFrame>,
-    pub(super) commands: Consumer<'static, Command>,
-    pub(super) records: Producer<'static, TimedRecord>,
-    pub(super) events: Producer<'static, Event>,
+/// The slot task's ends of the queues between the halves.
+pub(crate) struct SlotQueues<C: Controller> {
+    pub(crate) from_bus: Consumer<'static, CanFrame>,
+    pub(crate) to_bus: Producer<'static, CanFrame>,
+    pub(crate) commands: Consumer<'static, C::Command>,
+    pub(crate) records: Producer<'static, TimedRecord<C::Record>>,
+    pub(crate) events: Producer<'static, C::Event>,
+}
+
+/// What counts as the cost of a control cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Cost {
+    /// Its control slot alone, which the torques wait for.
+    ControlSlot,
+    /// Its three slots together, replies and their decoding included: what a small processor has to bear.
+    AllSlots,
 }
 
 /// The task of the highest priority.
-pub struct SlotTask<E: Edge> {
-    clock: E::Clock,
-    timer: E::SlotTimer,
-    light: E::StatusLight,
-    ends: Ends,
+pub struct SlotTask<B: Board, C: Controller> {
+    clock: B::Clock,
+    timer: B::SlotTimer,
+    light: B::StatusLight,
+    queues: SlotQueues<C>,
+    measured: Cost,
     slot: Slot,
     lost_frames: u32,
     bus_offs: u32,
+    /// Ticks of the slots of this cycle so far.
+    spent: u32,
 }
 
 /// The world of the core during one slot.
-struct SlotIo<'a> {
-    ends: &'a mut Ends,
+struct SlotIo<'a, C: Controller> {
+    queues: &'a mut SlotQueues<C>,
     meters: &'a Meters,
     /// The record of this slot; its cost is known only when the slot is over.
-    record: Option<CycleRecord>,
+    record: Option<C::Record>,
 }
 
-impl CoreIo for SlotIo<'_> {
+impl<C: Controller> ControllerIo<C> for SlotIo<'_, C> {
     fn receive(&mut self) -> Option<CanFrame> {
-        self.ends.from_bus.dequeue()
+        self.queues.from_bus.dequeue()
     }
 
     fn transmit(&mut self, frame: CanFrame) -> bool {
-        self.ends.to_bus.enqueue(frame).is_ok()
+        self.queues.to_bus.enqueue(frame).is_ok()
     }
 
-    fn command(&mut self) -> Option<Command> {
-        self.ends.commands.dequeue()
+    fn command(&mut self) -> Option<C::Command> {
+        self.queues.commands.dequeue()
     }
 
-    fn record(&mut self, record: CycleRecord) {
+    fn record(&mut self, record: C::Record) {
         self.record = Some(record);
     }
 
-    fn event(&mut self, event: Event) {
-        if self.ends.events.enqueue(event).is_err() {
+    fn event(&mut self, event: C::Event) {
+        if self.queues.events.enqueue(event).is_err() {
             self.meters.event_dropped();
         }
     }
 }
 
-impl<E: Edge> SlotTask<E> {
-    pub(super) fn new(clock: E::Clock, timer: E::SlotTimer, light: E::StatusLight, ends: Ends) -> Self {
-        Self { clock, timer, light, ends, slot: Slot::Request, lost_frames: 0, bus_offs: 0 }
+impl<B: Board, C: Controller> SlotTask<B, C> {
+    pub(crate) fn new(
+        clock: B::Clock,
+        timer: B::SlotTimer,
+        light: B::StatusLight,
+        queues: SlotQueues<C>,
+        measured: Cost,
+    ) -> Self {
+        Self { clock, timer, light, queues, measured, slot: Slot::Request, lost_frames: 0, bus_offs: 0, spent: 0 }
     }
 
     /// Computes one slot. Afterwards the transmitter and the session are due.
-    pub fn run(
-        &mut self,
-        mut core: impl Mutex<T = &'static mut Core>,
-        mut can: impl Mutex<T = E::Can>,
-        meters: &Meters,
-    ) {
+    pub fn run(&mut self, mut core: impl Mutex<T = &'static mut C>, mut can: impl Mutex<T = B::Can>, meters: &Meters) {
         meters.slot(self.timer.acknowledge());
         let begin = self.clock.short_ticks();
         let now = self.clock.now_us();
@@ -81,12 +93,12 @@ impl<E: Edge> SlotTask<E> {
         if self.slot == Slot::Slow {
             // The torques of the control slot must have left before another frame is queued behind them.
             let (waiting, overruns, offs) = can.lock(|can| (can.waiting(), can.overruns(), can.bus_offs()));
-            late = waiting > 0 || !self.ends.to_bus.is_empty();
+            late = waiting > 0 || !self.queues.to_bus.is_empty();
             (lost, off) = (overruns != self.lost_frames, offs != self.bus_offs);
             (self.lost_frames, self.bus_offs) = (overruns, offs);
         }
         let slot = self.slot;
-        let mut io = SlotIo { ends: &mut self.ends, meters, record: None };
+        let mut io = SlotIo { queues: &mut self.queues, meters, record: None };
         core.lock(|core| {
             if late {
                 core.note_overrun();
@@ -97,13 +109,27 @@ impl<E: Edge> SlotTask<E> {
             core.slot(slot, now, &mut io);
         });
         let record = io.record;
-        let cost_ticks = self.clock.short_ticks().wrapping_sub(begin);
-        if let Some(record) = record {
+        self.spent += self.clock.short_ticks().wrapping_sub(begin);
+        let cost_ticks = self.spent;
+        let measured = match self.measured {
+            Cost::ControlSlot => {
+                self.spent = 0;
+                record.is_some()
+            }
+            Cost::AllSlots => {
+                let last = slot == Slot::Slow;
+                self.spent = if last { 0 } else { cost_ticks };
+                last
+            }
+        };
+        if measured {
             meters.control(cost_ticks);
+        }
+        if let Some(record) = record {
             // A light that cannot be switched must not stop the arm.
-            let _ = self.light.set_state(PinState::from(record.state.has_torque()));
-            // A session that lags 50 ms behind loses telemetry, which its host sees by the cycle numbers.
-            let _ = self.ends.records.enqueue(TimedRecord { record, cost_ticks });
+            let _ = self.light.set_state(PinState::from(record.state().has_torque()));
+            // A session that lags some 30 ms behind loses telemetry, which its host sees by the cycle numbers.
+            let _ = self.queues.records.enqueue(TimedRecord { record, cost_ticks });
         }
         self.slot = slot.next();
         if self.timer.is_due() {

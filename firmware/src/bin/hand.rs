@@ -19,21 +19,21 @@ const IMAGE: link::metadata::MemoryRegion = link::metadata::MemoryRegion { start
 #[used]
 #[unsafe(link_section = ".tactus")]
 static METADATA: [u8; link::metadata::METADATA_BYTES] = {
-    use firmware::board::{Board, Edge};
+    use firmware::board::{Board, SelectedBoard};
     // No store: the library is in memory.
-    firmware::metadata::block(BOARD_NAME, Board::SIMULATED, IMAGE, None)
+    firmware::metadata::block(BOARD_NAME, SelectedBoard::SIMULATED, IMAGE, None)
 };
 
 #[cfg(target_os = "none")]
 #[rtic::app(device = firmware::board::device, peripherals = false, dispatchers = [DISPATCH_SESSION])]
 mod app {
-    use firmware::application::{ReceiveTask, StackUse, TransmitTask};
+    use firmware::application::{ReceiveTask, SessionTask, SlotTask, StackUse, TransmitTask};
     use firmware::board::device::Interrupt;
-    use firmware::board::{Board, Edge, stack};
-    use firmware::hand::{self as application, Application, Memory, SessionTask, SlotTask};
+    use firmware::board::{Board, SelectedBoard, stack};
+    use firmware::hand::{self as application, Application, Memory};
     use firmware::metadata;
     use firmware::meters::Meters;
-    use hand::Core;
+    use hand::{DeviceController, Session};
 
     use super::BOARD_NAME;
 
@@ -41,33 +41,34 @@ mod app {
 
     #[shared]
     struct Shared {
-        core: &'static mut Core,
-        can: <Board as Edge>::Can,
+        core: &'static mut DeviceController,
+        can: <SelectedBoard as Board>::Can,
     }
 
     #[local]
     struct Local {
-        slot_task: SlotTask<Board>,
+        slot_task: SlotTask<SelectedBoard, DeviceController>,
         receive_task: ReceiveTask,
         transmit_task: TransmitTask,
-        session_task: SessionTask<Board>,
+        session_task: SessionTask<SelectedBoard, DeviceController>,
+        session: &'static mut Session<'static>,
     }
 
     #[init(local = [memory: Memory = Memory::new()])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let board = Board::start(cx.core);
+        let board = SelectedBoard::start(cx.core);
         let version = metadata::FIRMWARE;
         defmt::info!("tactus hand {=str} on {=str}", version, BOARD_NAME);
         let serial = board.serial();
-        let Application { core, can, slot_task, receive_task, transmit_task, session_task } =
+        let Application { core, session, can, slot_task, receive_task, transmit_task, session_task } =
             application::start(version, BOARD_NAME, serial, board.split(), cx.local.memory);
-        (Shared { core, can }, Local { slot_task, receive_task, transmit_task, session_task })
+        (Shared { core, can }, Local { slot_task, receive_task, transmit_task, session_task, session })
     }
 
     #[idle]
     fn idle(_: idle::Context) -> ! {
         loop {
-            Board::sleep();
+            SelectedBoard::sleep();
         }
     }
 
@@ -93,9 +94,9 @@ mod app {
     }
 
     /// Talks with the host; runs once per slot.
-    #[task(priority = 2, shared = [core], local = [session_task])]
+    #[task(priority = 2, shared = [core], local = [session_task, session])]
     async fn session(cx: session::Context) {
-        cx.local.session_task.run(cx.shared.core, &METERS, stack_use);
+        cx.local.session_task.run(cx.local.session, cx.shared.core, &METERS, stack_use);
     }
 
     fn stack_use() -> StackUse {

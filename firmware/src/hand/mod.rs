@@ -1,23 +1,16 @@
-//! The bodies of the hand image's tasks, for any board: the hand alone, in fixed point.
-//!
-//! As [`crate::application`], with the halves of the crate `hand` and without storage: the library lives in memory.
-
-mod session;
-mod slot;
+//! The hand alone, in fixed point: the halves of the crate `hand` in the tasks of [`crate::application`], without a log and without
+//! storage. The library lives in memory.
 
 use core::mem::MaybeUninit;
 
-use device::Identity;
-use hand::{Command, Core, Event, Library, Session, TimedRecord};
+use device::{HostSession, Identity, Message, TimedRecord};
+use hand::{Command, DeviceController, HandApplication, Library, Record, Session};
 use heapless::spsc::Queue;
 use puck::CanFrame;
 
-use crate::application::{ReceiveTask, TransmitTask};
-use crate::board::{Clock, Edge, Parts, SlotTimer};
+use crate::application::{Cost, ReceiveTask, SessionQueues, SessionTask, SlotQueues, SlotTask, TransmitTask};
+use crate::board::{Board, Clock, Parts, SlotTimer};
 use crate::in_place;
-
-pub use session::SessionTask;
-pub use slot::SlotTask;
 
 /// Frames on their way to the controller: a cycle sends four.
 const OUTGOING: usize = 8 + 1;
@@ -35,8 +28,8 @@ struct Queues {
     outgoing: Queue<CanFrame, OUTGOING>,
     incoming: Queue<CanFrame, INCOMING>,
     commands: Queue<Command, COMMANDS>,
-    records: Queue<TimedRecord, RECORDS>,
-    events: Queue<Event, EVENTS>,
+    records: Queue<TimedRecord<Record>, RECORDS>,
+    events: Queue<Message, EVENTS>,
 }
 
 /// Everything that lives as long as the image: put it into a static. [`start`] fills it where it is, because no task should
@@ -44,7 +37,7 @@ struct Queues {
 pub struct Memory {
     queues: Queues,
     library: Library,
-    core: MaybeUninit<Core>,
+    core: MaybeUninit<DeviceController>,
     session: MaybeUninit<Session<'static>>,
 }
 
@@ -74,31 +67,33 @@ impl Default for Memory {
 }
 
 /// Everything the image consists of, for the tasks that own or share it.
-pub struct Application<E: Edge> {
+pub struct Application<B: Board> {
     /// Shared by slot and session.
-    pub core: &'static mut Core,
+    pub core: &'static mut DeviceController,
+    /// Of the session task alone.
+    pub session: &'static mut Session<'static>,
     /// Shared by slot, receiver and transmitter.
-    pub can: E::Can,
+    pub can: B::Can,
     /// On `SLOT_TIMER`.
-    pub slot_task: SlotTask<E>,
+    pub slot_task: SlotTask<B, DeviceController>,
     /// On `CAN_RECEIVE`.
     pub receive_task: ReceiveTask,
     /// On `CAN_TRANSMIT`.
     pub transmit_task: TransmitTask,
     /// After every slot.
-    pub session_task: SessionTask<E>,
+    pub session_task: SessionTask<B, DeviceController>,
 }
 
 /// Joins the application to the pieces of a board called `name`, and starts the timer of the slots.
-pub fn start<E: Edge>(
+pub fn start<B: Board>(
     firmware: &'static str,
     name: &'static str,
     serial: &'static str,
-    parts: Parts<E>,
+    parts: Parts<B>,
     memory: &'static mut Memory,
-) -> Application<E> {
+) -> Application<B> {
     let identity =
-        Identity { firmware, board: name, serial, simulated: E::SIMULATED, ticks_per_second: <E::Clock as Clock>::HZ };
+        Identity { firmware, board: name, serial, simulated: B::SIMULATED, ticks_per_second: <B::Clock as Clock>::HZ };
     let Parts { clock, mut slot_timer, can, link, light, .. } = parts;
     let Memory { queues, library, core, session } = memory;
     let (to_bus, outgoing) = queues.outgoing.split();
@@ -106,16 +101,19 @@ pub fn start<E: Edge>(
     let (to_core, commands) = queues.commands.split();
     let (records, from_core) = queues.records.split();
     let (events, news) = queues.events.split();
-    let core = in_place::keep(core, Core::new);
-    let session = in_place::keep(session, || Session::new(identity, library));
+    let core = in_place::keep(core, DeviceController::new);
+    let session = in_place::build(session, HostSession::over(identity, HandApplication::new(library)));
+    let slot_queues = SlotQueues { from_bus, to_bus, commands, records, events };
+    let session_queues = SessionQueues { port: link, to_core, from_core, news, to_log: None };
     // When everything is built, which takes a while: the first slot must find its task ready.
     slot_timer.start();
     Application {
         core,
+        session,
         can,
-        slot_task: SlotTask::new(clock, slot_timer, light, slot::Ends { from_bus, to_bus, commands, records, events }),
+        slot_task: SlotTask::new(clock, slot_timer, light, slot_queues, Cost::AllSlots),
         receive_task: ReceiveTask::new(incoming),
         transmit_task: TransmitTask::new(outgoing),
-        session_task: SessionTask::new(clock, session, session::Ends { port: link, to_core, from_core, news }),
+        session_task: SessionTask::new(clock, session_queues),
     }
 }

@@ -10,12 +10,12 @@ use control::Payload;
 use control::model::{ArmModel, Frames};
 use control::units::JointPositions;
 use device::storage::Opening;
-use device::{Core, Store};
+use device::{DeviceController, Store};
 use firmware::application::{
-    self, Application, CorePlace, Dialogue, Log, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse,
-    StorageRoom, TransmitTask,
+    self, Application, ArmSession, CorePlace, Log, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse,
+    StorageScratch, TransmitTask,
 };
-use firmware::board::Edge;
+use firmware::board::Board;
 use firmware::meters::Meters;
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
 use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
@@ -79,13 +79,13 @@ pub(crate) struct Host {
     plant: Plant,
     silicon: Shared,
     now: Ticks,
-    core: Lock<&'static mut Core>,
+    core: Lock<&'static mut DeviceController>,
     can: Lock<Can>,
-    session: Lock<&'static mut Dialogue>,
-    slot_task: SlotTask<MemoryBoard>,
+    session: Lock<&'static mut ArmSession>,
+    slot_task: SlotTask<MemoryBoard, DeviceController>,
     receive_task: ReceiveTask,
     transmit_task: TransmitTask,
-    session_task: SessionTask<MemoryBoard>,
+    session_task: SessionTask<MemoryBoard, DeviceController>,
     log_task: LogTask,
     storage_task: Pin<Box<dyn Future<Output = Infallible>>>,
     flash_clock: VirtualClock,
@@ -109,7 +109,7 @@ impl Host {
         let Application { core, can, session, slot_task, receive_task, transmit_task, session_task, log_task, flash } =
             application::start("test", serial, board.split(), memory, Box::leak(Box::new(CorePlace::uninit())));
         let (session, notes) = (Lock::new(session), Notes::default());
-        let room = Box::leak(Box::new(StorageRoom::new()));
+        let room = Box::leak(Box::new(StorageScratch::new()));
         Self {
             plant: Plant::new(PlantConfig::default(), Box::new(FreeJoints::new(HOME))),
             silicon,

@@ -8,12 +8,10 @@ use link::RunOptions;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, Table, connection, upload};
-use lab::client::Client;
 use lab::demonstration::{RATE, Recording};
-use lab::device::Device;
 use lab::learn::memory::{MemoryError, MemorySummary, Payload, remember_rehearsals};
 use lab::primitive_file::PrimitiveFile;
-use lab::procedure::{self, CHANNELS, FlagCounts, Mode, ProcedureError, RunRequest, recording_text};
+use lab::procedure::{self, CHANNELS, FlagCounts, Mode, ProcedureError};
 
 /// Options of `rehearse`.
 #[derive(Debug, Clone, Args)]
@@ -96,16 +94,20 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut client = connection::open(global, DOING, |options| surround(options, command.surroundings))?;
     upload::send(&mut client, &movement, output, DOING)?;
     connection::ready(&mut client, command.at_home, output, DOING)?;
+    let simulated = if client.is_simulated() { " (simulated arm)" } else { "" };
+    let notes = format!("Tactus recording of a rehearsal of '{}', 300 Hz{simulated}", movement.name);
+    // The same gains and the same pose feedback as in the runs that will compare themselves with this one.
+    let options = RunOptions { speed: command.speed as f32, ..Mode::OpenLoop.options() };
     let mut recordings = Vec::new();
-    let mut marks = Vec::new();
+    let mut flags = Vec::new();
     for trial in 1..=command.trials {
         let bar = output.bar((file.duration / command.speed * RATE) as u64, "to the start");
-        let played = play(&mut client, &movement, command.speed, &mut |samples| {
+        let played = procedure::play_once(&mut client, &movement, options, &notes, &mut |samples| {
             bar.set_message(format!("rehearsal {trial} of {}", command.trials));
             bar.set_position(samples as u64);
         });
         bar.finish_and_clear();
-        let (bytes, flags) = played.map_err(|error| connection::failure(error, DOING))?;
+        let (bytes, outcome) = played.map_err(|error| connection::failure(error, DOING))?;
         let path = match &command.record_dir {
             None => PathBuf::from(format!("rehearsal {trial}")),
             Some(folder) => {
@@ -119,7 +121,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             Failure::new(ErrorCode::RecordingReadsBackWrong, "rehearse: the recording reads back wrong", cause)
         })?;
         recordings.push(recording);
-        marks.push(flags);
+        flags.push(outcome.flags);
     }
     let gaps = client.gaps().telemetry;
     connection::tell_speed(&client, started, output);
@@ -136,7 +138,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let target = command.output.clone().unwrap_or_else(|| command.primitive.clone());
     write(&file, &target, "rehearse")?;
     output.say(format!("wrote {}", target.display()));
-    if marks.iter().any(|flags| flags.limited > 0) {
+    if flags.iter().any(|flags| flags.limited > 0) {
         output.warn("the torque limiter was at work: the arm did not follow its plan everywhere");
     }
     if file.feedback.is_none() {
@@ -148,32 +150,10 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         checksum: format!("0x{:08x}", file.checksum()),
         weighted: file.feedback.as_ref().is_some_and(|feedback| feedback.k2.len() > 1),
         expectation: summary,
-        flags: marks,
+        flags,
         gaps,
     };
     output.result(&report, report.to_text())
-}
-
-/// One rehearsal from the start posture; gives the recording.
-fn play(
-    client: &mut Client<Device>,
-    movement: &PrimitiveFile,
-    speed: f64,
-    progress: &mut dyn FnMut(usize),
-) -> Result<(Vec<u8>, FlagCounts), ProcedureError> {
-    procedure::go_to_start(client, &movement.start, |_| {})?;
-    let name =
-        link::Name::new(&movement.name).map_err(|error| lab::transport::TransportError::other(error.to_string()))?;
-    // The same gains and the same pose feedback as in the runs that will compare themselves with this one.
-    let options = RunOptions { speed: speed as f32, ..Mode::Open.options() };
-    let mut cycles = Vec::new();
-    let outcome = procedure::play(client, &RunRequest::new(name, movement.duration, options), &mut |cycle| {
-        cycles.push(*cycle);
-        progress(cycles.len());
-    })?;
-    let simulated = if client.is_simulated() { " (simulated arm)" } else { "" };
-    let notes = format!("Tactus recording of a rehearsal of '{}', 300 Hz{simulated}", movement.name);
-    Ok((recording_text(&cycles, &notes)?, outcome.flags))
 }
 
 /// Writes a primitive that has learned something.

@@ -21,7 +21,7 @@ use lab::procedure::{
 use lab::tracking::{HandTracking, Tracking};
 
 /// Rest that is recorded at the goal, s.
-const AFTERGLOW: f64 = 1.0;
+const POST_ROLL: f64 = 1.0;
 
 /// Instructions per tick of the emulated board's clock (125 million and 25 million a second).
 const INSTRUCTIONS_PER_TICK: u32 = 5;
@@ -73,7 +73,7 @@ pub struct Report {
     /// Name of the primitive.
     pub name: String,
     /// How force entered the run.
-    pub mode: Mode,
+    pub mode: &'static str,
     /// Duration of the movement, s.
     pub duration_s: f64,
     /// How well the tool kept to the plan; none where a hand alone is driven.
@@ -194,7 +194,7 @@ fn play(
         ..usual
     };
     let changes = command.goal_at.iter().chain(&command.speed_at).copied().collect();
-    let request = RunRequest { rest: AFTERGLOW, changes, ..RunRequest::new(name, file.duration, options) };
+    let request = RunRequest { rest: POST_ROLL, changes, ..RunRequest::new(name, file.duration, options) };
 
     output.say(format!("running '{}' ({})", file.name, command.mode.name()));
     let notes = notes(client, file);
@@ -322,7 +322,7 @@ fn report(
     };
     Ok(Report {
         name: file.name.clone(),
-        mode,
+        mode: mode.name(),
         duration_s: recording.running().len() as f64 / RATE,
         tracking,
         hand_tracking,
@@ -352,7 +352,7 @@ impl Report {
         let mut row = |name: &str, value: String| {
             table.row([name.to_owned(), value]);
         };
-        row("mode", self.mode.name().to_owned());
+        row("mode", self.mode.to_owned());
         row("duration", format!("{:.2} s", self.duration_s));
         if let Some(tracking) = &self.tracking {
             let pose = |metres: f64, radians: f64| format!("{:.2} mm  {:.2} deg", metres * 1e3, radians.to_degrees());

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use control::State;
 use serde_json::json;
 use sim::teacher::TaughtMovement;
 
@@ -14,14 +13,14 @@ use super::{ErrorCode, Failure, Global, connection};
 use lab::client::Client;
 use lab::demonstration::RATE;
 use lab::device::Device;
-use lab::procedure::{self, ProcedureError, Recorder, Take};
-use lab::simulation::DEFAULT_SEED;
+use lab::procedure::{self, ProcedureError, Recorder, teacher};
+use lab::simulation::{DEFAULT_SEED, SimulationOptions};
 
-/// Rest that is recorded after a simulated person has let go, s.
-const AFTERGLOW: f64 = 0.5;
+/// Rest that is recorded after the simulated teacher has let go, s.
+const POST_ROLL: f64 = 0.5;
 
 /// Longest demonstration, s.
-const LONGEST: f64 = 120.0;
+const LONGEST_DEMONSTRATION: f64 = 120.0;
 
 /// Options of `teach`.
 #[derive(Debug, Clone, Args)]
@@ -143,10 +142,10 @@ fn record(
     command: &Cmd,
     global: &Global,
     client: &mut Client<Device>,
-    mut recorder: Recorder<BufWriter<File>>,
+    recorder: Recorder<BufWriter<File>>,
 ) -> Result<(usize, u32), ProcedureError> {
     let output = global.output();
-    let guided = begin_guiding(client);
+    let guided = teacher::begin(client);
     let enter = (!guided && command.duration.is_none()).then(wait_for_enter);
     if guided {
         output.say("a simulated person guides the hand");
@@ -154,31 +153,14 @@ fn record(
         output.say("guide the arm; press Enter when the movement is shown");
     }
     let spinner = output.spinner("recording");
-    let mut done_at = None;
-    loop {
-        let Take::Cycle(telemetry) = recorder.take(client)? else {
-            continue;
-        };
-        if State::from_code(telemetry.state) != Some(State::Gravity) {
-            let fault = control::Fault::from_code(telemetry.fault).unwrap_or(control::Fault::None);
-            return Err(ProcedureError::Stopped(fault));
-        }
-        let seconds = recorder.rows() as f64 / RATE;
+    let limit = command.duration.unwrap_or(LONGEST_DEMONSTRATION);
+    let post_roll = if guided { POST_ROLL } else { 0.0 };
+    let shown = procedure::record_demonstration(client, recorder, limit, post_roll, |client, seconds| {
         spinner.set_message(format!("recording, {seconds:.1} s"));
-        let person_done = guided && guiding_is_over(client);
-        let entered = enter.as_ref().is_some_and(|enter| enter.is_finished());
-        if done_at.is_none() && (person_done || entered) {
-            done_at = Some(seconds + if guided { AFTERGLOW } else { 0.0 });
-        }
-        let limit = command.duration.unwrap_or(LONGEST);
-        if seconds >= done_at.unwrap_or(limit).min(limit) {
-            break;
-        }
-    }
+        (guided && teacher::has_finished(client)) || enter.as_ref().is_some_and(|enter| enter.is_finished())
+    });
     spinner.finish_and_clear();
-    let rows = recorder.rows();
-    recorder.finish(client)?;
-    Ok((rows, client.gaps().telemetry))
+    Ok((shown?.samples, client.gaps().telemetry))
 }
 
 /// A thread that ends when Enter is pressed.
@@ -190,75 +172,20 @@ fn wait_for_enter() -> std::thread::JoinHandle<()> {
     })
 }
 
-#[cfg(feature = "mujoco")]
-mod person {
-    use std::any::Any;
-
-    use sim::teacher::{GuidedWorld, Stage, TaughtMovement};
-    use sim::world::mujoco::{MujocoWorld, Scene};
-
-    use lab::client::Client;
-    use lab::device::Device;
-    use lab::simulation::SimulationOptions;
-
-    type Guided = GuidedWorld<MujocoWorld>;
-
-    fn guided(client: &mut Client<Device>) -> Option<&mut Guided> {
-        let world: &mut dyn Any = client.transport().simulation()?.world();
-        world.downcast_mut()
+/// Takes the object off the table: what is shown is the way, and a hand that is guided would push it over. The first
+/// demonstration keeps it, because its grasp ends beside it.
+fn clear_the_table(options: &mut SimulationOptions) {
+    #[cfg(feature = "mujoco")]
+    if options.lesson != TaughtMovement::SmallTorch {
+        options.scene = sim::world::mujoco::Scene::EMPTY;
     }
-
-    /// The way is shown without the object: a person who leads the hand would push it over, and what is shown is the way. The
-    /// first lesson keeps it, because its grasp ends beside it.
-    pub(super) fn clear_the_table(options: &mut SimulationOptions) {
-        if options.lesson != TaughtMovement::SmallTorch {
-            options.scene = Scene::EMPTY;
-        }
-    }
-
-    /// Tells the simulated person to begin; `false` if there is none.
-    pub(super) fn begin_guiding(client: &mut Client<Device>) -> bool {
-        let Some(world) = guided(client) else {
-            return false;
-        };
-        world.teacher_mut().begin();
-        true
-    }
-
-    pub(super) fn guiding_is_over(client: &mut Client<Device>) -> bool {
-        guided(client).is_some_and(|world| world.teacher().stage() == Stage::Done)
-    }
-
-    /// Where the simulated person's path begins.
-    pub(super) fn default_posture(client: &mut Client<Device>, lesson: super::LessonName) -> Option<super::Posture> {
-        guided(client)?;
-        Some(lesson.lesson().start().map(|angle| angle as f32))
-    }
+    let _ = options;
 }
 
-/// Without MuJoCo nobody stands beside the arm.
-#[cfg(not(feature = "mujoco"))]
-mod person {
-    use lab::client::Client;
-    use lab::device::Device;
-    use lab::simulation::SimulationOptions;
-
-    pub(super) fn clear_the_table(_options: &mut SimulationOptions) {}
-
-    pub(super) fn begin_guiding(_client: &mut Client<Device>) -> bool {
-        false
-    }
-
-    pub(super) fn guiding_is_over(_client: &mut Client<Device>) -> bool {
-        false
-    }
-
-    pub(super) fn default_posture(_client: &mut Client<Device>, _lesson: super::LessonName) -> Option<super::Posture> {
-        None
-    }
+/// Where the simulated teacher's path begins, if there is one.
+fn default_posture(client: &mut Client<Device>, lesson: LessonName) -> Option<Posture> {
+    teacher::is_present(client).then(|| lesson.lesson().start().map(|angle| angle as f32))
 }
-
-use person::{begin_guiding, clear_the_table, default_posture, guiding_is_over};
 
 /// Seven numbers separated by commas.
 pub(super) fn posture(text: &str) -> Result<Posture, String> {

@@ -146,7 +146,7 @@ fn ready_to_run(options: &SimulationOptions, primitive: &PrimitiveFile) -> Clien
 }
 
 fn request(primitive: &PrimitiveFile) -> RunRequest {
-    RunRequest::new(expect(Name::new(&primitive.name)), primitive.duration, procedure::Mode::Adapt.options())
+    RunRequest::new(expect(Name::new(&primitive.name)), primitive.duration, procedure::Mode::Adaptive.options())
 }
 
 #[test]
@@ -171,7 +171,7 @@ fn a_sensor_error_within_the_dead_band_neither_moves_the_plan_nor_makes_the_hand
     };
     for seed in 1..=3 {
         let arm = Arm { engine: engine("sil:"), kind: PlantKind::Honest, variation: Variation::default(), seed };
-        let (bent, taught) = (touchless(&arm, procedure::Mode::Adapt), touchless(&arm, procedure::Mode::Open));
+        let (bent, taught) = (touchless(&arm, procedure::Mode::Adaptive), touchless(&arm, procedure::Mode::OpenLoop));
         let approach = BEFORE_CLOSING * RATE as usize;
         assert!(bent.len() > approach && taught.len() > approach, "{} {}", bent.len(), taught.len());
         let apart = bent.iter().zip(&taught).take(approach).map(|(one, other)| {

@@ -76,6 +76,11 @@ impl<R: Real> HandDrive<R> {
         self.state.filter(|state| !state.is_lost())
     }
 
+    /// True while a move that a person asked for is under way.
+    pub fn is_moving(&self) -> bool {
+        matches!(&self.aim, Aim::Move(motion, _) if !motion.is_finished())
+    }
+
     /// Takes the present gauges as zero.
     pub fn tare(&mut self) {
         self.estimator.tare();

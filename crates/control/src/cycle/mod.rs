@@ -13,7 +13,6 @@ mod laws;
 pub mod record;
 mod transitions;
 
-use dmp::Primitive;
 use pinned_init::{Init, init};
 use puck::SafetyMode;
 
@@ -33,6 +32,7 @@ use crate::model::arm::ArmModel;
 use crate::model::calibration::{Calibration, Payload};
 use crate::model::kinematics::Frames;
 use crate::plan::load::{Fit, LoadRefusal, Loaded};
+use crate::plan::primitive::Primitive;
 use crate::plan::run::FADE;
 use crate::real::Real;
 use crate::sense::joints::{JointEstimator, JointState};
@@ -149,6 +149,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// Returns the payload of the arm that this cycle controls.
     pub fn payload(&self) -> Payload {
         self.calibration.payload
+    }
+
+    /// True while the hand makes a move of its own, outside a run.
+    pub fn moves_hand(&self) -> bool {
+        self.hand.is_moving()
     }
 
     /// True if the wrench has a zero; see [`WrenchEstimator::is_tared`].

@@ -5,7 +5,7 @@ use link::frame::LINK_TIMEOUT_MS;
 
 /// What to do with a request, by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Turn {
+pub(super) enum RequestOrder {
     /// Handle it.
     New,
     /// It has been answered before: answer again.
@@ -16,7 +16,7 @@ pub enum Turn {
 
 /// The host that has the session.
 #[derive(Debug)]
-pub struct Owner {
+pub(super) struct Owner {
     session: u16,
     heard_ms: u32,
     newest: u16,
@@ -25,46 +25,46 @@ pub struct Owner {
 
 impl Owner {
     /// A host whose hello had this number.
-    pub fn new(session: u16, sequence: u16, now_ms: u32) -> Self {
+    pub(super) fn new(session: u16, sequence: u16, now_ms: u32) -> Self {
         Self { session, heard_ms: now_ms, newest: sequence, answer: None }
     }
 
     /// Its session number.
-    pub fn session(&self) -> u16 {
+    pub(super) fn session(&self) -> u16 {
         self.session
     }
 
     /// For how long it has not been heard, ms.
-    pub fn silence(&self, now_ms: u32) -> u32 {
+    pub(super) fn silence(&self, now_ms: u32) -> u32 {
         now_ms.wrapping_sub(self.heard_ms)
     }
 
     /// How long another host must wait to take over, ms; 0 if it need not.
-    pub fn protected_for(&self, now_ms: u32) -> u32 {
+    pub(super) fn protected_for(&self, now_ms: u32) -> u32 {
         LINK_TIMEOUT_MS.saturating_sub(self.silence(now_ms))
     }
 
     /// Notes that it was heard, and says what to do with its request of this number.
-    pub fn turn(&mut self, sequence: u16, now_ms: u32) -> Turn {
+    pub(super) fn order(&mut self, sequence: u16, now_ms: u32) -> RequestOrder {
         self.heard_ms = now_ms;
         if sequence == self.newest {
-            return if self.answer().is_some() { Turn::Again } else { Turn::Ignore };
+            return if self.answer().is_some() { RequestOrder::Again } else { RequestOrder::Ignore };
         }
         // Numbers wrap: one that is "behind" by less than half the circle is old.
         if sequence.wrapping_sub(self.newest) >= 0x8000 {
-            return Turn::Ignore;
+            return RequestOrder::Ignore;
         }
         self.newest = sequence;
-        Turn::New
+        RequestOrder::New
     }
 
     /// The answer to the newest request, if there was one already.
-    pub fn answer(&self) -> Option<&Reply> {
+    pub(super) fn answer(&self) -> Option<&Reply> {
         self.answer.as_ref().filter(|answer| answer.answers() == Some(self.newest))
     }
 
     /// Keeps the answer to the newest request.
-    pub fn remember(&mut self, answer: Reply) {
+    pub(super) fn remember(&mut self, answer: Reply) {
         if answer.answers() == Some(self.newest) {
             self.answer = Some(answer);
         }

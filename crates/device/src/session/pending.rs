@@ -13,7 +13,7 @@ const ANSWER_TIMEOUT_MS: u32 = 100;
 
 /// Who waits for an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Asker {
+pub(super) enum Requester {
     /// Nobody: the device itself sent the command.
     Device,
     /// The host that had the session.
@@ -24,7 +24,7 @@ pub enum Asker {
         of: u16,
     },
     /// A host without a session, which may do nothing but stop.
-    Stranger {
+    OtherHost {
         /// The session number in its request.
         session: u16,
         /// Number of its request.
@@ -34,36 +34,36 @@ pub enum Asker {
 
 /// Commands without an answer, oldest first.
 #[derive(Debug, Default)]
-pub struct Pending(Deque<(Asker, u32), PENDING>);
+pub(super) struct Pending(Deque<(Requester, u32), PENDING>);
 
 impl Pending {
-    /// Whether another command can be tracked.
-    pub fn has_room(&self, stop: bool) -> bool {
+    /// True if another command can be tracked.
+    pub(super) fn has_room(&self, stop: bool) -> bool {
         self.0.len() + usize::from(!stop) < PENDING
     }
 
-    /// Whether the control half owes an answer.
-    pub fn is_empty(&self) -> bool {
+    /// True if the control half owes no answer.
+    pub(super) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
     /// A command has been queued.
-    pub fn push(&mut self, asker: Asker, now_ms: u32) {
+    pub(super) fn push(&mut self, requester: Requester, now_ms: u32) {
         // `has_room` was asked before; without room the answer would find nobody, and be ignored.
-        let _ = self.0.push_back((asker, now_ms));
+        let _ = self.0.push_back((requester, now_ms));
     }
 
     /// The oldest command has been answered: who asked? `None`: no command was on its way.
-    pub fn answered(&mut self) -> Option<Asker> {
-        self.0.pop_front().map(|(asker, _)| asker)
+    pub(super) fn answered(&mut self) -> Option<Requester> {
+        self.0.pop_front().map(|(requester, _)| requester)
     }
 
     /// Takes out the oldest command if it has waited too long: who asked, and how long ago, ms.
-    pub fn expired(&mut self, now_ms: u32) -> Option<(Asker, u32)> {
+    pub(super) fn expired(&mut self, now_ms: u32) -> Option<(Requester, u32)> {
         let waited = now_ms.wrapping_sub(self.0.front()?.1);
         if waited < ANSWER_TIMEOUT_MS {
             return None;
         }
-        self.0.pop_front().map(|(asker, _)| (asker, waited))
+        self.0.pop_front().map(|(requester, _)| (requester, waited))
     }
 }

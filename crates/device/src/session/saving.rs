@@ -1,104 +1,69 @@
 //! A change of the store on its way to being durable: the host is answered when it is.
 
-use link::{Refusal, Reply};
+use link::Refusal;
 
-use super::Session;
-use super::directory::{Directory, Entry};
-use super::owner::Owner;
-use super::upload::Refused;
-use crate::port::SessionPort;
+use crate::application::{Refused, Saved, SessionPort};
+use crate::controller::DeviceController;
+use crate::session::arm::ArmApplication;
+use crate::session::directory::{Directory, Entry};
 use crate::store::{Store, StoreError};
 
 /// For how long after start-up a hello waits for the store to be open, ms. Reading a flash in order takes a tenth of it; one
 /// that must first be repaired takes seconds, and then the host is told so instead of waiting.
-const OPENING_PATIENCE_MS: u32 = 1000;
-
-/// A change under way.
-#[derive(Debug)]
-pub(super) struct Saving {
-    /// Session and number of the request.
-    asker: Option<(u16, u16)>,
-    change: Change,
-}
+const OPENING_TIMEOUT_MS: u32 = 1000;
 
 /// What changes.
 #[derive(Debug)]
-enum Change {
+pub(super) enum Change {
     /// A place of the library.
     Place {
         slot: u8,
         /// What will stand there: nothing after a delete.
         entry: Option<Entry>,
-        /// The session's primitive is still that of the image.
+        /// The primitive that was built is still that of the image.
         built: bool,
     },
     /// The home of the arm.
     Home,
 }
 
-impl Saving {
-    /// The session's primitive is going to be another one.
-    pub(super) fn building(&mut self) {
-        if let Change::Place { built, .. } = &mut self.change {
+impl Change {
+    /// The primitive that was built for the change under way is going to be another one.
+    pub(super) fn note_building(saving: &mut Option<Self>) {
+        if let Some(Change::Place { built, .. }) = saving {
             *built = false;
         }
     }
 }
 
-impl<S: Store> Session<S> {
-    /// Notes who asked for the change of a place that the store has begun. The answer comes from [`Self::settle`].
-    pub(super) fn save(&mut self, of: u16, slot: u8, entry: Option<Entry>) {
-        self.note(of, Change::Place { slot, built: entry.is_some(), entry });
-    }
-
-    /// The same for a change of the home.
-    pub(super) fn save_home(&mut self, of: u16) {
-        self.note(of, Change::Home);
-    }
-
-    fn note(&mut self, of: u16, change: Change) {
-        let asker = self.owner.as_ref().map(|owner| (owner.session(), of));
-        self.saving = Some(Saving { asker, change });
-    }
-
-    /// Whether a place is being emptied.
+impl<S: Store> ArmApplication<S> {
+    /// True while a place is being emptied.
     pub(super) fn is_deleting(&self, place: u8) -> bool {
-        let change = self.saving.as_ref().map(|saving| &saving.change);
-        matches!(change, Some(Change::Place { slot, entry: None, .. }) if *slot == place)
+        matches!(&self.saving, Some(Change::Place { slot, entry: None, .. }) if *slot == place)
     }
 
-    /// Whether requests must wait because the store does not know yet what it holds.
+    /// True while requests must wait because the store does not know yet what it holds.
     pub(super) fn is_opening(&mut self, now_ms: u32) -> bool {
         if !self.opened && self.store.is_open() {
             self.opened = true;
             self.directory = Directory::read(&self.store);
         }
-        !self.opened && now_ms < OPENING_PATIENCE_MS
+        !self.opened && now_ms < OPENING_TIMEOUT_MS
     }
 
-    /// Answers the host whose change has become durable, or has failed.
-    pub(super) fn settle(&mut self, now_ms: u32, port: &mut impl SessionPort) {
-        let Some(outcome) = self.store.finished() else { return };
-        let Some(Saving { asker, change }) = self.saving.take() else { return };
-        let mut changed = None;
+    /// The change that has become durable, or has failed, since the last call.
+    pub(super) fn settle(&mut self, calm: bool, port: &mut impl SessionPort<DeviceController>) -> Option<Saved> {
+        let outcome = self.store.finished()?;
+        let change = self.saving.take()?;
+        let mut place = None;
         if let (Ok(()), Change::Place { slot, entry, built }) = (outcome, change) {
             self.replace(slot, entry);
             if built {
-                self.preload(slot, port);
+                self.preload(slot, calm, port);
             }
-            changed = Some(slot);
+            place = Some(slot);
         }
-        let of = asker.filter(|(session, _)| self.owner.as_ref().map(Owner::session) == Some(*session));
-        if let Some((_, of)) = of {
-            let reply = match outcome.map_err(|error| -> Refused { error.into() }) {
-                Ok(()) => Reply::Accepted { of },
-                Err((reason, detail)) => Reply::Refused { of, reason, detail },
-            };
-            self.answer(now_ms, reply, port);
-        }
-        if let Some(slot) = changed {
-            self.store_changed(now_ms, slot, port);
-        }
+        Some(Saved { outcome: outcome.map_err(Refused::from), place })
     }
 
     /// Notes what stands at a place now.

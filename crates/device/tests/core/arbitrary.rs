@@ -1,7 +1,7 @@
 //! A6, C2: whatever comes over the bus and from people, in whatever order, the core neither panics nor sends torque early.
 
 use control::Command as Control;
-use device::{Command, Core, Stage};
+use device::{Command, Controller, DeviceController, Stage};
 use proptest::prelude::*;
 use puck::{CanFrame, CanId, Counts, Node, PuckTorque, SafetyMode};
 
@@ -89,7 +89,7 @@ fn happening() -> impl Strategy<Value = Happening> {
     ]
 }
 
-fn happen(core: &mut Core, bus: &mut Bus, happening: &Happening) {
+fn happen(core: &mut DeviceController, bus: &mut Bus, happening: &Happening) {
     match happening {
         Happening::Frame(frame) => bus.inject(*frame),
         Happening::Position(joint, counts) => bus.pucks[*joint].position = Counts(*counts),

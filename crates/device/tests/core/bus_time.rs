@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use device::{Core, Slot};
+use device::{DeviceController, Slot};
 use puck::CanFrame;
 
 use crate::double::{Bus, holding_with_ready_hand};
@@ -95,7 +95,7 @@ fn played(jobs: &[Job]) -> f64 {
 }
 
 /// Runs cycles; the largest sum and the latest end, us.
-fn measure(core: &mut Core, bus: &mut Bus, cycles: usize) -> (f64, f64, BTreeMap<usize, usize>) {
+fn measure(core: &mut DeviceController, bus: &mut Bus, cycles: usize) -> (f64, f64, BTreeMap<usize, usize>) {
     bus.run_to(core, Slot::Request);
     let (mut sum, mut end, mut counts) = (0.0_f64, 0.0_f64, BTreeMap::new());
     for _ in 0..cycles {

@@ -1,7 +1,7 @@
 //! The cyclic loop: rounds, torque authority, and every way in which it ends.
 
 use control::{Command, Fault, State};
-use device::{Core, EventKind, Slot, Stage};
+use device::{Controller, DeviceController, EventKind, Slot, Stage};
 use puck::device::{position_frame, reply16};
 use puck::{CanFrame, CanId, Counts, Destination, GaugeStatus, Node, PropertyId, PuckTorque};
 
@@ -14,7 +14,7 @@ fn has_torque(bus: &Bus, since: usize) -> bool {
     bus.torques_since(since).any(|torque| torque != PuckTorque::ZERO)
 }
 
-fn lost(core: &Core) -> u32 {
+fn lost(core: &DeviceController) -> u32 {
     core.health().counters.lost_replies
 }
 

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 
 use crate::digit::Digit;
 use control::CycleRecord;
-use device::{Command, Core, CoreIo, Event, EventKind, Slot, Stage};
+use device::{Command, Controller, ControllerIo, DeviceController, Event, EventKind, Slot, Stage};
 use link::HandStage;
 use pinned_init::InPlaceWrite;
 use puck::device::{force_frame, position_frame, reply16, reply32, safety_broadcast, torque_frame};
@@ -201,7 +201,7 @@ impl Bus {
     }
 
     /// Runs the core for some slots of 1/900 s.
-    pub(crate) fn run_slots(&mut self, core: &mut Core, slots: usize) {
+    pub(crate) fn run_slots(&mut self, core: &mut DeviceController, slots: usize) {
         for _ in 0..slots {
             self.now_us = self.ticks * 1_000_000 / 900;
             self.on_the_wire.sort_by_key(|(due, _)| *due);
@@ -215,12 +215,12 @@ impl Bus {
     }
 
     /// Runs the core for this long, s.
-    pub(crate) fn run(&mut self, core: &mut Core, seconds: f64) {
+    pub(crate) fn run(&mut self, core: &mut DeviceController, seconds: f64) {
         self.run_slots(core, (seconds * 900.0) as usize);
     }
 
     /// Runs until the core has reached a stage; panics after ten seconds.
-    pub(crate) fn run_until(&mut self, core: &mut Core, stage: Stage) {
+    pub(crate) fn run_until(&mut self, core: &mut DeviceController, stage: Stage) {
         for _ in 0..9_000 {
             if core.stage() == stage {
                 return;
@@ -231,7 +231,7 @@ impl Bus {
     }
 
     /// Runs until the next slot is this one.
-    pub(crate) fn run_to(&mut self, core: &mut Core, slot: Slot) {
+    pub(crate) fn run_to(&mut self, core: &mut DeviceController, slot: Slot) {
         while self.slot != slot {
             self.run_slots(core, 1);
         }
@@ -447,7 +447,7 @@ impl Bus {
     }
 }
 
-impl CoreIo for Bus {
+impl ControllerIo<DeviceController> for Bus {
     fn receive(&mut self) -> Option<CanFrame> {
         self.received.pop_front()
     }
@@ -479,13 +479,13 @@ impl CoreIo for Bus {
 pub(crate) const HOME: [f32; 7] = [0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0];
 
 /// A core that has just got power.
-pub(crate) fn silent_device() -> Box<Core> {
-    let Ok(core) = Box::new_uninit().write_init(Core::init());
+pub(crate) fn silent_device() -> Box<DeviceController> {
+    let Ok(core) = Box::new_uninit().write_init(DeviceController::init());
     core
 }
 
 /// A core and its bus, started, zeroed at home and waiting for Shift-Activate.
-pub(crate) fn started() -> (Box<Core>, Bus) {
+pub(crate) fn started() -> (Box<DeviceController>, Bus) {
     let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.commands.push_back(Command::Zero { home: HOME });
@@ -494,7 +494,7 @@ pub(crate) fn started() -> (Box<Core>, Bus) {
 }
 
 /// A core and its bus with a hand, activated, holding; the hand is not initialised.
-pub(crate) fn holding_with_hand() -> (Box<Core>, Bus) {
+pub(crate) fn holding_with_hand() -> (Box<DeviceController>, Bus) {
     let (mut core, mut bus) = (silent_device(), Bus::idle().with_hand());
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.commands.push_back(Command::Zero { home: [0.1, 0.5, 0.1, 1.5, 0.1, 0.2, 0.1] });
@@ -509,7 +509,7 @@ pub(crate) fn holding_with_hand() -> (Box<Core>, Bus) {
 }
 
 /// The same, with an initialised hand.
-pub(crate) fn holding_with_ready_hand() -> (Box<Core>, Bus) {
+pub(crate) fn holding_with_ready_hand() -> (Box<DeviceController>, Bus) {
     let (mut core, mut bus) = holding_with_hand();
     bus.commands.push_back(Command::InitialiseHand);
     bus.run(&mut core, 7.0);
@@ -518,7 +518,7 @@ pub(crate) fn holding_with_ready_hand() -> (Box<Core>, Bus) {
 }
 
 /// The same as [`started`], activated and floating under gravity compensation away from the joint limits.
-pub(crate) fn floating() -> (Box<Core>, Bus) {
+pub(crate) fn floating() -> (Box<DeviceController>, Bus) {
     let (mut core, mut bus) = (silent_device(), Bus::idle());
     bus.run_until(&mut core, Stage::WaitingForZero);
     bus.commands.push_back(Command::Zero { home: [0.1, 0.5, 0.1, 1.5, 0.1, 0.2, 0.1] });

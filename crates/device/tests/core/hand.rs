@@ -1,7 +1,7 @@
 //! The hand: found, woken, initialised by a person alone, read and driven in every cycle, and lost without the arm.
 
 use control::{Command as Control, State, flags};
-use device::{Command, EventKind, HandTrouble, Refusal, Slot, Stage};
+use device::{Command, Controller, EventKind, HandTrouble, Refusal, Slot, Stage};
 use link::HandStage;
 use puck::hand::angles;
 use puck::{
@@ -187,6 +187,31 @@ fn an_initialisation_that_does_not_end_fails_and_is_braked() {
     bus.commands.push_back(Command::InitialiseHand);
     bus.run(&mut core, 7.0);
     assert_eq!(core.health().hand, HandStage::Ready);
+}
+
+#[test]
+fn g11_the_hand_moves_in_its_initialisation_and_in_a_move_and_a_stop_ends_both() {
+    let (mut core, mut bus) = holding_with_hand();
+    assert!(!core.health().hand_moves);
+    bus.commands.push_back(Command::InitialiseHand);
+    bus.run(&mut core, 0.5);
+    assert!(core.health().hand_moves, "it is being initialised");
+    bus.commands.push_back(Control::Stop.into());
+    bus.run(&mut core, 0.1);
+    assert!(!core.health().hand_moves);
+
+    let (mut core, mut bus) = holding_with_ready_hand();
+    assert!(!core.health().hand_moves);
+    move_hand(&mut bus);
+    bus.run(&mut core, 0.5);
+    assert!(core.health().hand_moves, "it moves for a second");
+    bus.run(&mut core, 1.0);
+    assert!(!core.health().hand_moves, "it has arrived");
+    move_hand(&mut bus);
+    bus.run(&mut core, 0.1);
+    bus.commands.push_back(Control::Stop.into());
+    bus.run(&mut core, 0.1);
+    assert!(!core.health().hand_moves);
 }
 
 #[test]

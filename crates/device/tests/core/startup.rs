@@ -1,6 +1,6 @@
 //! From power-up to a cyclic loop, and all the reasons not to get there.
 
-use device::{Command, EventKind, Refusal, Stage, StartupError};
+use device::{Command, Controller, EventKind, Refusal, Stage, StartupError};
 use puck::{
     Action, CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId, PropertyTable, PuckTorque,
     Request, SafetyMode, set, zero_torques,

@@ -1,7 +1,7 @@
 //! Requests for the control half, and what it tells.
 
 use control::{Fault, State};
-use device::{Command, Counters, EventKind, HandTrouble, Refusal as Core, Stage};
+use device::{Command, Counters, EventKind, HandTrouble, Refusal as ControlRefusal, Stage};
 use link::message::{AccelerationSource, PoseFeedback};
 use link::{Event, EventKind as LinkKind, Goal, HandStage, Name, Refusal, Reply, Request, RunOptions, Telemetry};
 use proptest::prelude::*;
@@ -184,23 +184,23 @@ fn numbers_that_are_none_never_reach_the_control_half() {
 
 #[test]
 fn every_refusal_of_the_control_half_reaches_the_host() {
-    let control = |reason| Core::Control(reason);
+    let control = |reason| ControlRefusal::Control(reason);
     let pairs = [
         (control(control::Refusal::WrongState), Refusal::State, [State::Hold.code().into(), 0]),
         (control(control::Refusal::FaultLatched), Refusal::Faulted, [Fault::JointSpeed.code().into(), 0]),
         (control(control::Refusal::SafetyNotActive), Refusal::SafetyMode, [2, 0]),
         (control(control::Refusal::StartTooFar), Refusal::FarFromStart, [0, 0]),
         (control(control::Refusal::OutsideWorkspace), Refusal::OutsideWorkspace, [0, 0]),
-        (Core::NotReady(Stage::Waking), Refusal::NotReady, [Stage::Waking.code().into(), 0]),
-        (Core::NotReady(Stage::WaitingForZero), Refusal::NotZeroed, [0, 0]),
-        (Core::ZeroNeedsIdle, Refusal::ZeroNeedsIdle, [0, 0]),
-        (Core::HomeOutOfRange { joint: 3 }, Refusal::BadValue, [3, 0]),
+        (ControlRefusal::NotReady(Stage::Waking), Refusal::NotReady, [Stage::Waking.code().into(), 0]),
+        (ControlRefusal::NotReady(Stage::WaitingForZero), Refusal::NotZeroed, [0, 0]),
+        (ControlRefusal::ZeroNeedsIdle, Refusal::ZeroNeedsIdle, [0, 0]),
+        (ControlRefusal::HomeOutOfRange { joint: 3 }, Refusal::BadValue, [3, 0]),
         (control(control::Refusal::NoExpectation), Refusal::NoExpectation, [0, 0]),
         (control(control::Refusal::HandTooFar), Refusal::HandFarFromStart, [0, 0]),
         (control(control::Refusal::ForceAtRest), Refusal::ForceAtRest, [0, 0]),
         (control(control::Refusal::NoHand), Refusal::HandNotReady, [HandStage::NotInitialised.code().into(), 0]),
-        (Core::NoHand, Refusal::HandNotReady, [HandStage::NotInitialised.code().into(), 0]),
-        (Core::HandBusy, Refusal::HandBusy, [0, 0]),
+        (ControlRefusal::NoHand, Refusal::HandNotReady, [HandStage::NotInitialised.code().into(), 0]),
+        (ControlRefusal::HandBusy, Refusal::HandBusy, [0, 0]),
     ];
     let mut rig = Rig::greeted();
     rig.cycle(1, Fault::JointSpeed);
@@ -231,7 +231,7 @@ fn answers_find_their_requests_in_order() {
     let first = rig.sequence;
     assert_eq!(rig.ask(Request::Hold), None);
     let second = rig.sequence;
-    rig.event(EventKind::Refused(Core::Control(control::Refusal::Moving)));
+    rig.event(EventKind::Refused(ControlRefusal::Control(control::Refusal::Moving)));
     rig.event(EventKind::Accepted);
     let answers: Vec<Reply> = rig.sent().into_iter().map(|frame| frame.message).collect();
     let refused = Reply::Refused { of: first, reason: Refusal::Moving, detail: [0, 0] };
@@ -257,7 +257,7 @@ fn an_answer_to_a_host_that_is_gone_is_not_given_to_the_next_one() {
     rig.number = 88;
     rig.greet();
     assert_eq!(rig.ask(Request::Gravity), None);
-    rig.event(EventKind::Refused(Core::Control(control::Refusal::Moving)));
+    rig.event(EventKind::Refused(ControlRefusal::Control(control::Refusal::Moving)));
     assert_eq!(rig.answer(), None, "that was the answer to the hold of the other host");
     rig.event(EventKind::Accepted);
     assert_eq!(rig.answer(), Some(Reply::Accepted { of: rig.sequence }));

@@ -198,6 +198,54 @@ fn c10_a_moving_arm_is_stopped_when_its_host_falls_silent_for_half_a_second() {
 }
 
 #[test]
+fn g5_a_second_host_does_not_inherit_the_motion_of_a_silent_one() {
+    let mut rig = Rig::greeted();
+    rig.bench.state = State::Run;
+    // The hello is on the line when the session looks for the first time after the half second.
+    rig.now_ms += 500;
+    (rig.number, rig.sequence) = (88, 0);
+    rig.greet();
+    assert_eq!(rig.bench.commands, [Command::Control(control::Command::Stop)]);
+}
+
+#[test]
+fn g5_no_host_is_admitted_while_the_stop_of_a_silent_one_finds_no_room() {
+    let mut rig = Rig::greeted();
+    rig.bench.state = State::Run;
+    rig.bench.stuck = true;
+    rig.now_ms += 500;
+    (rig.number, rig.sequence) = (88, 0);
+    assert_eq!(rig.ask(Request::Hello(hello())), None, "it waits");
+    rig.bench.stuck = false;
+    rig.poll();
+    assert_eq!(rig.bench.commands, [Command::Control(control::Command::Stop)]);
+    assert!(matches!(rig.answer(), Some(Reply::Hello { .. })));
+}
+
+#[test]
+fn g5_a_host_that_follows_a_goodbye_at_once_does_not_inherit_the_motion() {
+    let mut rig = Rig::greeted();
+    rig.bench.state = State::Run;
+    rig.bench.room = 0;
+    rig.ask(Request::Goodbye);
+    (rig.number, rig.sequence) = (88, 0);
+    rig.ask(Request::Hello(hello()));
+    rig.bench.room = 4096;
+    rig.poll();
+    assert_eq!(rig.bench.commands, [Command::Control(control::Command::Stop)]);
+}
+
+#[test]
+fn g11_a_hand_that_moves_is_stopped_when_its_host_falls_silent_for_half_a_second() {
+    let mut rig = Rig::greeted();
+    rig.bench.hand_moves = true;
+    rig.wait(499);
+    assert!(rig.bench.commands.is_empty());
+    rig.wait(1);
+    assert_eq!(rig.bench.commands, [Command::Control(control::Command::Stop)]);
+}
+
+#[test]
 fn a_stop_after_silence_is_sent_once_and_tried_again_while_the_queue_is_full() {
     let mut rig = Rig::greeted();
     rig.bench.state = State::Run;

@@ -6,8 +6,8 @@ use control::model::{ArmModel, Frames};
 use control::units::JointPositions;
 use control::{CycleRecord, Fault, LoadRefusal, Payload, State};
 use device::{
-    Command, Counters, Event, EventKind, FitPrimitive, Health, Identity, QueueFull, RamStore, Session, SessionPort,
-    Stage, StoredPrimitive, TimedRecord, Timing,
+    Command, Counters, DeviceController, Event, EventKind, FitPrimitive, Health, Identity, QueueFull, RamStore,
+    Session, SessionPort, Stage, StoredPrimitive, TimedRecord, Timing,
 };
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame};
 use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
@@ -48,6 +48,8 @@ pub(crate) struct Bench {
     pub(crate) state: State,
     /// Its latched fault.
     pub(crate) fault: Fault,
+    /// The hand moves by itself.
+    pub(crate) hand_moves: bool,
     /// What is mounted on its arm.
     pub(crate) payload: Payload,
     /// Where its arm was zeroed.
@@ -56,7 +58,7 @@ pub(crate) struct Bench {
     pub(crate) counters: Counters,
 }
 
-impl SessionPort for Bench {
+impl SessionPort<DeviceController> for Bench {
     fn send(&mut self, bytes: &[u8]) {
         assert!(bytes.len() <= self.room, "the session sent more than there was room for");
         self.line.extend_from_slice(bytes);
@@ -77,7 +79,7 @@ impl SessionPort for Bench {
     fn load(&mut self, fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
         assert_ne!(self.state, State::Run, "a primitive was exchanged under a run");
         self.load?;
-        self.loaded.push(fit.primitive().duration());
+        self.loaded.push(fit.primitive().movement().duration());
         self.primitive = Some(fit.primitive().clone());
         Ok(())
     }
@@ -105,6 +107,7 @@ impl SessionPort for Bench {
             pendant: Some(0x0F3F_1249),
             temperatures: [Some(30), None, None, None, None, None, Some(35)],
             hand: HandStage::NotInitialised,
+            hand_moves: self.hand_moves,
             hand_temperatures: [Some(31), None, None, Some(34)],
             counters: self.counters,
         }
@@ -116,7 +119,7 @@ impl SessionPort for Bench {
 }
 
 /// A session with its bench and one host.
-pub(crate) struct Rig<S = Store> {
+pub(crate) struct Rig<S: device::Store = Store> {
     /// The session under test.
     pub(crate) session: Box<Session<S>>,
     /// What is around it.
@@ -166,6 +169,7 @@ impl<S: device::Store> Rig<S> {
             load: Ok(()),
             state: State::Hold,
             fault: Fault::None,
+            hand_moves: false,
             payload: Payload::SensorAndHand,
             zeroed_at: None,
             counters: Counters::default(),

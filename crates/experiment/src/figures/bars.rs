@@ -1,10 +1,12 @@
 //! Bars side by side: one quantity in every cell, mode against mode.
 
-use super::drawing::{Anchor, Colour, Drawing, Frame, GREY, GRID, INK, LIMIT, colour, plain, ticks};
+use lab::plot::drawing::{Anchor, Colour, Drawing, Frame, GREY, GRID, INK, LIMIT, plain, ticks};
+
+use super::colour;
 use crate::grid::Grid;
-use crate::mode::Mode;
 use crate::outcome::Measures;
 use crate::results::Results;
+use lab::procedure::Mode;
 
 const LEFT: f64 = 96.0;
 const TOP: f64 = 128.0;
@@ -51,7 +53,7 @@ pub fn by_cell(
 
 /// The names and colours of modes as members of the groups.
 pub fn members(modes: &[Mode]) -> Vec<(String, Colour)> {
-    modes.iter().map(|mode| (format!("({mode}) {}", mode.name()), colour(*mode))).collect()
+    modes.iter().map(|mode| (format!("({mode}) {}", mode.title()), colour(*mode))).collect()
 }
 
 /// Diagrams below each other; `members` names the bars of a group, `below` what the groups are.

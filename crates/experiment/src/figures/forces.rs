@@ -1,6 +1,8 @@
 //! How hard the object was pushed before the fingers closed, against the force that tips it over.
 
-use super::drawing::{Anchor, Drawing, Frame, GREY, GRID, INK, LIMIT, colour, plain, ticks};
+use lab::plot::drawing::{Anchor, Drawing, Frame, GREY, GRID, INK, LIMIT, plain, ticks};
+
+use super::colour;
 use crate::results::Results;
 
 /// Bars over the whole range.
@@ -57,7 +59,7 @@ pub fn draw(results: &Results, title: &str, tipping: Option<f64>) -> Drawing {
         }
         frame.axes(&mut drawing);
         let side = frame.right() + 24.0;
-        drawing.text([side, corner[1] + 36.0], format!("({mode}) {}", mode.name()), 17, Anchor::Start, colour(*mode));
+        drawing.text([side, corner[1] + 36.0], format!("({mode}) {}", mode.title()), 17, Anchor::Start, colour(*mode));
         let below = tipping.map(|tipping| values.iter().filter(|value| **value < tipping).count());
         let words = match below {
             Some(below) => format!("{below} of {} trials stay below", values.len()),

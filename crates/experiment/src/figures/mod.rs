@@ -1,7 +1,6 @@
 //! Figures of an experiment.
 
 pub mod bars;
-pub mod drawing;
 pub mod forces;
 pub mod paths;
 pub mod series;
@@ -14,12 +13,26 @@ mod write;
 #[cfg(feature = "mujoco")]
 pub use write::{FigureError, write, write_lift};
 
+use lab::plot::drawing::{Colour, GREY};
+use lab::procedure::Mode;
+
+/// The colour of a mode, the same in every figure.
+pub fn colour(mode: Mode) -> Colour {
+    match mode {
+        Mode::Track => GREY,
+        Mode::OpenLoop => "#D55E00",
+        Mode::ForceControl => "#E9B44C",
+        Mode::Adaptive => "#0072B2",
+        Mode::RigidFingers => "#009E73",
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::grid::Grid;
     use crate::made_up;
-    use crate::mode::Mode;
+    use lab::procedure::Mode;
 
     /// Set this to a folder to look at the figures with made-up data.
     const LOOK: &str = "TACTUS_FIGURES";

@@ -1,6 +1,8 @@
 //! The ways of the hand seen from above, with the objects it met.
 
-use super::drawing::{Anchor, Drawing, Frame, GREY, INK, colour};
+use lab::plot::drawing::{Anchor, Drawing, Frame, GREY, INK};
+
+use super::colour;
 use crate::grid::{ApproachFrame, Grid};
 use crate::results::{Report, Results};
 
@@ -69,7 +71,7 @@ pub fn draw(
         drawing.dashed(&way, INK, 2.6, [9.0, 5.0]);
         drawing.circle(panel.at([0.0, 0.0]), 5.0, Some(INK), Some(("#ffffff", 1.5)));
         panel.axes(&mut drawing);
-        let count = format!("({mode}) {}: {} of {}", mode.name(), held.len(), held.len() + lost.len());
+        let count = format!("({mode}) {}: {} of {}", mode.title(), held.len(), held.len() + lost.len());
         drawing.text([corner[0], TOP - 14.0], count, 17, Anchor::Start, colour(*mode));
         let middle = corner[0] + size[0] / 2.0;
         drawing.text([middle, panel.bottom() + 52.0], "along the approach, cm", 16, Anchor::Middle, INK);

@@ -1,8 +1,10 @@
 //! One trial in closed loop against the same in open loop: forces with their expected band, pose, fingers. The paper's figure 4.
 
-use super::drawing::{Anchor, BAND, Drawing, Frame, GREY, INK, colour};
-use crate::mode::Mode;
+use lab::plot::drawing::{Anchor, BAND, Drawing, Frame, GREY, INK};
+
+use super::colour;
 use crate::trace::{CHANNELS, Cycle, Trace};
+use lab::procedure::Mode;
 
 const LEFT: f64 = 96.0;
 const TOP: f64 = 132.0;
@@ -111,8 +113,8 @@ fn legend(drawing: &mut Drawing, runs: &[(Mode, &Trace)], band: bool) {
     let (mut x, y) = (LEFT, 84.0);
     for (mode, _) in runs {
         drawing.line(&[[x, y], [x + 44.0, y]], colour(*mode), 2.6);
-        drawing.text([x + 54.0, y + 6.0], mode.name(), 16, Anchor::Start, INK);
-        x += 54.0 + 8.6 * mode.name().len() as f64 + 40.0;
+        drawing.text([x + 54.0, y + 6.0], mode.title(), 16, Anchor::Start, INK);
+        x += 54.0 + 8.6 * mode.title().len() as f64 + 40.0;
     }
     drawing.dashed(&[[x, y], [x + 44.0, y]], GREY, 1.8, [6.0, 4.0]);
     drawing.text([x + 54.0, y + 6.0], "planned", 16, Anchor::Start, INK);
@@ -183,7 +185,7 @@ fn band(drawing: &mut Drawing, frame: &Frame, channel: usize, expected: &Expecte
 fn range(panel: &Panel, runs: &[(Mode, &Trace)], expected: Option<&Expected>) -> [f64; 2] {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     let mut take = |values: Vec<f64>| {
-        let at = |share| crate::statistics::quantile(&values, share);
+        let at = |share| crate::quantile::quantile(&values, share);
         if let (Some(least), Some(most)) = (at(0.005), at(0.995)) {
             (low, high) = (low.min(least), high.max(most));
         }

@@ -1,10 +1,12 @@
 //! Where the object could stand and was still grasped: the paper's figure 5, with three regions.
 
-use super::drawing::{Anchor, Colour, Drawing, Frame, GREY, INK, PALE, colour, plain};
+use lab::plot::drawing::{Anchor, Colour, Drawing, Frame, GREY, INK, PALE, plain};
+
+use super::colour;
 use crate::grid::Grid;
 use crate::map::short;
-use crate::mode::Mode;
 use crate::results::Results;
+use lab::procedure::Mode;
 
 /// Pixels per millimetre of the grid.
 const SCALE: f64 = 2.75;
@@ -111,6 +113,7 @@ fn legend(drawing: &mut Drawing, results: &Results, grid: &Grid, [x, top]: [f64;
     for (rank, mode) in results.modes().into_iter().enumerate() {
         drawing.rectangle([x, y], [28.0, 28.0], colour(mode));
         let words = match (mode, rank) {
+            (Mode::Track, _) => "with stiff position control",
             (Mode::OpenLoop, _) => "already in open loop",
             (Mode::ForceControl, _) => "with force control",
             (Mode::Adaptive, _) => "only with adaptation of the movement",
@@ -146,7 +149,7 @@ mod tests {
         let mut results = made_up::results(&[1, 2]);
         for report in results.reports.iter_mut().filter(|report| report.key.index == 5) {
             let held = match report.key.mode {
-                Mode::OpenLoop => false,
+                Mode::Track | Mode::OpenLoop => false,
                 Mode::ForceControl => report.key.seed == 1,
                 Mode::Adaptive | Mode::RigidFingers => true,
             };

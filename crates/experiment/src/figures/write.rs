@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use super::series::Expected;
 use super::{bars, forces, paths, series, strip, success_map};
 use crate::lift::{Carried, Case};
-use crate::mode::Mode;
 use crate::outcome::Measures;
 use crate::runner::{Experiment, telling};
 use crate::trace::CHANNELS;
@@ -13,6 +12,7 @@ use crate::trial::Trial;
 use crate::{Config, Scenario, comparison};
 use lab::plot::PlotError;
 use lab::primitive_file::PrimitiveFile;
+use lab::procedure::Mode;
 
 /// Points of an expected curve.
 const EXPECTED_POINTS: usize = 200;
@@ -53,7 +53,7 @@ pub fn write(
     let title = config.object.row().title;
     let radius = config.object_at(&experiment.prepared.frame, Default::default()).foot_radius();
     let mut written = Vec::new();
-    let mut put = |drawing: super::drawing::Drawing, name: &str| -> Result<(), FigureError> {
+    let mut put = |drawing: lab::plot::drawing::Drawing, name: &str| -> Result<(), FigureError> {
         drawing.write(folder, name)?;
         written.push(folder.join(format!("{name}.svg")));
         written.push(folder.join(format!("{name}.png")));

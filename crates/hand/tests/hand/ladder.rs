@@ -5,7 +5,7 @@ use dmp::Scalar;
 use hand::number::real;
 use link::{EventKind, HandStage, Name, Refusal, Reply, Request, RunOptions};
 use puck::device::reply32;
-use puck::{Action, MotorMode, Node, PropertyId, Status};
+use puck::{Action, Group, MotorMode, Node, PropertyId, Status};
 use sim::FingerObstacle;
 
 use crate::common::Movement;
@@ -53,7 +53,8 @@ fn hand_is_found_and_moves_only_after_a_persons_word() {
     rig.plant.record_bus();
     rig.wait(5.0, |rig| rig.health().hand == HandStage::NotInitialised);
     rig.run(1.0);
-    assert_eq!(torques(&rig).len(), 0, "torque without a command");
+    assert!(torques(&rig).iter().all(|units| *units == [0; 4]), "torque without a command");
+    rig.plant.take_recorded();
     assert_eq!(rig.refusal(Request::MoveHand { q: [0.1; 4], duration: 0.0 }), Refusal::HandNotReady);
     rig.accept(Request::InitialiseHand);
     rig.wait(20.0, |rig| rig.health().hand == HandStage::Ready);
@@ -62,6 +63,37 @@ fn hand_is_found_and_moves_only_after_a_persons_word() {
     assert_eq!((rig.health().state, torques(&rig).len()), (State::Idle, 0));
     assert_eq!(rig.plant.trace().invalid, 0);
     assert_eq!(rig.plant.lost_requests(), 0, "requests came too fast for the pucks");
+}
+
+#[test]
+fn g3_a_hand_device_that_restarts_takes_off_the_torque_before_it_asks_anything() {
+    // The pucks still apply what the old life commanded, perhaps in MODE TORQUE.
+    let mut rig = Rig::new(OBJECT);
+    let zero = puck::packed_torques(Group::HAND, PropertyId::TORQUE, [puck::PuckTorque::ZERO; 4]);
+    let idle = puck::set(Group::HAND, PropertyId::MODE, MotorMode::Idle.value());
+    rig.run(0.01);
+    assert_eq!(rig.sent[..2], [zero, idle]);
+}
+
+#[test]
+fn g5_a_second_host_does_not_inherit_the_motion_of_a_silent_hand_host() {
+    let mut rig = gripping(adapt());
+    rig.run(1.0);
+    rig.change_hosts();
+    rig.run(0.05);
+    assert_eq!(rig.health().state, State::SoftStop);
+}
+
+#[test]
+fn g11_an_initialisation_whose_host_dies_ends_after_half_a_second() {
+    let mut rig = Rig::new(OBJECT);
+    rig.wait(5.0, |rig| rig.health().hand == HandStage::NotInitialised);
+    rig.accept(Request::InitialiseHand);
+    rig.alive = false;
+    rig.run(0.45);
+    assert_eq!(rig.health().hand, HandStage::Initialising);
+    rig.run(0.1);
+    assert_eq!(rig.health().hand, HandStage::NotInitialised);
 }
 
 #[test]
@@ -121,7 +153,7 @@ fn lost_replies_are_bridged_for_five_cycles_and_end_the_torque_in_the_sixth() {
     for (cycles, survives) in [(1, true), (5, true), (7, false)] {
         let mut rig = gripping(adapt());
         rig.run(1.0);
-        let from = rig.health().cycle;
+        let from = rig.health().cycle as u32;
         let before = rig.now().torque;
         let left = std::cell::Cell::new(0);
         let begin = std::cell::OnceCell::new();
@@ -227,6 +259,23 @@ fn a_puck_that_reports_its_reset_is_a_fault_that_ends_with_clearing_and_initiali
     rig.wait(20.0, |rig| rig.health().hand == HandStage::Ready);
     rig.accept(run(adapt()));
     rig.wait(6.0, |rig| rig.health().state == State::Hold);
+}
+
+#[test]
+fn a10_bus_off_ends_the_torque_of_a_hand_alone_and_latches() {
+    let mut rig = gripping(adapt());
+    rig.run(1.0);
+    rig.bus_off();
+    rig.plant.record_bus();
+    rig.run(0.02);
+    assert_eq!((rig.health().state, rig.health().fault), (State::Fault, Fault::BusFault));
+    assert!(torques(&rig).iter().all(|units| *units == [0; 4]) && !torques(&rig).is_empty(), "zeros, then silence");
+    let told = rig.heard.iter().any(|reply| {
+        matches!(reply, Reply::Event(event) if event.kind == EventKind::State && event.detail == u32::from(Fault::BusFault.code()))
+    });
+    assert!(told, "the host hears of it");
+    rig.accept(Request::ClearFault);
+    rig.accept(Request::MoveHand { q: [0.0; 4], duration: 1.0 });
 }
 
 #[test]

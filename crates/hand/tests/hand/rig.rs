@@ -2,11 +2,15 @@
 
 use std::collections::VecDeque;
 
+use control::LoadRefusal;
 use device::time::{CYCLE_SLOTS, SLOT_HZ};
-use device::{Identity, QueueFull, Slot, Timing};
-use hand::{Command, Core, CoreIo, Event, FingerPrimitive, Health, Library, Record, Session, SessionPort, TimedRecord};
-use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
+use device::{
+    Controller, ControllerIo, Health, HostSession, Identity, Message, QueueFull, SessionPort, Slot, TimedRecord, Timing,
+};
+use hand::{Command, DeviceController, FingerPrimitive, HandApplication, Library, Record, Session};
+use link::frame::{self, Decoder, Envelope, FRAME_BYTES, LINK_TIMEOUT_MS};
 use link::{HostHello, LINK_VERSION, Reply, Request, SCHEMA_HASH, Text};
+use pinned_init::InPlaceWrite;
 use puck::CanFrame;
 use sim::{FingerObstacle, FreeJoints, HOME, Plant, PlantConfig, TICKS_PER_MICROSECOND, Ticks};
 
@@ -25,11 +29,11 @@ struct Queues {
     received: VecDeque<CanFrame>,
     sent: Vec<CanFrame>,
     commands: VecDeque<Command>,
-    records: VecDeque<TimedRecord>,
-    events: VecDeque<Event>,
+    records: VecDeque<TimedRecord<Record>>,
+    events: VecDeque<Message>,
 }
 
-impl CoreIo for Queues {
+impl ControllerIo<DeviceController> for Queues {
     fn receive(&mut self) -> Option<CanFrame> {
         self.received.pop_front()
     }
@@ -43,18 +47,18 @@ impl CoreIo for Queues {
     fn record(&mut self, record: Record) {
         self.records.push_back(TimedRecord { record, cost_ticks: 0 });
     }
-    fn event(&mut self, event: Event) {
+    fn event(&mut self, event: Message) {
         self.events.push_back(event);
     }
 }
 
 struct Port<'a> {
     queues: &'a mut Queues,
-    core: &'a mut Core,
+    core: &'a mut DeviceController,
     line: &'a mut Vec<u8>,
 }
 
-impl SessionPort for Port<'_> {
+impl SessionPort<DeviceController> for Port<'_> {
     fn send(&mut self, bytes: &[u8]) {
         self.line.extend_from_slice(bytes);
     }
@@ -65,13 +69,13 @@ impl SessionPort for Port<'_> {
         self.queues.commands.push_back(command);
         Ok(())
     }
-    fn load(&mut self, primitive: &FingerPrimitive) -> bool {
+    fn load(&mut self, primitive: &FingerPrimitive) -> Result<(), LoadRefusal> {
         self.core.load(primitive)
     }
-    fn record(&mut self) -> Option<TimedRecord> {
+    fn record(&mut self) -> Option<TimedRecord<Record>> {
         self.queues.records.pop_front()
     }
-    fn event(&mut self) -> Option<Event> {
+    fn event(&mut self) -> Option<Message> {
         self.queues.events.pop_front()
     }
     fn health(&mut self) -> Health {
@@ -85,11 +89,21 @@ impl SessionPort for Port<'_> {
 /// Whether a frame that is through at this time is lost.
 type Loss = Box<dyn FnMut(&CanFrame, u64) -> bool>;
 
+/// A hello that fits.
+fn hello() -> Request {
+    Request::Hello(HostHello {
+        link_version: LINK_VERSION,
+        schema_hash: SCHEMA_HASH,
+        model_hash: control::MODEL_HASH,
+        owner: Text::new("rig"),
+    })
+}
+
 /// Device, bus and host in one.
 pub(crate) struct Rig {
     pub(crate) plant: Plant,
-    core: Core,
-    session: Session<'static>,
+    core: DeviceController,
+    session: Box<Session<'static>>,
     queues: Queues,
     slot: Slot,
     ticks: u64,
@@ -101,6 +115,8 @@ pub(crate) struct Rig {
     pub(crate) heard: Vec<Reply>,
     /// Every record.
     pub(crate) records: Vec<Record>,
+    /// Every frame the device sent.
+    pub(crate) sent: Vec<CanFrame>,
     /// Frames from the bus that this takes away do not arrive.
     pub(crate) lose: Loss,
 }
@@ -114,10 +130,11 @@ impl Rig {
         let identity =
             Identity { firmware: "test", board: "test", serial: "test", simulated: true, ticks_per_second: 25_000_000 };
         let library: &'static mut Library = Box::leak(Box::new(Library::EMPTY));
+        let Ok(session) = Box::new_uninit().write_init(HostSession::over(identity, HandApplication::new(library)));
         let mut rig = Rig {
             plant: Plant::new(config, Box::new(world)),
-            core: Core::new(),
-            session: Session::new(identity, library),
+            core: DeviceController::new(),
+            session,
             queues: Queues::default(),
             slot: Slot::Request,
             ticks: 10 * SLOT_TICKS,
@@ -126,15 +143,10 @@ impl Rig {
             alive: true,
             heard: Vec::new(),
             records: Vec::new(),
+            sent: Vec::new(),
             lose: Box::new(|_, _| false),
         };
-        let hello = HostHello {
-            link_version: LINK_VERSION,
-            schema_hash: SCHEMA_HASH,
-            model_hash: control::MODEL_HASH,
-            owner: Text::new("rig"),
-        };
-        assert!(matches!(rig.ask(Request::Hello(hello)), Reply::Hello { .. }));
+        assert!(matches!(rig.ask(hello()), Reply::Hello { .. }));
         rig
     }
 
@@ -179,6 +191,7 @@ impl Rig {
             self.heard.push(frame.message);
         }
         for frame in self.queues.sent.drain(..) {
+            self.sent.push(frame);
             self.plant.submit(now, frame);
         }
         self.slot = self.slot.next();
@@ -191,6 +204,11 @@ impl Rig {
     /// A frame arrives beside those of the simulated bus, in the next slot.
     pub(crate) fn hear(&mut self, frame: CanFrame) {
         self.queues.received.push_back(frame);
+    }
+
+    /// The CAN controller leaves the bus, and comes back at once.
+    pub(crate) fn bus_off(&mut self) {
+        self.core.note_bus_error(true);
     }
 
     /// So many seconds.
@@ -225,6 +243,19 @@ impl Rig {
         self.put(Envelope { session: 999, sequence: OF, time_ms: 0 }, &request);
         self.run(0.1);
         self.heard.iter().find(|reply| reply.answers() == Some(OF)).expect("an answer").clone()
+    }
+
+    /// The host says its last word. Another one says hello just when the half second has passed in which the first was silent.
+    pub(crate) fn change_hosts(&mut self) {
+        self.alive = false;
+        let milliseconds = |rig: &Rig| (rig.ticks / TICKS_PER_MICROSECOND / 1000) as u32;
+        let last = milliseconds(self);
+        self.accept(Request::Ping);
+        while milliseconds(self) < last + LINK_TIMEOUT_MS {
+            self.step();
+        }
+        let time_ms = milliseconds(self);
+        self.put(Envelope { session: 8, sequence: 1, time_ms }, &hello());
     }
 
     fn put(&mut self, envelope: Envelope, request: &Request) {

@@ -1,4 +1,5 @@
-//! Draws panels on a page and writes it as SVG or PNG: the only file that knows the plotting crate.
+//! Draws panels on a page and writes it as SVG or PNG. This file and `drawing.rs` are the only ones that know the plotting
+//! crate.
 //!
 //! The look is decided here once: white page, thin open axes, grey grid, one font (shipped inside the plotting
 //! crate), the Okabe-Ito colours that people with any kind of colour blindness tell apart, and line styles that
@@ -302,7 +303,7 @@ fn thin(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 /// Cuts a curve into dashes of constant length on the page; `scale` is px per unit of x and of y.
-fn dashes(points: &[(f64, f64)], pattern: (f64, f64), scale: (f64, f64)) -> Vec<Vec<(f64, f64)>> {
+pub(super) fn dashes(points: &[(f64, f64)], pattern: (f64, f64), scale: (f64, f64)) -> Vec<Vec<(f64, f64)>> {
     let mut pieces: Vec<Vec<(f64, f64)>> = Vec::new();
     let mut piece: Vec<(f64, f64)> = points.first().copied().into_iter().collect();
     let mut drawing = true;

@@ -1,6 +1,7 @@
-//! Figures: demonstration, plan and execution of a movement on one page.
+//! Figures: pages of panels, free drawings, and demonstration, plan and execution of a movement on one page.
 
 pub mod canvas;
+pub mod drawing;
 pub mod movement;
 
 use std::path::{Path, PathBuf};

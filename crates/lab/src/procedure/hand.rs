@@ -6,7 +6,8 @@ use control::State;
 use link::HandStage;
 
 use super::ProcedureError;
-use crate::client::{Client, Incoming};
+use super::wait::{Ends, pass};
+use crate::client::Client;
 use crate::device::Device;
 
 /// Longest initialisation, s; it takes about five.
@@ -56,7 +57,7 @@ pub fn initialise_hand(client: &mut Client<Device>) -> Result<HandStage, Procedu
     }
     let deadline = client.now() + Duration::from_secs(INITIALISATION);
     loop {
-        look(client)?;
+        pass(client, LOOK, Ends::OnFault)?;
         match client.status()?.hand_stage {
             HandStage::Ready => return Ok(HandStage::Ready),
             HandStage::Absent => return Err(ProcedureError::Hand("a puck of it does not answer any more")),
@@ -80,7 +81,7 @@ pub fn move_hand(client: &mut Client<Device>, q: [f32; 4]) -> Result<HandReach, 
     let started = client.now();
     let (mut last, mut moved) = (client.status()?.hand, started);
     loop {
-        look(client)?;
+        pass(client, LOOK, Ends::OnFault)?;
         let hand = client.status()?.hand;
         let distance = |to: &[f32; 4]| hand.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         if distance(&q) < NEAR {
@@ -95,18 +96,4 @@ pub fn move_hand(client: &mut Client<Device>, q: [f32; 4]) -> Result<HandReach, 
             return Err(ProcedureError::TooLong { what: "moving the hand", seconds: LONGEST_MOVE });
         }
     }
-}
-
-/// Lets a moment pass. Telemetry and events of that time are dropped, except those that end the procedure.
-fn look(client: &mut Client<Device>) -> Result<(), ProcedureError> {
-    let end = client.now() + LOOK;
-    while client.now() < end {
-        if let Some(Incoming::Event(event)) = client.next(end.saturating_sub(client.now()))?
-            && event.kind == link::EventKind::State
-            && event.detail != 0
-        {
-            super::after(event.code, event.detail)?;
-        }
-    }
-    Ok(())
 }

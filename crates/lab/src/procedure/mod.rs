@@ -2,17 +2,25 @@
 
 mod calibrate;
 mod hand;
+mod mode;
 mod ready;
 mod recorder;
+mod rehearse;
 mod run;
+mod teach;
 mod travel;
+mod wait;
 
 pub use calibrate::{HomeCorrection, correct_home};
 pub use hand::{HandReach, initialise_hand, move_hand};
+pub use mode::Mode;
 pub use ready::{Readiness, make_ready, start_up};
 pub use recorder::{Recorder, Take, recording_row, recording_text};
-pub use run::{CHANNELS, Change, ChangeKind, FlagCounts, Mode, RunOutcome, RunRequest, Surprise, play};
-pub use travel::{after, drives_arm, go_to_start, travel, wait_for};
+pub use rehearse::play_once;
+pub use run::{CHANNELS, Change, ChangeKind, FlagCounts, RunOutcome, RunRequest, Surprise, play};
+pub use teach::{Demonstrated, record_demonstration, teacher};
+pub use travel::{drives_arm, go_to_start, travel};
+pub use wait::{Ends, after, pass, wait_for};
 
 use control::Fault;
 

@@ -6,10 +6,10 @@
 use std::time::Duration;
 
 use control::{Fault, State, flags};
-use link::message::PoseFeedback;
 use link::{Event, EventKind, Goal, Name, RunOptions, Telemetry};
 
-use super::{ProcedureError, after};
+use super::ProcedureError;
+use super::wait::after;
 use crate::client::{Client, Incoming};
 use crate::demonstration::RATE;
 use crate::device::Device;
@@ -20,54 +20,6 @@ const SILENCE: Duration = Duration::from_secs(1);
 
 /// Longest time a run may take beyond its planned duration, s: what settling against friction and contact takes, and more.
 const PATIENCE: f64 = 5.0;
-
-/// How force enters a run: the three modes that the paper compares, and the stiff one for a new primitive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, clap::ValueEnum, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Mode {
-    /// Position control with stiff gains; forces change nothing
-    #[default]
-    Track,
-    /// (a) Open loop: compliant gains, forces change nothing
-    Open,
-    /// (b) Force control: compliant gains and the controller of Eq (12)
-    Force,
-    /// (c) Force control, and the plan adapts to what is felt (Eq 8)
-    Adapt,
-}
-
-impl Mode {
-    /// The modes of the paper, in its order.
-    pub const PAPER: [Mode; 3] = [Mode::Open, Mode::Force, Mode::Adapt];
-
-    /// The options of a run in this mode, at the taught speed and goal. All modes of the paper have the same gains and close
-    /// the position loop over the planned pose, so that only the use of force differs between them.
-    pub fn options(self) -> RunOptions {
-        let compliant = self != Mode::Track;
-        RunOptions {
-            feedback: self == Mode::Adapt,
-            force_control: matches!(self, Mode::Force | Mode::Adapt),
-            pose_feedback: if compliant { PoseFeedback::Planned } else { PoseFeedback::Measured },
-            compliant,
-            ..RunOptions::default()
-        }
-    }
-
-    /// Whether the mode compares forces with an expectation.
-    pub fn needs_expectation(self) -> bool {
-        matches!(self, Mode::Force | Mode::Adapt)
-    }
-
-    /// The word for people and files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Mode::Track => "track",
-            Mode::Open => "open",
-            Mode::Force => "force",
-            Mode::Adapt => "adapt",
-        }
-    }
-}
 
 /// Something that changes while a primitive runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -133,7 +85,7 @@ pub struct Surprise {
 }
 
 /// Names of the channels that an experience compares.
-pub const CHANNELS: [&str; dmp::EXPERIENCE_CHANNELS] = [
+pub const CHANNELS: [&str; control::plan::primitive::STATISTICS_CHANNELS] = [
     "force x",
     "force y",
     "force z",

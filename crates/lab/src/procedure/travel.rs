@@ -1,12 +1,14 @@
-//! Waiting for motions to end.
+//! Moves to a posture and to the start of a primitive.
 
 use std::time::Duration;
 
-use control::{Fault, State};
-use link::{EventKind, HandStage, Name, Refusal, Request};
+use control::State;
+use link::{HandStage, Name, Refusal, Request};
 
-use super::{HandReach, ProcedureError, move_hand};
-use crate::client::{Client, Incoming};
+use super::ProcedureError;
+use super::hand::{HandReach, move_hand};
+use super::wait::{Ends, pass, wait_for};
+use crate::client::Client;
 use crate::device::Device;
 use crate::error::HostError;
 use crate::primitive_file::Waypoint;
@@ -26,7 +28,7 @@ pub fn travel(client: &mut Client<Device>, q: [f32; 7], progress: impl FnMut(f64
     // Torque begins with holding: from rest the arm must first carry itself before it may move.
     if State::from_code(client.status()?.state) != Some(State::Hold) {
         client.hold()?;
-        pass(client, LET_GO)?;
+        pass(client, LET_GO, Ends::OnAnyStop)?;
     }
     client.take_events();
     client.approach(q, 0.0)?;
@@ -82,62 +84,5 @@ pub fn drives_arm(client: &mut Client<Device>, held: &Name) -> Result<bool, Host
         Ok(_) => Ok(true),
         Err(HostError::Refused { reason, .. }) => Ok(reason != Refusal::NoArm),
         Err(error) => Err(error),
-    }
-}
-
-/// Waits until a motion that was just commanded has arrived.
-///
-/// # Errors
-/// As [`travel`].
-pub fn wait_for(
-    what: &'static str,
-    seconds: u64,
-    client: &mut Client<Device>,
-    mut progress: impl FnMut(f64),
-) -> Result<(), ProcedureError> {
-    let started = client.now();
-    loop {
-        let passed = client.now().saturating_sub(started);
-        if passed > Duration::from_secs(seconds) {
-            client.stop()?;
-            return Err(ProcedureError::TooLong { what, seconds });
-        }
-        progress(passed.as_secs_f64());
-        let Some(Incoming::Event(event)) = client.next(Duration::from_millis(100))? else {
-            continue;
-        };
-        match event.kind {
-            EventKind::Arrived => return Ok(()),
-            EventKind::State => after(event.code, event.detail)?,
-            _ => {}
-        }
-    }
-}
-
-/// Lets time pass; the arm must not leave its state meanwhile.
-fn pass(client: &mut Client<Device>, time: Duration) -> Result<(), ProcedureError> {
-    let end = client.now() + time;
-    while client.now() < end {
-        if let Some(Incoming::Event(event)) = client.next(end.saturating_sub(client.now()))?
-            && event.kind == EventKind::State
-        {
-            after(event.code, event.detail)?;
-        }
-    }
-    Ok(())
-}
-
-/// Whether a state entered during a motion ends it.
-pub fn after(code: u16, detail: u32) -> Result<(), ProcedureError> {
-    let state = u8::try_from(code).ok().and_then(State::from_code);
-    let fault = u8::try_from(detail).ok().and_then(Fault::from_code).unwrap_or(Fault::None);
-    match state {
-        Some(State::Idle | State::SoftStop | State::Fault) if fault != Fault::None => {
-            Err(ProcedureError::Stopped(fault))
-        }
-        Some(state @ (State::Idle | State::SoftStop | State::Fault | State::Gravity)) => {
-            Err(ProcedureError::Diverted(state.name()))
-        }
-        _ => Ok(()),
     }
 }

@@ -1,6 +1,6 @@
 //! The device's application without a bus: what comes is put in, what it sends is taken out, slot by slot.
 
-use device::{Core, Identity, RamStore, STORE_SLOTS, Session, Slot};
+use device::{Controller, DeviceController, Identity, RamStore, STORE_SLOTS, Session, Slot};
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
 use sim::{TICKS_PER_MICROSECOND, Ticks};
@@ -10,7 +10,7 @@ use crate::simulation::halves::{FIRST_SLOT, LINE_ROOM, Port, Queues, SLOT_TICKS}
 
 /// The application of a device at power-up, and the time of its next slot.
 pub(super) struct Engine {
-    core: Box<Core>,
+    core: Box<DeviceController>,
     session: Box<Session<RamStore<STORE_SLOTS, IMAGE_BYTES_LIMIT>>>,
     queues: Queues,
     slot: Slot,
@@ -29,7 +29,7 @@ impl Engine {
             ticks_per_second: sim::TICKS_PER_SECOND as u32,
         };
         Self {
-            core: boxed(Core::init()),
+            core: boxed(DeviceController::init()),
             session: boxed(Session::init(identity, RamStore::new())),
             queues: Queues::default(),
             slot: Slot::Request,

@@ -1,7 +1,7 @@
 //! A log played to the device's application: what the pucks and the host said is said again, and what the device then says is
 //! compared with what it said in the log.
 //!
-//! The application is the real one, `device::Core` and `device::Session`. It begins at power-up, so the log must too. Orders of a
+//! The application is the real one, `device::DeviceController` and `device::Session`. It begins at power-up, so the log must too. Orders of a
 //! person come from the host; a log that holds the host's bus as well as the arm's holds them all.
 
 mod clock;

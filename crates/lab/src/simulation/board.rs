@@ -4,18 +4,19 @@
 //! people stay on this side, as with QEMU. The end of its input is the power switch: it then writes bank 2 and its report.
 
 use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use sim::{Lockstep, LockstepError, PlainLine, Plant, Ticks};
 
-use super::options::{FlashSource, SimulationOptions};
+use super::board_can::RECORD_BYTES;
+use super::options::{BoardEngine, FlashSource, SimulationOptions};
 use super::seat::Seat;
 use super::words::Words;
 use super::{Execute, SimulationError};
 use crate::image_file::{ImageFile, ImageFileError};
-use crate::transport::{ChipOptions, LineKind, RECORD_BYTES};
+use crate::transport::LineKind;
 
 /// The board whose image the emulator executes, as its image says it.
 const BOARD: &str = "nucleo-h743zi2";
@@ -26,47 +27,34 @@ const END_PATIENCE: Duration = Duration::from_secs(10);
 /// Exit status of an emulator that cannot begin: its options or the image are not to its liking.
 const REFUSED: i32 = 2;
 
-/// The emulator, the image, and what befalls the chip.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct BoardEngine {
-    /// The emulator, a program.
-    pub emulator: PathBuf,
-    /// The image, an ELF file.
-    pub image: PathBuf,
-    /// What the chip is, and what befalls it.
-    pub chip: ChipOptions,
-}
-
-impl BoardEngine {
-    /// The words for the emulator.
-    fn command(&self, options: &SimulationOptions) -> Result<Command, SimulationError> {
-        let mut command = Command::new(&self.emulator);
-        command.arg("serve").arg("--image").arg(&self.image);
-        match &options.flash {
-            FlashSource::New => {}
-            FlashSource::File(path) => {
-                command.arg("--bank2").arg(path);
-            }
-            FlashSource::Chip(_) => return Err(SimulationError::FlashOfItsOwn),
+/// The words for the emulator.
+fn command(engine: &BoardEngine, options: &SimulationOptions) -> Result<Command, SimulationError> {
+    let mut command = Command::new(&engine.emulator);
+    command.arg("serve").arg("--image").arg(&engine.image);
+    match &options.flash {
+        FlashSource::New => {}
+        FlashSource::File(path) => {
+            command.arg("--bank2").arg(path);
         }
-        command.args(["--host-line", if options.line == LineKind::Can { "can" } else { "serial" }]);
-        let files = [("--log", &options.firmware_log), ("--report", &options.board_report)];
-        for (name, file) in files {
-            if let Some(path) = file {
-                command.arg(name).arg(path);
-            }
-        }
-        if let Some(reading) = self.chip.cancellation {
-            command.args(["--cancellation", reading.word()]);
-        }
-        if let Some(revision) = self.chip.revision {
-            command.args(["--revision", &format!("{revision:#06x}")]);
-        }
-        for fault in &self.chip.faults {
-            command.args(["--fault", fault]);
-        }
-        Ok(command)
+        FlashSource::Chip(_) => return Err(SimulationError::FlashOfItsOwn),
     }
+    command.args(["--host-line", if options.line == LineKind::Can { "can" } else { "serial" }]);
+    let files = [("--log", &options.firmware_log), ("--report", &options.board_report)];
+    for (name, file) in files {
+        if let Some(path) = file {
+            command.arg(name).arg(path);
+        }
+    }
+    if let Some(reading) = engine.chip.cancellation {
+        command.args(["--cancellation", reading.word()]);
+    }
+    if let Some(revision) = engine.chip.revision {
+        command.args(["--revision", &format!("{revision:#06x}")]);
+    }
+    for fault in &engine.chip.faults {
+        command.args(["--fault", fault]);
+    }
+    Ok(command)
 }
 
 /// A running emulator and the streams to it.
@@ -86,8 +74,7 @@ impl EmulatedBoard {
         plant: &mut Plant,
     ) -> Result<Self, SimulationError> {
         check_image(&engine.image)?;
-        let mut child = engine
-            .command(options)?
+        let mut child = command(engine, options)?
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

@@ -4,7 +4,10 @@ use std::collections::VecDeque;
 
 use control::{CycleRecord, LoadRefusal};
 use device::time::{CYCLE_SLOTS, SLOT_HZ};
-use device::{Command, Core, CoreIo, Event, FitPrimitive, Health, QueueFull, SessionPort, TimedRecord, Timing};
+use device::{
+    Command, Controller, ControllerIo, DeviceController, Event, FitPrimitive, Health, QueueFull, SessionPort,
+    TimedRecord, Timing,
+};
 use puck::CanFrame;
 use sim::Ticks;
 
@@ -36,7 +39,7 @@ pub(crate) struct Queues {
     events: VecDeque<Event>,
 }
 
-impl CoreIo for Queues {
+impl ControllerIo<DeviceController> for Queues {
     fn receive(&mut self) -> Option<CanFrame> {
         self.received.pop_front()
     }
@@ -65,14 +68,14 @@ impl CoreIo for Queues {
 /// The low-priority half's view while it is polled.
 pub(crate) struct Port<'a> {
     pub(crate) queues: &'a mut Queues,
-    pub(crate) core: &'a mut Core,
+    pub(crate) core: &'a mut DeviceController,
     /// Where its bytes go.
     pub(crate) line: &'a mut Vec<u8>,
     /// Bytes the line still takes.
     pub(crate) room: usize,
 }
 
-impl SessionPort for Port<'_> {
+impl SessionPort<DeviceController> for Port<'_> {
     fn send(&mut self, bytes: &[u8]) {
         self.line.extend_from_slice(bytes);
         self.room = self.room.saturating_sub(bytes.len());

@@ -1,11 +1,12 @@
 //! Simulated devices: the co-controller's real application against the simulated bus and world, in virtual time.
 //!
-//! Three engines run the application. `InProcess` calls `device::Core` and `device::Session` directly (`sil:`); `Qemu` runs the
+//! Three engines run the application. `InProcess` calls `device::DeviceController` and `device::Session` directly (`sil:`); `Qemu` runs the
 //! firmware image under QEMU and exchanges frames with it in lock step (`sim:`); `EmulatedBoard` does so with the image for the real board
 //! on an emulated STM32H743 (`board:`). Either way nothing moves unless the host waits: virtual time advances only inside [`Transport::receive`], so a whole session is one deterministic sequence of events, whatever
 //! the load of the machine.
 
 mod board;
+mod board_can;
 mod bus_log;
 mod error;
 pub(crate) mod halves;
@@ -13,15 +14,17 @@ mod in_process;
 mod options;
 mod qemu;
 mod seat;
+mod simulated_can;
 mod words;
 
-pub use board::BoardEngine;
+pub use board_can::BoardCan;
 pub use error::SimulationError;
 pub use halves::{CYCLE_TICKS, SLOT_TICKS};
 pub use options::{
-    BOARD_EMULATOR_VARIABLE, BOARD_IMAGE_VARIABLE, DEFAULT_SEED, Engine, FlashSource, GRIPPED, HAND_IMAGE_VARIABLE,
-    IMAGE_VARIABLE, SimulationOptions, WorldKind, built_image,
+    BOARD_EMULATOR_VARIABLE, BOARD_IMAGE_VARIABLE, BoardEngine, DEFAULT_SEED, Engine, FlashSource, GRIPPED,
+    HAND_IMAGE_VARIABLE, IMAGE_VARIABLE, SimulationOptions, WorldKind, built_image,
 };
+pub use simulated_can::{HostBus, SimulatedCan};
 
 use std::time::Duration;
 

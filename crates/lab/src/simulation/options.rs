@@ -9,8 +9,8 @@ use sim::world::HOME;
 use sim::world::mujoco::{Imperfections, MujocoWorld, Scene};
 use sim::{FingerObstacle, FreeJoints, PlantConfig, World};
 
-use super::{BoardEngine, SimulationError};
-use crate::transport::{LineKind, SimulatorKind, SimulatorOptions};
+use super::SimulationError;
+use crate::transport::{ChipOptions, LineKind, SimulatorKind, SimulatorOptions};
 
 /// Environment variable that names the firmware image for QEMU.
 pub const IMAGE_VARIABLE: &str = "TACTUS_IMAGE";
@@ -29,6 +29,17 @@ pub const GRIPPED: FingerObstacle = FingerObstacle { inner: f64::INFINITY, outer
 
 /// Seed of a simulation that was given none.
 pub const DEFAULT_SEED: u64 = 1;
+
+/// The emulator, the image, and what befalls the chip.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BoardEngine {
+    /// The emulator, a program.
+    pub emulator: PathBuf,
+    /// The image, an ELF file.
+    pub image: PathBuf,
+    /// What the chip is, and what befalls it.
+    pub chip: ChipOptions,
+}
 
 /// What executes the co-controller's application.
 #[derive(Debug, Clone, PartialEq, Eq)]

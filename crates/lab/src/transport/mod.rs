@@ -5,6 +5,7 @@
 //! nothing in a simulated session depends on how busy the machine is.
 
 mod address;
+mod address_error;
 pub mod can;
 mod options;
 mod serial;
@@ -12,9 +13,9 @@ mod stream;
 
 use std::time::Duration;
 
-pub use address::{Address, AddressError, SimulatorKind};
-pub(crate) use can::RECORD_BYTES;
-pub use can::{BoardCan, CanTransport, CanTrouble, SimulatedCan, SocketCan};
+pub use address::{Address, SimulatorKind};
+pub use address_error::AddressError;
+pub use can::{CanProblem, CanTransport, SocketCan};
 pub use options::{BoardOptions, Cancellation, ChipOptions, LineKind, SimulatorOptions};
 pub use serial::SerialTransport;
 pub use stream::StreamTransport;
@@ -88,7 +89,7 @@ pub enum TransportError {
     Io(#[source] std::io::Error),
     /// A CAN interface cannot be used.
     #[error(transparent)]
-    Can(#[from] CanTrouble),
+    Can(#[from] CanProblem),
     /// A simulator could not be started or ended unexpectedly.
     #[error("{0}")]
     Other(#[source] Box<dyn std::error::Error + Send + Sync>),

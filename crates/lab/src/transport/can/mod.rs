@@ -1,13 +1,11 @@
 //! `can:`: the link's bytes as frames on a CAN bus, real or simulated.
 //!
-//! [`CanTransport`] cuts and joins the stream as `link::can` says; a [`CanPort`] sends and receives frames. Three ports exist:
-//! [`SocketCan`], Linux' own CAN interfaces; [`SimulatedCan`], a bus in virtual time with a simulated device on it; and [`BoardCan`], the
-//! bus inside the emulated board.
+//! [`CanTransport`] cuts and joins the stream as `link::can` says; a [`CanPort`] sends and receives frames. Three ports
+//! exist: [`SocketCan`], Linux' own CAN interfaces, and two of `simulation`: a bus in virtual time with a simulated device
+//! on it, and the bus inside the emulated board.
 
-mod board;
-mod simulated;
+mod problem;
 mod socket;
-mod trouble;
 
 use std::time::Duration;
 
@@ -17,11 +15,8 @@ use puck::{CanFrame, CanId};
 
 use super::{Transport, TransportError};
 
-pub use board::BoardCan;
-pub(crate) use board::RECORD_BYTES;
-pub use simulated::{HostBus, SimulatedCan};
+pub use problem::CanProblem;
 pub use socket::SocketCan;
-pub use trouble::CanTrouble;
 
 /// Sends and receives frames on a bus.
 pub trait CanPort {

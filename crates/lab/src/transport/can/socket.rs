@@ -6,7 +6,7 @@ use std::time::{Duration, Instant, SystemTime};
 use link::can::{DeviceNumber, Direction, filter};
 use puck::CanFrame;
 
-use super::{CanPort, CanTrouble, TransportError};
+use super::{CanPort, CanProblem, TransportError};
 use canlog::AnyFrame;
 
 /// Where the kernel tells about its network interfaces.
@@ -21,8 +21,8 @@ const FULL_QUEUE_PAUSE: Duration = Duration::from_millis(1);
 /// What the kernel says of an interface before it is opened.
 ///
 /// # Errors
-/// [`CanTrouble`] if it cannot be used as it is.
-fn inspect(interfaces: &Path, interface: &str) -> Result<(), CanTrouble> {
+/// [`CanProblem`] if it cannot be used as it is.
+fn inspect(interfaces: &Path, interface: &str) -> Result<(), CanProblem> {
     /// `ARPHRD_CAN` of `if_arp.h`.
     const CAN_TYPE: &str = "280";
     /// `IFF_UP` of `if.h`.
@@ -40,18 +40,18 @@ fn inspect(interfaces: &Path, interface: &str) -> Result<(), CanTrouble> {
     let interface = interface.to_owned();
     // A name with a slash would lead elsewhere; the kernel allows none.
     if interface.contains('/') || !interfaces.join(&interface).exists() {
-        return Err(CanTrouble::NoInterface { interface, known: known() });
+        return Err(CanProblem::NoInterface { interface, known: known() });
     }
     if tell(&interface, "type").is_some_and(|kind| kind != CAN_TYPE) {
-        return Err(CanTrouble::NotCan { interface, known: known() });
+        return Err(CanProblem::NotCan { interface, known: known() });
     }
     let flags = tell(&interface, "flags").and_then(|text| u32::from_str_radix(text.trim_start_matches("0x"), 16).ok());
     if flags.is_some_and(|flags| flags & UP == 0) {
-        return Err(CanTrouble::Down { interface });
+        return Err(CanProblem::Down { interface });
     }
     // The drivers take the carrier away while the controller is bus-off.
     if tell(&interface, "carrier").as_deref() == Some("0") {
-        return Err(CanTrouble::BusOff { interface });
+        return Err(CanProblem::BusOff { interface });
     }
     Ok(())
 }
@@ -93,7 +93,7 @@ fn classify(interfaces: &Path, interface: &str, cause: std::io::Error) -> Transp
     /// `EAFNOSUPPORT` and `EPROTONOSUPPORT` of Linux: a kernel without CAN, or without its raw protocol.
     const NO_CAN: [i32; 2] = [97, 93];
     if cause.raw_os_error().is_some_and(|number| NO_CAN.contains(&number)) {
-        return CanTrouble::Unsupported(cause).into();
+        return CanProblem::Unsupported(cause).into();
     }
     match inspect(interfaces, interface) {
         Err(trouble) => trouble.into(),
@@ -184,7 +184,7 @@ mod linux {
                 if started.elapsed() >= SEND_PATIENCE {
                     inspect(Path::new(INTERFACES), &self.interface)?;
                     let seconds = SEND_PATIENCE.as_secs();
-                    return Err(CanTrouble::NotSent { interface: self.interface.clone(), seconds }.into());
+                    return Err(CanProblem::NotSent { interface: self.interface.clone(), seconds }.into());
                 }
                 std::thread::sleep(FULL_QUEUE_PAUSE);
             }
@@ -196,7 +196,7 @@ mod linux {
                 match self.listen(deadline.saturating_duration_since(Instant::now()))? {
                     Some((_, AnyFrame::Data(frame))) => return Ok(Some(frame)),
                     Some((_, AnyFrame::Error { class, .. })) if class & BUS_OFF != 0 => {
-                        return Err(CanTrouble::BusOff { interface: self.interface.clone() }.into());
+                        return Err(CanProblem::BusOff { interface: self.interface.clone() }.into());
                     }
                     Some(_) => {}
                     None => return Ok(None),
@@ -220,7 +220,7 @@ mod elsewhere {
 
     impl SocketCan {
         pub(super) fn open(_interface: &str, _only: Option<(u16, u16)>) -> Result<Self, TransportError> {
-            Err(CanTrouble::Unsupported(std::io::ErrorKind::Unsupported.into()).into())
+            Err(CanProblem::Unsupported(std::io::ErrorKind::Unsupported.into()).into())
         }
 
         /// There are no interfaces on this system.
@@ -290,9 +290,9 @@ mod tests {
         interface(folder.path(), "can0", &[("type", "280"), ("flags", "0x400c1"), ("carrier", "1")]);
         interface(folder.path(), "can1", &[("type", "280"), ("flags", "0x40080")]);
         let tell = |name: &str, number| classify(folder.path(), name, std::io::Error::from_raw_os_error(number));
-        assert!(matches!(tell("can1", 100), TransportError::Can(CanTrouble::Down { .. })), "ENETDOWN");
-        assert!(matches!(tell("can0", 97), TransportError::Can(CanTrouble::Unsupported(_))), "EAFNOSUPPORT");
+        assert!(matches!(tell("can1", 100), TransportError::Can(CanProblem::Down { .. })), "ENETDOWN");
+        assert!(matches!(tell("can0", 97), TransportError::Can(CanProblem::Unsupported(_))), "EAFNOSUPPORT");
         assert!(matches!(tell("can0", 1), TransportError::Permission { .. }), "EPERM");
-        assert!(matches!(tell("gone", 19), TransportError::Can(CanTrouble::NoInterface { .. })), "ENODEV");
+        assert!(matches!(tell("gone", 19), TransportError::Can(CanProblem::NoInterface { .. })), "ENODEV");
     }
 }

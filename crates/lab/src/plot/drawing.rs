@@ -1,7 +1,6 @@
-//! A free page for figures that are no panels of curves: shapes and text in pixels, and frames with axes in the data's units.
+//! A free page for figures that are no panels of curves: shapes and text in pixels, and frames with axes in data units.
 //!
-//! The look is that of `plot::canvas`: white page, thin open axes, grey grid, the font shipped with the plotting crate, and the Okabe-Ito
-//! colours that people with any kind of colour blindness tell apart. These two files are the only ones that know the plotting crate.
+//! The look is that of `canvas`. These two files are the only ones that know the plotting crate.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -11,8 +10,8 @@ use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 
-use crate::mode::Mode;
-use lab::plot::PlotError;
+use super::PlotError;
+use super::canvas::dashes;
 
 /// A colour as `#rrggbb`.
 pub type Colour = &'static str;
@@ -29,16 +28,6 @@ pub const PALE: Colour = "#ededed";
 pub const BAND: Colour = "#d9d9d9";
 /// Limits.
 pub const LIMIT: Colour = "#000000";
-
-/// The colour of a mode, the same in every figure.
-pub fn colour(mode: Mode) -> Colour {
-    match mode {
-        Mode::OpenLoop => "#D55E00",
-        Mode::ForceControl => "#E9B44C",
-        Mode::Adaptive => "#0072B2",
-        Mode::RigidFingers => "#009E73",
-    }
-}
 
 /// Where a text stands relative to its point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -101,31 +90,9 @@ impl Drawing {
 
     /// A dashed line through points, cut into dashes here: the plotting crate would begin the pattern anew at every point.
     pub fn dashed(&mut self, points: &[[f64; 2]], colour: Colour, width: f64, pattern: [f64; 2]) {
-        let (mut piece, mut drawing, mut left) = (Vec::new(), true, pattern[0]);
-        piece.extend(points.first().copied());
-        for pair in points.windows(2) {
-            let (from, to) = (pair[0], pair[1]);
-            let length = (to[0] - from[0]).hypot(to[1] - from[1]);
-            let mut done = 0.0;
-            while length - done > left {
-                done += left;
-                let at = [0, 1].map(|axis| from[axis] + done / length * (to[axis] - from[axis]));
-                if drawing {
-                    piece.push(at);
-                    self.line(&std::mem::take(&mut piece), colour, width);
-                } else {
-                    piece = vec![at];
-                }
-                drawing = !drawing;
-                left = if drawing { pattern[0] } else { pattern[1] };
-            }
-            left -= length - done;
-            if drawing {
-                piece.push(to);
-            }
-        }
-        if drawing && piece.len() > 1 {
-            self.line(&piece, colour, width);
+        let points: Vec<(f64, f64)> = points.iter().map(|[x, y]| (*x, *y)).collect();
+        for dash in dashes(&points, pattern.into(), (1.0, 1.0)) {
+            self.line(&dash.into_iter().map(Into::into).collect::<Vec<_>>(), colour, width);
         }
     }
 

@@ -15,8 +15,9 @@ use link::can::{DeviceNumber, Direction, Reassembler, SegmentCounters, Segmenter
 use puck::{CanFrame, CanId, Node};
 use sim::{Bus, CHUNK, LinkLine, Passage, TICKS_PER_MICROSECOND, Ticks};
 
-use super::{CanPort, TransportError};
-use crate::simulation::Simulation;
+use super::Simulation;
+use crate::transport::TransportError;
+use crate::transport::can::CanPort;
 
 /// The participants, as the bus numbers them.
 const HOST: Node = Node::HOST;

@@ -9,8 +9,9 @@ use std::time::Duration;
 use embedded_can::Frame;
 use puck::{CanFrame, CanId};
 
-use super::{CanPort, TransportError};
-use crate::simulation::Simulation;
+use super::Simulation;
+use crate::transport::TransportError;
+use crate::transport::can::CanPort;
 
 /// Bytes of a frame in the lock step.
 pub(crate) const RECORD_BYTES: usize = 11;

@@ -1,6 +1,6 @@
 //! The high-priority half of the device: the bus, its start-up, and the control cycle.
 //!
-//! A hardware timer calls [`Core::slot`] three times per control cycle. In the start-up each slot sends at most one frame.
+//! A hardware timer calls [`DeviceController::slot`] three times per control cycle. In the start-up each slot sends at most one frame.
 //! After that the three slots do different things:
 //!
 //! | slot | at | what |
@@ -15,54 +15,22 @@
 use control::law::Gains;
 use control::time::periods;
 use control::{Calibration, Cycle, CycleInput, CycleRecord, Fault, LoadRefusal, Payload, State};
+use link::HandStage;
 use pinned_init::{Init, init};
 use puck::{CanFrame, MotorMode, Node, PropertyId, Reply, SafetyMode, Status, set, zero_torques};
 
+use crate::application::{Controller, ControllerIo, CycleReport, Message, Slot};
+use crate::background::{BackgroundPoll, PollReply};
 use crate::bus::{Outlet, SlotOutlet};
 use crate::command::{Command, Refusal};
 use crate::event::{Event, EventKind};
 use crate::hand::Hand;
 use crate::health::{Counters, Health};
 use crate::port::FitPrimitive;
-use crate::round::{Round, Taken};
-use crate::slow::{SlowPoll, Told};
+use crate::round::Round;
+
+use crate::session;
 use crate::startup::{Pacer, Stage, Startup, StartupError};
-
-/// The third of a control cycle that a timer tick begins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Slot {
-    /// Ask for positions and wrench.
-    Request,
-    /// Compute and send torques.
-    Control,
-    /// Ask one slow question.
-    Slow,
-}
-
-impl Slot {
-    /// The slot of the next timer tick.
-    pub const fn next(self) -> Slot {
-        match self {
-            Slot::Request => Slot::Control,
-            Slot::Control => Slot::Slow,
-            Slot::Slow => Slot::Request,
-        }
-    }
-}
-
-/// What the control half needs from the world: a CAN controller, and the queues to the session half.
-pub trait CoreIo {
-    /// The next frame that has come in, oldest first.
-    fn receive(&mut self) -> Option<CanFrame>;
-    /// Queues a frame for sending; `false` if there is no room. Must not wait.
-    fn transmit(&mut self, frame: CanFrame) -> bool;
-    /// The next command of a person, oldest first.
-    fn command(&mut self) -> Option<Command>;
-    /// What a control cycle measured and decided.
-    fn record(&mut self, record: CycleRecord);
-    /// Something happened.
-    fn event(&mut self, event: Event);
-}
 
 /// Time that a puck may be silent before the bus is started anew: 1 s, in control periods; long after the supervisor has
 /// taken the torque off.
@@ -83,15 +51,24 @@ const OVERRUN_WEIGHT: u16 = 50;
 /// The sum at which the control cycle is too late too often: six overruns within a few cycles. One in fifty is tolerated.
 const OVERRUN_LIMIT: u16 = 300;
 
+/// Who has the bus.
+#[derive(Clone, Copy, Debug)]
+enum BusPhase {
+    /// The start-up.
+    StartUp,
+    /// The cyclic loop, with its questions beside the control cycle.
+    Cyclic(BackgroundPoll),
+}
+
 /// The high-priority half of the device.
-pub struct Core {
+pub struct DeviceController {
     cycle: Cycle<f32, { control::MAX_KERNELS }>,
     number: u64,
     startup: Startup,
     pacer: Pacer,
     round: Round,
     hand: Hand,
-    slow: Option<SlowPoll>,
+    phase: BusPhase,
     counters: Counters,
     safety_mode: Option<SafetyMode>,
     /// The mode told since the last cycle.
@@ -112,10 +89,10 @@ pub struct Core {
     idle_request_in: u16,
 }
 
-impl Core {
+impl DeviceController {
     /// Makes, in its place, a device that has just got power: silent, without torque, at the beginning of the start-up.
-    pub fn init() -> impl Init<Core> {
-        init!(Core {
+    pub fn init() -> impl Init<DeviceController> {
+        init!(DeviceController {
             // Never used for torque: the scales of this arm replace it before the first cycle.
             cycle <- Cycle::init(Calibration::nominal(Payload::SensorAndHand), Gains::tuned()),
             number: 0,
@@ -123,7 +100,7 @@ impl Core {
             pacer: Pacer::default(),
             round: Round::default(),
             hand: Hand::new(),
-            slow: None,
+            phase: BusPhase::StartUp,
             counters: Counters::default(),
             safety_mode: None,
             fresh_safety: None,
@@ -142,72 +119,9 @@ impl Core {
         })
     }
 
-    /// One timer tick. `now_us` is the device's time in microseconds and never runs backwards.
-    pub fn slot(&mut self, slot: Slot, now_us: u64, io: &mut impl CoreIo) {
-        self.drain(io);
-        match (self.slow.is_some(), slot) {
-            (false, _) => self.start_up(now_us, io),
-            (true, Slot::Request) => self.request(now_us, io),
-            (true, Slot::Control) => self.control(now_us, io),
-            (true, Slot::Slow) => self.ask_slowly(now_us, io),
-        }
-        match self.startup.zero_answer() {
-            Some(Ok(())) => self.tell(EventKind::Accepted, io),
-            Some(Err(reason)) => self.tell(EventKind::Refused(reason), io),
-            None => {}
-        }
-        self.tell_stage(io);
-        if let Some((stage, cause)) = self.hand.news() {
-            self.tell(EventKind::Hand { stage, cause }, io);
-        }
-    }
-
-    /// Takes a primitive for the next run: a copy, as the slots wait meanwhile.
-    ///
-    /// # Errors
-    /// [`LoadRefusal`] while a run is in progress, or if it was checked for another arm than this. The old one stays.
-    pub fn load(&mut self, fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
-        self.cycle.load(fit)
-    }
-
     /// Forgets the primitive. Ignored while it runs.
     pub fn unload(&mut self) {
         self.cycle.unload();
-    }
-
-    /// The board began a control slot too late for its torque frames to leave in time.
-    pub fn note_overrun(&mut self) {
-        Counters::count(&mut self.counters.overruns);
-        self.overruns = self.overruns.saturating_add(OVERRUN_WEIGHT);
-    }
-
-    /// The CAN controller reported an error; `bus_off` if it has left the bus.
-    pub fn note_bus_error(&mut self, bus_off: bool) {
-        Counters::count(&mut self.counters.bus_errors);
-        if bus_off && self.slow.is_some() {
-            self.fail();
-        }
-    }
-
-    /// The state of the control half now.
-    pub fn health(&self) -> Health {
-        Health {
-            cycle: self.number,
-            stage: self.stage(),
-            blocked: self.startup.error(),
-            state: self.cycle.state(),
-            fault: self.cycle.fault(),
-            zeroed: self.startup.is_zeroed(),
-            zeroed_at: self.startup.zeroed_at(),
-            payload: self.cycle.payload(),
-            wrench_zeroed: self.startup.has_sensor().then(|| self.cycle.is_wrench_zeroed()),
-            safety_mode: self.safety_mode,
-            pendant: self.pendant,
-            temperatures: self.temperatures,
-            hand: self.hand.stage(),
-            hand_temperatures: self.hand_temperatures,
-            counters: self.counters,
-        }
     }
 
     /// How far the start-up has come.
@@ -221,7 +135,7 @@ impl Core {
     }
 
     /// Takes every frame that has come in.
-    fn drain(&mut self, io: &mut impl CoreIo) {
+    fn drain(&mut self, io: &mut impl ControllerIo<Self>) {
         while let Some(frame) = io.receive() {
             Counters::count(&mut self.counters.frames_received);
             let reply = match Reply::decode(&frame) {
@@ -242,8 +156,8 @@ impl Core {
     }
 
     /// Gives a reply to whoever waits for it; whether anybody did.
-    fn take(&mut self, reply: &Reply, io: &mut impl CoreIo) -> bool {
-        if self.slow.is_none() {
+    fn take(&mut self, reply: &Reply, io: &mut impl ControllerIo<Self>) -> bool {
+        if matches!(self.phase, BusPhase::StartUp) {
             let expected = self.startup.receive(reply);
             if let (true, Reply::Property { node: Node::SAFETY_MODULE, property: PropertyId::MODE, value }) =
                 (expected, *reply)
@@ -252,7 +166,7 @@ impl Core {
             }
             return expected;
         }
-        if self.round.take(reply, &mut self.counters) == Taken::Yes {
+        if self.round.take(reply, &mut self.counters) {
             return true;
         }
         if self.hand.take(reply, &mut self.counters) {
@@ -261,29 +175,32 @@ impl Core {
         let Reply::Property { node, property, value } = *reply else {
             return false;
         };
-        let Some(told) = self.slow.as_mut().and_then(|slow| slow.take(node, property, value)) else {
+        let BusPhase::Cyclic(poll) = &mut self.phase else {
             return false;
         };
-        match told {
-            Told::SafetyMode(value) => self.hear_safety(value, io),
-            Told::PuckMode(value) => {
+        let Some(reply) = poll.take(node, property, value) else {
+            return false;
+        };
+        match reply {
+            PollReply::SafetyMode(value) => self.hear_safety(value, io),
+            PollReply::PuckMode(value) => {
                 let braking = MotorMode::from_value(value) == Some(MotorMode::Idle);
                 let active = self.safety_mode == Some(SafetyMode::Active);
                 self.braking = if braking && active { self.braking.saturating_add(1) } else { 0 };
             }
-            Told::Pendant(value) => self.pendant = Some(value),
-            Told::Temperature(joint, value) => {
+            PollReply::Pendant(value) => self.pendant = Some(value),
+            PollReply::Temperature(joint, value) => {
                 if let Some(place) = self.temperatures.get_mut(joint) {
                     *place = Some(value as i16);
                 }
             }
-            Told::HandMode(node, value) => self.hand.hear_mode(node, value),
-            Told::HandTemperature(digit, value) => {
+            PollReply::HandMode(node, value) => self.hand.hear_mode(node, value),
+            PollReply::HandTemperature(digit, value) => {
                 if let Some(place) = self.hand_temperatures.get_mut(digit) {
                     *place = Some(value as i16);
                 }
             }
-            Told::Status(_, value) => {
+            PollReply::Status(_, value) => {
                 if Status::from_value(value) != Some(Status::Ready) {
                     self.fail();
                 }
@@ -293,7 +210,7 @@ impl Core {
     }
 
     /// The safety module has told its mode. A value that nobody knows counts as IDLE: no torque.
-    fn hear_safety(&mut self, value: i32, io: &mut impl CoreIo) {
+    fn hear_safety(&mut self, value: i32, io: &mut impl ControllerIo<Self>) {
         let mode = SafetyMode::from_value(value).unwrap_or(SafetyMode::Idle);
         self.fresh_safety = Some(mode);
         if self.safety_mode != Some(mode) {
@@ -309,10 +226,10 @@ impl Core {
         self.last_cycles.get_or_insert(LAST_CYCLES);
     }
 
-    /// A slot of the start-up. Not inlined, nor is [`Core::control`]: a board keeps the two in different memories, and the frame of the
+    /// A slot of the start-up. Not inlined, nor is [`DeviceController::control`]: a board keeps the two in different memories, and the frame of the
     /// start-up stays out of the cycle's.
     #[inline(never)]
-    fn start_up(&mut self, now_us: u64, io: &mut impl CoreIo) {
+    fn start_up(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
         // Answers keep the order of the commands: the next one waits while an answer is outstanding.
         if !self.startup.is_zero_pending() {
             match io.command() {
@@ -341,7 +258,7 @@ impl Core {
         if self.cycle.calibrate(*calibration).is_err() {
             return;
         }
-        self.slow = Some(SlowPoll::new(safety));
+        self.phase = BusPhase::Cyclic(BackgroundPoll::new(safety));
         self.round = Round::new(self.startup.has_sensor());
         match self.startup.take_hand() {
             Some(found) => self.hand.begin(found),
@@ -360,14 +277,14 @@ impl Core {
     /// Leaves the cyclic loop.
     fn restart(&mut self) {
         Counters::count(&mut self.counters.restarts);
-        self.slow = None;
+        self.phase = BusPhase::StartUp;
         self.cycle.reset();
         self.startup.restart();
         self.hand.suspend();
         self.hand_temperatures = [None; 4];
     }
 
-    fn request(&mut self, now_us: u64, io: &mut impl CoreIo) {
+    fn request(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
         let (positions, wrench) = self.round.open();
         let mut outlet = self.outlet(now_us, io);
         outlet.send(positions);
@@ -378,7 +295,7 @@ impl Core {
 
     /// The slot that computes and sends torques.
     #[inline(never)]
-    fn control(&mut self, now_us: u64, io: &mut impl CoreIo) {
+    fn control(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
         if !self.round.is_open() {
             // The start-up ended in the middle of a cycle.
             return;
@@ -387,7 +304,7 @@ impl Core {
         let hand = self.hand.sample(&mut self.counters);
         self.number += 1;
         Counters::count(&mut self.counters.cycles);
-        if self.slow.is_some_and(|slow| slow.safety_silence() >= SAFETY_SILENCE)
+        if matches!(self.phase, BusPhase::Cyclic(poll) if poll.safety_silence() >= SAFETY_SILENCE)
             || self.round.longest_silence() >= SILENT_CYCLES
         {
             self.fail();
@@ -428,7 +345,7 @@ impl Core {
     }
 
     /// The command for the control cycle; those for the start-up are answered here.
-    fn next_command(&mut self, now_us: u64, io: &mut impl CoreIo) -> Option<control::Command> {
+    fn next_command(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) -> Option<control::Command> {
         match io.command()? {
             Command::Control(command) => {
                 if command == control::Command::Stop {
@@ -454,7 +371,7 @@ impl Core {
     }
 
     /// Both frames of the cycle, or zeros: pucks keep their last torque until they are told another.
-    fn send_torques(&mut self, frames: Option<[CanFrame; 2]>, now_us: u64, io: &mut impl CoreIo) {
+    fn send_torques(&mut self, frames: Option<[CanFrame; 2]>, now_us: u64, io: &mut impl ControllerIo<Self>) {
         let [arm, wrist] = frames.unwrap_or_else(zero_torques);
         let mut outlet = self.outlet(now_us, io);
         let sent = (outlet.send(arm), outlet.send(wrist));
@@ -476,7 +393,7 @@ impl Core {
     fn leave_if_lost(&mut self) {
         if !self.startup.is_done() {
             // A command has sent the start-up back to zeroing.
-            self.slow = None;
+            self.phase = BusPhase::StartUp;
             self.cycle.reset();
             return;
         }
@@ -493,7 +410,7 @@ impl Core {
 
     /// The slot that asks one slow question.
     #[inline(never)]
-    fn ask_slowly(&mut self, now_us: u64, io: &mut impl CoreIo) {
+    fn ask_slowly(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
         self.idle_request_in = self.idle_request_in.saturating_sub(1);
         let writable = self.startup.safety_properties().is_some_and(|safety| safety.mode_is_writable);
         let lower =
@@ -505,27 +422,27 @@ impl Core {
             }
             return;
         }
-        let Some(slow) = &mut self.slow else {
+        let BusPhase::Cyclic(poll) = &mut self.phase else {
             return;
         };
         let mut outlet = SlotOutlet { io, counters: &mut self.counters, pacer: &mut self.pacer, now_us, cyclic: true };
-        let question = match (slow.begin(), self.round.suspect()) {
+        let question = match (poll.begin(), self.round.suspect()) {
             (Some(safety), _) => Some(safety),
-            (None, Some(node)) => Some(slow.suspect(node)),
+            (None, Some(node)) => Some(poll.suspect(node)),
             (None, None) if self.hand.act(&mut outlet) => None,
-            (None, None) => slow.other(self.hand.answers_questions()),
+            (None, None) => poll.other(self.hand.answers_questions()),
         };
         if let Some(frame) = question {
             outlet.send(frame);
         }
     }
 
-    fn outlet<'a, I: CoreIo>(&'a mut self, now_us: u64, io: &'a mut I) -> SlotOutlet<'a, I> {
+    fn outlet<'a, I: ControllerIo<Self>>(&'a mut self, now_us: u64, io: &'a mut I) -> SlotOutlet<'a, I> {
         SlotOutlet { io, counters: &mut self.counters, pacer: &mut self.pacer, now_us, cyclic: true }
     }
 
     /// Tells a change of the stage, and a new reason for which the start-up cannot go on.
-    fn tell_stage(&mut self, io: &mut impl CoreIo) {
+    fn tell_stage(&mut self, io: &mut impl ControllerIo<Self>) {
         let stage = self.stage();
         let error = self.startup.error();
         if error.is_some() && error != self.blocked {
@@ -540,7 +457,98 @@ impl Core {
         }
     }
 
-    fn tell(&self, kind: EventKind, io: &mut impl CoreIo) {
+    fn tell(&self, kind: EventKind, io: &mut impl ControllerIo<Self>) {
         io.event(Event { cycle: self.number, kind });
+    }
+}
+
+impl Controller for DeviceController {
+    type Command = Command;
+    type Event = Event;
+    type Record = CycleRecord;
+    type Primitive<'a> = &'a FitPrimitive<'a>;
+
+    const STOP: Command = Command::Control(control::Command::Stop);
+
+    fn slot(&mut self, slot: Slot, now_us: u64, io: &mut impl ControllerIo<Self>) {
+        self.drain(io);
+        match (self.phase, slot) {
+            (BusPhase::StartUp, _) => self.start_up(now_us, io),
+            (BusPhase::Cyclic(_), Slot::Request) => self.request(now_us, io),
+            (BusPhase::Cyclic(_), Slot::Control) => self.control(now_us, io),
+            (BusPhase::Cyclic(_), Slot::Slow) => self.ask_slowly(now_us, io),
+        }
+        match self.startup.zero_answer() {
+            Some(Ok(())) => self.tell(EventKind::Accepted, io),
+            Some(Err(reason)) => self.tell(EventKind::Refused(reason), io),
+            None => {}
+        }
+        self.tell_stage(io);
+        if let Some((stage, cause)) = self.hand.news() {
+            self.tell(EventKind::Hand { stage, cause }, io);
+        }
+    }
+
+    fn load(&mut self, fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
+        self.cycle.load(fit)
+    }
+
+    fn note_overrun(&mut self) {
+        Counters::count(&mut self.counters.overruns);
+        self.overruns = self.overruns.saturating_add(OVERRUN_WEIGHT);
+    }
+
+    fn note_bus_error(&mut self, bus_off: bool) {
+        Counters::count(&mut self.counters.bus_errors);
+        if bus_off && matches!(self.phase, BusPhase::Cyclic(_)) {
+            self.fail();
+        }
+    }
+
+    fn health(&self) -> Health {
+        Health {
+            cycle: self.number,
+            stage: self.stage(),
+            blocked: self.startup.error(),
+            state: self.cycle.state(),
+            fault: self.cycle.fault(),
+            zeroed: self.startup.is_zeroed(),
+            zeroed_at: self.startup.zeroed_at(),
+            payload: self.cycle.payload(),
+            wrench_zeroed: self.startup.has_sensor().then(|| self.cycle.is_wrench_zeroed()),
+            safety_mode: self.safety_mode,
+            pendant: self.pendant,
+            temperatures: self.temperatures,
+            hand: self.hand.stage(),
+            hand_moves: self.hand.stage() == HandStage::Initialising || self.cycle.moves_hand(),
+            hand_temperatures: self.hand_temperatures,
+            counters: self.counters,
+        }
+    }
+
+    fn message(event: Event, health: &Health) -> Option<Message> {
+        match event.kind {
+            EventKind::Accepted => Some(Message::Answer(Ok(()))),
+            EventKind::Refused(reason) => Some(Message::Answer(Err(session::refusal(reason, health)))),
+            _ => session::event(event).map(Message::News),
+        }
+    }
+}
+
+impl CycleReport for CycleRecord {
+    fn number(&self) -> u32 {
+        self.cycle as u32
+    }
+
+    fn state(&self) -> State {
+        self.state
+    }
+
+    fn flags(&self) -> u32 {
+        self.flags
+    }
+
+    fn telemetry(&self) -> link::Telemetry {
+        session::telemetry(self)
     }
 }

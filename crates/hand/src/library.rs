@@ -22,7 +22,7 @@ struct Place {
 pub struct Library {
     places: [Place; PLACES],
     /// Where an upload is converted.
-    pub(super) staging: FingerPrimitive,
+    pub(crate) staging: FingerPrimitive,
 }
 
 impl Library {
@@ -33,27 +33,27 @@ impl Library {
     };
 
     /// What is at a place.
-    pub(super) fn get(&self, place: usize) -> Option<&Summary> {
+    pub(crate) fn get(&self, place: usize) -> Option<&Summary> {
         self.places.get(place)?.summary.as_ref()
     }
 
     /// Place and summary of a name.
-    pub(super) fn find(&self, name: &Name) -> Option<(usize, &Summary)> {
+    pub(crate) fn find(&self, name: &Name) -> Option<(usize, &Summary)> {
         (0..PLACES).find_map(|place| self.get(place).filter(|entry| entry.name == *name).map(|entry| (place, entry)))
     }
 
     /// Where a primitive of this name goes: over the old one, or into a free place.
-    pub(super) fn place_for(&self, name: &Name) -> Option<usize> {
+    pub(crate) fn place_for(&self, name: &Name) -> Option<usize> {
         self.find(name).map(|(place, _)| place).or_else(|| (0..PLACES).find(|place| self.get(*place).is_none()))
     }
 
     /// The primitive at a place.
-    pub(super) fn primitive(&self, place: usize) -> Option<&FingerPrimitive> {
+    pub(crate) fn primitive(&self, place: usize) -> Option<&FingerPrimitive> {
         self.places.get(place).filter(|place| place.summary.is_some()).map(|place| &place.primitive)
     }
 
     /// Puts what was converted into a place.
-    pub(super) fn commit(&mut self, place: usize, summary: Summary) {
+    pub(crate) fn commit(&mut self, place: usize, summary: Summary) {
         let Self { places, staging } = self;
         if let Some(place) = places.get_mut(place) {
             place.primitive.clone_from(staging);
@@ -62,7 +62,7 @@ impl Library {
     }
 
     /// Empties a place.
-    pub(super) fn delete(&mut self, place: usize) {
+    pub(crate) fn delete(&mut self, place: usize) {
         if let Some(place) = self.places.get_mut(place) {
             place.summary = None;
             place.primitive.clear();
@@ -71,7 +71,7 @@ impl Library {
 }
 
 /// An entry as it goes over the link.
-pub(super) fn listing(index: u8, entry: &Summary, loaded: bool) -> Listing {
+pub(crate) fn listing(index: u8, entry: &Summary, loaded: bool) -> Listing {
     Listing {
         index,
         name: entry.name.clone(),

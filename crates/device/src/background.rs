@@ -37,7 +37,7 @@ const REPEAT: u32 = 42 * 7 * 40;
 
 /// What a slow reply told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Told {
+pub(crate) enum PollReply {
     /// MODE of the safety module.
     SafetyMode(i32),
     /// MODE of puck 1.
@@ -56,7 +56,7 @@ pub(crate) enum Told {
 
 /// Whose turn it is.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct SlowPoll {
+pub(crate) struct BackgroundPoll {
     tick: u32,
     asked: Option<(Node, PropertyId)>,
     pendant: PropertyId,
@@ -64,10 +64,10 @@ pub(crate) struct SlowPoll {
     safety_silence: u16,
 }
 
-impl SlowPoll {
+impl BackgroundPoll {
     /// The polls of a bus whose safety module has these properties.
-    pub(crate) fn new(safety: &SafetyProperties) -> SlowPoll {
-        SlowPoll { tick: REPEAT - 1, asked: None, pendant: safety.pendant, safety_silence: 0 }
+    pub(crate) fn new(safety: &SafetyProperties) -> BackgroundPoll {
+        BackgroundPoll { tick: REPEAT - 1, asked: None, pendant: safety.pendant, safety_silence: 0 }
     }
 
     /// Begins a slot. The question to the safety module, if the slot is its own.
@@ -115,24 +115,24 @@ impl SlowPoll {
     }
 
     /// A property reply has come; `None` if it answers no open question.
-    pub(crate) fn take(&mut self, node: Node, property: PropertyId, value: i32) -> Option<Told> {
+    pub(crate) fn take(&mut self, node: Node, property: PropertyId, value: i32) -> Option<PollReply> {
         if self.asked != Some((node, property)) {
             return None;
         }
         self.asked = None;
         Some(match property {
-            PropertyId::STAT => Told::Status(node, value),
-            TEMPERATURE if node.hand_index().is_some() => Told::HandTemperature(node.hand_index()?, value),
-            TEMPERATURE if node != Node::SAFETY_MODULE => Told::Temperature(node.arm_index()?, value),
-            PropertyId::MODE if node.hand_index().is_some() => Told::HandMode(node, value),
-            PropertyId::MODE if node != Node::SAFETY_MODULE => Told::PuckMode(value),
+            PropertyId::STAT => PollReply::Status(node, value),
+            TEMPERATURE if node.hand_index().is_some() => PollReply::HandTemperature(node.hand_index()?, value),
+            TEMPERATURE if node != Node::SAFETY_MODULE => PollReply::Temperature(node.arm_index()?, value),
+            PropertyId::MODE if node.hand_index().is_some() => PollReply::HandMode(node, value),
+            PropertyId::MODE if node != Node::SAFETY_MODULE => PollReply::PuckMode(value),
             PropertyId::MODE => {
                 self.safety_silence = 0;
-                Told::SafetyMode(value)
+                PollReply::SafetyMode(value)
             }
             _ => {
                 self.safety_silence = 0;
-                Told::Pendant(value)
+                PollReply::Pendant(value)
             }
         })
     }
@@ -154,15 +154,15 @@ mod tests {
 
     fn polls(seconds: usize, hand: bool) -> BTreeMap<(u8, u8), usize> {
         let safety = SafetyProperties::for_tests();
-        let mut slow = SlowPoll::new(&safety);
+        let mut poll = BackgroundPoll::new(&safety);
         let mut counts = BTreeMap::new();
         for _ in 0..300 * seconds {
-            if let Some(frame) = slow.begin().or_else(|| slow.other(hand)) {
+            if let Some(frame) = poll.begin().or_else(|| poll.other(hand)) {
                 let request = Request::decode(&frame).expect("a request");
                 let puck::Destination::Node(node) = request.to else { panic!("a poll to a group") };
                 let puck::Action::Get { property } = request.action else { panic!("a poll that sets") };
                 *counts.entry((node.number(), property.number())).or_default() += 1;
-                slow.take(node, property, 0);
+                poll.take(node, property, 0);
             }
         }
         counts
@@ -196,11 +196,11 @@ mod tests {
 
     #[test]
     fn a_reply_that_nobody_asked_for_tells_nothing() {
-        let mut slow = SlowPoll::new(&SafetyProperties::for_tests());
-        assert_eq!(slow.take(Node::SAFETY_MODULE, PropertyId::MODE, 2), None);
-        slow.begin();
-        assert_eq!(slow.take(Node::SAFETY_MODULE, PropertyId::STAT, 2), None);
-        assert_eq!(slow.take(Node::SAFETY_MODULE, PropertyId::MODE, 2), Some(Told::SafetyMode(2)));
-        assert_eq!(slow.take(Node::SAFETY_MODULE, PropertyId::MODE, 2), None, "a duplicate");
+        let mut poll = BackgroundPoll::new(&SafetyProperties::for_tests());
+        assert_eq!(poll.take(Node::SAFETY_MODULE, PropertyId::MODE, 2), None);
+        poll.begin();
+        assert_eq!(poll.take(Node::SAFETY_MODULE, PropertyId::STAT, 2), None);
+        assert_eq!(poll.take(Node::SAFETY_MODULE, PropertyId::MODE, 2), Some(PollReply::SafetyMode(2)));
+        assert_eq!(poll.take(Node::SAFETY_MODULE, PropertyId::MODE, 2), None, "a duplicate");
     }
 }

@@ -4,7 +4,7 @@ use crate::error_code::ErrorCode;
 
 /// Why an interface cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub enum CanTrouble {
+pub enum CanProblem {
     /// There is no interface of that name.
     #[error("there is no network interface '{interface}'; {}", found(.known))]
     NoInterface {
@@ -59,7 +59,7 @@ fn switch_on(interface: &str) -> String {
     )
 }
 
-impl CanTrouble {
+impl CanProblem {
     /// Stable number.
     #[must_use]
     pub fn code(&self) -> ErrorCode {
@@ -100,7 +100,7 @@ mod tests {
 
     #[test]
     fn an_interface_that_is_down_prints_the_command_that_switches_it_on() {
-        let help = CanTrouble::Down { interface: "can7".into() }.help().expect("a command");
+        let help = CanProblem::Down { interface: "can7".into() }.help().expect("a command");
         assert!(help.contains("sudo ip link set can7 type can bitrate 1000000"), "{help}");
         assert!(help.contains("sudo ip link set can7 txqueuelen 256 up"), "{help}");
     }

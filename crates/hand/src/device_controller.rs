@@ -1,4 +1,4 @@
-//! `Core`: the high-priority half. Owns the hand's bus and the control cycle; sans-I/O, driven by three slots per cycle.
+//! `DeviceController`: the high-priority half. Owns the hand's bus and the control cycle; sans-I/O, driven by three slots per cycle.
 //!
 //! | slot | what |
 //! |---|---|
@@ -9,14 +9,14 @@
 //! On a bus of its own the hand is answered within one slot: 1015 us at worst, stuffing and puck latency included, of 1111. The
 //! torque leaves in the cycle of its sample, one cycle earlier than behind an arm.
 
-use control::{Fault, State};
+use control::{LoadRefusal, Payload};
 use device::hand::{Drive, HandProperties, HandRound, HandTrouble, Initialisation, Outcome, Outlet};
-use device::{Counters, Slot, Stage};
+use device::{Controller, ControllerIo, Counters, Health, Message, Refused, Slot, Stage};
 use link::{Event as LinkEvent, EventKind, HandStage, Refusal};
 use puck::{CanFrame, Node, PropertyId, Reply, Status, get};
 
 use crate::DIGITS;
-use crate::command::{Command, Refused};
+use crate::command::Command;
 use crate::cycle::Cycle;
 use crate::primitive::FingerPrimitive;
 use crate::record::Record;
@@ -34,50 +34,8 @@ const TEMPERATURE: PropertyId = match PropertyId::new(9) {
 /// Slow slots between two polls; every eighth poll is a temperature, the others are modes: each digit's mode at 8 Hz.
 const POLL_SLOTS: u32 = 8;
 
-/// The way out, the clock, and the queues to the other half, during one slot.
-pub trait CoreIo {
-    /// The next received frame.
-    fn receive(&mut self) -> Option<CanFrame>;
-    /// Hands a frame to the controller; false without room.
-    fn transmit(&mut self, frame: CanFrame) -> bool;
-    /// The next command of a person.
-    fn command(&mut self) -> Option<Command>;
-    /// The record of a control cycle.
-    fn record(&mut self, record: Record);
-    /// Something happened.
-    fn event(&mut self, event: Event);
-}
-
-/// What the control half tells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Event {
-    /// Answer to the oldest command without one.
-    Answer(Result<(), Refused>),
-    /// News, as they go over the link.
-    News(LinkEvent),
-}
-
-/// The state of the control half at one moment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Health {
-    /// Number of the latest control cycle.
-    pub cycle: u32,
-    /// How far the start-up has come.
-    pub stage: Stage,
-    /// State of the ladder.
-    pub state: State,
-    /// Latched fault.
-    pub fault: Fault,
-    /// How far the hand has come.
-    pub hand: HandStage,
-    /// Latest temperature of each puck (F1, F2, F3, spread), degree Celsius.
-    pub temperatures: [Option<i16>; DIGITS],
-    /// Counters.
-    pub counters: Counters,
-}
-
 /// The control half.
-pub struct Core {
+pub struct DeviceController {
     cycle: Cycle,
     cycles: u32,
     startup: Startup,
@@ -103,7 +61,7 @@ struct SlotOutlet<'a, I> {
     now_us: u64,
 }
 
-impl<I: CoreIo> Outlet for SlotOutlet<'_, I> {
+impl<I: ControllerIo<DeviceController>> Outlet for SlotOutlet<'_, I> {
     fn now_us(&self) -> u64 {
         self.now_us
     }
@@ -116,10 +74,10 @@ impl<I: CoreIo> Outlet for SlotOutlet<'_, I> {
     }
 }
 
-impl Core {
+impl DeviceController {
     /// At power-up.
-    pub fn new() -> Core {
-        Core {
+    pub fn new() -> DeviceController {
+        DeviceController {
             cycle: Cycle::new(),
             cycles: 0,
             startup: Startup::new(),
@@ -139,53 +97,7 @@ impl Core {
         }
     }
 
-    /// Takes another primitive; false while one runs.
-    pub fn load(&mut self, primitive: &FingerPrimitive) -> bool {
-        self.cycle.load(primitive)
-    }
-
-    /// A slot began late, or its frames had not left in time.
-    pub fn note_overrun(&mut self) {
-        Counters::count(&mut self.counters.overruns);
-    }
-
-    /// The board lost frames.
-    pub fn note_bus_error(&mut self) {
-        Counters::count(&mut self.counters.bus_errors);
-    }
-
-    /// The state now.
-    pub fn health(&self) -> Health {
-        Health {
-            cycle: self.cycles,
-            stage: match self.startup.phase() {
-                Phase::Enumerating => Stage::Enumerating,
-                Phase::Waking => Stage::Waking,
-                Phase::Reading => Stage::Reading,
-                Phase::Done => Stage::Ready,
-            },
-            state: self.cycle.state(),
-            fault: self.cycle.fault(),
-            hand: self.stage,
-            temperatures: self.temperatures,
-            counters: self.counters,
-        }
-    }
-
-    /// One slot, at device time `now_us`.
-    pub fn slot(&mut self, slot: Slot, now_us: u64, io: &mut impl CoreIo) {
-        while let Some(frame) = io.receive() {
-            self.take(&frame);
-        }
-        match slot {
-            Slot::Request => self.request(now_us, io),
-            Slot::Control => self.control(now_us, io),
-            Slot::Slow => self.slow(now_us, io),
-        }
-        self.tell(io);
-    }
-
-    fn request(&mut self, now_us: u64, io: &mut impl CoreIo) {
+    fn request(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
         let (HandStage::Ready, Some(properties)) = (self.stage, self.properties) else {
             return;
         };
@@ -196,7 +108,7 @@ impl Core {
         }
     }
 
-    fn control(&mut self, now_us: u64, io: &mut impl CoreIo) {
+    fn control(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
         self.cycles = self.cycles.wrapping_add(1);
         Counters::count(&mut self.counters.cycles);
         let sample = self.round.close(&mut self.counters);
@@ -207,7 +119,7 @@ impl Core {
         let sample = sample.filter(|_| self.stage == HandStage::Ready);
         let command = io.command();
         let refused = match command {
-            Some(Command::InitialiseHand) => self.initialise(now_us).err(),
+            Some(Command::InitialiseHand) => self.initialise().err(),
             Some(Command::Stop | Command::Release) if self.stage == HandStage::Initialising => {
                 self.enter(HandStage::NotInitialised, None);
                 None
@@ -218,14 +130,14 @@ impl Core {
         let record = Record { cycle: self.cycles, ..output.record };
         io.record(record);
         if let Some(reason) = refused {
-            io.event(Event::Answer(Err(reason)));
+            io.event(Message::Answer(Err(reason)));
         }
         if let Some(answer) = output.answer {
             // Only now that the cycle lets go of the hand as well does its initialisation begin.
             if command == Some(Command::InitialiseHand) && answer.is_ok() {
                 self.begin_initialisation(now_us);
             }
-            io.event(Event::Answer(answer));
+            io.event(Message::Answer(answer));
         }
         if let Some((state, fault)) = output.entered {
             self.news(io, EventKind::State, state.code().into(), fault.code().into());
@@ -240,7 +152,7 @@ impl Core {
         }
     }
 
-    fn slow(&mut self, now_us: u64, io: &mut impl CoreIo) {
+    fn slow(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
         self.tick = self.tick.wrapping_add(1);
         let mut outlet = SlotOutlet { io, counters: &mut self.counters, now_us };
         let Some(properties) = self.properties else {
@@ -341,8 +253,8 @@ impl Core {
         false
     }
 
-    /// Whether the hand may be initialised now.
-    fn initialise(&self, _now_us: u64) -> Result<(), Refused> {
+    /// Refuses an initialisation that cannot begin now.
+    fn initialise(&self) -> Result<(), Refused> {
         match (self.stage, self.properties) {
             (HandStage::Initialising, _) => Err((Refusal::HandBusy, [0, 0])),
             (HandStage::Absent, _) | (_, None) => Err((Refusal::NoHand, [0, 0])),
@@ -380,7 +292,7 @@ impl Core {
     }
 
     /// Tells what is new of start-up and hand.
-    fn tell(&mut self, io: &mut impl CoreIo) {
+    fn tell(&mut self, io: &mut impl ControllerIo<Self>) {
         let phase = self.startup.phase();
         if self.told_phase != Some(phase) {
             self.told_phase = Some(phase);
@@ -394,13 +306,81 @@ impl Core {
         }
     }
 
-    fn news(&self, io: &mut impl CoreIo, kind: EventKind, code: u16, detail: u32) {
-        io.event(Event::News(LinkEvent { cycle: self.cycles, kind, code, detail }));
+    fn news(&self, io: &mut impl ControllerIo<Self>, kind: EventKind, code: u16, detail: u32) {
+        io.event(Message::News(LinkEvent { cycle: self.cycles, kind, code, detail }));
     }
 }
 
-impl Default for Core {
+impl Controller for DeviceController {
+    type Command = Command;
+    type Event = Message;
+    type Record = Record;
+    type Primitive<'a> = &'a FingerPrimitive;
+
+    const STOP: Command = Command::Stop;
+
+    fn slot(&mut self, slot: Slot, now_us: u64, io: &mut impl ControllerIo<Self>) {
+        while let Some(frame) = io.receive() {
+            self.take(&frame);
+        }
+        match slot {
+            Slot::Request => self.request(now_us, io),
+            Slot::Control => self.control(now_us, io),
+            Slot::Slow => self.slow(now_us, io),
+        }
+        self.tell(io);
+    }
+
+    fn load(&mut self, primitive: &FingerPrimitive) -> Result<(), LoadRefusal> {
+        if self.cycle.load(primitive) { Ok(()) } else { Err(LoadRefusal::Running) }
+    }
+
+    fn note_overrun(&mut self) {
+        Counters::count(&mut self.counters.overruns);
+    }
+
+    /// The bus may recover by itself; motion does not. The pucks hear zeros as soon as there is a bus again.
+    fn note_bus_error(&mut self, bus_off: bool) {
+        Counters::count(&mut self.counters.bus_errors);
+        if bus_off {
+            self.cycle.hand_failed();
+        }
+    }
+
+    fn health(&self) -> Health {
+        Health {
+            cycle: self.cycles.into(),
+            stage: match self.startup.phase() {
+                Phase::Enumerating => Stage::Enumerating,
+                Phase::Waking => Stage::Waking,
+                Phase::Reading => Stage::Reading,
+                Phase::Done => Stage::Ready,
+            },
+            state: self.cycle.state(),
+            fault: self.cycle.fault(),
+            hand: self.stage,
+            // A move is a state of the cycle.
+            hand_moves: self.stage == HandStage::Initialising,
+            hand_temperatures: self.temperatures,
+            counters: self.counters,
+            blocked: None,
+            zeroed: false,
+            zeroed_at: None,
+            payload: Payload::SensorAndHand,
+            wrench_zeroed: None,
+            safety_mode: None,
+            pendant: None,
+            temperatures: [None; 7],
+        }
+    }
+
+    fn message(event: Message, _: &Health) -> Option<Message> {
+        Some(event)
+    }
+}
+
+impl Default for DeviceController {
     fn default() -> Self {
-        Core::new()
+        DeviceController::new()
     }
 }

@@ -1,0 +1,260 @@
+//! What an arm with its hand and a hand alone have in common, and where they differ.
+//!
+//! A device has two halves. The control half is a [`Controller`]: a timer drives it, three slots a control cycle. The other half is
+//! a [`crate::HostSession`] over an [`Application`]: the rules of the link are those of every device, the primitives and the
+//! requests that move something are those of the application.
+
+use control::{CycleRecord, LoadRefusal, State};
+use link::{Listing, Name, Refusal, Reply, Request, Telemetry};
+use puck::CanFrame;
+
+use crate::health::{Health, Timing};
+
+/// A refusal with its detail.
+pub type Refused = (Refusal, [u32; 2]);
+
+/// The third of a control cycle that a timer tick begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Slot {
+    /// Ask for positions and wrench.
+    Request,
+    /// Compute and send torques.
+    Control,
+    /// Ask one slow question.
+    Slow,
+}
+
+impl Slot {
+    /// The slot of the next timer tick.
+    pub const fn next(self) -> Slot {
+        match self {
+            Slot::Request => Slot::Control,
+            Slot::Control => Slot::Slow,
+            Slot::Slow => Slot::Request,
+        }
+    }
+}
+
+/// The high-priority half of a device.
+pub trait Controller: Sized + 'static {
+    /// A request of a person on its way to this half; each is answered by exactly one event.
+    type Command: Copy + PartialEq + 'static;
+    /// What it tells.
+    type Event: Copy + 'static;
+    /// What a control cycle measured and decided.
+    type Record: CycleReport;
+    /// A checked primitive, as it is handed over.
+    type Primitive<'a>;
+
+    /// The command that ends every motion.
+    const STOP: Self::Command;
+
+    /// One timer tick. `now_us` is the device's time in microseconds and never runs backwards.
+    fn slot(&mut self, slot: Slot, now_us: u64, io: &mut impl ControllerIo<Self>);
+
+    /// Takes a primitive for the next run: a copy, as the slots wait meanwhile.
+    ///
+    /// # Errors
+    /// [`LoadRefusal`] while a run is in progress, or if it was checked for another arm than this. The old one stays.
+    fn load(&mut self, primitive: Self::Primitive<'_>) -> Result<(), LoadRefusal>;
+
+    /// The board began a control slot too late for its torque frames to leave in time.
+    fn note_overrun(&mut self);
+
+    /// The CAN controller reported an error; `bus_off` if it has left the bus.
+    fn note_bus_error(&mut self, bus_off: bool);
+
+    /// The state of the control half now.
+    fn health(&self) -> Health;
+
+    /// An event as a host is told it; `None` for what only people read.
+    fn message(event: Self::Event, health: &Health) -> Option<Message>;
+}
+
+/// What the control half needs from the world: a CAN controller, and the queues to the session half.
+pub trait ControllerIo<C: Controller> {
+    /// The next frame that has come in, oldest first.
+    fn receive(&mut self) -> Option<CanFrame>;
+    /// Queues a frame for sending; `false` if there is no room. Must not wait.
+    fn transmit(&mut self, frame: CanFrame) -> bool;
+    /// The next command of a person, oldest first.
+    fn command(&mut self) -> Option<C::Command>;
+    /// What a control cycle measured and decided.
+    fn record(&mut self, record: C::Record);
+    /// Something happened.
+    fn event(&mut self, event: C::Event);
+}
+
+/// The queue to the control half is full: it has not taken the previous commands yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct QueueFull;
+
+impl core::fmt::Display for QueueFull {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("the control cycle has not taken the previous commands yet")
+    }
+}
+
+impl core::error::Error for QueueFull {}
+
+/// The line to the host and the queues to the control half, as the session sees them.
+pub trait SessionPort<C: Controller> {
+    /// Hands bytes to the line. Never more than [`SessionPort::room`] said.
+    fn send(&mut self, bytes: &[u8]);
+
+    /// Bytes the line can take now. The session waits with answers and drops telemetry when it is too little.
+    fn room(&self) -> usize {
+        usize::MAX
+    }
+
+    /// Queues a command for the control half, which answers each by exactly one event, in their order.
+    ///
+    /// # Errors
+    /// [`QueueFull`]
+    fn command(&mut self, command: C::Command) -> Result<(), QueueFull>;
+
+    /// Gives the control cycle another primitive, which is no more than a copy. Called only while no primitive runs.
+    ///
+    /// # Errors
+    /// As [`Controller::load`]. It must not be swallowed: the next run would be that of the old primitive.
+    fn load(&mut self, primitive: C::Primitive<'_>) -> Result<(), LoadRefusal>;
+
+    /// The next record of a control cycle, oldest first.
+    fn record(&mut self) -> Option<TimedRecord<C::Record>>;
+
+    /// The next event of the control half, oldest first.
+    fn event(&mut self) -> Option<C::Event>;
+
+    /// The state of the control half now.
+    fn health(&mut self) -> Health;
+
+    /// What the board measured about its processor.
+    fn timing(&mut self) -> Timing;
+}
+
+/// What the control half tells, as it goes over the link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Message {
+    /// The answer to the oldest command without one.
+    Answer(Result<(), Refused>),
+    /// News.
+    News(link::Event),
+}
+
+/// What of a cycle every device tells.
+pub trait CycleReport: Copy + core::fmt::Debug + 'static {
+    /// Number of the cycle, modulo 2^32.
+    fn number(&self) -> u32;
+    /// State after it.
+    fn state(&self) -> State;
+    /// Bits of [`control::flags`].
+    fn flags(&self) -> u32;
+    /// All of it for a host, but its cost.
+    fn telemetry(&self) -> Telemetry;
+}
+
+/// One control cycle together with what only its caller can measure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TimedRecord<R = CycleRecord> {
+    /// What the cycle measured and decided.
+    pub record: R,
+    /// How long its computation took, ticks; 0 where that is not measured.
+    pub cost_ticks: u32,
+}
+
+/// What a request means to an application.
+#[derive(Debug)]
+pub enum Action<C> {
+    /// A command for the control half; its answer is that of the request.
+    Command(C),
+    /// The answer.
+    Answer(Reply),
+    /// A change of what is stored has begun; [`Application::saved`] tells what became of it.
+    Save,
+}
+
+/// A change of what is stored that is over.
+#[derive(Clone, Copy, Debug)]
+pub struct Saved {
+    /// Durable, or why not.
+    pub outcome: Result<(), Refused>,
+    /// The place that holds something else now.
+    pub place: Option<u8>,
+}
+
+/// The primitives of a device, and the requests that only it knows.
+pub trait Application {
+    /// The other half.
+    type Controller: Controller;
+
+    /// True once it is known what is stored. Until then, and not for long, requests wait.
+    fn is_open(&mut self, now_ms: u32) -> bool;
+
+    /// Number of places for primitives.
+    fn places(&self) -> u8;
+
+    /// Room of a place, bytes of an image.
+    fn place_bytes(&self) -> u32;
+
+    /// What is at a place.
+    ///
+    /// # Errors
+    /// Why that cannot be told.
+    fn listing(&self, place: u8) -> Result<Option<Listing>, Refused>;
+
+    /// Name of the primitive that the control half holds.
+    fn loaded(&self) -> Option<&Name>;
+
+    /// Prepares for an image of this name and length, which fits into a place. Another upload has been given up before.
+    ///
+    /// # Errors
+    /// Why it cannot be taken.
+    fn begin(&mut self, name: &Name, length: u32) -> Result<(), Refused>;
+
+    /// Takes the next part of the image.
+    ///
+    /// # Errors
+    /// Why it cannot be taken.
+    fn write(&mut self, offset: u32, data: &[u8]) -> Result<(), Refused>;
+
+    /// Forgets the upload.
+    fn abort(&mut self);
+
+    /// Checks the image, which is whole, and begins to save it.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    fn commit(&mut self, name: &Name, crc: u32, port: &mut impl SessionPort<Self::Controller>) -> Result<(), Refused>;
+
+    /// Begins to delete a primitive.
+    ///
+    /// # Errors
+    /// Why it stays.
+    fn delete(&mut self, name: &Name, port: &mut impl SessionPort<Self::Controller>) -> Result<(), Refused>;
+
+    /// A change that is over now. `calm`: no command is on its way to the control half.
+    fn saved(&mut self, calm: bool, port: &mut impl SessionPort<Self::Controller>) -> Option<Saved>;
+
+    /// Does what is asked, where it is not the same on every device. `of` is the request's number; `calm` as above.
+    ///
+    /// # Errors
+    /// Why it is not done.
+    fn act(
+        &mut self,
+        of: u16,
+        request: Request,
+        calm: bool,
+        port: &mut impl SessionPort<Self::Controller>,
+    ) -> Result<Action<<Self::Controller as Controller>::Command>, Refused>;
+}
+
+/// Refuses numbers that are none, naming the first.
+///
+/// # Errors
+/// [`Refusal::BadValue`] with its place.
+pub fn finite(values: &[f32]) -> Result<(), Refused> {
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(place) => Err((Refusal::BadValue, [u32::try_from(place).unwrap_or(u32::MAX), 0])),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,30 @@
+//! Why a text is no address of a device.
+
+/// Why a text is no address.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum AddressError {
+    /// The part before the colon names no kind of device.
+    #[error(
+        "'{0}' names no kind of device; there are sim:, sil:, board:, hand:, tcp:HOST:PORT, unix:PATH, serial:PORT[@BAUD] and can:INTERFACE[/N]"
+    )]
+    Kind(String),
+    /// Something is missing behind the colon.
+    #[error("'{0}' is incomplete; it should look like {1}")]
+    Incomplete(String, &'static str),
+    /// An option of a simulator that there is not.
+    #[error(
+        "simulated devices have the options seed=NUMBER, world=NAME, line=serial|can, bus=FILE and flash=FILE, not '{0}'"
+    )]
+    Option(String),
+    /// An option of the emulated board that there is not.
+    #[error(
+        "board: has the options of the other simulated devices, and report=FILE, cancellation=skipped|stuck, revision=0xNNNN and fault=KIND@MICROSECONDS[:ARGUMENT], not '{0}'"
+    )]
+    BoardOption(String),
+    /// A value that is no number.
+    #[error("'{0}' is not a whole number")]
+    Number(String),
+    /// A device number that there is not.
+    #[error("devices on a CAN bus have the numbers 0 to 15, not '{0}'")]
+    DeviceNumber(String),
+}
