@@ -1,10 +1,10 @@
-//! What a person may ask of the arm: commands, the options of a run, and the reasons a command is refused.
+//! A person's requests to the arm: commands, the options of a run, and the reasons a command is refused.
 //!
 //! Commands carry plain `f32` in SI units, as they arrive over the link; they are checked when the cycle takes them up.
 
 use core::fmt;
 
-/// Which tool pose stands in the position feedback `K_x (x_d - x)` of Eq (11).
+/// The tool pose in the position feedback `K_x (x_d - x)` of Eq (11).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PoseFeedback {
     /// The measured pose: integral action through `q_d`, removes the steady-state error of friction and model.
@@ -13,7 +13,7 @@ pub enum PoseFeedback {
     Planned,
 }
 
-/// How the desired joint acceleration of Eq (10) is made.
+/// The source of the desired joint acceleration of Eq (10).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AccelerationSource {
     /// `J^+ (ddx_d + K_x (dx_d - dx) - dJ dq)`, where `dx` is the velocity of the pose named by [`PoseFeedback`].
@@ -43,17 +43,17 @@ pub struct RunOptions {
     pub goal: Goal,
     /// Speed factor on the stored duration: 1 as stored, 0.5 half as fast. Refused outside 0.1 to 2.
     pub speed: f32,
-    /// Whether the felt wrench bends the plan (Eqs 8, 9). Off while an expectation is recorded.
+    /// True if the measured wrench bends the plan (Eqs 8, 9). Off while an expectation is recorded.
     pub feedback: bool,
-    /// Whether the force controller of Eq (12) adds its torque.
+    /// True if the force controller of Eq (12) adds its torque.
     pub force_control: bool,
     /// Pose used in Eq (11).
     pub pose_feedback: PoseFeedback,
     /// Acceleration used in Eq (10).
     pub acceleration: AccelerationSource,
-    /// Whether the finger gauges bend the finger rows; only together with `feedback`.
+    /// True if the finger gauges bend the finger rows; only together with `feedback`.
     pub finger_feedback: bool,
-    /// Whether the arm tracks with the compliant gains, so that the force controller is not overruled.
+    /// True if the arm tracks with the compliant gains, so that the force controller is not overruled.
     pub compliant: bool,
 }
 

@@ -48,8 +48,8 @@ impl Real for f32 {
         counts as f32
     }
 
-    /// Two-step reduction by quarter turns, then polynomials; 7.6e-8 on [-pi, pi]. `libm` costs fifty times as much on a
-    /// Cortex-M4F because it computes in f64.
+    /// Two-step reduction by quarter turns, then polynomials; 7.6e-8 on [-pi, pi]. `libm` costs fifty times as much on
+    /// a Cortex-M4F because it computes in f64.
     #[inline]
     fn sine_cosine(self) -> (Self, Self) {
         let quarters = self * core::f32::consts::FRAC_2_PI;

@@ -1,8 +1,8 @@
-//! The control rate, the one source of time: durations are written in seconds and converted to control periods here, when
-//! the code is compiled.
+//! The control rate, the one source of time: durations are written in seconds and converted to control periods here,
+//! when the code is compiled.
 
-/// Control rate (Hz). Everything that counts control periods, here and in the other crates, follows from it. A higher rate
-/// has to leave room on the bus for requests, replies and torques within each period.
+/// Control rate (Hz). Everything that counts control periods, here and in the other crates, follows from it. A higher
+/// rate has to leave room on the bus for requests, replies and torques within each period.
 pub const RATE_HZ: u32 = 300;
 
 /// Control rate (Hz), for arithmetic.

@@ -1,6 +1,8 @@
-//! Quantities as types: what a vector means and in which unit stands in its type, so that a torque is never taken for an angle.
+//! Quantities as types: what a vector means and in which unit stands in its type, so that a torque is never taken for
+//! an angle.
 //!
-//! Joint quantities hold one number per joint, J1 to J7. Spatial quantities name the axes they are given in. All in SI units.
+//! Joint quantities hold one number per joint, J1 to J7. Spatial quantities name the axes they are given in. All in SI
+//! units.
 
 use nalgebra::{Matrix3, SVector, Vector3};
 
@@ -43,7 +45,7 @@ macro_rules! joint_quantity {
                 values.map(Real::single)
             }
 
-            /// Whether every component is finite.
+            /// True if every component is finite.
             pub fn is_finite(&self) -> bool {
                 self.0.iter().all(|value| value.is_finite_number())
             }
@@ -152,8 +154,8 @@ impl<R: Real> Orientation<R> {
         )
     }
 
-    /// The rotation error from `self` to `desired` as `2 vec(q_d (x) conj(q))`, sign-aligned, in world axes (rad for small
-    /// angles): turning by it brings `self` towards `desired`. Eq (11).
+    /// The rotation error from `self` to `desired` as `2 vec(q_d (x) conj(q))`, sign-aligned, in world axes (rad for
+    /// small angles): turning by it brings `self` towards `desired`. Eq (11).
     pub fn error_to(&self, desired: &Orientation<R>) -> Vector3<R> {
         let [w, x, y, z] = self.0;
         let [dw, dx, dy, dz] = desired.0;

@@ -38,7 +38,8 @@ fn no_damping_mode_is_faster_than_the_delay_of_the_loop_allows() {
         }
     }
     println!("fastest damping mode: {worst} /s");
-    // Velocity filter 4.5 ms, differencing 1.7 ms, hold 1.7 ms and one cycle of delay 3.3 ms: rings at pi/2 / 11.2 ms = 140 /s.
+    // Velocity filter 4.5 ms, differencing 1.7 ms, hold 1.7 ms and one cycle of delay 3.3 ms: rings at pi/2 / 11.2 ms =
+    // 140 /s.
     assert!(worst < 100.0, "{worst}");
 }
 

@@ -1,4 +1,5 @@
-//! Frames and signs of the kinematics that the golden vectors cannot show: derivatives, pseudo-inverse, orientation error.
+//! Frames and signs of the kinematics that the golden vectors cannot show: derivatives, pseudo-inverse, orientation
+//! error.
 
 use control::model::{ArmModel, Frames};
 use control::units::{JointPositions, JointVelocities, Orientation, Vector6, Vector7};

@@ -1,5 +1,5 @@
-//! The bundle of a movement with its feedback, expectation and statistics: which sensor bends which row, and filling all
-//! of it in place.
+//! The bundle of a movement with its feedback, expectation and statistics: which sensor bends which row, and filling
+//! all of it in place.
 
 use control::plan::primitive::{
     COUPLED_ROWS, Configuration, Coupling, ExpectedWrench, Feedback, GainSchedule, Limits, MovementTables, POINT_ROWS,

@@ -11,19 +11,36 @@ pub struct Coefficients {
 }
 
 impl Coefficients {
-    /// From gain and feedback of the transfer function.
-    pub const fn new(gain: f64, a1: f64, a2: f64) -> Self {
-        Coefficients { gain: constant(gain), a1: constant(a1), a2: constant(a2) }
+    /// The second-order Butterworth filter of this cut-off (Hz) at the control rate, by the bilinear transform.
+    pub const fn butterworth(cut_off: f64) -> Self {
+        let k = tangent(core::f64::consts::PI * cut_off / control::RATE);
+        let scale = 1.0 / (1.0 + core::f64::consts::SQRT_2 * k + k * k);
+        Coefficients {
+            gain: constant(k * k * scale),
+            a1: constant(2.0 * (k * k - 1.0) * scale),
+            a2: constant((1.0 - core::f64::consts::SQRT_2 * k + k * k) * scale),
+        }
     }
 }
 
-/// Cut-off 15 Hz at 300 Hz: gauges. The test holds the numbers against the bilinear transform.
-pub const GAUGE: Coefficients =
-    Coefficients::new(0.020_083_365_564_211_23, -1.561_018_075_800_718_2, 0.641_351_538_057_563);
+/// Returns the tangent of an angle between 0 and pi/2 by its continued fraction, for constants: 12 terms are exact to 1e-13
+/// up to 1.4.
+const fn tangent(angle: f64) -> f64 {
+    let square = angle * angle;
+    let mut denominator = 25.0;
+    let mut odd = 23.0;
+    while odd > 0.0 {
+        denominator = odd - square / denominator;
+        odd -= 2.0;
+    }
+    angle / denominator
+}
 
-/// Cut-off 50 Hz at 300 Hz: velocities.
-pub const VELOCITY: Coefficients =
-    Coefficients::new(0.155_051_025_721_682_2, -0.620_204_102_886_728_8, 0.240_408_205_773_457_55);
+/// Filter of the gauges.
+pub const GAUGE: Coefficients = Coefficients::butterworth(control::sense::wrench::WRENCH_CUT_OFF);
+
+/// Filter of the velocities.
+pub const VELOCITY: Coefficients = Coefficients::butterworth(control::sense::joints::VELOCITY_CUT_OFF);
 
 /// `D` channels through one filter (transposed direct form).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

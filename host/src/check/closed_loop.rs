@@ -4,6 +4,7 @@ use control::law::Gains;
 use control::model::Calibration;
 use control::plan::load;
 use control::plan::primitive::posture_and_hand;
+use control::time::periods;
 use control::units::{JointVelocities, Vector7};
 use control::{BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, RunOptions, State, flags};
 use puck::SafetyMode;
@@ -14,8 +15,8 @@ use lab::boxed::boxed;
 use lab::plan::PERIOD;
 use lab::primitive_file::HostPrimitive;
 
-/// Cycles in which the arm is taken up and comes to rest before the run begins: 1.5 s.
-const SETTLING: u64 = 450;
+/// Time in which the arm is taken up and comes to rest before the run begins: 1.5 s, in control periods.
+const SETTLING: u64 = periods(1.5) as u64;
 
 /// Cycles that a run may take beyond its duration: the cycle settles for 1 s and gives up at 1.5 durations.
 const OVERTIME: f64 = 1.5;
@@ -85,7 +86,7 @@ impl ClosedLoop {
         }
         let mut plant = Plant::at(posture_and_hand(&primitive.movement().start().points).0);
         let expected = (primitive.movement().duration() / speed / PERIOD).ceil();
-        let last = SETTLING + (expected * (1.0 + OVERTIME)) as u64 + 900;
+        let last = SETTLING + (expected * (1.0 + OVERTIME)) as u64 + u64::from(periods(3.0));
         for number in 0..last {
             let Some(counts) = plant.counts() else {
                 run.ending = Ending::Diverged;

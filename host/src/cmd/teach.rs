@@ -11,6 +11,7 @@ use sim::teacher::TaughtMovement;
 
 use super::{ErrorCode, Failure, Global, connection};
 use lab::client::Client;
+use lab::demonstration::RATE;
 use lab::device::Device;
 use lab::procedure::{self, ProcedureError, Recorder, teacher};
 use lab::simulation::{DEFAULT_SEED, SimulationOptions};
@@ -131,8 +132,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     connection::tell_speed(&client, started, output);
     output.say(format!("wrote {}", command.output.display()));
     output.result(
-        &json!({ "file": command.output, "samples": rows, "duration_s": rows as f64 / 300.0, "gaps": gaps }),
-        format!("{rows} samples, {:.1} s, {gaps} lost", rows as f64 / 300.0),
+        &json!({ "file": command.output, "samples": rows, "duration_s": rows as f64 / RATE, "gaps": gaps }),
+        format!("{rows} samples, {:.1} s, {gaps} lost", rows as f64 / RATE),
     )
 }
 

@@ -176,7 +176,7 @@ fn hand_image_grips_with_the_expected_force_within_half_of_a_72_mhz_cycle() {
 
 /// Instructions as a share of a control cycle of a 72 MHz part, percent.
 fn share(instructions: u32, clocks: f64) -> f64 {
-    100.0 * f64::from(instructions) * clocks / (72e6 / 300.0)
+    100.0 * f64::from(instructions) * clocks / (72e6 / control::RATE)
 }
 
 #[test]

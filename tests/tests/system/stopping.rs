@@ -23,7 +23,7 @@ fn in_the_middle(address: &str) -> (Arm, Vec<Telemetry>) {
     prepare(&mut arm, file);
     expect(arm.set_telemetry(1));
     begin(&mut arm, file);
-    let cycles = (file.duration * 300.0 / 2.0) as usize;
+    let cycles = (file.duration * control::RATE / 2.0) as usize;
     let mut telemetry = Vec::new();
     while telemetry.len() < cycles {
         telemetry.extend(next(&mut arm));
@@ -92,7 +92,7 @@ fn arm_stops_half_a_second_after_its_host_fell_silent() {
     // The last words of the session say why it ends; telemetry ends with it.
     let Some(Reply::Event(event)) = heard.last() else { panic!("{:?}", heard.last()) };
     assert_eq!((event.kind, event.detail), (EventKind::LinkTimeout, LINK_TIMEOUT_MS));
-    let after = f64::from(event.cycle - silent_since) / 300.0;
+    let after = f64::from(event.cycle - silent_since) / control::RATE;
     println!("stopped {after:.3} s after the host's last look");
     // The host's last ping was up to 100 ms before that.
     assert!((0.39..=0.51).contains(&after), "stopped after {after:.3} s of silence");

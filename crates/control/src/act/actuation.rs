@@ -1,7 +1,7 @@
-//! What one cycle sends to the motors: two packed-torque frames for the arm and one for the hand, or nothing.
+//! The frames of one cycle to the motors: two packed-torque frames for the arm and one for the hand, or nothing.
 //!
-//! The only place where torques become frames, and it takes nothing but [`LimitedTorques`] and [`LimitedHandTorques`]. Rounding to counts is the
-//! manufacturer's, downwards.
+//! The only place where torques become frames, and it takes nothing but [`LimitedTorques`] and [`LimitedHandTorques`].
+//! Rounding to counts is the manufacturer's, downwards.
 
 use puck::hand::{INNER_LINK_RATIO, SPREAD_RATIO};
 use puck::{CanFrame, Group, PropertyId, PuckTorque, packed_torques};
@@ -67,13 +67,13 @@ impl Actuation {
         self.frames
     }
 
-    /// The packed torque frame of the hand (0x405), to be sent after the arm's; `None` where the hand is not driven and its
-    /// worm drives hold.
+    /// The packed torque frame of the hand (0x405), to be sent after the arm's; `None` where the hand is not driven and
+    /// its worm drives hold.
     pub fn hand_frame(&self) -> Option<CanFrame> {
         self.hand_frame
     }
 
-    /// Whether the safety module should be asked to go to IDLE (after a fault).
+    /// True if the safety module should be asked to go to IDLE (after a fault).
     pub fn requests_idle(&self) -> bool {
         self.requests_idle
     }

@@ -44,7 +44,8 @@ impl<R: Real> HandLimiter<R> {
         &self.last
     }
 
-    /// Cuts the wanted torques (N m) of one cycle to magnitude and rate. What is not finite counts as zero: the worm holds.
+    /// Cuts the wanted torques (N m) of one cycle to magnitude and rate. What is not finite counts as zero: the worm
+    /// holds.
     pub fn limit(&mut self, wanted: &[R; DIGITS]) -> LimitedHandTorques<R> {
         for ((last, wanted), limit) in self.last.iter_mut().zip(wanted).zip(TORQUE_LIMIT) {
             let finite = if wanted.is_finite_number() { *wanted } else { R::of(0.0) };

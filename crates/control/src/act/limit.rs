@@ -1,12 +1,14 @@
 //! `TorqueLimiter`: the only maker of [`LimitedTorques`], and with it the only way to the motors.
 //!
-//! In this order: what is not finite is refused; each joint is cut to its own limit; each differential pair is scaled until
-//! both of its motors are below their caps; the step from the last torque is cut to the rate limit, a pair by a common
-//! fraction. The set of allowed torques is convex and the last torque lies in it, so the step never leaves it again.
+//! In this order: what is not finite is refused; each joint is cut to its own limit; each differential pair is scaled
+//! until both of its motors are below their caps; the step from the last torque is cut to the rate limit, a pair by a
+//! common fraction. The set of allowed torques is convex and the last torque lies in it, so the step never leaves it
+//! again.
 //!
-//! Joint limits are the worst gravity torque of the arm with its hand plus what the manufacturer's own controllers allow
-//! themselves (25, 20, 15, 15, 5, 5, 5 N m): those add gravity after their limit, and the outstretched arm alone needs 41 N m
-//! at J2. The motor caps lie below the safety module's warning (TL1 = 4731 counts) and the pucks' own cap (MT).
+//! Joint limits are the worst gravity torque of the arm with its hand plus what the manufacturer's own controllers
+//! allow themselves (25, 20, 15, 15, 5, 5, 5 N m): those add gravity after their limit, and the outstretched arm alone
+//! needs 41 N m at J2. The motor caps lie below the safety module's warning (TL1 = 4731 counts) and the pucks' own cap
+//! (MT).
 
 use puck::Transmission;
 
@@ -29,10 +31,11 @@ pub const STEP_LIMIT: [f64; JOINTS] = {
     [j1 / cycles, j2 / cycles, j3 / cycles, j4 / cycles, j5 / cycles, j6 / cycles, j7 / cycles]
 };
 
-/// Largest torque of a puck (counts of its torque unit): below the safety module's warning of 4731 and its limit of 5204.
+/// Largest torque of a puck (counts of its torque unit): below the safety module's warning of 4731 and its limit of
+/// 5204.
 pub const MOTOR_COUNTS_LIMIT: f64 = 4600.0;
 
-/// Which joints share motors.
+/// Joints that share motors.
 const GROUPS: [&[usize]; 5] = [&[0], &[1, 2], &[3], &[4, 5], &[6]];
 
 /// Joint torques within every limit. No public constructor: the limiter makes them.
@@ -46,7 +49,7 @@ impl<R: Real> LimitedTorques<R> {
     }
 }
 
-/// What the limiter had to do in one cycle.
+/// Limits that acted in one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LimitReport {
     /// A joint was cut to its own limit.

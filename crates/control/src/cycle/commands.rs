@@ -112,8 +112,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
-    /// Conditions of a run that uses force: it is measured, expected, and at rest what it should be (B5). A load that the
-    /// primitive expects at its start is no reason to refuse it.
+    /// Conditions of a run that uses force: it is measured, expected, and at rest what it should be (B5). A load that
+    /// the primitive expects at its start is no reason to refuse it.
     fn may_use_force(&self, primitive: &Primitive<R, N>, measured: &Measured<'_, R>) -> Result<(), Refusal> {
         if self.wrench.age().is_none_or(|age| age > WRENCH_AGE) {
             return Err(Refusal::WrenchMissing);

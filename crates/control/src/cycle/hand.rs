@@ -16,7 +16,7 @@ use crate::time::periods;
 /// Time for which the hand is still driven after a move that nothing follows: 0.5 s, in control periods.
 const SETTLING: u16 = periods(0.5);
 
-/// What the hand is after.
+/// Aim of the hand.
 #[derive(Clone, Copy, Debug)]
 enum Aim<R: Real> {
     /// Nothing: the worms hold.
@@ -37,7 +37,7 @@ pub struct HandDrive<R: Real> {
     aim: Aim<R>,
     /// Gauges that Eq (14) should see (N m); `None` controls position alone.
     expected: Option<[R; FINGERS]>,
-    /// Whether a finger torque was cut to its limit in the last tick.
+    /// True if a finger torque was cut to its limit in the last tick.
     saturated: bool,
     driven: bool,
 }
@@ -66,7 +66,7 @@ impl<R: Real> HandDrive<R> {
         }
     }
 
-    /// What is known about the hand; `None` without an initialised one.
+    /// Returns the state of the hand; `None` without an initialised one.
     pub fn state(&self) -> Option<HandState<R>> {
         self.state
     }
@@ -98,7 +98,8 @@ impl<R: Real> HandDrive<R> {
         self.stop_driving();
     }
 
-    /// Moves to `goal` (rad) in `duration` (s) or longer, from where the hand is held, or is. Position alone is controlled.
+    /// Moves to `goal` (rad) in `duration` (s) or longer, from where the hand is held, or is. Position alone is
+    /// controlled.
     pub fn move_to(&mut self, goal: &[R; DIGITS], duration: R) {
         let Some(state) = self.state else { return };
         let from = match &self.aim {
@@ -139,7 +140,7 @@ impl<R: Real> HandDrive<R> {
         }
     }
 
-    /// Where the hand should be (rad); where it is, if nothing is desired; zero without a hand.
+    /// Returns the desired angles (rad); the measured ones, if nothing is desired; zero without a hand.
     pub fn desired(&self) -> [R; DIGITS] {
         match (&self.aim, self.state) {
             (Aim::Follow(reference), _) => reference.q,
@@ -149,7 +150,8 @@ impl<R: Real> HandDrive<R> {
         }
     }
 
-    /// The torques of one tick; `None` where the hand is not driven. `keeps` tells whether a finished move is held on to.
+    /// The torques of one tick; `None` where the hand is not driven. `keeps` tells whether a finished move is held on
+    /// to.
     pub fn step(&mut self, gains: &HandGains<R>, keeps: bool) -> Option<LimitedHandTorques<R>> {
         let reference = match &mut self.aim {
             Aim::None => None,

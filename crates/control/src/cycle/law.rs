@@ -75,8 +75,8 @@ impl<R: Real> Posture<R> {
         }
     }
 
-    /// Gives way where the arm was pushed away by more than `clamp` (rad), and comes back slowly once it is let go. A spring
-    /// that is not bounded would throw it back.
+    /// Gives way where the arm was pushed away by more than `clamp` (rad), and comes back slowly once it is let go. A
+    /// spring that is not bounded would throw it back.
     fn give_way(&mut self, q: &JointPositions<R>, clamp: &Vector7<R>) {
         let step = R::of(RETURN_SPEED * PERIOD);
         let back = (self.q.0 - self.held.0).map(|way| within(way, step));

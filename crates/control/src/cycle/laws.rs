@@ -19,11 +19,12 @@ const ARMING: u16 = periods(0.5);
 /// Speed of the hand up to which the arm floats freely (m/s).
 const TAUGHT_SPEED: f64 = 0.18;
 
-/// Speed of the hand from which it is damped as in a soft stop (m/s); in between the damping rises. 0.25 m/s, the reduced
-/// speed of the standards for work beside a person, lies in between: an arm that was shoved falls below it by itself.
+/// Speed of the hand from which it is damped as in a soft stop (m/s); in between the damping rises. 0.25 m/s, the
+/// reduced speed of the standards for work beside a person, lies in between: an arm that was shoved falls below it by
+/// itself.
 const BRAKED_SPEED: f64 = 0.30;
 
-/// What the law of a state asks for, besides the torque.
+/// Output of a law: the torque wanted, and values for the record.
 pub(super) struct Demand<R: Real> {
     pub(super) torque: JointTorques<R>,
     pub(super) q_d: JointPositions<R>,
@@ -62,7 +63,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
-    /// Gravity compensation; damped while it builds up after arming, and while the hand is faster than a person teaches.
+    /// Gravity compensation; damped while it builds up after arming, and while the hand is faster than a person
+    /// teaches.
     fn float(&self, measured: &Measured<'_, R>) -> Demand<R> {
         let mut torque = self.model.gravity_torque(measured.frames).0;
         let mut share = (hand_speed(measured) - R::of(TAUGHT_SPEED)) * R::of(1.0 / (BRAKED_SPEED - TAUGHT_SPEED));
@@ -159,7 +161,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.cut.joint || self.cut.motor || senses != Senses::Fresh,
             );
             let bounded = bounded(&command, tracking.force_limit) * run.kept();
-            // What the primitive expects to carry or to press is fed forward: the integral has a finite gain.
+            // The expected wrench is fed forward, because the gain of the integral is finite.
             let wanted = bounded - deviation.expected.in_world(to_world);
             torque.0 += ForceController::torque(&measured.frames.jacobian(), &wanted).0;
             set |= flags::FORCE_CONTROL;

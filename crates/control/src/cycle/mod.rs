@@ -55,7 +55,8 @@ const WRENCH_AGE: u8 = few_periods(1.0 / 60.0);
 /// Length of the ramp that takes all but gravity and damping away in a soft stop: 100 ms, in control periods.
 const STOP_RAMP: u16 = periods(0.1);
 
-/// Length of the ramp that takes away what a compliant run inherits from the stiff hold before it: 1 s, in control periods.
+/// Length of the ramp that takes away what a compliant run inherits from the stiff hold before it: 1 s, in control
+/// periods.
 const HANDOVER: u16 = periods(1.0);
 
 /// Below this joint speed (rad/s) the arm counts as standing, for leaving a stop.
@@ -80,12 +81,12 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     safety: Option<(SafetyMode, u16)>,
     /// Control periods since torque came on, saturating.
     armed_for: u16,
-    /// How the last torque was cut.
+    /// Limits that cut the last torque.
     cut: LimitReport,
     pending: Option<Event>,
 }
 
-/// What is measured in one cycle.
+/// Measurements of one cycle.
 struct Measured<'a, R: Real> {
     state: &'a JointState<R>,
     frames: &'a Frames<R>,
@@ -96,7 +97,8 @@ struct Measured<'a, R: Real> {
 }
 
 impl<R: Real, const N: usize> Cycle<R, N> {
-    /// Makes, in its place, a cycle in `Idle` with these gains (for a real arm: [`Gains::tuned`]) and without a primitive.
+    /// Makes, in its place, a cycle in `Idle` with these gains (for a real arm: [`Gains::tuned`]) and without a
+    /// primitive.
     ///
     /// In place, piece by piece, because a cycle takes half of a small processor's stack. Where there is a heap:
     /// `Box::new_uninit().write_init(Cycle::init(..))`, with [`pinned_init::InPlaceWrite`].
@@ -144,7 +146,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.loaded.get()
     }
 
-    /// What is mounted on the arm this cycle controls.
+    /// Returns the payload of the arm that this cycle controls.
     pub fn payload(&self) -> Payload {
         self.calibration.payload
     }
@@ -154,12 +156,13 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.hand.is_moving()
     }
 
-    /// Whether the wrench has a zero; see [`WrenchEstimator::is_tared`].
+    /// True if the wrench has a zero; see [`WrenchEstimator::is_tared`].
     pub fn is_wrench_zeroed(&self) -> bool {
         self.wrench.is_tared()
     }
 
-    /// Takes the scales read from the pucks. Positions are learned anew, and a primitive that was for another payload is forgotten.
+    /// Takes the scales read from the pucks. Positions are learned anew, and a primitive that was for another payload
+    /// is forgotten.
     ///
     /// # Errors
     /// [`Refusal::WrongState`] while torque is on.
@@ -188,8 +191,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.leave_torque();
     }
 
-    /// Takes a primitive for the next run: no more than a copy, because its caller keeps the control task waiting. A refused one
-    /// leaves the old in place.
+    /// Takes a primitive for the next run: no more than a copy, because its caller keeps the control task waiting. A
+    /// refused one leaves the old in place.
     ///
     /// # Errors
     /// [`LoadRefusal`] while a run is in progress, or if it was checked for another arm than this.

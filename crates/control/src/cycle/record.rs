@@ -1,4 +1,4 @@
-//! What goes into one control cycle and what comes out of it.
+//! Input, output and record of one control cycle.
 
 use crate::act::actuation::Actuation;
 use crate::command::{Command, Refusal};
@@ -22,9 +22,9 @@ pub struct CycleInput {
 /// The output of one control cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CycleOutput {
-    /// What to send to the motors.
+    /// Frames to the motors.
     pub actuation: Actuation,
-    /// What the cycle measured and decided.
+    /// Measurements and decisions of the cycle.
     pub record: CycleRecord,
     /// Something a person should hear of, at most one per cycle.
     pub event: Option<Event>,

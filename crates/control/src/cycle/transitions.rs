@@ -26,8 +26,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
-    /// Begins the law of the state that was just entered; an approach and a run are begun by [`Cycle::begin_approach`] and
-    /// [`Cycle::begin_run`]. Not inlined: it is rare, and a board may keep the code of every cycle in a small fast memory.
+    /// Begins the law of the state that was just entered; an approach and a run are begun by [`Cycle::begin_approach`]
+    /// and [`Cycle::begin_run`]. Not inlined: it is rare, and a board may keep the code of every cycle in a small fast
+    /// memory.
     #[inline(never)]
     pub(super) fn entered(&mut self, measured: Option<&Measured<'_, R>>) {
         let state = self.supervisor.law();
@@ -37,8 +38,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             self.hand.release()
         }
         let Some(measured) = measured.filter(|_| state.has_torque()) else {
-            // Without a measurement there is nothing to hold or to stop with: only states without torque can follow, or a
-            // soft stop whose ramp has nothing to take away.
+            // Without a measurement there is nothing to hold or to stop with: only states without torque can follow, or
+            // a soft stop whose ramp has nothing to take away.
             if state.has_torque() {
                 self.law = Law::SoftStop(Ramp::none());
             } else {
@@ -110,8 +111,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         posture
     }
 
-    /// What the last torque has beyond what the arm itself needs at rest in its motion (N m): friction, contact, and what the
-    /// model does not know.
+    /// Returns the part of the last torque that the motion of the arm itself does not explain (N m): friction, contact,
+    /// and what the model does not know.
     fn torque_beyond_model(&self, measured: &Measured<'_, R>) -> Vector7<R> {
         let own = self.model.inverse_dynamics(measured.frames, &measured.state.dq, &JointAccelerations::zero());
         self.limiter.last().torques().0 - own.0

@@ -69,7 +69,7 @@ impl Fault {
         Fault::ALL.into_iter().find(|fault| fault.code() == code)
     }
 
-    /// What happened and what to do, in one sentence for a person.
+    /// Returns cause and remedy in one sentence for a person.
     pub const fn explanation(self) -> &'static str {
         match self {
             Fault::None => "no fault",

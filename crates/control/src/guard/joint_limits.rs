@@ -16,7 +16,8 @@ const STOP_DISTANCE: f64 = 0.02;
 /// Stiffness of the push back beyond a bound (N m/rad): several N m before the stop, so that a person feels it coming.
 const STIFFNESS: [f64; JOINTS] = [100.0, 150.0, 80.0, 60.0, 25.0, 40.0, 8.0];
 
-/// Speed of a return at which nothing pushes any more (rad/s). Without it the push gives back as speed what the way out cost.
+/// Speed of a return at which nothing pushes any more (rad/s). Without it the push gives back as speed what the way out
+/// cost.
 const RETURN_SPEED: f64 = 0.5;
 
 /// Damping while moving further out (N m s/rad).
@@ -49,7 +50,7 @@ impl<R: Real> JointBounds<R> {
         }
     }
 
-    /// Whether a joint is beyond its bound by more than `STOP_DISTANCE`.
+    /// True if a joint is beyond its bound by more than `STOP_DISTANCE`.
     pub fn violated(&self, q: &JointPositions<R>) -> bool {
         let distance = R::of(STOP_DISTANCE);
         (0..JOINTS).any(|joint| q.0[joint] > self.max[joint] + distance || q.0[joint] < self.min[joint] - distance)

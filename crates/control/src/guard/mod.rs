@@ -1,4 +1,4 @@
-//! What watches and decides: faults, the monitor of limits, the state machine, the watch for unusual runs.
+//! Guards: faults, the monitor of limits, the state machine, the watch for unusual runs.
 
 pub mod fault;
 pub mod joint_limits;

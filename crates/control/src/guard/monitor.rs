@@ -19,7 +19,8 @@ pub const TIP_REACH: f64 = 0.35;
 /// A joint may exceed its speed limit by this factor before it is stopped: noise and overshoot.
 const SPEED_MARGIN: f64 = 1.2;
 
-/// Contact force that stops a movement (N): the lowest permissible quasi-static one (face) of the collaboration standards.
+/// Contact force that stops a movement (N): the lowest permissible quasi-static one (face) of the collaboration
+/// standards.
 pub(crate) const FORCE_LIMIT: f64 = 65.0;
 
 /// Samples in a row above the force limit: one corrupt sample stops no movement.
@@ -28,7 +29,8 @@ const FORCE_CYCLES: u8 = 2;
 /// Largest distance between plan and tool (m); a plan farther away has lost its arm.
 pub(crate) const TRACKING_LIMIT: f64 = 0.30;
 
-/// Largest speed of the tool against its plan (m/s). Somebody who pushes harder is not followed; a loop that swings is stopped.
+/// Largest speed of the tool against its plan (m/s). Somebody who pushes harder is not followed; a loop that swings is
+/// stopped.
 const LAG_LIMIT: f64 = 0.5;
 
 /// Time without positions after which torque goes off: 200 ms, in control periods.
@@ -41,7 +43,7 @@ pub(crate) struct Monitor<R: Real> {
     pressed: u8,
 }
 
-/// What the monitor looks at besides the joint state.
+/// Input of the monitor besides the joint state.
 pub(crate) struct Observation<'a, R: Real> {
     pub(crate) frames: &'a Frames<R>,
     pub(crate) bounds: &'a JointBounds<R>,
@@ -49,9 +51,9 @@ pub(crate) struct Observation<'a, R: Real> {
     pub(crate) force: R,
     /// Distance (m) and speed (m/s) of the tool against the plan in the last cycle.
     pub(crate) lag: (R, R),
-    /// Whether the run depends on the wrench, and it is gone.
+    /// True if the run depends on the wrench, and it is gone.
     pub(crate) wrench_lost: bool,
-    /// Whether the sensor has been at full scale: in a force, or in a torque that the run depends on.
+    /// True if the sensor has been at full scale: in a force, or in a torque that the run depends on.
     pub(crate) full_scale: bool,
 }
 

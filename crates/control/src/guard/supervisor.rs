@@ -57,7 +57,7 @@ impl State {
         State::ALL.into_iter().find(|state| state.code() == code)
     }
 
-    /// Whether torque is sent in this state.
+    /// True if torque is sent in this state.
     pub const fn has_torque(self) -> bool {
         !matches!(self, State::Idle | State::Fault)
     }
@@ -132,7 +132,7 @@ impl Trigger {
         Trigger::Arrived,
     ];
 
-    /// Whether a person caused it.
+    /// True if a person caused it.
     pub const fn is_command(self) -> bool {
         matches!(
             self,
@@ -147,7 +147,7 @@ impl Trigger {
     }
 }
 
-/// What a trigger does in a state.
+/// Effect of a trigger in a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transition {
     /// Nothing changes.
@@ -161,8 +161,8 @@ pub enum Transition {
 }
 
 /// The whole state machine. Torque authority goes down by itself; it goes up by a person's command alone (whose further
-/// conditions, above all an ACTIVE safety module, the cycle checks first). The one exception is `Coast`, which returns to
-/// the state it bridged.
+/// conditions, above all an ACTIVE safety module, the cycle checks first). The one exception is `Coast`, which returns
+/// to the state it bridged.
 pub const fn transition(state: State, trigger: Trigger) -> Transition {
     use Transition::{Enter, Refuse, Resume, Stay};
     match (state, trigger) {
@@ -238,7 +238,7 @@ impl Supervisor {
         self.fault
     }
 
-    /// Whether a command would be taken.
+    /// True if a command would be taken.
     ///
     /// # Errors
     /// [`Refusal::WrongState`] where it would not.

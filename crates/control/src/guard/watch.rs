@@ -1,10 +1,11 @@
 //! `Watch`: notices, from what successful runs felt like, that this one is not going as it should.
 //!
-//! Two things are told. A channel leaves its band: its z-score by the [`SensorStatistics`] is averaged
-//! over [`MEMORY`] with its sign (noise averages out, a missing object does not) and passes [`LIMIT`]. Of a finger only
-//! going too far counts: one that stops early has met something, be it thicker than usual; one that closes farther than ever
-//! holds nothing. And contact is lost: before the fingers move, the force falls to a small part of what it was. No table
-//! by phase can tell that, because objects are met at different phases, but what was met and fell over is not felt any more.
+//! Two things are told. A channel leaves its band: its z-score by the [`SensorStatistics`] is averaged over [`MEMORY`]
+//! with its sign (noise averages out, a missing object does not) and passes [`LIMIT`]. Of a finger only going too far
+//! counts: one that stops early has met something, be it thicker than usual; one that closes farther than ever holds
+//! nothing. And contact is lost: before the fingers move, the force falls to a small part of what it was. No table by
+//! phase can tell that, because objects are met at different phases, but what was met and fell over is not felt any
+//! more.
 //!
 //! Each is told once per run. The watch only tells; it never touches a torque, since a wrong alarm must not stop an arm
 //! that holds something.
@@ -36,15 +37,15 @@ const WILDEST: f64 = 40.0;
 /// Channels that the wrist sensor measures; those after them belong to the hand.
 const WRIST_CHANNELS: usize = 6;
 
-/// Time over which the force is averaged before contact is judged (s): longer than a bounce, or the swing of an object that
-/// stays on its foot.
+/// Time over which the force is averaged before contact is judged (s): longer than a bounce, or the swing of an object
+/// that stays on its foot.
 const CONTACT_MEMORY: f64 = 0.5;
 
 /// Averaged force that counts as contact (N): ten times what the sensor drifts by.
 const CONTACT: f64 = 1.0;
 
-/// Share of its largest value to which the force falls when contact is lost. Successful runs keep a quarter at least, even
-/// those that give way.
+/// Share of its largest value to which the force falls when contact is lost. Successful runs keep a quarter at least,
+/// even those that give way.
 const KEPT: f64 = 1.0 / 7.0;
 
 /// Movement of a finger from where it was at the start by which the hand is closing (rad).
@@ -83,7 +84,8 @@ impl<R: Real> Watch<R> {
         }
     }
 
-    /// Takes the values of one control period at `progress`; gives the most deviant channel that has just left its band.
+    /// Takes the values of one control period at `progress`; gives the most deviant channel that has just left its
+    /// band.
     ///
     /// Without a hand (`has_hand` false) its six channels say nothing.
     pub fn step(
@@ -114,7 +116,8 @@ impl<R: Real> Watch<R> {
             .map(|channel| Surprise { channel: channel as u8, progress: progress.single() })
     }
 
-    /// The largest averaged deviation, as a share of [`LIMIT`]: above 1 is a surprise. At least 2 once contact was lost.
+    /// The largest averaged deviation, as a share of [`LIMIT`]: above 1 is a surprise. At least 2 once contact was
+    /// lost.
     pub fn statistic(&self) -> R {
         let begin = if self.contact.lost { R::of(LOST) } else { R::of(0.0) };
         self.averages.iter().enumerate().fold(begin, |largest, (channel, average)| {
@@ -123,8 +126,8 @@ impl<R: Real> Watch<R> {
         })
     }
 
-    /// How far each channel is on the way to a surprise (spreads, never negative): the averaged deviation, of fingers only
-    /// that of closing too far.
+    /// How far each channel is on the way to a surprise (spreads, never negative): the averaged deviation, of fingers
+    /// only that of closing too far.
     pub fn sizes(&self) -> [R; STATISTICS_CHANNELS] {
         core::array::from_fn(|channel| self.averages.get(channel).map_or(R::of(0.0), |average| size(channel, *average)))
     }
@@ -289,7 +292,7 @@ mod tests {
     fn pushed(then: f64, finger: f64) -> (Option<(u8, f64)>, f64) {
         let (statistics, mut watch) = (indifferent(), Watch::new());
         let mut told = None;
-        for tick in 0..1500 {
+        for tick in 0..crate::time::periods(5.0) {
             let time = f64::from(tick) * PERIOD;
             let force = if time < 1.0 {
                 0.0

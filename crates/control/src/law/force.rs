@@ -1,10 +1,10 @@
 //! `ForceController`: proportional and windowed integral force control.
 //!
-//! Eq (12): `tau = -J^T (e + K_i integral_{t-Dt}^{t} e dt)`, `e = F_expected - F`, `F` the wrench of the environment on the
-//! robot. With this sign it is negative feedback: a wall that pushes too little is pressed harder. The window makes the
-//! integral a box filter of gain `K_i Dt`; against a rigid wall the force settles at `F_expected G/(1+G)`,
-//! `G = P + K_i Dt`. `F` has to be low-passed before it comes here: with unit gain and a tick of delay a stiff contact is
-//! marginally stable.
+//! Eq (12): `tau = -J^T (e + K_i integral_{t-Dt}^{t} e dt)`, `e = F_expected - F`, `F` the wrench of the environment on
+//! the robot. With this sign it is negative feedback: a wall that pushes too little is pressed harder. The window makes
+//! the integral a box filter of gain `K_i Dt`; against a rigid wall the force settles at `F_expected G/(1+G)`,
+//! `G = P + K_i Dt`. `F` has to be low-passed before it comes here: with unit gain and a tick of delay a stiff contact
+//! is marginally stable.
 
 use pinned_init::{Init, init};
 
@@ -35,7 +35,8 @@ impl<R: Real> ForceController<R> {
         self.window.restart(length);
     }
 
-    /// The command `-(P e + K_i dt sum e)` in the axes of the error (N, N m), world axes for [`ForceController::torque`].
+    /// The command `-(P e + K_i dt sum e)` in the axes of the error (N, N m), world axes for
+    /// [`ForceController::torque`].
     ///
     /// `frozen` (a torque saturates) keeps the window as it is. The error of this tick belongs to the window.
     pub fn command(&mut self, error: &Vector6<R>, proportional: R, integral: R, period: R, frozen: bool) -> Vector6<R> {

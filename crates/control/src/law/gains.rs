@@ -1,8 +1,8 @@
 //! The gains of all controllers, with the values that were tuned against the simulated arm.
 //!
-//! The arm tracks in one of two ways: *stiff*, for everything that has to be exact (`Hold`, `Approach`, a run in free space),
-//! and *compliant*, for a run whose contacts the force controller and the feedback are to decide: with stiff joints the
-//! position loop overrules them.
+//! The arm tracks in one of two ways: *stiff*, for everything that has to be exact (`Hold`, `Approach`, a run in free
+//! space), and *compliant*, for a run whose contacts the force controller and the feedback are to decide: with stiff
+//! joints the position loop overrules them.
 
 use crate::model::wam7;
 use crate::real::Real;
@@ -22,8 +22,8 @@ struct Numbers {
     force_limit: (f64, f64),
 }
 
-/// Exact. Damping: too high for the delay of the loop, the wrist sings; too low, it rings. Clamp times stiffness is the most
-/// a blocked joint pushes with, and that has to be more than its friction.
+/// Exact. Damping: too high for the delay of the loop, the wrist sings; too low, it rings. Clamp times stiffness is the
+/// most a blocked joint pushes with, and that has to be more than its friction.
 const STIFF: Numbers = Numbers {
     stiffness: [300.0, 700.0, 150.0, 160.0, 10.0, 20.0, 2.5],
     damping: [22.0, 40.0, 4.5, 5.0, 0.22, 0.6, 0.06],
@@ -52,30 +52,31 @@ const COMPLIANT: Numbers = Numbers {
 /// Fraction of the model's Coulomb friction that is fed forward. Below 1, so that too large an estimate never drives.
 const FRICTION_FRACTION: f64 = 0.8;
 
-/// Largest torque of the integral of `Hold` and `Approach`, in parts of the model's Coulomb friction: enough for friction that
-/// is 30 % more, with 20 % to spare.
+/// Largest torque of the integral of `Hold` and `Approach`, in parts of the model's Coulomb friction: enough for
+/// friction that is 30 % more, with 20 % to spare.
 const SETTLING_FRACTION: f64 = 1.5;
 
 /// Damping of a soft stop (N m s/rad).
 const STOP_DAMPING: [f64; 7] = [22.0, 40.0, 4.5, 5.0, 0.22, 0.6, 0.06];
 
-/// Digits of the hand: stiffness (N m/rad) and damping (N m s/rad) of Eq (14), in the order spread, F1, F2, F3. At a finger
-/// 6 N m/rad against 0.1 N m of friction leave 0.017 rad; the reflected rotor (2.2e-3 kg m^2) and 10 ms of delay bound both.
+/// Digits of the hand: stiffness (N m/rad) and damping (N m s/rad) of Eq (14), in the order spread, F1, F2, F3. At a
+/// finger 6 N m/rad against 0.1 N m of friction leave 0.017 rad; the reflected rotor (2.2e-3 kg m^2) and 10 ms of delay
+/// bound both.
 pub const HAND_STIFFNESS: [f64; 4] = [2.0, 6.0, 6.0, 6.0];
 /// Damping of the digits (N m s/rad), see [`HAND_STIFFNESS`].
 pub const HAND_DAMPING: [f64; 4] = [0.02, 0.1, 0.1, 0.1];
 
-/// Friction of the hand's drives fed forward along the desired velocity: viscous (N m s/rad; a finger turns at 2.44 rad/s
-/// with its full torque) and 0.8 of the Coulomb friction (N m). All estimates.
+/// Friction of the hand's drives fed forward along the desired velocity: viscous (N m s/rad; a finger turns at 2.44
+/// rad/s with its full torque) and 0.8 of the Coulomb friction (N m). All estimates.
 pub const HAND_VISCOUS: [f64; 4] = [0.1, 0.49, 0.49, 0.49];
 /// Coulomb friction of the digits that is fed forward (N m), see [`HAND_VISCOUS`].
 pub const HAND_COULOMB: [f64; 4] = [0.05, 0.08, 0.08, 0.08];
 
-/// Proportional and integral gain (1/s) of the gauges, and their window (control periods). The finger is stiff behind its gauge:
-/// with the delay of filter and bus a proportional gain of 1 is close to ringing.
+/// Proportional and integral gain (1/s) of the gauges, and their window (control periods). The finger is stiff behind
+/// its gauge: with the delay of filter and bus a proportional gain of 1 is close to ringing.
 pub const HAND_FORCE: (f64, f64, usize) = (0.5, 2.0, periods(0.2) as usize);
 
-/// How the arm follows a reference.
+/// Gains with which the arm follows a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracking<R: Real> {
     /// `K_p` of Eq (10) (N m/rad). Error of the plan under Coulomb friction alone: friction / K_p.
@@ -101,8 +102,8 @@ pub struct Tracking<R: Real> {
     pub force_proportional: R,
     /// `K_i` of Eq (12) (1/s).
     pub force_integral: R,
-    /// Share of both gains that acts on the torque rows. Below 1 where the wrist is soft: the forearm's inertia about the hand's
-    /// axis is so small that, at full gain, closing fingers make it whip.
+    /// Share of both gains that acts on the torque rows. Below 1 where the wrist is soft: the forearm's inertia about
+    /// the hand's axis is so small that, at full gain, closing fingers make it whip.
     pub moment_share: R,
     /// Window `Delta t` of Eq (12) (control periods).
     pub force_window: usize,

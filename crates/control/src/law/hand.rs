@@ -1,9 +1,10 @@
 //! `HandController`: position and force of the digits.
 //!
-//! Eq (14): `tau_finger = PD(position) + PI(force)`, the force from the finger's strain gauge, with the sign of Eq (12):
-//! `PI = -(P e + K_i integral_{t-Dt}^{t} e dt)`, `e = F_expected - F`, `F` the torque of the environment on the finger, negative
-//! when closing on an object. A finger that presses harder than expected (`F < F_expected`) is driven open, one that misses
-//! what it should press on is driven shut. The spread is controlled in position alone.
+//! Eq (14): `tau_finger = PD(position) + PI(force)`, the force from the finger's strain gauge, with the sign of Eq
+//! (12):
+//! `PI = -(P e + K_i integral_{t-Dt}^{t} e dt)`, `e = F_expected - F`, `F` the torque of the environment on the finger,
+//! negative when closing on an object. A finger that presses harder than expected (`F < F_expected`) is driven open,
+//! one that misses what it should press on is driven shut. The spread is controlled in position alone.
 
 use nalgebra::SVector;
 use pinned_init::{Init, init};
@@ -45,7 +46,8 @@ impl<R: Real> HandController<R> {
 
     /// The torques of one tick (N m, spread first).
     ///
-    /// A digit whose reply is missing keeps the position feedback of its last one. With `expected` gauges (N m) the PI acts;
+    /// A digit whose reply is missing keeps the position feedback of its last one. With `expected` gauges (N m) the PI
+    /// acts;
     /// `frozen` (a torque saturates) keeps its window as it is, and so do gauges that are not measured.
     pub fn torque(
         &mut self,

@@ -1,11 +1,14 @@
 //! `PostureIntegral`: the slow part of holding a posture, which takes away what friction leaves.
 //!
-//! Eq (10) alone rests wherever `K_p (q_d - q)` is less than the Coulomb friction: up to 0.04 rad at J7. While the arm holds
-//! or approaches, the desired posture is therefore shifted towards the error, joint by joint, until the joint moves:
+//! Eq (10) alone rests wherever `K_p (q_d - q)` is less than the Coulomb friction: up to 0.04 rad at J7. While the arm
+//! holds or approaches, the desired posture is therefore shifted towards the error, joint by joint, until the joint
+//! moves:
 //!
-//! * at a constant rate, the whole clamp in [`RISE`], so that friction is overcome in the same time however small the error;
+//! * at a constant rate, the whole clamp in [`RISE`], so that friction is overcome in the same time however small the
+//!   error;
 //!   the joint then slides at that rate, at most 0.08 rad/s (J7);
-//! * from an error of three quarters of [`TOLERANCE`] on, until it is less than half of it; in between nothing changes, which
+//! * from an error of three quarters of [`TOLERANCE`] on, until it is less than half of it; in between nothing changes,
+//!   which
 //!   is why it does not hunt;
 //! * within a clamp worth 1.5 times the friction of the model: an obstacle feels that much more, and no more with time.
 
@@ -14,7 +17,7 @@ use crate::real::{Real, within};
 use crate::time::PERIOD;
 use crate::units::{JOINTS, JointPositions, Vector7};
 
-/// How exactly a posture is held under the friction of the model, 30 % more or less (rad).
+/// Accuracy of a held posture under the friction of the model, 30 % more or less (rad).
 pub const TOLERANCE: [f64; JOINTS] = [0.004, 0.004, 0.004, 0.004, 0.008, 0.008, 0.008];
 
 /// Time from zero to the clamp (s).
@@ -43,21 +46,21 @@ impl<R: Real> PostureIntegral<R> {
         &self.shift
     }
 
-    /// Takes over from a law whose torque, beyond what the arm itself needs, equals `K_p offset`: as much of the offset (rad)
-    /// as the clamp allows becomes shift, so that the torque makes no step. Returns the posture to hold: `q` where friction
-    /// and the error of the model alone are in the way.
+    /// Takes over from a law whose torque, beyond what the arm itself needs, equals `K_p offset`: as much of the offset
+    /// (rad) as the clamp allows becomes shift, so that the torque makes no step. Returns the posture to hold: `q`
+    /// where friction and the error of the model alone are in the way.
     pub fn take_over(&mut self, gains: &Gains<R>, offset: &Vector7<R>, q: &JointPositions<R>) -> JointPositions<R> {
         *self = PostureIntegral { shift: offset.zip_map(&gains.settling, within), seeking: [false; JOINTS] };
         JointPositions(q.0 + offset - self.shift)
     }
 
-    /// Whether every joint was close enough to be left alone in the last control period.
+    /// True if every joint was close enough to be left alone in the last control period.
     pub fn is_settled(&self) -> bool {
         !self.seeking.contains(&true)
     }
 
-    /// One control period towards the posture `q_d`, measured at `q`; the caller leaves it out where a torque could not be
-    /// given in full or a position is not measured.
+    /// One control period towards the posture `q_d`, measured at `q`; the caller leaves it out where a torque could not
+    /// be given in full or a position is not measured.
     pub fn step(&mut self, gains: &Gains<R>, q_d: &JointPositions<R>, q: &JointPositions<R>) {
         let errors = q_d.0 - q.0;
         let joints = self.shift.iter_mut().zip(&mut self.seeking).zip(errors.iter()).zip(gains.settling.iter());

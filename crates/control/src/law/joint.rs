@@ -1,8 +1,8 @@
 //! `JointController`: inverse dynamics with joint feedback.
 //!
 //! Eq (10): `tau = M ddq_d + h + K_p (q_d - q) + K_d (dq_d - dq)`, with `M` including the rotors and `h` Coriolis,
-//! centrifugal and gravity torque at the measured state. Friction is fed forward along the *desired* velocity: along the
-//! measured one it would be positive feedback. External forces are deliberately absent, Eq (12) deals with them.
+//! centrifugal and gravity torque at the measured state. Friction is fed forward along the *desired* velocity: along
+//! the measured one it would be positive feedback. External forces are deliberately absent, Eq (12) deals with them.
 
 use crate::law::gains::Tracking;
 use crate::model::arm::ArmModel;
@@ -34,8 +34,8 @@ impl<R: Real> JointController<R> {
         self.feedback = Vector7::zeros();
     }
 
-    /// The torque of one tick. With `frozen` feedback (a reply is missing, `state` is extrapolated) the feedback torque of
-    /// the last good tick is kept, while the feed-forward follows the extrapolated posture.
+    /// The torque of one tick. With `frozen` feedback (a reply is missing, `state` is extrapolated) the feedback torque
+    /// of the last good tick is kept, while the feed-forward follows the extrapolated posture.
     pub fn torque(
         &mut self,
         model: &ArmModel<R>,

@@ -1,5 +1,5 @@
-//! The controllers: Eq (11) in [`operational`], Eq (10) in [`joint`], Eq (12) in [`force`]; their sum is Eq (13). Beside
-//! them [`integral`], for the postures that are held, and Eq (14) in [`hand`].
+//! The controllers: Eq (11) in [`operational`], Eq (10) in [`joint`], Eq (12) in [`force`]; their sum is Eq (13).
+//! Beside them [`integral`], for the postures that are held, and Eq (14) in [`hand`].
 
 pub mod force;
 pub mod gains;

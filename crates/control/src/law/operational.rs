@@ -1,7 +1,8 @@
 //! `OperationalController`: the plan of the tool becomes a plan of the joints.
 //!
-//! Eq (11): `dq_d = J^+ (dx_d + K_x (x_d - x)) + K_post (I - J^+ J)(q_post - q)`, `J^+` damped. `q_d` is its integral, kept
-//! within a clamp of the measured `q` (anti-windup: blocked by contact, the integral would grow without bound). `ddq_d` is
+//! Eq (11): `dq_d = J^+ (dx_d + K_x (x_d - x)) + K_post (I - J^+ J)(q_post - q)`, `J^+` damped. `q_d` is its integral,
+//! kept within a clamp of the measured `q` (anti-windup: blocked by contact, the integral would grow without bound).
+//! `ddq_d` is
 //! `J^+ (ddx_d + K_x (dx_d - dx) - dJ dq) + (I - J^+ J) K_post (dq_post - dq)`, or the low-passed derivative of `dq_d`.
 //! The orientation error is `2 vec(q_d (x) conj(q))`, sign-aligned, in world axes, as the Jacobian's angular rows are.
 
@@ -21,8 +22,8 @@ use crate::units::{JOINTS, JointAccelerations, JointPositions, JointVelocities, 
 /// Cut-off of the differentiated acceleration (Hz).
 const ACCELERATION_CUT_OFF: f64 = 15.0;
 
-/// Fastest return to the plan, added to the speed of the plan itself (m/s, rad/s): an arm that was pushed far off does not
-/// snap back.
+/// Fastest return to the plan, added to the speed of the plan itself (m/s, rad/s): an arm that was pushed far off does
+/// not snap back.
 const CORRECTION_SPEED: (f64, f64) = (0.2, 1.0);
 
 /// Eq (11), with `q_d` as its state.
@@ -52,7 +53,7 @@ impl<R: Real> OperationalController<R> {
         &self.q_d
     }
 
-    /// Whether the anti-windup clamp acted in the last tick.
+    /// True if the anti-windup clamp acted in the last tick.
     pub fn is_clamped(&self) -> bool {
         self.clamped
     }
@@ -116,7 +117,8 @@ impl<R: Real> OperationalController<R> {
             self.clamped |= kept != *desired;
             *desired = kept;
         }
-        // What feedback asks for beyond a soft limit is not wanted of this joint: the arm gives way as far as it can, and does not stop.
+        // Feedback beyond a soft limit is not wanted of this joint: the arm gives way as far as it can, and does not
+        // stop.
         let limits = model.soft_min.iter().zip(&model.soft_max);
         for ((desired, rate), (min, max)) in q_d.iter_mut().zip(self.dq_d.0.iter_mut()).zip(limits) {
             let kept = at_most(at_least(*desired, *min), *max);

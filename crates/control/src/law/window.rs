@@ -11,8 +11,8 @@ pub struct Window<R: Real, const D: usize, const CAPACITY: usize> {
     errors: [SVector<R, D>; CAPACITY],
     length: usize,
     next: usize,
-    /// Whether the window has been filled since it was emptied: before that there is no oldest error, and what the ring holds
-    /// is from earlier. So emptying it writes nothing but a few words, within a control cycle.
+    /// True if the window has been filled since it was emptied: before that there is no oldest error, and what the ring
+    /// holds is from earlier. So emptying it writes nothing but a few words, within a control cycle.
     full: bool,
     sum: SVector<R, D>,
     /// Errors taken in since the window was last summed afresh.

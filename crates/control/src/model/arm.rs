@@ -50,8 +50,8 @@ impl<R: Real> ArmModel<R> {
         ArmModel::with(payload, 1.0, 0.0)
     }
 
-    /// The same arm with every link mass and inertia scaled and extra mass at the tool: for tests of robustness against a
-    /// model that is not the plant.
+    /// The same arm with every link mass and inertia scaled and extra mass at the tool: for tests of robustness against
+    /// a model that is not the plant.
     pub fn disturbed(payload: Payload, inertia_scale: f64, extra_mass: f64) -> Self {
         ArmModel::with(payload, inertia_scale, extra_mass)
     }
@@ -94,7 +94,7 @@ impl<R: Real> ArmModel<R> {
         }
     }
 
-    /// Whether every joint lies within its soft limits. False for a NaN.
+    /// True if every joint lies within its soft limits. False for a NaN.
     pub fn within_soft_limits(&self, q: &JointPositions<R>) -> bool {
         q.0.iter().zip(self.soft_min.iter().zip(&self.soft_max)).all(|(q, (min, max))| q >= min && q <= max)
     }

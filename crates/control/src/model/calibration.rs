@@ -1,4 +1,4 @@
-//! What differs from arm to arm: encoder and torque scales, and what is mounted on the tool plate.
+//! The differences from arm to arm: encoder and torque scales, and what is mounted on the tool plate.
 
 use core::fmt;
 
@@ -10,7 +10,7 @@ use crate::real::Real;
 /// Torque units per N m of the hand's motors where nothing else is known.
 const NOMINAL_HAND_UNITS: [i32; 4] = [20_000; 4];
 
-/// What is mounted on the tool plate.
+/// Payload on the tool plate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Payload {
     /// The bare arm; the tool frame is the tool plate.
@@ -63,7 +63,8 @@ impl core::error::Error for CalibrationError {}
 impl<R: Real> Calibration<R> {
     /// Checks the scales read from the pucks (CTS and IPNM, M1 first).
     ///
-    /// The bounds are a factor of several around every puck known: a puck that answers with garbage must not scale torques.
+    /// The bounds are a factor of several around every puck known: a puck that answers with garbage must not scale
+    /// torques.
     ///
     /// # Errors
     /// [`CalibrationError`] names the first puck whose scale is out of bounds.
@@ -122,7 +123,7 @@ impl<R: Real> Calibration<R> {
         &self.drives
     }
 
-    /// What is mounted.
+    /// The payload.
     pub fn payload(&self) -> Payload {
         self.payload
     }

@@ -1,9 +1,9 @@
 //! Inverse dynamics by the recursive Newton-Euler method: gravity, Coriolis and inertial torques, mass matrix.
 //!
-//! `tau = M(q) ddq + c(q, dq) + g(q)`. Link frames are standard (distal): frame j rides on link j, joint j turns about z of
-//! frame j-1. Moments are therefore taken about the origin of frame j-1, which lies on the joint axis. Rotor inertia acts at
-//! the joints only (`reflected`): what the fast rotors add to the gyroscopic torques of the links is below 1 % of them and
-//! left out, as the manufacturer's model does.
+//! `tau = M(q) ddq + c(q, dq) + g(q)`. Link frames are standard (distal): frame j rides on link j, joint j turns about
+//! z of frame j-1. Moments are therefore taken about the origin of frame j-1, which lies on the joint axis. Rotor
+//! inertia acts at the joints only (`reflected`): what the fast rotors add to the gyroscopic torques of the links is
+//! below 1 % of them and left out, as the manufacturer's model does.
 
 use nalgebra::{SMatrix, Vector3};
 
@@ -13,8 +13,8 @@ use crate::real::Real;
 use crate::units::{JOINTS, JointAccelerations, JointTorques, JointVelocities, Vector6, Vector7};
 
 impl<R: Real> ArmModel<R> {
-    /// What the wrist sensor feels of the hand alone while the arm is at rest: its weight, as force (N) and torque about the
-    /// sensor's origin (N m), in sensor axes.
+    /// Returns the weight of the hand as the wrist sensor measures it while the arm is at rest: force (N) and torque
+    /// about the sensor's origin (N m), in sensor axes.
     pub fn hanging_weight(&self, frames: &Frames<R>) -> Vector6<R> {
         let force = frames.sensor_to_world().tr_mul(&self.base_acceleration) * -self.hanging_mass;
         let torque = self.hanging_centre.cross(&force);

@@ -1,6 +1,7 @@
 //! Forward kinematics, geometric Jacobian and its damped pseudo-inverse.
 //!
-//! `T(j-1 -> j) = Rz(q_j) Tz(d_j) Tx(a_j) Rx(alpha_j)`; joint j turns about z of frame j-1. The Jacobian is geometric: rows
+//! `T(j-1 -> j) = Rz(q_j) Tz(d_j) Tx(a_j) Rx(alpha_j)`; joint j turns about z of frame j-1. The Jacobian is geometric:
+//! rows
 //! 0..3 give the velocity of the tool origin, rows 3..6 the angular velocity, both in world axes. The pseudo-inverse of
 //! Eq (11) is `J^T (J J^T + lambda I)^-1`, by an `L D L^T` factorisation that needs no square root.
 
@@ -111,7 +112,8 @@ pub struct DampedInverse<'a, R: Real> {
 }
 
 impl<R: Real> DampedInverse<'_, R> {
-    /// `J^+ task + (I - J^+ J) bias`: the joint vector that does the task and comes as near to `bias` as the task allows.
+    /// `J^+ task + (I - J^+ J) bias`: the joint vector that does the task and comes as near to `bias` as the task
+    /// allows.
     pub fn resolve(&self, task: &Vector6<R>, bias: &Vector7<R>) -> Vector7<R> {
         let remaining = task - self.jacobian.twist(bias);
         bias + self.jacobian.transpose_times(&self.factor.solve(&remaining))

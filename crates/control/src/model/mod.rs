@@ -1,4 +1,4 @@
-//! What is known of the arm before anything is measured: its numbers, kinematics, dynamics, and what is mounted on it.
+//! The arm before anything is measured: its numbers, kinematics, dynamics, and what is mounted on it.
 
 pub mod arm;
 pub mod calibration;

@@ -1,8 +1,8 @@
 //! The numbers of the arm, generated from `model/wam7.toml` when the crate is built. SI units.
 //!
-//! Frames: standard Denavit-Hartenberg, `T(j-1 -> j) = Rz(q_j) Tz(d_j) Tx(a_j) Rx(alpha_j)`; frame 0 is the world, its origin
-//! where the axes of J1 and J2 meet, z up. Inertias are about the centre of mass, in the axes of the link frame, with the
-//! signs of a physical tensor (`I_xy = -sum m x y`).
+//! Frames: standard Denavit-Hartenberg, `T(j-1 -> j) = Rz(q_j) Tz(d_j) Tx(a_j) Rx(alpha_j)`; frame 0 is the world, its
+//! origin where the axes of J1 and J2 meet, z up. Inertias are about the centre of mass, in the axes of the link frame,
+//! with the signs of a physical tensor (`I_xy = -sum m x y`).
 
 /// Mass properties of one body as the model file gives them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,7 +15,7 @@ pub struct BodyTable {
     pub inertia: [f64; 6],
 }
 
-/// What is mounted on the tool plate, and the tool frame that goes with it.
+/// Payload on the tool plate, and the tool frame that goes with it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PayloadTable {
     /// Mass properties in frame 7.

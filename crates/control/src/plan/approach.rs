@@ -1,7 +1,8 @@
 //! `Approach`: a joint-space move along a minimum-jerk path.
 //!
-//! `q(u) = q_0 + (q_1 - q_0)(10 u^3 - 15 u^4 + 6 u^5)`, `u = t/T`. The duration is long enough that no joint exceeds half of
-//! its speed limit and neither the elbow nor the point 0.35 m beyond it exceeds 0.35 m/s; the safety module faults at 1.0 m/s.
+//! `q(u) = q_0 + (q_1 - q_0)(10 u^3 - 15 u^4 + 6 u^5)`, `u = t/T`. The duration is long enough that no joint exceeds
+//! half of its speed limit and neither the elbow nor the point 0.35 m beyond it exceeds 0.35 m/s; the safety module
+//! faults at 1.0 m/s.
 
 use crate::guard::monitor::TIP_REACH;
 use crate::model::arm::ArmModel;
@@ -82,17 +83,17 @@ impl<R: Real> Approach<R> {
         R::from_counts(self.passed) / R::from_counts(self.length)
     }
 
-    /// Whether the path has ended at the target.
+    /// True if the path has ended at the target.
     pub fn is_finished(&self) -> bool {
         self.passed >= self.length
     }
 
-    /// Whether the arm has had all the time to settle there that it gets.
+    /// True if the time to settle at the target is over.
     pub fn is_overdue(&self) -> bool {
         self.settled >= SETTLING
     }
 
-    /// Where the arm should be now; then one control period passes.
+    /// Returns the reference of this control period and goes on to the next.
     pub fn step(&mut self) -> JointReference<R> {
         let (position, speed, acceleration) = minimum_jerk(self.progress());
         if self.passed < self.length {

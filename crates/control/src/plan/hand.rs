@@ -43,17 +43,17 @@ impl<R: Real> HandMotion<R> {
         HandMotion { start: *start, way, length: (needed * R::of(RATE)).whole_below().to_whole() + 1, passed: 0 }
     }
 
-    /// Where the hand should be at the end (rad).
+    /// Returns the goal (rad).
     pub fn goal(&self) -> [R; DIGITS] {
         core::array::from_fn(|digit| self.start[digit] + self.way[digit])
     }
 
-    /// Whether the path has ended.
+    /// True if the path has ended.
     pub fn is_finished(&self) -> bool {
         self.passed >= self.length
     }
 
-    /// Where the hand should be now; then one control period passes.
+    /// Returns the reference of this control period and goes on to the next.
     pub fn step(&mut self) -> HandReference<R> {
         let reference = self.now();
         if self.passed < self.length {
@@ -62,7 +62,7 @@ impl<R: Real> HandMotion<R> {
         reference
     }
 
-    /// Where the hand should be now.
+    /// Returns the reference of this control period.
     pub fn now(&self) -> HandReference<R> {
         let length = R::from_counts(self.length);
         let (position, speed, _) = minimum_jerk(R::from_counts(self.passed) / length);

@@ -1,4 +1,4 @@
-//! Where the arm and the hand are to go: moves in joint space, and the run of a primitive.
+//! Plans of arm and hand: moves in joint space, and the run of a primitive.
 
 pub mod approach;
 pub mod hand;

@@ -1,4 +1,4 @@
-//! What a plan asks for at one tick: of the joints, of the tool, of the hand.
+//! References: the part of a plan at one tick, for the joints, the tool and the hand.
 
 use dmp::PoseReference;
 use nalgebra::Vector3;
@@ -8,7 +8,7 @@ use crate::plan::primitive::{Reference, posture_and_hand};
 use crate::real::Real;
 use crate::units::{JointAccelerations, JointPositions, JointVelocities, Orientation, Pose, Vector6, Vector7};
 
-/// What the joints should do at one tick.
+/// Reference of the joints at one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointReference<R: Real> {
     /// Desired positions (rad).
@@ -26,7 +26,7 @@ impl<R: Real> JointReference<R> {
     }
 }
 
-/// What the tool should do at one tick, and which posture the rest of the arm should prefer.
+/// Reference of the tool at one tick, and the posture that the rest of the arm prefers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TaskReference<R: Real> {
     /// Desired position (m) and orientation.
@@ -62,7 +62,7 @@ impl<R: Real> TaskReference<R> {
     }
 }
 
-/// What the digits should do at one tick, spread first.
+/// Reference of the digits at one tick, spread first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandReference<R: Real> {
     /// Desired angles (rad).

@@ -1,7 +1,7 @@
 //! Causal second-order Butterworth low-pass, the one filter of this crate.
 //!
-//! `y_k = b0 (x_k + 2 x_{k-1} + x_{k-2}) - a1 y_{k-1} - a2 y_{k-2}`, by the bilinear transform with pre-warping, so that the
-//! gain at the cut-off is exactly `1/sqrt(2)`. Its delay far below the cut-off is `sqrt(2) / (2 pi f_c)`.
+//! `y_k = b0 (x_k + 2 x_{k-1} + x_{k-2}) - a1 y_{k-1} - a2 y_{k-2}`, by the bilinear transform with pre-warping, so
+//! that the gain at the cut-off is exactly `1/sqrt(2)`. Its delay far below the cut-off is `sqrt(2) / (2 pi f_c)`.
 
 use nalgebra::SVector;
 
@@ -16,7 +16,8 @@ pub struct Butterworth<R: Real> {
 }
 
 impl<R: Real> Butterworth<R> {
-    /// A filter with this cut-off at this sampling rate (both Hz). The cut-off is kept between 1/1000 and 0.45 of the rate.
+    /// A filter with this cut-off at this sampling rate (both Hz). The cut-off is kept between 1/1000 and 0.45 of the
+    /// rate.
     pub fn new(cut_off: f64, rate: f64) -> Self {
         let ratio = (cut_off / rate).clamp(1e-3, 0.45);
         let warped = libm::tan(core::f64::consts::PI * ratio);

@@ -1,4 +1,5 @@
-//! `HandEstimator`: counts of the hand's pucks to angles, velocities and gauge torques, through lost and implausible replies.
+//! `HandEstimator`: counts of the hand's pucks to angles, velocities and gauge torques, through lost and implausible
+//! replies.
 
 use nalgebra::SVector;
 use puck::{Counts, gauge};
@@ -37,7 +38,7 @@ const GAUGE_STEP: f64 = 1.0;
 /// Largest torque (N m) that an automatic tare takes away once the gauges have been tared: what is more is a grip.
 const GAUGE_DRIFT: f64 = 0.05;
 
-/// What is known about the hand at one tick, digits in the order spread, F1, F2, F3.
+/// State of the hand at one tick, digits in the order spread, F1, F2, F3.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandState<R: Real> {
     /// Angles of spread and inner links (rad); the last known ones where a reply is missing.
@@ -55,12 +56,12 @@ pub struct HandState<R: Real> {
 }
 
 impl<R: Real> HandState<R> {
-    /// Whether a digit has been silent for so long that the hand must not be driven.
+    /// True if a digit has been silent for so long that the hand must not be driven.
     pub fn is_lost(&self) -> bool {
         self.age.iter().any(|age| *age > LOST_CYCLES)
     }
 
-    /// Whether the gauges can be believed.
+    /// True if the gauges can be believed.
     pub fn feels(&self) -> bool {
         self.gauge_age <= LOST_CYCLES
     }
@@ -136,8 +137,8 @@ impl<R: Real> HandEstimator<R> {
         }
     }
 
-    /// Takes what the hand told since the last cycle. `None` until all four digits have answered in the same cycle; a hand
-    /// that is gone is learned anew, because it may have been zeroed meanwhile. The tare of the gauges is kept.
+    /// Takes what the hand told since the last cycle. `None` until all four digits have answered in the same cycle; a
+    /// hand that is gone is learned anew, because it may have been zeroed meanwhile. The tare of the gauges is kept.
     pub fn update(&mut self, sample: Option<&HandSample>) -> Option<HandState<R>> {
         let Some(sample) = sample else {
             self.encoders = None;
@@ -158,7 +159,7 @@ impl<R: Real> HandEstimator<R> {
         self.state()
     }
 
-    /// What is known now; `None` without an initialised hand.
+    /// Returns the present state; `None` without an initialised hand.
     pub fn state(&self) -> Option<HandState<R>> {
         let encoders = self.encoders.as_ref()?;
         let tared = self.gauge.output() - SVector::from(self.zero);
@@ -180,7 +181,8 @@ impl<R: Real> HandEstimator<R> {
         }
     }
 
-    /// Tares each gauge, unless the gauges have been tared already and this one differs from that by more than a gauge drifts.
+    /// Tares each gauge, unless the gauges have been tared already and this one differs from that by more than a gauge
+    /// drifts.
     pub fn tare_drift(&mut self) {
         if !self.tared {
             self.tare();

@@ -1,17 +1,18 @@
 //! `JointEstimator`: motor counts to joint positions and velocities, through lost and implausible replies.
 //!
-//! Positions come from the unwrapped counts of each motor. Velocities are the difference of whole counts over the time that
-//! really passed since the last reply, through the transmission, low-passed at 50 Hz (second-order Butterworth, delay 4.5 ms).
-//! One count is 3.7e-5 rad at J1 and 1.0e-4 rad at J7, which plain differencing at 300 Hz turns into steps of 0.011 and
-//! 0.031 rad/s; the noise of differencing lies near half the sampling rate, and behind the 50 Hz filter it is 8 times smaller.
-//! At 30 Hz the delay would already cost the wrist its damping (stiff gains, three cycles of delay).
+//! Positions come from the unwrapped counts of each motor. Velocities are the difference of whole counts over the time
+//! that really passed since the last reply, through the transmission, low-passed at 50 Hz (second-order Butterworth,
+//! delay 4.5 ms). One count is 3.7e-5 rad at J1 and 1.0e-4 rad at J7, which plain differencing at 300 Hz turns into
+//! steps of 0.011 and 0.031 rad/s; the noise of differencing lies near half the sampling rate, and behind the 50 Hz
+//! filter it is 8 times smaller. At 30 Hz the delay would already cost the wrist its damping (stiff gains, three cycles
+//! of delay).
 //!
-//! A reply is believed if it lies where the motor can have turned to: at its last speed, stopped dead, or in between, changed
-//! by at most 1.5 times its speed limit a cycle. A person who shoves the arm stays within that at any speed, into a mechanical
-//! stop too; a puck that begins to count anew does not.
-//! Two replies that agree with each other but not with the ones before are a jump: the position goes on from where the motor
-//! was carried to, the speed is measured, and the joint state says that the zero is lost ([`JointState::displaced`]).
-//! Missing motors are carried on at the velocity estimated last, for at most [`COAST_CYCLES`]; then they stand still.
+//! A reply is believed if it lies where the motor can have turned to: at its last speed, stopped dead, or in between,
+//! changed by at most 1.5 times its speed limit a cycle. A person who shoves the arm stays within that at any speed,
+//! into a mechanical stop too; a puck that begins to count anew does not. Two replies that agree with each other but
+//! not with the ones before are a jump: the position goes on from where the motor was carried to, the speed is
+//! measured, and the joint state says that the zero is lost ([`JointState::displaced`]). Missing motors are carried on
+//! at the velocity estimated last, for at most [`COAST_CYCLES`]; then they stand still.
 
 use puck::{Counts, Transmission};
 
@@ -28,11 +29,12 @@ pub const COAST_CYCLES: u8 = few_periods(1.0 / 60.0);
 /// Cut-off of the velocity filter (Hz).
 pub const VELOCITY_CUT_OFF: f64 = 50.0;
 
-/// Largest change of a motor's speed from one cycle to the next, in parts of its speed limit: 450 times the limit per second,
-/// several times what a blow to the hand can do. Smaller, and a shove counts as a jump; larger, and a jump counts as motion.
+/// Largest change of a motor's speed from one cycle to the next, in parts of its speed limit: 450 times the limit per
+/// second, several times what a blow to the hand can do. Smaller, and a shove counts as a jump; larger, and a jump
+/// counts as motion.
 const PLAUSIBLE_CHANGE: f64 = 1.5;
 
-/// What is known of one motor.
+/// State of one motor.
 #[derive(Clone, Copy, Debug)]
 struct Motor {
     /// Unwrapped counts of the last reply believed, offset included.
@@ -66,9 +68,10 @@ pub struct JointState<R: Real> {
     pub missing: u8,
     /// Largest number of cycles since a believed reply.
     pub age: u8,
-    /// True while a reply of this cycle was implausible.
+    /// True if a reply of this cycle was implausible.
     pub implausible: bool,
-    /// True from a jump of a motor on until the estimator begins anew: the positions no longer refer to the zero of the arm.
+    /// True from a jump of a motor on until the estimator begins anew: the positions no longer refer to the zero of the
+    /// arm.
     pub displaced: bool,
 }
 
@@ -96,7 +99,8 @@ impl<R: Real> JointEstimator<R> {
             let counts = f64::from(calibration.drives.counts_per_revolution()[motor]);
             radians_per_count[motor] = R::of(core::f64::consts::TAU / counts);
             counts_per_radian[motor] = R::of(counts / core::f64::consts::TAU);
-            // Joint limits through the absolute values of the transmission: the fastest this motor can be asked to turn.
+            // Joint limits through the absolute values of the transmission: the fastest this motor can be asked to
+            // turn.
             let fastest: f64 = wam7::JOINT_TO_MOTOR[motor]
                 .iter()
                 .zip(&wam7::VELOCITY_MAX)
@@ -126,8 +130,9 @@ impl<R: Real> JointEstimator<R> {
 
     /// Takes the replies of one cycle. `None` until all seven motors have answered once in the same cycle.
     ///
-    /// A jump is carried over where `torque_on` is true, because a step of the position would be a step of the torque. Where it
-    /// is false, or where the motor was silent for long and can have turned so far, the counts are taken as they are.
+    /// A jump is carried over where `torque_on` is true, because a step of the position would be a step of the torque.
+    /// Where it is false, or where the motor was silent for long and can have turned so far, the counts are taken as
+    /// they are.
     pub fn update(&mut self, replies: &[Option<Counts>; JOINTS], torque_on: bool) -> Option<JointState<R>> {
         let Some(motors) = &mut self.motors else {
             return self.begin(replies);
@@ -222,8 +227,8 @@ impl Motor {
     }
 }
 
-/// True if a motor that was to move by `carried` can have moved by `moved`: stopped dead by an obstacle and thrown back by
-/// half, going on, or anything in between, and that changed by `gate`.
+/// True if a motor that was to move by `carried` can have moved by `moved`: stopped dead by an obstacle and thrown back
+/// by half, going on, or anything in between, and that changed by `gate`.
 fn is_within(moved: i32, carried: i32, gate: i32) -> bool {
     let thrown_back = -(carried / 2);
     let (low, high) = if carried < 0 { (carried, thrown_back) } else { (thrown_back, carried) };

@@ -1,8 +1,8 @@
-//! What one round on the bus brings in.
+//! Samples: the replies of one round on the bus.
 
 use puck::{Counts, RawWrench, SafetyMode};
 
-/// What the hand's pucks told since the last cycle, in the order F1, F2, F3, spread.
+/// Replies of the hand's pucks since the last cycle, in the order F1, F2, F3, spread.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HandSample {
     /// Motor positions of the four pucks; `None` where the reply was lost or malformed.
@@ -13,7 +13,7 @@ pub struct HandSample {
     pub gauges: [Option<u16>; 3],
 }
 
-/// What the bus round of one cycle brought in.
+/// Replies of the bus round of one cycle.
 ///
 /// Only replies of this cycle belong here: the caller empties its mailboxes before it sends the requests, so a late
 /// reply is a missing one.
@@ -25,6 +25,6 @@ pub struct BusSample {
     pub wrench: Option<RawWrench>,
     /// Latest mode of the safety module, where it was polled since the last cycle.
     pub safety: Option<SafetyMode>,
-    /// What the hand told since the last cycle; `None` without a hand, or while it is not initialised.
+    /// Replies of the hand since the last cycle; `None` without a hand, or while it is not initialised.
     pub hand: Option<HandSample>,
 }

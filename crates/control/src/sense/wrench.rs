@@ -1,12 +1,12 @@
 //! `WrenchEstimator`: raw force/torque counts to the wrench of the environment on the robot at the grasp point.
 //!
-//! The sensor reports what is mounted on it: the wrench of the hand on the sensor, in sensor axes, about the sensor's origin.
-//! The weight of the hand is known from the model in every orientation and is taken off first; what the environment does to
-//! the hand remains, with the hand's inertia, which the expectation of a primitive contains as well. Filter (second-order
-//! Butterworth, 15 Hz, the same live and recorded) and tare act in sensor axes, and because the weight is gone the tare is the
-//! sensor's bias and nothing else: it holds in every orientation. Then the force is turned into world axes and the torque is
-//! moved to the grasp point, `n_g = n_s + (p_s - p_g) x f`, and turned into tool axes: the frames of the position and
-//! orientation rows of Eq (8).
+//! The sensor reports what is mounted on it: the wrench of the hand on the sensor, in sensor axes, about the sensor's
+//! origin. The weight of the hand is known from the model in every orientation and is taken off first; what the
+//! environment does to the hand remains, with the hand's inertia, which the expectation of a primitive contains as
+//! well. Filter (second-order Butterworth, 15 Hz, the same live and recorded) and tare act in sensor axes, and because
+//! the weight is gone the tare is the sensor's bias and nothing else: it holds in every orientation. Then the force is
+//! turned into world axes and the torque is moved to the grasp point, `n_g = n_s + (p_s - p_g) x f`, and turned into
+//! tool axes: the frames of the position and orientation rows of Eq (8).
 
 use nalgebra::Vector3;
 use puck::RawWrench;
@@ -21,14 +21,15 @@ use crate::units::{Vector6, Wrench};
 /// Cut-off of the wrench filter (Hz).
 pub const WRENCH_CUT_OFF: f64 = 15.0;
 
-/// Largest believed change from one sample to the next (N, N m). A larger one is believed when the next sample confirms it:
-/// one corrupt sample must not bend the plan.
+/// Largest believed change from one sample to the next (N, N m). A larger one is believed when the next sample confirms
+/// it: one corrupt sample must not bend the plan.
 const LARGEST_STEP: [f64; 6] = [20.0, 20.0, 20.0, 1.0, 1.0, 1.0];
 
 /// Half of the time over which a resting wrench is averaged for the tare: 0.15 s, in control periods.
 const REST_HALF: u16 = periods(0.15);
 
-/// Largest drift (N) that an automatic tare takes away once the wrench has been tared: what is more is a load or a contact.
+/// Largest drift (N) that an automatic tare takes away once the wrench has been tared: what is more is a load or a
+/// contact.
 const DRIFT: f64 = 1.0;
 
 /// Largest force at rest (N) with which a run that uses force begins.
@@ -40,7 +41,7 @@ const FULL_SCALE: f64 = 0.99;
 /// Largest force that a frame can carry (N).
 const LARGEST_FORCE: f64 = 32_767.0 / 256.0;
 
-/// How many samples in a row were at full scale.
+/// Number of samples in a row at full scale.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FullScale {
     /// In a force.
@@ -88,7 +89,7 @@ pub struct WrenchEstimator<R: Real> {
     last: Vector6<R>,
     /// The same without the weight of the hand.
     felt: Vector6<R>,
-    /// Whether the filter has had an input without the weight.
+    /// True if the filter has had an input without the weight.
     placed: bool,
     rest: RestMean<R>,
     saturated: bool,
@@ -117,7 +118,8 @@ impl<R: Real> WrenchEstimator<R> {
     /// Takes the sample of one cycle; a lost or bad one is bridged by the last.
     ///
     /// `weight` is what the hand alone does to the sensor in the present posture
-    /// ([`ArmModel::hanging_weight`](crate::model::arm::ArmModel::hanging_weight)); without a posture only the age is kept.
+    /// ([`ArmModel::hanging_weight`](crate::model::arm::ArmModel::hanging_weight)); without a posture only the age is
+    /// kept.
     pub fn update(&mut self, sample: Option<&RawWrench>, weight: Option<&Vector6<R>>, at_rest: bool) {
         let believed = sample.filter(|raw| !raw.status.is_some_and(|status| status.is_bad()));
         match believed {
@@ -160,12 +162,14 @@ impl<R: Real> WrenchEstimator<R> {
         self.age = Some(0);
     }
 
-    /// What a tare would take as zero: the mean at rest, or the filtered value where the arm has just moved.
+    /// Returns the wrench that a tare would take as zero: the mean at rest, or the filtered value where the arm has
+    /// just moved.
     fn offset(&self) -> Vector6<R> {
         self.rest.mean().unwrap_or(*self.filter.output())
     }
 
-    /// Takes the present wrench, less the weight of the hand, as zero. False if none has been measured in a known posture.
+    /// Takes the present wrench, less the weight of the hand, as zero. False if none has been measured in a known
+    /// posture.
     pub fn tare(&mut self) -> bool {
         if self.age.is_none() || !self.placed {
             return false;
@@ -182,8 +186,8 @@ impl<R: Real> WrenchEstimator<R> {
         }
     }
 
-    /// Tares, unless the wrench has been tared already and differs from that by more than a sensor drifts: then the hand holds
-    /// or touches something, which must stay in the wrench.
+    /// Tares, unless the wrench has been tared already and differs from that by more than a sensor drifts: then the
+    /// hand holds or touches something, which must stay in the wrench.
     pub fn tare_drift(&mut self) {
         let drift = self.rest_force();
         if !self.tared || drift.dot(&drift) <= R::of(DRIFT * DRIFT) {
@@ -196,17 +200,18 @@ impl<R: Real> WrenchEstimator<R> {
         (self.offset() - self.tare).fixed_rows::<3>(0).into_owned()
     }
 
-    /// Whether the wrench has been tared.
+    /// True if the wrench has been tared.
     pub fn is_tared(&self) -> bool {
         self.tared
     }
 
-    /// Whether the last sample is at the end of the sensor's range, or a gauge has saturated since the sensor's own tare.
+    /// True if the last sample is at the end of the sensor's range, or a gauge has saturated since the sensor's own
+    /// tare.
     pub fn is_saturated(&self) -> bool {
         self.saturated || self.full_scale != FullScale::default()
     }
 
-    /// How many samples in a row were at full scale.
+    /// Number of samples in a row at full scale.
     pub fn full_scale(&self) -> FullScale {
         self.full_scale
     }
@@ -216,8 +221,8 @@ impl<R: Real> WrenchEstimator<R> {
         self.age
     }
 
-    /// Magnitude of the last sample's force, unfiltered, without the weight of the hand, tared (N): for the contact threshold,
-    /// which cannot wait for a filter.
+    /// Magnitude of the last sample's force, unfiltered, without the weight of the hand, tared (N): for the contact
+    /// threshold, which cannot wait for a filter.
     pub fn raw_force(&self) -> R {
         if !self.placed {
             return R::of(0.0);

@@ -147,7 +147,8 @@ fn a_deviation_within_the_dead_band_moves_nothing() {
     assert!(inside < 1e-4 && outside > 2e-3);
 }
 
-/// Largest displacement and rotation of the plan of a run that stays in place, with the sensor stuck at a wrench from 0.5 s on.
+/// Largest displacement and rotation of the plan of a run that stays in place, with the sensor stuck at a wrench from
+/// 0.5 s on.
 fn stuck(force: Vector3<f64>, torque: Vector3<f64>, options: RunOptions) -> (f64, f64, Rig<f32>) {
     let mut rig = holding(START);
     rig.load(&primitive(&staying(START))).expect("loads");
@@ -471,8 +472,9 @@ fn a_wall_is_pressed_with_the_force_that_statics_predicts() {
     let (felt, truth, speed, record) = pressed(gains);
     assert!((felt - truth).abs() < 0.1 && speed < 0.01, "at rest: {felt} {truth} {speed}");
 
-    // Statics about the start: K_p (q_d - q) + J^T (-F_d - G (F_d - F)) + J^T F = 0 with the posture pulled by Eq (11) as well.
-    // The desired posture is where the controller has it; what remains are seven equations for q - q_0 and the wall's F = -k x.
+    // Statics about the start: K_p (q_d - q) + J^T (-F_d - G (F_d - F)) + J^T F = 0 with the posture pulled by Eq (11)
+    // as well. The desired posture is where the controller has it; what remains are seven equations for q - q_0 and the
+    // wall's F = -k x.
     let tracking = gains.compliant;
     let proportional = f64::from(tracking.force_proportional);
     let window = tracking.force_window as f64 / RATE;

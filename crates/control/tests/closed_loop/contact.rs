@@ -128,8 +128,8 @@ fn force_control_gives_way_to_a_moment_about_the_axis_it_acts_on() {
     let share = (dot(&rest, &rest) / dot(&difference, &difference)).sqrt();
     println!("gain {gain}, share of the torque elsewhere {share}");
     assert!((1.0..1.5).contains(&gain), "gain {gain}");
-    // 0.27 is left by encoder counts times the stiff gains of J2 and J3, and by J5 creeping in its friction; with the moment left
-    // in tool axes it is 0.94.
+    // 0.27 is left by encoder counts times the stiff gains of J2 and J3, and by J5 creeping in its friction; with the
+    // moment left in tool axes it is 0.94.
     assert!(share < 0.4, "{share} of the torque acts about other axes: {difference:?} for {wanted:?}");
 }
 

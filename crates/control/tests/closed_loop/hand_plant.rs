@@ -1,7 +1,8 @@
 //! A hand of four worm-driven digits behind its frames: counts and gauges out, a torque frame in.
 //!
-//! A finger's drive has the reflected inertia of its rotor, viscous and Coulomb friction, and a worm: a load can stop it but
-//! never turn it. Objects are springs that each inner link runs into; TorqueSwitch and outer links are left to the simulator.
+//! A finger's drive has the reflected inertia of its rotor, viscous and Coulomb friction, and a worm: a load can stop
+//! it but never turn it. Objects are springs that each inner link runs into; TorqueSwitch and outer links are left to
+//! the simulator.
 
 use control::model::hand::EFFICIENCY;
 use control::{HandSample, PERIOD};

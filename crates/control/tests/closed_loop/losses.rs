@@ -18,7 +18,8 @@ fn running(seconds: f64) -> Rig<f32> {
     rig
 }
 
-/// The positions of 60 cycles from a moment on, with `cycles` replies of the chosen motors lost at first; checks torque.
+/// The positions of 60 cycles from a moment on, with `cycles` replies of the chosen motors lost at first; checks
+/// torque.
 fn with_losses(rig: &mut Rig<f32>, motors: [bool; 7], cycles: usize) -> Vec<[f64; 7]> {
     let mut last = rig.last.expect("ran").record.tau;
     (0..60)

@@ -171,7 +171,8 @@ fn lost_replies_leave_the_integral_as_it_was() {
 
 #[test]
 fn while_a_torque_is_cut_the_integral_waits() {
-    // While gravity torque builds up, the rate limit acts; the arm is stuck meanwhile, beside the posture it should hold.
+    // While gravity torque builds up, the rate limit acts; the arm is stuck meanwhile, beside the posture it should
+    // hold.
     let mut rig = Rig::<f32>::new(GOAL, 0);
     rig.plant.coulomb *= 50.0;
     let mut record = rig.command(Command::Hold).record;

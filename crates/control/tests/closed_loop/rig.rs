@@ -1,8 +1,8 @@
 //! A rigid-body arm in f64 behind the real interface: counts in, torque frames out.
 //!
-//! The plant is built from the crate's own dynamics, which `golden_dynamics` proves against an independent library; what it
-//! adds is what the controller does not have: dry friction with true sticking, encoder quantisation and delay. The whole
-//! path through counts, frames and 14-bit torques is part of every test.
+//! The plant is built from the crate's own dynamics, which `golden_dynamics` proves against an independent library;
+//! what it adds is what the controller does not have: dry friction with true sticking, encoder quantisation and delay.
+//! The whole path through counts, frames and 14-bit torques is part of every test.
 
 use std::collections::VecDeque;
 
@@ -129,7 +129,8 @@ impl Plant {
         self.torque = self.queue.pop_front().expect("just pushed");
     }
 
-    /// Torque of the mechanical stops on joints that have run into them: as stiff and as damped as one step of time allows.
+    /// Torque of the mechanical stops on joints that have run into them: as stiff and as damped as one step of time
+    /// allows.
     fn stops(&self, mass: &SMatrix<f64, 7, 7>, dt: f64) -> Vector7<f64> {
         Vector7::from_fn(|joint, _| {
             let (q, dq) = (self.q[joint], self.dq[joint]);

@@ -28,8 +28,8 @@ struct Outcome {
     energy: f64,
     /// Speed of the hand 0.3 s after the push (m/s).
     braked: f64,
-    /// Largest distance of a reported joint speed from those that the joint had in the last 30 ms, in parts of the fastest (1
-    /// rad/s at least).
+    /// Largest distance of a reported joint speed from those that the joint had in the last 30 ms, in parts of the
+    /// fastest (1 rad/s at least).
     unseen: f64,
     state: State,
     fault: Fault,
