@@ -12,8 +12,8 @@ pub mod board;
 pub mod defmt_log;
 pub mod hand;
 pub mod in_place;
-#[cfg(target_os = "none")]
-pub mod last_words;
 pub mod line;
 pub mod metadata;
 pub mod meters;
+#[cfg(target_os = "none")]
+pub mod panic_stop;

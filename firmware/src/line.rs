@@ -50,7 +50,7 @@ const PORTION: usize = 32;
 
 /// One conversation over one of two lines; either may be such a pair again.
 #[derive(Debug)]
-pub struct Either<A, B> {
+pub struct LineSelector<A, B> {
     lines: (A, B),
     listeners: (Listener, Listener),
     chosen: Chosen,
@@ -67,7 +67,7 @@ enum Chosen {
     Second,
 }
 
-impl<A: LinkPort, B: LinkPort> Either<A, B> {
+impl<A: LinkPort, B: LinkPort> LineSelector<A, B> {
     /// Both lines, the first one chosen until the other is heard.
     pub const fn new(first: A, second: B) -> Self {
         Self {
@@ -111,7 +111,7 @@ impl<A: LinkPort, B: LinkPort> Either<A, B> {
 /// Portions looked at in one visit of the session: all that a line's queue of 1024 bytes holds.
 const LISTEN_ROUNDS: usize = 32;
 
-impl<A: LinkPort, B: LinkPort> LinkPort for Either<A, B> {
+impl<A: LinkPort, B: LinkPort> LinkPort for LineSelector<A, B> {
     fn read(&mut self, buffer: &mut [u8]) -> usize {
         self.listen();
         let mut count = 0;

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 
 use firmware::board::LinkPort;
-use firmware::line::Either;
+use firmware::line::LineSelector;
 use link::Request;
 use link::frame::{Decoder, Envelope, FRAME_BYTES, encode};
 
@@ -76,7 +76,7 @@ fn requests(mut stream: &[u8]) -> Vec<u16> {
 fn three() -> ([Wire; 3], impl LinkPort) {
     let wires = [Wire::default(), Wire::default(), Wire::default()];
     let [a, b, c] = wires.clone();
-    (wires, Either::new(a, Either::new(b, c)))
+    (wires, LineSelector::new(a, LineSelector::new(b, c)))
 }
 
 #[test]

@@ -69,7 +69,7 @@ fn libraries_without_std(machine: &Machine) -> Result<()> {
     for target in [ARM, HAND] {
         for features in [&[][..], &["--features", "fixed"]] {
             let mut check = machine.toolchain.cargo("check", target)?;
-            check.args(["--package", "dmp", "--no-default-features"]).args(features);
+            check.args(["--package", "movement-primitives", "--no-default-features"]).args(features);
             shell::run(&mut check)?;
         }
     }

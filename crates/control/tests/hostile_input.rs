@@ -7,11 +7,12 @@ use control::law::Gains;
 use control::model::ArmModel;
 use control::plan::load;
 use control::plan::load::{End, LoadError};
-use control::{BusSample, Calibration, Cycle, CycleInput, Event, Fault, HandSample, Payload, Refusal, State, flags};
-use dmp::{
-    Configuration, ExpectedWrench, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, PrimitiveTables,
-    Quaternion, Velocity,
+use control::plan::primitive::{
+    COUPLED_ROWS, Configuration, ExpectedWrench, Feedback, GainSchedule, MovementTables, ROWS, SENSORS, Velocity,
+    configuration as rows, gains, limits,
 };
+use control::{BusSample, Calibration, Cycle, CycleInput, Event, Fault, HandSample, Payload, Refusal, State, flags};
+use dmp::{Hemisphere, OrientationError};
 use std::sync::LazyLock;
 
 use pinned_init::InPlaceWrite;
@@ -30,43 +31,35 @@ fn counts(q: [f64; 7]) -> [Option<Counts>; 7] {
 fn configuration(q: [f64; 7]) -> Configuration<f32> {
     let model = ArmModel::<f64>::new(Payload::SensorAndHand);
     let pose = control::model::Frames::new(&model, &control::units::JointPositions::from_array(q)).tool_pose();
-    let [w, x, y, z] = pose.orientation.0.map(|value| value as f32);
-    Configuration {
-        position: [0, 1, 2].map(|axis| pose.position[axis] as f32),
-        orientation: Quaternion::new(w, x, y, z),
-        posture: q.map(|q| q as f32),
-        hand: [0.0; 4],
-    }
+    let position = [0, 1, 2].map(|axis| pose.position[axis] as f32);
+    rows(position, pose.orientation.0.map(|value| value as f32), q.map(|q| q as f32), [0.0; 4])
 }
 
-const WEIGHTS: [f32; dmp::ROWS * KERNELS] = [0.0; dmp::ROWS * KERNELS];
+const WEIGHTS: [f32; ROWS * KERNELS] = [0.0; ROWS * KERNELS];
 
 static FEEDBACK: LazyLock<Feedback<f32>> = LazyLock::new(|| {
-    let gains = GainSchedule::constant([20.0; dmp::COUPLED_ROWS]).expect("gains");
-    let weights = GainSchedule::constant([1.0; dmp::SENSORS]).expect("weights");
-    Feedback::new(gains, weights, Limits { displacement: 0.25, rotation: 0.4, hand: 0.5 }).expect("limits")
+    let sensitivity = GainSchedule::constant([20.0; COUPLED_ROWS]).expect("gains");
+    let weights = GainSchedule::constant([1.0; SENSORS]).expect("weights");
+    Feedback::new(sensitivity, weights, limits(0.25, 0.4, 0.5)).expect("limits")
 });
 
 static EXPECTED: LazyLock<ExpectedWrench<f32>> =
-    LazyLock::new(|| ExpectedWrench::new(&[[0.0; dmp::SENSORS]; 2], 4.0).expect("an expectation"));
+    LazyLock::new(|| ExpectedWrench::new(&[[0.0; SENSORS]; 2], 4.0).expect("an expectation"));
 
-fn tables() -> PrimitiveTables<'static, f32> {
-    PrimitiveTables {
+fn tables() -> MovementTables<'static, f32> {
+    MovementTables {
+        control_period: control::PERIOD as f32,
         duration: 4.0,
         alpha: 4.6052,
         activation: 0.7,
         kernel_count: KERNELS,
         weights: &WEIGHTS,
-        stiffness: [200.0; 4],
-        damping: [28.28, 20.0, 28.28, 28.28],
+        gains: gains([200.0; 4], [28.28, 20.0, 28.28, 28.28]),
         orientation_error: OrientationError::Quaternion,
         hemisphere: Hemisphere::Nearest,
         start: configuration(POSTURE),
         goal: configuration([-0.3, 1.4, 1.3, 2.0, -0.2, -0.5, 1.6]),
-        start_velocity: Velocity { position: [0.0; 3], orientation: [0.0; 3], posture: [0.0; 7], hand: [0.0; 4] },
-        feedback: Some(&FEEDBACK),
-        expected: Some(&EXPECTED),
-        experience: None,
+        start_velocity: Velocity::ZERO,
     }
 }
 
@@ -92,7 +85,9 @@ fn cycle(payload: Payload) -> Box<Cycle<f32, KERNELS>> {
 fn cycle_in(state: State) -> Box<Cycle<f32, KERNELS>> {
     let mut cycle = cycle(Payload::SensorAndHand);
     let model = ArmModel::new(Payload::SensorAndHand);
-    let primitive = load::primitive(&model, &tables()).expect("a good primitive");
+    let mut primitive = load::primitive(&model, &tables()).expect("a good primitive");
+    primitive.set_feedback(Some(&FEEDBACK));
+    primitive.set_expected(Some(&EXPECTED));
     cycle.load(&load::check(&model, &primitive).expect("fits")).expect("loads");
     let mut feed = |command: Option<Command>, cycles: usize| {
         for index in 0..cycles {
@@ -324,7 +319,7 @@ fn e4_commands_out_of_range_are_refused_with_a_reason_and_change_nothing() {
 #[test]
 fn e4_a_primitive_that_this_arm_cannot_run_is_refused_at_load() {
     let model = ArmModel::<f32>::new(Payload::SensorAndHand);
-    let reason = |change: &dyn Fn(&mut PrimitiveTables<'static, f32>)| {
+    let reason = |change: &dyn Fn(&mut MovementTables<'static, f32>)| {
         let mut tables = tables();
         change(&mut tables);
         load::primitive::<f32, KERNELS>(&model, &tables).expect_err("refused")
@@ -335,13 +330,13 @@ fn e4_a_primitive_that_this_arm_cannot_run_is_refused_at_load() {
     assert!(matches!(reason(&|tables| tables.duration = 0.0), LoadError::Primitive(_)));
     assert!(matches!(reason(&|tables| tables.duration = f32::NAN), LoadError::Primitive(_)));
     assert!(matches!(reason(&|tables| tables.kernel_count = 0), LoadError::Primitive(_)));
-    assert!(matches!(reason(&|tables| tables.goal.posture[1] = f32::NAN), LoadError::Primitive(_)));
-    assert!(matches!(reason(&|tables| tables.start.orientation.w = 2.0), LoadError::Primitive(_)));
-    assert_eq!(reason(&|tables| tables.goal.posture[5] = 1.55), LoadError::Posture(End::Goal, 5));
-    assert_eq!(reason(&|tables| tables.start.posture[0] = -2.6), LoadError::Posture(End::Start, 0));
-    assert_eq!(reason(&|tables| tables.goal.position = [1.2, 0.0, 0.0]), LoadError::OutOfReach(End::Goal));
-    assert_eq!(reason(&|tables| tables.goal.position[2] += 0.1), LoadError::Inconsistent(End::Goal));
-    assert_eq!(reason(&|tables| tables.start.posture[6] += 0.4), LoadError::Inconsistent(End::Start));
+    assert!(matches!(reason(&|tables| tables.goal.points[1] = f32::NAN), LoadError::Primitive(_)));
+    assert!(matches!(reason(&|tables| tables.start.poses[0].orientation.w = 2.0), LoadError::Primitive(_)));
+    assert_eq!(reason(&|tables| tables.goal.points[5] = 1.55), LoadError::Posture(End::Goal, 5));
+    assert_eq!(reason(&|tables| tables.start.points[0] = -2.6), LoadError::Posture(End::Start, 0));
+    assert_eq!(reason(&|tables| tables.goal.poses[0].position = [1.2, 0.0, 0.0]), LoadError::OutOfReach(End::Goal));
+    assert_eq!(reason(&|tables| tables.goal.poses[0].position[2] += 0.1), LoadError::Inconsistent(End::Goal));
+    assert_eq!(reason(&|tables| tables.start.points[6] += 0.4), LoadError::Inconsistent(End::Start));
 }
 
 #[test]

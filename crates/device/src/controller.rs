@@ -51,6 +51,15 @@ const OVERRUN_WEIGHT: u16 = 50;
 /// The sum at which the control cycle is too late too often: six overruns within a few cycles. One in fifty is tolerated.
 const OVERRUN_LIMIT: u16 = 300;
 
+/// Who has the bus.
+#[derive(Clone, Copy, Debug)]
+enum BusPhase {
+    /// The start-up.
+    StartUp,
+    /// The cyclic loop, with its questions beside the control cycle.
+    Cyclic(BackgroundPoll),
+}
+
 /// The high-priority half of the device.
 pub struct DeviceController {
     cycle: Cycle<f32, { control::MAX_KERNELS }>,
@@ -59,7 +68,7 @@ pub struct DeviceController {
     pacer: Pacer,
     round: Round,
     hand: Hand,
-    slow: Option<BackgroundPoll>,
+    phase: BusPhase,
     counters: Counters,
     safety_mode: Option<SafetyMode>,
     /// The mode told since the last cycle.
@@ -91,7 +100,7 @@ impl DeviceController {
             pacer: Pacer::default(),
             round: Round::default(),
             hand: Hand::new(),
-            slow: None,
+            phase: BusPhase::StartUp,
             counters: Counters::default(),
             safety_mode: None,
             fresh_safety: None,
@@ -148,7 +157,7 @@ impl DeviceController {
 
     /// Gives a reply to whoever waits for it; whether anybody did.
     fn take(&mut self, reply: &Reply, io: &mut impl ControllerIo<Self>) -> bool {
-        if self.slow.is_none() {
+        if matches!(self.phase, BusPhase::StartUp) {
             let expected = self.startup.receive(reply);
             if let (true, Reply::Property { node: Node::SAFETY_MODULE, property: PropertyId::MODE, value }) =
                 (expected, *reply)
@@ -166,10 +175,13 @@ impl DeviceController {
         let Reply::Property { node, property, value } = *reply else {
             return false;
         };
-        let Some(told) = self.slow.as_mut().and_then(|slow| slow.take(node, property, value)) else {
+        let BusPhase::Cyclic(poll) = &mut self.phase else {
             return false;
         };
-        match told {
+        let Some(reply) = poll.take(node, property, value) else {
+            return false;
+        };
+        match reply {
             PollReply::SafetyMode(value) => self.hear_safety(value, io),
             PollReply::PuckMode(value) => {
                 let braking = MotorMode::from_value(value) == Some(MotorMode::Idle);
@@ -246,7 +258,7 @@ impl DeviceController {
         if self.cycle.calibrate(*calibration).is_err() {
             return;
         }
-        self.slow = Some(BackgroundPoll::new(safety));
+        self.phase = BusPhase::Cyclic(BackgroundPoll::new(safety));
         self.round = Round::new(self.startup.has_sensor());
         match self.startup.take_hand() {
             Some(found) => self.hand.begin(found),
@@ -265,7 +277,7 @@ impl DeviceController {
     /// Leaves the cyclic loop.
     fn restart(&mut self) {
         Counters::count(&mut self.counters.restarts);
-        self.slow = None;
+        self.phase = BusPhase::StartUp;
         self.cycle.reset();
         self.startup.restart();
         self.hand.suspend();
@@ -292,7 +304,7 @@ impl DeviceController {
         let hand = self.hand.sample(&mut self.counters);
         self.number += 1;
         Counters::count(&mut self.counters.cycles);
-        if self.slow.is_some_and(|slow| slow.safety_silence() >= SAFETY_SILENCE)
+        if matches!(self.phase, BusPhase::Cyclic(poll) if poll.safety_silence() >= SAFETY_SILENCE)
             || self.round.longest_silence() >= SILENT_CYCLES
         {
             self.fail();
@@ -381,7 +393,7 @@ impl DeviceController {
     fn leave_if_lost(&mut self) {
         if !self.startup.is_done() {
             // A command has sent the start-up back to zeroing.
-            self.slow = None;
+            self.phase = BusPhase::StartUp;
             self.cycle.reset();
             return;
         }
@@ -410,15 +422,15 @@ impl DeviceController {
             }
             return;
         }
-        let Some(slow) = &mut self.slow else {
+        let BusPhase::Cyclic(poll) = &mut self.phase else {
             return;
         };
         let mut outlet = SlotOutlet { io, counters: &mut self.counters, pacer: &mut self.pacer, now_us, cyclic: true };
-        let question = match (slow.begin(), self.round.suspect()) {
+        let question = match (poll.begin(), self.round.suspect()) {
             (Some(safety), _) => Some(safety),
-            (None, Some(node)) => Some(slow.suspect(node)),
+            (None, Some(node)) => Some(poll.suspect(node)),
             (None, None) if self.hand.act(&mut outlet) => None,
-            (None, None) => slow.other(self.hand.answers_questions()),
+            (None, None) => poll.other(self.hand.answers_questions()),
         };
         if let Some(frame) = question {
             outlet.send(frame);
@@ -460,11 +472,11 @@ impl Controller for DeviceController {
 
     fn slot(&mut self, slot: Slot, now_us: u64, io: &mut impl ControllerIo<Self>) {
         self.drain(io);
-        match (self.slow.is_some(), slot) {
-            (false, _) => self.start_up(now_us, io),
-            (true, Slot::Request) => self.request(now_us, io),
-            (true, Slot::Control) => self.control(now_us, io),
-            (true, Slot::Slow) => self.ask_slowly(now_us, io),
+        match (self.phase, slot) {
+            (BusPhase::StartUp, _) => self.start_up(now_us, io),
+            (BusPhase::Cyclic(_), Slot::Request) => self.request(now_us, io),
+            (BusPhase::Cyclic(_), Slot::Control) => self.control(now_us, io),
+            (BusPhase::Cyclic(_), Slot::Slow) => self.ask_slowly(now_us, io),
         }
         match self.startup.zero_answer() {
             Some(Ok(())) => self.tell(EventKind::Accepted, io),
@@ -488,7 +500,7 @@ impl Controller for DeviceController {
 
     fn note_bus_error(&mut self, bus_off: bool) {
         Counters::count(&mut self.counters.bus_errors);
-        if bus_off && self.slow.is_some() {
+        if bus_off && matches!(self.phase, BusPhase::Cyclic(_)) {
             self.fail();
         }
     }

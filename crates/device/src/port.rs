@@ -1,7 +1,7 @@
 //! Primitives on their way from the session to the control half.
 
 use control::Fit;
-use dmp::Primitive;
+use control::plan::primitive::Primitive;
 
 /// A primitive as the control half holds it.
 pub type StoredPrimitive = Primitive<f32, { control::MAX_KERNELS }>;

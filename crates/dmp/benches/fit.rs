@@ -2,13 +2,13 @@
 
 use divan::{Bencher, black_box};
 use dmp::Quaternion;
-use dmp::fit::{Demonstration, FitOptions, fit};
+use dmp::fit::{Demonstration, FitOptions, PoseSamples, fit};
 
 fn main() {
     divan::main();
 }
 
-fn demonstration() -> Demonstration {
+fn demonstration() -> Demonstration<11, 1> {
     let samples = 1501;
     let value = |k: usize, i: usize| {
         let u = k as f64 / (samples - 1) as f64;
@@ -18,7 +18,7 @@ fn demonstration() -> Demonstration {
         (0..1501).map(|k| std::array::from_fn(|i| value(k, i))).collect()
     }
     let orientation = rows::<3>(value).iter().map(Quaternion::from_rotation_vector).collect();
-    Demonstration::new(1.0 / 300.0, rows(value), orientation, rows(value), rows(value)).unwrap()
+    Demonstration::new(1.0 / 300.0, [PoseSamples { position: rows(value), orientation }], rows(value)).unwrap()
 }
 
 #[divan::bench]

@@ -2,40 +2,36 @@
 
 use divan::{Bencher, black_box};
 use dmp::{
-    Configuration, Coupling, Hemisphere, OrientationError, Primitive, PrimitiveTables, Quaternion, ROWS, Rollout,
-    Scalar, StartState, Velocity,
+    Configuration, Coupling, Gains, Hemisphere, OrientationError, Pose, Primitive, PrimitiveTables, Quaternion,
+    Rollout, Scalar, StartState, Stiffness, Velocity,
 };
 
 fn main() {
     divan::main();
 }
 
-fn primitive<T: Scalar, const N: usize>(kernels: usize) -> Primitive<T, N> {
+/// One pose and eleven point rows: the arm of seven joints with a hand of four.
+type Arm<T, const N: usize> = Primitive<T, 11, 1, N>;
+
+fn primitive<T: Scalar, const N: usize>(kernels: usize) -> Arm<T, N> {
     let f = T::from_f64;
-    let weights: Vec<T> = (0..ROWS * kernels).map(|i| f(0.3 * (0.37 * i as f64).sin())).collect();
-    let configuration = |x: f64, q: Quaternion<T>| Configuration {
-        position: [f(x); 3],
-        orientation: q,
-        posture: [f(x); 7],
-        hand: [f(x); 4],
-    };
+    let weights: Vec<T> = (0..Arm::<T, N>::ROWS * kernels).map(|i| f(0.3 * (0.37 * i as f64).sin())).collect();
+    let configuration =
+        |x: f64, orientation| Configuration { poses: [Pose { position: [f(x); 3], orientation }], points: [f(x); 11] };
     let turned = Quaternion::from_rotation_vector(&[f(0.4), f(-0.8), f(0.3)]);
     Primitive::new(&PrimitiveTables {
+        control_period: f(1.0 / 300.0),
         duration: f(5.0),
         alpha: f(4.605),
         activation: f(0.7),
         kernel_count: kernels,
         weights: &weights,
-        stiffness: [f(200.0); 4],
-        damping: [f(28.28), f(20.0), f(28.28), f(28.28)],
+        gains: Gains::critically_damped(&Stiffness::uniform(f(200.0)), OrientationError::Quaternion),
         orientation_error: OrientationError::Quaternion,
         hemisphere: Hemisphere::Nearest,
         start: configuration(0.0, Quaternion::IDENTITY),
         goal: configuration(0.5, turned),
         start_velocity: Velocity::ZERO,
-        feedback: None,
-        expected: None,
-        experience: None,
     })
     .unwrap()
 }

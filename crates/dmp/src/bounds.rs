@@ -1,6 +1,6 @@
 //! Bounds: what no movement of a real robot needs more of.
 //!
-//! A number beyond them is a slip of the pen, a wrong unit or a damaged file. Refused at load it costs a message;
+//! A number beyond them is a typing error, a wrong unit or a damaged file. Refused at load it costs a message;
 //! taken, it is a plan that leaves the room, or overflows to infinity and then to NaN in f32. They are wide on
 //! purpose: the limits of one particular arm belong to whoever knows it.
 
@@ -26,19 +26,19 @@ pub const SMALLEST_GAIN: f64 = 0.1;
 /// Largest stiffness and damping.
 pub const LARGEST_GAIN: f64 = 1e6;
 
-/// Largest displacement of the position by feedback (m). The method's authors bend their plans by up to 0.23 m.
+/// Largest displacement of a position by a coupling (m). The method's authors bend their plans by up to 0.23 m.
 pub const LARGEST_DISPLACEMENT: f64 = 2.0;
 
-/// Largest displacement of a hand joint by feedback (rad): half a turn, as for the orientation.
-pub const LARGEST_HAND_DISPLACEMENT: f64 = core::f64::consts::PI;
+/// Largest displacement of a point row by a coupling (rad): half a turn, as for the orientation.
+pub const LARGEST_POINT_DISPLACEMENT: f64 = core::f64::consts::PI;
 
 /// Largest value of a sensor (N, N m, rad): the strongest six-axis sensors measure 40 kN.
 pub const LARGEST_SENSOR_VALUE: f64 = 1e5;
 
-/// Largest gain `K1` or weight `K2` of the feedback. At K = 1e6 and 2 N for a displacement of 2 m `K1` is 1e6.
-pub const LARGEST_FEEDBACK_GAIN: f64 = 1e6;
+/// Largest gain `K1` or weight `K2` of the coupling. At K = 1e6 and 2 N for a displacement of 2 m `K1` is 1e6.
+pub const LARGEST_COUPLING_GAIN: f64 = 1e6;
 
-/// Smallest spread of an experience (N, N m, rad): a thousandth of what the finest of these sensors resolves. The
+/// Smallest spread of sensor statistics (N, N m, rad): a thousandth of what the finest of these sensors resolves. The
 /// distance from the mean is divided by it.
 pub const SMALLEST_SPREAD: f64 = 1e-6;
 

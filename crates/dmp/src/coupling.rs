@@ -1,188 +1,190 @@
-//! `Feedback` and `Coupling`: Eq. (8), the term by which felt forces bend the plan.
+//! `Coupling` and `CouplingGains`: Eq. (8), the term by which measured forces bend the plan.
 //!
 //! `zeta = K1 J_sensor^T K2 (F - F_expected)`, F = wrench of the ENVIRONMENT ON THE ROBOT: an unexpected push along +x
 //! moves the plan towards +x. `zeta` stands inside the right-hand side of Eqs. (9) and (6), so a constant one settles
 //! at `x = g + zeta/K` and at the angle `2 asin(zeta_o/K_o)`. Beyond `zeta_o = K_o` there is no equilibrium and the
-//! plan would spin, therefore `|zeta_p| <= K dx_max` and `|zeta_o| <= K_o sin(theta_max/2)`.
+//! plan would spin, therefore `|zeta_p| <= K dx_max` and `|zeta_o| <= K_o sin(theta_max/2)`
+//! ([`DisplacementLimits`], [`Primitive::limited_coupling`](crate::Primitive::limited_coupling)).
+//!
+//! Sensors and their Jacobian are the caller's: [`CouplingGains::zeta`] takes the map from sensors to rows as a
+//! function.
 
-use crate::vector::{clamp, clamp_norm, cross, rotate};
-use crate::{Entry, OrientationError, PhaseTable, Scalar, TableError, bounds};
+use crate::vector::clamp;
+use crate::{Entry, PhaseTable, Scalar, TableError, bounds};
 
-/// Sensor values: force x, y, z (N), torque x, y, z (N m), torque on finger F1, F2, F3 (N m).
-pub const SENSORS: usize = 9;
-/// Task dimensions with feedback: position 3, orientation 3, hand 4 (the spread has no gauge).
-pub const COUPLED_ROWS: usize = 10;
-/// Most samples of a gain over the phase.
-pub const GAIN_CAPACITY: usize = 32;
-
-/// Diagonal gains, constant or by phase.
-pub type GainSchedule<T, const COLUMNS: usize> = PhaseTable<T, COLUMNS, GAIN_CAPACITY>;
-
-/// How far feedback may displace the plan in steady state.
+/// `zeta` of one pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits<T> {
-    /// `dx_max`, m.
-    pub displacement: T,
-    /// `theta_max`, rad (0..pi).
-    pub rotation: T,
-    /// Largest displacement of a hand joint, rad.
-    pub hand: T,
-}
-
-/// Gains and limits of Eq. (8).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Feedback<T> {
-    sensitivity: GainSchedule<T, COUPLED_ROWS>,
-    weight: GainSchedule<T, SENSORS>,
-    limits: Limits<T>,
-}
-
-/// `zeta` of one tick, in the unit of the rows (m, rad) times the stiffness.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Coupling<T> {
+pub struct PoseCoupling<T> {
     /// Position rows, world frame.
     pub position: [T; 3],
     /// Orientation rows, body frame.
     pub orientation: [T; 3],
-    /// Hand rows (spread, F1, F2, F3).
-    pub hand: [T; 4],
 }
 
-impl<T: Scalar> Coupling<T> {
-    /// No feedback: the plan runs open loop.
-    pub const NONE: Self = Self { position: [T::ZERO; 3], orientation: [T::ZERO; 3], hand: [T::ZERO; 4] };
+impl<T: Scalar> PoseCoupling<T> {
+    /// No coupling.
+    pub const NONE: Self = Self { position: [T::ZERO; 3], orientation: [T::ZERO; 3] };
+}
 
-    /// True if no value can be beyond its limit (of position, orientation, posture, hand): the sum of all magnitudes
-    /// is within the least. A NaN makes it false.
+/// `zeta` of one tick, in the unit of the rows (m, rad) times the stiffness. Any row can have one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coupling<T, const D: usize, const P: usize> {
+    /// Of the poses.
+    pub poses: [PoseCoupling<T>; P],
+    /// Of the point rows.
+    pub points: [T; D],
+}
+
+impl<T: Scalar, const D: usize, const P: usize> Coupling<T, D, P> {
+    /// No coupling: the plan runs open loop.
+    pub const NONE: Self = Self { poses: [PoseCoupling::NONE; P], points: [T::ZERO; D] };
+
+    /// Every value through `f`.
     #[inline]
-    pub(crate) fn is_within(&self, &[position, orientation, _, hand]: &[T; 4]) -> bool {
-        let sum = |values: &[T]| values.iter().fold(T::ZERO, |sum, value| sum + value.abs());
-        let least = |a: T, b: T| if a < b { a } else { b };
-        sum(&self.position) + sum(&self.orientation) + sum(&self.hand) <= least(least(position, orientation), hand)
+    #[must_use]
+    pub fn map(&self, mut f: impl FnMut(T) -> T) -> Self {
+        Self {
+            poses: self.poses.map(|pose| PoseCoupling {
+                position: pose.position.map(&mut f),
+                orientation: pose.orientation.map(&mut f),
+            }),
+            points: self.points.map(&mut f),
+        }
+    }
+
+    /// All values in the order of the weights: of each pose position and orientation, then the point rows.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &T> + Clone {
+        self.poses.iter().flat_map(|pose| pose.position.iter().chain(&pose.orientation)).chain(&self.points)
+    }
+
+    /// True if no magnitude is above `least`. A NaN makes it false.
+    #[inline]
+    pub(crate) fn is_within(&self, least: T) -> bool {
+        // No early end: without a branch the comparisons run in parallel.
+        let within = |values: &[T]| values.iter().fold(true, |within, value| within & (value.abs() <= least));
+        let poses = |all: bool, pose: &PoseCoupling<T>| all & within(&pose.position) & within(&pose.orientation);
+        self.poses.iter().fold(true, poses) & within(&self.points)
     }
 
     /// Each value cut to its limit; one that is not a number counts as 0.
     #[cold]
-    pub(crate) fn limited(&self, &[position, orientation, _, hand]: &[T; 4]) -> Self {
+    pub(crate) fn limited(&self, limits: &Self) -> Self {
+        let pose = |n: usize| PoseCoupling {
+            position: core::array::from_fn(|i| clamp(self.poses[n].position[i], limits.poses[n].position[i])),
+            orientation: core::array::from_fn(|i| clamp(self.poses[n].orientation[i], limits.poses[n].orientation[i])),
+        };
         Self {
-            position: self.position.map(|zeta| clamp(zeta, position)),
-            orientation: self.orientation.map(|zeta| clamp(zeta, orientation)),
-            hand: self.hand.map(|zeta| clamp(zeta, hand)),
+            poses: core::array::from_fn(pose),
+            points: core::array::from_fn(|i| clamp(self.points[i], limits.points[i])),
         }
     }
 }
 
-/// `J_sensor^T` for a wrist sensor and finger gauges: where the sensor sits relative to the controlled point.
-///
-/// [`SensorMap::IDENTITY`] is right if the forces are in the world frame and the torques in the body frame at the
-/// controlled point already; this is how an expectation should be recorded.
+/// Largest displacement of one pose by a coupling in steady state.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SensorMap<T> {
-    /// Rotation from the frame of the force values to the world, row by row.
-    pub force: [[T; 3]; 3],
-    /// Rotation from the frame of the torque values to the body, row by row.
-    pub torque: [[T; 3]; 3],
-    /// From the sensor's origin to the controlled point, in the frame of the torque values, m.
-    ///
-    /// Only meaningful if forces and torques come in the same frame; zero otherwise.
-    pub lever: [T; 3],
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PoseLimits<T> {
+    /// `dx_max`, m.
+    pub displacement: T,
+    /// `theta_max`, rad (0..pi).
+    pub rotation: T,
 }
 
-impl<T: Scalar> SensorMap<T> {
-    const UNIT: [[T; 3]; 3] = [[T::ONE, T::ZERO, T::ZERO], [T::ZERO, T::ONE, T::ZERO], [T::ZERO, T::ZERO, T::ONE]];
+/// Largest displacement of the plan by a coupling in steady state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DisplacementLimits<T, const D: usize, const P: usize> {
+    /// Of the poses.
+    pub poses: [PoseLimits<T>; P],
+    /// Of each point row, in its unit.
+    pub points: [T; D],
+}
 
-    /// Sensor values are already in the frames of the task.
-    pub const IDENTITY: Self = Self { force: Self::UNIT, torque: Self::UNIT, lever: [T::ZERO; 3] };
+impl<T: Scalar, const D: usize, const P: usize> DisplacementLimits<T, D, P> {
+    /// No displacement at all.
+    pub const NONE: Self =
+        Self { poses: [PoseLimits { displacement: T::ZERO, rotation: T::ZERO }; P], points: [T::ZERO; D] };
 
-    /// `J_sensor^T e`: generalised force on the ten task rows.
-    #[inline]
-    pub fn to_task(&self, e: &[T; SENSORS]) -> [T; COUPLED_ROWS] {
-        let [fx, fy, fz, tx, ty, tz, f1, f2, f3] = *e;
-        let (force, torque) = ([fx, fy, fz], [tx, ty, tz]);
-        let moment = cross(&self.lever, &force);
-        let at_point = core::array::from_fn(|i| torque[i] - moment[i]);
-        let [px, py, pz] = rotate(&self.force, &force);
-        let [rx, ry, rz] = rotate(&self.torque, &at_point);
-        [px, py, pz, rx, ry, rz, T::ZERO, f1, f2, f3]
+    /// Checks that the limits are numbers, not negative and within [`bounds`].
+    ///
+    /// # Errors
+    /// [`TableError::NotFinite`], [`TableError::Negative`], [`TableError::TooLarge`], also for a rotation above pi.
+    pub fn check(&self) -> Result<(), TableError> {
+        let poses = self.poses.iter().flat_map(|pose| {
+            [
+                (pose.displacement, bounds::LARGEST_DISPLACEMENT, Entry::Displacement),
+                // Pi as somebody else may have rounded it.
+                (pose.rotation, core::f64::consts::PI + 1e-6, Entry::Rotation),
+            ]
+        });
+        let points = self
+            .points
+            .iter()
+            .map(|limit| (*limit, bounds::LARGEST_POINT_DISPLACEMENT + 1e-6, Entry::PointDisplacement));
+        let all = || poses.clone().chain(points.clone());
+        if all().any(|(value, _, _)| !value.is_finite()) {
+            return Err(TableError::NotFinite);
+        }
+        if all().any(|(value, _, _)| value < T::ZERO) {
+            return Err(TableError::Negative);
+        }
+        match all().find(|(value, largest, _)| *value > T::from_f64(*largest)) {
+            Some((_, _, entry)) => Err(TableError::TooLarge(entry)),
+            None => Ok(()),
+        }
     }
 }
 
-/// Stiffnesses that the clamps of Eq. (8) are relative to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stiffness<T> {
-    /// `K` of the position rows.
-    pub position: T,
-    /// `K_o` of the orientation rows.
-    pub orientation: T,
-    /// `K` of the hand rows.
-    pub hand: T,
-    /// Kind of orientation error.
-    pub orientation_error: OrientationError,
+/// `K1` of `ROWS` coupled rows and `K2` of `SENSORS` sensors, each constant or by phase in up to `CAPACITY` samples.
+///
+/// `ROWS` are those rows that the sensors can bend, in an order of the caller's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CouplingGains<T, const ROWS: usize, const SENSORS: usize, const CAPACITY: usize> {
+    sensitivity: PhaseTable<T, ROWS, CAPACITY>,
+    weight: PhaseTable<T, SENSORS, CAPACITY>,
 }
 
-impl<T: Scalar> Feedback<T> {
-    /// With sensitivity `K1` per task row, weight `K2` per sensor, and limits.
+impl<T: Scalar, const ROWS: usize, const SENSORS: usize, const CAPACITY: usize>
+    CouplingGains<T, ROWS, SENSORS, CAPACITY>
+{
+    /// With sensitivity `K1` per coupled row and weight `K2` per sensor.
     ///
     /// # Errors
-    /// [`TableError::Negative`] for a negative gain or limit, [`TableError::TooLarge`] for one beyond [`bounds`] or a
-    /// rotation limit above pi, [`TableError::NotFinite`] for a limit that is not a number.
+    /// [`TableError::Negative`] for a negative gain, [`TableError::TooLarge`] for one beyond [`bounds`].
     pub fn new(
-        sensitivity: GainSchedule<T, COUPLED_ROWS>,
-        weight: GainSchedule<T, SENSORS>,
-        limits: Limits<T>,
+        sensitivity: PhaseTable<T, ROWS, CAPACITY>,
+        weight: PhaseTable<T, SENSORS, CAPACITY>,
     ) -> Result<Self, TableError> {
-        let feedback = Self { sensitivity, weight, limits };
-        feedback.check()?;
-        Ok(feedback)
+        let gains = Self { sensitivity, weight };
+        gains.check()?;
+        Ok(gains)
     }
 
     fn check(&self) -> Result<(), TableError> {
-        let Limits { displacement, rotation, hand } = self.limits;
-        if !(displacement.is_finite() && rotation.is_finite() && hand.is_finite()) {
-            return Err(TableError::NotFinite);
-        }
-        let gains = self.sensitivity.samples().iter().flatten();
-        if gains
-            .chain(self.weight.samples().iter().flatten())
-            .chain(&[displacement, rotation, hand])
-            .any(|&value| value < T::ZERO)
-        {
+        let gains = self.sensitivity.samples().iter().flatten().chain(self.weight.samples().iter().flatten());
+        if gains.into_iter().any(|&value| value < T::ZERO) {
             return Err(TableError::Negative);
         }
-        let limits = [
-            (displacement, bounds::LARGEST_DISPLACEMENT, Entry::Displacement),
-            // Pi as somebody else may have rounded it.
-            (rotation, core::f64::consts::PI + 1e-6, Entry::Rotation),
-            (hand, bounds::LARGEST_HAND_DISPLACEMENT + 1e-6, Entry::Hand),
-        ];
-        let limit = limits.into_iter().find(|(value, largest, _)| *value > T::from_f64(*largest));
-        if let Some((_, _, entry)) = limit {
-            return Err(TableError::TooLarge(entry));
-        }
-        if let Some((point, column)) = self.sensitivity.first_beyond(bounds::LARGEST_FEEDBACK_GAIN) {
+        if let Some((point, column)) = self.sensitivity.first_beyond(bounds::LARGEST_COUPLING_GAIN) {
             return Err(TableError::TooLarge(Entry::Sensitivity { point, column }));
         }
-        if let Some((point, column)) = self.weight.first_beyond(bounds::LARGEST_FEEDBACK_GAIN) {
+        if let Some((point, column)) = self.weight.first_beyond(bounds::LARGEST_COUPLING_GAIN) {
             return Err(TableError::TooLarge(Entry::SensorWeight { point, column }));
         }
         Ok(())
     }
 
-    /// Stands for feedback that is not there; never leaves this crate.
-    pub(crate) const EMPTY: Self = Self {
-        sensitivity: PhaseTable::EMPTY,
-        weight: PhaseTable::EMPTY,
-        limits: Limits { displacement: T::ZERO, rotation: T::ZERO, hand: T::ZERO },
-    };
+    /// No gains: for statics that are filled by [`assign`](Self::assign).
+    pub const EMPTY: Self = Self { sensitivity: PhaseTable::EMPTY, weight: PhaseTable::EMPTY };
 
-    /// As [`Feedback::new`], in place: `K1` and `K2` point after point. After an error it is empty.
-    pub(crate) fn assign(
+    /// As [`CouplingGains::new`], in place: `K1` and `K2` point after point.
+    ///
+    /// # Errors
+    /// As [`CouplingGains::new`] and [`PhaseTable::assign`]; the gains are then empty.
+    pub fn assign(
         &mut self,
         sensitivity: impl IntoIterator<Item = T>,
         weight: impl IntoIterator<Item = T>,
-        limits: Limits<T>,
     ) -> Result<(), TableError> {
-        self.limits = limits;
         let filled = self.sensitivity.assign(sensitivity).and_then(|()| self.weight.assign(weight));
         let result = filled.and_then(|()| self.check());
         if result.is_err() {
@@ -191,53 +193,42 @@ impl<T: Scalar> Feedback<T> {
         result
     }
 
-    pub(crate) fn copy_from(&mut self, other: &Self) {
+    /// Takes over the gains of others, and only what they hold.
+    pub fn copy_from(&mut self, other: &Self) {
         self.sensitivity.copy_from(&other.sensitivity);
         self.weight.copy_from(&other.weight);
-        self.limits = other.limits;
     }
 
-    pub(crate) fn clear(&mut self) {
+    /// Forgets all gains.
+    pub fn clear(&mut self) {
         self.sensitivity.clear();
         self.weight.clear();
-        self.limits = Self::EMPTY.limits;
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
+    /// True without gains.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
         self.sensitivity.samples().is_empty()
     }
 
     /// Sensitivity `K1` over the phase.
-    pub fn sensitivity(&self) -> &GainSchedule<T, COUPLED_ROWS> {
+    #[must_use]
+    pub fn sensitivity(&self) -> &PhaseTable<T, ROWS, CAPACITY> {
         &self.sensitivity
     }
 
     /// Weight `K2` over the phase.
-    pub fn weight(&self) -> &GainSchedule<T, SENSORS> {
+    #[must_use]
+    pub fn weight(&self) -> &PhaseTable<T, SENSORS, CAPACITY> {
         &self.weight
     }
 
-    /// Limits.
-    pub fn limits(&self) -> &Limits<T> {
-        &self.limits
-    }
-
-    /// `zeta` at progress `u` for the error `F - F_expected`, clamped. A value that is not a number counts as 0.
-    pub fn coupling(&self, u: T, error: &[T; SENSORS], map: &SensorMap<T>, stiffness: &Stiffness<T>) -> Coupling<T> {
+    /// `K1 J^T K2 e` at progress `u` for the error `e = F - F_expected`; `to_rows` is `J^T`.
+    #[inline]
+    #[must_use]
+    pub fn zeta(&self, u: T, error: &[T; SENSORS], to_rows: impl FnOnce(&[T; SENSORS]) -> [T; ROWS]) -> [T; ROWS] {
         let (k1, k2) = (self.sensitivity.at(u), self.weight.at(u));
-        let task = map.to_task(&core::array::from_fn(|i| k2[i] * error[i]));
-        let zeta: [T; COUPLED_ROWS] = core::array::from_fn(|i| k1[i] * task[i]);
-        let largest_rotation = match stiffness.orientation_error {
-            OrientationError::Quaternion => {
-                T::sin_cos(self.limits.rotation * T::from_f64(0.5)).0 * stiffness.orientation
-            }
-            OrientationError::RotationVector => self.limits.rotation * stiffness.orientation,
-        };
-        let [px, py, pz, rx, ry, rz, hand @ ..] = zeta;
-        Coupling {
-            position: clamp_norm(&[px, py, pz], self.limits.displacement * stiffness.position),
-            orientation: clamp_norm(&[rx, ry, rz], largest_rotation),
-            hand: hand.map(|zeta| clamp(zeta, self.limits.hand * stiffness.hand)),
-        }
+        let rows = to_rows(&core::array::from_fn(|i| k2[i] * error[i]));
+        core::array::from_fn(|i| k1[i] * rows[i])
     }
 }

@@ -1,28 +1,24 @@
-//! `ExpectedWrench`: what the sensors should feel at each phase (`F_des` of Eqs. 8 and 12).
+//! `ExpectedSensors`: the sensor values that a successful run would measure at each phase (`F_des` of Eqs. 8 and 12).
 //!
-//! Recorded during a successful execution without feedback. F is the wrench of the ENVIRONMENT ON THE ROBOT. Force
-//! rows are in the world frame: in the sensor frame a hand that is tilted by 20 degrees would fake newtons. Torque
-//! rows are in the body frame at the controlled point, finger rows are torques of the environment on each finger.
+//! Recorded during a successful execution without coupling. F is the wrench of the ENVIRONMENT ON THE ROBOT. Forces
+//! belong in the world frame: in the sensor frame a hand that is tilted by 20 degrees would fake newtons.
 
-use crate::{Entry, PhaseTable, SENSORS, Scalar, TableError, bounds};
+use crate::{Entry, PhaseTable, Scalar, TableError, bounds};
 
-/// Most samples an expectation can hold.
-pub const EXPECTED_CAPACITY: usize = 128;
-
-/// Expected sensor values by phase.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ExpectedWrench<T> {
-    table: PhaseTable<T, SENSORS, EXPECTED_CAPACITY>,
+/// Expected values of `SENSORS` sensors by phase, in up to `CAPACITY` samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExpectedSensors<T, const SENSORS: usize, const CAPACITY: usize> {
+    table: PhaseTable<T, SENSORS, CAPACITY>,
     recorded_duration: T,
 }
 
-impl<T: Scalar> ExpectedWrench<T> {
-    /// Full feedback while the duration is within this fraction of the recorded one.
+impl<T: Scalar, const SENSORS: usize, const CAPACITY: usize> ExpectedSensors<T, SENSORS, CAPACITY> {
+    /// Full coupling while the duration is within this fraction of the recorded one.
     const TRUSTED_DEVIATION: f64 = 0.1;
-    /// No feedback from this fraction on.
+    /// No coupling from this fraction on.
     const USELESS_DEVIATION: f64 = 0.5;
 
-    /// From samples (force N world, torque N m body, fingers N m) evenly spaced in progress from 0 to 1, recorded at
+    /// From samples evenly spaced in progress from 0 to 1, recorded at
     /// the duration `recorded_duration` (s).
     ///
     /// # Errors
@@ -44,15 +40,14 @@ impl<T: Scalar> ExpectedWrench<T> {
         }
     }
 
-    /// Stands for an expectation that is not there; never leaves this crate.
-    pub(crate) const EMPTY: Self = Self { table: PhaseTable::EMPTY, recorded_duration: T::ZERO };
+    /// No samples, for statics that are filled by [`assign`](Self::assign).
+    pub const EMPTY: Self = Self { table: PhaseTable::EMPTY, recorded_duration: T::ZERO };
 
-    /// As [`ExpectedWrench::new`], in place. After an error it is empty.
-    pub(crate) fn assign(
-        &mut self,
-        values: impl IntoIterator<Item = T>,
-        recorded_duration: T,
-    ) -> Result<(), TableError> {
+    /// As [`ExpectedSensors::new`], in place, point after point.
+    ///
+    /// # Errors
+    /// As [`ExpectedSensors::new`] and [`PhaseTable::assign`]; the expectation is then empty.
+    pub fn assign(&mut self, values: impl IntoIterator<Item = T>, recorded_duration: T) -> Result<(), TableError> {
         self.recorded_duration = recorded_duration;
         let result = self.table.assign(values).and_then(|()| self.check());
         if result.is_err() {
@@ -61,17 +56,21 @@ impl<T: Scalar> ExpectedWrench<T> {
         result
     }
 
-    pub(crate) fn copy_from(&mut self, other: &Self) {
+    /// Takes over the samples of another one.
+    pub fn copy_from(&mut self, other: &Self) {
         self.table.copy_from(&other.table);
         self.recorded_duration = other.recorded_duration;
     }
 
-    pub(crate) fn clear(&mut self) {
+    /// Forgets all samples.
+    pub fn clear(&mut self) {
         self.table.clear();
         self.recorded_duration = T::ZERO;
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
+    /// True without samples.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
         self.table.samples().is_empty()
     }
 
@@ -91,7 +90,7 @@ impl<T: Scalar> ExpectedWrench<T> {
         self.recorded_duration
     }
 
-    /// How far the expectation can be believed at another speed, 1 to 0.
+    /// Returns how far the expectation can be believed at another speed, 1 to 0.
     ///
     /// The inertial part of the record scales with `1/tau^2`; how large that part is, the record does not tell. Up
     /// to 10 % deviation of the duration it is used in full, from 50 % on not at all, linearly in between.

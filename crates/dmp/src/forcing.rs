@@ -140,77 +140,91 @@ impl<T: Scalar, const N: usize> Activations<T, N> {
     }
 }
 
+/// Weights of `ROWS` rows, kernel by kernel, so that a tick walks through memory once and all rows advance together.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Weights<T, const ROWS: usize, const N: usize>([[T; ROWS]; N]);
+
+impl<T: Scalar, const ROWS: usize, const N: usize> Weights<T, ROWS, N> {
+    /// All weights zero.
+    pub(crate) const ZERO: Self = Self([[T::ZERO; ROWS]; N]);
+
+    /// Takes `ROWS` rows of `count` weights each, row after row; what is missing is 0.
+    pub(crate) fn assign(&mut self, count: usize, weights: &[T]) {
+        self.0.iter_mut().for_each(|kernel| *kernel = [T::ZERO; ROWS]);
+        for (row, weights) in weights.chunks(count.max(1)).take(ROWS).enumerate() {
+            for (kernel, weight) in self.0.iter_mut().zip(weights) {
+                kernel[row] = *weight;
+            }
+        }
+    }
+
+    /// Copies the weights of others.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.0.copy_from_slice(&other.0);
+    }
+
+    /// Weight of a row at kernel `i`; `None` outside.
+    pub(crate) fn get(&self, row: usize, i: usize) -> Option<T> {
+        self.0.get(i)?.get(row).copied()
+    }
+
+    /// `f` of all rows from kernels that are already evaluated.
+    #[inline]
+    pub(crate) fn combine(&self, activations: &Activations<T, N>) -> [T; ROWS] {
+        let mut f = [T::ZERO; ROWS];
+        let active = activations.active();
+        for (kernel, weights) in activations.kernels[active.clone()].iter().zip(&self.0[active]) {
+            for (f, weight) in f.iter_mut().zip(weights) {
+                *f = *f + *kernel * *weight;
+            }
+        }
+        f.map(|f| f * activations.scale)
+    }
+}
+
 /// Weights of `ROWS` rows over a common basis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForcingTerm<T, const ROWS: usize, const N: usize> {
     basis: Basis<T, N>,
-    /// Kernel by kernel, so that a tick walks through memory once and all rows advance together.
-    weights: [[T; ROWS]; N],
+    weights: Weights<T, ROWS, N>,
 }
 
 impl<T: Scalar, const ROWS: usize, const N: usize> ForcingTerm<T, ROWS, N> {
     /// From weights in row-major order `[ROWS][count]`; `None` if there are not exactly `ROWS * count` finite ones.
+    #[must_use]
     pub fn new(basis: Basis<T, N>, weights: &[T]) -> Option<Self> {
-        let mut forcing = Self::without_force(Basis::fewest());
-        forcing.assign(&basis, weights).then_some(forcing)
-    }
-
-    /// All weights zero.
-    pub(crate) const fn without_force(basis: Basis<T, N>) -> Self {
-        Self { basis, weights: [[T::ZERO; ROWS]; N] }
-    }
-
-    /// As [`ForcingTerm::new`], in place; on `false` nothing is changed.
-    pub(crate) fn assign(&mut self, basis: &Basis<T, N>, weights: &[T]) -> bool {
-        let count = basis.count();
-        if weights.len() != ROWS * count || !weights.iter().all(|w| w.is_finite()) {
-            return false;
+        if weights.len() != ROWS * basis.count() || !weights.iter().all(|w| w.is_finite()) {
+            return None;
         }
-        self.basis.clone_from(basis);
-        for kernel in self.weights.iter_mut().skip(count) {
-            *kernel = [T::ZERO; ROWS];
-        }
-        for (row, weights) in weights.chunks_exact(count).enumerate() {
-            for (kernel, weight) in self.weights.iter_mut().zip(weights) {
-                kernel[row] = *weight;
-            }
-        }
-        true
-    }
-
-    /// Takes over basis and weights of another one.
-    pub(crate) fn copy_from(&mut self, other: &Self) {
-        self.basis.clone_from(&other.basis);
-        self.weights.copy_from_slice(&other.weights);
+        let mut forcing = Self { basis, weights: Weights::ZERO };
+        forcing.weights.assign(forcing.basis.count(), weights);
+        Some(forcing)
     }
 
     /// The common basis.
     #[inline]
+    #[must_use]
     pub fn basis(&self) -> &Basis<T, N> {
         &self.basis
     }
 
     /// Weight `theta_i` of a row; `None` outside.
+    #[must_use]
     pub fn weight(&self, row: usize, i: usize) -> Option<T> {
-        self.weights.get(..self.basis.count())?.get(i)?.get(row).copied()
+        if i < self.basis.count() { self.weights.get(row, i) } else { None }
     }
 
     /// `f(s)` of all rows; 0 at s = 0.
     #[inline]
+    #[must_use]
     pub fn evaluate(&self, s: T) -> [T; ROWS] {
         self.combine(&self.basis.evaluate(s))
     }
 
     /// `f` of all rows from kernels that are already evaluated.
     #[inline]
+    #[must_use]
     pub fn combine(&self, activations: &Activations<T, N>) -> [T; ROWS] {
-        let mut f = [T::ZERO; ROWS];
-        let active = activations.active();
-        for (kernel, weights) in activations.kernels[active.clone()].iter().zip(&self.weights[active]) {
-            for (f, weight) in f.iter_mut().zip(weights) {
-                *f = *f + *kernel * *weight;
-            }
-        }
-        f.map(|f| f * activations.scale)
+        self.weights.combine(activations)
     }
 }

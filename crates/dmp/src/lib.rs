@@ -11,6 +11,7 @@ mod configuration;
 mod coupling;
 mod expected_sensors;
 mod forcing;
+mod gains;
 mod log_map;
 mod orientation;
 mod orientation_rows;
@@ -31,26 +32,22 @@ mod vector;
 #[cfg(feature = "std")]
 pub mod fit;
 
-pub use configuration::{Configuration, Velocity};
-pub use coupling::{
-    COUPLED_ROWS, Coupling, Feedback, GAIN_CAPACITY, GainSchedule, Limits, SENSORS, SensorMap, Stiffness,
-};
-pub use expected_sensors::{EXPECTED_CAPACITY, ExpectedWrench};
+pub use configuration::{Configuration, Pose, Twist, Velocity};
+pub use coupling::{Coupling, CouplingGains, DisplacementLimits, PoseCoupling, PoseLimits};
+pub use expected_sensors::ExpectedSensors;
 pub use forcing::{Activations, Basis, ForcingTerm};
-pub use log_map::RotationChart;
+pub use gains::{Gain, Gains, PoseGains, Stiffness};
+pub use log_map::LogMap;
 pub use orientation::{OrientationError, OrientationInput, OrientationState, OrientationSystem, orientation_error};
 pub use phase::{CanonicalSystem, Phase};
-pub use primitive::{
-    CONTROL_PERIOD, HAND_ROWS, Hemisphere, ORIENTATION_ROWS, POSITION_ROWS, POSTURE_ROWS, Primitive, PrimitiveTables,
-    ROWS,
-};
-pub use primitive_error::{Part, PrimitiveError, Row};
+pub use primitive::{Hemisphere, Primitive, PrimitiveTables};
+pub use primitive_error::{Group, Part, PrimitiveError};
 pub use quaternion::Quaternion;
-pub use reference::{OrientationReference, Reference, StartState, Trajectory};
+pub use reference::{OrientationReference, PoseReference, Reference, StartState, Trajectory};
 pub use rollout::{Rollout, RolloutError};
 #[cfg(feature = "fixed")]
 pub use scalar::FixedPoint;
 pub use scalar::Scalar;
-pub use sensor_statistics::{EXPERIENCE_CAPACITY, EXPERIENCE_CHANNELS, Experience};
+pub use sensor_statistics::SensorStatistics;
 pub use table::{Entry, PhaseTable, TableError};
 pub use transformation::{GainError, PointInput, PointState, TransformationSystem};

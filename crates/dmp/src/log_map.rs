@@ -1,4 +1,4 @@
-//! `RotationChart`: orientations as rotation vectors about a centre, for movements beyond 175 degrees.
+//! `LogMap`: orientations as rotation vectors (log-map coordinates) about a centre, for movements beyond 175 degrees.
 //!
 //! `q = c (x) exp(y)`, `y = 2 log(conj(c) (x) q)`. On `y` runs the linear system of Eq. (1), stable at any angle. This
 //! is not in the paper. Putting `2 log(conj(q) (x) g)` in the place of Eq. (4) looks simpler and was refused: across the
@@ -13,7 +13,7 @@ use crate::{Quaternion, Scalar};
 
 /// Rotation vectors about a centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RotationChart<T> {
+pub struct LogMap<T> {
     centre: Quaternion<T>,
     half: [T; 3],
 }
@@ -58,7 +58,7 @@ impl<T: Scalar> Coefficients<T> {
     }
 }
 
-impl<T: Scalar> RotationChart<T> {
+impl<T: Scalar> LogMap<T> {
     /// Centred half-way between the ends of a demonstration, whose signs tell which way round it turned (less than a
     /// full turn).
     pub fn between(start: &Quaternion<T>, goal: &Quaternion<T>) -> Self {

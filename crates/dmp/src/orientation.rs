@@ -10,13 +10,15 @@
 use crate::vector::scale;
 use crate::{GainError, Quaternion, Scalar, TransformationSystem};
 
-/// In which coordinates the orientation moves.
+/// Coordinates in which the orientation moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum OrientationError {
     /// Eqs. (4), (6), (7): error of length `sin(angle/2)`. Usable up to 175 degrees from the goal.
     #[default]
     Quaternion,
-    /// Rotation vectors, see [`RotationChart`](crate::RotationChart): error of length `angle`. Usable up to almost a
+    /// Rotation vectors, see [`LogMap`](crate::LogMap): error of length `angle`. Usable up to almost a
     /// full turn. Not in the paper.
     RotationVector,
 }

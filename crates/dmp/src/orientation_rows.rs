@@ -1,41 +1,53 @@
-//! `Turn`: the orientation of a run, in the coordinates that its primitive chose.
+//! `OrientationRows`: the orientation of a run, in the coordinates that its primitive chose.
 //!
 //! Here the signs of start and goal are decided, once: never per tick, because a path may exceed 180 degrees.
 
 use crate::orientation::is_near_enough;
-use crate::point_rows::{Group, Tick};
+use crate::point_rows::{PointRows, Tick};
 use crate::vector::scale;
 use crate::{
-    Hemisphere, ORIENTATION_ROWS, OrientationError, OrientationInput, OrientationReference, OrientationState,
-    OrientationSystem, Primitive, Quaternion, RolloutError, RotationChart, Scalar, TransformationSystem,
+    Hemisphere, LogMap, OrientationError, OrientationInput, OrientationReference, OrientationState, OrientationSystem,
+    Quaternion, RolloutError, Scalar, TransformationSystem,
 };
 
 /// The orientation in the coordinates that the primitive chose.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Turn<T> {
+pub(crate) enum OrientationRows<T> {
     /// Eqs. (4), (6), (7).
     Quaternion { state: OrientationState<T>, start: Quaternion<T>, goal: Quaternion<T>, commanded: Quaternion<T> },
     /// Eq. (1) on rotation vectors.
-    Vector { chart: RotationChart<T>, group: Group<T, ORIENTATION_ROWS> },
+    Vector { map: LogMap<T>, rows: PointRows<T, 3> },
 }
 
-impl<T: Scalar> Turn<T> {
+/// Orientations at the ends of a demonstration, and how they are meant.
+pub(crate) struct Taught<T> {
+    pub(crate) start: Quaternion<T>,
+    pub(crate) goal: Quaternion<T>,
+    pub(crate) duration: T,
+    pub(crate) error: OrientationError,
+    pub(crate) hemisphere: Hemisphere,
+}
+
+impl<T: Scalar> OrientationRows<T> {
+    /// Not turned and not turning.
+    pub(crate) const AT_REST: Self = Self::Quaternion {
+        state: OrientationState { q: Quaternion::IDENTITY, omega: [T::ZERO; 3] },
+        start: Quaternion::IDENTITY,
+        goal: Quaternion::IDENTITY,
+        commanded: Quaternion::IDENTITY,
+    };
+
     /// # Errors
     /// [`RolloutError::TurnsTooFar`].
-    pub(crate) fn start<const N: usize>(
-        primitive: &Primitive<T, N>,
-        from: &Quaternion<T>,
-        omega: &[T; ORIENTATION_ROWS],
-    ) -> Result<Self, RolloutError> {
-        let (demonstrated, goal) = (primitive.start().orientation, primitive.goal().orientation);
-        let tau = primitive.duration();
-        let nearest = primitive.hemisphere() == Hemisphere::Nearest;
-        if primitive.orientation_error() == OrientationError::RotationVector {
+    pub(crate) fn start(taught: &Taught<T>, from: &Quaternion<T>, omega: &[T; 3]) -> Result<Self, RolloutError> {
+        let Taught { start: demonstrated, goal, duration, error, hemisphere } = *taught;
+        let nearest = hemisphere == Hemisphere::Nearest;
+        if error == OrientationError::RotationVector {
             let goal = if nearest { goal.aligned_with(&demonstrated) } else { goal };
-            let chart = RotationChart::between(&demonstrated, &goal);
-            let y = chart.vector(from, &chart.start());
-            let dy = chart.velocity(&y, omega);
-            return Ok(Self::Vector { chart, group: Group::new(y, dy, tau, chart.goal()) });
+            let map = LogMap::between(&demonstrated, &goal);
+            let y = map.vector(from, &map.start());
+            let dy = map.velocity(&y, omega);
+            return Ok(Self::Vector { map, rows: PointRows::new(y, dy, duration, map.goal()) });
         }
         let (start, goal) =
             if nearest { (*from, goal.aligned_with(from)) } else { (from.aligned_with(&demonstrated), goal) };
@@ -43,7 +55,7 @@ impl<T: Scalar> Turn<T> {
             return Err(RolloutError::TurnsTooFar);
         }
         Ok(Self::Quaternion {
-            state: OrientationState { q: start, omega: scale(omega, tau) },
+            state: OrientationState { q: start, omega: scale(omega, duration) },
             start,
             goal,
             commanded: goal,
@@ -55,8 +67,8 @@ impl<T: Scalar> Turn<T> {
         &mut self,
         gains: &TransformationSystem<T>,
         tick: &Tick<T>,
-        f: &[T; ORIENTATION_ROWS],
-        zeta: &[T; ORIENTATION_ROWS],
+        f: &[T; 3],
+        zeta: &[T; 3],
     ) -> OrientationReference<T> {
         match self {
             Self::Quaternion { state, start, goal, commanded } => {
@@ -75,28 +87,28 @@ impl<T: Scalar> Turn<T> {
                 }
                 out
             }
-            Self::Vector { chart, group } => {
-                let y = group.state.map(|state| state.x());
-                let zeta = chart.generalised(&y, zeta);
-                let row = group.step(gains, tick, f, &zeta);
-                let (omega, domega) = chart.rates(&row.x, &row.v, &row.a);
-                OrientationReference { quaternion: chart.orientation(&row.x), omega, domega }
+            Self::Vector { map, rows } => {
+                let y = rows.state.map(|state| state.x());
+                let zeta = map.generalised(&y, zeta);
+                let row = rows.step(|_| gains, tick, f, &zeta);
+                let (omega, domega) = map.rates(&row.x, &row.v, &row.a);
+                OrientationReference { quaternion: map.orientation(&row.x), omega, domega }
             }
         }
     }
 
     /// # Errors
     /// [`RolloutError::TurnsTooFar`]; the goal stays as it was.
-    pub(crate) fn command<const N: usize>(
+    pub(crate) fn command(
         &mut self,
-        primitive: &Primitive<T, N>,
+        taught: &Taught<T>,
         new: &Quaternion<T>,
         filtered: bool,
     ) -> Result<(), RolloutError> {
         match self {
             Self::Quaternion { state, goal, commanded, .. } => {
-                let new = match primitive.hemisphere() {
-                    Hemisphere::Demonstrated => new.aligned_with(&primitive.goal().orientation),
+                let new = match taught.hemisphere {
+                    Hemisphere::Demonstrated => new.aligned_with(&taught.goal),
                     Hemisphere::Nearest => new.aligned_with(&state.q),
                 };
                 if !is_near_enough(&state.q, &new) {
@@ -107,10 +119,10 @@ impl<T: Scalar> Turn<T> {
                     *goal = *commanded;
                 }
             }
-            Self::Vector { chart, group } => {
-                group.commanded = chart.vector(new, &chart.goal());
+            Self::Vector { map, rows } => {
+                rows.commanded = map.vector(new, &map.goal());
                 if !filtered {
-                    group.goal = group.commanded;
+                    rows.goal = rows.commanded;
                 }
             }
         }
@@ -120,7 +132,7 @@ impl<T: Scalar> Turn<T> {
     pub(crate) fn arrive(&mut self) {
         match self {
             Self::Quaternion { goal, commanded, .. } => *goal = *commanded,
-            Self::Vector { group, .. } => group.goal = group.commanded,
+            Self::Vector { rows, .. } => rows.goal = rows.commanded,
         }
     }
 
@@ -129,7 +141,7 @@ impl<T: Scalar> Turn<T> {
         match self {
             // Of the sign that the path has now: it is the near one by itself.
             Self::Quaternion { state, goal, commanded, .. } => (*goal, *commanded) = (state.q, state.q),
-            Self::Vector { group, .. } => group.settle(),
+            Self::Vector { rows, .. } => rows.settle(),
         }
     }
 }

@@ -28,9 +28,7 @@ impl<T: Scalar> CanonicalSystem<T> {
     }
 
     /// alpha = 1, for what rests.
-    pub(crate) const fn unit() -> Self {
-        Self { alpha: T::ONE }
-    }
+    pub(crate) const UNIT: Self = Self { alpha: T::ONE };
 
     /// Decay `alpha`.
     #[inline]

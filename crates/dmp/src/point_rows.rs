@@ -1,18 +1,18 @@
-//! `Group`: rows of Eq. (9) that share their gains, with start, goal and goal filter.
+//! `PointRows`: rows of Eq. (9) with start, goal and goal filter.
 
 use crate::vector::all_finite;
 use crate::{PointInput, PointState, RolloutError, Scalar, Trajectory, TransformationSystem, bounds};
 
-/// Rows that share their gains.
+/// `D` rows in motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Group<T, const D: usize> {
+pub(crate) struct PointRows<T, const D: usize> {
     pub(crate) state: [PointState<T>; D],
     pub(crate) start: [T; D],
     pub(crate) goal: [T; D],
     pub(crate) commanded: [T; D],
 }
 
-/// What one tick has in common for all rows.
+/// Values of one tick that all rows share.
 pub(crate) struct Tick<T> {
     pub(crate) s: T,
     pub(crate) h: T,
@@ -23,7 +23,7 @@ pub(crate) struct Tick<T> {
     pub(crate) goal_fraction: T,
 }
 
-impl<T: Scalar, const D: usize> Group<T, D> {
+impl<T: Scalar, const D: usize> PointRows<T, D> {
     pub(crate) fn new(start: [T; D], velocity: [T; D], duration: T, goal: [T; D]) -> Self {
         Self {
             state: core::array::from_fn(|i| PointState::new(start[i], velocity[i] * duration)),
@@ -34,9 +34,9 @@ impl<T: Scalar, const D: usize> Group<T, D> {
     }
 
     #[inline]
-    pub(crate) fn step(
+    pub(crate) fn step<'a>(
         &mut self,
-        system: &TransformationSystem<T>,
+        system: impl Fn(usize) -> &'a TransformationSystem<T>,
         tick: &Tick<T>,
         f: &[T; D],
         zeta: &[T; D],
@@ -45,12 +45,16 @@ impl<T: Scalar, const D: usize> Group<T, D> {
         for i in 0..D {
             let state = &mut self.state[i];
             let input = PointInput { start: self.start[i], goal: self.goal[i], s: tick.s, f: f[i], zeta: zeta[i] };
-            let rhs = system.right_hand_side(state, &input);
+            let rhs = system(i).right_hand_side(state, &input);
             out.x[i] = state.x();
             out.v[i] = state.v() * tick.rate;
             out.a[i] = rhs * tick.rate_squared + state.v() * tick.rate_slope;
             state.step(rhs, tick.h);
-            self.goal[i] = self.goal[i] + (self.commanded[i] - self.goal[i]) * tick.goal_fraction;
+        }
+        if tick.goal_fraction > T::ZERO {
+            for (goal, commanded) in self.goal.iter_mut().zip(&self.commanded) {
+                *goal = *goal + (*commanded - *goal) * tick.goal_fraction;
+            }
         }
         out
     }

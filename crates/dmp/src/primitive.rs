@@ -1,34 +1,28 @@
-//! `Primitive`: one movement, checked once, so that the 300 Hz loop needs no checks.
+//! `Primitive`: one movement, checked once, so that the control loop needs no checks.
 //!
-//! Holds position (3), orientation (3), posture (7) and hand (4) on one phase. The paper does not say how the posture
-//! is parameterised; one 1-D row per arm joint is our reading.
+//! `P` poses and `D` point rows on one phase, learned together and run together. Of each pose the weights come first:
+//! three position rows, three orientation rows; the point rows follow.
 
+use crate::forcing::Weights;
+use crate::gains::Systems;
 use crate::orientation::is_near_enough;
-use crate::vector::all_finite;
+use crate::orientation_rows::Taught;
+use crate::vector::{all_finite, clamp, clamp_norm};
 use crate::{
-    Activations, Basis, CanonicalSystem, Configuration, ExpectedWrench, Experience, Feedback, ForcingTerm, Limits,
-    OrientationError, Part, PrimitiveError, Quaternion, Row, Scalar, Stiffness, TableError, TransformationSystem,
-    Velocity, bounds,
+    Activations, Basis, CanonicalSystem, Configuration, Coupling, DisplacementLimits, Gains, Group, OrientationError,
+    Part, PoseCoupling, PrimitiveError, Scalar, TransformationSystem, Velocity, bounds,
 };
 
-/// Rows of the end-effector position (x, y, z in the world frame, metres).
-pub const POSITION_ROWS: usize = 3;
-/// Rows of the end-effector orientation (body frame).
-pub const ORIENTATION_ROWS: usize = 3;
-/// Rows of the default posture `q_post` (one per arm joint, radians).
-pub const POSTURE_ROWS: usize = 7;
-/// Rows of the hand (spread, F1, F2, F3, radians).
-pub const HAND_ROWS: usize = 4;
-/// All rows of weights in their order: position, orientation, posture, hand.
-pub const ROWS: usize = POSITION_ROWS + ORIENTATION_ROWS + POSTURE_ROWS + HAND_ROWS;
-/// Longest control period, s (300 Hz): the integration is proven stable for it, and [`crate::Rollout::step`] cuts a
-/// longer one to it.
-pub const CONTROL_PERIOD: f64 = 1.0 / 300.0;
+/// Rows of a pose: three of the position, three of the orientation.
+pub(crate) const POSE_ROWS: usize = 6;
 
 /// How the signs of the start and goal quaternions were chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Hemisphere {
     /// Start and goal carry the signs of a sign-continuous demonstration: a run aligns its own to them.
+    #[default]
     Demonstrated,
     /// There is no demonstration: the goal is taken on the side nearest to the current orientation.
     Nearest,
@@ -36,7 +30,9 @@ pub enum Hemisphere {
 
 /// The plain tables of a primitive, as they come from an image or a file: unchecked input of [`Primitive::new`].
 #[derive(Clone, Copy, Debug)]
-pub struct PrimitiveTables<'a, T> {
+pub struct PrimitiveTables<'a, T, const D: usize, const P: usize> {
+    /// Longest control period of a run, s. [`Rollout::step`](crate::Rollout::step) refuses a longer one.
+    pub control_period: T,
     /// Duration tau of the movement, s.
     pub duration: T,
     /// Decay `alpha` of the phase, Eq. (3).
@@ -45,62 +41,52 @@ pub struct PrimitiveTables<'a, T> {
     pub activation: T,
     /// Number of kernels in use, 2..=N.
     pub kernel_count: usize,
-    /// Weights theta, row-major `[ROWS][kernel_count]`, in the paper's convention (the force is multiplied by K).
+    /// Weights theta, row-major `[6 P + D][kernel_count]`, in the paper's convention (the force is multiplied by K).
     pub weights: &'a [T],
-    /// Stiffness K of position, orientation, posture, hand.
-    pub stiffness: [T; 4],
-    /// Damping D of position, orientation, posture, hand.
-    pub damping: [T; 4],
-    /// Which orientation error the orientation system uses.
+    /// Stiffness and damping.
+    pub gains: Gains<T, D, P>,
+    /// Orientation error of the poses.
     pub orientation_error: OrientationError,
-    /// Meaning of the signs of the two quaternions below.
+    /// Meaning of the signs of the quaternions below.
     pub hemisphere: Hemisphere,
     /// Start of the demonstration.
-    pub start: Configuration<T>,
+    pub start: Configuration<T, D, P>,
     /// Goal.
-    pub goal: Configuration<T>,
+    pub goal: Configuration<T, D, P>,
     /// Velocity at the start of the demonstration (zero if it began at rest).
-    pub start_velocity: Velocity<T>,
-    /// Gains of the sensory feedback, Eq. (8); `None` runs open loop.
-    pub feedback: Option<&'a Feedback<T>>,
-    /// What the sensors should feel, by phase; `None` (not recorded yet) runs open loop.
-    pub expected: Option<&'a ExpectedWrench<T>>,
-    /// How successful runs felt, by phase; `None` (not recorded yet) is not watched.
-    pub experience: Option<&'a Experience<T>>,
+    pub start_velocity: Velocity<T, D, P>,
 }
 
-/// One movement with checked parameters; `N` = kernel capacity.
+/// One movement of `P` poses and `D` point rows with checked parameters; `N` = kernel capacity.
 ///
-/// For f32 and N = 100 about 23 kB: keep it in a static or behind a reference on a small stack, and fill it there with
-/// [`Primitive::assign`] and the other `assign_` functions.
+/// Use [`fit::fit`](crate::fit::fit) to learn one, [`Rollout`](crate::Rollout) to run it. For f32, 17 rows and N = 100
+/// about 8 kB: keep it in a static or behind a reference on a small stack, and fill it there with
+/// [`Primitive::assign`].
 #[derive(Debug, PartialEq)]
-pub struct Primitive<T, const N: usize> {
+pub struct Primitive<T, const D: usize, const P: usize, const N: usize> {
     fingerprint: u32,
+    control_period: T,
     duration: T,
     rate: T,
     minimum_duration: T,
     canonical: CanonicalSystem<T>,
-    forcing: ForcingTerm<T, ROWS, N>,
-    position: TransformationSystem<T>,
-    orientation: TransformationSystem<T>,
+    basis: Basis<T, N>,
+    pose_weights: [Weights<T, POSE_ROWS, N>; P],
+    point_weights: Weights<T, D, N>,
+    systems: Systems<T, D, P>,
     orientation_error: OrientationError,
-    posture: TransformationSystem<T>,
-    hand: TransformationSystem<T>,
-    /// Largest coupling of position, orientation, posture and hand: K times the largest forcing term that the movement
-    /// can need.
-    coupling_limits: [T; 4],
     hemisphere: Hemisphere,
-    start: Configuration<T>,
-    goal: Configuration<T>,
-    start_velocity: Velocity<T>,
-    // An empty table stands for one that is not there: an `Option` of kilobytes would be moved through the stack.
-    feedback: Feedback<T>,
-    expected: ExpectedWrench<T>,
-    experience: Experience<T>,
+    /// Largest coupling of each row: K times the largest forcing term that the movement can need.
+    coupling_limits: Coupling<T, D, P>,
+    /// The least of them.
+    least_coupling_limit: T,
+    start: Configuration<T, D, P>,
+    goal: Configuration<T, D, P>,
+    start_velocity: Velocity<T, D, P>,
 }
 
 /// A copy into an existing primitive ([`Clone::clone_from`]) needs no second one on the stack.
-impl<T: Scalar, const N: usize> Clone for Primitive<T, N> {
+impl<T: Scalar, const D: usize, const P: usize, const N: usize> Clone for Primitive<T, D, P, N> {
     fn clone(&self) -> Self {
         let mut copy = Self::PLACEHOLDER;
         copy.clone_from(self);
@@ -109,75 +95,67 @@ impl<T: Scalar, const N: usize> Clone for Primitive<T, N> {
 
     fn clone_from(&mut self, source: &Self) {
         self.fingerprint = source.fingerprint;
+        self.control_period = source.control_period;
         self.duration = source.duration;
         self.rate = source.rate;
         self.minimum_duration = source.minimum_duration;
         self.canonical = source.canonical;
-        self.forcing.copy_from(&source.forcing);
-        self.position = source.position;
-        self.orientation = source.orientation;
+        self.basis.clone_from(&source.basis);
+        for (weights, source) in self.pose_weights.iter_mut().zip(&source.pose_weights) {
+            weights.copy_from(source);
+        }
+        self.point_weights.copy_from(&source.point_weights);
+        self.systems = source.systems;
         self.orientation_error = source.orientation_error;
-        self.posture = source.posture;
-        self.hand = source.hand;
-        self.coupling_limits = source.coupling_limits;
         self.hemisphere = source.hemisphere;
+        self.coupling_limits = source.coupling_limits;
+        self.least_coupling_limit = source.least_coupling_limit;
         self.start = source.start;
         self.goal = source.goal;
         self.start_velocity = source.start_velocity;
-        self.feedback.copy_from(&source.feedback);
-        self.expected.copy_from(&source.expected);
-        self.experience.copy_from(&source.experience);
     }
 }
 
-/// What is computed from tables before anything is written.
-struct Checked<T, const N: usize> {
+/// Results of the check of tables, before anything is written.
+struct Checked<T, const D: usize, const P: usize, const N: usize> {
     canonical: CanonicalSystem<T>,
     basis: Basis<T, N>,
-    systems: [TransformationSystem<T>; 4],
+    systems: Systems<T, D, P>,
     minimum_duration: T,
-    start: Configuration<T>,
-    goal: Configuration<T>,
+    start: Configuration<T, D, P>,
+    goal: Configuration<T, D, P>,
 }
 
-impl<T: Scalar, const N: usize> Primitive<T, N> {
-    /// Something to [`assign`](Primitive::assign) to, for statics: rests at the origin for a second. No movement of use.
-    pub const PLACEHOLDER: Self = {
-        let system = TransformationSystem::unit();
-        let origin = Configuration {
-            position: [T::ZERO; POSITION_ROWS],
-            orientation: Quaternion::IDENTITY,
-            posture: [T::ZERO; POSTURE_ROWS],
-            hand: [T::ZERO; HAND_ROWS],
-        };
-        Self {
-            fingerprint: 0,
-            duration: T::ONE,
-            rate: T::ONE,
-            minimum_duration: T::ZERO,
-            canonical: CanonicalSystem::unit(),
-            forcing: ForcingTerm::without_force(Basis::fewest()),
-            position: system,
-            orientation: system,
-            orientation_error: OrientationError::Quaternion,
-            posture: system,
-            hand: system,
-            coupling_limits: [T::ZERO; 4],
-            hemisphere: Hemisphere::Nearest,
-            start: origin,
-            goal: origin,
-            start_velocity: Velocity::ZERO,
-            feedback: Feedback::EMPTY,
-            expected: ExpectedWrench::EMPTY,
-            experience: Experience::EMPTY,
-        }
+impl<T: Scalar, const D: usize, const P: usize, const N: usize> Primitive<T, D, P, N> {
+    /// Rows of weights.
+    pub const ROWS: usize = POSE_ROWS * P + D;
+
+    /// A place to [`assign`](Primitive::assign) to, for statics: rests at the origin for a second. No movement of use.
+    pub const PLACEHOLDER: Self = Self {
+        fingerprint: 0,
+        control_period: T::ONE,
+        duration: T::ONE,
+        rate: T::ONE,
+        minimum_duration: T::ZERO,
+        canonical: CanonicalSystem::UNIT,
+        basis: Basis::fewest(),
+        pose_weights: [const { Weights::ZERO }; P],
+        point_weights: Weights::ZERO,
+        systems: Systems::UNIT,
+        orientation_error: OrientationError::Quaternion,
+        hemisphere: Hemisphere::Nearest,
+        coupling_limits: Coupling::NONE,
+        least_coupling_limit: T::ZERO,
+        start: Configuration::ORIGIN,
+        goal: Configuration::ORIGIN,
+        start_velocity: Velocity::ZERO,
     };
 
     /// Checks the tables and builds the primitive.
     ///
     /// # Errors
     /// The first [`PrimitiveError`] found.
-    pub fn new(tables: &PrimitiveTables<'_, T>) -> Result<Self, PrimitiveError> {
+    pub fn new(tables: &PrimitiveTables<'_, T, D, P>) -> Result<Self, PrimitiveError> {
         let mut primitive = Self::PLACEHOLDER;
         primitive.assign(tables)?;
         Ok(primitive)
@@ -188,290 +166,256 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
     ///
     /// # Errors
     /// The first [`PrimitiveError`] found; then nothing has been changed.
-    pub fn assign(&mut self, tables: &PrimitiveTables<'_, T>) -> Result<(), PrimitiveError> {
+    pub fn assign(&mut self, tables: &PrimitiveTables<'_, T, D, P>) -> Result<(), PrimitiveError> {
         let checked = Self::check(tables)?;
-        // The only check that is left to the writer; it refuses before it writes.
-        if !self.forcing.assign(&checked.basis, tables.weights) {
-            return Err(PrimitiveError::Weight);
+        let count = tables.kernel_count;
+        let (poses, points) = tables.weights.split_at_checked(POSE_ROWS * P * count).unwrap_or_default();
+        for (to, weights) in self.pose_weights.iter_mut().zip(poses.chunks(POSE_ROWS * count)) {
+            to.assign(count, weights);
         }
+        self.point_weights.assign(count, points);
+        self.basis.clone_from(&checked.basis);
         self.fingerprint = tables.fingerprint();
+        self.control_period = tables.control_period;
         self.duration = tables.duration;
         self.rate = T::ONE / tables.duration;
         self.minimum_duration = checked.minimum_duration;
         self.canonical = checked.canonical;
-        [self.position, self.orientation, self.posture, self.hand] = checked.systems;
-        self.coupling_limits = checked
-            .systems
-            .map(|system| system.stiffness() * bounds::largest_force(&system, tables.duration, tables.kernel_count));
+        self.systems = checked.systems;
+        let limit = |system: &TransformationSystem<T>| {
+            system.stiffness() * bounds::largest_force(system, tables.duration, count)
+        };
+        self.coupling_limits = checked.systems.each_row(limit);
+        self.least_coupling_limit = T::MAX;
+        for limit in self.coupling_limits.iter() {
+            if *limit < self.least_coupling_limit {
+                self.least_coupling_limit = *limit;
+            }
+        }
         self.orientation_error = tables.orientation_error;
         self.hemisphere = tables.hemisphere;
         self.start = checked.start;
         self.goal = checked.goal;
         self.start_velocity = tables.start_velocity;
-        self.feedback.clear();
-        self.expected.clear();
-        self.experience.clear();
-        if let Some(feedback) = tables.feedback {
-            self.feedback.copy_from(feedback);
-        }
-        if let Some(expected) = tables.expected {
-            self.expected.copy_from(expected);
-        }
-        if let Some(experience) = tables.experience {
-            self.experience.copy_from(experience);
-        }
         Ok(())
     }
 
-    fn check(tables: &PrimitiveTables<'_, T>) -> Result<Checked<T, N>, PrimitiveError> {
+    fn check(tables: &PrimitiveTables<'_, T, D, P>) -> Result<Checked<T, D, P, N>, PrimitiveError> {
         let duration = tables.duration;
         if !(duration > T::ZERO && duration <= T::from_f64(bounds::LONGEST_DURATION)) {
             return Err(PrimitiveError::Duration);
+        }
+        if !(tables.control_period > T::ZERO && tables.control_period <= T::from_f64(bounds::LONGEST_DURATION)) {
+            return Err(PrimitiveError::ControlPeriod);
         }
         let canonical = CanonicalSystem::new(tables.alpha).ok_or(PrimitiveError::Alpha)?;
         if tables.kernel_count < 2 || tables.kernel_count > N {
             return Err(PrimitiveError::KernelCount);
         }
         let basis = Basis::new(&canonical, tables.kernel_count, tables.activation).ok_or(PrimitiveError::Activation)?;
-        if tables.weights.len() != ROWS * tables.kernel_count {
+        if tables.weights.len() != Self::ROWS * tables.kernel_count {
             return Err(PrimitiveError::WeightCount);
         }
         if !all_finite(tables.weights) {
             return Err(PrimitiveError::Weight);
         }
-        let systems = tables.systems()?;
+        let systems = Systems::new(&tables.gains)?;
         let mut minimum_duration = T::ZERO;
-        for (row, system) in [Row::Position, Row::Orientation, Row::Posture, Row::Hand].into_iter().zip(&systems) {
-            let shortest = T::from_f64(CONTROL_PERIOD) / system.largest_step();
+        for (group, index, system) in systems.iter() {
+            let shortest = tables.control_period / system.largest_step();
             if !(duration > shortest) {
-                return Err(PrimitiveError::Unstable(row));
+                return Err(PrimitiveError::Unstable { group, index });
             }
             if shortest > minimum_duration {
                 minimum_duration = shortest;
             }
         }
         tables.check_weights(&basis, &systems)?;
-        if !tables.start.is_finite() {
-            return Err(PrimitiveError::Start);
-        }
-        if !tables.goal.is_finite() {
-            return Err(PrimitiveError::Goal);
-        }
-        if !tables.start_velocity.is_finite() {
-            return Err(PrimitiveError::StartVelocity);
-        }
-        let too_large = |part: Part, place: Option<(Row, u8)>| match place {
-            Some((row, index)) => Err(PrimitiveError::TooLarge { part, row, index }),
-            None => Ok(()),
-        };
-        too_large(Part::Start, tables.start.out_of_bounds())?;
-        too_large(Part::Goal, tables.goal.out_of_bounds())?;
-        too_large(Part::StartVelocity, tables.start_velocity.out_of_bounds())?;
-        let start = tables.start.normalised().ok_or(PrimitiveError::StartNotUnit)?;
-        let goal = tables.goal.normalised().ok_or(PrimitiveError::GoalNotUnit)?;
-        // With an undemonstrated goal the sign is free and the angle at most 180 degrees.
-        let to = match tables.hemisphere {
-            Hemisphere::Demonstrated => goal.orientation,
-            Hemisphere::Nearest => goal.orientation.aligned_with(&start.orientation),
-        };
-        if tables.orientation_error == OrientationError::Quaternion && !is_near_enough(&start.orientation, &to) {
-            return Err(PrimitiveError::TurnsTooFar);
-        }
+        let (start, goal) = tables.check_ends()?;
         Ok(Checked { canonical, basis, systems, minimum_duration, start, goal })
     }
 
-    /// Tells movements apart: equal for equal tables. Feedback, expectation and experience may change under a run and
-    /// do not count.
+    /// Tells movements apart: equal for equal tables.
     #[inline]
     pub(crate) fn fingerprint(&self) -> u32 {
         self.fingerprint
     }
 
+    /// Longest control period of a run, s.
+    #[inline]
+    #[must_use]
+    pub fn control_period(&self) -> T {
+        self.control_period
+    }
+
     /// Duration tau as taught, s.
     #[inline]
+    #[must_use]
     pub fn duration(&self) -> T {
         self.duration
     }
 
     /// 1/tau, 1/s.
     #[inline]
-    pub(crate) fn rate(&self) -> T {
+    #[must_use]
+    pub fn rate(&self) -> T {
         self.rate
     }
 
-    /// Shortest duration at which the integration is stable at 300 Hz, s (0.057 s for the default gains).
+    /// Shortest duration at which the integration is stable at the control period, s (0.057 s for the default gains at
+    /// 300 Hz).
     #[inline]
+    #[must_use]
     pub fn minimum_duration(&self) -> T {
         self.minimum_duration
     }
 
     /// The clock, Eq. (3).
     #[inline]
+    #[must_use]
     pub fn canonical(&self) -> &CanonicalSystem<T> {
         &self.canonical
     }
 
-    /// The forcing term of all rows, Eq. (2).
+    /// Kernels of all rows, Eq. (2).
     #[inline]
-    pub fn forcing(&self) -> &ForcingTerm<T, ROWS, N> {
-        &self.forcing
+    #[must_use]
+    pub fn basis(&self) -> &Basis<T, N> {
+        &self.basis
     }
 
-    /// Spring and damper of the position rows.
-    #[inline]
-    pub fn position(&self) -> &TransformationSystem<T> {
-        &self.position
+    /// Weight `theta_i` of a row, in the order of [`PrimitiveTables::weights`]; `None` outside.
+    #[must_use]
+    pub fn weight(&self, row: usize, i: usize) -> Option<T> {
+        if i >= self.basis.count() {
+            return None;
+        }
+        match self.pose_weights.get(row / POSE_ROWS) {
+            Some(weights) => weights.get(row % POSE_ROWS, i),
+            None => self.point_weights.get(row.checked_sub(POSE_ROWS * P)?, i),
+        }
     }
 
-    /// Spring and damper of the orientation rows.
+    /// Forcing terms at the phase `s`, Eq. (2): of each pose position and orientation, and of the point rows.
     #[inline]
-    pub fn orientation(&self) -> &TransformationSystem<T> {
-        &self.orientation
+    #[must_use]
+    pub fn forces(&self, s: T) -> ([[T; 6]; P], [T; D]) {
+        let activations = self.basis.evaluate(s);
+        (core::array::from_fn(|n| self.pose_weights[n].combine(&activations)), self.point_weights.combine(&activations))
+    }
+
+    /// Springs and dampers of position and orientation of each pose.
+    #[inline]
+    #[must_use]
+    pub fn pose_systems(&self) -> &[[TransformationSystem<T>; 2]; P] {
+        &self.systems.poses
+    }
+
+    /// Springs and dampers of the point rows.
+    #[inline]
+    #[must_use]
+    pub fn point_systems(&self) -> &[TransformationSystem<T>; D] {
+        &self.systems.points
     }
 
     /// Coordinates of the orientation rows.
     #[inline]
+    #[must_use]
     pub fn orientation_error(&self) -> OrientationError {
         self.orientation_error
     }
 
-    /// Spring and damper of the posture rows.
+    /// Largest coupling of each row.
     #[inline]
-    pub fn posture(&self) -> &TransformationSystem<T> {
-        &self.posture
-    }
-
-    /// Spring and damper of the hand rows.
-    #[inline]
-    pub fn hand(&self) -> &TransformationSystem<T> {
-        &self.hand
-    }
-
-    /// Largest coupling of position, orientation, posture and hand.
-    #[inline]
-    pub(crate) fn coupling_limits(&self) -> &[T; 4] {
+    pub(crate) fn coupling_limits(&self) -> &Coupling<T, D, P> {
         &self.coupling_limits
+    }
+
+    /// The least of the largest couplings.
+    #[inline]
+    pub(crate) fn least_coupling_limit(&self) -> T {
+        self.least_coupling_limit
+    }
+
+    /// `zeta` cut so that it displaces the plan by no more than `limits` in steady state: `|zeta_p| <= K dx_max`,
+    /// `|zeta_o| <= K_o sin(theta_max/2)` (of [`OrientationError::RotationVector`] `K_o theta_max`), each point row to
+    /// its own. A value that is not a number counts as 0.
+    #[must_use]
+    pub fn limited_coupling(
+        &self,
+        zeta: &Coupling<T, D, P>,
+        limits: &DisplacementLimits<T, D, P>,
+    ) -> Coupling<T, D, P> {
+        let pose = |n: usize| {
+            let (zeta, limits, [position, orientation]) = (&zeta.poses[n], &limits.poses[n], &self.systems.poses[n]);
+            let largest_rotation = match self.orientation_error {
+                OrientationError::Quaternion => T::sin_cos(limits.rotation * T::from_f64(0.5)).0,
+                OrientationError::RotationVector => limits.rotation,
+            };
+            PoseCoupling {
+                position: clamp_norm(&zeta.position, limits.displacement * position.stiffness()),
+                orientation: clamp_norm(&zeta.orientation, largest_rotation * orientation.stiffness()),
+            }
+        };
+        let point = |i: usize| clamp(zeta.points[i], limits.points[i] * self.systems.points[i].stiffness());
+        Coupling { poses: core::array::from_fn(pose), points: core::array::from_fn(point) }
+    }
+
+    /// Start and goal orientation of a pose, and how they are meant.
+    pub(crate) fn taught(&self, pose: usize) -> Option<Taught<T>> {
+        Some(Taught {
+            start: self.start.poses.get(pose)?.orientation,
+            goal: self.goal.poses.get(pose)?.orientation,
+            duration: self.duration,
+            error: self.orientation_error,
+            hemisphere: self.hemisphere,
+        })
     }
 
     /// How quaternion signs are chosen.
     #[inline]
+    #[must_use]
     pub fn hemisphere(&self) -> Hemisphere {
         self.hemisphere
     }
 
     /// Start of the demonstration.
     #[inline]
-    pub fn start(&self) -> &Configuration<T> {
+    #[must_use]
+    pub fn start(&self) -> &Configuration<T, D, P> {
         &self.start
     }
 
     /// Velocity at the start of the demonstration.
     #[inline]
-    pub fn start_velocity(&self) -> &Velocity<T> {
+    #[must_use]
+    pub fn start_velocity(&self) -> &Velocity<T, D, P> {
         &self.start_velocity
     }
 
     /// Goal of the demonstration.
     #[inline]
-    pub fn goal(&self) -> &Configuration<T> {
+    #[must_use]
+    pub fn goal(&self) -> &Configuration<T, D, P> {
         &self.goal
-    }
-
-    /// Gains of the sensory feedback.
-    #[inline]
-    pub fn feedback(&self) -> Option<&Feedback<T>> {
-        (!self.feedback.is_empty()).then_some(&self.feedback)
-    }
-
-    /// What the sensors should feel.
-    #[inline]
-    pub fn expected(&self) -> Option<&ExpectedWrench<T>> {
-        (!self.expected.is_empty()).then_some(&self.expected)
-    }
-
-    /// How successful runs felt.
-    #[inline]
-    pub fn experience(&self) -> Option<&Experience<T>> {
-        (!self.experience.is_empty()).then_some(&self.experience)
-    }
-
-    /// Replaces the expectation, e.g. after the open-loop run that recorded it; `None` runs open loop.
-    pub fn set_expected(&mut self, expected: Option<&ExpectedWrench<T>>) {
-        match expected {
-            Some(expected) => self.expected.copy_from(expected),
-            None => self.expected.clear(),
-        }
-    }
-
-    /// Replaces the feedback by values that come one by one, as from a stored image: `K1` and `K2` by phase, point after
-    /// point, and the limits.
-    ///
-    /// # Errors
-    /// As [`Feedback::new`] and [`crate::PhaseTable::new`], [`TableError::Shape`] for a point that is cut short; the
-    /// primitive then has no feedback and runs open loop.
-    pub fn assign_feedback(
-        &mut self,
-        sensitivity: impl IntoIterator<Item = T>,
-        weight: impl IntoIterator<Item = T>,
-        limits: Limits<T>,
-    ) -> Result<(), TableError> {
-        self.feedback.assign(sensitivity, weight, limits)
-    }
-
-    /// Replaces the expectation by values that come one by one, point after point; recorded at the duration
-    /// `recorded_duration` (s).
-    ///
-    /// # Errors
-    /// As [`ExpectedWrench::new`], [`TableError::Shape`] for a point that is cut short; the primitive then has no
-    /// expectation and runs open loop.
-    pub fn assign_expected(
-        &mut self,
-        samples: impl IntoIterator<Item = T>,
-        recorded_duration: T,
-    ) -> Result<(), TableError> {
-        self.expected.assign(samples, recorded_duration)
-    }
-
-    /// Replaces the experience by values that come one by one, point after point.
-    ///
-    /// # Errors
-    /// As [`Experience::new`], [`TableError::Shape`] also for a point that is cut short; the primitive then has no
-    /// experience and is not watched.
-    pub fn assign_experience(
-        &mut self,
-        mean: impl IntoIterator<Item = T>,
-        spread: impl IntoIterator<Item = T>,
-        trials: u16,
-    ) -> Result<(), TableError> {
-        self.experience.assign(mean, spread, trials)
-    }
-
-    pub(crate) fn stiffness(&self) -> Stiffness<T> {
-        Stiffness {
-            position: self.position.stiffness(),
-            orientation: self.orientation.stiffness(),
-            hand: self.hand.stiffness(),
-            orientation_error: self.orientation_error,
-        }
     }
 }
 
-impl<T: Scalar> PrimitiveTables<'_, T> {
+impl<T: Scalar, const D: usize, const P: usize> PrimitiveTables<'_, T, D, P> {
     /// FNV-1a over the values of the movement, folded to 32 bits.
     fn fingerprint(&self) -> u32 {
-        let ends =
-            [&self.start, &self.goal].map(|end| (end.position, end.orientation.to_array(), end.posture, end.hand));
-        let ends = ends.iter().flat_map(|(position, orientation, posture, hand)| {
-            position.iter().chain(orientation).chain(posture).chain(hand)
-        });
-        let gains = self.stiffness.iter().chain(&self.damping);
-        let values =
-            [&self.duration, &self.alpha, &self.activation].into_iter().chain(gains).chain(ends).chain(self.weights);
         let choices = [
             self.kernel_count as u64,
             u64::from(self.orientation_error == OrientationError::RotationVector),
             u64::from(self.hemisphere == Hemisphere::Nearest),
         ];
+        let numbers = [self.control_period, self.duration, self.alpha, self.activation];
+        let gains = self.gains.iter().flat_map(|gain| [gain.stiffness, gain.damping]);
+        let ends = [&self.start, &self.goal].into_iter().flat_map(|end| {
+            let poses = end.poses.iter().flat_map(|pose| pose.position.into_iter().chain(pose.orientation.to_array()));
+            poses.chain(end.points)
+        });
+        let values = numbers.into_iter().chain(gains).chain(ends).chain(self.weights.iter().copied());
         let words = choices.into_iter().chain(values.map(|value| value.bits()));
         let hash = words.fold(0xcbf2_9ce4_8422_2325_u64, |hash, word| {
             // Word by word instead of byte by byte; the rotation brings the high bits of a product back to where it
@@ -481,8 +425,37 @@ impl<T: Scalar> PrimitiveTables<'_, T> {
         (hash ^ (hash >> 32)) as u32
     }
 
-    fn gains(&self) -> [(T, T); 4] {
-        core::array::from_fn(|i| (self.stiffness[i], self.damping[i]))
+    /// Start and goal with exactly unit quaternions.
+    fn check_ends(&self) -> Result<(Configuration<T, D, P>, Configuration<T, D, P>), PrimitiveError> {
+        if !self.start.is_finite() {
+            return Err(PrimitiveError::Start);
+        }
+        if !self.goal.is_finite() {
+            return Err(PrimitiveError::Goal);
+        }
+        if !self.start_velocity.is_finite() {
+            return Err(PrimitiveError::StartVelocity);
+        }
+        let too_large = |part: Part, place: Option<(Group, u8)>| match place {
+            Some((group, index)) => Err(PrimitiveError::TooLarge { part, group, index }),
+            None => Ok(()),
+        };
+        too_large(Part::Start, self.start.out_of_bounds())?;
+        too_large(Part::Goal, self.goal.out_of_bounds())?;
+        too_large(Part::StartVelocity, self.start_velocity.out_of_bounds())?;
+        let start = self.start.normalised().ok_or(PrimitiveError::StartNotUnit)?;
+        let goal = self.goal.normalised().ok_or(PrimitiveError::GoalNotUnit)?;
+        for (from, to) in start.poses.iter().zip(&goal.poses) {
+            // With an undemonstrated goal the sign is free and the angle at most 180 degrees.
+            let to = match self.hemisphere {
+                Hemisphere::Demonstrated => to.orientation,
+                Hemisphere::Nearest => to.orientation.aligned_with(&from.orientation),
+            };
+            if self.orientation_error == OrientationError::Quaternion && !is_near_enough(&from.orientation, &to) {
+                return Err(PrimitiveError::TurnsTooFar);
+            }
+        }
+        Ok((start, goal))
     }
 
     /// The forcing term is nowhere larger than a movement can need. It is a mean of the weights times s, so it is
@@ -490,39 +463,27 @@ impl<T: Scalar> PrimitiveTables<'_, T> {
     fn check_weights<const N: usize>(
         &self,
         basis: &Basis<T, N>,
-        systems: &[TransformationSystem<T>; 4],
+        systems: &Systems<T, D, P>,
     ) -> Result<(), PrimitiveError> {
-        let largest = systems.map(|system| bounds::largest_force(&system, self.duration, self.kernel_count));
-        let place = |index: usize| u8::try_from(index).unwrap_or(u8::MAX);
-        let rows = || self.weights.chunks_exact(self.kernel_count).enumerate();
+        let number = |place: usize| u8::try_from(place).unwrap_or(u8::MAX);
+        let largest = systems.each_row(|system| bounds::largest_force(system, self.duration, self.kernel_count));
+        let rows = || self.weights.chunks_exact(self.kernel_count).zip(largest.iter()).enumerate();
         for kernel in 0..self.kernel_count {
             let centre = basis.centre(kernel).unwrap_or(T::ONE);
             let half = basis.centre(kernel + 1).map_or(centre, |next| (centre + next) * T::from_f64(0.5));
             let (at, between) = (basis.evaluate(centre), basis.evaluate(half));
-            for (row, weights) in rows() {
-                let (group, _) = Row::of_weights(row);
-                let largest = largest[group as usize];
+            for (row, (weights, &largest)) in rows() {
                 let weight = |i: usize| weights.get(i).copied().unwrap_or(T::ZERO);
                 let force = |activations: &Activations<T, N>| {
                     activations.active().fold(T::ZERO, |sum, i| sum + activations.factor(i) * weight(i))
                 };
                 let alone = weight(kernel) * centre * T::from_f64(1.0 / bounds::LARGEST_CANCELLATION);
                 if [alone, force(&at), force(&between)].into_iter().any(|force| !(force.abs() <= largest)) {
-                    return Err(PrimitiveError::WeightTooLarge { row: place(row), kernel: place(kernel) });
+                    let (group, index) = Group::of_weights(row, P);
+                    return Err(PrimitiveError::WeightTooLarge { group, index: number(index), kernel: number(kernel) });
                 }
             }
         }
         Ok(())
-    }
-
-    fn systems(&self) -> Result<[TransformationSystem<T>; 4], PrimitiveError> {
-        let [position, orientation, posture, hand] = self.gains();
-        let system = |row, (k, d)| TransformationSystem::new(k, d).map_err(|error| PrimitiveError::Gains(row, error));
-        Ok([
-            system(Row::Position, position)?,
-            system(Row::Orientation, orientation)?,
-            system(Row::Posture, posture)?,
-            system(Row::Hand, hand)?,
-        ])
     }
 }

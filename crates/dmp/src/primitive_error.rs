@@ -2,49 +2,51 @@
 
 use core::fmt;
 
-use crate::{GainError, ORIENTATION_ROWS, POSITION_ROWS, POSTURE_ROWS};
+use crate::GainError;
 
-/// Group of rows with common gains.
+/// Kind of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Row {
-    /// Position rows.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Group {
+    /// Position rows of the poses, three each.
     Position,
-    /// Orientation rows.
+    /// Orientation rows of the poses, three each.
     Orientation,
-    /// Posture rows.
-    Posture,
-    /// Hand rows.
-    Hand,
+    /// Point rows.
+    Points,
 }
 
-impl Row {
-    /// Group of a row of weights, and its place there.
-    pub(crate) fn of_weights(row: usize) -> (Self, usize) {
-        const ORIENTATION: usize = POSITION_ROWS;
-        const POSTURE: usize = ORIENTATION + ORIENTATION_ROWS;
-        const HAND: usize = POSTURE + POSTURE_ROWS;
-        match row {
-            0..ORIENTATION => (Self::Position, row),
-            ORIENTATION..POSTURE => (Self::Orientation, row - ORIENTATION),
-            POSTURE..HAND => (Self::Posture, row - POSTURE),
-            _ => (Self::Hand, row - HAND),
+impl Group {
+    /// Group of a row of weights, and its place there: of each pose three position and three orientation rows, then
+    /// the point rows.
+    #[must_use]
+    pub fn of_weights(row: usize, poses: usize) -> (Self, usize) {
+        let (pose, axis) = (row / 6, row % 6);
+        if pose >= poses {
+            (Self::Points, row - 6 * poses)
+        } else if axis < 3 {
+            (Self::Position, 3 * pose + axis)
+        } else {
+            (Self::Orientation, 3 * pose + axis - 3)
         }
     }
 }
 
-impl fmt::Display for Row {
+impl fmt::Display for Group {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Position => "position",
             Self::Orientation => "orientation",
-            Self::Posture => "posture",
-            Self::Hand => "hand",
+            Self::Points => "point",
         })
     }
 }
 
-/// Which values of a movement.
+/// Part of the values of a movement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Part {
     /// The start.
     Start,
@@ -66,6 +68,7 @@ impl fmt::Display for Part {
 
 /// Why tables are refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum PrimitiveError {
     /// The duration is not a positive number up to 3600 s.
@@ -76,14 +79,28 @@ pub enum PrimitiveError {
     KernelCount,
     /// The activation at the next centre is outside 0.05..0.95.
     Activation,
-    /// Not exactly `ROWS * kernel_count` weights.
+    /// Not exactly `kernel_count` weights for each row.
     WeightCount,
+    /// The control period is not a positive number.
+    ControlPeriod,
     /// A weight is NaN or infinite.
     Weight,
-    /// Gains of this group are unusable.
-    Gains(Row, GainError),
-    /// The duration is too short for the gains of this group: at 300 Hz the integration would be unstable.
-    Unstable(Row),
+    /// The gains of a row are unusable.
+    Gains {
+        /// Its group.
+        group: Group,
+        /// Its place in the group, from 0.
+        index: u8,
+        /// What is wrong.
+        error: GainError,
+    },
+    /// The duration is too short for the gains of a row: at this control period the integration would be unstable.
+    Unstable {
+        /// Its group.
+        group: Group,
+        /// Its place in the group, from 0.
+        index: u8,
+    },
     /// A start value is NaN or infinite.
     Start,
     /// A start velocity is NaN or infinite.
@@ -100,8 +117,10 @@ pub enum PrimitiveError {
     /// The weights give a larger forcing term than any movement of this duration with these gains needs, see
     /// [`bounds`](crate::bounds).
     WeightTooLarge {
-        /// Row of weights, 0 to 16.
-        row: u8,
+        /// Group of the row.
+        group: Group,
+        /// Its place in the group, from 0.
+        index: u8,
         /// Kernel at whose centre, or behind it, the term is too large, from 0.
         kernel: u8,
     },
@@ -110,7 +129,7 @@ pub enum PrimitiveError {
         /// Where it is.
         part: Part,
         /// Its group.
-        row: Row,
+        group: Group,
         /// Its place in the group, from 0.
         index: u8,
     },
@@ -125,9 +144,13 @@ impl fmt::Display for PrimitiveError {
             Self::Activation => f.write_str("the kernel activation is outside 0.05..0.95"),
             Self::WeightCount => f.write_str("the number of weights is not rows times kernels"),
             Self::Weight => f.write_str("a weight is not a number"),
-            Self::Gains(row, error) => write!(f, "{row}: {error}"),
-            Self::Unstable(row) => {
-                write!(f, "{row}: the duration is too short for these gains at 300 Hz")
+            Self::ControlPeriod => f.write_str("the control period is not a positive number"),
+            Self::Gains { group, index, error } => write!(f, "{group} row {index} (from 0): {error}"),
+            Self::Unstable { group, index } => {
+                write!(
+                    f,
+                    "{group} row {index} (from 0): the duration is too short for its gains at this control period"
+                )
             }
             Self::Start => f.write_str("a start value is not a number"),
             Self::StartVelocity => f.write_str("a start velocity is not a number"),
@@ -137,16 +160,12 @@ impl fmt::Display for PrimitiveError {
             Self::TurnsTooFar => {
                 f.write_str("start and goal are more than 175 degrees apart; the rotation-vector error is needed")
             }
-            Self::WeightTooLarge { row, kernel } => {
-                let (group, row) = Row::of_weights(usize::from(*row));
-                write!(
-                    f,
-                    "the weights of {group} row {row} at kernel {kernel} (both from 0) are larger than any movement \
-                     needs"
-                )
-            }
-            Self::TooLarge { part, row, index } => {
-                write!(f, "{row} value {index} (from 0) of the {part} is larger than any movement needs")
+            Self::WeightTooLarge { group, index, kernel } => write!(
+                f,
+                "the weights of {group} row {index} at kernel {kernel} (both from 0) are larger than any movement needs"
+            ),
+            Self::TooLarge { part, group, index } => {
+                write!(f, "{group} value {index} (from 0) of the {part} is larger than any movement needs")
             }
         }
     }

@@ -8,6 +8,8 @@ use crate::vector::{clamp_norm, cross, dot, scale};
 
 /// Hamilton quaternion; `R(q)` maps body to world.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Quaternion<T> {
     /// Scalar part (`eta`).
     pub w: T,

@@ -1,24 +1,26 @@
 //! `Reference` and `StartState`: what a run reports at each tick and what it starts from, in physical units.
 
-use crate::{Configuration, HAND_ROWS, POSITION_ROWS, POSTURE_ROWS, Primitive, Quaternion, Scalar, Velocity};
+use crate::{Configuration, Primitive, Quaternion, Scalar, Velocity};
 
 /// Where a run begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StartState<T> {
-    /// Pose, posture and hand.
-    pub configuration: Configuration<T>,
+pub struct StartState<T, const D: usize, const P: usize> {
+    /// Poses and point rows.
+    pub configuration: Configuration<T, D, P>,
     /// Physical velocity.
-    pub velocity: Velocity<T>,
+    pub velocity: Velocity<T, D, P>,
 }
 
-impl<T: Scalar> StartState<T> {
+impl<T: Scalar, const D: usize, const P: usize> StartState<T, D, P> {
     /// At rest in this configuration.
-    pub fn at_rest(configuration: Configuration<T>) -> Self {
+    #[must_use]
+    pub fn at_rest(configuration: Configuration<T, D, P>) -> Self {
         Self { configuration, velocity: Velocity::ZERO }
     }
 
     /// As the demonstration started, with its initial velocity: replays a recording that was cut out of a motion.
-    pub fn demonstrated<const N: usize>(primitive: &Primitive<T, N>) -> Self {
+    #[must_use]
+    pub fn demonstrated<const N: usize>(primitive: &Primitive<T, D, P, N>) -> Self {
         Self { configuration: *primitive.start(), velocity: *primitive.start_velocity() }
     }
 }
@@ -48,20 +50,31 @@ pub struct OrientationReference<T> {
 impl<T: Scalar> OrientationReference<T> {
     /// `R omega`: angular velocity in the world frame, rad/s. A geometric Jacobian needs this one.
     #[inline]
+    #[must_use]
     pub fn omega_world(&self) -> [T; 3] {
         self.quaternion.rotate(&self.omega)
     }
 
     /// `R domega`: angular acceleration in the world frame, rad/s^2 (exact, since `omega x omega` = 0).
     #[inline]
+    #[must_use]
     pub fn domega_world(&self) -> [T; 3] {
         self.quaternion.rotate(&self.domega)
     }
 }
 
+/// Desired pose with its rates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseReference<T> {
+    /// Position, world frame.
+    pub position: Trajectory<T, 3>,
+    /// Orientation.
+    pub orientation: OrientationReference<T>,
+}
+
 /// The plan at one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reference<T> {
+pub struct Reference<T, const D: usize, const P: usize> {
     /// Phase s: 1 at the start, decaying.
     pub phase: T,
     /// Progress u = -ln(s)/alpha: 0 at the start, 1 at the end of the movement, growing beyond.
@@ -70,12 +83,8 @@ pub struct Reference<T> {
     pub time: T,
     /// 1/tau(t), 1/s; 0 while time is stopped.
     pub rate: T,
-    /// Position, world frame.
-    pub position: Trajectory<T, POSITION_ROWS>,
-    /// Orientation.
-    pub orientation: OrientationReference<T>,
-    /// Default posture `q_post`.
-    pub posture: Trajectory<T, POSTURE_ROWS>,
-    /// Hand (spread, F1, F2, F3).
-    pub hand: Trajectory<T, HAND_ROWS>,
+    /// Poses.
+    pub poses: [PoseReference<T>; P],
+    /// Point rows.
+    pub points: Trajectory<T, D>,
 }

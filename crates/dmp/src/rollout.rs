@@ -8,17 +8,15 @@
 
 use core::fmt;
 
-use crate::orientation_rows::Turn;
-use crate::point_rows::{Group, Tick};
-use crate::time_scale::Pace;
+use crate::orientation_rows::OrientationRows;
+use crate::point_rows::{PointRows, Tick};
+use crate::time_scale::TimeScale;
 use crate::vector::all_finite;
-use crate::{
-    CONTROL_PERIOD, Coupling, HAND_ROWS, POSITION_ROWS, POSTURE_ROWS, Phase, Primitive, Quaternion, Reference, SENSORS,
-    Scalar, SensorMap, StartState, bounds,
-};
+use crate::{Coupling, Phase, PoseReference, Primitive, Quaternion, Reference, Scalar, StartState, bounds};
 
-/// Why a start or a change in flight is refused; the run goes on unchanged.
+/// Reason for which a start, a tick or a change in flight is refused; the run goes on unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RolloutError {
     /// A value is NaN or infinite.
@@ -31,8 +29,12 @@ pub enum RolloutError {
     TooFast,
     /// A speed, rate or duration is negative, or a duration is 0.
     Negative,
+    /// The control period is longer than the one that the primitive was checked for.
+    PeriodTooLong,
     /// The run was started with another primitive.
     OtherPrimitive,
+    /// The primitive has no such pose.
+    NoSuchPose,
     /// The start or the new goal is more than 175 degrees away, where the error of Eq. (4) fails.
     TurnsTooFar,
 }
@@ -43,7 +45,9 @@ impl fmt::Display for RolloutError {
             Self::NotFinite => "a value is not a number",
             Self::TooLarge => "a value is larger than any movement needs",
             Self::NotUnit => "a quaternion is not of unit norm",
-            Self::TooFast => "too fast: the integration would be unstable at 300 Hz",
+            Self::TooFast => "too fast: the integration would be unstable at this control period",
+            Self::PeriodTooLong => "the control period is longer than the primitive was checked for",
+            Self::NoSuchPose => "the primitive has no such pose",
             Self::Negative => "a speed, rate or duration is negative",
             Self::OtherPrimitive => "the run was started with another primitive",
             Self::TurnsTooFar => "the goal is more than 175 degrees away; the rotation-vector error is needed",
@@ -53,24 +57,29 @@ impl fmt::Display for RolloutError {
 
 impl core::error::Error for RolloutError {}
 
+/// One pose in motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct PoseRows<T> {
+    position: PointRows<T, 3>,
+    orientation: OrientationRows<T>,
+}
+
 /// State of one run of a [`Primitive`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rollout<T, const N: usize> {
+pub struct Rollout<T, const D: usize, const P: usize, const N: usize> {
     /// Of the primitive that it runs.
     fingerprint: u32,
     phase: Phase<T>,
     time: T,
     time_lost: T,
-    pace: Pace<T>,
-    position: Group<T, POSITION_ROWS>,
-    posture: Group<T, POSTURE_ROWS>,
-    hand: Group<T, HAND_ROWS>,
-    orientation: Turn<T>,
+    time_scale: TimeScale<T>,
+    poses: [PoseRows<T>; P],
+    points: PointRows<T, D>,
     goal_filter: Option<T>,
     goal_fraction: (T, T),
 }
 
-impl<T: Scalar, const N: usize> Rollout<T, N> {
+impl<T: Scalar, const D: usize, const P: usize, const N: usize> Rollout<T, D, P, N> {
     /// Largest change of speed per second unless told otherwise: from full speed to rest in half a second.
     pub const DEFAULT_SLEW: f64 = 2.0;
 
@@ -82,7 +91,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// # Errors
     /// [`RolloutError::NotFinite`], [`RolloutError::TooLarge`], [`RolloutError::NotUnit`],
     /// [`RolloutError::TurnsTooFar`].
-    pub fn start(primitive: &Primitive<T, N>, start: &StartState<T>) -> Result<Self, RolloutError> {
+    pub fn start(primitive: &Primitive<T, D, P, N>, start: &StartState<T, D, P>) -> Result<Self, RolloutError> {
         let StartState { configuration, velocity } = start;
         if !(configuration.is_finite() && velocity.is_finite()) {
             return Err(RolloutError::NotFinite);
@@ -91,18 +100,29 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
             return Err(RolloutError::TooLarge);
         }
         let from = configuration.normalised().ok_or(RolloutError::NotUnit)?;
-        let to = primitive.goal();
-        let tau = primitive.duration();
+        let (to, tau) = (primitive.goal(), primitive.duration());
+        let at_rest = PointRows::new([T::ZERO; 3], [T::ZERO; 3], tau, [T::ZERO; 3]);
+        let no_map = OrientationRows::AT_REST;
+        let mut poses = [PoseRows { position: at_rest, orientation: no_map }; P];
+        for (n, rows) in poses.iter_mut().enumerate() {
+            let taught = primitive.taught(n).ok_or(RolloutError::NoSuchPose)?;
+            let (pose, twist) = (&from.poses[n], &velocity.poses[n]);
+            rows.position = PointRows::new(pose.position, twist.linear, tau, to.poses[n].position);
+            rows.orientation = OrientationRows::start(&taught, &pose.orientation, &twist.angular)?;
+        }
         Ok(Self {
             fingerprint: primitive.fingerprint(),
             phase: Phase::START,
             time: T::ZERO,
             time_lost: T::ZERO,
-            pace: Pace { speed: T::ONE, target: T::ONE, stopped: false, slew: Some(T::from_f64(Self::DEFAULT_SLEW)) },
-            position: Group::new(from.position, velocity.position, tau, to.position),
-            posture: Group::new(from.posture, velocity.posture, tau, to.posture),
-            hand: Group::new(from.hand, velocity.hand, tau, to.hand),
-            orientation: Turn::start(primitive, &from.orientation, &velocity.orientation)?,
+            time_scale: TimeScale {
+                speed: T::ONE,
+                target: T::ONE,
+                stopped: false,
+                slew: Some(T::from_f64(Self::DEFAULT_SLEW)),
+            },
+            poses,
+            points: PointRows::new(from.points, velocity.points, tau, to.points),
             goal_filter: None,
             goal_fraction: (T::ZERO, T::ZERO),
         })
@@ -111,31 +131,27 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// Returns the plan at this tick, then advances it by `dt` (s).
     ///
     /// Value, velocity and acceleration belong to the same instant, the one BEFORE the step: the first call returns
-    /// the start state. `coupling` is the feedback of the same instant. A `dt` above [`CONTROL_PERIOD`] is cut to it
-    /// (a late tick slows the plan down instead of making it unstable); one that is not positive advances nothing. A
+    /// the start state. `coupling` is that of the same instant. A `dt` that is not positive advances nothing. A
     /// coupling beyond what any movement needs is cut to that, and one that is not a number counts as 0.
     ///
     /// # Errors
-    /// [`RolloutError::OtherPrimitive`]; nothing has changed then.
+    /// [`RolloutError::PeriodTooLong`] for a `dt` above [`Primitive::control_period`], at which the integration could be
+    /// unstable, [`RolloutError::OtherPrimitive`]; nothing has changed then.
     #[inline]
     pub fn step(
         &mut self,
-        primitive: &Primitive<T, N>,
+        primitive: &Primitive<T, D, P, N>,
         dt: T,
-        coupling: &Coupling<T>,
-    ) -> Result<Reference<T>, RolloutError> {
+        coupling: &Coupling<T, D, P>,
+    ) -> Result<Reference<T, D, P>, RolloutError> {
         self.check(primitive)?;
-        let longest = T::from_f64(CONTROL_PERIOD);
-        let dt = if !(dt > T::ZERO) {
-            T::ZERO
-        } else if dt > longest {
-            longest
-        } else {
-            dt
-        };
-        let f = primitive.forcing().evaluate(self.phase.s());
-        let change = self.pace.change(dt);
-        let rate = self.pace.speed * primitive.rate();
+        if dt > primitive.control_period() {
+            return Err(RolloutError::PeriodTooLong);
+        }
+        let dt = if dt > T::ZERO { dt } else { T::ZERO };
+        let (pose_forces, point_forces) = primitive.forces(self.phase.s());
+        let change = self.time_scale.change(dt);
+        let rate = self.time_scale.speed * primitive.rate();
         let h = dt * rate;
         let tick = Tick {
             s: self.phase.s(),
@@ -148,33 +164,41 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
         let progress = self.phase.progress();
         let time = self.time;
 
-        let [f0, f1, f2, r0, r1, r2, p0, p1, p2, p3, p4, p5, p6, h0, h1, h2, h3] = f;
         let limited;
-        let coupling = if coupling.is_within(primitive.coupling_limits()) {
+        let coupling = if coupling.is_within(primitive.least_coupling_limit()) {
             coupling
         } else {
             limited = coupling.limited(primitive.coupling_limits());
             &limited
         };
-        let position = self.position.step(primitive.position(), &tick, &[f0, f1, f2], &coupling.position);
-        let orientation = self.orientation.step(primitive.orientation(), &tick, &[r0, r1, r2], &coupling.orientation);
-        let posture =
-            self.posture.step(primitive.posture(), &tick, &[p0, p1, p2, p3, p4, p5, p6], &[T::ZERO; POSTURE_ROWS]);
-        let hand = self.hand.step(primitive.hand(), &tick, &[h0, h1, h2, h3], &coupling.hand);
+        let (pose_systems, point_systems) = (primitive.pose_systems(), primitive.point_systems());
+        let poses = core::array::from_fn(|n| {
+            let (rows, [position, orientation], zeta) = (&mut self.poses[n], &pose_systems[n], &coupling.poses[n]);
+            let [x, y, z, a, b, c] = pose_forces[n];
+            PoseReference {
+                position: rows.position.step(|_| position, &tick, &[x, y, z], &zeta.position),
+                orientation: rows.orientation.step(orientation, &tick, &[a, b, c], &zeta.orientation),
+            }
+        });
+        let points = self.points.step(|i| &point_systems[i], &tick, &point_forces, &coupling.points);
 
         self.phase.step(primitive.canonical(), h);
-        self.pace.speed = self.pace.speed + change;
+        self.time_scale.speed = self.time_scale.speed + change;
         let step = dt - self.time_lost;
         let sum = self.time + step;
         self.time_lost = (sum - self.time) - step;
         self.time = sum;
 
-        Ok(Reference { phase: tick.s, progress, time, rate, position, orientation, posture, hand })
+        Ok(Reference { phase: tick.s, progress, time, rate, poses, points })
     }
 
-    /// Weights, gains and start of one movement with the state of another would be a plan that nobody has taught.
+    /// Checks that this is a run of `primitive`: weights, gains and start of one movement with the state of another would
+    /// be a plan that nobody has taught.
+    ///
+    /// # Errors
+    /// [`RolloutError::OtherPrimitive`].
     #[inline]
-    fn check(&self, primitive: &Primitive<T, N>) -> Result<(), RolloutError> {
+    pub fn check(&self, primitive: &Primitive<T, D, P, N>) -> Result<(), RolloutError> {
         if self.fingerprint == primitive.fingerprint() { Ok(()) } else { Err(RolloutError::OtherPrimitive) }
     }
 
@@ -190,50 +214,26 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
         self.goal_fraction.1
     }
 
-    /// `zeta` of Eq. (8) for this tick from the measured sensor values (environment on the robot, in the frames of
-    /// [`SensorMap`]); open loop if the primitive has no gains or no expectation.
-    ///
-    /// Loses effect when the speed differs from the one of the recording, see
-    /// [`ExpectedWrench::trust`](crate::ExpectedWrench::trust).
+    /// New goal of the position of a pose, m. The start is never reset, so the acceleration jumps by
+    /// `K dg (1-s)/tau^2`; use [`Rollout::set_goal_filter`] if that is too much.
     ///
     /// # Errors
-    /// [`RolloutError::OtherPrimitive`].
-    pub fn coupling(
-        &self,
-        primitive: &Primitive<T, N>,
-        measured: &[T; SENSORS],
-        map: &SensorMap<T>,
-    ) -> Result<Coupling<T>, RolloutError> {
-        self.check(primitive)?;
-        let (Some(feedback), Some(expected)) = (primitive.feedback(), primitive.expected()) else {
-            return Ok(Coupling::NONE);
-        };
-        let u = self.phase.progress();
-        let felt = expected.at(u);
-        let relative_speed = expected.recorded_duration() * primitive.rate() * self.pace.speed;
-        let trust = expected.trust(relative_speed);
-        let error = core::array::from_fn(|i| (measured[i] - felt[i]) * trust);
-        Ok(feedback.coupling(u, &error, map, &primitive.stiffness()))
+    /// [`RolloutError::NoSuchPose`], [`RolloutError::NotFinite`], [`RolloutError::TooLarge`].
+    pub fn set_goal_position(&mut self, pose: usize, goal: [T; 3]) -> Result<(), RolloutError> {
+        let rows = self.poses.get_mut(pose).ok_or(RolloutError::NoSuchPose)?;
+        rows.position.command(goal, self.goal_filter.is_some())
     }
 
-    /// New goal position, m. The start is never reset, so the acceleration jumps by `K dg (1-s)/tau^2`; use
-    /// [`Rollout::set_goal_filter`] if that is too much.
+    /// New goal of the orientation of a pose, either sign: it is aligned with the demonstrated goal, or without a
+    /// demonstration with the present orientation.
     ///
     /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::TooLarge`].
-    pub fn set_goal_position(&mut self, goal: [T; POSITION_ROWS]) -> Result<(), RolloutError> {
-        self.position.command(goal, self.goal_filter.is_some())
-    }
-
-    /// New goal orientation, either sign: it is aligned with the demonstrated goal, or without a demonstration with
-    /// the present orientation.
-    ///
-    /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::NotUnit`], [`RolloutError::TurnsTooFar`],
-    /// [`RolloutError::OtherPrimitive`].
+    /// [`RolloutError::NoSuchPose`], [`RolloutError::NotFinite`], [`RolloutError::NotUnit`],
+    /// [`RolloutError::TurnsTooFar`], [`RolloutError::OtherPrimitive`].
     pub fn set_goal_orientation(
         &mut self,
-        primitive: &Primitive<T, N>,
+        primitive: &Primitive<T, D, P, N>,
+        pose: usize,
         goal: Quaternion<T>,
     ) -> Result<(), RolloutError> {
         self.check(primitive)?;
@@ -241,32 +241,27 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
             return Err(RolloutError::NotFinite);
         }
         let goal = goal.checked_unit(T::from_f64(1e-3)).ok_or(RolloutError::NotUnit)?;
-        self.orientation.command(primitive, &goal, self.goal_filter.is_some())
+        let rows = self.poses.get_mut(pose).ok_or(RolloutError::NoSuchPose)?;
+        let taught = primitive.taught(pose).ok_or(RolloutError::NoSuchPose)?;
+        rows.orientation.command(&taught, &goal, self.goal_filter.is_some())
     }
 
-    /// New goal of the posture, rad.
+    /// New goal of the point rows.
     ///
     /// # Errors
     /// [`RolloutError::NotFinite`], [`RolloutError::TooLarge`].
-    pub fn set_goal_posture(&mut self, goal: [T; POSTURE_ROWS]) -> Result<(), RolloutError> {
-        self.posture.command(goal, self.goal_filter.is_some())
+    pub fn set_goal_points(&mut self, goal: [T; D]) -> Result<(), RolloutError> {
+        self.points.command(goal, self.goal_filter.is_some())
     }
 
-    /// New goal of the hand, rad.
-    ///
-    /// # Errors
-    /// [`RolloutError::NotFinite`], [`RolloutError::TooLarge`].
-    pub fn set_goal_hand(&mut self, goal: [T; HAND_ROWS]) -> Result<(), RolloutError> {
-        self.hand.command(goal, self.goal_filter.is_some())
-    }
-
-    /// Makes the place where the plan is now its goal, in all rows: what the feedback has bent stays as it is when the feedback ends. The
-    /// phase runs on, so what is left of the forcing term (`s` of it) still fades out about the new goal.
+    /// Makes the place where the plan is now its goal, in all rows: where a coupling has bent it, it stays when the coupling ends.
+    /// The phase runs on, so what is left of the forcing term (`s` of it) still fades out about the new goal.
     pub fn settle(&mut self) {
-        self.position.settle();
-        self.posture.settle();
-        self.hand.settle();
-        self.orientation.settle();
+        for rows in &mut self.poses {
+            rows.position.settle();
+            rows.orientation.settle();
+        }
+        self.points.settle();
     }
 
     /// Goal filter `tau gd = a_g (g_commanded - g)` for the goals set from now on; 12.5 is a usual `a_g`.
@@ -284,10 +279,11 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
                 return Err(RolloutError::Negative);
             }
         } else {
-            self.position.goal = self.position.commanded;
-            self.posture.goal = self.posture.commanded;
-            self.hand.goal = self.hand.commanded;
-            self.orientation.arrive();
+            for rows in &mut self.poses {
+                rows.position.goal = rows.position.commanded;
+                rows.orientation.arrive();
+            }
+            self.points.goal = self.points.commanded;
         }
         self.goal_filter = rate;
         self.goal_fraction = (T::ZERO, T::ZERO);
@@ -299,7 +295,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// # Errors
     /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`],
     /// [`RolloutError::OtherPrimitive`].
-    pub fn set_duration(&mut self, primitive: &Primitive<T, N>, duration: T) -> Result<(), RolloutError> {
+    pub fn set_duration(&mut self, primitive: &Primitive<T, D, P, N>, duration: T) -> Result<(), RolloutError> {
         self.check(primitive)?;
         if !duration.is_finite() {
             return Err(RolloutError::NotFinite);
@@ -319,7 +315,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
     /// # Errors
     /// [`RolloutError::NotFinite`], [`RolloutError::Negative`], [`RolloutError::TooFast`],
     /// [`RolloutError::OtherPrimitive`].
-    pub fn set_speed(&mut self, primitive: &Primitive<T, N>, speed: T) -> Result<(), RolloutError> {
+    pub fn set_speed(&mut self, primitive: &Primitive<T, D, P, N>, speed: T) -> Result<(), RolloutError> {
         self.check(primitive)?;
         if !speed.is_finite() {
             return Err(RolloutError::NotFinite);
@@ -350,34 +346,34 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
                 return Err(RolloutError::TooFast);
             }
         }
-        self.pace.update(self.pace.target, self.pace.stopped, slew);
+        self.time_scale.update(self.time_scale.target, self.time_scale.stopped, slew);
         Ok(())
     }
 
     /// Brings time to a stop at the slew rate; [`Rollout::resume`] continues the same path.
     pub fn pause(&mut self) {
-        self.pace.update(self.pace.target, true, self.pace.slew);
+        self.time_scale.update(self.time_scale.target, true, self.time_scale.slew);
     }
 
     /// Stops time at once: the desired velocity jumps to 0. For use when the plan must not move another tick.
     pub fn freeze(&mut self) {
-        self.pace.stopped = true;
-        self.pace.speed = T::ZERO;
+        self.time_scale.stopped = true;
+        self.time_scale.speed = T::ZERO;
     }
 
     /// Lets time run again, slewed up to the speed last asked for.
     pub fn resume(&mut self) {
-        self.pace.update(self.pace.target, false, self.pace.slew);
+        self.time_scale.update(self.time_scale.target, false, self.time_scale.slew);
     }
 
     fn set_target(&mut self, speed: T) {
-        self.pace.update(speed, self.pace.stopped, self.pace.slew);
+        self.time_scale.update(speed, self.time_scale.stopped, self.time_scale.slew);
     }
 
     /// Present speed relative to the taught one.
     #[inline]
     pub fn speed(&self) -> T {
-        self.pace.speed
+        self.time_scale.speed
     }
 
     /// Phase s.
@@ -392,7 +388,7 @@ impl<T: Scalar, const N: usize> Rollout<T, N> {
         self.phase.progress()
     }
 
-    /// Whether the movement has run its duration. The plan may go on settling into its goal.
+    /// True once the movement has run its duration. The plan may go on settling into its goal.
     #[inline]
     pub fn is_finished(&self) -> bool {
         self.phase.progress() >= T::ONE

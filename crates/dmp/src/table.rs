@@ -9,7 +9,7 @@ use crate::vector::all_finite;
 use crate::{Scalar, bounds};
 
 /// `COLUMNS` values at up to `CAPACITY` evenly spaced phases.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct PhaseTable<T, const COLUMNS: usize, const CAPACITY: usize> {
     count: usize,
     samples: [[T; COLUMNS]; CAPACITY],
@@ -24,6 +24,7 @@ impl<T: PartialEq, const COLUMNS: usize, const CAPACITY: usize> PartialEq for Ph
 
 /// Why a table is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum TableError {
     /// No sample at all.
@@ -46,15 +47,17 @@ pub enum TableError {
     TooLarge(Entry),
 }
 
-/// A value of feedback, expectation or experience; points by phase and columns count from 0.
+/// A value of coupling gains, expectation or statistics; points by phase and columns count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Entry {
     /// Limit of the displacement, m.
     Displacement,
     /// Limit of the rotation, rad.
     Rotation,
-    /// Limit of the hand, rad.
-    Hand,
+    /// Limit of a point row, in its unit.
+    PointDisplacement,
     /// Sensitivity `K1`.
     Sensitivity {
         /// Point by phase.
@@ -76,14 +79,14 @@ pub enum Entry {
         /// Sensor.
         column: u8,
     },
-    /// Mean of an experience.
+    /// Mean of sensor statistics.
     Mean {
         /// Point by phase.
         point: u8,
         /// Channel.
         column: u8,
     },
-    /// Spread of an experience.
+    /// Spread of sensor statistics.
     Spread {
         /// Point by phase.
         point: u8,
@@ -97,12 +100,12 @@ impl fmt::Display for Entry {
         let (name, point, column) = match *self {
             Self::Displacement => return f.write_str("the limit of the displacement"),
             Self::Rotation => return f.write_str("the limit of the rotation"),
-            Self::Hand => return f.write_str("the limit of the hand"),
+            Self::PointDisplacement => return f.write_str("the limit of a point row"),
             Self::Sensitivity { point, column } => ("sensitivity", point, column),
             Self::SensorWeight { point, column } => ("sensor weight", point, column),
             Self::Expected { point, column } => ("expected value", point, column),
-            Self::Mean { point, column } => ("mean of the experience", point, column),
-            Self::Spread { point, column } => ("spread of the experience", point, column),
+            Self::Mean { point, column } => ("mean of the statistics", point, column),
+            Self::Spread { point, column } => ("spread of the statistics", point, column),
         };
         write!(f, "the {name} at point {point}, column {column} (from 0)")
     }
@@ -154,14 +157,14 @@ impl<T: Scalar, const COLUMNS: usize, const CAPACITY: usize> PhaseTable<T, COLUM
         Ok(table)
     }
 
-    /// No samples: stands for a table that is not there, and never leaves this crate.
-    pub(crate) const EMPTY: Self = Self { count: 0, samples: [[T::ZERO; COLUMNS]; CAPACITY] };
+    /// No samples, for statics that are filled by [`assign`](Self::assign). It reads as 0 everywhere.
+    pub const EMPTY: Self = Self { count: 0, samples: [[T::ZERO; COLUMNS]; CAPACITY] };
 
     /// Replaces the samples by `values`, point after point, without a second table on the stack.
     ///
     /// # Errors
     /// As [`PhaseTable::new`], and [`TableError::Shape`] for a point that is cut short. The table is then empty.
-    pub(crate) fn assign(&mut self, values: impl IntoIterator<Item = T>) -> Result<(), TableError> {
+    pub fn assign(&mut self, values: impl IntoIterator<Item = T>) -> Result<(), TableError> {
         self.count = 0;
         let mut values = values.into_iter();
         let mut count = 0;
@@ -185,17 +188,15 @@ impl<T: Scalar, const COLUMNS: usize, const CAPACITY: usize> PhaseTable<T, COLUM
 
     /// Point and column of the first value whose magnitude is not at most `largest`.
     pub(crate) fn first_beyond(&self, largest: f64) -> Option<(u8, u8)> {
-        // At most 128 points and 12 columns.
-        let place = |point: usize, column: usize| (u8::try_from(point), u8::try_from(column));
         let beyond = |sample: &[T; COLUMNS]| bounds::first_beyond(sample, largest);
         let (point, column) =
             self.samples().iter().enumerate().find_map(|(point, sample)| Some((point, beyond(sample)?)))?;
-        let (point, column) = place(point, column);
-        Some((point.unwrap_or(u8::MAX), column.unwrap_or(u8::MAX)))
+        let number = |place: usize| u8::try_from(place).unwrap_or(u8::MAX);
+        Some((number(point), number(column)))
     }
 
     /// Takes over the samples of another table, and only those in use.
-    pub(crate) fn copy_from(&mut self, other: &Self) {
+    pub fn copy_from(&mut self, other: &Self) {
         let samples = other.samples();
         if let Some(target) = self.samples.get_mut(..samples.len()) {
             target.copy_from_slice(samples);
@@ -204,7 +205,7 @@ impl<T: Scalar, const COLUMNS: usize, const CAPACITY: usize> PhaseTable<T, COLUM
     }
 
     /// Without samples.
-    pub(crate) fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.count = 0;
     }
 

@@ -18,8 +18,9 @@ pub struct TransformationSystem<T> {
     damping: T,
 }
 
-/// Why a pair of gains is refused.
+/// Reason for which a pair of gains is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum GainError {
     /// The stiffness is not between 0.1 and 1e6.
@@ -71,9 +72,7 @@ impl<T: Scalar> TransformationSystem<T> {
     }
 
     /// K = D = 1, for what rests.
-    pub(crate) const fn unit() -> Self {
-        Self { stiffness: T::ONE, damping: T::ONE }
-    }
+    pub(crate) const UNIT: Self = Self { stiffness: T::ONE, damping: T::ONE };
 
     /// Stiffness `K`.
     #[inline]

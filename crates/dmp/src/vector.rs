@@ -25,12 +25,6 @@ pub(crate) fn scale<T: Scalar, const D: usize>(a: &[T; D], k: T) -> [T; D] {
     a.map(|a| a * k)
 }
 
-/// M a for a row-major 3x3 matrix.
-#[inline]
-pub(crate) fn rotate<T: Scalar>(m: &[[T; 3]; 3], a: &[T; 3]) -> [T; 3] {
-    [dot(&m[0], a), dot(&m[1], a), dot(&m[2], a)]
-}
-
 /// `a` shortened to the norm `limit` (not negative) if it is longer; 0 if it is not a number.
 pub(crate) fn clamp_norm<T: Scalar>(a: &[T; 3], limit: T) -> [T; 3] {
     // The largest component first: squares of large values would overflow in f32 and fixed point.
@@ -71,7 +65,7 @@ pub(crate) fn clamp<T: Scalar>(a: T, limit: T) -> T {
     }
 }
 
-/// Whether all components are numbers.
+/// True if all components are numbers.
 #[inline]
 pub(crate) fn all_finite<T: Scalar>(values: &[T]) -> bool {
     values.iter().all(|v| v.is_finite())

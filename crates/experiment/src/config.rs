@@ -146,8 +146,8 @@ impl Config {
         let closing = references
             .unwrap_or_default()
             .into_iter()
-            .find(|reference| (1..4).any(|finger| (reference.hand.x[finger] - start[finger]).abs() > 0.05));
-        closing.map_or(goal.position, |reference| reference.position.x)
+            .find(|reference| (1..4).any(|finger| (reference.points.x[7 + finger] - start[finger]).abs() > 0.05));
+        closing.map_or(goal.position, |reference| reference.poses[0].position.x)
     }
 
     /// What the results belong to. Modes and seeds do not count: more of them may be added later.

@@ -125,7 +125,7 @@ impl Prepared {
         let primitive = config.primitive.to_primitive()?;
         let references = lab::plan::roll_out(&primitive).map_err(|_| TrialError::Movement("it has no valid start"))?;
         let taught =
-            references.iter().map(|reference| (reference.position.x, lab::plan::orientation(reference))).collect();
+            references.iter().map(|reference| (reference.poses[0].position.x, lab::plan::orientation(reference))).collect();
         Ok(Prepared {
             image: config.primitive.to_image()?,
             name: link::Name::new(&config.primitive.name)

@@ -5,7 +5,7 @@
 use control::plan::load::{LONGEST, LoadError, SHORTEST};
 use device::PrimitiveTrouble;
 use device::recorded_filter::{self, OtherFilter};
-use dmp::{GainError, PrimitiveError, Row, TransformationSystem};
+use dmp::{GainError, Group, PrimitiveError, TransformationSystem};
 use link::Refusal;
 use link::image::{EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT};
 
@@ -45,6 +45,14 @@ pub struct Marks {
     pub recorded_duration: f32,
     /// Cut-off of the filter behind it (Hz).
     pub filter_cut_off: f32,
+}
+
+/// The first row of the hand in a movement of the arm.
+const HAND: (Group, u8) = (Group::Points, control::plan::primitive::POSTURE_ROWS as u8);
+
+/// The gains of the hand are unusable.
+fn gains(error: GainError) -> PrimitiveError {
+    PrimitiveError::Gains { group: HAND.0, index: HAND.1, error }
 }
 
 /// Why an image is no primitive of this device.
@@ -153,18 +161,17 @@ impl FingerPrimitive {
         const GAIN_LIMITS: [f32; 2] = [1e5, 4e4];
         let [largest_stiffness, largest_damping] = GAIN_LIMITS;
         if marks.stiffness.abs() > largest_stiffness {
-            return Err(PrimitiveError::Gains(Row::Hand, GainError::Stiffness).into());
+            return Err(gains(GainError::Stiffness).into());
         }
         if marks.damping.abs() > largest_damping {
-            return Err(PrimitiveError::Gains(Row::Hand, GainError::Damping).into());
+            return Err(gains(GainError::Damping).into());
         }
-        let system =
-            TransformationSystem::new(stiffness, damping).map_err(|error| PrimitiveError::Gains(Row::Hand, error))?;
+        let system = TransformationSystem::new(stiffness, damping).map_err(gains)?;
         self.duration = Number::constant(duration);
         self.rate = Number::constant(1.0 / duration);
-        self.shortest = Number::constant(dmp::CONTROL_PERIOD) / system.largest_step();
+        self.shortest = Number::constant(control::PERIOD) / system.largest_step();
         if self.duration <= self.shortest {
-            return Err(PrimitiveError::Unstable(Row::Hand).into());
+            return Err(PrimitiveError::Unstable { group: HAND.0, index: HAND.1 }.into());
         }
         let ends = [(&marks.start, PrimitiveError::Start), (&marks.goal, PrimitiveError::Goal)];
         for (end, error) in ends {

@@ -145,7 +145,7 @@ impl Rollout {
     }
 }
 
-/// How far an expectation can be believed at another speed than it was recorded at, 1 to 0; see `dmp::ExpectedWrench::trust`.
+/// How far an expectation can be believed at another speed than it was recorded at, 1 to 0; see `dmp::ExpectedSensors::trust`.
 fn trust(relative_speed: Number) -> Number {
     let [full, none] = TRUST;
     let deviation = magnitude(ONE - relative_speed);

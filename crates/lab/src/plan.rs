@@ -1,6 +1,7 @@
 //! The plan of a primitive: its rollout at 300 Hz without feedback, from the start of its demonstration.
 
-use dmp::{Coupling, Reference, Rollout, RolloutError, StartState};
+use control::plan::primitive::{Coupling, Reference, Rollout, StartState};
+use dmp::RolloutError;
 
 use crate::demonstration::RATE;
 use crate::plot::movement::PosePath;
@@ -14,9 +15,10 @@ pub const PERIOD: f64 = 1.0 / RATE;
 /// # Errors
 /// The stored start is no valid start ([`RolloutError`]).
 pub fn roll_out(primitive: &HostPrimitive) -> Result<Vec<Reference<f64>>, RolloutError> {
-    let mut rollout = Rollout::start(primitive, &StartState::demonstrated(primitive))?;
-    let cycles = cycles(primitive.duration());
-    (0..cycles).map(|_| rollout.step(primitive, PERIOD, &Coupling::NONE)).collect()
+    let movement = primitive.movement();
+    let mut rollout = Rollout::start(movement, &StartState::demonstrated(movement))?;
+    let cycles = cycles(movement.duration());
+    (0..cycles).map(|_| rollout.step(movement, PERIOD, &Coupling::NONE)).collect()
 }
 
 /// Cycles of a movement of `duration` s, both ends included.
@@ -28,13 +30,13 @@ pub fn cycles(duration: f64) -> usize {
 pub fn pose_path(references: &[Reference<f64>]) -> PosePath {
     PosePath {
         time: references.iter().map(|reference| reference.time).collect(),
-        position: references.iter().map(|reference| reference.position.x).collect(),
+        position: references.iter().map(|reference| reference.poses[0].position.x).collect(),
         orientation: references.iter().map(orientation).collect(),
     }
 }
 
 /// Orientation of a reference as (w, x, y, z).
 pub fn orientation(reference: &Reference<f64>) -> [f64; 4] {
-    let q = &reference.orientation.quaternion;
+    let q = &reference.poses[0].orientation.quaternion;
     [q.w, q.x, q.y, q.z]
 }

@@ -56,12 +56,13 @@ fn a_taught_movement_is_reproduced() {
 fn the_plan_stays_at_its_goal_behind_the_end_of_the_movement() {
     let learned = learned(&taught(5.0), &LearnOptions::named("reach")).unwrap();
     let primitive = learned.primitive.to_primitive().unwrap();
-    let mut rollout = dmp::Rollout::start(&primitive, &dmp::StartState::demonstrated(&primitive)).unwrap();
+    let primitive = primitive.movement();
+    let mut rollout = dmp::Rollout::start(primitive, &dmp::StartState::demonstrated(primitive)).unwrap();
     for cycle in 0..3600 {
-        let plan = rollout.step(&primitive, 1.0 / 300.0, &dmp::Coupling::NONE).unwrap();
+        let plan = rollout.step(primitive, 1.0 / 300.0, &dmp::Coupling::NONE).unwrap();
         if f64::from(cycle) / 300.0 > primitive.duration() {
             let away = (0..3)
-                .map(|axis| (plan.position.x[axis] - learned.primitive.goal.position[axis]).powi(2))
+                .map(|axis| (plan.poses[0].position.x[axis] - learned.primitive.goal.position[axis]).powi(2))
                 .sum::<f64>()
                 .sqrt();
             assert!(away < GOAL_DISTANCE, "{away} m at {} s", plan.time);
@@ -328,15 +329,16 @@ fn a_dwell_makes_the_movement_longer_by_exactly_that_and_rests_at_the_goal() {
     assert!((grasp.primitive.duration - plain.primitive.duration - 2.5).abs() < 1e-12);
     assert_eq!(grasp.demonstration.len(), plain.demonstration.len() + 750);
     let primitive = grasp.primitive.to_primitive().unwrap();
-    let mut rollout = dmp::Rollout::start(&primitive, &dmp::StartState::demonstrated(&primitive)).unwrap();
+    let primitive = primitive.movement();
+    let mut rollout = dmp::Rollout::start(primitive, &dmp::StartState::demonstrated(primitive)).unwrap();
     loop {
-        let plan = rollout.step(&primitive, 1.0 / 300.0, &dmp::Coupling::NONE).unwrap();
+        let plan = rollout.step(primitive, 1.0 / 300.0, &dmp::Coupling::NONE).unwrap();
         if plan.time > plain.primitive.duration + 0.3 {
-            let away = (0..3).map(|axis| plan.position.x[axis] - grasp.primitive.goal.position[axis]);
+            let away = (0..3).map(|axis| plan.poses[0].position.x[axis] - grasp.primitive.goal.position[axis]);
             assert!(away.map(|e| e * e).sum::<f64>().sqrt() < 3e-3, "at {} s", plan.time);
         }
         if plan.time > grasp.primitive.duration {
-            assert!((plan.hand.x[1] - 2.0).abs() < 0.02, "{:?}", plan.hand.x);
+            assert!((plan.points.x[8] - 2.0).abs() < 0.02, "{:?}", plan.points.x);
             break;
         }
     }

@@ -104,11 +104,11 @@ fn watched(file: &PrimitiveFile, recording: &Recording) -> f64 {
         (run.phase.unwrap(), run.wrench.unwrap(), run.gauges.unwrap(), run.hand.unwrap());
     let mut largest = 0.0_f64;
     for index in 0..phase.len() {
-        let mut values = [0.0; dmp::EXPERIENCE_CHANNELS];
+        let mut values = [0.0; control::plan::primitive::STATISTICS_CHANNELS];
         values[..6].copy_from_slice(&wrench[index]);
         values[6..9].copy_from_slice(&gauges[index]);
         values[9..].copy_from_slice(&hand[index][1..]);
-        watch.step(primitive.experience().unwrap(), -phase[index].ln() / file.alpha, &values, true);
+        watch.step(primitive.statistics().unwrap(), -phase[index].ln() / file.alpha, &values, true);
         largest = largest.max(watch.statistic());
     }
     largest

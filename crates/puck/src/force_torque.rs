@@ -43,8 +43,8 @@ impl GaugeStatus {
 
 /// One sample of the sensor in counts: the wrench of the environment on the robot's tool side, in the sensor frame.
 ///
-/// On the bus it is two frames, [`Reply::Force`](crate::Reply::Force) and [`Reply::Torque`](crate::Reply::Torque); put them together
-/// only if they answer the same request.
+/// On the bus it is two frames, [`Reply::Force`](crate::Reply::Force) and [`Reply::Torque`](crate::Reply::Torque); put
+/// them together only if they answer the same request.
 ///
 /// ```
 /// use puck::RawWrench;

@@ -19,7 +19,8 @@ pub const TICKS_PER_MILLISECOND: Ticks = 25_000;
 /// One bit on the wire at 1 Mbit/s (docs/barrett-can.md).
 pub const TICKS_PER_BIT: Ticks = 25;
 
-/// One physics step. Six fit one control cycle of 300 Hz exactly; with another rate a response is seen up to one step late.
+/// One physics step. Six fit one control cycle of 300 Hz exactly; with another rate a response is seen up to one step
+/// late.
 pub const STEP_TICKS: Ticks = 13_889;
 
 /// One physics step in seconds (0.555 56 ms).

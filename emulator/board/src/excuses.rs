@@ -29,7 +29,7 @@ pub fn address(_address: u64) -> Option<&'static str> {
 #[must_use]
 pub fn told(register: &str, function: &str) -> Option<&'static str> {
     // Where the compiler puts that start, in line or not.
-    let places = ["embassy_stm32", "__rtic_init_resources", "Board as firmware::board::Edge>::start"];
+    let places = ["embassy_stm32", "__rtic_init_resources", "SelectedBoard as firmware::board::Board>::start"];
     let is_start = places.iter().any(|place| function.contains(place));
     (register == "RCC.PLLCKSELR" && is_start).then_some(
         "embassy-stm32 0.6.0 clears the divider of each loop that the configuration leaves out; the fields of \

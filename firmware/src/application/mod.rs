@@ -22,13 +22,13 @@ mod storage;
 
 use core::mem::MaybeUninit;
 
-use device::storage::{Library, Room, value_bytes};
+use device::storage::{Library, Scratch, value_bytes};
 use device::{Command, DeviceController, Event, Identity, Session, TimedRecord};
 use heapless::spsc::Queue;
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
 
-use crate::board::{Clock, Edge, Parts, SlotTimer};
+use crate::board::{Board, Clock, Parts, SlotTimer};
 use crate::in_place;
 
 pub use bus::{ReceiveTask, TransmitTask};
@@ -61,7 +61,7 @@ pub type PrimitiveLibrary = Library<PRIMITIVES, IMAGE_BYTES_LIMIT>;
 pub type ArmSession = Session<&'static mut PrimitiveLibrary>;
 
 /// Memory of the task that keeps the library on the flash.
-pub type StorageRoom = Room<IMAGE_BYTES_LIMIT, { value_bytes(IMAGE_BYTES_LIMIT) }>;
+pub type StorageScratch = Scratch<IMAGE_BYTES_LIMIT, { value_bytes(IMAGE_BYTES_LIMIT) }>;
 
 /// What the tasks hand to each other.
 struct Queues {
@@ -111,42 +111,42 @@ impl Default for Memory {
 }
 
 /// Everything an image consists of, for the tasks that own or share it.
-pub struct Application<E: Edge> {
+pub struct Application<B: Board> {
     /// Shared by slot and session.
     pub core: &'static mut DeviceController,
     /// Shared by slot, receiver and transmitter.
-    pub can: E::Can,
+    pub can: B::Can,
     /// Shared by session and storage.
     pub session: &'static mut ArmSession,
     /// On `SLOT_TIMER`.
-    pub slot_task: SlotTask<E, DeviceController>,
+    pub slot_task: SlotTask<B, DeviceController>,
     /// On `CAN_RECEIVE`.
     pub receive_task: ReceiveTask,
     /// On `CAN_TRANSMIT`.
     pub transmit_task: TransmitTask,
     /// After every slot.
-    pub session_task: SessionTask<E, DeviceController>,
+    pub session_task: SessionTask<B, DeviceController>,
     /// When there is something to tell.
     pub log_task: LogTask,
     /// For [`keep_library`], when nothing else is to be done.
-    pub flash: E::Flash,
+    pub flash: B::Flash,
 }
 
 /// Joins the application to the pieces of a board, and starts the timer of the slots: the first comes a slot later at the
 /// earliest. `firmware` is the version of the image, for people; `serial` tells this board from others of its kind.
-pub fn start<E: Edge>(
+pub fn start<B: Board>(
     firmware: &'static str,
     serial: &'static str,
-    parts: Parts<E>,
+    parts: Parts<B>,
     memory: &'static mut Memory,
     core: &'static mut CorePlace,
-) -> Application<E> {
+) -> Application<B> {
     let identity = Identity {
         firmware,
-        board: E::NAME,
+        board: B::NAME,
         serial,
-        simulated: E::SIMULATED,
-        ticks_per_second: <E::Clock as Clock>::HZ,
+        simulated: B::SIMULATED,
+        ticks_per_second: <B::Clock as Clock>::HZ,
     };
     let Memory { queues, shelf, session } = memory;
     let Parts { clock, mut slot_timer, can, link, light, flash } = parts;

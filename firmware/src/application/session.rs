@@ -5,7 +5,7 @@ use device::{Application, Controller, Health, HostSession, QueueFull, SessionPor
 use heapless::spsc::{Consumer, Producer};
 use rtic_core::Mutex;
 
-use crate::board::{Clock, Edge, LinkPort};
+use crate::board::{Board, Clock, LinkPort};
 use crate::meters::Meters;
 
 /// Bytes taken from the line at a time; the rest waits in the port.
@@ -31,9 +31,9 @@ pub struct StackUse {
 }
 
 /// The task that runs once a slot.
-pub struct SessionTask<E: Edge, C: Controller> {
-    clock: E::Clock,
-    queues: SessionQueues<E::LinkPort, C>,
+pub struct SessionTask<B: Board, C: Controller> {
+    clock: B::Clock,
+    queues: SessionQueues<B::LinkPort, C>,
 }
 
 /// The world of the session during one poll.
@@ -90,8 +90,8 @@ impl<P: LinkPort, C: Controller, M: Mutex<T = &'static mut C>> SessionPort<C> fo
     }
 }
 
-impl<E: Edge, C: Controller> SessionTask<E, C> {
-    pub(crate) fn new(clock: E::Clock, queues: SessionQueues<E::LinkPort, C>) -> Self {
+impl<B: Board, C: Controller> SessionTask<B, C> {
+    pub(crate) fn new(clock: B::Clock, queues: SessionQueues<B::LinkPort, C>) -> Self {
         Self { clock, queues }
     }
 

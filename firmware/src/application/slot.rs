@@ -6,7 +6,7 @@ use heapless::spsc::{Consumer, Producer};
 use puck::CanFrame;
 use rtic_core::Mutex;
 
-use crate::board::{CanStatus, Clock, Edge, SlotTimer};
+use crate::board::{Board, CanStatus, Clock, SlotTimer};
 use crate::meters::Meters;
 
 /// The slot task's ends of the queues between the halves.
@@ -28,10 +28,10 @@ pub(crate) enum Cost {
 }
 
 /// The task of the highest priority.
-pub struct SlotTask<E: Edge, C: Controller> {
-    clock: E::Clock,
-    timer: E::SlotTimer,
-    light: E::StatusLight,
+pub struct SlotTask<B: Board, C: Controller> {
+    clock: B::Clock,
+    timer: B::SlotTimer,
+    light: B::StatusLight,
     queues: SlotQueues<C>,
     measured: Cost,
     slot: Slot,
@@ -73,11 +73,11 @@ impl<C: Controller> ControllerIo<C> for SlotIo<'_, C> {
     }
 }
 
-impl<E: Edge, C: Controller> SlotTask<E, C> {
+impl<B: Board, C: Controller> SlotTask<B, C> {
     pub(crate) fn new(
-        clock: E::Clock,
-        timer: E::SlotTimer,
-        light: E::StatusLight,
+        clock: B::Clock,
+        timer: B::SlotTimer,
+        light: B::StatusLight,
         queues: SlotQueues<C>,
         measured: Cost,
     ) -> Self {
@@ -85,7 +85,7 @@ impl<E: Edge, C: Controller> SlotTask<E, C> {
     }
 
     /// Computes one slot. Afterwards the transmitter and the session are due.
-    pub fn run(&mut self, mut core: impl Mutex<T = &'static mut C>, mut can: impl Mutex<T = E::Can>, meters: &Meters) {
+    pub fn run(&mut self, mut core: impl Mutex<T = &'static mut C>, mut can: impl Mutex<T = B::Can>, meters: &Meters) {
         meters.slot(self.timer.acknowledge());
         let begin = self.clock.short_ticks();
         let now = self.clock.now_us();

@@ -5,19 +5,19 @@ use core::pin::pin;
 use core::task::{Context, Poll, Waker};
 
 use device::StoreError;
-use device::storage::{Desk, Opening, Work, keep};
+use device::storage::{LibraryAccess, Opening, Work, keep};
 use embedded_storage_async::nor_flash::NorFlash;
 use rtic_core::Mutex;
 
-use super::{ArmSession, Log, StorageRoom};
+use super::{ArmSession, Log, StorageScratch};
 
 /// The library behind the session's lock: each call holds it for one copy of an image at most.
-struct SharedDesk<M, L> {
+struct SharedLibrary<M, L> {
     session: M,
     log: L,
 }
 
-impl<M: Mutex<T = &'static mut ArmSession>, L: Log> Desk for SharedDesk<M, L> {
+impl<M: Mutex<T = &'static mut ArmSession>, L: Log> LibraryAccess for SharedLibrary<M, L> {
     fn restore(&mut self, slot: u8, image: &[u8]) {
         self.session.lock(|session| session.store_mut().restore(slot, image));
     }
@@ -43,11 +43,11 @@ impl<M: Mutex<T = &'static mut ArmSession>, L: Log> Desk for SharedDesk<M, L> {
 /// Opens the library and keeps it on the flash, for ever.
 pub async fn keep_library<F: NorFlash>(
     flash: F,
-    room: &mut StorageRoom,
+    room: &mut StorageScratch,
     session: impl Mutex<T = &'static mut ArmSession>,
     log: impl Log,
 ) -> Infallible {
-    keep(flash, room, &mut SharedDesk { session, log }).await
+    keep(flash, room, &mut SharedLibrary { session, log }).await
 }
 
 /// What a processor does that has nothing to do: asks the `task` whether it can go on, and sleeps until the next interrupt. Lower

@@ -11,8 +11,8 @@ fn main() {}
 #[used]
 #[unsafe(link_section = ".tactus")]
 static METADATA: [u8; link::metadata::METADATA_BYTES] = {
-    use firmware::board::{Board, Edge, device};
-    firmware::metadata::block(Board::NAME, Board::SIMULATED, device::IMAGE, device::STORE)
+    use firmware::board::{Board, SelectedBoard, device};
+    firmware::metadata::block(SelectedBoard::NAME, SelectedBoard::SIMULATED, device::IMAGE, device::STORE)
 };
 
 // RTIC gives the first line to the lowest priority among the software tasks, which is that of the log.
@@ -22,10 +22,10 @@ mod app {
     use device::DeviceController;
     use firmware::application::{
         self, Application, ArmSession, CorePlace, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse,
-        StorageRoom, TransmitTask,
+        StorageScratch, TransmitTask,
     };
     use firmware::board::device::Interrupt;
-    use firmware::board::{Board, Edge, stack};
+    use firmware::board::{Board, SelectedBoard, stack};
     use firmware::defmt_log::DefmtLog;
     use firmware::metadata;
     use firmware::meters::Meters;
@@ -35,18 +35,18 @@ mod app {
     #[shared]
     struct Shared {
         core: &'static mut DeviceController,
-        can: <Board as Edge>::Can,
+        can: <SelectedBoard as Board>::Can,
         session: &'static mut ArmSession,
     }
 
     #[local]
     struct Local {
-        slot_task: SlotTask<Board, DeviceController>,
+        slot_task: SlotTask<SelectedBoard, DeviceController>,
         receive_task: ReceiveTask,
         transmit_task: TransmitTask,
-        session_task: SessionTask<Board, DeviceController>,
+        session_task: SessionTask<SelectedBoard, DeviceController>,
         log_task: LogTask,
-        flash: <Board as Edge>::Flash,
+        flash: <SelectedBoard as Board>::Flash,
     }
 
     #[init(local = [
@@ -56,9 +56,9 @@ mod app {
         core: CorePlace = CorePlace::uninit(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let board = Board::start(cx.core);
+        let board = SelectedBoard::start(cx.core);
         let version = metadata::FIRMWARE;
-        defmt::info!("tactus arm {=str} on {=str}", version, Board::NAME);
+        defmt::info!("tactus arm {=str} on {=str}", version, SelectedBoard::NAME);
         let serial = board.serial();
         let Application { core, can, session, slot_task, receive_task, transmit_task, session_task, log_task, flash } =
             application::start(version, serial, board.split(), cx.local.memory, cx.local.core);
@@ -66,11 +66,11 @@ mod app {
     }
 
     /// Keeps the library on the flash; sleeps otherwise.
-    #[idle(shared = [session], local = [flash, room: StorageRoom = StorageRoom::new()])]
+    #[idle(shared = [session], local = [flash, room: StorageScratch = StorageScratch::new()])]
     fn idle(cx: idle::Context) -> ! {
         application::rest(
             application::keep_library(cx.local.flash, cx.local.room, cx.shared.session, DefmtLog),
-            Board::sleep,
+            SelectedBoard::sleep,
         )
     }
 

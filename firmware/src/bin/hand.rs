@@ -19,9 +19,9 @@ const IMAGE: link::metadata::MemoryRegion = link::metadata::MemoryRegion { start
 #[used]
 #[unsafe(link_section = ".tactus")]
 static METADATA: [u8; link::metadata::METADATA_BYTES] = {
-    use firmware::board::{Board, Edge};
+    use firmware::board::{Board, SelectedBoard};
     // No store: the library is in memory.
-    firmware::metadata::block(BOARD_NAME, Board::SIMULATED, IMAGE, None)
+    firmware::metadata::block(BOARD_NAME, SelectedBoard::SIMULATED, IMAGE, None)
 };
 
 #[cfg(target_os = "none")]
@@ -29,7 +29,7 @@ static METADATA: [u8; link::metadata::METADATA_BYTES] = {
 mod app {
     use firmware::application::{ReceiveTask, SessionTask, SlotTask, StackUse, TransmitTask};
     use firmware::board::device::Interrupt;
-    use firmware::board::{Board, Edge, stack};
+    use firmware::board::{Board, SelectedBoard, stack};
     use firmware::hand::{self as application, Application, Memory};
     use firmware::metadata;
     use firmware::meters::Meters;
@@ -42,21 +42,21 @@ mod app {
     #[shared]
     struct Shared {
         core: &'static mut DeviceController,
-        can: <Board as Edge>::Can,
+        can: <SelectedBoard as Board>::Can,
     }
 
     #[local]
     struct Local {
-        slot_task: SlotTask<Board, DeviceController>,
+        slot_task: SlotTask<SelectedBoard, DeviceController>,
         receive_task: ReceiveTask,
         transmit_task: TransmitTask,
-        session_task: SessionTask<Board, DeviceController>,
+        session_task: SessionTask<SelectedBoard, DeviceController>,
         session: &'static mut Session<'static>,
     }
 
     #[init(local = [memory: Memory = Memory::new()])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let board = Board::start(cx.core);
+        let board = SelectedBoard::start(cx.core);
         let version = metadata::FIRMWARE;
         defmt::info!("tactus hand {=str} on {=str}", version, BOARD_NAME);
         let serial = board.serial();
@@ -68,7 +68,7 @@ mod app {
     #[idle]
     fn idle(_: idle::Context) -> ! {
         loop {
-            Board::sleep();
+            SelectedBoard::sleep();
         }
     }
 

@@ -1,8 +1,8 @@
 //! The edge between the application and a board: what a board must offer, and the board this image is for.
 //!
-//! A board is one module below this one. It provides `Board` (made once, at start-up), the module `device` for RTIC
+//! A board is one module below this one. It provides `SelectedBoard` (made once, at start-up), the module `device` for RTIC
 //! (interrupts named by their *role*: `SLOT_TIMER`, `CAN_RECEIVE`, `CAN_TRANSMIT` and two lines for software tasks),
-//! a defmt logger, and [`Edge::stop`] for the end. The binaries name nothing else.
+//! a defmt logger, and [`Board::stop`] for the end. The binaries name nothing else.
 
 use embedded_can::nb;
 use embedded_hal::digital::OutputPin;
@@ -12,14 +12,14 @@ use puck::CanFrame;
 #[cfg(all(target_os = "none", feature = "board-mps2"))]
 mod mps2;
 #[cfg(all(target_os = "none", feature = "board-mps2"))]
-pub use mps2::{Board, device};
+pub use mps2::{SelectedBoard, device};
 
 pub mod stm32h743;
 #[cfg(all(target_os = "none", feature = "board-stm32h743"))]
-pub use stm32h743::{Board, device};
+pub use stm32h743::{SelectedBoard, device};
 
 /// Everything a board offers at start-up.
-pub trait Edge: Sized {
+pub trait Board: Sized {
     /// See [`Clock`].
     type Clock: Clock;
     /// See [`SlotTimer`].
@@ -61,19 +61,19 @@ pub trait Edge: Sized {
 }
 
 /// The peripherals of a board, each for the task that owns it.
-pub struct Parts<E: Edge> {
+pub struct Parts<B: Board> {
     /// Time.
-    pub clock: E::Clock,
+    pub clock: B::Clock,
     /// The timer that makes the slots.
-    pub slot_timer: E::SlotTimer,
+    pub slot_timer: B::SlotTimer,
     /// The arm's bus.
-    pub can: E::Can,
+    pub can: B::Can,
     /// The line to the host.
-    pub link: E::LinkPort,
+    pub link: B::LinkPort,
     /// The status light.
-    pub light: E::StatusLight,
+    pub light: B::StatusLight,
     /// The library's flash.
-    pub flash: E::Flash,
+    pub flash: B::Flash,
 }
 
 /// Time since start-up.

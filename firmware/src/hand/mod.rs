@@ -9,7 +9,7 @@ use heapless::spsc::Queue;
 use puck::CanFrame;
 
 use crate::application::{Cost, ReceiveTask, SessionQueues, SessionTask, SlotQueues, SlotTask, TransmitTask};
-use crate::board::{Clock, Edge, Parts, SlotTimer};
+use crate::board::{Board, Clock, Parts, SlotTimer};
 use crate::in_place;
 
 /// Frames on their way to the controller: a cycle sends four.
@@ -67,33 +67,33 @@ impl Default for Memory {
 }
 
 /// Everything the image consists of, for the tasks that own or share it.
-pub struct Application<E: Edge> {
+pub struct Application<B: Board> {
     /// Shared by slot and session.
     pub core: &'static mut DeviceController,
     /// Of the session task alone.
     pub session: &'static mut Session<'static>,
     /// Shared by slot, receiver and transmitter.
-    pub can: E::Can,
+    pub can: B::Can,
     /// On `SLOT_TIMER`.
-    pub slot_task: SlotTask<E, DeviceController>,
+    pub slot_task: SlotTask<B, DeviceController>,
     /// On `CAN_RECEIVE`.
     pub receive_task: ReceiveTask,
     /// On `CAN_TRANSMIT`.
     pub transmit_task: TransmitTask,
     /// After every slot.
-    pub session_task: SessionTask<E, DeviceController>,
+    pub session_task: SessionTask<B, DeviceController>,
 }
 
 /// Joins the application to the pieces of a board called `name`, and starts the timer of the slots.
-pub fn start<E: Edge>(
+pub fn start<B: Board>(
     firmware: &'static str,
     name: &'static str,
     serial: &'static str,
-    parts: Parts<E>,
+    parts: Parts<B>,
     memory: &'static mut Memory,
-) -> Application<E> {
+) -> Application<B> {
     let identity =
-        Identity { firmware, board: name, serial, simulated: E::SIMULATED, ticks_per_second: <E::Clock as Clock>::HZ };
+        Identity { firmware, board: name, serial, simulated: B::SIMULATED, ticks_per_second: <B::Clock as Clock>::HZ };
     let Parts { clock, mut slot_timer, can, link, light, .. } = parts;
     let Memory { queues, library, core, session } = memory;
     let (to_bus, outgoing) = queues.outgoing.split();

@@ -8,7 +8,7 @@ use std::rc::Rc;
 use device::time::SLOT_HZ;
 use embedded_can::nb;
 use embedded_hal::digital::{ErrorType, OutputPin};
-use firmware::board::{self, CanStatus, Edge, LinkPort, Parts};
+use firmware::board::{self, Board, CanStatus, LinkPort, Parts};
 use puck::CanFrame;
 use sim::flash::FlashPort;
 use sim::{TICKS_PER_SECOND, Ticks};
@@ -163,7 +163,7 @@ pub(crate) struct MemoryBoard {
     pub(crate) flash: FlashPort,
 }
 
-impl Edge for MemoryBoard {
+impl Board for MemoryBoard {
     type Clock = Clock;
     type SlotTimer = SlotTimer;
     type Can = Can;

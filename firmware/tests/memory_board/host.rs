@@ -13,9 +13,9 @@ use device::storage::Opening;
 use device::{DeviceController, Store};
 use firmware::application::{
     self, Application, ArmSession, CorePlace, Log, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse,
-    StorageRoom, TransmitTask,
+    StorageScratch, TransmitTask,
 };
-use firmware::board::Edge;
+use firmware::board::Board;
 use firmware::meters::Meters;
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
 use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
@@ -109,7 +109,7 @@ impl Host {
         let Application { core, can, session, slot_task, receive_task, transmit_task, session_task, log_task, flash } =
             application::start("test", serial, board.split(), memory, Box::leak(Box::new(CorePlace::uninit())));
         let (session, notes) = (Lock::new(session), Notes::default());
-        let room = Box::leak(Box::new(StorageRoom::new()));
+        let room = Box::leak(Box::new(StorageScratch::new()));
         Self {
             plant: Plant::new(PlantConfig::default(), Box::new(FreeJoints::new(HOME))),
             silicon,

@@ -3,6 +3,7 @@
 use control::law::Gains;
 use control::model::Calibration;
 use control::plan::load;
+use control::plan::primitive::posture_and_hand;
 use control::units::{JointVelocities, Vector7};
 use control::{BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, RunOptions, State, flags};
 use puck::SafetyMode;
@@ -82,8 +83,8 @@ impl ClosedLoop {
                 return run;
             }
         }
-        let mut plant = Plant::at(primitive.start().posture);
-        let expected = (primitive.duration() / speed / PERIOD).ceil();
+        let mut plant = Plant::at(posture_and_hand(&primitive.movement().start().points).0);
+        let expected = (primitive.movement().duration() / speed / PERIOD).ceil();
         let last = SETTLING + (expected * (1.0 + OVERTIME)) as u64 + 900;
         for number in 0..last {
             let Some(counts) = plant.counts() else {
@@ -117,7 +118,7 @@ impl ClosedLoop {
                         let time = (number - SETTLING) as f64 * PERIOD;
                         run.samples.push(sample(&plant, time, record));
                         if number % 100 == 0 {
-                            progress((time * speed / primitive.duration()).min(1.0));
+                            progress((time * speed / primitive.movement().duration()).min(1.0));
                         }
                     }
                     State::Hold => {

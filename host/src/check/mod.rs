@@ -213,20 +213,20 @@ fn check_plan(primitive: &lab::primitive_file::HostPrimitive, report: &mut Check
     };
     let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
     let broken = references.iter().find(|reference| {
-        !(finite(&reference.position.x)
-            && finite(&reference.position.a)
+        let ([pose], points) = (&reference.poses, &reference.points);
+        !(finite(&pose.position.x)
+            && finite(&pose.position.a)
             && finite(&plan::orientation(reference))
-            && finite(&reference.orientation.domega)
-            && finite(&reference.posture.x)
-            && finite(&reference.posture.a)
-            && finite(&reference.hand.x))
+            && finite(&pose.orientation.domega)
+            && finite(&points.x)
+            && finite(&points.a))
     });
     if let Some(reference) = broken {
         report.violations.push(format!("the plan is not finite at {:.3} s", reference.time));
         return;
     }
     let farthest = references.iter().map(|reference| {
-        let distance = reference.position.x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let distance = reference.poses[0].position.x.iter().map(|x| x * x).sum::<f64>().sqrt();
         (reference.time, distance)
     });
     if let Some((time_s, distance)) = farthest.max_by(|a, b| a.1.total_cmp(&b.1)) {

@@ -1,6 +1,5 @@
 //! Commands: their conditions, and what they start.
 
-use dmp::Primitive;
 use nalgebra::Vector3;
 
 use crate::command::{Command, Refusal};
@@ -11,6 +10,7 @@ use crate::guard::supervisor::{State, Trigger};
 use crate::model::hand;
 use crate::plan;
 use crate::plan::approach::{Approach, LONGEST};
+use crate::plan::primitive::Primitive;
 use crate::plan::run;
 use crate::real::Real;
 use crate::sense::wrench::REST_FORCE;

@@ -5,6 +5,7 @@ use crate::cycle::record::{Event, flags};
 use crate::cycle::{Cycle, Measured, WRENCH_AGE};
 use crate::law::force::ForceController;
 use crate::model::kinematics::Frames;
+use crate::plan::primitive::posture_and_hand;
 use crate::plan::reference::{HandReference, JointReference, TaskReference};
 use crate::plan::run::Senses;
 use crate::real::Real;
@@ -121,7 +122,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         let deviation = run.deviation().filter(|_| options.force_control);
         let expected_gauges = deviation.map(|deviation| deviation.expected_gauges);
-        self.hand.follow(&HandReference { q: plan.hand.x, dq: plan.hand.v }, expected_gauges);
+        self.hand.follow(
+            &HandReference { q: posture_and_hand(&plan.points.x).1, dq: posture_and_hand(&plan.points.v).1 },
+            expected_gauges,
+        );
         let task = TaskReference::from_plan(&plan);
         let reference = operational.step(
             &self.model,

@@ -13,7 +13,6 @@ mod laws;
 pub mod record;
 mod transitions;
 
-use dmp::Primitive;
 use pinned_init::{Init, init};
 use puck::SafetyMode;
 
@@ -33,6 +32,7 @@ use crate::model::arm::ArmModel;
 use crate::model::calibration::{Calibration, Payload};
 use crate::model::kinematics::Frames;
 use crate::plan::load::{Fit, LoadRefusal, Loaded};
+use crate::plan::primitive::Primitive;
 use crate::plan::run::FADE;
 use crate::real::Real;
 use crate::sense::joints::{JointEstimator, JointState};

@@ -1,7 +1,5 @@
 //! Transitions: what a state inherits from the one before it, so that no torque makes a step.
 
-use dmp::{Primitive, Rollout};
-
 use crate::act::limit::LimitReport;
 use crate::command::RunOptions;
 use crate::cycle::law::{Law, Posture, Ramp, Running};
@@ -13,6 +11,7 @@ use crate::law::force::ForceController;
 use crate::law::joint::JointController;
 use crate::law::operational::OperationalController;
 use crate::plan::approach::Approach;
+use crate::plan::primitive::{Primitive, Rollout};
 use crate::plan::run::Run;
 use crate::real::{Real, within};
 use crate::sense::deviation::Deviation;

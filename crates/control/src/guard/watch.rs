@@ -1,6 +1,6 @@
 //! `Watch`: notices, from what successful runs felt like, that this one is not going as it should.
 //!
-//! Two things are told. A channel leaves its band: its deviation from the [`Experience`], in units of the spread, is averaged
+//! Two things are told. A channel leaves its band: its z-score by the [`SensorStatistics`] is averaged
 //! over [`MEMORY`] with its sign (noise averages out, a missing object does not) and passes [`LIMIT`]. Of a finger only
 //! going too far counts: one that stops early has met something, be it thicker than usual; one that closes farther than ever
 //! holds nothing. And contact is lost: before the fingers move, the force falls to a small part of what it was. No table
@@ -9,10 +9,17 @@
 //! Each is told once per run. The watch only tells; it never touches a torque, since a wrong alarm must not stop an arm
 //! that holds something.
 
-use dmp::{EXPERIENCE_CHANNELS, Experience};
-
 use crate::real::Real;
 use crate::time::PERIOD;
+
+/// Channels: the nine sensor values, then the angles of fingers F1, F2, F3 (rad).
+pub const STATISTICS_CHANNELS: usize = 12;
+
+/// Most points of the statistics.
+pub const STATISTICS_CAPACITY: usize = 64;
+
+/// Mean and spread of the sensor values of successful runs.
+pub type SensorStatistics<T> = dmp::SensorStatistics<T, STATISTICS_CHANNELS, STATISTICS_CAPACITY>;
 
 /// Time over which a deviation is averaged (s).
 pub const MEMORY: f64 = 0.1;
@@ -52,17 +59,17 @@ const STRONGEST: f64 = 1e3;
 /// What was not as it should be, and when.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surprise {
-    /// Channel of the experience, 0 to 11. For lost contact it is the axis along which the force was largest, 0 to 2.
+    /// Channel of the statistics, 0 to 11. For lost contact it is the axis along which the force was largest, 0 to 2.
     pub channel: u8,
     /// Progress of the movement, 0 to 1 and a little beyond.
     pub progress: f32,
 }
 
-/// The running comparison of one run with its experience.
+/// The running comparison of one run with its statistics.
 #[derive(Clone, Debug)]
 pub struct Watch<R: Real> {
-    averages: [R; EXPERIENCE_CHANNELS],
-    told: [bool; EXPERIENCE_CHANNELS],
+    averages: [R; STATISTICS_CHANNELS],
+    told: [bool; STATISTICS_CHANNELS],
     contact: Contact<R>,
 }
 
@@ -70,8 +77,8 @@ impl<R: Real> Watch<R> {
     /// Before the first sample.
     pub fn new() -> Self {
         Watch {
-            averages: [R::of(0.0); EXPERIENCE_CHANNELS],
-            told: [false; EXPERIENCE_CHANNELS],
+            averages: [R::of(0.0); STATISTICS_CHANNELS],
+            told: [false; STATISTICS_CHANNELS],
             contact: Contact::new(),
         }
     }
@@ -81,12 +88,12 @@ impl<R: Real> Watch<R> {
     /// Without a hand (`has_hand` false) its six channels say nothing.
     pub fn step(
         &mut self,
-        experience: &Experience<R>,
+        statistics: &SensorStatistics<R>,
         progress: R,
-        values: &[R; EXPERIENCE_CHANNELS],
+        values: &[R; STATISTICS_CHANNELS],
         has_hand: bool,
     ) -> Option<Surprise> {
-        let deviations = experience.deviation(progress, values);
+        let deviations = statistics.z_score(progress, values);
         let mut worst: Option<(usize, R)> = None;
         let channels = self.averages.iter_mut().zip(&mut self.told).zip(deviations).enumerate();
         for (channel, ((average, told), deviation)) in channels {
@@ -118,7 +125,7 @@ impl<R: Real> Watch<R> {
 
     /// How far each channel is on the way to a surprise (spreads, never negative): the averaged deviation, of fingers only
     /// that of closing too far.
-    pub fn sizes(&self) -> [R; EXPERIENCE_CHANNELS] {
+    pub fn sizes(&self) -> [R; STATISTICS_CHANNELS] {
         core::array::from_fn(|channel| self.averages.get(channel).map_or(R::of(0.0), |average| size(channel, *average)))
     }
 
@@ -128,7 +135,7 @@ impl<R: Real> Watch<R> {
     }
 
     /// Averaged deviation of each channel (spreads), with its sign.
-    pub fn averages(&self) -> &[R; EXPERIENCE_CHANNELS] {
+    pub fn averages(&self) -> &[R; STATISTICS_CHANNELS] {
         &self.averages
     }
 }
@@ -160,7 +167,7 @@ impl<R: Real> Contact<R> {
     }
 
     /// Gives the axis of the force that is no longer felt, once.
-    fn step(&mut self, progress: R, values: &[R; EXPERIENCE_CHANNELS], has_hand: bool) -> Option<usize> {
+    fn step(&mut self, progress: R, values: &[R; STATISTICS_CHANNELS], has_hand: bool) -> Option<usize> {
         let [fx, fy, fz, .., q1, q2, q3] = *values;
         if has_hand {
             let start = *self.fingers.get_or_insert([q1, q2, q3]);
@@ -223,39 +230,39 @@ fn magnitude<R: Real>(value: R) -> R {
 mod tests {
     use super::*;
 
-    fn experience() -> Experience<f64> {
+    fn statistics() -> SensorStatistics<f64> {
         // Finger F1 closes to 1.5 rad; the force may wander.
         let mean = [0.0, 0.5, 1.0].map(|u| {
-            let mut point = [0.0; EXPERIENCE_CHANNELS];
+            let mut point = [0.0; STATISTICS_CHANNELS];
             point[9] = 0.25 + 1.25 * u;
             point
         });
-        let mut spread = [0.1; EXPERIENCE_CHANNELS];
+        let mut spread = [0.1; STATISTICS_CHANNELS];
         spread[0] = 1.0;
-        Experience::new(&mean, &[spread; 3], 10).expect("a valid experience")
+        SensorStatistics::new(&mean, &[spread; 3], 10).expect("valid statistics")
     }
 
-    fn values(finger: f64, force: f64) -> [f64; EXPERIENCE_CHANNELS] {
-        let mut values = [0.0; EXPERIENCE_CHANNELS];
+    fn values(finger: f64, force: f64) -> [f64; STATISTICS_CHANNELS] {
+        let mut values = [0.0; STATISTICS_CHANNELS];
         (values[0], values[9]) = (force, finger);
         values
     }
 
     #[test]
     fn a_run_within_the_band_surprises_nobody() {
-        let (experience, mut watch) = (experience(), Watch::new());
+        let (statistics, mut watch) = (statistics(), Watch::new());
         for tick in 0..300 {
             let u = f64::from(tick) / 300.0;
             let noise = if tick % 2 == 0 { 8.0 } else { -8.0 };
-            assert_eq!(watch.step(&experience, u, &values(0.25 + 1.25 * u + 0.1, noise), true), None);
+            assert_eq!(watch.step(&statistics, u, &values(0.25 + 1.25 * u + 0.1, noise), true), None);
         }
         assert!(watch.statistic() < 0.5, "{}", watch.statistic());
     }
 
     #[test]
     fn a_finger_that_closes_on_nothing_is_told_once_with_its_channel() {
-        let (experience, mut watch) = (experience(), Watch::new());
-        let mut told = (0..60).filter_map(|_| watch.step(&experience, 1.0, &values(2.35, 0.0), true));
+        let (statistics, mut watch) = (statistics(), Watch::new());
+        let mut told = (0..60).filter_map(|_| watch.step(&statistics, 1.0, &values(2.35, 0.0), true));
         assert_eq!(told.next().map(|surprise| surprise.channel), Some(9));
         assert_eq!(told.next(), None);
         assert!(watch.statistic() > 1.0);
@@ -263,24 +270,24 @@ mod tests {
 
     #[test]
     fn a_finger_that_stops_early_has_met_something_and_is_no_surprise() {
-        let (experience, mut watch) = (experience(), Watch::new());
+        let (statistics, mut watch) = (statistics(), Watch::new());
         for _ in 0..300 {
-            assert_eq!(watch.step(&experience, 1.0, &values(0.6, 0.0), true), None);
+            assert_eq!(watch.step(&statistics, 1.0, &values(0.6, 0.0), true), None);
         }
         assert_eq!(watch.statistic(), 0.0);
         assert!(watch.averages()[9] < -2.0 * LIMIT);
     }
 
-    /// An experience to which every force is usual.
-    fn indifferent() -> Experience<f64> {
-        let mut spread = [100.0; EXPERIENCE_CHANNELS];
+    /// Statistics to which every force is usual.
+    fn indifferent() -> SensorStatistics<f64> {
+        let mut spread = [100.0; STATISTICS_CHANNELS];
         spread[9] = 0.1;
-        Experience::new(&[[0.25; EXPERIENCE_CHANNELS]; 2], &[spread; 2], 10).expect("a valid experience")
+        SensorStatistics::new(&[[0.25; STATISTICS_CHANNELS]; 2], &[spread; 2], 10).expect("valid statistics")
     }
 
     /// Pushed with 2 N for two seconds, then with `then` N for two; gives what was told, and after which time (s).
     fn pushed(then: f64, finger: f64) -> (Option<(u8, f64)>, f64) {
-        let (experience, mut watch) = (indifferent(), Watch::new());
+        let (statistics, mut watch) = (indifferent(), Watch::new());
         let mut told = None;
         for tick in 0..1500 {
             let time = f64::from(tick) * PERIOD;
@@ -296,7 +303,7 @@ mod tests {
             if time > 2.9 {
                 values[9] = finger;
             }
-            if let Some(surprise) = watch.step(&experience, 0.5, &values, true) {
+            if let Some(surprise) = watch.step(&statistics, 0.5, &values, true) {
                 assert_eq!(told, None);
                 told = Some((surprise.channel, time));
             }
@@ -325,20 +332,20 @@ mod tests {
 
     #[test]
     fn a_single_wild_sample_is_no_surprise() {
-        let (experience, mut watch) = (experience(), Watch::new());
+        let (statistics, mut watch) = (statistics(), Watch::new());
         for wild in [1e9, f64::NAN, f64::NEG_INFINITY] {
-            assert_eq!(watch.step(&experience, 0.0, &values(0.25, wild), true), None);
+            assert_eq!(watch.step(&statistics, 0.0, &values(0.25, wild), true), None);
             for _ in 0..300 {
-                assert_eq!(watch.step(&experience, 0.0, &values(0.25, 0.0), true), None);
+                assert_eq!(watch.step(&statistics, 0.0, &values(0.25, 0.0), true), None);
             }
         }
     }
 
     #[test]
     fn without_a_hand_its_channels_say_nothing() {
-        let (experience, mut watch) = (experience(), Watch::new());
+        let (statistics, mut watch) = (statistics(), Watch::new());
         for _ in 0..300 {
-            assert_eq!(watch.step(&experience, 1.0, &values(0.0, 0.0), false), None);
+            assert_eq!(watch.step(&statistics, 1.0, &values(0.0, 0.0), false), None);
         }
     }
 }

@@ -5,11 +5,12 @@
 
 use core::fmt;
 
-use dmp::{Configuration, Primitive, PrimitiveError, PrimitiveTables};
+use dmp::PrimitiveError;
 use pinned_init::{Init, init};
 
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
+use crate::plan::primitive::{Configuration, MovementTables, Primitive, posture_and_hand, write_error};
 use crate::real::Real;
 use crate::units::{JointPositions, Orientation};
 
@@ -60,7 +61,7 @@ pub enum LoadError {
 impl fmt::Display for LoadError {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            LoadError::Primitive(error) => error.fmt(formatter),
+            LoadError::Primitive(error) => write_error(error, formatter),
             LoadError::Duration => write!(formatter, "the duration is outside {SHORTEST} to {LONGEST} s"),
             LoadError::Posture(end, joint) => {
                 write!(formatter, "J{} of the {end} posture lies outside its soft limits", joint + 1)
@@ -147,7 +148,7 @@ impl<R: Real> Tool<R> {
 /// [`LoadError`] names what is wrong; nothing is changed.
 pub fn primitive<R: Real, const N: usize>(
     model: &ArmModel<R>,
-    tables: &PrimitiveTables<'_, R>,
+    tables: &MovementTables<'_, R>,
 ) -> Result<Primitive<R, N>, LoadError> {
     let primitive = Primitive::new(tables).map_err(LoadError::Primitive)?;
     check(model, &primitive)?;
@@ -162,28 +163,29 @@ pub fn check<'a, R: Real, const N: usize>(
     model: &ArmModel<R>,
     primitive: &'a Primitive<R, N>,
 ) -> Result<Fit<'a, R, N>, LoadError> {
-    let duration = primitive.duration();
+    let duration = primitive.movement().duration();
     if !(duration >= R::of(SHORTEST) && duration <= R::of(LONGEST)) {
         return Err(LoadError::Duration);
     }
-    check_end(model, End::Start, primitive.start())?;
-    check_end(model, End::Goal, primitive.goal())?;
+    check_end(model, End::Start, primitive.movement().start())?;
+    check_end(model, End::Goal, primitive.movement().goal())?;
     Ok(Fit { primitive, tool: Tool::of(model) })
 }
 
 fn check_end<R: Real>(model: &ArmModel<R>, end: End, configuration: &Configuration<R>) -> Result<(), LoadError> {
+    let ([taught], (posture, _)) = (&configuration.poses, posture_and_hand(&configuration.points));
     let limits = model.soft_min.iter().zip(&model.soft_max);
-    for (joint, (q, (min, max))) in (0u8..).zip(configuration.posture.iter().zip(limits)) {
+    for (joint, (q, (min, max))) in (0u8..).zip(posture.iter().zip(limits)) {
         if !(q >= min && q <= max) {
             return Err(LoadError::Posture(end, joint));
         }
     }
-    let position = nalgebra::Vector3::from(configuration.position);
+    let position = nalgebra::Vector3::from(taught.position);
     if !within_reach(&position) {
         return Err(LoadError::OutOfReach(end));
     }
-    let pose = Frames::new(model, &JointPositions::from_array(configuration.posture)).tool_pose();
-    let orientation = Orientation(configuration.orientation.to_array());
+    let pose = Frames::new(model, &JointPositions::from_array(posture)).tool_pose();
+    let orientation = Orientation(taught.orientation.to_array());
     let (offset, turn) = (pose.position - position, pose.orientation.error_to(&orientation));
     let near = offset.dot(&offset) <= R::of(POSE_MISMATCH * POSE_MISMATCH);
     let aligned = turn.dot(&turn) <= R::of(TURN_MISMATCH * TURN_MISMATCH);

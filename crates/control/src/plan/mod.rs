@@ -3,6 +3,7 @@
 pub mod approach;
 pub mod hand;
 pub mod load;
+pub mod primitive;
 pub mod reference;
 pub(crate) mod run;
 

@@ -1,8 +1,10 @@
 //! What a plan asks for at one tick: of the joints, of the tool, of the hand.
 
+use dmp::PoseReference;
 use nalgebra::Vector3;
 
 use crate::model::hand::DIGITS;
+use crate::plan::primitive::{Reference, posture_and_hand};
 use crate::real::Real;
 use crate::units::{JointAccelerations, JointPositions, JointVelocities, Orientation, Pose, Vector6, Vector7};
 
@@ -41,21 +43,21 @@ pub struct TaskReference<R: Real> {
 
 impl<R: Real> TaskReference<R> {
     /// From the plan of a primitive, whose angular quantities are in body axes.
-    pub fn from_plan(plan: &dmp::Reference<R>) -> Self {
-        let orientation = &plan.orientation;
-        let [vx, vy, vz] = plan.position.v;
-        let [ax, ay, az] = plan.position.a;
+    pub fn from_plan(plan: &Reference<R>) -> Self {
+        let [PoseReference { position, orientation }] = &plan.poses;
+        let [vx, vy, vz] = position.v;
+        let [ax, ay, az] = position.a;
         let [wx, wy, wz] = orientation.omega_world();
         let [bx, by, bz] = orientation.domega_world();
         TaskReference {
             pose: Pose {
-                position: Vector3::from(plan.position.x),
+                position: Vector3::from(position.x),
                 orientation: Orientation(orientation.quaternion.to_array()),
             },
             velocity: Vector6::new(vx, vy, vz, wx, wy, wz),
             acceleration: Vector6::new(ax, ay, az, bx, by, bz),
-            posture: Vector7::from(plan.posture.x),
-            posture_velocity: Vector7::from(plan.posture.v),
+            posture: Vector7::from(posture_and_hand(&plan.points.x).0),
+            posture_velocity: Vector7::from(posture_and_hand(&plan.points.v).0),
         }
     }
 }

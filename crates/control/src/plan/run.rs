@@ -1,11 +1,12 @@
 //! `Run`: the loaded primitive in motion: its rollout, the options of this run, and the decision that it is over.
 
-use dmp::{Configuration, Coupling, Primitive, Quaternion, Reference, Rollout, RolloutError, SensorMap, StartState};
+use dmp::{Quaternion, RolloutError};
 use nalgebra::Vector3;
 
 use crate::command::{Goal, Refusal, RunOptions};
 use crate::guard::watch::{Surprise, Watch};
 use crate::plan::load::within_reach;
+use crate::plan::primitive::{Coupling, Primitive, Reference, Rollout, StartState, configuration, posture_and_hand};
 use crate::real::Real;
 use crate::sense::deviation::{Deviation, SmoothedWrench};
 use crate::sense::hand::HandState;
@@ -130,7 +131,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             if !self.options.finger_feedback {
                 seen.gauges = [R::of(0.0); 3];
             }
-            self.coupling = self.rollout.coupling(primitive, &seen.sensors(), &SensorMap::IDENTITY)?;
+            self.coupling = primitive.coupling(&self.rollout, &seen.error())?;
         }
         // A plan that springs back tips what has just been grasped, and one that goes on giving way pulls at it.
         if bends && self.rollout.is_finished() && self.kept == FADE {
@@ -138,27 +139,28 @@ impl<R: Real, const N: usize> Run<R, N> {
             self.coupling = Coupling::NONE;
             self.settled = true;
         }
-        let coupling = part(&self.coupling, self.kept());
-        let plan = self.rollout.step(primitive, R::of(PERIOD), &coupling)?;
+        let kept = self.kept();
+        let coupling = self.coupling.map(|value| value * kept);
+        let plan = self.rollout.step(primitive.movement(), R::of(PERIOD), &coupling)?;
+        let (posture, hand) = posture_and_hand(&plan.points.v);
         let slow =
             |speeds: &[R], limit: f64| speeds.iter().all(|speed| *speed < R::of(limit) && *speed > R::of(-limit));
         let resting = self.rollout.is_finished()
-            && slow(&plan.position.v, REST.0)
-            && slow(&plan.orientation.omega, REST.1)
-            && slow(&plan.posture.v, REST.1)
-            && slow(&plan.hand.v, HAND_REST);
+            && plan.poses.iter().all(|pose| slow(&pose.position.v, REST.0) && slow(&pose.orientation.omega, REST.1))
+            && slow(&posture, REST.1)
+            && slow(&hand, HAND_REST);
         self.rested = if resting { self.rested.saturating_add(1) } else { 0 };
         Ok(plan)
     }
 
-    /// Compares what is felt with the experience of the primitive, if it has one; tells what has just become a surprise.
+    /// Compares the measured values with the statistics of the primitive, if it has any; returns what has just become a surprise.
     pub(crate) fn watch(
         &mut self,
         primitive: &Primitive<R, N>,
         wrench: &Wrench<R>,
         hand: Option<&HandState<R>>,
     ) -> Option<Surprise> {
-        let experience = primitive.experience()?;
+        let statistics = primitive.statistics()?;
         let (f, n) = (&wrench.force, &wrench.torque);
         let zero = [R::of(0.0); 3];
         let [g1, g2, g3] = hand.map_or(zero, |hand| hand.gauges);
@@ -167,10 +169,10 @@ impl<R: Real, const N: usize> Run<R, N> {
             fingers
         });
         let values = [f.x, f.y, f.z, n.x, n.y, n.z, g1, g2, g3, q1, q2, q3];
-        self.watch.step(experience, self.rollout.progress(), &values, hand.is_some())
+        self.watch.step(statistics, self.rollout.progress(), &values, hand.is_some())
     }
 
-    /// The largest deviation from the experience, 1 at the limit of a surprise; 0 without an experience.
+    /// The largest z-score, 1 at the limit of a surprise; 0 without statistics.
     pub(crate) fn surprise(&self) -> R {
         self.watch.statistic()
     }
@@ -184,11 +186,7 @@ impl<R: Real, const N: usize> Run<R, N> {
     /// another time than the recording of the expectation.
     pub(crate) fn is_faded(&self, primitive: &Primitive<R, N>) -> bool {
         let uses_force = self.options.feedback || self.options.force_control;
-        let derated = self.options.feedback
-            && primitive.expected().is_some_and(|expected| {
-                let relative = expected.recorded_duration() / primitive.duration() * self.rollout.speed();
-                expected.trust(relative) < R::of(1.0)
-            });
+        let derated = self.options.feedback && primitive.trust(&self.rollout) < R::of(1.0);
         (uses_force && self.kept < FADE) || derated
     }
 
@@ -217,12 +215,12 @@ pub(crate) fn start<R: Real, const N: usize>(
     hand: Option<&HandState<R>>,
     options: &RunOptions,
 ) -> Result<Rollout<R, N>, Refusal> {
-    let taught = primitive.start();
+    let (taught_posture, taught_hand) = posture_and_hand(&primitive.movement().start().points);
     let far = |(q, start): (&R, &R)| {
         let distance = *q - *start;
         !(distance <= R::of(START_DISTANCE) && distance >= R::of(-START_DISTANCE))
     };
-    if q.0.iter().zip(&taught.posture).any(far) {
+    if q.0.iter().zip(&taught_posture).any(far) {
         return Err(Refusal::StartTooFar);
     }
     let hand = match hand {
@@ -231,21 +229,15 @@ pub(crate) fn start<R: Real, const N: usize>(
                 let distance = *q - *start;
                 !(distance <= R::of(HAND_DISTANCE) && distance >= R::of(-HAND_DISTANCE))
             };
-            if state.q.iter().zip(&taught.hand).any(far) {
+            if state.q.iter().zip(&taught_hand).any(far) {
                 return Err(Refusal::HandTooFar);
             }
             state.q
         }
-        None => taught.hand,
+        None => taught_hand,
     };
-    let [w, x, y, z] = pose.orientation.0;
-    let start = StartState::at_rest(Configuration {
-        position: pose.position.into(),
-        orientation: Quaternion::new(w, x, y, z),
-        posture: q.0.into(),
-        hand,
-    });
-    let mut rollout = Rollout::start(primitive, &start).map_err(reason)?;
+    let start = StartState::at_rest(configuration(pose.position.into(), pose.orientation.0, q.0.into(), hand));
+    let mut rollout = Rollout::start(primitive.movement(), &start).map_err(reason)?;
     // The first speed acts at once; later ones are approached at the rollout's slew rate.
     rollout.set_speed_slew(None).map_err(reason)?;
     set_speed(&mut rollout, primitive, options.speed)?;
@@ -271,11 +263,11 @@ fn set_goal<R: Real, const N: usize>(
         if !within_reach(&Vector3::from(position)) {
             return Err(Refusal::OutsideWorkspace);
         }
-        next.set_goal_position(position).map_err(reason)?;
+        next.set_goal_position(0, position).map_err(reason)?;
     }
     if let Some(orientation) = goal.orientation {
         let [w, x, y, z] = orientation.map(|value| R::of(f64::from(value)));
-        next.set_goal_orientation(primitive, Quaternion::new(w, x, y, z)).map_err(reason)?;
+        next.set_goal_orientation(primitive.movement(), 0, Quaternion::new(w, x, y, z)).map_err(reason)?;
     }
     *rollout = next;
     Ok(())
@@ -290,16 +282,7 @@ fn set_speed<R: Real, const N: usize>(
     if !(factor >= SPEEDS.0 && factor <= SPEEDS.1) {
         return Err(Refusal::OutOfRange);
     }
-    rollout.set_speed(primitive, R::of(f64::from(factor))).map_err(reason)
-}
-
-/// A share of a feedback.
-fn part<R: Real>(of: &Coupling<R>, share: R) -> Coupling<R> {
-    Coupling {
-        position: of.position.map(|value| value * share),
-        orientation: of.orientation.map(|value| value * share),
-        hand: of.hand.map(|value| value * share),
-    }
+    rollout.set_speed(primitive.movement(), R::of(f64::from(factor))).map_err(reason)
 }
 
 /// Every reason a rollout gives is a number out of range.

@@ -1,12 +1,15 @@
 //! `Deviation`: how what is felt differs from what is expected, the one input of Eq (8), Eq (12) and Eq (14).
 
-use dmp::SENSORS;
 use nalgebra::Vector3;
 
 use crate::real::Real;
 use crate::sense::filter::{Butterworth, LowPass};
 use crate::time::RATE;
 use crate::units::{Vector6, Wrench};
+
+/// Sensor values: force x, y, z (N, world axes), torque x, y, z (N m, tool axes at the grasp point), torque of the
+/// environment on finger F1, F2, F3 (N m).
+pub const SENSORS: usize = 9;
 
 /// Force (N) that counts as none: the bias and hysteresis of the sensor that a tare leaves would otherwise move the plan by
 /// centimetres.
@@ -54,11 +57,9 @@ impl<R: Real> Deviation<R> {
         Deviation { wrench: wrench.beyond_dead_band(), ..*self }
     }
 
-    /// The sensor values that Eq (8) is to see: what is expected, plus the deviation beyond the dead band.
-    pub fn sensors(&self) -> [R; SENSORS] {
-        let force = self.expected.force + self.wrench.force;
-        let torque = self.expected.torque + self.wrench.torque;
-        let [f1, f2, f3]: [R; 3] = core::array::from_fn(|finger| self.expected_gauges[finger] + self.gauges[finger]);
+    /// The error of Eq (8): the deviation of each sensor beyond the dead band.
+    pub fn error(&self) -> [R; SENSORS] {
+        let (Wrench { force, torque }, [f1, f2, f3]) = (&self.wrench, self.gauges);
         [force.x, force.y, force.z, torque.x, torque.y, torque.z, f1, f2, f3]
     }
 }

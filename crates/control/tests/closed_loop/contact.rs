@@ -187,6 +187,6 @@ fn a_run_that_needs_the_wrench_is_refused_or_stopped_without_it() {
 
 #[test]
 fn the_goal_configuration_belongs_to_its_posture() {
-    let goal = configuration::<f64>(GOAL);
+    let [goal] = configuration::<f64>(GOAL, [0.0; 4]).poses;
     assert!((goal.position[0] - 0.75).abs() < 0.05 && (goal.position[1] - 0.20).abs() < 0.05, "{goal:?}");
 }

@@ -4,11 +4,12 @@ use control::Payload;
 use control::Real;
 use control::model::{ArmModel, Frames};
 use control::plan::load;
-use control::units::JointPositions;
-use dmp::{
-    Configuration, ExpectedWrench, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, Primitive,
-    PrimitiveTables, Quaternion, Velocity,
+use control::plan::primitive::{
+    Configuration, ExpectedWrench, Feedback, GainSchedule, MovementTables, Primitive, ROWS, SENSORS, Velocity,
+    configuration as rows, gains, limits,
 };
+use control::units::JointPositions;
+use dmp::{Hemisphere, OrientationError};
 
 use crate::rig::KERNELS;
 
@@ -21,21 +22,16 @@ pub(crate) const DISPLACEMENT: f64 = 0.1;
 pub(crate) const ROTATION: f64 = 0.4;
 
 /// The pose and posture of the arm at `q`.
-pub(crate) fn configuration<R: Real>(q: [f64; 7]) -> Configuration<R> {
+pub(crate) fn configuration<R: Real>(q: [f64; 7], hand: [f64; 4]) -> Configuration<R> {
     let model = ArmModel::<f64>::new(Payload::SensorAndHand);
     let pose = Frames::new(&model, &JointPositions::from_array(q)).tool_pose();
-    let [w, x, y, z] = pose.orientation.0.map(R::of);
-    Configuration {
-        position: [0, 1, 2].map(|axis| R::of(pose.position[axis])),
-        orientation: Quaternion::new(w, x, y, z),
-        posture: q.map(R::of),
-        hand: [0.0, 0.25, 0.25, 0.25].map(R::of),
-    }
+    let position = [0, 1, 2].map(|axis| R::of(pose.position[axis]));
+    rows(position, pose.orientation.0.map(R::of), q.map(R::of), hand.map(R::of))
 }
 
 /// Weights that bend the position path by a few centimetres and the orientation by some degrees.
 fn weights<R: Real>() -> Vec<R> {
-    (0..dmp::ROWS)
+    (0..ROWS)
         .flat_map(|row| {
             (0..KERNELS).map(move |kernel| {
                 let place = (kernel as f64 + 0.5) / KERNELS as f64;
@@ -90,42 +86,40 @@ pub(crate) fn primitive<R: Real>(design: &Design) -> Primitive<R, KERNELS> {
     let zero = R::of(0.0);
     let stiffness = R::of(200.0);
     let critical = R::of(2.0 * 200f64.sqrt());
-    let weights = if design.bent { weights() } else { vec![zero; dmp::ROWS * KERNELS] };
+    let weights = if design.bent { weights() } else { vec![zero; ROWS * KERNELS] };
     let [p, o, h] = design.sensitivity;
     let feedback = design.expected.map(|_| {
         Feedback::new(
             GainSchedule::constant([p, p, p, o, o, o, 0.0, h, h, h].map(R::of)).expect("gains"),
-            GainSchedule::constant([R::of(1.0); dmp::SENSORS]).expect("gains"),
-            Limits { displacement: R::of(DISPLACEMENT), rotation: R::of(ROTATION), hand: R::of(0.8) },
+            GainSchedule::constant([R::of(1.0); SENSORS]).expect("gains"),
+            limits(R::of(DISPLACEMENT), R::of(ROTATION), R::of(0.8)),
         )
         .expect("gains")
     });
     let expected = design.expected.map(|wrench| {
-        let mut row = [zero; dmp::SENSORS];
+        let mut row = [zero; SENSORS];
         for (entry, value) in row.iter_mut().zip(wrench.into_iter().chain(design.expected_gauges)) {
             *entry = R::of(value);
         }
         ExpectedWrench::new(&[row, row], R::of(design.recorded.unwrap_or(design.duration))).expect("an expectation")
     });
-    let tables = PrimitiveTables {
+    let tables = MovementTables {
+        control_period: R::of(control::PERIOD),
         duration: R::of(design.duration),
         alpha: R::of(-(0.01f64).ln()),
         activation: R::of(0.7),
         kernel_count: KERNELS,
         weights: &weights,
-        stiffness: [stiffness; 4],
-        damping: [critical, R::of(20.0), critical, critical],
+        gains: gains([stiffness; 4], [critical, R::of(20.0), critical, critical]),
         orientation_error: OrientationError::Quaternion,
         hemisphere: Hemisphere::Nearest,
-        start: configuration(design.start),
-        goal: Configuration {
-            hand: [0.0, design.closed, design.closed, design.closed].map(R::of),
-            ..configuration(design.goal)
-        },
-        start_velocity: Velocity { position: [zero; 3], orientation: [zero; 3], posture: [zero; 7], hand: [zero; 4] },
-        feedback: feedback.as_ref(),
-        expected: expected.as_ref(),
-        experience: None,
+        start: configuration(design.start, [0.0, 0.25, 0.25, 0.25]),
+        goal: configuration(design.goal, [0.0, design.closed, design.closed, design.closed]),
+        start_velocity: Velocity::ZERO,
     };
-    load::primitive(&ArmModel::new(Payload::SensorAndHand), &tables).expect("a movement this arm can run")
+    let model = ArmModel::new(Payload::SensorAndHand);
+    let mut primitive = load::primitive(&model, &tables).expect("a movement this arm can run");
+    primitive.set_feedback(feedback.as_ref());
+    primitive.set_expected(expected.as_ref());
+    primitive
 }

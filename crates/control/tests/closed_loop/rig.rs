@@ -11,11 +11,11 @@ use control::command::Command;
 use control::law::Gains;
 use control::model::{ArmModel, Frames};
 use control::plan::load;
+use control::plan::primitive::Primitive;
 use control::units::{JointPositions, JointVelocities, Vector7};
 use control::{
     BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, LoadRefusal, Payload, RATE, Real, State, model,
 };
-use dmp::Primitive;
 use nalgebra::{SMatrix, Vector3};
 use pinned_init::InPlaceWrite;
 use puck::{Action, CanFrame, Counts, Group, RawWrench, Request, SafetyMode};

@@ -63,7 +63,7 @@ fn run_disturbed<R: Real>(rig: &mut Rig<R>, options: RunOptions, change: impl Fn
     }
     rig.run_for(1.0);
     let pose = rig.plant.frames().tool_pose();
-    let goal = primitive::<f64>(&Design::default()).goal().to_owned();
+    let [goal] = primitive::<f64>(&Design::default()).movement().goal().poses;
     quality.goal_position = (pose.position - nalgebra::Vector3::from(goal.position)).norm();
     quality.goal_angle = pose.orientation.error_to(&Orientation(goal.orientation.to_array())).norm();
     quality.position_rms = (quality.position_rms / count).sqrt();
@@ -166,7 +166,7 @@ fn a_goal_set_in_flight_is_reached() {
     rig.run_for(2.0);
     rig.command(Command::Run(RunOptions::default()));
     rig.run_for(1.0);
-    let goal = configuration::<f64>(GOAL).position;
+    let goal = configuration::<f64>(GOAL, [0.0; 4]).poses[0].position;
     let moved = [goal[0] - 0.05, goal[1] + 0.04, goal[2] + 0.03];
     rig.command(Command::SetGoal(Goal { position: Some(moved.map(|value| value as f32)), orientation: None }));
     rig.until(State::Hold, 15.0);

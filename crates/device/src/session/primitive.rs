@@ -3,7 +3,8 @@
 use control::model::ArmModel;
 use control::plan::load;
 use control::plan::load::LoadError;
-use dmp::{Configuration, Hemisphere, Limits, OrientationError, PrimitiveTables, Quaternion, Velocity};
+use control::plan::primitive::{self, Configuration, MovementTables, configuration, gains, limits, velocity};
+use dmp::{Hemisphere, OrientationError};
 use link::Refusal;
 use link::image::{
     EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT, EXPERIENCE_ROWS, GAIN_POINTS_LIMIT, HemisphereKind,
@@ -18,10 +19,10 @@ use crate::session::wire::PrimitiveTrouble;
 // The image's limits must not exceed what the control half can hold; a table that does not fit would be refused
 // only after its upload.
 const _: () = assert!(KERNEL_LIMIT <= control::MAX_KERNELS);
-const _: () = assert!(GAIN_POINTS_LIMIT <= dmp::GAIN_CAPACITY);
-const _: () = assert!(EXPECTATION_POINTS_LIMIT <= dmp::EXPECTED_CAPACITY);
-const _: () = assert!(EXPERIENCE_POINTS_LIMIT <= dmp::EXPERIENCE_CAPACITY);
-const _: () = assert!(EXPERIENCE_ROWS == dmp::EXPERIENCE_CHANNELS);
+const _: () = assert!(GAIN_POINTS_LIMIT <= primitive::GAIN_CAPACITY);
+const _: () = assert!(EXPECTATION_POINTS_LIMIT <= primitive::EXPECTED_CAPACITY);
+const _: () = assert!(EXPERIENCE_POINTS_LIMIT <= primitive::STATISTICS_CAPACITY);
+const _: () = assert!(EXPERIENCE_ROWS == primitive::STATISTICS_CHANNELS);
 
 /// Buffer to copy the weights into, because those of an image are not aligned.
 pub(crate) type WeightBuffer = [f32; WEIGHT_ROWS * KERNEL_LIMIT];
@@ -66,15 +67,15 @@ pub(crate) fn build<'a>(
         recorded_filter::check(content.marks.filter_cutoff).map_err(Unfit::Filter)?;
     }
     let weights = content.weights.copy_to(weights_buffer).unwrap_or_default();
-    let velocity = &content.start_velocity;
-    let tables = PrimitiveTables {
+    let start_velocity = &content.start_velocity;
+    let tables = MovementTables {
+        control_period: control::PERIOD as f32,
         duration: content.duration,
         alpha: content.alpha,
         activation: content.activation,
         kernel_count: content.kernels,
         weights,
-        stiffness: content.stiffness,
-        damping: content.damping,
+        gains: gains(content.stiffness, content.damping),
         orientation_error: match content.orientation_error {
             OrientationErrorKind::QuaternionDifference => OrientationError::Quaternion,
             OrientationErrorKind::RotationVector => OrientationError::RotationVector,
@@ -83,23 +84,19 @@ pub(crate) fn build<'a>(
             HemisphereKind::Demonstrated => Hemisphere::Demonstrated,
             HemisphereKind::Nearest => Hemisphere::Nearest,
         },
-        start: configuration(&content.start),
-        goal: configuration(&content.goal),
-        start_velocity: Velocity {
-            position: velocity.position,
-            orientation: velocity.orientation,
-            posture: velocity.posture,
-            hand: velocity.hand,
-        },
-        // These follow, number by number.
-        feedback: None,
-        expected: None,
-        experience: None,
+        start: waypoint(&content.start),
+        goal: waypoint(&content.goal),
+        start_velocity: velocity(
+            start_velocity.position,
+            start_velocity.orientation,
+            start_velocity.posture,
+            start_velocity.hand,
+        ),
     };
     primitive.assign(&tables).map_err(|error| PrimitiveTrouble::from(LoadError::Primitive(error)))?;
     if !content.k1.is_empty() {
         let clamps = &content.clamps;
-        let limits = Limits { displacement: clamps.position, rotation: clamps.orientation, hand: clamps.hand };
+        let limits = limits(clamps.position, clamps.orientation, clamps.hand);
         primitive.assign_feedback(content.k1.iter(), content.k2.iter(), limits).map_err(PrimitiveTrouble::feedback)?;
     }
     if !content.expected_mean.is_empty() {
@@ -109,17 +106,11 @@ pub(crate) fn build<'a>(
     }
     if !content.experience_mean.is_empty() {
         let (mean, spread) = (content.experience_mean.iter(), content.experience_spread.iter());
-        primitive.assign_experience(mean, spread, content.experience_trials).map_err(PrimitiveTrouble::experience)?;
+        primitive.assign_statistics(mean, spread, content.experience_trials).map_err(PrimitiveTrouble::experience)?;
     }
     load::check(model, primitive).map_err(|error| PrimitiveTrouble::from(error).into())
 }
 
-fn configuration(waypoint: &Waypoint) -> Configuration<f32> {
-    let [w, x, y, z] = waypoint.orientation;
-    Configuration {
-        position: waypoint.position,
-        orientation: Quaternion::new(w, x, y, z),
-        posture: waypoint.posture,
-        hand: waypoint.hand,
-    }
+fn waypoint(waypoint: &Waypoint) -> Configuration<f32> {
+    configuration(waypoint.position, waypoint.orientation, waypoint.posture, waypoint.hand)
 }

@@ -5,8 +5,9 @@
 use core::fmt;
 
 use control::plan::load::{End, LoadError};
+use control::plan::primitive::{ORIENTATION_ROWS, POSITION_ROWS, RowGroup};
 use control::{CalibrationError, CycleRecord};
-use dmp::{Entry, GainError, Part, PrimitiveError, Row, TableError};
+use dmp::{Entry, GainError, Group, Part, PrimitiveError, TableError};
 use link::{Event as LinkEvent, EventKind as LinkKind, HandStage, Refusal as LinkRefusal, Telemetry};
 use puck::Node;
 
@@ -181,10 +182,9 @@ impl fmt::Display for StartupTrouble {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PrimitiveTrouble(pub [u32; 2]);
 
-/// Gain groups and errors in the order of their numbers.
-const ROWS: [Row; 4] = [Row::Position, Row::Orientation, Row::Posture, Row::Hand];
+/// Errors in the order of their numbers.
 const GAINS: [GainError; 2] = [GainError::Stiffness, GainError::Damping];
-const PLAIN: [PrimitiveError; 12] = [
+const PLAIN: [PrimitiveError; 13] = [
     PrimitiveError::Duration,
     PrimitiveError::Alpha,
     PrimitiveError::KernelCount,
@@ -197,6 +197,7 @@ const PLAIN: [PrimitiveError; 12] = [
     PrimitiveError::StartNotUnit,
     PrimitiveError::GoalNotUnit,
     PrimitiveError::TurnsTooFar,
+    PrimitiveError::ControlPeriod,
 ];
 
 const PARTS: [Part; 3] = [Part::Start, Part::Goal, Part::StartVelocity];
@@ -232,12 +233,13 @@ impl PrimitiveTrouble {
         let (kind, point, column) = match entry {
             Entry::Displacement => (0, 0, 0),
             Entry::Rotation => (1, 0, 0),
-            Entry::Hand => (2, 0, 0),
+            Entry::PointDisplacement => (2, 0, 0),
             Entry::Sensitivity { point, column } => (3, point, column),
             Entry::SensorWeight { point, column } => (4, point, column),
             Entry::Expected { point, column } => (5, point, column),
             Entry::Mean { point, column } => (6, point, column),
             Entry::Spread { point, column } => (7, point, column),
+            _ => return None,
         };
         Some(Self([TABLE_VALUE, kind << 16 | u32::from(point) << 8 | u32::from(column)]))
     }
@@ -251,7 +253,7 @@ impl PrimitiveTrouble {
         Some(match kind {
             0 => Entry::Displacement,
             1 => Entry::Rotation,
-            2 => Entry::Hand,
+            2 => Entry::PointDisplacement,
             3 => Entry::Sensitivity { point, column },
             4 => Entry::SensorWeight { point, column },
             5 => Entry::Expected { point, column },
@@ -277,20 +279,29 @@ fn item<T: Copy>(list: &[T], index: u32) -> Option<T> {
 
 impl From<LoadError> for PrimitiveTrouble {
     fn from(error: LoadError) -> Self {
+        let number = |group: RowGroup| place(&RowGroup::ALL, &group);
         let end = |end: End| match end {
             End::Start => 0,
             End::Goal => 1,
         };
         Self(match error {
-            LoadError::Primitive(PrimitiveError::Gains(row, gain)) => {
-                [2, place(&ROWS, &row) * 2 + place(&GAINS, &gain)]
+            LoadError::Primitive(PrimitiveError::Gains { group, index, error }) => {
+                [2, number(RowGroup::of(group, index).0) * 2 + place(&GAINS, &error)]
             }
-            LoadError::Primitive(PrimitiveError::Unstable(row)) => [3, place(&ROWS, &row)],
-            LoadError::Primitive(PrimitiveError::WeightTooLarge { row, kernel }) => {
-                [11, u32::from(row) << 8 | u32::from(kernel)]
+            LoadError::Primitive(PrimitiveError::Unstable { group, index }) => {
+                [3, number(RowGroup::of(group, index).0)]
             }
-            LoadError::Primitive(PrimitiveError::TooLarge { part, row, index }) => {
-                [12, place(&PARTS, &part) << 16 | place(&ROWS, &row) << 8 | u32::from(index)]
+            LoadError::Primitive(PrimitiveError::WeightTooLarge { group, index, kernel }) => {
+                let first = match group {
+                    Group::Position => 0,
+                    Group::Orientation => POSITION_ROWS,
+                    _ => POSITION_ROWS + ORIENTATION_ROWS,
+                };
+                [11, (first as u32 + u32::from(index)) << 8 | u32::from(kernel)]
+            }
+            LoadError::Primitive(PrimitiveError::TooLarge { part, group, index }) => {
+                let (group, index) = RowGroup::of(group, index);
+                [12, place(&PARTS, &part) << 16 | number(group) << 8 | u32::from(index)]
             }
             LoadError::Primitive(plain) => [1, place(&PLAIN, &plain)],
             LoadError::Duration => [4, 0],
@@ -307,20 +318,27 @@ impl PrimitiveTrouble {
         let end = |bit: u32| if bit == 0 { End::Start } else { End::Goal };
         Some(match code {
             1 => LoadError::Primitive(item(&PLAIN, detail)?),
-            2 => LoadError::Primitive(PrimitiveError::Gains(item(&ROWS, detail / 2)?, item(&GAINS, detail % 2)?)),
-            3 => LoadError::Primitive(PrimitiveError::Unstable(item(&ROWS, detail)?)),
+            2 => {
+                let (group, index) = item(&RowGroup::ALL, detail / 2)?.row(0);
+                LoadError::Primitive(PrimitiveError::Gains { group, index, error: item(&GAINS, detail % 2)? })
+            }
+            3 => {
+                let (group, index) = item(&RowGroup::ALL, detail)?.row(0);
+                LoadError::Primitive(PrimitiveError::Unstable { group, index })
+            }
             4 => LoadError::Duration,
             5 => LoadError::Posture(end(detail >> 8), u8::try_from(detail & 0xFF).ok()?),
             6 => LoadError::OutOfReach(end(detail)),
             7 => LoadError::Inconsistent(end(detail)),
             11 => {
                 let [kernel, row, _, _] = detail.to_le_bytes();
-                LoadError::Primitive(PrimitiveError::WeightTooLarge { row, kernel })
+                let (group, index) = Group::of_weights(row.into(), 1);
+                LoadError::Primitive(PrimitiveError::WeightTooLarge { group, index: u8::try_from(index).ok()?, kernel })
             }
             12 => {
                 let [index, row, part, _] = detail.to_le_bytes();
-                let (part, row) = (item(&PARTS, part.into())?, item(&ROWS, row.into())?);
-                LoadError::Primitive(PrimitiveError::TooLarge { part, row, index })
+                let (part, (group, index)) = (item(&PARTS, part.into())?, item(&RowGroup::ALL, row.into())?.row(index));
+                LoadError::Primitive(PrimitiveError::TooLarge { part, group, index })
             }
             _ => return None,
         })

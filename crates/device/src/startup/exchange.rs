@@ -5,7 +5,7 @@ use puck::{Node, PropertyId, get};
 use crate::bus::Outlet;
 
 /// How long an answer may take, us. A puck in wake-up needs up to 50 ms; all others answer within 1 ms.
-const PATIENCE_US: u64 = 50_000;
+const TIMEOUT_US: u64 = 50_000;
 /// How often a question is put before the node counts as silent. A lost frame must not fail a start-up.
 const ATTEMPTS: u8 = 3;
 
@@ -38,7 +38,7 @@ pub struct Exchange {
 impl Exchange {
     /// Puts the question, or looks how it stands. To be called with the same arguments until it is no longer pending.
     pub fn ask(&mut self, node: Node, property: PropertyId, outlet: &mut impl Outlet) -> Answer {
-        let deadline_us = outlet.now_us() + PATIENCE_US;
+        let deadline_us = outlet.now_us() + TIMEOUT_US;
         match &mut self.question {
             Some(question) if question.node == node && question.property == property => {
                 if let Some(value) = question.value {

@@ -31,7 +31,7 @@ pub(super) const ENUMERATED: core::ops::RangeInclusive<u8> = 1..=31;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Step {
     /// Take off what torque may still be applied: frames 0 and 1 zero torques, then MODE IDLE to the arm and to the hand.
-    Hush { frame: u8 },
+    ZeroTorques { frame: u8 },
     /// Ask this node for its STAT.
     Enumerate { node: u8, powered: bool },
     /// Hear the last answers.
@@ -130,7 +130,7 @@ impl Startup {
     /// were sent, and a board that was reset does not know whether its arm is ACTIVE.
     pub(crate) fn new() -> Startup {
         Startup {
-            step: Step::Hush { frame: 0 },
+            step: Step::ZeroTorques { frame: 0 },
             exchange: Exchange::default(),
             survey: Survey::new(),
             hand: HandSurvey::default(),
@@ -155,7 +155,7 @@ impl Startup {
     /// How far it has come.
     pub(crate) fn stage(&self) -> Stage {
         match self.step {
-            Step::Hush { .. } | Step::Enumerate { .. } | Step::Listen { .. } => Stage::Enumerating,
+            Step::ZeroTorques { .. } | Step::Enumerate { .. } | Step::Listen { .. } => Stage::Enumerating,
             Step::IdentifySafety { .. } | Step::LoadLimit { .. } => Stage::LoadingLimits,
             Step::AwaitIdle { .. } => Stage::WaitingForIdle,
             Step::Identify { .. } | Step::Wake { .. } | Step::Silence { .. } => Stage::Waking,
@@ -263,7 +263,7 @@ impl Startup {
     /// Does what the present step asks.
     fn perform(&mut self, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
         match self.step {
-            Step::Hush { frame } => Ok(self.hush(frame, outlet)),
+            Step::ZeroTorques { frame } => Ok(self.take_torque_off(frame, outlet)),
             Step::Enumerate { node, powered } => Ok(self.enumerate(node, powered, outlet)),
             Step::Listen { until_us, .. } if outlet.now_us() < until_us => Ok(Next::Stay),
             Step::Listen { powered: false, .. } => {

@@ -16,9 +16,9 @@ const ENUMERATIONS: u8 = 6;
 const WAKE_SILENCE_US: u64 = 1_000_000;
 
 impl Startup {
-    pub(super) fn hush(&self, frame: u8, outlet: &mut impl Outlet) -> Next {
+    pub(super) fn take_torque_off(&self, frame: u8, outlet: &mut impl Outlet) -> Next {
         match stop_frames().get(usize::from(frame)) {
-            Some(content) => after(outlet.send(*content), Step::Hush { frame: frame + 1 }),
+            Some(content) => after(outlet.send(*content), Step::ZeroTorques { frame: frame + 1 }),
             None => Next::Go(Step::Enumerate { node: *ENUMERATED.start(), powered: false }),
         }
     }

@@ -41,7 +41,7 @@ pub(super) struct Journal {
 }
 
 /// What the journal says at start-up.
-pub(super) struct Account {
+pub(super) struct JournalState {
     pub(super) journal: Journal,
     /// The sector whose erase was not ticked off.
     pub(super) unfinished: Option<u16>,
@@ -49,7 +49,7 @@ pub(super) struct Account {
 
 impl Journal {
     /// Reads the journal at `base`. `None`: there is none, the region is not ours.
-    pub(super) async fn read<F: NorFlash>(flash: &mut F, base: u32) -> Result<Option<Account>, F::Error> {
+    pub(super) async fn read<F: NorFlash>(flash: &mut F, base: u32) -> Result<Option<JournalState>, F::Error> {
         let mut newest: Option<(u32, Matter, u32)> = None;
         let mut ends = [0; SECTORS as usize];
         for (half, end) in (0..SECTORS).zip(&mut ends) {
@@ -73,7 +73,7 @@ impl Journal {
         Ok(newest.map(|(number, matter, half)| {
             let next = ends.get(half as usize).copied().unwrap_or(u32::MAX);
             let unfinished = if let Matter::Erasing(sector) = matter { Some(sector) } else { None };
-            Account { journal: Self { base, half, next, number }, unfinished }
+            JournalState { journal: Self { base, half, next, number }, unfinished }
         }))
     }
 

@@ -9,8 +9,8 @@ use sequential_storage::Error;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 
+use super::journaled::{Found, JournaledFlash};
 use super::library::Work;
-use super::sound::{Found, SoundFlash};
 use super::{HOME_KEY, Opening};
 use crate::calibration::StoredHome;
 use crate::store::StoreError;
@@ -22,16 +22,16 @@ pub const fn value_bytes(image: usize) -> usize {
 }
 
 type NoCache = Cache<Uncached, Uncached, Uncached, u8>;
-type Log<F> = MapStorage<u8, SoundFlash<F>, NoCache>;
+type Log<F> = MapStorage<u8, JournaledFlash<F>, NoCache>;
 
 /// Memory the keeper works in: the image being saved, and a value of the log ([`value_bytes`]). Put it into a static.
 #[derive(Debug)]
-pub struct Room<const IMAGE: usize, const VALUE: usize> {
+pub struct Scratch<const IMAGE: usize, const VALUE: usize> {
     image: [u8; IMAGE],
     value: [u8; VALUE],
 }
 
-impl<const IMAGE: usize, const VALUE: usize> Room<IMAGE, VALUE> {
+impl<const IMAGE: usize, const VALUE: usize> Scratch<IMAGE, VALUE> {
     /// Empty.
     #[must_use]
     pub const fn new() -> Self {
@@ -39,14 +39,14 @@ impl<const IMAGE: usize, const VALUE: usize> Room<IMAGE, VALUE> {
     }
 }
 
-impl<const IMAGE: usize, const VALUE: usize> Default for Room<IMAGE, VALUE> {
+impl<const IMAGE: usize, const VALUE: usize> Default for Scratch<IMAGE, VALUE> {
     fn default() -> Self {
         Self::new()
     }
 }
 
 /// Where the keeper meets the library, which others use at the same time. Each call is short.
-pub trait Desk {
+pub trait LibraryAccess {
     /// An image was found on the flash.
     fn restore(&mut self, slot: u8, image: &[u8]);
 
@@ -65,12 +65,12 @@ pub trait Desk {
 
 /// Opens the library on this flash and makes its changes durable, for ever. Poll it when nothing else is to be done, again after
 /// every interrupt: it waits for the flash and for work by being pending, and wakes nobody.
-pub async fn keep<F: NorFlash, D: Desk, const IMAGE: usize, const VALUE: usize>(
+pub async fn keep<F: NorFlash, D: LibraryAccess, const IMAGE: usize, const VALUE: usize>(
     flash: F,
-    room: &mut Room<IMAGE, VALUE>,
+    room: &mut Scratch<IMAGE, VALUE>,
     desk: &mut D,
 ) -> Infallible {
-    let Room { image, value } = room;
+    let Scratch { image, value } = room;
     let mut log = match open(flash, value, desk).await {
         Some((log, opening)) => {
             desk.open(opening);
@@ -112,9 +112,9 @@ async fn pause() {
 }
 
 /// Reads everything, oldest first, into the library. `None`: the flash does not work.
-async fn open<F: NorFlash, D: Desk>(flash: F, value: &mut [u8], desk: &mut D) -> Option<(Log<F>, Opening)> {
-    let bytes = SoundFlash::log_bytes(&flash)?;
-    let (sound, found) = SoundFlash::open(flash, bytes).await.ok()?;
+async fn open<F: NorFlash, D: LibraryAccess>(flash: F, value: &mut [u8], desk: &mut D) -> Option<(Log<F>, Opening)> {
+    let bytes = JournaledFlash::log_bytes(&flash)?;
+    let (sound, found) = JournaledFlash::open(flash, bytes).await.ok()?;
     let config = MapConfig::try_new(0..bytes).ok()?;
     let mut log = Log::new(sound, config, Cache::new_uncached());
     let mut opening =
@@ -131,7 +131,7 @@ async fn open<F: NorFlash, D: Desk>(flash: F, value: &mut [u8], desk: &mut D) ->
 }
 
 /// Tells the library every image; the last one of a place counts. Returns the number of places that hold one, and the home.
-async fn read_all<F: NorFlash, D: Desk>(
+async fn read_all<F: NorFlash, D: LibraryAccess>(
     log: &mut Log<F>,
     value: &mut [u8],
     desk: &mut D,

@@ -1,7 +1,7 @@
 //! The library of primitives and the home of the arm on a NOR flash: what survives when the power goes.
 //!
 //! ```text
-//! Session ── Store ──> Library (memory) <── Desk ── keep() ──> MapStorage ──> SoundFlash ──> NorFlash of the board
+//! Session ── Store ──> Library (memory) <── LibraryAccess ── keep() ──> MapStorage ──> JournaledFlash ──> NorFlash of the board
 //!  link requests        what runs read       lowest priority     log of values   erases done over    words and sectors
 //! ```
 //!
@@ -12,11 +12,11 @@
 //! guarantees and measurements: `docs/storage.md`.
 
 mod journal;
+mod journaled;
 mod keeper;
 mod library;
-mod sound;
 
-pub use keeper::{Desk, Room, keep, value_bytes};
+pub use keeper::{LibraryAccess, Scratch, keep, value_bytes};
 pub use library::{Library, Work};
 
 use core::fmt;

@@ -79,7 +79,7 @@ impl SessionPort<DeviceController> for Bench {
     fn load(&mut self, fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
         assert_ne!(self.state, State::Run, "a primitive was exchanged under a run");
         self.load?;
-        self.loaded.push(fit.primitive().duration());
+        self.loaded.push(fit.primitive().movement().duration());
         self.primitive = Some(fit.primitive().clone());
         Ok(())
     }

@@ -251,23 +251,26 @@ fn a_primitive_beyond_all_bounds_is_refused_with_the_value_that_is() {
             (content.experience_mean, content.experience_spread, content.experience_trials) = (&KNOWN, &TWELVE, 3);
             content.marks.filter_cutoff = 15.0;
         }),
-        "the mean of the experience at point 0, column 11 (from 0) is larger than anything real"
+        "the mean of the statistics at point 0, column 11 (from 0) is larger than anything real"
     );
 }
 
 #[test]
 fn every_place_of_a_value_survives_its_two_numbers() {
     use control::plan::load::LoadError;
-    use dmp::{Part, PrimitiveError, Row};
+    use control::plan::primitive::RowGroup;
+    use dmp::{Group, Part, PrimitiveError};
     for row in 0..17 {
         for kernel in [0, 1, 99] {
-            let error = LoadError::Primitive(PrimitiveError::WeightTooLarge { row, kernel });
+            let (group, index) = Group::of_weights(row, 1);
+            let error = LoadError::Primitive(PrimitiveError::WeightTooLarge { group, index: index as u8, kernel });
             assert_eq!(PrimitiveTrouble::from(error).to_string(), error.to_string());
         }
     }
     for part in [Part::Start, Part::Goal, Part::StartVelocity] {
-        for row in [Row::Position, Row::Orientation, Row::Posture, Row::Hand] {
-            let error = LoadError::Primitive(PrimitiveError::TooLarge { part, row, index: 6 });
+        for (part_of_arm, last) in RowGroup::ALL.into_iter().zip([2, 2, 6, 3]) {
+            let (group, index) = part_of_arm.row(last);
+            let error = LoadError::Primitive(PrimitiveError::TooLarge { part, group, index });
             assert_eq!(PrimitiveTrouble::from(error).to_string(), error.to_string());
         }
     }
@@ -312,7 +315,7 @@ fn expectation_and_experience_reach_the_control_half() {
         rig.commanded(Request::Run { name: name(text), options: link::RunOptions::default() });
         let loaded = rig.bench.primitive.as_ref().expect("a primitive");
         assert_eq!(loaded.expected().is_some(), felt, "{text}: nothing may be left of the one before");
-        assert_eq!(loaded.experience().map(|experience| experience.trials()), felt.then_some(5));
+        assert_eq!(loaded.statistics().map(|statistics| statistics.trials()), felt.then_some(5));
     }
 }
 

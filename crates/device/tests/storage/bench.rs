@@ -4,7 +4,7 @@ use core::pin::pin;
 use core::task::{Context, Poll, Waker};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use device::storage::{Desk, HOME_KEY, Library, Opening, Room, Work, keep, value_bytes};
+use device::storage::{HOME_KEY, Library, LibraryAccess, Opening, Scratch, Work, keep, value_bytes};
 use device::{Home, Store, StoreError};
 use embedded_storage_async::nor_flash::NorFlash;
 use sim::flash::{Flash, FlashChip, FlashPort, FlashTimes, VirtualClock};
@@ -22,7 +22,7 @@ impl<const SLOTS: usize> Shared<SLOTS> {
     }
 }
 
-impl<const SLOTS: usize> Desk for Shared<SLOTS> {
+impl<const SLOTS: usize> LibraryAccess for Shared<SLOTS> {
     fn restore(&mut self, slot: u8, image: &[u8]) {
         self.library().restore(slot, image);
     }
@@ -79,7 +79,7 @@ pub(crate) fn run<const SLOTS: usize, F: NorFlash>(
     wishes: &[Wish],
 ) -> (Shared<SLOTS>, Vec<Option<Result<(), StoreError>>>) {
     let shared = Shared(Arc::new(Mutex::new(Library::<SLOTS, IMAGE>::new())));
-    let mut room = Box::new(Room::<IMAGE, VALUE>::new());
+    let mut room = Box::new(Scratch::<IMAGE, VALUE>::new());
     let mut desk = Shared(Arc::clone(&shared.0));
     let mut keeper = pin!(keep(flash, &mut room, &mut desk));
     let mut context = Context::from_waker(Waker::noop());
@@ -133,7 +133,7 @@ pub(crate) fn chip(content: &[u8]) -> FlashChip {
 /// A keeper's desk that has it store these bytes as the home, whatever they are.
 struct Forger<'a>(Option<&'a [u8]>);
 
-impl Desk for Forger<'_> {
+impl LibraryAccess for Forger<'_> {
     fn restore(&mut self, _: u8, _: &[u8]) {}
 
     fn forget(&mut self, _: u8) {}
@@ -153,7 +153,7 @@ impl Desk for Forger<'_> {
 
 /// Stores these bytes on the chip as the home.
 pub(crate) fn write_home(chip: &FlashChip, bytes: &[u8]) {
-    let mut room = Box::new(Room::<IMAGE, VALUE>::new());
+    let mut room = Box::new(Scratch::<IMAGE, VALUE>::new());
     let mut forger = Forger(Some(bytes));
     let port = FlashPort::new(chip.clone(), VirtualClock::default());
     let mut keeper = pin!(keep(port, &mut room, &mut forger));

@@ -1,9 +1,9 @@
-//! From recorded sensor values to an [`ExpectedWrench`] and to the weights `K2` of Eq. (8).
+//! From recorded sensor values to [`ExpectedSensors`] and to the weights `K2` of Eq. (8).
 
 use std::vec::Vec;
 
 use super::statistics::phase_statistics;
-use crate::{ExpectedWrench, GAIN_CAPACITY, SENSORS, TableError};
+use crate::{ExpectedSensors, TableError};
 
 /// Fewest recordings whose spread says something about the sensors; with two, chance decides.
 pub const FEWEST_TRIALS: usize = 3;
@@ -20,15 +20,15 @@ pub const WEIGHT_RANGE: f64 = 4.0;
 /// # Errors
 /// [`TableError::Empty`] without a usable sample, [`TableError::TooMany`], [`TableError::NotFinite`],
 /// [`TableError::Duration`].
-pub fn expected_wrench(
+pub fn expected_sensors<const SENSORS: usize, const CAPACITY: usize>(
     samples: &[(f64, [f64; SENSORS])],
     count: usize,
     recorded_duration: f64,
-) -> Result<ExpectedWrench<f64>, TableError> {
-    if count > crate::EXPECTED_CAPACITY {
+) -> Result<ExpectedSensors<f64, SENSORS, CAPACITY>, TableError> {
+    if count > CAPACITY {
         return Err(TableError::TooMany);
     }
-    ExpectedWrench::new(&phase_statistics(&[samples], count)?.mean, recorded_duration)
+    ExpectedSensors::new(&phase_statistics(&[samples], count)?.mean, recorded_duration)
 }
 
 /// The weights `K2` of Eq. (8) at `count` evenly spaced phases from the spread of `trials` recordings.
@@ -40,9 +40,9 @@ pub fn expected_wrench(
 ///
 /// # Errors
 /// [`TableError::Trials`] below [`FEWEST_TRIALS`], [`TableError::Negative`] for a floor that is not positive or a negative resolution (without a floor a
-/// silent sensor would outweigh all others), [`TableError::Empty`], [`TableError::TooMany`] above [`GAIN_CAPACITY`],
+/// silent sensor would outweigh all others), [`TableError::Empty`],
 /// [`TableError::NotFinite`].
-pub fn weights_from_spread(
+pub fn weights_from_spread<const SENSORS: usize>(
     spread: &[[f64; SENSORS]],
     trials: usize,
     count: usize,
@@ -57,9 +57,6 @@ pub fn weights_from_spread(
     }
     if spread.is_empty() || count == 0 {
         return Err(TableError::Empty);
-    }
-    if count > GAIN_CAPACITY {
-        return Err(TableError::TooMany);
     }
     if !spread.iter().flatten().all(|sigma| sigma.is_finite()) {
         return Err(TableError::NotFinite);

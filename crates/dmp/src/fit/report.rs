@@ -2,8 +2,8 @@
 
 use std::vec::Vec;
 
-use super::{Demonstration, FIT_CAPACITY, WARNING_ANGLE};
-use crate::{CONTROL_PERIOD, Coupling, Primitive, ROWS, Rollout, StartState};
+use super::{Demonstration, FIT_CAPACITY, PoseSamples, WARNING_ANGLE, largest_angle_to_goal};
+use crate::{Coupling, Primitive, Rollout, StartState};
 
 /// Quality of one row.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -39,14 +39,18 @@ pub struct OrientationReport {
 
 /// Quality of a fit. The replay starts with the demonstrated velocity and is compared with the smoothed demonstration;
 /// what the smoothing took away is reported beside it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Report {
-    /// Row by row: position, orientation, posture, hand.
-    pub rows: [RowReport; ROWS],
-    /// Orientation as a whole.
-    pub orientation: OrientationReport,
+    /// Row by row in the order of the weights.
+    pub rows: Vec<RowReport>,
+    /// Orientation of each pose as a whole.
+    pub orientations: Vec<OrientationReport>,
     /// Condition number of the design matrix; the weights lose about that factor of precision.
     pub condition: f64,
+    /// Root mean square distance of several demonstrations from their mean, row by row in the order of the weights
+    /// (m, rad); empty where one alone was learned.
+    pub spread: Vec<f64>,
 }
 
 /// Sum and maximum of distances.
@@ -68,77 +72,78 @@ impl Distance {
 }
 
 /// Rolls the primitive out and compares it with the demonstration.
-pub(super) fn replay(
-    recorded: &Demonstration,
-    demonstration: &Demonstration,
-    primitive: &Primitive<f64, FIT_CAPACITY>,
-    residuals: &[f64; ROWS],
+pub(super) fn replay<const D: usize, const P: usize>(
+    recorded: &Demonstration<D, P>,
+    demonstration: &Demonstration<D, P>,
+    primitive: &Primitive<f64, D, P, FIT_CAPACITY>,
+    residuals: &[f64],
     condition: f64,
-    largest_angle: f64,
 ) -> Report {
-    let mut report = Report { condition, ..Report::default() };
-    for (row, &residual) in report.rows.iter_mut().zip(residuals) {
-        row.force_rms = residual;
-    }
-    for (row, column) in demonstration.linear_columns() {
-        let low = column.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        report.rows[row].extent = high - low;
-    }
+    let row = |&force_rms: &f64| RowReport { force_rms, ..RowReport::default() };
+    let mut report = Report { rows: residuals.iter().map(row).collect(), condition, ..Report::default() };
     for ((row, raw), (_, smooth)) in recorded.linear_columns().zip(demonstration.linear_columns()) {
+        let low = smooth.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = smooth.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        report.rows[row].extent = high - low;
         let squares: f64 = raw.iter().zip(&smooth).map(|(a, b)| (a - b) * (a - b)).sum();
         report.rows[row].removed_rms = libm::sqrt(squares / raw.len() as f64);
     }
-    // The demonstrated start of a checked primitive is always accepted, and so is each step with that primitive.
-    let Ok(mut rollout) = Rollout::start(primitive, &StartState::demonstrated(primitive)) else {
+    let Some(replayed) = roll_out(demonstration, primitive) else {
         return report;
     };
-    let steps = libm::ceil(demonstration.period() / CONTROL_PERIOD - 1e-6).max(1.0);
-    let dt = demonstration.period() / steps;
     let count = demonstration.len();
-    let mut rows = [Distance::default(); ROWS];
-    let mut turn = Distance::default();
-    let mut orientations = Vec::with_capacity(count);
+    let mut rows = std::vec![Distance::default(); residuals.len()];
+    let mut turns = [Distance::default(); P];
     for k in 0..count {
-        let Ok(row) = rollout.step(primitive, dt, &Coupling::NONE) else {
-            return report;
-        };
-        for _ in 1..steps as usize {
-            if rollout.step(primitive, dt, &Coupling::NONE).is_err() {
-                return report;
-            }
+        let distances = replayed.distance(demonstration, k);
+        for (n, turn) in turns.iter_mut().enumerate() {
+            turn.add(libm::sqrt(distances[6 * n + 3..6 * n + 6].iter().map(|e| e * e).sum()));
         }
-        let demonstrated = demonstration.configuration(k);
-        let linear = (0..3)
-            .map(|i| (i, row.position.x[i] - demonstrated.position[i]))
-            .chain((0..7).map(|i| (6 + i, row.posture.x[i] - demonstrated.posture[i])))
-            .chain((0..4).map(|i| (13 + i, row.hand.x[i] - demonstrated.hand[i])));
-        for (i, distance) in linear {
-            rows[i].add(distance);
+        for (row, distance) in rows.iter_mut().zip(distances) {
+            row.add(distance);
         }
-        let q = row.orientation.quaternion;
-        let e =
-            q.aligned_with(&demonstrated.orientation).conjugate().product(&demonstrated.orientation).rotation_vector();
-        for (i, e) in e.iter().enumerate() {
-            rows[3 + i].add(*e);
-        }
-        turn.add(libm::sqrt(e.iter().map(|e| e * e).sum()));
-        orientations.push(q);
     }
     for (row, distance) in report.rows.iter_mut().zip(&rows) {
         row.rms = distance.rms(count);
         row.max = distance.max;
     }
-    let path = |orientation: &[crate::Quaternion<f64>]| -> f64 {
-        orientation.windows(2).map(|pair| pair[0].conjugate().product(&pair[1]).angle()).sum()
+    let path = |pose: &PoseSamples| -> f64 {
+        pose.orientation.windows(2).map(|pair| pair[0].conjugate().product(&pair[1]).angle()).sum()
     };
-    report.orientation = OrientationReport {
-        rms: turn.rms(count),
-        max: turn.max,
-        path: path(demonstration.orientation()),
-        replayed_path: path(&orientations),
-        largest_angle,
-        wide: largest_angle > WARNING_ANGLE,
-    };
+    for ((shown, replayed), turn) in demonstration.poses().iter().zip(replayed.poses()).zip(turns) {
+        let largest_angle = largest_angle_to_goal(&shown.orientation);
+        report.orientations.push(OrientationReport {
+            rms: turn.rms(count),
+            max: turn.max,
+            path: path(shown),
+            replayed_path: path(replayed),
+            largest_angle,
+            wide: largest_angle > WARNING_ANGLE,
+        });
+    }
     report
+}
+
+/// The samples of a run at the instants of the demonstration. `None` if a step is refused: the demonstrated start of a
+/// checked primitive is always accepted, and so is each step with that primitive.
+fn roll_out<const D: usize, const P: usize>(
+    demonstration: &Demonstration<D, P>,
+    primitive: &Primitive<f64, D, P, FIT_CAPACITY>,
+) -> Option<Demonstration<D, P>> {
+    let mut rollout = Rollout::start(primitive, &StartState::demonstrated(primitive)).ok()?;
+    let steps = libm::ceil(demonstration.period() / primitive.control_period() - 1e-6).max(1.0);
+    let dt = (demonstration.period() / steps).min(primitive.control_period());
+    let mut samples = Vec::with_capacity(demonstration.len());
+    for _ in 0..demonstration.len() {
+        samples.push(rollout.step(primitive, dt, &Coupling::NONE).ok()?);
+        for _ in 1..steps as usize {
+            rollout.step(primitive, dt, &Coupling::NONE).ok()?;
+        }
+    }
+    let poses = core::array::from_fn(|n| PoseSamples {
+        position: samples.iter().map(|row| row.poses[n].position.x).collect(),
+        orientation: samples.iter().map(|row| row.poses[n].orientation.quaternion).collect(),
+    });
+    let points = samples.iter().map(|row| row.points.x).collect();
+    Demonstration::new(demonstration.period(), poses, points).ok()
 }

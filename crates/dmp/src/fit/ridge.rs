@@ -7,12 +7,13 @@
 use std::vec::Vec;
 
 use super::FIT_CAPACITY;
-use crate::{Activations, Basis, ROWS};
+use crate::Basis;
 
 /// Factorised normal equations.
 pub(super) struct Ridge {
     count: usize,
-    activations: Vec<Activations<f64, FIT_CAPACITY>>,
+    /// Rows of `A`: the first kernel that counts and the factors from there on.
+    design: Vec<(usize, Vec<f64>)>,
     /// Lower triangle of the Cholesky factor, row by row.
     factor: Vec<Vec<f64>>,
     /// `A^T A`, lower triangle.
@@ -22,15 +23,17 @@ pub(super) struct Ridge {
 impl Ridge {
     pub(super) fn new(basis: &Basis<f64, FIT_CAPACITY>, phases: &[f64], ridge: f64) -> Option<Self> {
         let count = basis.count();
-        let activations: Vec<_> = phases.iter().map(|&s| basis.evaluate(s)).collect();
+        let factors = |s: &f64| {
+            let a = basis.evaluate(*s);
+            (a.active().start, a.active().map(|i| a.factor(i)).collect())
+        };
+        let design: Vec<(usize, Vec<f64>)> = phases.iter().map(factors).collect();
         let mut gram: Vec<Vec<f64>> = (0..count).map(|i| std::vec![0.0; i + 1]).collect();
-        for a in &activations {
-            let active = a.active();
-            let factors: Vec<f64> = active.clone().map(|i| a.factor(i)).collect();
-            for (n, i) in active.clone().enumerate() {
-                let row = &mut gram[i][active.start..=i];
-                for (g, factor) in row.iter_mut().zip(&factors) {
-                    *g += factors[n] * factor;
+        for (first, factors) in &design {
+            for (n, factor) in factors.iter().enumerate() {
+                let row = &mut gram[first + n][*first..];
+                for (g, other) in row.iter_mut().zip(factors) {
+                    *g += factor * other;
                 }
             }
         }
@@ -41,34 +44,29 @@ impl Ridge {
             row[i] += lambda;
         }
         let factor = cholesky(&regularised)?;
-        Some(Self { count, activations, factor, gram })
+        Some(Self { count, design, factor, gram })
     }
 
-    /// Weights, kernel by kernel, for targets sample by sample.
-    pub(super) fn solve(&self, targets: &[[f64; ROWS]]) -> Vec<[f64; ROWS]> {
-        let mut x = std::vec![[0.0; ROWS]; self.count];
-        for (a, target) in self.activations.iter().zip(targets) {
-            for i in a.active() {
-                add_scaled(&mut x[i], target, a.factor(i));
+    /// Weights of one row, kernel by kernel, for its targets sample by sample.
+    pub(super) fn solve(&self, targets: &[f64]) -> Vec<f64> {
+        let mut x = std::vec![0.0; self.count];
+        for ((first, factors), target) in self.design.iter().zip(targets) {
+            for (x, factor) in x[*first..].iter_mut().zip(factors) {
+                *x += factor * target;
             }
         }
         back_substitute(&self.factor, &mut x);
         x
     }
 
-    /// Root mean square of what the weights leave of the targets, row by row.
-    pub(super) fn residuals(&self, weights: &[[f64; ROWS]], targets: &[[f64; ROWS]]) -> [f64; ROWS] {
-        let mut sum = [0.0; ROWS];
-        for (a, target) in self.activations.iter().zip(targets) {
-            let mut rest = *target;
-            for i in a.active() {
-                add_scaled(&mut rest, &weights[i], -a.factor(i));
-            }
-            for (sum, rest) in sum.iter_mut().zip(rest) {
-                *sum += rest * rest;
-            }
+    /// Root mean square of what the weights of a row leave of its targets.
+    pub(super) fn residual(&self, weights: &[f64], targets: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        for ((first, factors), target) in self.design.iter().zip(targets) {
+            let rest = weights[*first..].iter().zip(factors).fold(*target, |rest, (w, factor)| rest - factor * w);
+            sum += rest * rest;
         }
-        sum.map(|sum| libm::sqrt(sum / targets.len() as f64))
+        libm::sqrt(sum / targets.len() as f64)
     }
 
     /// Condition number of the design matrix `A`, without the ridge: root of the ratio of the extreme eigenvalues of
@@ -78,32 +76,32 @@ impl Ridge {
         let Some(factor) = cholesky(&self.gram) else {
             return f64::INFINITY;
         };
-        let start = || -> Vec<[f64; 1]> {
+        let start = || -> Vec<f64> {
             // Alternating signs are far from the smooth eigenvector of the largest value and near that of the smallest;
             // the slope keeps a part of both.
-            (0..self.count).map(|i| [if i % 2 == 0 { 1.0 } else { -0.9 } + i as f64 * 1e-2]).collect()
+            (0..self.count).map(|i| if i % 2 == 0 { 1.0 } else { -0.9 } + i as f64 * 1e-2).collect()
         };
-        let norm = |x: &[[f64; 1]]| libm::sqrt(x.iter().map(|[x]| x * x).sum::<f64>());
+        let norm = |x: &[f64]| libm::sqrt(x.iter().map(|x| x * x).sum::<f64>());
         let (mut largest, mut x) = (0.0, start());
         for _ in 0..ITERATIONS {
-            let mut y = std::vec![[0.0]; self.count];
+            let mut y = std::vec![0.0; self.count];
             for (i, row) in self.gram.iter().enumerate() {
                 for (j, g) in row.iter().enumerate() {
-                    y[i][0] += g * x[j][0];
+                    y[i] += g * x[j];
                     if i != j {
-                        y[j][0] += g * x[i][0];
+                        y[j] += g * x[i];
                     }
                 }
             }
             largest = norm(&y);
-            x = y.into_iter().map(|[y]| [y / largest]).collect();
+            x = y.into_iter().map(|y| y / largest).collect();
         }
         let (mut smallest, mut x) = (1.0, start());
         for _ in 0..ITERATIONS {
             back_substitute(&factor, &mut x);
             let length = norm(&x);
             smallest = 1.0 / length;
-            for [x] in &mut x {
+            for x in &mut x {
                 *x /= length;
             }
         }
@@ -111,28 +109,18 @@ impl Ridge {
     }
 }
 
-/// Solves `L L^T y = x` in place for all columns at once.
-fn back_substitute<const D: usize>(factor: &[Vec<f64>], x: &mut [[f64; D]]) {
+/// Solves `L L^T y = x` in place.
+fn back_substitute(factor: &[Vec<f64>], x: &mut [f64]) {
     for i in 0..factor.len() {
-        let mut value = x[i];
-        for (j, l) in factor[i][..i].iter().enumerate() {
-            add_scaled(&mut value, &x[j], -l);
-        }
-        x[i] = value.map(|value| value / factor[i][i]);
+        let value = factor[i][..i].iter().zip(&*x).fold(x[i], |value, (l, x)| value - l * x);
+        x[i] = value / factor[i][i];
     }
     for i in (0..factor.len()).rev() {
-        let value = x[i].map(|value| value / factor[i][i]);
+        let value = x[i] / factor[i][i];
         x[i] = value;
-        for (j, l) in factor[i][..i].iter().enumerate() {
-            add_scaled(&mut x[j], &value, -l);
+        for (x, l) in x.iter_mut().zip(&factor[i][..i]) {
+            *x -= l * value;
         }
-    }
-}
-
-/// a += k b
-fn add_scaled<const D: usize>(a: &mut [f64; D], b: &[f64; D], k: f64) {
-    for (a, b) in a.iter_mut().zip(b) {
-        *a += k * b;
     }
 }
 

@@ -1,8 +1,8 @@
-//! `PhaseStatistics`: mean and spread by phase of what several runs recorded; experiences are made of them.
+//! `PhaseStatistics`: mean and spread by phase of the recordings of several runs, and [`SensorStatistics`] from them.
 
 use std::vec::Vec;
 
-use crate::{EXPERIENCE_CAPACITY, EXPERIENCE_CHANNELS, Experience, TableError};
+use crate::{SensorStatistics, TableError};
 
 /// Mean and spread at evenly spaced phases.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,30 +83,31 @@ pub fn phase_statistics<const CHANNELS: usize>(
     Ok(PhaseStatistics { mean, spread, trials: runs })
 }
 
-/// An experience of `count` phases from the recordings of successful runs.
+/// Statistics of `count` phases from the recordings of successful runs.
 ///
 /// Runs that met their object in different places differ by far more than noise, and are not normally distributed: a
 /// standard deviation would make the outermost of them a failure. So the band goes by the envelope of the runs: the
-/// centre is the middle between the smallest and the largest of the runs' means at a phase and its two neighbours (the moment of
-/// contact shifts), and the spread is a quarter of their distance, of which normally distributed runs, 20 to 40 of them, span
-/// four. Of the fingers only closing too far is of interest: their centre is the mean, and their spread half the distance from
-/// there to the largest.
+/// centre is the middle between the smallest and the largest of the runs' means at a phase and its two neighbours (the
+/// moment of contact shifts), and the spread is a quarter of their distance, of which normally distributed runs, 20 to
+/// 40 of them, span four. A channel marked in `one_sided` is judged upwards only (a finger that closes too far): its
+/// centre is the mean, and its spread half the distance from there to the largest.
 ///
 /// `floor` is the smallest spread of each channel: a few runs that agree by chance must not make the next one a failure.
-/// Samples beyond progress 1 count at 1, since whoever compares with the experience goes on with its end.
+/// Samples beyond progress 1 count at 1, since whoever compares with the statistics goes on with their end.
 ///
 /// # Errors
-/// [`TableError::Trials`] without a run, [`TableError::TooMany`] above [`EXPERIENCE_CAPACITY`], [`TableError::Spread`] for a floor
+/// [`TableError::Trials`] without a run, [`TableError::TooMany`] above the capacity, [`TableError::Spread`] for a floor
 /// that is not positive, [`TableError::Empty`], [`TableError::NotFinite`].
-pub fn experience(
-    trials: &[&[(f64, [f64; EXPERIENCE_CHANNELS])]],
+pub fn sensor_statistics<const CHANNELS: usize, const CAPACITY: usize>(
+    trials: &[&[(f64, [f64; CHANNELS])]],
     count: usize,
-    floor: &[f64; EXPERIENCE_CHANNELS],
-) -> Result<Experience<f64>, TableError> {
+    floor: &[f64; CHANNELS],
+    one_sided: &[bool; CHANNELS],
+) -> Result<SensorStatistics<f64, CHANNELS, CAPACITY>, TableError> {
     if trials.is_empty() {
         return Err(TableError::Trials);
     }
-    if count > EXPERIENCE_CAPACITY {
+    if count > CAPACITY {
         return Err(TableError::TooMany);
     }
     if !floor.iter().all(|floor| *floor > 0.0 && floor.is_finite()) {
@@ -125,15 +126,15 @@ pub fn experience(
         .collect::<Result<Vec<_>, _>>()?;
     let (mut centre, mut spread) = (Vec::with_capacity(count), Vec::with_capacity(count));
     for i in 0..count {
-        let (mut middle, mut width) = ([0.0; EXPERIENCE_CHANNELS], *floor);
-        for channel in 0..EXPERIENCE_CHANNELS {
-            let is_finger = channel >= FINGER_CHANNELS.start;
-            let around = if is_finger { i..i + 1 } else { i.saturating_sub(1)..(i + 2).min(count) };
-            let felt = || means.iter().flat_map(|run| &run[around.clone()]).map(|point| point[channel]);
+        let (mut middle, mut width) = ([0.0; CHANNELS], *floor);
+        for channel in 0..CHANNELS {
+            let is_one_sided = one_sided[channel];
+            let around = if is_one_sided { i..i + 1 } else { i.saturating_sub(1)..(i + 2).min(count) };
+            let values = || means.iter().flat_map(|run| &run[around.clone()]).map(|point| point[channel]);
             let (low, high) =
-                felt().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-            let half = if is_finger {
-                middle[channel] = felt().sum::<f64>() / means.len() as f64;
+                values().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+            let half = if is_one_sided {
+                middle[channel] = values().sum::<f64>() / means.len() as f64;
                 high - middle[channel]
             } else {
                 middle[channel] = 0.5 * (low + high);
@@ -144,14 +145,11 @@ pub fn experience(
         centre.push(middle);
         spread.push(width);
     }
-    Experience::new(&centre, &spread, u16::try_from(trials.len()).unwrap_or(u16::MAX))
+    SensorStatistics::new(&centre, &spread, u16::try_from(trials.len()).unwrap_or(u16::MAX))
 }
 
 /// Spreads from the centre of the runs to the outermost of them.
 const ENVELOPE: f64 = 2.0;
-
-/// Channels that are angles of fingers.
-const FINGER_CHANNELS: core::ops::Range<usize> = 9..EXPERIENCE_CHANNELS;
 
 /// The entries beside progress `u` and their shares; shares of 0 for a sample outside.
 fn places(u: f64, last: usize) -> [(usize, f64); 2] {

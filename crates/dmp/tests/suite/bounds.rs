@@ -1,27 +1,23 @@
 //! Bounds of single parts: what was once accepted, or once came out, that no movement can use.
 
-use crate::common::{ALPHA, DT, ORIGIN, Plan};
-use dmp::fit::{Demonstration, FitOptions, experience, fit, minimum_jerk, phase_statistics};
+use crate::arm::{
+    Coupling, Demonstration, ExpectedWrench, Feedback, FitOptions, GainSchedule, Limits, ORIGIN, Primitive, ROWS,
+    Rollout, SENSORS, StartState, Tables, Velocity, configuration, gains, limits,
+};
+use crate::common::{ALPHA, DT, Plan};
+use dmp::fit::{fit, minimum_jerk, phase_statistics, sensor_statistics};
 use dmp::{
-    Basis, CanonicalSystem, Coupling, EXPERIENCE_CHANNELS, Entry, ExpectedWrench, Feedback, FixedPoint, GainSchedule,
-    Limits, OrientationError, Part, Phase, PointInput, PointState, Primitive, PrimitiveError, PrimitiveTables,
-    Quaternion, ROWS, Rollout, RolloutError, SENSORS, Scalar, SensorMap, StartState, Stiffness, TableError,
-    TransformationSystem, Velocity,
+    Basis, CanonicalSystem, CouplingGains, Entry, FixedPoint, Group, OrientationError, Part, Phase, PointInput,
+    PointState, PrimitiveError, Quaternion, RolloutError, Scalar, TableError, TransformationSystem,
 };
 
-fn feedback<T: Scalar>(limit: f64) -> Feedback<T> {
-    let f = T::from_f64;
-    Feedback::new(
-        GainSchedule::constant([T::ONE; 10]).unwrap(),
-        GainSchedule::constant([T::ONE; SENSORS]).unwrap(),
-        Limits { displacement: f(limit), rotation: f(limit), hand: f(limit) },
-    )
-    .unwrap()
-}
+/// Channels of the statistics of the tests.
+const CHANNELS: usize = 12;
+type Statistics<T> = dmp::SensorStatistics<T, CHANNELS, 64>;
 
-fn stiffness<T: Scalar>() -> Stiffness<T> {
-    let k = T::from_f64(200.0);
-    Stiffness { position: k, orientation: k, hand: k, orientation_error: OrientationError::Quaternion }
+fn feedback<T: Scalar>(limit: f64) -> Feedback<T> {
+    let limit = T::from_f64(limit);
+    Feedback::new([T::ONE; 10], [T::ONE; SENSORS], limits(limit, limit, limit)).unwrap()
 }
 
 fn norm<T: Scalar>(a: &[T]) -> f64 {
@@ -34,20 +30,17 @@ fn an_error_too_small_for_its_reciprocal_is_no_nan() {
     for limit in [0.0, 0.2] {
         for error in [2e-39_f32, 1e-45, f32::MIN_POSITIVE] {
             for axes in [[error; SENSORS], core::array::from_fn(|i| if i % 3 == 0 { error } else { 0.0 })] {
-                let zeta = feedback(limit).coupling(0.0, &axes, &SensorMap::IDENTITY, &stiffness());
-                let all = [zeta.position.as_slice(), &zeta.orientation, &zeta.hand].concat();
+                let zeta = feedback(limit).of_error(&Plan::empty().build::<f32>(), 0.0, &axes);
+                let pose = &zeta.poses[0];
+                let all = [pose.position.as_slice(), &pose.orientation, &zeta.points].concat();
                 assert!(all.iter().all(|z| z.is_finite()), "limit {limit}, error {error:e}: {zeta:?}");
-                assert!(norm(&zeta.position) <= 200.0 * limit && norm(&zeta.orientation) <= 200.0 * limit, "{zeta:?}");
+                assert!(norm(&pose.position) <= 200.0 * limit && norm(&pose.orientation) <= 200.0 * limit, "{zeta:?}");
             }
         }
         // In fixed point the reciprocal saturates instead.
-        let zeta = feedback(limit).coupling(
-            FixedPoint::ZERO,
-            &[FixedPoint::from_bits(1); SENSORS],
-            &SensorMap::IDENTITY,
-            &stiffness(),
-        );
-        assert!(norm(&zeta.position) <= 200.0 * limit, "limit {limit}: {zeta:?}");
+        let primitive = Plan::empty().build::<FixedPoint>();
+        let zeta = feedback(limit).of_error(&primitive, FixedPoint::ZERO, &[FixedPoint::from_bits(1); SENSORS]);
+        assert!(norm(&zeta.poses[0].position) <= 200.0 * limit, "limit {limit}: {zeta:?}");
     }
 }
 
@@ -106,27 +99,31 @@ fn the_phase_belongs_to_the_progress_at_every_speed() {
     }
 }
 
-type Run = Vec<(f64, [f64; EXPERIENCE_CHANNELS])>;
+type Run = Vec<(f64, [f64; CHANNELS])>;
 
 /// A run whose values fall from its very beginning.
 fn run_from(value: f64) -> Run {
-    (0..200).map(|k| f64::from(k) / 199.0).map(|u| (u, [value - u; EXPERIENCE_CHANNELS])).collect()
+    (0..200).map(|k| f64::from(k) / 199.0).map(|u| (u, [value - u; CHANNELS])).collect()
 }
 
 #[test]
 fn a_sample_at_no_progress_is_no_sample_at_the_end() {
-    let floor = [0.05; EXPERIENCE_CHANNELS];
+    let floor = [0.05; CHANNELS];
     for u in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let mut run = run_from(1.0);
         run[50].0 = u;
-        assert_eq!(experience(&[&run, &run_from(1.0)], 8, &floor).err(), Some(TableError::NotFinite), "{u}");
+        assert_eq!(
+            sensor_statistics::<CHANNELS, 64>(&[&run, &run_from(1.0)], 8, &floor, &[false; CHANNELS]).err(),
+            Some(TableError::NotFinite),
+            "{u}"
+        );
     }
 }
 
 #[test]
 fn a_run_without_a_usable_sample_leaves_the_others_alone() {
     let alone = phase_statistics(&[&run_from(1.0)], 8).unwrap();
-    for stray in [vec![(1.5, [7.0; EXPERIENCE_CHANNELS]); 3], vec![(-0.5, [7.0; EXPERIENCE_CHANNELS])], vec![]] {
+    for stray in [vec![(1.5, [7.0; CHANNELS]); 3], vec![(-0.5, [7.0; CHANNELS])], vec![]] {
         let both = phase_statistics(&[&run_from(1.0), &stray], 8).unwrap();
         assert_eq!(both, alone, "a run of {} samples outside", stray.len());
     }
@@ -170,7 +167,7 @@ fn condition_of_the_design(count: usize, activation: f64, samples: usize) -> f64
 
 fn demonstration(position: Vec<[f64; 3]>, posture: Vec<[f64; 7]>, hand: Vec<[f64; 4]>) -> Demonstration {
     let still = vec![Quaternion::IDENTITY; position.len()];
-    Demonstration::new(DT, position, still, posture, hand).unwrap()
+    crate::arm::demonstration(DT, position, still, posture, hand).unwrap()
 }
 
 #[test]
@@ -198,19 +195,23 @@ fn a_goal_in_flight_is_no_further_away_than_one_at_the_start() {
     for hemisphere in [dmp::Hemisphere::Nearest, dmp::Hemisphere::Demonstrated] {
         let mut plan = Plan::empty();
         plan.hemisphere = hemisphere;
-        plan.goal.orientation = about_z(60.0);
+        plan.goal.poses[0].orientation = about_z(60.0);
         let primitive = plan.build::<f64>();
         let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
         let before = rollout.clone();
         for far in [about_z(178.0), about_z(180.0), about_z(178.0).negated()] {
-            assert_eq!(rollout.set_goal_orientation(&primitive, far), Err(RolloutError::TurnsTooFar), "{hemisphere:?}");
+            assert_eq!(
+                rollout.set_goal_orientation(&primitive, 0, far),
+                Err(RolloutError::TurnsTooFar),
+                "{hemisphere:?}"
+            );
             assert_eq!(rollout, before);
         }
         for near in [about_z(170.0), about_z(-90.0)] {
-            rollout.clone().set_goal_orientation(&primitive, near).unwrap();
+            rollout.clone().set_goal_orientation(&primitive, 0, near).unwrap();
         }
         // The same bound holds where a run begins.
-        let turned = StartState::at_rest(dmp::Configuration { orientation: about_z(-118.0), ..ORIGIN });
+        let turned = StartState::at_rest(configuration([0.0; 3], about_z(-118.0), [0.0; 7], [0.0; 4]));
         assert_eq!(Rollout::start(&primitive, &turned).err(), Some(RolloutError::TurnsTooFar), "{hemisphere:?}");
     }
     // Rotation vectors go any way round.
@@ -218,7 +219,7 @@ fn a_goal_in_flight_is_no_further_away_than_one_at_the_start() {
     plan.orientation_error = OrientationError::RotationVector;
     let primitive = plan.build::<f64>();
     let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
-    rollout.set_goal_orientation(&primitive, about_z(180.0)).unwrap();
+    rollout.set_goal_orientation(&primitive, 0, about_z(180.0)).unwrap();
 }
 
 /// The fit goes on with rest behind the last sample only if everything rests there. Whatever of it still moves would
@@ -257,22 +258,20 @@ fn a_run_goes_on_only_with_the_primitive_it_was_started_with() {
     *others[1].weights.last_mut().unwrap() += 1e-6;
     others[2].duration = 4.0;
     others[3].stiffness = 201.0;
-    others[4].goal.hand[3] += 1e-6;
+    others[4].goal.points[10] += 1e-6;
     others[5].hemisphere = dmp::Hemisphere::Demonstrated;
     others[6].weights.swap(3, 4);
     for (index, other) in others.iter().enumerate() {
         let other = other.build::<f32>();
         assert_eq!(rollout.step(&other, DT as f32, &Coupling::NONE).err(), refused.err(), "{index}");
-        assert_eq!(rollout.coupling(&other, &[0.0; SENSORS], &SensorMap::IDENTITY).err(), refused.err(), "{index}");
+        assert_eq!(rollout.check(&other), refused, "{index}");
         assert_eq!(rollout.set_speed(&other, 0.5), refused, "{index}");
         assert_eq!(rollout.set_duration(&other, 6.0), refused, "{index}");
-        assert_eq!(rollout.set_goal_orientation(&other, Quaternion::IDENTITY), refused, "{index}");
+        assert_eq!(rollout.set_goal_orientation(&other, 0, Quaternion::IDENTITY), refused, "{index}");
         assert_eq!(rollout, before);
     }
-    // A copy is the same movement, and so is one with another memory.
-    let mut copy = primitive.clone();
-    copy.set_expected(Some(&dmp::ExpectedWrench::new(&[[1.0; SENSORS]], 5.0).unwrap()));
-    rollout.step(&copy, DT as f32, &Coupling::NONE).unwrap();
+    // A copy is the same movement.
+    rollout.step(&primitive.clone(), DT as f32, &Coupling::NONE).unwrap();
 }
 
 /// A tick that comes late after one that came early: each is stable alone.
@@ -292,25 +291,22 @@ fn ticks_of_changing_length_are_stable_whatever_the_damping() {
     }
 }
 
-fn refused<T: Scalar>(weights: &[f64], change: impl Fn(&mut PrimitiveTables<'_, T>)) -> Option<PrimitiveError> {
+fn refused<T: Scalar>(weights: &[f64], change: impl Fn(&mut Tables<'_, T>)) -> Option<PrimitiveError> {
     let weights: Vec<T> = weights.iter().map(|&w| T::from_f64(w)).collect();
     let f = T::from_f64;
-    let mut tables = PrimitiveTables {
+    let mut tables = Tables {
+        control_period: f(DT),
         duration: f(5.0),
         alpha: f(ALPHA),
         activation: f(0.7),
         kernel_count: 10,
         weights: &weights,
-        stiffness: [f(200.0); 4],
-        damping: [28.3, 20.0, 28.3, 28.3].map(f),
+        gains: gains([f(200.0); 4], [28.3, 20.0, 28.3, 28.3].map(f)),
         orientation_error: OrientationError::Quaternion,
         hemisphere: dmp::Hemisphere::Demonstrated,
-        start: crate::common::configuration(&ORIGIN),
-        goal: crate::common::configuration(&ORIGIN),
+        start: ORIGIN.cast(),
+        goal: ORIGIN.cast(),
         start_velocity: Velocity::ZERO,
-        feedback: None,
-        expected: None,
-        experience: None,
     };
     change(&mut tables);
     Primitive::<T, 10>::new(&tables).err()
@@ -326,8 +322,8 @@ fn check_weights<T: Scalar>() {
     for (at, row, kernel) in [(0, 0, 0), (39, 3, 9), (64, 6, 4), (169, 16, 9)] {
         for value in [1e6, -1e6, 1e30, -1e30] {
             match refused::<T>(&weights(at, value), |_| {}) {
-                Some(PrimitiveError::WeightTooLarge { row: found, kernel: near }) => {
-                    assert_eq!(found, row);
+                Some(PrimitiveError::WeightTooLarge { group, index, kernel: near }) => {
+                    assert_eq!(Group::of_weights(row, 1), (group, usize::from(index)));
                     assert!(near <= kernel && near + 6 > kernel, "{near} is not near {kernel}");
                 }
                 other => panic!("{value:e} at {at}: {other:?}"),
@@ -350,10 +346,10 @@ fn a_weight_larger_than_any_movement_needs_is_refused_by_its_place() {
     check_weights::<f64>();
     check_weights::<f32>();
     check_weights::<FixedPoint>();
-    let error = PrimitiveError::WeightTooLarge { row: 7, kernel: 4 };
+    let error = PrimitiveError::WeightTooLarge { group: Group::Points, index: 1, kernel: 4 };
     assert_eq!(
         error.to_string(),
-        "the weights of posture row 1 at kernel 4 (both from 0) are larger than any movement needs"
+        "the weights of point row 1 at kernel 4 (both from 0) are larger than any movement needs"
     );
 }
 
@@ -385,19 +381,19 @@ fn the_weights_of_real_fits_are_far_inside_the_bound() {
 #[test]
 fn starts_goals_and_velocities_out_of_this_world_are_refused_by_their_place() {
     let weights = [0.0; ROWS * 10];
-    let far = |change: &dyn Fn(&mut PrimitiveTables<'_, f64>)| refused::<f64>(&weights, change);
-    let too_large = |part: Part, row: dmp::Row, index: u8| Some(PrimitiveError::TooLarge { part, row, index });
+    let far = |change: &dyn Fn(&mut Tables<'_, f64>)| refused::<f64>(&weights, change);
+    let too_large = |part: Part, group: Group, index: u8| Some(PrimitiveError::TooLarge { part, group, index });
     for value in [20.1, -1e30] {
-        assert_eq!(far(&|t| t.start.position[1] = value), too_large(Part::Start, dmp::Row::Position, 1));
-        assert_eq!(far(&|t| t.start.posture[6] = value), too_large(Part::Start, dmp::Row::Posture, 6));
-        assert_eq!(far(&|t| t.goal.hand[3] = value), too_large(Part::Goal, dmp::Row::Hand, 3));
+        assert_eq!(far(&|t| t.start.poses[0].position[1] = value), too_large(Part::Start, Group::Position, 1));
+        assert_eq!(far(&|t| t.start.points[6] = value), too_large(Part::Start, Group::Points, 6));
+        assert_eq!(far(&|t| t.goal.points[10] = value), too_large(Part::Goal, Group::Points, 10));
         let fast = 3.0 * value;
         let part = Part::StartVelocity;
-        assert_eq!(far(&|t| t.start_velocity.position[0] = fast), too_large(part, dmp::Row::Position, 0));
-        assert_eq!(far(&|t| t.start_velocity.orientation[2] = fast), too_large(part, dmp::Row::Orientation, 2));
-        assert_eq!(far(&|t| t.start_velocity.hand[1] = fast), too_large(part, dmp::Row::Hand, 1));
+        assert_eq!(far(&|t| t.start_velocity.poses[0].linear[0] = fast), too_large(part, Group::Position, 0));
+        assert_eq!(far(&|t| t.start_velocity.poses[0].angular[2] = fast), too_large(part, Group::Orientation, 2));
+        assert_eq!(far(&|t| t.start_velocity.points[8] = fast), too_large(part, Group::Points, 8));
     }
-    let error = PrimitiveError::TooLarge { part: Part::StartVelocity, row: dmp::Row::Orientation, index: 2 };
+    let error = PrimitiveError::TooLarge { part: Part::StartVelocity, group: Group::Orientation, index: 2 };
     assert_eq!(
         error.to_string(),
         "orientation value 2 (from 0) of the start velocity is larger than any movement needs"
@@ -408,16 +404,15 @@ fn starts_goals_and_velocities_out_of_this_world_are_refused_by_their_place() {
     let demonstrated = StartState::demonstrated(&primitive);
     let refused = Err(RolloutError::TooLarge);
     let mut start = demonstrated;
-    start.configuration.posture[4] = 1e30;
+    start.configuration.points[4] = 1e30;
     assert_eq!(Rollout::start(&primitive, &start).map(|_| ()), refused);
     let mut start = demonstrated;
-    start.velocity.orientation[0] = 51.0;
+    start.velocity.poses[0].angular[0] = 51.0;
     assert_eq!(Rollout::start(&primitive, &start).map(|_| ()), refused);
     let mut rollout = Rollout::start(&primitive, &demonstrated).unwrap();
     let before = rollout.clone();
-    assert_eq!(rollout.set_goal_position([0.0, 1e30, 0.0]), refused);
-    assert_eq!(rollout.set_goal_posture([21.0; 7]), refused);
-    assert_eq!(rollout.set_goal_hand([-21.0; 4]), refused);
+    assert_eq!(rollout.set_goal_position(0, [0.0, 1e30, 0.0]), refused);
+    assert_eq!(rollout.set_goal_points([-21.0; 11]), refused);
     assert_eq!(rollout.set_speed_slew(Some(1e30)), Err(RolloutError::TooFast));
     assert_eq!(rollout, before);
 }
@@ -426,24 +421,25 @@ fn check_tables<T: Scalar>() {
     let f = T::from_f64;
     let gains = |values: f64| GainSchedule::constant([f(values); 10]).unwrap();
     let sensors = |values: f64| GainSchedule::<T, SENSORS>::constant([f(values); SENSORS]).unwrap();
-    let limits = |displacement: f64, rotation: f64, hand: f64| Limits {
-        displacement: f(displacement),
-        rotation: f(rotation),
-        hand: f(hand),
-    };
-    let feedback = |k1: f64, k2: f64, limits: Limits<T>| Feedback::new(gains(k1), sensors(k2), limits).err();
+    let limits = |displacement: f64, rotation: f64, hand: f64| limits(f(displacement), f(rotation), f(hand));
+    let limited = |limits: Limits<T>| limits.check().err();
+    let feedback = |k1: f64, k2: f64| CouplingGains::new(gains(k1), sensors(k2)).err();
     let too_large = |entry: Entry| Some(TableError::TooLarge(entry));
-    assert_eq!(feedback(1e4, 4.0, limits(0.5, 3.0, 3.0)), None);
+    assert_eq!((feedback(1e4, 4.0), limited(limits(0.5, 3.0, 3.0))), (None, None));
     for value in [1e30, 2.1, 1e6] {
-        assert_eq!(feedback(1.0, 1.0, limits(value, 1.0, 1.0)), too_large(Entry::Displacement), "{value}");
+        assert_eq!(limited(limits(value, 1.0, 1.0)), too_large(Entry::Displacement), "{value}");
     }
     for value in [1e30, 3.15] {
-        assert_eq!(feedback(1.0, 1.0, limits(0.2, value, 1.0)), too_large(Entry::Rotation), "{value}");
-        assert_eq!(feedback(1.0, 1.0, limits(0.2, 1.0, value)), too_large(Entry::Hand), "{value}");
+        assert_eq!(limited(limits(0.2, value, 1.0)), too_large(Entry::Rotation), "{value}");
+        assert_eq!(limited(limits(0.2, 1.0, value)), too_large(Entry::PointDisplacement), "{value}");
+    }
+    for (value, error) in [(-0.1, TableError::Negative), (f64::NAN, TableError::NotFinite)] {
+        let is_refused = limited(limits(0.2, 1.0, value)) == Some(error);
+        assert!(is_refused || f(value) == T::ZERO, "{value}");
     }
     let (point, column) = (0, 0);
-    assert_eq!(feedback(1e30, 1.0, limits(0.2, 1.0, 1.0)), too_large(Entry::Sensitivity { point, column }));
-    assert_eq!(feedback(1.0, 1e30, limits(0.2, 1.0, 1.0)), too_large(Entry::SensorWeight { point, column }));
+    assert_eq!(feedback(1e30, 1.0), too_large(Entry::Sensitivity { point, column }));
+    assert_eq!(feedback(1.0, 1e30), too_large(Entry::SensorWeight { point, column }));
 
     let mut samples = vec![[T::ZERO; SENSORS]; 7];
     assert!(ExpectedWrench::new(&samples, f(5.0)).is_ok());
@@ -454,16 +450,16 @@ fn check_tables<T: Scalar>() {
     let entry = Entry::Expected { point: 4, column: 8 };
     assert_eq!(ExpectedWrench::new(&samples, f(5.0)).err(), too_large(entry));
 
-    let experience = |mean: f64, spread: f64| {
-        let mut tables = [[[f(0.5); EXPERIENCE_CHANNELS]; 3]; 2];
+    let statistics = |mean: f64, spread: f64| {
+        let mut tables = [[[f(0.5); CHANNELS]; 3]; 2];
         (tables[0][2][11], tables[1][1][0]) = (f(mean), f(spread));
-        dmp::Experience::new(&tables[0], &tables[1], 3).err()
+        Statistics::new(&tables[0], &tables[1], 3).err()
     };
-    assert_eq!(experience(1.0, 1e-3), None);
-    assert_eq!(experience(1e30, 1.0), too_large(Entry::Mean { point: 2, column: 11 }));
-    assert_eq!(experience(1.0, 1e30), too_large(Entry::Spread { point: 1, column: 0 }));
+    assert_eq!(statistics(1.0, 1e-3), None);
+    assert_eq!(statistics(1e30, 1.0), too_large(Entry::Mean { point: 2, column: 11 }));
+    assert_eq!(statistics(1.0, 1e30), too_large(Entry::Spread { point: 1, column: 0 }));
     for narrow in [0.0, 1e-7, 1e-39] {
-        assert_eq!(experience(1.0, narrow), Some(TableError::Spread), "{narrow}");
+        assert_eq!(statistics(1.0, narrow), Some(TableError::Spread), "{narrow}");
     }
 }
 
@@ -478,7 +474,7 @@ fn limits_gains_and_sensor_values_beyond_anything_real_are_refused_by_their_plac
     );
     assert_eq!(
         TableError::TooLarge(Entry::Mean { point: 2, column: 11 }).to_string(),
-        "the mean of the experience at point 2, column 11 (from 0) is larger than anything real"
+        "the mean of the statistics at point 2, column 11 (from 0) is larger than anything real"
     );
 }
 

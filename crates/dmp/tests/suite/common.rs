@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 
-use dmp::{
-    Configuration, Coupling, Feedback, Hemisphere, OrientationError, Primitive, PrimitiveTables, Quaternion, ROWS,
-    Reference, Rollout, Scalar, StartState, Velocity,
+use crate::arm::{
+    Configuration, Coupling, ORIGIN, Primitive, ROWS, Reference, Rollout, StartState, Tables, Velocity, gains,
 };
+use dmp::{Hemisphere, OrientationError, Quaternion, Scalar};
 
 /// Control period of the golden vectors, s.
 pub(crate) const DT: f64 = 1.0 / 300.0;
@@ -24,7 +24,7 @@ pub(crate) struct Table {
 impl Table {
     /// Reads `tests/vectors/<name>.csv`; empty fields become NaN, words too.
     pub(crate) fn load(name: &str) -> Self {
-        let path = format!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/vectors/{}.csv"), name);
+        let path = format!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/vectors/{}.csv"), name);
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .from_path(&path)
@@ -54,7 +54,7 @@ impl Table {
 
 /// Weights of one set of `dmp_theta.csv`, row by row.
 pub(crate) fn theta(set: &str) -> Vec<Vec<f64>> {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/vectors/dmp_theta.csv");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/vectors/dmp_theta.csv");
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(path).unwrap();
     let rows: Vec<Vec<f64>> = reader
         .records()
@@ -80,9 +80,6 @@ pub(crate) struct Plan {
     pub(crate) stiffness: f64,
 }
 
-pub(crate) const ORIGIN: Configuration<f64> =
-    Configuration { position: [0.0; 3], orientation: Quaternion::IDENTITY, posture: [0.0; 7], hand: [0.0; 4] };
-
 impl Plan {
     /// Unforced, from the origin to the origin in 5 s.
     pub(crate) fn empty() -> Self {
@@ -102,16 +99,16 @@ impl Plan {
     /// The movement of `dmp_nocoupling.csv` and its relatives.
     pub(crate) fn golden() -> Self {
         let mut plan = Self::empty();
-        plan.start.position = [0.4, -0.1, 0.25];
-        plan.goal.position = [0.55, 0.2, 0.05];
-        plan.goal.hand = [0.3, 2.1, 2.1, 2.1];
-        plan.start.orientation = Quaternion::new(
+        plan.start.poses[0].position = [0.4, -0.1, 0.25];
+        plan.goal.poses[0].position = [0.55, 0.2, 0.05];
+        plan.goal.points[7..].copy_from_slice(&[0.3, 2.1, 2.1, 2.1]);
+        plan.start.poses[0].orientation = Quaternion::new(
             0.952_874_852_886_029_6,
             0.147_636_255_766_526_28,
             -0.098_424_170_511_017_53,
             0.246_060_426_277_543_8,
         );
-        plan.goal.orientation = Quaternion::new(
+        plan.goal.poses[0].orientation = Quaternion::new(
             0.735_556_974_165_655_5,
             0.398_362_610_102_983_3,
             0.547_780_779_185_993_2,
@@ -133,51 +130,24 @@ impl Plan {
 
     /// The primitive in the number type `T` with critically damped rows.
     pub(crate) fn build<T: Scalar>(&self) -> Primitive<T, 100> {
-        self.build_with(None)
-    }
-
-    /// The same with feedback and an expectation of zero.
-    pub(crate) fn build_with<T: Scalar>(&self, feedback: Option<Feedback<T>>) -> Primitive<T, 100> {
         let weights: Vec<T> = self.weights.iter().map(|&w| T::from_f64(w)).collect();
         let damping = 2.0 * self.stiffness.sqrt();
         let damping_o = self.orientation_error.critical_damping(self.stiffness);
-        Primitive::new(&PrimitiveTables {
+        Primitive::new(&Tables {
+            control_period: T::from_f64(DT),
             duration: T::from_f64(self.duration),
             alpha: T::from_f64(ALPHA),
             activation: T::from_f64(0.7),
             kernel_count: self.count,
             weights: &weights,
-            stiffness: [T::from_f64(self.stiffness); 4],
-            damping: [damping, damping_o, damping, damping].map(T::from_f64),
+            gains: gains([self.stiffness; 4], [damping, damping_o, damping, damping]).cast(),
             orientation_error: self.orientation_error,
             hemisphere: self.hemisphere,
-            start: configuration(&self.start),
-            goal: configuration(&self.goal),
-            start_velocity: Velocity {
-                position: self.start_velocity.position.map(T::from_f64),
-                orientation: self.start_velocity.orientation.map(T::from_f64),
-                posture: self.start_velocity.posture.map(T::from_f64),
-                hand: self.start_velocity.hand.map(T::from_f64),
-            },
-            feedback: feedback.as_ref(),
-            expected: None,
-            experience: None,
+            start: self.start.cast(),
+            goal: self.goal.cast(),
+            start_velocity: self.start_velocity.cast(),
         })
         .unwrap()
-    }
-}
-
-pub(crate) fn quaternion<T: Scalar>(q: &Quaternion<f64>) -> Quaternion<T> {
-    let [w, x, y, z] = q.to_array().map(T::from_f64);
-    Quaternion::new(w, x, y, z)
-}
-
-pub(crate) fn configuration<T: Scalar>(c: &Configuration<f64>) -> Configuration<T> {
-    Configuration {
-        position: c.position.map(T::from_f64),
-        orientation: quaternion(&c.orientation),
-        posture: c.posture.map(T::from_f64),
-        hand: c.hand.map(T::from_f64),
     }
 }
 

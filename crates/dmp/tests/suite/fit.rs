@@ -2,11 +2,12 @@
 
 use std::f64::consts::PI;
 
+use crate::arm::{Coupling, Demonstration, FitOptions, Learned, Rollout, StartState, demonstration as shown};
 use crate::common::DT;
 use dmp::fit::{
-    Demonstration, DemonstrationError, FitError, FitOptions, Learned, RowReport, angular_velocity, fit, minimum_jerk,
+    DemonstrationError, FitError, PoseSamples, RowReport, angular_velocity, fit, fit_several, minimum_jerk,
 };
-use dmp::{Coupling, OrientationError, Quaternion, Rollout, StartState};
+use dmp::{OrientationError, Quaternion};
 
 const SAMPLES: usize = 1501;
 
@@ -22,7 +23,7 @@ fn rippled(samples: usize) -> Demonstration {
         let window = (PI * u).sin().powi(4);
         base[k][0] + window * (0.2 * (6.0 * PI * u + phase).sin())
     };
-    Demonstration::new(
+    shown(
         5.0 / (samples - 1) as f64,
         (0..samples).map(|k| std::array::from_fn(|i| value(k, i as f64))).collect(),
         still_orientation(samples),
@@ -44,7 +45,7 @@ fn turning(samples: usize, angle: f64) -> Demonstration {
                 .product(&Quaternion::from_rotation_vector(&[0.48 * angle * b, 0.6 * angle * b, 0.64 * angle * b]))
         })
         .collect();
-    Demonstration::new(
+    shown(
         5.0 / (samples - 1) as f64,
         vec![[0.0; 3]; samples],
         orientation,
@@ -84,7 +85,7 @@ fn multi_axis_orientation_is_followed_in_angle_and_path() {
     for degrees in [60.0_f64, 110.0, 140.0] {
         let demonstration = turning(SAMPLES, degrees.to_radians());
         let learned = fit(&demonstration, &exact()).unwrap();
-        let report = learned.report.orientation;
+        let report = learned.report.orientations[0];
         println!(
             "turning: up to {:.1} deg from the goal, error {:.4} deg, path {:.2} / {:.2} deg",
             report.largest_angle.to_degrees(),
@@ -101,7 +102,7 @@ fn multi_axis_orientation_is_followed_in_angle_and_path() {
 fn orientation_turning_150_degrees_is_followed() {
     // The angle to the goal peaks a little above the nominal one because of the swing; aim at 150 degrees.
     let demonstration = turning(SAMPLES, 148.5_f64.to_radians());
-    let report = fit(&demonstration, &exact()).unwrap().report.orientation;
+    let report = fit(&demonstration, &exact()).unwrap().report.orientations[0];
     println!(
         "150 deg: {:.2} deg from the goal, error {:.4} deg",
         report.largest_angle.to_degrees(),
@@ -120,7 +121,7 @@ fn replay_with_rows(
 ) -> (f64, f64) {
     // Fit again from targets that were computed wrongly: done here with the library's own pieces.
     use dmp::{OrientationInput, OrientationState, OrientationSystem};
-    let q = demonstration.orientation();
+    let q = &demonstration.poses()[0].orientation;
     let tau = demonstration.duration();
     let omega = angular_velocity(q, demonstration.period());
     let system = OrientationSystem::<f64>::critically_damped(200.0).unwrap();
@@ -156,7 +157,7 @@ fn mixing_body_and_world_frames_is_degrees_wrong() {
     let demonstration = turning(SAMPLES, 110.0_f64.to_radians());
     let learned = fit(&demonstration, &exact()).unwrap();
     let (right, _) = replay_with_rows(&demonstration, &learned, |_, w| w);
-    let q = demonstration.orientation();
+    let q = &demonstration.poses()[0].orientation;
     let (mixed, _) = replay_with_rows(&demonstration, &learned, |i, w| q[i].rotate(&w));
     let (reversed, path) = replay_with_rows(&demonstration, &learned, |_, w| w.map(|w| -w));
     println!(
@@ -172,15 +173,8 @@ fn forgetting_tau_in_the_target_is_far_off() {
     // tau xdd + D xd instead of tau^2 xdd + D tau xd: 5 s taught, but differentiated as if tau were 1.
     let right = rippled(SAMPLES);
     let learned = fit(&right, &exact()).unwrap();
-    let squeezed = Demonstration::new(
-        right.period() / 5.0,
-        right.position().to_vec(),
-        right.orientation().to_vec(),
-        right.posture().to_vec(),
-        right.hand().to_vec(),
-    )
-    .unwrap();
-    let same = fit(&squeezed, &exact()).unwrap();
+    let squeezed = Demonstration::new(right.period() / 5.0, right.poses().clone(), right.points().to_vec()).unwrap();
+    let same = fit(&squeezed, &FitOptions { control_period: Some(DT), ..exact() }).unwrap();
     // The same path taught five times faster has the same weights, up to the half tick that belongs to the integrator:
     // tau is factored out ...
     let largest = learned.weights.iter().fold(0.0_f64, |a, w| a.max(w.abs()));
@@ -195,9 +189,9 @@ fn forgetting_tau_in_the_target_is_far_off() {
     let primitive = wrong.primitive::<f64, 100>().unwrap();
     let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
     let mut worst = 0.0_f64;
-    for x in right.position() {
-        let row = rollout.step(&primitive, DT, &Coupling::NONE).unwrap();
-        worst = worst.max((row.position.x[0] - x[0]).abs());
+    for x in &right.poses()[0].position {
+        let row = rollout.step(&primitive, primitive.control_period(), &Coupling::NONE).unwrap();
+        worst = worst.max((row.poses[0].position.x[0] - x[0]).abs());
     }
     assert!(worst > 0.1, "{worst}");
 }
@@ -210,7 +204,7 @@ fn half_circle_is_refused_unless_the_rotation_vector_is_chosen() {
     };
     assert!((angle.to_degrees() - 200.0).abs() < 15.0);
     let options = FitOptions { orientation_error: OrientationError::RotationVector, ..exact() };
-    let report = fit(&demonstration, &options).unwrap().report.orientation;
+    let report = fit(&demonstration, &options).unwrap().report.orientations[0];
     println!("200 deg by rotation vector: error {:.4} deg", report.max.to_degrees());
     assert!(report.max.to_degrees() < 0.1);
     assert!(report.wide);
@@ -220,9 +214,9 @@ fn half_circle_is_refused_unless_the_rotation_vector_is_chosen() {
 #[test]
 fn more_than_150_degrees_is_reported() {
     let wide = turning(SAMPLES, 160.0_f64.to_radians());
-    assert!(fit(&wide, &exact()).unwrap().report.orientation.wide);
+    assert!(fit(&wide, &exact()).unwrap().report.orientations[0].wide);
     let narrow = turning(SAMPLES, 120.0_f64.to_radians());
-    assert!(!fit(&narrow, &exact()).unwrap().report.orientation.wide);
+    assert!(!fit(&narrow, &exact()).unwrap().report.orientations[0].wide);
 }
 
 #[test]
@@ -247,25 +241,19 @@ fn noise_is_filtered_before_it_is_differentiated() {
         }
         sum * 2e-4
     };
-    let noisy: Vec<[f64; 3]> = clean.position().iter().map(|x| x.map(|x| x + noise())).collect();
-    let demonstration = Demonstration::new(
-        clean.period(),
-        noisy,
-        clean.orientation().to_vec(),
-        clean.posture().to_vec(),
-        clean.hand().to_vec(),
-    )
-    .unwrap();
+    let noisy: Vec<[f64; 3]> = clean.poses()[0].position.iter().map(|x| x.map(|x| x + noise())).collect();
+    let pose = PoseSamples { position: noisy, orientation: clean.poses()[0].orientation.clone() };
+    let demonstration = Demonstration::new(clean.period(), [pose], clean.points().to_vec()).unwrap();
     let error = |options: &FitOptions| {
         let learned = fit(&demonstration, options).unwrap();
         let primitive = learned.primitive::<f64, 50>().unwrap();
         let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
-        let squares: f64 = clean
-            .position()
+        let squares: f64 = clean.poses()[0]
+            .position
             .iter()
             .map(|x| {
-                let row = rollout.step(&primitive, clean.period(), &Coupling::NONE).unwrap();
-                (row.position.x[0] - x[0]).powi(2)
+                let row = rollout.step(&primitive, primitive.control_period(), &Coupling::NONE).unwrap();
+                (row.poses[0].position.x[0] - x[0]).powi(2)
             })
             .sum();
         ((squares / clean.len() as f64).sqrt(), learned.report.rows[0].force_rms)
@@ -302,8 +290,7 @@ fn synthetic_recording() -> Vec<(String, Demonstration)> {
                 .product(&Quaternion::from_rotation_vector(&[0.0, 0.0, turn]))
         })
         .collect();
-    let demonstration =
-        Demonstration::new(DT, position, orientation, vec![[0.0; 7]; samples], vec![[0.0; 4]; samples]).unwrap();
+    let demonstration = shown(DT, position, orientation, vec![[0.0; 7]; samples], vec![[0.0; 4]; samples]).unwrap();
     vec![("synthetic".into(), demonstration)]
 }
 
@@ -329,7 +316,7 @@ fn recordings() -> Vec<(String, Demonstration)> {
                 .records()
                 .map(|record| record.unwrap().iter().map(|x| x.parse().unwrap()).collect())
                 .collect();
-            let demonstration = Demonstration::new(
+            let demonstration = shown(
                 DT,
                 rows.iter().map(|r| [r[1], r[2], r[3]]).collect(),
                 rows.iter().map(|r| Quaternion::new(r[4], r[5], r[6], r[7])).collect(),
@@ -361,7 +348,7 @@ fn recordings_cut_from_a_motion_replay_from_their_own_velocity() {
             let worst = norm(&|row| row.rms) / extent;
             let max = norm(&|row| row.max) / extent;
             let removed = norm(&|row| row.removed_rms) / extent;
-            let report = learned.report.orientation;
+            let report = learned.report.orientations[0];
             println!(
                 "{name}, N = {kernel_count}: position rms {:.3} %, max {:.2} %, smoothed away {:.2} % of the extent; orientation max {:.3} deg, \
                  rms {:.3} deg, {:.1} deg from the goal, path {:.1} / {:.1} deg, condition {:.1e}",
@@ -386,9 +373,9 @@ fn recordings_cut_from_a_motion_replay_from_their_own_velocity() {
             let start = StartState::at_rest(*primitive.start());
             let mut rollout = Rollout::start(&primitive, &start).unwrap();
             let mut from_rest = 0.0_f64;
-            for x in demonstration.position() {
-                let row = rollout.step(&primitive, DT, &Coupling::NONE).unwrap();
-                for (planned, x) in row.position.x.iter().zip(x) {
+            for x in &demonstration.poses()[0].position {
+                let row = rollout.step(&primitive, primitive.control_period(), &Coupling::NONE).unwrap();
+                for (planned, x) in row.poses[0].position.x.iter().zip(x) {
                     from_rest += (planned - x).powi(2);
                 }
             }
@@ -403,7 +390,7 @@ fn recordings_cut_from_a_motion_replay_from_their_own_velocity() {
 fn unusable_demonstrations_are_refused_with_the_sample() {
     let n = 100;
     let build = |position: Vec<[f64; 3]>, orientation: Vec<Quaternion<f64>>| {
-        Demonstration::new(DT, position, orientation, vec![[0.0; 7]; n], vec![[0.0; 4]; n])
+        shown(DT, position, orientation, vec![[0.0; 7]; n], vec![[0.0; 4]; n])
     };
     let mut position = vec![[0.0; 3]; n];
     position[42][1] = f64::NAN;
@@ -413,7 +400,7 @@ fn unusable_demonstrations_are_refused_with_the_sample() {
     assert_eq!(build(vec![[0.0; 3]; n], orientation), Err(DemonstrationError::NotUnit { sample: 7 }));
     assert_eq!(build(vec![[0.0; 3]; n - 1], still_orientation(n)), Err(DemonstrationError::Lengths));
     assert_eq!(
-        Demonstration::new(DT, vec![[0.0; 3]; 5], still_orientation(5), vec![[0.0; 7]; 5], vec![[0.0; 4]; 5]),
+        shown(DT, vec![[0.0; 3]; 5], still_orientation(5), vec![[0.0; 7]; 5], vec![[0.0; 4]; 5]),
         Err(DemonstrationError::TooFew { samples: 5 })
     );
     let demonstration = rippled(200);
@@ -447,18 +434,74 @@ fn the_plan_of_a_demonstration_that_ends_at_rest_stays_at_its_goal() {
         .collect();
     let posture = std::vec![[0.2; 7]; samples];
     let hand = std::vec![[0.0; 4]; samples];
-    let demonstration = Demonstration::new(period, position, orientation, posture, hand).unwrap();
+    let demonstration = shown(period, position, orientation, posture, hand).unwrap();
     let learned = fit(&demonstration, &FitOptions::default()).unwrap();
-    let primitive: dmp::Primitive<f64, 50> = learned.primitive().unwrap();
+    let primitive: crate::arm::Primitive<f64, 50> = learned.primitive().unwrap();
     let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
     let mut worst = 0.0_f64;
     for k in 0..3 * samples {
-        let reference = rollout.step(&primitive, period, &Coupling::NONE).unwrap();
+        let reference = rollout.step(&primitive, primitive.control_period(), &Coupling::NONE).unwrap();
         if k >= samples {
             for axis in 0..3 {
-                worst = worst.max((reference.position.x[axis] - learned.goal.position[axis]).abs());
+                worst = worst.max((reference.poses[0].position.x[axis] - learned.goal.poses[0].position[axis]).abs());
             }
         }
     }
     assert!(worst < 2e-3, "the plan leaves its goal by {worst} m");
+}
+
+#[test]
+fn one_row_alone_is_learned_and_run() {
+    let samples: Vec<f64> = minimum_jerk([0.2], [1.1], 501).into_iter().map(|[x]| x).collect();
+    let demonstration = dmp::fit::Demonstration::of_row(0.002, &samples).unwrap();
+    let learned = fit(&demonstration, &dmp::fit::FitOptions::default()).unwrap();
+    assert!(learned.report.rows[0].max < 1e-4 && learned.report.orientations.is_empty());
+    let primitive = learned.primitive::<f32, 50>().unwrap();
+    let mut rollout = dmp::Rollout::start(&primitive, &dmp::StartState::demonstrated(&primitive)).unwrap();
+    for x in &samples {
+        let plan = rollout.step(&primitive, 0.002, &dmp::Coupling::NONE).unwrap();
+        assert!((f64::from(plan.points.x[0]) - x).abs() < 2e-4);
+    }
+}
+
+#[test]
+fn several_demonstrations_are_learned_as_their_mean_and_their_spread_is_told() {
+    // The same way, 4, 5 and 6 s long, shifted by -2, 0 and 2 cm along x.
+    let one = |samples: usize, shift: f64, turned: bool| {
+        let position = minimum_jerk([0.1 + shift, 0.0, 0.2], [0.5 + shift, 0.2, 0.1], samples);
+        let turn = minimum_jerk([0.0], [0.8], samples);
+        let orientation = turn.iter().map(|[angle]| Quaternion::from_rotation_vector(&[0.0, *angle, 0.0]));
+        let orientation = orientation.map(|q| if turned { q.negated() } else { q }).collect();
+        shown(DT, position, orientation, vec![[0.3; 7]; samples], vec![[0.0; 4]; samples]).unwrap()
+    };
+    let all = [one(1201, -0.02, false), one(1501, 0.0, true), one(1801, 0.02, false)];
+    let learned = fit_several(&all, &exact()).unwrap();
+    assert!((learned.duration - 5.0).abs() < 1e-9);
+    let alone = fit(&one(1501, 0.0, false), &exact()).unwrap();
+    for (mean, one) in learned.goal.poses[0].position.iter().zip(alone.goal.poses[0].position) {
+        assert!((mean - one).abs() < 1e-6, "{mean} {one}");
+    }
+    let turn = learned.goal.poses[0].orientation.aligned_with(&alone.goal.poses[0].orientation);
+    assert!(turn.conjugate().product(&alone.goal.poses[0].orientation).angle() < 1e-6);
+    let spread = &learned.report.spread;
+    assert_eq!(spread.len(), 17);
+    assert!((spread[0] - 0.02 * (2.0_f64 / 3.0).sqrt()).abs() < 1e-4, "{spread:?}");
+    assert!(spread[1..].iter().all(|spread| *spread < 1e-4), "{spread:?}");
+    assert!(alone.report.spread.is_empty());
+    assert_eq!(fit_several::<11, 1>(&[], &exact()).unwrap_err(), FitError::Demonstration(DemonstrationError::None));
+    let other_rate = shown(0.01, vec![[0.0; 3]; 100], still_orientation(100), vec![[0.0; 7]; 100], vec![[0.0; 4]; 100]);
+    let mixed = fit_several(&[all[0].clone(), other_rate.unwrap()], &exact());
+    assert_eq!(mixed.unwrap_err(), FitError::Demonstration(DemonstrationError::Lengths));
+}
+
+#[test]
+fn a_movement_taught_and_run_at_another_rate_is_the_same_movement() {
+    // 5 s at 100 Hz and at 1 kHz.
+    for period in [0.01, 0.001] {
+        let samples = (5.0 / period) as usize + 1;
+        let learned = fit(&rippled(samples), &exact()).unwrap();
+        assert_eq!(learned.control_period, 5.0 / (samples - 1) as f64);
+        let worst = learned.report.rows.iter().fold(0.0_f64, |worst, row| worst.max(row.max));
+        assert!(worst < 2e-3, "{period} s: {worst}");
+    }
 }

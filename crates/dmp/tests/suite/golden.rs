@@ -1,10 +1,11 @@
 //! Golden vectors of Eqs. (1)-(9): f64 within 1e-10 of the Euler reference, f32 within 5e-6 m and 1e-5, fixed point
 //! within 5e-4, and all of them within the stated integrator error of the continuous solution.
 
+use crate::arm::{Coupling, Reference, coupling};
 use crate::common::{ALPHA, DT, K, N, Plan, Table, largest_difference, run, theta, ticks};
 use dmp::{
-    Basis, CanonicalSystem, Coupling, FixedPoint, ForcingTerm, Phase, PointInput, PointState, Quaternion, Reference,
-    Scalar, TransformationSystem,
+    Basis, CanonicalSystem, FixedPoint, ForcingTerm, Phase, PointInput, PointState, Quaternion, Scalar,
+    TransformationSystem,
 };
 
 const F64: f64 = 1e-10;
@@ -27,7 +28,7 @@ fn d3<T: Scalar>(values: [T; 3]) -> [f64; 3] {
 }
 
 fn quaternion<T: Scalar>(row: &Reference<T>) -> [f64; 4] {
-    row.orientation.quaternion.to_array().map(Scalar::to_f64)
+    row.poses[0].orientation.quaternion.to_array().map(Scalar::to_f64)
 }
 
 #[test]
@@ -173,18 +174,21 @@ fn one_row_follows_a_change_of_tau() {
 
 fn position_run<T: Scalar>(ticks: usize, per_tick: usize) -> Vec<[[f64; 3]; 3]> {
     let mut plan = Plan::golden();
-    plan.goal.orientation = plan.start.orientation;
+    plan.goal.poses[0].orientation = plan.start.poses[0].orientation;
     let primitive = plan.build::<T>();
     let rows = run(&primitive, ticks * per_tick, DT / per_tick as f64, |i, rollout| {
         if i == 750 * per_tick {
-            rollout.set_goal_position([0.6, 0.12, 0.09].map(T::from_f64)).unwrap();
+            rollout.set_goal_position(0, [0.6, 0.12, 0.09].map(T::from_f64)).unwrap();
         }
         if i == 900 * per_tick {
             rollout.set_duration(&primitive, T::from_f64(6.0)).unwrap();
         }
         Coupling::NONE
     });
-    rows.iter().step_by(per_tick).map(|row| [d3(row.position.x), d3(row.position.v), d3(row.position.a)]).collect()
+    rows.iter()
+        .step_by(per_tick)
+        .map(|row| [d3(row.poses[0].position.x), d3(row.poses[0].position.v), d3(row.poses[0].position.a)])
+        .collect()
 }
 
 #[test]
@@ -242,7 +246,7 @@ fn orientation_errors<T: Scalar>(
         {
             let [w, x, y, z] = goal.map(T::from_f64);
             let goal = Quaternion::new(w, x, y, z);
-            rollout.set_goal_orientation(&primitive, goal).unwrap();
+            rollout.set_goal_orientation(&primitive, 0, goal).unwrap();
         }
         Coupling::NONE
     });
@@ -251,9 +255,11 @@ fn orientation_errors<T: Scalar>(
         quaternion: largest_difference(times, &table.columns(["qw_e", "qx_e", "qy_e", "qz_e"]), |k| {
             quaternion(&rows[k])
         }),
-        omega: largest_difference(times, &table.columns(["wx_e", "wy_e", "wz_e"]), |k| d3(rows[k].orientation.omega)),
+        omega: largest_difference(times, &table.columns(["wx_e", "wy_e", "wz_e"]), |k| {
+            d3(rows[k].poses[0].orientation.omega)
+        }),
         domega: largest_difference(times, &table.columns(["dwx_e", "dwy_e", "dwz_e"]), |k| {
-            d3(rows[k].orientation.domega)
+            d3(rows[k].poses[0].orientation.domega)
         }),
         continuous: largest_difference(times, &table.columns(["qw_c", "qx_c", "qy_c", "qz_c"]), |k| {
             quaternion(&rows[k])
@@ -291,7 +297,7 @@ fn orientation_goal_on_the_far_hemisphere_is_flipped() {
 #[test]
 fn antipodal_goal_is_reached_the_short_way() {
     let mut plan = Plan::empty();
-    plan.goal.orientation = Quaternion::from_rotation_vector(&[0.0, 0.0, 0.5]).negated();
+    plan.goal.poses[0].orientation = Quaternion::from_rotation_vector(&[0.0, 0.0, 0.5]).negated();
     check_orientation("dmp_quat_antipodal", &plan, None);
 }
 
@@ -322,37 +328,41 @@ fn full_errors<T: Scalar>(
     let primitive = plan.build::<T>();
     let rows = run(&primitive, ticks(times), DT, |i, _| {
         let [px, py, pz, rx, ry, rz, hand @ ..] = zeta(i).map(T::from_f64);
-        Coupling { position: [px, py, pz], orientation: [rx, ry, rz], hand }
+        coupling([px, py, pz], [rx, ry, rz], hand)
     });
     let mut errors = FullErrors {
-        position: largest_difference(times, &table.columns(["px_e", "py_e", "pz_e"]), |k| d3(rows[k].position.x)),
+        position: largest_difference(times, &table.columns(["px_e", "py_e", "pz_e"]), |k| {
+            d3(rows[k].poses[0].position.x)
+        }),
         orientation: largest_difference(times, &table.columns(["qw_e", "qx_e", "qy_e", "qz_e"]), |k| {
             quaternion(&rows[k])
         }),
-        continuous: largest_difference(times, &table.columns(["px_c", "py_c", "pz_c"]), |k| d3(rows[k].position.x)),
+        continuous: largest_difference(times, &table.columns(["px_c", "py_c", "pz_c"]), |k| {
+            d3(rows[k].poses[0].position.x)
+        }),
         ..FullErrors::default()
     };
     let rates = [
-        largest_difference(times, &table.columns(["vx_e", "vy_e", "vz_e"]), |k| d3(rows[k].position.v)),
-        largest_difference(times, &table.columns(["ax_e", "ay_e", "az_e"]), |k| d3(rows[k].position.a)),
-        largest_difference(times, &table.columns(["wx_e", "wy_e", "wz_e"]), |k| d3(rows[k].orientation.omega)),
-        largest_difference(times, &table.columns(["dwx_e", "dwy_e", "dwz_e"]), |k| d3(rows[k].orientation.domega)),
+        largest_difference(times, &table.columns(["vx_e", "vy_e", "vz_e"]), |k| d3(rows[k].poses[0].position.v)),
+        largest_difference(times, &table.columns(["ax_e", "ay_e", "az_e"]), |k| d3(rows[k].poses[0].position.a)),
+        largest_difference(times, &table.columns(["wx_e", "wy_e", "wz_e"]), |k| d3(rows[k].poses[0].orientation.omega)),
+        largest_difference(times, &table.columns(["dwx_e", "dwy_e", "dwz_e"]), |k| {
+            d3(rows[k].poses[0].orientation.domega)
+        }),
     ];
     errors.rates = rates.into_iter().fold(0.0, f64::max);
     if let Some(&[x, y, z, w]) = hand_columns {
-        let hand = |k: usize| rows[k].hand.x.map(Scalar::to_f64);
-        let fingers = |values: [T; 4]| {
-            let [_, f1, f2, f3] = values.map(Scalar::to_f64);
-            [f1, f2, f3]
-        };
+        let hand = |k: usize| std::array::from_fn(|i| rows[k].points.x[7 + i].to_f64());
+        let fingers = |values: [T; 11]| std::array::from_fn(|i| values[8 + i].to_f64());
         errors.hand = if x.is_empty() {
-            largest_difference(times, &table.columns([y, z, w]), |k| fingers(rows[k].hand.x))
+            largest_difference(times, &table.columns([y, z, w]), |k| fingers(rows[k].points.x))
         } else {
             largest_difference(times, &table.columns([x, y, z, w]), hand)
         };
-        let d = largest_difference(times, &table.columns(["f1_d_e", "f2_d_e", "f3_d_e"]), |k| fingers(rows[k].hand.v));
+        let d =
+            largest_difference(times, &table.columns(["f1_d_e", "f2_d_e", "f3_d_e"]), |k| fingers(rows[k].points.v));
         let dd =
-            largest_difference(times, &table.columns(["f1_dd_e", "f2_dd_e", "f3_dd_e"]), |k| fingers(rows[k].hand.a));
+            largest_difference(times, &table.columns(["f1_dd_e", "f2_dd_e", "f3_dd_e"]), |k| fingers(rows[k].points.a));
         errors.rates = errors.rates.max(d).max(dd);
     }
     errors
@@ -402,8 +412,8 @@ fn whole_primitive_bends_as_the_coupled_vectors() {
 #[test]
 fn constant_feedback_follows_its_vectors() {
     let mut plan = Plan::empty();
-    plan.start.position = [0.4, -0.1, 0.25];
-    plan.goal.position = [0.55, 0.2, 0.05];
+    plan.start.poses[0].position = [0.4, -0.1, 0.25];
+    plan.goal.poses[0].position = [0.55, 0.2, 0.05];
     let zeta = [10.0, -5.0, 2.0, 20.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     check_full("dmp_coupling_const", &plan, None, |_| zeta);
 }

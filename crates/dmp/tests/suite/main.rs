@@ -1,5 +1,6 @@
 //! Tests of the library from outside, as one program: golden vectors, sign-catching checks, learning, robustness.
 
+mod arm;
 mod bounds;
 mod common;
 mod fit;

@@ -1,21 +1,32 @@
-//! What a primitive remembers beside its movement: expectation, weights from the spread, experience, and filling all of it in place.
+//! From recordings to mean and spread, weights of sensors, and statistics of successful runs.
 
-use crate::common::{ALPHA, DT, ORIGIN};
-use dmp::fit::{WEIGHT_RANGE, experience, phase_statistics, weights_from_spread};
-use dmp::{
-    Coupling, EXPERIENCE_CHANNELS, ExpectedWrench, Experience, Feedback, GainSchedule, Hemisphere, Limits,
-    OrientationError, Primitive, PrimitiveTables, ROWS, Rollout, SENSORS, StartState, TableError, Velocity,
-};
+use dmp::TableError;
+use dmp::fit::{WEIGHT_RANGE, phase_statistics, sensor_statistics, weights_from_spread};
+
+/// Sensors, and channels of statistics, of the tests.
+const SENSORS: usize = 9;
+const CHANNELS: usize = 12;
+type Statistics = dmp::SensorStatistics<f64, CHANNELS, 64>;
+/// The last three channels are angles of fingers.
+const ONE_SIDED: [bool; CHANNELS] = [false, false, false, false, false, false, false, false, false, true, true, true];
+
+fn statistics(
+    trials: &[&[(f64, [f64; CHANNELS])]],
+    count: usize,
+    floor: &[f64; CHANNELS],
+) -> Result<Statistics, TableError> {
+    sensor_statistics(trials, count, floor, &ONE_SIDED)
+}
 
 type Trial<const CHANNELS: usize> = Vec<(f64, [f64; CHANNELS])>;
 
 /// A run of 3600 samples whose channels are `mean(u)` plus `offset` plus alternating noise of size `noise`.
-fn trial<const CHANNELS: usize>(offset: f64, noise: f64, mean: impl Fn(f64) -> f64) -> Trial<CHANNELS> {
+fn trial<const C: usize>(offset: f64, noise: f64, mean: impl Fn(f64) -> f64) -> Trial<C> {
     (0..3600)
         .map(|k| {
             let u = f64::from(k) / 3599.0;
             let shake = if k % 2 == 0 { noise } else { -noise };
-            (u, [mean(u) + offset + shake; CHANNELS])
+            (u, [mean(u) + offset + shake; C])
         })
         .collect()
 }
@@ -91,144 +102,36 @@ fn a_sensor_counts_more_where_it_repeats_itself_and_its_mean_weight_is_one() {
     assert!(even.iter().flatten().all(|weight| (weight - 1.0).abs() < 0.01), "{even:?}");
     assert_eq!(weights_from_spread(&spread, 2, 16, 0.5, &[0.0; SENSORS]).unwrap_err(), TableError::Trials);
     assert_eq!(weights_from_spread(&spread, 3, 16, 0.0, &[0.0; SENSORS]).unwrap_err(), TableError::Negative);
-    assert_eq!(weights_from_spread(&spread, 3, 33, 0.5, &[0.0; SENSORS]).unwrap_err(), TableError::TooMany);
     assert_eq!(weights_from_spread(&[], 3, 16, 0.5, &[0.0; SENSORS]).unwrap_err(), TableError::Empty);
 }
 
 #[test]
-fn an_experience_tells_how_many_spreads_a_run_is_away_and_never_divides_by_nothing() {
-    let trials: Vec<Trial<EXPERIENCE_CHANNELS>> =
-        [-0.5, 0.0, 0.5].map(|offset| trial(offset, 0.0, |u| 4.0 * u)).to_vec();
-    let floor = [0.05; EXPERIENCE_CHANNELS];
-    let known = experience(&slices(&trials), 64, &floor).unwrap();
+fn statistics_tell_how_many_spreads_a_run_is_away_and_never_divides_by_nothing() {
+    let trials: Vec<Trial<CHANNELS>> = [-0.5, 0.0, 0.5].map(|offset| trial(offset, 0.0, |u| 4.0 * u)).to_vec();
+    let floor = [0.05; CHANNELS];
+    let known = statistics(&slices(&trials), 64, &floor).unwrap();
     assert_eq!((known.trials(), known.mean().len()), (3, 64));
     // The runs lie between -0.5 and 0.5 about the middle: two spreads to the outermost, and the slope between three neighbours on top.
     let (middle, slope) = (known.mean_at(0.5), 4.0 / 63.0);
     assert!((middle[0] - 2.0).abs() < 0.02 && (middle[11] - 2.0).abs() < 0.02, "{middle:?}");
     assert!((known.spread_at(0.5)[0] - (0.5 + slope) / 2.0).abs() < 0.01, "{:?}", known.spread_at(0.5));
-    let away = known.deviation(0.5, &[3.0; EXPERIENCE_CHANNELS]);
+    let away = known.z_score(0.5, &[3.0; CHANNELS]);
     assert!((away[11] - 4.0).abs() < 0.05, "{away:?}");
-    let below = known.deviation(0.5, &[1.0; EXPERIENCE_CHANNELS]);
+    let below = known.z_score(0.5, &[1.0; CHANNELS]);
     assert!((below[0] + 2.0 / (0.5 + slope)).abs() < 0.1, "{below:?}");
     // Of fingers only closing too far widens the band; of everything else both sides.
-    let lagging: Vec<Trial<EXPERIENCE_CHANNELS>> =
-        [-0.9, 0.0, 0.0, 0.0].map(|offset| trial(offset, 0.0, |_| 1.0)).to_vec();
-    let uneven = experience(&slices(&lagging), 8, &floor).unwrap();
+    let lagging: Vec<Trial<CHANNELS>> = [-0.9, 0.0, 0.0, 0.0].map(|offset| trial(offset, 0.0, |_| 1.0)).to_vec();
+    let uneven = statistics(&slices(&lagging), 8, &floor).unwrap();
     assert!((uneven.spread_at(0.5)[0] - 0.225).abs() < 1e-3 && (uneven.spread_at(0.5)[9] - 0.1125).abs() < 1e-3);
     // Runs that agree to the last digit leave the floor.
-    let same: Vec<Trial<EXPERIENCE_CHANNELS>> = vec![trials[0].clone(); 3];
-    assert_eq!(experience(&slices(&same), 64, &floor).unwrap().spread_at(0.3)[4], 0.05);
-    assert_eq!(experience(&slices(&same), 64, &[0.0; 12]).unwrap_err(), TableError::Spread);
-    assert_eq!(experience(&slices(&same), 65, &floor).unwrap_err(), TableError::TooMany);
-    assert_eq!(experience(&[], 64, &floor).unwrap_err(), TableError::Trials);
-    let (row, zero) = ([[1.0; EXPERIENCE_CHANNELS]; 2], [[0.0; EXPERIENCE_CHANNELS]; 2]);
-    assert_eq!(Experience::new(&row, &zero, 3).unwrap_err(), TableError::Spread);
-    assert_eq!(Experience::new(&row, &row[..1], 3).unwrap_err(), TableError::Shape);
-    assert_eq!(Experience::new(&row, &row, 0).unwrap_err(), TableError::Trials);
-    assert_eq!(Experience::new(&row, &[[f64::NAN; 12]; 2], 3).unwrap_err(), TableError::NotFinite);
-}
-
-const LIMITS: Limits<f64> = Limits { displacement: 0.25, rotation: 0.4, hand: 0.6 };
-
-/// The tables of a movement with `count` kernels; `goal` is its goal along x.
-fn tables<'a>(weights: &'a [f64], goal: f64) -> PrimitiveTables<'a, f64> {
-    let mut end = ORIGIN;
-    end.position[0] = goal;
-    PrimitiveTables {
-        duration: 2.0 + goal,
-        alpha: ALPHA,
-        activation: 0.7,
-        kernel_count: weights.len() / ROWS,
-        weights,
-        stiffness: [200.0; 4],
-        damping: [28.3, 20.0, 28.3, 28.3],
-        orientation_error: OrientationError::Quaternion,
-        hemisphere: Hemisphere::Demonstrated,
-        start: ORIGIN,
-        goal: end,
-        start_velocity: Velocity::ZERO,
-        feedback: None,
-        expected: None,
-        experience: None,
-    }
-}
-
-fn path(primitive: &Primitive<f64, 30>) -> Vec<f64> {
-    let mut rollout = Rollout::start(primitive, &StartState::demonstrated(primitive)).unwrap();
-    (0..900).map(|_| rollout.step(primitive, DT, &Coupling::NONE).unwrap().position.x[0]).collect()
-}
-
-#[test]
-fn a_primitive_filled_in_place_is_the_same_as_a_new_one_whatever_it_was_before() {
-    let (few, many) = ([0.3; ROWS * 10], [-0.2; ROWS * 30]);
-    let k1 = GainSchedule::constant([80.0; 10]).unwrap();
-    let k2 = GainSchedule::new(&[[1.0; SENSORS]; 16]).unwrap();
-    let feedback = Feedback::new(k1, k2, LIMITS).unwrap();
-    let expected = ExpectedWrench::new(&[[0.5; SENSORS]; 128], 2.5).unwrap();
-    let experience = Experience::new(&[[0.5; 12]; 64], &[[0.1; 12]; 64], 5).unwrap();
-    let rich = PrimitiveTables {
-        feedback: Some(&feedback),
-        expected: Some(&expected),
-        experience: Some(&experience),
-        ..tables(&many, 0.5)
-    };
-    let mut primitive = Primitive::<f64, 30>::PLACEHOLDER;
-    primitive.assign(&rich).unwrap();
-    assert_eq!(primitive, Primitive::new(&rich).unwrap());
-    assert_eq!(primitive.experience(), Some(&experience));
-
-    // Value by value, as from a stored image.
-    let mut streamed = Primitive::new(&tables(&many, 0.5)).unwrap();
-    streamed.assign_feedback([80.0; 10], [1.0; SENSORS * 16], LIMITS).unwrap();
-    streamed.assign_expected([0.5; SENSORS * 128], 2.5).unwrap();
-    streamed.assign_experience([0.5; 12 * 64], [0.1; 12 * 64], 5).unwrap();
-    assert_eq!(streamed, primitive);
-    let mut copy = Primitive::<f64, 30>::PLACEHOLDER;
-    copy.clone_from(&streamed);
-    assert_eq!(copy, primitive);
-
-    // A poorer movement afterwards: nothing of the rich one is left in it.
-    let poor = Primitive::new(&tables(&few, 0.1)).unwrap();
-    primitive.assign(&tables(&few, 0.1)).unwrap();
-    copy.clone_from(&poor);
-    assert_eq!(primitive, poor);
-    assert_eq!(copy, poor);
-    assert!(primitive.feedback().is_none() && primitive.expected().is_none() && primitive.experience().is_none());
-    assert_eq!(path(&primitive), path(&poor));
-}
-
-#[test]
-fn a_refused_movement_changes_nothing_and_a_refused_table_is_gone() {
-    let good = [0.3; ROWS * 10];
-    let mut bad = [0.1; ROWS * 10];
-    bad[ROWS * 10 - 1] = f64::NAN;
-    let mut primitive = Primitive::<f64, 30>::new(&tables(&good, 0.5)).unwrap();
-    primitive.assign_expected([0.5; SENSORS * 2], 2.5).unwrap();
-    let before = primitive.clone();
-    let mut unstable = tables(&good, 0.5);
-    unstable.duration = 0.02;
-    let mut far = tables(&good, 0.5);
-    far.goal.position[2] = f64::INFINITY;
-    for refused in [tables(&bad, 0.1), tables(&good[1..], 0.1), unstable, far] {
-        assert!(primitive.assign(&refused).is_err());
-        assert_eq!(primitive, before);
-    }
-    // A value is missing, one is not finite, there are too many, a gain is negative.
-    assert_eq!(primitive.assign_expected([0.5; SENSORS * 2 - 1], 2.5), Err(TableError::Shape));
-    assert!(primitive.expected().is_none(), "half an expectation must not be believed");
-    assert_eq!(primitive.assign_expected([0.5; SENSORS * 129], 2.5), Err(TableError::TooMany));
-    assert_eq!(primitive.assign_expected([0.5; SENSORS], 0.0), Err(TableError::Duration));
-    assert_eq!(primitive.assign_feedback([-1.0; 10], [1.0; SENSORS], LIMITS), Err(TableError::Negative));
-    assert_eq!(primitive.assign_feedback([1.0; 10], [f64::NAN; SENSORS], LIMITS), Err(TableError::NotFinite));
-    assert!(primitive.feedback().is_none());
-    assert_eq!(primitive.assign_experience([0.5; 12], [0.0; 12], 3), Err(TableError::Spread));
-    assert_eq!(primitive.assign_experience([0.5; 24], [0.1; 12], 3), Err(TableError::Shape));
-    assert!(primitive.experience().is_none());
-    assert_eq!(path(&primitive), path(&before));
-}
-
-#[test]
-fn the_placeholder_rests() {
-    let primitive = Primitive::<f64, 30>::PLACEHOLDER;
-    assert!(path(&primitive).iter().all(|x| *x == 0.0));
+    let same: Vec<Trial<CHANNELS>> = vec![trials[0].clone(); 3];
+    assert_eq!(statistics(&slices(&same), 64, &floor).unwrap().spread_at(0.3)[4], 0.05);
+    assert_eq!(statistics(&slices(&same), 64, &[0.0; 12]).unwrap_err(), TableError::Spread);
+    assert_eq!(statistics(&slices(&same), 65, &floor).unwrap_err(), TableError::TooMany);
+    assert_eq!(statistics(&[], 64, &floor).unwrap_err(), TableError::Trials);
+    let (row, zero) = ([[1.0; CHANNELS]; 2], [[0.0; CHANNELS]; 2]);
+    assert_eq!(Statistics::new(&row, &zero, 3).unwrap_err(), TableError::Spread);
+    assert_eq!(Statistics::new(&row, &row[..1], 3).unwrap_err(), TableError::Shape);
+    assert_eq!(Statistics::new(&row, &row, 0).unwrap_err(), TableError::Trials);
+    assert_eq!(Statistics::new(&row, &[[f64::NAN; 12]; 2], 3).unwrap_err(), TableError::NotFinite);
 }

@@ -1,34 +1,34 @@
 //! Bad parameters are refused with a reason; no input makes a run panic, jump or leave the numbers.
 
-use crate::common::{ALPHA, DT, ORIGIN, Plan, run};
+use crate::arm::{
+    Configuration, Coupling, ORIGIN, Primitive, ROWS, Rollout, StartState, Tables, Velocity, configuration, coupling,
+    gains,
+};
+use crate::common::{ALPHA, DT, Plan, run};
 use dmp::{
-    Configuration, Coupling, FixedPoint, GainError, Hemisphere, OrientationError, PhaseTable, Primitive,
-    PrimitiveError, PrimitiveTables, Quaternion, ROWS, Rollout, RolloutError, Row, Scalar, StartState, TableError,
-    Velocity,
+    FixedPoint, GainError, Group, Hemisphere, OrientationError, PhaseTable, PrimitiveError, Quaternion, RolloutError,
+    Scalar, TableError,
 };
 use proptest::prelude::*;
 
-fn tables(weights: &[f64]) -> PrimitiveTables<'_, f64> {
-    PrimitiveTables {
+fn tables(weights: &[f64]) -> Tables<'_, f64> {
+    Tables {
+        control_period: DT,
         duration: 5.0,
         alpha: ALPHA,
         activation: 0.7,
         kernel_count: 10,
         weights,
-        stiffness: [200.0; 4],
-        damping: [28.3, 20.0, 28.3, 28.3],
+        gains: gains([200.0; 4], [28.3, 20.0, 28.3, 28.3]),
         orientation_error: OrientationError::Quaternion,
         hemisphere: Hemisphere::Demonstrated,
         start: ORIGIN,
         goal: ORIGIN,
         start_velocity: Velocity::ZERO,
-        feedback: None,
-        expected: None,
-        experience: None,
     }
 }
 
-fn refused(change: impl Fn(&mut PrimitiveTables<'_, f64>)) -> PrimitiveError {
+fn refused(change: impl Fn(&mut Tables<'_, f64>)) -> PrimitiveError {
     let weights = [0.1; ROWS * 10];
     let mut tables = tables(&weights);
     change(&mut tables);
@@ -41,6 +41,14 @@ fn refused(change: impl Fn(&mut PrimitiveTables<'_, f64>)) -> PrimitiveError {
 fn unusable_parameters_are_refused_with_their_reason() {
     let weights = [0.1; ROWS * 10];
     assert!(Primitive::<f64, 20>::new(&tables(&weights)).is_ok());
+    for period in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert_eq!(refused(|t| t.control_period = period), PrimitiveError::ControlPeriod);
+    }
+    // A slow loop needs a long movement.
+    assert_eq!(
+        refused(|t| t.control_period = 90.0 * DT),
+        PrimitiveError::Unstable { group: Group::Position, index: 0 }
+    );
     for duration in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert_eq!(refused(|t| t.duration = duration), PrimitiveError::Duration);
     }
@@ -54,34 +62,39 @@ fn unusable_parameters_are_refused_with_their_reason() {
     assert_eq!(refused(|t| t.kernel_count = 11), PrimitiveError::WeightCount);
     assert_eq!(refused(|t| t.activation = 0.99), PrimitiveError::Activation);
     assert_eq!(refused(|t| t.weights = &[f64::NAN; ROWS * 10]), PrimitiveError::Weight);
-    assert_eq!(refused(|t| t.stiffness[2] = -1.0), PrimitiveError::Gains(Row::Posture, GainError::Stiffness));
-    assert_eq!(refused(|t| t.damping[3] = f64::NAN), PrimitiveError::Gains(Row::Hand, GainError::Damping));
+    assert_eq!(
+        refused(|t| t.gains.points[4].stiffness = -1.0),
+        PrimitiveError::Gains { group: Group::Points, index: 4, error: GainError::Stiffness }
+    );
+    assert_eq!(
+        refused(|t| t.gains.poses[0].orientation.damping = f64::NAN),
+        PrimitiveError::Gains { group: Group::Orientation, index: 0, error: GainError::Damping }
+    );
     // The default gains need tau > 0.057 s at 300 Hz.
-    assert_eq!(refused(|t| t.duration = 0.0565), PrimitiveError::Unstable(Row::Position));
-    assert_eq!(refused(|t| t.start.posture[6] = f64::NAN), PrimitiveError::Start);
-    assert_eq!(refused(|t| t.goal.hand[0] = f64::INFINITY), PrimitiveError::Goal);
-    assert_eq!(refused(|t| t.start_velocity.hand[0] = f64::NAN), PrimitiveError::StartVelocity);
-    assert_eq!(refused(|t| t.start.orientation.w = 0.9), PrimitiveError::StartNotUnit);
-    assert_eq!(refused(|t| t.goal.orientation.x = 0.1), PrimitiveError::GoalNotUnit);
+    assert_eq!(refused(|t| t.duration = 0.0565), PrimitiveError::Unstable { group: Group::Position, index: 0 });
+    assert_eq!(refused(|t| t.start.points[6] = f64::NAN), PrimitiveError::Start);
+    assert_eq!(refused(|t| t.goal.points[7] = f64::INFINITY), PrimitiveError::Goal);
+    assert_eq!(refused(|t| t.start_velocity.points[7] = f64::NAN), PrimitiveError::StartVelocity);
+    assert_eq!(refused(|t| t.start.poses[0].orientation.w = 0.9), PrimitiveError::StartNotUnit);
+    assert_eq!(refused(|t| t.goal.poses[0].orientation.x = 0.1), PrimitiveError::GoalNotUnit);
     let far = Quaternion::from_rotation_vector(&[0.0, 3.1, 0.0]);
-    assert_eq!(refused(|t| t.goal.orientation = far), PrimitiveError::TurnsTooFar);
+    assert_eq!(refused(|t| t.goal.poses[0].orientation = far), PrimitiveError::TurnsTooFar);
 }
 
 #[test]
 fn shortest_accepted_duration_is_stable_and_a_shorter_one_is_not() {
     let mut plan = Plan::empty();
-    plan.goal.position = [1.0; 3];
+    plan.goal.poses[0].position = [1.0; 3];
     plan.duration = 0.0575;
     let primitive = plan.build::<f64>();
     assert!((primitive.minimum_duration() - 0.0569).abs() < 1e-4);
     let rows = run(&primitive, 3000, DT, |_, _| Coupling::NONE);
-    assert!((rows[2999].position.x[0] - 1.0).abs() < 1e-6);
+    assert!((rows[2999].poses[0].position.x[0] - 1.0).abs() < 1e-6);
     // Negative control: the same equations with a step just beyond the limit blow up.
     let mut state = dmp::PointState::new(0.0, 0.0);
     let h = DT / 0.056;
     for _ in 0..3000 {
-        let rhs = primitive
-            .position()
+        let rhs = primitive.pose_systems()[0][0]
             .right_hand_side(&state, &dmp::PointInput { start: 0.0, goal: 1.0, s: 0.0, f: 0.0, zeta: 0.0 });
         state.step(rhs, h);
     }
@@ -96,11 +109,12 @@ fn changes_in_flight_are_refused_without_touching_the_run() {
     rollout.step(&primitive, DT, &Coupling::NONE).unwrap();
     let before = rollout.clone();
     let nan = f64::NAN;
-    assert_eq!(rollout.set_goal_position([nan; 3]), Err(RolloutError::NotFinite));
-    assert_eq!(rollout.set_goal_posture([nan; 7]), Err(RolloutError::NotFinite));
-    assert_eq!(rollout.set_goal_hand([nan; 4]), Err(RolloutError::NotFinite));
+    assert_eq!(rollout.set_goal_position(0, [nan; 3]), Err(RolloutError::NotFinite));
+    assert_eq!(rollout.set_goal_points([nan; 11]), Err(RolloutError::NotFinite));
+    assert_eq!(rollout.set_goal_position(1, [0.0; 3]), Err(RolloutError::NoSuchPose));
+    assert_eq!(rollout.set_goal_orientation(&primitive, 1, Quaternion::IDENTITY), Err(RolloutError::NoSuchPose));
     let half = Quaternion::new(0.5, 0.0, 0.0, 0.0);
-    assert_eq!(rollout.set_goal_orientation(&primitive, half), Err(RolloutError::NotUnit));
+    assert_eq!(rollout.set_goal_orientation(&primitive, 0, half), Err(RolloutError::NotUnit));
     assert_eq!(rollout.set_duration(&primitive, 0.01), Err(RolloutError::TooFast));
     assert_eq!(rollout.set_duration(&primitive, 0.0), Err(RolloutError::Negative));
     assert_eq!(rollout.set_speed(&primitive, 500.0), Err(RolloutError::TooFast));
@@ -125,39 +139,37 @@ fn frozen_time_holds_the_plan_and_resumes_on_the_same_path() {
         Coupling::NONE
     });
     for row in &rows[500..800] {
-        assert_eq!(row.position.x, rows[500].position.x);
-        assert_eq!(row.orientation.quaternion, rows[500].orientation.quaternion);
-        assert_eq!([row.position.v, row.position.a], [[0.0; 3]; 2]);
+        assert_eq!(row.poses[0].position.x, rows[500].poses[0].position.x);
+        assert_eq!(row.poses[0].orientation.quaternion, rows[500].poses[0].orientation.quaternion);
+        assert_eq!([row.poses[0].position.v, row.poses[0].position.a], [[0.0; 3]; 2]);
         assert_eq!(row.phase, rows[500].phase);
     }
     assert!((rows[799].time - 799.0 * DT).abs() < 1e-9);
     // Velocity comes back without a jump.
-    let faster =
-        rows[801..].windows(2).all(|pair| (0..3).all(|i| (pair[1].position.v[i] - pair[0].position.v[i]).abs() < 5e-3));
+    let faster = rows[801..]
+        .windows(2)
+        .all(|pair| (0..3).all(|i| (pair[1].poses[0].position.v[i] - pair[0].poses[0].position.v[i]).abs() < 5e-3));
     assert!(faster);
-    assert!((rows[2399].position.x[0] - 0.55).abs() < 2e-3);
+    assert!((rows[2399].poses[0].position.x[0] - 0.55).abs() < 2e-3);
 }
 
 #[test]
-fn late_or_senseless_ticks_do_not_move_the_plan_too_far() {
+fn a_late_tick_is_an_error_and_a_senseless_one_moves_nothing() {
     let primitive = Plan::golden().build::<f64>();
-    let start = StartState::demonstrated(&primitive);
-    let mut normal = Rollout::start(&primitive, &start).unwrap();
-    let mut late = normal.clone();
-    let mut senseless = normal.clone();
-    normal.step(&primitive, DT, &Coupling::NONE).unwrap();
-    late.step(&primitive, 0.5, &Coupling::NONE).unwrap();
-    assert_eq!(normal, late);
-    for dt in [0.0, -1.0, f64::NAN] {
-        senseless.step(&primitive, dt, &Coupling::NONE).unwrap();
+    let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
+    rollout.step(&primitive, DT, &Coupling::NONE).unwrap();
+    let before = rollout.clone();
+    for late in [1.001 * DT, 0.5, f64::INFINITY] {
+        assert_eq!(rollout.step(&primitive, late, &Coupling::NONE).err(), Some(RolloutError::PeriodTooLong));
+        assert_eq!(rollout, before);
     }
-    let fresh = Rollout::start(&primitive, &start).unwrap();
-    assert_eq!([senseless.progress(), senseless.phase()], [0.0, 1.0]);
-    let (a, b) = (
-        senseless.clone().step(&primitive, DT, &Coupling::NONE).unwrap(),
-        fresh.clone().step(&primitive, DT, &Coupling::NONE).unwrap(),
-    );
-    assert_eq!((a.position, a.time), (b.position, b.time));
+    let next = rollout.clone().step(&primitive, DT, &Coupling::NONE).unwrap();
+    for dt in [0.0, -1.0, f64::NAN] {
+        rollout.step(&primitive, dt, &Coupling::NONE).unwrap();
+    }
+    assert_eq!([rollout.progress(), rollout.phase()], [before.progress(), before.phase()]);
+    let after = rollout.step(&primitive, DT, &Coupling::NONE).unwrap();
+    assert_eq!((after.poses, after.points, after.time), (next.poses, next.points, next.time));
 }
 
 #[test]
@@ -168,16 +180,16 @@ fn goal_filter_turns_the_jump_into_a_ramp() {
         let rows = run(&primitive, 6000, DT, |i, rollout| {
             if i == 900 {
                 rollout.set_goal_filter(filter).unwrap();
-                rollout.set_goal_position([0.65, 0.2, 0.05]).unwrap();
-                rollout.set_goal_orientation(&primitive, turned).unwrap();
+                rollout.set_goal_position(0, [0.65, 0.2, 0.05]).unwrap();
+                rollout.set_goal_orientation(&primitive, 0, turned).unwrap();
             }
             Coupling::NONE
         });
         let end = rows[5999];
-        assert!((end.position.x[0] - 0.65).abs() < 1e-6);
-        let miss = end.orientation.quaternion.aligned_with(&turned).conjugate().product(&turned);
+        assert!((end.poses[0].position.x[0] - 0.65).abs() < 1e-6);
+        let miss = end.poses[0].orientation.quaternion.aligned_with(&turned).conjugate().product(&turned);
         assert!(miss.angle() < 1e-4, "{}", miss.angle());
-        (rows[900].position.a[0] - rows[899].position.a[0]).abs()
+        (rows[900].poses[0].position.a[0] - rows[899].poses[0].position.a[0]).abs()
     };
     assert!(jump(None) > 0.5);
     assert!(jump(Some(12.5)) < 0.05);
@@ -190,16 +202,16 @@ fn start_turned_past_a_full_turn_still_goes_the_demonstrated_way() {
     plan.orientation_error = OrientationError::RotationVector;
     plan.hemisphere = Hemisphere::Demonstrated;
     let about_z = |degrees: f64| Quaternion::from_rotation_vector(&[0.0, 0.0, degrees.to_radians()]);
-    plan.start.orientation = Quaternion::IDENTITY;
-    plan.goal.orientation = about_z(350.0);
+    plan.start.poses[0].orientation = Quaternion::IDENTITY;
+    plan.goal.poses[0].orientation = about_z(350.0);
     let primitive = plan.build::<f64>();
     for from in [about_z(-20.0), about_z(-20.0).negated(), about_z(15.0)] {
-        let start = StartState::at_rest(Configuration { orientation: from, ..ORIGIN });
+        let start = StartState::at_rest(configuration([0.0; 3], from, [0.0; 7], [0.0; 4]));
         let mut rollout = Rollout::start(&primitive, &start).unwrap();
         let mut turned = 0.0;
         let mut last = from;
         for _ in 0..9000 {
-            let q = rollout.step(&primitive, DT, &Coupling::NONE).unwrap().orientation.quaternion;
+            let q = rollout.step(&primitive, DT, &Coupling::NONE).unwrap().poses[0].orientation.quaternion;
             turned += last.conjugate().product(&q.aligned_with(&last)).rotation_vector()[2];
             last = q;
         }
@@ -230,13 +242,13 @@ fn recorded_sensor_values_become_an_expectation_by_phase() {
             (u, std::array::from_fn(|i| (3.0 * u + i as f64).sin()))
         })
         .collect();
-    let expected = dmp::fit::expected_wrench(&samples, 101, 5.0).unwrap();
+    let expected = dmp::fit::expected_sensors::<9, 128>(&samples, 101, 5.0).unwrap();
     for u in [0.0, 0.123, 0.5, 0.871, 1.0] {
         for (i, value) in expected.at(u).iter().enumerate() {
             assert!((value - (3.0 * u + i as f64).sin()).abs() < 0.02);
         }
     }
-    assert_eq!(dmp::fit::expected_wrench(&[], 101, 5.0), Err(TableError::Empty));
+    assert_eq!(dmp::fit::expected_sensors::<9, 128>(&[], 101, 5.0), Err(TableError::Empty));
 }
 
 fn scalar_functions<T: Scalar>(absolute: f64) {
@@ -294,39 +306,36 @@ proptest! {
         kernels in 0_usize..6,
     ) {
         let v = |i: usize| if plausible { values[i].clamp(-10.0, 10.0) } else { values[i] };
-        let configuration = |at: usize| Configuration {
-            position: [v(at), v(at + 1), v(at + 2)],
-            orientation: if plausible {
+        let ends = |at: usize| -> Configuration<f64> {
+            let orientation = if plausible {
                 Quaternion::IDENTITY
             } else {
                 Quaternion::new(v(at), v(at + 1), v(at + 2), v(at + 3))
-            },
-            posture: [v(at + 4); 7],
-            hand: [v(at + 5); 4],
+            };
+            configuration([v(at), v(at + 1), v(at + 2)], orientation, [v(at + 4); 7], [v(at + 5); 4])
         };
-        let tables = PrimitiveTables {
+        let tables = Tables {
+            control_period: DT,
             duration: if plausible { 3.0 } else { v(30) },
             alpha: if plausible { 4.6 } else { v(31) },
             activation: if plausible { 0.7 } else { v(32) },
             kernel_count: if plausible { 3 } else { kernels },
             weights: &weights,
-            stiffness: [200.0; 4],
-            damping: [28.0; 4],
+            gains: gains([200.0; 4], [28.0; 4]),
             orientation_error: OrientationError::RotationVector,
             hemisphere: Hemisphere::Nearest,
-            start: configuration(0),
-            goal: configuration(10),
+            start: ends(0),
+            goal: ends(10),
             start_velocity: Velocity::ZERO,
-            feedback: None,
-            expected: None,
-            experience: None,
         };
         if let Ok(primitive) = Primitive::<f64, 4>::new(&tables) {
             let start = StartState::demonstrated(&primitive);
             let mut rollout = Rollout::start(&primitive, &start).unwrap();
             for i in 0..200 {
-                let coupling = Coupling { position: [values[i % 40]; 3], ..Coupling::NONE };
-                let row = rollout.step(&primitive, values[(i * 7) % 40], &coupling).unwrap();
+                let zeta = coupling([values[i % 40]; 3], [0.0; 3], [0.0; 4]);
+                let Ok(row) = rollout.step(&primitive, values[(i * 7) % 40].min(DT), &zeta) else {
+                    return Err(TestCaseError::fail("a step within the control period was refused"));
+                };
                 prop_assert!(row.phase > 0.0 && row.phase <= 1.0);
             }
         }

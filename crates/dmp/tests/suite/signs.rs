@@ -1,9 +1,12 @@
 //! Checks that a wrong sign, a wrong frame or a forgotten tau cannot pass. Numbers are those of the design's list.
 
+use crate::arm::{
+    Coupling, ExpectedWrench, Feedback, Reference, Rollout, SENSORS, StartState, coupling, limits, velocity,
+};
 use crate::common::{ALPHA, DT, K, Plan, run};
 use dmp::{
-    CanonicalSystem, Coupling, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, Phase, PointInput,
-    PointState, Quaternion, Reference, RotationChart, SENSORS, Scalar, SensorMap, TransformationSystem, Velocity,
+    CanonicalSystem, Hemisphere, LogMap, OrientationError, Phase, PointInput, PointState, Quaternion, Scalar,
+    TransformationSystem,
 };
 
 type Row = Reference<f64>;
@@ -16,7 +19,7 @@ fn nominal(plan: &Plan, seconds: f64) -> Vec<Row> {
 fn path_length<T: Scalar>(rows: &[Reference<T>]) -> f64 {
     rows.windows(2)
         .map(|pair| {
-            let (a, b) = (&pair[0].orientation.quaternion, &pair[1].orientation.quaternion);
+            let (a, b) = (&pair[0].poses[0].orientation.quaternion, &pair[1].poses[0].orientation.quaternion);
             a.conjugate().product(b).angle().to_f64()
         })
         .sum()
@@ -27,20 +30,24 @@ fn check_1_first_tick_is_driven_by_the_forcing_term_alone() {
     // xdd(0) = K f(1)/tau^2; the kick K (g - x0)/tau^2 of a missing start term would be 1.2 m/s^2 here.
     let plan = Plan::golden();
     let primitive = plan.build::<f64>();
-    let f = primitive.forcing().evaluate(1.0);
+    let ([f], points) = primitive.forces(1.0);
     let first = &nominal(&plan, 0.1)[0];
-    println!("first tick: {:?} m/s^2, {:?} rad/s^2", first.position.a, first.orientation.domega);
+    println!("first tick: {:?} m/s^2, {:?} rad/s^2", first.poses[0].position.a, first.poses[0].orientation.domega);
     for i in 0..3 {
         let (expected, turning) = (K * f[i] / 25.0, K * f[3 + i] / 25.0);
-        assert!((first.position.a[i] - expected).abs() < 1e-12, "{} {expected}", first.position.a[i]);
-        assert!((first.orientation.domega[i] - turning).abs() < 1e-12, "{} {turning}", first.orientation.domega[i]);
-        assert_eq!(first.position.x[i], plan.start.position[i]);
+        assert!((first.poses[0].position.a[i] - expected).abs() < 1e-12, "{} {expected}", first.poses[0].position.a[i]);
+        assert!(
+            (first.poses[0].orientation.domega[i] - turning).abs() < 1e-12,
+            "{} {turning}",
+            first.poses[0].orientation.domega[i]
+        );
+        assert_eq!(first.poses[0].position.x[i], plan.start.poses[0].position[i]);
     }
     for i in 0..4 {
-        assert!((first.hand.a[i] - K * f[13 + i] / 25.0).abs() < 1e-12);
+        assert!((first.points.a[7 + i] - K * points[7 + i] / 25.0).abs() < 1e-12);
     }
-    let kick = K * (plan.goal.position[0] - plan.start.position[0]) / 25.0;
-    assert!(kick > 10.0 * first.position.a[0].abs());
+    let kick = K * (plan.goal.poses[0].position[0] - plan.start.poses[0].position[0]) / 25.0;
+    assert!(kick > 10.0 * first.poses[0].position.a[0].abs());
 }
 
 #[test]
@@ -52,15 +59,15 @@ fn check_2_goal_jump_steps_the_acceleration_by_the_open_fraction() {
     for tick in [150, 400, 750, 1400] {
         let jumped = run(&primitive, 1500, DT, |i, rollout| {
             if i == tick {
-                rollout.set_goal_position([0.65, 0.2, 0.05]).unwrap();
+                rollout.set_goal_position(0, [0.65, 0.2, 0.05]).unwrap();
             }
             Coupling::NONE
         });
-        let jump = jumped[tick].position.a[0] - quiet[tick].position.a[0];
+        let jump = jumped[tick].poses[0].position.a[0] - quiet[tick].poses[0].position.a[0];
         let expected = K * 0.1 * (1.0 - quiet[tick].phase) / 25.0;
         assert!((jump / expected - 1.0).abs() < 1e-9, "{jump} {expected}");
         // Negative control: with x0 reset to the present value the jump would be another one.
-        let moved = quiet[tick].position.x[0] - plan.start.position[0];
+        let moved = quiet[tick].poses[0].position.x[0] - plan.start.poses[0].position[0];
         let reset = expected + K * moved * quiet[tick].phase / 25.0;
         separation = separation.max((jump / reset - 1.0).abs());
     }
@@ -96,13 +103,13 @@ fn check_3_path_does_not_depend_on_the_course_of_tau() {
         let (a, b) = (&reference[left], &reference[left + 1]);
         let w = (row.progress - a.progress) / (b.progress - a.progress);
         for i in 0..3 {
-            let x = a.position.x[i] + (b.position.x[i] - a.position.x[i]) * w;
-            worst = worst.max((row.position.x[i] - x).abs());
+            let x = a.poses[0].position.x[i] + (b.poses[0].position.x[i] - a.poses[0].position.x[i]) * w;
+            worst = worst.max((row.poses[0].position.x[i] - x).abs());
         }
-        let (q, next) = (&a.orientation.quaternion, &b.orientation.quaternion);
+        let (q, next) = (&a.poses[0].orientation.quaternion, &b.poses[0].orientation.quaternion);
         let way = q.conjugate().product(next).rotation_vector().map(|r| r * w);
         let planned = q.product(&Quaternion::from_rotation_vector(&way));
-        let turned = row.orientation.quaternion.conjugate().product(&planned).rotation_vector();
+        let turned = row.poses[0].orientation.quaternion.conjugate().product(&planned).rotation_vector();
         worst_turn = turned.iter().fold(worst_turn, |worst, r| worst.max(r.abs()));
         compared += 1;
     }
@@ -150,11 +157,11 @@ fn check_3_negative_control_rescaled_velocity_leaves_the_path() {
 #[test]
 fn check_5_antipodal_goal_turns_half_a_radian_and_no_more() {
     let mut plan = Plan::empty();
-    plan.goal.orientation = Quaternion::from_rotation_vector(&[0.0, 0.0, 0.5]).negated();
+    plan.goal.poses[0].orientation = Quaternion::from_rotation_vector(&[0.0, 0.0, 0.5]).negated();
     for error in [OrientationError::Quaternion, OrientationError::RotationVector] {
         plan.orientation_error = error;
         let rows = nominal(&plan, 20.0);
-        let end = rows.last().unwrap().orientation.quaternion;
+        let end = rows.last().unwrap().poses[0].orientation.quaternion;
         let target = Quaternion::from_rotation_vector(&[0.0, 0.0, 0.5]);
         let (missed, path) = (end.aligned_with(&target).conjugate().product(&target).angle(), path_length(&rows));
         println!("{error:?}: path {path:.4} rad, missed by {missed:.1e} rad");
@@ -170,29 +177,32 @@ fn check_5_antipodal_goal_turns_half_a_radian_and_no_more() {
 #[test]
 fn check_6_constant_feedback_settles_where_it_should() {
     let mut plan = Plan::empty();
-    plan.goal.position = [0.1, 0.0, 0.0];
+    plan.goal.poses[0].position = [0.1, 0.0, 0.0];
     let primitive = plan.build::<f64>();
-    let coupling = Coupling { position: [10.0, -5.0, 2.0], orientation: [20.0, 0.0, 0.0], hand: [0.0, 4.0, 4.0, 4.0] };
+    let mut coupling = coupling([10.0, -5.0, 2.0], [20.0, 0.0, 0.0], [0.0, 4.0, 4.0, 4.0]);
+    coupling.points[3] = 6.0;
     let rows = run(&primitive, 9000, DT, |_, _| coupling);
     let end = rows.last().unwrap();
-    for (i, zeta) in coupling.position.iter().enumerate() {
-        let settled = plan.goal.position[i] + zeta / K;
-        assert!((end.position.x[i] - settled).abs() < 1e-9, "{} {settled}", end.position.x[i]);
+    for (i, zeta) in coupling.poses[0].position.iter().enumerate() {
+        let settled = plan.goal.poses[0].position[i] + zeta / K;
+        assert!((end.poses[0].position.x[i] - settled).abs() < 1e-9, "{} {settled}", end.poses[0].position.x[i]);
     }
-    assert!((end.hand.x[1] - 4.0 / K).abs() < 1e-9, "{}", end.hand.x[1]);
-    let turned = end.orientation.quaternion.rotation_vector();
+    // A finger, and a joint of the posture: every row can be bent.
+    assert!((end.points.x[8] - 4.0 / K).abs() < 1e-9, "{}", end.points.x[8]);
+    assert!((end.points.x[3] - 6.0 / K).abs() < 1e-9, "{}", end.points.x[3]);
+    let turned = end.poses[0].orientation.quaternion.rotation_vector();
     assert!((turned[0] - 2.0 * (20.0_f64 / K).asin()).abs() < 1e-9, "{turned:?}");
     // Negative control: 20/K, the answer for a position row, is half of it.
     assert!((turned[0] - 20.0 / K).abs() > 0.05);
     // No memory: the plan returns when the force vanishes.
     let rows = run(&primitive, 12_000, DT, |i, _| if i < 3000 { coupling } else { Coupling::NONE });
-    assert!((rows.last().unwrap().position.x[0] - 0.1).abs() < 1e-9);
+    assert!((rows.last().unwrap().poses[0].position.x[0] - 0.1).abs() < 1e-9);
 
     // In rotation-vector coordinates the angle is zeta/K itself.
     plan.orientation_error = OrientationError::RotationVector;
     let primitive = plan.build::<f64>();
     let rows = run(&primitive, 9000, DT, |_, _| coupling);
-    let turned = rows.last().unwrap().orientation.quaternion.rotation_vector();
+    let turned = rows.last().unwrap().poses[0].orientation.quaternion.rotation_vector();
     assert!((turned[0] - 0.1).abs() < 1e-9, "{turned:?}");
 }
 
@@ -200,7 +210,7 @@ fn check_6_constant_feedback_settles_where_it_should() {
 fn check_6_feedback_on_rotation_vectors_does_the_work_of_the_moment() {
     // A moment zeta (body frame) on the coordinates y: its power is zeta . omega = (J^T zeta) . dy for every motion dy.
     let ends = [[0.3, -0.8, 0.5], [-0.4, 0.2, 0.9]].map(|r| Quaternion::<f64>::from_rotation_vector(&r));
-    let chart = RotationChart::between(&ends[0], &ends[1]);
+    let chart = LogMap::between(&ends[0], &ends[1]);
     let zeta = [20.0, -7.0, 11.0];
     let dot = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     for y in [[0.0, 0.0, 0.2], [0.9, -0.5, 1.1], [-1.5, 1.2, 0.4]] {
@@ -222,54 +232,31 @@ fn check_6_feedback_on_rotation_vectors_does_the_work_of_the_moment() {
 
 #[test]
 fn pushes_of_the_environment_move_the_plan_along_and_are_clamped() {
-    let feedback = Feedback::<f64>::new(
-        GainSchedule::constant([3.0, 3.0, 2.0, 20.0, 20.0, 15.0, 9.0, 40.0, 40.0, 40.0]).unwrap(),
-        GainSchedule::constant([1.0; SENSORS]).unwrap(),
-        Limits { displacement: 0.23, rotation: 0.4, hand: 0.3 },
-    )
-    .unwrap();
+    let k1 = [3.0, 3.0, 2.0, 20.0, 20.0, 15.0, 9.0, 40.0, 40.0, 40.0];
+    let feedback = Feedback::<f64>::new(k1, [1.0; SENSORS], limits(0.23, 0.4, 0.3)).unwrap();
+    let feedback =
+        Feedback { expected: ExpectedWrench::new(&[[0.0; SENSORS], [1.0; SENSORS]], 5.0).unwrap(), ..feedback };
     let mut plan = Plan::empty();
-    plan.goal.position = [0.1, 0.0, 0.0];
-    let mut primitive = plan.build_with(Some(feedback));
+    plan.goal.poses[0].position = [0.1, 0.0, 0.0];
+    let primitive = plan.build();
     let push = [4.0, 0.0, 0.0, 0.0, 0.0, 0.3, 0.5, 0.0, 0.0];
-    let rollout =
-        |primitive: &_| dmp::Rollout::<f64, 100>::start(primitive, &dmp::StartState::demonstrated(primitive)).unwrap();
-    // Without an expectation there is nothing to compare with: open loop.
-    let open = rollout(&primitive).coupling(&primitive, &push, &SensorMap::IDENTITY).unwrap();
-    assert_eq!(open, Coupling::NONE);
-    let expected = dmp::ExpectedWrench::new(&[[0.0; SENSORS], [1.0; SENSORS]], 5.0).unwrap();
-    primitive.set_expected(Some(&expected));
-    let run = rollout(&primitive);
-    let zeta = run.coupling(&primitive, &push, &SensorMap::IDENTITY).unwrap();
-    assert_eq!(zeta.position, [12.0, 0.0, 0.0]);
-    assert_eq!(zeta.orientation, [0.0, 0.0, 4.5]);
+    let run = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
+    let zeta = feedback.coupling(&run, &primitive, &push).unwrap();
     // The spread has no gauge.
-    assert_eq!(zeta.hand, [0.0, 20.0, 0.0, 0.0]);
+    assert_eq!(zeta, coupling([12.0, 0.0, 0.0], [0.0, 0.0, 4.5], [0.0, 20.0, 0.0, 0.0]));
     // A blow, an infinite and an undefined value stay bounded.
     for blow in [1e6, -1e30, f64::INFINITY, f64::NAN] {
-        let zeta = run.coupling(&primitive, &[blow; SENSORS], &SensorMap::IDENTITY).unwrap();
+        let zeta = feedback.coupling(&run, &primitive, &[blow; SENSORS]).unwrap();
         let norm = |a: &[f64]| a.iter().map(|a| a * a).sum::<f64>().sqrt();
-        assert!(norm(&zeta.position) <= K * 0.23 * (1.0 + 1e-12));
-        assert!(norm(&zeta.orientation) <= K * 0.2_f64.sin() * (1.0 + 1e-12));
-        assert!(zeta.hand.iter().all(|z| z.abs() <= K * 0.3));
+        assert!(norm(&zeta.poses[0].position) <= K * 0.23 * (1.0 + 1e-12));
+        assert!(norm(&zeta.poses[0].orientation) <= K * 0.2_f64.sin() * (1.0 + 1e-12));
+        assert!(zeta.points.iter().all(|z| z.abs() <= K * 0.3));
     }
 }
 
 #[test]
-fn sensor_map_turns_and_shifts_a_wrench() {
-    // Sensor turned by 90 degrees about z, controlled point 0.1 m along its z axis.
-    let r = Quaternion::<f64>::from_rotation_vector(&[0.0, 0.0, std::f64::consts::FRAC_PI_2]);
-    let map = SensorMap { force: r.rotation_matrix(), torque: r.rotation_matrix(), lever: [0.0, 0.0, 0.1] };
-    let [px, py, pz, rx, ry, rz, spread, f1, ..] = map.to_task(&[2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0]);
-    assert!((py - 2.0).abs() < 1e-12 && px.abs() < 1e-12 && pz == 0.0);
-    // tau - lever x F = -(0.1 z) x (2 x) = -0.2 y, turned to +0.2 x.
-    assert!((rx - 0.2).abs() < 1e-12 && ry.abs() < 1e-12 && rz == 0.0);
-    assert_eq!([spread, f1], [0.0, 0.3]);
-}
-
-#[test]
 fn feedback_fades_when_the_speed_differs_from_the_recording() {
-    let expected = dmp::ExpectedWrench::new(&[[0.0_f64; SENSORS]], 5.0).unwrap();
+    let expected = ExpectedWrench::new(&[[0.0_f64; SENSORS]], 5.0).unwrap();
     assert_eq!(expected.trust(1.0), 1.0);
     assert_eq!(expected.trust(1.0 / 1.05), 1.0);
     assert!((expected.trust(1.0 / 1.3) - 0.5).abs() < 1e-9);
@@ -283,13 +270,13 @@ fn norm_after_a_million_ticks<T: Scalar>(error: OrientationError) -> f64 {
     plan.orientation_error = error;
     plan.duration = 3000.0;
     let primitive = plan.build::<T>();
-    let mut rollout = dmp::Rollout::start(&primitive, &dmp::StartState::demonstrated(&primitive)).unwrap();
+    let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
     let dt = T::from_f64(DT);
     // A feedback beyond the equilibrium keeps the orientation spinning all the time.
-    let spin = Coupling { orientation: [300_000.0, 200_000.0, -100_000.0].map(T::from_f64), ..Coupling::NONE };
+    let spin = coupling([T::ZERO; 3], [300_000.0, 200_000.0, -100_000.0].map(T::from_f64), [T::ZERO; 4]);
     let mut worst = 0.0_f64;
     for _ in 0..1_000_000 {
-        let q = rollout.step(&primitive, dt, &spin).unwrap().orientation.quaternion;
+        let q = rollout.step(&primitive, dt, &spin).unwrap().poses[0].orientation.quaternion;
         worst = worst.max((q.dot(&q).to_f64().sqrt() - 1.0).abs());
     }
     worst
@@ -335,8 +322,7 @@ fn check_10_reported_rates_are_the_derivatives_of_the_reported_path() {
         let mut plan = Plan::golden();
         plan.duration = 2.7;
         plan.orientation_error = error;
-        plan.start_velocity =
-            Velocity { position: [0.1, -0.05, 0.02], orientation: [0.2, 0.1, -0.3], ..Velocity::ZERO };
+        plan.start_velocity = velocity([0.1, -0.05, 0.02], [0.2, 0.1, -0.3], [0.0; 7], [0.0; 4]);
         let primitive = plan.build::<f64>();
         let dt = DT / 64.0;
         let rows = run(&primitive, 64 * 900, dt, |i, rollout| {
@@ -346,9 +332,9 @@ fn check_10_reported_rates_are_the_derivatives_of_the_reported_path() {
             }
             Coupling::NONE
         });
-        assert_eq!(rows[0].position.v, plan.start_velocity.position);
+        assert_eq!(rows[0].poses[0].position.v, plan.start_velocity.poses[0].linear);
         for i in 0..3 {
-            let w = rows[0].orientation.omega[i] - plan.start_velocity.orientation[i];
+            let w = rows[0].poses[0].orientation.omega[i] - plan.start_velocity.poses[0].angular[i];
             assert!(w.abs() < 1e-12, "{error:?}: {w}");
         }
         let (mut v, mut a, mut w, mut dw) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
@@ -359,16 +345,16 @@ fn check_10_reported_rates_are_the_derivatives_of_the_reported_path() {
                 continue;
             }
             for i in 0..3 {
-                let x = |row: &Row| row.position.x[i];
-                let rate = |row: &Row| row.position.v[i];
+                let x = |row: &Row| row.poses[0].position.x[i];
+                let rate = |row: &Row| row.poses[0].position.v[i];
                 v = v.max(((x(after) - x(before)) / (2.0 * dt) - rate(now)).abs());
-                a = a.max(((rate(after) - rate(before)) / (2.0 * dt) - now.position.a[i]).abs());
-                let omega = |row: &Row| row.orientation.omega[i];
-                dw = dw.max(((omega(after) - omega(before)) / (2.0 * dt) - now.orientation.domega[i]).abs());
+                a = a.max(((rate(after) - rate(before)) / (2.0 * dt) - now.poses[0].position.a[i]).abs());
+                let omega = |row: &Row| row.poses[0].orientation.omega[i];
+                dw = dw.max(((omega(after) - omega(before)) / (2.0 * dt) - now.poses[0].orientation.domega[i]).abs());
             }
-            let (q0, q1) = (before.orientation.quaternion, after.orientation.quaternion);
+            let (q0, q1) = (before.poses[0].orientation.quaternion, after.poses[0].orientation.quaternion);
             let turn = q0.conjugate().product(&q1).rotation_vector();
-            for (turn, omega) in turn.iter().zip(&now.orientation.omega) {
+            for (turn, omega) in turn.iter().zip(&now.poses[0].orientation.omega) {
                 w = w.max((turn / (2.0 * dt) - omega).abs());
             }
         }
@@ -383,16 +369,16 @@ fn world_rates_turn_with_the_hand() {
     let rows = nominal(&Plan::golden(), 4.0);
     let dt = DT;
     for k in (100..1000).step_by(50) {
-        let (a, b) = (&rows[k - 1].orientation.quaternion, &rows[k + 1].orientation.quaternion);
+        let (a, b) = (&rows[k - 1].poses[0].orientation.quaternion, &rows[k + 1].poses[0].orientation.quaternion);
         // World rates from q(t): log(b (x) conj(a)).
         let world = b.product(&a.conjugate()).rotation_vector().map(|r| r / (2.0 * dt));
-        let reported = rows[k].orientation.omega_world();
+        let reported = rows[k].poses[0].orientation.omega_world();
         for i in 0..3 {
             assert!((world[i] - reported[i]).abs() < 5e-3, "{world:?} {reported:?}");
         }
     }
     // Negative control: the body rates are another vector.
-    let row = &rows[600].orientation;
+    let row = &rows[600].poses[0].orientation;
     let difference: f64 = row.omega.iter().zip(row.omega_world()).map(|(a, b)| (a - b).abs()).sum();
     assert!(difference > 0.05);
 }
@@ -403,8 +389,7 @@ fn a_plan_that_settles_stays_where_its_feedback_has_bent_it() {
         // Without forcing: at rest at its end, as a fitted plan is.
         let (start, goal) = (Plan::golden().start, Plan::golden().goal);
         let primitive = Plan { orientation_error: error, start, goal, ..Plan::empty() }.build::<f64>();
-        let bent =
-            Coupling { position: [6.0, -4.0, 3.0], orientation: [20.0, 10.0, -15.0], hand: [0.0, 40.0, 40.0, 40.0] };
+        let bent = coupling([6.0, -4.0, 3.0], [20.0, 10.0, -15.0], [0.0, 40.0, 40.0, 40.0]);
         let ticks = (primitive.duration() * 300.0) as usize;
         let play = |settles: bool| {
             run(&primitive, 4 * ticks, DT, |tick, rollout| {
@@ -417,9 +402,10 @@ fn a_plan_that_settles_stays_where_its_feedback_has_bent_it() {
         let (kept, freed) = (play(true), play(false));
         let (at_end, settled, sprung) = (&kept[ticks], &kept[4 * ticks - 1], &freed[4 * ticks - 1]);
         let apart = |a: &Row, b: &Row| {
-            let way = (0..3).map(|i| (a.position.x[i] - b.position.x[i]).powi(2)).sum::<f64>().sqrt();
-            let turn = a.orientation.quaternion.conjugate().product(&b.orientation.quaternion).angle();
-            (way, turn, (a.hand.x[1] - b.hand.x[1]).abs())
+            let way = (0..3).map(|i| (a.poses[0].position.x[i] - b.poses[0].position.x[i]).powi(2)).sum::<f64>().sqrt();
+            let turn =
+                a.poses[0].orientation.quaternion.conjugate().product(&b.poses[0].orientation.quaternion).angle();
+            (way, turn, (a.points.x[8] - b.points.x[8]).abs())
         };
         let (way, turn, finger) = apart(at_end, settled);
         assert!(way < 1e-3 && turn < 1e-2 && finger < 1e-3, "{error:?}: {way} m, {turn} rad, {finger} rad");

@@ -1,11 +1,12 @@
 //! The whole primitive under any numbers: whatever tables are accepted and whatever is asked of a run, what it gives
 //! is finite and bounded, in every number type and both orientation systems.
 
-use dmp::{
-    CONTROL_PERIOD, Configuration, Coupling, ExpectedWrench, Feedback, FixedPoint, GainSchedule, Hemisphere, Limits,
-    OrientationError, Primitive, PrimitiveTables, Quaternion, ROWS, Reference, Rollout, SENSORS, Scalar, SensorMap,
-    StartState, TransformationSystem, Velocity, bounds,
+use crate::arm::{
+    Configuration, Coupling, ExpectedWrench, Feedback, Primitive, ROWS, Reference, Rollout, SENSORS, StartState,
+    Tables, Velocity, coupling, gains, limits,
 };
+use crate::common::DT;
+use dmp::{FixedPoint, Hemisphere, OrientationError, Pose, Quaternion, Scalar, TransformationSystem, Twist, bounds};
 use proptest::prelude::*;
 
 /// Most kernels of a case.
@@ -88,9 +89,8 @@ fn any_case() -> impl Strategy<Value = Case> {
             // By the damping ratio: from swinging to creeping.
             let gains = gains.map(|(k, ratio)| (k, 2.0 * ratio * k.sqrt()));
             // From as short as it can be.
-            let shortest = |(k, d): (f64, f64)| {
-                TransformationSystem::new(k, d).map_or(1.0, |system| CONTROL_PERIOD / system.largest_step())
-            };
+            let shortest =
+                |(k, d): (f64, f64)| TransformationSystem::new(k, d).map_or(1.0, |system| DT / system.largest_step());
             let duration = slowness * gains.map(shortest).into_iter().fold(0.0, f64::max);
             let (k1, k2, displacement, angle, expected) = feedback;
             Case {
@@ -129,22 +129,21 @@ impl Case {
         case
     }
 
-    fn build<T: Scalar>(&self) -> Option<Primitive<T, KERNELS>> {
+    /// The primitive, and its feedback.
+    fn build<T: Scalar>(&self) -> Option<(Primitive<T, KERNELS>, Feedback<T>)> {
         let f = T::from_f64;
         let weights: Vec<T> = self.weights.iter().take(ROWS * self.kernels).map(|&w| f(w)).collect();
         let [k1, k2, displacement, rotation, hand, expected, recorded] = self.feedback.map(f);
-        let limits = Limits { displacement, rotation, hand };
-        let feedback =
-            Feedback::new(GainSchedule::constant([k1; 10]).ok()?, GainSchedule::constant([k2; SENSORS]).ok()?, limits);
-        let (feedback, expected) = (feedback.ok()?, ExpectedWrench::new(&[[expected; SENSORS]], recorded).ok()?);
-        Primitive::new(&PrimitiveTables {
+        let feedback = Feedback::new([k1; 10], [k2; SENSORS], limits(displacement, rotation, hand)).ok()?;
+        let expected = ExpectedWrench::new(&[[expected; SENSORS]], recorded).ok()?;
+        let primitive = Primitive::new(&Tables {
+            control_period: f(DT),
             duration: f(self.duration),
             alpha: f(self.alpha),
             activation: f(self.activation),
             kernel_count: self.kernels,
             weights: &weights,
-            stiffness: self.stiffness.map(f),
-            damping: self.damping.map(f),
+            gains: gains(self.stiffness, self.damping).cast(),
             orientation_error: if self.is_vector {
                 OrientationError::RotationVector
             } else {
@@ -154,11 +153,9 @@ impl Case {
             start: configuration(&self.ends[0]),
             goal: configuration(&self.ends[1]),
             start_velocity: velocity(&self.velocity),
-            feedback: Some(&feedback),
-            expected: Some(&expected),
-            experience: None,
         })
-        .ok()
+        .ok()?;
+        Some((primitive, Feedback { expected, ..feedback }))
     }
 
     /// How far a row of a group can get from 0: what drives it, over what a swinging system makes of it.
@@ -176,22 +173,14 @@ fn quaternion<T: Scalar>([x, y, z]: [f64; 3]) -> Quaternion<T> {
 
 fn configuration<T: Scalar>(row: &[f64; 17]) -> Configuration<T> {
     let part = |at: usize| T::from_f64(row[at]);
-    Configuration {
-        position: core::array::from_fn(part),
-        orientation: quaternion([row[3], row[4], row[5]]),
-        posture: core::array::from_fn(|i| part(6 + i)),
-        hand: core::array::from_fn(|i| part(13 + i)),
-    }
+    let pose = Pose { position: core::array::from_fn(part), orientation: quaternion([row[3], row[4], row[5]]) };
+    Configuration { poses: [pose], points: core::array::from_fn(|i| part(6 + i)) }
 }
 
 fn velocity<T: Scalar>(row: &[f64; 17]) -> Velocity<T> {
     let part = |at: usize| T::from_f64(row[at]);
-    Velocity {
-        position: core::array::from_fn(part),
-        orientation: core::array::from_fn(|i| part(3 + i)),
-        posture: core::array::from_fn(|i| part(6 + i)),
-        hand: core::array::from_fn(|i| part(13 + i)),
-    }
+    let twist = Twist { linear: core::array::from_fn(part), angular: core::array::from_fn(|i| part(3 + i)) };
+    Velocity { poses: [twist], points: core::array::from_fn(|i| part(6 + i)) }
 }
 
 /// What is asked of a run between two ticks.
@@ -241,13 +230,12 @@ fn ask<T: Scalar>(rollout: &mut Rollout<T, KERNELS>, primitive: &Primitive<T, KE
         Ask::Nothing => Ok(()),
         Ask::Goal(row) => {
             let goal = configuration::<T>(row);
-            let _ = rollout.set_goal_posture(goal.posture);
-            let _ = rollout.set_goal_hand(goal.hand);
-            rollout.set_goal_position(goal.position)
+            let _ = rollout.set_goal_points(goal.points);
+            rollout.set_goal_position(0, goal.poses[0].position)
         }
         Ask::Orientation(q) => {
             let [w, x, y, z] = q.map(f);
-            rollout.set_goal_orientation(primitive, Quaternion::new(w, x, y, z))
+            rollout.set_goal_orientation(primitive, 0, Quaternion::new(w, x, y, z))
         }
         Ask::Speed(speed) => rollout.set_speed(primitive, f(*speed)),
         Ask::Duration(duration) => rollout.set_duration(primitive, f(*duration)),
@@ -280,13 +268,14 @@ fn largest<T: Scalar>(values: &[T]) -> Result<f64, TestCaseError> {
 }
 
 fn check_plan<T: Scalar>(plan: &Reference<T>, case: &Case) -> Result<(), TestCaseError> {
-    let Reference { phase, progress, time, rate, position, orientation, posture, hand } = plan;
+    let Reference { phase, progress, time, rate, poses: [pose], points } = plan;
     largest(&[*progress, *time, *rate])?;
     prop_assert!(*phase >= T::ZERO && *phase <= T::ONE && *progress >= T::ZERO && *rate >= T::ZERO, "{plan:?}");
+    let orientation = &pose.orientation;
     for (group, x, v, a) in [
-        (0, position.x.as_slice(), position.v.as_slice(), position.a.as_slice()),
-        (2, &posture.x, &posture.v, &posture.a),
-        (3, &hand.x, &hand.v, &hand.a),
+        (0, pose.position.x.as_slice(), pose.position.v.as_slice(), pose.position.a.as_slice()),
+        (2, &points.x[..7], &points.v[..7], &points.a[..7]),
+        (3, &points.x[7..], &points.v[7..], &points.a[7..]),
     ] {
         let (far, limit) = (largest(x)?, case.farthest(group));
         prop_assert!(far <= limit, "group {group} is at {far:e} of {limit:e}");
@@ -316,15 +305,15 @@ fn check_coupling<T: Scalar>(zeta: &Coupling<T>, case: &Case) -> Result<(), Test
     let turn = if case.is_vector { rotation } else { (rotation / 2.0).sin() };
     // Half a unit in the last place of K times the limit, in fixed point of both factors.
     let within = |found: f64, limit: f64, k: f64| found <= limit * k * (1.0 + 1e-5) + (k + 1.0) * 1e-9;
-    prop_assert!(within(norm(&zeta.position)?, displacement, k), "{zeta:?}");
-    prop_assert!(within(norm(&zeta.orientation)?, turn, k_o), "{zeta:?}");
-    prop_assert!(within(largest(&zeta.hand)?, hand, k_h), "{zeta:?}");
+    prop_assert!(within(norm(&zeta.poses[0].position)?, displacement, k), "{zeta:?}");
+    prop_assert!(within(norm(&zeta.poses[0].orientation)?, turn, k_o), "{zeta:?}");
+    prop_assert!(within(largest(&zeta.points[7..])?, hand, k_h), "{zeta:?}");
     Ok(())
 }
 
 fn check<T: Scalar>(case: &Case, start: Option<&[f64; 17]>, ticks: &[Tick]) -> Result<bool, TestCaseError> {
     let case = case.slipped();
-    let Some(primitive) = case.build::<T>() else {
+    let Some((primitive, feedback)) = case.build::<T>() else {
         return Ok(false);
     };
     let f = T::from_f64;
@@ -337,16 +326,25 @@ fn check<T: Scalar>(case: &Case, start: Option<&[f64; 17]>, ticks: &[Tick]) -> R
     };
     for (asked, dt, measured, given) in ticks {
         ask(&mut rollout, &primitive, asked);
-        let felt = rollout.coupling(&primitive, &measured.map(f), &SensorMap::IDENTITY).unwrap();
-        check_coupling(&felt, &case)?;
-        let coupling = given.map_or(felt, |given| Coupling {
-            position: core::array::from_fn(|i| f(given[i])),
-            orientation: core::array::from_fn(|i| f(given[3 + i])),
-            hand: core::array::from_fn(|i| f(given[6 + i])),
+        let zeta = feedback.coupling(&rollout, &primitive, &measured.map(f)).unwrap();
+        check_coupling(&zeta, &case)?;
+        let zeta = given.map_or(zeta, |given| {
+            let given = given.map(f);
+            let mut any = coupling(
+                core::array::from_fn(|i| given[i]),
+                core::array::from_fn(|i| given[3 + i]),
+                core::array::from_fn(|i| given[6 + i]),
+            );
+            any.points[..7].copy_from_slice(&given[..7]);
+            any
         });
         // Each several times, so that what grows has time to.
         for _ in 0..5 {
-            check_plan(&rollout.step(&primitive, f(*dt), &coupling).unwrap(), &case)?;
+            let plan = rollout.step(&primitive, f(*dt), &zeta);
+            prop_assert_eq!(plan.is_err(), f(*dt) > f(DT));
+            if let Ok(plan) = plan {
+                check_plan(&plan, &case)?;
+            }
         }
     }
     Ok(true)

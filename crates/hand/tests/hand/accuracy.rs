@@ -1,6 +1,7 @@
 //! Trajectories in fixed point against the same equations in f64, and against the golden vectors.
 
-use dmp::{Coupling, Scalar, SensorMap, StartState};
+use control::plan::primitive::StartState;
+use dmp::Scalar;
 use hand::number::{Number, ONE, ZERO, from_real};
 use hand::{Rollout, forcing};
 
@@ -11,28 +12,28 @@ const BOUND: f64 = 5e-4;
 
 /// Largest difference of position (rad) and velocity (rad/s) over the movement and half as long again.
 fn error(movement: &Movement, speed: f64, gauges: impl Fn(f64) -> [f64; 3]) -> [f64; 2] {
-    let (fixed, exact) = (movement.fixed(), movement.exact());
-    let mut start = StartState::at_rest(*exact.start());
-    start.velocity = *exact.start_velocity();
-    let mut reference = dmp::Rollout::start(&exact, &start).expect("a start");
+    let (fixed, sensed) = (movement.fixed(), movement.exact());
+    let exact = sensed.movement();
+    let mut reference = dmp::Rollout::start(exact, &StartState::demonstrated(exact)).expect("a start");
     let mut rollout = Rollout::demonstrated(&fixed);
-    reference.set_speed(&exact, speed).expect("a speed");
+    reference.set_speed(exact, speed).expect("a speed");
     assert!(rollout.set_speed(&fixed, Number::from_f64(speed)));
     let mut worst = [0.0_f64; 2];
     let ticks = (1.5 * f64::from(movement.duration) / speed * 300.0) as usize;
     for tick in 0..ticks {
-        let felt = gauges(tick as f64 / 300.0);
-        let [a, b, c] = felt;
-        let coupling = reference
-            .coupling(&exact, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, a, b, c], &SensorMap::IDENTITY)
-            .expect("its own");
-        let coupling = Coupling { hand: coupling.hand, ..Coupling::NONE };
-        let wanted = reference.step(&exact, 1.0 / 300.0, &coupling).expect("its own");
-        let zeta = rollout.feedback(&fixed, &felt.map(|torque| from_real(torque as f32)), ONE);
+        let measured = gauges(tick as f64 / 300.0);
+        let mut error = [0.0; 9];
+        if let Some(expected) = sensed.expected() {
+            let expected = expected.at(reference.progress());
+            (0..3).for_each(|finger| error[6 + finger] = measured[finger] - expected[6 + finger]);
+        }
+        let coupling = sensed.coupling(&reference, &error).expect("its own");
+        let wanted = reference.step(exact, 1.0 / 300.0, &coupling).expect("its own");
+        let zeta = rollout.feedback(&fixed, &measured.map(|torque| from_real(torque as f32)), ONE);
         let found = rollout.step(&fixed, &zeta);
         for digit in 0..4 {
-            worst[0] = worst[0].max((found.q[digit].to_f64() - wanted.hand.x[digit]).abs());
-            worst[1] = worst[1].max((found.dq[digit].to_f64() - wanted.hand.v[digit]).abs());
+            worst[0] = worst[0].max((found.q[digit].to_f64() - wanted.points.x[7 + digit]).abs());
+            worst[1] = worst[1].max((found.dq[digit].to_f64() - wanted.points.v[7 + digit]).abs());
         }
     }
     worst
@@ -145,7 +146,7 @@ fn golden<const D: usize>(name: &str, columns: [&str; D]) -> Vec<(usize, [f64; D
 #[test]
 fn golden_finger_rows_are_followed() {
     let mut movement = Movement::closing(50, 5.0, 0.0);
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/vectors/dmp_theta.csv");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../dmp/tests/vectors/dmp_theta.csv");
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(path).expect("weights");
     let rows: Vec<Vec<f32>> = reader
         .records()

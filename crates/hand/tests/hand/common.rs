@@ -1,6 +1,7 @@
 //! What the tests share: primitives as images, in fixed point and in f64.
 
-use dmp::{Configuration, Hemisphere, OrientationError, Primitive, PrimitiveTables, Quaternion, ROWS, Velocity};
+use control::plan::primitive::{MovementTables, Primitive, ROWS, configuration as rows, gains, limits, velocity};
+use dmp::{Hemisphere, OrientationError};
 use hand::FingerPrimitive;
 use hand::image::ImageReader;
 use link::Name;
@@ -142,29 +143,22 @@ impl Movement {
     pub(crate) fn exact(&self) -> Primitive<f64, 100> {
         let mut weights = vec![0.0; (ROWS - 4) * self.kernels];
         weights.extend(self.weights.iter().flatten().map(|weight| f64::from(*weight)));
-        let configuration = |hand: [f32; 4]| Configuration {
-            position: [0.0; 3],
-            orientation: Quaternion::IDENTITY,
-            posture: [0.0; 7],
-            hand: hand.map(f64::from),
-        };
+        let configuration =
+            |hand: [f32; 4]| rows([0.0; 3], [1.0, 0.0, 0.0, 0.0], [0.0; 7], hand.map(f64::from));
         let (k, d) = (f64::from(self.stiffness), f64::from(self.damping));
-        let mut primitive = Primitive::new(&PrimitiveTables {
+        let mut primitive = Primitive::new(&MovementTables {
+            control_period: control::PERIOD,
             duration: f64::from(self.duration),
             alpha: f64::from(self.alpha),
             activation: f64::from(self.activation),
             kernel_count: self.kernels,
             weights: &weights,
-            stiffness: [k; 4],
-            damping: [d; 4],
+            gains: gains([k; 4], [d; 4]),
             orientation_error: OrientationError::Quaternion,
             hemisphere: Hemisphere::Nearest,
             start: configuration(self.start),
             goal: configuration(self.goal),
-            start_velocity: Velocity { hand: self.start_velocity.map(f64::from), ..Velocity::ZERO },
-            feedback: None,
-            expected: None,
-            experience: None,
+            start_velocity: velocity([0.0; 3], [0.0; 3], [0.0; 7], self.start_velocity.map(f64::from)),
         })
         .expect("a primitive");
         let column = |columns: usize, table: &[[f32; 3]]| -> Vec<f64> {
@@ -173,7 +167,7 @@ impl Movement {
             table.iter().flat_map(row).collect()
         };
         if !self.k1.is_empty() {
-            let limits = dmp::Limits { displacement: 0.2, rotation: 0.5, hand: f64::from(self.limit) };
+            let limits = limits(0.2, 0.5, f64::from(self.limit));
             primitive.assign_feedback(column(10, &self.k1), column(9, &self.k2), limits).expect("gains");
         }
         if !self.expected.is_empty() {

@@ -2,8 +2,11 @@
 
 use control::guard::Watch;
 use control::guard::watch::{FIRST_FINGER, LIMIT};
-use dmp::fit::{FEWEST_TRIALS, experience};
-use dmp::{EXPERIENCE_CAPACITY, EXPERIENCE_CHANNELS, Experience, TableError};
+use control::plan::primitive::{
+    ONE_SIDED_CHANNELS, STATISTICS_CAPACITY, STATISTICS_CHANNELS, SensorStatistics, posture_and_hand,
+};
+use dmp::TableError;
+use dmp::fit::{FEWEST_TRIALS, sensor_statistics};
 
 use crate::plan;
 use crate::primitive_file::PrimitiveFile;
@@ -22,13 +25,13 @@ const TELLS: f64 = 1.5;
 const CLOSED: usize = 90;
 
 /// The samples of a run: progress and channels.
-pub(super) type Run = Vec<(f64, [f64; EXPERIENCE_CHANNELS])>;
+pub(super) type Run = Vec<(f64, [f64; STATISTICS_CHANNELS])>;
 
 /// An experience whose spreads leave successful runs room, and what it is worth.
 #[derive(Debug, Clone)]
 pub(super) struct Calibrated {
     /// The experience.
-    pub(super) experience: Experience<f64>,
+    pub(super) experience: SensorStatistics<f64>,
     /// How far a hand that closes on nothing goes beyond the limit of the watch: above 1 it is told.
     pub(super) empty_hand: f64,
 }
@@ -43,12 +46,14 @@ pub(super) struct Calibrated {
 pub(super) fn calibrated(
     primitive: &PrimitiveFile,
     runs: &[Run],
-    floor: &[f64; EXPERIENCE_CHANNELS],
+    floor: &[f64; STATISTICS_CHANNELS],
 ) -> Result<Calibrated, TableError> {
-    let of = |runs: &[&[_]]| experience(runs, EXPERIENCE_CAPACITY, floor);
+    let of = |runs: &[&[_]]| -> Result<SensorStatistics<f64>, TableError> {
+        sensor_statistics(runs, STATISTICS_CAPACITY, floor, &ONE_SIDED_CHANNELS)
+    };
     let all: Vec<_> = runs.iter().map(Vec::as_slice).collect();
     let gathered = of(&all)?;
-    let mut farthest = [1.0; EXPERIENCE_CHANNELS];
+    let mut farthest = [1.0; STATISTICS_CHANNELS];
     all.iter().for_each(|run| raise(&mut farthest, &reach(&gathered, run)));
     if runs.len() >= FEWEST_TRIALS {
         let parts = PARTS.min(runs.len());
@@ -62,7 +67,7 @@ pub(super) fn calibrated(
     }
     let empty = empty_hand(primitive, &gathered);
     let nothing = reach(&gathered, &empty);
-    let factors: [f64; EXPERIENCE_CHANNELS] = std::array::from_fn(|channel| {
+    let factors: [f64; STATISTICS_CHANNELS] = std::array::from_fn(|channel| {
         let (success, nothing) = (farthest[channel], nothing[channel]);
         if channel >= FIRST_FINGER && nothing > TELLS * success {
             (success * nothing).sqrt() / LIMIT
@@ -75,15 +80,15 @@ pub(super) fn calibrated(
         .iter()
         .map(|point| std::array::from_fn(|channel| point[channel] * factors[channel]))
         .collect();
-    let experience = Experience::new(gathered.mean(), &spread, gathered.trials())?;
+    let experience = SensorStatistics::new(gathered.mean(), &spread, gathered.trials())?;
     let empty_hand = reach(&experience, &empty).into_iter().fold(0.0, f64::max) / LIMIT;
     Ok(Calibrated { experience, empty_hand })
 }
 
 /// The farthest that the watch finds a run away from an experience, channel by channel (spreads).
-fn reach(known: &Experience<f64>, run: &[(f64, [f64; EXPERIENCE_CHANNELS])]) -> [f64; EXPERIENCE_CHANNELS] {
+fn reach(known: &SensorStatistics<f64>, run: &[(f64, [f64; STATISTICS_CHANNELS])]) -> [f64; STATISTICS_CHANNELS] {
     let mut watch = Watch::new();
-    let mut farthest = [0.0; EXPERIENCE_CHANNELS];
+    let mut farthest = [0.0; STATISTICS_CHANNELS];
     for (progress, values) in run {
         watch.step(known, *progress, values, true);
         raise(&mut farthest, &watch.sizes());
@@ -91,19 +96,19 @@ fn reach(known: &Experience<f64>, run: &[(f64, [f64; EXPERIENCE_CHANNELS])]) -> 
     farthest
 }
 
-fn raise(largest: &mut [f64; EXPERIENCE_CHANNELS], values: &[f64; EXPERIENCE_CHANNELS]) {
+fn raise(largest: &mut [f64; STATISTICS_CHANNELS], values: &[f64; STATISTICS_CHANNELS]) {
     largest.iter_mut().zip(values).for_each(|(largest, value)| *largest = largest.max(*value));
 }
 
 /// A run whose fingers go as planned; everything else is as always. Empty for a primitive that cannot be played.
-fn empty_hand(primitive: &PrimitiveFile, known: &Experience<f64>) -> Run {
+fn empty_hand(primitive: &PrimitiveFile, known: &SensorStatistics<f64>) -> Run {
     let played =
         primitive.to_primitive().ok().and_then(|primitive| plan::roll_out(&primitive).ok()).unwrap_or_default();
     let mut run: Run = played
         .iter()
         .map(|reference| {
             let mut values = known.mean_at(reference.progress);
-            values[FIRST_FINGER..].copy_from_slice(&reference.hand.x[1..]);
+            values[FIRST_FINGER..].copy_from_slice(&posture_and_hand(&reference.points.x).1[1..]);
             (reference.progress, values)
         })
         .collect();

@@ -81,7 +81,7 @@ pub fn tables(primitive: &PrimitiveFile, options: &LearnOptions) -> FeedbackTabl
     FeedbackTables {
         clamps: [metres, degrees.to_radians(), fingers],
         k1: vec![k1.to_vec()],
-        k2: vec![vec![1.0; dmp::SENSORS]],
+        k2: vec![vec![1.0; control::plan::primitive::SENSORS]],
     }
 }
 

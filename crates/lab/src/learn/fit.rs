@@ -1,7 +1,8 @@
 //! Hands a demonstration to `dmp::fit` and turns what comes back into the content of a primitive file.
 
-use dmp::fit::{Demonstration as Samples, FitOptions};
-use dmp::{Configuration, OrientationError, Quaternion};
+use control::plan::primitive::{Configuration, points, posture_and_hand};
+use dmp::fit::{Demonstration as Samples, FitOptions, PoseSamples};
+use dmp::{OrientationError, Quaternion, Stiffness};
 
 use super::{LearnOptions, feedback};
 use crate::demonstration::{Demonstration, RATE};
@@ -15,15 +16,17 @@ pub(super) fn fit(
     options: &LearnOptions,
 ) -> Result<PrimitiveFile, String> {
     let orientation = demonstration.orientation.iter().map(|[w, x, y, z]| Quaternion::new(*w, *x, *y, *z)).collect();
-    let samples =
-        Samples::new(1.0 / RATE, demonstration.position.clone(), orientation, posture.to_vec(), hand.to_vec())
-            .map_err(|error| error.to_string())?;
+    let pose = PoseSamples { position: demonstration.position.clone(), orientation };
+    let rows = posture.iter().zip(hand).map(|(posture, hand)| points(*posture, *hand)).collect();
+    let samples = Samples::new(1.0 / RATE, [pose], rows).map_err(|error| error.to_string())?;
+    let [position, orientation, posture, hand] = feedback::stiffness(&options.feedback, samples.duration());
     let learned = dmp::fit::fit(
         &samples,
         &FitOptions {
             kernel_count: options.kernels,
             cutoff: Some(options.cutoff),
-            stiffness: feedback::stiffness(&options.feedback, samples.duration()),
+            control_period: Some(control::PERIOD),
+            stiffness: Stiffness { poses: [[position, orientation]], points: points([posture; 7], [hand; 4]) },
             orientation_error: match options.orientation_error {
                 OrientationErrorKind::Quaternion => OrientationError::Quaternion,
                 OrientationErrorKind::RotationVector => OrientationError::RotationVector,
@@ -32,10 +35,9 @@ pub(super) fn fit(
         },
     )
     .map_err(|error| error.to_string())?;
-    let gains: [Gain; 4] = std::array::from_fn(|group| Gain {
-        stiffness: learned.options.stiffness[group],
-        damping: learned.damping[group],
-    });
+    let ([gains], ([posture, ..], [hand, ..])) = (learned.gains.poses, posture_and_hand(&learned.gains.points));
+    let [twist] = learned.start_velocity.poses;
+    let (posture_velocity, hand_velocity) = posture_and_hand(&learned.start_velocity.points);
     Ok(PrimitiveFile {
         file: std::path::PathBuf::new(),
         name: String::new(),
@@ -45,13 +47,14 @@ pub(super) fn fit(
         activation: learned.options.activation,
         orientation_error: options.orientation_error,
         hemisphere: HemisphereKind::Demonstrated,
-        gains,
+        gains: [gains.position, gains.orientation, posture, hand]
+            .map(|gain| Gain { stiffness: gain.stiffness, damping: gain.damping }),
         start: waypoint(&learned.start),
         start_velocity: WaypointVelocity {
-            position: learned.start_velocity.position,
-            orientation: learned.start_velocity.orientation,
-            posture: learned.start_velocity.posture,
-            hand: learned.start_velocity.hand,
+            position: twist.linear,
+            orientation: twist.angular,
+            posture: posture_velocity,
+            hand: hand_velocity,
         },
         goal: waypoint(&learned.goal),
         weights: learned.weights.chunks(learned.options.kernel_count).map(<[f64]>::to_vec).collect(),
@@ -63,10 +66,6 @@ pub(super) fn fit(
 }
 
 fn waypoint(configuration: &Configuration<f64>) -> Waypoint {
-    Waypoint {
-        position: configuration.position,
-        orientation: configuration.orientation.to_array(),
-        posture: configuration.posture,
-        hand: configuration.hand,
-    }
+    let ([pose], (posture, hand)) = (&configuration.poses, posture_and_hand(&configuration.points));
+    Waypoint { position: pose.position, orientation: pose.orientation.to_array(), posture, hand }
 }

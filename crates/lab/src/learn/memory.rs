@@ -4,8 +4,9 @@
 use std::path::PathBuf;
 
 use control::flags;
+use control::plan::primitive::{EXPECTED_CAPACITY, SENSORS, STATISTICS_CHANNELS};
+use dmp::TableError;
 use dmp::fit::{FEWEST_TRIALS, phase_statistics, weights_from_spread};
-use dmp::{EXPECTED_CAPACITY, EXPERIENCE_CHANNELS, SENSORS, TableError};
 use serde::Serialize;
 use thiserror::Error;
 
@@ -31,7 +32,7 @@ const RESOLUTION: [f64; SENSORS] = {
 /// Smallest spread of the channels of an experience: what objects and grasps that are all good differ by, however alike the
 /// gathered runs were. Force 0.5 N, torque 0.06 N m (that force at the distance of the fingers), gauges 0.15 N m (a finger
 /// that happens to carry the object alone), fingers 0.025 rad.
-const EXPERIENCE_FLOOR: [f64; EXPERIENCE_CHANNELS] =
+const EXPERIENCE_FLOOR: [f64; STATISTICS_CHANNELS] =
     [0.5, 0.5, 0.5, 0.06, 0.06, 0.06, 0.15, 0.15, 0.15, 0.025, 0.025, 0.025];
 
 /// A recording must cover the movement from this progress at the latest to one minus this at the earliest.
@@ -185,7 +186,7 @@ pub fn remember_successes(
 ) -> Result<MemorySummary, MemoryError> {
     let first = recordings.first().ok_or(MemoryError::None)?;
     let (_, duration) = progress(first, primitive.alpha)?;
-    let runs = runs::<EXPERIENCE_CHANNELS>(primitive, recordings, duration, channels)?;
+    let runs = runs::<STATISTICS_CHANNELS>(primitive, recordings, duration, channels)?;
     let calibrated = calibrated(primitive, &runs, &EXPERIENCE_FLOOR)?;
     let gathered = &calibrated.experience;
     let trials = u32::from(gathered.trials());
@@ -261,14 +262,14 @@ fn sensors(recording: &Recording) -> Result<Vec<[f64; SENSORS]>, MemoryError> {
 }
 
 /// The channels of an experience: the sensors, then the fingers.
-fn channels(recording: &Recording) -> Result<Vec<[f64; EXPERIENCE_CHANNELS]>, MemoryError> {
+fn channels(recording: &Recording) -> Result<Vec<[f64; STATISTICS_CHANNELS]>, MemoryError> {
     let hand = recording.hand.as_ref().ok_or_else(|| columns(recording, "spread_rad to finger3_rad"))?;
     let sensors = sensors(recording)?;
     Ok(sensors
         .iter()
         .zip(hand)
         .map(|(sensors, hand)| {
-            let mut channels = [0.0; EXPERIENCE_CHANNELS];
+            let mut channels = [0.0; STATISTICS_CHANNELS];
             channels[..SENSORS].copy_from_slice(sensors);
             channels[SENSORS..].copy_from_slice(&hand[1..]);
             channels

@@ -315,13 +315,13 @@ fn compare(
     let count = references.len().min(demonstration.len());
     let references = &references[..count];
     let orientation: Vec<[f64; 4]> = references.iter().map(plan::orientation).collect();
-    let mut rows = Vec::with_capacity(dmp::ROWS);
+    let mut rows = Vec::with_capacity(control::plan::primitive::ROWS);
     let mut add = |errors: Vec<f64>, shown: Vec<f64>| {
         rows.push(row_error(rows.len(), &errors, &shown));
     };
     for axis in 0..3 {
         let shown: Vec<f64> = demonstration.position[..count].iter().map(|x| x[axis]).collect();
-        let errors = references.iter().zip(&shown).map(|(reference, x)| reference.position.x[axis] - x);
+        let errors = references.iter().zip(&shown).map(|(reference, x)| reference.poses[0].position.x[axis] - x);
         add(errors.collect(), shown);
     }
     let goal = demonstration.orientation[demonstration.len() - 1];
@@ -340,18 +340,20 @@ fn compare(
     }
     for joint in 0..7 {
         let shown: Vec<f64> = posture[..count].iter().map(|q| q[joint]).collect();
-        let errors = references.iter().zip(&shown).map(|(reference, q)| reference.posture.x[joint] - q);
+        let errors = references.iter().zip(&shown).map(|(reference, q)| reference.points.x[joint] - q);
         add(errors.collect(), shown);
     }
     for joint in 0..4 {
         let shown: Vec<f64> = hand[..count].iter().map(|q| q[joint]).collect();
-        let errors = references.iter().zip(&shown).map(|(reference, q)| reference.hand.x[joint] - q);
+        let errors = references.iter().zip(&shown).map(|(reference, q)| reference.points.x[7 + joint] - q);
         add(errors.collect(), shown);
     }
     let distances: Vec<f64> = references
         .iter()
         .zip(&demonstration.position)
-        .map(|(reference, x)| (0..3).map(|axis| (reference.position.x[axis] - x[axis]).powi(2)).sum::<f64>().sqrt())
+        .map(|(reference, x)| {
+            (0..3).map(|axis| (reference.poses[0].position.x[axis] - x[axis]).powi(2)).sum::<f64>().sqrt()
+        })
         .collect();
     let angles: Vec<f64> = orientation
         .iter()

@@ -6,7 +6,7 @@ use super::feedback::FeedbackReport;
 use crate::table::Table;
 
 /// Names of the 17 rows with the unit of their error.
-pub const ROW_NAMES: [(&str, &str); dmp::ROWS] = [
+pub const ROW_NAMES: [(&str, &str); control::plan::primitive::ROWS] = [
     ("position x", "m"),
     ("position y", "m"),
     ("position z", "m"),

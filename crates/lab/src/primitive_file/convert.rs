@@ -1,9 +1,11 @@
 //! From the file to what a controller runs: `dmp::Primitive` on the host, the image for a device.
 
-use dmp::{
-    Configuration, ExpectedWrench, Experience, Feedback, GainSchedule, Hemisphere, Limits, OrientationError, Primitive,
-    PrimitiveTables, Quaternion, TableError, Velocity,
+use control::LoadError;
+use control::plan::primitive::{
+    Configuration, ExpectedWrench, Feedback, GainSchedule, MovementTables, Primitive, SensorStatistics, configuration,
+    gains, limits, velocity,
 };
+use dmp::{Hemisphere, OrientationError, TableError};
 use link::image::{ExpectationMarks, FeedbackClamps, IMAGE_BYTES_LIMIT, ImageContent, PrimitiveImage};
 
 use super::{
@@ -33,7 +35,7 @@ impl PrimitiveFile {
                 Feedback::new(
                     GainSchedule::new(&points(&tables.k1))?,
                     GainSchedule::new(&points(&tables.k2))?,
-                    Limits { displacement: tables.clamps[0], rotation: tables.clamps[1], hand: tables.clamps[2] },
+                    limits(tables.clamps[0], tables.clamps[1], tables.clamps[2]),
                 )
             })
             .transpose()
@@ -49,18 +51,18 @@ impl PrimitiveFile {
             .as_ref()
             .map(|table| {
                 let trials = u16::try_from(table.trials).unwrap_or(u16::MAX);
-                Experience::new(&points(&table.mean), &points(&table.spread), trials)
+                SensorStatistics::new(&points(&table.mean), &points(&table.spread), trials)
             })
             .transpose()
             .map_err(|error| refused(format!("experience: {error}")))?;
-        let tables = PrimitiveTables {
+        let tables = MovementTables {
+            control_period: control::PERIOD,
             duration: self.duration,
             alpha: self.alpha,
             activation: self.activation,
             kernel_count: self.kernels(),
             weights: &weights,
-            stiffness: self.gains.map(|gain| gain.stiffness),
-            damping: self.gains.map(|gain| gain.damping),
+            gains: gains(self.gains.map(|gain| gain.stiffness), self.gains.map(|gain| gain.damping)),
             orientation_error: match self.orientation_error {
                 OrientationErrorKind::Quaternion => OrientationError::Quaternion,
                 OrientationErrorKind::RotationVector => OrientationError::RotationVector,
@@ -69,14 +71,16 @@ impl PrimitiveFile {
                 HemisphereKind::Demonstrated => Hemisphere::Demonstrated,
                 HemisphereKind::Nearest => Hemisphere::Nearest,
             },
-            start: configuration(&self.start),
-            goal: configuration(&self.goal),
-            start_velocity: velocity(&self.start_velocity),
-            feedback: feedback.as_ref(),
-            expected: expected.as_ref(),
-            experience: experience.as_ref(),
+            start: waypoint(&self.start),
+            goal: waypoint(&self.goal),
+            start_velocity: start_velocity(&self.start_velocity),
         };
-        Primitive::new(&tables).map_err(|error| refused(error.to_string()))
+        let mut primitive =
+            Primitive::new(&tables).map_err(|error| refused(LoadError::Primitive(error).to_string()))?;
+        primitive.set_feedback(feedback.as_ref());
+        primitive.set_expected(expected.as_ref());
+        primitive.set_statistics(experience.as_ref());
+        Ok(primitive)
     }
 
     /// The image that is uploaded: single precision, checked by reading it back.
@@ -159,23 +163,12 @@ fn points<const SIZE: usize>(rows: &[Vec<f64>]) -> Vec<[f64; SIZE]> {
     rows.iter().map(|row| std::array::from_fn(|index| row.get(index).copied().unwrap_or(f64::NAN))).collect()
 }
 
-fn configuration(waypoint: &Waypoint) -> Configuration<f64> {
-    let [w, x, y, z] = waypoint.orientation;
-    Configuration {
-        position: waypoint.position,
-        orientation: Quaternion { w, x, y, z },
-        posture: waypoint.posture,
-        hand: waypoint.hand,
-    }
+fn waypoint(waypoint: &Waypoint) -> Configuration<f64> {
+    configuration(waypoint.position, waypoint.orientation, waypoint.posture, waypoint.hand)
 }
 
-fn velocity(velocity: &WaypointVelocity) -> Velocity<f64> {
-    Velocity {
-        position: velocity.position,
-        orientation: velocity.orientation,
-        posture: velocity.posture,
-        hand: velocity.hand,
-    }
+fn start_velocity(at: &WaypointVelocity) -> control::plan::primitive::Velocity<f64> {
+    velocity(at.position, at.orientation, at.posture, at.hand)
 }
 
 fn image_waypoint(waypoint: &Waypoint) -> link::image::Waypoint {

@@ -12,6 +12,8 @@ mod text;
 
 use std::path::{Path, PathBuf};
 
+use control::plan::primitive;
+
 pub use convert::{HostPrimitive, KERNEL_CAPACITY};
 pub use error::PrimitiveFileError;
 
@@ -26,10 +28,10 @@ pub const LARGEST_DURATION_DEVIATION: f64 = 0.5;
 
 /// Rows of weights by group: position, orientation, posture, hand.
 pub const GROUPS: [(&str, usize); 4] = [
-    ("position", dmp::POSITION_ROWS),
-    ("orientation", dmp::ORIENTATION_ROWS),
-    ("posture", dmp::POSTURE_ROWS),
-    ("hand", dmp::HAND_ROWS),
+    ("position", primitive::POSITION_ROWS),
+    ("orientation", primitive::ORIENTATION_ROWS),
+    ("posture", primitive::POSTURE_ROWS),
+    ("hand", primitive::HAND_ROWS),
 ];
 
 /// Which orientation error the movement uses.
@@ -359,7 +361,7 @@ impl PrimitiveFile {
                 Err(PrimitiveFileError::Shape { file: self.file.clone(), key: key.to_owned(), found, expected })
             }
         };
-        shape("weights", self.weights.len(), dmp::ROWS)?;
+        shape("weights", self.weights.len(), primitive::ROWS)?;
         for (key, values) in self.tables() {
             if key.starts_with("weights.") {
                 shape(&key, values.len(), self.kernels())?;

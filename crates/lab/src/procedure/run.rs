@@ -87,7 +87,7 @@ pub struct Surprise {
 }
 
 /// Names of the channels that an experience compares.
-pub const CHANNELS: [&str; dmp::EXPERIENCE_CHANNELS] = [
+pub const CHANNELS: [&str; control::plan::primitive::STATISTICS_CHANNELS] = [
     "force x",
     "force y",
     "force z",

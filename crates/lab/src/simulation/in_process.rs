@@ -10,7 +10,7 @@ use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 
-use device::storage::{Desk, Library, Opening, Room, Work, keep, value_bytes};
+use device::storage::{Library, LibraryAccess, Opening, Scratch, Work, keep, value_bytes};
 use device::{Controller, DeviceController, Identity, Session, Slot, StoreError};
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
@@ -33,19 +33,19 @@ const fn computing(slot: Slot) -> Ticks {
     }
 }
 
-type Dialogue = Session<Library<STORE_SLOTS, IMAGE_BYTES_LIMIT>>;
+type ArmSession = Session<Library<STORE_SLOTS, IMAGE_BYTES_LIMIT>>;
 
 /// The session, shared with whoever keeps its library on the flash; never by two at a time.
 #[derive(Clone)]
-struct SharedSession(Arc<Mutex<Box<Dialogue>>>);
+struct SharedSession(Arc<Mutex<Box<ArmSession>>>);
 
 impl SharedSession {
-    fn lock(&self) -> MutexGuard<'_, Box<Dialogue>> {
+    fn lock(&self) -> MutexGuard<'_, Box<ArmSession>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Desk for SharedSession {
+impl LibraryAccess for SharedSession {
     fn restore(&mut self, slot: u8, image: &[u8]) {
         self.lock().store_mut().restore(slot, image);
     }
@@ -79,7 +79,7 @@ impl Keeper {
         let clock = VirtualClock::default();
         let port = FlashPort::new(chip.clone(), clock.clone());
         let task = Box::pin(async move {
-            let mut room = Box::new(Room::<IMAGE_BYTES_LIMIT, { value_bytes(IMAGE_BYTES_LIMIT) }>::new());
+            let mut room = Box::new(Scratch::<IMAGE_BYTES_LIMIT, { value_bytes(IMAGE_BYTES_LIMIT) }>::new());
             keep(port, &mut room, &mut desk).await
         });
         Self { task, clock, chip }

@@ -21,12 +21,12 @@ use semihosting::io::Write;
 use semihosting::process::ExitCode;
 
 use super::Parts;
-use crate::last_words;
+use crate::panic_stop;
 
 /// The board.
-pub struct Board(());
+pub struct SelectedBoard(());
 
-impl super::Edge for Board {
+impl super::Board for SelectedBoard {
     type Clock = clock::Clock;
     type SlotTimer = slot_timer::SlotTimer;
     type Can = can::Can;
@@ -86,5 +86,5 @@ impl super::Edge for Board {
 /// QEMU's stack has no guard and can always be read.
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    last_words::after_hard_fault(core::ptr::from_ref(frame).addr() as u32, Some(frame))
+    panic_stop::after_hard_fault(core::ptr::from_ref(frame).addr() as u32, Some(frame))
 }

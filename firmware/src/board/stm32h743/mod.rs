@@ -11,4 +11,4 @@ pub mod constants;
 mod parts;
 
 #[cfg(all(target_os = "none", feature = "board-stm32h743"))]
-pub use parts::{Board, device};
+pub use parts::{SelectedBoard, device};

@@ -8,7 +8,7 @@ use embassy_stm32::pac::RCC;
 
 use super::super::constants::clocks::{HSE_BLINK_US, HSE_BLINKS, HSE_SOON_US};
 use super::{clock, light};
-use crate::last_words;
+use crate::panic_stop;
 
 /// Switches the input on and waits for it; does not return without it. The clock counts already.
 pub(super) fn wait() {
@@ -26,7 +26,7 @@ pub(super) fn wait() {
         }
         light::before_all(turn % 2 == 1);
     }
-    last_words::stop(format_args!("no 8 MHz from the ST-LINK: the bus was not touched"));
+    panic_stop::stop(format_args!("no 8 MHz from the ST-LINK: the bus was not touched"));
 }
 
 /// From here on its failure is a non-maskable interrupt. The clock tree runs.
@@ -40,7 +40,7 @@ pub(super) fn watch() {
 unsafe fn NonMaskableInt() -> ! {
     if RCC.cifr().read().hsecssf() {
         RCC.cicr().write(|w| w.set_hsecssc(true));
-        last_words::stop(format_args!("the 8 MHz from the ST-LINK have stopped"));
+        panic_stop::stop(format_args!("the 8 MHz from the ST-LINK have stopped"));
     }
-    last_words::stop(format_args!("a non-maskable interrupt without a cause of the chip: asked for by a debug probe"));
+    panic_stop::stop(format_args!("a non-maskable interrupt without a cause of the chip: asked for by a debug probe"));
 }

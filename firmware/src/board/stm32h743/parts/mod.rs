@@ -7,9 +7,9 @@ mod faults;
 mod fdcan;
 mod flash;
 mod host_can;
-mod last_words;
 mod light;
 mod logger;
+mod panic_reason;
 mod pins;
 mod port;
 mod protection;
@@ -35,13 +35,13 @@ use crate::board::Parts;
 static STOPPING: AtomicBool = AtomicBool::new(false);
 
 /// The board.
-pub struct Board {
+pub struct SelectedBoard {
     light: light::StatusLight,
     serial: &'static str,
     host_bus: bool,
 }
 
-impl crate::board::Edge for Board {
+impl crate::board::Board for SelectedBoard {
     type Clock = clock::Clock;
     type SlotTimer = slot_timer::SlotTimer;
     type Can = fdcan::ArmBus;
@@ -82,7 +82,7 @@ impl crate::board::Edge for Board {
         let serial = serial_number::read();
         usb::start(&mut core.NVIC, serial);
         defmt::info!("reset by {=str}", cause);
-        last_words::tell();
+        panic_reason::tell();
         supply::tell();
         if !host_bus {
             defmt::warn!(
@@ -119,7 +119,7 @@ impl crate::board::Edge for Board {
             watchdog::feed();
             // The frames go to the controller, which needs nobody to send them; the words are written meanwhile.
             fdcan::hand_over_last(frames);
-            last_words::write(reason);
+            panic_reason::write(reason);
         }
         fdcan::wait_for_last();
         reset::restart()

@@ -7,7 +7,7 @@
 
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 
-use super::journal::{Account, Journal, SECTORS, sector_bytes};
+use super::journal::{Journal, JournalState, SECTORS, sector_bytes};
 
 /// Most bytes of a word.
 const WORD_LIMIT: usize = 32;
@@ -20,7 +20,7 @@ const BLANK_CHUNK: usize = 256;
 
 /// The region without its journal.
 #[derive(Debug)]
-pub(super) struct SoundFlash<F> {
+pub(super) struct JournaledFlash<F> {
     flash: F,
     journal: Journal,
     /// Bytes of the log: all but the journal.
@@ -38,7 +38,7 @@ pub(super) enum Found {
     Formatted,
 }
 
-impl<F: NorFlash> SoundFlash<F> {
+impl<F: NorFlash> JournaledFlash<F> {
     /// Bytes of the log in a region of this flash; `None`: the flash is of a kind this storage cannot use.
     pub(super) fn log_bytes(flash: &F) -> Option<u32> {
         let usable = F::WRITE_SIZE <= WORD_LIMIT
@@ -57,7 +57,7 @@ impl<F: NorFlash> SoundFlash<F> {
     /// Those of the flash.
     pub(super) async fn open(mut flash: F, capacity: u32) -> Result<(Self, Found), F::Error> {
         match Journal::read(&mut flash, capacity).await? {
-            Some(Account { journal, unfinished }) => {
+            Some(JournalState { journal, unfinished }) => {
                 let mut sound = Self { flash, journal, capacity };
                 let sector = unfinished.filter(|sector| u32::from(*sector) * sector_bytes::<F>() < capacity);
                 let Some(sector) = sector else { return Ok((sound, Found::Sound)) };
@@ -115,11 +115,11 @@ async fn is_blank<F: NorFlash>(flash: &mut F, sector: u32) -> Result<bool, F::Er
     Ok(true)
 }
 
-impl<F: NorFlash> ErrorType for SoundFlash<F> {
+impl<F: NorFlash> ErrorType for JournaledFlash<F> {
     type Error = F::Error;
 }
 
-impl<F: NorFlash> ReadNorFlash for SoundFlash<F> {
+impl<F: NorFlash> ReadNorFlash for JournaledFlash<F> {
     const READ_SIZE: usize = F::READ_SIZE;
 
     async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), F::Error> {
@@ -141,7 +141,7 @@ impl<F: NorFlash> ReadNorFlash for SoundFlash<F> {
     }
 }
 
-impl<F: NorFlash> NorFlash for SoundFlash<F> {
+impl<F: NorFlash> NorFlash for JournaledFlash<F> {
     const WRITE_SIZE: usize = F::WRITE_SIZE;
     const ERASE_SIZE: usize = F::ERASE_SIZE;
 

@@ -28,7 +28,7 @@ struct Place(UnsafeCell<MaybeUninit<Record>>);
 // SAFETY: read and cleared at start-up with interrupts masked, written by `write` with interrupts masked.
 unsafe impl Sync for Place {}
 
-#[unsafe(link_section = ".uninit.last_words")]
+#[unsafe(link_section = ".uninit.panic_reason")]
 static PLACE: Place = Place(UnsafeCell::new(MaybeUninit::uninit()));
 
 /// Writes text to the record, dropping what does not fit. In place: there may be little stack left.

@@ -10,7 +10,7 @@ use cortex_m::peripheral::SCB;
 use cortex_m_rt::{ExceptionFrame, exception};
 use puck::stop_frames;
 
-use crate::board::{Board, Edge};
+use crate::board::{Board, SelectedBoard};
 
 #[panic_handler]
 fn panicked(information: &PanicInfo<'_>) -> ! {
@@ -20,7 +20,7 @@ fn panicked(information: &PanicInfo<'_>) -> ! {
 /// The end, for a reason that the board has found.
 pub fn stop(reason: fmt::Arguments<'_>) -> ! {
     cortex_m::interrupt::disable();
-    Board::stop(&stop_frames(), reason)
+    SelectedBoard::stop(&stop_frames(), reason)
 }
 
 /// What the processor's fault registers say.
