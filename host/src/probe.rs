@@ -1,7 +1,7 @@
 //! The debug probe: every command that is run with it, as a line a person can paste, and what can go wrong.
 //!
-//! The work is done by probe-rs, a program of its own: it knows the probes and the chips, and needs access to USB that this tool
-//! should not have.
+//! The work is done by probe-rs, a program of its own: it knows the probes and the chips, and needs access to USB
+//! that this tool should not have.
 
 use std::ffi::OsString;
 use std::fmt;
@@ -68,8 +68,8 @@ impl Line {
     }
 
     /// Shows the log of a running image. Once attached the processor is not halted, whatever happens to it: a halted
-    /// processor sends no torques, and the pucks would hold the last ones. Attaching itself halts it for a moment, which no
-    /// option of probe-rs prevents (its issue 3135).
+    /// processor sends no torques, and the pucks would hold the last ones. Attaching itself halts it for a moment,
+    /// which no option of probe-rs prevents (its issue 3135).
     #[must_use]
     pub fn attach(chip: &str, probe: Option<&str>, image: &Path) -> Self {
         let mut line = Self::probe_rs("attach", chip, probe);

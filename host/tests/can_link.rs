@@ -38,7 +38,8 @@ fn arm(address: &str) -> Client<Device> {
     Client::connect(Device::open(&address, |_| {}).unwrap(), "test").unwrap()
 }
 
-/// Waits until this time of the simulated arm, shortly after a control slot: what is sent now reaches the next one whatever the line.
+/// Waits until this time of the simulated arm, shortly after a control slot: what is sent now reaches the next one
+/// whatever the line.
 fn wait_until(client: &mut Client<Device>, seconds: f64) {
     let cycle = (seconds * control::RATE).round();
     let behind_control_slot = cycle * sim::seconds(CYCLE_TICKS) + sim::seconds(SLOT_TICKS) + 0.1e-3;
@@ -104,7 +105,8 @@ fn a_run_over_can_is_the_run_over_the_serial_line_to_the_last_bit() {
     assert_eq!((at_device.gaps, at_device.duplicates, at_device.malformed), (0, 0, 0));
 }
 
-/// What a bus could carry at most of these very bytes: frames of eight, back to back, with the stuff bits they have. Byte/s.
+/// What a bus could carry at most of these very bytes: frames of eight, back to back, with the stuff bits they have.
+/// Byte/s.
 fn possible(bytes: &[u8]) -> f64 {
     let frames = bytes.chunks(SEGMENT_BYTES).filter_map(|part| CanFrame::new(CanId::new(0x010)?, part));
     let bits: u32 = frames.map(|frame| sim::wire::frame_bits(&frame)).sum();

@@ -6,8 +6,8 @@ use tactus::cmd::Cli;
 
 const GUIDE: &str = include_str!("../../docs/lab-guide.md");
 
-/// Command lines of the guide with their line numbers: in code blocks the lines that begin with `tactus` (after a prompt or a variable),
-/// in prose what stands between backticks and begins with it.
+/// Command lines of the guide with their line numbers: in code blocks the lines that begin with `tactus` (after a
+/// prompt or a variable), in prose what stands between backticks and begins with it.
 fn command_lines(guide: &str) -> Vec<(usize, String)> {
     let mut inside = false;
     let mut found = Vec::new();

@@ -1,7 +1,7 @@
 //! Lines of `candump -L`: `(1436509052.249713) can0 123#0102`, read and written.
 //!
-//! Everything candump writes is read: data, remote and error frames of eleven and 29 bits, frames of CAN FD, and the direction that
-//! newer versions put at the end. Time keeps its microseconds exactly; further decimals are cut off.
+//! Everything candump writes is read: data, remote and error frames of eleven and 29 bits, frames of CAN FD, and the
+//! direction that newer versions put at the end. Time keeps its microseconds exactly; further decimals are cut off.
 
 use std::fmt;
 use std::str::FromStr;

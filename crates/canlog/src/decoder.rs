@@ -1,7 +1,7 @@
 //! Frames of the arm's bus to sentences: who says what to whom.
 //!
-//! A frame alone does not tell what its number means: the firmware of the puck decides, and the puck tells that in other frames.
-//! So the decoder must see the frames in order; [`PuckState`] keeps what they have told.
+//! A frame alone does not tell what its number means: the firmware of the puck decides, and the puck tells that in
+//! other frames. So the decoder must see the frames in order; [`PuckState`] keeps what they have told.
 
 use puck::{
     Action, CanFrame, Counts, Destination, Group, Node, Property, PropertyId, Reply, ReplyError, Request, RequestError,

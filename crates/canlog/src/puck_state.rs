@@ -1,4 +1,5 @@
-//! What a log has told about one puck so far: what it runs, and its scales. Numbers of properties mean nothing without it.
+//! What a log has told about one puck so far: what it runs, and its scales. Numbers of properties mean nothing
+//! without it.
 
 use puck::{Node, Property, PropertyId, PropertyTable, Role, Status};
 
@@ -50,8 +51,8 @@ impl PuckState {
         known.unwrap_or(PropertyTable::monitor())
     }
 
-    /// The property with this number. What the boot loader has not is looked up as if the main firmware ran: one may be addressed
-    /// while it wakes.
+    /// The property with this number. What the boot loader has not is looked up as if the main firmware ran: one may
+    /// be addressed while it wakes.
     #[must_use]
     pub fn property(&self, id: PropertyId) -> Option<Property> {
         self.table().property(id).or_else(|| Self { status: None, ..*self }.table().property(id))

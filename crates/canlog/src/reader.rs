@@ -26,8 +26,8 @@ pub struct Interface {
 
 impl Interface {
     fn new(name: &str) -> Self {
-        // Until an identifier shows otherwise: every arm's bus has others than those of segments, and the first frame is one
-        // unless the log begins in the middle of an enumeration.
+        // Until an identifier shows otherwise: every arm's bus has others than those of segments, and the first frame
+        // is one unless the log begins in the middle of an enumeration.
         Self { name: name.into(), kind: BusKind::Host, decoder: Decoder::default(), link: HostLink::default() }
     }
 

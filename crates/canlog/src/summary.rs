@@ -243,7 +243,8 @@ fn answers_to(node: Node, property: PropertyId) -> [Option<Answer>; 2] {
     }
 }
 
-/// Whose answer a reply is, and to what; `None` for what nobody asks for, and for tactile data, which come in several frames.
+/// Whose answer a reply is, and to what; `None` for what nobody asks for, and for tactile data, which come in several
+/// frames.
 fn answer_of(reply: &Reply) -> Option<(Node, Answer)> {
     Some(match *reply {
         Reply::Property { node, property, .. } => (node, Answer::Property(property.number())),

@@ -176,11 +176,11 @@ impl fmt::Display for Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::made_up;
+    use crate::fixtures;
 
     #[test]
     fn what_open_loop_does_not_meet_is_left_out_and_said_so() {
-        let mut results = made_up::results(&[1]);
+        let mut results = fixtures::results(&[1]);
         for report in &mut results.reports {
             let adapted = report.key.mode == Mode::Adaptive;
             report.measures.push_m = if adapted { 0.01 } else { 0.04 };
@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn one_mode_alone_is_compared_with_nothing() {
-        let mut results = made_up::results(&[1]);
+        let mut results = fixtures::results(&[1]);
         results.reports.retain(|report| report.key.mode == Mode::Adaptive);
         assert_eq!(Comparison::of(&results, Scenario::Cup), None);
     }

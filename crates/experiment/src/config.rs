@@ -57,7 +57,8 @@ pub struct Config {
 }
 
 impl Config {
-    /// The scenario as it is meant: all modes, seed 1, in this process, the honest plant, all processors, nothing on disk.
+    /// The scenario as it is meant: all modes, seed 1, in this process, the honest plant, all processors, nothing on
+    /// disk.
     pub fn new(scenario: Scenario, primitive: PrimitiveFile) -> Config {
         Config {
             scenario,
@@ -78,7 +79,8 @@ impl Config {
         }
     }
 
-    /// All trials, in the order in which they are tried: cell by cell, so that a broken off experiment has complete cells.
+    /// All trials, in the order in which they are tried: cell by cell, so that a broken off experiment has complete
+    /// cells.
     pub fn keys(&self) -> Vec<Key> {
         let cells = || self.grid.cells.iter().copied().enumerate();
         let trial = |seed: u64| {
@@ -87,8 +89,8 @@ impl Config {
         self.seeds.iter().flat_map(|&seed| trial(seed)).collect()
     }
 
-    /// The frame of the approach: its goal is where the primitive ends (where its fingers close, for one that lifts), its direction that of
-    /// the hand's z axis there; of a grasp from above, where the hand comes from.
+    /// The frame of the approach: its goal is where the primitive ends (where its fingers close, for one that lifts),
+    /// its direction that of the hand's z axis there; of a grasp from above, where the hand comes from.
     ///
     /// `None` for a primitive that cannot be played.
     pub fn frame(&self) -> Option<ApproachFrame> {
@@ -123,7 +125,8 @@ impl Config {
         Rule { upright: !self.object.row().lies }
     }
 
-    /// Horizontal force at the height of the grasp that tips the object over, N; `None` for what lies, or slides before it tips.
+    /// Horizontal force at the height of the grasp that tips the object over, N; `None` for what lies, or slides
+    /// before it tips.
     pub fn tipping_force(&self) -> Option<f64> {
         let object = self.object_at(&self.frame()?, Cell::default());
         let tips = object.toppling_force(self.grasp_height());

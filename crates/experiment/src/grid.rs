@@ -19,7 +19,8 @@ const PAPER_ALONG: [i32; 2] = [-240, 40];
 /// Extent of the paper's grid sideways, mm.
 const PAPER_SIDEWAYS: [i32; 2] = [-120, 80];
 
-/// Displacement of the object from the goal in the frame of the approach. Whole millimetres, so that a cell has one name only.
+/// Displacement of the object from the goal in the frame of the approach. Whole millimetres, so that a cell has one
+/// name only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub struct Cell {
     /// Along the approach, mm; negative is nearer the arm.
@@ -82,8 +83,8 @@ impl Grid {
         Grid::raster(&steps(PAPER_ALONG, 8), &steps(PAPER_SIDEWAYS, 6))
     }
 
-    /// `columns` along the approach and `rows` sideways, spread evenly over the paper's grid. As long as there are no more of them than
-    /// the paper has, they are cells of the paper's grid.
+    /// `columns` along the approach and `rows` sideways, spread evenly over the paper's grid. As long as there are no
+    /// more of them than the paper has, they are cells of the paper's grid.
     ///
     /// # Errors
     /// More than 64 either way, or none.
@@ -201,7 +202,8 @@ pub struct ApproachFrame {
 }
 
 impl ApproachFrame {
-    /// The frame at `goal` with the approach along `direction` (need not be a unit vector); `None` if that is no horizontal direction.
+    /// The frame at `goal` with the approach along `direction` (need not be a unit vector); `None` if that is no
+    /// horizontal direction.
     pub fn new(goal: [f64; 2], direction: [f64; 2]) -> Option<ApproachFrame> {
         let length = direction[0].hypot(direction[1]);
         (length > 1e-6 && goal.iter().all(|value| value.is_finite()))

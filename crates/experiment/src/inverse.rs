@@ -20,7 +20,8 @@ const NEAR: f64 = 1e-4;
 /// Angle at which it does, rad.
 const NEAR_ANGLE: f64 = 1e-3;
 
-/// A posture (rad) within the soft limits whose tool frame is at `position` (m) with `orientation` (w, x, y, z); `None` if none is found.
+/// A posture (rad) within the soft limits whose tool frame is at `position` (m) with `orientation` (w, x, y, z);
+/// `None` if none is found.
 pub fn reach(position: [f64; 3], orientation: [f64; 4], near: [f64; 7]) -> Option<[f64; 7]> {
     let mut q = near;
     for _ in 0..ITERATIONS {

@@ -1,5 +1,6 @@
-//! The primitive of an experiment, made on the spot: taught by the simulated person, learned, rehearsed, and with the experience of runs that
-//! succeeded; the same library calls as in `tactus teach`, `learn`, `rehearse` and `experience`.
+//! The primitive of an experiment, made on the spot: taught by the simulated person, learned, rehearsed, and with the
+//! experience of runs that succeeded; the same library calls as in `tactus teach`, `learn`, `rehearse` and
+//! `experience`.
 
 use std::path::Path;
 
@@ -34,7 +35,8 @@ const LONGEST_DEMONSTRATION: f64 = 60.0;
 const NOTES: &str = "Tactus recording, 300 Hz (simulated arm)";
 /// Opening of the fingers before the grasp, rad.
 const OPEN: f64 = 0.25;
-/// The same for an object that may stand beside the palm: as wide as the fingers go without touching their stops, 12 cm to either side.
+/// The same for an object that may stand beside the palm: as wide as the fingers go without touching their stops, 12
+/// cm to either side.
 const WIDE_OPEN: f64 = 0.05;
 /// Part of the dwell in which the fingers move.
 const CLOSING: [f64; 2] = [0.06, 0.94];
@@ -61,15 +63,17 @@ struct GraspTuning {
 impl GraspTuning {
     fn of(scenario: Scenario) -> GraspTuning {
         let usual = GraspTuning { closing: 3.5, closed: 2.35, compliance: None, turns: true, fingers: None };
-        // A light cup slides at 1 N: half of that must bend the plan by its whole reach, and 0.3 N of it are the dead band.
+        // A light cup slides at 1 N: half of that must bend the plan by its whole reach, and 0.3 N of it are the dead
+        // band.
         let light = Some([2.0, 0.0]);
         match scenario {
             Scenario::Flashlight | Scenario::Lift => usual,
             Scenario::Cup => GraspTuning { compliance: light, ..usual },
-            // What is in the way is below: the hand gives way upwards and nowhere else. Fingers that sweep along a table take their time.
+            // What is in the way is below: the hand gives way upwards and nowhere else. Fingers that sweep along a
+            // table take their time.
             Scenario::Bottle => GraspTuning { closing: 7.0, compliance: Some([0.0, 0.5]), turns: false, ..usual },
-            // What a finger can crush is touched slowly, and the plan of the fingers is quick enough (K) and gives way enough (K1) to end
-            // where they touch. They close to 0.4 rad beyond the cup, in both modes.
+            // What a finger can crush is touched slowly, and the plan of the fingers is quick enough (K) and gives
+            // way enough (K1) to end where they touch. They close to 0.4 rad beyond the cup, in both modes.
             Scenario::Fingers => {
                 GraspTuning { closing: 7.0, closed: 1.95, compliance: light, fingers: Some([2400.0, 3.0]), ..usual }
             }
@@ -121,7 +125,8 @@ impl From<lab::simulation::SimulationError> for LessonError {
     }
 }
 
-/// Makes the primitive of a scenario on `jobs` processors. `say` hears what is being done; `file` is where it will be written.
+/// Makes the primitive of a scenario on `jobs` processors. `say` hears what is being done; `file` is where it will be
+/// written.
 ///
 /// # Errors
 /// [`LessonError`]
@@ -142,7 +147,8 @@ pub fn make(
     rehearsed(&Config { plant, jobs, ..Config::new(scenario, primitive) }, interrupt)
 }
 
-/// The primitive of an experiment with the expectation of new rehearsals; the object is there only where its weight is what shall be expected.
+/// The primitive of an experiment with the expectation of new rehearsals; the object is there only where its weight
+/// is what shall be expected.
 ///
 /// # Errors
 /// [`LessonError`]
@@ -280,10 +286,11 @@ fn parse(cycles: &[link::Telemetry], name: &str) -> Result<Recording, LessonErro
     Ok(Recording::parse(Path::new(name), &bytes)?)
 }
 
-/// Runs with the object in many places; those that succeed become what the device watches later runs by. Gives how many succeeded of how many.
+/// Runs with the object in many places; those that succeed become what the device watches later runs by. Gives how
+/// many succeeded of how many.
 ///
-/// Every run has an arm of its own, and the modes of the scenario are mixed, because the device knows neither of them: each mode
-/// where it has a chance. Arms and places are none of an experiment's trials.
+/// Every run has an arm of its own, and the modes of the scenario are mixed, because the device knows neither of
+/// them: each mode where it has a chance. Arms and places are none of an experiment's trials.
 ///
 /// # Errors
 /// [`LessonError`]; too few successes leave the primitive without experience, which is no error.
@@ -311,8 +318,8 @@ pub fn experience(
     Ok((recordings.len(), keys.len()))
 }
 
-/// Where and how experience is gathered: `(mode, runs, part of the grid about the goal)`. The less a mode answers to what it feels, the
-/// nearer the object must be.
+/// Where and how experience is gathered: `(mode, runs, part of the grid about the goal)`. The less a mode answers to
+/// what it feels, the nearer the object must be.
 const PRACTICE: [(Mode, usize, f64); 4] = [
     (Mode::OpenLoop, 20, 0.5),
     (Mode::ForceControl, 16, 0.6),
@@ -322,7 +329,8 @@ const PRACTICE: [(Mode, usize, f64); 4] = [
 /// First of the seeds of arms that gather experience; experiments count from 1 to at most 1000.
 const PRACTICE_SEED: u64 = 1_000_000;
 
-/// The runs that gather experience: places spread evenly over the extent of a grid (the points of Halton), each with another arm.
+/// The runs that gather experience: places spread evenly over the extent of a grid (the points of Halton), each with
+/// another arm.
 fn practice(grid: &Grid, modes: &[Mode]) -> Vec<Key> {
     let extent = |values: &[i32]| {
         let bound = |pick: fn(i32, i32) -> i32| f64::from(values.iter().copied().reduce(pick).unwrap_or(0));

@@ -1,4 +1,5 @@
-//! Experiments: the same movement tried on objects that are not where it expects them, in several modes, over a grid and over seeds.
+//! Experiments: the same movement tried on objects that are not where it expects them, in several modes, over a grid
+//! and over seeds.
 //!
 //! ```text
 //! Config --keys--> trial::run (own simulation, own noise) --> Report --> results.jsonl
@@ -10,14 +11,14 @@ pub mod comparison;
 #[cfg(feature = "mujoco")]
 pub mod config;
 pub mod figures;
+#[cfg(test)]
+pub mod fixtures;
 pub mod grid;
 pub mod inverse;
 #[cfg(feature = "mujoco")]
 pub mod lesson;
 #[cfg(feature = "mujoco")]
 pub mod lift;
-#[cfg(test)]
-pub mod made_up;
 pub mod map;
 pub mod observation;
 #[cfg(feature = "mujoco")]

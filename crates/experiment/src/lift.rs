@@ -1,7 +1,8 @@
 //! The experiment with a weight: what is expected to be heavy is carried as high as what is light.
 //!
-//! One movement, two memories: rehearsed with the usual weight, and with one that is 0.3 kg heavier. Each is then carried with the
-//! memory of it, and the heavier one also with the memory of the usual one: what that sags is what the memory is good for.
+//! One movement, two memories: rehearsed with the usual weight, and with one that is 0.3 kg heavier. Each is then
+//! carried with the memory of it, and the heavier one also with the memory of the usual one: what that sags is what
+//! the memory is good for.
 
 use serde::Serialize;
 

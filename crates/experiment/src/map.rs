@@ -11,8 +11,8 @@ const GAP: &str = "   ";
 
 /// The maps of all modes side by side: columns along the approach, rows sideways, one sign a cell.
 ///
-/// With one seed the sign is the outcome's letter; with several it is a letter where all agree, and otherwise the number of successes
-/// (`+` from ten).
+/// With one seed the sign is the outcome's letter; with several it is a letter where all agree, and otherwise the
+/// number of successes (`+` from ten).
 pub fn draw(results: &Results, grid: &Grid) -> String {
     let (columns, rows) = (grid.columns(), grid.rows());
     let width = 2 * columns.len() - 1;
@@ -124,12 +124,12 @@ pub fn table(summaries: &[Summary]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::made_up;
+    use crate::fixtures;
     use crate::outcome::Outcome;
 
     #[test]
     fn the_map_has_the_arm_on_the_left_and_the_left_side_on_top() {
-        let mut results = made_up::results(&[1]);
+        let mut results = fixtures::results(&[1]);
         for report in &mut results.reports {
             let cell = report.key.cell;
             report.outcome = match (cell.along_mm, cell.sideways_mm) {
@@ -148,7 +148,7 @@ mod tests {
 
     #[test]
     fn seeds_that_differ_show_how_many_held() {
-        let mut results = made_up::results(&[1, 2, 3]);
+        let mut results = fixtures::results(&[1, 2, 3]);
         for report in &mut results.reports {
             report.outcome =
                 if report.key.index == 0 && report.key.seed == 2 { Outcome::KnockedOver } else { Outcome::Held };
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn the_table_names_every_mode() {
-        let results = made_up::results(&[1, 2]);
+        let results = fixtures::results(&[1, 2]);
         let summaries: Vec<Summary> = Mode::PAPER.iter().map(|mode| Summary::of(&results, *mode, Some(2.0))).collect();
         let text = table(&summaries);
         assert!(

@@ -1,6 +1,7 @@
 //! What the world itself saw in a trial, every 10 ms: things that no sensor of the arm measures.
 
-/// Physics steps in one sample: 10 ms, over which contact forces are averaged. Shorter peaks are the contact solver's, not the world's.
+/// Physics steps in one sample: 10 ms, over which contact forces are averaged. Shorter peaks are the contact
+/// solver's, not the world's.
 pub const STEPS_PER_SAMPLE: usize = 18;
 
 /// Time between two samples, s.

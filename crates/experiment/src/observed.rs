@@ -32,7 +32,7 @@ impl ObservedWorld {
     }
 
     /// The same as a box, for the options of a simulation.
-    pub fn dress(world: MujocoWorld) -> Box<dyn World> {
+    pub fn wrap_world(world: MujocoWorld) -> Box<dyn World> {
         Box::new(ObservedWorld::new(world))
     }
 

@@ -15,7 +15,8 @@ const LIFTED: f64 = 0.08;
 const RAISED: f64 = 0.02;
 /// An object that was moved by more than this, and not grasped, was pushed away, m.
 const PUSHED: f64 = 0.03;
-/// An object that is knocked over has begun to fall when it leaves this lean for good: until then it may still come back.
+/// An object that is knocked over has begun to fall when it leaves this lean for good: until then it may still come
+/// back.
 const FALLING: f64 = 10.0 * std::f64::consts::PI / 180.0;
 /// Inner links of a hand that holds something stand at 1.8 to 2.2 rad: a finger beyond this, rad, should have met it.
 const SHOULD_HOLD: f64 = 1.9;
@@ -105,8 +106,9 @@ pub struct Measures {
     pub closing_s: f64,
     /// The arm began to lift.
     pub lift_s: f64,
-    /// When the failure began in the world: the object leaned over 10 degrees and went on to fall, was pushed 3 cm, the first finger
-    /// passed the angle at which it should have held the object, or the hand touched what it dropped for the last time.
+    /// When the failure began in the world: the object leaned over 10 degrees and went on to fall, was pushed 3 cm,
+    /// the first finger passed the angle at which it should have held the object, or the hand touched what it dropped
+    /// for the last time.
     pub failure_s: Option<f64>,
     /// Largest horizontal force on the object before the fingers close, 10 ms average, N.
     pub contact_peak_n: f64,

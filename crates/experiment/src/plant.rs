@@ -1,4 +1,5 @@
-//! The simulated device of one trial: an arm that was started before, the object in its cell, and what differs from the model.
+//! The simulated device of one trial: an arm that was started before, the object in its cell, and what differs from
+//! the model.
 
 use sim::world::mujoco::{Imperfections, Scene};
 use sim::{ForceTorqueConfig, OperatorConfig, PlantConfig, TICKS_PER_MILLISECOND, Ticks};
@@ -11,14 +12,14 @@ use lab::simulation::{CYCLE_TICKS, Engine, SimulationOptions, WorldKind};
 
 /// Error of the force sensor of the honest plant, N; a variation of the bias takes its place.
 const HONEST_BIAS: f64 = 0.1;
-/// Time in which that error comes up, from the start of the run on. A constant one would be tared away when the run starts, and would
-/// show nothing: what a run suffers from is what comes after, when the sensor warms or creeps.
+/// Time in which that error comes up, from the start of the run on. A constant one would be tared away when the run
+/// starts, and would show nothing: what a run suffers from is what comes after, when the sensor warms or creeps.
 pub const BIAS_OVER: Ticks = 2_000 * TICKS_PER_MILLISECOND;
 /// Half-width of its hysteresis, N and N m.
 const HONEST_HYSTERESIS: [f64; 2] = [0.05, 0.0015];
 
-/// How long after its torque has come the operator still holds the arm: the host, which uploads first, needs half a second to see it and to make it
-/// hold itself, and an arm that nobody holds falls.
+/// How long after its torque has come the operator still holds the arm: the host, which uploads first, needs half a
+/// second to see it and to make it hold itself, and an arm that nobody holds falls.
 const LET_GO: Ticks = 900 * TICKS_PER_MILLISECOND;
 
 /// Which arm.
@@ -62,7 +63,7 @@ pub fn options(arm: &Arm, noise_seed: u64, posture: [f64; 7], scene: Scene) -> S
         },
         ..PlantConfig::default()
     };
-    options.dress = Some(ObservedWorld::dress);
+    options.wrap_world = Some(ObservedWorld::wrap_world);
     options
 }
 

@@ -41,7 +41,7 @@ pub struct Surprise {
 
 /// The way of the hand and of its plan, seen from above, every 0.1 s.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Path2 {
+pub struct PlanarPath {
     /// Measured grasp point, world x and y, m.
     pub measured: Vec<[f64; 2]>,
     /// Planned grasp point, world x and y, m.
@@ -74,7 +74,7 @@ pub struct Report {
     pub surprise: Option<Surprise>,
     /// Paths.
     #[serde(default)]
-    pub path: Path2,
+    pub path: PlanarPath,
     /// Virtual time of the trial, s.
     pub virtual_s: f64,
     /// Time it took on this machine, s; only in `results.jsonl`, because it differs from run to run.
@@ -377,7 +377,7 @@ fn number(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::made_up;
+    use crate::fixtures;
 
     fn header(object: &str) -> Header {
         Header {
@@ -393,7 +393,7 @@ mod tests {
     #[test]
     fn an_experiment_goes_on_where_it_was_ended_even_in_the_middle_of_a_line() {
         let folder = tempfile::tempdir().unwrap();
-        let made = made_up::results(&[1]).reports;
+        let made = fixtures::results(&[1]).reports;
         let (mut log, before) = Log::open(folder.path(), &header("torch"), false).unwrap();
         assert!(before.is_empty());
         made[..5].iter().for_each(|report| log.add(report).unwrap());
@@ -412,7 +412,7 @@ mod tests {
     fn results_are_not_added_to_unasked_nor_to_those_of_another_configuration() {
         let folder = tempfile::tempdir().unwrap();
         let (mut log, _) = Log::open(folder.path(), &header("torch"), false).unwrap();
-        log.add(&made_up::results(&[1]).reports[0]).unwrap();
+        log.add(&fixtures::results(&[1]).reports[0]).unwrap();
         drop(log);
         let again = Log::open(folder.path(), &header("torch"), false).err().unwrap();
         assert!(matches!(again, ResultsError::Exists { trials: 1, .. }), "{again}");
@@ -433,7 +433,7 @@ mod tests {
 
     #[test]
     fn results_do_not_depend_on_the_order_in_which_trials_end() {
-        let ordered = made_up::results(&[1, 2]);
+        let ordered = fixtures::results(&[1, 2]);
         let mut reversed = ordered.reports.clone();
         reversed.reverse();
         assert_eq!(Results::new(reversed), ordered);
@@ -443,7 +443,7 @@ mod tests {
     fn the_table_has_a_line_for_every_trial_and_a_value_in_every_column() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("results.csv");
-        let results = made_up::results(&[1]);
+        let results = fixtures::results(&[1]);
         results.write_csv(&file).unwrap();
         let mut reader = csv::Reader::from_path(&file).unwrap();
         let names = reader.headers().unwrap().clone();
@@ -457,7 +457,7 @@ mod tests {
 
     #[test]
     fn wall_times_are_left_out_of_what_shall_be_repeatable() {
-        let results = made_up::results(&[1]).without_wall_times();
+        let results = fixtures::results(&[1]).without_wall_times();
         assert!(!serde_json::to_string(&results).unwrap().contains("wall_s"));
     }
 }

@@ -77,7 +77,8 @@ pub enum Progress<'a> {
 pub struct Experiment {
     /// All reports.
     pub results: Results,
-    /// Trials of the first seed with everything that was seen, if the configuration asks for it; those that were there from before are missing.
+    /// Trials of the first seed with everything that was seen, if the configuration asks for it; those that were
+    /// there from before are missing.
     pub trials: Vec<Trial>,
     /// What all trials shared.
     pub prepared: Prepared,
@@ -182,7 +183,7 @@ pub fn run(
     let results = Results::new(reports);
     if config.keep_traces {
         // What was there from before has left no trace, but a trial can be repeated: the same key, the same trial.
-        for key in telling(&results) {
+        for key in representative(&results) {
             if !trials.iter().any(|trial| trial.report.key == key) {
                 trials.push(
                     trial::run(config, &prepared, key, interrupt)
@@ -195,9 +196,9 @@ pub fn run(
     Ok(Experiment { results, trials, prepared })
 }
 
-/// One trial of each mode, first seed, in the cell that tells most: the adapted one held the object and another mode did not; the middle
-/// of all such cells by distance, neither the easiest nor the hardest.
-pub(super) fn telling(results: &Results) -> Vec<Key> {
+/// One trial of each mode, first seed, in the cell that tells most: the adapted one held the object and another mode
+/// did not; the middle of all such cells by distance, neither the easiest nor the hardest.
+pub(super) fn representative(results: &Results) -> Vec<Key> {
     let seed = results.seeds().first().copied();
     let reports = || results.reports.iter().filter(|report| Some(report.key.seed) == seed);
     let held = |index: usize, mode: Mode| {
@@ -211,8 +212,8 @@ pub(super) fn telling(results: &Results) -> Vec<Key> {
         let others = [Mode::OpenLoop, Mode::RigidFingers];
         held(index, Mode::Adaptive) == Some(true) && others.iter().any(|mode| held(index, *mode) == Some(false))
     };
-    let telling: Vec<usize> = cells.iter().map(|(_, index)| *index).filter(|index| tells(*index)).collect();
-    let chosen = telling.get(telling.len() / 2).or(cells.get(cells.len() / 2).map(|(_, index)| index));
+    let representative: Vec<usize> = cells.iter().map(|(_, index)| *index).filter(|index| tells(*index)).collect();
+    let chosen = representative.get(representative.len() / 2).or(cells.get(cells.len() / 2).map(|(_, index)| index));
     let of_cell = |index: usize| reports().filter(move |report| report.key.index == index).map(|report| report.key);
     chosen.map(|index| of_cell(*index).collect()).unwrap_or_default()
 }

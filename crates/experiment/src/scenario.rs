@@ -82,8 +82,9 @@ impl Scenario {
 
     /// What the device is asked for in a mode. All modes of a scenario have the same gains.
     ///
-    /// What stands is approached with compliant gains, so that a touch moves the arm before it topples the object. A hand above a table needs its
-    /// height: with compliant gains it sags by its own friction as much as it shall give way, so there the gains are stiff.
+    /// What stands is approached with compliant gains, so that a touch moves the arm before it topples the object. A
+    /// hand above a table needs its height: with compliant gains it sags by its own friction as much as it shall give
+    /// way, so there the gains are stiff.
     pub fn options(self, mode: Mode) -> RunOptions {
         RunOptions { compliant: self != Scenario::Bottle, ..mode.options() }
     }
@@ -104,7 +105,8 @@ impl fmt::Display for Scenario {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum PlantKind {
-    /// An arm as it might stand in a laboratory: link masses off by up to 10 %, friction by 30 %, elastic cables, a force sensor with bias and hysteresis
+    /// An arm as it might stand in a laboratory: link masses off by up to 10 %, friction by 30 %, elastic cables, a
+    /// force sensor with bias and hysteresis
     Honest,
     /// An arm that equals the controller's model: rigid cables, a force sensor with noise only
     Ideal,

@@ -1,6 +1,7 @@
 //! The seed of a trial: from experiment seed and cell, so that any trial can be repeated alone.
 //!
-//! The modes of one cell and seed share it on purpose: they meet the same plant and the same noise, and differ in the mode only.
+//! The modes of one cell and seed share it on purpose: they meet the same plant and the same noise, and differ in the
+//! mode only.
 
 use super::grid::Cell;
 

@@ -55,9 +55,10 @@ pub struct Detection {
     pub dropped: Told,
     /// Those in which it was crushed.
     pub crushed: Told,
-    /// Median time from the beginning of the failure in the world ([`failure_s`](super::outcome::Measures::failure_s)) to the report, s;
-    /// negative: reported before. A failure that was not reported before the lift counts as reported at the lift, so that silence does not
-    /// pass for speed. What was dropped is left out.
+    /// Median time from the beginning of the failure in the world
+    /// ([`failure_s`](super::outcome::Measures::failure_s)) to the report, s; negative: reported before. A failure
+    /// that was not reported before the lift counts as reported at the lift, so that silence does not pass for speed.
+    /// What was dropped is left out.
     pub median_delay_s: Option<f64>,
 }
 
@@ -140,7 +141,8 @@ pub struct Summary {
     pub adaptation_deg: f64,
     /// Peak force on the object before the fingers close, N.
     pub contact_peak_n: Spread,
-    /// Share of the trials in which that peak, averaged over 100 ms, stays below the tipping force; `None` where nothing can tip.
+    /// Share of the trials in which that peak, averaged over 100 ms, stays below the tipping force; `None` where
+    /// nothing can tip.
     pub below_tipping: Option<f64>,
     /// Way the object was pushed before the fingers close, m.
     pub push_m: Spread,
@@ -205,7 +207,7 @@ impl Summary {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::made_up;
+    use crate::fixtures;
     use crate::results::Surprise;
 
     #[test]
@@ -217,7 +219,7 @@ mod tests {
 
     #[test]
     fn successes_are_counted_per_seed() {
-        let results = made_up::results(&[1, 2, 3]);
+        let results = fixtures::results(&[1, 2, 3]);
         let summary = Summary::of(&results, Mode::Adaptive, Some(2.0));
         assert_eq!((summary.cells, summary.seeds), (48, 3));
         let by_seed: f64 = summary.success_by_seed.iter().map(|count| *count as f64).sum();
@@ -234,7 +236,7 @@ mod tests {
 
     #[test]
     fn an_alarm_after_the_lift_began_comes_too_late() {
-        let mut reports = made_up::results(&[1]).reports;
+        let mut reports = fixtures::results(&[1]).reports;
         reports.iter_mut().for_each(|report| report.surprise = None);
         let held = reports.iter().position(|report| report.outcome == Outcome::Held).unwrap();
         let fallen: Vec<usize> =
@@ -260,7 +262,7 @@ mod tests {
 
     #[test]
     fn what_was_dropped_is_a_failure_and_what_the_arm_stopped_is_none_of_the_watch() {
-        let mut reports = made_up::results(&[1]).reports;
+        let mut reports = fixtures::results(&[1]).reports;
         reports.truncate(2);
         (reports[0].outcome, reports[1].outcome) = (Outcome::Dropped, Outcome::Stopped("torque limit".into()));
         let detection = Detection::of(reports.iter());

@@ -15,7 +15,7 @@ use super::observation::{Marks, Observation};
 use super::observed::{ObservedWorld, Snapshot};
 use super::outcome;
 use super::plant::{self, Arm};
-use super::results::{Key, Path2, Report, Surprise};
+use super::results::{Key, PlanarPath, Report, Surprise};
 use super::trace::{Cycle, Trace};
 use lab::client::{Client, Incoming, Interrupt};
 use lab::device::Device;
@@ -50,8 +50,8 @@ const CALMING: usize = 10;
 const BEAT: Ticks = periods(0.1) as Ticks * CYCLE_TICKS;
 /// An upload is followed by a longer one, 0.5 s: it takes 0.35 s, and on a board, which has to check it, 0.05 s more.
 const BEAT_OF_UPLOAD: Ticks = periods(0.5) as Ticks * CYCLE_TICKS;
-/// Time from the beginning of a cycle to the request, ticks. The request reaches the device before the next cycle begins,
-/// even if the engine overruns this by a slot.
+/// Time from the beginning of a cycle to the request, ticks. The request reaches the device before the next cycle
+/// begins, even if the engine overruns this by a slot.
 const AFTER_BEAT: Ticks = TICKS_PER_MILLISECOND / 2;
 /// One tick, ns.
 const NANOSECONDS_PER_TICK: u128 = 40;
@@ -202,7 +202,8 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
         measures,
         adaptation_m,
         adaptation_deg,
-        // A movement that lifts by itself is measured against its own plan: behind it the arm holds whatever it has reached.
+        // A movement that lifts by itself is measured against its own plan: behind it the arm holds whatever it has
+        // reached.
         sag_m: match (&fault, config.scenario.lifts_itself()) {
             (Some(_), _) => 0.0,
             (None, true) => trace.sag(arrived - run - SETTLED_SECONDS, arrived - run),
@@ -231,8 +232,8 @@ pub(super) fn connect(
     Ok(client)
 }
 
-/// Lets time pass until the next multiple of `beat`. Checking an upload takes a device its time, one in this process none; from here on both are at
-/// the same cycle, and what is asked for comes in the same one.
+/// Lets time pass until the next multiple of `beat`. Checking an upload takes a device its time, one in this process
+/// none; from here on both are at the same cycle, and what is asked for comes in the same one.
 fn wait_for_beat(client: &mut Client<Device>, beat: Ticks) -> Result<(), ProcedureError> {
     let now = (client.now().as_nanos() / NANOSECONDS_PER_TICK) as Ticks;
     // The first slot of a cycle is the tenth since power-up, and every third from there.
@@ -272,8 +273,9 @@ impl Attempt<'_> {
         procedure::play(self.client, &request, &mut |cycle| telemetry.push(*cycle))
     }
 
-    /// Straight up from where the hand is. A load that the controller does not know of pulls the arm below its reference; what is
-    /// missing then is lifted as well, in every mode alike, so that an object is judged by the grasp and not by the arm's stiffness.
+    /// Straight up from where the hand is. A load that the controller does not know of pulls the arm below its
+    /// reference; what is missing then is lifted as well, in every mode alike, so that an object is judged by the
+    /// grasp and not by the arm's stiffness.
     fn lift(&mut self) -> Result<(), ProcedureError> {
         let ([x, y, z], orientation) = lab::arm::tool_pose(&self.posture()?);
         let top = z + LIFT;
@@ -357,11 +359,11 @@ fn rise(trace: &Trace, end: f64) -> f64 {
     low.and_then(|index| cycles.get(index)).map_or(end, |cycle| cycle.time)
 }
 
-fn path(trace: &Trace, end: f64) -> Path2 {
+fn path(trace: &Trace, end: f64) -> PlanarPath {
     let cycles = || trace.cycles.iter().filter(|cycle| (0.0..=end).contains(&cycle.time)).step_by(PATH_EVERY);
     // A tenth of a millimetre is more than a picture shows.
     let point = |[x, y, _]: [f64; 3]| [x, y].map(|value: f64| (value * 1e4).round() / 1e4);
-    Path2 {
+    PlanarPath {
         measured: cycles().map(|cycle| point(cycle.position)).collect(),
         planned: cycles().map(|cycle| point(cycle.position_d)).collect(),
     }

@@ -22,8 +22,8 @@ pub struct Variation {
     pub noise: f64,
     /// Whole control cycles of delay beyond the usual one.
     pub delay: u8,
-    /// Error that the force sensor comes to within 2 s after the run has started and been tared, N; its direction is drawn from the seed.
-    /// An error from before would be tared away.
+    /// Error that the force sensor comes to within 2 s after the run has started and been tared, N; its direction is
+    /// drawn from the seed. An error from before would be tared away.
     pub bias: f64,
 }
 

@@ -1,5 +1,5 @@
-//! How two executions of the same movement differ, cycle by cycle: what `tactus compare` shows, and what must be small between the
-//! firmware and the same application in this process.
+//! How two executions of the same movement differ, cycle by cycle: what `tactus compare` shows, and what must be
+//! small between the firmware and the same application in this process.
 
 use std::fmt;
 use std::path::PathBuf;

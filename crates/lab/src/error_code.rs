@@ -1,8 +1,8 @@
 //! The numbered reasons for which a command fails: name, number, meaning, usual cause, and what to do.
 //!
 //! A number is never changed and never used again. Its hundreds are the exit code of the process; 500 to 589 are the
-//! refusals of the device in their order. `docs/errors.md` is written from this table, from the refusals and from the faults
-//! (`crates/lab/tests/errors.rs`).
+//! refusals of the device in their order. `docs/errors.md` is written from this table, from the refusals and from the
+//! faults (`crates/lab/tests/errors.rs`).
 
 use std::fmt;
 

@@ -1,8 +1,8 @@
 //! A firmware image in a file: what it says about itself, and what flashing it would write where.
 //!
-//! The description is the section `.tactus` (`link::metadata`); a device that runs the image tells the same in its hello. An
-//! image is only taken for flashing if all it would write lies where it says images belong: never where the device keeps its
-//! primitives.
+//! The description is the section `.tactus` (`link::metadata`); a device that runs the image tells the same in its
+//! hello. An image is only taken for flashing if all it would write lies where it says images belong: never where the
+//! device keeps its primitives.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
-//! What the lab tool does with a device, without its command line: connect, teach, learn, upload, run, record, simulate.
+//! What the lab tool does with a device, without its command line: connect, teach, learn, upload, run, record,
+//! simulate.
 
 pub mod arm;
 pub mod boxed;

@@ -136,7 +136,8 @@ mod tests {
 
     use super::*;
 
-    /// A hand whose finger 2 is behind its plan by as much as the state says: 0.1 and 0.3 rad in turn, and far more before the run.
+    /// A hand whose finger 2 is behind its plan by as much as the state says: 0.1 and 0.3 rad in turn, and far more
+    /// before the run.
     fn recording(names: &str) -> Recording {
         let mut text = format!("t_s,state,{names}\n");
         for line in 0..120 {

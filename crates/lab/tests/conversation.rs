@@ -341,7 +341,8 @@ fn a_socket_behind_which_nobody_answers_is_given_up_in_two_seconds_of_wall_time(
     let result = Client::connect(StreamTransport::tcp(&address).unwrap(), "test");
     let waited = started.elapsed();
     assert!(matches!(result.err(), Some(HostError::NoAnswer { .. })));
-    // How exactly it keeps to two seconds is tested in virtual time; the rest is for a computer that does something else as well.
+    // How exactly it keeps to two seconds is tested in virtual time; the rest is for a computer that does something
+    // else as well.
     assert!(waited > Duration::from_millis(1900) && waited < Duration::from_secs(10), "{waited:?}");
 }
 

@@ -1,4 +1,5 @@
-//! `--device board:` with a stand-in for the emulator: a script that speaks as much of the lock step as each test needs.
+//! `--device board:` with a stand-in for the emulator: a script that speaks as much of the lock step as each test
+//! needs.
 #![cfg(unix)]
 
 mod elf;

@@ -171,8 +171,8 @@ pub(super) fn simulation_failure(error: SimulationError, doing: &str) -> Failure
     Failure::new(code, doing, error)
 }
 
-/// Who this is, for people who find the device busy. Nobody else finds a simulated device of this process, and what is said to it
-/// must be the same in every run, or its virtual times would not be.
+/// Who this is, for people who find the device busy. Nobody else finds a simulated device of this process, and what
+/// is said to it must be the same in every run, or its virtual times would not be.
 fn owner(simulated: bool) -> String {
     if simulated {
         return "tactus".to_owned();

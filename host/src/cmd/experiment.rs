@@ -15,7 +15,8 @@ pub struct Cmd {
     /// Which experiment
     #[arg(value_enum)]
     pub scenario: Scenario,
-    /// Where the object stands: `paper` (8 x 6 cells, 4 cm apart), a part of it such as `4x3`, or cells ALONG:SIDEWAYS in cm such as `-24:8,0:0`
+    /// Where the object stands: `paper` (8 x 6 cells, 4 cm apart), a part of it such as `4x3`, or cells
+    /// ALONG:SIDEWAYS in cm such as `-24:8,0:0`
     #[arg(long, visible_alias = "cells", allow_hyphen_values = true)]
     pub grid: Option<Grid>,
     /// Turn the grid about its middle, degrees
@@ -24,8 +25,9 @@ pub struct Cmd {
     /// Shift the grid along the approach and sideways, cm
     #[arg(long, value_name = "ALONG,SIDEWAYS", value_parser = super::learn::numbers::<2>, default_value = "0,0", allow_hyphen_values = true)]
     pub shift: [f64; 2],
-    /// Modes: a open loop, b force control, c force control and adaptation, d as c but the fingers do not adapt [default: a,b,c; lift c; fingers c,d]
-    #[arg(long, value_delimiter = ',')]
+    /// Modes: a open loop, b force control, c force control and adaptation, d as c but the fingers do not adapt
+    /// [default: a,b,c; lift c; fingers c,d]
+    #[arg(long, value_delimiter = ',', value_parser = str::parse::<Mode>)]
     pub modes: Vec<Mode>,
     /// Try every cell with the seeds 1 to N; a seed is an arm
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000), conflicts_with = "seed")]
@@ -39,7 +41,8 @@ pub struct Cmd {
     /// How well the controller's model fits the simulated arm
     #[arg(long, value_enum, default_value = "honest")]
     pub plant: PlantKind,
-    /// What differs from that arm: mass, table-friction, finger-friction, joint-friction, link-mass, noise (factors), delay (cycles), bias (N, comes up after the run's tare)
+    /// What differs from that arm: mass, table-friction, finger-friction, joint-friction, link-mass, noise (factors),
+    /// delay (cycles), bias (N, comes up after the run's tare)
     #[arg(long, value_name = "NAME=VALUE,...", default_value = "")]
     pub vary: Variation,
     /// What stands on the table instead of the usual object

@@ -27,8 +27,8 @@ pub struct Cmd {
     pub dry_run: bool,
 }
 
-/// Checks the image, writes it, reads it back and starts it. Stored primitives stay. With `--device` the running device is then
-/// asked whether it is that image.
+/// Checks the image, writes it, reads it back and starts it. Stored primitives stay. With `--device` the running
+/// device is then asked whether it is that image.
 ///
 /// # Errors
 /// The image is not for a real board, probe-rs is missing or fails, or another image answers.

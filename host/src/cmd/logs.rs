@@ -26,7 +26,8 @@ pub struct Cmd {
     /// Show a log that was kept in a file, as the emulator writes it
     #[arg(long, value_name = "FILE")]
     pub file: Option<PathBuf>,
-    /// Attach to a running board: that halts it for a moment, and its watchdog may restart it, so the arm must have no torque
+    /// Attach to a running board: that halts it for a moment, and its watchdog may restart it, so the arm must have
+    /// no torque
     #[arg(long, conflicts_with = "file")]
     pub attach_may_reset: bool,
     /// Say what would be run

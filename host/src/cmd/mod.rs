@@ -171,12 +171,25 @@ fn seconds(text: &str) -> Result<Duration, String> {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
+    use clap::{CommandFactory, Parser};
+    use lab::procedure::Mode;
 
-    use super::Cli;
+    use super::{Cli, Command};
 
     #[test]
     fn command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn experiments_name_modes_by_letter_and_runs_by_word() {
+        let parse = |line: &str| Cli::try_parse_from(line.split(' ')).map(|cli| cli.command);
+        let Ok(Command::Experiment(experiment)) = parse("tactus experiment cup --modes a,d") else { panic!("letters") };
+        assert_eq!(experiment.modes, [Mode::OpenLoop, Mode::RigidFingers]);
+        let Ok(Command::Run(run)) = parse("tactus run reach.toml --mode adapt") else { panic!("a word") };
+        assert_eq!(run.mode, Mode::Adaptive);
+        assert!(
+            parse("tactus experiment cup --modes adapt").is_err() && parse("tactus run reach.toml --mode c").is_err()
+        );
     }
 }

@@ -46,7 +46,7 @@ enum Listener {
 const GUESTS: usize = 4;
 
 /// A message is shorter than this; what is longer without an end is none.
-const LONGEST: usize = 4096;
+const LONGEST_MESSAGE: usize = 4096;
 
 /// One connection. The others speak on the same line, so messages go on as wholes.
 struct Guest {
@@ -67,7 +67,7 @@ impl Guest {
         }
         let end = self.begun.iter().rposition(|byte| *byte == 0).map_or(0, |zero| zero + 1);
         let messages = self.begun.drain(..end).collect();
-        if self.begun.len() > LONGEST {
+        if self.begun.len() > LONGEST_MESSAGE {
             self.begun.clear();
         }
         Some(messages)
@@ -86,8 +86,8 @@ impl Party {
         said
     }
 
-    /// Hands over what the device says. One that does not read loses bytes, as on a serial line. Nobody leaves here: one that has
-    /// hung up may have said its last words before.
+    /// Hands over what the device says. One that does not read loses bytes, as on a serial line. Nobody leaves here:
+    /// one that has hung up may have said its last words before.
     fn tell(&mut self, bytes: &[u8]) {
         for guest in &mut self.0 {
             let _ = guest.peer.write_all(bytes);

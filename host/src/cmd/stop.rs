@@ -18,7 +18,8 @@ pub struct Cmd {
 
 const DOING: &str = "stop";
 
-/// Stops any motion softly (gravity compensation and damping), also that of another host, and says which fault is latched.
+/// Stops any motion softly (gravity compensation and damping), also that of another host, and says which fault is
+/// latched.
 ///
 /// # Errors
 /// The device cannot be reached, the arm still moves after 200 ms, or the cause of the fault is still there.

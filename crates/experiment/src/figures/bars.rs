@@ -128,11 +128,11 @@ fn draw_panel(drawing: &mut Drawing, frame: &Frame, panel: &Panel, members: &[(S
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::made_up;
+    use crate::fixtures;
 
     #[test]
     fn every_cell_has_a_bar_of_each_mode_and_the_limit_is_in_the_picture() {
-        let results = made_up::results(&[1, 2]);
+        let results = fixtures::results(&[1, 2]);
         let modes = [Mode::OpenLoop, Mode::Adaptive];
         let limit = Some((2.0, "tips over".to_owned()));
         let panel = by_cell(&results, &Grid::paper(), &modes, "force, N".to_owned(), |m| m.contact_peak_n, limit);

@@ -87,7 +87,7 @@ fn counts(values: &[f64], high: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::made_up;
+    use crate::fixtures;
 
     #[test]
     fn every_trial_is_in_one_bar() {
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn the_tipping_force_is_in_the_picture() {
-        let svg = draw(&made_up::results(&[1]), "Torch", Some(1.97)).to_svg();
+        let svg = draw(&fixtures::results(&[1]), "Torch", Some(1.97)).to_svg();
         assert!(svg.contains("tips over at 2.0 N") && svg.contains("trials stay below"));
     }
 }

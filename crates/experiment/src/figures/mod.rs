@@ -30,8 +30,8 @@ pub fn colour(mode: Mode) -> Colour {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures;
     use crate::grid::Grid;
-    use crate::made_up;
     use lab::procedure::Mode;
 
     /// Set this to a folder to look at the figures with made-up data.
@@ -41,14 +41,14 @@ mod tests {
     fn figures_are_written_as_svg_and_png() {
         let temporary = tempfile::tempdir().unwrap();
         let folder = std::env::var_os(LOOK).map_or(temporary.path().to_owned(), Into::into);
-        let results = made_up::results(&[1, 2, 3, 4, 5]);
+        let results = fixtures::results(&[1, 2, 3, 4, 5]);
         success_map::draw(&results, &Grid::paper(), "Torch: where it is grasped", 0.028).write(&folder, "map").unwrap();
         forces::draw(&results, "Torch: contact forces", Some(1.97)).write(&folder, "forces").unwrap();
         let taught = results.reports[0].path.planned.clone();
-        paths::draw(&results, &Grid::paper(), &made_up::frame(), &taught, "Torch: ways of the hand", 0.028)
+        paths::draw(&results, &Grid::paper(), &fixtures::frame(), &taught, "Torch: ways of the hand", 0.028)
             .write(&folder, "paths")
             .unwrap();
-        let (open, closed, expected) = series::tests::made_up();
+        let (open, closed, expected) = series::tests::fixtures();
         let runs = [(Mode::OpenLoop, &open), (Mode::Adaptive, &closed)];
         series::draw(&runs, Some(&expected), &[(12.0, "lift")], "Torch: forces and movement")
             .write(&folder, "series")

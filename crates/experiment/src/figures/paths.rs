@@ -14,8 +14,8 @@ const PANEL_GAP: f64 = 70.0;
 /// Ways whose object was not held.
 const FAINT: &str = "#bbbbbb";
 
-/// One panel for each mode, in the frame of the approach; the first seed of the experiment. `radius` is the object's, m; `taught` the way of
-/// the primitive without feedback, world x and y, m.
+/// One panel for each mode, in the frame of the approach; the first seed of the experiment. `radius` is the object's,
+/// m; `taught` the way of the primitive without feedback, world x and y, m.
 pub fn draw(
     results: &Results,
     grid: &Grid,
@@ -83,13 +83,13 @@ pub fn draw(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::made_up;
+    use crate::fixtures;
 
     #[test]
     fn every_mode_has_its_panel() {
-        let results = made_up::results(&[1, 2]);
+        let results = fixtures::results(&[1, 2]);
         let taught = results.reports[0].path.planned.clone();
-        let svg = draw(&results, &Grid::paper(), &made_up::frame(), &taught, "Torch", 0.028).to_svg();
+        let svg = draw(&results, &Grid::paper(), &fixtures::frame(), &taught, "Torch", 0.028).to_svg();
         for words in
             ["(a) open loop: 8 of 48", "(b) force control: 18 of 48", "(c) force control and adaptation: 47 of 48"]
         {

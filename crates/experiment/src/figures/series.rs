@@ -1,4 +1,5 @@
-//! One trial in closed loop against the same in open loop: forces with their expected band, pose, fingers. The paper's figure 4.
+//! One trial in closed loop against the same in open loop: forces with their expected band, pose, fingers. The
+//! paper's figure 4.
 
 use lab::plot::drawing::{Anchor, BAND, Drawing, Frame, GREY, INK};
 
@@ -212,7 +213,7 @@ pub(crate) mod tests {
     use crate::trace::tests::cycle;
 
     /// A made-up approach: the force rises at contact at 5 s, by much in open loop and little in closed loop.
-    pub(crate) fn made_up() -> (Trace, Trace, Expected) {
+    pub(crate) fn fixtures() -> (Trace, Trace, Expected) {
         let run = |force: f64| Trace {
             cycles: (0..4200)
                 .map(|k| {
@@ -244,7 +245,7 @@ pub(crate) mod tests {
 
     #[test]
     fn all_fifteen_diagrams_are_there() {
-        let (open, closed, expected) = made_up();
+        let (open, closed, expected) = fixtures();
         let runs = [(Mode::OpenLoop, &open), (Mode::Adaptive, &closed)];
         let svg = draw(&runs, Some(&expected), &[(12.0, "lift")], "Torch").to_svg();
         for title in PANELS.iter().flatten() {
@@ -254,7 +255,7 @@ pub(crate) mod tests {
 
     #[test]
     fn one_spike_does_not_flatten_a_diagram() {
-        let (mut open, closed, _) = made_up();
+        let (mut open, closed, _) = fixtures();
         open.cycles[2000].felt[0] = 500.0;
         let runs = [(Mode::OpenLoop, &open), (Mode::Adaptive, &closed)];
         let [low, high] = range(&PANELS[0][0], &runs, None);

@@ -18,7 +18,8 @@ const LEGEND: f64 = 470.0;
 
 /// The map of an experiment; `title` says what was grasped, `radius` is the object's, m.
 ///
-/// A cell is filled by the simplest mode that held the object there; where the seeds differ it is divided in their proportion.
+/// A cell is filled by the simplest mode that held the object there; where the seeds differ it is divided in their
+/// proportion.
 pub fn draw(results: &Results, grid: &Grid, title: &str, radius: f64) -> Drawing {
     let (columns, rows) = (grid.columns(), grid.rows());
     let pitch = [pitch(&columns), pitch(&rows)];
@@ -141,12 +142,12 @@ fn legend(drawing: &mut Drawing, results: &Results, grid: &Grid, [x, top]: [f64;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::made_up;
+    use crate::fixtures;
     use crate::outcome::Outcome;
 
     #[test]
     fn a_cell_goes_to_the_simplest_mode_and_is_divided_where_seeds_differ() {
-        let mut results = made_up::results(&[1, 2]);
+        let mut results = fixtures::results(&[1, 2]);
         for report in results.reports.iter_mut().filter(|report| report.key.index == 5) {
             let held = match report.key.mode {
                 Mode::Track | Mode::OpenLoop => false,
@@ -161,7 +162,7 @@ mod tests {
 
     #[test]
     fn the_map_is_a_picture() {
-        let svg = draw(&made_up::results(&[1, 2]), &Grid::paper(), "Torch", 0.028).to_svg();
+        let svg = draw(&fixtures::results(&[1, 2]), &Grid::paper(), "Torch", 0.028).to_svg();
         assert!(svg.contains("object along the approach, cm") && svg.contains("of 48"));
     }
 }

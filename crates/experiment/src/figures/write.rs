@@ -6,7 +6,7 @@ use super::series::Expected;
 use super::{bars, forces, paths, series, strip, success_map};
 use crate::lift::{Carried, Case};
 use crate::outcome::Measures;
-use crate::runner::{Experiment, telling};
+use crate::runner::{Experiment, representative};
 use crate::trace::CHANNELS;
 use crate::trial::Trial;
 use crate::{Config, Scenario, comparison};
@@ -90,7 +90,7 @@ pub fn write(
         let below = "cell: object along the approach and sideways, cm";
         put(bars::draw(&panels, &bars::members(&modes), &format!("{title}: mode against mode"), below), "bars")?;
     }
-    let keys = telling(results);
+    let keys = representative(results);
     let shown: Vec<&Trial> =
         keys.iter().filter_map(|key| experiment.trials.iter().find(|trial| trial.report.key == *key)).collect();
     if !shown.is_empty() {

@@ -21,7 +21,8 @@ impl<T: Transport> Client<T> {
     /// Has the device keep this home (rad) for every zeroing from now on. Returns when it is durable.
     ///
     /// # Errors
-    /// As [`Client::request`]; the device refuses what cannot be the home of its arm, and everything while the arm has torque.
+    /// As [`Client::request`]; the device refuses what cannot be the home of its arm, and everything while the arm
+    /// has torque.
     pub fn calibrate(&mut self, home: [f32; 7]) -> Result<(), HostError> {
         self.order(&Request::Calibrate { home })
     }

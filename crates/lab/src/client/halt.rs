@@ -17,7 +17,8 @@ pub enum Halted<T: Transport> {
 }
 
 impl<T: Transport> Client<T> {
-    /// Stops the arm first and opens a conversation then: a stop needs none, so it works while another host has the device.
+    /// Stops the arm first and opens a conversation then: a stop needs none, so it works while another host has the
+    /// device.
     ///
     /// # Errors
     /// As [`Client::connect`], except that a busy device is none; [`HostError::Refused`] if the stop was not taken.

@@ -35,12 +35,12 @@ pub use upload::{UploadOutcome, UploadPhase};
 /// How long an answer may take, the repetitions of its request included.
 pub const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// How long the answer to a change of the store may take: it comes when the change is durable, and the flash may have to
-/// erase two sectors first, each of which takes up to 4 s.
+/// How long the answer to a change of the store may take: it comes when the change is durable, and the flash may have
+/// to erase two sectors first, each of which takes up to 4 s.
 pub const STORE_TIMEOUT: Duration = Duration::from_secs(15);
 
-/// A request without an answer is repeated after this time. Longer than most answers take on a good line; a change of the store
-/// takes longer, and then the repetitions tell the device that this host is still there.
+/// A request without an answer is repeated after this time. Longer than most answers take on a good line; a change of
+/// the store takes longer, and then the repetitions tell the device that this host is still there.
 const REPEAT_AFTER: Duration = Duration::from_millis(250);
 
 /// The device hears from this host at least so often while it waits for telemetry; it stops the arm after 500 ms.
@@ -51,7 +51,7 @@ const KEEP_ALIVE: Duration = Duration::from_millis(100);
 const FRESH: Duration = Duration::from_millis(200);
 
 /// How long to wait for another host to be gone. A killed one keeps its session for half a second.
-const BUSY_PATIENCE: Duration = Duration::from_millis(1500);
+const BUSY_TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// Something the device sent unasked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,7 +113,7 @@ impl<T: Transport> Client<T> {
     /// As [`Client::connect`].
     pub fn connect_as(transport: T, owner: &str, link_version: u16, schema_hash: u32) -> Result<Self, HostError> {
         let mut client = Self::begin(transport)?;
-        client.open(owner, link_version, schema_hash, BUSY_PATIENCE)?;
+        client.open(owner, link_version, schema_hash, BUSY_TIMEOUT)?;
         Ok(client)
     }
 
@@ -216,8 +216,8 @@ impl<T: Transport> Client<T> {
         self.transport.is_virtual()
     }
 
-    /// Whether the arm is a simulated one, as far as can be known here: the device says so, or its time is virtual. The image on an
-    /// emulated board does not know it, and behind a socket nobody does.
+    /// Whether the arm is a simulated one, as far as can be known here: the device says so, or its time is virtual.
+    /// The image on an emulated board does not know it, and behind a socket nobody does.
     pub fn is_simulated(&self) -> bool {
         self.hello.simulated || self.transport.is_virtual()
     }
@@ -331,8 +331,8 @@ impl<T: Transport> Client<T> {
         Ok(self.transport.send(&[head, &buffer[..length]].concat())?)
     }
 
-    /// As [`Client::send`], after a zero byte: on a bus where another host speaks to the same device, a message is lost where the two
-    /// alternate, unless such a byte ends what came before.
+    /// As [`Client::send`], after a zero byte: on a bus where another host speaks to the same device, a message is
+    /// lost where the two alternate, unless such a byte ends what came before.
     fn send_again(&mut self, envelope: Envelope, request: &Request) -> Result<(), HostError> {
         self.send_behind(&[0], envelope, request)
     }

@@ -46,8 +46,8 @@ impl<T: Transport> Client<T> {
         self.order(&Request::Approach { q, duration })
     }
 
-    /// Initialises the hand: the fingers drive to their stops, for about five seconds. Accepted before that time is over;
-    /// the status tells the rest.
+    /// Initialises the hand: the fingers drive to their stops, for about five seconds. Accepted before that time is
+    /// over; the status tells the rest.
     ///
     /// # Errors
     /// As [`Client::request`].

@@ -1,7 +1,8 @@
 //! Images in parts, several of them on the way at a time, so that the line never waits for an answer.
 //!
-//! The device takes parts in order and says which one it expects. So a part or an answer that got lost needs no bookkeeping:
-//! what the device expects is where sending goes on, under new numbers. Reading is the same the other way round.
+//! The device takes parts in order and says which one it expects. So a part or an answer that got lost needs no
+//! bookkeeping: what the device expects is where sending goes on, under new numbers. Reading is the same the other
+//! way round.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -14,8 +15,8 @@ use super::{Client, REPEAT_AFTER};
 use crate::error::HostError;
 use crate::transport::Transport;
 
-/// Parts on their way. Two keep a line busy whose answers come within the time of one part, which is so from 9 600 baud to
-/// 1 Mbit/s; the third covers a device that looks at its line once a slot. The device keeps four requests.
+/// Parts on their way. Two keep a line busy whose answers come within the time of one part, which is so from 9 600
+/// baud to 1 Mbit/s; the third covers a device that looks at its line once a slot. The device keeps four requests.
 const WINDOW: usize = 3;
 
 /// How quickly an image went over the line.
@@ -144,8 +145,8 @@ impl<T: Transport> Client<T> {
         Ok(self.sequence)
     }
 
-    /// The next answer to one of the requests of the window, and where that ended. `None`: none came for a while, and the window
-    /// has gone back to what is sure.
+    /// The next answer to one of the requests of the window, and where that ended. `None`: none came for a while, and
+    /// the window has gone back to what is sure.
     fn answer_within(&mut self, window: &mut Window, word: &'static str) -> Result<Option<(usize, Reply)>, HostError> {
         let quiet_from = self.now();
         loop {

@@ -56,8 +56,8 @@ impl<T: Transport> Client<T> {
                 let same = stored.iter().zip(image).take_while(|(there, here)| there == here).count();
                 return Err(HostError::ReadBack { offset: same });
             }
-            // The device of a hand alone converts an image while it arrives and keeps none: its check sum over every byte,
-            // compared below, has to do.
+            // The device of a hand alone converts an image while it arrives and keeps none: its check sum over every
+            // byte, compared below, has to do.
             Err(HostError::Refused { reason: Refusal::NoArm, .. }) => {}
             Err(error) => return Err(error),
         }

@@ -1,5 +1,5 @@
-//! Draws panels on a page and writes it as SVG or PNG. This file and `drawing.rs` are the only ones that know the plotting
-//! crate.
+//! Draws panels on a page and writes it as SVG or PNG. This file and `drawing.rs` are the only ones that know the
+//! plotting crate.
 //!
 //! The look is decided here once: white page, thin open axes, grey grid, one font (shipped inside the plotting
 //! crate), the Okabe-Ito colours that people with any kind of colour blindness tell apart, and line styles that

@@ -88,7 +88,8 @@ impl Drawing {
         });
     }
 
-    /// A dashed line through points, cut into dashes here: the plotting crate would begin the pattern anew at every point.
+    /// A dashed line through points, cut into dashes here: the plotting crate would begin the pattern anew at every
+    /// point.
     pub fn dashed(&mut self, points: &[[f64; 2]], colour: Colour, width: f64, pattern: [f64; 2]) {
         let points: Vec<(f64, f64)> = points.iter().map(|[x, y]| (*x, *y)).collect();
         for dash in dashes(&points, pattern.into(), (1.0, 1.0)) {

@@ -3,9 +3,9 @@
 //! ```text
 //! home' = z + (q_true - q_read)
 //! ```
-//! `z`: the posture at which the last zeroing took the arm to stand. An encoder that counts from a wrong zero is wrong by the same
-//! angle everywhere, so the difference at any posture is that at home. With `z` in place of the stored home the same measurement
-//! made twice gives the same home, also after the first was stored.
+//! `z`: the posture at which the last zeroing took the arm to stand. An encoder that counts from a wrong zero is
+//! wrong by the same angle everywhere, so the difference at any posture is that at home. With `z` in place of the
+//! stored home the same measurement made twice gives the same home, also after the first was stored.
 
 use std::time::Duration;
 
@@ -22,7 +22,7 @@ const CYCLES: usize = 60;
 const STILL: f64 = 2e-3;
 
 /// How long these cycles may take to arrive.
-const PATIENCE: Duration = Duration::from_secs(5);
+const TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A home corrected by a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,10 +37,12 @@ pub struct HomeCorrection {
     pub home: [f32; 7],
 }
 
-/// Measures where the arm says it stands, and corrects its home by what is known better. Nothing moves and nothing is stored.
+/// Measures where the arm says it stands, and corrects its home by what is known better. Nothing moves and nothing is
+/// stored.
 ///
 /// # Errors
-/// [`ProcedureError::NotZeroed`], [`ProcedureError::ZeroOfOthers`], [`ProcedureError::Moves`], and as [`Client::request`].
+/// [`ProcedureError::NotZeroed`], [`ProcedureError::ZeroOfOthers`], [`ProcedureError::Moves`], and as
+/// [`Client::request`].
 pub fn correct_home(client: &mut Client<Device>, truth: [f64; 7]) -> Result<HomeCorrection, ProcedureError> {
     if !client.status()?.zeroed {
         return Err(ProcedureError::NotZeroed);
@@ -60,7 +62,7 @@ fn resting_posture(client: &mut Client<Device>) -> Result<[f64; 7], ProcedureErr
 }
 
 fn watch(client: &mut Client<Device>) -> Result<[f64; 7], ProcedureError> {
-    let deadline = client.now() + PATIENCE;
+    let deadline = client.now() + TIMEOUT;
     let (mut sum, mut least, mut most) = ([0.0; 7], [f64::INFINITY; 7], [f64::NEG_INFINITY; 7]);
     let mut seen = 0;
     while seen < CYCLES {

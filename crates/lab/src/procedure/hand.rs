@@ -19,7 +19,8 @@ const LONGEST_MOVE: u64 = 15;
 /// How often the hand is looked at.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// A digit nearer to its target than this has arrived, rad: friction in the drive was seen to leave 0.04 rad at the spread.
+/// A digit nearer to its target than this has arrived, rad: friction in the drive was seen to leave 0.04 rad at the
+/// spread.
 const NEAR: f32 = 0.06;
 
 /// A digit that moves less than this between two looks stands, rad.
@@ -39,8 +40,8 @@ pub enum HandReach {
 
 /// Initialises the hand if there is one that needs it; gives its stage: ready, or absent.
 ///
-/// The fingers move to their stops. Ask a person first. An arm without torque holds its pose before: it would sink in the
-/// seconds this takes.
+/// The fingers move to their stops. Ask a person first. An arm without torque holds its pose before: it would sink in
+/// the seconds this takes.
 ///
 /// # Errors
 /// [`ProcedureError::Hand`] if it fails, and as [`Client::request`].

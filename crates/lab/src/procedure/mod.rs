@@ -1,4 +1,5 @@
-//! What an operator does step by step, done by the host: make the arm ready, bring it to a posture, record what it does.
+//! What an operator does step by step, done by the host: make the arm ready, bring it to a posture, record what it
+//! does.
 
 mod calibrate;
 mod hand;

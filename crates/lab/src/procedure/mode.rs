@@ -1,4 +1,5 @@
-//! The ways in which a primitive is played: stiff, the three that the paper compares, and one without the fingers' own adaptation.
+//! The ways in which a primitive is played: stiff, the three that the paper compares, and one without the fingers'
+//! own adaptation.
 
 use std::fmt;
 use std::str::FromStr;
@@ -41,8 +42,8 @@ impl Mode {
     /// Those of the paper.
     pub const PAPER: [Mode; 3] = [Mode::OpenLoop, Mode::ForceControl, Mode::Adaptive];
 
-    /// The switches of a run in this mode, at the taught speed and goal. All modes but `track` have the same gains and close
-    /// the position loop over the planned pose, so that only the use of force differs between them.
+    /// The switches of a run in this mode, at the taught speed and goal. All modes but `track` have the same gains
+    /// and close the position loop over the planned pose, so that only the use of force differs between them.
     pub fn options(self) -> RunOptions {
         let compliant = self != Mode::Track;
         RunOptions {

@@ -12,16 +12,17 @@ use crate::device::Device;
 use crate::error::{HostError, explain_blocked};
 
 /// How long a simulated start-up may take, s of virtual time; it takes about four.
-const SIMULATED_PATIENCE: u64 = 30;
+const SIMULATED_TIMEOUT: u64 = 30;
 
 /// How long people get to reach the pendant, s.
-const PATIENCE: u64 = 600;
+const TIMEOUT: u64 = 600;
 
 /// How often the stage is looked at.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// For how many control cycles an arm that is ready is left alone until its wrench has a zero: 5 s of the device's time. The device
-/// takes its first rest, 0.3 s, for it, and only while nothing has been commanded; mostly it has rested before it was activated.
+/// For how many control cycles an arm that is ready is left alone until its wrench has a zero: 5 s of the device's
+/// time. The device takes its first rest, 0.3 s, for it, and only while nothing has been commanded; mostly it has
+/// rested before it was activated.
 const FIRST_REST: u32 = 1500;
 
 /// What a start-up led to.
@@ -35,12 +36,12 @@ pub struct Readiness {
 
 /// Waits until the arm can be commanded, tells every stage, and initialises the hand where there is one.
 ///
-/// A simulated arm stands at home, so it is zeroed there; which home that is the device knows. For a real one `at_home` must be the
-/// word of a person.
+/// A simulated arm stands at home, so it is zeroed there; which home that is the device knows. For a real one
+/// `at_home` must be the word of a person.
 ///
 /// # Errors
-/// [`ProcedureError::NotZeroed`] if nobody vouches for the pose; [`ProcedureError::NotReady`] when the start-up is blocked for
-/// longer than people need.
+/// [`ProcedureError::NotZeroed`] if nobody vouches for the pose; [`ProcedureError::NotReady`] when the start-up is
+/// blocked for longer than people need.
 pub fn make_ready(
     client: &mut Client<Device>,
     at_home: bool,
@@ -51,8 +52,8 @@ pub fn make_ready(
     Ok(readiness)
 }
 
-/// Waits until the start-up has come as far as `goal`, and zeroes the arm on the way; nothing is commanded. An arm that gets
-/// ready is left alone until its wrench has a zero, as far as one comes.
+/// Waits until the start-up has come as far as `goal`, and zeroes the arm on the way; nothing is commanded. An arm
+/// that gets ready is left alone until its wrench has a zero, as far as one comes.
 ///
 /// # Errors
 /// As [`make_ready`].
@@ -63,7 +64,7 @@ pub fn start_up(
     mut tell: impl FnMut(Stage),
 ) -> Result<Readiness, ProcedureError> {
     let simulated = client.is_simulated();
-    let seconds = if simulated { SIMULATED_PATIENCE } else { PATIENCE };
+    let seconds = if simulated { SIMULATED_TIMEOUT } else { TIMEOUT };
     let deadline = client.now() + Duration::from_secs(seconds);
     let mut readiness = Readiness::default();
     let mut told = None;
@@ -107,7 +108,8 @@ pub fn start_up(
     }
 }
 
-/// Zeroes the arm at the home that the device knows, and tells whose that is; `None`: the device is still reading its storage.
+/// Zeroes the arm at the home that the device knows, and tells whose that is; `None`: the device is still reading its
+/// storage.
 fn zero(client: &mut Client<Device>) -> Result<Option<HomeSource>, ProcedureError> {
     let busy = StoreError::Busy.code();
     match client.calibration() {

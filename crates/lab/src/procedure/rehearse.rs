@@ -10,8 +10,8 @@ use crate::device::Device;
 use crate::primitive_file::PrimitiveFile;
 use crate::transport::TransportError;
 
-/// Goes to the start of a primitive that the device holds and plays it; returns the recording as text with `notes` above it.
-/// `progress` hears the number of samples.
+/// Goes to the start of a primitive that the device holds and plays it; returns the recording as text with `notes`
+/// above it. `progress` hears the number of samples.
 ///
 /// # Errors
 /// As [`go_to_start`] and [`play`]; the primitive's name is none that a device takes.

@@ -1,7 +1,8 @@
 //! Playing a stored primitive from its first cycle to its end: what `tactus run`, rehearsals and experiments share.
 //!
-//! The arm must stand at the start of the primitive and hold. Telemetry comes at 300 Hz; changes of goal and speed are sent
-//! when their time has come in the device's cycles, so that a simulated run is the same whatever the machine does beside it.
+//! The arm must stand at the start of the primitive and hold. Telemetry comes at 300 Hz; changes of goal and speed
+//! are sent when their time has come in the device's cycles, so that a simulated run is the same whatever the machine
+//! does beside it.
 
 use std::time::Duration;
 
@@ -18,8 +19,9 @@ use crate::error::HostError;
 /// Silence on the stream after which the device counts as lost.
 const SILENCE: Duration = Duration::from_secs(1);
 
-/// Longest time a run may take beyond its planned duration, s: what settling against friction and contact takes, and more.
-const PATIENCE: f64 = 5.0;
+/// Longest time a run may take beyond its planned duration, s: what settling against friction and contact takes, and
+/// more.
+const SETTLING_ALLOWANCE: f64 = 5.0;
 
 /// Something that changes while a primitive runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +69,7 @@ impl RunRequest {
             ChangeKind::Goal(_) => None,
         });
         let slowest = speeds.fold(f64::from(self.options.speed), f64::min);
-        self.duration / slowest.max(0.05) + PATIENCE
+        self.duration / slowest.max(0.05) + SETTLING_ALLOWANCE
     }
 }
 
@@ -237,7 +239,8 @@ fn surprise(event: &Event, first: Option<u32>) -> Surprise {
     }
 }
 
-/// Time from one cycle to a later one, s; 0 for an earlier one, which a counter that wraps cannot tell from one far ahead.
+/// Time from one cycle to a later one, s; 0 for an earlier one, which a counter that wraps cannot tell from one far
+/// ahead.
 fn since(first: u32, cycle: u32) -> f64 {
     let cycles = cycle.wrapping_sub(first);
     if cycles > u32::MAX / 2 { 0.0 } else { f64::from(cycles) / RATE }

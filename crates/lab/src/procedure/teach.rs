@@ -21,8 +21,8 @@ pub struct Demonstrated<W> {
     pub is_complete: bool,
 }
 
-/// Records until the movement is shown, and `post_roll` s of rest after it; at most `limit` s. `is_shown` is asked after
-/// every sample and hears how long the recording is, s.
+/// Records until the movement is shown, and `post_roll` s of rest after it; at most `limit` s. `is_shown` is asked
+/// after every sample and hears how long the recording is, s.
 ///
 /// # Errors
 /// [`ProcedureError::Stopped`] when the arm leaves gravity compensation, and as [`Recorder::take`].

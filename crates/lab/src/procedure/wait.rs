@@ -21,7 +21,8 @@ pub enum Ends {
 /// Lets `time` pass. Telemetry of that time is dropped.
 ///
 /// # Errors
-/// [`ProcedureError::Stopped`] or [`ProcedureError::Diverted`] when the arm leaves its state in a way that `ends` the wait.
+/// [`ProcedureError::Stopped`] or [`ProcedureError::Diverted`] when the arm leaves its state in a way that `ends` the
+/// wait.
 pub fn pass(client: &mut Client<Device>, time: Duration, ends: Ends) -> Result<(), ProcedureError> {
     let end = client.now() + time;
     while client.now() < end {

@@ -1,7 +1,8 @@
 //! The logging computer's time in the device's time.
 //!
-//! A log says when frames were on the bus, not when the device's slots began. But the device's first frame leaves a little after its
-//! first slot, and the position request of every cycle a little after another. In the log of a simulation both times are the same.
+//! A log says when frames were on the bus, not when the device's slots began. But the device's first frame leaves a
+//! little after its first slot, and the position request of every cycle a little after another. In the log of a
+//! simulation both times are the same.
 
 use puck::CanFrame;
 use sim::wire::frame_bits;

@@ -63,7 +63,8 @@ impl Engine {
         self.core.health().cycle
     }
 
-    /// The next slot. Returns the frames and the bytes that the device sends; `backlog`: bytes of its own that are still waiting.
+    /// The next slot. Returns the frames and the bytes that the device sends; `backlog`: bytes of its own that are
+    /// still waiting.
     pub(super) fn run_slot(&mut self, backlog: usize) -> (Vec<CanFrame>, Vec<u8>) {
         let now_us = self.next / TICKS_PER_MICROSECOND;
         self.core.slot(self.slot, now_us, &mut self.queues);

@@ -1,8 +1,9 @@
-//! A log played to the device's application: what the pucks and the host said is said again, and what the device then says is
-//! compared with what it said in the log.
+//! A log played to the device's application: what the pucks and the host said is said again, and what the device then
+//! says is compared with what it said in the log.
 //!
-//! The application is the real one, `device::DeviceController` and `device::Session`. It begins at power-up, so the log must too. Orders of a
-//! person come from the host; a log that holds the host's bus as well as the arm's holds them all.
+//! The application is the real one, `device::DeviceController` and `device::Session`. It begins at power-up, so the
+//! log must too. Orders of a person come from the host; a log that holds the host's bus as well as the arm's holds
+//! them all.
 
 mod clock;
 mod engine;
@@ -25,7 +26,7 @@ use clock::LogClock;
 use engine::Engine;
 
 /// A frame of the log for which the device has nothing to show after so many slots was not sent by it.
-const PATIENCE_SLOTS: Ticks = 6;
+const SEND_TIMEOUT_SLOTS: Ticks = 6;
 
 /// Frames that are looked through for the one in the log before the rest counts as different.
 const LOOK_AHEAD: usize = 16;
@@ -182,7 +183,8 @@ impl Replay {
         Ok(())
     }
 
-    /// Waits for the frames with which a device begins. All of them: a log may also begin at a zero torque of an idle arm.
+    /// Waits for the frames with which a device begins. All of them: a log may also begin at a zero torque of an idle
+    /// arm.
     fn begin(&mut self, line: LogLine) -> Result<(), ReplayError> {
         let AnyFrame::Data(frame) = line.frame else {
             return Ok(());
@@ -276,7 +278,7 @@ impl Replay {
         }
         self.compare();
         // What the log says and the device does not.
-        while let Some(logged) = self.logged.pop_front_if(|logged| logged.at + PATIENCE_SLOTS * SLOT_TICKS < at) {
+        while let Some(logged) = self.logged.pop_front_if(|logged| logged.at + SEND_TIMEOUT_SLOTS * SLOT_TICKS < at) {
             self.differ(DifferenceKind::NotSent, Some(&logged), None);
         }
         // Without a host's bus nobody takes the bytes away.

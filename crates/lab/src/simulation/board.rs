@@ -1,7 +1,8 @@
 //! The engine of `board:`: the image for the real board on the emulated chip, in lock step with the plant.
 //!
-//! The emulator is a process of its own (`emulated-board serve`). It keeps the time of the chip, its flash and its host line; bus, world and
-//! people stay on this side, as with QEMU. The end of its input is the power switch: it then writes bank 2 and its report.
+//! The emulator is a process of its own (`emulated-board serve`). It keeps the time of the chip, its flash and its
+//! host line; bus, world and people stay on this side, as with QEMU. The end of its input is the power switch: it
+//! then writes bank 2 and its report.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -22,7 +23,7 @@ use crate::transport::LineKind;
 const BOARD: &str = "nucleo-h743zi2";
 
 /// How long the emulator may take to write bank 2 and its report when the power is switched off.
-const END_PATIENCE: Duration = Duration::from_secs(10);
+const END_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Exit status of an emulator that cannot begin: its options or the image are not to its liking.
 const REFUSED: i32 = 2;
@@ -120,7 +121,7 @@ impl EmulatedBoard {
 
     /// Waits for it to end by itself; `None`: it did not and was killed.
     fn wait(&mut self) -> Option<ExitStatus> {
-        let deadline = Instant::now() + END_PATIENCE;
+        let deadline = Instant::now() + END_TIMEOUT;
         loop {
             match self.child.try_wait() {
                 Ok(Some(status)) => return Some(status),

@@ -1,7 +1,7 @@
 //! The host's end of the emulated board's second CAN: the bus itself is inside the emulator.
 //!
-//! Frames pass the lock step as records of 11 bytes: identifier u16 little-endian, length u8, 8 data bytes of which the unused
-//! ones are 0. When they travel on the wire the emulator decides.
+//! Frames pass the lock step as records of 11 bytes: identifier u16 little-endian, length u8, 8 data bytes of which
+//! the unused ones are 0. When they travel on the wire the emulator decides.
 
 use std::collections::VecDeque;
 use std::time::Duration;

@@ -1,7 +1,7 @@
 //! A log of the simulated buses as `candump -L` writes it: `can0` is the arm's bus, `can1` the host's.
 //!
-//! A line's time is the moment at which the receivers have the frame, virtual seconds since power-up. Six decimals, as every tool
-//! that reads such files expects.
+//! A line's time is the moment at which the receivers have the frame, virtual seconds since power-up. Six decimals,
+//! as every tool that reads such files expects.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};

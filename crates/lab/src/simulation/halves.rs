@@ -1,4 +1,5 @@
-//! The two halves of the device's application in one thread: the queues between them, and what the session sees of the rest.
+//! The two halves of the device's application in one thread: the queues between them, and what the session sees of
+//! the rest.
 
 use std::collections::VecDeque;
 

@@ -1,8 +1,8 @@
 //! The engine of `sil:`: core and session called directly, at the same slot times as on a board.
 //!
-//! Two things differ from a board. Computing takes the same virtual time in every cycle, where the board's differs by some
-//! microseconds from cycle to cycle. And the session, whose computing takes none, is polled once a slot instead of whenever the
-//! processor is free.
+//! Two things differ from a board. Computing takes the same virtual time in every cycle, where the board's differs by
+//! some microseconds from cycle to cycle. And the session, whose computing takes none, is polled once a slot instead
+//! of whenever the processor is free.
 
 use std::collections::VecDeque;
 use std::convert::Infallible;
@@ -24,7 +24,8 @@ use crate::boxed::boxed;
 /// Primitives the store holds, twice as many as in the firmware.
 const STORE_SLOTS: usize = 8;
 
-/// From the beginning of a slot to its frames in the bus controller: what the image takes under QEMU, in the middle of its range.
+/// From the beginning of a slot to its frames in the bus controller: what the image takes under QEMU, in the middle
+/// of its range.
 const fn computing(slot: Slot) -> Ticks {
     match slot {
         Slot::Control => 200 * TICKS_PER_MICROSECOND,

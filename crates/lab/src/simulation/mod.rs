@@ -1,9 +1,10 @@
 //! Simulated devices: the co-controller's real application against the simulated bus and world, in virtual time.
 //!
-//! Three engines run the application. `InProcess` calls `device::DeviceController` and `device::Session` directly (`sil:`); `Qemu` runs the
-//! firmware image under QEMU and exchanges frames with it in lock step (`sim:`); `EmulatedBoard` does so with the image for the real board
-//! on an emulated STM32H743 (`board:`). Either way nothing moves unless the host waits: virtual time advances only inside [`Transport::receive`], so a whole session is one deterministic sequence of events, whatever
-//! the load of the machine.
+//! Three engines run the application. `InProcess` calls `device::DeviceController` and `device::Session` directly
+//! (`sil:`); `Qemu` runs the firmware image under QEMU and exchanges frames with it in lock step (`sim:`);
+//! `EmulatedBoard` does so with the image for the real board on an emulated STM32H743 (`board:`). Either way nothing
+//! moves unless the host waits: virtual time advances only inside [`Transport::receive`], so a whole session is one
+//! deterministic sequence of events, whatever the load of the machine.
 
 mod board;
 mod board_can;
@@ -55,7 +56,8 @@ impl Simulation {
     /// Builds world and plant and boots the co-controller at virtual time 0.
     ///
     /// # Errors
-    /// The world or the engine named in `options` cannot be started here; the message names the command that sets it up.
+    /// The world or the engine named in `options` cannot be started here; the message names the command that sets it
+    /// up.
     pub fn start(options: &SimulationOptions) -> Result<Self, SimulationError> {
         let world = options.build_world()?;
         let mut plant = Plant::new(PlantConfig { seed: options.seed, ..options.plant.clone() }, world);

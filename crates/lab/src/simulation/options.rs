@@ -24,7 +24,8 @@ pub const BOARD_EMULATOR_VARIABLE: &str = "TACTUS_BOARD_EMULATOR";
 /// Environment variable that names the image for the emulated board.
 pub const BOARD_IMAGE_VARIABLE: &str = "TACTUS_BOARD_IMAGE";
 
-/// What a hand alone finds between its fingers: a spring that its outer links meet at 0.45 rad, with inner links at 1.35 rad.
+/// What a hand alone finds between its fingers: a spring that its outer links meet at 0.45 rad, with inner links at
+/// 1.35 rad.
 pub const GRIPPED: FingerObstacle = FingerObstacle { inner: f64::INFINITY, outer: 0.45, stiffness: 2.0 };
 
 /// Seed of a simulation that was given none.
@@ -75,8 +76,8 @@ pub enum FlashSource {
     /// A new one, gone when the simulation is.
     #[default]
     New,
-    /// This one: whoever else holds it can look at it, cut its power, and put it into the next device. Not for the emulated board, whose
-    /// flash is inside its chip.
+    /// This one: whoever else holds it can look at it, cut its power, and put it into the next device. Not for the
+    /// emulated board, whose flash is inside its chip.
     Chip(FlashChip),
     /// One that is kept in a file.
     File(PathBuf),
@@ -121,7 +122,7 @@ pub struct SimulationOptions {
     pub imperfections: Imperfections,
     /// Puts the MuJoCo world, where nobody stands beside the arm, into another one around it, such as one that watches.
     #[cfg(feature = "mujoco")]
-    pub dress: Option<fn(MujocoWorld) -> Box<dyn World>>,
+    pub wrap_world: Option<fn(MujocoWorld) -> Box<dyn World>>,
     /// Where the firmware's log goes, raw defmt frames; `None` drops it.
     pub firmware_log: Option<PathBuf>,
     /// What the host link travels on.
@@ -206,7 +207,7 @@ impl SimulationOptions {
             #[cfg(feature = "mujoco")]
             imperfections: Imperfections::NONE,
             #[cfg(feature = "mujoco")]
-            dress: None,
+            wrap_world: None,
             firmware_log: None,
             line: LineKind::Serial,
             bus_log: None,
@@ -237,13 +238,13 @@ impl SimulationOptions {
                     imperfections: self.imperfections,
                     ..MujocoOptions::default()
                 })?;
-                Ok(match (self.person, self.dress) {
+                Ok(match (self.person, self.wrap_world) {
                     (Some(seed), _) => {
                         let person =
                             Teacher::new(TeacherConfig { seed, ..TeacherConfig::default() }, self.lesson.path());
                         Box::new(GuidedWorld::new(world, person))
                     }
-                    (None, Some(dress)) => dress(world),
+                    (None, Some(wrap_world)) => wrap_world(world),
                     (None, None) => Box::new(world),
                 })
             }
@@ -255,8 +256,8 @@ impl SimulationOptions {
 
 /// An image or a program: named by the environment, or where `cargo xtask` leaves it; an error is where it should be.
 ///
-/// The build folder is found from the place of this program (`target/release/tactus`, `target/debug/deps/...`), so that it
-/// does not matter where it is called from.
+/// The build folder is found from the place of this program (`target/release/tactus`, `target/debug/deps/...`), so
+/// that it does not matter where it is called from.
 fn find(variable: &str, file: &str) -> Result<PathBuf, PathBuf> {
     if let Some(path) = std::env::var_os(variable) {
         let path = PathBuf::from(path);

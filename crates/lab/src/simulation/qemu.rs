@@ -20,8 +20,8 @@ pub(super) const HAND_MACHINE: &str = "mps2-an385";
 
 /// The machine, with everything QEMU would add by itself switched off.
 ///
-/// `shift=3`: one instruction takes 8 ns of virtual time (125 million a second). `sleep=off`: virtual time never waits for the wall
-/// clock. Together they make a run a function of the image and of what the simulator answers.
+/// `shift=3`: one instruction takes 8 ns of virtual time (125 million a second). `sleep=off`: virtual time never
+/// waits for the wall clock. Together they make a run a function of the image and of what the simulator answers.
 const OPTIONS: &[&str] = &[
     "-nodefaults",
     "-nic",

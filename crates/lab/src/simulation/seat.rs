@@ -1,15 +1,17 @@
 //! One processor for two processes that never run at the same time.
 //!
-//! In the lock step either QEMU or this thread works, and each exchange hands over. On one processor that is a plain switch; across two
-//! it wakes a sleeping one 20 000 times a second, which was measured to double the time of a run. Results do not depend on it.
+//! In the lock step either QEMU or this thread works, and each exchange hands over. On one processor that is a plain
+//! switch; across two it wakes a sleeping one 20 000 times a second, which was measured to double the time of a run.
+//! Results do not depend on it.
 
 use std::process::Child;
 
-/// While it lives, this thread and the child share the processor the thread was on. Does nothing where that is not possible.
+/// While it lives, this thread and the child share the processor the thread was on. Does nothing where that is not
+/// possible.
 pub(super) struct Seat(());
 
-/// Processors this program may use, as found before the first seat was taken. Every seat gives these back, so that seats may
-/// overlap and end in any order.
+/// Processors this program may use, as found before the first seat was taken. Every seat gives these back, so that
+/// seats may overlap and end in any order.
 #[cfg(target_os = "linux")]
 static ALL: std::sync::OnceLock<Option<rustix::thread::CpuSet>> = std::sync::OnceLock::new();
 

@@ -1,8 +1,8 @@
 //! A host's bus in virtual time with one simulated device on it: 1 Mbit/s, arbitration, exact frame times.
 //!
-//! Two ends share the bus. [`SimulatedCan`] is the host's: frames in, frames out, like an interface of the system. The device's
-//! end takes the place of the serial line in the plant and cuts and joins the bytes as a board with a second CAN controller does:
-//! one frame on the wire, one in the controller, the rest as bytes.
+//! Two ends share the bus. [`SimulatedCan`] is the host's: frames in, frames out, like an interface of the system.
+//! The device's end takes the place of the serial line in the plant and cuts and joins the bytes as a board with a
+//! second CAN controller does: one frame on the wire, one in the controller, the rest as bytes.
 //!
 //! Frames begin on whole microseconds, so that a log of this bus with its six decimals is exact.
 
@@ -23,8 +23,8 @@ use crate::transport::can::CanPort;
 const HOST: Node = Node::HOST;
 const DEVICE: Node = Node::ARM[0];
 
-/// Frames of the device that its controller holds, the one on the wire included. The rest waits as bytes, so that frames are full
-/// while the line is busy.
+/// Frames of the device that its controller holds, the one on the wire included. The rest waits as bytes, so that
+/// frames are full while the line is busy.
 const CONTROLLER: usize = 2;
 
 /// The bus and what its ends have not taken yet.

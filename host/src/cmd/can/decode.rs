@@ -14,8 +14,8 @@ use lab::table::Table;
 
 /// Options of `can decode`.
 ///
-/// Lines go to stdout, and behind them a summary. Lines of the log that cannot be read go to stderr with their numbers; the exit
-/// code is then 6.
+/// Lines go to stdout, and behind them a summary. Lines of the log that cannot be read go to stderr with their
+/// numbers; the exit code is then 6.
 #[derive(Debug, Clone, Args)]
 pub struct Cmd {
     /// A log as `candump -L` writes it; `-` is standard input

@@ -10,8 +10,8 @@ use lab::replay::{Difference, DifferenceKind, Outcome, Replay, ReplayError};
 
 /// Options of `can replay`.
 ///
-/// The log must begin before the co-controller gets power. It should hold the host's bus too (`candump -L can0 can1`): orders come
-/// from there.
+/// The log must begin before the co-controller gets power. It should hold the host's bus too (`candump -L can0
+/// can1`): orders come from there.
 #[derive(Debug, Clone, Args)]
 pub struct Cmd {
     /// A log as `candump -L` writes it; `-` is standard input

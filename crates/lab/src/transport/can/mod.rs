@@ -1,8 +1,8 @@
 //! `can:`: the link's bytes as frames on a CAN bus, real or simulated.
 //!
 //! [`CanTransport`] cuts and joins the stream as `link::can` says; a [`CanPort`] sends and receives frames. Three ports
-//! exist: [`SocketCan`], Linux' own CAN interfaces, and two of `simulation`: a bus in virtual time with a simulated device
-//! on it, and the bus inside the emulated board.
+//! exist: [`SocketCan`], Linux' own CAN interfaces, and two of `simulation`: a bus in virtual time with a simulated
+//! device on it, and the bus inside the emulated board.
 
 mod problem;
 mod socket;

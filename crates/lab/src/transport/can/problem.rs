@@ -50,8 +50,8 @@ fn found(known: &[String]) -> String {
     if known.is_empty() { "no CAN interface was found".to_owned() } else { format!("there is {}", known.join(", ")) }
 }
 
-/// The commands that switch an interface on as the link needs it: 1 Mbit/s, back from bus-off by itself, and a queue that holds a
-/// few messages.
+/// The commands that switch an interface on as the link needs it: 1 Mbit/s, back from bus-off by itself, and a queue
+/// that holds a few messages.
 fn switch_on(interface: &str) -> String {
     format!(
         "`sudo ip link set {interface} type can bitrate {} restart-ms 100 && sudo ip link set {interface} txqueuelen 256 up`",

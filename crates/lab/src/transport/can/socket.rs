@@ -13,7 +13,7 @@ use canlog::AnyFrame;
 const INTERFACES: &str = "/sys/class/net";
 
 /// How long a full queue may stay full before frames count as not leaving.
-const SEND_PATIENCE: Duration = Duration::from_secs(1);
+const SEND_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Pause before a full queue is tried again: about nine frames leave meanwhile.
 const FULL_QUEUE_PAUSE: Duration = Duration::from_millis(1);
@@ -126,7 +126,7 @@ mod linux {
                 None => socket.set_error_filter_accept_all().map_err(failed)?,
             }
             socket.set_recv_timestamp(true).map_err(failed)?;
-            socket.set_write_timeout(SEND_PATIENCE).map_err(failed)?;
+            socket.set_write_timeout(SEND_TIMEOUT).map_err(failed)?;
             Ok(Self { interface: interface.to_owned(), socket, opened: Instant::now() })
         }
 
@@ -181,9 +181,9 @@ mod linux {
                 if !full {
                     return Err(self.failure(cause));
                 }
-                if started.elapsed() >= SEND_PATIENCE {
+                if started.elapsed() >= SEND_TIMEOUT {
                     inspect(Path::new(INTERFACES), &self.interface)?;
-                    let seconds = SEND_PATIENCE.as_secs();
+                    let seconds = SEND_TIMEOUT.as_secs();
                     return Err(CanProblem::NotSent { interface: self.interface.clone(), seconds }.into());
                 }
                 std::thread::sleep(FULL_QUEUE_PAUSE);

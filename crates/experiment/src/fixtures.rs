@@ -2,7 +2,7 @@
 
 use super::grid::{ApproachFrame, Grid};
 use super::outcome::{Measures, Outcome};
-use super::results::{Key, Path2, Report, Results, Surprise};
+use super::results::{Key, PlanarPath, Report, Results, Surprise};
 use super::seed;
 use lab::procedure::Mode;
 
@@ -74,7 +74,7 @@ pub fn results(seeds: &[u64]) -> Results {
                         channel: 0,
                         time_s: 6.5 + chance,
                     }),
-                    path: Path2 { measured: way(share), planned: way(share) },
+                    path: PlanarPath { measured: way(share), planned: way(share) },
                     virtual_s: 20.0,
                     wall_s: Some(1.0),
                 });
