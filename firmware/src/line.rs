@@ -1,12 +1,12 @@
 //! Which of several lines the host is on: the one on which a sound frame came last.
 //!
-//! A board may have several lines to a host (serial, USB, CAN); one conversation goes on at a time. Every line is read all the
-//! time. Bytes on the chosen line pass through untouched. On the others a [`Listener`] waits for a whole frame whose check sum
-//! is right; then that line is chosen, its frame is handed on, and what is sent goes there from then on. Noise on a line that
-//! nobody uses, an open input or another program's chatter never takes the conversation away.
+//! A board may have several lines to a host (serial, USB, CAN); one conversation goes on at a time. Every line is read
+//! all the time. Bytes on the chosen line pass through untouched. On the others a [`Listener`] waits for a whole frame
+//! whose check sum is right; then that line is chosen, its frame is handed on, and what is sent goes there from then
+//! on. Noise on a line that nobody uses, an open input or another program's chatter never takes the conversation away.
 //!
-//! Whether a new host may take over from the old one is the session's decision, not the line's: it refuses a second host while
-//! the first is heard, and the refusal goes back on the line the request came from.
+//! True if a new host may take over from the old one is the session's decision, not the line's: it refuses a second
+//! host while the first is heard, and the refusal goes back on the line the request came from.
 
 use link::Request;
 use link::frame::{Decoder, FRAME_BYTES};

@@ -54,7 +54,8 @@ fn a_bit_lasts_one_microsecond_exactly_and_is_sampled_at_three_quarters() {
     assert_eq!(BIT_TIMING.bits_per_second(), BITS_PER_SECOND);
     assert_eq!(BIT_TIMING.sample_point_per_mille(), 750);
     assert_eq!(BIT_TIMING.jump, 1);
-    // What the registers can hold: prescaler 1..512, segments 1..256 and 1..128, jump no longer than the second segment.
+    // What the registers can hold: prescaler 1..512, segments 1..256 and 1..128, jump no longer than the second
+    // segment.
     assert!((1..=512).contains(&BIT_TIMING.prescaler) && (2..=256).contains(&BIT_TIMING.before_sample));
     assert!((2..=128).contains(&BIT_TIMING.after_sample) && BIT_TIMING.jump <= BIT_TIMING.after_sample);
 }
@@ -107,7 +108,8 @@ fn watchdog_bears_with_the_start_and_tells_soon_that_it_has_no_oscillator() {
 
 #[test]
 fn the_end_waits_long_enough_for_the_last_frames_and_ends_before_the_watchdog() {
-    // Eleven-bit identifier, eight bytes, a stuff bit after every four bits of what is stuffed, and the space behind it.
+    // Eleven-bit identifier, eight bytes, a stuff bit after every four bits of what is stuffed, and the space behind
+    // it.
     let longest_bits = 47 + 64 + (34 + 64 - 1) / 4;
     let frame_us = longest_bits * 1_000_000 / BITS_PER_SECOND;
     let last = 4;
@@ -190,9 +192,9 @@ fn receive_queues_outlast_the_time_until_somebody_fetches() {
     assert!(HOST.transmit > 2 * slot_us / 111, "the line would fall silent between two visits of the session");
 }
 
-/// Bits per second that the serial controller makes of its baud rate register, as the reference manual says: with sixteen
-/// samples a bit the register is the divider; with eight the divider is that of twice the clock, its lowest four bits stand
-/// one place lower and the lowest is lost; the register's bit 3 must be clear.
+/// Bits per second that the serial controller makes of its baud rate register, as the reference manual says: with
+/// sixteen samples a bit the register is the divider; with eight the divider is that of twice the clock, its lowest
+/// four bits stand one place lower and the lowest is lost; the register's bit 3 must be clear.
 fn serial_rate(clock_hz: u32, register: u16, eight_samples: bool) -> f64 {
     let register = u32::from(register);
     if eight_samples {

@@ -25,7 +25,7 @@ pub enum AnyFrame {
     Remote {
         /// Its identifier.
         id: u32,
-        /// Whether that has 29 bits.
+        /// True if that has 29 bits.
         extended: bool,
         /// The length it asks for.
         length: u8,

@@ -153,7 +153,7 @@ impl Meaning {
         }
     }
 
-    /// Whether everything in the frame has a name.
+    /// True if everything in the frame has a name.
     #[must_use]
     pub fn is_named(&self) -> bool {
         let needs_property = matches!(self.kind, Kind::Get | Kind::Set | Kind::Property);

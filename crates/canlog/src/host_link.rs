@@ -31,7 +31,7 @@ pub enum Message {
 }
 
 impl HostLink {
-    /// Whether a frame has the identifier of a segment.
+    /// True if a frame has the identifier of a segment.
     #[must_use]
     pub fn is_segment(frame: &CanFrame) -> bool {
         Heading::parse(frame.can_id().raw()).is_some()

@@ -1,8 +1,8 @@
 //! What an arm with its hand and a hand alone have in common, and where they differ.
 //!
-//! A device has two halves. The control half is a [`Controller`]: a timer drives it, three slots a control cycle. The other half is
-//! a [`crate::HostSession`] over an [`Application`]: the rules of the link are those of every device, the primitives and the
-//! requests that move something are those of the application.
+//! A device has two halves. The control half is a [`Controller`]: a timer drives it, three slots a control cycle. The
+//! other half is a [`crate::HostSession`] over an [`Application`]: the rules of the link are those of every device, the
+//! primitives and the requests that move something are those of the application.
 
 use control::{CycleRecord, LoadRefusal, State};
 use link::{Listing, Name, Refusal, Reply, Request, Telemetry};
@@ -162,7 +162,11 @@ pub struct TimedRecord<R = CycleRecord> {
     pub cost_ticks: u32,
 }
 
-/// What a request means to an application.
+/// Outcome of a request to an application.
+#[allow(
+    clippy::large_enum_variant,
+    reason = "no allocation on the device, and the answer is sent from where it is returned to"
+)]
 #[derive(Debug)]
 pub enum Action<C> {
     /// A command for the control half; its answer is that of the request.

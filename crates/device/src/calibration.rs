@@ -3,9 +3,9 @@
 //! ```text
 //! "TacH" | layout u16 | 0 u16 | model hash u32 | home 7 f32 (rad) | CRC-32/ISCSI u32        all little endian
 //! ```
-//! The stops at which an arm is brought home are where its maker's screws and cables put them, some degrees beside those of the
-//! model. What is wrong here is wrong in every angle afterwards: in the weight that gravity compensation carries, in the limits, in
-//! every place.
+//! The stops at which an arm is brought home are where its maker's screws and cables put them, some degrees beside
+//! those of the model. What is wrong here is wrong in every angle afterwards: in the weight that gravity compensation
+//! carries, in the limits, in every place.
 
 use core::fmt;
 use core::ops::RangeInclusive;
@@ -16,9 +16,9 @@ use link::{Calibration, HomeSource};
 
 /// How far a joint's home may lie from the model's (rad): 20 degrees.
 ///
-/// Arms differ from the default home by a few degrees. What is to be kept out are angles in degrees, a wrong sign, two joints
-/// exchanged, and an arm that was not at home: all of them are larger, in at least one joint, for an arm folded at home
-/// (J2 -2.0, J4 3.13 rad). A smaller bound would refuse arms whose stops have been rebuilt.
+/// Arms differ from the default home by a few degrees. What is to be kept out are angles in degrees, a wrong sign, two
+/// joints exchanged, and an arm that was not at home: all of them are larger, in at least one joint, for an arm folded
+/// at home (J2 -2.0, J4 3.13 rad). A smaller bound would refuse arms whose stops have been rebuilt.
 pub const HOME_DISTANCE: f32 = 0.35;
 
 /// How far beyond the joint's range a home may lie (rad): home is at the stops, and stops are where cables stretch.
@@ -50,7 +50,7 @@ pub enum HomeFault {
 pub struct HomeError {
     /// Which joint, 0 for J1.
     pub joint: u8,
-    /// What is wrong.
+    /// Description.
     pub fault: HomeFault,
 }
 

@@ -4,8 +4,8 @@ use core::fmt;
 
 use crate::startup::Stage;
 
-/// One request of a person, on its way to the control half. Each is answered by exactly one [`crate::EventKind::Accepted`]
-/// or [`crate::EventKind::Refused`].
+/// One request of a person, on its way to the control half. Each is answered by exactly one
+/// [`crate::EventKind::Accepted`] or [`crate::EventKind::Refused`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
     /// "The arm stands at these joint angles (rad)": define the encoder positions and tell the safety module.
@@ -38,7 +38,8 @@ pub enum Refusal {
     NoHand,
     /// The hand is being initialised already, or a movement runs.
     HandBusy,
-    /// This home angle (0 = J1) is not a number, is outside the joint's limits, or does not fit into the encoder's range.
+    /// This home angle (0 = J1) is not a number, is outside the joint's limits, or does not fit into the encoder's
+    /// range.
     HomeOutOfRange {
         /// Index of the joint.
         joint: u8,

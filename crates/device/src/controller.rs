@@ -1,7 +1,7 @@
 //! The high-priority half of the device: the bus, its start-up, and the control cycle.
 //!
-//! A hardware timer calls [`DeviceController::slot`] three times per control cycle. In the start-up each slot sends at most one frame.
-//! After that the three slots do different things:
+//! A hardware timer calls [`DeviceController::slot`] three times per control cycle. In the start-up each slot sends at
+//! most one frame. After that the three slots do different things:
 //!
 //! | slot | at | what |
 //! |---|---|---|
@@ -9,8 +9,8 @@
 //! | [`Slot::Control`] | 1.11 ms | take what has come, advance the control cycle, send both torque frames, then drive and ask the hand |
 //! | [`Slot::Slow`] | 2.22 ms | one question about modes, pendant or temperatures |
 //!
-//! No torque but zero leaves before the start-up is over, a person has activated the arm, and a person has commanded it:
-//! the frames of a cycle come from [`control::Actuation`] or are zero.
+//! No torque but zero leaves before the start-up is over, a person has activated the arm, and a person has commanded
+//! it: the frames of a cycle come from [`control::Actuation`] or are zero.
 
 use control::law::Gains;
 use control::time::periods;
@@ -32,23 +32,26 @@ use crate::round::Round;
 use crate::session;
 use crate::startup::{Pacer, Stage, Startup, StartupError};
 
-/// Time that a puck may be silent before the bus is started anew: 1 s, in control periods; long after the supervisor has
-/// taken the torque off.
+/// Time that a puck may be silent before the bus is started anew: 1 s, in control periods; long after the supervisor
+/// has taken the torque off.
 const SILENT_CYCLES: u16 = periods(1.0);
 /// Unanswered questions to the safety module that mean it is gone: 100 ms, one question in two control periods.
 const SAFETY_SILENCE: u16 = periods(0.1) / 2;
-/// Cycles between a fault of the bus and the new start-up: three of zero torque, and time to ask the safety module for IDLE.
+/// Cycles between a fault of the bus and the new start-up: three of zero torque, and time to ask the safety module for
+/// IDLE.
 const LAST_CYCLES: u8 = 6;
 /// Cycles in a row whose torque frames could not be sent, after which the bus counts as failed.
 const REFUSED_CYCLES: u8 = 6;
-/// Answers in a row of a braking puck 1 under an ACTIVE safety module that mean IDLE: one may be older than the activation.
+/// Answers in a row of a braking puck 1 under an ACTIVE safety module that mean IDLE: one may be older than the
+/// activation.
 const BRAKING_ANSWERS: u8 = 2;
 /// Time between two requests to the safety module to go IDLE: 0.25 s, in slow slots.
 const IDLE_REQUEST_SLOTS: u16 = periods(0.25);
 
 /// How much an overrun counts against the cycles without one.
 const OVERRUN_WEIGHT: u16 = 50;
-/// The sum at which the control cycle is too late too often: six overruns within a few cycles. One in fifty is tolerated.
+/// The sum at which the control cycle is too late too often: six overruns within a few cycles. One in fifty is
+/// tolerated.
 const OVERRUN_LIMIT: u16 = 300;
 
 /// Who has the bus.
@@ -226,8 +229,8 @@ impl DeviceController {
         self.last_cycles.get_or_insert(LAST_CYCLES);
     }
 
-    /// A slot of the start-up. Not inlined, nor is [`DeviceController::control`]: a board keeps the two in different memories, and the frame of the
-    /// start-up stays out of the cycle's.
+    /// A slot of the start-up. Not inlined, nor is [`DeviceController::control`]: a board keeps the two in different
+    /// memories, and the frame of the start-up stays out of the cycle's.
     #[inline(never)]
     fn start_up(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
         // Answers keep the order of the commands: the next one waits while an answer is outstanding.

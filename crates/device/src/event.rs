@@ -17,7 +17,7 @@ pub struct Event {
     pub kind: EventKind,
 }
 
-/// What happened.
+/// Description.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EventKind {
     /// The oldest unanswered command was taken up.

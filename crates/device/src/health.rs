@@ -74,13 +74,15 @@ pub struct Health {
     pub state: State,
     /// The latched fault.
     pub fault: Fault,
-    /// The encoders count from a known pose, as the safety module says. False for a hand alone, as for all that is only an arm's.
+    /// The encoders count from a known pose, as the safety module says. False for a hand alone, as for all that is only
+    /// an arm's.
     pub zeroed: bool,
-    /// The posture (rad) at which the arm was told to stand when it was zeroed; `None` if that was before the bus was started.
+    /// The posture (rad) at which the arm was told to stand when it was zeroed; `None` if that was before the bus was
+    /// started.
     pub zeroed_at: Option<[f32; 7]>,
     /// What is mounted on the arm, as the last start-up found it; sensor and hand until one has.
     pub payload: Payload,
-    /// Whether the wrench has a zero; `None` without a force/torque sensor.
+    /// True if the wrench has a zero; `None` without a force/torque sensor.
     pub wrench_zeroed: Option<bool>,
     /// Latest mode of the safety module; `None` before it answered.
     pub safety_mode: Option<SafetyMode>,

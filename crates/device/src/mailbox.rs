@@ -2,8 +2,8 @@
 
 /// The place for the reply of one sender in one round.
 ///
-/// A frame carries no cycle number. Two different replies of one sender within a round mean that one of them is late; as
-/// nothing tells which, both are discarded.
+/// A frame carries no cycle number. Two different replies of one sender within a round mean that one of them is late;
+/// as nothing tells which, both are discarded.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) enum Mailbox<T> {
     #[default]

@@ -1,4 +1,4 @@
-//! Whether what a primitive expects was recorded through the same filter as the device's own.
+//! True if what a primitive expects was recorded through the same filter as the device's own.
 //!
 //! Recording and execution must see a contact equally late, or every contact would differ from what is expected of it.
 

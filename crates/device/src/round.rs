@@ -1,8 +1,8 @@
 //! One round of requests and replies per control cycle, each reply in the slot of its sender.
 //!
-//! A frame carries no cycle number, so the round itself is the tag: slots are emptied before the requests leave, and what
-//! comes while no round is open belongs to a cycle that is over. A queue per identifier, as in Barrett's library, would
-//! answer each request with the reply to the one before, for ever.
+//! A frame carries no cycle number, so the round itself is the tag: slots are emptied before the requests leave, and
+//! what comes while no round is open belongs to a cycle that is over. A queue per identifier, as in Barrett's library,
+//! would answer each request with the reply to the one before, for ever.
 
 use puck::{CanFrame, Counts, GaugeStatus, Group, Node, PropertyId, RawWrench, Reply, force_torque, get};
 
@@ -50,7 +50,7 @@ impl Round {
         (get(Group::ARM, PropertyId::POSITION), self.has_sensor.then(force_torque::get_wrench))
     }
 
-    /// Whether requests have left and no cycle has taken the replies.
+    /// True if requests have left and no cycle has taken the replies.
     pub(crate) fn is_open(&self) -> bool {
         self.open
     }

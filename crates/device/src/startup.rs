@@ -1,7 +1,7 @@
 //! The start of the bus: from power-up to a cyclic loop, as a state machine that sends at most one frame per slot.
 //!
-//! Nothing here sends a torque other than zero, wakes or zeroes a puck while the safety module is ACTIVE, or goes on after
-//! a device has said something unexpected. After a failure it rests for a second and begins anew.
+//! Nothing here sends a torque other than zero, wakes or zeroes a puck while the safety module is ACTIVE, or goes on
+//! after a device has said something unexpected. After a failure it rests for a second and begins anew.
 
 mod exchange;
 mod hand;

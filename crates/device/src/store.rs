@@ -1,8 +1,9 @@
-//! Where primitives are kept: places for whole images, and a spare one in which an upload grows; and the home of the arm.
+//! Where primitives are kept: places for whole images, and a spare one in which an upload grows; and the home of the
+//! arm.
 //!
-//! Invariants every [`Store`] keeps: an image is either wholly there or not at all; until [`Store::finished`] tells of success,
-//! reading gives what it gave before the change was asked for; if power fails in between, the next start finds the old
-//! or the new (for a store that outlives power); names are the session's business, not the store's.
+//! Invariants every [`Store`] keeps: an image is either wholly there or not at all; until [`Store::finished`] tells of
+//! success, reading gives what it gave before the change was asked for; if power fails in between, the next start finds
+//! the old or the new (for a store that outlives power); names are the session's business, not the store's.
 
 use core::fmt;
 
@@ -63,7 +64,7 @@ impl core::error::Error for StoreError {}
 
 /// Places for images.
 pub trait Store {
-    /// Whether the store knows by now what it holds.
+    /// True if the store knows by now what it holds.
     fn is_open(&self) -> bool {
         true
     }
@@ -92,12 +93,12 @@ pub trait Store {
     /// The image being written, all of its announced length.
     fn staged(&self) -> Option<&[u8]>;
 
-    /// Begins to make the image being written the one at place `slot`, whatever was there. It is when [`Store::finished`]
-    /// says so.
+    /// Begins to make the image being written the one at place `slot`, whatever was there. It is when
+    /// [`Store::finished`] says so.
     ///
     /// # Errors
-    /// [`StoreError::NotOpen`], [`StoreError::NoPlace`], [`StoreError::Medium`], [`StoreError::Busy`]. The store is then as
-    /// before.
+    /// [`StoreError::NotOpen`], [`StoreError::NoPlace`], [`StoreError::Medium`], [`StoreError::Busy`]. The store is
+    /// then as before.
     fn commit(&mut self, slot: u8) -> Result<(), StoreError>;
 
     /// Forgets the image being written, unless it is being committed.

@@ -1,7 +1,7 @@
 //! `HandApplication`: the primitives of a hand alone, and the requests that only it knows.
 //!
-//! An image is converted while it arrives and never held, so it cannot be read back; requests that need an arm are refused with
-//! [`Refusal::NoArm`]. Numbers become real ones here and in [`crate::record`], and nowhere else.
+//! An image is converted while it arrives and never held, so it cannot be read back; requests that need an arm are
+//! refused with [`Refusal::NoArm`]. Numbers become real ones here and in [`crate::record`], and nowhere else.
 
 use control::LoadRefusal;
 use device::{Action, Application, HostSession, Refused, Saved, SessionPort, finite};

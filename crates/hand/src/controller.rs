@@ -1,7 +1,7 @@
 //! `HandController`: Eq (14) in fixed point, the law of `control::law::HandController` with its gains.
 //!
-//! `tau_finger = PD(position) - (P e + K_i integral_{t-Dt}^{t} e dt)`, `e = F_expected - F`, `F` the torque of the environment on the
-//! finger. The window's sum is exact: integers are added and taken away, nothing drifts.
+//! `tau_finger = PD(position) - (P e + K_i integral_{t-Dt}^{t} e dt)`, `e = F_expected - F`, `F` the torque of the
+//! environment on the finger. The window's sum is exact: integers are added and taken away, nothing drifts.
 
 use control::law::gains::{HAND_COULOMB, HAND_DAMPING, HAND_FORCE, HAND_STIFFNESS, HAND_VISCOUS};
 
@@ -93,8 +93,8 @@ impl HandController {
 
     /// The torques of one tick (N m, spread first).
     ///
-    /// A digit whose reply is missing keeps the position part of its last one. With `expected` gauges (N m) the PI acts;
-    /// `frozen` (a torque saturates) keeps its window as it is, and so do gauges that are not measured.
+    /// A digit whose reply is missing keeps the position part of its last one. With `expected` gauges (N m) the PI
+    /// acts; `frozen` (a torque saturates) keeps its window as it is, and so do gauges that are not measured.
     pub fn torque(
         &mut self,
         state: &HandState,

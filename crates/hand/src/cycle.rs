@@ -8,8 +8,8 @@
 //!     |                '--> Fault      a puck under torque tells that it was reset
 //!     <---ClearFault---- SoftStop, Fault
 //! ```
-//! It goes down by itself and up by a person's command, except from Coast to Run. No state needs torque to be safe: the worms cannot
-//! be driven back.
+//! It goes down by itself and up by a person's command, except from Coast to Run. No state needs torque to be safe: the
+//! worms cannot be driven back.
 
 use control::plan::hand::LONGEST;
 use control::{Fault, HandSample, State, flags};

@@ -1,4 +1,5 @@
-//! `DeviceController`: the high-priority half. Owns the hand's bus and the control cycle; sans-I/O, driven by three slots per cycle.
+//! `DeviceController`: the high-priority half. Owns the hand's bus and the control cycle; sans-I/O, driven by three
+//! slots per cycle.
 //!
 //! | slot | what |
 //! |---|---|
@@ -6,8 +7,8 @@
 //! | control | the replies of this very cycle, [`Cycle::step`], the torque frame |
 //! | slow | one of: initialisation, MODE where it is due, STAT of a silent puck, MODE and TEMP in turn |
 //!
-//! On a bus of its own the hand is answered within one slot: 1015 us at worst, stuffing and puck latency included, of 1111. The
-//! torque leaves in the cycle of its sample, one cycle earlier than behind an arm.
+//! On a bus of its own the hand is answered within one slot: 1015 us at worst, stuffing and puck latency included, of
+//! 1111. The torque leaves in the cycle of its sample, one cycle earlier than behind an arm.
 
 use control::{LoadRefusal, Payload};
 use device::hand::{Drive, HandProperties, HandRound, HandTrouble, Initialisation, Outcome, Outlet};
@@ -273,7 +274,8 @@ impl DeviceController {
         self.cycle.hand_failed();
         self.enter(HandStage::Failed, Some((node, trouble)));
         if matches!(trouble, HandTrouble::Reset | HandTrouble::Silent) {
-            // Whatever was known of it may be gone: it is looked for again. What counts as known to people is that it failed.
+            // Whatever was known of it may be gone: it is looked for again. What counts as known to people is that it
+            // failed.
             self.properties = None;
             self.startup = Startup::new();
         }

@@ -1,4 +1,5 @@
-//! `HandEstimator`: counts to angles, velocities and gauge torques in fixed point, through lost and implausible replies.
+//! `HandEstimator`: counts to angles, velocities and gauge torques in fixed point, through lost and implausible
+//! replies.
 //!
 //! The rules are those of `control::sense::hand`; the gates are the same.
 
@@ -10,8 +11,8 @@ use crate::filter::{GAUGE, LowPass, VELOCITY};
 use crate::number::{Number, ZERO, constants, within};
 use crate::{DIGITS, FINGERS, LOST_CYCLES};
 
-/// Largest believed motion per control period (counts), F1 to F3 and spread: three times the no-load speeds. A larger one is
-/// believed when the next reply confirms it.
+/// Largest believed motion per control period (counts), F1 to F3 and spread: three times the no-load speeds. A larger
+/// one is believed when the next reply confirms it.
 const MOTOR_GATE: [i32; DIGITS] = [1990, 1990, 1990, 720];
 /// The same of the worm encoders.
 const WORM_GATE: i32 = 800;
@@ -22,8 +23,8 @@ const GAUGE_STEP: Number = Number::constant(1.0);
 /// Reading of an unloaded gauge, before a tare.
 const UNLOADED: u16 = puck::gauge::UNLOADED;
 
-/// Barrett's curve of a gauge over `counts / 4096`, constant first (N m): the powers of 4096 keep its coefficients, of which
-/// the largest power has 2.8e-10, above the resolution.
+/// Barrett's curve of a gauge over `counts / 4096`, constant first (N m): the powers of 4096 keep its coefficients, of
+/// which the largest power has 2.8e-10, above the resolution.
 const CURVE: [Number; 4] =
     constants([-2.85, 0.003764 * 4096.0, -1.708e-6 * 4096.0 * 4096.0, 2.754e-10 * 4096.0 * 4096.0 * 4096.0]);
 
@@ -51,11 +52,13 @@ const RATES: [Number; 256] = {
 
 /// Angle (rad) of a position in counts.
 fn angle(counts: Counts, per_count: i64) -> Number {
-    // 32 bits of counts times at most 2^41 do not reach 2^63 for what 22 bits and some turns can hold; beyond, it saturates.
+    // 32 bits of counts times at most 2^41 do not reach 2^63 for what 22 bits and some turns can hold; beyond, it
+    // saturates.
     Number::from_bits(i64::from(counts.0).saturating_mul(per_count) >> (COUNT_BITS - crate::number::FRACTION_BITS))
 }
 
-/// Torque of the environment on the finger (N m) for a reading, by Barrett's curve: negative when the finger presses in closing.
+/// Torque of the environment on the finger (N m) for a reading, by Barrett's curve: negative when the finger presses in
+/// closing.
 pub fn gauge_torque(counts: u16) -> Number {
     let place = Number::from_bits(i64::from(counts.min(puck::gauge::LARGEST)) << 20);
     let [c0, c1, c2, c3] = CURVE;
@@ -83,7 +86,7 @@ impl HandState {
         self.age.iter().copied().max().unwrap_or(u8::MAX)
     }
 
-    /// Whether the gauges can be believed.
+    /// True if the gauges can be believed.
     pub fn feels(&self) -> bool {
         self.gauge_age <= LOST_CYCLES
     }
@@ -157,8 +160,8 @@ impl HandEstimator {
         }
     }
 
-    /// Takes what the hand told since the last cycle. `None` until all four digits have answered in the same cycle; a hand
-    /// that is gone is learned anew. The tare of the gauges is kept.
+    /// Takes what the hand told since the last cycle. `None` until all four digits have answered in the same cycle; a
+    /// hand that is gone is learned anew. The tare of the gauges is kept.
     pub fn update(&mut self, sample: Option<&HandSample>) -> Option<HandState> {
         let Some(sample) = sample else {
             self.encoders = None;
@@ -201,7 +204,7 @@ impl HandEstimator {
         self.gauge_age.is_some()
     }
 
-    /// Whether the gauges have been tared.
+    /// True if the gauges have been tared.
     pub fn is_tared(&self) -> bool {
         self.zero.is_some()
     }

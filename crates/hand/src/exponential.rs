@@ -1,7 +1,7 @@
 //! `decay`: `exp(-x)` in 32-bit integers, the kernel function of Eq (2) and the phase of Eq (3).
 //!
-//! `exp(-x) = 2^-n 2^-(i/32) exp(-t)` with `t < ln 2 / 32`: a shift, a table and a cubic. Error below 1e-8, some 30 instructions
-//! on a Cortex-M3.
+//! `exp(-x) = 2^-n 2^-(i/32) exp(-t)` with `t < ln 2 / 32`: a shift, a table and a cubic. Error below 1e-8, some 30
+//! instructions on a Cortex-M3.
 
 /// Fraction bits of the exponent that [`decay`] takes.
 pub(crate) const EXPONENT_BITS: u32 = 27;

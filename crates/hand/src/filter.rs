@@ -23,8 +23,8 @@ impl Coefficients {
     }
 }
 
-/// Returns the tangent of an angle between 0 and pi/2 by its continued fraction, for constants: 12 terms are exact to 1e-13
-/// up to 1.4.
+/// Returns the tangent of an angle between 0 and pi/2 by its continued fraction, for constants: 12 terms are exact to
+/// 1e-13 up to 1.4.
 const fn tangent(angle: f64) -> f64 {
     let square = angle * angle;
     let mut denominator = 25.0;

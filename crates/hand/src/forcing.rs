@@ -1,10 +1,11 @@
 //! `Forcing`: Eq (2) for the four rows of the hand, in 32-bit weights and kernels.
 //!
-//! Centres lie at `c_i = exp(-alpha i/(N-1))` and the widths follow their distances, so the exponent of a kernel depends on the
-//! ratio `E_i = s/c_i = exp(alpha (u_i - u))` alone: `h_i (s - c_i)^2 = (r (E_i - 1))^2` with one `r` for all kernels but the
-//! last (which repeats the width before it, hence `r exp(-delta)`). `E_i` goes from kernel to kernel by a constant
-//! factor `exp(+-delta)`, `delta = alpha/(N-1)`. So a tick needs one exponential for the kernel at hand, one product per
-//! neighbour, and an exponential for each kernel that counts: 22 below the largest exponent none does.
+//! Centres lie at `c_i = exp(-alpha i/(N-1))` and the widths follow their distances, so the exponent of a kernel
+//! depends on the ratio `E_i = s/c_i = exp(alpha (u_i - u))` alone: `h_i (s - c_i)^2 = (r (E_i - 1))^2` with one `r`
+//! for all kernels but the last (which repeats the width before it, hence `r exp(-delta)`). `E_i` goes from kernel to
+//! kernel by a constant factor `exp(+-delta)`, `delta = alpha/(N-1)`. So a tick needs one exponential for the kernel at
+//! hand, one product per neighbour, and an exponential for each kernel that counts: 22 below the largest exponent none
+//! does.
 //!
 //! | quantity | integer | range | resolution |
 //! |---|---|---|---|
@@ -82,8 +83,8 @@ impl Basis {
         last_root_width: 0,
     };
 
-    /// `count` kernels with decay `alpha` and `activation` at the next centre; `None` for a basis that is none, or that the
-    /// integers cannot hold. Computes in floating point: at upload, never on the control path.
+    /// `count` kernels with decay `alpha` and `activation` at the next centre; `None` for a basis that is none, or that
+    /// the integers cannot hold. Computes in floating point: at upload, never on the control path.
     pub fn new(count: usize, alpha: f64, activation: f64) -> Option<Basis> {
         let sound =
             (2..=KERNELS).contains(&count) && (2.3..=13.82).contains(&alpha) && (0.05..=0.95).contains(&activation);

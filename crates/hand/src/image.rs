@@ -1,8 +1,9 @@
 //! `ImageReader`: an uploaded image to a [`FingerPrimitive`], byte by byte.
 //!
-//! An image has up to 25 kB, of which the hand needs a tenth. So it is never held: header, numbers and check sum pass through,
-//! the hand's columns are converted to fixed point and kept. What a whole image is checked for by `link::PrimitiveImage`
-//! is checked here as well; `tests/hand/image.rs` holds the two against each other. Layout: `docs/image-format.md`.
+//! An image has up to 25 kB, of which the hand needs a tenth. So it is never held: header, numbers and check sum pass
+//! through, the hand's columns are converted to fixed point and kept. What a whole image is checked for by
+//! `link::PrimitiveImage` is checked here as well; `tests/hand/image.rs` holds the two against each other. Layout:
+//! `docs/image-format.md`.
 
 use link::image::{
     COUPLED_ROWS, EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT, EXPERIENCE_ROWS, GAIN_POINTS_LIMIT, IMAGE_SCHEMA,
@@ -22,7 +23,8 @@ const HEADER_BYTES: usize = 60;
 const CRC_BYTES: usize = 4;
 /// Reals in front of the tables.
 const FIXED_REALS: usize = 75;
-/// First hand row of the weights and of the coupled rows (there the spread, which no gauge moves), first gauge of the sensors.
+/// First hand row of the weights and of the coupled rows (there the spread, which no gauge moves), first gauge of the
+/// sensors.
 const FIRST_WEIGHT_ROW: usize = WEIGHT_ROWS - DIGITS;
 const FIRST_COUPLED_FINGER: usize = COUPLED_ROWS - FINGERS;
 const FIRST_GAUGE: usize = SENSOR_ROWS - FINGERS;
@@ -87,7 +89,7 @@ pub struct Summary {
     pub duration: f32,
     /// Kernels of each row.
     pub kernels: u16,
-    /// Whether it knows what the gauges should feel.
+    /// True if it knows what the gauges should feel.
     pub expectation: bool,
 }
 
@@ -165,8 +167,8 @@ impl ImageReader {
         }
     }
 
-    /// Takes the next bytes and puts what they hold into `primitive`. A flaw is kept until the end: the host learns of it when
-    /// it asks for the primitive to be stored.
+    /// Takes the next bytes and puts what they hold into `primitive`. A flaw is kept until the end: the host learns of
+    /// it when it asks for the primitive to be stored.
     pub fn take(&mut self, bytes: &[u8], primitive: &mut FingerPrimitive) {
         for byte in bytes {
             let place = self.received;
@@ -296,7 +298,8 @@ impl ImageReader {
         Ok(())
     }
 
-    /// A value of a table whose last three columns are the fingers'; `push` gets a whole sample. `None` if it does not take it.
+    /// A value of a table whose last three columns are the fingers'; `push` gets a whole sample. `None` if it does not
+    /// take it.
     fn column<T: Stored>(
         &mut self,
         column: usize,
@@ -344,13 +347,15 @@ impl ImageReader {
         clip(self.received)
     }
 
-    /// The image is whole: what it was, or why it is refused. `announced` is the check sum the host gave at the beginning.
+    /// The image is whole: what it was, or why it is refused. `announced` is the check sum the host gave at the
+    /// beginning.
     ///
     /// # Errors
     /// The refusal, with the numbers that belong to it.
     pub fn finish(self, primitive: &mut FingerPrimitive, announced: u32) -> Result<Summary, (Refusal, [u32; 2])> {
         let computed = self.digest.sum();
-        // As a whole image is read: an image of another version is named as such, a damaged one as damaged, the rest as it is.
+        // As a whole image is read: an image of another version is named as such, a damaged one as damaged, the rest as
+        // it is.
         if let Some(Flaw::Image(error @ (ImageError::Magic | ImageError::Schema { .. }))) = self.flaw {
             return Err(Flaw::Image(error).into());
         }

@@ -40,8 +40,8 @@ pub const FINGERS: usize = 3;
 /// Most kernels of a row.
 pub const KERNELS: usize = link::image::KERNEL_LIMIT;
 
-/// Time without a reply of a digit before torque ends, and that a gauge is believed: 17 ms, in control periods, as for the
-/// positions of an arm (A3). Behind an arm it is `control::sense::hand::LOST_CYCLES`, for the reason given there.
+/// Time without a reply of a digit before torque ends, and that a gauge is believed: 17 ms, in control periods, as for
+/// the positions of an arm (A3). Behind an arm it is `control::sense::hand::LOST_CYCLES`, for the reason given there.
 pub const LOST_CYCLES: u8 = control::time::few_periods(1.0 / 60.0);
 
 /// Ranges of the digits (rad).

@@ -41,7 +41,8 @@ impl LimitedTorques {
         &self.0
     }
 
-    /// The packed frame for the four pucks, rounded toward minus infinity; `scales` in units per N m at the link, spread first.
+    /// The packed frame for the four pucks, rounded toward minus infinity; `scales` in units per N m at the link,
+    /// spread first.
     pub fn frame(&self, scales: &Scales) -> CanFrame {
         let mut units = [PuckTorque::ZERO; DIGITS];
         let wanted: [Number; DIGITS] = core::array::from_fn(|digit| self.0[digit] * scales.0[digit]);
@@ -85,7 +86,8 @@ impl HandLimiter {
         self.last = [ZERO; DIGITS];
     }
 
-    /// Cuts the wanted torques (N m) of one cycle to magnitude and rate; also whether a finger was cut to its magnitude.
+    /// Cuts the wanted torques (N m) of one cycle to magnitude and rate; also whether a finger was cut to its
+    /// magnitude.
     pub fn limit(&mut self, wanted: &[Number; DIGITS]) -> (LimitedTorques, bool) {
         let mut saturated = false;
         for (digit, last) in self.last.iter_mut().enumerate() {

@@ -11,7 +11,8 @@ const LONGEST: Number = constant(control::plan::hand::LONGEST);
 /// Shortest move (s).
 const SHORTEST: Number = constant(0.3);
 
-/// Time per angle that keeps the peak speed of a minimum jerk, 1.875 times its mean, at 3 rad/s (spread) and 1.5 (fingers).
+/// Time per angle that keeps the peak speed of a minimum jerk, 1.875 times its mean, at 3 rad/s (spread) and 1.5
+/// (fingers).
 const SLOWNESS: [Number; DIGITS] = constants([1.875 / 3.0, 1.875 / 1.5, 1.875 / 1.5, 1.875 / 1.5]);
 
 /// A move in progress.
@@ -46,7 +47,7 @@ impl HandMotion {
         core::array::from_fn(|digit| self.start[digit] + self.way[digit])
     }
 
-    /// Whether the path has ended.
+    /// True if the path has ended.
     pub fn is_finished(&self) -> bool {
         self.passed >= self.length
     }

@@ -1,7 +1,7 @@
 //! `Number`, the fixed-point number of the control path, and what it lacks for that path.
 //!
-//! 64 bits, 32 of them behind the point ([`dmp::FixedPoint`]): range +-2.1e9, resolution 2.3e-10, every operation saturates and none
-//! wraps (`docs/decisions/0050-numbers-of-the-hand-image.md`).
+//! 64 bits, 32 of them behind the point ([`dmp::FixedPoint`]): range +-2.1e9, resolution 2.3e-10, every operation
+//! saturates and none wraps (`docs/decisions/0050-numbers-of-the-hand-image.md`).
 
 use dmp::{FixedPoint, Scalar};
 
@@ -58,7 +58,8 @@ pub fn magnitude(value: Number) -> Number {
     Scalar::abs(value)
 }
 
-/// `part / whole` for a part that is not larger than the whole in magnitude, to 31 bits; 0 where the whole is not positive.
+/// `part / whole` for a part that is not larger than the whole in magnitude, to 31 bits; 0 where the whole is not
+/// positive.
 ///
 /// One division of 64 by 32 bits, where the general one of the type needs 128.
 pub fn share(part: Number, whole: Number) -> Number {

@@ -1,6 +1,7 @@
 //! `FingerPrimitive`: the hand's part of a movement primitive, in fixed point, checked.
 //!
-//! Made from the real numbers of an image while it is uploaded ([`crate::image`]); nothing here computes on the control path.
+//! Made from the real numbers of an image while it is uploaded ([`crate::image`]); nothing here computes on the control
+//! path.
 
 use control::plan::load::{LONGEST, LoadError, SHORTEST};
 use device::PrimitiveTrouble;
@@ -14,7 +15,8 @@ use crate::number::{Number, ZERO, from_real};
 use crate::profile::{Profile, Torque};
 use crate::{DIGITS, KERNELS};
 
-/// Most a start or goal may lie outside the range of its digit (rad): what noise of a demonstration at the stops leaves.
+/// Most a start or goal may lie outside the range of its digit (rad): what noise of a demonstration at the stops
+/// leaves.
 const RANGE_MARGIN: f64 = 0.05;
 
 /// Largest magnitude of a feedback limit (rad).
@@ -219,7 +221,7 @@ impl FingerPrimitive {
         Ok(())
     }
 
-    /// Whether it holds a movement.
+    /// True if it holds a movement.
     pub fn is_whole(&self) -> bool {
         self.system.is_some()
     }
@@ -234,7 +236,7 @@ impl FingerPrimitive {
         &self.start
     }
 
-    /// Whether it knows what the gauges should feel.
+    /// True if it knows what the gauges should feel.
     pub fn has_expectation(&self) -> bool {
         !self.expected.is_empty()
     }

@@ -1,7 +1,7 @@
 //! `Profile`: three values, one per finger, over the progress of the movement.
 //!
-//! As `dmp::PhaseTable`: samples at evenly spaced progress from 0 to 1, linear in between, end values beyond. Filled point by
-//! point while an image arrives.
+//! As `dmp::PhaseTable`: samples at evenly spaced progress from 0 to 1, linear in between, end values beyond. Filled
+//! point by point while an image arrives.
 
 use dmp::Scalar;
 
@@ -52,7 +52,7 @@ impl<T: Stored, const POINTS: usize> Profile<T, POINTS> {
         Profile(heapless::Vec::new())
     }
 
-    /// Whether there are no samples.
+    /// True if there are no samples.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -67,7 +67,7 @@ impl<T: Stored, const POINTS: usize> Profile<T, POINTS> {
         self.0.push(sample).is_ok()
     }
 
-    /// Whether a sample makes `doubt` true.
+    /// True if a sample makes `doubt` true.
     pub fn any(&self, doubt: impl Fn(Number) -> bool) -> bool {
         self.0.iter().flatten().any(|value| doubt(value.number()))
     }

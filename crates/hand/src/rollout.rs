@@ -1,8 +1,8 @@
 //! `Rollout`: the running state of the four hand rows, Eqs (1), (3), (8) and (9), advanced once per control period.
 //!
-//! The rows are those of `dmp` ([`dmp::PointState`], [`dmp::TransformationSystem`]) in fixed point. The phase comes from the
-//! progress, `s = exp(-alpha u)` with `u <- u + dt/tau(t)`: the exact solution of Eq (3) for any course of tau, without the drift
-//! of a phase that is multiplied thousands of times.
+//! The rows are those of `dmp` ([`dmp::PointState`], [`dmp::TransformationSystem`]) in fixed point. The phase comes
+//! from the progress, `s = exp(-alpha u)` with `u <- u + dt/tau(t)`: the exact solution of Eq (3) for any course of
+//! tau, without the drift of a phase that is multiplied thousands of times.
 
 use dmp::{PointInput, PointState, Scalar};
 
@@ -88,12 +88,13 @@ impl Rollout {
         primitive.has_expectation().then(|| primitive.expected.at(self.progress))
     }
 
-    /// Whether the feedback is derated because this run is faster or slower than the recorded one.
+    /// True if the feedback is derated because this run is faster or slower than the recorded one.
     pub fn is_derated(&self) -> bool {
         self.trust.1 < ONE
     }
 
-    /// Eq (8) for the fingers: `zeta = K1 K2 (F - F_des)`, clamped; `fade` (0 to 1) takes it away where the gauges are old.
+    /// Eq (8) for the fingers: `zeta = K1 K2 (F - F_des)`, clamped; `fade` (0 to 1) takes it away where the gauges are
+    /// old.
     pub fn feedback(
         &mut self,
         primitive: &FingerPrimitive,
@@ -145,7 +146,8 @@ impl Rollout {
     }
 }
 
-/// How far an expectation can be believed at another speed than it was recorded at, 1 to 0; see `dmp::ExpectedSensors::trust`.
+/// How far an expectation can be believed at another speed than it was recorded at, 1 to 0; see
+/// `dmp::ExpectedSensors::trust`.
 fn trust(relative_speed: Number) -> Number {
     let [full, none] = TRUST;
     let deviation = magnitude(ONE - relative_speed);

@@ -1,6 +1,7 @@
 //! `Startup`: from power-up to four woken hand pucks whose properties are known, on a bus with nothing else.
 //!
-//! Sends at most one frame per call, torque none. Where something is wrong it tells why, rests for a second and begins anew.
+//! Sends at most one frame per call, torque none. Where something is wrong it tells why, rests for a second and begins
+//! anew.
 
 use device::hand::{Answer, Exchange, HandProperties, HandTrouble, Outlet};
 use puck::hand::{COUNTS_PER_REVOLUTION, HandCommander};

@@ -39,8 +39,8 @@ pub use slot::SlotTask;
 pub(crate) use slot::{Cost, SlotQueues};
 pub use storage::{keep_library, rest};
 
-/// Frames on their way to the controller. A cycle sends at most 8, of these 5 in its control slot (torques of arm, wrist
-/// and hand, two questions to the hand); 16 hold two cycles of a dead bus.
+/// Frames on their way to the controller. A cycle sends at most 8, of these 5 in its control slot (torques of arm,
+/// wrist and hand, two questions to the hand); 16 hold two cycles of a dead bus.
 const OUTGOING: usize = 16 + 1;
 /// Frames on their way to the core. The bus carries at most 24 of the shortest in a slot, and each slot drains them.
 const INCOMING: usize = 32 + 1;
@@ -73,16 +73,17 @@ struct Queues {
     log: Queue<Event, EVENTS>,
 }
 
-/// Everything that lives as long as the image but the control half: put it into a static. It is all zeros, so that an image
-/// need not keep its content in flash; [`start`] fills it where it is, because the halves are too large for the stack of a
-/// small processor.
+/// Everything that lives as long as the image but the control half: put it into a static. It is all zeros, so that an
+/// image need not keep its content in flash; [`start`] fills it where it is, because the halves are too large for the
+/// stack of a small processor.
 pub struct Memory {
     queues: Queues,
     shelf: PrimitiveLibrary,
     session: MaybeUninit<ArmSession>,
 }
 
-/// The place of the control half. Put it into a static too, in the memory that is never waited for; nobody need clear it.
+/// The place of the control half. Put it into a static too, in the memory that is never waited for; nobody need clear
+/// it.
 pub type CorePlace = MaybeUninit<DeviceController>;
 
 impl Memory {
@@ -132,8 +133,8 @@ pub struct Application<B: Board> {
     pub flash: B::Flash,
 }
 
-/// Joins the application to the pieces of a board, and starts the timer of the slots: the first comes a slot later at the
-/// earliest. `firmware` is the version of the image, for people; `serial` tells this board from others of its kind.
+/// Joins the application to the pieces of a board, and starts the timer of the slots: the first comes a slot later at
+/// the earliest. `firmware` is the version of the image, for people; `serial` tells this board from others of its kind.
 pub fn start<B: Board>(
     firmware: &'static str,
     serial: &'static str,

@@ -50,8 +50,9 @@ pub async fn keep_library<F: NorFlash>(
     keep(flash, room, &mut SharedLibrary { session, log }).await
 }
 
-/// What a processor does that has nothing to do: asks the `task` whether it can go on, and sleeps until the next interrupt. Lower
-/// than every task, so it may take its time; slots make an interrupt every 1.1 ms, so nothing needs to wake it.
+/// What a processor does that has nothing to do: asks the `task` whether it can go on, and sleeps until the next
+/// interrupt. Lower than every task, so it may take its time; slots make an interrupt every 1.1 ms, so nothing needs to
+/// wake it.
 pub fn rest(task: impl Future<Output = Infallible>, mut sleep: impl FnMut()) -> ! {
     let mut task = pin!(task);
     let mut context = Context::from_waker(Waker::noop());

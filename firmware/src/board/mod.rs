@@ -1,8 +1,8 @@
 //! The edge between the application and a board: what a board must offer, and the board this image is for.
 //!
-//! A board is one module below this one. It provides `SelectedBoard` (made once, at start-up), the module `device` for RTIC
-//! (interrupts named by their *role*: `SLOT_TIMER`, `CAN_RECEIVE`, `CAN_TRANSMIT` and two lines for software tasks),
-//! a defmt logger, and [`Board::stop`] for the end. The binaries name nothing else.
+//! A board is one module below this one. It provides `SelectedBoard` (made once, at start-up), the module `device` for
+//! RTIC (interrupts named by their *role*: `SLOT_TIMER`, `CAN_RECEIVE`, `CAN_TRANSMIT` and two lines for software
+//! tasks), a defmt logger, and [`Board::stop`] for the end. The binaries name nothing else.
 
 use embedded_can::nb;
 use embedded_hal::digital::OutputPin;
@@ -31,8 +31,8 @@ pub trait Board: Sized {
     type LinkPort: LinkPort;
     /// Lit while the supervisor lets torque through: people beside the arm see it before they touch it.
     type StatusLight: OutputPin;
-    /// The flash in which the device keeps its library, and nothing else: address 0 is the first byte of that region. Its
-    /// operations are awaited in the idle task alone, where they may take as long as they like; they must not mask
+    /// The flash in which the device keeps its library, and nothing else: address 0 is the first byte of that region.
+    /// Its operations are awaited in the idle task alone, where they may take as long as they like; they must not mask
     /// interrupts meanwhile.
     type Flash: NorFlash;
 
@@ -51,8 +51,8 @@ pub trait Board: Sized {
     /// The peripherals, for the tasks that own them.
     fn split(self) -> Parts<Self>;
 
-    /// What a processor does that has nothing to do: sleeps until the next interrupt, or only a moment. Called with interrupts
-    /// unmasked.
+    /// What a processor does that has nothing to do: sleeps until the next interrupt, or only a moment. Called with
+    /// interrupts unmasked.
     fn sleep();
 
     /// The end: sends these frames, waits until they are on the bus as far as the bus allows, says why, and stops or
@@ -103,7 +103,7 @@ pub trait SlotTimer {
     /// Takes the interrupt back and returns how long ago the slot began, ticks of [`Clock`].
     fn acknowledge(&mut self) -> u32;
 
-    /// Whether the next slot has already begun.
+    /// True if the next slot has already begun.
     fn is_due(&self) -> bool;
 }
 

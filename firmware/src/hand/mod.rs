@@ -1,5 +1,5 @@
-//! The hand alone, in fixed point: the halves of the crate `hand` in the tasks of [`crate::application`], without a log and without
-//! storage. The library lives in memory.
+//! The hand alone, in fixed point: the halves of the crate `hand` in the tasks of [`crate::application`], without a log
+//! and without storage. The library lives in memory.
 
 use core::mem::MaybeUninit;
 
@@ -32,8 +32,8 @@ struct Queues {
     events: Queue<Message, EVENTS>,
 }
 
-/// Everything that lives as long as the image: put it into a static. [`start`] fills it where it is, because no task should
-/// run above a stack on which the halves were made.
+/// Everything that lives as long as the image: put it into a static. [`start`] fills it where it is, because no task
+/// should run above a stack on which the halves were made.
 pub struct Memory {
     queues: Queues,
     library: Library,

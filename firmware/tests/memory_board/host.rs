@@ -138,7 +138,7 @@ impl Host {
         *self.notes.0.borrow()
     }
 
-    /// Whether the device knows what it holds.
+    /// True if the device knows what it holds.
     pub(crate) fn is_library_open(&self) -> bool {
         self.session.0.borrow().store().is_open()
     }

@@ -1,4 +1,5 @@
-//! The application of the arm image on a third board, which is made of memory: the same code as in the images, on the host.
+//! The application of the arm image on a third board, which is made of memory: the same code as in the images, on the
+//! host.
 
 mod board;
 mod host;

@@ -88,9 +88,7 @@ impl<R: Real> Monitor<R> {
             Some(Fault::JointLimit)
         } else if law == State::Run && seen.wrench_lost {
             Some(Fault::WrenchLost)
-        } else if law == State::Run && seen.lag.0 > R::of(TRACKING_LIMIT) {
-            Some(Fault::TrackingError)
-        } else if law == State::Run && seen.lag.1 > R::of(LAG_LIMIT) {
+        } else if law == State::Run && (seen.lag.0 > R::of(TRACKING_LIMIT) || seen.lag.1 > R::of(LAG_LIMIT)) {
             Some(Fault::TrackingError)
         } else if state.dq.0.iter().zip(&self.speed_limit).any(|(dq, limit)| *dq > *limit || *dq < -*limit) {
             Some(Fault::JointSpeed)

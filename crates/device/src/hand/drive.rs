@@ -1,8 +1,8 @@
-//! Whether the hand's motors take torque: MODE of its four pucks.
+//! True if the hand's motors take torque: MODE of its four pucks.
 //!
-//! Nobody but us sets the mode of a hand puck. TORQUE is entered before the first torque frame and left when none has come
-//! for some cycles: then the worm drives hold the fingers without current. A puck keeps its last torque until it hears
-//! another or leaves TORQUE, so the first cycle without a torque sends zeros.
+//! Nobody but us sets the mode of a hand puck. TORQUE is entered before the first torque frame and left when none has
+//! come for some cycles: then the worm drives hold the fingers without current. A puck keeps its last torque until it
+//! hears another or leaves TORQUE, so the first cycle without a torque sends zeros.
 
 use puck::{CanFrame, Group, MotorMode, Node, PropertyId, PuckTorque, packed_torques, set};
 

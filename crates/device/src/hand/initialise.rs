@@ -1,8 +1,8 @@
 //! The initialisation of the hand (HI): its digits drive to their open stops and count from there.
 //!
-//! Fingers first, then the spread; meanwhile the hand hears nothing but GET MODE, for any other request can break it off.
-//! Whether something has, for example the safety module's own broadcast of MODE, shows in the positions: they must be zero.
-//! Afterwards no digit ends a torque because it stalls (TSTOP 0): a grasp is a stall.
+//! Fingers first, then the spread; meanwhile the hand hears nothing but GET MODE, for any other request can break it
+//! off. True if something has, for example the safety module's own broadcast of MODE, shows in the positions: they must
+//! be zero. Afterwards no digit ends a torque because it stalls (TSTOP 0): a grasp is a stall.
 
 use puck::hand::HandCommand;
 use puck::{Counts, Group, MotorMode, Node, PropertyId, get, set};
@@ -20,8 +20,8 @@ const LISTEN_US: u64 = 20_000;
 const LIMIT_US: u64 = 10_000_000;
 /// Looks in a row that a digit may leave unanswered.
 const SILENT_POLLS: u8 = 5;
-/// How far a digit may stand from zero after its initialisation, counts: 0.025 rad of a finger, 0.18 rad of the spread, whose
-/// brake is soft. What an uninitialised puck counts from is anything.
+/// How far a digit may stand from zero after its initialisation, counts: 0.025 rad of a finger, 0.18 rad of the spread,
+/// whose brake is soft. What an uninitialised puck counts from is anything.
 const ZERO_TOLERANCE: i32 = 2000;
 /// How often a setting is written, and positions are asked for, before they count as not taken, or missing.
 const ATTEMPTS: u8 = 3;
@@ -34,7 +34,7 @@ enum Digits {
 }
 
 impl Digits {
-    /// Whether a digit (0 to 3) belongs to them.
+    /// True if a digit (0 to 3) belongs to them.
     const fn contains(self, digit: usize) -> bool {
         match self {
             Digits::Fingers => digit < Node::FINGERS.len(),

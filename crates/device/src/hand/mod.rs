@@ -1,7 +1,7 @@
 //! The hand on the bus: from four woken pucks to a sample and a torque frame in every control cycle.
 //!
-//! A hand is optional: whatever is wrong with it is told and leaves the arm alone. Its fingers move only when a person has
-//! asked for the initialisation, and after that only by the torques of the control cycle.
+//! A hand is optional: whatever is wrong with it is told and leaves the arm alone. Its fingers move only when a person
+//! has asked for the initialisation, and after that only by the torques of the control cycle.
 //!
 //! | stage | what goes to the hand |
 //! |---|---|
@@ -124,7 +124,7 @@ impl Hand {
         }
     }
 
-    /// Whether its pucks may be asked for MODE and TEMP.
+    /// True if its pucks may be asked for MODE and TEMP.
     pub(crate) fn answers_questions(&self) -> bool {
         matches!(self.stage, HandStage::NotInitialised | HandStage::Ready)
     }

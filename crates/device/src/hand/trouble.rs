@@ -54,7 +54,8 @@ impl HandTrouble {
         HandTrouble::NotZeroed,
     ];
 
-    /// Puck and reason as one number: the node in the low eight bits, the code above. The detail of `link::EventKind::Hand`.
+    /// Puck and reason as one number: the node in the low eight bits, the code above. The detail of
+    /// `link::EventKind::Hand`.
     pub const fn number(self, node: Node) -> u32 {
         node.number() as u32 | (self as u32) << 8
     }

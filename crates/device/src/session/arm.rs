@@ -23,8 +23,8 @@ use crate::store::{Store, StoreError};
 pub type Session<S> = HostSession<ArmApplication<S>>;
 
 impl<S: Store> Session<S> {
-    /// Makes a session without a host in its place. Reads the store. Until the control half knows what is mounted, primitives are
-    /// checked against an arm with sensor and hand.
+    /// Makes a session without a host in its place. Reads the store. Until the control half knows what is mounted,
+    /// primitives are checked against an arm with sensor and hand.
     pub fn init(identity: Identity, store: S) -> impl Init<Self> {
         HostSession::over(identity, ArmApplication::init(store))
     }
@@ -83,8 +83,8 @@ impl<S: Store> ArmApplication<S> {
         }
     }
 
-    /// Hands the primitive that has just been checked to the control half, so that its run need not be waited for. Where that cannot be
-    /// done now, the run does it.
+    /// Hands the primitive that has just been checked to the control half, so that its run need not be waited for.
+    /// Where that cannot be done now, the run does it.
     pub(super) fn preload(&mut self, slot: u8, calm: bool, port: &mut impl SessionPort<DeviceController>) {
         let Some(entry) = self.directory.get(slot).cloned() else { return };
         let health = port.health();
@@ -156,7 +156,8 @@ impl<S: Store> ArmApplication<S> {
         let image = match PrimitiveImage::parse(bytes) {
             Ok(image) => image,
             Err(ImageError::Crc { computed, stored }) => {
-                // Arrived as announced, the image was wrong when it left: then its own check sum is the one that differs.
+                // Arrived as announced, the image was wrong when it left: then its own check sum is the one that
+                // differs.
                 let expected = if computed == crc { stored } else { crc };
                 return Err((Refusal::UploadCrc, [computed, expected]));
             }

@@ -34,7 +34,7 @@ impl Entry {
         }
     }
 
-    /// Whether both are the same image, byte for byte.
+    /// True if both are the same image, byte for byte.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         (&self.name, self.length, self.crc) == (&other.name, other.length, other.crc)
     }

@@ -44,7 +44,8 @@ pub struct Identity {
 
 /// The device's end of the link.
 ///
-/// That of an arm takes about 35 kB beside the store; [`crate::RamStore`] should be a static of its own, lent as `&mut`.
+/// That of an arm takes about 35 kB beside the store; [`crate::RamStore`] should be a static of its own, lent as
+/// `&mut`.
 #[derive(Debug)]
 pub struct HostSession<A: Application> {
     pub(super) identity: Identity,
@@ -213,8 +214,8 @@ impl<A: Application> HostSession<A> {
         }
     }
 
-    /// Stops a motion whose host has fallen silent or gone, and ends its session: what it says next may be stale. False if the stop
-    /// found no room: nothing else may happen before it has.
+    /// Stops a motion whose host has fallen silent or gone, and ends its session: what it says next may be stale. False
+    /// if the stop found no room: nothing else may happen before it has.
     fn watch_host(&mut self, now_ms: u32, port: &mut impl SessionPort<A::Controller>) -> bool {
         let silence = self.owner.as_ref().map(|owner| owner.silence(now_ms));
         if silence.is_some_and(|silence| silence < LINK_TIMEOUT_MS) {

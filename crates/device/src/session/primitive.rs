@@ -51,8 +51,8 @@ impl From<Unfit> for Refused {
     }
 }
 
-/// Makes `primitive` that of the content, in place (it has 23 kB, the stack has 64), and checks it against the arm: last, so that
-/// nothing can change between the check and the copy that its result allows.
+/// Makes `primitive` that of the content, in place (it has 23 kB, the stack has 64), and checks it against the arm:
+/// last, so that nothing can change between the check and the copy that its result allows.
 ///
 /// # Errors
 /// [`Unfit`]; what `primitive` holds then is of no use.

@@ -52,8 +52,8 @@ impl<A: Application> HostSession<A> {
         self.owner.as_ref().is_some_and(|owner| owner.session() == session)
     }
 
-    /// A stop only ever takes motion away: it is honoured whoever sends it, without a hello, under another host's session and in
-    /// none. Repeating it stops again, so nothing is remembered of it.
+    /// A stop only ever takes motion away: it is honoured whoever sends it, without a hello, under another host's
+    /// session and in none. Repeating it stops again, so nothing is remembered of it.
     fn stop_for_other_host(&mut self, now_ms: u32, session: u16, of: u16, port: &mut impl SessionPort<A::Controller>) {
         let requester = Requester::OtherHost { session, of };
         if let Err(refused) = self.send_command(now_ms, requester, A::Controller::STOP, port) {

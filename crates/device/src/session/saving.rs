@@ -8,8 +8,8 @@ use crate::session::arm::ArmApplication;
 use crate::session::directory::{Directory, Entry};
 use crate::store::{Store, StoreError};
 
-/// For how long after start-up a hello waits for the store to be open, ms. Reading a flash in order takes a tenth of it; one
-/// that must first be repaired takes seconds, and then the host is told so instead of waiting.
+/// For how long after start-up a hello waits for the store to be open, ms. Reading a flash in order takes a tenth of
+/// it; one that must first be repaired takes seconds, and then the host is told so instead of waiting.
 const OPENING_TIMEOUT_MS: u32 = 1000;
 
 /// What changes.

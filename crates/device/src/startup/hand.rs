@@ -43,12 +43,12 @@ impl Survey {
         Node::HAND.into_iter().filter(|node| self.is_present(*node)).count()
     }
 
-    /// Whether any puck of a hand answered.
+    /// True if any puck of a hand answered.
     pub(super) fn has_digits(&self) -> bool {
         self.digits() > 0
     }
 
-    /// Whether some pucks of a hand answered and others did not, or not yet.
+    /// True if some pucks of a hand answered and others did not, or not yet.
     pub(super) fn hand_is_partial(&self) -> bool {
         !matches!(self.digits(), 0 | 4)
     }

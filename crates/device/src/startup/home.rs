@@ -11,8 +11,8 @@ use crate::command::Refusal;
 /// The counts of the seven motors at `home` (rad).
 ///
 /// # Errors
-/// [`Refusal::HomeOutOfRange`] with the joint whose angle is not a number or out of reach, or whose motor would leave the
-/// 22 bits of the bus.
+/// [`Refusal::HomeOutOfRange`] with the joint whose angle is not a number or out of reach, or whose motor would leave
+/// the 22 bits of the bus.
 pub(crate) fn home_counts(calibration: &Calibration<f32>, home: &[f32; 7]) -> Result<[Counts; 7], Refusal> {
     for (joint, angle) in (0_u8..).zip(home) {
         if !reach(joint.into()).contains(angle) {

@@ -1,7 +1,7 @@
 //! The pauses that Barrett's devices need between frames, measured in device time.
 //!
-//! A puck acknowledges no SET and drops some that follow each other too closely; a puck that wakes disturbs the bus. The
-//! rules live at the single point through which every frame of the start-up leaves, not in the steps.
+//! A puck acknowledges no SET and drops some that follow each other too closely; a puck that wakes disturbs the bus.
+//! The rules live at the single point through which every frame of the start-up leaves, not in the steps.
 
 use puck::{Action, CanFrame, Destination, Node, PropertyId, Request};
 
@@ -20,12 +20,12 @@ pub(crate) struct Pacer {
     wake: Option<u64>,
 }
 
-/// Whether `gap` has passed since `last`.
+/// True if `gap` has passed since `last`.
 fn passed(last: Option<u64>, gap: u64, now_us: u64) -> bool {
     last.is_none_or(|last| now_us.saturating_sub(last) >= gap)
 }
 
-/// Whether a frame is a SET to the safety module, and whether it is a wake.
+/// True if a frame is a SET to the safety module, and whether it is a wake.
 fn kind(frame: &CanFrame) -> (bool, bool) {
     match Request::decode(frame) {
         Ok(Request { to, action: Action::Set { property, .. }, .. }) => {
@@ -36,7 +36,7 @@ fn kind(frame: &CanFrame) -> (bool, bool) {
 }
 
 impl Pacer {
-    /// Whether this frame may leave now.
+    /// True if this frame may leave now.
     pub(crate) fn permits(&self, frame: &CanFrame, now_us: u64) -> bool {
         let (safety, wake) = kind(frame);
         passed(self.frame, FRAME_GAP_US, now_us)
@@ -44,7 +44,7 @@ impl Pacer {
             && (!wake || passed(self.wake, WAKE_GAP_US, now_us))
     }
 
-    /// Whether this frame may leave now although others leave in the same slot, as in the cyclic loop.
+    /// True if this frame may leave now although others leave in the same slot, as in the cyclic loop.
     pub(crate) fn permits_in_cycle(&self, frame: &CanFrame, now_us: u64) -> bool {
         let (safety, _) = kind(frame);
         !safety || passed(self.safety, SAFETY_GAP_US, now_us)

@@ -1,8 +1,9 @@
 //! The state machine of the start-up: which frame comes next, and what its answer means.
 //!
-//! Zero torque and IDLE to everything come first. Then the order is that of Barrett's library and drivers: enumerate, reload the limits of the safety module, wait for IDLE,
-//! enumerate again (the pucks have power only now), wake, verify, read, zero, tare, one position read, then the cyclic loop.
-//! Each step sends through an outlet that may refuse (a pause is not over); it then simply tries again in the next slot.
+//! Zero torque and IDLE to everything come first. Then the order is that of Barrett's library and drivers: enumerate,
+//! reload the limits of the safety module, wait for IDLE, enumerate again (the pucks have power only now), wake,
+//! verify, read, zero, tare, one position read, then the cyclic loop. Each step sends through an outlet that may refuse
+//! (a pause is not over); it then simply tries again in the next slot.
 
 use control::Calibration;
 use puck::{Counts, Group, Node, PropertyId, Reply, force_torque, set};
@@ -30,7 +31,8 @@ pub(super) const ENUMERATED: core::ops::RangeInclusive<u8> = 1..=31;
 /// Where the start-up stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Step {
-    /// Take off what torque may still be applied: frames 0 and 1 zero torques, then MODE IDLE to the arm and to the hand.
+    /// Take off what torque may still be applied: frames 0 and 1 zero torques, then MODE IDLE to the arm and to the
+    /// hand.
     ZeroTorques { frame: u8 },
     /// Ask this node for its STAT.
     Enumerate { node: u8, powered: bool },
@@ -126,8 +128,8 @@ pub(super) enum ZeroRequest {
 }
 
 impl Startup {
-    /// Begins at the beginning. The first frames take off what torque may still be applied: pucks keep the last torque they
-    /// were sent, and a board that was reset does not know whether its arm is ACTIVE.
+    /// Begins at the beginning. The first frames take off what torque may still be applied: pucks keep the last torque
+    /// they were sent, and a board that was reset does not know whether its arm is ACTIVE.
     pub(crate) fn new() -> Startup {
         Startup {
             step: Step::ZeroTorques { frame: 0 },
@@ -173,7 +175,7 @@ impl Startup {
         }
     }
 
-    /// Whether the cyclic loop has the bus.
+    /// True if the cyclic loop has the bus.
     pub(crate) fn is_done(&self) -> bool {
         self.step == Step::Done
     }
@@ -183,7 +185,7 @@ impl Startup {
         self.error
     }
 
-    /// Whether the safety module says that positions count from a known pose.
+    /// True if the safety module says that positions count from a known pose.
     pub(crate) fn is_zeroed(&self) -> bool {
         self.zeroed
     }
@@ -203,7 +205,7 @@ impl Startup {
         self.safety.as_ref()
     }
 
-    /// Whether a force/torque sensor answered.
+    /// True if a force/torque sensor answered.
     pub(crate) fn has_sensor(&self) -> bool {
         self.survey.is_present(Node::FORCE_TORQUE)
     }

@@ -44,7 +44,7 @@ pub(crate) struct SafetyProperties {
     pub(crate) zero: PropertyId,
     pub(crate) ignore_faults: PropertyId,
     pub(crate) pendant: PropertyId,
-    /// Whether MODE may be written (to a lower one): from VERS 197.
+    /// True if MODE may be written (to a lower one): from VERS 197.
     pub(crate) mode_is_writable: bool,
 }
 
@@ -114,7 +114,7 @@ impl Survey {
         self.entry(node).version = Some(version);
     }
 
-    /// Whether the node answered in the latest enumeration.
+    /// True if the node answered in the latest enumeration.
     pub(crate) fn is_present(&self, node: Node) -> bool {
         self.seen(node).status.is_some()
     }

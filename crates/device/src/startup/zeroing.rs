@@ -10,8 +10,8 @@ use crate::command::Refusal;
 
 /// How long the seven replies to one position request may take, us.
 const POSITIONS_US: u64 = 10_000;
-/// How far a puck may stand from the position just written, counts (0.3 rad of a motor, 7 mrad of J1): a braked arm sinks a
-/// little between the write and the read.
+/// How far a puck may stand from the position just written, counts (0.3 rad of a motor, 7 mrad of J1): a braked arm
+/// sinks a little between the write and the read.
 const ZERO_TOLERANCE: i32 = 200;
 
 impl Startup {
@@ -34,7 +34,7 @@ impl Startup {
         Ok(())
     }
 
-    /// Whether a command to zero the arm has no answer yet.
+    /// True if a command to zero the arm has no answer yet.
     pub(crate) fn is_zero_pending(&self) -> bool {
         self.zero_request == ZeroRequest::Pending
     }

@@ -1,8 +1,10 @@
-//! The journal of erases: two sectors in which every erase is announced before it begins and ticked off when it is over.
+//! The journal of erases: two sectors in which every erase is announced before it begins and ticked off when it is
+//! over.
 //!
-//! An erase that power fails in leaves a sector in any state, also one that looks whole. Only a note elsewhere can tell.
-//! The notes carry a running number and a check sum; the one with the highest number counts. When one sector is full the
-//! other is erased and written on: should power fail in *that* erase, what it leaves has lower numbers and does no harm.
+//! An erase that power fails in leaves a sector in any state, also one that looks whole. Only a note elsewhere can
+//! tell. The notes carry a running number and a check sum; the one with the highest number counts. When one sector is
+//! full the other is erased and written on: should power fail in *that* erase, what it leaves has lower numbers and
+//! does no harm.
 
 use embedded_storage_async::nor_flash::NorFlash;
 use link::frame::CRC;
@@ -77,8 +79,8 @@ impl Journal {
         }))
     }
 
-    /// Begins a journal, on sectors that are `blank` or must be erased first, and says that the region is ours; twice, as one
-    /// damaged word must not cost the library.
+    /// Begins a journal, on sectors that are `blank` or must be erased first, and says that the region is ours; twice,
+    /// as one damaged word must not cost the library.
     pub(super) async fn create<F: NorFlash>(flash: &mut F, base: u32, blank: bool) -> Result<Self, F::Error> {
         if !blank {
             flash.erase(base, base + SECTORS * sector_bytes::<F>()).await?;

@@ -1,9 +1,9 @@
 //! A flash whose erases are done or not done: what the log above needs and no flash gives.
 //!
-//! `sequential-storage` trusts two things that a power failure can break. That a sector whose erase was interrupted shows
-//! it: here the [`Journal`] knows, and the erase is repeated before anybody reads. And that a marker word at the edge of a
-//! sector is read the same every time: here a marker counts as written as soon as one bit of it is, because half a
-//! marker can be neither trusted nor written again.
+//! `sequential-storage` trusts two things that a power failure can break. That a sector whose erase was interrupted
+//! shows it: here the [`Journal`] knows, and the erase is repeated before anybody reads. And that a marker word at the
+//! edge of a sector is read the same every time: here a marker counts as written as soon as one bit of it is, because
+//! half a marker can be neither trusted nor written again.
 
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 
@@ -82,7 +82,7 @@ impl<F: NorFlash> JournaledFlash<F> {
         Ok(())
     }
 
-    /// Whether these bytes are at a marker word, the first or last of a sector.
+    /// True if these bytes are at a marker word, the first or last of a sector.
     fn is_marker(offset: u32, length: usize) -> bool {
         let word = F::WRITE_SIZE.max(F::READ_SIZE);
         let (start, end) = (offset as usize % F::ERASE_SIZE, offset as usize % F::ERASE_SIZE + length);

@@ -63,8 +63,8 @@ pub trait LibraryAccess {
     fn settle(&mut self, outcome: Result<(), StoreError>);
 }
 
-/// Opens the library on this flash and makes its changes durable, for ever. Poll it when nothing else is to be done, again after
-/// every interrupt: it waits for the flash and for work by being pending, and wakes nobody.
+/// Opens the library on this flash and makes its changes durable, for ever. Poll it when nothing else is to be done,
+/// again after every interrupt: it waits for the flash and for work by being pending, and wakes nobody.
 pub async fn keep<F: NorFlash, D: LibraryAccess, const IMAGE: usize, const VALUE: usize>(
     flash: F,
     room: &mut Scratch<IMAGE, VALUE>,
@@ -130,7 +130,8 @@ async fn open<F: NorFlash, D: LibraryAccess>(flash: F, value: &mut [u8], desk: &
     Some((log, opening))
 }
 
-/// Tells the library every image; the last one of a place counts. Returns the number of places that hold one, and the home.
+/// Tells the library every image; the last one of a place counts. Returns the number of places that hold one, and the
+/// home.
 async fn read_all<F: NorFlash, D: LibraryAccess>(
     log: &mut Log<F>,
     value: &mut [u8],

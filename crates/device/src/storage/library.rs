@@ -22,7 +22,7 @@ pub enum Work {
 }
 
 impl Work {
-    /// Whether it is about the home, and about no place.
+    /// True if it is about the home, and about no place.
     fn is_of_home(self) -> bool {
         let (Self::Save { slot, .. } | Self::Delete { slot }) = self;
         slot == HOME_KEY
@@ -142,7 +142,7 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         Ok(())
     }
 
-    /// Whether the image being written is on its way to the flash.
+    /// True if the image being written is on its way to the flash.
     fn is_saving(&self) -> bool {
         match self.job {
             Job::Asked(work) | Job::Taken(work) => matches!(work, Work::Save { .. }) && !work.is_of_home(),

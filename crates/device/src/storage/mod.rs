@@ -7,8 +7,8 @@
 //!
 //! The session works with the [`Library`] in memory. What it changes there is a job for [`keep`], the one task that
 //! touches the flash: it runs when nothing else does, waits as long as the flash likes, and tells the library when the
-//! change is durable; only then the host is answered. The flash holds a log of `sequential-storage`: the newest value of
-//! a key counts, an older one goes only when its sector is needed and all that still counts has been copied. Layout,
+//! change is durable; only then the host is answered. The flash holds a log of `sequential-storage`: the newest value
+//! of a key counts, an older one goes only when its sector is needed and all that still counts has been copied. Layout,
 //! guarantees and measurements: `docs/storage.md`.
 
 mod journal;

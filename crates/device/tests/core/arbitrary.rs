@@ -1,4 +1,5 @@
-//! A6, C2: whatever comes over the bus and from people, in whatever order, the core neither panics nor sends torque early.
+//! A6, C2: whatever comes over the bus and from people, in whatever order, the core neither panics nor sends torque
+//! early.
 
 use control::Command as Control;
 use device::{Command, Controller, DeviceController, Stage};
@@ -120,8 +121,9 @@ fn happen(core: &mut DeviceController, bus: &mut Bus, happening: &Happening) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// The double panics on any request that no master may send (setting TORQUE, pulling the emergency stop, zeroing under
-    /// torque, malformed frames, disturbing a hand that is initialised, driving one that never was), so this is a test of both directions.
+    /// The double panics on any request that no master may send (setting TORQUE, pulling the emergency stop, zeroing
+    /// under torque, malformed frames, disturbing a hand that is initialised, driving one that never was), so this is a
+    /// test of both directions.
     #[test]
     fn c2_torque_needs_a_whole_start_up_and_a_command(
         hand in any::<bool>(),

@@ -1,7 +1,7 @@
 //! What a control cycle costs on the bus, with every stuff bit there can be: summed, and played through bit by bit.
 //!
-//! A standard frame of n data bytes has 47 + 8 n bits with the three bits behind it, and at worst one stuff bit for every
-//! four bits after the first of the 34 + 8 n bits in which stuffing happens. One bit takes a microsecond.
+//! A standard frame of n data bytes has 47 + 8 n bits with the three bits behind it, and at worst one stuff bit for
+//! every four bits after the first of the 34 + 8 n bits in which stuffing happens. One bit takes a microsecond.
 
 use std::collections::BTreeMap;
 
@@ -43,8 +43,8 @@ fn jobs(bus: &Bus, log_begin: usize, answers_begin: usize, begin_us: u64) -> Vec
         .iter()
         .map(|(time, frame)| Job { ready_us: (time - begin_us) as f64, answers: None, frame: *frame })
         .collect();
-    // Requests of one slot are answered in the order they were sent; which answers belong to which is told by their group
-    // (3 positions, 6 properties, 10 and 11 the sensor) and their sender.
+    // Requests of one slot are answered in the order they were sent; which answers belong to which is told by their
+    // group (3 positions, 6 properties, 10 and 11 the sensor) and their sender.
     let requests = jobs.clone();
     for (time, frame) in &bus.answers[answers_begin..] {
         let sender = frame.can_id().sender().number();
@@ -70,7 +70,8 @@ fn jobs(bus: &Bus, log_begin: usize, answers_begin: usize, begin_us: u64) -> Vec
     jobs
 }
 
-/// Plays the cycle on the wire: whenever it is free the lowest identifier that is ready goes. When the last frame ends, us.
+/// Plays the cycle on the wire: whenever it is free the lowest identifier that is ready goes. When the last frame ends,
+/// us.
 fn played(jobs: &[Job]) -> f64 {
     let mut ends: Vec<Option<f64>> = vec![None; jobs.len()];
     let mut free = 0.0_f64;

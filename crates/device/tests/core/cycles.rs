@@ -29,8 +29,8 @@ fn torque_needs_an_active_arm_and_a_command() {
     bus.run(&mut core, 1.0);
     assert_eq!(core.stage(), Stage::Ready);
     assert!(!has_torque(&bus, 0), "active, but nobody has commanded anything");
-    // Both zero frames of every cycle were sent all the same: a puck keeps its last torque until it hears another. So were
-    // the two with which the start-up begins.
+    // Both zero frames of every cycle were sent all the same: a puck keeps its last torque until it hears another. So
+    // were the two with which the start-up begins.
     let cycles = core.health().counters.cycles as usize;
     assert_eq!(bus.torques_since(0).count(), (cycles + 1) * 8);
 

@@ -197,7 +197,8 @@ impl Digit {
                 self.working_until = Some(now_us + self.work_us);
             }
             Some(Property::Mode) => {
-                // Not the one that ends an initialisation: a new start of the bus asks it again, and must not be blamed.
+                // Not the one that ends an initialisation: a new start of the bus asks it again, and must not be
+                // blamed.
                 if self.lose_modes > 0 && self.working_until.is_none() {
                     self.lose_modes -= 1;
                     return;

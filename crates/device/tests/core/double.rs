@@ -1,5 +1,5 @@
-//! A small double of the arm's bus: seven pucks, a force/torque sensor, a safety module and perhaps a hand, spoken to in
-//! frames.
+//! A small double of the arm's bus: seven pucks, a force/torque sensor, a safety module and perhaps a hand, spoken to
+//! in frames.
 //!
 //! It answers as docs/barrett-can.md says that devices answer, through the device side of the `puck` crate, and logs
 //! every frame with its time. There is no arbitration and no physics: an arm of this double stands still.
@@ -532,5 +532,5 @@ pub(crate) fn floating() -> (Box<DeviceController>, Bus) {
     (core, bus)
 }
 
-/// Whether the group's members are the whole arm.
+/// True if the group's members are the whole arm.
 pub(crate) const ARM: Destination = Destination::Group(Group::ARM);

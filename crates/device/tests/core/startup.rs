@@ -28,7 +28,8 @@ fn stages(bus: &Bus) -> Vec<Stage> {
 /// The pauses that Barrett's devices need, checked on everything that was sent before the cyclic loop.
 fn assert_pauses(bus: &Bus) {
     let loop_begins = bus.records.first().map_or(bus.log.len(), |_| {
-        // The cyclic loop begins with the first request for a wrench, or with torque behind that of the first two frames.
+        // The cyclic loop begins with the first request for a wrench, or with torque behind that of the first two
+        // frames.
         let begins = |frame: &puck::CanFrame| {
             matches!(
                 Request::decode(frame).expect("a request").action,

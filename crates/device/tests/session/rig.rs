@@ -32,7 +32,7 @@ pub(crate) struct Bench {
     pub(crate) room: usize,
     /// Commands that have reached the control half.
     pub(crate) commands: Vec<Command>,
-    /// Whether the queue of commands is full.
+    /// True if the queue of commands is full.
     pub(crate) stuck: bool,
     /// Events waiting for the session.
     pub(crate) events: VecDeque<Event>,

@@ -72,8 +72,8 @@ pub(crate) fn image(number: u8) -> Vec<u8> {
     (0..length).map(|place| number ^ (place as u8).wrapping_mul(31)).collect()
 }
 
-/// Starts the device on this flash, has it fulfil the wishes one after the other, and gives its library and the answers.
-/// `None` in place of an answer: power failed before it came.
+/// Starts the device on this flash, has it fulfil the wishes one after the other, and gives its library and the
+/// answers. `None` in place of an answer: power failed before it came.
 pub(crate) fn run<const SLOTS: usize, F: NorFlash>(
     flash: F,
     wishes: &[Wish],

@@ -78,8 +78,8 @@ fn erases_of(before: &[u8], wish: Wish, operations: u64) -> Vec<u64> {
     found
 }
 
-/// Fulfils `wish` with power failing at each of its operations, then starts again, with power failing at each operation of
-/// that start too. Returns how many cuts were tried.
+/// Fulfils `wish` with power failing at each of its operations, then starts again, with power failing at each operation
+/// of that start too. Returns how many cuts were tried.
 fn cut_everywhere(before: &[u8], wish: Wish) -> usize {
     let old = found(&chip(before));
     let mut new = old;
@@ -149,8 +149,8 @@ fn cut_the_start(torn: &[u8], old: Content, new: Content, first: u64, operations
     usize::try_from(operations).expect("few")
 }
 
-/// A flash that has been written all around, so that the next image needs a sector that still holds images: places 0, 1, 2
-/// with images 40, 41, 42 of which the oldest stands in the sector to be emptied, as does the home, 7.
+/// A flash that has been written all around, so that the next image needs a sector that still holds images: places 0,
+/// 1, 2 with images 40, 41, 42 of which the oldest stands in the sector to be emptied, as does the home, 7.
 fn crowded() -> Vec<u8> {
     let blank = vec![0xFF; sim::flash::FLASH_BYTES];
     let mut before = after(&blank, &[Wish::Home(7), Wish::Save(0, 40), Wish::Save(1, 41), Wish::Save(2, 42)]);
@@ -197,7 +197,8 @@ fn power_fails_at_every_operation_of_a_delete_that_needs_an_erase_and_the_image_
     assert!(cuts > 500, "{cuts} cuts: no sector was emptied");
 }
 
-/// A crowded flash in which what is left of the sector is filled with small images, until this wish would need an erase.
+/// A crowded flash in which what is left of the sector is filled with small images, until this wish would need an
+/// erase.
 fn full_for(wish: Wish) -> Vec<u8> {
     let mut before = crowded();
     loop {

@@ -86,7 +86,7 @@ impl SessionPort<DeviceController> for Port<'_> {
     }
 }
 
-/// Whether a frame that is through at this time is lost.
+/// True if a frame that is through at this time is lost.
 type Loss = Box<dyn FnMut(&CanFrame, u64) -> bool>;
 
 /// A hello that fits.
@@ -245,7 +245,8 @@ impl Rig {
         self.heard.iter().find(|reply| reply.answers() == Some(OF)).expect("an answer").clone()
     }
 
-    /// The host says its last word. Another one says hello just when the half second has passed in which the first was silent.
+    /// The host says its last word. Another one says hello just when the half second has passed in which the first was
+    /// silent.
     pub(crate) fn change_hosts(&mut self) {
         self.alive = false;
         let milliseconds = |rig: &Rig| (rig.ticks / TICKS_PER_MICROSECOND / 1000) as u32;

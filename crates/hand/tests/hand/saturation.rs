@@ -1,4 +1,5 @@
-//! A million random inputs, extreme ones among them: nothing wraps, nothing panics. Wrapping is looked for with a wide-integer oracle.
+//! A million random inputs, extreme ones among them: nothing wraps, nothing panics. Wrapping is looked for with a
+//! wide-integer oracle.
 
 use control::HandSample;
 use dmp::Scalar;
@@ -89,7 +90,8 @@ fn a_million_random_samples_and_references_leave_every_torque_within_its_limit()
 
 #[test]
 fn a_torque_points_where_wide_arithmetic_says_whatever_the_error() {
-    // The law of a digit without force, in f64, cut to the range of the numbers: where it saturates, the sign must hold.
+    // The law of a digit without force, in f64, cut to the range of the numbers: where it saturates, the sign must
+    // hold.
     let mut random = Random(3);
     for _ in 0..CASES {
         let (q, q_d) = (any(&mut random), any(&mut random));

@@ -1,8 +1,8 @@
 //! QEMU's `mps2-an500` (Cortex-M7) with a CAN controller and a host link that live in the simulator.
 //!
 //! The machine has no CAN controller. What would be silicon on a real board is here an interrupt above all others
-//! (`can`), which exchanges frames with the simulator in lock step by semihosting (`lockstep`): virtual time stands still
-//! while the simulator computes, and frames arrive at exact virtual times. The address map and the lines of the
+//! (`can`), which exchanges frames with the simulator in lock step by semihosting (`lockstep`): virtual time stands
+//! still while the simulator computes, and frames arrive at exact virtual times. The address map and the lines of the
 //! peripherals are those of Arm's application notes AN385 and AN500, as QEMU models them.
 
 mod can;
@@ -60,9 +60,10 @@ impl super::Board for SelectedBoard {
     }
 
     fn sleep() {
-        // QEMU's other thread moves virtual time on to the next timer as soon as the core is halted. On a busy machine it may do so
-        // before the core's thread has accounted for what it executed since it last looked at the time, by which the timer then
-        // is late. So the core looks at the time right before it halts; masked, so that no task comes between the two.
+        // QEMU's other thread moves virtual time on to the next timer as soon as the core is halted. On a busy machine
+        // it may do so before the core's thread has accounted for what it executed since it last looked at the time, by
+        // which the timer then is late. So the core looks at the time right before it halts; masked, so that no task
+        // comes between the two.
         #[cfg(feature = "wfi")]
         cortex_m::interrupt::free(|_| {
             clock::synchronise();

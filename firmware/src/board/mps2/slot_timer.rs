@@ -5,11 +5,12 @@ use device::time::{CYCLE_SLOTS, SLOT_HZ};
 use super::clock;
 use super::device::{PERIPHERAL_HZ, TIMER0, Timer};
 
-/// Ticks of one slot, rounded to the nearest: 27 778 at 900 Hz, so a control cycle takes 83 334 ticks = 3.333 36 ms (299.998 Hz).
+/// Ticks of one slot, rounded to the nearest: 27 778 at 900 Hz, so a control cycle takes 83 334 ticks = 3.333 36 ms
+/// (299.998 Hz).
 const PERIOD: u32 = (PERIPHERAL_HZ + SLOT_HZ / 2) / SLOT_HZ;
 
-/// The first slot comes this many periods after reset, or whole cycles later: however long start-up takes, the slots of two
-/// images lie on one grid, the same as those of the simulator's own device (`docs/lockstep.md`).
+/// The first slot comes this many periods after reset, or whole cycles later: however long start-up takes, the slots of
+/// two images lie on one grid, the same as those of the simulator's own device (`docs/lockstep.md`).
 const FIRST_SLOT: u64 = 10;
 
 /// The timer that makes slots.

@@ -83,21 +83,21 @@ impl MessageMemory {
     }
 }
 
-/// The arm's bus. Receive: 32 frames, more than the 24 of the shortest that fit into a slot of 1.11 ms, while `CAN_RECEIVE`
-/// waits for the control slot for at most half of that. Transmit: 8 frames, all that a cycle sends (questions, torques of
-/// arm, wrist and hand, one slow question), so the controller never waits for software within a cycle; no more, because
-/// what waits there cannot be taken back for a newer torque.
+/// The arm's bus. Receive: 32 frames, more than the 24 of the shortest that fit into a slot of 1.11 ms, while
+/// `CAN_RECEIVE` waits for the control slot for at most half of that. Transmit: 8 frames, all that a cycle sends
+/// (questions, torques of arm, wrist and hand, one slow question), so the controller never waits for software within a
+/// cycle; no more, because what waits there cannot be taken back for a newer torque.
 pub const ARM: MessageMemory = MessageMemory::from(0, filters::ARM_ELEMENTS as u32, 32, 8);
 
 /// The host's bus. Receive: 64 frames, 7 ms of a full line; the session fetches them every 1.1 ms. Transmit: 32 frames,
 /// 3.5 ms of a full line, so that the line stays busy between two visits of the session.
 pub const HOST: MessageMemory = MessageMemory::from(ARM.end(), filters::HOST_ELEMENTS as u32, 64, 32);
 
-/// First revision of the chip (REV_ID) on which both controllers may run: before it (revisions Z, Y, W) the processor may
-/// read wrong words from the message memory while both are active (errata sheet ES0392, 2.24.2).
+/// First revision of the chip (REV_ID) on which both controllers may run: before it (revisions Z, Y, W) the processor
+/// may read wrong words from the message memory while both are active (errata sheet ES0392, 2.24.2).
 const FIRST_REVISION_FOR_BOTH: u16 = 0x2001;
 
-/// Whether a chip of this revision bears the host's bus beside the arm's.
+/// True if a chip of this revision bears the host's bus beside the arm's.
 #[must_use]
 pub const fn bears_both(revision: u16) -> bool {
     revision >= FIRST_REVISION_FOR_BOTH

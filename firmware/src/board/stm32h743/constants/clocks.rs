@@ -11,8 +11,8 @@
 /// wrong every rate below would be wrong by the same factor: bus, line and control.
 pub const HSE_HZ: u32 = 8_000_000;
 
-/// The chip's own RC oscillator, from which everything runs until the clock tree is set up, Hz; 1 % off at room temperature,
-/// so the bus cannot be driven by it.
+/// The chip's own RC oscillator, from which everything runs until the clock tree is set up, Hz; 1 % off at room
+/// temperature, so the bus cannot be driven by it.
 pub const HSI_HZ: u32 = 64_000_000;
 
 /// How long HSE may take before the light begins to blink, us: a clock that is there is ready within microseconds.
@@ -53,8 +53,8 @@ impl PhaseLockedLoop {
 }
 
 /// embassy-stm32 takes the medium oscillator (150 to 420 MHz) for every frequency up to this one, Hz. That oscillator
-/// wants a comparison at 1 to 2 MHz, and these loops compare at 8 MHz: one that stays below this may never lock, and the
-/// start-up would wait for it for ever.
+/// wants a comparison at 1 to 2 MHz, and these loops compare at 8 MHz: one that stays below this may never lock, and
+/// the start-up would wait for it for ever.
 pub const MEDIUM_OSCILLATOR_HZ_LIMIT: u32 = 420_000_000;
 
 /// Core and CAN.
@@ -99,8 +99,8 @@ pub const CAN_HZ: u32 = output(&PLL1, PLL1.q);
 /// Clock of the USB device, Hz: 48 MHz within 0.25 %, so from the crystal and not from an RC oscillator.
 pub const USB_HZ: u32 = output(&PLL3, PLL3.q);
 
-/// Kernel clock of the serial line to the ST-LINK, Hz: 48 MHz / 52 comes nearer to [`super::lines::BAUD`] than any whole
-/// fraction of [`APB_HZ`].
+/// Kernel clock of the serial line to the ST-LINK, Hz: 48 MHz / 52 comes nearer to [`super::lines::BAUD`] than any
+/// whole fraction of [`APB_HZ`].
 pub const UART_HZ: u32 = output(&PLL3, PLL3.q);
 
 /// The watchdog's own RC oscillator, Hz, nominal.

@@ -1,7 +1,7 @@
 //! Which identifiers each CAN controller lets through: everything else never costs the processor an instruction.
 //!
-//! Every identifier of the arm's bus is named, two a filter element, so the set is exact: 26 of 2048. Rejected are, among
-//! others, the safety module's broadcasts to the pucks (0x540), other hosts' questions, and nodes no WAM has.
+//! Every identifier of the arm's bus is named, two a filter element, so the set is exact: 26 of 2048. Rejected are,
+//! among others, the safety module's broadcasts to the pucks (0x540), other hosts' questions, and nodes no WAM has.
 
 use puck::{Group, Node};
 
@@ -74,7 +74,7 @@ pub const HOST_FILTERS: [u32; HOST_ELEMENTS] = {
     [MASKED | TO_QUEUE_0 | (id as u32) << 16 | mask as u32]
 };
 
-/// Whether a controller with these elements, rejecting what matches none, takes a standard data frame. This is the
+/// True if a controller with these elements, rejecting what matches none, takes a standard data frame. This is the
 /// controller's own rule, for the tests.
 #[must_use]
 pub fn accepts(elements: &[u32], id: u16) -> bool {

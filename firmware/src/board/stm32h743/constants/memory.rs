@@ -1,5 +1,6 @@
-//! What lies where: code in bank 1 of the flash and in ITCM, stack and the control half in DTCM, the rest in AXI memory,
-//! the primitives in bank 2. `firmware/memory/stm32h743.x` says the same to the linker; a test compares the two.
+//! What lies where: code in bank 1 of the flash and in ITCM, stack and the control half in DTCM, the rest in AXI
+//! memory, the primitives in bank 2. `firmware/memory/stm32h743.x` says the same to the linker; a test compares the
+//! two.
 
 /// A stretch of the address space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,7 +18,7 @@ impl Region {
         self.start + self.length
     }
 
-    /// Whether both share a byte.
+    /// True if both share a byte.
     #[must_use]
     pub const fn overlaps(&self, other: &Self) -> bool {
         self.start < other.end() && other.start < self.end()
@@ -48,8 +49,9 @@ pub const HOT_CODE: Region = Region { start: 0x400, length: 63 * 1024 };
 /// All of the tightly coupled data memory.
 pub const DTCM: Region = Region { start: 0x2000_0000, length: 128 * 1024 };
 
-/// Addresses below the stack that may not be touched: whoever gets here has overflowed the stack. There is no memory, so the
-/// guard costs nothing, and it is as long as the stack itself: no frame that fits into the stack can step over it.
+/// Addresses below the stack that may not be touched: whoever gets here has overflowed the stack. There is no memory,
+/// so the guard costs nothing, and it is as long as the stack itself: no frame that fits into the stack can step over
+/// it.
 pub const STACK_GUARD: Region = Region { start: 0x1FFF_0000, length: 64 * 1024 };
 
 /// The stack of all tasks and interrupts, growing down to the first byte of the DTCM: never cached, never waited for.

@@ -1,7 +1,7 @@
 //! The supply, and below which voltage the chip is held in reset.
 
-/// Brown-out level (BOR_LEV) a board should have: far enough below 3.3 V for every disturbance that does no harm, and so far above
-/// what flash and core need that a falling supply ends the image before it ends an erasure half done.
+/// Brown-out level (BOR_LEV) a board should have: far enough below 3.3 V for every disturbance that does no harm, and
+/// so far above what flash and core need that a falling supply ends the image before it ends an erasure half done.
 pub const BROWN_OUT_LEVEL: u8 = 2;
 
 /// Supply below which the chip is held in reset at a level, mV. Level 0, as delivered, is the reset of power-on and

@@ -11,19 +11,20 @@ pub const SLOT_TICKS: u32 = (TIMER_HZ + SLOT_HZ / 2) / SLOT_HZ;
 /// Divider in front of the slot timer's counter: none, so that the rounding is as small as it can be.
 pub const SLOT_PRESCALER: u32 = 1;
 
-/// Ticks per second of the time since start-up (TIM5), Hz: every tick of the timer clock. Its 32 bits last 21 s, and every
-/// slot reads it.
+/// Ticks per second of the time since start-up (TIM5), Hz: every tick of the timer clock. Its 32 bits last 21 s, and
+/// every slot reads it.
 pub const CLOCK_HZ: u32 = TIMER_HZ;
 
 /// Divider in front of the watchdog's counter, its value after a reset.
 pub const WATCHDOG_PRESCALER: u32 = 4;
 
-/// What the watchdog counts down from the start of the image until the first slot is due, its value after a reset: 512 ms.
-/// The clock tree and the building of both halves take this long at most, or the chip starts again.
+/// What the watchdog counts down from the start of the image until the first slot is due, its value after a reset: 512
+/// ms. The clock tree and the building of both halves take this long at most, or the chip starts again.
 pub const WATCHDOG_START_TICKS: u32 = 4096;
 
-/// What the watchdog counts down in service: 80 ticks of 8 kHz are 10 ms, nine slots. The control slot may legally be late
-/// by one; pucks keep the last torque until the safety module's heartbeat runs out, so this must be the first to act.
+/// What the watchdog counts down in service: 80 ticks of 8 kHz are 10 ms, nine slots. The control slot may legally be
+/// late by one; pucks keep the last torque until the safety module's heartbeat runs out, so this must be the first to
+/// act.
 pub const WATCHDOG_TICKS: u32 = 80;
 
 /// Time until the watchdog resets the chip, us, at the nominal frequency of its oscillator.
@@ -32,8 +33,8 @@ pub const WATCHDOG_US: u32 = watchdog_us(WATCHDOG_TICKS);
 /// The same before the first slot, us.
 pub const WATCHDOG_START_US: u32 = watchdog_us(WATCHDOG_START_TICKS);
 
-/// Longest the watchdog may take to make a new window its own, us. It needs six periods of its divided oscillator, 0.8 ms;
-/// one that needs longer than this has no oscillator, and never resets anything.
+/// Longest the watchdog may take to make a new window its own, us. It needs six periods of its divided oscillator, 0.8
+/// ms; one that needs longer than this has no oscillator, and never resets anything.
 pub const WATCHDOG_UPDATE_US: u32 = 5_000;
 
 /// Time of so many ticks of the watchdog, us, at the nominal frequency.
@@ -44,9 +45,10 @@ const fn watchdog_us(ticks: u32) -> u32 {
 /// At the end, the longest wait for room for the last frames, us: four full frames of ours and one of another node.
 pub const LAST_ROOM_US: u32 = 1_500;
 
-/// At the end, the longest wait until a controller whose queue does not move has left the bus, us: a few ticks of its clock.
+/// At the end, the longest wait until a controller whose queue does not move has left the bus, us: a few ticks of its
+/// clock.
 pub const LAST_STOP_US: u32 = 100;
 
-/// At the end, the longest wait for the last frames to leave, us: either the bus has to be joined again, which takes 129
-/// times eleven bits, or a frame of another node and four that waited come first.
+/// At the end, the longest wait for the last frames to leave, us: either the bus has to be joined again, which takes
+/// 129 times eleven bits, or a frame of another node and four that waited come first.
 pub const LAST_LEFT_US: u32 = 3_000;

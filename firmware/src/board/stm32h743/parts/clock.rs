@@ -34,8 +34,8 @@ impl crate::board::Clock for Clock {
     }
 }
 
-/// Lets the counter count every tick of the timer clock, from 0. Called once before the clock tree is set up, so that there is
-/// a time to wait by, and once afterwards.
+/// Lets the counter count every tick of the timer clock, from 0. Called once before the clock tree is set up, so that
+/// there is a time to wait by, and once afterwards.
 pub(super) fn start() {
     RCC.apb1lenr().modify(|w| w.set_tim5en(true));
     // A clock that was just enabled reaches the peripheral two bus cycles later; reading back waits for that.
@@ -58,7 +58,8 @@ pub(super) fn now() -> u64 {
     })
 }
 
-/// Asks until it is so, for at most this long; tells whether it was. Works with interrupts masked, once [`start`] has run.
+/// Asks until it is so, for at most this long; tells whether it was. Works with interrupts masked, once [`start`] has
+/// run.
 pub(super) fn within(us: u32, is_so: impl FnMut() -> bool) -> bool {
     within_ticks(us * (TICKS_PER_US as u32), is_so)
 }

@@ -1,7 +1,8 @@
-//! The 8 MHz from the ST-LINK, which every rate follows: waited for before the clock tree is set up, watched afterwards.
+//! The 8 MHz from the ST-LINK, which every rate follows: waited for before the clock tree is set up, watched
+//! afterwards.
 //!
-//! The chip's own oscillator is not exact enough for the bus, so without the 8 MHz there is nothing this board may do: it
-//! blinks, keeps the reason and starts again (`docs/decisions/0027-without-a-clock-no-bus.md`).
+//! The chip's own oscillator is not exact enough for the bus, so without the 8 MHz there is nothing this board may do:
+//! it blinks, keeps the reason and starts again (`docs/decisions/0027-without-a-clock-no-bus.md`).
 
 use cortex_m_rt::exception;
 use embassy_stm32::pac::RCC;
@@ -34,8 +35,8 @@ pub(super) fn watch() {
     RCC.cr().modify(|w| w.set_hsecsson(true));
 }
 
-/// The 8 MHz have failed: the chip has gone over to its own oscillator, and the bus has no clock any more. Anything else
-/// that ends here was asked for by a debug probe.
+/// The 8 MHz have failed: the chip has gone over to its own oscillator, and the bus has no clock any more. Anything
+/// else that ends here was asked for by a debug probe.
 #[exception]
 unsafe fn NonMaskableInt() -> ! {
     if RCC.cifr().read().hsecssf() {

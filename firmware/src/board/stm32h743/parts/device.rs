@@ -1,6 +1,7 @@
 //! Interrupts by role, for RTIC: the numbers are the chip's, the names are what they are for.
 //!
-//! The vector table is that of the chip's peripheral crate; `memory/stm32h743.x` makes its names aliases of these roles.
+//! The vector table is that of the chip's peripheral crate; `memory/stm32h743.x` makes its names aliases of these
+//! roles.
 
 use embassy_stm32::pac;
 use link::metadata::MemoryRegion;

@@ -1,7 +1,7 @@
 //! Faults of the processor: their handlers run on a stack of their own and end the image with what the processor tells.
 //!
-//! The stack at fault may be overflown, or point to where there is no memory at all because one large frame stepped over
-//! the guard. So nothing is pushed to it and nothing is read from it unless it lies where the stack belongs.
+//! The stack at fault may be overflown, or point to where there is no memory at all because one large frame stepped
+//! over the guard. So nothing is pushed to it and nothing is read from it unless it lies where the stack belongs.
 
 use core::arch::global_asm;
 

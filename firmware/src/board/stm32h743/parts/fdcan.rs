@@ -187,9 +187,9 @@ impl Controller {
 
     /// Empties both queues and joins the bus. Only for a controller that is off the bus (INIT).
     ///
-    /// Not by cancelling: that is for dedicated buffers and queues, and the controller's manual does not say that its FIFO
-    /// skips a cancelled frame. Opening the configuration (CCE) makes the controller forget what waits and what it has
-    /// received (TXBRP, TXFQS, RXF0S) and keeps its settings.
+    /// Not by cancelling: that is for dedicated buffers and queues, and the controller's manual does not say that its
+    /// FIFO skips a cancelled frame. Opening the configuration (CCE) makes the controller forget what waits and what it
+    /// has received (TXBRP, TXFQS, RXF0S) and keeps its settings.
     fn forget_and_join(&self) {
         self.registers.cccr().modify(|w| w.set_cce(true));
         self.join();
@@ -311,8 +311,8 @@ impl CanStatus for ArmBus {
     }
 }
 
-/// The end: hands these frames over behind what waits, of which there is less than a millisecond. Only if the queue does
-/// not move, or the controller has left the bus, what waits is thrown away.
+/// The end: hands these frames over behind what waits, of which there is less than a millisecond. Only if the queue
+/// does not move, or the controller has left the bus, what waits is thrown away.
 pub(super) fn hand_over_last(frames: &[CanFrame]) {
     if !is_started() {
         return;
@@ -340,8 +340,8 @@ pub(super) fn wait_for_last() {
     }
 }
 
-/// Whether the controllers have their clocks: the end may come before the start-up got here, or because the clock failed. The
-/// one that bounds the waits is started before them.
+/// True if the controllers have their clocks: the end may come before the start-up got here, or because the clock
+/// failed. The one that bounds the waits is started before them.
 fn is_started() -> bool {
     RCC.apb1henr().read().fdcanen() && RCC.cr().read().pllrdy(0)
 }

@@ -1,13 +1,13 @@
 //! Bank 2 of the internal flash: where the device keeps its library.
 //!
-//! The image runs from bank 1 and ITCM, so an operation in bank 2 stops nobody; whoever awaits it is asked again and again
-//! whether it has ended, and interrupts are never masked for it. (The chip's usual driver erases inside a critical
-//! section, for up to four seconds.) While an operation runs nothing reads bank 2: this type is the only way to it, and
-//! the memory protection unit keeps the processor from reading ahead in it.
+//! The image runs from bank 1 and ITCM, so an operation in bank 2 stops nobody; whoever awaits it is asked again and
+//! again whether it has ended, and interrupts are never masked for it. (The chip's usual driver erases inside a
+//! critical section, for up to four seconds.) While an operation runs nothing reads bank 2: this type is the only way
+//! to it, and the memory protection unit keeps the processor from reading ahead in it.
 //!
-//! A flash word of 32 bytes carries check bits. One that was being written when power went may be damaged beyond repair:
-//! reading it is then a bus fault, which [`read_word`] turns into 32 zero bytes. The storage above tells from its own check
-//! sums that this is nothing it wrote.
+//! A flash word of 32 bytes carries check bits. One that was being written when power went may be damaged beyond
+//! repair: reading it is then a bus fault, which [`read_word`] turns into 32 zero bytes. The storage above tells from
+//! its own check sums that this is nothing it wrote.
 
 use core::arch::asm;
 use core::future::poll_fn;
@@ -40,8 +40,8 @@ const FAULT_STATUS: *mut u32 = 0xE000_ED28 as *mut u32;
 /// Its bits of bus faults.
 const BUS_FAULTS: u32 = 0xFF00;
 
-/// Looks at the status before the task lets the core sleep until the next interrupt: about 0.2 ms, which a flash word takes to
-/// be written; an erasure takes seconds and is slept through. Everything else interrupts this anyway.
+/// Looks at the status before the task lets the core sleep until the next interrupt: about 0.2 ms, which a flash word
+/// takes to be written; an erasure takes seconds and is slept through. Everything else interrupts this anyway.
 const LOOKS: u32 = 4000;
 
 /// Why the flash did not do what it should.
@@ -149,18 +149,19 @@ fn judge(status: Sr) -> Result<(), Error> {
 
 /// Reads one flash word, or zeros where it is damaged.
 ///
-/// Bus faults are ignored only by handlers above all others, so the eight reads run as one: half a microsecond in which an
-/// interrupt waits. The protection unit stays on meanwhile, so they are reads of device memory: in order, each from the
-/// flash, nothing ahead. `address` must be a flash word of bank 2.
+/// Bus faults are ignored only by handlers above all others, so the eight reads run as one: half a microsecond in which
+/// an interrupt waits. The protection unit stays on meanwhile, so they are reads of device memory: in order, each from
+/// the flash, nothing ahead. `address` must be a flash word of bank 2.
 fn read_word(address: u32) -> [u8; WORD_BYTES] {
     let mut parts = [0_u32; PARTS];
-    // What was noted before this read must not be taken for it: `damaged` is judged by both below. Bus faults noted earlier are
-    // nobody's business any more, those that matter never return; flags of an operation were judged at its end.
+    // What was noted before this read must not be taken for it: `damaged` is judged by both below. Bus faults noted
+    // earlier are nobody's business any more, those that matter never return; flags of an operation were judged at its
+    // end.
     bank().ccr().write_value(every_flag());
     // SAFETY: clears the bits of bus faults, see above.
     unsafe { FAULT_STATUS.write_volatile(BUS_FAULTS) };
-    // SAFETY: faults of the reads below are ignored (`protection`) and noted in the status register. The mask was clear:
-    // this runs in the task of lowest priority.
+    // SAFETY: faults of the reads below are ignored (`protection`) and noted in the status register. The mask was
+    // clear: this runs in the task of lowest priority.
     unsafe { asm!("cpsid f", "dsb", "isb", options(nostack, preserves_flags)) };
     for (part, offset) in parts.iter_mut().zip((0_u32..).step_by(4)) {
         // SAFETY: inside bank 2, by the callers.
@@ -184,7 +185,7 @@ fn read_word(address: u32) -> [u8; WORD_BYTES] {
     bytes
 }
 
-/// Whether a stretch lies inside the bank and on boundaries of `unit`.
+/// True if a stretch lies inside the bank and on boundaries of `unit`.
 fn check(offset: u32, length: usize, unit: u32) -> Result<(), Error> {
     let length = u32::try_from(length).map_err(|_| Error::Address(NorFlashErrorKind::OutOfBounds))?;
     if offset.checked_add(length).is_none_or(|end| end > STORE.length) {

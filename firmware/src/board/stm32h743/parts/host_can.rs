@@ -1,8 +1,8 @@
 //! The second CAN bus as a line to the host: the link's bytes in segments (`link::can`).
 //!
-//! Without interrupts: the controller holds 7 ms of received and 3.5 ms of waiting frames, and the session comes by every
-//! 1.1 ms. Bytes wait in a queue of their own and are cut into segments only when the controller has room for a frame, so
-//! that frames are full while the line is busy.
+//! Without interrupts: the controller holds 7 ms of received and 3.5 ms of waiting frames, and the session comes by
+//! every 1.1 ms. Bytes wait in a queue of their own and are cut into segments only when the controller has room for a
+//! frame, so that frames are full while the line is busy.
 
 use heapless::Deque;
 use link::can::{Direction, Reassembler, SEGMENT_BYTES, Segmenter};
@@ -14,7 +14,7 @@ use crate::board::LinkPort;
 
 /// The line as the selector sees it.
 pub struct HostCan {
-    /// Whether the controller runs. One that does not hears nothing, so the conversation is never here.
+    /// True if the controller runs. One that does not hears nothing, so the conversation is never here.
     runs: bool,
     segmenter: Segmenter,
     reassembler: Reassembler,

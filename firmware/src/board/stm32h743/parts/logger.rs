@@ -1,9 +1,9 @@
 //! defmt over RTT: a buffer in memory that the debug probe reads while the processor runs.
 //!
 //! Not defmt-rtt, which masks *all* interrupts from the first to the last byte of a message, and the control slot with
-//! them. Only tasks below priority 10 log (never the slot or the CAN tasks), so masking those is enough. A message for which
-//! there is no room is lost, whole or in part, and the reader finds the next one by its frame mark: nobody ever waits for a
-//! probe.
+//! them. Only tasks below priority 10 log (never the slot or the CAN tasks), so masking those is enough. A message for
+//! which there is no room is lost, whole or in part, and the reader finds the next one by its frame mark: nobody ever
+//! waits for a probe.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicU32, Ordering, compiler_fence};
@@ -51,8 +51,8 @@ static BUFFER: Buffer = Buffer(UnsafeCell::new([0; BUFFER_BYTES]));
 // SAFETY: the fields that change are atomic, the others are constant after `start`.
 unsafe impl Sync for ControlBlock {}
 
-/// The name by which probes and their tools find the block. Its identification is written at start-up, last of all: what an
-/// earlier image left in memory, or the image in the flash, must not be mistaken for it.
+/// The name by which probes and their tools find the block. Its identification is written at start-up, last of all:
+/// what an earlier image left in memory, or the image in the flash, must not be mistaken for it.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".uninit.log_control")]
 static _SEGGER_RTT: Shared<ControlBlock> = Shared(UnsafeCell::new(ControlBlock {
@@ -70,8 +70,8 @@ static _SEGGER_RTT: Shared<ControlBlock> = Shared(UnsafeCell::new(ControlBlock {
 #[repr(transparent)]
 struct Shared<T>(UnsafeCell<T>);
 
-// SAFETY: the control block is written whole at start-up with interrupts masked; later only its atomics change. The encoder
-// and the mask are touched between `acquire` and `release` only.
+// SAFETY: the control block is written whole at start-up with interrupts masked; later only its atomics change. The
+// encoder and the mask are touched between `acquire` and `release` only.
 unsafe impl<T> Sync for Shared<T> {}
 
 /// Name of the channel, by which readers know that it is defmt.

@@ -1,7 +1,7 @@
 //! The reason of the last stop, kept in memory that a restart does not clear, and told after it.
 //!
-//! The record lies in tightly coupled memory: no cache holds any of it back when the chip restarts. It counts only if its mark
-//! and its check sum are right, so what the memory holds after power came is never taken for words.
+//! The record lies in tightly coupled memory: no cache holds any of it back when the chip restarts. It counts only if
+//! its mark and its check sum are right, so what the memory holds after power came is never taken for words.
 
 use core::cell::UnsafeCell;
 use core::fmt::{self, Write};

@@ -2,8 +2,8 @@
 //!
 //! Three regions of the memory protection unit on top of the processor's default map. The guard below the stack and the
 //! one at address 0 may not be touched by anybody. Bank 2 of the flash is *device* memory: the processor then neither
-//! caches it nor reads ahead in it, so it is only touched when the store asks, and a running erasure never holds up a read
-//! nobody meant. That holds at every priority (`docs/decisions/0026-bank-2-is-never-cached.md`).
+//! caches it nor reads ahead in it, so it is only touched when the store asks, and a running erasure never holds up a
+//! read nobody meant. That holds at every priority (`docs/decisions/0026-bank-2-is-never-cached.md`).
 //!
 //! No peripheral reads or writes memory by itself (there is no direct memory access anywhere in the image), so the data
 //! cache needs no further rule.
@@ -20,8 +20,9 @@ use super::super::constants::memory::{IMAGE, NULL_GUARD, Region, STACK_GUARD, ST
 const NO_ACCESS: u32 = 1 << 28;
 /// Region attributes: read and write, never execute, shareable device.
 const DEVICE: u32 = 1 << 28 | 0b011 << 24 | 1 << 18 | 1 << 16;
-/// Unit on, with the default map behind it, also inside hard faults and while everything but those is masked (HFNMIENA):
-/// bank 2 is read so, and by the default map it would go through the data cache and be stale after the next write.
+/// Unit on, with the default map behind it, also inside hard faults and while everything but those is masked
+/// (HFNMIENA): bank 2 is read so, and by the default map it would go through the data cache and be stale after the next
+/// write.
 const ENABLE: u32 = 0b111;
 /// Ignore bus faults of handlers that run above all others: they probe damaged flash words, and report.
 const IGNORE_BUS_FAULTS: u32 = 1 << 8;
@@ -56,8 +57,8 @@ fn region(unit: &mut MPU, number: u32, region: &Region, attributes: u32) {
     }
 }
 
-// Before main: the code of the control cycle goes to where it runs. Written by hand, because no function of Rust may run
-// before its memory is there.
+// Before main: the code of the control cycle goes to where it runs. Written by hand, because no function of Rust may
+// run before its memory is there.
 global_asm!(
     ".section .text.__pre_init,\"ax\",%progbits",
     ".global __pre_init",

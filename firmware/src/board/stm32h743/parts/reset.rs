@@ -1,8 +1,8 @@
 //! Why the chip started: what the chip says, and how far the image was when it happened.
 //!
-//! The chip cannot tell a restart that the image asked for from one that a debug probe asked for, nor where the watchdog met
-//! the image. So the image notes its phase in memory that a restart keeps. After power came that memory holds anything,
-//! but then the chip says so, and the phase is not looked at.
+//! The chip cannot tell a restart that the image asked for from one that a debug probe asked for, nor where the
+//! watchdog met the image. So the image notes its phase in memory that a restart keeps. After power came that memory
+//! holds anything, but then the chip says so, and the phase is not looked at.
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;

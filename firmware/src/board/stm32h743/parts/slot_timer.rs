@@ -1,4 +1,5 @@
-//! Timer 2: the slots of the control cycle, and with it the watchdog: in service it is fed where a slot begins, and nowhere else.
+//! Timer 2: the slots of the control cycle, and with it the watchdog: in service it is fed where a slot begins, and
+//! nowhere else.
 
 use embassy_stm32::pac::timer::regs::SrGp16;
 use embassy_stm32::pac::{RCC, TIM2};

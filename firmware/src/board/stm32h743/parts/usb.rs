@@ -1,7 +1,7 @@
 //! The USB line: a serial device of the communication class (CDC ACM), by interrupts.
 //!
-//! The device itself belongs to the interrupt; the session shares two queues with it. A host that does not read fills its
-//! queue and harms nobody: the other lines go on.
+//! The device itself belongs to the interrupt; the session shares two queues with it. A host that does not read fills
+//! its queue and harms nobody: the other lines go on.
 
 use core::cell::{RefCell, UnsafeCell};
 

@@ -1,8 +1,8 @@
-//! The independent watchdog: resets the chip when no slot has begun for 10 ms. It has an oscillator of its own, and once
-//! started nothing but a reset stops it.
+//! The independent watchdog: resets the chip when no slot has begun for 10 ms. It has an oscillator of its own, and
+//! once started nothing but a reset stops it.
 //!
-//! It starts with the image, with the widest window it has, so that a start-up that hangs ends as well; [`narrow`] takes
-//! the window of the service just before the first slot.
+//! It starts with the image, with the widest window it has, so that a start-up that hangs ends as well; [`narrow`]
+//! takes the window of the service just before the first slot.
 //!
 //! It goes on while a debugger halts the core: the pucks would hold the last torque for as long as somebody looks at a
 //! variable. A halt therefore ends in a reset, with the arm at rest.
