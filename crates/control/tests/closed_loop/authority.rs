@@ -58,7 +58,7 @@ fn the_first_torque_after_arming_is_gravity_with_a_limited_onset() {
     ));
     let mut last = [0.0f32; 7];
     let mut output = rig.command(Command::Hold);
-    for _ in 0..90 {
+    for _ in 0..periods(0.3) {
         for joint in 0..7 {
             let step = (output.record.tau[joint] - last[joint]).abs();
             assert!(step <= STEP_LIMIT[joint] as f32 * 1.0001, "J{}: {step}", joint + 1);
@@ -173,7 +173,7 @@ fn e5_stop_at_any_phase_comes_to_rest_within_the_torque_rate() {
         let mut last = rig.last.expect("ran").record.tau;
         let q = rig.plant.q;
         rig.command(Command::Stop);
-        for _ in 0..90 {
+        for _ in 0..periods(0.3) {
             let record = rig.tick(None).record;
             assert_eq!(record.state, State::SoftStop);
             for joint in 0..7 {

@@ -171,7 +171,7 @@ fn a_run_that_needs_the_wrench_is_refused_or_stopped_without_it() {
     rig.load(&primitive(&design)).expect("loads");
     rig.command(Command::Run(RunOptions { feedback: true, ..RunOptions::default() }));
     rig.run_for(0.5);
-    for _ in 0..40 {
+    for _ in 0..periods(0.14) {
         let sample = control::BusSample {
             positions: rig.plant.counts(),
             wrench: None,

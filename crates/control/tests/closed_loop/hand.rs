@@ -49,7 +49,7 @@ fn a_hand_is_moved_when_asked_to_and_its_worms_hold_it_otherwise() {
         assert!(rig.last.expect("ran").record.flags & flags::HAND_READY != 0);
         rig.command(Command::MoveHand { q: [1.0, 1.2, 1.3, 1.4], duration: 1.5 });
         let mut fastest = 0.0f64;
-        for _ in 0..750 {
+        for _ in 0..periods(2.5) {
             let record = rig.tick(None).record;
             fastest = fastest.max(hand(&rig).dq[3]);
             for digit in 0..4 {

@@ -2,6 +2,7 @@
 
 use control::act::limit::STEP_LIMIT;
 use control::command::{Command, RunOptions};
+use control::sense::joints::COAST_CYCLES;
 use control::{Fault, RATE_HZ, State};
 
 use crate::primitives::{Design, START, primitive};
@@ -77,9 +78,9 @@ fn a3_six_lost_cycles_stop_the_arm_softly() {
     let mut rig = running(0.9);
     let q = rig.plant.q;
     rig.lose = [true; 7];
-    for cycle in 1..=6 {
+    for cycle in 1..=COAST_CYCLES + 1 {
         rig.tick(None);
-        let expected = if cycle <= 5 { State::Coast } else { State::SoftStop };
+        let expected = if cycle <= COAST_CYCLES { State::Coast } else { State::SoftStop };
         assert_eq!(rig.cycle.state(), expected, "cycle {cycle}");
     }
     assert_eq!(rig.cycle.fault(), Fault::RepliesLost);

@@ -158,7 +158,7 @@ fn lost_replies_leave_the_integral_as_it_was() {
         // Until the jump has left the velocity filter.
         rig.run_for(0.1);
         let before = rig.last.expect("ran").record.tau[0];
-        for cycle in 0..30 {
+        for cycle in 0..periods(0.1) {
             rig.lose = [lossy && cycle % 3 != 2; 7];
             rig.tick(None);
         }

@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 
 use crate::digit::Digit;
 use control::CycleRecord;
+use device::time::SLOT_HZ;
 use device::{Command, Controller, ControllerIo, DeviceController, Event, EventKind, Slot, Stage};
 use link::HandStage;
 use pinned_init::InPlaceWrite;
@@ -200,10 +201,10 @@ impl Bus {
         self.on_the_wire.push((self.now_us, frame));
     }
 
-    /// Runs the core for some slots of 1/900 s.
+    /// Runs the core for some slots.
     pub(crate) fn run_slots(&mut self, core: &mut DeviceController, slots: usize) {
         for _ in 0..slots {
-            self.now_us = self.ticks * 1_000_000 / 900;
+            self.now_us = self.ticks * 1_000_000 / u64::from(SLOT_HZ);
             self.on_the_wire.sort_by_key(|(due, _)| *due);
             let due = self.on_the_wire.partition_point(|(due, _)| *due <= self.now_us);
             self.received.extend(self.on_the_wire.drain(..due).map(|(_, frame)| frame));
@@ -216,7 +217,7 @@ impl Bus {
 
     /// Runs the core for this long, s.
     pub(crate) fn run(&mut self, core: &mut DeviceController, seconds: f64) {
-        self.run_slots(core, (seconds * 900.0) as usize);
+        self.run_slots(core, (seconds * f64::from(SLOT_HZ)) as usize);
     }
 
     /// Runs until the core has reached a stage; panics after ten seconds.

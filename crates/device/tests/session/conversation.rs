@@ -37,7 +37,7 @@ fn a_matching_hello_is_answered_with_who_the_device_is() {
     assert_eq!((device.link_version, device.schema_hash), (LINK_VERSION, SCHEMA_HASH));
     assert_eq!(device.model_hash, control::MODEL_HASH);
     assert_eq!((device.board.as_str(), device.serial.as_str(), device.simulated), ("bench", "B-1", true));
-    assert_eq!((device.slots, device.slot_bytes, device.cycles_per_second), (3, 4096, 300));
+    assert_eq!((device.slots, device.slot_bytes, device.cycles_per_second), (3, 4096, control::RATE_HZ as u16));
     rig.done(Request::Ping);
 }
 
