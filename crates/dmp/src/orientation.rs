@@ -59,7 +59,7 @@ pub struct OrientationSystem<T> {
     gains: TransformationSystem<T>,
 }
 
-/// What acts on the orientation during one tick.
+/// Everything that acts on the orientation during one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrientationInput<T> {
     /// Start orientation.

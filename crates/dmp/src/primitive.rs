@@ -16,7 +16,7 @@ use crate::{
 /// Rows of a pose: three of the position, three of the orientation.
 pub(crate) const POSE_ROWS: usize = 6;
 
-/// How the signs of the start and goal quaternions were chosen.
+/// Choice of the signs of the start and goal quaternions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -372,7 +372,7 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Primitive<T, D, 
         })
     }
 
-    /// How quaternion signs are chosen.
+    /// Choice of the quaternion signs.
     #[inline]
     #[must_use]
     pub fn hemisphere(&self) -> Hemisphere {

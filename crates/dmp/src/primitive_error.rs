@@ -91,7 +91,7 @@ pub enum PrimitiveError {
         group: Group,
         /// Its place in the group, from 0.
         index: u8,
-        /// What is wrong.
+        /// The gain that is wrong.
         error: GainError,
     },
     /// The duration is too short for the gains of a row: at this control period the integration would be unstable.

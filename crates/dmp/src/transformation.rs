@@ -117,7 +117,7 @@ impl<T: Scalar> TransformationSystem<T> {
     }
 }
 
-/// What acts on one row during one tick.
+/// Everything that acts on one row during one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointInput<T> {
     /// Start `x0` of the movement.

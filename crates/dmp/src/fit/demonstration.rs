@@ -40,7 +40,7 @@ pub enum DemonstrationError {
     Period,
     /// Fewer than 30 samples.
     TooFew {
-        /// How many there are.
+        /// Number of samples.
         samples: usize,
     },
     /// Not every quantity, or not every demonstration, has what the others have: samples, or the sampling period.

@@ -40,7 +40,7 @@ pub const WARNING_ANGLE: f64 = 150.0 * core::f64::consts::PI / 180.0;
 pub const LARGEST_ANGLE: f64 = 175.0 * core::f64::consts::PI / 180.0;
 /// A demonstration whose last speed is below this share of its highest one ends at rest.
 const REST_SPEED_SHARE: f64 = 0.15;
-/// How long the plan of a demonstration that ends at rest is told to stay at its goal, as a share of the duration.
+/// Time for which the plan of a demonstration that ends at rest is told to stay at its goal, as a share of the duration.
 const REST_SHARE: f64 = 0.5;
 /// Beyond this angle to the goal (rad, 359 degrees) even rotation vectors are refused: the sign of the start could not tell which way to turn.
 pub const LARGEST_ROTATION_VECTOR: f64 = 359.0 * core::f64::consts::PI / 180.0;
@@ -144,7 +144,7 @@ pub struct Learned<const D: usize, const P: usize> {
     pub duration: f64,
     /// Longest control period of a run, s.
     pub control_period: f64,
-    /// How it was learned.
+    /// Options of learning.
     pub options: FitOptions<D, P>,
     /// Stiffness and damping.
     pub gains: Gains<f64, D, P>,

@@ -59,7 +59,7 @@ pub trait Scalar:
     fn sin_cos(self) -> (Self, Self);
     /// Angle of the point (`x`, `self`) in (-pi, pi].
     fn atan2(self, x: Self) -> Self;
-    /// Whether the value is a number: neither NaN nor infinite.
+    /// True for a number: neither NaN nor infinite.
     fn is_finite(self) -> bool;
     /// Integer part as an index; 0 for negative numbers and NaN, saturated above.
     fn to_index(self) -> usize;

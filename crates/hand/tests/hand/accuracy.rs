@@ -128,7 +128,7 @@ fn bases_that_the_integers_cannot_hold_are_refused() {
 
 /// Columns of a golden table.
 fn golden<const D: usize>(name: &str, columns: [&str; D]) -> Vec<(usize, [f64; D])> {
-    let path = format!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/vectors/{}.csv"), name);
+    let path = format!(concat!(env!("CARGO_MANIFEST_DIR"), "/../dmp/tests/vectors/{}.csv"), name);
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(path).expect("a golden table");
     let header = reader.headers().expect("a header").clone();
     let place = |column: &str| header.iter().position(|name| name == column).unwrap_or_else(|| panic!("no {column}"));
