@@ -32,7 +32,10 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("control::plan::run::", "once, when a run begins or its goal changes"),
     ("control::plan::approach", "once, when an approach begins"),
     ("control::model::arm::ArmModel", "when a payload is found"),
-    ("dmp::coupling::Coupling<T,_,_>::limited", "a coupling beyond its limit: not in a run of a primitive that was accepted"),
+    (
+        "dmp::coupling::Coupling<T,_,_>::limited",
+        "a coupling beyond its limit: not in a run of a primitive that was accepted",
+    ),
     ("tare_drift", "at rest, by a person's command"),
     ("control::cycle::hand::HandDrive<R>::move_to", "once, when a person moves the hand"),
     ("control::model::hand::within_range", "once, when a person moves the hand"),

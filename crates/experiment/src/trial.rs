@@ -124,8 +124,10 @@ impl Prepared {
     pub fn of(config: &Config) -> Result<Prepared, TrialError> {
         let primitive = config.primitive.to_primitive()?;
         let references = lab::plan::roll_out(&primitive).map_err(|_| TrialError::Movement("it has no valid start"))?;
-        let taught =
-            references.iter().map(|reference| (reference.poses[0].position.x, lab::plan::orientation(reference))).collect();
+        let taught = references
+            .iter()
+            .map(|reference| (reference.poses[0].position.x, lab::plan::orientation(reference)))
+            .collect();
         Ok(Prepared {
             image: config.primitive.to_image()?,
             name: link::Name::new(&config.primitive.name)

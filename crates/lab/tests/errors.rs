@@ -13,7 +13,7 @@ const HEAD: &str = "\
 # Errors, refusals and faults
 
 Who reads this: whoever has a number in front of them. This file is written from `crates/lab/src/error_code.rs`,
-`crates/link/src/refusal.rs` and `crates/control/src/fault.rs`; change it there (`crates/lab/tests/errors.rs`).
+`crates/link/src/refusal.rs` and `crates/control/src/guard/fault.rs`; change it there (`crates/lab/tests/errors.rs`).
 
 A command that fails prints `error[E...]`, the cause and a help line, with `--json` as an object too. The hundreds of the
 number are the exit code of the process; E130 ends with exit code 130. Numbers never change.

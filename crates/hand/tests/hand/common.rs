@@ -143,8 +143,7 @@ impl Movement {
     pub(crate) fn exact(&self) -> Primitive<f64, 100> {
         let mut weights = vec![0.0; (ROWS - 4) * self.kernels];
         weights.extend(self.weights.iter().flatten().map(|weight| f64::from(*weight)));
-        let configuration =
-            |hand: [f32; 4]| rows([0.0; 3], [1.0, 0.0, 0.0, 0.0], [0.0; 7], hand.map(f64::from));
+        let configuration = |hand: [f32; 4]| rows([0.0; 3], [1.0, 0.0, 0.0, 0.0], [0.0; 7], hand.map(f64::from));
         let (k, d) = (f64::from(self.stiffness), f64::from(self.damping));
         let mut primitive = Primitive::new(&MovementTables {
             control_period: control::PERIOD,
