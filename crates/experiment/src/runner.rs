@@ -142,27 +142,21 @@ pub fn run(
                     if stop.load(Ordering::SeqCst) || interrupt.is_raised() {
                         return;
                     }
-                    match trial::run(config, prepared, key, interrupt) {
-                        Ok(trial) => {
-                            if sender.send(trial).is_err() {
-                                return;
-                            }
-                        }
+                    let sent = match trial::run(config, prepared, key, interrupt) {
+                        Ok(trial) => sender.send(trial).is_ok(),
                         // An interrupted trial is no failed one.
-                        Err(_) if interrupt.is_raised() => return,
+                        Err(_) if interrupt.is_raised() => false,
                         Err(cause) => return fail(ExperimentError::Trial { key, cause }),
+                    };
+                    if !sent {
+                        return;
                     }
                 }
             });
         }
         drop(sender);
         for mut trial in receiver {
-            let kept = log.as_mut().map_or(Ok(()), |log| log.add(&trial.report)).map_err(ExperimentError::from);
-            let recorded = kept.and_then(|()| match config.out.as_deref().filter(|_| config.keep_recordings) {
-                Some(folder) => record(folder, &trial),
-                None => Ok(()),
-            });
-            if let Err(error) = recorded {
+            if let Err(error) = keep(config, log.as_mut(), &trial) {
                 fail(error);
             }
             progress(Progress::Done(&trial.report));
@@ -182,18 +176,34 @@ pub fn run(
     }
     let results = Results::new(reports);
     if config.keep_traces {
-        // What was there from before has left no trace, but a trial can be repeated: the same key, the same trial.
-        for key in representative(&results) {
-            if !trials.iter().any(|trial| trial.report.key == key) {
-                trials.push(
-                    trial::run(config, &prepared, key, interrupt)
-                        .map_err(|cause| ExperimentError::Trial { key, cause })?,
-                );
-            }
-        }
+        repeat_representative(config, &prepared, &results, &mut trials, interrupt)?;
     }
     trials.sort_by_key(|trial| trial.report.key);
     Ok(Experiment { results, trials, prepared })
+}
+
+/// Writes a trial into the log of results, and its telemetry where recordings are kept.
+fn keep(config: &Config, log: Option<&mut Log>, trial: &Trial) -> Result<(), ExperimentError> {
+    log.map_or(Ok(()), |log| log.add(&trial.report))?;
+    config.out.as_deref().filter(|_| config.keep_recordings).map_or(Ok(()), |folder| record(folder, trial))
+}
+
+/// Repeats the trials of the representative cell that have left no trace because their results were there from before: the
+/// same key, the same trial.
+fn repeat_representative(
+    config: &Config,
+    prepared: &Prepared,
+    results: &Results,
+    trials: &mut Vec<Trial>,
+    interrupt: &Interrupt,
+) -> Result<(), ExperimentError> {
+    for key in representative(results) {
+        if !trials.iter().any(|trial| trial.report.key == key) {
+            let repeated = trial::run(config, prepared, key, interrupt);
+            trials.push(repeated.map_err(|cause| ExperimentError::Trial { key, cause })?);
+        }
+    }
+    Ok(())
 }
 
 /// One trial of each mode, first seed, in the cell that tells most: the adapted one held the object and another mode
