@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::command::{Command, Refusal};
-use crate::cycle::law::{Law, Running};
+use crate::cycle::law::Law;
 use crate::cycle::{Cycle, Measured, STANDING, WRENCH_AGE};
 use crate::guard::fault::Fault;
 use crate::guard::supervisor::{State, Trigger};
@@ -11,7 +11,7 @@ use crate::model::hand;
 use crate::plan;
 use crate::plan::approach::{Approach, LONGEST};
 use crate::plan::primitive::Primitive;
-use crate::plan::run;
+use crate::plan::run::Run;
 use crate::real::Real;
 use crate::sense::wrench::REST_FORCE;
 use crate::units::JointPositions;
@@ -94,19 +94,19 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                     self.may_use_force(primitive, measured)?;
                 }
                 let hand = self.hand.answering();
-                let rollout = run::start(primitive, q, &measured.pose, hand.as_ref(), &options)?;
+                Run::start(&mut self.run, primitive, q, &measured.pose, hand.as_ref(), options)?;
                 self.supervisor.take(Trigger::Run, Fault::None)?;
                 self.wrench.tare_drift();
                 self.hand.tare_drift();
-                self.begin_run(rollout, options, measured);
+                self.begin_run(options, measured);
                 Ok(())
             }
-            Command::SetGoal(goal) => match (&mut self.law, self.loaded.get()) {
-                (Law::Run(Running { run, .. }), Some(primitive)) => run.set_goal(primitive, &goal),
+            Command::SetGoal(goal) => match (&self.law, &mut self.run, self.loaded.get()) {
+                (Law::Run(_), Some(run), Some(primitive)) => run.set_goal(primitive, &goal),
                 _ => Err(Refusal::WrongState),
             },
-            Command::SetSpeed { factor } => match (&mut self.law, self.loaded.get()) {
-                (Law::Run(Running { run, .. }), Some(primitive)) => run.set_speed(primitive, factor),
+            Command::SetSpeed { factor } => match (&self.law, &mut self.run, self.loaded.get()) {
+                (Law::Run(_), Some(run), Some(primitive)) => run.set_speed(primitive, factor),
                 _ => Err(Refusal::WrongState),
             },
         }

@@ -5,7 +5,6 @@ use crate::law::joint::JointController;
 use crate::law::operational::OperationalController;
 use crate::plan::approach::Approach;
 use crate::plan::reference::JointReference;
-use crate::plan::run::Run;
 use crate::real::{Real, within};
 use crate::time::PERIOD;
 use crate::units::{JointPositions, Vector7};
@@ -18,7 +17,7 @@ const RETURN_SPEED: f64 = 0.2;
     clippy::large_enum_variant,
     reason = "there is no heap, and one of these at a time is what memory is needed for"
 )]
-pub(super) enum Law<R: Real, const N: usize> {
+pub(super) enum Law<R: Real> {
     /// `Idle` and `Fault`: no torque. Frames of zero torque are sent this many cycles more.
     Off { zero_cycles: u8 },
     /// `Gravity`.
@@ -26,7 +25,7 @@ pub(super) enum Law<R: Real, const N: usize> {
     /// `Hold` and `Approach`.
     Posture(Posture<R>),
     /// `Run`.
-    Run(Running<R, N>),
+    Run(Running<R>),
     /// `SoftStop`: the torque beyond gravity when it began is ramped away.
     SoftStop(Ramp<R>),
 }
@@ -89,9 +88,9 @@ impl<R: Real> Posture<R> {
     }
 }
 
-/// A run, and the controllers that follow its plan.
-pub(super) struct Running<R: Real, const N: usize> {
-    pub(super) run: Run<R, N>,
+/// The controllers that follow the plan of a run. The run itself stays in its place in the cycle: it is large, and is written
+/// there once.
+pub(super) struct Running<R: Real> {
     pub(super) operational: OperationalController<R>,
     pub(super) controller: JointController<R>,
     /// Torque beyond what the arm itself needs when a compliant run began.

@@ -110,11 +110,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
 
     /// Eqs (8), (9), (11), (10), (12), (13), and the hand's part for Eq (14).
     fn run_primitive(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
-        let (Law::Run(running), Some(primitive)) = (&mut self.law, self.loaded.get()) else {
+        let (Law::Run(running), Some(run), Some(primitive)) = (&mut self.law, &mut self.run, self.loaded.get()) else {
             // A run begins with a primitive, and no other is loaded meanwhile; else the arm floats.
             return self.float(measured);
         };
-        let Running { run, operational, controller, handover, lag } = running;
+        let Running { operational, controller, handover, lag } = running;
         let frozen = measured.state.missing > 0;
         let senses = match self.wrench.age() {
             Some(0) if !frozen => Senses::Fresh,

@@ -33,7 +33,7 @@ use crate::model::calibration::{Calibration, Payload};
 use crate::model::kinematics::Frames;
 use crate::plan::load::{Fit, LoadRefusal, Loaded};
 use crate::plan::primitive::Primitive;
-use crate::plan::run::FADE;
+use crate::plan::run::{FADE, Run};
 use crate::real::Real;
 use crate::sense::joints::{JointEstimator, JointState};
 use crate::sense::wrench::WrenchEstimator;
@@ -73,7 +73,9 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     wrench: WrenchEstimator<R>,
     limiter: TorqueLimiter<R>,
     bounds: JointBounds<R>,
-    law: Law<R, N>,
+    law: Law<R>,
+    /// Place of the run that [`Law::Run`] carries out; in every other state what is left of the last one.
+    run: Option<Run<R, N>>,
     /// Force controller of a run. Not in its law: the window is large, and stays where it is.
     force: ForceController<R>,
     hand: HandDrive<R>,
@@ -113,6 +115,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             wrench: WrenchEstimator::new(),
             limiter: TorqueLimiter::new(&calibration),
             law: Law::Off { zero_cycles: 0 },
+            run: None,
             force <- ForceController::init(gains.stiff.force_window),
             hand <- HandDrive::init(&gains.hand),
             loaded <- Loaded::init(),
@@ -298,8 +301,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             return;
         }
         self.bounds.tighten(&self.model, &measured.state.q);
-        let (depends, lag) = match &self.law {
-            Law::Run(Running { run, lag, .. }) => (run.options.feedback || run.options.force_control, *lag),
+        let (depends, lag) = match (&self.law, &self.run) {
+            (Law::Run(Running { lag, .. }), Some(run)) => (run.options.feedback || run.options.force_control, *lag),
             _ => (false, Lag::none()),
         };
         let seen = Observation {
@@ -376,7 +379,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             return false;
         }
         match &self.law {
-            Law::Run(running) => running.run.is_over(),
+            Law::Run(_) => self.run.as_ref().is_none_or(Run::is_over),
             Law::Posture(Posture { approach: Some(approach), integral, .. }) => {
                 let rests = integral.is_settled() && self.fastest(measured) < R::of(STANDING);
                 approach.is_overdue() || (approach.is_finished() && rests)

@@ -11,8 +11,7 @@ use crate::law::force::ForceController;
 use crate::law::joint::JointController;
 use crate::law::operational::OperationalController;
 use crate::plan::approach::Approach;
-use crate::plan::primitive::{Primitive, Rollout};
-use crate::plan::run::Run;
+use crate::plan::primitive::Primitive;
 use crate::real::{Real, within};
 use crate::sense::deviation::Deviation;
 use crate::units::{JointAccelerations, JointPositions, Vector7, Wrench};
@@ -77,7 +76,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
 
     /// Begins a run, after the supervisor has allowed it.
     #[inline(never)]
-    pub(super) fn begin_run(&mut self, rollout: Rollout<R, N>, options: RunOptions, measured: &Measured<'_, R>) {
+    pub(super) fn begin_run(&mut self, options: RunOptions, measured: &Measured<'_, R>) {
         self.hand.begin_run();
         // From what the feedback is drawn to while holding, so that the torque against friction stays.
         let start = match &self.law {
@@ -92,7 +91,6 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         };
         self.force.restart(self.gains.tracking(options.compliant).force_window);
         self.law = Law::Run(Running {
-            run: Run::new(rollout, options),
             operational: OperationalController::new(start),
             controller: JointController::new(),
             handover,

@@ -71,10 +71,50 @@ pub(crate) struct Run<R: Real, const N: usize> {
 }
 
 impl<R: Real, const N: usize> Run<R, N> {
-    /// A run of this rollout, before its first tick.
-    #[inline(always)]
-    pub(crate) fn new(rollout: Rollout<R, N>, options: RunOptions) -> Self {
-        Run {
+    /// Puts a run into its place that begins at the measured pose and posture, at rest; a refused one leaves the place as
+    /// it was. In place, because moving it out of a result costs thousands of instructions in the cycle that has most to do.
+    ///
+    /// # Errors
+    /// [`Refusal`]: the arm or the hand is not where the primitive starts, or an option is out of range.
+    pub(crate) fn start(
+        place: &mut Option<Self>,
+        primitive: &Primitive<R, N>,
+        q: &JointPositions<R>,
+        pose: &Pose<R>,
+        hand: Option<&HandState<R>>,
+        options: RunOptions,
+    ) -> Result<(), Refusal> {
+        let (taught_posture, taught_hand) = posture_and_hand(&primitive.movement().start().points);
+        let far = |(q, start): (&R, &R)| {
+            let distance = *q - *start;
+            !(distance <= R::of(START_DISTANCE) && distance >= R::of(-START_DISTANCE))
+        };
+        if q.0.iter().zip(&taught_posture).any(far) {
+            return Err(Refusal::StartTooFar);
+        }
+        let hand = match hand {
+            Some(state) => {
+                let far = |(q, start): (&R, &R)| {
+                    let distance = *q - *start;
+                    !(distance <= R::of(HAND_DISTANCE) && distance >= R::of(-HAND_DISTANCE))
+                };
+                if state.q.iter().zip(&taught_hand).any(far) {
+                    return Err(Refusal::HandTooFar);
+                }
+                state.q
+            }
+            None => taught_hand,
+        };
+        let start = StartState::at_rest(configuration(pose.position.into(), pose.orientation.0, q.0.into(), hand));
+        let mut rollout = Rollout::start(primitive.movement(), &start).map_err(reason)?;
+        // The first speed acts at once; later ones are approached at the rollout's slew rate.
+        rollout.set_speed_slew(None).map_err(reason)?;
+        set_speed(&mut rollout, primitive, options.speed)?;
+        rollout.set_speed_slew(Some(R::of(Rollout::<R, N>::DEFAULT_SLEW))).map_err(reason)?;
+        if options.goal != Goal::STORED {
+            set_goal(&mut rollout, primitive, &options.goal)?;
+        }
+        *place = Some(Run {
             rollout,
             options,
             coupling: Coupling::NONE,
@@ -84,7 +124,8 @@ impl<R: Real, const N: usize> Run<R, N> {
             kept: FADE,
             settled: false,
             rested: 0,
-        }
+        });
+        Ok(())
     }
 
     /// Takes a new goal, or leaves everything as it was.
@@ -200,52 +241,6 @@ impl<R: Real, const N: usize> Run<R, N> {
     pub(crate) fn deviation(&self) -> Option<&Deviation<R>> {
         self.deviation.as_ref()
     }
-}
-
-/// Starts a rollout at the measured pose and posture, at rest. Inlined: moving it out of a result costs thousands of
-/// instructions in the cycle that has most to do.
-///
-/// # Errors
-/// [`Refusal`]: the arm or the hand is not where the primitive starts, or an option is out of range.
-#[inline(always)]
-pub(crate) fn start<R: Real, const N: usize>(
-    primitive: &Primitive<R, N>,
-    q: &JointPositions<R>,
-    pose: &Pose<R>,
-    hand: Option<&HandState<R>>,
-    options: &RunOptions,
-) -> Result<Rollout<R, N>, Refusal> {
-    let (taught_posture, taught_hand) = posture_and_hand(&primitive.movement().start().points);
-    let far = |(q, start): (&R, &R)| {
-        let distance = *q - *start;
-        !(distance <= R::of(START_DISTANCE) && distance >= R::of(-START_DISTANCE))
-    };
-    if q.0.iter().zip(&taught_posture).any(far) {
-        return Err(Refusal::StartTooFar);
-    }
-    let hand = match hand {
-        Some(state) => {
-            let far = |(q, start): (&R, &R)| {
-                let distance = *q - *start;
-                !(distance <= R::of(HAND_DISTANCE) && distance >= R::of(-HAND_DISTANCE))
-            };
-            if state.q.iter().zip(&taught_hand).any(far) {
-                return Err(Refusal::HandTooFar);
-            }
-            state.q
-        }
-        None => taught_hand,
-    };
-    let start = StartState::at_rest(configuration(pose.position.into(), pose.orientation.0, q.0.into(), hand));
-    let mut rollout = Rollout::start(primitive.movement(), &start).map_err(reason)?;
-    // The first speed acts at once; later ones are approached at the rollout's slew rate.
-    rollout.set_speed_slew(None).map_err(reason)?;
-    set_speed(&mut rollout, primitive, options.speed)?;
-    rollout.set_speed_slew(Some(R::of(Rollout::<R, N>::DEFAULT_SLEW))).map_err(reason)?;
-    if options.goal != Goal::STORED {
-        set_goal(&mut rollout, primitive, &options.goal)?;
-    }
-    Ok(rollout)
 }
 
 /// Takes a new goal, or leaves everything as it was.
