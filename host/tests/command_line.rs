@@ -95,7 +95,8 @@ fn a_bad_demonstration_ends_with_6_and_names_file_line_and_column() {
     let failed = tactus(folder.path(), &["learn", "demo.csv"]).failure().code(6);
     assert_eq!(
         stderr(&failed),
-        "error[E620]: learn refused: demo.csv: line 100, column 9 (q3_rad): the value NaN is not finite\n"
+        "error[E620]: learn refused: demo.csv: line 100, column 9 (q3_rad): the value NaN is not finite\n  \
+         help: docs/recording-format.md describes the file\n"
     );
     assert_eq!(stdout(&failed), "");
     assert!(!folder.path().join("demo.toml").exists());

@@ -24,7 +24,7 @@ pub const WORST_GRAVITY: [f64; JOINTS] = [0.0, 41.5, 13.0, 11.0, 1.9, 1.9, 0.2];
 /// The manufacturer's full scale (N m).
 const FULL_SCALE: [f64; JOINTS] = [25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0];
 
-/// Largest change of torque (N m per control period): [`FULL_SCALE`] in 50 ms.
+/// Largest change of torque (N m per control period): full scale in 50 ms.
 pub const STEP_LIMIT: [f64; JOINTS] = {
     let [j1, j2, j3, j4, j5, j6, j7] = FULL_SCALE;
     let cycles = periods(0.05) as f64;

@@ -39,7 +39,7 @@ pub fn pass(client: &mut Client<Device>, time: Duration, ends: Ends) -> Result<(
 /// Waits until a motion that was just commanded has arrived.
 ///
 /// # Errors
-/// As [`travel`].
+/// As [`super::travel`].
 pub fn wait_for(
     what: &'static str,
     seconds: u64,
