@@ -90,7 +90,7 @@ pub(crate) fn run(machine: &Machine) -> Result<()> {
     shell::step("the hand image under QEMU: start-up, grip, costs");
     let mut system = shell::cargo();
     system.args(["test", "--release", "--package", "system-tests", "--test", "system", "hand::"]);
-    system.args(["--features", build::WORLD]);
+    system.args(["--features", "mujoco"]);
     shell::run(system.args(["--", "--nocapture", "--test-threads", "1"]))?;
     shell::step("accuracy against f64, saturation, ladder (development profile: integers that wrap are errors)");
     shell::run(shell::cargo().args(["test", "--package", "hand", "--", "--nocapture", "--test-threads", "1"]))

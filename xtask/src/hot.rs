@@ -47,6 +47,11 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "control::cycle::laws::<impl control::cycle::Cycle<R,_>>::float",
         "led by hand: no plan and no feedback is computed",
     ),
+    (
+        "control::cycle::laws::<impl control::cycle::Cycle<R,_>>::stop",
+        "a soft stop: no plan and no feedback is computed",
+    ),
+    ("control::sense::joints::Motor::doubt", "a reply that does not fit the ones before"),
     ("control::cycle::Cycle<R,_>::reset", "after a fault of the bus"),
     ("device::controller::DeviceController::restart", "after a fault of the bus"),
     ("device::startup", "a person zeroes the arm again"),

@@ -78,7 +78,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.plain(measured, torque)
     }
 
-    /// Gravity compensation and damping; what else was there is ramped away.
+    /// Gravity compensation and damping; what else was there is ramped away. Not inlined, as [`Cycle::hold_to`].
+    #[inline(never)]
     fn stop(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
         let Law::SoftStop(ramp) = &mut self.law else { return self.float(measured) };
         let rest = ramp.step();
@@ -88,6 +89,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     }
 
     /// Eq (10) along a joint reference, with the integral that takes away what friction leaves.
+    /// Not inlined: the small fast memory of a board is for the code of a run.
+    #[inline(never)]
     fn hold_to(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
         let Law::Posture(posture) = &mut self.law else { return self.float(measured) };
         let reference = posture.reference(&measured.state.q, &self.gains.stiff.clamp);

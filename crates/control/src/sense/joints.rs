@@ -217,6 +217,15 @@ impl Motor {
             *self = Motor { counts, step: moved / cycles, age: 0, doubtful: None, ..*self };
             return Some(Believed { rate: R::from_counts(moved) / R::from_counts(cycles), jumped: false });
         }
+        self.doubt(counts, carried, gate, torque_on)
+    }
+
+    /// Weighs a reply that does not fit the ones before; `None` if it does not fit the last doubtful one either. Not inlined:
+    /// it is rare.
+    #[inline(never)]
+    fn doubt<R: Real>(&mut self, counts: Counts, carried: i32, gate: i32, torque_on: bool) -> Option<Believed<R>> {
+        let elapsed = self.age.saturating_add(1);
+        let moved = counts.0.wrapping_sub(self.counts.0);
         let since = self.doubtful.replace(counts).map(|doubtful| counts.0.wrapping_sub(doubtful.0));
         let step = since.filter(|step| is_within(*step, self.step, gate))?;
         let can_have_turned = moved.unsigned_abs() <= gate.unsigned_abs().saturating_mul(u32::from(elapsed));
