@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use fdcan_model::{Cancellation, Options};
+use fdcan_model::Options;
 use rigless::emulator::{self, Start, Watch};
 use rigless::image::Image as Placed;
 use rigless::session::Session;
@@ -15,13 +15,11 @@ use rigless::time::VirtualNanos;
 
 use crate::board::{Board, BoardError};
 use crate::cache::BANK;
-use crate::can::{HostLine, SharedCan};
+use crate::can::SharedCan;
 use crate::core::SharedCore;
-use crate::fault::Fault;
 use crate::image::Image;
 use crate::log::Log;
 use crate::part::Fitting;
-use crate::report::Measured;
 use crate::serial::SharedLine;
 use crate::setup::{Outcome, Setup};
 use crate::watchdog::SharedWatch;
