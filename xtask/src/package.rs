@@ -29,7 +29,8 @@ pub(crate) fn run() -> Result<()> {
         shell::run(std::process::Command::new("tar").arg("-xzf").arg(&file).arg("-C").arg(&folder))?;
         let mut test = shell::cargo();
         test.current_dir(folder.join(format!("{name}-{version}")));
-        test.env("CARGO_TARGET_DIR", shell::target_dir().join("unpacked"));
+        // In the folder that is removed: a build that is kept names its sources where they were unpacked the last time.
+        test.env("CARGO_TARGET_DIR", folder.join("target"));
         shell::run(test.args(["test", "--quiet", "--all-features"]))?;
     }
     fs::remove_dir_all(&folder)?;
