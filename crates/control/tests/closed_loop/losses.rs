@@ -165,5 +165,12 @@ fn a7_a_motor_that_begins_to_count_anew_stops_the_arm_softly_without_a_step_and_
         rig.command(Command::ClearFault);
         rig.tick(None);
         assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::SoftStop, Fault::ImplausiblePosition));
+        // A new start with a new zero: the arm can be used again.
+        rig.cycle.reset();
+        rig.jump = [0; 7];
+        rig.tick(None);
+        rig.command(Command::Hold);
+        rig.run_for(0.3);
+        assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None));
     }
 }

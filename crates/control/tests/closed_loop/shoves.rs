@@ -11,9 +11,6 @@ use crate::rig::Rig;
 /// Speed of the hand that counts as braked (m/s): the reduced speed of the standards for work beside a person.
 const BRAKED: f64 = 0.25;
 
-/// Speed of the hand that a few shoves in hold and run leave (m/s): the stiffness of the posture still swings.
-const SWINGS: f64 = 0.4;
-
 /// Length of what the velocity filter still remembers (control periods).
 const FILTER_CYCLES: usize = 9;
 
@@ -110,10 +107,25 @@ fn fraction(index: usize, of: f64) -> f64 {
     ((index + 1) as f64 * of).fract()
 }
 
-#[test]
-fn g1_a_shove_of_up_to_10_n_s_in_teach_hold_and_run_is_braked_with_torque_and_seen() {
-    let (mut worst, mut late) = (0.0f64, 0);
-    for index in 0..201 {
+/// The arm can be used again after a stop: a person clears it and asks it to hold. True if its zero was lost, which takes a
+/// new start and a new zero in between.
+fn recovers(rig: &mut Rig<f32>) -> bool {
+    rig.command(Command::ClearFault);
+    let zero_lost = rig.tick(None).record.fault == Fault::ImplausiblePosition;
+    if zero_lost {
+        rig.cycle.reset();
+        rig.tick(None);
+    }
+    rig.command(Command::Hold);
+    rig.run_for(0.3);
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None));
+    zero_lost
+}
+
+/// 201 shoves from this number on; how many leave the hand too fast, how many cost the zero, and the fastest (m/s).
+fn shoves(from: usize) -> (usize, usize, f64) {
+    let (mut late, mut zeros, mut worst) = (0, 0, 0.0f64);
+    for index in from..from + 201 {
         let state = [State::Gravity, State::Hold, State::Run][index % 3];
         let force = 10.0 + 70.0 * fraction(index, 0.618_034);
         let seconds = (0.05 + 0.45 * fraction(index, 0.754_878)).min(10.0 / force);
@@ -129,9 +141,24 @@ fn g1_a_shove_of_up_to_10_n_s_in_teach_hold_and_run_is_braked_with_torque_and_se
         assert_eq!(outcome.state == State::SoftStop, outcome.fault != Fault::None, "{what}");
         worst = worst.max(outcome.braked);
         late += usize::from(outcome.braked >= BRAKED);
-        let swings = if state == State::Gravity { BRAKED } else { SWINGS };
-        assert!(outcome.braked < swings, "{what}");
+        if outcome.state == State::SoftStop {
+            zeros += usize::from(recovers(&mut rig));
+        }
     }
-    println!("{late} of 201 faster than {BRAKED} m/s 0.3 s after the push; the fastest {worst:.2} m/s");
-    assert!(late <= 6, "{late}");
+    println!(
+        "{late} of 201 faster than {BRAKED} m/s 0.3 s after the push, the fastest {worst:.2} m/s; {zeros} zeros lost"
+    );
+    (late, zeros, worst)
+}
+
+#[test]
+fn g1_a_shove_of_up_to_10_n_s_in_teach_hold_and_run_is_braked_with_torque_and_seen() {
+    let (late, zeros, worst) = shoves(0);
+    assert!(late <= 5 && zeros <= 1 && worst < 0.4, "{late}, {zeros}, {worst}");
+}
+
+#[test]
+fn g1_shoves_that_no_limit_was_chosen_on_are_braked_as_well() {
+    let (late, zeros, worst) = shoves(1005);
+    assert!(late <= 8 && zeros <= 1 && worst < 0.75, "{late}, {zeros}, {worst}");
 }
