@@ -1,8 +1,8 @@
 //! Tells the executables of this package where the MuJoCo library lies; harmless where they do not use it.
 //!
 //! `mujoco-rs` links the library but leaves no search path in the executable. `$ORIGIN` keeps the path relative to the
-//! executable, so that the build folder can be moved: programs lie in `target/<profile>`, test binaries and examples one
-//! folder deeper, and `cargo xtask setup` puts the library into `target/mujoco/lib`. Not tied to a feature of this
+//! executable, so that the build folder can be moved: programs lie in `target/<profile>`, test binaries and examples
+//! one folder deeper, and `cargo xtask setup` puts the library into `target/mujoco/lib`. Not tied to a feature of this
 //! package: cargo may switch the MuJoCo world of `sim` on for a neighbour, and then these executables need it too.
 
 fn main() {

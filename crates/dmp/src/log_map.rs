@@ -1,10 +1,10 @@
 //! `LogMap`: orientations as rotation vectors (log-map coordinates) about a centre, for movements beyond 175 degrees.
 //!
 //! `q = c (x) exp(y)`, `y = 2 log(conj(c) (x) q)`. On `y` runs the linear system of Eq. (1), stable at any angle. This
-//! is not in the paper. Putting `2 log(conj(q) (x) g)` in the place of Eq. (4) looks simpler and was refused: across the
-//! axis its stiffness is `K (phi/2) cot(phi/2)`, negative beyond 180 degrees, and real recordings of 357 degrees then
-//! run away by more than 100 degrees. The centre lies half-way between the start and the goal of the demonstration, so
-//! `y` stays within half a turn where the path is shorter than a full one.
+//! is not in the paper. Putting `2 log(conj(q) (x) g)` in the place of Eq. (4) looks simpler and was refused: across
+//! the axis its stiffness is `K (phi/2) cot(phi/2)`, negative beyond 180 degrees, and real recordings of 357 degrees
+//! then run away by more than 100 degrees. The centre lies half-way between the start and the goal of the
+//! demonstration, so `y` stays within half a turn where the path is shorter than a full one.
 //!
 //! `omega = J_r(y) yd` (body frame), `J_r = 1 - b [y] + c [y]^2`, `b = (1 - cos n)/n^2`, `c = (n - sin n)/n^3`.
 

@@ -1,10 +1,10 @@
 //! `Rollout`: the running state of one primitive, advanced once per control period on one phase.
 //!
 //! Outputs are physical: `(x, v/tau, rhs/tau^2)`. A change of speed keeps the scaled state `v` and the phase, so the
-//! path x(s) does not depend on the course of tau(t); the plan's velocity changes instead. With
-//! `rate = 1/tau(t)` the outputs are `xd = v rate` and `xdd = rhs rate^2 + v d(rate)/dt`, which is
-//! `(vd - xd taud)/tau` written without a division and valid at rate 0 (time stopped). Speed changes are slewed, because
-//! a jump of the rate is a jump of the desired velocity.
+//! path x(s) does not depend on the course of tau(t); the plan's velocity changes instead. With `rate = 1/tau(t)` the
+//! outputs are `xd = v rate` and `xdd = rhs rate^2 + v d(rate)/dt`, which is `(vd - xd taud)/tau` written without a
+//! division and valid at rate 0 (time stopped). Speed changes are slewed, because a jump of the rate is a jump of the
+//! desired velocity.
 
 use core::fmt;
 
@@ -135,8 +135,8 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Rollout<T, D, P,
     /// coupling beyond what any movement needs is cut to that, and one that is not a number counts as 0.
     ///
     /// # Errors
-    /// [`RolloutError::PeriodTooLong`] for a `dt` above [`Primitive::control_period`], at which the integration could be
-    /// unstable, [`RolloutError::OtherPrimitive`]; nothing has changed then.
+    /// [`RolloutError::PeriodTooLong`] for a `dt` above [`Primitive::control_period`], at which the integration could
+    /// be unstable, [`RolloutError::OtherPrimitive`]; nothing has changed then.
     #[inline]
     pub fn step(
         &mut self,
@@ -192,8 +192,8 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Rollout<T, D, P,
         Ok(Reference { phase: tick.s, progress, time, rate, poses, points })
     }
 
-    /// Checks that this is a run of `primitive`: weights, gains and start of one movement with the state of another would
-    /// be a plan that nobody has taught.
+    /// Checks that this is a run of `primitive`: weights, gains and start of one movement with the state of another
+    /// would be a plan that nobody has taught.
     ///
     /// # Errors
     /// [`RolloutError::OtherPrimitive`].
@@ -254,8 +254,9 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Rollout<T, D, P,
         self.points.command(goal, self.goal_filter.is_some())
     }
 
-    /// Makes the place where the plan is now its goal, in all rows: where a coupling has bent it, it stays when the coupling ends.
-    /// The phase runs on, so what is left of the forcing term (`s` of it) still fades out about the new goal.
+    /// Makes the place where the plan is now its goal, in all rows: where a coupling has bent it, it stays when the
+    /// coupling ends. The phase runs on, so what is left of the forcing term (`s` of it) still fades out about the new
+    /// goal.
     pub fn settle(&mut self) {
         for rows in &mut self.poses {
             rows.position.settle();

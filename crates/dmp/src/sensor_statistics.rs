@@ -2,9 +2,9 @@
 //!
 //! Mean `m(u)` is the middle of the successful runs, spread `sigma(u)` the unit in which a distance from it is judged;
 //! `fit::sensor_statistics` makes both from recordings. A run whose values leave the band for longer than noise would
-//! explain is not going as it should: the object was missed, something blocks the way, what was held is lost. Two tables
-//! are kept apart on purpose: [`crate::ExpectedSensors`] bends the plan and is best recorded without the object (with
-//! it, the inner forces of the grasp would drag the hand away whenever the object is not there); this one is only
+//! explain is not going as it should: the object was missed, something blocks the way, what was held is lost. Two
+//! tables are kept apart on purpose: [`crate::ExpectedSensors`] bends the plan and is best recorded without the object
+//! (with it, the inner forces of the grasp would drag the hand away whenever the object is not there); this one is only
 //! compared with, and comes from runs that met the object.
 
 use crate::{Entry, PhaseTable, Scalar, TableError, bounds};

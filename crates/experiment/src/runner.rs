@@ -188,8 +188,8 @@ fn keep(config: &Config, log: Option<&mut Log>, trial: &Trial) -> Result<(), Exp
     config.out.as_deref().filter(|_| config.keep_recordings).map_or(Ok(()), |folder| record(folder, trial))
 }
 
-/// Repeats the trials of the representative cell that have left no trace because their results were there from before: the
-/// same key, the same trial.
+/// Repeats the trials of the representative cell that have left no trace because their results were there from before:
+/// the same key, the same trial.
 fn repeat_representative(
     config: &Config,
     prepared: &Prepared,

@@ -88,8 +88,8 @@ impl<R: Real> Posture<R> {
     }
 }
 
-/// The controllers that follow the plan of a run. The run itself stays in its place in the cycle: it is large, and is written
-/// there once.
+/// The controllers that follow the plan of a run. The run itself stays in its place in the cycle: it is large, and is
+/// written there once.
 pub(super) struct Running<R: Real> {
     pub(super) operational: OperationalController<R>,
     pub(super) controller: JointController<R>,

@@ -76,8 +76,9 @@ impl fmt::Display for LoadError {
 
 impl core::error::Error for LoadError {}
 
-/// A primitive that an arm can run: the word of [`check`], which alone gives it, and what [`Cycle::load`](crate::Cycle::load) asks
-/// for. The check costs two forward kinematics and belongs where there is time; taking the primitive over is then a copy.
+/// A primitive that an arm can run: the word of [`check`], which alone gives it, and what
+/// [`Cycle::load`](crate::Cycle::load) asks for. The check costs two forward kinematics and belongs where there is
+/// time; taking the primitive over is then a copy.
 #[derive(Debug)]
 pub struct Fit<'a, R: Real, const N: usize> {
     primitive: &'a Primitive<R, N>,
@@ -90,15 +91,15 @@ impl<'a, R: Real, const N: usize> Fit<'a, R, N> {
         self.primitive
     }
 
-    /// Whether it was checked for an arm with the tool of this one. Nothing else of an arm that a check looks at can differ: links
-    /// and limits are constants of the model.
+    /// Whether it was checked for an arm with the tool of this one. Nothing else of an arm that a check looks at can
+    /// differ: links and limits are constants of the model.
     pub(crate) fn is_for(&self, model: &ArmModel<R>) -> bool {
         self.tool == Tool::of(model)
     }
 }
 
-/// The place of the primitive that the next run plays. It is there from the beginning, so that the first one is copied into it as every
-/// other, and not also built and moved: 23 kB take some time.
+/// The place of the primitive that the next run plays. It is there from the beginning, so that the first one is copied
+/// into it as every other, and not also built and moved: 23 kB take some time.
 pub(crate) struct Loaded<R: Real, const N: usize> {
     primitive: Primitive<R, N>,
     present: bool,

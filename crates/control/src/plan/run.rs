@@ -25,8 +25,8 @@ const REST: (f64, f64) = (2e-3, 1e-2);
 /// The hand rows count as at rest below this speed (rad/s).
 const HAND_REST: f64 = 5e-2;
 
-/// Time that the plan stays at rest before the run is over: 1 s, in control periods. It is three time constants of the pose feedback of
-/// Eq (11), so that the arm has closed the last millimetres.
+/// Time that the plan stays at rest before the run is over: 1 s, in control periods. It is three time constants of the
+/// pose feedback of Eq (11), so that the arm has closed the last millimetres.
 const SETTLING: u16 = periods(1.0);
 
 /// Progress beyond which a plan that never comes to rest (feedback still bends it) is over as well.
@@ -71,8 +71,9 @@ pub(crate) struct Run<R: Real, const N: usize> {
 }
 
 impl<R: Real, const N: usize> Run<R, N> {
-    /// Puts a run into its place that begins at the measured pose and posture, at rest; a refused one leaves the place as
-    /// it was. In place, because moving it out of a result costs thousands of instructions in the cycle that has most to do.
+    /// Puts a run into its place that begins at the measured pose and posture, at rest; a refused one leaves the place
+    /// as it was. In place, because moving it out of a result costs thousands of instructions in the cycle that has
+    /// most to do.
     ///
     /// # Errors
     /// [`Refusal`]: the arm or the hand is not where the primitive starts, or an option is out of range.
@@ -194,7 +195,8 @@ impl<R: Real, const N: usize> Run<R, N> {
         Ok(plan)
     }
 
-    /// Compares the measured values with the statistics of the primitive, if it has any; returns what has just become a surprise.
+    /// Compares the measured values with the statistics of the primitive, if it has any; returns what has just become a
+    /// surprise.
     pub(crate) fn watch(
         &mut self,
         primitive: &Primitive<R, N>,
@@ -223,8 +225,8 @@ impl<R: Real, const N: usize> Run<R, N> {
         R::from_counts(i32::from(self.kept)) * R::of(1.0 / FADE as f64)
     }
 
-    /// Whether the feedback or the force controller acts with less than it would: the sensor is silent, or the run takes
-    /// another time than the recording of the expectation.
+    /// Whether the feedback or the force controller acts with less than it would: the sensor is silent, or the run
+    /// takes another time than the recording of the expectation.
     pub(crate) fn is_faded(&self, primitive: &Primitive<R, N>) -> bool {
         let uses_force = self.options.feedback || self.options.force_control;
         let derated = self.options.feedback && primitive.trust(&self.rollout) < R::of(1.0);

@@ -11,16 +11,16 @@ use crate::units::{Vector6, Wrench};
 /// environment on finger F1, F2, F3 (N m).
 pub const SENSORS: usize = 9;
 
-/// Force (N) that counts as none: the bias and hysteresis of the sensor that a tare leaves would otherwise move the plan by
-/// centimetres.
+/// Force (N) that counts as none: the bias and hysteresis of the sensor that a tare leaves would otherwise move the
+/// plan by centimetres.
 pub const FORCE_DEAD_BAND: f64 = 0.3;
 
 /// Torque (N m) that counts as none.
 pub const TORQUE_DEAD_BAND: f64 = 0.02;
 
-/// Cut-off of the filter between the deviation and the plan (Hz). The plan's acceleration is fed forward, the hand's inertia is
-/// felt by the wrist sensor, and the sum bends the plan again: with K1/K = 0.8 m/N that loop has a gain of 3 above its
-/// resonance and swings at 20 Hz as soon as a bias comes near the dead band.
+/// Cut-off of the filter between the deviation and the plan (Hz). The plan's acceleration is fed forward, the hand's
+/// inertia is felt by the wrist sensor, and the sum bends the plan again: with K1/K = 0.8 m/N that loop has a gain of 3
+/// above its resonance and swings at 20 Hz as soon as a bias comes near the dead band.
 pub const FEEDBACK_CUT_OFF: f64 = 8.0;
 
 /// What is expected at one tick, and what is felt beyond it. `F` is what the environment does to the robot.

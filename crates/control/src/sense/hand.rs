@@ -12,8 +12,9 @@ use crate::sense::sample::HandSample;
 use crate::sense::wrench::WRENCH_CUT_OFF;
 use crate::time::{PERIOD, RATE, few_periods};
 
-/// Time without a reply after which the hand counts as lost: 33 ms, in control periods. A hand alone has half of it, as an arm
-/// (A3); behind an arm letting go in the middle of a movement is the greater harm, and the arm goes on without the fingers.
+/// Time without a reply after which the hand counts as lost: 33 ms, in control periods. A hand alone has half of it, as
+/// an arm (A3); behind an arm letting go in the middle of a movement is the greater harm, and the arm goes on without
+/// the fingers.
 pub const LOST_CYCLES: u8 = few_periods(1.0 / 30.0);
 
 /// Largest believed motion per control period (counts): three times the no-load speeds of 2.44 rad/s (inner link) and

@@ -220,8 +220,8 @@ impl Motor {
         self.doubt(counts, carried, gate, torque_on)
     }
 
-    /// Weighs a reply that does not fit the ones before; `None` if it does not fit the last doubtful one either. Not inlined:
-    /// it is rare.
+    /// Weighs a reply that does not fit the ones before; `None` if it does not fit the last doubtful one either. Not
+    /// inlined: it is rare.
     #[inline(never)]
     fn doubt<R: Real>(&mut self, counts: Counts, carried: i32, gate: i32, torque_on: bool) -> Option<Believed<R>> {
         let elapsed = self.age.saturating_add(1);

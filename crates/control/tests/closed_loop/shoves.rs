@@ -107,8 +107,8 @@ fn fraction(index: usize, of: f64) -> f64 {
     ((index + 1) as f64 * of).fract()
 }
 
-/// The arm can be used again after a stop: a person clears it and asks it to hold. True if its zero was lost, which takes a
-/// new start and a new zero in between.
+/// The arm can be used again after a stop: a person clears it and asks it to hold. True if its zero was lost, which
+/// takes a new start and a new zero in between.
 fn recovers(rig: &mut Rig<f32>) -> bool {
     rig.command(Command::ClearFault);
     let zero_lost = rig.tick(None).record.fault == Fault::ImplausiblePosition;

@@ -306,8 +306,8 @@ fn smooth<const D: usize>(filter: &ZeroPhaseFilter, rows: &[[f64; D]]) -> Vec<[f
     (0..rows.len()).map(|k| core::array::from_fn(|i| columns[i][k])).collect()
 }
 
-/// Minimum-jerk values from `start` to `goal` in `samples` samples: at rest at both ends. The paper generates the finger
-/// trajectories this way.
+/// Minimum-jerk values from `start` to `goal` in `samples` samples: at rest at both ends. The paper generates the
+/// finger trajectories this way.
 pub fn minimum_jerk<const D: usize>(start: [f64; D], goal: [f64; D], samples: usize) -> Vec<[f64; D]> {
     let intervals = samples.saturating_sub(1).max(1) as f64;
     (0..samples)

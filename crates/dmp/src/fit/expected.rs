@@ -8,8 +8,8 @@ use crate::{ExpectedSensors, TableError};
 /// Fewest recordings whose spread says something about the sensors; with two, chance decides.
 pub const FEWEST_TRIALS: usize = 3;
 
-/// `K2` stays between 1 and this factor below and above 1: a sensor is trusted less where it scattered, never silenced, and
-/// never trusted so much that a chance coincidence of three recordings becomes a gain.
+/// `K2` stays between 1 and this factor below and above 1: a sensor is trusted less where it scattered, never silenced,
+/// and never trusted so much that a chance coincidence of three recordings becomes a gain.
 pub const WEIGHT_RANGE: f64 = 4.0;
 
 /// The expectation at `count` evenly spaced phases from samples at arbitrary progress `u`.
@@ -33,14 +33,15 @@ pub fn expected_sensors<const SENSORS: usize, const CAPACITY: usize>(
 
 /// The weights `K2` of Eq. (8) at `count` evenly spaced phases from the spread of `trials` recordings.
 ///
-/// `K2_i(u) = k_i/(sigma_i(u)^2 + sigma_min_i^2)` with `sigma_min_i` = `floor` times the root mean square of `sigma_i` over the
-/// phase, but at least `resolution[i]` (N or N m): what a sensor cannot tell, or the dead band behind it drops, is no reason to trust it
-/// less. `k_i` is such that the mean over the phase is 1 before it is kept within [`WEIGHT_RANGE`]: a sensor counts more where it repeats itself, while `K1` keeps its
-/// meaning in every row, whatever the units of the sensors. `sigma^2` is averaged around each phase first. A sensor that never moved has weight 1.
+/// `K2_i(u) = k_i/(sigma_i(u)^2 + sigma_min_i^2)` with `sigma_min_i` = `floor` times the root mean square of `sigma_i`
+/// over the phase, but at least `resolution[i]` (N or N m): what a sensor cannot tell, or the dead band behind it
+/// drops, is no reason to trust it less. `k_i` is such that the mean over the phase is 1 before it is kept within
+/// [`WEIGHT_RANGE`]: a sensor counts more where it repeats itself, while `K1` keeps its meaning in every row, whatever
+/// the units of the sensors. `sigma^2` is averaged around each phase first. A sensor that never moved has weight 1.
 ///
 /// # Errors
-/// [`TableError::Trials`] below [`FEWEST_TRIALS`], [`TableError::Negative`] for a floor that is not positive or a negative resolution (without a floor a
-/// silent sensor would outweigh all others), [`TableError::Empty`],
+/// [`TableError::Trials`] below [`FEWEST_TRIALS`], [`TableError::Negative`] for a floor that is not positive or a
+/// negative resolution (without a floor a silent sensor would outweigh all others), [`TableError::Empty`],
 /// [`TableError::NotFinite`].
 pub fn weights_from_spread<const SENSORS: usize>(
     spread: &[[f64; SENSORS]],

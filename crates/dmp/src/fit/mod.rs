@@ -40,9 +40,11 @@ pub const WARNING_ANGLE: f64 = 150.0 * core::f64::consts::PI / 180.0;
 pub const LARGEST_ANGLE: f64 = 175.0 * core::f64::consts::PI / 180.0;
 /// A demonstration whose last speed is below this share of its highest one ends at rest.
 const REST_SPEED_SHARE: f64 = 0.15;
-/// Time for which the plan of a demonstration that ends at rest is told to stay at its goal, as a share of the duration.
+/// Time for which the plan of a demonstration that ends at rest is told to stay at its goal, as a share of the
+/// duration.
 const REST_SHARE: f64 = 0.5;
-/// Beyond this angle to the goal (rad, 359 degrees) even rotation vectors are refused: the sign of the start could not tell which way to turn.
+/// Beyond this angle to the goal (rad, 359 degrees) even rotation vectors are refused: the sign of the start could not
+/// tell which way to turn.
 pub const LARGEST_ROTATION_VECTOR: f64 = 359.0 * core::f64::consts::PI / 180.0;
 
 /// Options of learning.
@@ -194,8 +196,8 @@ impl<const D: usize, const P: usize> Learned<D, P> {
     }
 }
 
-/// Learns a primitive from several demonstrations of one movement: from their mean, see [`Demonstration::mean`]. How far
-/// they lie apart is [`Report::spread`].
+/// Learns a primitive from several demonstrations of one movement: from their mean, see [`Demonstration::mean`]. How
+/// far they lie apart is [`Report::spread`].
 ///
 /// # Errors
 /// [`FitError`].
@@ -239,9 +241,9 @@ pub fn fit<const D: usize, const P: usize>(
         return Err(FitError::TurnsTooFar { angle });
     }
     let samples = smooth.len();
-    // Beyond the last sample nothing ties the last weights down, and they are large, because there f is small: a plan that
-    // reproduces its demonstration to a tenth of a millimetre was seen to leave the goal by 24 mm afterwards. So where
-    // the demonstration rests at its end, the fit goes on with rest.
+    // Beyond the last sample nothing ties the last weights down, and they are large, because there f is small: a plan
+    // that reproduces its demonstration to a tenth of a millimetre was seen to leave the goal by 24 mm afterwards. So
+    // where the demonstration rests at its end, the fit goes on with rest.
     let rest = if smooth.ends_at_rest(REST_SPEED_SHARE) { (samples as f64 * REST_SHARE) as usize } else { 0 };
     let phases: Vec<f64> = (0..samples + rest).map(|k| canonical.phase_at(k as f64 / (samples - 1) as f64)).collect();
     let control_period = options.control_period.unwrap_or(period);
@@ -368,8 +370,8 @@ fn vector_targets(orientation: &[Quaternion<f64>], timing: &Timing<'_>, gain: &G
 
 /// Eq. (1) solved for f, sample by sample, and the velocity to start with.
 ///
-/// The velocity is taken half a tick early, because semi-implicit Euler damps with the velocity of the step before: this
-/// cancels its first-order error at the control period.
+/// The velocity is taken half a tick early, because semi-implicit Euler damps with the velocity of the step before:
+/// this cancels its first-order error at the control period.
 fn linear_target(x: &[f64], timing: &Timing<'_>, gain: &Gain<f64>) -> (Target, f64) {
     let (tau, k, d) = (timing.duration, gain.stiffness, gain.damping);
     let (dx, ddx) = (first_derivative(x, timing.period), second_derivative(x, timing.period));

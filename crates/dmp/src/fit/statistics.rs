@@ -28,9 +28,9 @@ struct Entry<const CHANNELS: usize> {
 /// Every sample is shared between the two neighbouring entries by its distance, and each entry is the weighted mean: a
 /// triangular average, which does not shift the record in phase. Every run has the same weight, however densely it was
 /// sampled. The spread is that of the samples about the interpolated mean, so that a steep but repeatable slope is not
-/// taken for scatter; it holds the noise of the sensor and the differences between runs (with `n/(n-1)` for the mean that was
-/// estimated from the same `n` runs; of one run it is the noise alone). Entries without any sample are interpolated.
-/// Samples outside 0..=1 are left out.
+/// taken for scatter; it holds the noise of the sensor and the differences between runs (with `n/(n-1)` for the mean
+/// that was estimated from the same `n` runs; of one run it is the noise alone). Entries without any sample are
+/// interpolated. Samples outside 0..=1 are left out.
 ///
 /// # Errors
 /// [`TableError::Empty`] without a usable sample or for `count` = 0, [`TableError::NotFinite`].
@@ -92,8 +92,8 @@ pub fn phase_statistics<const CHANNELS: usize>(
 /// 40 of them, span four. A channel marked in `one_sided` is judged upwards only (a finger that closes too far): its
 /// centre is the mean, and its spread half the distance from there to the largest.
 ///
-/// `floor` is the smallest spread of each channel: a few runs that agree by chance must not make the next one a failure.
-/// Samples beyond progress 1 count at 1, since whoever compares with the statistics goes on with their end.
+/// `floor` is the smallest spread of each channel: a few runs that agree by chance must not make the next one a
+/// failure. Samples beyond progress 1 count at 1, since whoever compares with the statistics goes on with their end.
 ///
 /// # Errors
 /// [`TableError::Trials`] without a run, [`TableError::TooMany`] above the capacity, [`TableError::Spread`] for a floor

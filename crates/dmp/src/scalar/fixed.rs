@@ -6,9 +6,9 @@
 //! phase of a 5 s movement would be off by 2 %. A 64-bit product costs four multiplications on a Cortex-M3, which
 //! leaves one movement row with 50 kernels far inside a 300 Hz tick.
 //!
-//! Products are rounded toward minus infinity. A processor of 64 bits makes them in one 128-bit multiplication, one of 32 bits
-//! out of four 32-bit ones: the 128-bit routine of the compiler's library would cost three times as many instructions
-//! there. Both give the same bits.
+//! Products are rounded toward minus infinity. A processor of 64 bits makes them in one 128-bit multiplication, one of
+//! 32 bits out of four 32-bit ones: the 128-bit routine of the compiler's library would cost three times as many
+//! instructions there. Both give the same bits.
 //!
 //! All arithmetic saturates. It never wraps, because a wrapped velocity changes sign, and it never panics.
 

@@ -111,7 +111,8 @@ fn statistics_tell_how_many_spreads_a_run_is_away_and_never_divides_by_nothing()
     let floor = [0.05; CHANNELS];
     let known = statistics(&slices(&trials), 64, &floor).unwrap();
     assert_eq!((known.trials(), known.mean().len()), (3, 64));
-    // The runs lie between -0.5 and 0.5 about the middle: two spreads to the outermost, and the slope between three neighbours on top.
+    // The runs lie between -0.5 and 0.5 about the middle: two spreads to the outermost, and the slope between three
+    // neighbours on top.
     let (middle, slope) = (known.mean_at(0.5), 4.0 / 63.0);
     assert!((middle[0] - 2.0).abs() < 0.02 && (middle[11] - 2.0).abs() < 0.02, "{middle:?}");
     assert!((known.spread_at(0.5)[0] - (0.5 + slope) / 2.0).abs() < 0.01, "{:?}", known.spread_at(0.5));

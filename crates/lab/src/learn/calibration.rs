@@ -11,8 +11,8 @@ use dmp::fit::{FEWEST_TRIALS, sensor_statistics};
 use crate::plan;
 use crate::primitive_file::PrimitiveFile;
 
-/// Share of the limit of the watch that a success may use, judged by the experience of the others. Half, because twenty or
-/// thirty runs do not hold the most unusual success.
+/// Share of the limit of the watch that a success may use, judged by the experience of the others. Half, because twenty
+/// or thirty runs do not hold the most unusual success.
 const ROOM: f64 = 0.5;
 
 /// Parts into which the runs are divided; each is judged by an experience of the others.
@@ -39,7 +39,8 @@ pub(super) struct Calibrated {
 /// The experience of `runs`, with the spread of each channel multiplied by one factor:
 ///
 /// - the farthest success, judged by the experience of the others, comes to half the limit ([`ROOM`]);
-/// - where a finger that closes on nothing goes clearly farther than that, the limit lies halfway (geometrically) between the two. How
+/// - where a finger that closes on nothing goes clearly farther than that, the limit lies halfway (geometrically)
+/// between the two. How
 ///   an empty hand closes is known without trying it: as planned.
 ///
 /// Factors below 1 are only for fingers: what few runs agree in by chance is no reason for a narrow band.

@@ -1,9 +1,9 @@
-//! Feedback for a movement that has not felt anything yet: springs, sensitivity K1 of Eq (8), limits, and what they mean in
-//! newtons and kilograms.
+//! Feedback for a movement that has not felt anything yet: springs, sensitivity K1 of Eq (8), limits, and what they
+//! mean in newtons and kilograms.
 //!
-//! The gains act in the tau-scaled system: pushed by a force F the plan behaves like a mass `tau^2/K1` on a damper `D tau/K1`
-//! and a spring `K/K1`. What gives way to a standing object before it topples is therefore fixed by `K/K1` (0.3 N for
-//! 25 cm) and a virtual mass of at most 2 kg, and `K`, `K1` grow with the square of the duration.
+//! The gains act in the tau-scaled system: pushed by a force F the plan behaves like a mass `tau^2/K1` on a damper `D
+//! tau/K1` and a spring `K/K1`. What gives way to a standing object before it topples is therefore fixed by `K/K1` (0.3
+//! N for 25 cm) and a virtual mass of at most 2 kg, and `K`, `K1` grow with the square of the duration.
 
 use serde::Serialize;
 
@@ -19,13 +19,13 @@ const POSITION_STIFFNESS: f64 = 400.0;
 const ORIENTATION_STIFFNESS: f64 = 200.0;
 /// No K is smaller, however short the movement: softer plans are late at a goal that was moved.
 const SOFTEST: f64 = dmp::TransformationSystem::<f64>::DEFAULT_STIFFNESS;
-/// K1/K of the position rows, m/N: 25 cm of way for 0.3 N beyond the dead band of 0.3 N. A flashlight topples at 2 N and a small torch at 0.8 N, but
-/// what leans resists less, and friction lets the arm come on in steps.
+/// K1/K of the position rows, m/N: 25 cm of way for 0.3 N beyond the dead band of 0.3 N. A flashlight topples at 2 N
+/// and a small torch at 0.8 N, but what leans resists less, and friction lets the arm come on in steps.
 const POSITION_COMPLIANCE: f64 = 0.8;
 /// K1/K_o about the vertical, rad/(N m).
 const ROTATION_COMPLIANCE: f64 = 3.7;
-/// K1/K of the fingers, rad/(N m). At the drive's whole torque (1.4 N m) a finger yields by 0.42 rad, within its limit, and at
-/// the 0.3 N m of a light touch by 0.1 rad: it takes the shape of the object instead of pushing it.
+/// K1/K of the fingers, rad/(N m). At the drive's whole torque (1.4 N m) a finger yields by 0.42 rad, within its limit,
+/// and at the 0.3 N m of a light touch by 0.1 rad: it takes the shape of the object instead of pushing it.
 const FINGER_COMPLIANCE: f64 = 0.3;
 /// Limits: displacement m, rotation degrees, fingers rad.
 pub const DEFAULT_LIMITS: [f64; 3] = [0.25, 25.0, 0.6];
@@ -63,8 +63,8 @@ pub fn stiffness(options: &FeedbackOptions, duration: f64) -> [f64; 4] {
 
 /// The tables of a fitted primitive; K2 is 1 until rehearsals tell the spread of the sensors.
 ///
-/// A plan turns about the vertical only, so that a push cannot tilt what the hand holds. K1 is diagonal in axes of the hand:
-/// where none of them is vertical at the goal, the plan does not turn by itself.
+/// A plan turns about the vertical only, so that a push cannot tilt what the hand holds. K1 is diagonal in axes of the
+/// hand: where none of them is vertical at the goal, the plan does not turn by itself.
 pub fn tables(primitive: &PrimitiveFile, options: &LearnOptions) -> FeedbackTables {
     let [position, orientation, _, hand] = primitive.gains.map(|gain| gain.stiffness);
     let [metres, degrees, fingers] = options.feedback.limits.unwrap_or(DEFAULT_LIMITS);

@@ -1,5 +1,5 @@
-//! From recordings of runs to what a primitive remembers of them: the expectation (and the weights K2) from rehearsals, the
-//! experience from runs that succeeded.
+//! From recordings of runs to what a primitive remembers of them: the expectation (and the weights K2) from rehearsals,
+//! the experience from runs that succeeded.
 
 use std::path::PathBuf;
 
@@ -17,21 +17,21 @@ use crate::primitive_file::{ExpectationTable, ExperienceTable, PrimitiveFile};
 /// Points of the weights K2: coarse, because the spread of a few runs is itself uncertain.
 const WEIGHT_POINTS: usize = 16;
 
-/// `sigma_min` of K2 relative to the mean spread of a sensor. With a half, the most repeatable phase counts at most five times
-/// as much as one of ordinary spread.
+/// `sigma_min` of K2 relative to the mean spread of a sensor. With a half, the most repeatable phase counts at most
+/// five times as much as one of ordinary spread.
 const SPREAD_FLOOR: f64 = 0.5;
 
-/// What the sensors cannot tell: the controller's dead band on force and torque, and the same for the gauges. The stick-slip of the
-/// joints scatters by a tenth of a newton where a movement is slow; without this floor K2 would make the arm four times
-/// deafer there than at its end.
+/// What the sensors cannot tell: the controller's dead band on force and torque, and the same for the gauges. The
+/// stick-slip of the joints scatters by a tenth of a newton where a movement is slow; without this floor K2 would make
+/// the arm four times deafer there than at its end.
 const RESOLUTION: [f64; SENSORS] = {
     let (f, n) = (control::sense::deviation::FORCE_DEAD_BAND, control::sense::deviation::TORQUE_DEAD_BAND);
     [f, f, f, n, n, n, 0.05, 0.05, 0.05]
 };
 
-/// Smallest spread of the channels of an experience: what objects and grasps that are all good differ by, however alike the
-/// gathered runs were. Force 0.5 N, torque 0.06 N m (that force at the distance of the fingers), gauges 0.15 N m (a finger
-/// that happens to carry the object alone), fingers 0.025 rad.
+/// Smallest spread of the channels of an experience: what objects and grasps that are all good differ by, however alike
+/// the gathered runs were. Force 0.5 N, torque 0.06 N m (that force at the distance of the fingers), gauges 0.15 N m (a
+/// finger that happens to carry the object alone), fingers 0.025 rad.
 const EXPERIENCE_FLOOR: [f64; STATISTICS_CHANNELS] =
     [0.5, 0.5, 0.5, 0.06, 0.06, 0.06, 0.15, 0.15, 0.15, 0.025, 0.025, 0.025];
 
@@ -126,13 +126,14 @@ pub struct MemorySummary {
     pub extremes: Vec<f64>,
     /// Root mean square spread of each channel over the phase.
     pub spread: Vec<f64>,
-    /// Of an experience: how far a hand that closes on nothing goes, as a share of the watch's limit; above 1 it is told.
+    /// Of an experience: how far a hand that closes on nothing goes, as a share of the watch's limit; above 1 it is
+    /// told.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub empty_hand: Option<f64>,
 }
 
-/// Puts the expectation of these rehearsals into a primitive, and K2 if there are enough of them and `weigh`. The experience
-/// of earlier runs is dropped: it was gathered with another expectation.
+/// Puts the expectation of these rehearsals into a primitive, and K2 if there are enough of them and `weigh`. The
+/// experience of earlier runs is dropped: it was gathered with another expectation.
 ///
 /// `duration` is that of the runs, s.
 ///
@@ -175,8 +176,8 @@ pub fn remember_rehearsals(
     Ok(summary(trials, duration, &statistics.mean, &statistics.spread))
 }
 
-/// Puts the experience of these successful runs into a primitive; they must have been made at one speed. The more they differ
-/// (in place of the object, arm and mode), the less will be told of a run that is only unusual.
+/// Puts the experience of these successful runs into a primitive; they must have been made at one speed. The more they
+/// differ (in place of the object, arm and mode), the less will be told of a run that is only unusual.
 ///
 /// # Errors
 /// [`MemoryError`]; the primitive is then unchanged.
@@ -196,7 +197,8 @@ pub fn remember_successes(
     Ok(MemorySummary { empty_hand, ..summary(trials, duration, gathered.mean(), gathered.spread()) })
 }
 
-/// Progress of every sample of the movement itself with its index, and the duration of the movement that follows from it, s.
+/// Progress of every sample of the movement itself with its index, and the duration of the movement that follows from
+/// it, s.
 fn progress(recording: &Recording, alpha: f64) -> Result<(Vec<(usize, f64)>, f64), MemoryError> {
     let phase = recording.phase.as_ref().ok_or_else(|| columns(recording, "phase"))?;
     let samples: Vec<(usize, f64)> =

@@ -253,8 +253,9 @@ impl PrimitiveFile {
         }
     }
 
-    /// Refuses an expectation that is not that of this movement on this arm: recorded at a duration more than half away from
-    /// that of the movement (the inertial part of a wrench goes with the square of the speed), or with another model.
+    /// Refuses an expectation that is not that of this movement on this arm: recorded at a duration more than half away
+    /// from that of the movement (the inertial part of a wrench goes with the square of the speed), or with another
+    /// model.
     ///
     /// # Errors
     /// [`PrimitiveFileError::ExpectationDuration`], [`PrimitiveFileError::ExpectationModel`].

@@ -65,8 +65,8 @@ impl<T: Scalar> Feedback<T> {
         &self.limits
     }
 
-    /// `zeta` at progress `u` for the error `F - F_expected`, within the limits. Forces are in the world frame and torques
-    /// in the body frame at the controlled point: `J^T` only sorts them.
+    /// `zeta` at progress `u` for the error `F - F_expected`, within the limits. Forces are in the world frame and
+    /// torques in the body frame at the controlled point: `J^T` only sorts them.
     fn coupling<const N: usize>(&self, movement: &Movement<T, N>, u: T, error: &[T; SENSORS]) -> Coupling<T> {
         let [px, py, pz, rx, ry, rz, hand @ ..] = self.gains.zeta(u, error, |weighted| {
             let [fx, fy, fz, tx, ty, tz, f1, f2, f3] = *weighted;
@@ -192,8 +192,8 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
         }
     }
 
-    /// Replaces the feedback by values that come one by one, as from a stored image: `K1` and `K2` by phase, point after
-    /// point, and the limits.
+    /// Replaces the feedback by values that come one by one, as from a stored image: `K1` and `K2` by phase, point
+    /// after point, and the limits.
     ///
     /// # Errors
     /// As [`Feedback::new`], [`TableError::Shape`] for a point that is cut short; the primitive then runs open loop.
@@ -245,8 +245,8 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
         })
     }
 
-    /// `zeta` of Eq (8) for this tick from the error `F - F_expected` (environment on the robot); none if the primitive has
-    /// no gains or no expectation.
+    /// `zeta` of Eq (8) for this tick from the error `F - F_expected` (environment on the robot); none if the primitive
+    /// has no gains or no expectation.
     ///
     /// # Errors
     /// [`RolloutError::OtherPrimitive`].
