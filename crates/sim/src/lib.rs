@@ -5,7 +5,6 @@ mod boot;
 mod bus;
 mod chain;
 mod firmware;
-pub mod flash;
 mod force_torque;
 mod hand;
 mod inbox;
