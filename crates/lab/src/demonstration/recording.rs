@@ -95,9 +95,9 @@ impl Recording {
         if time_column.is_none() {
             missing.push(layout::TIME.to_owned());
         }
-        let q = table.group(&layout::joint_positions(), &mut missing);
-        let dq = table.group(&layout::joint_velocities(), &mut missing);
-        let tau = table.group(&layout::joint_torques(), &mut missing);
+        let q = table.group(&layout::JOINT_POSITIONS, &mut missing);
+        let dq = table.group(&layout::JOINT_VELOCITIES, &mut missing);
+        let tau = table.group(&layout::JOINT_TORQUES, &mut missing);
         let position_names = if layout::POSITION_ALIAS.iter().any(|name| table.column(name).is_some()) {
             layout::POSITION_ALIAS
         } else {

@@ -3,7 +3,6 @@
 use std::io::Write;
 use std::time::Duration;
 
-use control::State;
 use link::{Event, Telemetry};
 
 use super::ProcedureError;
@@ -31,26 +30,7 @@ pub fn recording_row(telemetry: &Telemetry, first: u32) -> RecordingRow {
     let mut pose = [0.0; 7];
     pose[..3].copy_from_slice(&position);
     pose[3..].copy_from_slice(&orientation);
-    RecordingRow {
-        cycle: telemetry.cycle,
-        time: f64::from(telemetry.cycle.wrapping_sub(first)) / RATE,
-        state: State::from_code(telemetry.state).map_or("unknown", State::name),
-        fault: telemetry.fault,
-        flags: telemetry.flags,
-        phase: telemetry.phase,
-        q: telemetry.q,
-        dq: telemetry.dq,
-        tau: telemetry.tau,
-        pose,
-        pose_d: telemetry.pose_d,
-        wrench: telemetry.wrench,
-        lost_replies: telemetry.lost_replies,
-        cost_ticks: telemetry.cost_ticks,
-        hand: telemetry.hand,
-        hand_d: telemetry.hand_d,
-        gauges: telemetry.gauges,
-        surprise: telemetry.surprise,
-    }
+    RecordingRow { time: f64::from(telemetry.cycle.wrapping_sub(first)) / RATE, pose, telemetry: *telemetry }
 }
 
 /// The text of a recording of these cycles.
