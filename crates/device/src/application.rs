@@ -5,7 +5,7 @@
 //! primitives and the requests that move something are those of the application.
 
 use control::{CycleRecord, LoadRefusal, State};
-use link::{Listing, Name, Refusal, Reply, Request, Telemetry};
+use link::{Capabilities, Listing, Name, Refusal, Reply, Request, Telemetry};
 use puck::CanFrame;
 
 use crate::health::{Health, Timing};
@@ -190,6 +190,9 @@ pub struct Saved {
 pub trait Application {
     /// The other half.
     type Controller: Controller;
+
+    /// The parts that it can drive and read, mounted or not.
+    const CAPABILITIES: Capabilities;
 
     /// True once it is known what is stored. Until then, and not for long, requests wait.
     fn is_open(&mut self, now_ms: u32) -> bool;

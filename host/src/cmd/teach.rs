@@ -13,6 +13,7 @@ use super::{ErrorCode, Failure, Global, connection};
 use lab::client::Client;
 use lab::demonstration::RATE;
 use lab::device::Device;
+use lab::error::Capability;
 use lab::procedure::{self, ProcedureError, Recorder, teacher};
 use lab::simulation::{DEFAULT_SEED, SimulationOptions};
 
@@ -89,6 +90,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         options.lesson = command.lesson.lesson();
         clear_the_table(options);
     })?;
+    client.require(Capability::Arm).map_err(|error| error.into_failure(DOING))?;
     let alone = global.non_interactive && command.duration.is_none();
     if alone && default_posture(&mut client, command.lesson).is_none() {
         return Err(Failure::new(

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use control::State;
-use lab::error::HostError;
+use lab::error::{Capability, HostError};
 use lab::image_file::ImageFile;
 use lab::procedure;
 use lab::simulation::{HAND_IMAGE_VARIABLE, built_image};
@@ -214,6 +214,9 @@ fn hand_device_refuses_what_needs_an_arm() {
             other => panic!("{other:?}"),
         }
     }
+    let missing = hand.require(Capability::Arm).unwrap_err();
+    assert_eq!(missing.to_string(), "the device does not drive an arm");
+    assert_eq!((hand.require(Capability::Hand).is_ok(), hand.hello().capabilities.wrench), (true, false));
     let listing = expect(hand.list());
     assert_eq!(listing.len(), 1);
     assert!(listing[0].expectation && listing[0].kernels == KERNELS as u16);

@@ -1,8 +1,8 @@
 //! The library of primitives and the home of the arm on a NOR flash: what survives when the power goes.
 //!
 //! ```text
-//! Session ── Store ──> Library (memory) <── LibraryAccess ── keep() ──> MapStorage ──> JournaledFlash ──> NorFlash of the board
-//!  link requests        what runs read       lowest priority     log of values   erases done over    words and sectors
+//! Session ── Store ──> Library <── LibraryAccess ── keep() ──> MapStorage ──> JournaledFlash ──> NorFlash
+//!  link requests        memory     lowest priority     log of values   erases done over    words and sectors
 //! ```
 //!
 //! The session works with the [`Library`] in memory. What it changes there is a job for [`keep`], the one task that

@@ -44,6 +44,8 @@ pub struct Identity {
     pub simulated: bool,
     /// Unit of all `*_ticks`: ticks per second.
     pub ticks_per_second: u32,
+    /// Instructions per tick, where time is counted in instructions as under QEMU; 0 where a clock runs.
+    pub instructions_per_tick: u8,
 }
 
 /// The device's end of the link.

@@ -189,6 +189,8 @@ impl<A: Application> HostSession<A> {
             firmware: Text::new(self.identity.firmware),
             board: Text::new(self.identity.board),
             serial: Text::new(self.identity.serial),
+            capabilities: A::CAPABILITIES,
+            instructions_per_tick: self.identity.instructions_per_tick,
         }
     }
 
