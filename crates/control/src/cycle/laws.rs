@@ -169,7 +169,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             torque.0 += ForceController::torque(&measured.frames.jacobian(), &wanted).0;
             set |= flags::FORCE_CONTROL;
         }
-        if run.surprise() > R::of(1.0) {
+        let surprise = run.surprise();
+        if surprise > R::of(1.0) {
             set |= flags::SURPRISE;
         }
         if run.is_faded(primitive) {
@@ -181,7 +182,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         torque.0 += handover.step();
         let offset = task.pose.position - measured.pose.position;
         *lag = Lag { distance: offset.dot(&offset).square_root(), speed: operational.lag() };
-        Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, surprise: run.surprise(), flags: set }
+        Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, surprise, flags: set }
     }
 }
 

@@ -107,16 +107,8 @@ impl<R: Real, const N: usize> Run<R, N> {
             None => taught_hand,
         };
         let start = StartState::at_rest(configuration(pose.position.into(), pose.orientation.0, q.0.into(), hand));
-        let mut rollout = Rollout::start(primitive.movement(), &start).map_err(reason)?;
-        // The first speed acts at once; later ones are approached at the rollout's slew rate.
-        rollout.set_speed_slew(None).map_err(reason)?;
-        set_speed(&mut rollout, primitive, options.speed)?;
-        rollout.set_speed_slew(Some(R::of(Rollout::<R, N>::DEFAULT_SLEW))).map_err(reason)?;
-        if options.goal != Goal::STORED {
-            set_goal(&mut rollout, primitive, &options.goal)?;
-        }
-        *place = Some(Run {
-            rollout,
+        let mut run = Run {
+            rollout: Rollout::start(primitive.movement(), &start).map_err(reason)?,
             options,
             coupling: Coupling::NONE,
             deviation: None,
@@ -125,7 +117,16 @@ impl<R: Real, const N: usize> Run<R, N> {
             kept: FADE,
             settled: false,
             rested: 0,
-        });
+        };
+        let rollout = &mut run.rollout;
+        // The first speed acts at once; later ones are approached at the rollout's slew rate.
+        rollout.set_speed_slew(None).map_err(reason)?;
+        set_speed(rollout, primitive, options.speed)?;
+        rollout.set_speed_slew(Some(R::of(Rollout::<R, N>::DEFAULT_SLEW))).map_err(reason)?;
+        if options.goal != Goal::STORED {
+            set_goal(rollout, primitive, &options.goal)?;
+        }
+        *place = Some(run);
         Ok(())
     }
 
