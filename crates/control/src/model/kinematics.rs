@@ -8,7 +8,7 @@
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use crate::model::arm::ArmModel;
-use crate::real::{Real, at_least};
+use crate::real::{Real, at_least, sqrt};
 use crate::units::{JOINTS, JointPositions, JointVelocities, Orientation, Pose, Twist, Vector6, Vector7};
 
 /// The geometric Jacobian: 6 rows (linear, angular; world axes), one column per joint.
@@ -243,7 +243,7 @@ impl<R: Real> Frames<R> {
             for joint in 0..joints {
                 velocity += self.axes[joint].cross(&(point - self.origins[joint])) * dq.0[joint];
             }
-            velocity.dot(&velocity).square_root()
+            sqrt(velocity.dot(&velocity))
         };
         [speed(elbow, 3), speed(tip, 4)]
     }
