@@ -3,7 +3,7 @@
 
 /// Control rate (Hz). Everything that counts control periods, here and in the other crates, follows from it. A higher
 /// rate has to leave room on the bus for requests, replies and torques within each period.
-pub const RATE_HZ: u32 = 500;
+pub const RATE_HZ: u32 = 300;
 
 /// Control rate (Hz), for arithmetic.
 pub const RATE: f64 = RATE_HZ as f64;
