@@ -6,7 +6,6 @@ mod bus;
 mod chain;
 pub mod fault;
 mod firmware;
-pub mod flash;
 mod force_torque;
 mod hand;
 mod inbox;

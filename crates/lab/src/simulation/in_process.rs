@@ -12,9 +12,9 @@ use std::task::{Context, Poll, Waker};
 
 use device::storage::{Library, LibraryAccess, Opening, Scratch, Work, keep, value_bytes};
 use device::{Controller, DeviceController, Identity, Session, Slot, StoreError};
+use flash::{FlashChip, FlashPort, VirtualClock};
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
-use sim::flash::{FlashChip, FlashPort, VirtualClock};
 use sim::{Plant, TICKS_PER_MICROSECOND, Ticks};
 
 use super::halves::{FIRST_SLOT, LINE_ROOM, Port, Queues, SLOT_TICKS};
