@@ -14,7 +14,7 @@ pub enum Figure {
     TorqueStep,
     /// Largest difference between the joint angles told and the true ones, mrad.
     Belief,
-    /// Largest true speed of the hand while no torque is sent, m/s.
+    /// Largest true speed of the hand while no torque is sent and no motor brakes, m/s.
     FreeSpeed,
     /// Number of times the latched fault changed without a clear.
     CausesLost,
@@ -72,7 +72,7 @@ impl Figure {
             Self::Torque => ("torque", "of limit"),
             Self::TorqueStep => ("torque step", "of limit"),
             Self::Belief => ("told from true", "mrad"),
-            Self::FreeSpeed => ("hand speed without torque", "m/s"),
+            Self::FreeSpeed => ("hand speed in free fall", "m/s"),
             Self::CausesLost => ("causes overwritten", ""),
             Self::Deviation => ("off nominal", "mrad"),
             Self::Tracking => ("tracking", "of nominal"),

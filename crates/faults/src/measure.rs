@@ -109,8 +109,11 @@ fn hand_speeds(moments: &[Moment]) -> Vec<(&Moment, f64)> {
     speeds
 }
 
-/// True if every motor is told zero torque at that moment.
+/// True if every motor is told zero torque at that moment and none brakes: they do unless the safety module is ACTIVE.
 fn is_free(sent: &[Sent], moment: &Moment) -> bool {
+    if moment.safety != SafetyMode::Active {
+        return false;
+    }
     let later = sent.partition_point(|pair| pair.at <= moment.ticks);
     later.checked_sub(1).and_then(|last| sent.get(last)).is_some_and(|pair| pair.is_zero)
 }

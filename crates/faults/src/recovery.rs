@@ -17,6 +17,9 @@ use crate::movement::movement;
 /// Longest time for the arm to come to rest, and for a start-up.
 const PATIENCE: Duration = Duration::from_secs(20);
 
+/// Time that a person takes between pendant and keyboard.
+const NOTICE: Duration = Duration::from_millis(500);
+
 /// Distance of the joint angles told from the true ones after a zeroing, rad: a count of M7, and what the arm moved.
 const BELIEVED: f64 = 0.02;
 
@@ -33,6 +36,11 @@ pub fn recover(arm: &mut Arm, way: Recover) -> Result<(), Failure> {
     }
     rest(arm)?;
     let has_zeroed = start_up(arm, way)?;
+    // The device asks the safety module now and then.
+    let ready = arm.now() + NOTICE;
+    while arm.now() < ready {
+        arm.next(NOTICE)?;
+    }
     if has_zeroed != (way == Recover::Zero) {
         let words = if has_zeroed { "zeroing was demanded" } else { "zeroing was not demanded" };
         return Err(words.into());
@@ -40,6 +48,7 @@ pub fn recover(arm: &mut Arm, way: Recover) -> Result<(), Failure> {
     if Fault::from_code(arm.status()?.fault) != Some(Fault::None) {
         arm.clear_fault().map_err(|error| format!("clear: {error}"))?;
     }
+    arm.take_events();
     arm.hold().map_err(|error| format!("hold: {error}"))?;
     procedure::pass(arm, Duration::from_millis(500), Ends::OnAnyStop)?;
     let told = arm.status()?.q.map(f64::from);

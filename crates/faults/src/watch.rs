@@ -169,6 +169,8 @@ impl Observer {
             }
             self.note(arm, told)?;
         }
+        // The client has not heard the device all the time: a question tells it that it is there.
+        arm.status()?;
         Ok(())
     }
 
