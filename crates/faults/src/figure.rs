@@ -26,7 +26,10 @@ pub enum Figure {
     Plan,
     /// Time from the first fault or order until the arm has left its motion, ms.
     Stop,
-    /// Time from there until every joint is slower than 0.05 rad/s and stays so, ms.
+    /// Time from the first fault or order until every true joint is slower than 0.05 rad/s and stays so, ms: for a
+    /// device that tells nothing any more.
+    Still,
+    /// Time from the stop until every joint is slower than 0.05 rad/s and stays so, ms.
     Rest,
     /// Largest way of a joint after the arm has left its motion, mrad.
     Travel,
@@ -78,6 +81,7 @@ impl Figure {
             Self::Tracking => ("tracking", "of nominal"),
             Self::Plan => ("plan off nominal", "mm"),
             Self::Stop => ("stops after", "ms"),
+            Self::Still => ("still after", "ms"),
             Self::Rest => ("rests after", "ms"),
             Self::Travel => ("way after the stop", "mrad"),
             Self::HandSpeed => ("hand speed", "m/s"),

@@ -48,11 +48,11 @@ pub fn all(scenario: &Scenario, watched: &Watched, nominal: Option<&Watched>) ->
     if let Some(stop) = stopped {
         figures.insert(Figure::Stop, 1e3 * (stop.time - first));
         let behind: Vec<&Moment> = moments.iter().filter(|moment| moment.time >= stop.time).collect();
-        let moved = behind.iter().rfind(|moment| moment.dq.iter().any(|speed| speed.abs() > AT_REST));
-        figures.insert(Figure::Rest, 1e3 * moved.map_or(0.0, |moment| moment.time - stop.time));
+        figures.insert(Figure::Rest, 1e3 * (moved_until(moments) - stop.time).max(0.0));
         let ways = behind.iter().flat_map(|moment| (0..7).map(|joint| (moment.q[joint] - stop.q[joint]).abs()));
         figures.insert(Figure::Travel, 1e3 * ways.fold(0.0, f64::max));
     }
+    figures.insert(Figure::Still, 1e3 * (moved_until(moments) - first).max(0.0));
     let late = hand_speeds(moments).into_iter().filter(|(moment, _)| moment.time > last + 0.3);
     figures.insert(Figure::LateSpeed, late.map(|(_, speed)| speed).fold(0.0, f64::max));
     if let Some(start) = moments.first() {
@@ -70,6 +70,12 @@ pub fn all(scenario: &Scenario, watched: &Watched, nominal: Option<&Watched>) ->
         figures.extend(against(moments, &nominal.moments));
     }
     figures
+}
+
+/// Last moment at which a joint moved, s.
+fn moved_until(moments: &[Moment]) -> f64 {
+    let moves = |moment: &&Moment| moment.dq.iter().any(|speed| speed.abs() > AT_REST);
+    moments.iter().rfind(moves).map_or(0.0, |moment| moment.time)
 }
 
 /// First begin, and last end or begin, of faults and orders, s.

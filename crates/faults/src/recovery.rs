@@ -36,17 +36,14 @@ pub fn recover(arm: &mut Arm, way: Recover) -> Result<(), Failure> {
     }
     rest(arm)?;
     let has_zeroed = start_up(arm, way)?;
-    // The device asks the safety module now and then.
-    let ready = arm.now() + NOTICE;
-    while arm.now() < ready {
-        arm.next(NOTICE)?;
-    }
     if has_zeroed != (way == Recover::Zero) {
         let words = if has_zeroed { "zeroing was demanded" } else { "zeroing was not demanded" };
         return Err(words.into());
     }
     if Fault::from_code(arm.status()?.fault) != Some(Fault::None) {
         arm.clear_fault().map_err(|error| format!("clear: {error}"))?;
+        // A device with a fault goes on asking for IDLE.
+        start_up(arm, way)?;
     }
     arm.take_events();
     arm.hold().map_err(|error| format!("hold: {error}"))?;
@@ -77,7 +74,16 @@ fn rest(arm: &mut Arm) -> Result<(), Failure> {
     Err("the arm does not come to rest".into())
 }
 
-/// At the pendant, until the device is ready; true if it demanded zeroing, which it then gets at the true posture.
+/// Lets time pass; what the device tells meanwhile does not matter.
+fn wait(arm: &mut Arm) -> Result<(), Failure> {
+    let end = arm.now() + NOTICE;
+    while arm.now() < end {
+        arm.next(NOTICE)?;
+    }
+    Ok(())
+}
+
+/// At the pendant, until the device is ready and has noticed it; true if it demanded zeroing, which it then gets at the true posture.
 fn start_up(arm: &mut Arm, way: Recover) -> Result<bool, Failure> {
     let deadline = arm.now() + PATIENCE;
     let mut has_zeroed = false;
@@ -101,7 +107,10 @@ fn start_up(arm: &mut Arm, way: Recover) -> Result<bool, Failure> {
                 plant(arm).press(PendantAction::ShiftIdle);
                 plant(arm).press(PendantAction::ShiftActivate);
             }
-            Some(Stage::Ready) if plant(arm).safety_mode() == SafetyMode::Active => return Ok(has_zeroed),
+            Some(Stage::Ready) if plant(arm).safety_mode() == SafetyMode::Active => {
+                wait(arm)?;
+                return Ok(has_zeroed);
+            }
             Some(Stage::Ready) => {
                 plant(arm).press(PendantAction::ShiftIdle);
                 plant(arm).press(PendantAction::ShiftActivate);

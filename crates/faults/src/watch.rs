@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
-use control::{Fault, State};
+use control::{Fault, MODEL_HASH, State};
 use lab::client::Incoming;
 use lab::error::HostError;
 use lab::simulation::CYCLE_TICKS;
 use lab::transport::Transport as _;
 use link::frame::Decoder;
-use link::{EventKind, Reply, Statistics, Telemetry};
+use link::{EventKind, HostHello, LINK_VERSION, Reply, Request, SCHEMA_HASH, Statistics, Telemetry, Text};
 use puck::SafetyMode;
 use sim::{Passage, Ticks};
 
@@ -169,8 +169,10 @@ impl Observer {
             }
             self.note(arm, told)?;
         }
-        // The client has not heard the device all the time: a question tells it that it is there.
-        arm.status()?;
+        // The device may have ended the session. A host that wakes up opens it again and wants its telemetry.
+        let owner = Text::new("fault catalogue");
+        arm.request(&Request::Hello(HostHello { link_version: LINK_VERSION, schema_hash: SCHEMA_HASH, model_hash: MODEL_HASH, owner }))?;
+        arm.set_telemetry(1)?;
         Ok(())
     }
 
