@@ -9,6 +9,7 @@ use link::{Capabilities, Listing, Name, Refusal, Reply, Request, Telemetry};
 use puck::CanFrame;
 
 use crate::health::{Health, Timing};
+use crate::time::{ANSWERS_US, SLOT_HZ};
 
 /// A refusal with its detail.
 pub type Refused = (Refusal, [u32; 2]);
@@ -25,12 +26,13 @@ pub enum Slot {
 }
 
 impl Slot {
-    /// The slot of the next timer tick.
+    /// The slot of the next timer tick. Where one slot is too short for the answers to a request, the slow question
+    /// fills the time in which they come.
     pub const fn next(self) -> Slot {
-        match self {
-            Slot::Request => Slot::Control,
-            Slot::Control => Slot::Slow,
-            Slot::Slow => Slot::Request,
+        match (self, ANSWERS_US * SLOT_HZ > 1_000_000) {
+            (Slot::Request, false) | (Slot::Slow, true) => Slot::Control,
+            (Slot::Control, false) | (Slot::Request, true) => Slot::Slow,
+            (Slot::Slow, false) | (Slot::Control, true) => Slot::Request,
         }
     }
 }

@@ -280,7 +280,8 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
 
 fn notes(client: &Client<Device>, file: &PrimitiveFile) -> String {
     let simulated = if client.is_simulated() { " (simulated arm)" } else { "" };
-    format!("Tactus recording of a run of '{}', 300 Hz, on {}{simulated}", file.name, client.hello().board.as_str())
+    let (rate, board) = (control::RATE_HZ, client.hello().board.as_str());
+    format!("Tactus recording of a run of '{}', {rate} Hz, on {board}{simulated}", file.name)
 }
 
 fn report(

@@ -120,7 +120,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 
     let file = File::create(&command.output).map_err(|cause| failed(ProcedureError::Recording(cause)))?;
     let notes = format!(
-        "Tactus recording of a demonstration by hand, 300 Hz, from {} {}",
+        "Tactus recording of a demonstration by hand, {} Hz, from {} {}",
+        control::RATE_HZ,
         client.hello().board.as_str(),
         if client.is_simulated() { "(simulated arm, simulated person)" } else { "" }
     );
@@ -150,7 +151,7 @@ fn record(
     let guided = teacher::begin(client);
     let enter = (!guided && command.duration.is_none()).then(wait_for_enter);
     if guided {
-        output.say("a simulated person guides the hand");
+        output.say("a simulated teacher guides the hand");
     } else if enter.is_some() {
         output.say("guide the arm; press Enter when the movement is shown");
     }
