@@ -46,6 +46,7 @@ pub(crate) fn refusal(reason: Refusal, health: &Health) -> (LinkRefusal, [u32; 2
         Refusal::Control(Control::NoExpectation) => (LinkRefusal::NoExpectation, [0, 0]),
         Refusal::Control(Control::HandTooFar) => (LinkRefusal::HandFarFromStart, [0, 0]),
         Refusal::Control(Control::ForceAtRest) => (LinkRefusal::ForceAtRest, [0, 0]),
+        Refusal::Control(Control::ZeroLost) => (LinkRefusal::NotZeroed, [0, 0]),
         Refusal::Control(Control::NoHand) | Refusal::NoHand => hand(health.hand),
         Refusal::HandBusy => (LinkRefusal::HandBusy, [0, 0]),
     }
