@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use sim::flash::{Flash, FlashChip, FlashTimes};
+use flash::{Flash, FlashChip, FlashTimes};
 use sim::teacher::TaughtMovement;
 use sim::world::HOME;
 #[cfg(feature = "mujoco")]

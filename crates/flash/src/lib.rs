@@ -4,6 +4,8 @@
 //! sector. An operation takes virtual time. [`Flash::cut_power_at`] chooses one operation (a word or a sector) in the
 //! middle of which power fails: what it leaves behind is drawn from a seed, and afterwards nothing answers.
 
+#![forbid(unsafe_code)]
+
 mod port;
 
 use std::fs::{File, OpenOptions};
@@ -13,9 +15,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use oorandom::Rand64;
 
-use crate::time::{TICKS_PER_SECOND, Ticks};
-
 pub use port::{FlashPort, VirtualClock};
+
+/// A point in virtual time or a duration, in ticks of 40 ns (25 MHz).
+pub type Ticks = u64;
+
+/// Ticks in one second; `sim` holds its clock against it.
+pub const TICKS_PER_SECOND: Ticks = 25_000_000;
 
 /// Bytes of a word, the least that can be written (STM32H743: 256 bits and their check bits).
 pub const WORD_BYTES: usize = 32;
@@ -29,10 +35,10 @@ pub const SECTORS: usize = 8;
 /// Bytes of the flash.
 pub const FLASH_BYTES: usize = SECTORS * SECTOR_BYTES;
 
-/// What a blank byte reads as.
+/// A blank byte.
 const BLANK: u8 = 0xFF;
 
-/// How long the operations take, ticks of the virtual clock.
+/// Durations of the operations, ticks of the virtual clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FlashTimes {
     /// Writing one word.
@@ -46,7 +52,7 @@ impl FlashTimes {
     /// (8-bit parallelism); typical are half of both and less.
     pub const SLOW: Self = Self { word: TICKS_PER_SECOND / 5000, sector: 4 * TICKS_PER_SECOND };
 
-    /// What the data sheet calls typical at 64-bit parallelism: 0.1 ms a word and 1 s a sector.
+    /// Typical of the data sheet at 64-bit parallelism: 0.1 ms a word and 1 s a sector.
     pub const TYPICAL: Self = Self { word: TICKS_PER_SECOND / 10_000, sector: TICKS_PER_SECOND };
 
     /// No time at all, for tests of content.
@@ -148,7 +154,7 @@ impl Flash {
         self.busy_until = 0;
     }
 
-    /// Whether power is there.
+    /// True while there is power.
     #[must_use]
     pub fn is_powered(&self) -> bool {
         self.powered
@@ -160,7 +166,7 @@ impl Flash {
         self.operations
     }
 
-    /// How often each sector was erased.
+    /// Erases of each sector so far.
     #[must_use]
     pub fn erases(&self) -> &[u32; SECTORS] {
         &self.erases
@@ -172,7 +178,7 @@ impl Flash {
         &self.bytes
     }
 
-    /// What went wrong with the file, once.
+    /// Takes the error of the file, if there was one since the last call.
     pub fn take_file_error(&mut self) -> Option<io::Error> {
         self.file_error.take()
     }
@@ -237,7 +243,7 @@ impl Flash {
         if self.powered { Ok(()) } else { Err(FlashError::NoPower) }
     }
 
-    /// What follows every operation: the file, the clock, perhaps the end.
+    /// Ends every operation: keeps the bytes in the file, moves the clock, and loses power if it was torn.
     fn after(
         &mut self,
         range: std::ops::Range<usize>,

@@ -7,8 +7,7 @@ use std::task::Poll;
 
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 
-use super::{FLASH_BYTES, FlashChip, FlashError, SECTOR_BYTES, WORD_BYTES};
-use crate::time::Ticks;
+use crate::{FLASH_BYTES, FlashChip, FlashError, SECTOR_BYTES, Ticks, WORD_BYTES};
 
 /// The time in which the device lives; whoever lets it pass sets it, and can ask what the device waits for.
 #[derive(Clone, Debug, Default)]
