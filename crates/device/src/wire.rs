@@ -137,6 +137,8 @@ impl From<StartupError> for StartupTrouble {
             StartupError::Calibration(CalibrationError::HandTorqueCounts(digit)) => Self([16, digit.into()]),
             StartupError::ZeroNotTaken(node) => at(14, node, 0),
             StartupError::SafetyNotZeroed => Self([15, 0]),
+            StartupError::CountsAnew(node) => at(17, node, 0),
+            StartupError::CountsJumped => Self([18, 0]),
         }
     }
 }
@@ -164,6 +166,8 @@ impl StartupTrouble {
             14 => StartupError::ZeroNotTaken(node),
             15 => StartupError::SafetyNotZeroed,
             16 => StartupError::Calibration(CalibrationError::HandTorqueCounts(byte)),
+            17 => StartupError::CountsAnew(node),
+            18 => StartupError::CountsJumped,
             _ => return None,
         })
     }

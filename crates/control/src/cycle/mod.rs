@@ -159,6 +159,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.hand.is_moving()
     }
 
+    /// True if a motor began to count anew since the positions were learned.
+    pub fn is_zero_lost(&self) -> bool {
+        self.joints.is_displaced()
+    }
+
     /// True if the wrench has a zero; see [`WrenchEstimator::is_tared`].
     pub fn is_wrench_zeroed(&self) -> bool {
         self.wrench.is_tared()
