@@ -337,6 +337,9 @@ impl DeviceController {
             self.outlet(now_us, io).send(frame);
         }
         self.wants_idle = output.actuation.requests_idle();
+        if self.cycle.is_zero_lost() {
+            self.startup.lose_zero();
+        }
         io.record(output.record);
         if let Some(event) = output.event {
             self.tell(event.into(), io);
@@ -432,6 +435,10 @@ impl DeviceController {
             return;
         };
         let mut outlet = SlotOutlet { io, counters: &mut self.counters, pacer: &mut self.pacer, now_us, cyclic: true };
+        // Not under torque: unzeroed, the safety module watches other speeds.
+        if !self.cycle.state().has_torque() && self.startup.revoke_zero(&mut outlet) {
+            return;
+        }
         let question = match (poll.begin(), self.round.suspect()) {
             (Some(safety), _) => Some(safety),
             (None, Some(node)) => Some(poll.suspect(node)),

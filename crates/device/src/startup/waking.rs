@@ -127,6 +127,10 @@ impl Startup {
         if self.survey.seen(node).status == Some(Status::Ready.value()) {
             return Next::Go(Step::Wake { device: index + 1, woken });
         }
+        if node.arm_index().is_some() {
+            // Its counts began with its firmware.
+            self.doubt.get_or_insert(StartupError::CountsAnew(node));
+        }
         let frame = set(node, PropertyId::STAT, Status::Ready.value());
         after(outlet.send(frame), Step::Wake { device: index + 1, woken: true })
     }
