@@ -216,17 +216,17 @@ const TROUBLE_EXPERIENCE: PrimitiveTrouble = PrimitiveTrouble([10, 0]);
 const TABLE_VALUE: u32 = 13;
 
 impl PrimitiveTrouble {
-    /// What is wrong with the feedback.
+    /// The error of the feedback's table as two numbers.
     pub(crate) fn feedback(error: TableError) -> Self {
         Self::value(error).unwrap_or(TROUBLE_FEEDBACK)
     }
 
-    /// What is wrong with the expectation.
+    /// The error of the expectation's table as two numbers.
     pub(crate) fn expectation(error: TableError) -> Self {
         Self::value(error).unwrap_or(TROUBLE_EXPECTATION)
     }
 
-    /// What is wrong with the experience.
+    /// The error of the table of earlier runs as two numbers.
     pub(crate) fn experience(error: TableError) -> Self {
         Self::value(error).unwrap_or(TROUBLE_EXPERIENCE)
     }

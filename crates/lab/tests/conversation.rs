@@ -9,15 +9,14 @@ use std::time::{Duration, Instant};
 use control::model::ArmModel;
 use control::{CycleRecord, LoadRefusal, Payload, State};
 use device::{
-    Command, Counters, DeviceController, Event, EventKind, FitPrimitive, Health, Identity, QueueFull, RamStore,
+    CheckedPrimitive, Command, Counters, DeviceController, Event, EventKind, Health, Identity, QueueFull, RamStore,
     Session, SessionPort, Stage, TimedRecord, Timing,
 };
 use lab::client::{Client, Halted, Incoming, Interrupt, UploadOutcome, UploadPhase};
-use lab::error::{Capability, HostError};
+use lab::error::HostError;
 use lab::transport::{StreamTransport, Transport, TransportError};
-use link::frame::{Decoder, FRAME_BYTES, Frame};
 use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
-use link::{LINK_VERSION, Name, Refusal, Reply, Request, SCHEMA_HASH};
+use link::{LINK_VERSION, Name, Refusal, Request, SCHEMA_HASH};
 use pinned_init::InPlaceWrite;
 
 /// One step of the virtual clock: a third of a control cycle.
@@ -51,7 +50,7 @@ impl SessionPort<DeviceController> for Half {
         Ok(())
     }
 
-    fn load(&mut self, _fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
+    fn load(&mut self, _fit: &CheckedPrimitive<'_>) -> Result<(), LoadRefusal> {
         Ok(())
     }
 
@@ -104,8 +103,6 @@ struct Device {
     dead: bool,
     /// The cable is out.
     unplugged: bool,
-    /// Its hello says that it drives no arm.
-    armless: bool,
 }
 
 impl Device {
@@ -135,7 +132,6 @@ impl Device {
             answers: 0,
             dead: false,
             unplugged: false,
-            armless: false,
         }
     }
 
@@ -174,10 +170,7 @@ impl Transport for Device {
         while self.half.line.is_empty() && self.now() < until {
             self.step();
         }
-        let mut bytes = std::mem::take(&mut self.half.line);
-        if self.armless {
-            bytes = without_arm(&bytes);
-        }
+        let bytes = std::mem::take(&mut self.half.line);
         if !bytes.is_empty() && !is_lost(self.lose_answers_every, &mut self.answers) {
             out.extend_from_slice(&bytes);
         }
@@ -191,20 +184,6 @@ impl Transport for Device {
     fn is_virtual(&self) -> bool {
         true
     }
-}
-
-/// The same answers, but that a hello says that the device drives no arm.
-fn without_arm(mut bytes: &[u8]) -> Vec<u8> {
-    let (mut decoder, mut out) = (Decoder::<FRAME_BYTES>::new(), Vec::new());
-    while let Some(Frame { envelope, mut message }) = decoder.next::<Reply>(&mut bytes) {
-        if let Reply::Hello { hello, .. } = &mut message {
-            hello.capabilities.arm = false;
-        }
-        let mut buffer = [0; FRAME_BYTES];
-        let length = link::frame::encode(envelope, &message, &mut buffer).unwrap();
-        out.extend_from_slice(&buffer[..length]);
-    }
-    out
 }
 
 fn connected() -> Client<Device> {
@@ -252,19 +231,6 @@ fn connecting_compares_versions_within_200_ms() {
     let client = connected();
     assert!(client.now() < Duration::from_millis(200), "{:?}", client.now());
     assert_eq!(client.hello().serial.as_str(), "T-1");
-}
-
-#[test]
-fn a_device_without_an_arm_is_refused_by_the_name_of_what_it_lacks() {
-    let arm = connected();
-    assert!(arm.require(Capability::Arm).is_ok() && arm.require(Capability::Hand).is_ok());
-
-    let hand = Client::connect(Device { armless: true, ..Device::new() }, "test").unwrap();
-    assert!(hand.require(Capability::Hand).is_ok());
-    let error = hand.require(Capability::Arm).unwrap_err();
-    assert_eq!(error.to_string(), "the device does not drive an arm");
-    assert_eq!((error.code().exit() as u8, error.code().to_string()), (4, "E405".to_owned()));
-    assert!(error.code().remedy().contains("--device"));
 }
 
 #[test]

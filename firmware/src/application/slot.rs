@@ -18,7 +18,7 @@ pub(crate) struct SlotQueues<C: Controller> {
     pub(crate) events: Producer<'static, C::Event>,
 }
 
-/// What counts as the cost of a control cycle.
+/// Parts of a slot that count as the cost of a control cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cost {
     /// Its control slot alone, which the torques wait for.

@@ -26,7 +26,7 @@ use survey::Survey;
 
 /// Between two looks at the mode of the safety module while a person is awaited, us.
 const POLL_US: u64 = 250_000;
-/// How long a failed start-up rests before it is tried again, us.
+/// Rest of a failed start-up before it is tried again, us.
 const RETRY_US: u64 = 1_000_000;
 /// Velocity faults the safety module shall ignore when positions are rewritten.
 const IGNORED_AT_ZERO: i32 = 8;
@@ -97,7 +97,7 @@ enum Step {
     Blocked { until_us: u64 },
 }
 
-/// What a step decides.
+/// Decision of a step.
 enum Next {
     /// Wait for an answer, a pause or a person.
     Stay,
@@ -130,7 +130,7 @@ pub(crate) struct Startup {
     error: Option<StartupError>,
 }
 
-/// What has become of a person's command to zero the arm.
+/// State of a person's command to zero the arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum ZeroRequest {
     /// There is none, or its answer has been fetched.
@@ -138,7 +138,7 @@ enum ZeroRequest {
     None,
     /// The safety module is being asked whether the arm is IDLE: what it said last may be 250 ms old.
     Pending,
-    /// Taken up or refused.
+    /// Accepted or refused.
     Answered(Result<(), Refusal>),
 }
 
@@ -186,7 +186,7 @@ impl Startup {
         true
     }
 
-    /// How far it has come.
+    /// Its stage.
     pub(crate) fn stage(&self) -> Stage {
         match self.step {
             Step::ZeroTorques { .. } | Step::Enumerate { .. } | Step::Listen { .. } => Stage::Enumerating,
@@ -319,21 +319,7 @@ impl Startup {
             Step::Brake { hand } => Ok(self.brake(hand, outlet)),
             Step::Read { joint, item } => self.read(joint, item, outlet),
             Step::ReadHand { digit, item } => Ok(self.read_digit(digit, item, outlet)),
-            Step::AskZero => Ok(match self.ask_safety(self.safety()?.zero, outlet)? {
-                None => Next::Stay,
-                Some(0) => {
-                    self.error = None;
-                    Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US })
-                }
-                Some(_) if self.doubt.is_some() => {
-                    self.error = self.doubt;
-                    Next::Go(Step::RevokeZero)
-                }
-                Some(_) => {
-                    self.zeroed = true;
-                    Next::Go(Step::Tare)
-                }
-            }),
+            Step::AskZero => self.ask_zero(outlet),
             Step::RevokeZero => {
                 let frame = set(Node::SAFETY_MODULE, self.safety()?.zero, 0);
                 let next_us = outlet.now_us() + POLL_US;
@@ -378,6 +364,25 @@ impl Startup {
                 Ok(Next::Stay)
             }
         }
+    }
+
+    /// Asks the safety module if positions count from a known pose.
+    fn ask_zero(&mut self, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
+        Ok(match self.ask_safety(self.safety()?.zero, outlet)? {
+            None => Next::Stay,
+            Some(0) => {
+                self.error = None;
+                Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US })
+            }
+            Some(_) if self.doubt.is_some() => {
+                self.error = self.doubt;
+                Next::Go(Step::RevokeZero)
+            }
+            Some(_) => {
+                self.zeroed = true;
+                Next::Go(Step::Tare)
+            }
+        })
     }
 
     fn safety(&self) -> Result<&SafetyProperties, StartupError> {

@@ -1,4 +1,4 @@
-//! What a control cycle costs on the bus, with every stuff bit there can be: summed, and played through bit by bit.
+//! The time of a control cycle on the bus with every stuff bit there can be: summed, and played through bit by bit.
 //!
 //! A standard frame of n data bytes has 47 + 8 n bits with the three bits behind it, and at worst one stuff bit for
 //! every four bits after the first of the 34 + 8 n bits in which stuffing happens. One bit takes a microsecond.

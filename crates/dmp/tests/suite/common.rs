@@ -1,4 +1,4 @@
-//! What the tests share: golden tables, primitives in any number type, rollouts that collect rows.
+//! Common parts of the tests: golden tables, primitives in any number type, rollouts that collect rows.
 
 use std::collections::HashMap;
 

@@ -3,7 +3,8 @@
 //! The table in `docs/recording-format.md` is written from [`LAYOUT`] by
 //! `UPDATE_DOCUMENTS=1 cargo test -p lab --test recording`.
 
-use super::writer::RecordingRow;
+use control::State;
+use link::Telemetry;
 
 /// Joints of the arm.
 pub const JOINTS: usize = 7;
@@ -47,6 +48,24 @@ pub const JOINT_VELOCITIES: [&str; JOINTS] =
     ["dq1_rad_s", "dq2_rad_s", "dq3_rad_s", "dq4_rad_s", "dq5_rad_s", "dq6_rad_s", "dq7_rad_s"];
 /// Columns of the joint torques commanded on the bus.
 pub const JOINT_TORQUES: [&str; JOINTS] = ["tau1_Nm", "tau2_Nm", "tau3_Nm", "tau4_Nm", "tau5_Nm", "tau6_Nm", "tau7_Nm"];
+
+/// One line of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordingRow {
+    /// Time since the first line, s.
+    pub time: f64,
+    /// Tool frame computed from the joint angles: x, y, z (m, world), w, x, y, z.
+    pub pose: [f64; 7],
+    /// Everything else, as the device told it.
+    pub telemetry: Telemetry,
+}
+
+impl RecordingRow {
+    /// State of the supervisor, a word.
+    pub fn state(&self) -> &'static str {
+        State::from_code(self.telemetry.state).map_or("unknown", State::name)
+    }
+}
 
 /// Columns of one quantity.
 #[derive(Debug, Clone, Copy)]

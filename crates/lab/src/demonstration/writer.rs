@@ -4,28 +4,7 @@
 
 use std::io::{self, Write};
 
-use control::State;
-use link::Telemetry;
-
-use super::layout;
-
-/// One line of a recording.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RecordingRow {
-    /// Time since the first line, s.
-    pub time: f64,
-    /// Tool frame computed from the joint angles: x, y, z (m, world), w, x, y, z.
-    pub pose: [f64; 7],
-    /// Everything else, as the device told it.
-    pub telemetry: Telemetry,
-}
-
-impl RecordingRow {
-    /// State of the supervisor, a word.
-    pub fn state(&self) -> &'static str {
-        State::from_code(self.telemetry.state).map_or("unknown", State::name)
-    }
-}
+use super::layout::{self, RecordingRow};
 
 /// A recording that is being written.
 #[derive(Debug)]

@@ -9,7 +9,7 @@ use super::ProcedureError;
 use crate::arm;
 use crate::client::{Client, Incoming};
 use crate::demonstration::RATE;
-use crate::demonstration::writer::{RecordingRow, RecordingWriter};
+use crate::demonstration::{RecordingRow, RecordingWriter};
 use crate::device::Device;
 
 /// Silence on the stream after which the device counts as lost.
