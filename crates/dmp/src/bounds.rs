@@ -67,7 +67,6 @@ pub(crate) fn largest_force<T: Scalar>(system: &TransformationSystem<T>, duratio
 }
 
 /// Place of the first value whose magnitude is not at most `largest`; a NaN is such a value.
-pub(crate) fn first_beyond<T: Scalar>(values: &[T], largest: f64) -> Option<usize> {
-    let largest = T::from_f64(largest);
+pub(crate) fn first_beyond<T: Scalar>(values: &[T], largest: T) -> Option<usize> {
     values.iter().position(|value| !(value.abs() <= largest))
 }

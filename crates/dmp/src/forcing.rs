@@ -8,149 +8,62 @@
 //! out, and the quotient is one reciprocal per tick. The exponent is computed as `(sqrt(h_i) (s - c_i))^2`, which
 //! keeps six more digits in fixed point.
 
-use crate::{CanonicalSystem, Scalar};
+use crate::{Activations, CanonicalSystem, Kernels, Scalar};
 
-/// Kernels over the phase: `count` of at most `N`.
+/// Kernels over the phase: `count` of at most `N`, evaluated as the number type does it best.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Basis<T, const N: usize> {
-    count: usize,
-    centres: [T; N],
-    root_widths: [T; N],
-}
+pub struct Basis<T: Scalar, const N: usize>(T::Kernels<N>);
 
 impl<T: Scalar, const N: usize> Basis<T, N> {
     /// Places `count` kernels so that each has the value `activation` at the next centre.
     ///
     /// `None` unless `2 <= count <= N` and `0.05 <= activation <= 0.95` (beyond, neighbours are indistinguishable
-    /// and the weights explode, or the kernels leave gaps).
+    /// and the weights explode, or the kernels leave gaps), or if the number type cannot hold such kernels.
     pub fn new(canonical: &CanonicalSystem<T>, count: usize, activation: T) -> Option<Self> {
         let allowed = T::from_f64(0.05)..=T::from_f64(0.95);
         if count < 2 || count > N || !allowed.contains(&activation) {
             return None;
         }
-        let intervals = T::from_index(count - 1);
-        let mut basis = Self { count, centres: [T::ZERO; N], root_widths: [T::ZERO; N] };
-        for (i, centre) in basis.centres.iter_mut().take(count).enumerate() {
-            *centre = canonical.phase_at(T::from_index(i) / intervals);
-        }
-        // h_i = -ln(a)/(c_{i+1} - c_i)^2; neighbours keep a constant ratio, so the difference is c_i (1 - ratio),
-        // which does not cancel.
-        let root_log = T::from_f64(libm::sqrt(-libm::log(activation.to_f64())));
-        let gap = T::ONE - canonical.phase_at(T::ONE / intervals);
-        for i in 0..count {
-            let left = basis.centres[if i + 1 < count { i } else { i - 1 }];
-            basis.root_widths[i] = root_log / (left * gap);
-        }
-        Some(basis)
+        T::Kernels::new(canonical.alpha(), count, activation).map(Self)
     }
 
     /// Two kernels, at the start and at the end of the phase: as few as there can be.
-    pub(crate) const fn fewest() -> Self {
-        let mut centres = [T::ZERO; N];
-        centres[0] = T::ONE;
-        Self { count: 2, centres, root_widths: [T::ONE; N] }
-    }
+    pub(crate) const FEWEST: Self = Self(T::Kernels::FEWEST);
 
     /// Number of kernels in use.
     #[inline]
     pub fn count(&self) -> usize {
-        self.count
+        self.0.count()
     }
 
     /// Centre `c_i`; `None` beyond the last kernel.
     pub fn centre(&self, i: usize) -> Option<T> {
-        self.centres.get(..self.count)?.get(i).copied()
+        self.0.centre(i)
     }
 
     /// Width `h_i`; `None` beyond the last kernel.
     pub fn width(&self, i: usize) -> Option<T> {
-        let root = *self.root_widths.get(..self.count)?.get(i)?;
-        Some(root * root)
+        self.0.width(i)
     }
 
     /// Evaluates all kernels at the phase `s`.
+    #[inline]
     pub fn evaluate(&self, s: T) -> Activations<T, N> {
-        let mut kernels = [T::ZERO; N];
-        let count = if self.count < N { self.count } else { N };
-        let (centres, roots) = (&self.centres[..count], &self.root_widths[..count]);
-        let exponent = |i: usize| {
-            let z = roots[i] * (s - centres[i]);
-            z * z
-        };
-        // Centres fall with i, and so do the signed distances in units of the width: the exponents have one minimum,
-        // beside the place where s would be sorted in.
-        let upper = centres.partition_point(|&c| c > s);
-        let nearest = if upper == 0 {
-            0
-        } else if upper == count || exponent(upper - 1) < exponent(upper) {
-            upper - 1
-        } else {
-            upper
-        };
-        let smallest = exponent(nearest);
-        let (mut first, mut last) = (nearest, nearest + 1);
-        kernels[nearest] = T::ZERO;
-        while first > 0 {
-            let e = exponent(first - 1) - smallest;
-            if !(e <= T::NEGLIGIBLE_EXPONENT) {
-                break;
-            }
-            first -= 1;
-            kernels[first] = e;
-        }
-        while last < count {
-            let e = exponent(last) - smallest;
-            if !(e <= T::NEGLIGIBLE_EXPONENT) {
-                break;
-            }
-            kernels[last] = e;
-            last += 1;
-        }
-        let mut sum = T::ZERO;
-        for kernel in &mut kernels[first..last] {
-            *kernel = T::kernel(*kernel);
-        }
-        for kernel in &kernels[first..last] {
-            sum = sum + *kernel;
-        }
-        Activations { first, last, kernels, scale: s / sum }
-    }
-}
-
-/// All kernels at one phase: what every row of a movement shares during a tick.
-#[derive(Clone, Debug)]
-pub struct Activations<T, const N: usize> {
-    first: usize,
-    last: usize,
-    kernels: [T; N],
-    scale: T,
-}
-
-impl<T: Scalar, const N: usize> Activations<T, N> {
-    /// Kernels that matter at this phase.
-    #[inline]
-    pub fn active(&self) -> core::ops::Range<usize> {
-        self.first..self.last
-    }
-
-    /// `psi_i s / sum psi`: the factor of `theta_i` in Eq. (2).
-    #[inline]
-    pub fn factor(&self, i: usize) -> T {
-        self.kernels.get(i).map_or(T::ZERO, |kernel| *kernel * self.scale)
+        self.0.evaluate(s)
     }
 }
 
 /// Weights of `ROWS` rows, kernel by kernel, so that a tick walks through memory once and all rows advance together.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Weights<T, const ROWS: usize, const N: usize>([[T; ROWS]; N]);
+pub(crate) struct Weights<T: Scalar, const ROWS: usize, const N: usize>([[T::Weight; ROWS]; N]);
 
 impl<T: Scalar, const ROWS: usize, const N: usize> Weights<T, ROWS, N> {
     /// All weights zero.
-    pub(crate) const ZERO: Self = Self([[T::ZERO; ROWS]; N]);
+    pub(crate) const ZERO: Self = Self([[T::NO_WEIGHT; ROWS]; N]);
 
     /// Takes `ROWS` rows of `count` weights each, row after row; what is missing is 0.
-    pub(crate) fn assign(&mut self, count: usize, weights: &[T]) {
-        self.0.iter_mut().for_each(|kernel| *kernel = [T::ZERO; ROWS]);
+    pub(crate) fn assign(&mut self, count: usize, weights: &[T::Weight]) {
+        self.0.iter_mut().for_each(|kernel| *kernel = [T::NO_WEIGHT; ROWS]);
         for (row, weights) in weights.chunks(count.max(1)).take(ROWS).enumerate() {
             for (kernel, weight) in self.0.iter_mut().zip(weights) {
                 kernel[row] = *weight;
@@ -165,26 +78,26 @@ impl<T: Scalar, const ROWS: usize, const N: usize> Weights<T, ROWS, N> {
 
     /// Weight of a row at kernel `i`; `None` outside.
     pub(crate) fn get(&self, row: usize, i: usize) -> Option<T> {
-        self.0.get(i)?.get(row).copied()
+        self.0.get(i)?.get(row).map(|weight| T::from_weight(*weight))
     }
 
     /// `f` of all rows from kernels that are already evaluated.
     #[inline]
     pub(crate) fn combine(&self, activations: &Activations<T, N>) -> [T; ROWS] {
         let mut f = [T::ZERO; ROWS];
-        let active = activations.active();
-        for (kernel, weights) in activations.kernels[active.clone()].iter().zip(&self.0[active]) {
+        let weights = self.0.get(activations.active()).unwrap_or_default();
+        for (kernel, weights) in activations.kernels().iter().zip(weights) {
             for (f, weight) in f.iter_mut().zip(weights) {
-                *f = *f + *kernel * *weight;
+                *f = f.add_weighted(*kernel, *weight);
             }
         }
-        f.map(|f| f * activations.scale)
+        f.map(|f| f * activations.scale())
     }
 }
 
 /// Weights of `ROWS` rows over a common basis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ForcingTerm<T, const ROWS: usize, const N: usize> {
+pub struct ForcingTerm<T: Scalar, const ROWS: usize, const N: usize> {
     basis: Basis<T, N>,
     weights: Weights<T, ROWS, N>,
 }
@@ -192,8 +105,9 @@ pub struct ForcingTerm<T, const ROWS: usize, const N: usize> {
 impl<T: Scalar, const ROWS: usize, const N: usize> ForcingTerm<T, ROWS, N> {
     /// From weights in row-major order `[ROWS][count]`; `None` if there are not exactly `ROWS * count` finite ones.
     #[must_use]
-    pub fn new(basis: Basis<T, N>, weights: &[T]) -> Option<Self> {
-        if weights.len() != ROWS * basis.count() || !weights.iter().all(|w| w.is_finite()) {
+    pub fn new(basis: Basis<T, N>, weights: &[T::Weight]) -> Option<Self> {
+        let finite = |weight: &T::Weight| T::from_weight(*weight).is_finite();
+        if weights.len() != ROWS * basis.count() || !weights.iter().all(finite) {
             return None;
         }
         let mut forcing = Self { basis, weights: Weights::ZERO };

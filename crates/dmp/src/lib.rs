@@ -35,7 +35,7 @@ pub mod fit;
 pub use configuration::{Configuration, Pose, Twist, Velocity};
 pub use coupling::{Coupling, CouplingGains, DisplacementLimits, PoseCoupling, PoseLimits};
 pub use expected_sensors::ExpectedSensors;
-pub use forcing::{Activations, Basis, ForcingTerm};
+pub use forcing::{Basis, ForcingTerm};
 pub use gains::{Gain, Gains, PoseGains, Stiffness};
 pub use log_map::LogMap;
 pub use orientation::{OrientationError, OrientationInput, OrientationState, OrientationSystem, orientation_error};
@@ -47,7 +47,7 @@ pub use reference::{OrientationReference, PoseReference, Reference, StartState, 
 pub use rollout::{Rollout, RolloutError};
 #[cfg(feature = "fixed")]
 pub use scalar::FixedPoint;
-pub use scalar::Scalar;
+pub use scalar::{Activations, Kernels, Scalar};
 pub use sensor_statistics::SensorStatistics;
 pub use table::{Entry, PhaseTable, TableError};
 pub use transformation::{GainError, PointInput, PointState, TransformationSystem};
