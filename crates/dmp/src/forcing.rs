@@ -8,7 +8,7 @@
 //! out, and the quotient is one reciprocal per tick. The exponent is computed as `(sqrt(h_i) (s - c_i))^2`, which
 //! keeps six more digits in fixed point.
 
-use crate::{Activations, CanonicalSystem, Kernels, Scalar};
+use crate::{CanonicalSystem, Kernels, Scalar};
 
 /// Kernels over the phase: `count` of at most `N`, evaluated as the number type does it best.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,9 +47,46 @@ impl<T: Scalar, const N: usize> Basis<T, N> {
     }
 
     /// Evaluates all kernels at the phase `s`.
-    #[inline]
     pub fn evaluate(&self, s: T) -> Activations<T, N> {
-        self.0.evaluate(s)
+        let mut activations = Activations { first: N, last: 0, kernels: [T::ZERO; N], scale: T::ZERO };
+        activations.scale = self.each(s, |i, kernel| {
+            if let Some(place) = activations.kernels.get_mut(i) {
+                *place = kernel;
+            }
+            activations.first = activations.first.min(i);
+            activations.last = i + 1;
+        });
+        activations
+    }
+
+    /// Gives each kernel that matters at the phase `s` to `take`, in order; returns `s / sum psi`. Without the array of
+    /// [`Basis::evaluate`], which costs more to clear than a tick needs of it.
+    #[inline]
+    pub(crate) fn each(&self, s: T, take: impl FnMut(usize, T)) -> T {
+        self.0.each(s, take)
+    }
+}
+
+/// All kernels at one phase: what every row of a movement shares during a tick.
+#[derive(Clone, Debug)]
+pub struct Activations<T, const N: usize> {
+    first: usize,
+    last: usize,
+    kernels: [T; N],
+    scale: T,
+}
+
+impl<T: Scalar, const N: usize> Activations<T, N> {
+    /// Kernels that matter at this phase.
+    #[inline]
+    pub fn active(&self) -> core::ops::Range<usize> {
+        self.first..self.last
+    }
+
+    /// `psi_i s / sum psi`: the factor of `theta_i` in Eq. (2).
+    #[inline]
+    pub fn factor(&self, i: usize) -> T {
+        self.kernels.get(i).map_or(T::ZERO, |kernel| *kernel * self.scale)
     }
 }
 
@@ -81,17 +118,13 @@ impl<T: Scalar, const ROWS: usize, const N: usize> Weights<T, ROWS, N> {
         self.0.get(i)?.get(row).map(|weight| T::from_weight(*weight))
     }
 
-    /// `f` of all rows from kernels that are already evaluated.
+    /// Adds the share of kernel `i` to the sum of each row.
     #[inline]
-    pub(crate) fn combine(&self, activations: &Activations<T, N>) -> [T; ROWS] {
-        let mut f = [T::ZERO; ROWS];
-        let weights = self.0.get(activations.active()).unwrap_or_default();
-        for (kernel, weights) in activations.kernels().iter().zip(weights) {
-            for (f, weight) in f.iter_mut().zip(weights) {
-                *f = f.add_weighted(*kernel, *weight);
-            }
+    pub(crate) fn add(&self, i: usize, kernel: T, sums: &mut [T; ROWS]) {
+        let weights = self.0.get(i).into_iter().flatten();
+        for (sum, weight) in sums.iter_mut().zip(weights) {
+            *sum = sum.add_weighted(kernel, *weight);
         }
-        f.map(|f| f * activations.scale())
     }
 }
 
@@ -132,13 +165,8 @@ impl<T: Scalar, const ROWS: usize, const N: usize> ForcingTerm<T, ROWS, N> {
     #[inline]
     #[must_use]
     pub fn evaluate(&self, s: T) -> [T; ROWS] {
-        self.combine(&self.basis.evaluate(s))
-    }
-
-    /// `f` of all rows from kernels that are already evaluated.
-    #[inline]
-    #[must_use]
-    pub fn combine(&self, activations: &Activations<T, N>) -> [T; ROWS] {
-        self.weights.combine(activations)
+        let mut f = [T::ZERO; ROWS];
+        let scale = self.basis.each(s, |i, kernel| self.weights.add(i, kernel, &mut f));
+        f.map(|f| f * scale)
     }
 }

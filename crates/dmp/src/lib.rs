@@ -22,6 +22,7 @@ mod primitive_error;
 mod quaternion;
 mod reference;
 mod rollout;
+mod rollout_error;
 mod scalar;
 mod sensor_statistics;
 mod table;
@@ -35,19 +36,22 @@ pub mod fit;
 pub use configuration::{Configuration, Pose, Twist, Velocity};
 pub use coupling::{Coupling, CouplingGains, DisplacementLimits, PoseCoupling, PoseLimits};
 pub use expected_sensors::ExpectedSensors;
-pub use forcing::{Basis, ForcingTerm};
+pub use forcing::{Activations, Basis, ForcingTerm};
 pub use gains::{Gain, Gains, PoseGains, Stiffness};
 pub use log_map::LogMap;
-pub use orientation::{OrientationError, OrientationInput, OrientationState, OrientationSystem, orientation_error};
+pub use orientation::{
+    Hemisphere, OrientationError, OrientationInput, OrientationState, OrientationSystem, orientation_error,
+};
 pub use phase::{CanonicalSystem, Phase};
-pub use primitive::{Hemisphere, Primitive, PrimitiveTables};
+pub use primitive::{Primitive, PrimitiveTables};
 pub use primitive_error::{Group, Part, PrimitiveError};
 pub use quaternion::Quaternion;
-pub use reference::{OrientationReference, PoseReference, Reference, StartState, Trajectory};
-pub use rollout::{Rollout, RolloutError};
+pub use reference::{OrientationReference, PoseReference, Reference, Trajectory};
+pub use rollout::{Rollout, StartState};
+pub use rollout_error::RolloutError;
 #[cfg(feature = "fixed")]
 pub use scalar::FixedPoint;
-pub use scalar::{Activations, Kernels, Scalar};
+pub use scalar::{Kernels, Scalar};
 pub use sensor_statistics::SensorStatistics;
 pub use table::{Entry, PhaseTable, TableError};
 pub use transformation::{GainError, PointInput, PointState, TransformationSystem};

@@ -3,7 +3,7 @@
 //! Four point rows of `dmp` without a pose, and the three gauges that bend them. Made from the real numbers of an image
 //! ([`FingerTables`]) when its upload is complete.
 
-use control::plan::load::{LONGEST, LoadError, SHORTEST};
+use control::plan::load::{LONGEST_MOVEMENT, LoadError, SHORTEST_MOVEMENT};
 use device::PrimitiveTrouble;
 use device::recorded_filter::{self, OtherFilter};
 use dmp::{
@@ -106,7 +106,7 @@ impl FingerTables {
     /// The checks that are the hand's own, and those of the tables that `dmp` fills one after another: a primitive is
     /// not to be left half filled.
     fn check(&self) -> Result<(), Unfit> {
-        if !(SHORTEST..=LONGEST).contains(&f64::from(self.duration)) {
+        if !(SHORTEST_MOVEMENT..=LONGEST_MOVEMENT).contains(&f64::from(self.duration)) {
             return Err(Unfit::Movement(LoadError::Duration));
         }
         for (end, error) in [(&self.start, PrimitiveError::Start), (&self.goal, PrimitiveError::Goal)] {

@@ -4,8 +4,8 @@
 mod boot;
 mod bus;
 mod chain;
+pub mod fault;
 mod firmware;
-pub mod flash;
 mod force_torque;
 mod hand;
 mod inbox;

@@ -4,12 +4,15 @@
 //! clock stands still meanwhile, so neither side can overtake the other, however slow the computer is. Layout, timing
 //! rule and the reasons: `docs/lockstep.md`.
 
-use crate::flash::{FlashChip, FlashError, WORD_BYTES};
 use crate::link_wire::CHUNK;
 use crate::plant::{Event, Plant};
-use crate::time::Ticks;
+use crate::time::{TICKS_PER_SECOND, Ticks};
+use flash::{FlashChip, FlashError, WORD_BYTES};
 use puck::{CanFrame, CanId};
 use std::io::{self, Read, Write};
+
+/// Flash and bus share one virtual clock.
+const _: () = assert!(flash::TICKS_PER_SECOND == TICKS_PER_SECOND);
 
 /// Bytes of a request without link bytes.
 pub const REQUEST_LENGTH: usize = 24;

@@ -9,6 +9,10 @@ use embedded_hal::digital::OutputPin;
 use embedded_storage_async::nor_flash::NorFlash;
 use puck::CanFrame;
 
+pub mod line;
+#[cfg(target_os = "none")]
+pub mod panic_stop;
+
 #[cfg(all(target_os = "none", feature = "board-mps2"))]
 mod mps2;
 #[cfg(all(target_os = "none", feature = "board-mps2"))]
@@ -80,6 +84,9 @@ pub struct Parts<B: Board> {
 pub trait Clock: Copy {
     /// Ticks per second.
     const HZ: u32;
+
+    /// Instructions that the processor executes per tick, where time is counted in instructions; 0 where a clock runs.
+    const INSTRUCTIONS_PER_TICK: u8 = 0;
 
     /// Ticks since start-up.
     fn ticks(self) -> u64;

@@ -9,8 +9,8 @@ use device::time::SLOT_HZ;
 use embedded_can::nb;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use firmware::board::{self, Board, CanStatus, LinkPort, Parts};
+use flash::FlashPort;
 use puck::CanFrame;
-use sim::flash::FlashPort;
 use sim::{TICKS_PER_SECOND, Ticks};
 
 /// Ticks of one slot.

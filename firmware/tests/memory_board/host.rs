@@ -17,12 +17,12 @@ use firmware::application::{
 };
 use firmware::board::Board;
 use firmware::meters::Meters;
+use flash::{FlashChip, FlashPort, VirtualClock};
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
 use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
 use link::message::{ChunkData, HostHello};
 use link::{Event, LINK_VERSION, Name, PrimitiveImage, Reply, Request, SCHEMA_HASH, Status, Text};
 use rtic_core::Mutex;
-use sim::flash::{FlashChip, FlashPort, VirtualClock};
 use sim::{FreeJoints, HOME, Plant, PlantConfig, TICKS_PER_SECOND, Ticks};
 
 use crate::board::{Can, MemoryBoard, SLOT_TICKS, Shared, set_now};

@@ -7,10 +7,10 @@ mod names;
 
 use control::State;
 use device::Stage;
+use flash::{Flash, FlashChip, FlashTimes};
 use host::Host;
 use link::message::{PoseFeedback, RunOptions};
 use link::{EventKind, HandStage, Name, Reply, Request};
-use sim::flash::{Flash, FlashChip, FlashTimes};
 
 /// Starts the arm up, from the released E-stop to the initialised hand.
 fn start_up(host: &mut Host) {
@@ -94,7 +94,7 @@ fn the_library_is_there_again_after_a_restart_and_a_deleted_primitive_is_not() {
 #[test]
 fn the_session_answers_while_a_sector_is_erased() {
     // Every erase takes 4 s here, and a foreign flash needs eight of them before the first word can be written.
-    let chip = FlashChip::new(Flash::with_content(vec![0; sim::flash::FLASH_BYTES], FlashTimes::SLOW));
+    let chip = FlashChip::new(Flash::with_content(vec![0; flash::FLASH_BYTES], FlashTimes::SLOW));
     let mut host = Host::new(chip.clone());
     host.wait(1.1);
     host.greet();

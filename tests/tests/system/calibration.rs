@@ -3,13 +3,13 @@
 
 use control::State;
 use device::Stage;
+use flash::{Flash, FlashChip, FlashTimes};
 use lab::client::Client;
 use lab::device::Device;
 use lab::error::HostError;
 use lab::procedure;
 use lab::simulation::FlashSource;
 use link::{HomeSource, Refusal};
-use sim::flash::{Flash, FlashChip, FlashTimes};
 use system_tests::{Arm, command, expect, simulation};
 
 /// Distance of this arm's home from the model's, rad: two to six degrees.

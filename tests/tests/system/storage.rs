@@ -6,6 +6,7 @@ use control::model::{ArmModel, Frames};
 use control::units::JointPositions;
 use control::{Payload, State};
 use device::Stage;
+use flash::{Flash, FlashChip, FlashTimes};
 use lab::client::{Client, Incoming};
 use lab::device::Device;
 use lab::simulation::FlashSource;
@@ -15,7 +16,6 @@ use link::image::{
 };
 use link::message::RunOptions;
 use link::{Name, Telemetry};
-use sim::flash::{Flash, FlashChip, FlashTimes};
 use system_tests::bus::{CYCLE_TICKS, torques};
 use system_tests::{Arm, command, expect, simulation};
 

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use device::storage::{HOME_KEY, Library, LibraryAccess, Opening, Scratch, Work, keep, value_bytes};
 use device::{Home, Store, StoreError};
 use embedded_storage_async::nor_flash::NorFlash;
-use sim::flash::{Flash, FlashChip, FlashPort, FlashTimes, VirtualClock};
+use flash::{Flash, FlashChip, FlashPort, FlashTimes, VirtualClock};
 
 /// Bytes of the images here: as large as the device's.
 pub(crate) const IMAGE: usize = 16_384;

@@ -1,7 +1,7 @@
 //! Power fails in the middle of every single word and sector, and every restart finds the old or the new.
 
 use device::{Store, StoredHome};
-use sim::flash::FlashChip;
+use flash::FlashChip;
 
 use crate::bench::{TINY, Wish, chip, home, image, run_on};
 
@@ -152,7 +152,7 @@ fn cut_the_start(torn: &[u8], old: Content, new: Content, first: u64, operations
 /// A flash that has been written all around, so that the next image needs a sector that still holds images: places 0,
 /// 1, 2 with images 40, 41, 42 of which the oldest stands in the sector to be emptied, as does the home, 7.
 fn crowded() -> Vec<u8> {
-    let blank = vec![0xFF; sim::flash::FLASH_BYTES];
+    let blank = vec![0xFF; flash::FLASH_BYTES];
     let mut before = after(&blank, &[Wish::Home(7), Wish::Save(0, 40), Wish::Save(1, 41), Wish::Save(2, 42)]);
     // Place 3 is written over and over, until the next image would be the first to erase.
     for number in 0_u8.. {
@@ -169,7 +169,7 @@ fn crowded() -> Vec<u8> {
 
 #[test]
 fn power_fails_at_every_word_of_an_upload_that_replaces_and_the_old_or_the_new_is_there() {
-    let blank = vec![0xFF; sim::flash::FLASH_BYTES];
+    let blank = vec![0xFF; flash::FLASH_BYTES];
     let before = after(&blank, &[Wish::Save(0, 1), Wish::Save(1, 2), Wish::Save(2, 3)]);
     let cuts = cut_everywhere(&before, Wish::Save(1, 9));
     assert!(cuts > 490 * WORD_DRAWS as usize, "{cuts} cuts are too few for an image of 16 kB in words of 32 bytes");
@@ -184,7 +184,7 @@ fn power_fails_at_every_operation_of_an_upload_that_needs_an_erase_and_the_old_o
 
 #[test]
 fn power_fails_at_every_operation_of_a_delete_and_the_image_is_there_or_gone() {
-    let blank = vec![0xFF; sim::flash::FLASH_BYTES];
+    let blank = vec![0xFF; flash::FLASH_BYTES];
     let before = after(&blank, &[Wish::Save(0, 1), Wish::Save(1, 2), Wish::Save(2, 3)]);
     let cuts = cut_everywhere(&before, Wish::Delete(1));
     assert!(cuts >= 2 * WORD_DRAWS as usize);
@@ -213,7 +213,7 @@ fn full_for(wish: Wish) -> Vec<u8> {
 
 #[test]
 fn power_fails_at_every_word_of_a_calibration_and_the_old_home_or_the_new_is_there() {
-    let blank = vec![0xFF; sim::flash::FLASH_BYTES];
+    let blank = vec![0xFF; flash::FLASH_BYTES];
     let mut cuts = 0;
     for before in [vec![], vec![Wish::Home(3)], vec![Wish::Home(3), Wish::ForgetHome]] {
         let before = [vec![Wish::Save(0, 1), Wish::Save(1, 2)], before].concat();
@@ -234,8 +234,8 @@ fn power_fails_at_every_operation_of_a_calibration_that_needs_an_erase_and_the_o
 
 #[test]
 fn power_fails_at_every_operation_of_the_first_start_and_the_flash_becomes_ours() {
-    let blank = vec![0xFF; sim::flash::FLASH_BYTES];
-    let foreign: Vec<u8> = (0..sim::flash::FLASH_BYTES).map(|place| (place / 7) as u8).collect();
+    let blank = vec![0xFF; flash::FLASH_BYTES];
+    let foreign: Vec<u8> = (0..flash::FLASH_BYTES).map(|place| (place / 7) as u8).collect();
     for before in [blank, foreign] {
         let whole = chip(&before);
         assert_eq!(found(&whole), EMPTY);
@@ -257,7 +257,7 @@ fn power_fails_at_every_operation_of_the_first_start_and_the_flash_becomes_ours(
 
 #[test]
 fn a_deleted_image_stays_deleted_however_often_its_sector_is_emptied() {
-    let blank = vec![0xFF; sim::flash::FLASH_BYTES];
+    let blank = vec![0xFF; flash::FLASH_BYTES];
     let mut now = after(&blank, &[Wish::Home(3), Wish::Save(0, 1), Wish::Save(1, 2), Wish::Delete(1)]);
     for number in 0..120 {
         now = after(&now, &[Wish::Save(2, number)]);
@@ -268,7 +268,7 @@ fn a_deleted_image_stays_deleted_however_often_its_sector_is_emptied() {
 
 #[test]
 fn wear_is_spread_over_the_sectors_of_the_log() {
-    let chip = chip(&vec![0xFF; sim::flash::FLASH_BYTES]);
+    let chip = chip(&vec![0xFF; flash::FLASH_BYTES]);
     let wishes: Vec<_> = (0..420).map(|count| Wish::Save(0, (count % 50) as u8)).collect();
     let (_, answers) = run_on::<SLOTS>(&chip, &wishes);
     assert!(answers.iter().all(|answer| *answer == Some(Ok(()))));

@@ -1,7 +1,7 @@
 //! What the storage refuses, and what it makes of a flash that is not its own.
 
 use device::{Store, StoreError, StoredHome};
-use sim::flash::{FLASH_BYTES, FlashPort, VirtualClock};
+use flash::{FLASH_BYTES, FlashPort, VirtualClock};
 
 use crate::bench::{Wish, chip, home, image, run, run_on, write_home};
 
@@ -121,7 +121,7 @@ fn a_flash_that_fails_refuses_and_the_memory_stays_as_it_was() {
 
 mod failing {
     use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
-    use sim::flash::{FlashError, FlashPort};
+    use flash::{FlashError, FlashPort};
 
     /// A flash that can be written a few more times.
     pub(super) struct Failing {

@@ -3,9 +3,9 @@
 use core::pin::pin;
 use core::task::{Context, Poll, Waker};
 
+use flash::{FLASH_BYTES, FlashChip, FlashPort, VirtualClock};
 use sequential_storage::cache::Cache;
 use sequential_storage::map::{MapConfig, MapStorage};
-use sim::flash::{FLASH_BYTES, FlashChip, FlashPort, VirtualClock};
 
 use crate::bench::{chip, image};
 

@@ -18,43 +18,9 @@ pub trait Kernels<T, const N: usize>: Clone + Debug + PartialEq {
     fn centre(&self, i: usize) -> Option<T>;
     /// Width `h_i`; `None` beyond the last kernel.
     fn width(&self, i: usize) -> Option<T>;
-    /// Evaluates all kernels at the phase `s`.
-    fn evaluate(&self, s: T) -> Activations<T, N>;
-}
-
-/// All kernels at one phase: what every row of a movement shares during a tick.
-#[derive(Clone, Debug)]
-pub struct Activations<T, const N: usize> {
-    pub(super) first: usize,
-    pub(super) last: usize,
-    pub(super) kernels: [T; N],
-    pub(super) scale: T,
-}
-
-impl<T: Scalar, const N: usize> Activations<T, N> {
-    /// Kernels that matter at this phase.
-    #[inline]
-    pub fn active(&self) -> core::ops::Range<usize> {
-        self.first..self.last
-    }
-
-    /// `psi_i s / sum psi`: the factor of `theta_i` in Eq. (2).
-    #[inline]
-    pub fn factor(&self, i: usize) -> T {
-        self.kernels.get(i).map_or(T::ZERO, |kernel| *kernel * self.scale)
-    }
-
-    /// `psi_i` of the kernels that matter, the largest of them 1.
-    #[inline]
-    pub(crate) fn kernels(&self) -> &[T] {
-        self.kernels.get(self.first..self.last).unwrap_or_default()
-    }
-
+    /// Gives each kernel that matters at the phase `s` to `take`, in order and such that the largest is 1; returns
     /// `s / sum psi`.
-    #[inline]
-    pub(crate) fn scale(&self) -> T {
-        self.scale
-    }
+    fn each(&self, s: T, take: impl FnMut(usize, T)) -> T;
 }
 
 /// Kernels by a table of centres and widths.
@@ -104,8 +70,8 @@ impl<T: Scalar, const N: usize> Kernels<T, N> for Tabulated<T, N> {
         Some(root * root)
     }
 
-    fn evaluate(&self, s: T) -> Activations<T, N> {
-        let mut kernels = [T::ZERO; N];
+    #[inline]
+    fn each(&self, s: T, mut take: impl FnMut(usize, T)) -> T {
         let count = if self.count < N { self.count } else { N };
         let (centres, roots) = (&self.centres[..count], &self.root_widths[..count]);
         let exponent = |i: usize| {
@@ -123,31 +89,17 @@ impl<T: Scalar, const N: usize> Kernels<T, N> for Tabulated<T, N> {
             upper
         };
         let smallest = exponent(nearest);
-        let (mut first, mut last) = (nearest, nearest + 1);
-        kernels[nearest] = T::ZERO;
-        while first > 0 {
-            let e = exponent(first - 1) - smallest;
-            if !(e <= T::NEGLIGIBLE_EXPONENT) {
-                break;
-            }
-            first -= 1;
-            kernels[first] = e;
-        }
-        while last < count {
-            let e = exponent(last) - smallest;
-            if !(e <= T::NEGLIGIBLE_EXPONENT) {
-                break;
-            }
-            kernels[last] = e;
-            last += 1;
-        }
+        let matters = |i: usize| exponent(i) - smallest <= T::NEGLIGIBLE_EXPONENT;
+        let first = (0..nearest).rev().take_while(|&i| matters(i)).last().unwrap_or(nearest);
         let mut sum = T::ZERO;
-        for kernel in &mut kernels[first..last] {
-            *kernel = T::kernel(*kernel);
+        for i in first..count {
+            if i > nearest && !matters(i) {
+                break;
+            }
+            let kernel = if i == nearest { T::kernel(T::ZERO) } else { T::kernel(exponent(i) - smallest) };
+            sum = sum + kernel;
+            take(i, kernel);
         }
-        for kernel in &kernels[first..last] {
-            sum = sum + *kernel;
-        }
-        Activations { first, last, kernels, scale: s / sum }
+        s / sum
     }
 }

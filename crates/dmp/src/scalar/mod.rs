@@ -14,7 +14,7 @@ mod ratios;
 
 #[cfg(feature = "fixed")]
 pub use self::fixed::FixedPoint;
-pub use self::kernels::{Activations, Kernels};
+pub use self::kernels::Kernels;
 
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};

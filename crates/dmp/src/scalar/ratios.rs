@@ -13,7 +13,7 @@
 //! | exponent | u64, 48 | 0 to 16 384 | 4e-15 |
 
 use super::exponential::decay;
-use super::kernels::{Activations, Kernels};
+use super::kernels::Kernels;
 use super::{FixedPoint, Scalar};
 
 /// Fraction bits of `r (E - 1)`.
@@ -138,52 +138,43 @@ impl<const N: usize> Kernels<FixedPoint, N> for Ratios {
         Some(root * root)
     }
 
-    fn evaluate(&self, s: FixedPoint) -> Activations<FixedPoint, N> {
+    #[inline]
+    fn each(&self, s: FixedPoint, mut take: impl FnMut(usize, FixedPoint)) -> FixedPoint {
         // The phase 1 is that of the first tick; one less of 2^-32 fits into 32 bits.
         let phase = s.to_bits().clamp(0, u32::MAX.into()) as u32;
         let near = self.near(phase.max(1));
         let centre = self.centre_at(near).to_bits().unsigned_abs();
-        let ratio = (u64::from(phase) << self.ratio_bits).checked_div(centre).unwrap_or(0);
+        let mut ratio = (u64::from(phase) << self.ratio_bits).checked_div(centre).unwrap_or(0);
+        let next = |ratio: u64| ((ratio * u64::from(self.rise)) >> self.ratio_bits).min(RATIO_LIMIT);
 
-        // Exponents first, in the place of the kernels.
-        let mut kernels = [FixedPoint::ZERO; N];
-        let mut smallest = u64::MAX;
-        let mut put = |i: usize, exponent: u64| {
-            if let Some(place) = kernels.get_mut(i) {
-                *place = FixedPoint::from_bits(exponent.cast_signed());
+        // Down to the first kernel that counts. The nearest one is met on the way, or is the one above.
+        let mut smallest = self.exponent(near, ratio);
+        if near + 1 < self.count {
+            smallest = smallest.min(self.exponent(near + 1, next(ratio)));
+        }
+        let mut first = near;
+        while first > 0 {
+            let falling = (ratio * u64::from(self.fall)) >> FALL_BITS;
+            let exponent = self.exponent(first - 1, falling);
+            if exponent.saturating_sub(smallest) > NEGLIGIBLE {
+                break;
             }
             smallest = smallest.min(exponent);
-            exponent - smallest <= NEGLIGIBLE
-        };
-        put(near, self.exponent(near, ratio));
-        let (mut first, mut last) = (near, near + 1);
-        let mut falling = ratio;
-        while first > 0 {
-            falling = (falling * u64::from(self.fall)) >> FALL_BITS;
-            if !put(first - 1, self.exponent(first - 1, falling)) {
-                break;
-            }
-            first -= 1;
-        }
-        let mut rising = ratio;
-        while last < self.count {
-            rising = ((rising * u64::from(self.rise)) >> self.ratio_bits).min(RATIO_LIMIT);
-            if !put(last, self.exponent(last, rising)) {
-                break;
-            }
-            last += 1;
+            (first, ratio) = (first - 1, falling);
         }
 
         let mut sum = FixedPoint::ZERO;
-        for kernel in kernels.get_mut(first..last).unwrap_or_default() {
-            let above = kernel.to_bits().unsigned_abs().saturating_sub(smallest);
-            let counts = above <= NEGLIGIBLE;
-            *kernel =
-                if counts { FixedPoint::from_bits(decay(above >> (2 * ROOT_BITS - 32))) } else { FixedPoint::ZERO };
-            sum = sum + *kernel;
+        for i in first..self.count {
+            let above = self.exponent(i, ratio).saturating_sub(smallest);
+            if above > NEGLIGIBLE && i > near {
+                break;
+            }
+            let kernel = FixedPoint::from_bits(decay(above >> (2 * ROOT_BITS - 32)));
+            sum = sum + kernel;
+            take(i, kernel);
+            ratio = next(ratio);
         }
         // Of the kernels the nearest is 1, so this is at most 1.
-        let scale = FixedPoint::from_bits(phase.into()) / sum;
-        Activations { first, last, kernels, scale }
+        FixedPoint::from_bits(phase.into()) / sum
     }
 }

@@ -18,16 +18,16 @@ fn error(movement: &Movement, speed: f64, gauges: impl Fn(f64) -> [f64; 3]) -> [
     reference.set_speed(exact, speed).expect("a speed");
     rollout.set_speed(fixed.movement(), Number::from_f64(speed)).expect("a speed");
     let mut worst = [0.0_f64; 2];
-    let ticks = (1.5 * f64::from(movement.duration) / speed * 300.0) as usize;
+    let ticks = (1.5 * f64::from(movement.duration) / speed * control::RATE) as usize;
     for tick in 0..ticks {
-        let measured = gauges(tick as f64 / 300.0);
+        let measured = gauges(tick as f64 / control::RATE);
         let mut error = [0.0; 9];
         if let Some(expected) = sensed.expected() {
             let expected = expected.at(reference.progress());
             (0..3).for_each(|finger| error[6 + finger] = measured[finger] - expected[6 + finger]);
         }
         let coupling = sensed.coupling(&reference, &error).expect("its own");
-        let wanted = reference.step(exact, 1.0 / 300.0, &coupling).expect("its own");
+        let wanted = reference.step(exact, control::PERIOD, &coupling).expect("its own");
         let found = step(&fixed, &mut rollout, &measured.map(|torque| from_real(torque as f32)));
         for digit in 0..4 {
             worst[0] = worst[0].max((found.x[digit].to_f64() - wanted.points.x[7 + digit]).abs());

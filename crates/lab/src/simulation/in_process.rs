@@ -12,9 +12,9 @@ use std::task::{Context, Poll, Waker};
 
 use device::storage::{Library, LibraryAccess, Opening, Scratch, Work, keep, value_bytes};
 use device::{Controller, DeviceController, Identity, Session, Slot, StoreError};
+use flash::{FlashChip, FlashPort, VirtualClock};
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
-use sim::flash::{FlashChip, FlashPort, VirtualClock};
 use sim::{Plant, TICKS_PER_MICROSECOND, Ticks};
 
 use super::halves::{FIRST_SLOT, LINE_ROOM, Port, Queues, SLOT_TICKS};
@@ -110,6 +110,7 @@ pub(super) struct InProcess {
     next_slot: Ticks,
     /// Frames that are still being computed, with the time at which they leave.
     leaving: VecDeque<(Ticks, CanFrame)>,
+    is_bus_off: bool,
     line: Vec<u8>,
 }
 
@@ -122,6 +123,7 @@ impl InProcess {
             serial: "simulated",
             simulated: true,
             ticks_per_second: sim::TICKS_PER_SECOND as u32,
+            instructions_per_tick: 0,
         };
         let session = boxed(Session::init(identity, Library::new()));
         let session = SharedSession(Arc::new(Mutex::new(session)));
@@ -133,6 +135,7 @@ impl InProcess {
             slot: Slot::Request,
             next_slot: FIRST_SLOT * SLOT_TICKS,
             leaving: VecDeque::new(),
+            is_bus_off: false,
             line: Vec::new(),
         }
     }
@@ -141,6 +144,12 @@ impl InProcess {
         let now = self.next_slot;
         plant.advance(now);
         let now_us = now / TICKS_PER_MICROSECOND;
+        self.queues.refused = plant.refused();
+        if plant.is_bus_off() && !self.is_bus_off {
+            self.leaving.clear();
+            self.core.note_bus_error(true);
+        }
+        self.is_bus_off = plant.is_bus_off();
         self.core.slot(self.slot, now_us, &mut self.queues);
         let leave = now + computing(self.slot);
         self.leaving.extend(self.queues.transmitted.drain(..).map(|frame| (leave, frame)));

@@ -5,7 +5,7 @@ use std::io::BufReader;
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-use sim::flash::FlashChip;
+use flash::FlashChip;
 use sim::{Lockstep, Plant, Ticks};
 
 use super::seat::Seat;

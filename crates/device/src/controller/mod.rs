@@ -1,0 +1,567 @@
+//! The high-priority half of the device: the bus, its start-up, and the control cycle.
+//!
+//! A hardware timer calls [`DeviceController::slot`] three times per control cycle. In the start-up each slot sends at
+//! most one frame. After that the three slots do different things:
+//!
+//! | slot | at | what |
+//! |---|---|---|
+//! | [`Slot::Request`] | 0 | empty the reply slots, ask all pucks for their position and the sensor for its wrench |
+//! | [`Slot::Control`] | 1.11 ms | take what has come, compute, send both torque frames, then drive and ask the hand |
+//! | [`Slot::Slow`] | 2.22 ms | one question about modes, pendant or temperatures |
+//!
+//! No torque but zero leaves before the start-up is over, a person has activated the arm, and a person has commanded
+//! it: the frames of a cycle come from [`control::Actuation`] or are zero.
+
+mod outlet;
+
+use control::law::Gains;
+use control::time::periods;
+use control::{Calibration, Cycle, CycleInput, CycleRecord, Fault, LoadRefusal, Payload, State};
+use link::HandStage;
+use pinned_init::{Init, init};
+use puck::{CanFrame, MotorMode, Node, PropertyId, Reply, SafetyMode, Status, set, zero_torques};
+
+use crate::application::{Controller, ControllerIo, CycleReport, Message, Slot};
+use crate::background::{BackgroundPoll, PollReply};
+use crate::bus::{Outlet, Pacer};
+use crate::command::{Command, Refusal};
+use crate::event::{Event, EventKind};
+use crate::hand::Hand;
+use crate::health::{Counters, Health};
+use crate::port::FitPrimitive;
+use crate::round::Round;
+use crate::stage::{Stage, StartupError};
+use crate::startup::Startup;
+use crate::wire;
+use outlet::SlotOutlet;
+
+/// Time that a puck may be silent before the bus is started anew: 1 s, in control periods; long after the supervisor
+/// has taken the torque off.
+const SILENT_CYCLES: u16 = periods(1.0);
+/// Unanswered questions to the safety module that mean it is gone: 100 ms, one question in two control periods.
+const SAFETY_SILENCE: u16 = periods(0.1) / 2;
+/// Cycles between a fault of the bus and the new start-up: three of zero torque, and time to ask the safety module for
+/// IDLE.
+const LAST_CYCLES: u8 = 6;
+/// Cycles in a row whose torque frames could not be sent, after which the bus counts as failed.
+const REFUSED_CYCLES: u8 = 6;
+/// Answers in a row of a braking puck 1 under an ACTIVE safety module that mean IDLE: one may be older than the
+/// activation.
+const BRAKING_ANSWERS: u8 = 2;
+/// Time between two requests to the safety module to go IDLE: 0.25 s, in slow slots.
+const IDLE_REQUEST_SLOTS: u16 = periods(0.25);
+
+/// How much an overrun counts against the cycles without one.
+const OVERRUN_WEIGHT: u16 = 50;
+/// The sum at which the control cycle is too late too often: six overruns within a few cycles. One in fifty is
+/// tolerated.
+const OVERRUN_LIMIT: u16 = 300;
+
+/// Who has the bus.
+#[derive(Clone, Copy, Debug)]
+enum BusPhase {
+    /// The start-up.
+    StartUp,
+    /// The cyclic loop, with its questions beside the control cycle.
+    Cyclic(BackgroundPoll),
+}
+
+/// The high-priority half of the device.
+pub struct DeviceController {
+    cycle: Cycle<f32, { control::MAX_KERNELS }>,
+    number: u64,
+    startup: Startup,
+    pacer: Pacer,
+    round: Round,
+    hand: Hand,
+    phase: BusPhase,
+    counters: Counters,
+    safety_mode: Option<SafetyMode>,
+    /// The mode told since the last cycle.
+    fresh_safety: Option<SafetyMode>,
+    pendant: Option<i32>,
+    temperatures: [Option<i16>; 7],
+    hand_temperatures: [Option<i16>; 4],
+    stage: Stage,
+    blocked: Option<StartupError>,
+    /// A fault of the bus, to be told to the next cycle, and the cycles left until the bus is started anew.
+    fault: Option<Fault>,
+    last_cycles: Option<u8>,
+    braking: u8,
+    refused: u8,
+    /// Overruns of late: up by [`OVERRUN_WEIGHT`] with each, down by one with each cycle.
+    overruns: u16,
+    wants_idle: bool,
+    idle_request_in: u16,
+}
+
+impl DeviceController {
+    /// Makes, in its place, a device that has just got power: silent, without torque, at the beginning of the start-up.
+    pub fn init() -> impl Init<DeviceController> {
+        init!(DeviceController {
+            // Never used for torque: the scales of this arm replace it before the first cycle.
+            cycle <- Cycle::init(Calibration::nominal(Payload::SensorAndHand), Gains::tuned()),
+            number: 0,
+            startup: Startup::new(),
+            pacer: Pacer::default(),
+            round: Round::default(),
+            hand: Hand::new(),
+            phase: BusPhase::StartUp,
+            counters: Counters::default(),
+            safety_mode: None,
+            fresh_safety: None,
+            pendant: None,
+            temperatures: [None; 7],
+            hand_temperatures: [None; 4],
+            stage: Stage::Enumerating,
+            blocked: None,
+            fault: None,
+            last_cycles: None,
+            braking: 0,
+            refused: 0,
+            overruns: 0,
+            wants_idle: false,
+            idle_request_in: 0,
+        })
+    }
+
+    /// Forgets the primitive. Ignored while it runs.
+    pub fn unload(&mut self) {
+        self.cycle.unload();
+    }
+
+    /// How far the start-up has come.
+    pub fn stage(&self) -> Stage {
+        let stage = self.startup.stage();
+        if stage == Stage::WaitingForActive && self.safety_mode == Some(SafetyMode::Active) {
+            Stage::Ready
+        } else {
+            stage
+        }
+    }
+
+    /// Takes every frame that has come in.
+    fn drain(&mut self, io: &mut impl ControllerIo<Self>) {
+        while let Some(frame) = io.receive() {
+            Counters::count(&mut self.counters.frames_received);
+            let reply = match Reply::decode(&frame) {
+                Ok(Reply::SafetyBroadcast) => {
+                    Counters::count(&mut self.counters.broadcasts);
+                    continue;
+                }
+                Ok(reply) => reply,
+                Err(_) => {
+                    Counters::count(&mut self.counters.malformed_frames);
+                    continue;
+                }
+            };
+            if !self.take(&reply, io) {
+                Counters::count(&mut self.counters.foreign_frames);
+            }
+        }
+    }
+
+    /// Gives a reply to whoever waits for it; whether anybody did.
+    fn take(&mut self, reply: &Reply, io: &mut impl ControllerIo<Self>) -> bool {
+        if matches!(self.phase, BusPhase::StartUp) {
+            let expected = self.startup.receive(reply);
+            if let (true, Reply::Property { node: Node::SAFETY_MODULE, property: PropertyId::MODE, value }) =
+                (expected, *reply)
+            {
+                self.hear_safety(value, io);
+            }
+            return expected;
+        }
+        if self.round.take(reply, &mut self.counters) {
+            return true;
+        }
+        if self.hand.take(reply, &mut self.counters) {
+            return true;
+        }
+        let Reply::Property { node, property, value } = *reply else {
+            return false;
+        };
+        let BusPhase::Cyclic(poll) = &mut self.phase else {
+            return false;
+        };
+        let Some(reply) = poll.take(node, property, value) else {
+            return false;
+        };
+        match reply {
+            PollReply::SafetyMode(value) => self.hear_safety(value, io),
+            PollReply::PuckMode(value) => {
+                let braking = MotorMode::from_value(value) == Some(MotorMode::Idle);
+                let active = self.safety_mode == Some(SafetyMode::Active);
+                self.braking = if braking && active { self.braking.saturating_add(1) } else { 0 };
+            }
+            PollReply::Pendant(value) => self.pendant = Some(value),
+            PollReply::Temperature(joint, value) => {
+                if let Some(place) = self.temperatures.get_mut(joint) {
+                    *place = Some(value as i16);
+                }
+            }
+            PollReply::HandMode(node, value) => self.hand.hear_mode(node, value),
+            PollReply::HandTemperature(digit, value) => {
+                if let Some(place) = self.hand_temperatures.get_mut(digit) {
+                    *place = Some(value as i16);
+                }
+            }
+            PollReply::Status(_, value) => {
+                if Status::from_value(value) != Some(Status::Ready) {
+                    self.fail();
+                }
+            }
+        }
+        true
+    }
+
+    /// The safety module has told its mode. A value that nobody knows counts as IDLE: no torque.
+    fn hear_safety(&mut self, value: i32, io: &mut impl ControllerIo<Self>) {
+        let mode = SafetyMode::from_value(value).unwrap_or(SafetyMode::Idle);
+        self.fresh_safety = Some(mode);
+        if self.safety_mode != Some(mode) {
+            self.safety_mode = Some(mode);
+            self.braking = 0;
+            self.tell(EventKind::Safety(mode), io);
+        }
+    }
+
+    /// The bus or a puck has failed: take the torque off and begin anew.
+    fn fail(&mut self) {
+        self.fault = Some(Fault::BusFault);
+        self.last_cycles.get_or_insert(LAST_CYCLES);
+    }
+
+    /// A slot of the start-up. Not inlined, nor is [`DeviceController::control`]: a board keeps the two in different
+    /// memories, and the frame of the start-up stays out of the cycle's.
+    #[inline(never)]
+    fn start_up(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
+        // Answers keep the order of the commands: the next one waits while an answer is outstanding.
+        if !self.startup.is_zero_pending() {
+            match io.command() {
+                Some(Command::Zero { home }) => self.startup.zero(&home),
+                // Nothing moves and no torque flows: what a stop asks for is so already.
+                Some(Command::Control(control::Command::Stop)) => self.tell(EventKind::Accepted, io),
+                Some(Command::Control(_) | Command::InitialiseHand) => {
+                    self.tell(EventKind::Refused(Refusal::NotReady(self.stage())), io);
+                }
+                None => {}
+            }
+        }
+        let mut outlet = SlotOutlet { io, counters: &mut self.counters, pacer: &mut self.pacer, now_us, cyclic: false };
+        if self.startup.advance(&mut outlet) {
+            self.begin_cycles();
+        }
+    }
+
+    /// The start-up is over: the next request slot begins the cyclic loop.
+    fn begin_cycles(&mut self) {
+        let (Some(calibration), Some(safety)) = (self.startup.calibration(), self.startup.safety_properties()) else {
+            return;
+        };
+        self.cycle.reset();
+        // After a reset no state has torque, and only torque makes the cycle refuse.
+        if self.cycle.calibrate(*calibration).is_err() {
+            return;
+        }
+        self.phase = BusPhase::Cyclic(BackgroundPoll::new(safety));
+        self.round = Round::new(self.startup.has_sensor());
+        match self.startup.take_hand() {
+            Some(found) => self.hand.begin(found),
+            None => self.hand.resume(),
+        }
+        self.fault = None;
+        self.last_cycles = None;
+        self.fresh_safety = None;
+        self.braking = 0;
+        self.refused = 0;
+        self.overruns = 0;
+        self.wants_idle = false;
+        self.idle_request_in = 0;
+    }
+
+    /// Leaves the cyclic loop.
+    fn restart(&mut self) {
+        Counters::count(&mut self.counters.restarts);
+        self.phase = BusPhase::StartUp;
+        self.cycle.reset();
+        self.startup.restart();
+        self.hand.suspend();
+        self.hand_temperatures = [None; 4];
+    }
+
+    fn request(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
+        let (positions, wrench) = self.round.open();
+        let mut outlet = self.outlet(now_us, io);
+        outlet.send(positions);
+        if let Some(wrench) = wrench {
+            outlet.send(wrench);
+        }
+    }
+
+    /// The slot that computes and sends torques.
+    #[inline(never)]
+    fn control(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
+        if !self.round.is_open() {
+            // The start-up ended in the middle of a cycle.
+            return;
+        }
+        let gathered = self.round.close(&mut self.counters);
+        let hand = self.hand.sample(&mut self.counters);
+        self.number += 1;
+        Counters::count(&mut self.counters.cycles);
+        if matches!(self.phase, BusPhase::Cyclic(poll) if poll.safety_silence() >= SAFETY_SILENCE)
+            || self.round.longest_silence() >= SILENT_CYCLES
+        {
+            self.fail();
+        }
+        if self.overruns >= OVERRUN_LIMIT {
+            self.overruns = 0;
+            self.fault.get_or_insert(Fault::Overrun);
+        }
+        self.overruns = self.overruns.saturating_sub(1);
+        let input = CycleInput {
+            cycle: self.number,
+            sample: control::BusSample {
+                positions: gathered.positions,
+                wrench: gathered.wrench,
+                safety: self.safety_of_cycle(),
+                hand,
+            },
+            command: self.next_command(now_us, io),
+            external_fault: self.fault.take(),
+        };
+        let output = self.cycle.step(&input);
+        self.send_torques(output.actuation.frames(), now_us, io);
+        for frame in self.hand.frames(output.actuation.hand_frame()).into_iter().flatten() {
+            self.outlet(now_us, io).send(frame);
+        }
+        self.wants_idle = output.actuation.requests_idle();
+        if self.cycle.is_zero_lost() {
+            self.startup.lose_zero();
+        }
+        io.record(output.record);
+        if let Some(event) = output.event {
+            self.tell(event.into(), io);
+        }
+        self.leave_if_lost();
+    }
+
+    /// What the cycle hears of the safety module: its own word, unless a braking puck contradicts.
+    fn safety_of_cycle(&mut self) -> Option<SafetyMode> {
+        let told = self.fresh_safety.take();
+        if self.braking >= BRAKING_ANSWERS { Some(SafetyMode::Idle) } else { told }
+    }
+
+    /// The command for the control cycle; those for the start-up are answered here.
+    fn next_command(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) -> Option<control::Command> {
+        match io.command()? {
+            Command::Control(command) => {
+                if command == control::Command::Stop {
+                    self.hand.stop();
+                }
+                Some(command)
+            }
+            Command::InitialiseHand => {
+                let running = matches!(self.cycle.state(), State::Run | State::Coast);
+                let outcome = if running { Err(Refusal::HandBusy) } else { self.hand.initialise(now_us) };
+                self.tell(outcome.map_or_else(EventKind::Refused, |()| EventKind::Accepted), io);
+                None
+            }
+            Command::Zero { home } => {
+                if self.cycle.state() == State::Idle && self.safety_mode == Some(SafetyMode::Idle) {
+                    self.startup.zero(&home);
+                } else {
+                    self.tell(EventKind::Refused(Refusal::ZeroNeedsIdle), io);
+                }
+                None
+            }
+        }
+    }
+
+    /// Both frames of the cycle, or zeros: pucks keep their last torque until they are told another.
+    fn send_torques(&mut self, frames: Option<[CanFrame; 2]>, now_us: u64, io: &mut impl ControllerIo<Self>) {
+        let [arm, wrist] = frames.unwrap_or_else(zero_torques);
+        let mut outlet = self.outlet(now_us, io);
+        let sent = (outlet.send(arm), outlet.send(wrist));
+        if sent == (true, true) {
+            self.refused = 0;
+            return;
+        }
+        if sent != (false, false) {
+            Counters::count(&mut self.counters.torque_mismatches);
+        }
+        self.refused = self.refused.saturating_add(1);
+        if self.refused == REFUSED_CYCLES {
+            // The bus may recover by itself; motion does not.
+            self.fault = Some(Fault::BusFault);
+        }
+    }
+
+    /// After a cycle: goes back to the start-up when the pucks have lost power, failed, or shall be zeroed again.
+    fn leave_if_lost(&mut self) {
+        if !self.startup.is_done() {
+            // A command has sent the start-up back to zeroing.
+            self.phase = BusPhase::StartUp;
+            self.cycle.reset();
+            return;
+        }
+        if self.safety_mode == Some(SafetyMode::EStop) {
+            self.restart();
+            return;
+        }
+        match &mut self.last_cycles {
+            Some(0) => self.restart(),
+            Some(left) => *left -= 1,
+            None => {}
+        }
+    }
+
+    /// The slot that asks one slow question.
+    #[inline(never)]
+    fn ask_slowly(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
+        self.idle_request_in = self.idle_request_in.saturating_sub(1);
+        let writable = self.startup.safety_properties().is_some_and(|safety| safety.mode_is_writable);
+        let lower =
+            self.wants_idle && writable && self.idle_request_in == 0 && self.safety_mode == Some(SafetyMode::Active);
+        if lower {
+            let frame = set(Node::SAFETY_MODULE, PropertyId::MODE, SafetyMode::Idle.value());
+            if self.outlet(now_us, io).send(frame) {
+                self.idle_request_in = IDLE_REQUEST_SLOTS;
+            }
+            return;
+        }
+        let BusPhase::Cyclic(poll) = &mut self.phase else {
+            return;
+        };
+        let mut outlet = SlotOutlet { io, counters: &mut self.counters, pacer: &mut self.pacer, now_us, cyclic: true };
+        // Not under torque: unzeroed, the safety module watches other speeds.
+        if !self.cycle.state().has_torque() && self.startup.revoke_zero(&mut outlet) {
+            return;
+        }
+        let question = match (poll.begin(), self.round.suspect()) {
+            (Some(safety), _) => Some(safety),
+            (None, Some(node)) => Some(poll.suspect(node)),
+            (None, None) if self.hand.act(&mut outlet) => None,
+            (None, None) => poll.other(self.hand.answers_questions()),
+        };
+        if let Some(frame) = question {
+            outlet.send(frame);
+        }
+    }
+
+    fn outlet<'a, I: ControllerIo<Self>>(&'a mut self, now_us: u64, io: &'a mut I) -> SlotOutlet<'a, I> {
+        SlotOutlet { io, counters: &mut self.counters, pacer: &mut self.pacer, now_us, cyclic: true }
+    }
+
+    /// Tells a change of the stage, and a new reason for which the start-up cannot go on.
+    fn tell_stage(&mut self, io: &mut impl ControllerIo<Self>) {
+        let stage = self.stage();
+        let error = self.startup.error();
+        if error.is_some() && error != self.blocked {
+            self.blocked = error;
+            self.tell(EventKind::Blocked(error.unwrap_or(StartupError::NoSafetyModule)), io);
+        } else if error.is_none() {
+            self.blocked = None;
+        }
+        if stage != self.stage {
+            self.stage = stage;
+            self.tell(EventKind::Startup(stage), io);
+        }
+    }
+
+    fn tell(&self, kind: EventKind, io: &mut impl ControllerIo<Self>) {
+        io.event(Event { cycle: self.number, kind });
+    }
+}
+
+impl Controller for DeviceController {
+    type Command = Command;
+    type Event = Event;
+    type Record = CycleRecord;
+    type Primitive<'a> = &'a FitPrimitive<'a>;
+
+    const STOP: Command = Command::Control(control::Command::Stop);
+
+    fn slot(&mut self, slot: Slot, now_us: u64, io: &mut impl ControllerIo<Self>) {
+        self.drain(io);
+        match (self.phase, slot) {
+            (BusPhase::StartUp, _) => self.start_up(now_us, io),
+            (BusPhase::Cyclic(_), Slot::Request) => self.request(now_us, io),
+            (BusPhase::Cyclic(_), Slot::Control) => self.control(now_us, io),
+            (BusPhase::Cyclic(_), Slot::Slow) => self.ask_slowly(now_us, io),
+        }
+        match self.startup.zero_answer() {
+            Some(Ok(())) => self.tell(EventKind::Accepted, io),
+            Some(Err(reason)) => self.tell(EventKind::Refused(reason), io),
+            None => {}
+        }
+        self.tell_stage(io);
+        if let Some((stage, cause)) = self.hand.news() {
+            self.tell(EventKind::Hand { stage, cause }, io);
+        }
+    }
+
+    fn load(&mut self, fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
+        self.cycle.load(fit)
+    }
+
+    fn note_overrun(&mut self) {
+        Counters::count(&mut self.counters.overruns);
+        self.overruns = self.overruns.saturating_add(OVERRUN_WEIGHT);
+    }
+
+    fn note_bus_error(&mut self, bus_off: bool) {
+        Counters::count(&mut self.counters.bus_errors);
+        if bus_off && matches!(self.phase, BusPhase::Cyclic(_)) {
+            self.fail();
+        }
+    }
+
+    fn health(&self) -> Health {
+        Health {
+            cycle: self.number,
+            stage: self.stage(),
+            blocked: self.startup.error(),
+            state: self.cycle.state(),
+            fault: self.cycle.fault(),
+            zeroed: self.startup.is_zeroed(),
+            zeroed_at: self.startup.zeroed_at(),
+            payload: self.cycle.payload(),
+            wrench_zeroed: self.startup.has_sensor().then(|| self.cycle.is_wrench_zeroed()),
+            safety_mode: self.safety_mode,
+            pendant: self.pendant,
+            temperatures: self.temperatures,
+            hand: self.hand.stage(),
+            hand_moves: self.hand.stage() == HandStage::Initialising || self.cycle.moves_hand(),
+            hand_temperatures: self.hand_temperatures,
+            counters: self.counters,
+        }
+    }
+
+    fn message(event: Event, health: &Health) -> Option<Message> {
+        match event.kind {
+            EventKind::Accepted => Some(Message::Answer(Ok(()))),
+            EventKind::Refused(reason) => Some(Message::Answer(Err(wire::refusal(reason, health)))),
+            _ => wire::event(event).map(Message::News),
+        }
+    }
+}
+
+impl CycleReport for CycleRecord {
+    fn number(&self) -> u32 {
+        self.cycle as u32
+    }
+
+    fn state(&self) -> State {
+        self.state
+    }
+
+    fn flags(&self) -> u32 {
+        self.flags
+    }
+
+    fn telemetry(&self) -> link::Telemetry {
+        wire::telemetry(self)
+    }
+}

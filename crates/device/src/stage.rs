@@ -1,0 +1,192 @@
+//! How far the start-up has come, and why it may stop.
+
+use core::fmt;
+
+use control::CalibrationError;
+use puck::Node;
+
+/// Stage of the bus start-up. The codes travel over the link and are never renumbered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Stage {
+    /// Looks for devices on the bus.
+    Enumerating = 0,
+    /// Loads the stored limits of the safety module.
+    LoadingLimits = 1,
+    /// Waits until a person has released the emergency stop and pressed Shift-Idle.
+    WaitingForIdle = 2,
+    /// Wakes the pucks and waits in silence.
+    Waking = 3,
+    /// Checks that all devices are awake and of a known firmware.
+    Verifying = 4,
+    /// Reads scales and group memberships of the pucks.
+    Reading = 5,
+    /// Waits for a person to say where the arm stands.
+    WaitingForZero = 6,
+    /// Writes the encoder positions.
+    Zeroing = 7,
+    /// Tares the force/torque sensor and begins to poll.
+    Preparing = 8,
+    /// The control cycle runs with zero torque; waits until a person presses Shift-Activate.
+    WaitingForActive = 9,
+    /// The arm can be commanded.
+    Ready = 10,
+    /// The start-up failed; tries again after a second.
+    Blocked = 11,
+}
+
+impl Stage {
+    /// Every stage, in the order of the codes.
+    pub const ALL: [Stage; 12] = [
+        Stage::Enumerating,
+        Stage::LoadingLimits,
+        Stage::WaitingForIdle,
+        Stage::Waking,
+        Stage::Verifying,
+        Stage::Reading,
+        Stage::WaitingForZero,
+        Stage::Zeroing,
+        Stage::Preparing,
+        Stage::WaitingForActive,
+        Stage::Ready,
+        Stage::Blocked,
+    ];
+
+    /// The stable number of this stage.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// The stage with this number, if there is one.
+    pub fn from_code(code: u8) -> Option<Stage> {
+        Stage::ALL.into_iter().find(|stage| stage.code() == code)
+    }
+
+    /// What happens, or what a person must do, in one phrase.
+    pub const fn explanation(self) -> &'static str {
+        match self {
+            Stage::Enumerating => "looking for devices on the bus",
+            Stage::LoadingLimits => "loading the limits of the safety module",
+            Stage::WaitingForIdle => "release the emergency stop and press Shift-Idle",
+            Stage::Waking => "waking the pucks",
+            Stage::Verifying => "checking the firmware of the pucks",
+            Stage::Reading => "reading the scales of the pucks",
+            Stage::WaitingForZero => "bring the arm to its home pose and zero it",
+            Stage::Zeroing => "writing the encoder positions",
+            Stage::Preparing => "taring the force sensor",
+            Stage::WaitingForActive => "press Shift-Activate",
+            Stage::Ready => "ready",
+            Stage::Blocked => "the start-up failed and is tried again",
+        }
+    }
+}
+
+impl fmt::Display for Stage {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.explanation())
+    }
+}
+
+/// Why the start-up cannot go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StartupError {
+    /// No safety module answers at node 10.
+    NoSafetyModule,
+    /// This puck of the arm does not answer.
+    MissingPuck(Node),
+    /// This node did not answer a request.
+    NoAnswer(Node),
+    /// This node was woken and still does not report READY.
+    DidNotWake(Node),
+    /// This node has another role than its number demands.
+    WrongRole {
+        /// Which node.
+        node: Node,
+        /// Its ROLE.
+        role: u16,
+    },
+    /// There is no property table for the firmware of this node, or an arm must not be run with it.
+    UnknownFirmware {
+        /// Which node.
+        node: Node,
+        /// Its VERS.
+        version: i32,
+    },
+    /// This puck does not belong to the groups that reach it with requests and torques.
+    WrongGroups(Node),
+    /// This puck takes its torque from another place of the frame than its number demands.
+    WrongPlace {
+        /// Which node.
+        node: Node,
+        /// Its PIDX.
+        place: i32,
+    },
+    /// This puck accepts no torque (MT), or more than a frame can carry.
+    WrongTorqueLimit {
+        /// Which node.
+        node: Node,
+        /// Its MT.
+        limit: i32,
+    },
+    /// Puck 7 does not drive a seven-joint wrist.
+    NotAWrist {
+        /// Its POLES.
+        poles: i32,
+    },
+    /// The scales of a puck are impossible.
+    Calibration(CalibrationError),
+    /// After zeroing, this puck reports another position than was written.
+    ZeroNotTaken(Node),
+    /// The safety module did not take the word that the arm is zeroed.
+    SafetyNotZeroed,
+    /// This puck of an arm that was zeroed had to be woken: it has restarted, and its counts began anew.
+    CountsAnew(Node),
+    /// The counts of a motor jumped since the arm was zeroed.
+    CountsJumped,
+}
+
+impl fmt::Display for StartupError {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            StartupError::NoSafetyModule => formatter.write_str("no safety module answers at node 10"),
+            StartupError::MissingPuck(node) => write!(formatter, "puck {} of the arm does not answer", node.number()),
+            StartupError::NoAnswer(node) => {
+                write!(formatter, "node {} did not answer a request", node.number())
+            }
+            StartupError::DidNotWake(node) => {
+                write!(formatter, "node {} did not wake up", node.number())
+            }
+            StartupError::WrongRole { node, role } => {
+                write!(formatter, "node {} has ROLE {role:#06X}, which does not fit its number", node.number())
+            }
+            StartupError::UnknownFirmware { node, version } => {
+                write!(formatter, "node {} runs firmware {version}, which is not supported", node.number())
+            }
+            StartupError::WrongGroups(node) => {
+                write!(formatter, "puck {} belongs to the wrong groups (GRPA, GRPB, GRPC)", node.number())
+            }
+            StartupError::WrongPlace { node, place } => {
+                write!(formatter, "puck {} has PIDX {place}, which does not fit its number", node.number())
+            }
+            StartupError::WrongTorqueLimit { node, limit } => {
+                write!(formatter, "puck {} has a torque limit MT of {limit}", node.number())
+            }
+            StartupError::NotAWrist { poles } => {
+                write!(formatter, "puck 7 drives a motor with {poles} poles, not that of a seven-joint wrist")
+            }
+            StartupError::Calibration(error) => error.fmt(formatter),
+            StartupError::ZeroNotTaken(node) => {
+                write!(formatter, "puck {} did not take the position written to it", node.number())
+            }
+            StartupError::SafetyNotZeroed => {
+                formatter.write_str("the safety module did not take the word that the arm is zeroed")
+            }
+            StartupError::CountsAnew(node) => {
+                write!(formatter, "puck {} has restarted and counts anew: zero the arm", node.number())
+            }
+            StartupError::CountsJumped => formatter.write_str("the counts of a motor jumped: zero the arm"),
+        }
+    }
+}
+
+impl core::error::Error for StartupError {}

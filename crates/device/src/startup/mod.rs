@@ -1,0 +1,404 @@
+//! The start of the bus: from power-up to a cyclic loop, as a state machine that sends at most one frame per slot.
+//!
+//! Nothing here sends a torque other than zero, wakes or zeroes a puck while the safety module is ACTIVE, or goes on
+//! after a device has said something unexpected. After a failure it rests for a second and begins anew.
+//!
+//! Zero torque and IDLE to everything come first. Then the order is that of Barrett's library and drivers: enumerate,
+//! reload the limits of the safety module, wait for IDLE, enumerate again (the pucks have power only now), wake,
+//! verify, read, zero, tare, one position read, then the cyclic loop. Each step sends through an outlet that may refuse
+//! (a pause is not over); it then simply tries again in the next slot.
+
+mod hand;
+mod home;
+mod survey;
+mod waking;
+mod zeroing;
+
+use control::Calibration;
+use puck::{Counts, Node, PropertyId, Reply, force_torque, set};
+
+use crate::bus::{Answer, Exchange, Outlet};
+use crate::command::Refusal;
+use crate::stage::{Stage, StartupError};
+use hand::HandSurvey;
+pub(crate) use survey::SafetyProperties;
+use survey::Survey;
+
+/// Between two looks at the mode of the safety module while a person is awaited, us.
+const POLL_US: u64 = 250_000;
+/// How long a failed start-up rests before it is tried again, us.
+const RETRY_US: u64 = 1_000_000;
+/// Velocity faults the safety module shall ignore when positions are rewritten.
+const IGNORED_AT_ZERO: i32 = 8;
+/// Velocity faults it shall ignore when polling begins: the length of its history.
+const IGNORED_AT_START: i32 = 5;
+/// Transitions within one slot; more would mean a loop.
+const TRANSITIONS: usize = 8;
+/// First and last node that an enumeration asks.
+const ENUMERATED: core::ops::RangeInclusive<u8> = 1..=31;
+
+/// Where the start-up stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Step {
+    /// Take off what torque may still be applied: frames 0 and 1 zero torques, then MODE IDLE to the arm and to the
+    /// hand.
+    ZeroTorques { frame: u8 },
+    /// Ask this node for its STAT.
+    Enumerate { node: u8, powered: bool },
+    /// Hear the last answers.
+    Listen { until_us: u64, powered: bool },
+    /// ROLE (0) and VERS (1) of the safety module.
+    IdentifySafety { item: u8 },
+    /// DEF (0), LOAD (1) and GET STAT (2) of a limit.
+    LoadLimit { limit: u8, part: u8 },
+    /// Ask for the safety module's mode from this time on.
+    AwaitIdle { next_us: u64 },
+    /// ROLE of each device of the arm.
+    Identify { device: u8 },
+    /// SET STAT to each sleeping device.
+    Wake { device: u8, woken: bool },
+    /// Send nothing.
+    Silence { until_us: u64 },
+    /// STAT (0) and VERS (1) of each device.
+    Verify { device: u8, item: u8 },
+    /// SET MODE IDLE to the arm, and to what there is of a hand.
+    Brake { hand: bool },
+    /// A property of a puck.
+    Read { joint: u8, item: u8 },
+    /// A property of a hand puck.
+    ReadHand { digit: u8, item: u8 },
+    /// Ask whether the arm is zeroed.
+    AskZero,
+    /// Wait for a person; look at the safety module from this time on.
+    AwaitZero { next_us: u64 },
+    /// Ask whether the arm is IDLE before its positions are rewritten.
+    ConfirmIdle,
+    /// IFAULT before positions are rewritten.
+    IgnoreFaults,
+    /// SET P of a puck.
+    WritePosition { joint: u8 },
+    /// Read the positions back; `until_us` once the request has left.
+    CheckPositions { until_us: Option<u64> },
+    /// SET ZERO.
+    TellZero,
+    /// GET ZERO.
+    ConfirmZero,
+    /// SET ZERO = 0: what the safety module believes is no longer so.
+    RevokeZero,
+    /// Tare the force/torque sensor.
+    Tare,
+    /// IFAULT before polling begins.
+    IgnoreFirstFaults,
+    /// One position read before the loop.
+    FirstPositions { until_us: Option<u64> },
+    /// Done: the cyclic loop has the bus.
+    Done,
+    /// Failed; rest, then begin anew.
+    Blocked { until_us: u64 },
+}
+
+/// What a step decides.
+enum Next {
+    /// Wait for an answer, a pause or a person.
+    Stay,
+    /// Go on with this step.
+    Go(Step),
+}
+
+/// The start-up.
+#[derive(Clone, Debug)]
+pub(crate) struct Startup {
+    step: Step,
+    exchange: Exchange,
+    survey: Survey,
+    hand: HandSurvey,
+    enumerations: u8,
+    safety: Option<SafetyProperties>,
+    calibration: Option<Calibration<f32>>,
+    targets: [Counts; 7],
+    positions: [Option<Counts>; 7],
+    zeroed: bool,
+    /// Why the counts do not refer to the zero of the arm, whatever the safety module says, until a person zeroes.
+    doubt: Option<StartupError>,
+    /// True while the safety module has not been told so.
+    owes_revocation: bool,
+    /// The posture that `targets` are the counts of (rad).
+    home: [f32; 7],
+    /// The same once the arm has been zeroed there.
+    zeroed_at: Option<[f32; 7]>,
+    zero_request: ZeroRequest,
+    error: Option<StartupError>,
+}
+
+/// What has become of a person's command to zero the arm.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+enum ZeroRequest {
+    /// There is none, or its answer has been fetched.
+    #[default]
+    None,
+    /// The safety module is being asked whether the arm is IDLE: what it said last may be 250 ms old.
+    Pending,
+    /// Taken up or refused.
+    Answered(Result<(), Refusal>),
+}
+
+impl Startup {
+    /// Begins at the beginning. The first frames take off what torque may still be applied: pucks keep the last torque
+    /// they were sent, and a board that was reset does not know whether its arm is ACTIVE.
+    pub(crate) fn new() -> Startup {
+        Startup {
+            step: Step::ZeroTorques { frame: 0 },
+            exchange: Exchange::default(),
+            survey: Survey::new(),
+            hand: HandSurvey::default(),
+            enumerations: 0,
+            safety: None,
+            calibration: None,
+            targets: [Counts(0); 7],
+            positions: [None; 7],
+            zeroed: false,
+            doubt: None,
+            owes_revocation: false,
+            home: [0.0; 7],
+            zeroed_at: None,
+            zero_request: ZeroRequest::None,
+            error: None,
+        }
+    }
+
+    /// Begins anew after the cyclic loop. A doubt about the zero stays.
+    pub(crate) fn restart(&mut self) {
+        *self = Startup { doubt: self.doubt, ..Startup::new() };
+    }
+
+    /// The counts of a motor have jumped in the cyclic loop.
+    pub(crate) fn lose_zero(&mut self) {
+        self.owes_revocation |= self.doubt.is_none();
+        self.doubt.get_or_insert(StartupError::CountsJumped);
+        self.zeroed = false;
+        self.zeroed_at = None;
+    }
+
+    /// Tells the safety module that the zero is lost, once; true if there was something to tell.
+    pub(crate) fn revoke_zero(&mut self, outlet: &mut impl Outlet) -> bool {
+        let Some(safety) = self.safety.filter(|_| self.owes_revocation) else { return false };
+        self.owes_revocation = !outlet.send(set(Node::SAFETY_MODULE, safety.zero, 0));
+        true
+    }
+
+    /// How far it has come.
+    pub(crate) fn stage(&self) -> Stage {
+        match self.step {
+            Step::ZeroTorques { .. } | Step::Enumerate { .. } | Step::Listen { .. } => Stage::Enumerating,
+            Step::IdentifySafety { .. } | Step::LoadLimit { .. } => Stage::LoadingLimits,
+            Step::AwaitIdle { .. } => Stage::WaitingForIdle,
+            Step::Identify { .. } | Step::Wake { .. } | Step::Silence { .. } => Stage::Waking,
+            Step::Verify { .. } => Stage::Verifying,
+            Step::Brake { .. } | Step::Read { .. } | Step::ReadHand { .. } | Step::AskZero => Stage::Reading,
+            Step::AwaitZero { .. } | Step::ConfirmIdle | Step::RevokeZero => Stage::WaitingForZero,
+            Step::IgnoreFaults
+            | Step::WritePosition { .. }
+            | Step::CheckPositions { .. }
+            | Step::TellZero
+            | Step::ConfirmZero => Stage::Zeroing,
+            Step::Tare | Step::IgnoreFirstFaults | Step::FirstPositions { .. } => Stage::Preparing,
+            Step::Done if !self.zeroed => Stage::WaitingForZero,
+            Step::Done => Stage::WaitingForActive,
+            Step::Blocked { .. } => Stage::Blocked,
+        }
+    }
+
+    /// True if the cyclic loop has the bus.
+    pub(crate) fn is_done(&self) -> bool {
+        self.step == Step::Done
+    }
+
+    /// Why it does not go on, if it does not. Survives the retries until it is done or waits for a person.
+    pub(crate) fn error(&self) -> Option<StartupError> {
+        self.error
+    }
+
+    /// True if the safety module says that positions count from a known pose.
+    pub(crate) fn is_zeroed(&self) -> bool {
+        self.zeroed
+    }
+
+    /// The posture (rad) at which it was zeroed; `None` if that was before this start-up.
+    pub(crate) fn zeroed_at(&self) -> Option<[f32; 7]> {
+        self.zeroed_at
+    }
+
+    /// The scales of this arm, once read.
+    pub(crate) fn calibration(&self) -> Option<&Calibration<f32>> {
+        self.calibration.as_ref()
+    }
+
+    /// The property numbers of the safety module, once known.
+    pub(crate) fn safety_properties(&self) -> Option<&SafetyProperties> {
+        self.safety.as_ref()
+    }
+
+    /// True if a force/torque sensor answered.
+    pub(crate) fn has_sensor(&self) -> bool {
+        self.survey.is_present(Node::FORCE_TORQUE)
+    }
+
+    /// A reply has come in; whether it was expected.
+    pub(crate) fn receive(&mut self, reply: &Reply) -> bool {
+        match *reply {
+            Reply::Property { node, property, value } => {
+                let enumerating = matches!(self.step, Step::Enumerate { .. } | Step::Listen { .. });
+                if enumerating && property == PropertyId::STAT {
+                    self.survey.note_status(node, value);
+                    return true;
+                }
+                self.exchange.receive(node, property, value)
+            }
+            Reply::Position { node, primary, .. } => {
+                let asked = matches!(
+                    self.step,
+                    Step::CheckPositions { until_us: Some(_) } | Step::FirstPositions { until_us: Some(_) }
+                );
+                match node.arm_index().and_then(|joint| self.positions.get_mut(joint)) {
+                    Some(place) if asked => {
+                        *place = Some(primary);
+                        true
+                    }
+                    _ => false,
+                }
+            }
+            _ => false,
+        }
+    }
+
+    /// One slot. Returns whether the start-up has ended and the cyclic loop may take over.
+    pub(crate) fn advance(&mut self, outlet: &mut impl Outlet) -> bool {
+        for _ in 0..TRANSITIONS {
+            match self.perform(outlet) {
+                Ok(Next::Stay) => break,
+                Ok(Next::Go(step)) => self.step = step,
+                Err(error) => {
+                    self.exchange.abandon();
+                    self.error = Some(error);
+                    if self.is_zero_pending() {
+                        self.zero_request = ZeroRequest::Answered(Err(Refusal::NotReady(Stage::Blocked)));
+                    }
+                    self.step = Step::Blocked { until_us: outlet.now_us() + RETRY_US };
+                    break;
+                }
+            }
+            if self.is_done() {
+                self.error = None;
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Does what the present step asks.
+    fn perform(&mut self, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
+        match self.step {
+            Step::ZeroTorques { frame } => Ok(self.take_torque_off(frame, outlet)),
+            Step::Enumerate { node, powered } => Ok(self.enumerate(node, powered, outlet)),
+            Step::Listen { until_us, .. } if outlet.now_us() < until_us => Ok(Next::Stay),
+            Step::Listen { powered: false, .. } => {
+                if !self.survey.is_present(Node::SAFETY_MODULE) {
+                    return Err(StartupError::NoSafetyModule);
+                }
+                Ok(Next::Go(Step::IdentifySafety { item: 0 }))
+            }
+            Step::Listen { powered: true, .. } => self.count_pucks(),
+            Step::IdentifySafety { item } => self.identify_safety(item, outlet),
+            Step::LoadLimit { limit, part } => self.load_limit(limit, part, outlet),
+            Step::AwaitIdle { next_us } => self.await_idle(next_us, outlet),
+            Step::Identify { device } => self.identify(device, outlet),
+            Step::Wake { device, woken } => Ok(self.wake(device, woken, outlet)),
+            Step::Silence { until_us } if outlet.now_us() < until_us => Ok(Next::Stay),
+            Step::Silence { .. } => Ok(Next::Go(Step::Verify { device: 0, item: 0 })),
+            Step::Verify { device, item } => self.verify(device, item, outlet),
+            Step::Brake { hand } => Ok(self.brake(hand, outlet)),
+            Step::Read { joint, item } => self.read(joint, item, outlet),
+            Step::ReadHand { digit, item } => Ok(self.read_digit(digit, item, outlet)),
+            Step::AskZero => Ok(match self.ask_safety(self.safety()?.zero, outlet)? {
+                None => Next::Stay,
+                Some(0) => {
+                    self.error = None;
+                    Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US })
+                }
+                Some(_) if self.doubt.is_some() => {
+                    self.error = self.doubt;
+                    Next::Go(Step::RevokeZero)
+                }
+                Some(_) => {
+                    self.zeroed = true;
+                    Next::Go(Step::Tare)
+                }
+            }),
+            Step::RevokeZero => {
+                let frame = set(Node::SAFETY_MODULE, self.safety()?.zero, 0);
+                let next_us = outlet.now_us() + POLL_US;
+                Ok(after(outlet.send(frame), Step::AwaitZero { next_us }))
+            }
+            Step::AwaitZero { next_us } => self.await_zero(next_us, outlet),
+            Step::ConfirmIdle => self.confirm_idle(outlet),
+            Step::IgnoreFaults => {
+                let frame = set(Node::SAFETY_MODULE, self.safety()?.ignore_faults, IGNORED_AT_ZERO);
+                Ok(after(outlet.send(frame), Step::WritePosition { joint: 0 }))
+            }
+            Step::WritePosition { joint } => Ok(self.write_position(joint, outlet)),
+            Step::CheckPositions { until_us } => self.check_positions(until_us, outlet),
+            Step::TellZero => {
+                let frame = set(Node::SAFETY_MODULE, self.safety()?.zero, 1);
+                Ok(after(outlet.send(frame), Step::ConfirmZero))
+            }
+            Step::ConfirmZero => Ok(match self.ask_safety(self.safety()?.zero, outlet)? {
+                None => Next::Stay,
+                Some(0) => return Err(StartupError::SafetyNotZeroed),
+                Some(_) => {
+                    self.zeroed = true;
+                    self.doubt = None;
+                    self.zeroed_at = Some(self.home);
+                    Next::Go(Step::Tare)
+                }
+            }),
+            Step::Tare if !self.has_sensor() => Ok(Next::Go(Step::IgnoreFirstFaults)),
+            Step::Tare => Ok(after(outlet.send(force_torque::tare()), Step::IgnoreFirstFaults)),
+            Step::IgnoreFirstFaults => {
+                let frame = set(Node::SAFETY_MODULE, self.safety()?.ignore_faults, IGNORED_AT_START);
+                Ok(after(outlet.send(frame), Step::FirstPositions { until_us: None }))
+            }
+            Step::FirstPositions { until_us } => {
+                self.read_positions(until_us, Step::Done, outlet, |until_us| Step::FirstPositions { until_us })
+            }
+            Step::Done => Ok(Next::Stay),
+            Step::Blocked { until_us } if outlet.now_us() < until_us => Ok(Next::Stay),
+            Step::Blocked { .. } => {
+                let (error, doubt, hand) = (self.error, self.doubt, self.hand.again());
+                *self = Startup { error, doubt, hand, ..Startup::new() };
+                Ok(Next::Stay)
+            }
+        }
+    }
+
+    fn safety(&self) -> Result<&SafetyProperties, StartupError> {
+        self.safety.as_ref().ok_or(StartupError::NoSafetyModule)
+    }
+
+    /// Asks a node; `None` while no answer has come.
+    fn ask(&mut self, node: Node, property: PropertyId, outlet: &mut impl Outlet) -> Result<Option<i32>, StartupError> {
+        match self.exchange.ask(node, property, outlet) {
+            Answer::Pending => Ok(None),
+            Answer::Value(value) => Ok(Some(value)),
+            Answer::Silent => Err(StartupError::NoAnswer(node)),
+        }
+    }
+
+    fn ask_safety(&mut self, property: PropertyId, outlet: &mut impl Outlet) -> Result<Option<i32>, StartupError> {
+        self.ask(Node::SAFETY_MODULE, property, outlet)
+    }
+}
+
+/// Go on once something has happened.
+fn after(happened: bool, step: Step) -> Next {
+    if happened { Next::Go(step) } else { Next::Stay }
+}
