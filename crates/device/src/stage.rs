@@ -139,6 +139,10 @@ pub enum StartupError {
     ZeroNotTaken(Node),
     /// The safety module did not take the word that the arm is zeroed.
     SafetyNotZeroed,
+    /// This puck of an arm that was zeroed had to be woken: it has restarted, and its counts began anew.
+    CountsAnew(Node),
+    /// The counts of a motor jumped since the arm was zeroed.
+    CountsJumped,
 }
 
 impl fmt::Display for StartupError {
@@ -177,6 +181,10 @@ impl fmt::Display for StartupError {
             StartupError::SafetyNotZeroed => {
                 formatter.write_str("the safety module did not take the word that the arm is zeroed")
             }
+            StartupError::CountsAnew(node) => {
+                write!(formatter, "puck {} has restarted and counts anew: zero the arm", node.number())
+            }
+            StartupError::CountsJumped => formatter.write_str("the counts of a motor jumped: zero the arm"),
         }
     }
 }

@@ -46,6 +46,7 @@ pub(crate) fn refusal(reason: Refusal, health: &Health) -> (LinkRefusal, [u32; 2
         Refusal::Control(Control::NoExpectation) => (LinkRefusal::NoExpectation, [0, 0]),
         Refusal::Control(Control::HandTooFar) => (LinkRefusal::HandFarFromStart, [0, 0]),
         Refusal::Control(Control::ForceAtRest) => (LinkRefusal::ForceAtRest, [0, 0]),
+        Refusal::Control(Control::ZeroLost) => (LinkRefusal::NotZeroed, [0, 0]),
         Refusal::Control(Control::NoHand) | Refusal::NoHand => hand(health.hand),
         Refusal::HandBusy => (LinkRefusal::HandBusy, [0, 0]),
     }
@@ -136,6 +137,8 @@ impl From<StartupError> for StartupTrouble {
             StartupError::Calibration(CalibrationError::HandTorqueCounts(digit)) => Self([16, digit.into()]),
             StartupError::ZeroNotTaken(node) => at(14, node, 0),
             StartupError::SafetyNotZeroed => Self([15, 0]),
+            StartupError::CountsAnew(node) => at(17, node, 0),
+            StartupError::CountsJumped => Self([18, 0]),
         }
     }
 }
@@ -163,6 +166,8 @@ impl StartupTrouble {
             14 => StartupError::ZeroNotTaken(node),
             15 => StartupError::SafetyNotZeroed,
             16 => StartupError::Calibration(CalibrationError::HandTorqueCounts(byte)),
+            17 => StartupError::CountsAnew(node),
+            18 => StartupError::CountsJumped,
             _ => return None,
         })
     }

@@ -187,6 +187,9 @@ error_codes! {
         "image and tool of different sources", "build tool and firmware from the same model file";
     OtherExperiment = 404: "the folder has results of another configuration",
         "an earlier experiment with other options", "choose another folder with `--out`";
+    CapabilityMissing = 405: "the device lacks a part that the command needs",
+        "a device for an arm is asked for a hand alone, or the other way round",
+        "`tactus status` tells what the device drives; name another one with `--device`";
     OtherImageRuns = 413: "the device runs another image than was written",
         "`--device` is another board than the probe's",
         "check that `--device` is the board the debug probe is connected to";

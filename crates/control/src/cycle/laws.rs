@@ -8,7 +8,7 @@ use crate::model::kinematics::Frames;
 use crate::plan::primitive::posture_and_hand;
 use crate::plan::reference::{HandReference, JointReference, TaskReference};
 use crate::plan::run::Senses;
-use crate::real::{Real, at_least, at_most};
+use crate::real::{Real, at_least, at_most, sqrt};
 use crate::sense::hand::HandState;
 use crate::time::{PERIOD, periods};
 use crate::units::{JointPositions, JointTorques, Pose, Vector6, Vector7, Wrench};
@@ -38,15 +38,19 @@ pub(super) struct Demand<R: Real> {
 impl<R: Real, const N: usize> Cycle<R, N> {
     /// The law of the present state; `None` where no torque is sent.
     pub(super) fn demand(&mut self, measured: &Measured<'_, R>) -> Option<Demand<R>> {
-        let repulsion = self.bounds.repulsion(&measured.state.q, &measured.state.dq);
+        let mut repulsion = self.bounds.repulsion(&measured.state.q, &measured.state.dq);
         let near = if repulsion.0.amax() > R::of(0.0) { flags::NEAR_LIMIT } else { 0 };
         let mut demand = match &self.law {
             Law::Off { .. } => return None,
             Law::Gravity => self.float(measured),
             Law::Posture(_) => self.hold_to(measured),
             Law::Run(_) => self.run_primitive(measured),
-            Law::SoftStop(_) => self.stop(measured),
+            Law::SoftStop(_) | Law::Lower(_) => self.stop(measured),
         };
+        if let Law::Lower(lowering) = &self.law {
+            // The arm comes down to its stops, not to what pushes back before them.
+            repulsion.0 *= lowering.share;
+        }
         demand.torque.0 += repulsion.0;
         demand.flags |= near;
         Some(demand)
@@ -78,12 +82,19 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.plain(measured, torque)
     }
 
-    /// Gravity compensation and damping; what else was there is ramped away. Not inlined, as [`Cycle::hold_to`].
+    /// Gravity compensation and damping; what else was there is ramped away, and gravity too where the arm is lowered.
+    /// Not inlined, as [`Cycle::hold_to`].
     #[inline(never)]
     fn stop(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
-        let Law::SoftStop(ramp) = &mut self.law else { return self.float(measured) };
-        let rest = ramp.step();
-        let gravity = self.model.gravity_torque(measured.frames).0;
+        let (rest, share) = match &mut self.law {
+            Law::SoftStop(ramp) => (ramp.step(), R::of(1.0)),
+            Law::Lower(lowering) => {
+                lowering.step(hand_speed(measured), measured.state.dq.0.amax());
+                (lowering.rest.step(), lowering.share)
+            }
+            _ => return self.float(measured),
+        };
+        let gravity = self.model.gravity_torque(measured.frames).0 * share;
         let damping = self.gains.stop_damping.component_mul(&measured.state.dq.0);
         self.plain(measured, gravity + rest - damping)
     }
@@ -169,7 +180,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             torque.0 += ForceController::torque(&measured.frames.jacobian(), &wanted).0;
             set |= flags::FORCE_CONTROL;
         }
-        if run.surprise() > R::of(1.0) {
+        let surprise = run.surprise();
+        if surprise > R::of(1.0) {
             set |= flags::SURPRISE;
         }
         if run.is_faded(primitive) {
@@ -180,14 +192,14 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         torque.0 += handover.step();
         let offset = task.pose.position - measured.pose.position;
-        *lag = Lag { distance: offset.dot(&offset).square_root(), speed: operational.lag() };
-        Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, surprise: run.surprise(), flags: set }
+        *lag = Lag { distance: sqrt(offset.dot(&offset)), speed: operational.lag() };
+        Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, surprise, flags: set }
     }
 }
 
 /// Speed of the hand (m/s).
 fn hand_speed<R: Real>(measured: &Measured<'_, R>) -> R {
-    measured.frames.jacobian().twist(&measured.state.dq.0).fixed_rows::<3>(0).norm_squared().square_root()
+    sqrt(measured.frames.jacobian().twist(&measured.state.dq.0).fixed_rows::<3>(0).norm_squared())
 }
 
 /// The command with its force and its torque cut to these magnitudes (N, N m), their directions kept.
@@ -195,7 +207,7 @@ fn bounded<R: Real>(command: &Vector6<R>, (force, torque): (R, R)) -> Vector6<R>
     let mut bounded = *command;
     for (first, limit) in [(0, force), (3, torque)] {
         let mut part = bounded.fixed_rows_mut::<3>(first);
-        let length = part.dot(&part).square_root();
+        let length = sqrt(part.dot(&part));
         if length > limit {
             part *= limit / length;
         }

@@ -14,7 +14,8 @@ use control::plan::load;
 use control::plan::primitive::Primitive;
 use control::units::{JointPositions, JointVelocities, Vector7};
 use control::{
-    BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, LoadRefusal, Payload, RATE, Real, State, model,
+    BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, Fault, LoadRefusal, Payload, RATE, Real, State,
+    model,
 };
 use nalgebra::{SMatrix, Vector3};
 use pinned_init::InPlaceWrite;
@@ -38,9 +39,9 @@ pub(crate) struct Plant {
     pub(crate) hand_weight: f64,
     /// Force that the sensor alone reports, along its x axis (N).
     pub(crate) glitch: f64,
-    /// What the sensor reports whatever it feels.
+    /// The one value that a stuck sensor reports.
     pub(crate) stuck: Option<RawWrench>,
-    /// Whether the sensor's replies are lost.
+    /// True while the sensor's replies are lost.
     pub(crate) deaf: bool,
     /// The hand, if it is on the bus.
     pub(crate) hand: Option<Hand>,
@@ -79,7 +80,7 @@ impl Plant {
         self.calibration.drives().counts(&motor).expect("finite").map(|counts| Some(counts.wrapped()))
     }
 
-    /// What the environment does to the tool right now (world axes).
+    /// Wrench of the environment on the tool right now (world axes).
     pub(crate) fn environment(&self) -> [f64; 6] {
         let mut wrench = self.push;
         if let Some((surface, stiffness)) = self.wall {
@@ -189,6 +190,8 @@ pub(crate) struct Rig<R: Real> {
     pub(crate) lose: [bool; 7],
     /// Counts by which the replies of each motor have jumped.
     pub(crate) jump: [i32; 7],
+    /// A fault that the device has found.
+    pub(crate) external: Option<Fault>,
     pub(crate) last: Option<CycleOutput>,
 }
 
@@ -201,6 +204,7 @@ impl<R: Real> Rig<R> {
             number: 0,
             lose: [false; 7],
             jump: [0; 7],
+            external: None,
             last: None,
         }
     }
@@ -221,7 +225,7 @@ impl<R: Real> Rig<R> {
             safety: Some(self.safety),
             hand: self.plant.hand.as_ref().map(Hand::sample),
         };
-        let input = CycleInput { cycle: self.number, sample, command, external_fault: None };
+        let input = CycleInput { cycle: self.number, sample, command, external_fault: self.external };
         let output = self.cycle.step(&input);
         self.plant.receive(output.actuation.frames());
         if let Some(hand) = &mut self.plant.hand {

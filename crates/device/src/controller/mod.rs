@@ -6,7 +6,7 @@
 //! | slot | at | what |
 //! |---|---|---|
 //! | [`Slot::Request`] | 0 | empty the reply slots, ask all pucks for their position and the sensor for its wrench |
-//! | [`Slot::Control`] | 1.11 ms | take what has come, advance the control cycle, send both torque frames, then drive and ask the hand |
+//! | [`Slot::Control`] | 1.11 ms | take what has come, compute, send both torque frames, then drive and ask the hand |
 //! | [`Slot::Slow`] | 2.22 ms | one question about modes, pendant or temperatures |
 //!
 //! No torque but zero leaves before the start-up is over, a person has activated the arm, and a person has commanded
@@ -337,6 +337,9 @@ impl DeviceController {
             self.outlet(now_us, io).send(frame);
         }
         self.wants_idle = output.actuation.requests_idle();
+        if self.cycle.is_zero_lost() {
+            self.startup.lose_zero();
+        }
         io.record(output.record);
         if let Some(event) = output.event {
             self.tell(event.into(), io);
@@ -432,6 +435,10 @@ impl DeviceController {
             return;
         };
         let mut outlet = SlotOutlet { io, counters: &mut self.counters, pacer: &mut self.pacer, now_us, cyclic: true };
+        // Not under torque: unzeroed, the safety module watches other speeds.
+        if !self.cycle.state().has_torque() && self.startup.revoke_zero(&mut outlet) {
+            return;
+        }
         let question = match (poll.begin(), self.round.suspect()) {
             (Some(safety), _) => Some(safety),
             (None, Some(node)) => Some(poll.suspect(node)),

@@ -15,7 +15,7 @@ mod waking;
 mod zeroing;
 
 use control::Calibration;
-use puck::{Counts, Group, Node, PropertyId, Reply, force_torque, set};
+use puck::{Counts, Node, PropertyId, Reply, force_torque, set};
 
 use crate::bus::{Answer, Exchange, Outlet};
 use crate::command::Refusal;
@@ -83,6 +83,8 @@ enum Step {
     TellZero,
     /// GET ZERO.
     ConfirmZero,
+    /// SET ZERO = 0: what the safety module believes is no longer so.
+    RevokeZero,
     /// Tare the force/torque sensor.
     Tare,
     /// IFAULT before polling begins.
@@ -116,6 +118,10 @@ pub(crate) struct Startup {
     targets: [Counts; 7],
     positions: [Option<Counts>; 7],
     zeroed: bool,
+    /// Why the counts do not refer to the zero of the arm, whatever the safety module says, until a person zeroes.
+    doubt: Option<StartupError>,
+    /// True while the safety module has not been told so.
+    owes_revocation: bool,
     /// The posture that `targets` are the counts of (rad).
     home: [f32; 7],
     /// The same once the arm has been zeroed there.
@@ -151,6 +157,8 @@ impl Startup {
             targets: [Counts(0); 7],
             positions: [None; 7],
             zeroed: false,
+            doubt: None,
+            owes_revocation: false,
             home: [0.0; 7],
             zeroed_at: None,
             zero_request: ZeroRequest::None,
@@ -158,9 +166,24 @@ impl Startup {
         }
     }
 
-    /// Begins anew after the cyclic loop.
+    /// Begins anew after the cyclic loop. A doubt about the zero stays.
     pub(crate) fn restart(&mut self) {
-        *self = Startup::new();
+        *self = Startup { doubt: self.doubt, ..Startup::new() };
+    }
+
+    /// The counts of a motor have jumped in the cyclic loop.
+    pub(crate) fn lose_zero(&mut self) {
+        self.owes_revocation |= self.doubt.is_none();
+        self.doubt.get_or_insert(StartupError::CountsJumped);
+        self.zeroed = false;
+        self.zeroed_at = None;
+    }
+
+    /// Tells the safety module that the zero is lost, once; true if there was something to tell.
+    pub(crate) fn revoke_zero(&mut self, outlet: &mut impl Outlet) -> bool {
+        let Some(safety) = self.safety.filter(|_| self.owes_revocation) else { return false };
+        self.owes_revocation = !outlet.send(set(Node::SAFETY_MODULE, safety.zero, 0));
+        true
     }
 
     /// How far it has come.
@@ -172,13 +195,14 @@ impl Startup {
             Step::Identify { .. } | Step::Wake { .. } | Step::Silence { .. } => Stage::Waking,
             Step::Verify { .. } => Stage::Verifying,
             Step::Brake { .. } | Step::Read { .. } | Step::ReadHand { .. } | Step::AskZero => Stage::Reading,
-            Step::AwaitZero { .. } | Step::ConfirmIdle => Stage::WaitingForZero,
+            Step::AwaitZero { .. } | Step::ConfirmIdle | Step::RevokeZero => Stage::WaitingForZero,
             Step::IgnoreFaults
             | Step::WritePosition { .. }
             | Step::CheckPositions { .. }
             | Step::TellZero
             | Step::ConfirmZero => Stage::Zeroing,
             Step::Tare | Step::IgnoreFirstFaults | Step::FirstPositions { .. } => Stage::Preparing,
+            Step::Done if !self.zeroed => Stage::WaitingForZero,
             Step::Done => Stage::WaitingForActive,
             Step::Blocked { .. } => Stage::Blocked,
         }
@@ -292,16 +316,7 @@ impl Startup {
             Step::Silence { until_us } if outlet.now_us() < until_us => Ok(Next::Stay),
             Step::Silence { .. } => Ok(Next::Go(Step::Verify { device: 0, item: 0 })),
             Step::Verify { device, item } => self.verify(device, item, outlet),
-            Step::Brake { hand } => {
-                // Only ever IDLE: the safety module alone sets TORQUE of the arm, when a person activates.
-                let group = if hand { Group::HAND } else { Group::ARM };
-                let next = if hand || !self.survey.has_digits() {
-                    Step::Read { joint: 0, item: 0 }
-                } else {
-                    Step::Brake { hand: true }
-                };
-                Ok(after(outlet.send(set(group, PropertyId::MODE, puck::MotorMode::Idle.value())), next))
-            }
+            Step::Brake { hand } => Ok(self.brake(hand, outlet)),
             Step::Read { joint, item } => self.read(joint, item, outlet),
             Step::ReadHand { digit, item } => Ok(self.read_digit(digit, item, outlet)),
             Step::AskZero => Ok(match self.ask_safety(self.safety()?.zero, outlet)? {
@@ -310,11 +325,20 @@ impl Startup {
                     self.error = None;
                     Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US })
                 }
+                Some(_) if self.doubt.is_some() => {
+                    self.error = self.doubt;
+                    Next::Go(Step::RevokeZero)
+                }
                 Some(_) => {
                     self.zeroed = true;
                     Next::Go(Step::Tare)
                 }
             }),
+            Step::RevokeZero => {
+                let frame = set(Node::SAFETY_MODULE, self.safety()?.zero, 0);
+                let next_us = outlet.now_us() + POLL_US;
+                Ok(after(outlet.send(frame), Step::AwaitZero { next_us }))
+            }
             Step::AwaitZero { next_us } => self.await_zero(next_us, outlet),
             Step::ConfirmIdle => self.confirm_idle(outlet),
             Step::IgnoreFaults => {
@@ -332,6 +356,7 @@ impl Startup {
                 Some(0) => return Err(StartupError::SafetyNotZeroed),
                 Some(_) => {
                     self.zeroed = true;
+                    self.doubt = None;
                     self.zeroed_at = Some(self.home);
                     Next::Go(Step::Tare)
                 }
@@ -348,8 +373,8 @@ impl Startup {
             Step::Done => Ok(Next::Stay),
             Step::Blocked { until_us } if outlet.now_us() < until_us => Ok(Next::Stay),
             Step::Blocked { .. } => {
-                let (error, hand) = (self.error, self.hand.again());
-                *self = Startup { error, hand, ..Startup::new() };
+                let (error, doubt, hand) = (self.error, self.doubt, self.hand.again());
+                *self = Startup { error, doubt, hand, ..Startup::new() };
                 Ok(Next::Stay)
             }
         }
