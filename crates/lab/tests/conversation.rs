@@ -15,7 +15,7 @@ use device::{
 use lab::client::{Client, Halted, Incoming, Interrupt, UploadOutcome, UploadPhase};
 use lab::error::HostError;
 use lab::transport::{StreamTransport, Transport, TransportError};
-use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
+use link::image::{FeedbackClamps, Hemisphere, ImageContent, OrientationError, Waypoint, WaypointVelocity};
 use link::{LINK_VERSION, Name, Refusal, Request, SCHEMA_HASH};
 use pinned_init::InPlaceWrite;
 
@@ -142,7 +142,7 @@ impl Device {
     }
 }
 
-/// Whether the present one of a series is one that gets lost.
+/// True if the present one of a series is one that gets lost.
 fn is_lost(every: u32, count: &mut u32) -> bool {
     *count += 1;
     every > 0 && count.is_multiple_of(every)
@@ -197,8 +197,8 @@ fn image(name: &str, duration: f32) -> Vec<u8> {
         activation: 0.7,
         stiffness: [200.0; 4],
         damping: [28.28, 20.0, 28.28, 28.28],
-        orientation_error: OrientationErrorKind::QuaternionDifference,
-        hemisphere: HemisphereKind::Demonstrated,
+        orientation_error: OrientationError::Quaternion,
+        hemisphere: Hemisphere::Demonstrated,
         start: there,
         start_velocity: WaypointVelocity::default(),
         goal: there,
@@ -209,7 +209,6 @@ fn image(name: &str, duration: f32) -> Vec<u8> {
         k2: &[],
         weights: &[0.0; 17 * 20],
         expected_mean: &[],
-        expected_spread: &[],
         experience_trials: 0,
         experience_mean: &[],
         experience_spread: &[],

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use control::{Fault, RATE, State};
 use experiment::plant::{self, Arm};
-use experiment::{Config, Experiment, Grid, Mode, Outcome, PlantKind, Scenario, Variation, lesson};
+use experiment::{Config, Experiment, Grid, Mode, Outcome, PlantKind, Scenario, Variation, preparation};
 use lab::client::{Client, Interrupt};
 use lab::demonstration::Recording;
 use lab::device::Device;
@@ -53,7 +53,7 @@ fn primitive() -> &'static PrimitiveFile {
     static PRIMITIVE: OnceLock<PrimitiveFile> = OnceLock::new();
     PRIMITIVE.get_or_init(|| {
         let file = Path::new("flashlight.toml");
-        expect(lesson::make(Scenario::Flashlight, PlantKind::Honest, file, 2, &Interrupt::never(), &mut |_| {}))
+        expect(preparation::make(Scenario::Flashlight, PlantKind::Perturbed, file, 2, &Interrupt::never(), &mut |_| {}))
     })
 }
 
@@ -146,7 +146,11 @@ fn ready_to_run(options: &SimulationOptions, primitive: &PrimitiveFile) -> Clien
 }
 
 fn request(primitive: &PrimitiveFile) -> RunRequest {
-    RunRequest::new(expect(Name::new(&primitive.name)), primitive.duration, procedure::Mode::Adaptive.options())
+    RunRequest::new(
+        expect(Name::new(&primitive.name)),
+        primitive.movement.duration,
+        procedure::Mode::Adaptive.options(),
+    )
 }
 
 #[test]

@@ -58,7 +58,7 @@ impl<W: Write> RecordingWriter<W> {
     /// Writes the notes and the header. Each line of `notes` becomes a line that starts with `#`.
     ///
     /// # Errors
-    /// What the output says.
+    /// The output's error.
     pub fn new(mut output: W, notes: &str) -> io::Result<RecordingWriter<W>> {
         for note in notes.lines() {
             writeln!(output, "# {note}")?;
@@ -70,7 +70,7 @@ impl<W: Write> RecordingWriter<W> {
     /// Writes one line.
     ///
     /// # Errors
-    /// What the output says.
+    /// The output's error.
     pub fn write(&mut self, row: &RecordingRow) -> io::Result<()> {
         let output = &mut self.output;
         write!(output, "{},{},{},{},{},{}", row.cycle, row.time, row.state, row.fault, row.flags, row.phase)?;
@@ -100,7 +100,7 @@ impl<W: Write> RecordingWriter<W> {
     /// Hands every byte to the operating system and gives the output back.
     ///
     /// # Errors
-    /// What the output says.
+    /// The output's error.
     pub fn finish(mut self) -> io::Result<W> {
         self.output.flush()?;
         Ok(self.output)

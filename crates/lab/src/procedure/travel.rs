@@ -16,8 +16,8 @@ use crate::primitive_file::Waypoint;
 /// Longest move to a posture, s: what `control` allows.
 const LONGEST_TRAVEL: u64 = 125;
 
-/// How long an arm that has just got its torque holds still before it moves. Whoever held it until then lets go: a
-/// hand that still does would be worked against, and the torque for that would be too much a moment later.
+/// Time for which an arm that has just got its torque holds still before it moves. Whoever held it until then lets go:
+/// a hand that still does would be worked against, and the torque for that would be too much a moment later.
 const LET_GO: Duration = Duration::from_secs(1);
 
 /// Moves the joints to `q` (rad) and waits until the arm holds there. `progress` hears the time since the start, s.
@@ -74,7 +74,7 @@ pub fn go_to_start(
     Ok(())
 }
 
-/// Whether the device drives an arm, or a hand alone. It is asked for the beginning of a primitive it holds: the
+/// True if the device drives an arm, false for a hand alone. It is asked for the beginning of a primitive it holds: the
 /// device of a hand alone keeps no images and says why; nothing moves.
 ///
 /// # Errors
