@@ -12,8 +12,7 @@ pub mod board;
 pub mod defmt_log;
 pub mod hand;
 pub mod in_place;
-pub mod line;
 pub mod metadata;
 pub mod meters;
 #[cfg(target_os = "none")]
-pub mod panic_stop;
+mod panic_handler;

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 
 use firmware::board::LinkPort;
-use firmware::line::LineSelector;
+use firmware::board::line::LineSelector;
 use link::Request;
 use link::frame::{Decoder, Envelope, FRAME_BYTES, encode};
 

@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 
 use anyhow::{Result, bail};
 
-use crate::{files, shell};
+use crate::{files, mutants, shell};
 use facts::Facts;
 
 /// Files whose text is not ours or not prose: licences, lock files, and the made-up files of the tests of this check.
@@ -34,7 +34,8 @@ struct Dead {
 
 /// Checks all files; the error lists every dead word with its place.
 pub(crate) fn run() -> Result<()> {
-    shell::step("documents: links, paths, decisions, test names, fault identifiers");
+    shell::step("documents: links, paths, decisions, test names, fault identifiers, the list of mutants");
+    mutants::check()?;
     let is_prose = |path: &str| !NOT_READ.iter().any(|start| path.starts_with(start)) && !path.ends_with(".csv");
     let files = files::all(is_prose)?;
     let dead = check(&files);

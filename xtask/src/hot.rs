@@ -56,7 +56,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("device::controller::DeviceController::restart", "after a fault of the bus"),
     ("device::startup", "a person zeroes the arm again"),
     ("device::hand", "the hand is initialised or has failed"),
-    ("firmware::panic_stop", "the end"),
+    ("firmware::board::panic_stop", "the end"),
     ("firmware::board::stm32h743::parts::", "the end; a frame's way into the controller"),
     ("firmware::application::slot::SlotIo", "an event or a record for the session"),
     ("core::", "the end: a panic"),

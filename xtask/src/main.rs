@@ -13,6 +13,7 @@ mod files;
 mod hand;
 mod hot;
 mod house;
+mod mutants;
 mod origin;
 mod package;
 mod panics;
@@ -54,6 +55,7 @@ cargo xtask <verb>
   doc      documentation of all crates
   docs     dead links, paths, test names and fault identifiers in any file
   package  packages for strangers: packed, unpacked outside the repository, tested there
+  mutants  wrong changes of the code that named tests must catch; cargo xtask mutants WORDS: those whose name has WORDS
   house    module circles, sizes, old words, arrows between crates; cargo xtask house RULE: one of the rules
 
 Every verb does the set-up it needs. Environment:
@@ -112,6 +114,8 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["doc"] => build::documentation()?,
         ["docs"] => docs::run()?,
         ["package"] => package::run()?,
+        ["mutants"] => mutants::run("")?,
+        ["mutants", part] => mutants::run(part)?,
         ["house"] => house::run(None)?,
         ["house", rule] => house::run(Some(rule))?,
         [] | ["help" | "--help" | "-h"] => {

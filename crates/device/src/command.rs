@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::startup::Stage;
+use crate::stage::Stage;
 
 /// One request of a person, on its way to the control half. Each is answered by exactly one
 /// [`crate::EventKind::Accepted`] or [`crate::EventKind::Refused`].

@@ -6,7 +6,7 @@ use puck::{Node, SafetyMode};
 
 use crate::command::Refusal;
 use crate::hand::HandTrouble;
-use crate::startup::{Stage, StartupError};
+use crate::stage::{Stage, StartupError};
 
 /// Something happened.
 #[derive(Clone, Copy, Debug, PartialEq)]

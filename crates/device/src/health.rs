@@ -4,7 +4,7 @@ use control::{Fault, Payload, State};
 use link::HandStage;
 use puck::SafetyMode;
 
-use crate::startup::{Stage, StartupError};
+use crate::stage::{Stage, StartupError};
 
 /// Counters since power-up. They wrap at 2^32: a day of lost frames at 300 Hz is 2.6e7.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -6,7 +6,7 @@
 
 mod application;
 mod background;
-mod bus;
+pub mod bus;
 pub mod calibration;
 pub mod command;
 pub mod controller;
@@ -16,8 +16,10 @@ pub mod health;
 mod mailbox;
 pub mod recorded_filter;
 mod round;
-pub mod startup;
+mod stage;
+mod startup;
 pub mod time;
+mod wire;
 
 pub use application::{
     Action, Application, Controller, ControllerIo, CycleReport, Message, QueueFull, Refused, Saved, SessionPort, Slot,
@@ -29,7 +31,7 @@ pub use controller::DeviceController;
 pub use event::{Event, EventKind};
 pub use hand::HandTrouble;
 pub use health::{Counters, Health, Timing};
-pub use startup::{Stage, StartupError};
+pub use stage::{Stage, StartupError};
 
 mod port;
 mod session;
@@ -37,5 +39,6 @@ pub mod storage;
 mod store;
 
 pub use port::{FitPrimitive, StoredPrimitive};
-pub use session::{ArmApplication, HostSession, Identity, PrimitiveTrouble, Session, StartupTrouble};
+pub use session::{ArmApplication, HostSession, Identity, Session};
 pub use store::{RamStore, STORE_SLOT_BYTES, STORE_SLOTS, Store, StoreError};
+pub use wire::{PrimitiveTrouble, StartupTrouble};

@@ -4,7 +4,7 @@
 //! taken, it is a plan that leaves the room, or overflows to infinity and then to NaN in f32. They are wide on
 //! purpose: the limits of one particular arm belong to whoever knows it.
 
-use crate::{Scalar, TransformationSystem};
+use crate::Scalar;
 
 /// Largest value of a row (m, rad): 20 m is no arm's reach, 20 rad are three turns of a joint.
 pub const LARGEST_VALUE: f64 = 20.0;
@@ -50,21 +50,6 @@ pub const FASTEST_SLEW: f64 = 1e4;
 /// kernels of activation 0.9 and 0.2 mm of noise that nobody had filtered. Much more is lost to rounding in single
 /// precision.
 pub const LARGEST_CANCELLATION: f64 = 1000.0;
-
-/// Largest forcing term that a movement of this duration needs, in the unit of the row.
-///
-/// Eq. (1) solved for it: `f = (tau^2 xdd + D tau xd)/K + (x - g) + (g - x0) s`. Its parts are bounded twice: by what
-/// a robot can do ([`LARGEST_ACCELERATION`], [`LARGEST_SPEED`]), and by what `kernel_count` kernels can express, which
-/// is no faster a wave than one with a half-wave per kernel, of the amplitude [`LARGEST_VALUE`].
-pub(crate) fn largest_force<T: Scalar>(system: &TransformationSystem<T>, duration: T, kernel_count: usize) -> T {
-    let f = T::from_f64;
-    let (k, d) = (system.stiffness(), system.damping());
-    let moves = duration / k * (duration * f(LARGEST_ACCELERATION) + d * f(LARGEST_SPEED));
-    let rate = f(core::f64::consts::PI) * T::from_index(kernel_count);
-    let waves = f(LARGEST_VALUE) * (rate / k) * (rate + d);
-    let motion = if moves < waves { moves } else { waves };
-    motion + f(2.0 * LARGEST_VALUE)
-}
 
 /// Place of the first value whose magnitude is not at most `largest`; a NaN is such a value.
 pub(crate) fn first_beyond<T: Scalar>(values: &[T], largest: f64) -> Option<usize> {

@@ -22,6 +22,7 @@ mod primitive_error;
 mod quaternion;
 mod reference;
 mod rollout;
+mod rollout_error;
 mod scalar;
 mod sensor_statistics;
 mod table;
@@ -38,13 +39,16 @@ pub use expected_sensors::ExpectedSensors;
 pub use forcing::{Activations, Basis, ForcingTerm};
 pub use gains::{Gain, Gains, PoseGains, Stiffness};
 pub use log_map::LogMap;
-pub use orientation::{OrientationError, OrientationInput, OrientationState, OrientationSystem, orientation_error};
+pub use orientation::{
+    Hemisphere, OrientationError, OrientationInput, OrientationState, OrientationSystem, orientation_error,
+};
 pub use phase::{CanonicalSystem, Phase};
-pub use primitive::{Hemisphere, Primitive, PrimitiveTables};
+pub use primitive::{Primitive, PrimitiveTables};
 pub use primitive_error::{Group, Part, PrimitiveError};
 pub use quaternion::Quaternion;
-pub use reference::{OrientationReference, PoseReference, Reference, StartState, Trajectory};
-pub use rollout::{Rollout, RolloutError};
+pub use reference::{OrientationReference, PoseReference, Reference, Trajectory};
+pub use rollout::{Rollout, StartState};
+pub use rollout_error::RolloutError;
 #[cfg(feature = "fixed")]
 pub use scalar::FixedPoint;
 pub use scalar::Scalar;

@@ -23,6 +23,18 @@ pub enum OrientationError {
     RotationVector,
 }
 
+/// Choice of the signs of the start and goal quaternions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Hemisphere {
+    /// Start and goal carry the signs of a sign-continuous demonstration: a run aligns its own to them.
+    #[default]
+    Demonstrated,
+    /// There is no demonstration: the goal is taken on the side nearest to the current orientation.
+    Nearest,
+}
+
 /// Cosine of half of 175 degrees: two unit quaternions with a smaller inner product are too far apart for the error of
 /// Eq. (4), which is longest at 180 degrees and pulls ever less beyond.
 const FARTHEST_COSINE: f64 = 0.043_619_387_365_336;

@@ -9,24 +9,12 @@ use crate::orientation::is_near_enough;
 use crate::orientation_rows::Taught;
 use crate::vector::{all_finite, clamp, clamp_norm};
 use crate::{
-    Activations, Basis, CanonicalSystem, Configuration, Coupling, DisplacementLimits, Gains, Group, OrientationError,
-    Part, PoseCoupling, PrimitiveError, Scalar, TransformationSystem, Velocity, bounds,
+    Activations, Basis, CanonicalSystem, Configuration, Coupling, DisplacementLimits, Gains, Group, Hemisphere,
+    OrientationError, Part, PoseCoupling, PrimitiveError, Scalar, TransformationSystem, Velocity, bounds,
 };
 
 /// Rows of a pose: three of the position, three of the orientation.
 pub(crate) const POSE_ROWS: usize = 6;
-
-/// Choice of the signs of the start and goal quaternions.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Hemisphere {
-    /// Start and goal carry the signs of a sign-continuous demonstration: a run aligns its own to them.
-    #[default]
-    Demonstrated,
-    /// There is no demonstration: the goal is taken on the side nearest to the current orientation.
-    Nearest,
-}
 
 /// The plain tables of a primitive, as they come from an image or a file: unchecked input of [`Primitive::new`].
 #[derive(Clone, Copy, Debug)]
@@ -182,9 +170,8 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Primitive<T, D, 
         self.minimum_duration = checked.minimum_duration;
         self.canonical = checked.canonical;
         self.systems = checked.systems;
-        let limit = |system: &TransformationSystem<T>| {
-            system.stiffness() * bounds::largest_force(system, tables.duration, count)
-        };
+        let limit =
+            |system: &TransformationSystem<T>| system.stiffness() * system.largest_force(tables.duration, count);
         self.coupling_limits = checked.systems.each_row(limit);
         self.least_coupling_limit = T::MAX;
         for limit in self.coupling_limits.iter() {
@@ -466,7 +453,7 @@ impl<T: Scalar, const D: usize, const P: usize> PrimitiveTables<'_, T, D, P> {
         systems: &Systems<T, D, P>,
     ) -> Result<(), PrimitiveError> {
         let number = |place: usize| u8::try_from(place).unwrap_or(u8::MAX);
-        let largest = systems.each_row(|system| bounds::largest_force(system, self.duration, self.kernel_count));
+        let largest = systems.each_row(|system| system.largest_force(self.duration, self.kernel_count));
         let rows = || self.weights.chunks_exact(self.kernel_count).zip(largest.iter()).enumerate();
         for kernel in 0..self.kernel_count {
             let centre = basis.centre(kernel).unwrap_or(T::ONE);

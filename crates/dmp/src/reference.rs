@@ -1,29 +1,6 @@
-//! `Reference` and `StartState`: what a run reports at each tick and what it starts from, in physical units.
+//! `Reference`: what a run reports at each tick, in physical units.
 
-use crate::{Configuration, Primitive, Quaternion, Scalar, Velocity};
-
-/// Where a run begins.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StartState<T, const D: usize, const P: usize> {
-    /// Poses and point rows.
-    pub configuration: Configuration<T, D, P>,
-    /// Physical velocity.
-    pub velocity: Velocity<T, D, P>,
-}
-
-impl<T: Scalar, const D: usize, const P: usize> StartState<T, D, P> {
-    /// At rest in this configuration.
-    #[must_use]
-    pub fn at_rest(configuration: Configuration<T, D, P>) -> Self {
-        Self { configuration, velocity: Velocity::ZERO }
-    }
-
-    /// As the demonstration started, with its initial velocity: replays a recording that was cut out of a motion.
-    #[must_use]
-    pub fn demonstrated<const N: usize>(primitive: &Primitive<T, D, P, N>) -> Self {
-        Self { configuration: *primitive.start(), velocity: *primitive.start_velocity() }
-    }
-}
+use crate::{Quaternion, Scalar};
 
 /// Desired value, velocity and acceleration of `D` rows, per second (not scaled by tau).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,62 +6,43 @@
 //! division and valid at rate 0 (time stopped). Speed changes are slewed, because a jump of the rate is a jump of the
 //! desired velocity.
 
-use core::fmt;
-
 use crate::orientation_rows::OrientationRows;
 use crate::point_rows::{PointRows, Tick};
 use crate::time_scale::TimeScale;
 use crate::vector::all_finite;
-use crate::{Coupling, Phase, PoseReference, Primitive, Quaternion, Reference, Scalar, StartState, bounds};
-
-/// Reason for which a start, a tick or a change in flight is refused; the run goes on unchanged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum RolloutError {
-    /// A value is NaN or infinite.
-    NotFinite,
-    /// A value is larger than any movement needs, see [`bounds`].
-    TooLarge,
-    /// A quaternion is not of unit norm.
-    NotUnit,
-    /// The duration is shorter than [`Primitive::minimum_duration`], or the speed too high.
-    TooFast,
-    /// A speed, rate or duration is negative, or a duration is 0.
-    Negative,
-    /// The control period is longer than the one that the primitive was checked for.
-    PeriodTooLong,
-    /// The run was started with another primitive.
-    OtherPrimitive,
-    /// The primitive has no such pose.
-    NoSuchPose,
-    /// The start or the new goal is more than 175 degrees away, where the error of Eq. (4) fails.
-    TurnsTooFar,
-}
-
-impl fmt::Display for RolloutError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::NotFinite => "a value is not a number",
-            Self::TooLarge => "a value is larger than any movement needs",
-            Self::NotUnit => "a quaternion is not of unit norm",
-            Self::TooFast => "too fast: the integration would be unstable at this control period",
-            Self::PeriodTooLong => "the control period is longer than the primitive was checked for",
-            Self::NoSuchPose => "the primitive has no such pose",
-            Self::Negative => "a speed, rate or duration is negative",
-            Self::OtherPrimitive => "the run was started with another primitive",
-            Self::TurnsTooFar => "the goal is more than 175 degrees away; the rotation-vector error is needed",
-        })
-    }
-}
-
-impl core::error::Error for RolloutError {}
+use crate::{
+    Configuration, Coupling, Phase, PoseReference, Primitive, Quaternion, Reference, RolloutError, Scalar, Velocity,
+    bounds,
+};
 
 /// One pose in motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct PoseRows<T> {
     position: PointRows<T, 3>,
     orientation: OrientationRows<T>,
+}
+
+/// Where a run begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StartState<T, const D: usize, const P: usize> {
+    /// Poses and point rows.
+    pub configuration: Configuration<T, D, P>,
+    /// Physical velocity.
+    pub velocity: Velocity<T, D, P>,
+}
+
+impl<T: Scalar, const D: usize, const P: usize> StartState<T, D, P> {
+    /// At rest in this configuration.
+    #[must_use]
+    pub fn at_rest(configuration: Configuration<T, D, P>) -> Self {
+        Self { configuration, velocity: Velocity::ZERO }
+    }
+
+    /// As the demonstration started, with its initial velocity: replays a recording that was cut out of a motion.
+    #[must_use]
+    pub fn demonstrated<const N: usize>(primitive: &Primitive<T, D, P, N>) -> Self {
+        Self { configuration: *primitive.start(), velocity: *primitive.start_velocity() }
+    }
 }
 
 /// State of one run of a [`Primitive`].

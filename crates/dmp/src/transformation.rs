@@ -107,6 +107,22 @@ impl<T: Scalar> TransformationSystem<T> {
         limits.into_iter().fold(T::ONE, |least, limit| if limit < least { limit } else { least })
     }
 
+    /// Largest forcing term that a movement of this duration needs, in the unit of the row.
+    ///
+    /// Eq. (1) solved for it: `f = (tau^2 xdd + D tau xd)/K + (x - g) + (g - x0) s`. Its parts are bounded twice: by
+    /// what a robot can do ([`bounds::LARGEST_ACCELERATION`], [`bounds::LARGEST_SPEED`]), and by what `kernel_count`
+    /// kernels can express, which is no faster a wave than one with a half-wave per kernel, of the amplitude
+    /// [`bounds::LARGEST_VALUE`].
+    pub(crate) fn largest_force(&self, duration: T, kernel_count: usize) -> T {
+        let f = T::from_f64;
+        let (k, d) = (self.stiffness, self.damping);
+        let moves = duration / k * (duration * f(bounds::LARGEST_ACCELERATION) + d * f(bounds::LARGEST_SPEED));
+        let rate = f(core::f64::consts::PI) * T::from_index(kernel_count);
+        let waves = f(bounds::LARGEST_VALUE) * (rate / k) * (rate + d);
+        let motion = if moves < waves { moves } else { waves };
+        motion + f(2.0 * bounds::LARGEST_VALUE)
+    }
+
     /// Right-hand side of Eq. (9) = `tau vd`.
     #[inline]
     pub fn right_hand_side(&self, state: &PointState<T>, input: &PointInput<T>) -> T {

@@ -11,7 +11,8 @@
 //! 1111. The torque leaves in the cycle of its sample, one cycle earlier than behind an arm.
 
 use control::{LoadRefusal, Payload};
-use device::hand::{Drive, HandProperties, HandRound, HandTrouble, Initialisation, Outcome, Outlet};
+use device::bus::Outlet;
+use device::hand::{Drive, HandProperties, HandRound, HandTrouble, Initialisation, Outcome};
 use device::{Controller, ControllerIo, Counters, Health, Message, Refused, Slot, Stage};
 use link::{Event as LinkEvent, EventKind, HandStage, Refusal};
 use puck::{CanFrame, Node, PropertyId, Reply, Status, get};

@@ -3,7 +3,8 @@
 //! Sends at most one frame per call, torque none. Where something is wrong it tells why, rests for a second and begins
 //! anew.
 
-use device::hand::{Answer, Exchange, HandProperties, HandTrouble, Outlet};
+use device::bus::{Answer, Exchange, Outlet};
+use device::hand::{HandProperties, HandTrouble};
 use puck::hand::{COUNTS_PER_REVOLUTION, HandCommander};
 use puck::{Group, Node, Property, PropertyId, PropertyTable, Role, Status, get, hand_stop_frames, set};
 

@@ -4,6 +4,7 @@
 mod boot;
 mod bus;
 mod chain;
+pub mod fault;
 mod firmware;
 mod force_torque;
 mod hand;

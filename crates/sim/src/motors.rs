@@ -93,8 +93,9 @@ impl Motors {
         self.stepped_at + STEP_TICKS
     }
 
-    /// One physics step over the interval that ends at [`Motors::next_step`].
-    pub(crate) fn step(&mut self, world: &mut dyn World) {
+    /// One physics step over the interval that ends at [`Motors::next_step`], with viscous friction (N m s/rad) beyond
+    /// the world's own.
+    pub(crate) fn step(&mut self, world: &mut dyn World, friction: &[f64; 7]) {
         let speeds = self.transmission.motor_from_joint(&self.dq);
         let torques = std::array::from_fn(|motor| {
             let damping = ROTOR_INERTIA[motor] / BRAKE_TIME_CONSTANT;
@@ -104,7 +105,7 @@ impl Motors {
         });
         let driven = self.transmission.joint_torques_from_motor(&torques);
         let held = self.hand.torques(self.next_step(), &self.q, &self.dq);
-        world.step(&std::array::from_fn(|joint| driven[joint] + held[joint]));
+        world.step(&std::array::from_fn(|joint| driven[joint] + held[joint] - friction[joint] * self.dq[joint]));
         self.q = world.motor_positions();
         self.dq = world.motor_velocities();
         self.stepped_at += STEP_TICKS;

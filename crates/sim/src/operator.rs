@@ -8,11 +8,14 @@ use crate::time::{TICKS_PER_MILLISECOND, Ticks};
 use puck::SafetyMode;
 
 /// An action of the operator at the pendant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum PendantAction {
     /// Hits the E-stop button; it latches. Motor power is cut at once.
+    #[serde(rename = "press-estop")]
     PressEStop,
     /// Turns the E-stop button until it pops out. The mode stays E-STOP until Shift-Idle.
+    #[serde(rename = "release-estop")]
     ReleaseEStop,
     /// Shift and Idle: to IDLE, from E-STOP or ACTIVE; clears latched faults.
     ShiftIdle,

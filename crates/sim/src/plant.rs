@@ -12,6 +12,7 @@
 //! Nothing here looks at a clock of the computer, and no order depends on a hash: equal calls give equal runs.
 
 use crate::bus::Bus;
+use crate::fault::{FaultKind, Faults, FrameKind, Injection, Treated};
 use crate::force_torque::{ForceTorque, ForceTorqueConfig};
 use crate::hand::{Hand, HandConfig};
 use crate::link_wire::{LinkLine, SerialLine};
@@ -136,6 +137,7 @@ pub struct Plant {
     link: Box<dyn LinkLine>,
     hand_alone: bool,
     deliveries: VecDeque<Delivery>,
+    faults: Faults,
     world: Box<dyn World>,
 }
 
@@ -188,6 +190,7 @@ impl Plant {
             link: Box::new(SerialLine::default()),
             hand_alone: config.hand_alone,
             deliveries: VecDeque::new(),
+            faults: Faults::new(config.seed),
             world,
         };
         if config.hand_alone {
@@ -343,6 +346,29 @@ impl Plant {
         self.force_torque.creep(error, self.now, self.now + over);
     }
 
+    /// Orders faults; their times count from now.
+    pub fn inject(&mut self, injections: &[Injection]) {
+        self.faults.order(self.now, injections);
+        self.next_happening = self.look_ahead();
+    }
+
+    /// Orders faults whose times count from the first torque on the bus that is not zero.
+    pub fn inject_on_torque(&mut self, injections: Vec<Injection>) {
+        self.faults.order_on_torque(injections);
+    }
+
+    /// True while a fault keeps the co-controller's CAN controller off the bus.
+    #[must_use]
+    pub fn is_bus_off(&self) -> bool {
+        self.faults.is_bus_off()
+    }
+
+    /// Frames that the co-controller's CAN controller does not take now, because of a fault.
+    #[must_use]
+    pub fn refused(&self) -> Option<FrameKind> {
+        self.faults.refused()
+    }
+
     /// The physical world.
     pub fn world(&mut self) -> &mut dyn World {
         &mut *self.world
@@ -383,6 +409,7 @@ impl Plant {
             self.late_torques.front().map(|(at, _)| *at),
             self.safety.next_time(),
             self.operator.next_time(&self.safety.view()),
+            self.faults.next_time(),
         ]
         .into_iter()
         .flatten()
@@ -396,11 +423,13 @@ impl Plant {
             if let Some(hand) = &mut self.hand {
                 hand.drive(now, &mut *self.world);
             }
-            self.motors.step(&mut *self.world);
+            self.motors.step(&mut *self.world, &self.faults.friction());
             if self.force_torque.has_memory() {
-                self.force_torque.follow(&self.world.wrist_wrench());
+                let strained = self.wrist_wrench();
+                self.force_torque.follow(&strained);
             }
         }
+        self.befall();
         while let Some((_, request)) = self.late_torques.pop_front_if(|(at, _)| *at <= now) {
             self.instruct(now, &request);
         }
@@ -419,7 +448,8 @@ impl Plant {
             }
         }
         while self.force_torque.next_time().is_some_and(|at| at <= now) {
-            for reply in self.force_torque.step(now, &self.world.wrist_wrench()).into_iter().flatten() {
+            let strained = self.wrist_wrench();
+            for reply in self.force_torque.step(now, &strained).into_iter().flatten() {
                 self.bus.queue(now, Node::FORCE_TORQUE, reply);
             }
         }
@@ -443,16 +473,67 @@ impl Plant {
         self.next_happening = self.look_ahead();
     }
 
+    /// Wrench on the sensor with the errors that are injected, N and N m.
+    fn wrist_wrench(&self) -> [f64; 6] {
+        let (wrench, error) = (self.world.wrist_wrench(), self.faults.sensor_error(self.now));
+        std::array::from_fn(|axis| wrench[axis] + error[axis])
+    }
+
+    /// Faults that begin or end now, and frames they made late.
+    fn befall(&mut self) {
+        while let Some((kind, begins)) = self.faults.change(self.now) {
+            let puck = |node: u8| usize::from(node.clamp(1, 7)) - 1;
+            match kind {
+                FaultKind::CountJump { node, by } => self.pucks[puck(node)].jump(if begins { by } else { -by }),
+                FaultKind::Restart { node } if begins => {
+                    self.pucks[puck(node)].restart(self.now);
+                    self.bus.withdraw(Node::ARM[puck(node)]);
+                }
+                FaultKind::Temperature { node, celsius } if begins => self.pucks[puck(node)].heat(celsius),
+                FaultKind::Pendant(action) if begins => {
+                    self.operator.observe(action);
+                    self.safety.press(self.now, action);
+                }
+                FaultKind::Warning(quantity) => self.safety.warn(quantity, begins),
+                FaultKind::Push { .. } | FaultKind::Payload(_) => self.world.push(self.faults.push(), [0.0; 3]),
+                _ => {}
+            }
+        }
+        while let Some(passage) = self.faults.take_late(self.now) {
+            self.receive(&passage, passage.end);
+        }
+    }
+
+    /// A frame has left the wire: its sender knows, and the others receive it unless a fault keeps it from them.
     fn deliver(&mut self, passage: &Passage) {
-        let received = (passage.sender != Node::HOST).then_some(passage.frame);
-        self.deliveries.push_back(Delivery { at: passage.end, received });
-        let at = passage.received_at();
+        if passage.sender == Node::HOST {
+            self.deliveries.push_back(Delivery { at: passage.end, received: None });
+        }
+        if let Treated::Received(frame, copies) = self.faults.treat(self.now, passage) {
+            for _ in 0..copies {
+                self.receive(&Passage { frame, ..*passage }, passage.received_at());
+            }
+        }
+    }
+
+    /// Everybody but its sender has a frame, at time `at`.
+    fn receive(&mut self, passage: &Passage, at: Ticks) {
+        if passage.sender != Node::HOST {
+            self.deliveries.push_back(Delivery { at: passage.end, received: Some(passage.frame) });
+        }
         if let Ok(request) = Request::decode(&passage.frame)
             // What a puck says is a request to nobody; the safety module is the only device that gives orders.
             && matches!(request.sender, Node::HOST | Node::SAFETY_MODULE)
         {
-            if self.torque_delay > 0 && matches!(request.action, Action::PackedTorques { .. }) {
-                self.late_torques.push_back((at + self.torque_delay, request));
+            let delay = self.torque_delay + self.faults.torque_delay();
+            if let Action::PackedTorques { torques, .. } = request.action
+                && self.faults.awaits_torque()
+                && torques.iter().any(|torque| torque.units() != 0)
+            {
+                self.faults.see_torque(self.now);
+            }
+            if delay > 0 && matches!(request.action, Action::PackedTorques { .. }) {
+                self.late_torques.push_back((at + delay, request));
             } else {
                 self.instruct(at, &request);
             }

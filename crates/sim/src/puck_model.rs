@@ -116,6 +116,22 @@ impl Puck {
         self.forget();
     }
 
+    /// Power fails for an instant: what was set is lost, and the counts begin anew.
+    pub(crate) fn restart(&mut self, now: Ticks) {
+        self.power_off();
+        self.power_on(now);
+    }
+
+    /// The position is off by so many counts from now on.
+    pub(crate) fn jump(&mut self, counts: i32) {
+        self.offset += i64::from(counts);
+    }
+
+    /// Puck and motor are this hot, degree Celsius.
+    pub(crate) fn heat(&mut self, celsius: i32) {
+        [Property::Temp, Property::Therm].into_iter().for_each(|property| self.firmware.store(property, celsius));
+    }
+
     /// A request on the bus at time `at`; packed torques act at once, the rest waits its turn.
     pub(crate) fn receive(&mut self, at: Ticks, request: &Request) {
         if let Heard::Torque(units) = self.firmware.receive(at, request) {

@@ -4,6 +4,7 @@
 //! and lowers the mode when a limit is passed; only the operator at the pendant raises it. On entering ACTIVE and IDLE
 //! it sets the MODE of all motor pucks by a broadcast on 0x540. Rules: docs/barrett-can.md; each assumption is marked.
 
+use crate::fault::Supervised;
 use crate::inbox::Inbox;
 use crate::operator::{PendantAction, PendantView};
 use crate::properties::{Numbers, Values};
@@ -75,6 +76,8 @@ pub(crate) struct SafetyModule {
     second_look: Option<Ticks>,
     torque: Health,
     heartbeat_fault: bool,
+    /// Quantities it warns of whatever it hears: a fault to inject.
+    warned: Vec<Supervised>,
     /// Since when full sets of positions have been flowing, and when the last one was complete.
     positions: Option<(Ticks, Ticks)>,
     /// When ACTIVE ends unless a full set comes before.
@@ -99,6 +102,7 @@ impl SafetyModule {
             second_look: None,
             torque: Health::Safe,
             heartbeat_fault: false,
+            warned: Vec::new(),
             positions: None,
             heartbeat_due: None,
             outgoing: Vec::new(),
@@ -133,17 +137,27 @@ impl SafetyModule {
             Some(speed) if speed > self.velocity_limit(Property::Vl1) => Health::Warning,
             _ => Health::Safe,
         };
+        let heartbeat = if self.heartbeat_fault { Health::Fault } else { Health::Safe };
+        let warned = |quantity: Supervised, health: Health| match health {
+            Health::Safe if self.warned.contains(&quantity) => Health::Warning,
+            health => health,
+        };
         PendantState {
-            velocity,
-            torque: self.torque,
-            voltage: Health::Safe,
-            heartbeat: if self.heartbeat_fault { Health::Fault } else { Health::Safe },
-            other: Health::Safe,
+            velocity: warned(Supervised::Velocity, velocity),
+            torque: warned(Supervised::Torque, self.torque),
+            voltage: warned(Supervised::Voltage, Health::Safe),
+            heartbeat: warned(Supervised::Heartbeat, heartbeat),
+            other: warned(Supervised::Other, Health::Safe),
             segments: DISPLAY_ZERO,
             idle_light: self.mode == SafetyMode::Idle,
             activate_light: self.mode == SafetyMode::Active,
             button: if self.button_latched { Button::EmergencyStop } else { Button::None },
         }
+    }
+
+    /// Warns of a quantity from now on, or no longer.
+    pub(crate) fn warn(&mut self, quantity: Supervised, is_on: bool) {
+        if is_on { self.warned.push(quantity) } else { self.warned.retain(|other| *other != quantity) }
     }
 
     /// The operator acts at the pendant.

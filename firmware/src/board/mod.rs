@@ -9,6 +9,10 @@ use embedded_hal::digital::OutputPin;
 use embedded_storage_async::nor_flash::NorFlash;
 use puck::CanFrame;
 
+pub mod line;
+#[cfg(target_os = "none")]
+pub mod panic_stop;
+
 #[cfg(all(target_os = "none", feature = "board-mps2"))]
 mod mps2;
 #[cfg(all(target_os = "none", feature = "board-mps2"))]

@@ -1,7 +1,7 @@
 //! The places where an image may panic, each with the reason why nothing from outside gets it there.
 //!
 //! Whatever panics all the same ends like every fault of the image: zero torques and idle to arm and hand, the reason
-//! kept, restart (`firmware/src/panic_stop.rs`); on the emulated board the image ends.
+//! kept, restart (`firmware/src/board/panic_stop.rs`); on the emulated board the image ends.
 
 use super::kind::Kind;
 use crate::board::Board;

@@ -9,8 +9,7 @@ use puck::{Counts, Group, MotorMode, Node, PropertyId, get, set};
 
 use super::found::HandProperties;
 use super::trouble::HandTrouble;
-use crate::bus::Outlet;
-use crate::startup::{Answer, Exchange};
+use crate::bus::{Answer, Exchange, Outlet};
 
 /// Between two looks at the modes, us.
 const POLL_US: u64 = 100_000;

@@ -21,10 +21,9 @@ use control::HandSample;
 use link::HandStage;
 use puck::{CanFrame, Node, PropertyId, Reply, Status, get};
 
-pub use crate::bus::Outlet;
+use crate::bus::Outlet;
 use crate::command::Refusal;
 use crate::health::Counters;
-pub use crate::startup::{Answer, Exchange};
 pub use drive::Drive;
 pub(crate) use found::Found;
 pub use found::HandProperties;

@@ -3,10 +3,9 @@
 use puck::hand::HandCommander;
 use puck::{Node, Property, PropertyId, PropertyTable, Role, Status};
 
-use super::exchange::Answer;
-use super::sequence::{Next, Startup, Step};
 use super::survey::Survey;
-use crate::bus::Outlet;
+use super::{Next, Startup, Step};
+use crate::bus::{Answer, Outlet};
 use crate::hand::{Found, HandProperties, HandTrouble};
 
 /// What is read of each hand puck, in this order.

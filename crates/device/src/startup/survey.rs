@@ -3,7 +3,7 @@
 use control::{Calibration, Payload};
 use puck::{Node, Property, PropertyId, PropertyTable, Role};
 
-use super::stage::StartupError;
+use crate::stage::StartupError;
 
 /// Number of nodes an identifier can name.
 const NODES: usize = 32;

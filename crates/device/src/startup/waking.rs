@@ -2,11 +2,10 @@
 
 use puck::{Node, PropertyId, SafetyMode, Status, get, set, stop_frames};
 
-use super::exchange::Answer;
-use super::sequence::{ENUMERATED, Next, POLL_US, Startup, Step, after};
-use super::stage::StartupError;
 use super::survey::{DRIVE_PROPERTIES, Survey};
-use crate::bus::Outlet;
+use super::{ENUMERATED, Next, POLL_US, Startup, Step, after};
+use crate::bus::{Answer, Outlet};
+use crate::stage::StartupError;
 
 /// How long a device may take to answer in an enumeration, us: a puck that boots needs up to 50 ms.
 const LISTEN_US: u64 = 50_000;

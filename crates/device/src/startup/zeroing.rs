@@ -3,10 +3,10 @@
 use puck::{Group, Node, PropertyId, SafetyMode, get, set};
 
 use super::home::home_counts;
-use super::sequence::{Next, POLL_US, Startup, Step, ZeroRequest, after};
-use super::stage::StartupError;
+use super::{Next, POLL_US, Startup, Step, ZeroRequest, after};
 use crate::bus::Outlet;
 use crate::command::Refusal;
+use crate::stage::StartupError;
 
 /// How long the seven replies to one position request may take, us.
 const POSITIONS_US: u64 = 10_000;

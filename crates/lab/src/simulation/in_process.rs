@@ -110,6 +110,7 @@ pub(super) struct InProcess {
     next_slot: Ticks,
     /// Frames that are still being computed, with the time at which they leave.
     leaving: VecDeque<(Ticks, CanFrame)>,
+    is_bus_off: bool,
     line: Vec<u8>,
 }
 
@@ -133,6 +134,7 @@ impl InProcess {
             slot: Slot::Request,
             next_slot: FIRST_SLOT * SLOT_TICKS,
             leaving: VecDeque::new(),
+            is_bus_off: false,
             line: Vec::new(),
         }
     }
@@ -141,6 +143,12 @@ impl InProcess {
         let now = self.next_slot;
         plant.advance(now);
         let now_us = now / TICKS_PER_MICROSECOND;
+        self.queues.refused = plant.refused();
+        if plant.is_bus_off() && !self.is_bus_off {
+            self.leaving.clear();
+            self.core.note_bus_error(true);
+        }
+        self.is_bus_off = plant.is_bus_off();
         self.core.slot(self.slot, now_us, &mut self.queues);
         let leave = now + computing(self.slot);
         self.leaving.extend(self.queues.transmitted.drain(..).map(|frame| (leave, frame)));

@@ -11,6 +11,7 @@ use device::{
 };
 use puck::CanFrame;
 use sim::Ticks;
+use sim::fault::FrameKind;
 
 /// Capacity of the queue of commands, as in the firmware.
 const COMMANDS: usize = 8;
@@ -35,6 +36,8 @@ pub(crate) struct Queues {
     pub(crate) received: VecDeque<CanFrame>,
     /// Frames for the bus.
     pub(crate) transmitted: Vec<CanFrame>,
+    /// Frames that the CAN controller does not take now.
+    pub(crate) refused: Option<FrameKind>,
     commands: VecDeque<Command>,
     records: VecDeque<TimedRecord>,
     events: VecDeque<Event>,
@@ -46,8 +49,9 @@ impl ControllerIo<DeviceController> for Queues {
     }
 
     fn transmit(&mut self, frame: CanFrame) -> bool {
-        self.transmitted.push(frame);
-        true
+        let is_taken = self.refused.is_none_or(|kind| !kind.fits(&frame));
+        self.transmitted.extend(is_taken.then_some(frame));
+        is_taken
     }
 
     fn command(&mut self) -> Option<Command> {

@@ -14,7 +14,7 @@ use puck::CanFrame;
 
 use super::clock;
 use super::device::{Interrupt, NVIC_PRIO_BITS, TIMER1, Timer};
-use super::link::Buffer;
+use super::link_buffer::Buffer;
 use super::lockstep::{FlashReply, FlashRequest, Gone, Reply, Request, Wire};
 use crate::board::CanStatus;
 

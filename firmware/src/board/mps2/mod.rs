@@ -11,6 +11,7 @@ pub mod device;
 mod flash;
 mod light;
 mod link;
+mod link_buffer;
 mod lockstep;
 mod logger;
 mod slot_timer;
@@ -20,8 +21,7 @@ use puck::CanFrame;
 use semihosting::io::Write;
 use semihosting::process::ExitCode;
 
-use super::Parts;
-use crate::panic_stop;
+use super::{Parts, panic_stop};
 
 /// The board.
 pub struct SelectedBoard(());
@@ -87,5 +87,5 @@ impl super::Board for SelectedBoard {
 /// QEMU's stack has no guard and can always be read.
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    panic_stop::after_hard_fault(core::ptr::from_ref(frame).addr() as u32, Some(frame))
+    panic_stop::after_hard_fault::<SelectedBoard>(core::ptr::from_ref(frame).addr() as u32, Some(frame))
 }

@@ -8,8 +8,9 @@ use cortex_m_rt::exception;
 use embassy_stm32::pac::RCC;
 
 use super::super::constants::clocks::{HSE_BLINK_US, HSE_BLINKS, HSE_SOON_US};
+use super::SelectedBoard;
 use super::{clock, light};
-use crate::panic_stop;
+use crate::board::panic_stop;
 
 /// Switches the input on and waits for it; does not return without it. The clock counts already.
 pub(super) fn wait() {
@@ -27,7 +28,7 @@ pub(super) fn wait() {
         }
         light::before_all(turn % 2 == 1);
     }
-    panic_stop::stop(format_args!("no 8 MHz from the ST-LINK: the bus was not touched"));
+    panic_stop::stop::<SelectedBoard>(format_args!("no 8 MHz from the ST-LINK: the bus was not touched"));
 }
 
 /// From here on its failure is a non-maskable interrupt. The clock tree runs.
@@ -41,7 +42,9 @@ pub(super) fn watch() {
 unsafe fn NonMaskableInt() -> ! {
     if RCC.cifr().read().hsecssf() {
         RCC.cicr().write(|w| w.set_hsecssc(true));
-        panic_stop::stop(format_args!("the 8 MHz from the ST-LINK have stopped"));
+        panic_stop::stop::<SelectedBoard>(format_args!("the 8 MHz from the ST-LINK have stopped"));
     }
-    panic_stop::stop(format_args!("a non-maskable interrupt without a cause of the chip: asked for by a debug probe"));
+    panic_stop::stop::<SelectedBoard>(format_args!(
+        "a non-maskable interrupt without a cause of the chip: asked for by a debug probe"
+    ));
 }

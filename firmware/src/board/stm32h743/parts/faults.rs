@@ -8,7 +8,8 @@ use core::arch::global_asm;
 use cortex_m_rt::ExceptionFrame;
 
 use super::super::constants::memory::STACK;
-use crate::panic_stop;
+use super::SelectedBoard;
+use crate::board::panic_stop;
 
 // The stack's position goes along as the argument.
 global_asm!(
@@ -32,7 +33,7 @@ global_asm!(
 /// Somebody touched a guard. Never returns.
 #[unsafe(no_mangle)]
 extern "C" fn memory_fault(stack_pointer: u32) -> ! {
-    panic_stop::after_memory_fault(stack_pointer)
+    panic_stop::after_memory_fault::<SelectedBoard>(stack_pointer)
 }
 
 /// Everything else that the processor cannot go on from. Never returns.
@@ -43,5 +44,5 @@ extern "C" fn hard_fault(stack_pointer: u32) -> ! {
         && stack_pointer <= STACK.end() - size_of::<ExceptionFrame>() as u32;
     // SAFETY: the processor has put a frame there, see above; every bit pattern is one.
     let frame = inside.then(|| unsafe { &*(stack_pointer as *const ExceptionFrame) });
-    panic_stop::after_hard_fault(stack_pointer, frame)
+    panic_stop::after_hard_fault::<SelectedBoard>(stack_pointer, frame)
 }

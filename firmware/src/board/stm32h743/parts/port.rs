@@ -3,7 +3,7 @@
 use super::host_can::HostCan;
 use super::uart::Serial;
 use super::usb::Usb;
-use crate::line::LineSelector;
+use crate::board::line::LineSelector;
 
 /// All three lines; the first that speaks is used.
 pub(super) type Port = LineSelector<Serial, LineSelector<Usb, HostCan>>;

@@ -11,8 +11,9 @@ use embassy_stm32::pac::IWDG1;
 use embassy_stm32::pac::iwdg::vals::Key;
 
 use super::super::constants::timers::{WATCHDOG_PRESCALER, WATCHDOG_START_TICKS, WATCHDOG_TICKS, WATCHDOG_UPDATE_US};
+use super::SelectedBoard;
 use super::clock;
-use crate::panic_stop;
+use crate::board::panic_stop;
 
 /// Key that opens the registers.
 const OPEN: u16 = 0x5555;
@@ -39,7 +40,9 @@ pub(super) fn narrow() {
         !(pending.pvu() || pending.rvu())
     });
     if !taken {
-        panic_stop::stop(format_args!("the watchdog does not take its window: no arm without a watchdog"));
+        panic_stop::stop::<SelectedBoard>(format_args!(
+            "the watchdog does not take its window: no arm without a watchdog"
+        ));
     }
     key(FEED);
 }

@@ -1,5 +1,10 @@
 //! `ArmApplication`: the primitives of an arm with its hand, and the requests that only it knows.
 
+mod calibration;
+mod directory;
+mod primitive;
+mod saving;
+
 use control::model::ArmModel;
 use control::plan::load;
 use control::{Command as Control, LoadRefusal, Payload, RunOptions, State};
@@ -13,11 +18,11 @@ use crate::command::Command;
 use crate::controller::DeviceController;
 use crate::health::Health;
 use crate::port::StoredPrimitive;
-use crate::session::directory::{Directory, Entry};
 use crate::session::host::{HostSession, Identity};
-use crate::session::primitive::{self, WeightBuffer};
-use crate::session::saving::Change;
 use crate::store::{Store, StoreError};
+use directory::{Directory, Entry};
+use primitive::WeightBuffer;
+use saving::Change;
 
 /// The session of an arm.
 pub type Session<S> = HostSession<ArmApplication<S>>;
@@ -46,12 +51,12 @@ pub struct ArmApplication<S> {
     /// What is mounted on the arm that primitives are checked against, and that arm.
     payload: Payload,
     model: ArmModel<f32>,
-    pub(super) store: S,
-    pub(super) directory: Directory,
+    store: S,
+    directory: Directory,
     /// The change of the store that is not durable yet.
-    pub(super) saving: Option<Change>,
-    pub(super) opened: bool,
-    pub(super) loaded: Option<Entry>,
+    saving: Option<Change>,
+    opened: bool,
+    loaded: Option<Entry>,
     weights: WeightBuffer,
     /// Where primitives are built, to be checked or handed to the control half.
     primitive: StoredPrimitive,
@@ -85,7 +90,7 @@ impl<S: Store> ArmApplication<S> {
 
     /// Hands the primitive that has just been checked to the control half, so that its run need not be waited for.
     /// Where that cannot be done now, the run does it.
-    pub(super) fn preload(&mut self, slot: u8, calm: bool, port: &mut impl SessionPort<DeviceController>) {
+    fn preload(&mut self, slot: u8, calm: bool, port: &mut impl SessionPort<DeviceController>) {
         let Some(entry) = self.directory.get(slot).cloned() else { return };
         let health = port.health();
         if !calm || matches!(health.state, State::Run | State::Coast) {
@@ -149,7 +154,7 @@ impl<S: Store> ArmApplication<S> {
         Ok(Reply::Chunk { of, offset, data })
     }
 
-    pub(super) fn check_and_commit(&mut self, name: &Name, crc: u32) -> Result<(u8, Entry), Refused> {
+    fn check_and_commit(&mut self, name: &Name, crc: u32) -> Result<(u8, Entry), Refused> {
         let Some(bytes) = self.store.staged() else {
             return Err((Refusal::NoUpload, [0, 0]));
         };

@@ -12,6 +12,8 @@
 //! No torque but zero leaves before the start-up is over, a person has activated the arm, and a person has commanded
 //! it: the frames of a cycle come from [`control::Actuation`] or are zero.
 
+mod outlet;
+
 use control::law::Gains;
 use control::time::periods;
 use control::{Calibration, Cycle, CycleInput, CycleRecord, Fault, LoadRefusal, Payload, State};
@@ -21,16 +23,17 @@ use puck::{CanFrame, MotorMode, Node, PropertyId, Reply, SafetyMode, Status, set
 
 use crate::application::{Controller, ControllerIo, CycleReport, Message, Slot};
 use crate::background::{BackgroundPoll, PollReply};
-use crate::bus::{Outlet, SlotOutlet};
+use crate::bus::{Outlet, Pacer};
 use crate::command::{Command, Refusal};
 use crate::event::{Event, EventKind};
 use crate::hand::Hand;
 use crate::health::{Counters, Health};
 use crate::port::FitPrimitive;
 use crate::round::Round;
-
-use crate::session;
-use crate::startup::{Pacer, Stage, Startup, StartupError};
+use crate::stage::{Stage, StartupError};
+use crate::startup::Startup;
+use crate::wire;
+use outlet::SlotOutlet;
 
 /// Time that a puck may be silent before the bus is started anew: 1 s, in control periods; long after the supervisor
 /// has taken the torque off.
@@ -532,8 +535,8 @@ impl Controller for DeviceController {
     fn message(event: Event, health: &Health) -> Option<Message> {
         match event.kind {
             EventKind::Accepted => Some(Message::Answer(Ok(()))),
-            EventKind::Refused(reason) => Some(Message::Answer(Err(session::refusal(reason, health)))),
-            _ => session::event(event).map(Message::News),
+            EventKind::Refused(reason) => Some(Message::Answer(Err(wire::refusal(reason, health)))),
+            _ => wire::event(event).map(Message::News),
         }
     }
 }
@@ -552,6 +555,6 @@ impl CycleReport for CycleRecord {
     }
 
     fn telemetry(&self) -> link::Telemetry {
-        session::telemetry(self)
+        wire::telemetry(self)
     }
 }

@@ -11,7 +11,7 @@
 use link::Request;
 use link::frame::{Decoder, FRAME_BYTES};
 
-use crate::board::LinkPort;
+use super::LinkPort;
 
 /// Watches one line for a sound frame and keeps the bytes of the frame under way.
 #[derive(Debug)]

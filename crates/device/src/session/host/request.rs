@@ -5,10 +5,10 @@ use link::{DeviceHello, HostHello, LINK_VERSION, Refusal, Reply, Request, SCHEMA
 
 use crate::application::{Action, Application, Controller, CycleReport, Refused, SessionPort};
 use crate::session::host::HostSession;
-use crate::session::owner::{Owner, RequestOrder};
-use crate::session::pending::Requester;
-use crate::session::upload::Upload;
-use crate::session::wire::StartupTrouble;
+use crate::session::host::owner::{Owner, RequestOrder};
+use crate::session::host::pending::Requester;
+use crate::session::host::upload::Upload;
+use crate::wire::StartupTrouble;
 
 impl<A: Application> HostSession<A> {
     /// Takes one request: greets, refuses other hosts, repeats answers, acts.

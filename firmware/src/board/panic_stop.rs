@@ -4,27 +4,21 @@
 //! torques go first. The panic may have come from anywhere: nothing here depends on the state of the application.
 
 use core::fmt;
-use core::panic::PanicInfo;
 
 use cortex_m::peripheral::SCB;
-use cortex_m_rt::{ExceptionFrame, exception};
+use cortex_m_rt::ExceptionFrame;
 use puck::stop_frames;
 
-use crate::board::{Board, SelectedBoard};
-
-#[panic_handler]
-fn panicked(information: &PanicInfo<'_>) -> ! {
-    stop(format_args!("{information}"))
-}
+use super::Board;
 
 /// The end, for a reason that the board has found.
-pub fn stop(reason: fmt::Arguments<'_>) -> ! {
+pub fn stop<B: Board>(reason: fmt::Arguments<'_>) -> ! {
     cortex_m::interrupt::disable();
-    SelectedBoard::stop(&stop_frames(), reason)
+    B::stop(&stop_frames(), reason)
 }
 
-/// What the processor's fault registers say.
-struct FaultRegisters;
+/// The fault registers of the processor, in words.
+pub struct FaultRegisters;
 
 impl fmt::Display for FaultRegisters {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -37,20 +31,16 @@ impl fmt::Display for FaultRegisters {
 }
 
 /// The end after a forbidden access, where the board guards its stack: called on another stack.
-pub fn after_memory_fault(stack_pointer: u32) -> ! {
-    stop(format_args!("memory fault, stack at {stack_pointer:#010x}: stack overflow? {FaultRegisters}"))
+pub fn after_memory_fault<B: Board>(stack_pointer: u32) -> ! {
+    stop::<B>(format_args!("memory fault, stack at {stack_pointer:#010x}: stack overflow? {FaultRegisters}"))
 }
 
 /// The end after a hard fault. `frame` is what the processor put on the stack, where that can be read.
-pub fn after_hard_fault(stack_pointer: u32, frame: Option<&ExceptionFrame>) -> ! {
+pub fn after_hard_fault<B: Board>(stack_pointer: u32, frame: Option<&ExceptionFrame>) -> ! {
     match frame {
-        Some(frame) => stop(format_args!("hard fault at {:#010x}: {FaultRegisters}; {frame:?}", frame.pc())),
-        None => stop(format_args!("hard fault, stack outside its memory at {stack_pointer:#010x}: {FaultRegisters}")),
+        Some(frame) => stop::<B>(format_args!("hard fault at {:#010x}: {FaultRegisters}; {frame:?}", frame.pc())),
+        None => {
+            stop::<B>(format_args!("hard fault, stack outside its memory at {stack_pointer:#010x}: {FaultRegisters}"))
+        }
     }
-}
-
-/// The end after an exception or an interrupt that has no handler: exceptions of the processor have negative numbers.
-#[exception]
-unsafe fn DefaultHandler(number: i16) -> ! {
-    stop(format_args!("nobody handles interrupt {number}: {FaultRegisters}"))
 }

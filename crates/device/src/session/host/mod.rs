@@ -10,6 +10,11 @@
 //! - an image replaces another only when it is complete, undamaged and fit for this device;
 //! - a change of the store is answered when it is durable.
 
+mod owner;
+mod pending;
+mod request;
+mod upload;
+
 use control::State;
 use heapless::Deque;
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame, LINK_TIMEOUT_MS};
@@ -17,9 +22,9 @@ use link::{Event, EventKind, Refusal, Reply, Request, Statistics, Telemetry};
 use pinned_init::{Init, init};
 
 use crate::application::{Application, Controller, CycleReport, Message, Refused, SessionPort, TimedRecord};
-use crate::session::owner::Owner;
-use crate::session::pending::{Pending, Requester};
-use crate::session::upload::Upload;
+use owner::Owner;
+use pending::{Pending, Requester};
+use upload::Upload;
 
 /// Requests that have arrived and are not handled yet. A host waits for its answers, so two would do.
 const INBOX: usize = 4;
@@ -48,19 +53,19 @@ pub struct Identity {
 /// `&mut`.
 #[derive(Debug)]
 pub struct HostSession<A: Application> {
-    pub(super) identity: Identity,
+    identity: Identity,
     pub(super) application: A,
     decoder: Decoder<FRAME_BYTES>,
     inbox: Deque<Frame<Request>, INBOX>,
     overrun: u32,
     sequence: u16,
-    pub(super) owner: Option<Owner>,
-    pub(super) pending: Pending,
-    pub(super) upload: Option<Upload>,
+    owner: Option<Owner>,
+    pending: Pending,
+    upload: Option<Upload>,
     /// Session and number of the request whose change is being saved.
-    pub(super) saving: Option<(u16, u16)>,
-    pub(super) telemetry_every: u8,
-    pub(super) latest: Option<TimedRecord<<A::Controller as Controller>::Record>>,
+    saving: Option<(u16, u16)>,
+    telemetry_every: u8,
+    latest: Option<TimedRecord<<A::Controller as Controller>::Record>>,
     limited_cycles: u32,
     telemetry_dropped: u32,
     events_dropped: u32,
@@ -153,7 +158,7 @@ impl<A: Application> HostSession<A> {
     }
 
     /// Tells whoever asked what became of a command; a host that has left meanwhile is told nothing.
-    pub(super) fn pass_on(
+    fn pass_on(
         &mut self,
         now_ms: u32,
         requester: Requester,
@@ -241,14 +246,14 @@ impl<A: Application> HostSession<A> {
     }
 
     /// Ends the session of the present host.
-    pub(super) fn close(&mut self) {
+    fn close(&mut self) {
         self.owner = None;
         self.telemetry_every = 0;
         self.upload_abort();
     }
 
     /// Sends an answer and keeps it for a repetition of its request.
-    pub(super) fn answer(&mut self, now_ms: u32, reply: Reply, port: &mut impl SessionPort<A::Controller>) {
+    fn answer(&mut self, now_ms: u32, reply: Reply, port: &mut impl SessionPort<A::Controller>) {
         if port.room() >= FRAME_BYTES {
             self.send(now_ms, &reply, port);
         }
@@ -258,7 +263,7 @@ impl<A: Application> HostSession<A> {
     }
 
     /// Sends an event if anybody listens and the line has room.
-    pub(super) fn tell(&mut self, now_ms: u32, event: Event, port: &mut impl SessionPort<A::Controller>) {
+    fn tell(&mut self, now_ms: u32, event: Event, port: &mut impl SessionPort<A::Controller>) {
         if self.owner.is_none() {
             return;
         }
@@ -270,19 +275,13 @@ impl<A: Application> HostSession<A> {
     }
 
     /// Sends a message to the host that has the session.
-    pub(super) fn send(&mut self, now_ms: u32, reply: &Reply, port: &mut impl SessionPort<A::Controller>) {
+    fn send(&mut self, now_ms: u32, reply: &Reply, port: &mut impl SessionPort<A::Controller>) {
         let session = self.owner.as_ref().map_or(0, Owner::session);
         self.send_to(session, now_ms, reply, port);
     }
 
     /// Sends a message to a host, be it the one that has the session or not.
-    pub(super) fn send_to(
-        &mut self,
-        session: u16,
-        now_ms: u32,
-        reply: &Reply,
-        port: &mut impl SessionPort<A::Controller>,
-    ) {
+    fn send_to(&mut self, session: u16, now_ms: u32, reply: &Reply, port: &mut impl SessionPort<A::Controller>) {
         let mut buffer = [0; FRAME_BYTES];
         let envelope = Envelope { session, sequence: self.sequence, time_ms: now_ms };
         if let Some(frame) = frame::encode(envelope, reply, &mut buffer).ok().and_then(|length| buffer.get(..length)) {
@@ -292,7 +291,7 @@ impl<A: Application> HostSession<A> {
     }
 
     /// All counters: those of the control half, of the board, and its own.
-    pub(super) fn statistics(&self, port: &mut impl SessionPort<A::Controller>) -> Statistics {
+    fn statistics(&self, port: &mut impl SessionPort<A::Controller>) -> Statistics {
         let counters = port.health().counters;
         let timing = port.timing();
         let mut link = self.decoder.counters();

@@ -14,7 +14,7 @@ use puck::Node;
 use crate::command::Refusal;
 use crate::event::{Event, EventKind};
 use crate::health::Health;
-use crate::startup::{Stage, StartupError};
+use crate::stage::{Stage, StartupError};
 
 /// A cycle number as it goes over the link, where it wraps after 165 days.
 const fn cycle(number: u64) -> u32 {

@@ -5,7 +5,7 @@ use link::Refusal;
 use crate::application::{Refused, Saved, SessionPort};
 use crate::controller::DeviceController;
 use crate::session::arm::ArmApplication;
-use crate::session::directory::{Directory, Entry};
+use crate::session::arm::directory::{Directory, Entry};
 use crate::store::{Store, StoreError};
 
 /// For how long after start-up a hello waits for the store to be open, ms. Reading a flash in order takes a tenth of

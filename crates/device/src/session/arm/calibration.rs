@@ -8,7 +8,7 @@ use crate::application::{Refused, SessionPort};
 use crate::calibration::{Home, HomeError};
 use crate::controller::DeviceController;
 use crate::session::arm::ArmApplication;
-use crate::session::saving::Change;
+use crate::session::arm::saving::Change;
 use crate::store::Store;
 
 impl<S: Store> ArmApplication<S> {

@@ -13,7 +13,7 @@ use link::image::{
 use crate::application::Refused;
 use crate::port::{FitPrimitive, StoredPrimitive};
 use crate::recorded_filter::{self, OtherFilter};
-use crate::session::wire::PrimitiveTrouble;
+use crate::wire::PrimitiveTrouble;
 
 // The image's limits must not exceed what the control half can hold; a table that does not fit would be refused
 // only after its upload.

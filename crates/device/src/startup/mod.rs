@@ -1,22 +1,31 @@
-//! The state machine of the start-up: which frame comes next, and what its answer means.
+//! The start of the bus: from power-up to a cyclic loop, as a state machine that sends at most one frame per slot.
+//!
+//! Nothing here sends a torque other than zero, wakes or zeroes a puck while the safety module is ACTIVE, or goes on
+//! after a device has said something unexpected. After a failure it rests for a second and begins anew.
 //!
 //! Zero torque and IDLE to everything come first. Then the order is that of Barrett's library and drivers: enumerate,
 //! reload the limits of the safety module, wait for IDLE, enumerate again (the pucks have power only now), wake,
 //! verify, read, zero, tare, one position read, then the cyclic loop. Each step sends through an outlet that may refuse
 //! (a pause is not over); it then simply tries again in the next slot.
 
+mod hand;
+mod home;
+mod survey;
+mod waking;
+mod zeroing;
+
 use control::Calibration;
 use puck::{Counts, Group, Node, PropertyId, Reply, force_torque, set};
 
-use super::exchange::{Answer, Exchange};
-use super::hand::HandSurvey;
-use super::stage::{Stage, StartupError};
-use super::survey::{SafetyProperties, Survey};
-use crate::bus::Outlet;
+use crate::bus::{Answer, Exchange, Outlet};
 use crate::command::Refusal;
+use crate::stage::{Stage, StartupError};
+use hand::HandSurvey;
+pub(crate) use survey::SafetyProperties;
+use survey::Survey;
 
 /// Between two looks at the mode of the safety module while a person is awaited, us.
-pub(super) const POLL_US: u64 = 250_000;
+const POLL_US: u64 = 250_000;
 /// How long a failed start-up rests before it is tried again, us.
 const RETRY_US: u64 = 1_000_000;
 /// Velocity faults the safety module shall ignore when positions are rewritten.
@@ -26,11 +35,11 @@ const IGNORED_AT_START: i32 = 5;
 /// Transitions within one slot; more would mean a loop.
 const TRANSITIONS: usize = 8;
 /// First and last node that an enumeration asks.
-pub(super) const ENUMERATED: core::ops::RangeInclusive<u8> = 1..=31;
+const ENUMERATED: core::ops::RangeInclusive<u8> = 1..=31;
 
 /// Where the start-up stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Step {
+enum Step {
     /// Take off what torque may still be applied: frames 0 and 1 zero torques, then MODE IDLE to the arm and to the
     /// hand.
     ZeroTorques { frame: u8 },
@@ -87,7 +96,7 @@ pub(super) enum Step {
 }
 
 /// What a step decides.
-pub(super) enum Next {
+enum Next {
     /// Wait for an answer, a pause or a person.
     Stay,
     /// Go on with this step.
@@ -97,27 +106,27 @@ pub(super) enum Next {
 /// The start-up.
 #[derive(Clone, Debug)]
 pub(crate) struct Startup {
-    pub(super) step: Step,
-    pub(super) exchange: Exchange,
-    pub(super) survey: Survey,
-    pub(super) hand: HandSurvey,
-    pub(super) enumerations: u8,
-    pub(super) safety: Option<SafetyProperties>,
-    pub(super) calibration: Option<Calibration<f32>>,
-    pub(super) targets: [Counts; 7],
-    pub(super) positions: [Option<Counts>; 7],
-    pub(super) zeroed: bool,
+    step: Step,
+    exchange: Exchange,
+    survey: Survey,
+    hand: HandSurvey,
+    enumerations: u8,
+    safety: Option<SafetyProperties>,
+    calibration: Option<Calibration<f32>>,
+    targets: [Counts; 7],
+    positions: [Option<Counts>; 7],
+    zeroed: bool,
     /// The posture that `targets` are the counts of (rad).
-    pub(super) home: [f32; 7],
+    home: [f32; 7],
     /// The same once the arm has been zeroed there.
-    pub(super) zeroed_at: Option<[f32; 7]>,
-    pub(super) zero_request: ZeroRequest,
-    pub(super) error: Option<StartupError>,
+    zeroed_at: Option<[f32; 7]>,
+    zero_request: ZeroRequest,
+    error: Option<StartupError>,
 }
 
 /// What has become of a person's command to zero the arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) enum ZeroRequest {
+enum ZeroRequest {
     /// There is none, or its answer has been fetched.
     #[default]
     None,
@@ -346,17 +355,12 @@ impl Startup {
         }
     }
 
-    pub(super) fn safety(&self) -> Result<&SafetyProperties, StartupError> {
+    fn safety(&self) -> Result<&SafetyProperties, StartupError> {
         self.safety.as_ref().ok_or(StartupError::NoSafetyModule)
     }
 
     /// Asks a node; `None` while no answer has come.
-    pub(super) fn ask(
-        &mut self,
-        node: Node,
-        property: PropertyId,
-        outlet: &mut impl Outlet,
-    ) -> Result<Option<i32>, StartupError> {
+    fn ask(&mut self, node: Node, property: PropertyId, outlet: &mut impl Outlet) -> Result<Option<i32>, StartupError> {
         match self.exchange.ask(node, property, outlet) {
             Answer::Pending => Ok(None),
             Answer::Value(value) => Ok(Some(value)),
@@ -364,16 +368,12 @@ impl Startup {
         }
     }
 
-    pub(super) fn ask_safety(
-        &mut self,
-        property: PropertyId,
-        outlet: &mut impl Outlet,
-    ) -> Result<Option<i32>, StartupError> {
+    fn ask_safety(&mut self, property: PropertyId, outlet: &mut impl Outlet) -> Result<Option<i32>, StartupError> {
         self.ask(Node::SAFETY_MODULE, property, outlet)
     }
 }
 
 /// Go on once something has happened.
-pub(super) fn after(happened: bool, step: Step) -> Next {
+fn after(happened: bool, step: Step) -> Next {
     if happened { Next::Go(step) } else { Next::Stay }
 }

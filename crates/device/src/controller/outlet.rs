@@ -1,19 +1,11 @@
-//! The way out to the bus: counts every frame and, in the start-up, keeps the pauses.
+//! The way out to the bus in one slot: counts every frame and keeps the pauses.
 
 use puck::CanFrame;
 
 use crate::application::ControllerIo;
+use crate::bus::{Outlet, Pacer};
 use crate::controller::DeviceController;
 use crate::health::Counters;
-use crate::startup::Pacer;
-
-/// Where a frame is sent, at a moment of device time.
-pub trait Outlet {
-    /// Device time of this slot, us.
-    fn now_us(&self) -> u64;
-    /// Sends the frame, unless a pause is not over or the controller has no room. Whether it was sent.
-    fn send(&mut self, frame: CanFrame) -> bool;
-}
 
 /// The outlet of one slot.
 pub(crate) struct SlotOutlet<'a, I: ControllerIo<DeviceController>> {
