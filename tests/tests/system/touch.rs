@@ -174,7 +174,7 @@ fn a_sensor_error_within_the_dead_band_neither_moves_the_plan_nor_makes_the_hand
         plans
     };
     for seed in 1..=3 {
-        let arm = Arm { engine: engine("sil:"), kind: PlantKind::Honest, variation: Variation::default(), seed };
+        let arm = Arm { engine: engine("sil:"), kind: PlantKind::Perturbed, variation: Variation::default(), seed };
         let (bent, taught) = (touchless(&arm, procedure::Mode::Adaptive), touchless(&arm, procedure::Mode::OpenLoop));
         let approach = BEFORE_CLOSING * RATE as usize;
         assert!(bent.len() > approach && taught.len() > approach, "{} {}", bent.len(), taught.len());
