@@ -95,6 +95,14 @@ impl<T: Transport> Client<T> {
         self.order(&Request::ClearFault)
     }
 
+    /// Gives up torque. An arm that is not braked sinks.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn release(&mut self) -> Result<(), HostError> {
+        self.order(&Request::Release)
+    }
+
     /// Stops any motion and waits until the arm has left it.
     ///
     /// # Errors
