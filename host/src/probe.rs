@@ -41,7 +41,7 @@ pub enum ProbeError {
     Failed {
         /// The command.
         line: Line,
-        /// How it ended.
+        /// Its exit status.
         status: ExitStatus,
     },
 }

@@ -105,7 +105,7 @@ fn a_run_over_can_is_the_run_over_the_serial_line_to_the_last_bit() {
     assert_eq!((at_device.gaps, at_device.duplicates, at_device.malformed), (0, 0, 0));
 }
 
-/// What a bus could carry at most of these very bytes: frames of eight, back to back, with the stuff bits they have.
+/// The most that a bus could carry of these very bytes: frames of eight, back to back, with the stuff bits they have.
 /// Byte/s.
 fn possible(bytes: &[u8]) -> f64 {
     let frames = bytes.chunks(SEGMENT_BYTES).filter_map(|part| CanFrame::new(CanId::new(0x010)?, part));

@@ -48,7 +48,7 @@ fn the_position_margin_is_the_distance_to_the_nearer_soft_limit() {
 #[test]
 fn a_movement_that_is_too_fast_is_refused() {
     let mut primitive = reach(5.0);
-    primitive.duration = 0.6;
+    primitive.movement.duration = 0.6;
     let report = checked(&primitive);
     assert!(!report.passed(), "{}", report.to_text());
     assert!(
@@ -87,7 +87,7 @@ fn a_pose_that_is_not_that_of_its_posture_is_refused() {
 fn a_plan_that_leaves_the_workspace_is_refused() {
     let mut primitive = reach(3.0);
     // A forcing term that throws the hand forward in the middle of the movement.
-    for weight in &mut primitive.weights[0][15..25] {
+    for weight in &mut primitive.weights.position[0][15..25] {
         *weight += 40.0;
     }
     let report = checked(&primitive);
@@ -107,7 +107,7 @@ fn a_primitive_of_another_arm_is_refused() {
 #[test]
 fn a_duration_that_the_integration_cannot_follow_is_refused() {
     let mut primitive = reach(3.0);
-    primitive.duration = 0.05;
+    primitive.movement.duration = 0.05;
     let error = check(&primitive, 1.0, |_| {}).unwrap_err();
     assert!(matches!(error, PrimitiveFileError::Invalid { .. }), "{error}");
 }

@@ -36,7 +36,7 @@ fn stand_in(folder: &Path, program: &str, status: u8) {
     fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
 }
 
-/// What the stand-ins were asked to do.
+/// The calls that the stand-ins received.
 fn calls(folder: &Path) -> Vec<String> {
     let text = fs::read_to_string(folder.join("calls")).unwrap_or_default();
     text.lines().map(str::to_owned).collect()

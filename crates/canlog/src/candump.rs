@@ -112,7 +112,7 @@ pub enum LineError {
     /// Not `(time) interface id#data`.
     #[error("a line looks like `(12.345678) can0 123#0102`")]
     Form,
-    /// What stands in parentheses is no time in seconds.
+    /// The text in parentheses is no time in seconds.
     #[error("'{0}' is no time in seconds")]
     Time(String),
     /// The identifier has neither three nor eight hexadecimal digits, or is too large.
@@ -124,9 +124,9 @@ pub enum LineError {
     /// More bytes than such a frame holds.
     #[error("{found} data bytes, at most {most} fit")]
     Length {
-        /// How many.
+        /// Data bytes found.
         found: usize,
-        /// How many may be.
+        /// Most data bytes of such a frame.
         most: usize,
     },
 }

@@ -17,7 +17,7 @@ use crate::value::{self, Reading};
 /// Nodes that the address field can name.
 const NODES: usize = 32;
 
-/// What a frame is.
+/// The kind of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
@@ -45,7 +45,7 @@ pub enum Kind {
     SafetyBroadcast,
     /// The link on the host's bus.
     Link,
-    /// What the controller says about errors.
+    /// A report of the controller about errors.
     Error,
     /// Nothing that has a place on this bus.
     Unknown,
@@ -92,10 +92,10 @@ impl Kind {
     }
 }
 
-/// What a frame means.
+/// The meaning of a frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Meaning {
-    /// What it is.
+    /// Its kind.
     pub kind: Kind,
     /// Who sends it.
     pub from: String,
@@ -132,7 +132,7 @@ impl Meaning {
         Self::new(Kind::Link, from, to).remark(remark)
     }
 
-    /// What it says, in one phrase.
+    /// The content in one phrase.
     #[must_use]
     pub fn sentence(&self) -> String {
         let values: Vec<String> = self.values.iter().map(ToString::to_string).collect();
@@ -175,7 +175,7 @@ impl Default for Decoder {
 }
 
 impl Decoder {
-    /// What is known of a node.
+    /// Everything known of a node.
     #[must_use]
     pub fn puck(&self, node: Node) -> &PuckState {
         // Node numbers end at 31.
@@ -376,7 +376,7 @@ fn with_status(meaning: Meaning, status: Option<puck::GaugeStatus>) -> Meaning {
     if words.is_empty() { meaning } else { meaning.remark(words.join("; ")) }
 }
 
-/// What the controller complains about: the classes of Linux' `can/error.h`.
+/// The complaints of the controller: the classes of Linux' `can/error.h`.
 fn errors(class: u32, data: &[u8]) -> String {
     const CLASSES: [&str; 10] = [
         "transmit time-out",

@@ -71,7 +71,7 @@ impl HostLink {
         (gaps, bad.sum())
     }
 
-    /// What a frame means.
+    /// The meaning of a frame.
     pub fn read(&mut self, frame: &CanFrame) -> Option<Meaning> {
         let (heading, messages) = self.take(frame)?;
         let device = format!("device {}", heading.device);

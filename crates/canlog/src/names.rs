@@ -1,4 +1,4 @@
-//! What the participants of the arm's bus are called.
+//! Names of the participants of the arm's bus.
 
 use puck::{Destination, Group, Node};
 

@@ -1,4 +1,4 @@
-//! What a log has told about one puck so far: what it runs, and its scales. Numbers of properties mean nothing
+//! The state of one puck as a log has shown it so far: its firmware and its scales. Numbers of properties mean nothing
 //! without it.
 
 use puck::{Node, Property, PropertyId, PropertyTable, Role, Status};

@@ -4,7 +4,7 @@ use crate::candump::{AnyFrame, LogLine};
 use crate::decoder::{Decoder, Meaning};
 use crate::host_link::HostLink;
 
-/// What an interface carries.
+/// The traffic of an interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BusKind {
     /// Barrett's protocol.
@@ -31,7 +31,7 @@ impl Interface {
         Self { name: name.into(), kind: BusKind::Host, decoder: Decoder::default(), link: HostLink::default() }
     }
 
-    /// What it carries, as far as is known.
+    /// Its traffic, as far as is known.
     #[must_use]
     pub fn kind(&self) -> BusKind {
         self.kind
@@ -56,7 +56,7 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// What a line means, and the interface it belongs to.
+    /// The meaning of a line, and the interface it belongs to.
     pub fn read(&mut self, line: &LogLine) -> (Meaning, &Interface) {
         let place = self.interfaces.iter().position(|interface| interface.name == line.interface);
         let place = place.unwrap_or_else(|| {

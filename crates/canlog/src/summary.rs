@@ -1,4 +1,4 @@
-//! What a log comes to: frames by kind, load, replies that did not come, and how even the cycle is.
+//! Summary of a log: frames by kind, load, replies that did not come, and the jitter of the cycle.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use crate::candump::{AnyFrame, LogLine};
 use crate::decoder::{Decoder, Kind, Meaning};
 use crate::names;
 
-/// A reply that has not come so long after its request is lost, us. Waking pucks take up to 50 ms.
+/// A reply that has not come this long after its request is lost, us. Waking pucks take up to 50 ms.
 const PATIENCE_US: u64 = 50_000;
 
 /// A node that has said nothing for so long is off or asleep and owes no reply, us.
@@ -22,7 +22,7 @@ const WINDOW_US: u64 = 100_000;
 /// Bit rate of both buses, bit/us.
 const BITS_PER_MICROSECOND: f64 = 1.0;
 
-/// What answers a request.
+/// The reply that a request expects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Answer {
     Property(u8),
@@ -127,7 +127,7 @@ impl Account {
         }
     }
 
-    /// What it comes to. `pucks` know the firmware.
+    /// The summary. `pucks` know the firmware.
     #[must_use]
     pub fn sum(&self, interface: &str, pucks: &Decoder) -> Summary {
         let duration_us = self.last_us - self.first_us.unwrap_or(self.last_us);
@@ -276,11 +276,11 @@ fn bits(frame: &AnyFrame) -> u32 {
 /// Frames of one kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KindSummary {
-    /// Which.
+    /// The kind.
     pub kind: Kind,
-    /// How many.
+    /// Their number.
     pub frames: u64,
-    /// How many a second.
+    /// Their rate, 1/s.
     pub per_second: f64,
     /// Their share of the bus' time, 0 to 1.
     pub load: f64,
@@ -308,10 +308,10 @@ pub struct NodeSummary {
     pub delay_worst_us: u64,
 }
 
-/// How even the control cycle is, by its position requests.
+/// Regularity of the control cycle, by its position requests.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CycleSummary {
-    /// How many.
+    /// Their number.
     pub cycles: u64,
     /// Mean period, us.
     pub mean_us: f64,
@@ -325,14 +325,14 @@ pub struct CycleSummary {
     pub longest_us: u32,
 }
 
-/// What one interface came to.
+/// Summary of one interface.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// Its name.
     pub interface: String,
     /// From its first frame to its last, s.
     pub seconds: f64,
-    /// How many frames.
+    /// Number of frames.
     pub frames: u64,
     /// Frames that have no name here.
     pub unnamed: u64,

@@ -10,7 +10,7 @@ use crate::puck_state::PuckState;
 /// One number off the bus with what it means.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reading {
-    /// What it is one of several of, e.g. `x` or `M3`; empty if it stands alone.
+    /// The member of several values that it is, e.g. `x` or `M3`; empty if it stands alone.
     #[serde(skip_serializing_if = "str::is_empty")]
     pub of: &'static str,
     /// The integer as sent.

@@ -13,7 +13,7 @@ use lab::procedure::Mode;
 /// Something that should be smaller with adaptation.
 #[derive(Debug, Clone, Copy)]
 pub struct Quantity {
-    /// What it is.
+    /// Name of the quantity.
     pub name: &'static str,
     /// Its unit in tables and figures.
     pub unit: &'static str,
@@ -47,7 +47,7 @@ const TABLE: Quantity = Quantity {
     value: |measures| measures.table_peak_n,
 };
 
-/// What an experiment compares; the first quantities decide.
+/// The quantities that an experiment compares; the first ones decide.
 pub fn quantities(scenario: Scenario) -> &'static [Quantity] {
     match scenario {
         Scenario::Flashlight | Scenario::Cup => &[PUSH, CONTACT],
@@ -59,7 +59,7 @@ pub fn quantities(scenario: Scenario) -> &'static [Quantity] {
 /// One quantity, adaptation relative to open loop.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Ratio {
-    /// What it is.
+    /// Name of the quantity.
     pub name: &'static str,
     /// Share of open loop below which adaptation should stay.
     pub bar: f64,
@@ -138,7 +138,7 @@ impl Comparison {
     }
 }
 
-/// Whether open loop meets at all what the comparison is about.
+/// True if the hand touches in open loop what the comparison is about.
 fn meets(open: &Report, scenario: Scenario) -> bool {
     let measures = &open.measures;
     match scenario {

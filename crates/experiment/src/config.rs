@@ -1,4 +1,4 @@
-//! What an experiment consists of, and the hash by which its results are known.
+//! The parts of an experiment, and the hash by which its results are known.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -24,21 +24,21 @@ const VERSION: u32 = 1;
 /// An experiment.
 #[derive(Debug, Clone)]
 pub struct Config {
-    /// Which.
+    /// The scenario.
     pub scenario: Scenario,
-    /// What stands on the table.
+    /// The object on the table.
     pub object: ObjectKind,
     /// Where.
     pub grid: Grid,
-    /// How the primitive is played.
+    /// The modes in which the primitive is played.
     pub modes: Vec<Mode>,
     /// With which seeds.
     pub seeds: Vec<u64>,
-    /// What executes the co-controller's application.
+    /// The engine that executes the co-controller's application.
     pub engine: Engine,
-    /// How well the model fits.
+    /// The difference between plant and model.
     pub plant: PlantKind,
-    /// What differs from that plant.
+    /// Factors that differ from that plant.
     pub variation: Variation,
     /// The primitive.
     pub primitive: PrimitiveFile,
@@ -57,7 +57,7 @@ pub struct Config {
 }
 
 impl Config {
-    /// The scenario as it is meant: all modes, seed 1, in this process, the honest plant, all processors, nothing on
+    /// The scenario as it is meant: all modes, seed 1, in this process, the perturbed plant, all processors, nothing on
     /// disk.
     pub fn new(scenario: Scenario, primitive: PrimitiveFile) -> Config {
         Config {
@@ -67,7 +67,7 @@ impl Config {
             modes: scenario.modes(),
             seeds: vec![1],
             engine: Engine::InProcess,
-            plant: PlantKind::Honest,
+            plant: PlantKind::Perturbed,
             variation: Variation::default(),
             primitive,
             jobs: std::thread::available_parallelism().map_or(1, usize::from),
@@ -104,8 +104,8 @@ impl Config {
             let start = self.primitive.start.position;
             [x - start[0], y - start[1]]
         };
-        // The object's place in the lesson: the grasp point need not end in its axis.
-        let short = self.scenario.lesson().short_of_object() / direction[0].hypot(direction[1]);
+        // The object's place in the demonstration: the grasp point need not end in its axis.
+        let short = self.scenario.taught_movement().short_of_object() / direction[0].hypot(direction[1]);
         ApproachFrame::new([x + short * direction[0], y + short * direction[1]], direction)
     }
 
@@ -150,7 +150,7 @@ impl Config {
         closing.map_or(goal.position, |reference| reference.poses[0].position.x)
     }
 
-    /// What the results belong to. Modes and seeds do not count: more of them may be added later.
+    /// The identity of the results. Modes and seeds do not count: more of them may be added later.
     pub fn header(&self) -> Header {
         let frame = self.frame().unwrap_or(ApproachFrame { goal: [0.0; 2], direction: [1.0, 0.0] });
         let cells: Vec<String> = self.grid.cells.iter().map(Cell::to_string).collect();

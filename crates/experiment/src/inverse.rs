@@ -39,7 +39,7 @@ pub fn reach(position: [f64; 3], orientation: [f64; 4], near: [f64; 7]) -> Optio
     None
 }
 
-/// What is missing to the pose: way (m) and turn (rad), world axes.
+/// Distance to the pose: way (m) and turn (rad), world axes.
 fn error(frames: &Frames<f64>, position: [f64; 3], [w, x, y, z]: [f64; 4]) -> Vector6<f64> {
     let pose = frames.tool_pose();
     let way = Vector3::from(position) - pose.position;

@@ -16,8 +16,6 @@ pub mod fixtures;
 pub mod grid;
 pub mod inverse;
 #[cfg(feature = "mujoco")]
-pub mod lesson;
-#[cfg(feature = "mujoco")]
 pub mod lift;
 pub mod map;
 pub mod observation;
@@ -26,6 +24,8 @@ pub mod observed;
 pub mod outcome;
 #[cfg(feature = "mujoco")]
 pub mod plant;
+#[cfg(feature = "mujoco")]
+pub mod preparation;
 mod quantile;
 #[cfg(feature = "mujoco")]
 pub mod reach;

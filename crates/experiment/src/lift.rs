@@ -7,7 +7,7 @@
 use serde::Serialize;
 
 use super::config::Config;
-use super::lesson::{self, LessonError};
+use super::preparation::{self, PreparationError};
 use super::quantile::quantile;
 use super::results::Results;
 use lab::client::Interrupt;
@@ -15,7 +15,7 @@ use lab::primitive_file::PrimitiveFile;
 use lab::table::Table;
 use sim::world::mujoco::{ObjectKind, ObjectSpec};
 
-/// How much heavier the heavier one is, kg.
+/// Mass that the heavier one has beyond the other, kg.
 pub const EXTRA: f64 = 0.3;
 
 /// A weight that is carried, and the weight that is remembered.
@@ -65,12 +65,12 @@ impl Case {
     /// The primitive of this case: the same movement, rehearsed with the weight that shall be remembered.
     ///
     /// # Errors
-    /// [`LessonError`]
-    pub fn rehearsed(self, config: &Config, interrupt: &Interrupt) -> Result<PrimitiveFile, LessonError> {
+    /// [`PreparationError`]
+    pub fn rehearsed(self, config: &Config, interrupt: &Interrupt) -> Result<PrimitiveFile, PreparationError> {
         let [remembered, _] = self.factors();
         let mut rehearsal = config.clone();
         rehearsal.variation.mass *= remembered;
-        lesson::rehearsed(&rehearsal, interrupt)
+        preparation::rehearsed(&rehearsal, interrupt)
     }
 
     /// The case whose rehearsals this one shares.
@@ -79,7 +79,7 @@ impl Case {
     }
 }
 
-/// What one case came to in one mode.
+/// The result of one case in one mode.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Carried {
     /// The case.
@@ -94,7 +94,7 @@ pub struct Carried {
     pub trials: usize,
     /// Trials in which it was held.
     pub held: usize,
-    /// How far the hand is below its plan when it has lifted, m: median over the trials.
+    /// Distance of the hand below its plan when it has lifted, m: median over the trials.
     pub sag_median_m: f64,
     /// The same, the worst trial.
     pub sag_max_m: f64,

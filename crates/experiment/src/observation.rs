@@ -1,4 +1,4 @@
-//! What the world itself saw in a trial, every 10 ms: things that no sensor of the arm measures.
+//! The state of the world in a trial, every 10 ms: quantities that no sensor of the arm measures.
 
 /// Physics steps in one sample: 10 ms, over which contact forces are averaged. Shorter peaks are the contact
 /// solver's, not the world's.
@@ -36,7 +36,7 @@ impl Contact {
         self.hand_on_object[0].hypot(self.hand_on_object[1])
     }
 
-    /// Whether the hand touches the object.
+    /// True while the hand touches the object.
     pub fn touches(&self) -> bool {
         self.palm > 0.0 || self.fingers.iter().any(|force| *force > 0.0)
     }
@@ -61,7 +61,7 @@ pub struct Sample {
 
 /// When the parts of a trial began, virtual time, s.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Marks {
+pub struct Milestones {
     /// The primitive started.
     pub run: f64,
     /// The arm began to lift.
@@ -75,7 +75,7 @@ pub struct Marks {
 pub struct Observation {
     /// Samples in order of time.
     pub samples: Vec<Sample>,
-    /// Whether a finger has pressed harder than the object bears.
+    /// True once a finger has pressed harder than the object bears.
     pub crushed: bool,
 }
 

@@ -1,10 +1,10 @@
-//! How a trial ended, and what happened to the object on the way.
+//! The outcome of a trial, and what happened to the object on the way.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::observation::{Marks, Observation, SAMPLE_SECONDS, Sample};
+use super::observation::{Milestones, Observation, SAMPLE_SECONDS, Sample};
 use super::quantile::quantile;
 
 /// An object that leaned farther than this before the grasp closed counts as knocked over.
@@ -29,7 +29,7 @@ const TOUCH: f64 = 0.05;
 /// Time over which a sustained force is averaged, s.
 const SUSTAINED: f64 = 0.1;
 
-/// How a trial ended.
+/// The outcome of a trial.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "outcome", content = "fault", rename_all = "snake_case")]
 pub enum Outcome {
@@ -63,7 +63,7 @@ impl Outcome {
         }
     }
 
-    /// Whether the object was grasped, lifted and held.
+    /// True if the object was grasped, lifted and held.
     pub fn is_success(&self) -> bool {
         *self == Outcome::Held
     }
@@ -91,7 +91,7 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// What happened to the object and between hand, object and table. Times are seconds after the primitive started.
+/// Forces and motion of the object, and between hand, object and table. Times are seconds after the primitive started.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Measures {
     /// Height of the object above where it stood, at the end, m.
@@ -128,15 +128,15 @@ pub struct Measures {
     pub finger_peak_n: f64,
 }
 
-/// What a trial is judged by.
+/// The rule by which a trial is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rule {
-    /// Whether leaning over counts as failure: not for objects that lie.
+    /// True if leaning over counts as failure: not for objects that lie.
     pub upright: bool,
 }
 
 /// Judges a trial. `fault` is the name of the fault that stopped the arm, if one did.
-pub fn judge(observation: &Observation, marks: &Marks, rule: Rule, fault: Option<&str>) -> (Outcome, Measures) {
+pub fn judge(observation: &Observation, marks: &Milestones, rule: Rule, fault: Option<&str>) -> (Outcome, Measures) {
     let (Some(first), Some(last)) =
         (observation.at(marks.run).or(observation.samples.first()), observation.samples.last())
     else {
@@ -233,7 +233,7 @@ mod tests {
     use super::*;
     use crate::observation::Contact;
 
-    const MARKS: Marks = Marks { run: 1.0, lift: 13.0, hold: 15.0 };
+    const MILESTONES: Milestones = Milestones { run: 1.0, lift: 13.0, hold: 15.0 };
     const UPRIGHT: Rule = Rule { upright: true };
 
     /// A grasp that works: touched at 6 s with 3 N, fingers close from 9 s, lifted from 13 to 15 s.
@@ -263,7 +263,7 @@ mod tests {
 
     #[test]
     fn a_lifted_object_that_stays_in_the_hand_is_held() {
-        let (outcome, measures) = judge(&good(), &MARKS, UPRIGHT, None);
+        let (outcome, measures) = judge(&good(), &MILESTONES, UPRIGHT, None);
         assert_eq!(outcome, Outcome::Held);
         assert!((measures.lift_m - 0.1).abs() < 1e-9);
         assert!((measures.contact_peak_n - 3.0).abs() < 1e-12 && (measures.contact_median_n - 3.0).abs() < 1e-12);
@@ -281,18 +281,18 @@ mod tests {
         // It rocked once and came back; half a second before it falls it leaves its foot for good.
         observation.samples[700].tilt = 0.3;
         observation.samples[750..800].iter_mut().for_each(|sample| sample.tilt = 0.2);
-        let (outcome, measures) = judge(&observation, &MARKS, UPRIGHT, None);
+        let (outcome, measures) = judge(&observation, &MILESTONES, UPRIGHT, None);
         assert_eq!(outcome, Outcome::KnockedOver);
         assert!((measures.failure_s.unwrap() - 6.5).abs() < 1e-9);
         // A bottle that lies has no upright to lean from.
-        assert_eq!(judge(&observation, &MARKS, Rule { upright: false }, None).0, Outcome::Held);
+        assert_eq!(judge(&observation, &MILESTONES, Rule { upright: false }, None).0, Outcome::Held);
     }
 
     #[test]
     fn a_crushed_object_is_no_success_however_well_it_is_held() {
         let mut observation = good();
         observation.crushed = true;
-        let (outcome, measures) = judge(&observation, &MARKS, UPRIGHT, None);
+        let (outcome, measures) = judge(&observation, &MILESTONES, UPRIGHT, None);
         assert_eq!((outcome.is_success(), outcome.word(), measures.finger_peak_n), (false, "crushed", 8.0));
     }
 
@@ -300,29 +300,29 @@ mod tests {
     fn an_object_that_falls_while_it_is_held_was_dropped() {
         let mut observation = good();
         observation.samples.iter_mut().filter(|sample| sample.time > 16.0).for_each(|sample| sample.object[2] = 0.0);
-        assert_eq!(judge(&observation, &MARKS, UPRIGHT, None).0, Outcome::Dropped);
+        assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, None).0, Outcome::Dropped);
         observation.samples[1620..].iter_mut().for_each(|sample| sample.contact = Contact::default());
-        assert!((judge(&observation, &MARKS, UPRIGHT, None).1.failure_s.unwrap() - 15.19).abs() < 1e-9);
+        assert!((judge(&observation, &MILESTONES, UPRIGHT, None).1.failure_s.unwrap() - 15.19).abs() < 1e-9);
         // Thrown up and out of the hand is not held either.
         let mut observation = good();
         observation.samples.iter_mut().filter(|sample| sample.time > 15.5).for_each(|sample| sample.object[0] = 1.3);
-        assert_eq!(judge(&observation, &MARKS, UPRIGHT, None).0, Outcome::Dropped);
+        assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, None).0, Outcome::Dropped);
     }
 
     #[test]
     fn an_object_that_stays_was_missed_and_one_that_went_was_pushed_away() {
         let mut observation = good();
         observation.samples.iter_mut().for_each(|sample| sample.object[2] = 0.0);
-        assert_eq!(judge(&observation, &MARKS, UPRIGHT, None).0, Outcome::Missed);
+        assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, None).0, Outcome::Missed);
         observation.samples.iter_mut().filter(|sample| sample.time > 7.0).for_each(|sample| sample.object[1] = 0.26);
-        let (outcome, measures) = judge(&observation, &MARKS, UPRIGHT, None);
+        let (outcome, measures) = judge(&observation, &MILESTONES, UPRIGHT, None);
         assert_eq!(outcome, Outcome::PushedAway);
         assert!((measures.push_m - 0.06).abs() < 1e-12 && (measures.failure_s.unwrap() - 6.01).abs() < 1e-9);
     }
 
     #[test]
     fn a_fault_outweighs_everything_and_keeps_its_name() {
-        let (outcome, _) = judge(&good(), &MARKS, UPRIGHT, Some("soft limits"));
+        let (outcome, _) = judge(&good(), &MILESTONES, UPRIGHT, Some("soft limits"));
         assert_eq!(outcome, Outcome::Stopped("soft limits".into()));
         let text = serde_json::to_string(&outcome).unwrap();
         assert_eq!(text, r#"{"outcome":"stopped","fault":"soft limits"}"#);
@@ -333,7 +333,7 @@ mod tests {
     fn a_short_peak_is_a_peak_but_no_sustained_force() {
         let mut observation = good();
         observation.samples[650].contact.hand_on_object = [0.0, 30.0, 400.0];
-        let (_, measures) = judge(&observation, &MARKS, UPRIGHT, None);
+        let (_, measures) = judge(&observation, &MILESTONES, UPRIGHT, None);
         assert!((measures.contact_peak_n - 30.0).abs() < 1e-12);
         assert!((measures.contact_sustained_n - 5.7).abs() < 1e-9, "{}", measures.contact_sustained_n);
         assert!((measures.contact_median_n - 3.0).abs() < 1e-12);

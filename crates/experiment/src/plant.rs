@@ -10,26 +10,26 @@ use super::seed;
 use super::variation::Variation;
 use lab::simulation::{CYCLE_TICKS, Engine, SimulationOptions, WorldKind};
 
-/// Error of the force sensor of the honest plant, N; a variation of the bias takes its place.
-const HONEST_BIAS: f64 = 0.1;
+/// Error of the force sensor of the perturbed plant, N; a variation of the bias takes its place.
+const PERTURBED_BIAS: f64 = 0.1;
 /// Time in which that error comes up, from the start of the run on. A constant one would be tared away when the run
 /// starts, and would show nothing: what a run suffers from is what comes after, when the sensor warms or creeps.
 pub const BIAS_OVER: Ticks = 2_000 * TICKS_PER_MILLISECOND;
 /// Half-width of its hysteresis, N and N m.
-const HONEST_HYSTERESIS: [f64; 2] = [0.05, 0.0015];
+const PERTURBED_HYSTERESIS: [f64; 2] = [0.05, 0.0015];
 
-/// How long after its torque has come the operator still holds the arm: the host, which uploads first, needs half a
+/// Time for which the operator holds the arm after its torque has come: the host, which uploads first, needs half a
 /// second to see it and to make it hold itself, and an arm that nobody holds falls.
 const LET_GO: Ticks = 900 * TICKS_PER_MILLISECOND;
 
-/// Which arm.
+/// Choice of the arm.
 #[derive(Debug, Clone)]
 pub struct Arm {
-    /// What executes the co-controller's application.
+    /// The engine that executes the co-controller's application.
     pub engine: Engine,
-    /// How well the model fits.
+    /// The difference between plant and model.
     pub kind: PlantKind,
-    /// What differs from that plant.
+    /// Factors that differ from that plant.
     pub variation: Variation,
     /// Seed that draws the arm: the same seed, the same arm.
     pub seed: u64,
@@ -39,10 +39,10 @@ pub struct Arm {
 pub fn options(arm: &Arm, noise_seed: u64, posture: [f64; 7], scene: Scene) -> SimulationOptions {
     let variation = &arm.variation;
     let drawn = match arm.kind {
-        PlantKind::Honest => Imperfections::drawn(arm.seed),
+        PlantKind::Perturbed => Imperfections::drawn(arm.seed),
         PlantKind::Ideal => Imperfections::NONE,
     };
-    let honest = f64::from(u8::from(arm.kind == PlantKind::Honest));
+    let perturbed = f64::from(u8::from(arm.kind == PlantKind::Perturbed));
     let mut options = SimulationOptions::new(arm.engine.clone(), noise_seed, WorldKind::Mujoco);
     options.posture = posture;
     options.scene = scene;
@@ -57,8 +57,8 @@ pub fn options(arm: &Arm, noise_seed: u64, posture: [f64; 7], scene: Scene) -> S
         torque_delay: Ticks::from(variation.delay) * CYCLE_TICKS,
         force_torque: ForceTorqueConfig {
             noise_scale: variation.noise,
-            force_hysteresis: honest * HONEST_HYSTERESIS[0],
-            torque_hysteresis: honest * HONEST_HYSTERESIS[1],
+            force_hysteresis: perturbed * PERTURBED_HYSTERESIS[0],
+            torque_hysteresis: perturbed * PERTURBED_HYSTERESIS[1],
             ..ForceTorqueConfig::default()
         },
         ..PlantConfig::default()
@@ -69,7 +69,7 @@ pub fn options(arm: &Arm, noise_seed: u64, posture: [f64; 7], scene: Scene) -> S
 
 /// The error that the force sensor comes to in a run, N and N m, sensor axes.
 pub fn bias(arm: &Arm) -> [f64; 6] {
-    let usual = if arm.kind == PlantKind::Honest { HONEST_BIAS } else { 0.0 };
+    let usual = if arm.kind == PlantKind::Perturbed { PERTURBED_BIAS } else { 0.0 };
     let size = if arm.variation.bias > 0.0 { arm.variation.bias } else { usual };
     let [x, y, z] = seed::direction(arm.seed).map(|part| size * part);
     [x, y, z, 0.0, 0.0, 0.0]
@@ -100,22 +100,22 @@ mod tests {
     }
 
     #[test]
-    fn an_honest_arm_has_the_errors_that_are_promised_and_a_seed_is_an_arm() {
-        let options = arm(PlantKind::Honest, "", 3);
+    fn a_perturbed_arm_has_the_errors_that_are_promised_and_a_seed_is_an_arm() {
+        let options = arm(PlantKind::Perturbed, "", 3);
         let sensor = options.plant.force_torque;
-        assert!((bias_of(PlantKind::Honest, "") - HONEST_BIAS).abs() < 1e-12 && sensor.force_hysteresis > 0.0);
+        assert!((bias_of(PlantKind::Perturbed, "") - PERTURBED_BIAS).abs() < 1e-12 && sensor.force_hysteresis > 0.0);
         assert!(options.imperfections.cables.is_some());
-        assert_eq!(options.imperfections, arm(PlantKind::Honest, "", 3).imperfections);
-        assert_ne!(options.imperfections, arm(PlantKind::Honest, "", 4).imperfections);
+        assert_eq!(options.imperfections, arm(PlantKind::Perturbed, "", 3).imperfections);
+        assert_ne!(options.imperfections, arm(PlantKind::Perturbed, "", 4).imperfections);
     }
 
     #[test]
     fn a_variation_changes_what_it_names() {
-        let usual = arm(PlantKind::Honest, "", 1);
-        let varied = arm(PlantKind::Honest, "joint-friction=1.3,noise=3,delay=1,bias=0.2", 1);
+        let usual = arm(PlantKind::Perturbed, "", 1);
+        let varied = arm(PlantKind::Perturbed, "joint-friction=1.3,noise=3,delay=1,bias=0.2", 1);
         let ratio = varied.imperfections.friction[2] / usual.imperfections.friction[2];
         assert!((ratio - 1.3).abs() < 1e-12 && varied.imperfections.links == usual.imperfections.links);
         assert_eq!((varied.plant.torque_delay, varied.plant.force_torque.noise_scale), (CYCLE_TICKS, 3.0));
-        assert!((bias_of(PlantKind::Honest, "bias=0.2") - 0.2).abs() < 1e-12);
+        assert!((bias_of(PlantKind::Perturbed, "bias=0.2") - 0.2).abs() < 1e-12);
     }
 }

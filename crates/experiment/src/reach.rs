@@ -1,4 +1,4 @@
-//! Whether objects can be reached at all: found out before an experiment starts.
+//! Reachability of the objects, checked before an experiment starts.
 
 use std::fmt;
 
@@ -13,7 +13,7 @@ const SPAN: f64 = 0.06;
 
 /// Why an object cannot be tried.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Trouble {
+pub enum Unreachable {
     /// It would stand beside the table.
     OffTable,
     /// The arm does not reach so far with the hand as it is taught.
@@ -22,29 +22,29 @@ pub enum Trouble {
     Refused(String),
 }
 
-impl fmt::Display for Trouble {
+impl fmt::Display for Unreachable {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Trouble::OffTable => formatter.write_str("not on the table"),
-            Trouble::OutOfReach => formatter.write_str("out of reach"),
-            Trouble::Refused(reason) => formatter.write_str(reason),
+            Unreachable::OffTable => formatter.write_str("not on the table"),
+            Unreachable::OutOfReach => formatter.write_str("out of reach"),
+            Unreachable::Refused(reason) => formatter.write_str(reason),
         }
     }
 }
 
 /// The cells whose object cannot be tried, with the reason.
-pub fn check(config: &Config, frame: &ApproachFrame) -> Vec<(Cell, Trouble)> {
-    let troubles = config.grid.cells.iter().map(|&cell| (cell, trouble(config, frame, cell)));
-    troubles.filter_map(|(cell, trouble)| trouble.map(|trouble| (cell, trouble))).collect()
+pub fn check(config: &Config, frame: &ApproachFrame) -> Vec<(Cell, Unreachable)> {
+    let obstacles = config.grid.cells.iter().map(|&cell| (cell, obstacle(config, frame, cell)));
+    obstacles.filter_map(|(cell, obstacle)| obstacle.map(|obstacle| (cell, obstacle))).collect()
 }
 
-fn trouble(config: &Config, frame: &ApproachFrame, cell: Cell) -> Option<Trouble> {
+fn obstacle(config: &Config, frame: &ApproachFrame, cell: Cell) -> Option<Unreachable> {
     let object = config.object_at(frame, cell);
     // The world itself knows best what it takes; making one costs a few milliseconds.
     match MujocoWorld::new(&MujocoOptions { scene: Scene::with(object), ..MujocoOptions::default() }) {
         Ok(_) => {}
-        Err(WorldError::OffTable { .. }) => return Some(Trouble::OffTable),
-        Err(error) => return Some(Trouble::Refused(error.to_string())),
+        Err(WorldError::OffTable { .. }) => return Some(Unreachable::OffTable),
+        Err(error) => return Some(Unreachable::Refused(error.to_string())),
     }
     let goal = config.primitive.goal;
     let [x, y] = object.position;
@@ -56,5 +56,5 @@ fn trouble(config: &Config, frame: &ApproachFrame, cell: Cell) -> Option<Trouble
         goal.position[1] + share * (y - goal.position[1]),
         goal.position[2],
     ];
-    inverse::reach(near, goal.orientation, goal.posture).is_none().then_some(Trouble::OutOfReach)
+    inverse::reach(near, goal.orientation, goal.posture).is_none().then_some(Unreachable::OutOfReach)
 }

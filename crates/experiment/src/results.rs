@@ -1,4 +1,4 @@
-//! What came out: one report a trial, written as it comes, and read back when an experiment is resumed.
+//! Results: one report a trial, written as it comes, and read back when an experiment is resumed.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -22,7 +22,7 @@ pub struct Key {
     /// Where the object stands.
     #[serde(flatten)]
     pub cell: Cell,
-    /// How the primitive is played.
+    /// The mode in which the primitive is played.
     pub mode: Mode,
     /// Seed of the experiment.
     pub seed: u64,
@@ -58,17 +58,17 @@ pub struct Report {
     pub trial_seed: u64,
     /// Where the object stood, world x and y, m.
     pub object: [f64; 2],
-    /// How it ended.
+    /// The outcome.
     #[serde(flatten)]
     pub outcome: Outcome,
-    /// What happened.
+    /// The measures.
     #[serde(flatten)]
     pub measures: Measures,
     /// Largest displacement of the plan from the taught one, m.
     pub adaptation_m: f64,
     /// Largest turn of the plan from the taught one, degrees.
     pub adaptation_deg: f64,
-    /// How far the hand is below its plan when it has lifted, mean over 1 s, m.
+    /// Distance of the hand below its plan when it has lifted, mean over 1 s, m.
     pub sag_m: f64,
     /// First surprise that the device reported.
     pub surprise: Option<Surprise>,
@@ -101,7 +101,7 @@ pub enum ResultsError {
     Exists {
         /// The file.
         file: PathBuf,
-        /// How many.
+        /// Their number.
         trials: usize,
     },
     /// The results that are there belong to another configuration.
@@ -109,7 +109,7 @@ pub enum ResultsError {
     OtherConfiguration {
         /// The file.
         file: PathBuf,
-        /// What differs, `was -> is`.
+        /// The difference, `was -> is`.
         differences: Vec<String>,
     },
     /// A line is no report.
@@ -119,7 +119,7 @@ pub enum ResultsError {
         file: PathBuf,
         /// Its number.
         line: usize,
-        /// What the reader says.
+        /// The reader's reason.
         cause: serde_json::Error,
     },
     /// The file cannot be read or written.
@@ -127,7 +127,7 @@ pub enum ResultsError {
     File {
         /// The file.
         file: PathBuf,
-        /// What the operating system says.
+        /// The operating system's reason.
         #[source]
         cause: io::Error,
     },
@@ -289,82 +289,53 @@ impl Results {
     /// The file cannot be written.
     pub fn write_csv(&self, file: &Path) -> Result<(), csv::Error> {
         let mut writer = csv::Writer::from_path(file)?;
-        writer.write_record([
-            "cell",
-            "along_m",
-            "sideways_m",
-            "mode",
-            "seed",
-            "outcome",
-            "fault",
-            "object_x_m",
-            "object_y_m",
-            "lift_m",
-            "tilt_deg",
-            "push_m",
-            "adaptation_m",
-            "adaptation_deg",
-            "contact_peak_n",
-            "contact_sustained_n",
-            "contact_median_n",
-            "contact_mean_n",
-            "finger1_n",
-            "finger2_n",
-            "finger3_n",
-            "table_peak_n",
-            "finger_peak_n",
-            "sag_m",
-            "touch_s",
-            "closing_s",
-            "lift_s",
-            "failure_s",
-            "surprise_s",
-            "surprise_phase",
-            "surprise_channel",
-            "virtual_s",
-        ])?;
-        let optional = |value: Option<f64>| value.map(number).unwrap_or_default();
+        writer.write_record(COLUMNS.map(|(name, _)| name))?;
         for report in &self.reports {
-            let (key, m) = (&report.key, &report.measures);
-            let fault = if let Outcome::Stopped(fault) = &report.outcome { fault.as_str() } else { "" };
-            writer.write_record([
-                key.index.to_string(),
-                number(key.cell.along()),
-                number(key.cell.sideways()),
-                key.mode.to_string(),
-                key.seed.to_string(),
-                report.outcome.word().to_owned(),
-                fault.to_owned(),
-                number(report.object[0]),
-                number(report.object[1]),
-                number(m.lift_m),
-                number(m.tilt_deg),
-                number(m.push_m),
-                number(report.adaptation_m),
-                number(report.adaptation_deg),
-                number(m.contact_peak_n),
-                number(m.contact_sustained_n),
-                number(m.contact_median_n),
-                number(m.contact_mean_n),
-                number(m.finger_n[0]),
-                number(m.finger_n[1]),
-                number(m.finger_n[2]),
-                number(m.table_peak_n),
-                number(m.finger_peak_n),
-                number(report.sag_m),
-                optional(m.touch_s),
-                number(m.closing_s),
-                number(m.lift_s),
-                optional(m.failure_s),
-                optional(report.surprise.map(|surprise| surprise.time_s)),
-                optional(report.surprise.map(|surprise| surprise.phase)),
-                report.surprise.map(|surprise| surprise.channel.to_string()).unwrap_or_default(),
-                number(report.virtual_s),
-            ])?;
+            writer.write_record(COLUMNS.map(|(_, value)| value(report)))?;
         }
         writer.flush()?;
         Ok(())
     }
+}
+
+/// Columns of `results.csv`: name with unit, and value.
+const COLUMNS: [(&str, fn(&Report) -> String); 32] = [
+    ("cell", |r| r.key.index.to_string()),
+    ("along_m", |r| number(r.key.cell.along())),
+    ("sideways_m", |r| number(r.key.cell.sideways())),
+    ("mode", |r| r.key.mode.to_string()),
+    ("seed", |r| r.key.seed.to_string()),
+    ("outcome", |r| r.outcome.word().to_owned()),
+    ("fault", |r| if let Outcome::Stopped(fault) = &r.outcome { fault.clone() } else { String::new() }),
+    ("object_x_m", |r| number(r.object[0])),
+    ("object_y_m", |r| number(r.object[1])),
+    ("lift_m", |r| number(r.measures.lift_m)),
+    ("tilt_deg", |r| number(r.measures.tilt_deg)),
+    ("push_m", |r| number(r.measures.push_m)),
+    ("adaptation_m", |r| number(r.adaptation_m)),
+    ("adaptation_deg", |r| number(r.adaptation_deg)),
+    ("contact_peak_n", |r| number(r.measures.contact_peak_n)),
+    ("contact_sustained_n", |r| number(r.measures.contact_sustained_n)),
+    ("contact_median_n", |r| number(r.measures.contact_median_n)),
+    ("contact_mean_n", |r| number(r.measures.contact_mean_n)),
+    ("finger1_n", |r| number(r.measures.finger_n[0])),
+    ("finger2_n", |r| number(r.measures.finger_n[1])),
+    ("finger3_n", |r| number(r.measures.finger_n[2])),
+    ("table_peak_n", |r| number(r.measures.table_peak_n)),
+    ("finger_peak_n", |r| number(r.measures.finger_peak_n)),
+    ("sag_m", |r| number(r.sag_m)),
+    ("touch_s", |r| optional(r.measures.touch_s)),
+    ("closing_s", |r| number(r.measures.closing_s)),
+    ("lift_s", |r| number(r.measures.lift_s)),
+    ("failure_s", |r| optional(r.measures.failure_s)),
+    ("surprise_s", |r| optional(r.surprise.map(|surprise| surprise.time_s))),
+    ("surprise_phase", |r| optional(r.surprise.map(|surprise| surprise.phase))),
+    ("surprise_channel", |r| r.surprise.map(|surprise| surprise.channel.to_string()).unwrap_or_default()),
+    ("virtual_s", |r| number(r.virtual_s)),
+];
+
+fn optional(value: Option<f64>) -> String {
+    value.map(number).unwrap_or_default()
 }
 
 /// Six digits are more than any of these quantities is worth.
@@ -385,7 +356,7 @@ mod tests {
             configuration: object.to_owned(),
             described: BTreeMap::from([
                 ("object".to_owned(), object.to_owned()),
-                ("plant".to_owned(), "honest".to_owned()),
+                ("plant".to_owned(), "perturbed".to_owned()),
             ]),
         }
     }

@@ -19,14 +19,14 @@ use lab::procedure::recording_text;
 pub enum ExperimentError {
     /// Objects would stand where they cannot, or out of the arm's reach.
     #[error("{}", explain(.0))]
-    OutOfReach(Vec<(Cell, reach::Trouble)>),
+    OutOfReach(Vec<(Cell, reach::Unreachable)>),
     /// The primitive cannot be played.
     #[error(transparent)]
     Primitive(TrialError),
     /// A trial could not be carried through.
     #[error("trial {mode} in cell {cell}, seed {seed}: {cause}", mode = key.mode, cell = key.cell, seed = key.seed)]
     Trial {
-        /// Which.
+        /// The trial.
         key: Key,
         /// Why.
         cause: TrialError,
@@ -39,7 +39,7 @@ pub enum ExperimentError {
     File {
         /// The file.
         file: std::path::PathBuf,
-        /// What the operating system says.
+        /// The operating system's reason.
         #[source]
         cause: std::io::Error,
     },
@@ -53,12 +53,12 @@ pub enum ExperimentError {
     },
 }
 
-fn explain(troubles: &[(Cell, reach::Trouble)]) -> String {
-    let cells: Vec<String> = troubles.iter().map(|(cell, trouble)| format!("{cell} ({trouble})")).collect();
+fn explain(cells: &[(Cell, reach::Unreachable)]) -> String {
+    let cells: Vec<String> = cells.iter().map(|(cell, reason)| format!("{cell} ({reason})")).collect();
     format!("{} of the objects cannot be reached or do not stand on the table: {}", cells.len(), cells.join(", "))
 }
 
-/// What happens while an experiment runs.
+/// An event while an experiment runs.
 #[derive(Debug)]
 pub enum Progress<'a> {
     /// So many trials are wanted, and so many are there from before.
@@ -80,7 +80,7 @@ pub struct Experiment {
     /// Trials of the first seed with everything that was seen, if the configuration asks for it; those that were
     /// there from before are missing.
     pub trials: Vec<Trial>,
-    /// What all trials shared.
+    /// The configuration that all trials shared.
     pub prepared: Prepared,
 }
 
@@ -107,9 +107,9 @@ pub fn run(
     progress: &mut dyn FnMut(Progress<'_>),
 ) -> Result<Experiment, ExperimentError> {
     let prepared = Prepared::of(config).map_err(ExperimentError::Primitive)?;
-    let troubles = reach::check(config, &prepared.frame);
-    if !troubles.is_empty() {
-        return Err(ExperimentError::OutOfReach(troubles));
+    let cells = reach::check(config, &prepared.frame);
+    if !cells.is_empty() {
+        return Err(ExperimentError::OutOfReach(cells));
     }
     let resume = config.resume || config.as_it_is;
     let opened = config.out.as_deref().map(|folder| Log::open(folder, &config.header(), resume)).transpose()?;

@@ -38,8 +38,8 @@ impl Scenario {
         }
     }
 
-    /// What a person teaches for it.
-    pub fn lesson(self) -> TaughtMovement {
+    /// The movement taught for it.
+    pub fn taught_movement(self) -> TaughtMovement {
         match self {
             Scenario::Flashlight => TaughtMovement::Flashlight,
             Scenario::Cup | Scenario::Fingers => TaughtMovement::Cup,
@@ -80,16 +80,16 @@ impl Scenario {
         }
     }
 
-    /// What the device is asked for in a mode. All modes of a scenario have the same gains.
+    /// The options with which the device runs a mode. All modes of a scenario have the same gains.
     ///
-    /// What stands is approached with compliant gains, so that a touch moves the arm before it topples the object. A
-    /// hand above a table needs its height: with compliant gains it sags by its own friction as much as it shall give
-    /// way, so there the gains are stiff.
+    /// An object that stands is approached with compliant gains, so that a touch moves the arm before it topples the
+    /// object. A hand above a table needs its height: with compliant gains it sags by its own friction as much as it
+    /// shall give way, so there the gains are stiff.
     pub fn options(self, mode: Mode) -> RunOptions {
         RunOptions { compliant: self != Scenario::Bottle, ..mode.options() }
     }
 
-    /// Whether the movement itself lifts the object.
+    /// True if the movement itself lifts the object.
     pub fn lifts_itself(self) -> bool {
         self == Scenario::Lift
     }
@@ -101,13 +101,13 @@ impl fmt::Display for Scenario {
     }
 }
 
-/// How well the controller's model fits the plant.
+/// Difference between the plant and the controller's model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum PlantKind {
     /// An arm as it might stand in a laboratory: link masses off by up to 10 %, friction by 30 %, elastic cables, a
     /// force sensor with bias and hysteresis
-    Honest,
+    Perturbed,
     /// An arm that equals the controller's model: rigid cables, a force sensor with noise only
     Ideal,
 }
@@ -116,7 +116,7 @@ impl PlantKind {
     /// Its name in options and files.
     pub fn name(self) -> &'static str {
         match self {
-            PlantKind::Honest => "honest",
+            PlantKind::Perturbed => "perturbed",
             PlantKind::Ideal => "ideal",
         }
     }

@@ -1,4 +1,4 @@
-//! What the trials of one mode say together.
+//! Statistics of the trials of one mode.
 
 use serde::Serialize;
 
@@ -34,7 +34,7 @@ pub struct Told {
     pub before_lift: usize,
 }
 
-/// How well the device's watch tells failures.
+/// Performance of the device's watch in reporting failures.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Detection {
     /// Trials that succeeded.
@@ -58,7 +58,7 @@ pub struct Detection {
     /// Median time from the beginning of the failure in the world
     /// ([`failure_s`](super::outcome::Measures::failure_s)) to the report, s; negative: reported before. A failure
     /// that was not reported before the lift counts as reported at the lift, so that silence does not pass for speed.
-    /// What was dropped is left out.
+    /// Dropped objects are left out.
     pub median_delay_s: Option<f64>,
 }
 
@@ -108,7 +108,7 @@ impl Detection {
     }
 }
 
-/// What the trials of one mode say together.
+/// Statistics of the trials of one mode.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// The mode.
@@ -150,7 +150,7 @@ pub struct Summary {
     pub finger_peak_n: Spread,
     /// Peak force of hand on table, N.
     pub table_peak_n: Spread,
-    /// How far the hand is below its plan when it has lifted, m.
+    /// Distance of the hand below its plan when it has lifted, m.
     pub sag_m: Spread,
     /// Failure detection.
     pub detection: Detection,

@@ -1,4 +1,4 @@
-//! What the device told about a run, cycle by cycle: the material of the time series and of the adaptation.
+//! The telemetry of a run, cycle by cycle: the material of the time series and of the adaptation.
 
 use lab::demonstration::RATE;
 
@@ -18,8 +18,8 @@ pub struct Cycle {
     pub position_d: [f64; 3],
     /// Planned orientation (w, x, y, z).
     pub orientation_d: [f64; 4],
-    /// What the sensors feel: force (world, N), torque (tool axes, N m), gauges (N m).
-    pub felt: [f64; CHANNELS],
+    /// Measured sensor values: force (world, N), torque (tool axes, N m), gauges (N m).
+    pub sensors: [f64; CHANNELS],
     /// Measured spread and fingers 1 to 3, rad.
     pub hand: [f64; 4],
     /// Planned spread and fingers 1 to 3, rad.
@@ -78,7 +78,7 @@ impl Cycle {
             orientation,
             position_d: [x, y, z],
             orientation_d: [w, a, b, c],
-            felt: std::array::from_fn(|channel| {
+            sensors: std::array::from_fn(|channel| {
                 let value = if channel < 6 { telemetry.wrench[channel] } else { telemetry.gauges[channel - 6] };
                 f64::from(value)
             }),
@@ -101,7 +101,7 @@ pub(crate) mod tests {
             orientation: [1.0, 0.0, 0.0, 0.0],
             position_d: [0.7, 0.2, 0.0],
             orientation_d: [1.0, 0.0, 0.0, 0.0],
-            felt: [0.0; CHANNELS],
+            sensors: [0.0; CHANNELS],
             hand: [0.0; 4],
             hand_d: [0.0; 4],
             q: [0.0; 7],

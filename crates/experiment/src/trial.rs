@@ -11,7 +11,7 @@ use sim::{TICKS_PER_MILLISECOND, Ticks};
 use super::config::Config;
 use super::grid::ApproachFrame;
 use super::inverse;
-use super::observation::{Marks, Observation};
+use super::observation::{Milestones, Observation};
 use super::observed::{ObservedWorld, Snapshot};
 use super::outcome;
 use super::plant::{self, Arm};
@@ -24,19 +24,19 @@ use lab::primitive_file::PrimitiveFileError;
 use lab::procedure::{self, CHANNELS, ProcedureError, RunRequest};
 use lab::simulation::{Simulation, SimulationError};
 
-/// How far the arm lifts, m.
+/// Height by which the arm lifts, m.
 const LIFT: f64 = 0.10;
 /// Duration of the lift, s.
 const LIFT_SECONDS: f64 = 2.0;
 /// A hand that is farther than this below the top of its lift is lifted by what is missing, m.
 const LIFT_TOLERANCE: f64 = 0.005;
-/// How often at most.
+/// Most repetitions.
 const CORRECTIONS: usize = 2;
 /// Duration of such a correction, s.
 const CORRECTION_SECONDS: f64 = 0.7;
-/// How long the arm may take to settle after a part of the lift, s.
+/// Longest time to settle after a part of the lift, s.
 const SETTLING_SECONDS: f64 = 2.0;
-/// How long it then holds, s.
+/// Time for which it then holds, s.
 const HOLD_SECONDS: f64 = 2.0;
 /// Time over which the height of a lifted hand is averaged, s.
 const SETTLED_SECONDS: f64 = 1.0;
@@ -46,7 +46,7 @@ const REST_SECONDS: f64 = 0.3;
 const RISEN: f64 = 0.005;
 /// Times that a move is asked for, a rest apart, while the arm still swings.
 const CALMING: usize = 10;
-/// What moves the arm is asked for at multiples of so many control cycles, 0.1 s.
+/// Requests that move the arm are sent at multiples of this many control cycles, 0.1 s.
 const BEAT: Ticks = periods(0.1) as Ticks * CYCLE_TICKS;
 /// An upload is followed by a longer one, 0.5 s: it takes 0.35 s, and on a board, which has to check it, 0.05 s more.
 const BEAT_OF_UPLOAD: Ticks = periods(0.5) as Ticks * CYCLE_TICKS;
@@ -84,26 +84,26 @@ impl From<HostError> for TrialError {
 /// A trial with everything that was seen of it.
 #[derive(Debug, Clone)]
 pub struct Trial {
-    /// What it came to.
+    /// The report.
     pub report: Report,
-    /// What the device told.
+    /// The device's telemetry.
     pub trace: Trace,
     /// Telemetry of run and lift as it came.
     pub telemetry: Vec<link::Telemetry>,
-    /// What the world saw.
+    /// The observation of the world.
     pub observation: Observation,
     /// Configurations for pictures.
     pub snapshots: Vec<Snapshot>,
     /// Table and object.
     pub scene: Scene,
     /// When its parts began.
-    pub marks: Marks,
+    pub marks: Milestones,
 }
 
 /// The plan without feedback at the control rate: positions and orientations.
 pub type Taught = Vec<([f64; 3], [f64; 4])>;
 
-/// What all trials of an experiment share.
+/// The data that all trials of an experiment share.
 #[derive(Debug, Clone)]
 pub struct Prepared {
     /// The image that is uploaded.
@@ -189,10 +189,10 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
     // The first cycle of the run comes some milliseconds after it was asked for: one sample of the observer at most.
     let run = begin;
     let lift = if config.scenario.lifts_itself() { run + rise(&trace, arrived - run) } else { arrived };
-    let marks = Marks { run, lift, hold };
+    let marks = Milestones { run, lift, hold };
     let (observation, snapshots) = take_observation(&mut client);
     let (outcome, measures) = outcome::judge(&observation, &marks, config.rule(), fault.as_deref());
-    let movement = config.primitive.duration.min(measures.lift_s);
+    let movement = config.primitive.movement.duration.min(measures.lift_s);
     let (adaptation_m, adaptation_deg) = trace.adaptation(&prepared.taught, movement);
     let report = Report {
         key,
@@ -267,7 +267,7 @@ impl Attempt<'_> {
         key: Key,
     ) -> Result<procedure::RunOutcome, ProcedureError> {
         let options = config.scenario.options(key.mode);
-        let mut request = RunRequest::new(prepared.name.clone(), config.primitive.duration, options);
+        let mut request = RunRequest::new(prepared.name.clone(), config.primitive.movement.duration, options);
         request.rest = REST_SECONDS;
         let telemetry = &mut *self.telemetry;
         procedure::play(self.client, &request, &mut |cycle| telemetry.push(*cycle))

@@ -1,4 +1,4 @@
-//! What differs from the usual plant: one factor at a time tells how robust a result is.
+//! Variations of the usual plant: one factor at a time shows the robustness of a result.
 
 use std::fmt;
 use std::str::FromStr;

@@ -1,16 +1,16 @@
-//! Experiments from the lesson to the results, in this process.
+//! Experiments from the demonstration to the results, in this process.
 
 #![cfg(feature = "mujoco")]
 
 use std::path::Path;
 
-use experiment::{Config, ExperimentError, Mode, PlantKind, Progress, Scenario, lesson};
+use experiment::{Config, ExperimentError, Mode, PlantKind, Progress, Scenario, preparation};
 use lab::client::Interrupt;
 use lab::primitive_file::PrimitiveFile;
 
 fn primitive() -> PrimitiveFile {
     let file = Path::new("flashlight.toml");
-    lesson::make(Scenario::Flashlight, PlantKind::Honest, file, 2, &Interrupt::never(), &mut |_| {})
+    preparation::make(Scenario::Flashlight, PlantKind::Perturbed, file, 2, &Interrupt::never(), &mut |_| {})
         .expect("the person teaches, and the arm learns")
 }
 

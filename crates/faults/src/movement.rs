@@ -32,7 +32,7 @@ pub fn movement() -> &'static PrimitiveFile {
         let mut primitive = learned.expect("a smooth movement").primitive;
         primitive.expectation = Some(ExpectationTable {
             model_hash: primitive.model_hash,
-            recorded_duration: primitive.duration,
+            recorded_duration: primitive.movement.duration,
             payload_mass: 0.0,
             payload_centre: [0.0; 3],
             filter_cutoff: control::sense::wrench::WRENCH_CUT_OFF,

@@ -57,7 +57,7 @@ pub fn recover(arm: &mut Arm, way: Recover) -> Result<(), Failure> {
     // Whoever restarted the device has to give it the movement again.
     arm.upload(&movement.to_image()?, |_, _, _| {}).map_err(|error| format!("upload: {error}"))?;
     procedure::go_to_start(arm, &movement.start, |_| {}).map_err(|error| format!("to the start: {error}"))?;
-    let request = RunRequest::new(Name::new(&movement.name)?, movement.duration, Mode::Track.options());
+    let request = RunRequest::new(Name::new(&movement.name)?, movement.movement.duration, Mode::Track.options());
     procedure::play(arm, &request, &mut |_| {}).map_err(|error| format!("run: {error}"))?;
     Ok(())
 }

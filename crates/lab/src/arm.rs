@@ -6,7 +6,7 @@ use control::act::TorqueLimiter;
 use control::model::{ArmModel, Calibration, Frames, Payload};
 use control::units::JointPositions;
 
-/// What is mounted on every arm that Tactus moves: force/torque sensor and hand; the tool frame is the grasp point.
+/// Equipment of every arm that Tactus moves: force/torque sensor and hand; the tool frame is the grasp point.
 pub const PAYLOAD: Payload = Payload::SensorAndHand;
 
 /// The model.

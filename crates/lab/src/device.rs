@@ -68,10 +68,32 @@ impl Device {
         })
     }
 
-    /// What the line carries at most, byte/s, where that is known whatever the adapter: on a CAN bus.
+    /// Most that the line carries, byte/s, where that is known whatever the adapter: on a CAN bus.
     pub fn line_rate(&self) -> Option<f64> {
         matches!(self, Self::Can(_) | Self::SimulatedCan(_) | Self::BoardCan(_))
             .then_some(link::can::LINE_BYTES_PER_SECOND)
+    }
+
+    fn line(&self) -> &dyn Transport {
+        match self {
+            Self::Simulated(device) => &**device,
+            Self::SimulatedCan(device) => &**device,
+            Self::BoardCan(device) => &**device,
+            Self::Stream(device) => device,
+            Self::Serial(device) => device,
+            Self::Can(device) => &**device,
+        }
+    }
+
+    fn line_mut(&mut self) -> &mut dyn Transport {
+        match self {
+            Self::Simulated(device) => &mut **device,
+            Self::SimulatedCan(device) => &mut **device,
+            Self::BoardCan(device) => &mut **device,
+            Self::Stream(device) => device,
+            Self::Serial(device) => device,
+            Self::Can(device) => &mut **device,
+        }
     }
 
     /// The simulation, if it is one.
@@ -87,39 +109,18 @@ impl Device {
 
 impl Transport for Device {
     fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
-        match self {
-            Self::Simulated(device) => device.send(bytes),
-            Self::SimulatedCan(device) => device.send(bytes),
-            Self::BoardCan(device) => device.send(bytes),
-            Self::Stream(device) => device.send(bytes),
-            Self::Serial(device) => device.send(bytes),
-            Self::Can(device) => device.send(bytes),
-        }
+        self.line_mut().send(bytes)
     }
 
     fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
-        match self {
-            Self::Simulated(device) => device.receive(timeout, out),
-            Self::SimulatedCan(device) => device.receive(timeout, out),
-            Self::BoardCan(device) => device.receive(timeout, out),
-            Self::Stream(device) => device.receive(timeout, out),
-            Self::Serial(device) => device.receive(timeout, out),
-            Self::Can(device) => device.receive(timeout, out),
-        }
+        self.line_mut().receive(timeout, out)
     }
 
     fn now(&self) -> Duration {
-        match self {
-            Self::Simulated(device) => device.now(),
-            Self::SimulatedCan(device) => device.now(),
-            Self::BoardCan(device) => device.now(),
-            Self::Stream(device) => device.now(),
-            Self::Serial(device) => device.now(),
-            Self::Can(device) => device.now(),
-        }
+        self.line().now()
     }
 
     fn is_virtual(&self) -> bool {
-        matches!(self, Self::Simulated(_) | Self::SimulatedCan(_) | Self::BoardCan(_))
+        self.line().is_virtual()
     }
 }

@@ -1,13 +1,12 @@
-//! How two executions of the same movement differ, cycle by cycle: what `tactus compare` shows, and what must be
-//! small between the firmware and the same application in this process.
+//! Differences between two executions of the same movement, cycle by cycle: `tactus compare` shows them, and they must
+//! be small between the firmware and the same application in this process.
 
 use std::fmt;
-use std::path::PathBuf;
 
 use serde::Serialize;
-use thiserror::Error;
 
 use crate::demonstration::{RATE, Recording, angle_between};
+use crate::tracking::{ComparisonError, Lack};
 
 /// Largest differences over a part of two runs.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -28,7 +27,7 @@ pub struct Largest {
     pub torque_nm: f64,
 }
 
-/// How two runs differ.
+/// Differences of two runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Difference {
     /// In the first cycle of the run.
@@ -39,23 +38,6 @@ pub struct Difference {
     pub contact_s: Option<f64>,
     /// Over all cycles that both have.
     pub whole: Largest,
-}
-
-/// Why two recordings cannot be compared.
-#[derive(Debug, Error)]
-pub enum DifferenceError {
-    /// Something to compare is missing.
-    #[error("{file}: joint angles, measured pose and wrench (q1_rad.., x_m..qz, fx_N..tz_Nm) are needed", file = file.display())]
-    Columns {
-        /// The file.
-        file: PathBuf,
-    },
-    /// No sample is left to compare.
-    #[error("{file}: there is no sample in state `run`", file = file.display())]
-    NoRun {
-        /// The file.
-        file: PathBuf,
-    },
 }
 
 /// The columns of one run that are compared.
@@ -70,9 +52,9 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn of(recording: &'a Recording) -> Result<Run<'a>, DifferenceError> {
-        let missing = || DifferenceError::Columns { file: recording.file.clone() };
-        let first = recording.time.first().ok_or_else(|| DifferenceError::NoRun { file: recording.file.clone() })?;
+    fn of(recording: &'a Recording) -> Result<Run<'a>, ComparisonError> {
+        let missing = || ComparisonError::of(recording, Lack::Columns);
+        let first = recording.time.first().ok_or_else(|| ComparisonError::of(recording, Lack::Run))?;
         Ok(Run {
             // Samples that the link lost leave a gap: cycles are matched by their number since the first one.
             index: recording.time.iter().map(|time| ((time - first) * RATE).round() as usize).collect(),
@@ -113,8 +95,8 @@ impl Difference {
     /// Compares the parts of two recordings in which a plan was played. A contact is a force above `contact` (N).
     ///
     /// # Errors
-    /// [`DifferenceError`].
-    pub fn between(one: &Recording, other: &Recording, contact: f64) -> Result<Difference, DifferenceError> {
+    /// [`ComparisonError`].
+    pub fn between(one: &Recording, other: &Recording, contact: f64) -> Result<Difference, ComparisonError> {
         let (one, other) = (one.running(), other.running());
         let (one, other) = (Run::of(&one)?, Run::of(&other)?);
         let [mut start, mut before_contact, mut whole] = [Largest::default(); 3];
@@ -152,8 +134,8 @@ impl fmt::Display for Difference {
             "cycles compared         {:>14}{:>26}{:>14}",
             parts[0].samples, parts[1].samples, parts[2].samples
         )?;
-        type Row = (&'static str, fn(&Largest) -> f64, &'static str);
-        let rows: [Row; 6] = [
+        type Line = (&'static str, fn(&Largest) -> f64, &'static str);
+        let rows: [Line; 6] = [
             ("joint angle", |part| part.joint_rad * 1e3, "mrad"),
             ("position", |part| part.position_m * 1e3, "mm"),
             ("orientation", |part| part.orientation_rad.to_degrees(), "deg"),

@@ -54,7 +54,7 @@ pub enum HostError {
     /// Host and device do not fit together.
     #[error("{what}: host has {host}, device has {device}")]
     Incompatible {
-        /// What differs, in the words of the refusal.
+        /// The difference, in the words of the refusal.
         what: Refusal,
         /// Version or hash of this tool.
         host: String,
@@ -64,9 +64,9 @@ pub enum HostError {
     /// The device did not answer.
     #[error("the device did not answer '{request}' within {:.1} s", .after.as_secs_f64())]
     NoAnswer {
-        /// What was asked.
+        /// The request.
         request: &'static str,
-        /// How long was waited, in the device's time.
+        /// Time waited, in the device's time.
         after: Duration,
     },
     /// The program of the device is not made for a part that the command needs.
@@ -75,7 +75,7 @@ pub enum HostError {
     /// The device refused a request.
     #[error("the device refused '{request}': {}", explain(*.reason, *.detail))]
     Refused {
-        /// What was asked.
+        /// The request.
         request: &'static str,
         /// Why not.
         reason: Refusal,
@@ -85,13 +85,13 @@ pub enum HostError {
     /// The device answered with something that is no answer to what was asked.
     #[error("the device answered '{request}' with another message")]
     WrongAnswer {
-        /// What was asked.
+        /// The request.
         request: &'static str,
     },
     /// The image to be uploaded is not sound.
     #[error("the image cannot be uploaded: {0}")]
     Image(#[from] ImageError),
-    /// What was read back from the device is not what was sent.
+    /// The bytes read back from the device are not those that were sent.
     #[error("reading the primitive back gave other bytes, the first at {offset}")]
     ReadBack {
         /// Where.
@@ -100,7 +100,7 @@ pub enum HostError {
     /// The arm did not come to rest after a stop was accepted.
     #[error("the arm was told to stop but still moves after {} ms", .after.as_millis())]
     NotStopped {
-        /// How long was waited.
+        /// Time waited.
         after: Duration,
     },
     /// The user interrupted; the arm was stopped.
@@ -169,7 +169,7 @@ impl HostError {
     pub fn code(&self) -> ErrorCode {
         match self {
             Self::WrongAnswer { .. } => ErrorCode::WrongAnswer,
-            Self::Transport(TransportError::Can(trouble)) => trouble.code(),
+            Self::Transport(TransportError::Can(problem)) => problem.code(),
             Self::Transport(TransportError::Other(_)) => ErrorCode::LineFailed,
             Self::Address(_) => ErrorCode::AddressInvalid,
             Self::Transport(TransportError::NotFound { .. }) => ErrorCode::DeviceNotFound,

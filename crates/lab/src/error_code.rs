@@ -56,7 +56,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// What has happened: one sentence without full stop.
+            /// The meaning: one sentence without full stop.
             #[must_use]
             pub const fn meaning(self) -> &'static str {
                 match self {
@@ -65,7 +65,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// What usually leads to it; empty where the meaning says it.
+            /// The usual cause; empty where the meaning says it.
             #[must_use]
             pub const fn cause(self) -> &'static str {
                 match self {
@@ -74,7 +74,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// What to do about it; empty where nothing helps in general.
+            /// The remedy; empty where nothing helps in general.
             #[must_use]
             pub const fn remedy(self) -> &'static str {
                 match self {

@@ -1,4 +1,4 @@
-//! How a command fails: a code, what happened, where, and what the user can run next.
+//! The failure of a command: a code, what happened, where, and what the user can run next.
 
 use std::error::Error;
 use std::fmt::{self, Write as _};
@@ -12,13 +12,13 @@ use crate::error_code::ErrorCode;
 pub struct Failure {
     /// The numbered reason; it says the exit code of the process as well.
     pub code: ErrorCode,
-    /// What was being done, `learn refused` for example.
+    /// The action that failed, `learn refused` for example.
     pub doing: String,
     /// Why it failed.
     pub cause: Box<dyn Error + Send + Sync>,
     /// A command or an action that helps.
     pub help: Option<String>,
-    /// What was found out before it failed, for `--json`.
+    /// Data found before the failure, for `--json`.
     pub data: Option<serde_json::Value>,
 }
 

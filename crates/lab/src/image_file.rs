@@ -12,7 +12,7 @@ use link::metadata::{METADATA_SECTION, MemoryRegion, MetadataError, chip};
 use object::read::elf::{FileHeader as _, ProgramHeader as _};
 use object::{Endianness, Object as _, ObjectSection as _, elf};
 
-/// What an image says about itself, in values that outlive its file.
+/// An image's description of itself, in values that outlive its file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Description {
     /// Link version.
@@ -38,9 +38,9 @@ pub struct Description {
 pub struct ImageFile {
     /// Its file.
     pub path: PathBuf,
-    /// What it says about itself.
+    /// Its description of itself.
     pub description: Description,
-    /// What flashing it writes: stretches of the device's address space.
+    /// The regions that flashing it writes: stretches of the device's address space.
     pub writes: Vec<MemoryRegion>,
 }
 
@@ -69,7 +69,7 @@ pub enum ImageFileError {
         /// The file.
         path: PathBuf,
     },
-    /// What the file says cannot be read.
+    /// The file's description cannot be read.
     #[error("{}: {source}", path.display())]
     Description {
         /// The file.
@@ -95,7 +95,7 @@ pub enum ImageFileError {
         write.length, write.start, image.start, image.length
     )]
     Outside {
-        /// What would be written.
+        /// The region that would be written.
         write: MemoryRegion,
         /// Where images belong.
         image: MemoryRegion,

@@ -1,4 +1,4 @@
-//! What the lab tool does with a device, without its command line: connect, teach, learn, upload, run, record,
+//! The lab tool without its command line: connect to a device, teach, learn, upload, run, record,
 //! simulate.
 
 pub mod arm;

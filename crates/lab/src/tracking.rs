@@ -1,4 +1,4 @@
-//! How well an execution kept to its plan: the figures that the run's report, the figure and the demo's table show.
+//! Tracking of the plan by an execution: the figures that the run's report, the figure and the demo's table show.
 
 use serde::Serialize;
 use thiserror::Error;
@@ -24,7 +24,7 @@ pub struct Tracking {
     pub orientation_end_rad: f64,
 }
 
-/// How well the hand kept to its plan in one run: measured against desired digits, in the order spread, F1, F2, F3.
+/// Tracking of the hand's plan in one run: measured against desired digits, in the order spread, F1, F2, F3.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct HandTracking {
     /// Samples compared.
@@ -37,39 +37,50 @@ pub struct HandTracking {
     pub end_rad: [f64; 4],
 }
 
-/// Why a recording cannot be compared with its plan.
+/// Reason for which a run cannot be compared with its plan or with another run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum Lack {
+    /// The measured or the desired pose.
+    #[error("the columns of the measured and of the desired pose (x_m..qz, x_d_m..qz_d) are both needed")]
+    Poses,
+    /// The measured or the desired hand.
+    #[error("the columns of the measured and of the desired hand (spread_rad.., spread_d_rad..) are both needed")]
+    Hands,
+    /// A column that two runs are compared by.
+    #[error("joint angles, measured pose and wrench (q1_rad.., x_m..qz, fx_N..tz_Nm) are needed")]
+    Columns,
+    /// A sample to compare.
+    #[error("there is no sample in state `run`")]
+    Run,
+}
+
+/// A recording that cannot be compared.
 #[derive(Debug, Error)]
-pub enum TrackingError {
-    /// The recording lacks the measured or the desired pose.
-    #[error("{file}: the columns of the measured and of the desired pose (x_m..qz, x_d_m..qz_d) are both needed", file = file.display())]
-    Columns {
-        /// The file.
-        file: std::path::PathBuf,
-    },
-    /// The recording lacks the measured or the desired hand.
-    #[error("{file}: the columns of the measured and of the desired hand (spread_rad.., spread_d_rad..) are both needed", file = file.display())]
-    HandColumns {
-        /// The file.
-        file: std::path::PathBuf,
-    },
-    /// No sample is left to compare.
-    #[error("{file}: there is no sample in state `run`", file = file.display())]
-    NoRun {
-        /// The file.
-        file: std::path::PathBuf,
-    },
+#[error("{file}: {lack}", file = file.display())]
+pub struct ComparisonError {
+    /// The file.
+    pub file: std::path::PathBuf,
+    /// The data that it lacks.
+    pub lack: Lack,
+}
+
+impl ComparisonError {
+    /// The error of a recording.
+    pub(crate) fn of(recording: &Recording, lack: Lack) -> ComparisonError {
+        ComparisonError { file: recording.file.clone(), lack }
+    }
 }
 
 impl Tracking {
     /// Compares the part of a recording in which a plan was played (all of it, if it has no states).
     ///
     /// # Errors
-    /// [`TrackingError`].
-    pub fn of_run(recording: &Recording) -> Result<Tracking, TrackingError> {
+    /// [`ComparisonError`].
+    pub fn of_run(recording: &Recording) -> Result<Tracking, ComparisonError> {
         let run = recording.running();
-        let errors = errors(&run).ok_or_else(|| TrackingError::Columns { file: recording.file.clone() })?;
+        let errors = errors(&run).ok_or_else(|| ComparisonError::of(recording, Lack::Poses))?;
         let (Some(last), count) = (errors.last(), errors.len() as f64) else {
-            return Err(TrackingError::NoRun { file: recording.file.clone() });
+            return Err(ComparisonError::of(recording, Lack::Run));
         };
         let square =
             |pick: fn(&(f64, f64)) -> f64| (errors.iter().map(|error| pick(error).powi(2)).sum::<f64>() / count).sqrt();
@@ -90,11 +101,11 @@ impl HandTracking {
     /// Compares the part of a recording in which a plan was played (all of it, if it has no states).
     ///
     /// # Errors
-    /// [`TrackingError`].
-    pub fn of_run(recording: &Recording) -> Result<HandTracking, TrackingError> {
+    /// [`ComparisonError`].
+    pub fn of_run(recording: &Recording) -> Result<HandTracking, ComparisonError> {
         let run = recording.running();
         let (Some(hand), Some(hand_d)) = (&run.hand, &run.hand_d) else {
-            return Err(TrackingError::HandColumns { file: recording.file.clone() });
+            return Err(ComparisonError::of(recording, Lack::Hands));
         };
         let errors: Vec<[f64; 4]> = hand
             .iter()
@@ -102,7 +113,7 @@ impl HandTracking {
             .map(|(hand, hand_d)| std::array::from_fn(|digit| (hand[digit] - hand_d[digit]).abs()))
             .collect();
         let Some(end_rad) = errors.last().copied() else {
-            return Err(TrackingError::NoRun { file: recording.file.clone() });
+            return Err(ComparisonError::of(recording, Lack::Run));
         };
         let count = errors.len() as f64;
         let of_digits = |figure: &dyn Fn(usize) -> f64| std::array::from_fn(figure);
@@ -169,7 +180,7 @@ mod tests {
     #[test]
     fn without_a_hand_nothing_is_made_up() {
         let text = HAND.replace("_d_rad", "_x").replace("_rad", "_y");
-        assert!(matches!(HandTracking::of_run(&recording(&text)), Err(TrackingError::HandColumns { .. })));
-        assert!(matches!(Tracking::of_run(&recording(HAND)), Err(TrackingError::Columns { .. })));
+        assert_eq!(HandTracking::of_run(&recording(&text)).unwrap_err().lack, Lack::Hands);
+        assert_eq!(Tracking::of_run(&recording(HAND)).unwrap_err().lack, Lack::Poses);
     }
 }

@@ -1,18 +1,19 @@
-//! How two executions differ: what is found, where it is found, and what lost samples do not hide.
+//! Differences of two executions: what is found, where it is found, and what lost samples do not hide.
 
 use std::path::Path;
 
 use lab::demonstration::Recording;
-use lab::difference::{Difference, DifferenceError};
+use lab::difference::Difference;
+use lab::tracking::Lack;
 
 /// A run of 200 cycles along x, with a force from cycle 100 on; `change` alters a row before it is written.
-fn recording(change: impl Fn(usize, &mut Row) -> bool) -> Recording {
+fn recording(change: impl Fn(usize, &mut Sample) -> bool) -> Recording {
     let joints = |name: &str, unit: &str| (1..=7).map(|i| format!("{name}{i}_{unit}")).collect::<Vec<_>>().join(",");
     let mut text =
         format!("t_s,state,{},x_m,y_m,z_m,qw,qx,qy,qz,fx_N,fy_N,fz_N,tx_Nm,ty_Nm,tz_Nm\n", joints("q", "rad"));
     for cycle in 0..200 {
         let force = if cycle < 100 { 0.1 } else { 2.0 };
-        let mut row = Row { q: [0.1; 7], x: 0.001 * cycle as f64, force };
+        let mut row = Sample { q: [0.1; 7], x: 0.001 * cycle as f64, force };
         if change(cycle, &mut row) {
             let q = row.q.map(|q| q.to_string()).join(",");
             let (time, x, force) = (cycle as f64 / 300.0, row.x, row.force);
@@ -22,7 +23,7 @@ fn recording(change: impl Fn(usize, &mut Row) -> bool) -> Recording {
     Recording::parse(Path::new("run.csv"), text.as_bytes()).expect("a recording")
 }
 
-struct Row {
+struct Sample {
     q: [f64; 7],
     x: f64,
     force: f64,
@@ -70,5 +71,8 @@ fn a_demonstration_without_forces_is_refused_by_name() {
     let pose = Recording::parse(Path::new("pose.csv"), format!("t_s,x_m,y_m,z_m,qw,qx,qy,qz\n{text}").as_bytes());
     let pose = pose.expect("a recording");
     let refused = Difference::between(&pose, &pose, 1.0);
-    assert!(matches!(&refused, Err(DifferenceError::Columns { file }) if file.ends_with("pose.csv")), "{refused:?}");
+    assert!(
+        matches!(&refused, Err(error) if error.lack == Lack::Columns && error.file.ends_with("pose.csv")),
+        "{refused:?}"
+    );
 }

@@ -8,7 +8,7 @@ use lab::demonstration::{Preparation, Recording};
 use lab::learn::feedback::FeedbackOptions;
 use lab::learn::{LearnError, LearnOptions, Learned, hand::HandMotion, learn};
 use lab::primitive_file::{
-    ExpectationTable, ExperienceTable, FeedbackTables, OrientationErrorKind, PrimitiveFile, PrimitiveFileError,
+    ExpectationTable, ExperienceTable, FeedbackTables, OrientationError, PrimitiveFile, PrimitiveFileError,
 };
 
 /// The plan has to end this near to its goal, m: the bound of `tactus check`.
@@ -49,7 +49,7 @@ fn a_taught_movement_is_reproduced() {
         assert!((primitive.start.posture[joint] - common::START[joint]).abs() < 5e-3);
         assert!((primitive.goal.posture[joint] - common::GOAL[joint]).abs() < 5e-3);
     }
-    assert!((primitive.duration - 5.0).abs() < 0.5);
+    assert!((primitive.movement.duration - 5.0).abs() < 0.5);
 }
 
 #[test]
@@ -115,8 +115,7 @@ fn a_turn_beyond_150_degrees_is_warned_of_and_beyond_175_refused_with_its_line()
 
 #[test]
 fn with_the_rotation_vector_a_turn_of_more_than_half_a_revolution_is_followed() {
-    let options =
-        LearnOptions { orientation_error: OrientationErrorKind::RotationVector, ..LearnOptions::named("turn") };
+    let options = LearnOptions { orientation_error: OrientationError::RotationVector, ..LearnOptions::named("turn") };
     let learned = learned(&foreign(5.0), &options).unwrap();
     let report = &learned.report;
     assert!(report.orientation_max_rad.to_degrees() < 0.5, "{}", report.orientation_max_rad.to_degrees());
@@ -162,7 +161,9 @@ fn full() -> PrimitiveFile {
         (0..size).map(|index| ((seed * 31 + index) as f64 * 0.7).sin() / 3.0).collect()
     };
     primitive.feedback = Some(FeedbackTables {
-        clamps: [0.23, 0.35, 0.1],
+        clamp_position: 0.23,
+        clamp_orientation: 0.35,
+        clamp_hand: 0.1,
         k1: vec![row(1, 10).iter().map(|value| value.abs()).collect()],
         k2: (0..3).map(|point| row(point, 9).iter().map(|value| value.abs()).collect()).collect(),
     });
@@ -188,18 +189,34 @@ fn full() -> PrimitiveFile {
 #[test]
 fn a_file_reads_back_bit_for_bit() {
     let mut primitive = full();
-    primitive.weights[0][0] = f64::MIN_POSITIVE;
-    primitive.weights[1][1] = 0.1 + 0.2;
-    primitive.weights[2][2] = -1e300;
+    primitive.weights.position[0][0] = f64::MIN_POSITIVE;
+    primitive.weights.position[1][1] = 0.1 + 0.2;
+    primitive.weights.position[2][2] = -1e300;
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("reach.toml");
     primitive.write(&file).unwrap();
     let again = PrimitiveFile::read(&file).unwrap();
     primitive.file = file;
     assert_eq!(primitive, again);
-    for (a, b) in primitive.weights.concat().iter().zip(again.weights.concat()) {
+    for (a, b) in primitive.weights.rows().flatten().zip(again.weights.rows().flatten()) {
         assert_eq!(a.to_bits(), b.to_bits());
     }
+}
+
+#[test]
+fn a_file_written_by_an_earlier_version_is_read_and_means_the_same() {
+    let text = include_str!("data/primitive.toml");
+    let primitive = PrimitiveFile::parse(Path::new("reach.toml"), text).unwrap();
+    assert_eq!(
+        (primitive.name.as_str(), primitive.model_hash, primitive.checksum()),
+        ("full.1", 0x9de7_b4e2, 0xb323_5ff7)
+    );
+    assert_eq!((primitive.movement.duration, primitive.movement.kernels), (3.446_666_666_666_666_8, 5));
+    assert_eq!((primitive.weights.position[0][0], primitive.weights.position[2][2]), (f64::MIN_POSITIVE, -1e300));
+    assert_eq!(primitive.gains.orientation.damping, 20.0);
+    assert_eq!(primitive.expectation.as_ref().unwrap().payload_centre, [0.0, 0.01, 1e-7]);
+    assert_eq!(primitive.provenance.as_ref().unwrap().demonstration, "demo.csv");
+    assert_eq!(PrimitiveFile::parse(Path::new("reach.toml"), &primitive.to_text()).unwrap(), primitive);
 }
 
 #[test]
@@ -227,8 +244,8 @@ fn a_wrong_file_is_refused_with_the_reason() {
     assert!(matches!(replaced("tactus-primitive/1", "tactus-primitive/9"), PrimitiveFileError::Schema { .. }));
     assert!(matches!(replaced("kernels = 50", "kernels = 40"), PrimitiveFileError::Shape { .. }));
     assert!(matches!(replaced("clamp_hand_rad = 0.1", "clamp_hand_rad = nan"), PrimitiveFileError::NotFinite { .. }));
-    assert!(matches!(replaced("\"demonstrated\"", "\"far\""), PrimitiveFileError::Word { .. }));
-    assert!(matches!(replaced("\"full.1\"", "\"a name\""), PrimitiveFileError::Word { .. }));
+    assert!(matches!(replaced("\"demonstrated\"", "\"far\""), PrimitiveFileError::Syntax { .. }));
+    assert!(matches!(replaced("\"full.1\"", "\"a name\""), PrimitiveFileError::Syntax { .. }));
     let error = replaced("duration_s = ", "duration_s = ten # ");
     assert!(matches!(error, PrimitiveFileError::Syntax { .. }));
     assert!(error.to_string().contains("line 9"), "{error}");
@@ -241,7 +258,7 @@ fn a_wrong_file_is_refused_with_the_reason() {
 #[test]
 fn what_is_not_finite_is_not_written() {
     let mut primitive = full();
-    primitive.weights[4][3] = f64::NAN;
+    primitive.weights.orientation[1][3] = f64::NAN;
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("reach.toml");
     let error = primitive.write(&file).unwrap_err();
@@ -258,9 +275,9 @@ fn the_image_holds_the_same_primitive_in_single_precision() {
     let content = image.content();
     assert_eq!(content.model_hash, control::MODEL_HASH);
     assert_eq!(content.kernels, 50);
-    assert_eq!(content.duration, primitive.duration as f32);
+    assert_eq!(content.duration, primitive.movement.duration as f32);
     assert_eq!(content.goal.orientation, primitive.goal.orientation.map(|value| value as f32));
-    for (index, weight) in primitive.weights.concat().iter().enumerate() {
+    for (index, weight) in primitive.weights.rows().flatten().enumerate() {
         assert_eq!(content.weights.get(index), Some(*weight as f32));
     }
     assert_eq!(content.expected_mean.len(), 50 * 9);
@@ -301,12 +318,12 @@ fn an_experience_that_is_changed_cut_or_impossible_is_refused() {
 #[test]
 fn an_expectation_of_another_speed_or_another_model_is_refused() {
     let mut slow = full();
-    slow.expectation.as_mut().unwrap().recorded_duration = slow.duration / 1.51;
+    slow.expectation.as_mut().unwrap().recorded_duration = slow.movement.duration / 1.51;
     for error in [slow.to_primitive().map(|_| ()).unwrap_err(), slow.to_image().map(|_| ()).unwrap_err()] {
         assert!(matches!(error, PrimitiveFileError::ExpectationDuration { .. }), "{error}");
         assert!(error.to_string().contains("more than 50 % apart"), "{error}");
     }
-    slow.expectation.as_mut().unwrap().recorded_duration = slow.duration / 1.45;
+    slow.expectation.as_mut().unwrap().recorded_duration = slow.movement.duration / 1.45;
     assert!(slow.to_image().is_ok());
     let mut foreign = full();
     foreign.expectation.as_mut().unwrap().model_hash ^= 1;
@@ -326,18 +343,18 @@ fn a_dwell_makes_the_movement_longer_by_exactly_that_and_rests_at_the_goal() {
         ..LearnOptions::named("grasp")
     };
     let grasp = learned(&taught(4.0), &options).unwrap();
-    assert!((grasp.primitive.duration - plain.primitive.duration - 2.5).abs() < 1e-12);
+    assert!((grasp.primitive.movement.duration - plain.primitive.movement.duration - 2.5).abs() < 1e-12);
     assert_eq!(grasp.demonstration.len(), plain.demonstration.len() + usize::from(control::time::periods(2.5)));
     let primitive = grasp.primitive.to_primitive().unwrap();
     let primitive = primitive.movement();
     let mut rollout = dmp::Rollout::start(primitive, &dmp::StartState::demonstrated(primitive)).unwrap();
     loop {
         let plan = rollout.step(primitive, control::PERIOD, &dmp::Coupling::NONE).unwrap();
-        if plan.time > plain.primitive.duration + 0.3 {
+        if plan.time > plain.primitive.movement.duration + 0.3 {
             let away = (0..3).map(|axis| plan.poses[0].position.x[axis] - grasp.primitive.goal.position[axis]);
             assert!(away.map(|e| e * e).sum::<f64>().sqrt() < 3e-3, "at {} s", plan.time);
         }
-        if plan.time > grasp.primitive.duration {
+        if plan.time > grasp.primitive.movement.duration {
             assert!((plan.points.x[8] - 2.0).abs() < 0.02, "{:?}", plan.points.x);
             break;
         }
@@ -365,14 +382,14 @@ fn gains_that_the_user_gives_are_taken_and_explained_and_a_heavy_plan_is_warned_
     let soft = learned(&taught(5.0), &feedback(k1, 300.0)).unwrap();
     let tables = soft.primitive.feedback.as_ref().unwrap();
     assert_eq!((tables.k1[0].as_slice(), tables.k2[0].as_slice()), (k1.as_slice(), [1.0; 9].as_slice()));
-    assert_eq!(tables.clamps[1], 30_f64.to_radians());
-    assert_eq!(soft.primitive.gains[0].stiffness, 300.0);
-    assert!((soft.primitive.gains[0].damping - 2.0 * 300_f64.sqrt()).abs() < 1e-12);
+    assert_eq!(tables.clamp_orientation, 30_f64.to_radians());
+    assert_eq!(soft.primitive.gains.position.stiffness, 300.0);
+    assert!((soft.primitive.gains.position.damping - 2.0 * 300_f64.sqrt()).abs() < 1e-12);
     let report = soft.report.feedback.as_ref().unwrap();
     let row = report.rows[0];
     // 0.2 m against a spring of K/K1 = 60 N/m; tau^2/K1.
     assert!((row.load_at_limit - 12.0).abs() < 1e-9, "{row:?}");
-    assert!((row.inertia - soft.primitive.duration.powi(2) / 5.0).abs() < 1e-9, "{row:?}");
+    assert!((row.inertia - soft.primitive.movement.duration.powi(2) / 5.0).abs() < 1e-9, "{row:?}");
     assert_eq!((report.rows.len(), report.rows[1].row), (2, "rotation z"));
     assert!(soft.report.warnings.iter().any(|warning| warning.contains("2 kg")), "{:?}", soft.report.warnings);
     k1[1] = -1.0;
@@ -385,7 +402,10 @@ fn gains_that_the_user_gives_are_taken_and_explained_and_a_heavy_plan_is_warned_
 #[test]
 fn more_kernels_than_a_device_holds_are_refused() {
     let mut primitive = full();
-    for row in &mut primitive.weights {
+    let weights = &mut primitive.weights;
+    for row in
+        weights.position.iter_mut().chain(&mut weights.orientation).chain(&mut weights.posture).chain(&mut weights.hand)
+    {
         row.resize(101, 0.0);
     }
     assert!(matches!(primitive.to_image().unwrap_err(), PrimitiveFileError::Image { .. }));

@@ -19,7 +19,7 @@ fn primitive() -> PrimitiveFile {
     learn(&demonstration, Path::new("reach.toml"), &LearnOptions::named("reach")).unwrap().primitive
 }
 
-/// The lines of a run of [`DURATION`] with half a second of rest before and behind, felt as `feel(u)` tells.
+/// The lines of a run of [`DURATION`] with half a second of rest before and behind; the sensors measure `feel(u)`.
 fn rows(alpha: f64, feel: impl Fn(f64) -> f64) -> Vec<RecordingRow> {
     let template = common::rows(3.0)[0].clone();
     (0..1800_u32)
@@ -50,7 +50,7 @@ fn rehearsals_become_an_expectation_by_phase_with_its_marks() {
     let mut file = primitive();
     // The first half repeats itself, the second differs by up to 1 N between the runs.
     let runs: Vec<_> = [-1.0, 0.0, 1.0]
-        .map(|offset| recording(&rows(file.alpha, |u| 4.0 * u + if u > 0.5 { offset } else { 0.05 * offset })))
+        .map(|offset| recording(&rows(file.movement.alpha, |u| 4.0 * u + if u > 0.5 { offset } else { 0.05 * offset })))
         .to_vec();
     let payload = Payload { mass: 0.3, centre: [0.0, 0.0, 0.05] };
     let summary = remember_rehearsals(&mut file, &runs, DURATION, payload, true).unwrap();
@@ -81,7 +81,8 @@ fn rehearsals_become_an_expectation_by_phase_with_its_marks() {
 #[test]
 fn successes_become_an_experience_that_ends_with_the_next_rehearsal() {
     let mut file = primitive();
-    let runs: Vec<_> = [-0.6, 0.0, 0.6].map(|offset| recording(&rows(file.alpha, |u| 2.0 * u + offset))).to_vec();
+    let runs: Vec<_> =
+        [-0.6, 0.0, 0.6].map(|offset| recording(&rows(file.movement.alpha, |u| 2.0 * u + offset))).to_vec();
     let summary = remember_successes(&mut file, &runs).unwrap();
     assert!((summary.duration_s - DURATION).abs() < 0.01, "{}", summary.duration_s);
     let experience = file.experience.as_ref().unwrap();
@@ -109,7 +110,7 @@ fn watched(file: &PrimitiveFile, recording: &Recording) -> f64 {
         values[..6].copy_from_slice(&wrench[index]);
         values[6..9].copy_from_slice(&gauges[index]);
         values[9..].copy_from_slice(&hand[index][1..]);
-        watch.step(primitive.statistics().unwrap(), -phase[index].ln() / file.alpha, &values, true);
+        watch.step(primitive.statistics().unwrap(), -phase[index].ln() / file.movement.alpha, &values, true);
         largest = largest.max(watch.statistic());
     }
     largest
@@ -119,7 +120,8 @@ fn watched(file: &PrimitiveFile, recording: &Recording) -> f64 {
 fn every_success_is_within_two_thirds_of_the_limit_and_so_is_the_next_one_like_them() {
     let mut file = primitive();
     // One in eight is far from the others, in its force and in the moment of contact.
-    let run = |offset: f64, touch: f64| recording(&rows(file.alpha, |u| if u > touch { 2.0 + offset } else { 0.0 }));
+    let run =
+        |offset: f64, touch: f64| recording(&rows(file.movement.alpha, |u| if u > touch { 2.0 + offset } else { 0.0 }));
     let runs: Vec<_> =
         (0..8).map(|k| run(if k == 7 { 6.0 } else { 0.1 * f64::from(k) }, 0.4 + 0.05 * f64::from(k))).collect();
     let next = run(5.5, 0.72);
@@ -129,7 +131,7 @@ fn every_success_is_within_two_thirds_of_the_limit_and_so_is_the_next_one_like_t
         let largest = watched(&file, recording);
         assert!(largest < 0.67, "{largest}");
     }
-    let far = recording(&rows(file.alpha, |u| if u > 0.5 { 40.0 } else { 0.0 }));
+    let far = recording(&rows(file.movement.alpha, |u| if u > 0.5 { 40.0 } else { 0.0 }));
     assert!(watched(&file, &far) > 1.0);
 }
 
@@ -137,7 +139,7 @@ fn every_success_is_within_two_thirds_of_the_limit_and_so_is_the_next_one_like_t
 fn recordings_that_tell_nothing_are_refused_and_nothing_is_changed() {
     let mut file = primitive();
     let before = file.clone();
-    let good = rows(file.alpha, |_| 1.0);
+    let good = rows(file.movement.alpha, |_| 1.0);
     let mut refused = |recordings: &[Recording]| {
         let error = remember_rehearsals(&mut file, recordings, DURATION, Payload::default(), true).unwrap_err();
         assert_eq!(file, before);

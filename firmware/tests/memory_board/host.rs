@@ -19,7 +19,7 @@ use firmware::board::Board;
 use firmware::meters::Meters;
 use flash::{FlashChip, FlashPort, VirtualClock};
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
-use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
+use link::image::{FeedbackClamps, Hemisphere, ImageContent, OrientationError, Waypoint, WaypointVelocity};
 use link::message::{ChunkData, HostHello};
 use link::{Event, LINK_VERSION, Name, PrimitiveImage, Reply, Request, SCHEMA_HASH, Status, Text};
 use rtic_core::Mutex;
@@ -324,8 +324,8 @@ pub(crate) fn image(name: &str) -> Vec<u8> {
         activation: 0.7,
         stiffness: [200.0; 4],
         damping: [28.28, 20.0, 28.28, 28.28],
-        orientation_error: OrientationErrorKind::QuaternionDifference,
-        hemisphere: HemisphereKind::Demonstrated,
+        orientation_error: OrientationError::Quaternion,
+        hemisphere: Hemisphere::Demonstrated,
         start: waypoint(start_posture()),
         start_velocity: WaypointVelocity::default(),
         goal: waypoint([a + 0.2, b, c, d - 0.2, e, f, g]),
@@ -336,7 +336,6 @@ pub(crate) fn image(name: &str) -> Vec<u8> {
         k2: &[],
         weights: &weights,
         expected_mean: &[],
-        expected_spread: &[],
         experience_trials: 0,
         experience_mean: &[],
         experience_spread: &[],

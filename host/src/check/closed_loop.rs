@@ -38,11 +38,11 @@ pub(super) struct Sample {
     pub(super) position: [f64; 3],
     /// Tool orientation.
     pub(super) orientation: [f64; 4],
-    /// What the cycle recorded.
+    /// The records of the cycle.
     pub(super) record: CycleRecord,
 }
 
-/// How the run ended.
+/// The end of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Ending {
     /// The arm holds the goal.

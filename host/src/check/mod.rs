@@ -45,7 +45,7 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// What a person calls it, and its unit.
+    /// Its name for people, and its unit.
     pub const fn name(self) -> (&'static str, &'static str) {
         match self {
             Limit::JointPosition => ("soft limit", "rad"),
@@ -70,7 +70,7 @@ pub struct Margin {
     pub value: f64,
     /// The bound it is compared with.
     pub bound: f64,
-    /// What is left: negative is a violation.
+    /// The margin: negative is a violation.
     pub margin: f64,
     /// When, s since the start of the movement.
     pub time_s: f64,
@@ -103,12 +103,12 @@ pub struct CheckReport {
     pub tool_speed_max_m_s: f64,
     /// Cycles in which the torque limiter cut.
     pub limited_cycles: usize,
-    /// What is wrong; empty if the primitive may move an arm.
+    /// The violations; empty if the primitive may move an arm.
     pub violations: Vec<String>,
 }
 
 impl CheckReport {
-    /// Whether nothing is wrong.
+    /// True if there is no violation.
     pub fn passed(&self) -> bool {
         self.violations.is_empty()
     }
@@ -176,7 +176,7 @@ pub fn check(file: &PrimitiveFile, speed: f64, progress: impl FnMut(f64)) -> Res
         model_hash: format!("0x{:08x}", file.model_hash),
         image: (image.len(), format!("0x{:08x}", lab::demonstration::recording::checksum(&image))),
         kernels: file.kernels(),
-        duration_s: file.duration,
+        duration_s: file.movement.duration,
         speed,
         run_duration_s: 0.0,
         margins: Vec::new(),

@@ -30,7 +30,7 @@ impl Plant {
         Plant { calibration: Calibration::nominal(arm::PAYLOAD), q: Vector7::from(q), dq: Vector7::zeros() }
     }
 
-    /// What the pucks report; `None` if the position is not finite any more.
+    /// The positions that the pucks report; `None` if the position is not finite any more.
     pub(super) fn counts(&self) -> Option<[Counts; 7]> {
         let motors = self.calibration.transmission().motor_from_joint(&self.q.into());
         self.calibration.drives().counts(&motors).ok()

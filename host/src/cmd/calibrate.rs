@@ -13,12 +13,12 @@ use lab::procedure::{self, HomeCorrection};
 /// Options of `calibrate`.
 #[derive(Debug, Clone, Args)]
 pub struct Cmd {
-    /// What to do
+    /// Action
     #[command(subcommand)]
     pub action: Action,
 }
 
-/// What can be done about a home.
+/// Actions on a home.
 #[derive(Debug, Clone, Subcommand)]
 pub enum Action {
     /// Show where the arm is taken to stand when it is zeroed, and whose home that is

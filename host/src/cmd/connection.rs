@@ -107,7 +107,7 @@ fn watch(
     let spinner = output.spinner("starting up");
     let result = start(client, &mut |stage| {
         spinner.set_message(stage.explanation());
-        // People at a simulated pendant need no telling; at a real one the words must stay on the screen.
+        // People at a simulated pendant need no reminder; at a real one the words must stay on the screen.
         if !simulated && matches!(stage, Stage::WaitingForIdle | Stage::WaitingForZero | Stage::WaitingForActive) {
             spinner.suspend(|| output.say(stage.explanation()));
         }

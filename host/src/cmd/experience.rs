@@ -1,4 +1,4 @@
-//! `tactus experience`: what successful runs felt like becomes what the device watches the next runs by.
+//! `tactus experience`: makes the statistics of successful runs, by which the device watches the next runs.
 
 use std::path::PathBuf;
 

@@ -19,7 +19,7 @@ pub struct Cmd {
     /// ALONG:SIDEWAYS in cm such as `-24:8,0:0`
     #[arg(long, visible_alias = "cells", allow_hyphen_values = true)]
     pub grid: Option<Grid>,
-    /// Turn the grid about its middle, degrees
+    /// Rotate the grid about its middle, degrees
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_hyphen_values = true)]
     pub rotate: f64,
     /// Shift the grid along the approach and sideways, cm
@@ -38,14 +38,14 @@ pub struct Cmd {
     /// The primitive, TOML; without it one is taught, learned and rehearsed first
     #[arg(long, value_name = "FILE")]
     pub primitive: Option<PathBuf>,
-    /// How well the controller's model fits the simulated arm
-    #[arg(long, value_enum, default_value = "honest")]
+    /// Difference between the simulated arm and the controller's model
+    #[arg(long, value_enum, default_value = "perturbed")]
     pub plant: PlantKind,
-    /// What differs from that arm: mass, table-friction, finger-friction, joint-friction, link-mass, noise (factors),
-    /// delay (cycles), bias (N, comes up after the run's tare)
+    /// Factors that differ from that arm: mass, table-friction, finger-friction, joint-friction, link-mass, noise
+    /// (factors), delay (cycles), bias (N, comes up after the run's tare)
     #[arg(long, value_name = "NAME=VALUE,...", default_value = "")]
     pub vary: Variation,
-    /// What stands on the table instead of the usual object
+    /// Object on the table instead of the usual object
     #[arg(long, value_parser = object_kinds())]
     pub object: Option<ObjectKind>,
     /// Simulations at a time [default: one for each processor]
@@ -100,8 +100,8 @@ mod work {
 
     use super::{Cmd, ErrorCode, Failure, Global};
     use crate::cmd::{Output, connection, upload};
-    use experiment::lesson::{self, LessonError};
     use experiment::lift::{self, Case};
+    use experiment::preparation::{self, PreparationError};
     use experiment::trial::TrialError;
     use experiment::{Comparison, Config, Experiment, ExperimentError, Progress, Scenario, figures, map};
     use lab::client::Interrupt;
@@ -182,8 +182,8 @@ mod work {
                 let spinner = output.spinner("rehearsing with the weight");
                 let rehearsed = case.rehearsed(config, interrupt);
                 spinner.finish_and_clear();
-                let primitive = rehearsed.map_err(lesson_failure)?;
-                primitive.write(&shared).map_err(|error| lesson_failure(error.into()))?;
+                let primitive = rehearsed.map_err(preparation_failure)?;
+                primitive.write(&shared).map_err(|error| preparation_failure(error.into()))?;
                 primitive
             };
             let config = case.config(config, primitive);
@@ -240,7 +240,7 @@ mod work {
         let spinner = output.spinner("teaching");
         let jobs =
             command.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from);
-        let made = lesson::make(command.scenario, command.plant, &file, jobs, interrupt, &mut |doing| {
+        let made = preparation::make(command.scenario, command.plant, &file, jobs, interrupt, &mut |doing| {
             spinner.set_message(doing.to_owned());
         })
         .and_then(|mut primitive| {
@@ -248,13 +248,13 @@ mod work {
             primitive.write(&file)?;
             spinner.set_message("gathering experience");
             let config = Config { plant: command.plant, ..Config::new(command.scenario, primitive.clone()) };
-            let (held, of) = lesson::experience(&config, interrupt, &mut primitive)?;
+            let (held, of) = preparation::experience(&config, interrupt, &mut primitive)?;
             output.say(format!("{held} of {of} runs succeeded and became experience"));
             primitive.write(&file)?;
             Ok(primitive)
         });
         spinner.finish_and_clear();
-        let primitive = made.map_err(lesson_failure)?;
+        let primitive = made.map_err(preparation_failure)?;
         output.say(format!("taught, learned and rehearsed: {}", file.display()));
         Ok(primitive)
     }
@@ -347,9 +347,9 @@ mod work {
         }
     }
 
-    fn lesson_failure(error: LessonError) -> Failure {
+    fn preparation_failure(error: PreparationError) -> Failure {
         match error {
-            LessonError::Trial(error) => trial_failure(error),
+            PreparationError::Trial(error) => trial_failure(error),
             error => Failure::new(ErrorCode::NotTaught, "experiment: no primitive was made", error),
         }
     }

@@ -81,7 +81,7 @@ pub(super) fn open_image(named: Option<&PathBuf>, doing: &str) -> Result<ImageFi
     ImageFile::read(&path).map_err(|error| image_failure(error, doing))
 }
 
-/// What the image says about itself, for people.
+/// The image's description of itself, for people.
 fn describe(image: &ImageFile, chip: &str) -> Table {
     let description = &image.description;
     let mut table = Table::new(["image", ""]);

@@ -19,7 +19,7 @@ const CLOSED: f32 = 2.3;
 /// Options of `hand`.
 #[derive(Debug, Clone, Args)]
 pub struct Cmd {
-    /// What the hand shall do
+    /// Action of the hand
     #[command(subcommand)]
     pub action: Action,
     /// I have brought the arm to its home pose: zero it there if need be
@@ -27,7 +27,7 @@ pub struct Cmd {
     pub at_home: bool,
 }
 
-/// What a hand can do.
+/// Actions of a hand.
 #[derive(Debug, Clone, Copy, PartialEq, Subcommand)]
 pub enum Action {
     /// Drive the fingers to their stops, from where they count

@@ -10,7 +10,7 @@ use lab::demonstration::{Preparation, Recording};
 use lab::learn::feedback::FeedbackOptions;
 use lab::learn::hand::HandMotion;
 use lab::learn::{self, LearnError, LearnOptions};
-use lab::primitive_file::OrientationErrorKind;
+use lab::primitive_file::OrientationError;
 
 /// Options of `learn`.
 #[derive(Debug, Clone, Args)]
@@ -89,9 +89,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         cutoff: command.cutoff,
         preparation: Preparation { still_speed: (!command.no_trim).then_some(command.still_speed) },
         orientation_error: if command.rotation_vector {
-            OrientationErrorKind::RotationVector
+            OrientationError::RotationVector
         } else {
-            OrientationErrorKind::Quaternion
+            OrientationError::Quaternion
         },
         dwell: command.dwell,
         hand: HandMotion { start: command.hand_start, goal: command.hand_goal, window: command.hand_window.into() },

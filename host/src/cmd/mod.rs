@@ -45,7 +45,7 @@ pub struct Cli {
     /// Options of every command.
     #[command(flatten)]
     pub global: Global,
-    /// What to do.
+    /// The action.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -89,7 +89,8 @@ pub enum Command {
     /// Play a primitive without feedback and remember what it feels like
     Rehearse(rehearse::Cmd),
     /// Remember successful runs, so that the device notices when one goes wrong
-    Experience(experience::Cmd),
+    #[command(name = "experience")]
+    Statistics(experience::Cmd),
     /// Validate a primitive before it moves an arm
     Check(check::Cmd),
     /// Put a primitive into the device
@@ -138,7 +139,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Learn(command) => learn::run(&command, &global),
         Command::Check(command) => check::run(&command, &global),
         Command::Rehearse(command) => rehearse::run(&command, &global),
-        Command::Experience(command) => experience::run(&command, &global),
+        Command::Statistics(command) => experience::run(&command, &global),
         Command::Hand(command) => hand::run(&command, &global),
         Command::Flash(command) => flash::run(&command, &global),
         Command::Logs(command) => logs::run(&command, &global),

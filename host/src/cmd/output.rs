@@ -1,4 +1,4 @@
-//! What a command shows: data on stdout, words and progress on stderr, JSON when asked.
+//! The output of a command: data on stdout, words and progress on stderr, JSON when asked.
 
 use std::borrow::Cow;
 use std::io::Write;

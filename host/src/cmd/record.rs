@@ -17,7 +17,7 @@ pub struct Cmd {
     /// Where the recording goes, CSV (see docs/recording-format.md)
     #[arg(long, short, value_name = "FILE", default_value = "recording.csv")]
     pub output: PathBuf,
-    /// How long, s
+    /// Duration, s
     #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = teach::duration)]
     pub duration: f64,
 }

@@ -1,4 +1,4 @@
-//! `tactus rehearse`: plays a primitive without feedback, and remembers what it felt like.
+//! `tactus rehearse`: plays a primitive without feedback, and remembers what the sensors measured.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -19,7 +19,7 @@ pub struct Cmd {
     /// The primitive, TOML
     #[arg(value_name = "PRIMITIVE")]
     pub primitive: PathBuf,
-    /// How often it is played; from 3 on the spread weighs the sensors (K2)
+    /// Repetitions; from 3 on the spread weighs the sensors (K2)
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=50))]
     pub trials: u8,
     /// Speed relative to the taught one, 0.1 to 2
@@ -40,12 +40,12 @@ pub struct Cmd {
     /// I have brought the arm to its home pose: zero it there if need be
     #[arg(long)]
     pub at_home: bool,
-    /// What stands around a simulated arm
+    /// Surroundings of a simulated arm
     #[arg(long, value_enum, default_value_t)]
     pub surroundings: Surroundings,
 }
 
-/// What stands around a simulated arm while it rehearses.
+/// Surroundings of a simulated arm while it rehearses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum Surroundings {
     /// The table without the object: what is expected is then the movement alone
@@ -57,7 +57,7 @@ pub enum Surroundings {
     Object,
 }
 
-/// What a rehearsal came to.
+/// The result of a rehearsal.
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
     /// Name of the primitive.
@@ -66,11 +66,11 @@ pub struct Report {
     pub file: PathBuf,
     /// Its check sum.
     pub checksum: String,
-    /// What was felt.
+    /// The measured wrench and gauges.
     pub expectation: MemorySummary,
-    /// Whether K2 came from the spread.
+    /// True if K2 came from the spread.
     pub weighted: bool,
-    /// What was out of the ordinary, trial by trial.
+    /// Irregularities, trial by trial.
     pub flags: Vec<FlagCounts>,
     /// Telemetry messages lost.
     pub gaps: u32,
@@ -101,7 +101,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut recordings = Vec::new();
     let mut flags = Vec::new();
     for trial in 1..=command.trials {
-        let bar = output.bar((file.duration / command.speed * RATE) as u64, "to the start");
+        let bar = output.bar((file.movement.duration / command.speed * RATE) as u64, "to the start");
         let played = procedure::play_once(&mut client, &movement, options, &notes, &mut |samples| {
             bar.set_message(format!("rehearsal {trial} of {}", command.trials));
             bar.set_position(samples as u64);
@@ -126,7 +126,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let gaps = client.gaps().telemetry;
     connection::tell_speed(&client, started, output);
 
-    let duration = file.duration / command.speed;
+    let duration = file.movement.duration / command.speed;
     let summary = remember_rehearsals(
         &mut file,
         &recordings,

@@ -1,12 +1,9 @@
 //! `tactus run`: the arm plays a primitive, watched and written down.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use embedded_can::Frame as _;
 use link::{Goal, RunOptions, Statistics};
 use serde::Serialize;
 
@@ -38,13 +35,13 @@ pub struct Cmd {
     /// Another goal of the grasp point, world frame, m
     #[arg(long, value_name = "X,Y,Z", value_parser = super::learn::numbers::<3>, allow_hyphen_values = true)]
     pub goal: Option<[f64; 3]>,
-    /// How force enters the run
+    /// Use of the measured force in the run
     #[arg(long, value_enum, default_value_t)]
     pub mode: Mode,
     /// Stiff gains in every mode: for a hand that must keep its place where nothing pushes
     #[arg(long)]
     pub stiff: bool,
-    /// Let the fingers keep to their plan, whatever their gauges feel
+    /// Let the fingers keep to their plan, whatever their gauges measure
     #[arg(long)]
     pub no_finger_feedback: bool,
     /// Move the goal while it runs: seconds after the start, then the goal as for --goal. May be given more than once
@@ -64,19 +61,19 @@ pub struct Cmd {
     pub bus_log: Option<PathBuf>,
 }
 
-/// What a run came to.
+/// The result of a run.
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
     /// Name of the primitive.
     pub name: String,
-    /// How force entered the run.
+    /// Use of the measured force in the run.
     pub mode: &'static str,
     /// Duration of the movement, s.
     pub duration_s: f64,
-    /// How well the tool kept to the plan; none where a hand alone is driven.
+    /// Tracking of the plan by the tool; none where a hand alone is driven.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking: Option<Tracking>,
-    /// How well the digits kept to the plan, where a hand alone is driven.
+    /// Tracking of the plan by the digits, where a hand alone is driven.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hand_tracking: Option<HandTracking>,
     /// Samples in the recording, and how many the link lost.
@@ -109,11 +106,11 @@ pub struct Report {
     pub stack_used: u32,
     /// Telemetry left out because the line was full.
     pub telemetry_dropped: u32,
-    /// What only the simulated bus knows.
+    /// Counters of the simulated bus.
     pub bus: Option<BusReport>,
 }
 
-/// What the simulated bus saw since the device was switched on.
+/// Traffic on the simulated bus since the device was switched on.
 #[derive(Debug, Clone, Serialize)]
 pub struct BusReport {
     /// Frames.
@@ -137,11 +134,12 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     check_expectation(&file, command, output)?;
     upload::precheck(&file, command.speed, output, DOING)?;
     let started = Instant::now();
-    let mut client = connection::open(global, DOING, |_| {})?;
-    if command.bus_log.is_some()
-        && let Some(simulation) = client.transport().simulation()
-    {
-        simulation.plant().record_bus();
+    let mut client = connection::open(global, DOING, |options| {
+        options.bus_log = command.bus_log.clone().or(options.bus_log.take());
+    })?;
+    if command.bus_log.is_some() && client.transport().simulation().is_none() {
+        let cause = std::io::Error::other("only a simulated bus can be written down");
+        return Err(connection::failure(ProcedureError::Recording(cause), DOING));
     }
     upload::send(&mut client, &file, output, DOING)?;
     output.say(format!("'{}' is in the device", file.name));
@@ -151,12 +149,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let ready_s = client.is_virtual().then(|| client.now().as_secs_f64());
-    let result = play(command, &mut client, &file, output);
-    if let Some(path) = &command.bus_log {
-        write_bus_log(&mut client, path)
-            .map_err(|cause| connection::failure(ProcedureError::Recording(cause), DOING))?;
-    }
-    let report = result.map_err(|error| connection::failure(error, DOING))?;
+    let report = play(command, &mut client, &file, output).map_err(|error| connection::failure(error, DOING))?;
     let report = Report { ready_s, ..report };
     connection::tell_speed(&client, started, output);
     if let Some(path) = &command.record {
@@ -191,11 +184,11 @@ fn play(
         ..usual
     };
     let changes = command.goal_at.iter().chain(&command.speed_at).copied().collect();
-    let request = RunRequest { rest: POST_ROLL, changes, ..RunRequest::new(name, file.duration, options) };
+    let request = RunRequest { rest: POST_ROLL, changes, ..RunRequest::new(name, file.movement.duration, options) };
 
     output.say(format!("running '{}' ({})", file.name, command.mode.name()));
     let notes = notes(client, file);
-    let bar = output.bar((file.duration / command.speed * RATE) as u64, "running");
+    let bar = output.bar((file.movement.duration / command.speed * RATE) as u64, "running");
     let mut cycles = Vec::new();
     let outcome = procedure::play(client, &request, &mut |cycle| {
         cycles.push(*cycle);
@@ -252,7 +245,7 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
         .help(help));
     };
     let primitive = file.to_primitive().map_err(|cause| super::check::failure(cause, &file.file, "run"))?;
-    let relative = expectation.recorded_duration / (file.duration / command.speed);
+    let relative = expectation.recorded_duration / (file.movement.duration / command.speed);
     let trust = primitive.expected().map_or(0.0, |expected| expected.trust(relative));
     if trust <= 0.0 {
         return Err(Failure::new(
@@ -261,7 +254,7 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
             format!(
                 "the expectation was recorded at {:.2} s, this run would take {:.2} s: more than 50 % apart",
                 expectation.recorded_duration,
-                file.duration / command.speed
+                file.movement.duration / command.speed
             ),
         )
         .help(format!("{help} --speed {}", command.speed)));
@@ -387,24 +380,6 @@ impl Report {
         }
         table.to_string()
     }
-}
-
-/// Every frame of the simulated bus as a line `(seconds) can0 ID#DATA`.
-fn write_bus_log(client: &mut Client<Device>, path: &Path) -> std::io::Result<()> {
-    let Some(simulation) = client.transport().simulation() else {
-        return Err(std::io::Error::other("only a simulated bus can be written down"));
-    };
-    let mut file = BufWriter::new(File::create(path)?);
-    for passage in simulation.plant().recorded() {
-        let frame = &passage.frame;
-        let seconds = sim::seconds(passage.start);
-        write!(file, "({seconds:.6}) can0 {:03X}#", frame.can_id().raw())?;
-        for byte in frame.data() {
-            write!(file, "{byte:02X}")?;
-        }
-        writeln!(file)?;
-    }
-    file.flush()
 }
 
 /// A time and a goal, as in `3.5:0.7,0.1,0.2`.

@@ -83,7 +83,7 @@ impl Guest {
 struct Party(Vec<Guest>);
 
 impl Party {
-    /// What has been said to the device; those who are gone leave once their last words are heard.
+    /// Bytes sent to the device; those who are gone leave once their last words are heard.
     fn hear(&mut self) -> Vec<u8> {
         let mut said = Vec::new();
         self.0.retain_mut(|guest| guest.messages().map(|messages| said.extend(messages)).is_some());

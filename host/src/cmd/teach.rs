@@ -32,23 +32,23 @@ pub struct Cmd {
     /// Posture the arm moves to before it becomes weightless: seven joint angles, rad. A simulated arm has a default
     #[arg(long, value_name = "Q1,...,Q7", value_parser = posture, allow_hyphen_values = true)]
     pub from: Option<Posture>,
-    /// How long to record, s. Without it: until Enter is pressed, or until the simulated person has let go
+    /// Duration of the recording, s. Without it: until Enter is pressed, or until the simulated teacher has let go
     #[arg(long, value_name = "SECONDS", value_parser = duration)]
     pub duration: Option<f64>,
     /// I have brought the arm to its home pose: zero it there if need be
     #[arg(long)]
     pub at_home: bool,
-    /// Seed of the simulated person's hand
+    /// Seed of the simulated teacher's hand
     #[arg(long, default_value_t = DEFAULT_SEED)]
-    pub person: u64,
-    /// What the simulated person shows
+    pub teacher: u64,
+    /// Movement that the simulated teacher shows
     #[arg(long, value_enum, default_value_t)]
-    pub lesson: LessonName,
+    pub movement: MovementName,
 }
 
-/// What the simulated person can show.
+/// The movements that the simulated teacher can show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
-pub enum LessonName {
+pub enum MovementName {
     /// A side grasp with turns about every axis
     #[default]
     Demonstration,
@@ -62,14 +62,14 @@ pub enum LessonName {
     Lift,
 }
 
-impl LessonName {
-    fn lesson(self) -> TaughtMovement {
+impl MovementName {
+    fn movement(self) -> TaughtMovement {
         match self {
-            LessonName::Demonstration => TaughtMovement::SmallTorch,
-            LessonName::Flashlight => TaughtMovement::Flashlight,
-            LessonName::Cup => TaughtMovement::Cup,
-            LessonName::Bottle => TaughtMovement::Bottle,
-            LessonName::Lift => TaughtMovement::Lift,
+            MovementName::Demonstration => TaughtMovement::SmallTorch,
+            MovementName::Flashlight => TaughtMovement::Flashlight,
+            MovementName::Cup => TaughtMovement::Cup,
+            MovementName::Bottle => TaughtMovement::Bottle,
+            MovementName::Lift => TaughtMovement::Lift,
         }
     }
 }
@@ -86,30 +86,30 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let started = Instant::now();
     let mut client = connection::open(global, DOING, |options| {
-        options.person = Some(command.person);
-        options.lesson = command.lesson.lesson();
+        options.teacher = Some(command.teacher);
+        options.movement = command.movement.movement();
         clear_the_table(options);
     })?;
     client.require(Capability::Arm).map_err(|error| error.into_failure(DOING))?;
     let alone = global.non_interactive && command.duration.is_none();
-    if alone && default_posture(&mut client, command.lesson).is_none() {
+    if alone && default_posture(&mut client, command.movement).is_none() {
         return Err(Failure::new(
             ErrorCode::NobodyToAsk,
             DOING,
             "nobody may be asked to press Enter when the movement is shown",
         ));
     }
-    if command.from.is_some() && default_posture(&mut client, command.lesson).is_some() {
+    if command.from.is_some() && default_posture(&mut client, command.movement).is_some() {
         return Err(Failure::new(
             ErrorCode::StartIsFixed,
             DOING,
-            "the simulated person knows one movement, and where it begins",
+            "the simulated teacher knows one movement, and where it begins",
         ));
     }
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let failed = |error| connection::failure(error, DOING);
 
-    if let Some(posture) = command.from.or_else(|| default_posture(&mut client, command.lesson)) {
+    if let Some(posture) = command.from.or_else(|| default_posture(&mut client, command.movement)) {
         let spinner = output.spinner("moving to the start");
         let travelled = procedure::travel(&mut client, posture, |passed| {
             spinner.set_message(format!("moving to the start, {passed:.0} s"));
@@ -123,7 +123,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         "Tactus recording of a demonstration by hand, {} Hz, from {} {}",
         control::RATE_HZ,
         client.hello().board.as_str(),
-        if client.is_simulated() { "(simulated arm, simulated person)" } else { "" }
+        if client.is_simulated() { "(simulated arm, simulated teacher)" } else { "" }
     );
     client.gravity().map_err(|error| failed(error.into()))?;
     let recorder = Recorder::start(&mut client, BufWriter::new(file), notes.trim_end()).map_err(failed)?;
@@ -179,15 +179,15 @@ fn wait_for_enter() -> std::thread::JoinHandle<()> {
 /// demonstration keeps it, because its grasp ends beside it.
 fn clear_the_table(options: &mut SimulationOptions) {
     #[cfg(feature = "mujoco")]
-    if options.lesson != TaughtMovement::SmallTorch {
+    if options.movement != TaughtMovement::SmallTorch {
         options.scene = sim::world::mujoco::Scene::EMPTY;
     }
     let _ = options;
 }
 
 /// Where the simulated teacher's path begins, if there is one.
-fn default_posture(client: &mut Client<Device>, lesson: LessonName) -> Option<Posture> {
-    teacher::is_present(client).then(|| lesson.lesson().start().map(|angle| angle as f32))
+fn default_posture(client: &mut Client<Device>, movement: MovementName) -> Option<Posture> {
+    teacher::is_present(client).then(|| movement.movement().start().map(|angle| angle as f32))
 }
 
 /// Seven numbers separated by commas.

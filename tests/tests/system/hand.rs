@@ -9,7 +9,7 @@ use lab::image_file::ImageFile;
 use lab::procedure;
 use lab::simulation::{HAND_IMAGE_VARIABLE, built_image};
 use link::image::{
-    ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity,
+    ExpectationMarks, FeedbackClamps, Hemisphere, ImageContent, OrientationError, Waypoint, WaypointVelocity,
 };
 use link::{EventKind, HandStage, Name, Refusal, Request, RunOptions, Statistics, Telemetry};
 use sim::BusTrace;
@@ -51,7 +51,6 @@ fn image() -> Vec<u8> {
             columns(9, EXPECTED.map(|torque| pressed * torque))
         })
         .collect();
-    let spread = vec![0.05; expected.len()];
     let waypoint = |hand: [f32; 4]| Waypoint {
         position: [0.4, 0.0, 0.2],
         orientation: [1.0, 0.0, 0.0, 0.0],
@@ -65,8 +64,8 @@ fn image() -> Vec<u8> {
         activation: 0.7,
         stiffness: [200.0; 4],
         damping: [28.284_271; 4],
-        orientation_error: OrientationErrorKind::QuaternionDifference,
-        hemisphere: HemisphereKind::Nearest,
+        orientation_error: OrientationError::Quaternion,
+        hemisphere: Hemisphere::Nearest,
         start: waypoint([0.0; 4]),
         start_velocity: WaypointVelocity::default(),
         goal: waypoint([0.3, 1.6, 1.6, 1.6]),
@@ -83,7 +82,6 @@ fn image() -> Vec<u8> {
         k2: &k2[..],
         weights: &weights[..],
         expected_mean: &expected[..],
-        expected_spread: &spread[..],
         experience_mean: &[][..],
         experience_spread: &[][..],
     };
@@ -248,7 +246,7 @@ fn hand_run_reports_its_fingers_and_no_tool() {
     assert!(rms.len() == 4 && rms.iter().all(|error| (1e-6..0.05).contains(error)), "{report}");
     assert!(rms.iter().zip(&worst).all(|(rms, worst)| rms <= worst && *worst < 0.15), "{report}");
     let seconds = report["duration_s"].as_f64().expect("a duration");
-    assert!(seconds >= file.duration, "{seconds} s of a movement of {} s", file.duration);
+    assert!(seconds >= file.movement.duration, "{seconds} s of a movement of {} s", file.movement.duration);
     let run = tactus(folder, &[&device[..], &["run", "primitive.toml"]].concat()).success();
     let text = stdout(&run);
     assert!(text.contains("fingers") && !text.contains(" mm") && !text.contains(" deg"), "{text}");

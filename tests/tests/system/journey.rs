@@ -32,7 +32,7 @@ fn what_a_person_shows_the_arm_does() {
     let folder = folder.path();
     let run = |arguments: &[&str]| one_object(&tactus(folder, arguments).success().get_output().stdout);
 
-    let taught = run(&["--device", "sim:seed=3", "--json", "teach", "--person", "5", "-o", "demo.csv"]);
+    let taught = run(&["--device", "sim:seed=3", "--json", "teach", "--teacher", "5", "-o", "demo.csv"]);
     assert_eq!(taught["gaps"], 0);
     let demonstration = expect(Recording::read(&folder.join("demo.csv")));
     assert_eq!(taught["samples"], demonstration.len());
@@ -65,7 +65,11 @@ fn what_a_person_shows_the_arm_does() {
     );
     assert!(mm(tracking.position_rms_m) <= 5.0 && degrees(tracking.orientation_rms_rad) <= 1.5, "{tracking:?}");
     assert!(mm(tracking.position_end_m) <= 3.0 && degrees(tracking.orientation_end_rad) <= 1.0, "{tracking:?}");
-    assert!(tracking.samples as f64 >= file.duration * control::RATE, "only {} samples of the run", tracking.samples);
+    assert!(
+        tracking.samples as f64 >= file.movement.duration * control::RATE,
+        "only {} samples of the run",
+        tracking.samples
+    );
 
     assert_eq!((execution.gaps, execution.recording.missing_samples), (0, 0));
     assert_eq!(execution.statistics.missed_deadlines, 0);
@@ -75,7 +79,11 @@ fn what_a_person_shows_the_arm_does() {
 
     let simulation = simulation(arm.transport());
     let sent = torques(simulation.plant().recorded());
-    assert!(sent.len() as f64 > 2.0 * file.duration * control::RATE, "two torque frames a cycle: {}", sent.len());
+    assert!(
+        sent.len() as f64 > 2.0 * file.movement.duration * control::RATE,
+        "two torque frames a cycle: {}",
+        sent.len()
+    );
     let largest = sent.iter().flat_map(|(_, units)| units).map(|units| units.unsigned_abs()).max();
     println!("largest torque on the bus: {largest:?} counts");
     assert!(largest.is_some_and(|largest| largest > 0 && f64::from(largest) <= MOTOR_COUNTS_LIMIT));

@@ -23,7 +23,7 @@ fn in_the_middle(address: &str) -> (Arm, Vec<Telemetry>) {
     prepare(&mut arm, file);
     expect(arm.set_telemetry(1));
     begin(&mut arm, file);
-    let cycles = (file.duration * control::RATE / 2.0) as usize;
+    let cycles = (file.movement.duration * control::RATE / 2.0) as usize;
     let mut telemetry = Vec::new();
     while telemetry.len() < cycles {
         telemetry.extend(next(&mut arm));

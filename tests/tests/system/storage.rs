@@ -11,7 +11,7 @@ use lab::client::{Client, Incoming};
 use lab::device::Device;
 use lab::simulation::FlashSource;
 use link::image::{
-    FeedbackClamps, HemisphereKind, IMAGE_BYTES_LIMIT, ImageContent, KERNEL_LIMIT, OrientationErrorKind, Waypoint,
+    FeedbackClamps, Hemisphere, IMAGE_BYTES_LIMIT, ImageContent, KERNEL_LIMIT, OrientationError, Waypoint,
     WaypointVelocity,
 };
 use link::message::RunOptions;
@@ -30,8 +30,8 @@ fn image(name: &str, duration: f32) -> Vec<u8> {
         activation: 0.7,
         stiffness: [200.0; 4],
         damping: [28.28, 20.0, 28.28, 28.28],
-        orientation_error: OrientationErrorKind::QuaternionDifference,
-        hemisphere: HemisphereKind::Demonstrated,
+        orientation_error: OrientationError::Quaternion,
+        hemisphere: Hemisphere::Demonstrated,
         start: waypoint(start),
         start_velocity: WaypointVelocity::default(),
         goal: waypoint([0.2, 0.5, 0.0, 1.4, 0.0, 0.5, 0.0]),
@@ -42,7 +42,6 @@ fn image(name: &str, duration: f32) -> Vec<u8> {
         k2: &[],
         weights: &weights,
         expected_mean: &[],
-        expected_spread: &[],
         experience_trials: 0,
         experience_mean: &[],
         experience_spread: &[],

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use control::{Fault, RATE, State};
 use experiment::plant::{self, Arm};
-use experiment::{Config, Experiment, Grid, Mode, Outcome, PlantKind, Scenario, Variation, lesson};
+use experiment::{Config, Experiment, Grid, Mode, Outcome, PlantKind, Scenario, Variation, preparation};
 use lab::client::{Client, Interrupt};
 use lab::demonstration::Recording;
 use lab::device::Device;
@@ -53,7 +53,7 @@ fn primitive() -> &'static PrimitiveFile {
     static PRIMITIVE: OnceLock<PrimitiveFile> = OnceLock::new();
     PRIMITIVE.get_or_init(|| {
         let file = Path::new("flashlight.toml");
-        expect(lesson::make(Scenario::Flashlight, PlantKind::Honest, file, 2, &Interrupt::never(), &mut |_| {}))
+        expect(preparation::make(Scenario::Flashlight, PlantKind::Perturbed, file, 2, &Interrupt::never(), &mut |_| {}))
     })
 }
 
@@ -146,7 +146,11 @@ fn ready_to_run(options: &SimulationOptions, primitive: &PrimitiveFile) -> Clien
 }
 
 fn request(primitive: &PrimitiveFile) -> RunRequest {
-    RunRequest::new(expect(Name::new(&primitive.name)), primitive.duration, procedure::Mode::Adaptive.options())
+    RunRequest::new(
+        expect(Name::new(&primitive.name)),
+        primitive.movement.duration,
+        procedure::Mode::Adaptive.options(),
+    )
 }
 
 #[test]
@@ -170,7 +174,7 @@ fn a_sensor_error_within_the_dead_band_neither_moves_the_plan_nor_makes_the_hand
         plans
     };
     for seed in 1..=3 {
-        let arm = Arm { engine: engine("sil:"), kind: PlantKind::Honest, variation: Variation::default(), seed };
+        let arm = Arm { engine: engine("sil:"), kind: PlantKind::Perturbed, variation: Variation::default(), seed };
         let (bent, taught) = (touchless(&arm, procedure::Mode::Adaptive), touchless(&arm, procedure::Mode::OpenLoop));
         let approach = BEFORE_CLOSING * RATE as usize;
         assert!(bent.len() > approach && taught.len() > approach, "{} {}", bent.len(), taught.len());

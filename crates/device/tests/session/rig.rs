@@ -10,7 +10,7 @@ use device::{
     Session, SessionPort, Stage, StoredPrimitive, TimedRecord, Timing,
 };
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame};
-use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
+use link::image::{FeedbackClamps, Hemisphere, ImageContent, OrientationError, Waypoint, WaypointVelocity};
 use link::message::{ChunkData, DeviceHello, HostHello};
 use link::{HandStage, LINK_VERSION, Name, Refusal, Reply, Request, SCHEMA_HASH, Text};
 use pinned_init::InPlaceWrite;
@@ -339,8 +339,8 @@ pub(crate) fn image_with(
         activation: 0.7,
         stiffness: [200.0; 4],
         damping: [28.28, 20.0, 28.28, 28.28],
-        orientation_error: OrientationErrorKind::QuaternionDifference,
-        hemisphere: HemisphereKind::Demonstrated,
+        orientation_error: OrientationError::Quaternion,
+        hemisphere: Hemisphere::Demonstrated,
         start: waypoint([0.0, 0.5, 0.0, 1.5, 0.0, 0.5, 0.0]),
         start_velocity: WaypointVelocity::default(),
         goal: waypoint([0.3, 0.7, 0.0, 1.3, 0.0, 0.5, 0.0]),
@@ -351,7 +351,6 @@ pub(crate) fn image_with(
         k2: &[],
         weights: &weights,
         expected_mean: &[],
-        expected_spread: &[],
         experience_trials: 0,
         experience_mean: &[],
         experience_spread: &[],

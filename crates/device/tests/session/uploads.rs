@@ -180,7 +180,7 @@ fn a_primitive_outside_the_limits_of_the_arm_is_refused_in_words() {
     static ONE: [f32; 9] = [1.0; 9];
     assert!(words(|content| (content.k1, content.k2) = (&NEGATIVE, &ONE)).contains("feedback"));
     let expectation = |content: &mut link::image::ImageContent<&[f32]>| {
-        (content.expected_mean, content.expected_spread) = (&ONE, &ONE);
+        content.expected_mean = &ONE;
         content.marks.filter_cutoff = 15.0;
     };
     assert!(words(expectation).contains("expectation"), "recorded in no time");
@@ -233,10 +233,9 @@ fn a_primitive_beyond_all_bounds_is_refused_with_the_value_that_is() {
         statistics[16] = 1e30;
         statistics
     };
-    static SPREAD: [f32; 18] = [1.0; 18];
     assert_eq!(
         words(|content| {
-            (content.expected_mean, content.expected_spread) = (&FELT, &SPREAD);
+            content.expected_mean = &FELT;
             (content.marks.recorded_duration, content.marks.filter_cutoff) = (3.0, 15.0);
         }),
         "the expected value at point 1, column 7 (from 0) is larger than anything real"
@@ -284,7 +283,7 @@ fn an_expectation_recorded_through_another_filter_is_refused_with_both() {
     let mut rig = Rig::greeted();
     let mut through = |filter_cutoff: f32| {
         let with_expectation = |content: &mut link::image::ImageContent<&[f32]>| {
-            (content.expected_mean, content.expected_spread) = (&NINE, &NINE);
+            content.expected_mean = &NINE;
             content.marks.recorded_duration = 3.0;
             content.marks.filter_cutoff = filter_cutoff;
         };
@@ -304,7 +303,7 @@ fn an_expectation_recorded_through_another_filter_is_refused_with_both() {
 fn expectation_and_experience_reach_the_control_half() {
     let mut rig = Rig::greeted();
     let whole = |content: &mut link::image::ImageContent<&[f32]>| {
-        (content.expected_mean, content.expected_spread) = (&NINE, &NINE);
+        content.expected_mean = &NINE;
         (content.experience_mean, content.experience_spread, content.experience_trials) = (&TWELVE, &TWELVE, 5);
         content.marks.recorded_duration = 3.0;
         content.marks.filter_cutoff = control::sense::wrench::WRENCH_CUT_OFF as f32;

@@ -21,7 +21,7 @@ const BETWEEN: f64 = 14.0;
 /// One diagram.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// What it shows, with its unit.
+    /// The quantity shown, with its unit.
     pub title: String,
     /// Groups of bars: a label, and the value of each member if it has one.
     pub groups: Vec<(String, Vec<Option<f64>>)>,

@@ -1,4 +1,4 @@
-//! How hard the object was pushed before the fingers closed, against the force that tips it over.
+//! The force on the object before the fingers closed, against the force that tips it over.
 
 use lab::plot::drawing::{Anchor, Drawing, Frame, GREY, GRID, INK, LIMIT, plain, ticks};
 

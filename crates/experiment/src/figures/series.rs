@@ -16,7 +16,7 @@ const MOST_POINTS: usize = 700;
 /// Standard deviations on either side of the expected mean.
 const BAND_WIDTH: f64 = 2.0;
 
-/// What the sensors should feel, over time.
+/// Expected sensor values over time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Expected {
     /// Times after the start, s.
@@ -41,14 +41,14 @@ struct Panel {
 /// Panels row by row, three a row.
 const PANELS: [[Panel; 3]; 5] = [
     [
-        felt("force x", "N", 4.0, 0, |c| c.felt[0]),
-        felt("force y", "N", 4.0, 1, |c| c.felt[1]),
-        felt("force z", "N", 4.0, 2, |c| c.felt[2]),
+        sensed("force x", "N", 4.0, 0, |c| c.sensors[0]),
+        sensed("force y", "N", 4.0, 1, |c| c.sensors[1]),
+        sensed("force z", "N", 4.0, 2, |c| c.sensors[2]),
     ],
     [
-        felt("torque x", "N m", 0.4, 3, |c| c.felt[3]),
-        felt("torque y", "N m", 0.4, 4, |c| c.felt[4]),
-        felt("torque z", "N m", 0.4, 5, |c| c.felt[5]),
+        sensed("torque x", "N m", 0.4, 3, |c| c.sensors[3]),
+        sensed("torque y", "N m", 0.4, 4, |c| c.sensors[4]),
+        sensed("torque z", "N m", 0.4, 5, |c| c.sensors[5]),
     ],
     [
         moved("position x", "cm", 4.0, |c| 100.0 * c.position[0], |c| 100.0 * c.position_d[0]),
@@ -61,13 +61,13 @@ const PANELS: [[Panel; 3]; 5] = [
         moved("finger 3", "rad", 0.5, |c| c.hand[3], |c| c.hand_d[3]),
     ],
     [
-        felt("gauge 1", "N m", 0.3, 6, |c| c.felt[6]),
-        felt("gauge 2", "N m", 0.3, 7, |c| c.felt[7]),
-        felt("gauge 3", "N m", 0.3, 8, |c| c.felt[8]),
+        sensed("gauge 1", "N m", 0.3, 6, |c| c.sensors[6]),
+        sensed("gauge 2", "N m", 0.3, 7, |c| c.sensors[7]),
+        sensed("gauge 3", "N m", 0.3, 8, |c| c.sensors[8]),
     ],
 ];
 
-const fn felt(
+const fn sensed(
     title: &'static str,
     unit: &'static str,
     height: f64,
@@ -223,7 +223,7 @@ pub(crate) mod tests {
                     let mut cycle = cycle(time);
                     cycle.position = [0.45 + 0.3 * s, -0.1 + 0.3 * s, 0.02 * (6.0 * s).sin()];
                     cycle.position_d = [0.45 + 0.3 * s + 0.01, -0.1 + 0.3 * s, 0.02 * (6.0 * s).sin()];
-                    cycle.felt = std::array::from_fn(|i| {
+                    cycle.sensors = std::array::from_fn(|i| {
                         let scale = if i < 3 { 1.0 } else { 0.05 };
                         scale * (-force * touch / (1.0 + i as f64) + 0.1 * (f64::from(k) * (0.7 + i as f64)).sin())
                     });
@@ -256,7 +256,7 @@ pub(crate) mod tests {
     #[test]
     fn one_spike_does_not_flatten_a_diagram() {
         let (mut open, closed, _) = fixtures();
-        open.cycles[2000].felt[0] = 500.0;
+        open.cycles[2000].sensors[0] = 500.0;
         let runs = [(Mode::OpenLoop, &open), (Mode::Adaptive, &closed)];
         let [low, high] = range(&PANELS[0][0], &runs, None);
         assert!(high - low < 20.0 && low < -9.0, "{low} {high}");

@@ -31,7 +31,7 @@ pub enum FigureError {
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// What the operating system says.
+        /// The operating system's reason.
         #[source]
         cause: std::io::Error,
     },
@@ -140,7 +140,7 @@ pub fn write_lift(rows: &[Carried], trials: usize, folder: &Path) -> Result<(), 
     Ok(())
 }
 
-/// What the primitive expects, over time: the experience of successful runs if there is one, else the rehearsals.
+/// The primitive's expectation over time: the experience of successful runs if there is one, else the rehearsals.
 fn expected(primitive: &PrimitiveFile) -> Option<Expected> {
     let (mean, spread) = match (&primitive.expectation, &primitive.experience) {
         (Some(table), _) => (&table.mean, &table.spread),
@@ -158,7 +158,7 @@ fn expected(primitive: &PrimitiveFile) -> Option<Expected> {
     };
     let progress = |k: usize| k as f64 / (EXPECTED_POINTS - 1) as f64;
     (points > 0).then(|| Expected {
-        time: (0..EXPECTED_POINTS).map(|k| progress(k) * primitive.duration).collect(),
+        time: (0..EXPECTED_POINTS).map(|k| progress(k) * primitive.movement.duration).collect(),
         mean: (0..EXPECTED_POINTS).map(|k| row(mean, progress(k))).collect(),
         spread: (0..EXPECTED_POINTS).map(|k| row(spread, progress(k))).collect(),
     })

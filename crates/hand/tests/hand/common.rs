@@ -1,13 +1,13 @@
 //! What the tests share: primitives as images, in fixed point and in f64.
 
 use control::plan::primitive::{MovementTables, Primitive, ROWS, configuration as rows, gains, limits, velocity};
-use dmp::{Hemisphere, OrientationError};
+
 use hand::image::ImageReader;
 use hand::number::Number;
 use hand::{FingerPrimitive, FingerTables, Rollout};
 use link::Name;
 use link::image::{
-    ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity,
+    ExpectationMarks, FeedbackClamps, Hemisphere, ImageContent, OrientationError, Waypoint, WaypointVelocity,
 };
 
 /// A movement of the hand, in real numbers.
@@ -86,7 +86,6 @@ impl Movement {
         };
         let (k1, k2) = (spread_out(10, &self.k1), spread_out(9, &self.k2));
         let expected_mean = spread_out(9, &self.expected);
-        let expected_spread = vec![0.1; expected_mean.len()];
         let waypoint = |hand: [f32; 4]| Waypoint {
             position: [0.4, 0.0, 0.2],
             orientation: [1.0, 0.0, 0.0, 0.0],
@@ -100,8 +99,8 @@ impl Movement {
             activation: self.activation,
             stiffness: [150.0, 150.0, 150.0, self.stiffness],
             damping: [24.0, 24.0, 24.0, self.damping],
-            orientation_error: OrientationErrorKind::QuaternionDifference,
-            hemisphere: HemisphereKind::Nearest,
+            orientation_error: OrientationError::Quaternion,
+            hemisphere: Hemisphere::Nearest,
             start: waypoint(self.start),
             start_velocity: WaypointVelocity { hand: self.start_velocity, ..WaypointVelocity::default() },
             goal: waypoint(self.goal),
@@ -118,7 +117,6 @@ impl Movement {
             k2: k2.as_slice(),
             weights: weights.as_slice(),
             expected_mean: expected_mean.as_slice(),
-            expected_spread: expected_spread.as_slice(),
             experience_mean: &[][..],
             experience_spread: &[][..],
         };

@@ -32,10 +32,10 @@ pub use telemetry::{Gaps, TelemetryStream};
 pub use transfer::Transfer;
 pub use upload::{UploadOutcome, UploadPhase};
 
-/// How long an answer may take, the repetitions of its request included.
+/// Longest time for an answer, the repetitions of its request included.
 pub const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// How long the answer to a change of the store may take: it comes when the change is durable, and the flash may have
+/// Longest time for the answer to a change of the store: it comes when the change is durable, and the flash may have
 /// to erase two sectors first, each of which takes up to 4 s.
 pub const STORE_TIMEOUT: Duration = Duration::from_secs(15);
 
@@ -50,7 +50,7 @@ const KEEP_ALIVE: Duration = Duration::from_millis(100);
 /// device refuses such a request when it is older than 500 ms.
 const FRESH: Duration = Duration::from_millis(200);
 
-/// How long to wait for another host to be gone. A killed one keeps its session for half a second.
+/// Longest wait for another host to be gone. A killed one keeps its session for half a second.
 const BUSY_TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// Something the device sent unasked.
@@ -219,18 +219,18 @@ impl<T: Transport> Client<T> {
         self.transport.now()
     }
 
-    /// Whether that clock is virtual.
+    /// True if that clock is virtual.
     pub fn is_virtual(&self) -> bool {
         self.transport.is_virtual()
     }
 
-    /// Whether the arm is a simulated one, as far as can be known here: the device says so, or its time is virtual.
+    /// True if the arm is a simulated one, as far as can be known here: the device says so, or its time is virtual.
     /// The image on an emulated board does not know it, and behind a socket nobody does.
     pub fn is_simulated(&self) -> bool {
         self.hello.simulated || self.transport.is_virtual()
     }
 
-    /// What this end of the link counted.
+    /// Counters of this end of the link.
     pub fn counters(&self) -> LinkCounters {
         self.decoder.counters()
     }
@@ -240,12 +240,12 @@ impl<T: Transport> Client<T> {
         self.gaps
     }
 
-    /// How quickly the last upload went.
+    /// Throughput of the last upload.
     pub fn transfer(&self) -> Transfer {
         self.transfer
     }
 
-    /// How quickly the device answered.
+    /// Response times of the device.
     pub fn round_trips(&self) -> RoundTrips {
         self.round_trips
     }

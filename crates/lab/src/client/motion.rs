@@ -9,7 +9,7 @@ use super::Client;
 use crate::error::HostError;
 use crate::transport::Transport;
 
-/// How long the arm may take to leave its motion after a stop was accepted. The soft stop begins in the cycle
+/// Longest time until the arm leaves its motion after a stop was accepted. The soft stop begins in the cycle
 /// after the command; this leaves room for a slow line.
 const STOP_TIMEOUT: Duration = Duration::from_millis(200);
 
@@ -87,14 +87,6 @@ impl<T: Transport> Client<T> {
         self.order(&Request::SetSpeed { factor })
     }
 
-    /// Takes the present wrench as zero.
-    ///
-    /// # Errors
-    /// As [`Client::request`].
-    pub fn tare(&mut self) -> Result<(), HostError> {
-        self.order(&Request::Tare)
-    }
-
     /// Clears a fault whose cause is gone.
     ///
     /// # Errors
@@ -146,7 +138,7 @@ impl<T: Transport> Client<T> {
     }
 }
 
-/// Whether a state is one of those the device would end when this host fell silent.
+/// True for a state that the device would end when this host fell silent.
 fn is_moving(state: u8) -> bool {
     matches!(State::from_code(state), Some(State::Gravity | State::Approach | State::Run | State::Coast))
 }

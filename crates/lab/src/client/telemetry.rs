@@ -8,7 +8,7 @@ use super::{Client, Incoming};
 use crate::error::HostError;
 use crate::transport::Transport;
 
-/// What did not arrive.
+/// Samples that did not arrive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Gaps {
     /// Telemetry messages missing between two that came.

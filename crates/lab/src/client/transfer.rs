@@ -19,7 +19,7 @@ use crate::transport::Transport;
 /// baud to 1 Mbit/s; the third covers a device that looks at its line once a slot. The device keeps four requests.
 const WINDOW: usize = 3;
 
-/// How quickly an image went over the line.
+/// Throughput of an image over the line.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Transfer {
     /// Its length.
@@ -170,7 +170,7 @@ impl<T: Transport> Client<T> {
     }
 }
 
-/// What is on its way, and what is sure.
+/// Bytes on their way, and bytes acknowledged.
 struct Window {
     on_their_way: VecDeque<Sent>,
     /// Bytes that have arrived for sure.

@@ -7,7 +7,7 @@ use super::Client;
 use crate::error::HostError;
 use crate::transport::Transport;
 
-/// What an upload is doing.
+/// Phase of an upload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum UploadPhase {
     /// Bytes are sent.
@@ -18,7 +18,7 @@ pub enum UploadPhase {
     Verify,
 }
 
-/// How an upload ended.
+/// Result of an upload.
 #[derive(Debug, Clone, PartialEq)]
 pub enum UploadOutcome {
     /// The image was sent, stored and read back.
@@ -82,7 +82,7 @@ impl<T: Transport> Client<T> {
         Ok(())
     }
 
-    /// What the device stores under a name.
+    /// The image that the device stores under a name.
     ///
     /// # Errors
     /// As [`Client::request`].
@@ -99,7 +99,7 @@ impl<T: Transport> Client<T> {
     }
 }
 
-/// Whether a listing is that of this very image.
+/// True if a listing is that of this very image.
 fn is_same(listing: &Listing, image: &[u8]) -> bool {
     usize::try_from(listing.length) == Ok(image.len()) && listing.crc == stored_crc(image)
 }

@@ -1,4 +1,4 @@
-//! What can be wrong with a recording, always with the file and, where there is one, the line and the column.
+//! Errors of a recording, always with the file and, where there is one, the line and the column.
 
 use std::path::PathBuf;
 
@@ -32,7 +32,7 @@ pub enum RecordingError {
     Unreadable {
         /// The file.
         file: PathBuf,
-        /// What the operating system says.
+        /// The operating system's reason.
         #[source]
         cause: std::io::Error,
     },
@@ -83,7 +83,7 @@ pub enum RecordingError {
     NotANumber {
         /// Where.
         place: Place,
-        /// What stands there.
+        /// The text found there.
         text: String,
     },
     /// A field is NaN or infinite.
@@ -91,7 +91,7 @@ pub enum RecordingError {
     NotFinite {
         /// Where.
         place: Place,
-        /// What was read.
+        /// The value found there.
         value: f64,
     },
     /// Time does not increase from one line to the next.

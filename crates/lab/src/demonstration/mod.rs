@@ -1,4 +1,4 @@
-//! Demonstrations: recordings of a movement that a person showed, made ready to be learned from.
+//! Demonstrations: recordings of a movement that was shown by hand, made ready to be learned from.
 //!
 //! [`Recording`] is what stands in a file, checked value by value; [`Demonstration`] is the movement in it: a pose
 //! at each instant, 300 times a second, without the time in which the arm stood still before and after.
@@ -24,7 +24,7 @@ pub const RATE: f64 = control::RATE;
 /// happened in a longer gap is not known.
 pub const LONGEST_GAP: f64 = 0.1;
 
-/// How a recording becomes a demonstration.
+/// Options for making a demonstration of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Preparation {
     /// Speed of the tool frame below which the arm counts as still, m/s; turning counts with [`TURN_RADIUS`].
@@ -76,7 +76,7 @@ pub struct Demonstration {
 pub enum PoseSource {
     /// Computed from the recorded joint angles by the forward kinematics of the arm's model.
     JointAngles,
-    /// Taken from the pose columns as they are.
+    /// The pose columns as they are.
     PoseColumns,
 }
 
@@ -217,7 +217,7 @@ impl Demonstration {
         self.time.len()
     }
 
-    /// Whether there are no samples; a demonstration that was prepared is never empty.
+    /// True if there are no samples; a demonstration that was prepared is never empty.
     pub fn is_empty(&self) -> bool {
         self.time.is_empty()
     }

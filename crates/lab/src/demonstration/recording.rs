@@ -90,94 +90,55 @@ impl Recording {
     /// The first thing that is wrong, with its line and column.
     pub fn parse(file: &Path, bytes: &[u8]) -> Result<Recording, RecordingError> {
         let table = Table::parse(file, bytes)?;
-        let time_column = table.column(layout::TIME);
         let mut missing: Vec<String> = Vec::new();
-        if time_column.is_none() {
+        if table.column(layout::TIME).is_none() {
             missing.push(layout::TIME.to_owned());
         }
-        let q = table.group(&layout::JOINT_POSITIONS, &mut missing);
-        let dq = table.group(&layout::JOINT_VELOCITIES, &mut missing);
-        let tau = table.group(&layout::JOINT_TORQUES, &mut missing);
-        let position_names = if layout::POSITION_ALIAS.iter().any(|name| table.column(name).is_some()) {
-            layout::POSITION_ALIAS
-        } else {
-            layout::POSITION
-        };
-        let position = table.group(&position_names, &mut missing);
-        let orientation = table.group(&layout::ORIENTATION, &mut missing);
-        let position_d = table.group(&layout::POSITION_D, &mut missing);
-        let orientation_d = table.group(&layout::ORIENTATION_D, &mut missing);
-        let wrench = table.group(&layout::WRENCH, &mut missing);
-        let hand = table.group(&layout::HAND, &mut missing);
-        let hand_d = table.group(&layout::HAND_D, &mut missing);
-        let gauges = table.group(&layout::GAUGES, &mut missing);
+        let q = table.vectors(&layout::JOINT_POSITIONS, &mut missing);
+        let dq = table.vectors(&layout::JOINT_VELOCITIES, &mut missing);
+        let tau = table.vectors(&layout::JOINT_TORQUES, &mut missing);
+        let has_alias = layout::POSITION_ALIAS.iter().any(|name| table.column(name).is_some());
+        let position_names = if has_alias { layout::POSITION_ALIAS } else { layout::POSITION };
+        let position = table.vectors(&position_names, &mut missing);
+        let orientation = table.vectors(&layout::ORIENTATION, &mut missing);
+        let position_d = table.vectors(&layout::POSITION_D, &mut missing);
+        let orientation_d = table.vectors(&layout::ORIENTATION_D, &mut missing);
+        let wrench = table.vectors(&layout::WRENCH, &mut missing);
+        let hand = table.vectors(&layout::HAND, &mut missing);
+        let hand_d = table.vectors(&layout::HAND_D, &mut missing);
+        let gauges = table.vectors(&layout::GAUGES, &mut missing);
         // A position without an orientation (or the reverse) is half a pose: say which half is missing.
         match (&position, &orientation) {
-            (Some(_), None) if missing.is_empty() => {
-                missing.extend(layout::ORIENTATION.map(String::from));
-            }
-            (None, Some(_)) if missing.is_empty() => {
-                missing.extend(layout::POSITION.map(String::from));
-            }
+            (Some(_), None) if missing.is_empty() => missing.extend(layout::ORIENTATION.map(String::from)),
+            (None, Some(_)) if missing.is_empty() => missing.extend(layout::POSITION.map(String::from)),
             _ => {}
         }
-        let (Some(time_column), true) = (time_column, missing.is_empty()) else {
-            return Err(RecordingError::MissingColumns {
-                file: file.to_owned(),
-                line: table.header_line,
-                column: table.names.len() + 1,
-                missing: missing.join(", "),
-            });
-        };
-        if table.rows.len() < FEWEST_SAMPLES {
-            return Err(RecordingError::TooFewSamples {
-                file: file.to_owned(),
-                line: table.lines.last().copied().unwrap_or(table.header_line),
-                found: table.rows.len(),
-                needed: FEWEST_SAMPLES,
-            });
-        }
-        let time: Vec<f64> = table.rows.iter().map(|row| row[time_column]).collect();
-        for index in 1..time.len() {
-            if time[index] <= time[index - 1] {
-                return Err(RecordingError::TimeRunsBackwards {
-                    place: table.place(index, time_column),
-                    time: time[index],
-                    before: time[index - 1],
-                });
-            }
-        }
-        let cycle = match table.column(layout::CYCLE) {
-            None => None,
-            Some(column) => Some(table.whole_numbers(column)?),
-        };
-        let flags = table.column(layout::FLAGS).map(|column| table.whole_numbers(column)).transpose()?;
-        let orientation = orientation.map(|columns| table.quaternions(columns)).transpose()?;
-        let orientation_d = orientation_d.map(|columns| table.quaternions(columns)).transpose()?;
+        let time = table.time(&missing)?;
+        let cycle = table.whole_numbers(layout::CYCLE)?;
         let (gaps, missing_samples, longest_gap) = count_gaps(&time, cycle.as_deref());
         Ok(Recording {
             file: file.to_owned(),
             checksum: checksum(bytes),
             header_line: table.header_line,
             columns: table.names.len(),
-            phase: table.column(layout::PHASE).map(|column| table.numbers(column)),
-            surprise: table.column(layout::SURPRISE).map(|column| table.numbers(column)),
-            q: q.map(|columns| table.vectors(columns)),
-            dq: dq.map(|columns| table.vectors(columns)),
-            tau: tau.map(|columns| table.vectors(columns)),
-            position: position.map(|columns| table.vectors(columns)),
-            position_d: position_d.map(|columns| table.vectors(columns)),
-            wrench: wrench.map(|columns| table.vectors(columns)),
-            hand: hand.map(|columns| table.vectors(columns)),
-            hand_d: hand_d.map(|columns| table.vectors(columns)),
-            gauges: gauges.map(|columns| table.vectors(columns)),
-            flags,
+            phase: table.numbers(layout::PHASE),
+            surprise: table.numbers(layout::SURPRISE),
+            flags: table.whole_numbers(layout::FLAGS)?,
+            orientation: table.unit_quaternions(orientation, layout::ORIENTATION[0])?,
+            orientation_d: table.unit_quaternions(orientation_d, layout::ORIENTATION_D[0])?,
             state: table.states,
             lines: table.lines,
+            q,
+            dq,
+            tau,
+            position,
+            position_d,
+            wrench,
+            hand,
+            hand_d,
+            gauges,
             time,
             cycle,
-            orientation,
-            orientation_d,
             gaps,
             missing_samples,
             longest_gap,
@@ -189,7 +150,7 @@ impl Recording {
         self.time.len()
     }
 
-    /// Whether there are no samples; a recording that was read is never empty.
+    /// True if there are no samples; a recording that was read is never empty.
     pub fn is_empty(&self) -> bool {
         self.time.is_empty()
     }
@@ -404,61 +365,88 @@ impl<'a> Table<'a> {
         self.names.iter().position(|known| known == name)
     }
 
+    /// Time of each sample, s, strictly increasing; refuses a file without columns that it needs, or with few samples.
+    fn time(&self, missing: &[String]) -> Result<Vec<f64>, RecordingError> {
+        let (Some(column), true) = (self.column(layout::TIME), missing.is_empty()) else {
+            return Err(RecordingError::MissingColumns {
+                file: self.file.to_owned(),
+                line: self.header_line,
+                column: self.names.len() + 1,
+                missing: missing.join(", "),
+            });
+        };
+        if self.rows.len() < FEWEST_SAMPLES {
+            return Err(RecordingError::TooFewSamples {
+                file: self.file.to_owned(),
+                line: self.lines.last().copied().unwrap_or(self.header_line),
+                found: self.rows.len(),
+                needed: FEWEST_SAMPLES,
+            });
+        }
+        let time: Vec<f64> = self.rows.iter().map(|row| row[column]).collect();
+        match time.windows(2).position(|pair| pair[1] <= pair[0]) {
+            None => Ok(time),
+            Some(index) => Err(RecordingError::TimeRunsBackwards {
+                place: self.place(index + 1, column),
+                time: time[index + 1],
+                before: time[index],
+            }),
+        }
+    }
+
     /// The columns of a group; `None` if the header has none of them. If it has some, the others go to `missing`.
-    fn group<const SIZE: usize>(
+    fn vectors<const SIZE: usize>(
         &self,
         names: &[impl AsRef<str>; SIZE],
         missing: &mut Vec<String>,
-    ) -> Option<[usize; SIZE]> {
-        let found: Vec<Option<usize>> = names.iter().map(|name| self.column(name.as_ref())).collect();
-        if found.iter().all(Option::is_none) {
+    ) -> Option<Vec<[f64; SIZE]>> {
+        let columns: [Option<usize>; SIZE] = std::array::from_fn(|index| self.column(names[index].as_ref()));
+        if columns.iter().all(Option::is_none) {
             return None;
         }
-        for (name, column) in names.iter().zip(&found) {
-            if column.is_none() {
-                missing.push(name.as_ref().to_owned());
-            }
-        }
-        let columns: Option<Vec<usize>> = found.into_iter().collect();
-        columns.and_then(|columns| columns.try_into().ok())
+        let absent = names.iter().zip(columns).filter(|(_, column)| column.is_none());
+        missing.extend(absent.map(|(name, _)| name.as_ref().to_owned()));
+        // An incomplete group is refused by its missing names.
+        Some(self.rows.iter().map(|row| columns.map(|column| column.map_or(f64::NAN, |column| row[column]))).collect())
     }
 
-    fn vectors<const SIZE: usize>(&self, columns: [usize; SIZE]) -> Vec<[f64; SIZE]> {
-        self.rows.iter().map(|row| columns.map(|column| row[column])).collect()
-    }
-
-    fn quaternions(&self, columns: [usize; 4]) -> Result<Vec<[f64; 4]>, RecordingError> {
-        let mut values = self.vectors(columns);
+    /// Unit quaternions with continuous signs; `first` names their first column.
+    fn unit_quaternions(
+        &self,
+        values: Option<Vec<[f64; 4]>>,
+        first: &str,
+    ) -> Result<Option<Vec<[f64; 4]>>, RecordingError> {
+        let Some(mut values) = values else { return Ok(None) };
         for (index, value) in values.iter_mut().enumerate() {
             let norm = value.iter().map(|part| part * part).sum::<f64>().sqrt();
             if (norm - 1.0).abs() > QUATERNION_NORM_TOLERANCE {
-                return Err(RecordingError::NotAUnitQuaternion { place: self.place(index, columns[0]), norm });
+                let place = self.place(index, self.column(first).unwrap_or_default());
+                return Err(RecordingError::NotAUnitQuaternion { place, norm });
             }
             for part in value {
                 *part /= norm;
             }
         }
         make_sign_continuous(&mut values);
-        Ok(values)
+        Ok(Some(values))
     }
 
-    fn numbers(&self, column: usize) -> Vec<f64> {
-        self.rows.iter().map(|row| row[column]).collect()
+    fn numbers(&self, name: &str) -> Option<Vec<f64>> {
+        let column = self.column(name)?;
+        Some(self.rows.iter().map(|row| row[column]).collect())
     }
 
-    fn whole_numbers(&self, column: usize) -> Result<Vec<u32>, RecordingError> {
-        self.rows
-            .iter()
-            .enumerate()
-            .map(|(index, row)| {
-                let value = row[column];
-                if value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value) {
-                    Ok(value as u32)
-                } else {
-                    Err(RecordingError::NotANumber { place: self.place(index, column), text: format!("{value}") })
-                }
-            })
-            .collect()
+    fn whole_numbers(&self, name: &str) -> Result<Option<Vec<u32>>, RecordingError> {
+        let Some(column) = self.column(name) else { return Ok(None) };
+        let values = self.rows.iter().enumerate().map(|(index, row)| {
+            let value = row[column];
+            if value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value) {
+                Ok(value as u32)
+            } else {
+                Err(RecordingError::NotANumber { place: self.place(index, column), text: format!("{value}") })
+            }
+        });
+        values.collect::<Result<_, _>>().map(Some)
     }
 
     fn place(&self, sample: usize, column: usize) -> Place {

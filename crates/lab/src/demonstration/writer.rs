@@ -17,7 +17,7 @@ impl<W: Write> RecordingWriter<W> {
     /// Writes the notes and the header. Each line of `notes` becomes a line that starts with `#`.
     ///
     /// # Errors
-    /// What the output says.
+    /// The output's error.
     pub fn new(mut output: W, notes: &str) -> io::Result<RecordingWriter<W>> {
         for note in notes.lines() {
             writeln!(output, "# {note}")?;
@@ -29,7 +29,7 @@ impl<W: Write> RecordingWriter<W> {
     /// Writes one line.
     ///
     /// # Errors
-    /// What the output says.
+    /// The output's error.
     pub fn write(&mut self, row: &RecordingRow) -> io::Result<()> {
         let fields: Vec<String> = layout::LAYOUT.iter().map(|quantity| (quantity.fields)(row)).collect();
         writeln!(self.output, "{}", fields.join(","))?;
@@ -45,7 +45,7 @@ impl<W: Write> RecordingWriter<W> {
     /// Hands every byte to the operating system and gives the output back.
     ///
     /// # Errors
-    /// What the output says.
+    /// The output's error.
     pub fn finish(mut self) -> io::Result<W> {
         self.output.flush()?;
         Ok(self.output)

@@ -1,4 +1,4 @@
-//! How wide the band of an experience must be: the device's own watch goes over the runs that it was made from.
+//! The width of an experience's band: the device's own watch goes over the runs that it was made from.
 
 use control::guard::Watch;
 use control::guard::watch::{FIRST_FINGER, LIMIT};
@@ -32,7 +32,7 @@ pub(super) type Run = Vec<(f64, [f64; STATISTICS_CHANNELS])>;
 pub(super) struct Calibrated {
     /// The experience.
     pub(super) experience: SensorStatistics<f64>,
-    /// How far a hand that closes on nothing goes beyond the limit of the watch: above 1 it is told.
+    /// Statistic of a hand that closes on nothing, as a share of the watch's limit: above 1 it is reported.
     pub(super) empty_hand: f64,
 }
 

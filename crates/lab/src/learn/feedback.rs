@@ -1,14 +1,15 @@
-//! Feedback for a movement that has not felt anything yet: springs, sensitivity K1 of Eq (8), limits, and what they
+//! Feedback for a movement without recorded forces: springs, sensitivity K1 of Eq (8), limits, and what they
 //! mean in newtons and kilograms.
 //!
 //! The gains act in the tau-scaled system: pushed by a force F the plan behaves like a mass `tau^2/K1` on a damper `D
 //! tau/K1` and a spring `K/K1`. What gives way to a standing object before it topples is therefore fixed by `K/K1` (0.3
 //! N for 25 cm) and a virtual mass of at most 2 kg, and `K`, `K1` grow with the square of the duration.
 
+use dmp::Gain;
 use serde::Serialize;
 
 use super::LearnOptions;
-use crate::primitive_file::{FeedbackTables, Gain, PrimitiveFile};
+use crate::primitive_file::{FeedbackTables, PrimitiveFile};
 use crate::table::Table;
 
 /// Duration for which the recommended gains were found, s.
@@ -66,7 +67,7 @@ pub fn stiffness(options: &FeedbackOptions, duration: f64) -> [f64; 4] {
 /// A plan turns about the vertical only, so that a push cannot tilt what the hand holds. K1 is diagonal in axes of the
 /// hand: where none of them is vertical at the goal, the plan does not turn by itself.
 pub fn tables(primitive: &PrimitiveFile, options: &LearnOptions) -> FeedbackTables {
-    let [position, orientation, _, hand] = primitive.gains.map(|gain| gain.stiffness);
+    let [position, orientation, _, hand] = primitive.gains.in_order().map(|gain| gain.stiffness);
     let [metres, degrees, fingers] = options.feedback.limits.unwrap_or(DEFAULT_LIMITS);
     let k1 = options.feedback.sensitivity.unwrap_or_else(|| {
         let mut k1 = [0.0; 10];
@@ -79,7 +80,9 @@ pub fn tables(primitive: &PrimitiveFile, options: &LearnOptions) -> FeedbackTabl
         k1
     });
     FeedbackTables {
-        clamps: [metres, degrees.to_radians(), fingers],
+        clamp_position: metres,
+        clamp_orientation: degrees.to_radians(),
+        clamp_hand: fingers,
         k1: vec![k1.to_vec()],
         k2: vec![vec![1.0; control::plan::primitive::SENSORS]],
     }
@@ -93,7 +96,7 @@ fn vertical_axis(orientation: &[f64; 4]) -> Option<usize> {
     (0..3).find(|axis| vertical[*axis].abs() > VERTICAL.to_radians().cos())
 }
 
-/// What the gains of one row mean.
+/// Physical meaning of the gains of one row.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RowFeedback {
     /// Name of the row.
@@ -108,7 +111,7 @@ pub struct RowFeedback {
     pub damping: f64,
 }
 
-/// What feedback means physically.
+/// Physical meaning of the feedback.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FeedbackReport {
     /// Largest displacement, m.
@@ -137,16 +140,17 @@ impl FeedbackReport {
             "F3",
         ];
         let tables = primitive.feedback.as_ref()?;
-        let [displacement_m, rotation_rad, hand_rad] = tables.clamps;
-        let [position, orientation, _, hand] = primitive.gains;
+        let (displacement_m, rotation_rad, hand_rad) =
+            (tables.clamp_position, tables.clamp_orientation, tables.clamp_hand);
+        let gains = &primitive.gains;
         let rows = NAMES.into_iter().enumerate().filter_map(|(index, row)| {
             let k1 = tables.k1.iter().filter_map(|point| point.get(index)).copied().fold(0.0, f64::max);
             let (Gain { stiffness, damping }, limit) = match index {
-                0..3 => (position, displacement_m),
-                3..6 => (orientation, (rotation_rad / 2.0).sin()),
-                _ => (hand, hand_rad),
+                0..3 => (gains.position, displacement_m),
+                3..6 => (gains.orientation, (rotation_rad / 2.0).sin()),
+                _ => (gains.hand, hand_rad),
             };
-            let tau = primitive.duration;
+            let tau = primitive.movement.duration;
             (k1 > 0.0).then(|| RowFeedback {
                 row,
                 k1,
@@ -158,7 +162,7 @@ impl FeedbackReport {
         Some(FeedbackReport { displacement_m, rotation_rad, hand_rad, rows: rows.collect() })
     }
 
-    /// What to warn of: a plan that gives way too slowly.
+    /// Warnings of a plan that gives way too slowly.
     pub fn warnings(&self) -> Vec<String> {
         let heavy = self.rows.iter().filter(|row| row.row.starts_with("position") && row.inertia > HEAVIEST);
         heavy

@@ -2,11 +2,12 @@
 
 use control::plan::primitive::{Configuration, points, posture_and_hand};
 use dmp::fit::{Demonstration as Samples, FitOptions, PoseSamples};
-use dmp::{OrientationError, Quaternion, Stiffness};
+use dmp::{Hemisphere, Quaternion, Stiffness};
+use serde::de::IgnoredAny;
 
 use super::{LearnOptions, feedback};
 use crate::demonstration::{Demonstration, RATE};
-use crate::primitive_file::{Gain, HemisphereKind, OrientationErrorKind, PrimitiveFile, Waypoint, WaypointVelocity};
+use crate::primitive_file::{Groups, MovementSection, PrimitiveFile, Waypoint, WaypointVelocity};
 
 /// The fitted primitive, without name and provenance.
 pub(super) fn fit(
@@ -27,10 +28,7 @@ pub(super) fn fit(
             cutoff: Some(options.cutoff),
             control_period: Some(control::PERIOD),
             stiffness: Stiffness { poses: [[position, orientation]], points: points([posture; 7], [hand; 4]) },
-            orientation_error: match options.orientation_error {
-                OrientationErrorKind::Quaternion => OrientationError::Quaternion,
-                OrientationErrorKind::RotationVector => OrientationError::RotationVector,
-            },
+            orientation_error: options.orientation_error,
             ..FitOptions::default()
         },
     )
@@ -38,17 +36,23 @@ pub(super) fn fit(
     let ([gains], ([posture, ..], [hand, ..])) = (learned.gains.poses, posture_and_hand(&learned.gains.points));
     let [twist] = learned.start_velocity.poses;
     let (posture_velocity, hand_velocity) = posture_and_hand(&learned.start_velocity.points);
+    let rows: Vec<Vec<f64>> = learned.weights.chunks(learned.options.kernel_count).map(<[f64]>::to_vec).collect();
+    let group = |rows: &[Vec<f64>]| rows.to_vec();
     Ok(PrimitiveFile {
         file: std::path::PathBuf::new(),
+        schema: IgnoredAny,
+        content_crc32: IgnoredAny,
         name: String::new(),
         model_hash: 0,
-        duration: learned.duration,
-        alpha: learned.options.alpha,
-        activation: learned.options.activation,
-        orientation_error: options.orientation_error,
-        hemisphere: HemisphereKind::Demonstrated,
-        gains: [gains.position, gains.orientation, posture, hand]
-            .map(|gain| Gain { stiffness: gain.stiffness, damping: gain.damping }),
+        movement: MovementSection {
+            duration: learned.duration,
+            alpha: learned.options.alpha,
+            activation: learned.options.activation,
+            kernels: learned.options.kernel_count,
+            orientation_error: options.orientation_error,
+            hemisphere: Hemisphere::Demonstrated,
+        },
+        gains: Groups { position: gains.position, orientation: gains.orientation, posture, hand },
         start: waypoint(&learned.start),
         start_velocity: WaypointVelocity {
             position: twist.linear,
@@ -57,7 +61,12 @@ pub(super) fn fit(
             hand: hand_velocity,
         },
         goal: waypoint(&learned.goal),
-        weights: learned.weights.chunks(learned.options.kernel_count).map(<[f64]>::to_vec).collect(),
+        weights: Groups {
+            position: group(&rows[..3]),
+            orientation: group(&rows[3..6]),
+            posture: group(&rows[6..13]),
+            hand: group(&rows[13..]),
+        },
         feedback: None,
         expectation: None,
         experience: None,

@@ -3,7 +3,7 @@
 //! A minimum jerk from one hand posture to another within a window of the movement, so that all fingers close
 //! together: `b(r) = 10 r^3 - 15 r^4 + 6 r^5`.
 
-/// What the fingers do during the movement.
+/// Movement of the fingers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HandMotion {
     /// Spread and fingers 1 to 3 at the start, rad.
@@ -22,7 +22,7 @@ impl Default for HandMotion {
 }
 
 impl HandMotion {
-    /// Whether numbers are finite and the window lies in order within the movement.
+    /// True if the numbers are finite and the window lies in order within the movement.
     pub fn is_valid(&self) -> bool {
         let (begin, end) = self.window;
         self.start.iter().chain(&self.goal).all(|value| value.is_finite())

@@ -21,7 +21,7 @@ const WEIGHT_POINTS: usize = 16;
 /// five times as much as one of ordinary spread.
 const SPREAD_FLOOR: f64 = 0.5;
 
-/// What the sensors cannot tell: the controller's dead band on force and torque, and the same for the gauges. The
+/// Resolution of the sensors: the controller's dead band on force and torque, and the same for the gauges. The
 /// stick-slip of the joints scatters by a tenth of a newton where a movement is slow; without this floor K2 would make
 /// the arm four times deafer there than at its end.
 const RESOLUTION: [f64; SENSORS] = {
@@ -57,7 +57,7 @@ pub enum MemoryError {
         file: PathBuf,
         /// Line of its header.
         line: u64,
-        /// What is missing.
+        /// The missing columns.
         columns: &'static str,
     },
     /// A recording does not cover the movement.
@@ -70,7 +70,7 @@ pub enum MemoryError {
         /// Where it ends, percent.
         to: f64,
     },
-    /// The force sensor was saturated: what it told is not what was felt.
+    /// The force sensor was saturated: its values are not the forces.
     #[error("{file}: the force sensor was saturated in {samples} samples", file = file.display())]
     Saturated {
         /// The recording.
@@ -113,7 +113,7 @@ pub struct Payload {
     pub centre: [f64; 3],
 }
 
-/// What an expectation says in a few numbers.
+/// Summary of an expectation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MemorySummary {
     /// Runs that were averaged.
@@ -186,7 +186,7 @@ pub fn remember_successes(
     recordings: &[Recording],
 ) -> Result<MemorySummary, MemoryError> {
     let first = recordings.first().ok_or(MemoryError::None)?;
-    let (_, duration) = progress(first, primitive.alpha)?;
+    let (_, duration) = progress(first, primitive.movement.alpha)?;
     let runs = runs::<STATISTICS_CHANNELS>(primitive, recordings, duration, channels)?;
     let calibrated = calibrated(primitive, &runs, &EXPERIENCE_FLOOR)?;
     let gathered = &calibrated.experience;
@@ -232,7 +232,7 @@ fn runs<const CHANNELS: usize>(
         .iter()
         .map(|recording| {
             let run = recording.running();
-            let (samples, found) = progress(&run, primitive.alpha)?;
+            let (samples, found) = progress(&run, primitive.movement.alpha)?;
             if (found - duration).abs() > SAME_DURATION * duration || !found.is_finite() {
                 return Err(MemoryError::Duration { file: recording.file.clone(), found, expected: duration });
             }
@@ -252,7 +252,7 @@ fn runs<const CHANNELS: usize>(
         .collect()
 }
 
-/// What the sensors of a recording told: wrench and gauges.
+/// The sensor values of a recording: wrench and gauges.
 fn sensors(recording: &Recording) -> Result<Vec<[f64; SENSORS]>, MemoryError> {
     let wrench = recording.wrench.as_ref().ok_or_else(|| columns(recording, "fx_N to tz_Nm"))?;
     let gauges = recording.gauges.as_ref().ok_or_else(|| columns(recording, "gauge1_Nm to gauge3_Nm"))?;

@@ -14,16 +14,17 @@ pub mod report;
 
 use std::path::{Path, PathBuf};
 
+use control::plan::primitive::Reference;
 use dmp::fit::{LARGEST_ANGLE, LARGEST_ROTATION_VECTOR, WARNING_ANGLE};
 use thiserror::Error;
 
 use crate::demonstration::{Demonstration, DemonstrationError, PoseSource, Preparation, Recording, angle_between};
 use crate::plan;
 use crate::plot::movement::rotation_vectors;
-use crate::primitive_file::{KERNEL_CAPACITY, OrientationErrorKind, PrimitiveFile, PrimitiveFileError, Provenance};
+use crate::primitive_file::{KERNEL_CAPACITY, OrientationError, PrimitiveFile, PrimitiveFileError, Provenance};
 use feedback::{FeedbackOptions, FeedbackReport};
 use hand::HandMotion;
-use report::{FitReport, row_error, wrench_statistics};
+use report::{FitReport, RowError, row_error, wrench_statistics};
 
 /// Speed of the tool (turning counted, m/s) above which a demonstration does not begin or end at rest.
 const MOVING_END: f64 = 0.01;
@@ -35,7 +36,7 @@ const LONGEST_DWELL: f64 = 60.0;
 /// right angle, far from every limit and every singularity.
 pub const DEFAULT_POSTURE: [f64; 7] = [0.0, 0.0, 0.0, std::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0];
 
-/// How a primitive is learned.
+/// Options for learning a primitive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LearnOptions {
     /// Name of the primitive.
@@ -47,7 +48,7 @@ pub struct LearnOptions {
     /// Trimming.
     pub preparation: Preparation,
     /// Orientation error.
-    pub orientation_error: OrientationErrorKind,
+    pub orientation_error: OrientationError,
     /// Rest at the goal that is appended to the demonstration, s: time for the fingers to close.
     pub dwell: f64,
     /// Movement of the fingers, in fractions of the duration with the dwell.
@@ -64,7 +65,7 @@ impl LearnOptions {
             kernels: 50,
             cutoff: 7.5,
             preparation: Preparation::default(),
-            orientation_error: OrientationErrorKind::Quaternion,
+            orientation_error: OrientationError::Quaternion,
             dwell: 0.0,
             hand: HandMotion::default(),
             feedback: FeedbackOptions::default(),
@@ -89,7 +90,7 @@ pub enum LearnError {
         degrees: f64,
         /// Largest angle that can be followed, degrees.
         limit: f64,
-        /// Whether the rotation vector would follow it.
+        /// True if the rotation vector would follow it.
         rotation_vector_helps: bool,
     },
     /// An option is out of range.
@@ -97,7 +98,7 @@ pub enum LearnError {
     Option {
         /// Name of the option.
         option: &'static str,
-        /// What is wrong with its value.
+        /// The reason.
         reason: String,
     },
     /// The regression failed.
@@ -105,7 +106,7 @@ pub enum LearnError {
     Fit {
         /// The recording.
         file: PathBuf,
-        /// What `dmp::fit` says.
+        /// The reason that `dmp::fit` gives.
         reason: String,
     },
     /// The fitted primitive is no valid primitive.
@@ -134,19 +135,7 @@ const COARSE_ORIENTATION: f64 = 0.5 * std::f64::consts::PI / 180.0;
 /// # Errors
 /// [`LearnError`].
 pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Result<Learned, LearnError> {
-    if !options.hand.is_valid() {
-        return Err(LearnError::Option {
-            option: "--hand-window",
-            reason: "two fractions of the duration in order, between 0 and 1, are expected".to_owned(),
-        });
-    }
-    check_feedback(&options.feedback)?;
-    if !(0.0..=LONGEST_DWELL).contains(&options.dwell) {
-        return Err(LearnError::Option {
-            option: "--dwell",
-            reason: format!("a time between 0 and {LONGEST_DWELL} s is expected"),
-        });
-    }
+    check_options(options)?;
     let mut demonstration = Demonstration::prepare(recording, &options.preparation)?;
     let moving_end = demonstration.speed().last().is_some_and(|speed| *speed > MOVING_END);
     if options.dwell > 0.0 && moving_end {
@@ -216,9 +205,16 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
     Ok(Learned { primitive, report, demonstration })
 }
 
-/// Refuses gains and limits that are no numbers of use.
-fn check_feedback(feedback: &FeedbackOptions) -> Result<(), LearnError> {
+/// Refuses values that are out of range.
+fn check_options(options: &LearnOptions) -> Result<(), LearnError> {
     let wrong = |option: &'static str, reason: &str| Err(LearnError::Option { option, reason: reason.to_owned() });
+    if !options.hand.is_valid() {
+        return wrong("--hand-window", "two fractions of the duration in order, between 0 and 1, are expected");
+    }
+    if !(0.0..=LONGEST_DWELL).contains(&options.dwell) {
+        return wrong("--dwell", &format!("a time between 0 and {LONGEST_DWELL} s is expected"));
+    }
+    let feedback = &options.feedback;
     let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value <= 1e6);
     if !positive(feedback.stiffness) {
         return wrong("--stiffness", "a number between 0 and 1e6 is expected");
@@ -253,8 +249,8 @@ fn check_angle(
     let (worst, angle) =
         angles.enumerate().fold((0, 0.0), |worst, (index, angle)| if angle > worst.1 { (index, angle) } else { worst });
     let limit = match options.orientation_error {
-        OrientationErrorKind::Quaternion => LARGEST_ANGLE,
-        OrientationErrorKind::RotationVector => LARGEST_ROTATION_VECTOR,
+        OrientationError::Quaternion => LARGEST_ANGLE,
+        OrientationError::RotationVector => LARGEST_ROTATION_VECTOR,
     };
     if angle > limit {
         // The demonstration was resampled and trimmed: find the recorded line at the same time.
@@ -265,11 +261,11 @@ fn check_angle(
             line: recording.lines[sample],
             degrees: angle.to_degrees(),
             limit: limit.to_degrees(),
-            rotation_vector_helps: options.orientation_error == OrientationErrorKind::Quaternion
+            rotation_vector_helps: options.orientation_error == OrientationError::Quaternion
                 && angle <= LARGEST_ROTATION_VECTOR,
         });
     }
-    if angle > WARNING_ANGLE && options.orientation_error == OrientationErrorKind::Quaternion {
+    if angle > WARNING_ANGLE && options.orientation_error == OrientationError::Quaternion {
         warnings.push(format!(
             "the movement turns {:.1} degrees away from its goal: beyond 150 degrees the spring of the quaternion error grows weak, consider --rotation-vector",
             angle.to_degrees()
@@ -315,39 +311,6 @@ fn compare(
     let count = references.len().min(demonstration.len());
     let references = &references[..count];
     let orientation: Vec<[f64; 4]> = references.iter().map(plan::orientation).collect();
-    let mut rows = Vec::with_capacity(control::plan::primitive::ROWS);
-    let mut add = |errors: Vec<f64>, shown: Vec<f64>| {
-        rows.push(row_error(rows.len(), &errors, &shown));
-    };
-    for axis in 0..3 {
-        let shown: Vec<f64> = demonstration.position[..count].iter().map(|x| x[axis]).collect();
-        let errors = references.iter().zip(&shown).map(|(reference, x)| reference.poses[0].position.x[axis] - x);
-        add(errors.collect(), shown);
-    }
-    let goal = demonstration.orientation[demonstration.len() - 1];
-    let shown_vectors = rotation_vectors(&goal, &demonstration.orientation);
-    let error_vectors: Vec<[f64; 3]> = demonstration
-        .orientation
-        .iter()
-        .zip(&orientation)
-        .map(|(shown, planned)| rotation_vectors(shown, &[*planned])[0])
-        .collect();
-    for axis in 0..3 {
-        add(
-            error_vectors.iter().map(|vector| vector[axis]).collect(),
-            shown_vectors[..count].iter().map(|vector| vector[axis]).collect(),
-        );
-    }
-    for joint in 0..7 {
-        let shown: Vec<f64> = posture[..count].iter().map(|q| q[joint]).collect();
-        let errors = references.iter().zip(&shown).map(|(reference, q)| reference.points.x[joint] - q);
-        add(errors.collect(), shown);
-    }
-    for joint in 0..4 {
-        let shown: Vec<f64> = hand[..count].iter().map(|q| q[joint]).collect();
-        let errors = references.iter().zip(&shown).map(|(reference, q)| reference.points.x[7 + joint] - q);
-        add(errors.collect(), shown);
-    }
     let distances: Vec<f64> = references
         .iter()
         .zip(&demonstration.position)
@@ -369,10 +332,10 @@ fn compare(
         name: file.name.clone(),
         kernels: file.kernels(),
         samples: demonstration.len(),
-        duration_s: file.duration,
+        duration_s: file.movement.duration,
         trimmed_s: demonstration.trimmed,
         gaps: (recording.gaps, recording.missing_samples),
-        phase: (1.0, (-file.alpha).exp()),
+        phase: (1.0, (-file.movement.alpha).exp()),
         largest_angle_rad: largest_angle,
         position_max_m: largest(&distances),
         position_rms_m: position_rms,
@@ -381,11 +344,48 @@ fn compare(
         orientation_rms_rad: root_mean_square(&angles),
         // Below a hundredth of a radian the path is noise: a ratio to it says nothing.
         orientation_path_ratio: if shown_path > 0.01 { path(&orientation) / shown_path } else { 1.0 },
-        rows,
+        rows: row_errors(references, &orientation, demonstration, posture, hand),
         wrench: demonstration.wrench.as_deref().map(wrench_statistics).unwrap_or_default(),
         feedback: None,
         warnings,
     })
+}
+
+/// Reproduction errors of all rows, in the order of the weights.
+fn row_errors(
+    references: &[Reference<f64>],
+    orientation: &[[f64; 4]],
+    demonstration: &Demonstration,
+    posture: &[[f64; 7]],
+    hand: &[[f64; 4]],
+) -> Vec<RowError> {
+    type Shown<'a> = &'a dyn Fn(usize) -> f64;
+    let count = references.len();
+    let mut rows = Vec::with_capacity(control::plan::primitive::ROWS);
+    let mut add = |shown: Shown<'_>, error: Shown<'_>| {
+        let values = |of: Shown<'_>| (0..count).map(of).collect::<Vec<f64>>();
+        rows.push(row_error(rows.len(), &values(error), &values(shown)));
+    };
+    for axis in 0..3 {
+        let shown = |index: usize| demonstration.position[index][axis];
+        add(&shown, &|index| references[index].poses[0].position.x[axis] - shown(index));
+    }
+    let goal = demonstration.orientation[demonstration.len() - 1];
+    let shown = rotation_vectors(&goal, &demonstration.orientation);
+    let errors: Vec<[f64; 3]> = demonstration
+        .orientation
+        .iter()
+        .zip(orientation)
+        .map(|(shown, planned)| rotation_vectors(shown, &[*planned])[0])
+        .collect();
+    for axis in 0..3 {
+        add(&|index| shown[index][axis], &|index| errors[index][axis]);
+    }
+    for (joint, columns) in (0..7).map(|joint| (joint, 0)).chain((0..4).map(|joint| (joint, 7))) {
+        let shown = |index: usize| if columns == 0 { posture[index][joint] } else { hand[index][joint] };
+        add(&shown, &|index| references[index].points.x[columns + joint] - shown(index));
+    }
+    rows
 }
 
 fn group_error(report: &FitReport, rows: std::ops::Range<usize>) -> [f64; 2] {

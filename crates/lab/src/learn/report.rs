@@ -1,4 +1,4 @@
-//! What `learn` reports: how well the primitive reproduces the demonstration, row by row, and what was felt.
+//! The report of `learn`: reproduction error of the primitive, row by row, and the recorded wrench.
 
 use serde::Serialize;
 
@@ -99,13 +99,13 @@ pub struct FitReport {
     pub orientation_rms_rad: f64,
     /// Length of the reproduced path of orientation relative to the demonstrated one, 1.
     pub orientation_path_ratio: f64,
-    /// Row by row.
+    /// Errors of the rows.
     pub rows: Vec<RowError>,
-    /// Wrench that was felt while the movement was shown; empty if it was not recorded.
+    /// Wrench that was measured while the movement was shown; empty if it was not recorded.
     pub wrench: Vec<WrenchStatistics>,
-    /// What the gains of the feedback mean.
+    /// Physical meaning of the feedback's gains.
     pub feedback: Option<FeedbackReport>,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
@@ -147,7 +147,7 @@ impl FitReport {
         }
         text += &rows.to_string();
         if !self.wrench.is_empty() {
-            let mut wrench = Table::new(["felt", "mean", "deviation", "min", "max", "unit"]);
+            let mut wrench = Table::new(["measured", "mean", "deviation", "min", "max", "unit"]);
             for axis in &self.wrench {
                 wrench.row([
                     axis.axis.to_owned(),

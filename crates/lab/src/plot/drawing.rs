@@ -1,6 +1,4 @@
-//! A free page for figures that are no panels of curves: shapes and text in pixels, and frames with axes in data units.
-//!
-//! The look is that of `canvas`. These two files are the only ones that know the plotting crate.
+//! A page: shapes and text in pixels, and frames with axes in data units. Only this file knows the plotting crate.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -11,7 +9,6 @@ use kuva::render::color::Color;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 
 use super::PlotError;
-use super::canvas::dashes;
 
 /// A colour as `#rrggbb`.
 pub type Colour = &'static str;
@@ -91,9 +88,8 @@ impl Drawing {
     /// A dashed line through points, cut into dashes here: the plotting crate would begin the pattern anew at every
     /// point.
     pub fn dashed(&mut self, points: &[[f64; 2]], colour: Colour, width: f64, pattern: [f64; 2]) {
-        let points: Vec<(f64, f64)> = points.iter().map(|[x, y]| (*x, *y)).collect();
-        for dash in dashes(&points, pattern.into(), (1.0, 1.0)) {
-            self.line(&dash.into_iter().map(Into::into).collect::<Vec<_>>(), colour, width);
+        for dash in dashes(points, pattern) {
+            self.line(&dash, colour, width);
         }
     }
 
@@ -164,16 +160,21 @@ impl Drawing {
         SvgBackend::new().with_embedded_font(true).render_scene(&self.scene)
     }
 
+    /// The page as PNG, `scale` pixels to a px of the page.
+    ///
+    /// # Errors
+    /// The encoder's error.
+    pub fn to_png(&self, scale: f32) -> Result<Vec<u8>, String> {
+        RasterBackend::new().with_scale(scale).render_scene(&self.scene)
+    }
+
     /// Writes the page as `NAME.svg` and `NAME.png` into `folder`.
     ///
     /// # Errors
     /// [`PlotError`]
     pub fn write(&self, folder: &Path, name: &str) -> Result<(), PlotError> {
         let png = folder.join(format!("{name}.png"));
-        let pixels = RasterBackend::new()
-            .with_scale(1.5)
-            .render_scene(&self.scene)
-            .map_err(|reason| PlotError::Encode { file: png.clone(), reason })?;
+        let pixels = self.to_png(1.5).map_err(|reason| PlotError::Encode { file: png.clone(), reason })?;
         for (file, bytes) in [(folder.join(format!("{name}.svg")), self.to_svg().into_bytes()), (png, pixels)] {
             std::fs::write(&file, bytes).map_err(|cause| PlotError::Write { file, cause })?;
         }
@@ -243,6 +244,40 @@ impl Frame {
     }
 }
 
+/// Cuts a line into dashes of constant length; `pattern` is the length of dash and space.
+fn dashes(points: &[[f64; 2]], pattern: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
+    let mut pieces: Vec<Vec<[f64; 2]>> = Vec::new();
+    let mut piece: Vec<[f64; 2]> = points.first().copied().into_iter().collect();
+    let mut drawing = true;
+    let mut left = pattern[0];
+    for pair in points.windows(2) {
+        let ([x0, y0], [x1, y1]) = (pair[0], pair[1]);
+        let length = (x1 - x0).hypot(y1 - y0);
+        let mut done = 0.0;
+        while length - done > left {
+            done += left;
+            let fraction = done / length;
+            let at = [x0 + fraction * (x1 - x0), y0 + fraction * (y1 - y0)];
+            if drawing {
+                piece.push(at);
+                pieces.push(std::mem::take(&mut piece));
+            } else {
+                piece = vec![at];
+            }
+            drawing = !drawing;
+            left = if drawing { pattern[0] } else { pattern[1] };
+        }
+        left -= length - done;
+        if drawing {
+            piece.push([x1, y1]);
+        }
+    }
+    if drawing && piece.len() > 1 {
+        pieces.push(piece);
+    }
+    pieces
+}
+
 /// Round values within a range, about `count` of them.
 pub fn ticks([low, high]: [f64; 2], count: usize) -> Vec<f64> {
     let raw = (high - low).max(f64::MIN_POSITIVE) / count.max(1) as f64;
@@ -264,6 +299,19 @@ pub fn plain(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn dashes_have_the_length_of_the_pattern_and_keep_to_the_line() {
+        let points: Vec<[f64; 2]> = (0..=1000).map(|k| [f64::from(k) * 0.1, 2.0]).collect();
+        let pieces = dashes(&points, [3.0, 2.0]);
+        // 100 px hold 20 patterns of 5 px; rounding may begin a 21st dash at the very end.
+        assert!((20..=21).contains(&pieces.len()));
+        for piece in &pieces[..20] {
+            let length = piece[piece.len() - 1][0] - piece[0][0];
+            assert!((length - 3.0).abs() < 1e-9, "{length}");
+            assert!(piece.iter().all(|point| point[1] == 2.0));
+        }
+    }
 
     #[test]
     fn ticks_are_round_and_inside() {

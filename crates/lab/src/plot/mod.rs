@@ -28,7 +28,7 @@ pub enum PlotError {
     Encode {
         /// The file.
         file: PathBuf,
-        /// What the encoder says.
+        /// The encoder's error.
         reason: String,
     },
     /// The file could not be written.
@@ -36,7 +36,7 @@ pub enum PlotError {
     Write {
         /// The file.
         file: PathBuf,
-        /// What the operating system says.
+        /// The operating system's reason.
         #[source]
         cause: std::io::Error,
     },
@@ -49,8 +49,8 @@ pub enum PlotError {
 pub fn write(page: &Page, file: &Path) -> Result<(), PlotError> {
     let extension = file.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     let bytes = match extension.as_deref() {
-        Some("svg") => page.to_svg().into_bytes(),
-        Some("png") => page.to_png(1.0).map_err(|reason| PlotError::Encode { file: file.to_owned(), reason })?,
+        Some("svg") => page.draw().to_svg().into_bytes(),
+        Some("png") => page.draw().to_png(1.0).map_err(|reason| PlotError::Encode { file: file.to_owned(), reason })?,
         _ => {
             return Err(PlotError::Format { file: file.to_owned() });
         }

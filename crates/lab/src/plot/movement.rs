@@ -1,6 +1,6 @@
 //! Demonstration, plan and execution of one movement as panels.
 //!
-//! Position and orientation stand above, the tracking error and the felt force below them, torques at the bottom.
+//! Position and orientation stand above, the tracking error and the measured force below them, torques at the bottom.
 //! The orientation is drawn as the rotation vector from the goal, `2 log(conj(g) (x) q)` in degrees: three numbers
 //! that are zero at the goal and, unlike quaternion components, can be read.
 
@@ -37,9 +37,9 @@ impl PosePath {
 pub struct Movement {
     /// Name for the title.
     pub name: String,
-    /// What the person showed.
+    /// The demonstration.
     pub demonstration: Option<PosePath>,
-    /// What the primitive plans.
+    /// The plan of the primitive.
     pub plan: Option<PosePath>,
     /// The recorded run, only its part in state `run`.
     pub execution: Option<Recording>,

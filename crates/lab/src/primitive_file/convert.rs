@@ -5,13 +5,10 @@ use control::plan::primitive::{
     Configuration, ExpectedWrench, Feedback, GainSchedule, MovementTables, Primitive, SensorStatistics, configuration,
     gains, limits, velocity,
 };
-use dmp::{Hemisphere, OrientationError, TableError};
+use dmp::TableError;
 use link::image::{ExpectationMarks, FeedbackClamps, IMAGE_BYTES_LIMIT, ImageContent, PrimitiveImage};
 
-use super::{
-    ExperienceTable, HemisphereKind, OrientationErrorKind, PrimitiveFile, PrimitiveFileError, Waypoint,
-    WaypointVelocity,
-};
+use super::{PrimitiveFile, PrimitiveFileError, Waypoint};
 
 /// Most kernels of a row, the same as on a device.
 pub const KERNEL_CAPACITY: usize = control::MAX_KERNELS;
@@ -27,7 +24,8 @@ impl PrimitiveFile {
     pub fn to_primitive(&self) -> Result<HostPrimitive, PrimitiveFileError> {
         let refused = |reason: String| PrimitiveFileError::Invalid { file: self.file.clone(), reason };
         self.require_expectation()?;
-        let weights = self.weights.concat();
+        let weights: Vec<f64> = self.weights.rows().flatten().copied().collect();
+        let (movement, velocities) = (&self.movement, &self.start_velocity);
         let feedback = self
             .feedback
             .as_ref()
@@ -35,7 +33,7 @@ impl PrimitiveFile {
                 Feedback::new(
                     GainSchedule::new(&points(&tables.k1))?,
                     GainSchedule::new(&points(&tables.k2))?,
-                    limits(tables.clamps[0], tables.clamps[1], tables.clamps[2]),
+                    limits(tables.clamp_position, tables.clamp_orientation, tables.clamp_hand),
                 )
             })
             .transpose()
@@ -57,23 +55,20 @@ impl PrimitiveFile {
             .map_err(|error| refused(format!("experience: {error}")))?;
         let tables = MovementTables {
             control_period: control::PERIOD,
-            duration: self.duration,
-            alpha: self.alpha,
-            activation: self.activation,
+            duration: movement.duration,
+            alpha: movement.alpha,
+            activation: movement.activation,
             kernel_count: self.kernels(),
             weights: &weights,
-            gains: gains(self.gains.map(|gain| gain.stiffness), self.gains.map(|gain| gain.damping)),
-            orientation_error: match self.orientation_error {
-                OrientationErrorKind::Quaternion => OrientationError::Quaternion,
-                OrientationErrorKind::RotationVector => OrientationError::RotationVector,
-            },
-            hemisphere: match self.hemisphere {
-                HemisphereKind::Demonstrated => Hemisphere::Demonstrated,
-                HemisphereKind::Nearest => Hemisphere::Nearest,
-            },
+            gains: gains(
+                self.gains.in_order().map(|gain| gain.stiffness),
+                self.gains.in_order().map(|gain| gain.damping),
+            ),
+            orientation_error: movement.orientation_error,
+            hemisphere: movement.hemisphere,
             start: waypoint(&self.start),
             goal: waypoint(&self.goal),
-            start_velocity: start_velocity(&self.start_velocity),
+            start_velocity: velocity(velocities.position, velocities.orientation, velocities.posture, velocities.hand),
         };
         let mut primitive =
             Primitive::new(&tables).map_err(|error| refused(LoadError::Primitive(error).to_string()))?;
@@ -90,45 +85,29 @@ impl PrimitiveFile {
     pub fn to_image(&self) -> Result<Vec<u8>, PrimitiveFileError> {
         self.require_expectation()?;
         let refused = |cause| PrimitiveFileError::Image { file: self.file.clone(), cause };
-        let single = |rows: &[Vec<f64>]| -> Vec<f32> { rows.iter().flatten().map(|value| *value as f32).collect() };
-        let weights = single(&self.weights);
-        let k1 = self.feedback.as_ref().map_or_else(Vec::new, |tables| single(&tables.k1));
-        let k2 = self.feedback.as_ref().map_or_else(Vec::new, |tables| single(&tables.k2));
-        let mean = self.expectation.as_ref().map_or_else(Vec::new, |table| single(&table.mean));
-        let spread = self.expectation.as_ref().map_or_else(Vec::new, |table| single(&table.spread));
-        let known = |pick: fn(&ExperienceTable) -> &Vec<Vec<f64>>| {
-            self.experience.as_ref().map_or_else(Vec::new, |table| single(pick(table)))
-        };
-        let (experience_mean, experience_spread) = (known(|table| &table.mean), known(|table| &table.spread));
+        fn single<'a>(rows: impl IntoIterator<Item = &'a Vec<f64>>) -> Vec<f32> {
+            rows.into_iter().flatten().map(|value| *value as f32).collect()
+        }
+        let (movement, feedback) = (&self.movement, self.feedback.as_ref());
+        let (expectation, experience) = (self.expectation.as_ref(), self.experience.as_ref());
         let content = ImageContent::<&[f32]> {
             model_hash: self.model_hash,
-            duration: self.duration as f32,
-            alpha: self.alpha as f32,
-            activation: self.activation as f32,
-            stiffness: self.gains.map(|gain| gain.stiffness as f32),
-            damping: self.gains.map(|gain| gain.damping as f32),
-            orientation_error: match self.orientation_error {
-                OrientationErrorKind::Quaternion => link::image::OrientationErrorKind::QuaternionDifference,
-                OrientationErrorKind::RotationVector => link::image::OrientationErrorKind::RotationVector,
-            },
-            hemisphere: match self.hemisphere {
-                HemisphereKind::Demonstrated => link::image::HemisphereKind::Demonstrated,
-                HemisphereKind::Nearest => link::image::HemisphereKind::Nearest,
-            },
-            start: image_waypoint(&self.start),
-            start_velocity: link::image::WaypointVelocity {
-                position: self.start_velocity.position.map(|value| value as f32),
-                orientation: self.start_velocity.orientation.map(|value| value as f32),
-                posture: self.start_velocity.posture.map(|value| value as f32),
-                hand: self.start_velocity.hand.map(|value| value as f32),
-            },
-            goal: image_waypoint(&self.goal),
-            clamps: self.feedback.as_ref().map_or_else(FeedbackClamps::default, |tables| FeedbackClamps {
-                position: tables.clamps[0] as f32,
-                orientation: tables.clamps[1] as f32,
-                hand: tables.clamps[2] as f32,
+            duration: movement.duration as f32,
+            alpha: movement.alpha as f32,
+            activation: movement.activation as f32,
+            stiffness: self.gains.in_order().map(|gain| gain.stiffness as f32),
+            damping: self.gains.in_order().map(|gain| gain.damping as f32),
+            orientation_error: movement.orientation_error,
+            hemisphere: movement.hemisphere,
+            start: self.start.single(),
+            start_velocity: self.start_velocity.single(),
+            goal: self.goal.single(),
+            clamps: feedback.map_or_else(FeedbackClamps::default, |tables| FeedbackClamps {
+                position: tables.clamp_position as f32,
+                orientation: tables.clamp_orientation as f32,
+                hand: tables.clamp_hand as f32,
             }),
-            marks: self.expectation.as_ref().map_or_else(ExpectationMarks::default, |table| ExpectationMarks {
+            marks: expectation.map_or_else(ExpectationMarks::default, |table| ExpectationMarks {
                 recorded_duration: table.recorded_duration as f32,
                 payload_mass: table.payload_mass as f32,
                 payload_centre: table.payload_centre.map(|value| value as f32),
@@ -137,17 +116,13 @@ impl PrimitiveFile {
                 spread_floor: table.spread_floor as f32,
             }),
             kernels: self.kernels(),
-            k1: &k1,
-            k2: &k2,
-            weights: &weights,
-            expected_mean: &mean,
-            expected_spread: &spread,
-            experience_trials: self
-                .experience
-                .as_ref()
-                .map_or(0, |table| u16::try_from(table.trials).unwrap_or(u16::MAX)),
-            experience_mean: &experience_mean,
-            experience_spread: &experience_spread,
+            k1: &single(feedback.iter().flat_map(|tables| &tables.k1)),
+            k2: &single(feedback.iter().flat_map(|tables| &tables.k2)),
+            weights: &single(self.weights.rows()),
+            expected_mean: &single(expectation.iter().flat_map(|table| &table.mean)),
+            experience_trials: experience.map_or(0, |table| u16::try_from(table.trials).unwrap_or(u16::MAX)),
+            experience_mean: &single(experience.iter().flat_map(|table| &table.mean)),
+            experience_spread: &single(experience.iter().flat_map(|table| &table.spread)),
         };
         let name = link::Name::new(&self.name).map_err(|_| refused(link::ImageError::Name))?;
         let mut bytes = vec![0; IMAGE_BYTES_LIMIT];
@@ -165,17 +140,4 @@ fn points<const SIZE: usize>(rows: &[Vec<f64>]) -> Vec<[f64; SIZE]> {
 
 fn waypoint(waypoint: &Waypoint) -> Configuration<f64> {
     configuration(waypoint.position, waypoint.orientation, waypoint.posture, waypoint.hand)
-}
-
-fn start_velocity(at: &WaypointVelocity) -> control::plan::primitive::Velocity<f64> {
-    velocity(at.position, at.orientation, at.posture, at.hand)
-}
-
-fn image_waypoint(waypoint: &Waypoint) -> link::image::Waypoint {
-    link::image::Waypoint {
-        position: waypoint.position.map(|value| value as f32),
-        orientation: waypoint.orientation.map(|value| value as f32),
-        posture: waypoint.posture.map(|value| value as f32),
-        hand: waypoint.hand.map(|value| value as f32),
-    }
 }

@@ -1,4 +1,4 @@
-//! What can be wrong with a primitive file.
+//! Errors of a primitive file.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ pub enum PrimitiveFileError {
     Io {
         /// The file.
         file: PathBuf,
-        /// What the operating system says.
+        /// The operating system's reason.
         #[source]
         cause: std::io::Error,
     },
@@ -21,7 +21,7 @@ pub enum PrimitiveFileError {
     Syntax {
         /// The file.
         file: PathBuf,
-        /// What the parser says, with the line it stumbled over.
+        /// The parser's reason, with the line.
         message: String,
     },
     /// The file is written in another version of the layout.
@@ -65,18 +65,6 @@ pub enum PrimitiveFileError {
         found: usize,
         /// Entries expected.
         expected: usize,
-    },
-    /// A text that must be one of a few words or a hexadecimal number is not.
-    #[error("{file}: {key}: `{found}` is not {expected}", file = file.display())]
-    Word {
-        /// The file.
-        file: PathBuf,
-        /// The key.
-        key: &'static str,
-        /// What stands there.
-        found: String,
-        /// What may stand there.
-        expected: &'static str,
     },
     /// The primitive is outside what a movement primitive can be: the reason comes from `dmp`.
     #[error("{file}: the primitive is refused: {reason}", file = file.display())]

@@ -6,15 +6,18 @@
 //! back. The check sum covers values, not text: comments and spaces may be changed, a number may not.
 
 mod convert;
-mod document;
 mod error;
 mod text;
 
 use std::path::{Path, PathBuf};
 
-use control::plan::primitive;
+use control::plan::primitive::{HAND_ROWS, ORIENTATION_ROWS, POSITION_ROWS, POSTURE_ROWS};
+use dmp::Gain;
+use serde::de::IgnoredAny;
+use serde::{Deserialize, Serialize};
 
 pub use convert::{HostPrimitive, KERNEL_CAPACITY};
+pub use dmp::{Hemisphere, OrientationError};
 pub use error::PrimitiveFileError;
 
 use crate::demonstration::recording::checksum;
@@ -26,90 +29,104 @@ pub const SCHEMA: &str = "tactus-primitive/1";
 /// to one beyond it.
 pub const LARGEST_DURATION_DEVIATION: f64 = 0.5;
 
-/// Rows of weights by group: position, orientation, posture, hand.
-pub const GROUPS: [(&str, usize); 4] = [
-    ("position", primitive::POSITION_ROWS),
-    ("orientation", primitive::ORIENTATION_ROWS),
-    ("posture", primitive::POSTURE_ROWS),
-    ("hand", primitive::HAND_ROWS),
-];
-
-/// Which orientation error the movement uses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OrientationErrorKind {
-    /// Eq (4); the movement stays within 175 degrees of its goal.
-    Quaternion,
-    /// Twice the logarithm of the quaternion difference; the movement may turn as far as it likes.
-    RotationVector,
-}
-
-/// What the signs of start and goal quaternion mean.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum HemisphereKind {
-    /// They carry the signs of a sign-continuous demonstration.
-    Demonstrated,
-    /// The nearer way round is meant.
-    Nearest,
-}
-
-/// Stiffness and damping of one group of rows, Eq (1): dimensionless.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gain {
-    /// Spring K.
-    pub stiffness: f64,
-    /// Damper D.
-    pub damping: f64,
-}
-
-/// Pose, posture and hand at one moment.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Waypoint {
-    /// Tool frame in the world frame, m.
-    pub position: [f64; 3],
-    /// Tool to world, unit quaternion (w, x, y, z).
-    pub orientation: [f64; 4],
-    /// Joint angles, rad.
-    pub posture: [f64; 7],
-    /// Spread and fingers 1 to 3, rad.
-    pub hand: [f64; 4],
-}
+/// Pose, posture and hand of one moment.
+pub type Waypoint = link::image::Waypoint<f64>;
 
 /// Velocities at one moment.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct WaypointVelocity {
-    /// World frame, m/s.
-    pub position: [f64; 3],
-    /// Body frame, rad/s.
-    pub orientation: [f64; 3],
-    /// rad/s.
-    pub posture: [f64; 7],
-    /// rad/s.
-    pub hand: [f64; 4],
+pub type WaypointVelocity = link::image::WaypointVelocity<f64>;
+
+/// Timing and coordinates of the movement.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MovementSection {
+    /// Duration as taught, s.
+    #[serde(rename = "duration_s")]
+    pub duration: f64,
+    /// Decay of the phase, Eq (3).
+    pub alpha: f64,
+    /// Activation of a kernel at the next centre, Eq (2).
+    pub activation: f64,
+    /// Kernels of each row of the weights.
+    pub kernels: usize,
+    /// Orientation error.
+    pub orientation_error: OrientationError,
+    /// Signs of the quaternions.
+    pub hemisphere: Hemisphere,
 }
 
+/// A value for each group of rows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Groups<T> {
+    /// Of the position.
+    pub position: T,
+    /// Of the orientation.
+    pub orientation: T,
+    /// Of the posture.
+    pub posture: T,
+    /// Of the hand.
+    pub hand: T,
+}
+
+impl<T> Groups<T> {
+    /// The values in the order position, orientation, posture, hand.
+    pub fn in_order(&self) -> [&T; 4] {
+        [&self.position, &self.orientation, &self.posture, &self.hand]
+    }
+}
+
+impl Groups<Vec<Vec<f64>>> {
+    /// All rows in their order.
+    pub fn rows(&self) -> impl Iterator<Item = &Vec<f64>> {
+        self.in_order().into_iter().flatten()
+    }
+}
+
+/// Names of the groups, and the number of rows of each.
+const GROUPS: Groups<(&str, usize)> = Groups {
+    position: ("position", POSITION_ROWS),
+    orientation: ("orientation", ORIENTATION_ROWS),
+    posture: ("posture", POSTURE_ROWS),
+    hand: ("hand", HAND_ROWS),
+};
+
 /// Sensory feedback, Eq (8).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FeedbackTables {
-    /// Largest displacement of the plan at rest: position m, orientation rad, hand rad.
-    pub clamps: [f64; 3],
+    /// Largest displacement of the planned position at rest, m.
+    #[serde(rename = "clamp_position_m")]
+    pub clamp_position: f64,
+    /// Largest displacement of the planned orientation at rest, rad.
+    #[serde(rename = "clamp_orientation_rad")]
+    pub clamp_orientation: f64,
+    /// Largest displacement of the planned hand at rest, rad.
+    #[serde(rename = "clamp_hand_rad")]
+    pub clamp_hand: f64,
     /// K1 by phase, 10 task rows a point, first point at the start of the movement. One point: constant.
     pub k1: Vec<Vec<f64>>,
     /// K2 by phase, 9 sensor rows a point.
     pub k2: Vec<Vec<f64>>,
 }
 
-/// What the sensors should feel, by phase.
-#[derive(Debug, Clone, PartialEq)]
+/// Expected sensor values by phase.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ExpectationTable {
     /// Hash of the robot model it was recorded with.
+    #[serde(with = "text::hexadecimal")]
     pub model_hash: u32,
     /// Duration of the recorded runs, s.
+    #[serde(rename = "recorded_duration_s")]
     pub recorded_duration: f64,
     /// Mass carried while recording beyond the hand, kg.
+    #[serde(rename = "payload_mass_kg")]
     pub payload_mass: f64,
     /// Centre of that mass in the tool frame, m.
+    #[serde(rename = "payload_centre_m")]
     pub payload_centre: [f64; 3],
     /// Cut-off of the causal filter on the recorded wrench, Hz.
+    #[serde(rename = "filter_cutoff_hz")]
     pub filter_cutoff: f64,
     /// Runs that were averaged.
     pub trials: u32,
@@ -117,12 +134,13 @@ pub struct ExpectationTable {
     pub spread_floor: f64,
     /// Mean by phase, 9 sensor rows a point: force N (world), torque N m, finger gauges N m.
     pub mean: Vec<Vec<f64>>,
-    /// Standard deviation, same shape.
+    /// Standard deviation, same shape. It stays on the host: K2 was made from it.
     pub spread: Vec<Vec<f64>>,
 }
 
-/// How successful runs felt and where the fingers stood, by phase: what the device watches a run by.
-#[derive(Debug, Clone, PartialEq)]
+/// Sensor values and finger angles of successful runs, by phase: the device watches a run by them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ExperienceTable {
     /// Successful runs it was made from.
     pub trials: u32,
@@ -133,62 +151,70 @@ pub struct ExperienceTable {
 }
 
 /// Where a primitive comes from: not part of its content, not covered by the check sum.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Provenance {
     /// File name of the demonstration, without its folder.
     pub demonstration: String,
     /// CRC-32 of the demonstration's bytes.
+    #[serde(rename = "demonstration_crc32", with = "text::hexadecimal")]
     pub demonstration_checksum: u32,
     /// Samples the primitive was fitted to.
     pub samples: usize,
     /// Time cut off before and behind the movement, s.
+    #[serde(rename = "trimmed_s")]
     pub trimmed: [f64; 2],
     /// Largest angle of the demonstration to its goal, rad.
+    #[serde(rename = "largest_angle_rad")]
     pub largest_angle: f64,
     /// Reproduction error of the position: maximum and RMS over time, m.
+    #[serde(rename = "position_error_m")]
     pub position_error: [f64; 2],
     /// Reproduction error of the orientation: maximum and RMS over time, rad.
+    #[serde(rename = "orientation_error_rad")]
     pub orientation_error: [f64; 2],
     /// Reproduction error of the posture: maximum and RMS over time and joints, rad.
+    #[serde(rename = "posture_error_rad")]
     pub posture_error: [f64; 2],
     /// Version of the tool.
     pub tool: String,
 }
 
-/// One movement primitive with everything that belongs to it.
-#[derive(Debug, Clone, PartialEq)]
+/// One movement primitive with everything that belongs to it, in the order of the text.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PrimitiveFile {
     /// The file it was read from or will be written to, for messages.
+    #[serde(skip)]
     pub file: PathBuf,
+    // The first two keys of the text are read and written by `text`.
+    #[serde(skip_serializing)]
+    pub(crate) schema: IgnoredAny,
+    #[serde(skip_serializing)]
+    pub(crate) content_crc32: IgnoredAny,
     /// Name on the device: 1 to 32 of `A-Z a-z 0-9 - _ .`.
+    #[serde(deserialize_with = "text::name")]
     pub name: String,
     /// Hash of the robot model it was learned with.
+    #[serde(with = "text::hexadecimal")]
     pub model_hash: u32,
-    /// Duration as taught, s.
-    pub duration: f64,
-    /// Decay of the phase, Eq (3).
-    pub alpha: f64,
-    /// Activation of a kernel at the next centre, Eq (2).
-    pub activation: f64,
-    /// Orientation error.
-    pub orientation_error: OrientationErrorKind,
-    /// Signs of the quaternions.
-    pub hemisphere: HemisphereKind,
-    /// Gains of position, orientation, posture, hand.
-    pub gains: [Gain; 4],
+    /// Timing and coordinates.
+    pub movement: MovementSection,
+    /// Stiffness and damping of each group of rows, Eq (1): dimensionless.
+    pub gains: Groups<Gain<f64>>,
     /// Start of the demonstration.
     pub start: Waypoint,
     /// Velocity there.
     pub start_velocity: WaypointVelocity,
     /// Goal of the demonstration.
     pub goal: Waypoint,
-    /// Weights theta, 17 rows of equal length: position, orientation, posture, hand. Position rows m, others rad.
-    pub weights: Vec<Vec<f64>>,
+    /// Weights theta, rows of equal length. Position rows m, others rad.
+    pub weights: Groups<Vec<Vec<f64>>>,
     /// Sensory feedback, if the primitive has any.
     pub feedback: Option<FeedbackTables>,
     /// Expected sensor values, if they were recorded.
     pub expectation: Option<ExpectationTable>,
-    /// How successful runs felt, if any were gathered.
+    /// Sensor values of successful runs, if any were gathered.
     pub experience: Option<ExperienceTable>,
     /// Where it comes from.
     pub provenance: Option<Provenance>,
@@ -211,7 +237,7 @@ impl PrimitiveFile {
     /// # Errors
     /// The first thing that is wrong.
     pub fn parse(file: &Path, text: &str) -> Result<PrimitiveFile, PrimitiveFileError> {
-        let (primitive, stored) = document::parse(file, text)?;
+        let (primitive, stored) = text::parse(file, text)?;
         primitive.check_values()?;
         let computed = primitive.checksum();
         if computed == stored {
@@ -270,11 +296,11 @@ impl PrimitiveFile {
         }
         let recorded = expectation.recorded_duration;
         // Both are finite: a file with another number is not read.
-        if (recorded - self.duration).abs() > LARGEST_DURATION_DEVIATION * recorded {
+        if (recorded - self.movement.duration).abs() > LARGEST_DURATION_DEVIATION * recorded {
             return Err(PrimitiveFileError::ExpectationDuration {
                 file: self.file.clone(),
                 recorded,
-                duration: self.duration,
+                duration: self.movement.duration,
             });
         }
         Ok(())
@@ -287,7 +313,7 @@ impl PrimitiveFile {
 
     /// Number of kernels of each row.
     pub fn kernels(&self) -> usize {
-        self.weights.first().map_or(0, Vec::len)
+        self.weights.position.first().map_or(0, Vec::len)
     }
 
     /// CRC-32/ISCSI of everything that determines the movement.
@@ -295,8 +321,8 @@ impl PrimitiveFile {
         let mut bytes = self.name.as_bytes().to_vec();
         bytes.push(0);
         bytes.extend(self.model_hash.to_le_bytes());
-        bytes.push(self.orientation_error as u8);
-        bytes.push(self.hemisphere as u8);
+        bytes.push(self.movement.orientation_error as u8);
+        bytes.push(self.movement.hemisphere as u8);
         for (key, values) in self.tables() {
             bytes.extend(key.as_bytes());
             bytes.extend((values.len() as u32).to_le_bytes());
@@ -309,8 +335,9 @@ impl PrimitiveFile {
 
     /// Every table of numbers with its key in the file.
     fn tables(&self) -> Vec<(String, Vec<f64>)> {
-        let mut tables = vec![("movement".to_owned(), vec![self.duration, self.alpha, self.activation])];
-        for ((group, _), gain) in GROUPS.iter().zip(&self.gains) {
+        let movement = &self.movement;
+        let mut tables = vec![("movement".to_owned(), vec![movement.duration, movement.alpha, movement.activation])];
+        for ((group, _), gain) in GROUPS.in_order().into_iter().zip(self.gains.in_order()) {
             tables.push((format!("gains.{group}"), vec![gain.stiffness, gain.damping]));
         }
         for (key, waypoint) in [("start", &self.start), ("goal", &self.goal)] {
@@ -324,16 +351,13 @@ impl PrimitiveFile {
         tables.push(("start_velocity.orientation_rad_s".into(), velocity.orientation.to_vec()));
         tables.push(("start_velocity.posture_rad_s".into(), velocity.posture.to_vec()));
         tables.push(("start_velocity.hand_rad_s".into(), velocity.hand.to_vec()));
-        let mut row = 0;
-        for (group, size) in GROUPS {
-            for index in 0..size {
-                let values = self.weights.get(row).cloned().unwrap_or_default();
-                tables.push((format!("weights.{group}, row {}", index + 1), values));
-                row += 1;
-            }
+        for ((group, _), rows) in GROUPS.in_order().into_iter().zip(self.weights.in_order()) {
+            let rows = rows.iter().enumerate();
+            tables.extend(rows.map(|(index, row)| (format!("weights.{group}, row {}", index + 1), row.clone())));
         }
         if let Some(feedback) = &self.feedback {
-            tables.push(("feedback.clamps".into(), feedback.clamps.to_vec()));
+            let clamps = vec![feedback.clamp_position, feedback.clamp_orientation, feedback.clamp_hand];
+            tables.push(("feedback.clamps".into(), clamps));
             tables.push(("feedback.k1".into(), feedback.k1.concat()));
             tables.push(("feedback.k2".into(), feedback.k2.concat()));
         }
@@ -362,36 +386,33 @@ impl PrimitiveFile {
                 Err(PrimitiveFileError::Shape { file: self.file.clone(), key: key.to_owned(), found, expected })
             }
         };
-        shape("weights", self.weights.len(), primitive::ROWS)?;
+        for ((group, rows), found) in GROUPS.in_order().into_iter().zip(self.weights.in_order()) {
+            shape(&format!("weights.{group}"), found.len(), *rows)?;
+        }
         for (key, values) in self.tables() {
             if key.starts_with("weights.") {
-                shape(&key, values.len(), self.kernels())?;
+                shape(&key, values.len(), self.movement.kernels)?;
             }
             if let Some(entry) = values.iter().position(|value| !value.is_finite()) {
                 return Err(PrimitiveFileError::NotFinite { file: self.file.clone(), key, entry: entry + 1 });
             }
         }
+        let columns = |key: &str, points: &[Vec<f64>], expected: usize| {
+            points.iter().try_for_each(|point| shape(key, point.len(), expected))
+        };
         if let Some(feedback) = &self.feedback {
-            for point in &feedback.k1 {
-                shape("feedback.k1", point.len(), link::image::COUPLED_ROWS)?;
-            }
-            for point in &feedback.k2 {
-                shape("feedback.k2", point.len(), link::image::SENSOR_ROWS)?;
-            }
+            columns("feedback.k1", &feedback.k1, link::image::COUPLED_ROWS)?;
+            columns("feedback.k2", &feedback.k2, link::image::SENSOR_ROWS)?;
         }
         if let Some(expectation) = &self.expectation {
             shape("expectation.spread", expectation.spread.len(), expectation.mean.len())?;
-            for point in expectation.mean.iter().chain(&expectation.spread) {
-                shape("expectation", point.len(), link::image::SENSOR_ROWS)?;
-            }
+            columns("expectation.mean", &expectation.mean, link::image::SENSOR_ROWS)?;
+            columns("expectation.spread", &expectation.spread, link::image::SENSOR_ROWS)?;
         }
         if let Some(experience) = &self.experience {
             shape("experience.spread", experience.spread.len(), experience.mean.len())?;
-            for (key, rows) in [("experience.mean", &experience.mean), ("experience.spread", &experience.spread)] {
-                for point in rows {
-                    shape(key, point.len(), link::image::EXPERIENCE_ROWS)?;
-                }
-            }
+            columns("experience.mean", &experience.mean, link::image::EXPERIENCE_ROWS)?;
+            columns("experience.spread", &experience.spread, link::image::EXPERIENCE_ROWS)?;
         }
         Ok(())
     }

@@ -21,7 +21,7 @@ const CYCLES: usize = 60;
 /// A joint that wanders farther than this meanwhile is moving (rad). Two counts of the motors are 0.3 to 0.6 mrad.
 const STILL: f64 = 2e-3;
 
-/// How long these cycles may take to arrive.
+/// Longest time until these cycles have arrived.
 const TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A home corrected by a measurement.

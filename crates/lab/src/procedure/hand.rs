@@ -16,7 +16,7 @@ const INITIALISATION: u64 = 30;
 /// Longest move of the hand, s: from stop to stop takes about three.
 const LONGEST_MOVE: u64 = 15;
 
-/// How often the hand is looked at.
+/// Period at which the hand is polled.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// A digit nearer to its target than this has arrived, rad: friction in the drive was seen to leave 0.04 rad at the
@@ -29,7 +29,7 @@ const STANDING: f32 = 2e-3;
 /// A hand that stands so long has met something; a minimum jerk is slow at its beginning, but not for so long.
 const STILL: Duration = Duration::from_millis(800);
 
-/// How a move of the hand ended.
+/// Result of a move of the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum HandReach {
     /// Every digit is at its target.

@@ -1,4 +1,4 @@
-//! What an operator does step by step, done by the host: make the arm ready, bring it to a posture, record what it
+//! The steps of an operator, done by the host: make the arm ready, bring it to a posture, record what it
 //! does.
 
 mod calibrate;
@@ -59,9 +59,9 @@ pub enum ProcedureError {
     /// It took too long.
     #[error("{what} did not end within {seconds} s")]
     TooLong {
-        /// What was waited for.
+        /// The event that was waited for.
         what: &'static str,
-        /// How long, s.
+        /// Time waited, s.
         seconds: u64,
     },
     /// The hand did not get ready.

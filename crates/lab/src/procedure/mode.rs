@@ -8,7 +8,7 @@ use link::RunOptions;
 use link::message::PoseFeedback;
 use serde::{Deserialize, Serialize};
 
-/// How force enters a run. In files and tables of experiments a mode is its letter.
+/// Use of the measured force in a run. In files and tables of experiments a mode is its letter.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, clap::ValueEnum, Serialize, Deserialize,
 )]
@@ -25,7 +25,7 @@ pub enum Mode {
     #[serde(rename = "b")]
     #[value(name = "force")]
     ForceControl,
-    /// (c) Force control, and the plan adapts to what is felt (Eq 8)
+    /// (c) Force control, and the plan adapts to the measured force (Eq 8)
     #[serde(rename = "c")]
     #[value(name = "adapt")]
     Adaptive,

@@ -11,13 +11,13 @@ use crate::client::{Client, Incoming};
 use crate::device::Device;
 use crate::error::{HostError, explain_blocked};
 
-/// How long a simulated start-up may take, s of virtual time; it takes about four.
+/// Longest simulated start-up, s of virtual time; it takes about four.
 const SIMULATED_TIMEOUT: u64 = 30;
 
-/// How long people get to reach the pendant, s.
+/// Time that people get to reach the pendant, s.
 const TIMEOUT: u64 = 600;
 
-/// How often the stage is looked at.
+/// Period at which the stage is polled.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// For how many control cycles an arm that is ready is left alone until its wrench has a zero: 5 s of the device's
@@ -25,10 +25,10 @@ const LOOK: Duration = Duration::from_millis(50);
 /// rested before it was activated.
 const FIRST_REST: u32 = 1500;
 
-/// What a start-up led to.
+/// Result of a start-up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Readiness {
-    /// Whether the wrench has a zero; `None` without a force/torque sensor.
+    /// True if the wrench has a zero; `None` without a force/torque sensor.
     pub wrench_zeroed: Option<bool>,
     /// Whose home the arm was zeroed at; `None` if it had been zeroed before.
     pub zeroed_at: Option<HomeSource>,
@@ -37,7 +37,7 @@ pub struct Readiness {
 /// Waits until the arm can be commanded, tells every stage, and initialises the hand where there is one.
 ///
 /// A simulated arm stands at home, so it is zeroed there; which home that is the device knows. For a real one
-/// `at_home` must be the word of a person.
+/// `at_home` must come from a person.
 ///
 /// # Errors
 /// [`ProcedureError::NotZeroed`] if nobody vouches for the pose; [`ProcedureError::NotReady`] when the start-up is

@@ -25,7 +25,7 @@ pub fn play_once(
     let name = Name::new(&movement.name).map_err(|error| TransportError::other(error.to_string()))?;
     go_to_start(client, &movement.start, |_| {})?;
     let mut cycles: Vec<Telemetry> = Vec::new();
-    let outcome = play(client, &RunRequest::new(name, movement.duration, options), &mut |cycle| {
+    let outcome = play(client, &RunRequest::new(name, movement.movement.duration, options), &mut |cycle| {
         cycles.push(*cycle);
         progress(cycles.len());
     })?;

@@ -32,7 +32,7 @@ pub struct Change {
     pub kind: ChangeKind,
 }
 
-/// What changes.
+/// A change during a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ChangeKind {
     /// The goal.
@@ -41,7 +41,7 @@ pub enum ChangeKind {
     Speed(f32),
 }
 
-/// What is to be run.
+/// The run that is asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunRequest {
     /// Name of the primitive in the device.
@@ -50,7 +50,7 @@ pub struct RunRequest {
     pub options: RunOptions,
     /// Duration as taught, s.
     pub duration: f64,
-    /// How long to go on watching after the arm has arrived, s.
+    /// Time to go on watching after the arm has arrived, s.
     pub rest: f64,
     /// Changes on the way, in any order.
     pub changes: Vec<Change>,
@@ -132,7 +132,7 @@ impl FlagCounts {
     }
 }
 
-/// What a run came to.
+/// Result of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RunOutcome {
     /// First cycle of the run.
@@ -141,7 +141,7 @@ pub struct RunOutcome {
     pub arrived_s: f64,
     /// Samples seen, from before the start until the rest at the end.
     pub samples: usize,
-    /// What was out of the ordinary, in samples of the movement itself.
+    /// Irregularities, in samples of the movement itself.
     pub flags: FlagCounts,
     /// Where the device was surprised.
     pub surprises: Vec<Surprise>,

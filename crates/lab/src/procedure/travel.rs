@@ -16,8 +16,8 @@ use crate::primitive_file::Waypoint;
 /// Longest move to a posture, s: what `control` allows.
 const LONGEST_TRAVEL: u64 = 125;
 
-/// How long an arm that has just got its torque holds still before it moves. Whoever held it until then lets go: a
-/// hand that still does would be worked against, and the torque for that would be too much a moment later.
+/// Time for which an arm that has just got its torque holds still before it moves. Whoever held it until then lets go:
+/// a hand that still does would be worked against, and the torque for that would be too much a moment later.
 const LET_GO: Duration = Duration::from_secs(1);
 
 /// Moves the joints to `q` (rad) and waits until the arm holds there. `progress` hears the time since the start, s.

@@ -65,7 +65,7 @@ pub fn wait_for(
     }
 }
 
-/// Whether a state entered during a motion ends it.
+/// True if a state entered during a motion ends it.
 pub fn after(code: u16, detail: u32) -> Result<(), ProcedureError> {
     let state = u8::try_from(code).ok().and_then(State::from_code);
     let fault = u8::try_from(detail).ok().and_then(Fault::from_code).unwrap_or(Fault::None);

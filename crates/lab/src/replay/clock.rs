@@ -8,7 +8,7 @@ use puck::CanFrame;
 use sim::wire::frame_bits;
 use sim::{TICKS_PER_BIT, TICKS_PER_MICROSECOND, Ticks};
 
-use crate::simulation::halves::{FIRST_SLOT, SLOT_TICKS};
+use crate::simulation::queues::{FIRST_SLOT, SLOT_TICKS};
 
 /// From the beginning of a slot to its first frame on an idle bus, us: what the application takes to begin.
 const LATENCY_US: i64 = 10;

@@ -6,7 +6,7 @@ use puck::CanFrame;
 use sim::{TICKS_PER_MICROSECOND, Ticks};
 
 use crate::boxed::boxed;
-use crate::simulation::halves::{FIRST_SLOT, LINE_ROOM, Port, Queues, SLOT_TICKS};
+use crate::simulation::queues::{FIRST_SLOT, LINE_ROOM, Port, Queues, SLOT_TICKS};
 
 /// The application of a device at power-up, and the time of its next slot.
 pub(super) struct Engine {

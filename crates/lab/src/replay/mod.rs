@@ -34,7 +34,7 @@ const LOOK_AHEAD: usize = 16;
 /// Differences that are kept; of more only the number.
 const KEPT: usize = 16;
 
-/// How a frame differs.
+/// Difference of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DifferenceKind {
@@ -57,15 +57,15 @@ pub struct Difference {
     pub line: u64,
     /// Control cycle of the device.
     pub cycle: u64,
-    /// What the log has, in words.
+    /// The log's frame, in words.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub logged: Option<String>,
-    /// What the device sent, in words.
+    /// The device's frame, in words.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sent: Option<String>,
 }
 
-/// What a replay came to.
+/// Result of a replay.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Outcome {
     /// Time of the log, s.
@@ -84,9 +84,9 @@ pub struct Outcome {
     pub requests: u64,
     /// Telemetry of cycles that both told, and how many of those were the same; how long computing took is left out.
     pub telemetry: (u64, u64),
-    /// Whether the log holds the host's bus.
+    /// True if the log holds the host's bus.
     pub has_host: bool,
-    /// How many frames were not the same.
+    /// Number of frames that differ.
     pub different: u64,
     /// The first of them.
     pub differences: Vec<Difference>,
@@ -129,7 +129,7 @@ pub struct Replay {
     early: Vec<(u64, LogLine)>,
     /// The first frame of the device and its time in the log.
     first: Option<(CanFrame, u64)>,
-    /// How many of the frames with which a device begins have been seen.
+    /// Number seen of the frames with which a device begins.
     begun: usize,
     line: u64,
     first_us: Option<u64>,

@@ -13,7 +13,7 @@ use sim::{Lockstep, LockstepError, PlainLine, Plant, Ticks};
 
 use super::board_can::RECORD_BYTES;
 use super::options::{BoardEngine, FlashSource, SimulationOptions};
-use super::seat::Seat;
+use super::processor::SharedProcessor;
 use super::words::Words;
 use super::{Execute, SimulationError};
 use crate::image_file::{ImageFile, ImageFileError};
@@ -22,7 +22,7 @@ use crate::transport::LineKind;
 /// The board whose image the emulator executes, as its image says it.
 const BOARD: &str = "nucleo-h743zi2";
 
-/// How long the emulator may take to write bank 2 and its report when the power is switched off.
+/// Longest time for the emulator to write bank 2 and its report when the power is switched off.
 const END_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Exit status of an emulator that cannot begin: its options or the image are not to its liking.
@@ -61,7 +61,7 @@ fn command(engine: &BoardEngine, options: &SimulationOptions) -> Result<Command,
 /// A running emulator and the streams to it.
 pub(super) struct EmulatedBoard {
     child: Child,
-    _seat: Seat,
+    _processor: SharedProcessor,
     /// `None` once it has ended, or is being switched off.
     lockstep: Option<Lockstep<BufReader<ChildStdout>, ChildStdin>>,
     words: Words,
@@ -85,12 +85,12 @@ impl EmulatedBoard {
         else {
             unreachable!("all three streams were asked for as pipes")
         };
-        let seat = Seat::share(&child);
+        let processor = SharedProcessor::share(&child);
         let words = Words::of(stderr, None);
         let mut from = BufReader::new(from);
         // Whether it begins at all is told here and not in the middle of a conversation.
         let begins = from.fill_buf().is_ok_and(|bytes| !bytes.is_empty());
-        let mut board = Self { child, _seat: seat, lockstep: begins.then(|| Lockstep::new(from, to)), words };
+        let mut board = Self { child, _processor: processor, lockstep: begins.then(|| Lockstep::new(from, to)), words };
         if !begins {
             return Err(board.ended());
         }
@@ -105,7 +105,7 @@ impl EmulatedBoard {
     fn ended(&mut self) -> SimulationError {
         self.lockstep = None;
         let status = self.wait();
-        let words = self.last_words();
+        let words = self.last_output();
         match status {
             Some(status) if status.code() == Some(REFUSED) => SimulationError::BoardRefused(words),
             Some(status) => SimulationError::BoardEnded { status: format!(" ({status})"), words },
@@ -113,7 +113,7 @@ impl EmulatedBoard {
         }
     }
 
-    fn last_words(&mut self) -> String {
+    fn last_output(&mut self) -> String {
         let words = self.words.last();
         let words = String::from_utf8_lossy(&words);
         if words.trim().is_empty() { "nothing".to_owned() } else { words.trim().to_owned() }
@@ -174,7 +174,7 @@ impl Drop for EmulatedBoard {
         if !ended.is_some_and(|status| status.success()) {
             // Nobody is left to take an error, but a bank 2 or a report that was not written must not go unnoticed.
             let how = ended.map_or_else(|| "had to be killed".to_owned(), |status| format!("ended with {status}"));
-            eprintln!("warning: when it was switched off, the emulated board {how}; it said: {}", self.last_words());
+            eprintln!("warning: when it was switched off, the emulated board {how}; it said: {}", self.last_output());
         }
     }
 }

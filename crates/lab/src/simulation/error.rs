@@ -57,7 +57,7 @@ pub enum SimulationError {
     BoardEnded {
         /// Exit status, if it is known.
         status: String,
-        /// What it said last.
+        /// Its last output.
         words: String,
     },
     /// The file for the firmware's log cannot be written.
@@ -83,7 +83,7 @@ pub enum SimulationError {
     Ended {
         /// Exit status, if it is known.
         status: String,
-        /// What it printed last, as far as it is text.
+        /// Its last output, as far as it is text.
         words: String,
     },
 }

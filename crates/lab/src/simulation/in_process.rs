@@ -17,7 +17,7 @@ use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
 use sim::{Plant, TICKS_PER_MICROSECOND, Ticks};
 
-use super::halves::{FIRST_SLOT, LINE_ROOM, Port, Queues, SLOT_TICKS};
+use super::queues::{FIRST_SLOT, LINE_ROOM, Port, Queues, SLOT_TICKS};
 use super::{Execute, SimulationError};
 use crate::boxed::boxed;
 

@@ -11,21 +11,21 @@ mod board_can;
 mod bus_log;
 mod error;
 mod fault_script;
-pub(crate) mod halves;
 mod in_process;
 mod options;
+mod processor;
 mod qemu;
-mod seat;
+pub(crate) mod queues;
 mod simulated_can;
 mod words;
 
 pub use board_can::BoardCan;
 pub use error::SimulationError;
-pub use halves::{CYCLE_TICKS, SLOT_TICKS};
 pub use options::{
     BOARD_EMULATOR_VARIABLE, BOARD_IMAGE_VARIABLE, BoardEngine, DEFAULT_SEED, Engine, FlashSource, GRIPPED,
     HAND_IMAGE_VARIABLE, IMAGE_VARIABLE, SimulationOptions, WorldKind, built_image,
 };
+pub use queues::{CYCLE_TICKS, SLOT_TICKS};
 pub use simulated_can::{HostBus, SimulatedCan};
 
 use std::time::Duration;
@@ -97,7 +97,7 @@ impl Simulation {
 
     /// Angle between the axis of the flashlight on the table and the vertical, rad; `None` where the world has none.
     ///
-    /// What a run came to in the world itself, which no telemetry can tell: whether the flashlight was knocked over.
+    /// No telemetry can tell whether a run knocked the flashlight over.
     pub fn flashlight_tilt(&mut self) -> Option<f64> {
         #[cfg(feature = "mujoco")]
         {
@@ -147,7 +147,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Whether what the buses carry is written to a file.
+    /// True if the traffic of the buses is written to a file.
     pub(crate) fn keeps_bus_log(&self) -> bool {
         self.log.is_some()
     }

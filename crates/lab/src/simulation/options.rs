@@ -1,4 +1,4 @@
-//! What a simulated device is made of: engine, seed, world, person.
+//! The parts of a simulated device: engine, seed, world, teacher.
 
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ pub const BOARD_EMULATOR_VARIABLE: &str = "TACTUS_BOARD_EMULATOR";
 /// Environment variable that names the image for the emulated board.
 pub const BOARD_IMAGE_VARIABLE: &str = "TACTUS_BOARD_IMAGE";
 
-/// What a hand alone finds between its fingers: a spring that its outer links meet at 0.45 rad, with inner links at
+/// The object between the fingers of a hand alone: a spring that its outer links meet at 0.45 rad, with inner links at
 /// 1.35 rad.
 pub const GRIPPED: FingerObstacle = FingerObstacle { inner: f64::INFINITY, outer: 0.45, stiffness: 2.0 };
 
@@ -38,11 +38,11 @@ pub struct BoardEngine {
     pub emulator: PathBuf,
     /// The image, an ELF file.
     pub image: PathBuf,
-    /// What the chip is, and what befalls it.
+    /// Variant and faults of the chip.
     pub chip: ChipOptions,
 }
 
-/// What executes the co-controller's application.
+/// The engine that executes the co-controller's application.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Engine {
     /// The application in this process.
@@ -97,27 +97,27 @@ impl FlashSource {
     }
 }
 
-/// How a simulated device is set up.
+/// Set-up of a simulated device.
 #[derive(Debug, Clone)]
 pub struct SimulationOptions {
-    /// What executes the application.
+    /// The engine that executes the application.
     pub engine: Engine,
-    /// Seed of everything random: sensor noise, wake delays, the person's tremor.
+    /// Seed of everything random: sensor noise, wake delays, the teacher's tremor.
     pub seed: u64,
     /// Which physics.
     pub world: WorldKind,
     /// Joint posture in which the arm stands at the beginning, rad.
     pub posture: [f64; 7],
-    /// Seed of the person who teaches; `None`: nobody stands beside the arm.
-    pub person: Option<u64>,
-    /// What that person teaches.
-    pub lesson: TaughtMovement,
+    /// Seed of the simulated teacher; `None`: nobody stands beside the arm.
+    pub teacher: Option<u64>,
+    /// The movement that the teacher shows.
+    pub movement: TaughtMovement,
     /// Bus, pucks, sensor, hand and operator; its seed is not used, [`seed`](Self::seed) is.
     pub plant: PlantConfig,
     /// Table and object.
     #[cfg(feature = "mujoco")]
     pub scene: Scene,
-    /// How the arm differs from the controller's model.
+    /// Deviations of the arm from the controller's model.
     #[cfg(feature = "mujoco")]
     pub imperfections: Imperfections,
     /// Puts the MuJoCo world, where nobody stands beside the arm, into another one around it, such as one that watches.
@@ -125,7 +125,7 @@ pub struct SimulationOptions {
     pub wrap_world: Option<fn(MujocoWorld) -> Box<dyn World>>,
     /// Where the firmware's log goes, raw defmt frames; `None` drops it.
     pub firmware_log: Option<PathBuf>,
-    /// What the host link travels on.
+    /// The line of the host link.
     pub line: LineKind,
     /// Where a log of the buses goes, in the format of `candump -L`; `None` keeps none.
     pub bus_log: Option<PathBuf>,
@@ -135,7 +135,7 @@ pub struct SimulationOptions {
     pub flash: FlashSource,
     /// The script of faults that befall the device: a file, or a file and the number of its scenario.
     pub faults: Option<String>,
-    /// What is in the way of the fingers of a hand alone; `None`: there is an arm, and a world around it.
+    /// Obstacles in the way of the fingers of a hand alone; `None`: there is an arm, and a world around it.
     pub grip: Option<[FingerObstacle; 3]>,
 }
 
@@ -202,8 +202,8 @@ impl SimulationOptions {
             seed,
             world,
             posture: HOME,
-            person: None,
-            lesson: TaughtMovement::SmallTorch,
+            teacher: None,
+            movement: TaughtMovement::SmallTorch,
             plant: PlantConfig::default(),
             #[cfg(feature = "mujoco")]
             scene: Scene::default(),
@@ -242,11 +242,11 @@ impl SimulationOptions {
                     imperfections: self.imperfections,
                     ..MujocoOptions::default()
                 })?;
-                Ok(match (self.person, self.wrap_world) {
+                Ok(match (self.teacher, self.wrap_world) {
                     (Some(seed), _) => {
-                        let person =
-                            Teacher::new(TeacherConfig { seed, ..TeacherConfig::default() }, self.lesson.path());
-                        Box::new(GuidedWorld::new(world, person))
+                        let teacher =
+                            Teacher::new(TeacherConfig { seed, ..TeacherConfig::default() }, self.movement.path());
+                        Box::new(GuidedWorld::new(world, teacher))
                     }
                     (None, Some(wrap_world)) => wrap_world(world),
                     (None, None) => Box::new(world),

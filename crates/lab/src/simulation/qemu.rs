@@ -8,7 +8,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use flash::FlashChip;
 use sim::{Lockstep, Plant, Ticks};
 
-use super::seat::Seat;
+use super::processor::SharedProcessor;
 use super::words::Words;
 use super::{Execute, SimulationError};
 
@@ -42,7 +42,7 @@ const OPTIONS: &[&str] = &[
 /// A running QEMU and the streams to it.
 pub(super) struct Qemu {
     child: Child,
-    _seat: Seat,
+    _processor: SharedProcessor,
     lockstep: Lockstep<BufReader<ChildStdout>, ChildStdin>,
     words: Words,
 }
@@ -70,9 +70,9 @@ impl Qemu {
             unreachable!("all three streams were asked for as pipes")
         };
         let words = Words::of(stderr, file);
-        let seat = Seat::share(&child);
+        let processor = SharedProcessor::share(&child);
         let lockstep = Lockstep::new(BufReader::new(from), to).with_flash(flash);
-        Ok(Self { child, _seat: seat, lockstep, words })
+        Ok(Self { child, _processor: processor, lockstep, words })
     }
 
     /// Why the firmware fell silent.

@@ -98,13 +98,7 @@ impl HostBus {
         }
     }
 
-    /// Time at which frames were on the wire since the start, and how many.
-    #[must_use]
-    pub fn account(&self) -> (Ticks, u64) {
-        (self.bus.trace().busy, self.bus.trace().total())
-    }
-
-    /// What the device's end counted of the segments that came.
+    /// Counters of the device's end for the segments that came.
     #[must_use]
     pub fn device_segments(&self) -> SegmentCounters {
         self.receiver.counters()

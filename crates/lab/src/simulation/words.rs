@@ -1,4 +1,4 @@
-//! What a process says on its standard error, kept for the day it ends by itself.
+//! The standard error of a process, kept for the case that it ends by itself.
 
 use std::fs::File;
 use std::io::{Read, Write};

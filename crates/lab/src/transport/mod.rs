@@ -38,27 +38,9 @@ pub trait Transport {
     /// Time of the clock that `timeout` counts on; its zero is arbitrary.
     fn now(&self) -> Duration;
 
-    /// Whether that clock is virtual: time passes only inside [`Transport::receive`].
+    /// True if that clock is virtual: time passes only inside [`Transport::receive`].
     fn is_virtual(&self) -> bool {
         false
-    }
-}
-
-impl<T: Transport + ?Sized> Transport for Box<T> {
-    fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
-        (**self).send(bytes)
-    }
-
-    fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
-        (**self).receive(timeout, out)
-    }
-
-    fn now(&self) -> Duration {
-        (**self).now()
-    }
-
-    fn is_virtual(&self) -> bool {
-        (**self).is_virtual()
     }
 }
 
@@ -70,7 +52,7 @@ pub enum TransportError {
     NotFound {
         /// The address.
         address: String,
-        /// What the system says.
+        /// The system's reason.
         cause: std::io::Error,
     },
     /// The device is there but this user may not open it.
@@ -78,7 +60,7 @@ pub enum TransportError {
     Permission {
         /// The address.
         address: String,
-        /// What the system says.
+        /// The system's reason.
         cause: std::io::Error,
     },
     /// The other end closed the connection, or the cable was pulled.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::AddressError;
 
-/// What the host link of a simulated device travels on.
+/// The line of the host link of a simulated device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LineKind {
     /// The board's UART.
@@ -22,7 +22,7 @@ pub struct SimulatorOptions {
     pub seed: Option<u64>,
     /// Name of the world; `None` is the best one that was built in.
     pub world: Option<String>,
-    /// What the host link travels on.
+    /// The line of the host link.
     pub line: LineKind,
     /// Where a log of the buses goes, in the format of `candump -L`.
     pub bus: Option<PathBuf>,
@@ -30,7 +30,7 @@ pub struct SimulatorOptions {
     pub flash: Option<PathBuf>,
     /// The script of faults that befall the device: a file, or a file and the number of its scenario.
     pub faults: Option<String>,
-    /// What only the emulated board takes.
+    /// Options of the emulated board only.
     pub board: BoardOptions,
 }
 
@@ -39,14 +39,14 @@ pub struct SimulatorOptions {
 pub struct BoardOptions {
     /// Where the emulator writes its report when the power is switched off, JSON.
     pub report: Option<PathBuf>,
-    /// What the chip is, and what befalls it.
+    /// Variant and faults of the chip.
     pub chip: ChipOptions,
 }
 
-/// What the emulated chip is, and what befalls it.
+/// Variant and faults of the emulated chip.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ChipOptions {
-    /// How the CAN controller treats a cancelled frame in its transmit FIFO; `None` is the emulator's choice.
+    /// Treatment of a cancelled frame in the transmit FIFO of the CAN controller; `None` is the emulator's choice.
     pub cancellation: Option<Cancellation>,
     /// Revision of the chip, `REV_ID`; `None` is the emulator's choice.
     pub revision: Option<u16>,

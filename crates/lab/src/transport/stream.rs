@@ -6,13 +6,13 @@ use std::time::{Duration, Instant};
 
 use super::{Transport, TransportError};
 
-/// How long connecting may take.
+/// Longest time for connecting.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// How long handing bytes over may take before the connection counts as dead.
+/// Longest time for handing bytes over before the connection counts as dead.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// What both kinds of socket can do.
+/// The operations of both kinds of socket.
 trait Socket: Read + Write + Send {
     /// A zero timeout means none at all to the system, so callers give at least 1 ms.
     fn set_timeout(&self, timeout: Duration) -> std::io::Result<()>;

@@ -10,7 +10,7 @@ pub(crate) const BANK_1: MemoryRegion = MemoryRegion { start: 0x0800_0000, lengt
 /// Where primitives belong.
 pub(crate) const BANK_2: MemoryRegion = MemoryRegion { start: 0x0810_0000, length: 0x10_0000 };
 
-/// What an image for the real board says about itself.
+/// The description of an image for the real board.
 pub(crate) fn real() -> ImageMetadata<'static> {
     ImageMetadata {
         link_version: LINK_VERSION,

@@ -1,49 +1,69 @@
 //! Content of an image: plain numbers with their units, not yet checked.
 
-/// The orientation error that the orientation system uses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum OrientationErrorKind {
-    /// Eq (4): the vector part of the quaternion difference.
-    #[default]
-    QuaternionDifference,
-    /// Twice the logarithm, for movements that turn beyond 180 degrees.
-    RotationVector,
-}
+use serde::{Deserialize, Serialize};
 
-/// Meaning of the signs of the start and goal quaternions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum HemisphereKind {
-    /// They come from a sign-continuous demonstration.
-    #[default]
-    Demonstrated,
-    /// They were chosen freely: the near way round is meant.
-    Nearest,
-}
+pub use dmp::{Hemisphere, OrientationError};
 
-/// Pose, posture and hand of one moment, or their velocities' bases.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Waypoint {
+/// Pose, posture and hand of one moment. As text each key names its unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Waypoint<T = f32> {
     /// Grasp point in the world frame, m.
-    pub position: [f32; 3],
+    #[serde(rename = "position_m")]
+    pub position: [T; 3],
     /// Hand to world, unit quaternion (w, x, y, z).
-    pub orientation: [f32; 4],
+    #[serde(rename = "orientation_wxyz")]
+    pub orientation: [T; 4],
     /// Joint angles, rad.
-    pub posture: [f32; 7],
+    #[serde(rename = "posture_rad")]
+    pub posture: [T; 7],
     /// Spread and three fingers, rad.
-    pub hand: [f32; 4],
+    #[serde(rename = "hand_rad")]
+    pub hand: [T; 4],
 }
 
-/// Velocities at the start of the demonstration.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct WaypointVelocity {
+impl Waypoint<f64> {
+    /// The same in single precision.
+    #[must_use]
+    pub fn single(&self) -> Waypoint {
+        Waypoint {
+            position: self.position.map(|value| value as f32),
+            orientation: self.orientation.map(|value| value as f32),
+            posture: self.posture.map(|value| value as f32),
+            hand: self.hand.map(|value| value as f32),
+        }
+    }
+}
+
+/// Velocities at the start of the demonstration. As text each key names its unit.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WaypointVelocity<T = f32> {
     /// World frame, m/s.
-    pub position: [f32; 3],
+    #[serde(rename = "position_m_s")]
+    pub position: [T; 3],
     /// Body frame, rad/s.
-    pub orientation: [f32; 3],
+    #[serde(rename = "orientation_rad_s")]
+    pub orientation: [T; 3],
     /// rad/s.
-    pub posture: [f32; 7],
+    #[serde(rename = "posture_rad_s")]
+    pub posture: [T; 7],
     /// rad/s.
-    pub hand: [f32; 4],
+    #[serde(rename = "hand_rad_s")]
+    pub hand: [T; 4],
+}
+
+impl WaypointVelocity<f64> {
+    /// The same in single precision.
+    #[must_use]
+    pub fn single(&self) -> WaypointVelocity {
+        WaypointVelocity {
+            position: self.position.map(|value| value as f32),
+            orientation: self.orientation.map(|value| value as f32),
+            posture: self.posture.map(|value| value as f32),
+            hand: self.hand.map(|value| value as f32),
+        }
+    }
 }
 
 /// Largest displacement of the plan by feedback at rest, Eq (8).
@@ -90,9 +110,9 @@ pub struct ImageContent<F> {
     /// D of position, orientation, posture, hand.
     pub damping: [f32; 4],
     /// Orientation error.
-    pub orientation_error: OrientationErrorKind,
+    pub orientation_error: OrientationError,
     /// Signs of the quaternions.
-    pub hemisphere: HemisphereKind,
+    pub hemisphere: Hemisphere,
     /// Start of the demonstration.
     pub start: Waypoint,
     /// Velocity there.
@@ -117,8 +137,6 @@ pub struct ImageContent<F> {
     /// Expected sensor values by phase: points x [`SENSOR_ROWS`](super::SENSOR_ROWS), environment on robot. Force N in
     /// world axes, torque N m in hand axes at the grasp point, fingers N m. May be empty.
     pub expected_mean: F,
-    /// Their standard deviations, same shape.
-    pub expected_spread: F,
     /// Sensor statistics of successful runs, by phase: points x [`EXPERIENCE_ROWS`](super::EXPERIENCE_ROWS): the sensor
     /// values as in `expected_mean`, then the angles of fingers F1 to F3, rad. May be empty.
     pub experience_mean: F,

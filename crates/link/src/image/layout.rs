@@ -1,7 +1,7 @@
 //! Sizes, limits and flags of the image layout.
 
 /// Version of this layout. An image of another version is refused with both versions named.
-pub const IMAGE_SCHEMA: u16 = 2;
+pub const IMAGE_SCHEMA: u16 = 3;
 
 /// First bytes of every image.
 pub const MAGIC: [u8; 4] = *b"TACP";
@@ -59,7 +59,7 @@ pub const fn image_bytes(
         + COUPLED_ROWS * k1_points
         + SENSOR_ROWS * k2_points
         + WEIGHT_ROWS * kernels
-        + 2 * SENSOR_ROWS * expectation_points
+        + SENSOR_ROWS * expectation_points
         + 2 * EXPERIENCE_ROWS * experience_points;
     HEADER_BYTES + REAL_BYTES * reals + CRC_BYTES
 }

@@ -18,7 +18,7 @@ mod read;
 mod write;
 
 pub use content::{
-    ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity,
+    ExpectationMarks, FeedbackClamps, Hemisphere, ImageContent, OrientationError, Waypoint, WaypointVelocity,
 };
 pub use error::ImageError;
 pub use layout::{

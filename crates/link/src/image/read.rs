@@ -1,7 +1,7 @@
 //! Bytes to a checked [`PrimitiveImage`], without copying the tables.
 
 use super::content::{
-    ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity,
+    ExpectationMarks, FeedbackClamps, Hemisphere, ImageContent, OrientationError, Waypoint, WaypointVelocity,
 };
 use super::counts::{Counts, clip};
 use super::error::ImageError;
@@ -203,15 +203,11 @@ fn read_content<'a>(
         stiffness,
         damping,
         orientation_error: if flags & FLAG_ROTATION_VECTOR == 0 {
-            OrientationErrorKind::QuaternionDifference
+            OrientationError::Quaternion
         } else {
-            OrientationErrorKind::RotationVector
+            OrientationError::RotationVector
         },
-        hemisphere: if flags & FLAG_NEAREST_HEMISPHERE == 0 {
-            HemisphereKind::Demonstrated
-        } else {
-            HemisphereKind::Nearest
-        },
+        hemisphere: if flags & FLAG_NEAREST_HEMISPHERE == 0 { Hemisphere::Demonstrated } else { Hemisphere::Nearest },
         start,
         start_velocity,
         goal,
@@ -230,7 +226,6 @@ fn read_content<'a>(
         k2: body.table(SENSOR_ROWS * counts.k2_points)?,
         weights: body.table(WEIGHT_ROWS * counts.kernels)?,
         expected_mean: body.table(SENSOR_ROWS * counts.expectation_points)?,
-        expected_spread: body.table(SENSOR_ROWS * counts.expectation_points)?,
         experience_mean: body.table(EXPERIENCE_ROWS * counts.experience_points)?,
         experience_spread: body.table(EXPERIENCE_ROWS * counts.experience_points)?,
     })

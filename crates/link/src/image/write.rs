@@ -1,6 +1,6 @@
 //! Plain numbers to an image.
 
-use super::content::{HemisphereKind, ImageContent, OrientationErrorKind, Waypoint};
+use super::content::{Hemisphere, ImageContent, OrientationError, Waypoint};
 use super::counts::{Counts, clip};
 use super::error::ImageError;
 use super::layout::{
@@ -27,7 +27,6 @@ impl ImageContent<&[f32]> {
         };
         counts.check()?;
         if self.weights.len() != WEIGHT_ROWS * self.kernels
-            || self.expected_spread.len() != self.expected_mean.len()
             || self.experience_spread.len() != self.experience_mean.len()
         {
             return Err(ImageError::Shape);
@@ -35,10 +34,10 @@ impl ImageContent<&[f32]> {
         let length = counts.bytes();
         let out = out.get_mut(..length).ok_or(ImageError::Shape)?;
         let mut flags = 0;
-        if self.orientation_error == OrientationErrorKind::RotationVector {
+        if self.orientation_error == OrientationError::RotationVector {
             flags |= FLAG_ROTATION_VECTOR;
         }
-        if self.hemisphere == HemisphereKind::Nearest {
+        if self.hemisphere == Hemisphere::Nearest {
             flags |= FLAG_NEAREST_HEMISPHERE;
         }
         let mut padded = [0_u8; NAME_BYTES];
@@ -73,15 +72,8 @@ impl ImageContent<&[f32]> {
         writer.reals(&[marks.recorded_duration, marks.payload_mass])?;
         writer.reals(&marks.payload_centre)?;
         writer.reals(&[marks.filter_cutoff, marks.trials, marks.spread_floor])?;
-        for table in [
-            self.k1,
-            self.k2,
-            self.weights,
-            self.expected_mean,
-            self.expected_spread,
-            self.experience_mean,
-            self.experience_spread,
-        ] {
+        for table in [self.k1, self.k2, self.weights, self.expected_mean, self.experience_mean, self.experience_spread]
+        {
             writer.reals(table)?;
         }
         let written = writer.position;

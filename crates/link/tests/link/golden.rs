@@ -7,7 +7,7 @@ use std::path::Path;
 
 use crate::samples::{EVENT_KINDS, Tables, event_index, replies, reply_index, request_index, requests};
 use link::frame::{self, Envelope, FRAME_BYTES};
-use link::image::{HemisphereKind, IMAGE_SCHEMA, PrimitiveImage, image_bytes};
+use link::image::{Hemisphere, IMAGE_SCHEMA, PrimitiveImage, image_bytes};
 use link::message::{AccelerationSource, PoseFeedback};
 use link::{HandStage, HomeSource, LINK_VERSION, Refusal, SCHEMA_HASH};
 
@@ -176,7 +176,7 @@ fn worked_example_of_the_image_document() {
     let image = Tables::new(2, 1, 2, 1).image();
     assert_eq!(image.len(), image_bytes(2, 1, 1, 2, 1));
     let parsed = PrimitiveImage::parse(&image).unwrap();
-    assert_eq!(parsed.content().hemisphere, HemisphereKind::Demonstrated);
+    assert_eq!(parsed.content().hemisphere, Hemisphere::Demonstrated);
     let document = include_str!("../../../../docs/image-format.md");
     for (offset, row) in image.chunks(16).enumerate().filter(|(index, _)| *index < 6) {
         let line = format!("{:04x}  {}", 16 * offset, hex(row));

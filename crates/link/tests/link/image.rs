@@ -54,7 +54,6 @@ fn what_was_written_is_what_is_read() {
         (read.k2, written.k2),
         (read.weights, written.weights),
         (read.expected_mean, written.expected_mean),
-        (read.expected_spread, written.expected_spread),
         (read.experience_mean, written.experience_mean),
         (read.experience_spread, written.experience_spread),
     ] {
@@ -182,8 +181,6 @@ fn what_could_not_be_read_back_is_not_written() {
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
     let bad = link::image::ImageContent { k1: &good.k1[1..], ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
-    let bad = link::image::ImageContent { expected_spread: &good.k1[..0], ..good };
-    assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
     let bad = link::image::ImageContent { experience_spread: &good.k1[..0], ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
     let bad = link::image::ImageContent { k2: &good.k2[..0], ..good };
@@ -213,7 +210,7 @@ proptest! {
         let bytes = tables.image();
         let image = PrimitiveImage::parse(&bytes).unwrap();
         prop_assert!(image.content().weights.iter().eq(tables.content().weights.iter().copied()));
-        prop_assert!(image.content().expected_spread.iter().eq(tables.content().expected_spread.iter().copied()));
+        prop_assert!(image.content().expected_mean.iter().eq(tables.content().expected_mean.iter().copied()));
         prop_assert!(image.content().experience_spread.iter().eq(tables.content().experience_spread.iter().copied()));
     }
 }

@@ -2,7 +2,7 @@
 
 use link::frame::FRAME_BYTES;
 use link::image::{
-    ExpectationMarks, FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity,
+    ExpectationMarks, FeedbackClamps, Hemisphere, ImageContent, OrientationError, Waypoint, WaypointVelocity,
 };
 use link::message::{AccelerationSource, ChunkData, PoseFeedback};
 use link::{
@@ -250,7 +250,6 @@ pub(crate) struct Tables {
     k2: Vec<f32>,
     weights: Vec<f32>,
     mean: Vec<f32>,
-    spread: Vec<f32>,
     experience_mean: Vec<f32>,
     experience_spread: Vec<f32>,
     kernels: usize,
@@ -265,7 +264,6 @@ impl Tables {
             k2: series(9 * gain_points, 0.25),
             weights: series(17 * kernels, 0.125),
             mean: series(9 * expectation_points, 2.0),
-            spread: series(9 * expectation_points, 4.0),
             experience_mean: series(12 * experience_points, 3.0),
             experience_spread: series(12 * experience_points, 5.0),
             kernels,
@@ -287,8 +285,8 @@ impl Tables {
             activation: 0.7,
             stiffness: [200.0, 201.0, 202.0, 203.0],
             damping: [28.0, 20.0, 29.0, 30.0],
-            orientation_error: OrientationErrorKind::RotationVector,
-            hemisphere: HemisphereKind::Demonstrated,
+            orientation_error: OrientationError::RotationVector,
+            hemisphere: Hemisphere::Demonstrated,
             start: waypoint(0.5),
             start_velocity: WaypointVelocity {
                 position: ramp(0.0),
@@ -312,7 +310,6 @@ impl Tables {
             k2: &self.k2,
             weights: &self.weights,
             expected_mean: &self.mean,
-            expected_spread: &self.spread,
             experience_mean: &self.experience_mean,
             experience_spread: &self.experience_spread,
         }

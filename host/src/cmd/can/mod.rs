@@ -11,12 +11,12 @@ use super::{ErrorCode, Failure, Global, Output, connection};
 /// Options of `can`.
 #[derive(Debug, Clone, Args)]
 pub struct Cmd {
-    /// What to do
+    /// Action
     #[command(subcommand)]
     pub action: Action,
 }
 
-/// What can be done with a bus.
+/// Actions on a bus.
 #[derive(Debug, Clone, Subcommand)]
 pub enum Action {
     /// Say what every frame means, and what they come to

@@ -17,7 +17,7 @@ const REPORTED: u64 = 20;
 /// Letters of a wrong line that are shown.
 const SHOWN: usize = 60;
 
-/// How often a file that may grow, and an interface, are looked at again.
+/// Period at which a growing file and an interface are polled.
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// A source of log lines.
@@ -33,7 +33,7 @@ pub(super) enum Source {
 /// Lines that could not be read.
 #[derive(Debug, Default)]
 pub(super) struct Garbage {
-    /// How many.
+    /// Their number.
     pub(super) lines: u64,
     /// Number of the first one.
     pub(super) first: Option<u64>,

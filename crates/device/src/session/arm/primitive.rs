@@ -4,11 +4,10 @@ use control::model::ArmModel;
 use control::plan::load;
 use control::plan::load::LoadError;
 use control::plan::primitive::{self, Configuration, MovementTables, configuration, gains, limits, velocity};
-use dmp::{Hemisphere, OrientationError};
 use link::Refusal;
 use link::image::{
-    EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT, EXPERIENCE_ROWS, GAIN_POINTS_LIMIT, HemisphereKind,
-    ImageContent, KERNEL_LIMIT, OrientationErrorKind, Reals, WEIGHT_ROWS, Waypoint,
+    EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT, EXPERIENCE_ROWS, GAIN_POINTS_LIMIT, ImageContent, KERNEL_LIMIT,
+    Reals, WEIGHT_ROWS, Waypoint,
 };
 
 use crate::application::Refused;
@@ -76,14 +75,8 @@ pub(crate) fn build<'a>(
         kernel_count: content.kernels,
         weights,
         gains: gains(content.stiffness, content.damping),
-        orientation_error: match content.orientation_error {
-            OrientationErrorKind::QuaternionDifference => OrientationError::Quaternion,
-            OrientationErrorKind::RotationVector => OrientationError::RotationVector,
-        },
-        hemisphere: match content.hemisphere {
-            HemisphereKind::Demonstrated => Hemisphere::Demonstrated,
-            HemisphereKind::Nearest => Hemisphere::Nearest,
-        },
+        orientation_error: content.orientation_error,
+        hemisphere: content.hemisphere,
         start: waypoint(&content.start),
         goal: waypoint(&content.goal),
         start_velocity: velocity(

@@ -35,7 +35,7 @@ pub trait CanPort {
     /// Time of the clock that `timeout` counts on.
     fn now(&self) -> Duration;
 
-    /// Whether that clock is virtual.
+    /// True if that clock is virtual.
     fn is_virtual(&self) -> bool;
 }
 
@@ -61,7 +61,7 @@ impl<P: CanPort> CanTransport<P> {
         &mut self.port
     }
 
-    /// What was counted of the segments that came.
+    /// Counters of the segments that came.
     pub fn segments(&self) -> SegmentCounters {
         self.receiver.counters()
     }

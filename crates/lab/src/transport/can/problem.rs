@@ -1,4 +1,4 @@
-//! What is wrong with a CAN interface, each with the command that mends it.
+//! Problems of a CAN interface, each with the command that mends it.
 
 use crate::error_code::ErrorCode;
 
@@ -38,7 +38,7 @@ pub enum CanProblem {
     NotSent {
         /// Its name.
         interface: String,
-        /// How long was waited, s.
+        /// Time waited, s.
         seconds: u64,
     },
     /// This kernel has no CAN, or this is not Linux.
@@ -73,7 +73,7 @@ impl CanProblem {
         }
     }
 
-    /// What mends it here, where more is known than the code advises.
+    /// The remedy here, where more is known than the code advises.
     #[must_use]
     pub fn help(&self) -> Option<String> {
         match self {

@@ -12,13 +12,13 @@ use canlog::AnyFrame;
 /// Where the kernel tells about its network interfaces.
 const INTERFACES: &str = "/sys/class/net";
 
-/// How long a full queue may stay full before frames count as not leaving.
+/// Time for which a queue may stay full before frames count as not leaving.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Pause before a full queue is tried again: about nine frames leave meanwhile.
 const FULL_QUEUE_PAUSE: Duration = Duration::from_millis(1);
 
-/// What the kernel says of an interface before it is opened.
+/// The kernel's view of an interface before it is opened.
 ///
 /// # Errors
 /// [`CanProblem`] if it cannot be used as it is.
@@ -82,7 +82,7 @@ impl SocketCan {
         Self::open(interface, None)
     }
 
-    /// What goes wrong with the open interface, from an error of the system.
+    /// The problem of the open interface, from an error of the system.
     fn failure(&self, cause: std::io::Error) -> TransportError {
         classify(Path::new(INTERFACES), &self.interface, cause)
     }
@@ -96,7 +96,7 @@ fn classify(interfaces: &Path, interface: &str, cause: std::io::Error) -> Transp
         return CanProblem::Unsupported(cause).into();
     }
     match inspect(interfaces, interface) {
-        Err(trouble) => trouble.into(),
+        Err(problem) => problem.into(),
         Ok(()) => TransportError::opening(&format!("can:{interface}"), cause),
     }
 }
@@ -263,7 +263,7 @@ mod tests {
     }
 
     fn told(folder: &Path, name: &str) -> Result<(), String> {
-        inspect(folder, name).map_err(|trouble| trouble.to_string())
+        inspect(folder, name).map_err(|problem| problem.to_string())
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! The two halves of the device's application in one thread: the queues between them, and what the session sees of
-//! the rest.
+//! The queues between the control part and the session of the device's application in one thread, and the session's
+//! view of the rest.
 
 use std::collections::VecDeque;
 
@@ -13,11 +13,11 @@ use puck::CanFrame;
 use sim::Ticks;
 use sim::fault::FrameKind;
 
-/// Room of the queue of commands, as in the firmware.
+/// Capacity of the queue of commands, as in the firmware.
 const COMMANDS: usize = 8;
 /// Records that may wait for the session, as in the firmware.
 const RECORDS: usize = 16;
-/// Bytes that may wait for the line before telemetry is left out; the firmware's port has the same room.
+/// Bytes that may wait for the line before telemetry is left out; the firmware's port has the same capacity.
 pub(crate) const LINE_ROOM: usize = 2048;
 
 /// Ticks of one slot of the device.
@@ -29,7 +29,7 @@ pub const CYCLE_TICKS: Ticks = CYCLE_SLOTS as Ticks * SLOT_TICKS;
 /// The first slot of a device, in slots since its power-up, as on the board (`docs/lockstep.md`).
 pub(crate) const FIRST_SLOT: Ticks = 10;
 
-/// What both halves see of each other and of the board.
+/// The connection of both parts to each other and to the board.
 #[derive(Default)]
 pub(crate) struct Queues {
     /// Frames from the bus that the core has not taken yet.

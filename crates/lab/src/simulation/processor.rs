@@ -8,15 +8,15 @@ use std::process::Child;
 
 /// While it lives, this thread and the child share the processor the thread was on. Does nothing where that is not
 /// possible.
-pub(super) struct Seat(());
+pub(super) struct SharedProcessor(());
 
-/// Processors this program may use, as found before the first seat was taken. Every seat gives these back, so that
-/// seats may overlap and end in any order.
+/// Processors this program may use, as found before any was shared. The end of every sharing gives these back, so that
+/// they may overlap and end in any order.
 #[cfg(target_os = "linux")]
 static ALL: std::sync::OnceLock<Option<rustix::thread::CpuSet>> = std::sync::OnceLock::new();
 
 #[cfg(target_os = "linux")]
-impl Seat {
+impl SharedProcessor {
     /// Takes the child to this thread's processor. Call before the child has started threads: they inherit the place.
     pub(super) fn share(child: &Child) -> Self {
         use rustix::thread::{CpuSet, Pid, sched_getaffinity, sched_getcpu, sched_setaffinity};
@@ -35,7 +35,7 @@ impl Seat {
 }
 
 #[cfg(target_os = "linux")]
-impl Drop for Seat {
+impl Drop for SharedProcessor {
     fn drop(&mut self) {
         if let Some(Some(all)) = ALL.get() {
             let _ = rustix::thread::sched_setaffinity(None, all);
@@ -44,7 +44,7 @@ impl Drop for Seat {
 }
 
 #[cfg(not(target_os = "linux"))]
-impl Seat {
+impl SharedProcessor {
     pub(super) fn share(_child: &Child) -> Self {
         Self(())
     }

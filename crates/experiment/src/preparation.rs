@@ -1,4 +1,4 @@
-//! The primitive of an experiment, made on the spot: taught by the simulated person, learned, rehearsed, and with the
+//! The primitive of an experiment, made on the spot: taught by the simulated teacher, learned, rehearsed, and with the
 //! experience of runs that succeeded; the same library calls as in `tactus teach`, `learn`, `rehearse` and
 //! `experience`.
 
@@ -26,7 +26,7 @@ use lab::procedure::{self, ProcedureError, Recorder, record_demonstration, recor
 use lab::simulation::Engine;
 
 /// Seed of arm, noise and person while a primitive is made. Experiments begin with 1, so their arms are others.
-const LESSON_SEED: u64 = 0;
+const TEACHER_SEED: u64 = 0;
 /// Rest recorded after the simulated teacher has let go, s.
 const POST_ROLL: f64 = 0.5;
 /// Longest demonstration, s.
@@ -43,7 +43,7 @@ const LIFTING_KERNELS: usize = 100;
 /// Rehearsals.
 const REHEARSALS: u64 = 3;
 
-/// How a scenario's hand closes and gives way: one set for all its cells and modes, chosen for what it meets.
+/// Closing and compliance of a scenario's hand: one set for all its cells and modes, chosen for what it meets.
 #[derive(Debug, Clone, Copy)]
 struct GraspTuning {
     /// Time for the fingers to close where the hand rests, s.
@@ -52,7 +52,7 @@ struct GraspTuning {
     closed: f64,
     /// K1/K of the position rows sideways and upwards, m/N; `None`: as recommended.
     compliance: Option<[f64; 2]>,
-    /// Whether the plan turns by what it feels.
+    /// True if the plan turns by the measured torque.
     turns: bool,
     /// K of the hand rows and their K1/K, rad/(N m); `None`: as recommended.
     fingers: Option<[f64; 2]>,
@@ -81,7 +81,7 @@ impl GraspTuning {
 
 /// Why no primitive was made.
 #[derive(Debug, thiserror::Error)]
-pub enum LessonError {
+pub enum PreparationError {
     /// The simulated device failed or refused.
     #[error(transparent)]
     Trial(#[from] TrialError),
@@ -100,24 +100,24 @@ pub enum LessonError {
     /// The file cannot be written.
     #[error(transparent)]
     File(#[from] PrimitiveFileError),
-    /// Nobody was there to teach, or the lesson did not end.
-    #[error("the lesson failed: {0}")]
+    /// There was no teacher, or the demonstration did not end.
+    #[error("the demonstration failed: {0}")]
     Teacher(&'static str),
 }
 
-impl From<ProcedureError> for LessonError {
+impl From<ProcedureError> for PreparationError {
     fn from(error: ProcedureError) -> Self {
         Self::Trial(error.into())
     }
 }
 
-impl From<lab::error::HostError> for LessonError {
+impl From<lab::error::HostError> for PreparationError {
     fn from(error: lab::error::HostError) -> Self {
         Self::Trial(error.into())
     }
 }
 
-impl From<lab::simulation::SimulationError> for LessonError {
+impl From<lab::simulation::SimulationError> for PreparationError {
     fn from(error: lab::simulation::SimulationError) -> Self {
         Self::Trial(error.into())
     }
@@ -127,7 +127,7 @@ impl From<lab::simulation::SimulationError> for LessonError {
 /// written.
 ///
 /// # Errors
-/// [`LessonError`]
+/// [`PreparationError`]
 pub fn make(
     scenario: Scenario,
     plant: PlantKind,
@@ -135,8 +135,8 @@ pub fn make(
     jobs: usize,
     interrupt: &Interrupt,
     say: &mut dyn FnMut(&str),
-) -> Result<PrimitiveFile, LessonError> {
-    let arm = Arm { engine: Engine::InProcess, kind: plant, variation: Variation::default(), seed: LESSON_SEED };
+) -> Result<PrimitiveFile, PreparationError> {
+    let arm = Arm { engine: Engine::InProcess, kind: plant, variation: Variation::default(), seed: TEACHER_SEED };
     say("teaching");
     let recording = teach(scenario, &arm, interrupt)?;
     say("learning");
@@ -149,12 +149,12 @@ pub fn make(
 /// is what shall be expected.
 ///
 /// # Errors
-/// [`LessonError`]
-pub fn rehearsed(config: &Config, interrupt: &Interrupt) -> Result<PrimitiveFile, LessonError> {
+/// [`PreparationError`]
+pub fn rehearsed(config: &Config, interrupt: &Interrupt) -> Result<PrimitiveFile, PreparationError> {
     let scene = match config.scenario {
         // What shall be expected is the weight, in its place.
         Scenario::Lift => {
-            let frame = config.frame().ok_or(LessonError::Teacher("the movement arrives from nowhere"))?;
+            let frame = config.frame().ok_or(PreparationError::Teacher("the movement arrives from nowhere"))?;
             Scene::with(config.object_at(&frame, Cell::default()))
         }
         // The hand shall give way to the table: so it is not expected.
@@ -162,16 +162,17 @@ pub fn rehearsed(config: &Config, interrupt: &Interrupt) -> Result<PrimitiveFile
         // A movement that expects no contact answers to every one.
         Scenario::Flashlight | Scenario::Cup | Scenario::Fingers => Scene::EMPTY,
     };
-    let arm = Arm { engine: Engine::InProcess, kind: config.plant, variation: Variation::default(), seed: LESSON_SEED };
+    let arm =
+        Arm { engine: Engine::InProcess, kind: config.plant, variation: Variation::default(), seed: TEACHER_SEED };
     let mut primitive = config.primitive.clone();
     let movement = primitive.without_memory();
     let seeds: Vec<u64> = (1..=REHEARSALS).collect();
-    // A weight is only felt where it is lifted: an arm that gives way would leave it on the table.
+    // A weight is only measured where it is lifted: an arm that gives way would leave it on the table.
     let exact = config.scenario == Scenario::Lift;
     let options = if exact { Mode::Track.options() } else { config.scenario.options(Mode::OpenLoop) };
     let runs = in_parallel(config.jobs, &seeds, |seed| rehearsal(&movement, &arm, scene, *seed, options, interrupt));
     let recordings = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
-    remember_rehearsals(&mut primitive, &recordings, movement.duration, Payload::default(), true)?;
+    remember_rehearsals(&mut primitive, &recordings, movement.movement.duration, Payload::default(), true)?;
     Ok(primitive)
 }
 
@@ -194,39 +195,40 @@ fn in_parallel<Item: Sync, Done: Send>(jobs: usize, items: &[Item], work: impl F
 }
 
 /// The person shows the movement on an empty table; one that shall find the table in its way, without it.
-fn teach(scenario: Scenario, arm: &Arm, interrupt: &Interrupt) -> Result<Recording, LessonError> {
-    let lesson = scenario.lesson();
+fn teach(scenario: Scenario, arm: &Arm, interrupt: &Interrupt) -> Result<Recording, PreparationError> {
+    let movement = scenario.taught_movement();
     let scene = if scenario == Scenario::Bottle { Scene::NOTHING } else { Scene::EMPTY };
-    let mut options = plant::options(arm, LESSON_SEED, lesson.start(), scene);
-    (options.person, options.lesson) = (Some(LESSON_SEED), lesson);
+    let mut options = plant::options(arm, TEACHER_SEED, movement.start(), scene);
+    (options.teacher, options.movement) = (Some(TEACHER_SEED), movement);
     let mut client = trial::connect(&options, interrupt)?;
     procedure::make_ready(&mut client, true, |_| {})?;
-    procedure::travel(&mut client, lesson.start().map(|angle| angle as f32), |_| {})?;
+    procedure::travel(&mut client, movement.start().map(|angle| angle as f32), |_| {})?;
     client.gravity()?;
     let rate = control::RATE_HZ;
-    let notes = format!("Tactus recording of a demonstration by hand, {rate} Hz (simulated arm, simulated person)");
+    let notes = format!("Tactus recording of a demonstration by hand, {rate} Hz (simulated arm, simulated teacher)");
     let recorder = Recorder::start(&mut client, Vec::new(), &notes)?;
     if !teacher::begin(&mut client) {
-        return Err(LessonError::Teacher("nobody stands beside the arm"));
+        return Err(PreparationError::Teacher("nobody stands beside the arm"));
     }
     let shown = record_demonstration(&mut client, recorder, LONGEST_DEMONSTRATION, POST_ROLL, |client, _| {
         teacher::has_finished(client)
     })?;
     if !shown.is_complete {
-        return Err(LessonError::Teacher("the simulated teacher did not come to an end"));
+        return Err(PreparationError::Teacher("the simulated teacher did not come to an end"));
     }
     client.hold()?;
     Ok(Recording::parse(Path::new("demonstration.csv"), &shown.output)?)
 }
 
 /// Movement of the arm as shown, with fingers that close where the hand rests.
-fn learn(scenario: Scenario, recording: &Recording, file: &Path) -> Result<PrimitiveFile, LessonError> {
+fn learn(scenario: Scenario, recording: &Recording, file: &Path) -> Result<PrimitiveFile, PreparationError> {
     let shown = Demonstration::prepare(recording, &Preparation::default())?.duration();
     let tuning = GraspTuning::of(scenario);
     let dwell = if scenario.lifts_itself() { 0.0 } else { tuning.closing };
-    let lesson = scenario.lesson();
-    // Within the lesson the hand rests from its arrival on; people need a moment longer than the path that they follow.
-    let arrival = lesson.arrival() / lesson.path().duration() * shown;
+    let movement = scenario.taught_movement();
+    // Within the demonstration the hand rests from its arrival on; people need a moment longer than the path that they
+    // follow.
+    let arrival = movement.arrival() / movement.path().duration() * shown;
     let closes = CLOSING.map(|share| (arrival + share * tuning.closing) / (shown + dwell));
     let fingers = |angle: f64| [0.0, angle, angle, angle];
     let usual = LearnOptions::named(scenario.name());
@@ -246,7 +248,7 @@ fn learn(scenario: Scenario, recording: &Recording, file: &Path) -> Result<Primi
         ..usual
     };
     let mut primitive = learn::learn(recording, file, &options)?.primitive;
-    let [position, _, _, hand] = primitive.gains.map(|gain| gain.stiffness);
+    let (position, hand) = (primitive.gains.position.stiffness, primitive.gains.hand.stiffness);
     if let Some(feedback) = &mut primitive.feedback {
         for row in &mut feedback.k1 {
             if let (Some([sideways, upwards]), [x, y, z, ..]) = (tuning.compliance, row.as_mut_slice()) {
@@ -271,7 +273,7 @@ fn rehearsal(
     seed: u64,
     options_of_rehearsal: link::RunOptions,
     interrupt: &Interrupt,
-) -> Result<Recording, LessonError> {
+) -> Result<Recording, PreparationError> {
     let options = plant::options(arm, seed, movement.start.posture, scene);
     let mut client = trial::connect(&options, interrupt)?;
     client.upload(&movement.to_image()?, |_, _, _| {})?;
@@ -280,7 +282,7 @@ fn rehearsal(
     Ok(Recording::parse(Path::new(&format!("rehearsal {seed}")), &bytes)?)
 }
 
-fn parse(cycles: &[link::Telemetry], name: &str) -> Result<Recording, LessonError> {
+fn parse(cycles: &[link::Telemetry], name: &str) -> Result<Recording, PreparationError> {
     let bytes = recording_text(cycles, &notes()).map_err(ProcedureError::Recording)?;
     Ok(Recording::parse(Path::new(name), &bytes)?)
 }
@@ -292,16 +294,16 @@ fn parse(cycles: &[link::Telemetry], name: &str) -> Result<Recording, LessonErro
 /// them: each mode where it has a chance. Arms and places are none of an experiment's trials.
 ///
 /// # Errors
-/// [`LessonError`]; too few successes leave the primitive without experience, which is no error.
+/// [`PreparationError`]; too few successes leave the primitive without experience, which is no error.
 pub fn experience(
     config: &Config,
     interrupt: &Interrupt,
     primitive: &mut PrimitiveFile,
-) -> Result<(usize, usize), LessonError> {
+) -> Result<(usize, usize), PreparationError> {
     let config = Config { primitive: primitive.clone(), variation: Variation::default(), ..config.clone() };
     let prepared = Prepared::of(&config)?;
     let keys = practice(&config.grid, &config.modes);
-    let runs = in_parallel(config.jobs, &keys, |&key| -> Result<Option<Recording>, LessonError> {
+    let runs = in_parallel(config.jobs, &keys, |&key| -> Result<Option<Recording>, PreparationError> {
         let trial = trial::run(&config, &prepared, key, interrupt)?;
         let saturated = trial.telemetry.iter().any(|cycle| cycle.flags & control::flags::SENSOR_SATURATED != 0);
         if !trial.report.outcome.is_success() || saturated {
