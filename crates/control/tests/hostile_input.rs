@@ -340,6 +340,24 @@ fn e4_a_primitive_that_this_arm_cannot_run_is_refused_at_load() {
 }
 
 #[test]
+fn h1_an_expectation_beyond_what_may_be_pressed_or_measured_is_refused_at_load() {
+    let model = ArmModel::<f32>::new(Payload::SensorAndHand);
+    let with = |sensor: usize, value: f32| {
+        let mut primitive = load::primitive::<f32, KERNELS>(&model, &tables()).expect("good");
+        let mut late = [0.0; 9];
+        late[sensor] = value;
+        primitive.set_expected(Some(&ExpectedWrench::new(&[[0.0; 9], late], 4.0).expect("numbers")));
+        load::check(&model, &primitive).map(drop)
+    };
+    for (sensor, largest) in [(0, 50.0), (1, 50.0), (2, 50.0), (3, 4.9), (5, 4.9), (6, 1.0)] {
+        for sign in [1.0, -1.0] {
+            assert_eq!(with(sensor, sign * 0.3 * largest), Ok(()), "sensor {sensor}");
+            assert_eq!(with(sensor, sign * 4.0 * largest), Err(LoadError::Expected(sensor as u8)));
+        }
+    }
+}
+
+#[test]
 fn a_primitive_is_not_exchanged_while_it_runs() {
     let model = ArmModel::new(Payload::SensorAndHand);
     let primitive = load::primitive(&model, &tables()).expect("good");

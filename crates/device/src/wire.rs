@@ -313,6 +313,7 @@ impl From<LoadError> for PrimitiveTrouble {
             LoadError::Posture(which, joint) => [5, end(which) << 8 | u32::from(joint)],
             LoadError::OutOfReach(which) => [6, end(which)],
             LoadError::Inconsistent(which) => [7, end(which)],
+            LoadError::Expected(sensor) => [14, sensor.into()],
         })
     }
 }
@@ -345,6 +346,7 @@ impl PrimitiveTrouble {
                 let (part, (group, index)) = (item(&PARTS, part.into())?, item(&RowGroup::ALL, row.into())?.row(index));
                 LoadError::Primitive(PrimitiveError::TooLarge { part, group, index })
             }
+            14 => LoadError::Expected(u8::try_from(detail).ok()?),
             _ => return None,
         })
     }

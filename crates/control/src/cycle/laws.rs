@@ -177,6 +177,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             let bounded = bounded(&command, tracking.force_limit) * run.kept();
             // The expected wrench is fed forward, because the gain of the integral is finite.
             let wanted = bounded - deviation.expected.in_world(to_world);
+            let wanted = self.force.confirmed(&wanted, &measured.wrench.in_world(to_world));
             torque.0 += ForceController::torque(&measured.frames.jacobian(), &wanted).0;
             set |= flags::FORCE_CONTROL;
         }

@@ -84,13 +84,13 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Law::Posture(posture) if !options.compliant => JointPositions(posture.q.0 + posture.integral.shift()),
             _ => measured.state.q,
         };
+        self.force.restart(self.gains.tracking(options.compliant).force_window);
         let handover = if options.compliant {
             let load = if options.force_control { self.load_expected_first(measured) } else { Vector7::zeros() };
             Ramp::new(self.torque_beyond_model(measured) - load, HANDOVER)
         } else {
             Ramp::none()
         };
-        self.force.restart(self.gains.tracking(options.compliant).force_window);
         self.law = Law::Run(Running {
             operational: OperationalController::new(start),
             controller: JointController::new(),
@@ -118,11 +118,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     }
 
     /// Torque that the force controller will feed forward for what the primitive expects at its start (N m).
-    fn load_expected_first(&self, measured: &Measured<'_, R>) -> Vector7<R> {
+    fn load_expected_first(&mut self, measured: &Measured<'_, R>) -> Vector7<R> {
         match self.loaded.get().and_then(Primitive::expected) {
             Some(expected) => {
                 let expected = Deviation::new(&expected.at(R::of(0.0)), &Wrench::zero(), None).expected;
-                let load = -expected.in_world(measured.frames.tool_to_world());
+                let to_world = measured.frames.tool_to_world();
+                let load = self.force.confirmed(&-expected.in_world(to_world), &measured.wrench.in_world(to_world));
                 ForceController::torque(&measured.frames.jacobian(), &load).0
             }
             None => Vector7::zeros(),

@@ -10,29 +10,41 @@ use pinned_init::{Init, init};
 
 use crate::law::window::Window;
 use crate::model::kinematics::Jacobian;
-use crate::real::Real;
-use crate::time::periods;
+use crate::real::{Real, at_least, at_most, sqrt};
+use crate::time::{PERIOD, periods};
 use crate::units::{JointTorques, Vector6};
 
 /// Longest window: 0.5 s, in control periods.
 pub const WINDOW_CAPACITY: usize = periods(0.5) as usize;
 
+/// Force (N) and torque (N m) that may be applied to nothing. More is applied only where the environment is felt to
+/// press back: a run that expects to press on what is not there would else throw the arm (30 N: 1.7 m/s).
+const UNCONFIRMED: [f64; 2] = [5.0, 0.5];
+
+/// Fastest rise of what counts as pressing back (N/s, N m/s). The sensor also feels the inertia of the hand, which
+/// "presses back" while the hand is thrown: with 30 N on nothing a compliant arm reaches 1.5 m/s without this.
+const CONFIRMATION: [f64; 2] = [20.0, 2.0];
+
 /// Eq (12).
 #[derive(Clone, Debug)]
 pub struct ForceController<R: Real> {
     window: Window<R, 6, WINDOW_CAPACITY>,
+    /// Force and torque (N, N m) with which the environment presses back; `None` before the first cycle, when the arm
+    /// rests and what is measured is a load.
+    pressing: Option<[R; 2]>,
 }
 
 impl<R: Real> ForceController<R> {
     /// Makes, in its place, a controller with an empty window of `length` control periods (kept within 1 and
     /// [`WINDOW_CAPACITY`]).
     pub fn init(length: usize) -> impl Init<Self> {
-        init!(ForceController { window <- Window::init(length) })
+        init!(ForceController { window <- Window::init(length), pressing: None })
     }
 
     /// Empties the window and gives it `length` control periods.
     pub fn restart(&mut self, length: usize) {
         self.window.restart(length);
+        self.pressing = None;
     }
 
     /// The command `-(P e + K_i dt sum e)` in the axes of the error (N, N m), world axes for
@@ -44,6 +56,28 @@ impl<R: Real> ForceController<R> {
             self.window.push(error);
         }
         -(error * proportional + self.window.sum() * (integral * period))
+    }
+
+    /// The wrench that is to be applied (world axes), its force and its torque cut to what the environment presses back
+    /// along them, as the sensor measures it, and `UNCONFIRMED` beyond that; their directions are kept.
+    pub fn confirmed(&mut self, wanted: &Vector6<R>, measured: &Vector6<R>) -> Vector6<R> {
+        let (mut confirmed, zero) = (*wanted, R::of(0.0));
+        let before = self.pressing.map_or([None; 2], |before| before.map(Some));
+        let rows =
+            self.pressing.insert([zero; 2]).iter_mut().zip(before).zip(UNCONFIRMED).zip(CONFIRMATION).zip([0, 3]);
+        for ((((pressing, before), unconfirmed), rise), first) in rows {
+            let mut part = confirmed.fixed_rows_mut::<3>(first);
+            let (length, unconfirmed) = (sqrt(part.dot(&part)), R::of(unconfirmed));
+            if length > unconfirmed {
+                let reaction = at_least(-part.dot(&measured.fixed_rows::<3>(first)) / length, zero);
+                *pressing = before.map_or(reaction, |before| at_most(reaction, before + R::of(rise * PERIOD)));
+                let most = *pressing + unconfirmed;
+                if length > most {
+                    part *= most / length;
+                }
+            }
+        }
+        confirmed
     }
 
     /// Joint torque of a command in world axes: `J^T u`.

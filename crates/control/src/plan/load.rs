@@ -10,6 +10,7 @@ use pinned_init::{Init, init};
 
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
+use crate::model::wam7;
 use crate::plan::primitive::{Configuration, MovementTables, Primitive, posture_and_hand, write_error};
 use crate::real::Real;
 use crate::units::{JointPositions, Orientation};
@@ -24,6 +25,9 @@ pub const REACH: f64 = 1.05;
 pub const POSE_MISMATCH: f64 = 0.05;
 /// Largest angle between them (rad): 10 degrees.
 pub const TURN_MISMATCH: f64 = 0.175;
+
+/// Largest force that a primitive may expect (N): three quarters of what stops a movement. A person may be in between.
+pub const EXPECTED_FORCE: f64 = 50.0;
 
 /// Start or goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,6 +60,8 @@ pub enum LoadError {
     OutOfReach(End),
     /// The start or goal pose is not that of the start or goal posture, within 5 cm and 10 degrees.
     Inconsistent(End),
+    /// A sensor (0 = force x) is expected to measure more than [`EXPECTED_FORCE`], or more than it can.
+    Expected(u8),
 }
 
 impl fmt::Display for LoadError {
@@ -72,6 +78,8 @@ impl fmt::Display for LoadError {
             LoadError::Inconsistent(end) => {
                 write!(formatter, "the {end} pose does not belong to the {end} posture on this arm")
             }
+            LoadError::Expected(0..3) => write!(formatter, "a force of more than {EXPECTED_FORCE} N is expected"),
+            LoadError::Expected(_) => formatter.write_str("a torque is expected that the sensor cannot measure"),
         }
     }
 }
@@ -172,7 +180,27 @@ pub fn check<'a, R: Real, const N: usize>(
     }
     check_end(model, End::Start, primitive.movement().start())?;
     check_end(model, End::Goal, primitive.movement().goal())?;
+    check_expected(primitive)?;
     Ok(CheckedPrimitive { primitive, tool: Tool::of(model) })
+}
+
+/// A run presses with what it expects, so that is bounded like a command.
+fn check_expected<R: Real, const N: usize>(primitive: &Primitive<R, N>) -> Result<(), LoadError> {
+    let [n1, n2, n3] = wam7::SENSOR_TORQUE_RANGE;
+    let finger = wam7::FINGER_TORQUE_MAX;
+    let limits = [EXPECTED_FORCE, EXPECTED_FORCE, EXPECTED_FORCE, n1, n2, n3, finger, finger, finger].map(R::of);
+    for sample in primitive.expected().into_iter().flat_map(|expected| expected.samples()) {
+        for (sensor, (value, limit)) in (0u8..).zip(sample.iter().zip(&limits)) {
+            if !(*value >= -*limit && value <= limit) {
+                return Err(LoadError::Expected(sensor));
+            }
+        }
+        let [x, y, z, ..] = *sample;
+        if !(x * x + y * y + z * z <= R::of(EXPECTED_FORCE * EXPECTED_FORCE)) {
+            return Err(LoadError::Expected(0));
+        }
+    }
+    Ok(())
 }
 
 fn check_end<R: Real>(model: &ArmModel<R>, end: End, configuration: &Configuration<R>) -> Result<(), LoadError> {

@@ -524,3 +524,36 @@ fn a_load_that_the_primitive_expects_does_not_sag() {
     println!("{known} m known, {unknown} m unknown");
     assert!(known.abs() < 5e-3, "{known}");
 }
+
+/// Fastest speed of the hand (m/s), fault and state of a run that expects this force (N) where nothing is.
+fn pressing_on_nothing(expected: [f64; 3], feedback: bool, compliant: bool) -> (f64, Fault, State) {
+    let mut rig = holding(START);
+    let [x, y, z] = expected;
+    let design = Design { expected: Some([x, y, z, 0.0, 0.0, 0.0]), ..staying(START) };
+    rig.load(&primitive(&design)).expect("loads");
+    rig.command(Command::Run(RunOptions { feedback, force_control: true, compliant, ..FEELING }));
+    let mut fastest: f64 = 0.0;
+    for _ in 0..4 * periods(1.0) {
+        rig.tick(None);
+        fastest = fastest.max(rig.plant.frames().jacobian().twist(&rig.plant.dq).fixed_rows::<3>(0).norm());
+    }
+    (fastest, rig.cycle.fault(), rig.cycle.state())
+}
+
+#[test]
+fn h1_a_run_that_is_to_press_on_what_is_not_there_stays_below_half_a_metre_per_second() {
+    let mut worst: f64 = 0.0;
+    for force in [10.0, 30.0, 50.0] {
+        for direction in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]] {
+            for (feedback, compliant) in [(false, false), (false, true), (true, false), (true, true)] {
+                let expected = direction.map(|x: f64| x * force);
+                let (fastest, fault, state) = pressing_on_nothing(expected, feedback, compliant);
+                println!(
+                    "{expected:?} feedback {feedback} compliant {compliant}: {fastest:.3} m/s, {fault:?}, {state:?}"
+                );
+                worst = worst.max(fastest);
+            }
+        }
+    }
+    assert!(worst < 0.5, "{worst} m/s");
+}
