@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use crate::board::Board;
 use crate::setup::{self, ARM, HAND, Machine};
-use crate::{budget, build, docs, emulated, hand, package, shell, test};
+use crate::{budget, build, docs, emulated, hand, house, package, shell, test};
 
 /// Runs every check; the first failure ends it.
 pub(crate) fn run() -> Result<()> {
@@ -12,6 +12,9 @@ pub(crate) fn run() -> Result<()> {
     shell::step("format");
     shell::run(shell::cargo().args(["fmt", "--all", "--check"]))?;
     docs::run()?;
+    // Sizes and old words follow when they are at zero.
+    house::run(Some("circles"))?;
+    house::run(Some("arrows"))?;
     let machine = setup::all()?;
     lint_host()?;
     lint_firmware(&machine)?;
