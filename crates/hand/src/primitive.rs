@@ -290,7 +290,7 @@ impl FingerPrimitive {
         self.has_expectation().then(|| self.expected.at(rollout.progress()))
     }
 
-    /// How far the expectation can be believed in this run, 1 to 0; see [`dmp::ExpectedSensors::trust`].
+    /// Trust in the expectation at the speed of this run, 1 to 0; see [`dmp::ExpectedSensors::trust`].
     pub fn trust(&self, rollout: &Rollout) -> Number {
         self.expected.trust(self.expected.recorded_duration() * self.movement.rate() * rollout.speed())
     }
