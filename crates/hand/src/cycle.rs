@@ -41,6 +41,7 @@ const DURATION_RANGE: [Number; 2] = crate::number::constants([0.0, LONGEST_MOVE]
 
 /// Present task of the hand.
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one, and no heap to put a run on")]
 enum Aim {
     /// Nothing: the worms hold.
     None,

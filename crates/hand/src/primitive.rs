@@ -126,8 +126,8 @@ impl FingerTables {
             recorded_filter::check(self.filter_cut_off).map_err(Unfit::Filter)?;
             let torque = |value: &f32| f64::from(*value).abs() <= bounds::LARGEST_SENSOR_VALUE;
             let duration = f64::from(self.recorded_duration);
-            if !self.expected.iter().flatten().all(torque) || !(duration > 0.0 && duration <= bounds::LONGEST_DURATION)
-            {
+            let is_real = duration > 0.0 && duration <= bounds::LONGEST_DURATION;
+            if !(is_real && self.expected.iter().flatten().all(torque)) {
                 return Err(Unfit::Expectation);
             }
         }
