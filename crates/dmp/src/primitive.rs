@@ -29,8 +29,8 @@ pub struct PrimitiveTables<'a, T: Scalar, const D: usize, const P: usize> {
     pub activation: T,
     /// Number of kernels in use, 2..=N.
     pub kernel_count: usize,
-    /// Weights theta, row-major `[6 P + D][kernel_count]`, in the paper's convention (the force is multiplied by K), as the
-    /// number type keeps them.
+    /// Weights theta, row-major `[6 P + D][kernel_count]`, in the paper's convention (the force is multiplied by K),
+    /// as the number type keeps them.
     pub weights: &'a [T::Weight],
     /// Stiffness and damping.
     pub gains: Gains<T, D, P>,

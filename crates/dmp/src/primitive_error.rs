@@ -83,7 +83,8 @@ pub enum PrimitiveError {
     WeightCount,
     /// The control period is not a positive number.
     ControlPeriod,
-    /// A weight is NaN or infinite, or more than the number type keeps ([`Scalar::to_weight`](crate::Scalar::to_weight)).
+    /// A weight is NaN or infinite, or more than the number type keeps
+    /// ([`Scalar::to_weight`](crate::Scalar::to_weight)).
     Weight,
     /// The gains of a row are unusable.
     Gains {

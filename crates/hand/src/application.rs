@@ -19,7 +19,7 @@ const NO_ARM: Refused = (Refusal::NoArm, [0, 0]);
 /// The session of a hand alone.
 pub type Session<'a> = HostSession<HandApplication<'a>>;
 
-/// What a hand's session has beside the conversation with its host.
+/// The hand's own part of a session: its primitives, and the upload under way.
 pub struct HandApplication<'a> {
     library: &'a mut Library,
     /// The image that is being converted.

@@ -1,9 +1,9 @@
-//! What a person may ask of the hand, already in fixed point.
+//! `Command` and `RunOptions`: requests of a person, already in fixed point.
 
 use crate::DIGITS;
 use crate::number::Number;
 
-/// How a primitive shall be run.
+/// Options of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RunOptions {
     /// Speed relative to the taught one.

@@ -22,7 +22,7 @@ const WINDOW: usize = HAND_FORCE.2;
 /// Desired speed at which half of the Coulomb friction is fed forward (rad/s).
 const FRICTION_SPEED: Number = constant(0.05);
 
-/// What the digits should do at one tick, spread first.
+/// Desired angles and velocities of the digits at one tick, spread first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HandReference {
     /// Desired angles (rad).

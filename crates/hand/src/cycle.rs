@@ -4,7 +4,8 @@
 //! Idle/Hold --Move--> Approach --> Hold        torque only in Approach, Run, Coast and a Hold that follows them
 //!     |  ------Run--> Run <-> Coast (1..5 cycles of lost replies)
 //!     |                |--> Hold (arrived: what is gripped stays gripped)
-//!     |                |--> SoftStop   torque off, the worm drives hold: a person's stop, a silent host, 6 cycles of lost replies
+//!     |                |--> SoftStop   torque off, the worm drives hold: a person's stop, a silent host,
+//!     |                |               6 cycles of lost replies
 //!     |                '--> Fault      a puck under torque tells that it was reset
 //!     <---ClearFault---- SoftStop, Fault
 //! ```
@@ -31,15 +32,16 @@ use crate::{DIGITS, FINGERS, LOST_CYCLES, RANGE_NUMBERS};
 /// Cycles over which feedback fades in and out: 100 ms.
 const FADE_STEP: Number = constant(1.0 / 30.0);
 
-/// How far a digit may be from where a primitive starts (rad).
+/// Largest distance of a digit from the start of a primitive that is to be run (rad).
 const START_DISTANCE: Number = constant(0.15);
 
 /// Allowed speeds, and durations of a move (s).
 const SPEED_RANGE: [Number; 2] = crate::number::constants([0.1, 2.0]);
 const DURATION_RANGE: [Number; 2] = crate::number::constants([0.0, LONGEST_MOVE]);
 
-/// What the hand is after.
+/// Present task of the hand.
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one, and no heap to put a run on")]
 enum Aim {
     /// Nothing: the worms hold.
     None,
@@ -51,12 +53,12 @@ enum Aim {
     Keep([Number; DIGITS], Option<[Number; FINGERS]>),
 }
 
-/// What one cycle comes to.
+/// Results of one cycle.
 #[derive(Clone, Copy, Debug)]
 pub struct Output {
     /// The torque frame; `None` where the hand is not driven.
     pub frame: Option<CanFrame>,
-    /// What was measured and decided.
+    /// Measurements and decisions.
     pub record: Record,
     /// The state entered in this cycle, if it is another one.
     pub entered: Option<(State, Fault)>,
@@ -172,7 +174,7 @@ impl Cycle {
         Output { frame, record, entered, arrived, answer }
     }
 
-    /// What is measured, for the record.
+    /// Puts the measurements into the record.
     fn note(&self, hand: &HandState, record: &mut Record) {
         record.q = hand.q;
         record.q_d = hand.q;

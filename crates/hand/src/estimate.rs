@@ -65,7 +65,7 @@ pub fn gauge_torque(counts: u16) -> Number {
     -(((c3 * place + c2) * place + c1) * place + c0)
 }
 
-/// What is known about the hand at one tick, spread first.
+/// Measured state of the hand at one tick, spread first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HandState {
     /// Angles of spread and inner links (rad); the last known ones where a reply is missing.
@@ -140,7 +140,7 @@ pub struct HandEstimator {
     velocity: LowPass<DIGITS>,
     gauge: LowPass<FINGERS>,
     /// Last believed torque of each gauge, not tared (N m).
-    felt: [Number; FINGERS],
+    measured: [Number; FINGERS],
     doubtful: [bool; FINGERS],
     zero: Option<[Number; FINGERS]>,
     gauge_age: Option<u8>,
@@ -153,7 +153,7 @@ impl HandEstimator {
             encoders: None,
             velocity: LowPass::new(VELOCITY),
             gauge: LowPass::new(GAUGE),
-            felt: [ZERO; FINGERS],
+            measured: [ZERO; FINGERS],
             doubtful: [false; FINGERS],
             zero: None,
             gauge_age: None,
@@ -182,15 +182,15 @@ impl HandEstimator {
         self.state()
     }
 
-    /// What is known now; `None` without an initialised hand.
+    /// The present state; `None` without an initialised hand.
     pub fn state(&self) -> Option<HandState> {
         let encoders = self.encoders.as_ref()?;
         let zero = self.zero.unwrap_or([gauge_torque(UNLOADED); FINGERS]);
-        let felt = self.gauge.output();
+        let gauges = self.gauge.output();
         Some(HandState {
             q: encoders.q,
             dq: *self.velocity.output(),
-            gauges: core::array::from_fn(|finger| felt[finger] - zero[finger]),
+            gauges: core::array::from_fn(|finger| gauges[finger] - zero[finger]),
             age: encoders.ages(),
             gauge_age: self.gauge_age.unwrap_or(u8::MAX),
         })
@@ -215,23 +215,23 @@ impl HandEstimator {
             return;
         }
         let mut complete = true;
-        for ((felt, doubtful), counts) in self.felt.iter_mut().zip(&mut self.doubtful).zip(counts) {
+        for ((measured, doubtful), counts) in self.measured.iter_mut().zip(&mut self.doubtful).zip(counts) {
             let Some(counts) = counts else {
                 complete = false;
                 continue;
             };
             let torque = gauge_torque(*counts);
-            let step = torque - *felt;
+            let step = torque - *measured;
             let jumped = !first && within(step, GAUGE_STEP) != step;
             *doubtful = jumped && !*doubtful;
             if !*doubtful {
-                *felt = torque;
+                *measured = torque;
             }
         }
         if first {
-            self.gauge.settle(&self.felt);
+            self.gauge.settle(&self.measured);
         }
-        self.gauge.step(&self.felt);
+        self.gauge.step(&self.measured);
         self.gauge_age = Some(if complete { 0 } else { self.gauge_age.unwrap_or(0).saturating_add(1) });
     }
 }

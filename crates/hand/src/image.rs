@@ -48,7 +48,7 @@ struct Header {
     ends: [usize; 4],
 }
 
-/// What a whole image was.
+/// Name, size and contents of a whole image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
     /// Its name.
@@ -139,8 +139,8 @@ impl ImageReader {
         }
     }
 
-    /// Takes the next bytes and puts what they hold into `tables`, which are empty at first. A flaw is kept until the end: the host learns of
-    /// it when it asks for the primitive to be stored.
+    /// Takes the next bytes and puts what they hold into `tables`, which are empty at first. A flaw is
+    /// kept until the end: the host learns of it when it asks for the primitive to be stored.
     pub fn take(&mut self, bytes: &[u8], tables: &mut FingerTables) {
         for byte in bytes {
             let place = self.received;

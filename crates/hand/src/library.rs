@@ -21,7 +21,7 @@ struct Place {
 #[derive(Debug)]
 pub struct Library {
     places: [Place; PLACES],
-    /// What has come of an upload.
+    /// Tables of the upload under way.
     pub(crate) staging: FingerTables,
 }
 
@@ -32,7 +32,7 @@ impl Library {
         staging: FingerTables::EMPTY,
     };
 
-    /// What is at a place.
+    /// Summary of the primitive at a place; `None` for a free one.
     pub(crate) fn get(&self, place: usize) -> Option<&Summary> {
         self.places.get(place)?.summary.as_ref()
     }

@@ -7,9 +7,9 @@ use crate::controller::HandReference;
 use crate::number::{Number, ONE, ZERO, at_least, at_most, constant, constants, magnitude, share, whole};
 
 /// Longest move (s).
-const LONGEST: Number = constant(control::plan::hand::LONGEST_MOVE);
+const LONGEST_MOVE: Number = constant(control::plan::hand::LONGEST_MOVE);
 /// Shortest move (s).
-const SHORTEST: Number = constant(0.3);
+const SHORTEST_MOVE: Number = constant(0.3);
 
 /// Time per angle that keeps the peak speed of a minimum jerk, 1.875 times its mean, at 3 rad/s (spread) and 1.5
 /// (fingers).
@@ -32,11 +32,11 @@ impl HandMotion {
     /// A move from `start` to `goal` (rad) in `duration` (s) or, where the speed limits ask for it, longer.
     pub fn new(start: &[Number; DIGITS], goal: &[Number; DIGITS], duration: Number) -> Self {
         let way: [Number; DIGITS] = core::array::from_fn(|digit| goal[digit] - start[digit]);
-        let mut needed = at_least(duration, SHORTEST);
+        let mut needed = at_least(duration, SHORTEST_MOVE);
         for (way, slowness) in way.iter().zip(SLOWNESS) {
             needed = at_least(needed, magnitude(*way) * slowness);
         }
-        let periods = (at_most(needed, LONGEST) * constant(control::RATE)).to_index();
+        let periods = (at_most(needed, LONGEST_MOVE) * constant(control::RATE)).to_index();
         let length = i32::try_from(periods).unwrap_or(0) + 1;
         let step = share(ONE, whole(length));
         HandMotion { start: *start, way, length, passed: 0, step, rate: step * constant(control::RATE) }

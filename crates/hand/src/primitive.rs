@@ -126,8 +126,8 @@ impl FingerTables {
             recorded_filter::check(self.filter_cut_off).map_err(Unfit::Filter)?;
             let torque = |value: &f32| f64::from(*value).abs() <= bounds::LARGEST_SENSOR_VALUE;
             let duration = f64::from(self.recorded_duration);
-            if !self.expected.iter().flatten().all(torque) || !(duration > 0.0 && duration <= bounds::LONGEST_DURATION)
-            {
+            let is_real = duration > 0.0 && duration <= bounds::LONGEST_DURATION;
+            if !(is_real && self.expected.iter().flatten().all(torque)) {
                 return Err(Unfit::Expectation);
             }
         }
@@ -290,7 +290,7 @@ impl FingerPrimitive {
         self.has_expectation().then(|| self.expected.at(rollout.progress()))
     }
 
-    /// How far the expectation can be believed in this run, 1 to 0; see [`dmp::ExpectedSensors::trust`].
+    /// Trust in the expectation at the speed of this run, 1 to 0; see [`dmp::ExpectedSensors::trust`].
     pub fn trust(&self, rollout: &Rollout) -> Number {
         self.expected.trust(self.expected.recorded_duration() * self.movement.rate() * rollout.speed())
     }

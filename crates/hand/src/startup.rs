@@ -10,7 +10,7 @@ use puck::{Group, Node, Property, PropertyId, PropertyTable, Role, Status, get, 
 
 use crate::DIGITS;
 
-/// How long a puck may take to answer in an enumeration (us): one that boots needs up to 50 ms.
+/// Longest time to an answer in an enumeration (us): a puck that boots needs up to 50 ms.
 const LISTEN_US: u64 = 50_000;
 /// Between two wakes (us): each may glitch the transceivers.
 const WAKE_GAP_US: u64 = 10_000;
@@ -18,10 +18,10 @@ const WAKE_GAP_US: u64 = 10_000;
 const WAKE_SILENCE_US: u64 = 1_000_000;
 /// Between two attempts (us).
 const REST_US: u64 = 1_000_000;
-/// How often a partial hand is looked for before it counts as one.
+/// Enumerations after which a partial hand counts as one.
 const ENUMERATIONS: u8 = 6;
 
-/// What is read of each puck, in this order.
+/// Properties that are read of each puck, in this order.
 const PROPERTIES: [Property; 7] =
     [Property::Cts, Property::Ipnm, Property::Pidx, Property::Grpa, Property::Grpb, Property::Grpc, Property::Hold];
 /// Torque scales that are possible.
@@ -29,7 +29,7 @@ const UNITS_RANGE: core::ops::RangeInclusive<i32> = 500..=50_000;
 /// Groups that carry the torques of an arm: a puck that listened to them would take another one's.
 const ARM_GROUPS: core::ops::RangeInclusive<i32> = 1..=4;
 
-/// How far it has come.
+/// Present step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
     /// Take off what torque may still be applied: the frames of [`hand_stop_frames`] from this one on.
@@ -91,7 +91,7 @@ pub struct FoundHand {
     pub units_per_newton_metre: [i32; DIGITS],
 }
 
-/// What one call came to.
+/// Result of one call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
     /// Under way.

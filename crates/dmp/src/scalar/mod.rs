@@ -4,6 +4,8 @@
 //! software routines with and without `std`, so that a host and a board with the same type agree bit for bit.
 
 #[cfg(feature = "fixed")]
+mod elementary;
+#[cfg(feature = "fixed")]
 mod exponential;
 #[cfg(feature = "fixed")]
 mod fixed;

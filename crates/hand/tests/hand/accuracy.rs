@@ -55,16 +55,16 @@ fn trajectories_stay_within_the_bound_of_those_in_f64() {
 
 #[test]
 fn feedback_bends_the_plan_as_in_f64() {
-    let felt = |t: f64| {
+    let measured = |t: f64| {
         let push = -0.3 * (t - 1.5).clamp(0.0, 1.0);
         [push, 0.8 * push, 0.5 * push]
     };
     for (speed, duration) in [(1.0, 4.0), (0.7, 4.0), (1.4, 4.0)] {
         let movement = Movement::closing(50, duration, 0.4).feeling();
-        let [x, _] = error(&movement, speed, felt);
+        let [x, _] = error(&movement, speed, measured);
         println!("feedback at speed {speed}: {x:.1e} rad");
         assert!(x <= BOUND, "{x:e}");
-        let [free, _] = error(&Movement { k1: Vec::new(), k2: Vec::new(), ..movement }, speed, felt);
+        let [free, _] = error(&Movement { k1: Vec::new(), k2: Vec::new(), ..movement }, speed, measured);
         assert!(free <= BOUND);
     }
 }

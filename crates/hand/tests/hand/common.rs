@@ -1,4 +1,4 @@
-//! What the tests share: primitives as images, in fixed point and in f64.
+//! Helpers of the tests: primitives as images, in fixed point and in f64.
 
 use control::plan::primitive::{MovementTables, Primitive, ROWS, configuration as rows, gains, limits, velocity};
 

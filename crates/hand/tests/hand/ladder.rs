@@ -119,11 +119,11 @@ fn a_run_closes_on_the_object_and_keeps_the_expected_force() {
     // What the movement expects at its end.
     let expected = [-0.25, -0.275, -0.225];
     let (tracked, adapted) = (end(RunOptions::default()), end(adapt()));
-    let error = |felt: [f32; 3]| {
-        felt.iter().zip(expected).map(|(felt, expected): (&f32, f32)| (felt - expected).abs()).fold(0.0, f32::max)
+    let error = |gauges: [f32; 3]| {
+        gauges.iter().zip(expected).map(|(gauge, expected): (&f32, f32)| (gauge - expected).abs()).fold(0.0, f32::max)
     };
     println!("expected {expected:?}, position alone {tracked:?}, with feedback and force control {adapted:?}");
-    assert!(tracked.iter().chain(&adapted).all(|felt| *felt < -0.02), "the fingers press on the object");
+    assert!(tracked.iter().chain(&adapted).all(|gauge| *gauge < -0.02), "the fingers press on the object");
     assert!(error(adapted) < 0.5 * error(tracked), "{} and {}", error(adapted), error(tracked));
 }
 

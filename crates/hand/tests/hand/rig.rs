@@ -20,7 +20,7 @@ pub(crate) const SLOT_TICKS: Ticks = sim::period_ticks(SLOT_HZ);
 /// Ticks of one control cycle.
 pub(crate) const CYCLE_TICKS: Ticks = CYCLE_SLOTS as Ticks * SLOT_TICKS;
 
-/// What is between the fingers unless told otherwise.
+/// Object between the fingers unless told otherwise.
 pub(crate) const OBJECT: FingerObstacle = FingerObstacle { inner: f64::INFINITY, outer: 0.45, stiffness: 2.0 };
 
 /// Queues between the halves, and the bus.
@@ -111,7 +111,7 @@ pub(crate) struct Rig {
     sequence: u16,
     /// The host pings by itself.
     pub(crate) alive: bool,
-    /// What the device sent, unasked or as an answer.
+    /// Messages of the device, unasked or as an answer.
     pub(crate) heard: Vec<Reply>,
     /// Every record.
     pub(crate) records: Vec<Record>,
