@@ -10,7 +10,7 @@ use sim::fault::Injection;
 
 use crate::figure::Figure;
 
-/// An entry: the file `tests/faults/ID.toml`.
+/// An entry: the file `tests/faults/NAME.toml`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entry {
@@ -59,10 +59,10 @@ pub struct Scenario {
     /// Orders of the host.
     #[serde(default)]
     pub order: Vec<Order>,
-    /// What must come of it.
+    /// Bars for the outcome.
     #[serde(default)]
     pub expect: Expect,
-    /// What a person does afterwards, and what must hold then.
+    /// The way back, and whether zeroing must be demanded on it.
     #[serde(default)]
     pub recover: Recover,
 }
@@ -124,7 +124,7 @@ pub enum Answer {
     Refused,
 }
 
-/// What must come of a scenario.
+/// Bars for the outcome of a scenario.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expect {

@@ -15,7 +15,7 @@ pub const AT_REST: f64 = 0.05;
 /// Telemetry tells of an instant at most so long past, s.
 const TELEMETRY_AGE: f64 = 0.012;
 
-/// Torque may still be sent for so long after the safety module has taken the arm out of ACTIVE.
+/// Torque may still be sent this long after the safety module has taken the arm out of ACTIVE.
 const NOTICE: Ticks = 30 * TICKS_PER_MILLISECOND;
 
 /// Speed of the hand is taken over so long a time, s.

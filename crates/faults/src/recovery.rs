@@ -15,7 +15,7 @@ use crate::measure::AT_REST;
 use crate::movement::movement;
 
 /// Longest time for the arm to be lowered and come to rest, and for a start-up.
-const PATIENCE: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Time that a person takes between pendant and keyboard.
 const NOTICE: Duration = Duration::from_millis(500);
@@ -64,7 +64,7 @@ pub fn recover(arm: &mut Arm, way: Recover) -> Result<(), Failure> {
 
 /// Waits until the arm rests.
 fn rest(arm: &mut Arm) -> Result<(), Failure> {
-    let deadline = arm.now() + PATIENCE;
+    let deadline = arm.now() + TIMEOUT;
     while arm.now() < deadline {
         if plant(arm).world().joint_velocities().iter().all(|speed| speed.abs() < AT_REST) {
             return Ok(());
@@ -83,10 +83,12 @@ fn wait(arm: &mut Arm) -> Result<(), Failure> {
     Ok(())
 }
 
-/// At the pendant, until the device is ready and has noticed it; true if it demanded zeroing, which it then gets at the true posture.
+/// At the pendant, until the device is ready and has noticed it; true if it demanded zeroing, which it then gets at the
+/// true posture.
 fn start_up(arm: &mut Arm, way: Recover) -> Result<bool, Failure> {
-    let deadline = arm.now() + PATIENCE;
+    let deadline = arm.now() + TIMEOUT;
     let mut has_zeroed = false;
+    let mut refused = String::new();
     if plant(arm).safety_mode() == SafetyMode::EStop {
         plant(arm).press(PendantAction::ReleaseEStop);
         plant(arm).press(PendantAction::ShiftIdle);
@@ -98,12 +100,14 @@ fn start_up(arm: &mut Arm, way: Recover) -> Result<bool, Failure> {
                 if way == Recover::Zero && !has_zeroed && arm.hold().is_ok() {
                     return Err("hold was accepted before zeroing".into());
                 }
-                let state = State::from_code(status.state).unwrap_or(State::Idle);
-                if state.has_torque() && state != State::Lower {
-                    arm.release().map_err(|error| format!("release: {error}"))?;
+                if plant(arm).safety_mode() == SafetyMode::Active {
+                    plant(arm).press(PendantAction::ShiftIdle);
                 }
                 let truth = plant(arm).world().joint_positions();
-                has_zeroed = arm.zero(truth.map(|angle| angle as f32)).is_ok() || has_zeroed;
+                match arm.zero(truth.map(|angle| angle as f32)) {
+                    Ok(()) => has_zeroed = true,
+                    Err(error) => refused = format!(", zeroing is refused: {error}"),
+                }
             }
             Some(Stage::WaitingForIdle) => plant(arm).press(PendantAction::ShiftIdle),
             Some(Stage::Blocked) => return Err(format!("the start-up is blocked: {:?}", status.blocked).into()),
@@ -112,8 +116,11 @@ fn start_up(arm: &mut Arm, way: Recover) -> Result<bool, Failure> {
                 plant(arm).press(PendantAction::ShiftActivate);
             }
             Some(Stage::Ready) if plant(arm).safety_mode() == SafetyMode::Active => {
+                // A device that still wants the brakes may take the arm out of ACTIVE once more.
                 wait(arm)?;
-                return Ok(has_zeroed);
+                if plant(arm).safety_mode() == SafetyMode::Active {
+                    return Ok(has_zeroed);
+                }
             }
             Some(Stage::Ready) => {
                 plant(arm).press(PendantAction::ShiftIdle);
@@ -122,7 +129,7 @@ fn start_up(arm: &mut Arm, way: Recover) -> Result<bool, Failure> {
             _ => {}
         }
         if arm.now() > deadline {
-            return Err(format!("the start-up hangs in {:?}", Stage::from_code(status.startup_stage)).into());
+            return Err(format!("the start-up hangs in {:?}{refused}", Stage::from_code(status.startup_stage)).into());
         }
         arm.next(Duration::from_millis(100))?;
     }

@@ -1,7 +1,7 @@
 //! Faults that are ordered beforehand: frames lost, late or changed, pucks that restart, the pendant, pushes.
 //!
-//! [`FaultKind`] is the one table of them, as scripts spell it (`docs/faults.md`). An [`Injection`] says when; its times
-//! count from the moment at which the plant is given it ([`Plant::inject`](crate::Plant::inject)).
+//! [`FaultKind`] is the one table of them, as scripts spell it (`docs/faults.md`). An [`Injection`] says when; its
+//! times count from the moment at which the plant is given it ([`Plant::inject`](crate::Plant::inject)).
 
 mod engine;
 
