@@ -271,7 +271,7 @@ fn g6_a_fault_that_comes_during_a_stop_that_a_person_asked_for_is_kept() {
 #[test]
 fn codes_are_stable_and_unique() {
     assert_eq!(State::ALL.map(State::code), [0, 1, 2, 3, 4, 5, 6, 7, 8]);
-    assert_eq!(Fault::ALL.map(Fault::code), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13]);
+    assert_eq!(Fault::ALL.map(Fault::code), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
     assert_eq!(Refusal::ALL.map(Refusal::code), [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]);
     for state in State::ALL {
         assert_eq!(State::from_code(state.code()), Some(state));
@@ -283,5 +283,5 @@ fn codes_are_stable_and_unique() {
     for refusal in Refusal::ALL {
         assert_eq!(Refusal::from_code(refusal.code()), Some(refusal));
     }
-    assert_eq!((State::from_code(9), Fault::from_code(14), Refusal::from_code(0)), (None, None, None));
+    assert_eq!((State::from_code(9), Fault::from_code(16), Refusal::from_code(0)), (None, None, None));
 }
