@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use control::State;
+use control::{RATE_HZ, State};
 use lab::arm;
 use lab::demonstration::Recording;
 use lab::primitive_file::PrimitiveFile;
@@ -13,11 +13,11 @@ use sim::BusTrace;
 
 use crate::{Arm, expect, simulation};
 
-/// Cycles recorded behind the arrival at the goal.
-const POST_ROLL: usize = 300;
+/// Cycles recorded behind the arrival at the goal: 1 s.
+const POST_ROLL: usize = RATE_HZ as usize;
 
-/// Cycles after which a movement that has not arrived is a failure.
-const TIMEOUT: usize = 30 * 300;
+/// Cycles after which a movement that has not arrived is a failure: 30 s.
+const TIMEOUT: usize = 30 * RATE_HZ as usize;
 
 /// Result of one run.
 pub struct Execution {

@@ -17,6 +17,7 @@ pub(crate) fn run() -> Result<()> {
     lint_firmware(&machine)?;
     libraries_without_std(&machine)?;
     plain_root()?;
+    crate::faults(&[])?;
     package::run()?;
     emulated::lint()?;
     emulated::run(None)?;

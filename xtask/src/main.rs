@@ -56,6 +56,7 @@ cargo xtask <verb>
   docs     dead links, paths, test names and fault identifiers in any file
   package  packages for strangers: packed, unpacked outside the repository, tested there
   mutants  wrong changes of the code that named tests must catch; cargo xtask mutants WORDS: those whose name has WORDS
+  faults [--all] [--json] [ID...]   the fault catalogue: every script of tests/faults against the simulated arm
   house    module circles, sizes, old words, arrows between crates; cargo xtask house RULE: one of the rules
 
 Every verb does the set-up it needs. Environment:
@@ -73,6 +74,12 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Runs the fault catalogue, or the entries named.
+fn faults(words: &[&str]) -> Result<()> {
+    shell::step("fault catalogue: what the simulated arm does, and the way back");
+    shell::run(shell::cargo().args(["run", "--quiet", "--package", "faults", "--"]).args(words))
 }
 
 fn dispatch(words: &[&str]) -> Result<()> {
@@ -113,6 +120,7 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["qemu", rest @ ..] => qemu::run(rest)?,
         ["doc"] => build::documentation()?,
         ["docs"] => docs::run()?,
+        ["faults", rest @ ..] => faults(rest)?,
         ["package"] => package::run()?,
         ["mutants"] => mutants::run("")?,
         ["mutants", part] => mutants::run(part)?,

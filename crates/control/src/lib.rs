@@ -22,7 +22,7 @@ pub use cycle::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
 pub use cycle::{Cycle, MAX_KERNELS};
 pub use guard::{Fault, State};
 pub use model::{Calibration, CalibrationError, MODEL_HASH, Payload};
-pub use plan::load::{Fit, LoadError, LoadRefusal};
+pub use plan::load::{CheckedPrimitive, LoadError, LoadRefusal};
 pub use real::Real;
 pub use sense::{BusSample, HandSample};
 pub use time::{PERIOD, RATE, RATE_HZ};

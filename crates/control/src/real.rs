@@ -19,12 +19,6 @@ pub trait Real: RealField + Copy + dmp::Scalar + puck::Real {
     /// Sine and cosine.
     fn sine_cosine(self) -> (Self, Self);
 
-    /// Square root.
-    fn square_root(self) -> Self;
-
-    /// Largest whole number not above `self`.
-    fn whole_below(self) -> Self;
-
     /// As a whole number, saturating; zero for a NaN.
     fn to_whole(self) -> i32;
 
@@ -68,17 +62,6 @@ impl Real for f32 {
     }
 
     #[inline]
-    fn square_root(self) -> Self {
-        libm::sqrtf(self)
-    }
-
-    /// micromath's floor is exact and needs no call into libm.
-    #[inline]
-    fn whole_below(self) -> Self {
-        micromath::F32Ext::floor(self)
-    }
-
-    #[inline]
     fn to_whole(self) -> i32 {
         self as i32
     }
@@ -111,16 +94,6 @@ impl Real for f64 {
     }
 
     #[inline]
-    fn square_root(self) -> Self {
-        libm::sqrt(self)
-    }
-
-    #[inline]
-    fn whole_below(self) -> Self {
-        libm::floor(self)
-    }
-
-    #[inline]
     fn to_whole(self) -> i32 {
         self as i32
     }
@@ -129,6 +102,12 @@ impl Real for f64 {
     fn is_finite_number(self) -> bool {
         f64::is_finite(self)
     }
+}
+
+/// Square root. Two of the traits of a [`Real`] have one by this name.
+#[inline]
+pub(crate) fn sqrt<R: Real>(value: R) -> R {
+    <R as dmp::Scalar>::sqrt(value)
 }
 
 /// The larger of two numbers; `bound` for a NaN.

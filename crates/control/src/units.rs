@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix3, SVector, Vector3};
 
-use crate::real::Real;
+use crate::real::{Real, sqrt};
 
 /// Number of joints of the arm.
 pub const JOINTS: usize = 7;
@@ -131,7 +131,7 @@ impl<R: Real> Orientation<R> {
         } else {
             (zz, [wz, xz, yz, zz])
         };
-        let scale = R::of(0.5) / square.square_root();
+        let scale = R::of(0.5) / sqrt(square);
         let scale = if row[0] < R::of(0.0) { -scale } else { scale };
         Orientation(row.map(|component| component * scale))
     }

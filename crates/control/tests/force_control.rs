@@ -26,7 +26,7 @@ where
     let header = reader.headers().expect("a header").clone();
     let column = |name: String| header.iter().position(|field| field == name).expect("a column");
     let columns = |prefix: &str| AXES.map(|axis| column(format!("{prefix}_{axis}")));
-    let (expected, felt, command) = (columns("Fdes"), columns("F"), columns("u"));
+    let (expected, measured, command) = (columns("Fdes"), columns("F"), columns("u"));
     let torque = [0, 1, 2, 3, 4, 5, 6].map(|joint| column(format!("tau{joint}")));
     // J[a][b] = c_a sin(0.7 a + 1.3 b + 0.2), as the file's header gives it.
     let jacobian = control::model::Jacobian(nalgebra::SMatrix::<R, 6, 7>::from_fn(|a, b| {
@@ -39,7 +39,7 @@ where
     for record in reader.records() {
         let record = record.expect("a row");
         let number = |index: usize| record[index].parse::<f64>().expect("a number");
-        let error = Vector6::from_fn(|axis, _| R::of(number(expected[axis])) - R::of(number(felt[axis])));
+        let error = Vector6::from_fn(|axis, _| R::of(number(expected[axis])) - R::of(number(measured[axis])));
         let u = controller.command(&error, R::of(1.0), R::of(2.0), R::of(PERIOD), false);
         let tau = ForceController::torque(&jacobian, &u);
         let mut compare = |which: usize, computed: f64, golden: f64| {
@@ -88,11 +88,11 @@ fn check_8_unit_step_starts_at_one_step_of_the_integral_ramps_and_stays() {
 fn against_the_wall(sign: f64) -> (f64, f64) {
     let (mass, damping, wall, expected) = (3.0, 60.0, 5000.0, -10.0);
     let mut controller = controller::<f64>();
-    let (mut x, mut v, mut felt) = (1e-3, 0.0, 0.0);
+    let (mut x, mut v, mut measured) = (1e-3, 0.0, 0.0);
     for _ in 0..3000 {
         let force = if x > 0.0 { -wall * x } else { 0.0 };
-        felt += 0.5 * (force - felt);
-        let error = Vector6::new(expected - felt, 0.0, 0.0, 0.0, 0.0, 0.0);
+        measured += 0.5 * (force - measured);
+        let error = Vector6::new(expected - measured, 0.0, 0.0, 0.0, 0.0, 0.0);
         let command = sign * controller.command(&error, 1.0, 2.0, PERIOD, false)[0];
         for _ in 0..20 {
             let dt = PERIOD / 20.0;

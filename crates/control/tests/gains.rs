@@ -1,4 +1,4 @@
-//! What the gains have to satisfy in every posture.
+//! Conditions that the gains meet in every posture.
 
 use control::law::Gains;
 use control::model::{ArmModel, Frames};

@@ -4,15 +4,15 @@ use control::model::{ArmModel, Frames};
 use control::units::{JointAccelerations, JointPositions, JointVelocities};
 use control::{Payload, Real};
 
-struct Row(Vec<f64>);
+struct Posture(Vec<f64>);
 
-impl Row {
+impl Posture {
     fn joints(&self, start: usize) -> [f64; 7] {
         self.0[start..start + 7].try_into().expect("seven columns")
     }
 }
 
-fn rows(file: &str) -> Vec<Row> {
+fn rows(file: &str) -> Vec<Posture> {
     let path = format!("{}/../../tests/vectors/{file}", env!("CARGO_MANIFEST_DIR"));
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(path).expect("golden vectors exist");
     let header: Vec<String> = reader.headers().expect("a header").iter().map(str::to_owned).collect();
@@ -32,9 +32,9 @@ fn rows(file: &str) -> Vec<Row> {
     ] {
         assert_eq!(header[index], name, "{file}");
     }
-    let rows: Vec<Row> = reader
+    let rows: Vec<Posture> = reader
         .records()
-        .map(|record| Row(record.expect("a row").iter().map(|field| field.parse().expect("a number")).collect()))
+        .map(|record| Posture(record.expect("a row").iter().map(|field| field.parse().expect("a number")).collect()))
         .collect();
     assert_eq!(rows.len(), 100, "{file}");
     rows

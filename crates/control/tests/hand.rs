@@ -120,8 +120,8 @@ fn a_gauge_is_the_torque_of_the_environment_on_the_finger_from_its_tared_zero() 
     };
     settle(&mut hand, 1950);
     hand.tare();
-    let felt = settle(&mut hand, 2500);
-    assert!((felt[0] + pressing).abs() < 1e-6 && felt[1].abs() < 1e-9, "{felt:?}");
+    let gauges = settle(&mut hand, 2500);
+    assert!((gauges[0] + pressing).abs() < 1e-6 && gauges[1].abs() < 1e-9, "{gauges:?}");
     // A grip is not drift: the automatic tare leaves it, and takes away what is less.
     hand.tare_drift();
     assert!((settle(&mut hand, 2500)[0] + pressing).abs() < 1e-6);
@@ -147,9 +147,9 @@ fn a_step_of_the_gauge_ramps_through_the_window_and_then_stays() {
     let mut controller = controller(&gains);
     let at = [0.4, 0.7, 0.8, 0.9];
     let reference = HandReference::at_rest(at);
-    let felt = [-0.5, 0.0, 0.3];
+    let gauges = [-0.5, 0.0, 0.3];
     for tick in 0..2 * gains.force_window {
-        let torque = controller.torque(&gains, &state_of(at, felt), &reference, Some(&[-0.1, 0.0, 0.0]), false);
+        let torque = controller.torque(&gains, &state_of(at, gauges), &reference, Some(&[-0.1, 0.0, 0.0]), false);
         let filled = (tick + 1).min(gains.force_window) as f64;
         let factor = gains.force_proportional + gains.force_integral * filled * PERIOD;
         assert_eq!((torque[0], torque[2]), (0.0, 0.0), "the spread knows no force, F2 no error");
@@ -158,12 +158,12 @@ fn a_step_of_the_gauge_ramps_through_the_window_and_then_stays() {
         assert!((torque[3] - 0.3 * factor).abs() < 1e-12, "tick {tick}: {torque:?}");
     }
     // Frozen, the window keeps what it has; without an expectation the position alone counts.
-    let before = controller.torque(&gains, &state_of(at, felt), &reference, Some(&[-0.1, 0.0, 0.0]), true);
+    let before = controller.torque(&gains, &state_of(at, gauges), &reference, Some(&[-0.1, 0.0, 0.0]), true);
     for _ in 0..100 {
-        let now = controller.torque(&gains, &state_of(at, felt), &reference, Some(&[-0.1, 0.0, 0.0]), true);
+        let now = controller.torque(&gains, &state_of(at, gauges), &reference, Some(&[-0.1, 0.0, 0.0]), true);
         assert_eq!(now, before);
     }
-    assert_eq!(controller.torque(&gains, &state_of(at, felt), &reference, None, false), [0.0; 4]);
+    assert_eq!(controller.torque(&gains, &state_of(at, gauges), &reference, None, false), [0.0; 4]);
 }
 
 #[test]

@@ -224,7 +224,7 @@ fn any_input() -> impl Strategy<Value = CycleInput> {
         })
 }
 
-/// What the frame of the hand makes its drives do by the nominal model (N m, spread, F1, F2, F3).
+/// Torques of the drives for a frame of the hand, by the nominal model (N m, spread, F1, F2, F3).
 fn hand_torques(frame: Option<CanFrame>) -> [f64; 4] {
     let Some(frame) = frame else { return [0.0; 4] };
     let Action::PackedTorques { torques, .. } = Request::decode(&frame).expect("a valid frame").action else {

@@ -4,7 +4,7 @@ use control::guard::supervisor::{Transition, transition};
 use control::guard::{Supervisor, Trigger};
 use control::{Fault, Refusal, State};
 
-/// How much may happen in a state: nothing, floating or stopping, moving.
+/// Rank of the motion that a state allows: nothing, floating or stopping, moving.
 fn authority(state: State) -> u8 {
     match state {
         State::Idle | State::Fault => 0,

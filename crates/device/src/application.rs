@@ -5,10 +5,11 @@
 //! primitives and the requests that move something are those of the application.
 
 use control::{CycleRecord, LoadRefusal, State};
-use link::{Listing, Name, Refusal, Reply, Request, Telemetry};
+use link::{Capabilities, Listing, Name, Refusal, Reply, Request, Telemetry};
 use puck::CanFrame;
 
 use crate::health::{Health, Timing};
+use crate::time::{ANSWERS_US, SLOT_HZ};
 
 /// A refusal with its detail.
 pub type Refused = (Refusal, [u32; 2]);
@@ -25,12 +26,13 @@ pub enum Slot {
 }
 
 impl Slot {
-    /// The slot of the next timer tick.
+    /// The slot of the next timer tick. Where one slot is too short for the answers to a request, the slow question
+    /// fills the time in which they come.
     pub const fn next(self) -> Slot {
-        match self {
-            Slot::Request => Slot::Control,
-            Slot::Control => Slot::Slow,
-            Slot::Slow => Slot::Request,
+        match (self, ANSWERS_US * SLOT_HZ > 1_000_000) {
+            (Slot::Request, false) | (Slot::Slow, true) => Slot::Control,
+            (Slot::Control, false) | (Slot::Request, true) => Slot::Slow,
+            (Slot::Slow, false) | (Slot::Control, true) => Slot::Request,
         }
     }
 }
@@ -190,6 +192,9 @@ pub struct Saved {
 pub trait Application {
     /// The other half.
     type Controller: Controller;
+
+    /// The parts that it can drive and read, mounted or not.
+    const CAPABILITIES: Capabilities;
 
     /// True once it is known what is stored. Until then, and not for long, requests wait.
     fn is_open(&mut self, now_ms: u32) -> bool;

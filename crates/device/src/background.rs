@@ -156,7 +156,7 @@ mod tests {
         let safety = SafetyProperties::for_tests();
         let mut poll = BackgroundPoll::new(&safety);
         let mut counts = BTreeMap::new();
-        for _ in 0..300 * seconds {
+        for _ in 0..control::RATE_HZ as usize * seconds {
             if let Some(frame) = poll.begin().or_else(|| poll.other(hand)) {
                 let request = Request::decode(&frame).expect("a request");
                 let puck::Destination::Node(node) = request.to else { panic!("a poll to a group") };

@@ -227,8 +227,10 @@ impl<T: Scalar, const ROWS: usize, const SENSORS: usize, const CAPACITY: usize>
     #[inline]
     #[must_use]
     pub fn zeta(&self, u: T, error: &[T; SENSORS], to_rows: impl FnOnce(&[T; SENSORS]) -> [T; ROWS]) -> [T; ROWS] {
-        let (k1, k2) = (self.sensitivity.at(u), self.weight.at(u));
-        let rows = to_rows(&core::array::from_fn(|i| k2[i] * error[i]));
-        core::array::from_fn(|i| k1[i] * rows[i])
+        // Without an index: a loop that is not unrolled would check it.
+        let (mut rows, mut weighted) = (self.sensitivity.at(u), self.weight.at(u));
+        weighted.iter_mut().zip(error).for_each(|(weight, error)| *weight = *weight * *error);
+        rows.iter_mut().zip(to_rows(&weighted)).for_each(|(row, force)| *row = *row * force);
+        rows
     }
 }

@@ -70,7 +70,19 @@ impl<T: Scalar, const N: usize> Basis<T, N> {
 
     /// Evaluates all kernels at the phase `s`.
     pub fn evaluate(&self, s: T) -> Activations<T, N> {
-        let mut kernels = [T::ZERO; N];
+        let mut activations = Activations { first: N, last: 0, kernels: [T::ZERO; N], scale: T::ZERO };
+        activations.scale = self.each(s, |i, kernel| {
+            activations.kernels[i] = kernel;
+            activations.first = activations.first.min(i);
+            activations.last = i + 1;
+        });
+        activations
+    }
+
+    /// Gives each kernel that matters at the phase `s` to `take`, in order; returns `s / sum psi`. Without the array of
+    /// [`Basis::evaluate`], which costs more to clear than a tick needs of it.
+    #[inline]
+    pub(crate) fn each(&self, s: T, mut take: impl FnMut(usize, T)) -> T {
         let count = if self.count < N { self.count } else { N };
         let (centres, roots) = (&self.centres[..count], &self.root_widths[..count]);
         let exponent = |i: usize| {
@@ -88,32 +100,18 @@ impl<T: Scalar, const N: usize> Basis<T, N> {
             upper
         };
         let smallest = exponent(nearest);
-        let (mut first, mut last) = (nearest, nearest + 1);
-        kernels[nearest] = T::ZERO;
-        while first > 0 {
-            let e = exponent(first - 1) - smallest;
-            if !(e <= T::NEGLIGIBLE_EXPONENT) {
-                break;
-            }
-            first -= 1;
-            kernels[first] = e;
-        }
-        while last < count {
-            let e = exponent(last) - smallest;
-            if !(e <= T::NEGLIGIBLE_EXPONENT) {
-                break;
-            }
-            kernels[last] = e;
-            last += 1;
-        }
+        let matters = |i: usize| exponent(i) - smallest <= T::NEGLIGIBLE_EXPONENT;
+        let first = (0..nearest).rev().take_while(|&i| matters(i)).last().unwrap_or(nearest);
         let mut sum = T::ZERO;
-        for kernel in &mut kernels[first..last] {
-            *kernel = T::kernel(*kernel);
+        for i in first..count {
+            if i > nearest && !matters(i) {
+                break;
+            }
+            let kernel = if i == nearest { T::kernel(T::ZERO) } else { T::kernel(exponent(i) - smallest) };
+            sum = sum + kernel;
+            take(i, kernel);
         }
-        for kernel in &kernels[first..last] {
-            sum = sum + *kernel;
-        }
-        Activations { first, last, kernels, scale: s / sum }
+        s / sum
     }
 }
 
@@ -168,17 +166,13 @@ impl<T: Scalar, const ROWS: usize, const N: usize> Weights<T, ROWS, N> {
         self.0.get(i)?.get(row).copied()
     }
 
-    /// `f` of all rows from kernels that are already evaluated.
+    /// Adds the share of kernel `i` to the sum of each row.
     #[inline]
-    pub(crate) fn combine(&self, activations: &Activations<T, N>) -> [T; ROWS] {
-        let mut f = [T::ZERO; ROWS];
-        let active = activations.active();
-        for (kernel, weights) in activations.kernels[active.clone()].iter().zip(&self.0[active]) {
-            for (f, weight) in f.iter_mut().zip(weights) {
-                *f = *f + *kernel * *weight;
-            }
+    pub(crate) fn add(&self, i: usize, kernel: T, sums: &mut [T; ROWS]) {
+        let weights = self.0.get(i).into_iter().flatten();
+        for (sum, weight) in sums.iter_mut().zip(weights) {
+            *sum = *sum + kernel * *weight;
         }
-        f.map(|f| f * activations.scale)
     }
 }
 
@@ -218,13 +212,8 @@ impl<T: Scalar, const ROWS: usize, const N: usize> ForcingTerm<T, ROWS, N> {
     #[inline]
     #[must_use]
     pub fn evaluate(&self, s: T) -> [T; ROWS] {
-        self.combine(&self.basis.evaluate(s))
-    }
-
-    /// `f` of all rows from kernels that are already evaluated.
-    #[inline]
-    #[must_use]
-    pub fn combine(&self, activations: &Activations<T, N>) -> [T; ROWS] {
-        self.weights.combine(activations)
+        let mut f = [T::ZERO; ROWS];
+        let scale = self.basis.each(s, |i, kernel| self.weights.add(i, kernel, &mut f));
+        f.map(|f| f * scale)
     }
 }

@@ -287,8 +287,14 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Primitive<T, D, 
     #[inline]
     #[must_use]
     pub fn forces(&self, s: T) -> ([[T; 6]; P], [T; D]) {
-        let activations = self.basis.evaluate(s);
-        (core::array::from_fn(|n| self.pose_weights[n].combine(&activations)), self.point_weights.combine(&activations))
+        let (mut poses, mut points) = ([[T::ZERO; POSE_ROWS]; P], [T::ZERO; D]);
+        let scale = self.basis.each(s, |i, kernel| {
+            for (sums, weights) in poses.iter_mut().zip(&self.pose_weights) {
+                weights.add(i, kernel, sums);
+            }
+            self.point_weights.add(i, kernel, &mut points);
+        });
+        (poses.map(|sums| sums.map(|f| f * scale)), points.map(|f| f * scale))
     }
 
     /// Springs and dampers of position and orientation of each pose.

@@ -13,7 +13,7 @@ pub enum RolloutError {
     TooLarge,
     /// A quaternion is not of unit norm.
     NotUnit,
-    /// The duration is shorter than [`Primitive::minimum_duration`](crate::Primitive::minimum_duration), or the speed too high.
+    /// The duration is shorter than [`minimum_duration`](crate::Primitive::minimum_duration), or the speed too high.
     TooFast,
     /// A speed, rate or duration is negative, or a duration is 0.
     Negative,

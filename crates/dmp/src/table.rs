@@ -219,19 +219,23 @@ impl<T: Scalar, const COLUMNS: usize, const CAPACITY: usize> PhaseTable<T, COLUM
     #[inline]
     pub fn at(&self, u: T) -> [T; COLUMNS] {
         let samples = self.samples();
-        let Some(last) = samples.len().checked_sub(1) else {
+        let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
             return [T::ZERO; COLUMNS];
         };
-        if last == 0 || !(u > T::ZERO) {
-            return samples[0];
+        if !(u > T::ZERO) {
+            return *first;
         }
         if u >= T::ONE {
-            return samples[last];
+            return *last;
         }
-        let place = u * T::from_index(last);
-        let left = place.to_index().min(last - 1);
+        let intervals = samples.len() - 1;
+        let place = u * T::from_index(intervals);
+        let left = place.to_index().min(intervals.saturating_sub(1));
         let weight = place - T::from_index(left);
-        let (a, b) = (&samples[left], &samples[left + 1]);
-        core::array::from_fn(|i| a[i] + (b[i] - a[i]) * weight)
+        // One sample alone is a constant.
+        let (Some(from), Some(to)) = (samples.get(left), samples.get(left + 1)) else { return *first };
+        let mut values = *from;
+        values.iter_mut().zip(to).for_each(|(value, to)| *value = *value + (*to - *value) * weight);
+        values
     }
 }

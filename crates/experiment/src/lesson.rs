@@ -31,8 +31,6 @@ const LESSON_SEED: u64 = 0;
 const POST_ROLL: f64 = 0.5;
 /// Longest demonstration, s.
 const LONGEST_DEMONSTRATION: f64 = 60.0;
-/// Note at the head of recordings that are not kept.
-const NOTES: &str = "Tactus recording, 300 Hz (simulated arm)";
 /// Opening of the fingers before the grasp, rad.
 const OPEN: f64 = 0.25;
 /// The same for an object that may stand beside the palm: as wide as the fingers go without touching their stops, 12
@@ -205,8 +203,9 @@ fn teach(scenario: Scenario, arm: &Arm, interrupt: &Interrupt) -> Result<Recordi
     procedure::make_ready(&mut client, true, |_| {})?;
     procedure::travel(&mut client, lesson.start().map(|angle| angle as f32), |_| {})?;
     client.gravity()?;
-    let notes = "Tactus recording of a demonstration by hand, 300 Hz (simulated arm, simulated person)";
-    let recorder = Recorder::start(&mut client, Vec::new(), notes)?;
+    let rate = control::RATE_HZ;
+    let notes = format!("Tactus recording of a demonstration by hand, {rate} Hz (simulated arm, simulated person)");
+    let recorder = Recorder::start(&mut client, Vec::new(), &notes)?;
     if !teacher::begin(&mut client) {
         return Err(LessonError::Teacher("nobody stands beside the arm"));
     }
@@ -277,12 +276,12 @@ fn rehearsal(
     let mut client = trial::connect(&options, interrupt)?;
     client.upload(&movement.to_image()?, |_, _, _| {})?;
     procedure::make_ready(&mut client, true, |_| {})?;
-    let (bytes, _) = procedure::play_once(&mut client, movement, options_of_rehearsal, NOTES, &mut |_| {})?;
+    let (bytes, _) = procedure::play_once(&mut client, movement, options_of_rehearsal, &notes(), &mut |_| {})?;
     Ok(Recording::parse(Path::new(&format!("rehearsal {seed}")), &bytes)?)
 }
 
 fn parse(cycles: &[link::Telemetry], name: &str) -> Result<Recording, LessonError> {
-    let bytes = recording_text(cycles, NOTES).map_err(ProcedureError::Recording)?;
+    let bytes = recording_text(cycles, &notes()).map_err(ProcedureError::Recording)?;
     Ok(Recording::parse(Path::new(name), &bytes)?)
 }
 
@@ -361,6 +360,11 @@ fn radical_inverse(mut number: usize, base: usize) -> f64 {
         number /= base;
     }
     value
+}
+
+/// Note at the head of recordings that are not kept.
+fn notes() -> String {
+    format!("Tactus recording, {} Hz (simulated arm)", control::RATE_HZ)
 }
 
 #[cfg(test)]

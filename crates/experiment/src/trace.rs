@@ -40,7 +40,7 @@ pub struct Trace {
 impl Trace {
     /// Largest distance (m) and angle (degrees) of the plan from the taught one, up to `end` (s).
     ///
-    /// `taught` is the plan without feedback at 300 Hz from the start of the movement.
+    /// `taught` is the plan without feedback at the control rate from the start of the movement.
     pub fn adaptation(&self, taught: &[([f64; 3], [f64; 4])], end: f64) -> (f64, f64) {
         let Some(last) = taught.last() else {
             return (0.0, 0.0);

@@ -100,7 +100,7 @@ pub struct Trial {
     pub marks: Marks,
 }
 
-/// The plan without feedback, 300 Hz: positions and orientations.
+/// The plan without feedback at the control rate: positions and orientations.
 pub type Taught = Vec<([f64; 3], [f64; 4])>;
 
 /// What all trials of an experiment share.

@@ -6,7 +6,7 @@
 use control::LoadRefusal;
 use device::{Action, Application, HostSession, Refused, Saved, SessionPort, finite};
 use link::image::IMAGE_BYTES_LIMIT;
-use link::{Goal, Listing, Name, Refusal, Request};
+use link::{Capabilities, Goal, Listing, Name, Refusal, Request};
 
 use crate::command::{Command, RunOptions};
 use crate::device_controller::DeviceController;
@@ -55,6 +55,8 @@ impl<'a> HandApplication<'a> {
 
 impl Application for HandApplication<'_> {
     type Controller = DeviceController;
+
+    const CAPABILITIES: Capabilities = Capabilities { arm: false, hand: true, wrench: false };
 
     fn is_open(&mut self, _now_ms: u32) -> bool {
         true

@@ -11,7 +11,7 @@
 //! It goes down by itself and up by a person's command, except from Coast to Run. No state needs torque to be safe: the
 //! worms cannot be driven back.
 
-use control::plan::hand::LONGEST;
+use control::plan::hand::LONGEST_MOVE;
 use control::{Fault, HandSample, State, flags};
 use device::Refused;
 use link::Refusal;
@@ -36,7 +36,7 @@ const START_DISTANCE: Number = constant(0.15);
 
 /// Allowed speeds, and durations of a move (s).
 const SPEED_RANGE: [Number; 2] = crate::number::constants([0.1, 2.0]);
-const DURATION_RANGE: [Number; 2] = crate::number::constants([0.0, LONGEST]);
+const DURATION_RANGE: [Number; 2] = crate::number::constants([0.0, LONGEST_MOVE]);
 
 /// What the hand is after.
 #[derive(Clone, Copy, Debug)]

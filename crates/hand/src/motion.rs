@@ -7,7 +7,7 @@ use crate::controller::HandReference;
 use crate::number::{Number, ONE, ZERO, at_least, at_most, constant, constants, magnitude, share, whole};
 
 /// Longest move (s).
-const LONGEST: Number = constant(control::plan::hand::LONGEST);
+const LONGEST: Number = constant(control::plan::hand::LONGEST_MOVE);
 /// Shortest move (s).
 const SHORTEST: Number = constant(0.3);
 

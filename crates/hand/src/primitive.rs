@@ -3,7 +3,7 @@
 //! Made from the real numbers of an image while it is uploaded ([`crate::image`]); nothing here computes on the control
 //! path.
 
-use control::plan::load::{LONGEST, LoadError, SHORTEST};
+use control::plan::load::{LONGEST_MOVEMENT, LoadError, SHORTEST_MOVEMENT};
 use device::PrimitiveTrouble;
 use device::recorded_filter::{self, OtherFilter};
 use dmp::{GainError, Group, PrimitiveError, TransformationSystem};
@@ -147,7 +147,7 @@ impl FingerPrimitive {
     pub fn begin(&mut self, marks: &Marks, kernels: usize) -> Result<(), Unfit> {
         self.clear();
         let duration = f64::from(marks.duration);
-        if !(SHORTEST..=LONGEST).contains(&duration) {
+        if !(SHORTEST_MOVEMENT..=LONGEST_MOVEMENT).contains(&duration) {
             return Err(Unfit::Movement(LoadError::Duration));
         }
         let (alpha, activation) = (f64::from(marks.alpha), f64::from(marks.activation));

@@ -1,5 +1,6 @@
 //! Why a conversation with a device failed, with its number.
 
+use std::fmt;
 use std::time::Duration;
 
 use device::{HomeError, PrimitiveTrouble, StartupTrouble};
@@ -8,6 +9,24 @@ use link::{ImageError, Refusal};
 use crate::error_code::ErrorCode;
 use crate::failure::Failure;
 use crate::transport::{AddressError, TransportError};
+
+/// A part that a device can drive or read, as its hello says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Capability {
+    /// [`link::Capabilities::arm`]
+    Arm,
+    /// [`link::Capabilities::hand`]
+    Hand,
+}
+
+impl fmt::Display for Capability {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Arm => "drive an arm",
+            Self::Hand => "drive a hand",
+        })
+    }
+}
 
 /// Why a conversation with a device failed.
 #[derive(Debug, thiserror::Error)]
@@ -36,6 +55,9 @@ pub enum HostError {
         /// How long was waited, in the device's time.
         after: Duration,
     },
+    /// The program of the device is not made for a part that the command needs.
+    #[error("the device does not {0}")]
+    Lacks(Capability),
     /// The device refused a request.
     #[error("the device refused '{request}': {}", explain(*.reason, *.detail))]
     Refused {
@@ -141,6 +163,7 @@ impl HostError {
             Self::Incompatible { what: Refusal::Schema, .. } => ErrorCode::LinkSchema,
             Self::Incompatible { what: Refusal::Model, .. } => ErrorCode::RobotModel,
             Self::Incompatible { .. } => ErrorCode::LinkVersion,
+            Self::Lacks(_) => ErrorCode::CapabilityMissing,
             Self::Refused { reason, .. } => ErrorCode::Refused(*reason),
             Self::Image(_) => ErrorCode::ImageInvalid,
             Self::ReadBack { .. } => ErrorCode::ReadBackDiffers,

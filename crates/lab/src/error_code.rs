@@ -142,6 +142,9 @@ error_codes! {
     FlashFile = 213: "the file cannot be used as the device's flash",
         "`flash=` names a file of another kind or without rights",
         "name a file of an earlier simulation, or one that does not exist yet";
+    FaultScript = 214: "the file cannot be used as a script of faults",
+        "`faults=` names a file that is missing, or none of `tests/faults`, or a fault in it is misspelt",
+        "the faults are listed in docs/faults.md; for example `sil:faults=tests/faults/a3.toml:2`";
     NameInvalid = 220: "the name of the primitive is not valid",
         "too long, empty, or other characters than letters, digits, `-` and `_`", "give a name with `--name NAME`";
     LearnOption = 221: "an option of `learn` is out of its range", "a value on the command line", "";
@@ -184,6 +187,9 @@ error_codes! {
         "image and tool of different sources", "build tool and firmware from the same model file";
     OtherExperiment = 404: "the folder has results of another configuration",
         "an earlier experiment with other options", "choose another folder with `--out`";
+    CapabilityMissing = 405: "the device lacks a part that the command needs",
+        "a device for an arm is asked for a hand alone, or the other way round",
+        "`tactus status` tells what the device drives; name another one with `--device`";
     OtherImageRuns = 413: "the device runs another image than was written",
         "`--device` is another board than the probe's",
         "check that `--device` is the board the debug probe is connected to";

@@ -1,4 +1,4 @@
-//! The plan of a primitive: its rollout at 300 Hz without feedback, from the start of its demonstration.
+//! The plan of a primitive: its rollout at the control rate without feedback, from the start of its demonstration.
 
 use control::plan::primitive::{Coupling, Reference, Rollout, StartState};
 use dmp::RolloutError;

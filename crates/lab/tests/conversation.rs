@@ -13,10 +13,11 @@ use device::{
     Session, SessionPort, Stage, TimedRecord, Timing,
 };
 use lab::client::{Client, Halted, Incoming, Interrupt, UploadOutcome, UploadPhase};
-use lab::error::HostError;
+use lab::error::{Capability, HostError};
 use lab::transport::{StreamTransport, Transport, TransportError};
+use link::frame::{Decoder, FRAME_BYTES, Frame};
 use link::image::{FeedbackClamps, HemisphereKind, ImageContent, OrientationErrorKind, Waypoint, WaypointVelocity};
-use link::{LINK_VERSION, Name, Refusal, Request, SCHEMA_HASH};
+use link::{LINK_VERSION, Name, Refusal, Reply, Request, SCHEMA_HASH};
 use pinned_init::InPlaceWrite;
 
 /// One step of the virtual clock: a third of a control cycle.
@@ -103,12 +104,20 @@ struct Device {
     dead: bool,
     /// The cable is out.
     unplugged: bool,
+    /// Its hello says that it drives no arm.
+    armless: bool,
 }
 
 impl Device {
     fn new() -> Self {
-        let identity =
-            Identity { firmware: "1.2.3", board: "test", serial: "T-1", simulated: true, ticks_per_second: 25_000_000 };
+        let identity = Identity {
+            firmware: "1.2.3",
+            board: "test",
+            serial: "T-1",
+            simulated: true,
+            ticks_per_second: 25_000_000,
+            instructions_per_tick: 0,
+        };
         let Ok(session) = Box::new_uninit().write_init(Session::init(identity, RamStore::new()));
         Self {
             session,
@@ -126,6 +135,7 @@ impl Device {
             answers: 0,
             dead: false,
             unplugged: false,
+            armless: false,
         }
     }
 
@@ -164,7 +174,10 @@ impl Transport for Device {
         while self.half.line.is_empty() && self.now() < until {
             self.step();
         }
-        let bytes = std::mem::take(&mut self.half.line);
+        let mut bytes = std::mem::take(&mut self.half.line);
+        if self.armless {
+            bytes = without_arm(&bytes);
+        }
         if !bytes.is_empty() && !is_lost(self.lose_answers_every, &mut self.answers) {
             out.extend_from_slice(&bytes);
         }
@@ -178,6 +191,20 @@ impl Transport for Device {
     fn is_virtual(&self) -> bool {
         true
     }
+}
+
+/// The same answers, but that a hello says that the device drives no arm.
+fn without_arm(mut bytes: &[u8]) -> Vec<u8> {
+    let (mut decoder, mut out) = (Decoder::<FRAME_BYTES>::new(), Vec::new());
+    while let Some(Frame { envelope, mut message }) = decoder.next::<Reply>(&mut bytes) {
+        if let Reply::Hello { hello, .. } = &mut message {
+            hello.capabilities.arm = false;
+        }
+        let mut buffer = [0; FRAME_BYTES];
+        let length = link::frame::encode(envelope, &message, &mut buffer).unwrap();
+        out.extend_from_slice(&buffer[..length]);
+    }
+    out
 }
 
 fn connected() -> Client<Device> {
@@ -225,6 +252,19 @@ fn connecting_compares_versions_within_200_ms() {
     let client = connected();
     assert!(client.now() < Duration::from_millis(200), "{:?}", client.now());
     assert_eq!(client.hello().serial.as_str(), "T-1");
+}
+
+#[test]
+fn a_device_without_an_arm_is_refused_by_the_name_of_what_it_lacks() {
+    let arm = connected();
+    assert!(arm.require(Capability::Arm).is_ok() && arm.require(Capability::Hand).is_ok());
+
+    let hand = Client::connect(Device { armless: true, ..Device::new() }, "test").unwrap();
+    assert!(hand.require(Capability::Hand).is_ok());
+    let error = hand.require(Capability::Arm).unwrap_err();
+    assert_eq!(error.to_string(), "the device does not drive an arm");
+    assert_eq!((error.code().exit() as u8, error.code().to_string()), (4, "E405".to_owned()));
+    assert!(error.code().remedy().contains("--device"));
 }
 
 #[test]

@@ -58,9 +58,9 @@ fn the_plan_stays_at_its_goal_behind_the_end_of_the_movement() {
     let primitive = learned.primitive.to_primitive().unwrap();
     let primitive = primitive.movement();
     let mut rollout = dmp::Rollout::start(primitive, &dmp::StartState::demonstrated(primitive)).unwrap();
-    for cycle in 0..3600 {
-        let plan = rollout.step(primitive, 1.0 / 300.0, &dmp::Coupling::NONE).unwrap();
-        if f64::from(cycle) / 300.0 > primitive.duration() {
+    for cycle in 0..12 * control::RATE_HZ {
+        let plan = rollout.step(primitive, control::PERIOD, &dmp::Coupling::NONE).unwrap();
+        if f64::from(cycle) / control::RATE > primitive.duration() {
             let away = (0..3)
                 .map(|axis| (plan.poses[0].position.x[axis] - learned.primitive.goal.position[axis]).powi(2))
                 .sum::<f64>()
@@ -327,12 +327,12 @@ fn a_dwell_makes_the_movement_longer_by_exactly_that_and_rests_at_the_goal() {
     };
     let grasp = learned(&taught(4.0), &options).unwrap();
     assert!((grasp.primitive.duration - plain.primitive.duration - 2.5).abs() < 1e-12);
-    assert_eq!(grasp.demonstration.len(), plain.demonstration.len() + 750);
+    assert_eq!(grasp.demonstration.len(), plain.demonstration.len() + usize::from(control::time::periods(2.5)));
     let primitive = grasp.primitive.to_primitive().unwrap();
     let primitive = primitive.movement();
     let mut rollout = dmp::Rollout::start(primitive, &dmp::StartState::demonstrated(primitive)).unwrap();
     loop {
-        let plan = rollout.step(primitive, 1.0 / 300.0, &dmp::Coupling::NONE).unwrap();
+        let plan = rollout.step(primitive, control::PERIOD, &dmp::Coupling::NONE).unwrap();
         if plan.time > plain.primitive.duration + 0.3 {
             let away = (0..3).map(|axis| plan.poses[0].position.x[axis] - grasp.primitive.goal.position[axis]);
             assert!(away.map(|e| e * e).sum::<f64>().sqrt() < 3e-3, "at {} s", plan.time);

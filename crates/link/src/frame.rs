@@ -134,21 +134,7 @@ impl Message for Reply {
         };
         let (of, fields) = postcard::take_from_bytes::<u16>(fields).ok()?;
         let (link_version, schema_hash) = foreign_version(fields)?;
-        let hello = DeviceHello {
-            link_version,
-            schema_hash,
-            model_hash: 0,
-            image_schema: 0,
-            maximum_kernels: 0,
-            slots: 0,
-            slot_bytes: 0,
-            cycles_per_second: 0,
-            ticks_per_second: 0,
-            simulated: false,
-            firmware: Text::new(""),
-            board: Text::new(""),
-            serial: Text::new(""),
-        };
+        let hello = DeviceHello { link_version, schema_hash, ..DeviceHello::default() };
         Some(Self::Hello { of, hello })
     }
 }

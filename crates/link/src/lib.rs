@@ -28,7 +28,7 @@ pub mod report;
 mod schema;
 
 pub use image::{ImageError, PrimitiveImage};
-pub use message::{DeviceHello, Goal, HostHello, Reply, Request, RunOptions};
+pub use message::{Capabilities, DeviceHello, Goal, HostHello, Reply, Request, RunOptions};
 pub use metadata::ImageMetadata;
 pub use name::{Name, NameError, Text};
 pub use refusal::Refusal;

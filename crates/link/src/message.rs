@@ -36,8 +36,19 @@ pub struct HostHello {
     pub owner: Text,
 }
 
+/// The parts that the program of a device is made for. The [`Status`](crate::Status) tells which of them answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Capabilities {
+    /// It drives an arm.
+    pub arm: bool,
+    /// It drives a hand.
+    pub hand: bool,
+    /// It reads the wrench of a force/torque sensor.
+    pub wrench: bool,
+}
+
 /// The device's answer to a matching [`HostHello`].
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct DeviceHello {
     /// [`crate::LINK_VERSION`] of the device.
     pub link_version: u16,
@@ -65,6 +76,10 @@ pub struct DeviceHello {
     pub board: Text,
     /// Serial number of the device.
     pub serial: Text,
+    /// Parts that it can drive and read.
+    pub capabilities: Capabilities,
+    /// Instructions per tick, where time is counted in instructions as under QEMU; 0 where a clock runs.
+    pub instructions_per_tick: u8,
 }
 
 /// Where a movement shall end, where it differs from the taught goal. `None` keeps the present one.

@@ -509,9 +509,10 @@ impl Plant {
         if passage.sender == Node::HOST {
             self.deliveries.push_back(Delivery { at: passage.end, received: None });
         }
-        if let Treated::Received(frame, copies) = self.faults.treat(self.now, passage) {
-            for _ in 0..copies {
-                self.receive(&Passage { frame, ..*passage }, passage.received_at());
+        if let Treated::Received(frame, is_repeated) = self.faults.treat(self.now, passage) {
+            self.receive(&Passage { frame, ..*passage }, passage.received_at());
+            if is_repeated && passage.sender != Node::HOST {
+                self.deliveries.push_back(Delivery { at: passage.end, received: Some(frame) });
             }
         }
     }

@@ -148,6 +148,7 @@ pub fn start<B: Board>(
         serial,
         simulated: B::SIMULATED,
         ticks_per_second: <B::Clock as Clock>::HZ,
+        instructions_per_tick: <B::Clock as Clock>::INSTRUCTIONS_PER_TICK,
     };
     let Memory { queues, shelf, session } = memory;
     let Parts { clock, mut slot_timer, can, link, light, flash } = parts;

@@ -45,8 +45,8 @@ pub struct SlotTask<B: Board, C: Controller> {
 struct SlotIo<'a, C: Controller> {
     queues: &'a mut SlotQueues<C>,
     meters: &'a Meters,
-    /// The record of this slot; its cost is known only when the slot is over.
-    record: Option<C::Record>,
+    /// Place of the record of this slot; its cost is known only when the slot is over.
+    record: &'a mut Option<TimedRecord<C::Record>>,
 }
 
 impl<C: Controller> ControllerIo<C> for SlotIo<'_, C> {
@@ -63,7 +63,7 @@ impl<C: Controller> ControllerIo<C> for SlotIo<'_, C> {
     }
 
     fn record(&mut self, record: C::Record) {
-        self.record = Some(record);
+        *self.record = Some(TimedRecord { record, cost_ticks: 0 });
     }
 
     fn event(&mut self, event: C::Event) {
@@ -90,7 +90,7 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
         let begin = self.clock.short_ticks();
         let now = self.clock.now_us();
         let (mut late, mut lost, mut off) = (false, false, false);
-        if self.slot == Slot::Slow {
+        if self.slot == Slot::Control.next() {
             // The torques of the control slot must have left before another frame is queued behind them.
             let (waiting, overruns, offs) = can.lock(|can| (can.waiting(), can.overruns(), can.bus_offs()));
             late = waiting > 0 || !self.queues.to_bus.is_empty();
@@ -98,7 +98,8 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
             (self.lost_frames, self.bus_offs) = (overruns, offs);
         }
         let slot = self.slot;
-        let mut io = SlotIo { queues: &mut self.queues, meters, record: None };
+        let mut record = None;
+        let mut io = SlotIo { queues: &mut self.queues, meters, record: &mut record };
         core.lock(|core| {
             if late {
                 core.note_overrun();
@@ -108,7 +109,6 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
             }
             core.slot(slot, now, &mut io);
         });
-        let record = io.record;
         self.spent += self.clock.short_ticks().wrapping_sub(begin);
         let cost_ticks = self.spent;
         let measured = match self.measured {
@@ -117,7 +117,7 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
                 record.is_some()
             }
             Cost::AllSlots => {
-                let last = slot == Slot::Slow;
+                let last = slot.next() == Slot::Request;
                 self.spent = if last { 0 } else { cost_ticks };
                 last
             }
@@ -125,11 +125,12 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
         if measured {
             meters.control(cost_ticks);
         }
-        if let Some(record) = record {
+        if let Some(timed) = &mut record {
+            timed.cost_ticks = cost_ticks;
             // A light that cannot be switched must not stop the arm.
-            let _ = self.light.set_state(PinState::from(record.state().has_torque()));
+            let _ = self.light.set_state(PinState::from(timed.record.state().has_torque()));
             // A session that lags some 30 ms behind loses telemetry, which its host sees by the cycle numbers.
-            let _ = self.queues.records.enqueue(TimedRecord { record, cost_ticks });
+            let _ = self.queues.records.enqueue(*timed);
         }
         self.slot = slot.next();
         if self.timer.is_due() {

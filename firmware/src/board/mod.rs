@@ -85,6 +85,9 @@ pub trait Clock: Copy {
     /// Ticks per second.
     const HZ: u32;
 
+    /// Instructions that the processor executes per tick, where time is counted in instructions; 0 where a clock runs.
+    const INSTRUCTIONS_PER_TICK: u8 = 0;
+
     /// Ticks since start-up.
     fn ticks(self) -> u64;
 

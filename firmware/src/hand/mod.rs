@@ -92,8 +92,14 @@ pub fn start<B: Board>(
     parts: Parts<B>,
     memory: &'static mut Memory,
 ) -> Application<B> {
-    let identity =
-        Identity { firmware, board: name, serial, simulated: B::SIMULATED, ticks_per_second: <B::Clock as Clock>::HZ };
+    let identity = Identity {
+        firmware,
+        board: name,
+        serial,
+        simulated: B::SIMULATED,
+        ticks_per_second: <B::Clock as Clock>::HZ,
+        instructions_per_tick: <B::Clock as Clock>::INSTRUCTIONS_PER_TICK,
+    };
     let Parts { clock, mut slot_timer, can, link, light, .. } = parts;
     let Memory { queues, library, core, session } = memory;
     let (to_bus, outgoing) = queues.outgoing.split();

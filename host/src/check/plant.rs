@@ -70,7 +70,7 @@ mod tests {
     fn gravity_torque_holds_the_arm_still() {
         let mut plant = Plant::at([0.3, -0.5, 0.2, 1.8, -0.4, 0.6, 0.1]);
         let start = plant.q;
-        for _ in 0..300 {
+        for _ in 0..control::RATE_HZ {
             let torque = arm::MODEL.gravity_torque(&plant.frames()).0;
             plant.step(&torque);
         }
@@ -81,7 +81,7 @@ mod tests {
     fn without_torque_the_outstretched_arm_falls() {
         let mut plant = Plant::at([0.0, 1.2, 0.0, 0.0, 0.0, 0.0, 0.0]);
         let height = plant.frames().tool_pose().position.z;
-        for _ in 0..60 {
+        for _ in 0..control::RATE_HZ / 5 {
             plant.step(&Vector7::zeros());
         }
         assert!(plant.frames().tool_pose().position.z < height - 0.05);

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::{ErrorCode, Failure, Global, Table, connection, learn};
 use lab::client::Client;
 use lab::device::Device;
-use lab::error::HostError;
+use lab::error::{Capability, HostError};
 use lab::procedure::{self, HomeCorrection};
 
 /// Options of `calibrate`.
@@ -59,6 +59,7 @@ const DOING: &str = "calibrate";
 /// The device cannot be reached, the arm is not zeroed or moves, or the device refuses the home.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut client = connection::open(global, DOING, |_| {})?;
+    client.require(Capability::Arm).map_err(|error| error.into_failure(DOING))?;
     match &command.action {
         Action::Show => show(&mut client, global),
         Action::Forget => {

@@ -166,6 +166,7 @@ pub(super) fn simulation_failure(error: SimulationError, doing: &str) -> Failure
         }
         SimulationError::BusLog(..) => ErrorCode::BusLogFile,
         SimulationError::Flash(..) => ErrorCode::FlashFile,
+        SimulationError::Faults(..) => ErrorCode::FaultScript,
         _ => ErrorCode::SimulatorFailed,
     };
     Failure::new(code, doing, error)

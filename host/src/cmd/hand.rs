@@ -7,6 +7,7 @@ use serde_json::json;
 use super::{ErrorCode, Failure, Global, connection};
 use lab::client::Client;
 use lab::device::Device;
+use lab::error::Capability;
 use lab::procedure::{self, HandReach, ProcedureError};
 
 /// Fingers open, spread as it stands, rad. A tenth off the stops, which the drives need not press.
@@ -54,6 +55,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "hand";
     let output = global.output();
     let mut client = connection::open(global, DOING, |_| {})?;
+    client.require(Capability::Hand).map_err(|error| error.into_failure(DOING))?;
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let status = client.status().map_err(|error| error.into_failure(DOING))?;
     if status.hand_stage != HandStage::Ready {

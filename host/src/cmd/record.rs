@@ -22,7 +22,7 @@ pub struct Cmd {
     pub duration: f64,
 }
 
-/// Records telemetry at 300 Hz.
+/// Records telemetry of every control cycle.
 ///
 /// # Errors
 /// The device cannot be reached, or the file cannot be written.
@@ -39,8 +39,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let file = File::create(&command.output).map_err(|cause| failed(ProcedureError::Recording(cause)))?;
     let wanted = (command.duration * lab::demonstration::RATE).round() as usize;
     let bar = output.bar(wanted as u64, "recording");
-    let mut recorder =
-        Recorder::start(&mut client, BufWriter::new(file), "Tactus recording, 300 Hz").map_err(failed)?;
+    let notes = format!("Tactus recording, {} Hz", control::RATE_HZ);
+    let mut recorder = Recorder::start(&mut client, BufWriter::new(file), &notes).map_err(failed)?;
     while recorder.rows() < wanted {
         recorder.take(&mut client).map_err(failed)?;
         bar.set_position(recorder.rows() as u64);

@@ -95,7 +95,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     upload::send(&mut client, &movement, output, DOING)?;
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let simulated = if client.is_simulated() { " (simulated arm)" } else { "" };
-    let notes = format!("Tactus recording of a rehearsal of '{}', 300 Hz{simulated}", movement.name);
+    let notes = format!("Tactus recording of a rehearsal of '{}', {} Hz{simulated}", movement.name, control::RATE_HZ);
     // The same gains and the same pose feedback as in the runs that will compare themselves with this one.
     let options = RunOptions { speed: command.speed as f32, ..Mode::OpenLoop.options() };
     let mut recordings = Vec::new();

@@ -23,9 +23,6 @@ use lab::tracking::{HandTracking, Tracking};
 /// Rest that is recorded at the goal, s.
 const POST_ROLL: f64 = 1.0;
 
-/// Instructions per tick of the emulated board's clock (125 million and 25 million a second).
-const INSTRUCTIONS_PER_TICK: u32 = 5;
-
 /// Options of `run`.
 #[derive(Debug, Clone, Args)]
 pub struct Cmd {
@@ -213,7 +210,7 @@ fn play(
     let outcome = outcome?;
     tell(&outcome, output);
     let statistics = client.statistics()?;
-    report(client, file, command.mode, &request.name, &bytes, outcome, &statistics)
+    report(client, file, command.mode, &bytes, outcome, &statistics)
 }
 
 /// Says what a person should know about how the run went.
@@ -283,14 +280,14 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
 
 fn notes(client: &Client<Device>, file: &PrimitiveFile) -> String {
     let simulated = if client.is_simulated() { " (simulated arm)" } else { "" };
-    format!("Tactus recording of a run of '{}', 300 Hz, on {}{simulated}", file.name, client.hello().board.as_str())
+    let (rate, board) = (control::RATE_HZ, client.hello().board.as_str());
+    format!("Tactus recording of a run of '{}', {rate} Hz, on {board}{simulated}", file.name)
 }
 
 fn report(
     client: &mut Client<Device>,
     file: &PrimitiveFile,
     mode: Mode,
-    name: &link::Name,
     bytes: &[u8],
     outcome: RunOutcome,
     statistics: &Statistics,
@@ -298,10 +295,8 @@ fn report(
     let unreadable = |error: &dyn std::fmt::Display| std::io::Error::other(format!("it reads back wrong: {error}"));
     let recording = Recording::parse(Path::new("run"), bytes).map_err(|error| unreadable(&error))?;
     let ticks_per_second = client.hello().ticks_per_second;
-    let counts_instructions = client.hello().board.as_str().starts_with("mps2");
-    let instructions = |ticks: u32| {
-        if counts_instructions { ticks * INSTRUCTIONS_PER_TICK } else { 0 }
-    };
+    let per_tick = u32::from(client.hello().instructions_per_tick);
+    let instructions = |ticks: u32| ticks.saturating_mul(per_tick);
     let microseconds = |ticks: u32| f64::from(ticks) * 1e6 / f64::from(ticks_per_second.max(1));
     let gaps = client.gaps().telemetry;
     let bus = client.transport().simulation().map(|simulation| {
@@ -315,7 +310,7 @@ fn report(
         }
     });
     // Asked last: the bus goes on meanwhile, and its figures are those at the end of the run.
-    let (tracking, hand_tracking) = if procedure::drives_arm(client, name)? {
+    let (tracking, hand_tracking) = if client.hello().capabilities.arm {
         (Some(Tracking::of_run(&recording).map_err(|error| unreadable(&error))?), None)
     } else {
         (None, Some(HandTracking::of_run(&recording).map_err(|error| unreadable(&error))?))

@@ -31,6 +31,10 @@ pub struct Cmd {
     /// Keep the device's flash in this file, so that its primitives are there again after a restart
     #[arg(long, value_name = "FILE")]
     pub flash: Option<PathBuf>,
+    /// Let the faults of this script befall the arm: a file such as those of `tests/faults`, `FILE:2` for the second of
+    /// its scenarios
+    #[arg(long, value_name = "FILE")]
+    pub faults: Option<String>,
 }
 
 /// A connection that can be read without waiting.
@@ -105,9 +109,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "sim";
     let output = global.output();
     let mut device = global.device.clone().unwrap_or_else(|| "sim:".to_owned());
-    if let Some(file) = &command.flash {
+    let flash = command.flash.as_ref().map(|file| format!("flash={}", file.display()));
+    let faults = command.faults.as_ref().map(|file| format!("faults={file}"));
+    for option in flash.into_iter().chain(faults) {
         let comma = if device.ends_with(':') { "" } else { "," };
-        device = format!("{device}{comma}flash={}", file.display());
+        device = format!("{device}{comma}{option}");
     }
     let (mut device, interrupt) = connection::simulated(&device, DOING)?;
     let listener = listen(&command.listen).map_err(|cause| {

@@ -29,12 +29,14 @@ pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
     };
     let hello = client.hello();
     let board = format!("{} ({})", hello.board.as_str(), hello.firmware.as_str());
+    let drives = hello.capabilities;
     let fault = Fault::from_code(status.fault).filter(|fault| *fault != Fault::None);
     let stage = Stage::from_code(status.startup_stage).map_or("unknown", Stage::explanation);
     let state = State::from_code(status.state).map_or("unknown", State::name);
     global.output().result(
         &json!({
             "board": hello.board.as_str(), "firmware": hello.firmware.as_str(), "cycle": status.cycle,
+            "drives_arm": drives.arm, "drives_hand": drives.hand, "reads_wrench": drives.wrench,
             "startup": stage, "blocked": status.blocked.map(explain_blocked), "state": state, "fault": status.fault,
             "zeroed": status.zeroed, "home": source.map(HomeSource::name), "safety_mode": status.safety_mode,
             "wrench_zeroed": status.wrench_zeroed, "hand": status.hand_stage.name(), "q_rad": status.q,

@@ -13,6 +13,7 @@ use super::{ErrorCode, Failure, Global, connection};
 use lab::client::Client;
 use lab::demonstration::RATE;
 use lab::device::Device;
+use lab::error::Capability;
 use lab::procedure::{self, ProcedureError, Recorder, teacher};
 use lab::simulation::{DEFAULT_SEED, SimulationOptions};
 
@@ -89,6 +90,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         options.lesson = command.lesson.lesson();
         clear_the_table(options);
     })?;
+    client.require(Capability::Arm).map_err(|error| error.into_failure(DOING))?;
     let alone = global.non_interactive && command.duration.is_none();
     if alone && default_posture(&mut client, command.lesson).is_none() {
         return Err(Failure::new(
@@ -118,7 +120,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 
     let file = File::create(&command.output).map_err(|cause| failed(ProcedureError::Recording(cause)))?;
     let notes = format!(
-        "Tactus recording of a demonstration by hand, 300 Hz, from {} {}",
+        "Tactus recording of a demonstration by hand, {} Hz, from {} {}",
+        control::RATE_HZ,
         client.hello().board.as_str(),
         if client.is_simulated() { "(simulated arm, simulated person)" } else { "" }
     );
@@ -148,7 +151,7 @@ fn record(
     let guided = teacher::begin(client);
     let enter = (!guided && command.duration.is_none()).then(wait_for_enter);
     if guided {
-        output.say("a simulated person guides the hand");
+        output.say("a simulated teacher guides the hand");
     } else if enter.is_some() {
         output.say("guide the arm; press Enter when the movement is shown");
     }

@@ -46,7 +46,7 @@ fn firmware_boots_from_the_emergency_stop_to_ready_through_every_stage() {
 fn every_cycle_begins_on_the_300_hz_grid() {
     let mut arm = ready("sim:seed=12,world=simple");
     let from = simulation(arm.transport()).ticks();
-    let telemetry = watch(&mut arm, 600);
+    let telemetry = watch(&mut arm, 2 * control::RATE_HZ as usize);
     assert!(telemetry.windows(2).all(|pair| pair[1].cycle == pair[0].cycle + 1), "a cycle is missing");
     let simulation = simulation(arm.transport());
     let until = simulation.ticks();
@@ -69,7 +69,7 @@ fn every_cycle_begins_on_the_300_hz_grid() {
 #[test]
 fn no_torque_flows_before_a_person_commands() {
     let mut arm = at_rest("sim:seed=13");
-    watch(&mut arm, 150);
+    watch(&mut arm, control::RATE_HZ as usize / 2);
     let plant = simulation(arm.transport()).plant();
     let sent = torques(plant.recorded());
     assert!(sent.len() > 100, "the pucks must be told zero explicitly: {} frames", sent.len());
@@ -83,7 +83,7 @@ fn gravity_compensation_holds_the_arm_still() {
     let mut arm = ready("sim:seed=14");
     expect(arm.gravity());
     let start = simulation(arm.transport()).world().grasp_pose().position;
-    let telemetry = watch(&mut arm, 900);
+    let telemetry = watch(&mut arm, 3 * control::RATE_HZ as usize);
     assert!(telemetry.iter().all(|cycle| State::from_code(cycle.state) == Some(State::Gravity)));
     let end = simulation(arm.transport()).world().grasp_pose().position;
     let drift = distance(&start, &end);

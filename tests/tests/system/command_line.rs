@@ -25,9 +25,12 @@ fn every_command_gives_one_json_object_and_nothing_else() {
     let simulated = object(&["sim", "--listen", "unix:arm.sock", "--duration", "0.5", "--fast"]);
     assert!(simulated["simulated_s"].as_f64().is_some_and(|seconds| (0.5..0.6).contains(&seconds)), "{simulated}");
     let taught = object(&["teach", "--duration", "1", "-o", "floating.csv"]);
-    assert_eq!((&taught["samples"], &taught["gaps"]), (&Value::from(300), &Value::from(0)));
+    assert_eq!((&taught["samples"], &taught["gaps"]), (&Value::from(control::RATE_HZ), &Value::from(0)));
     let recorded = object(&["record", "--duration", "0.5", "-o", "still.csv"]);
-    assert_eq!((&recorded["samples"], &recorded["file"]), (&Value::from(150), &Value::from("still.csv")));
+    assert_eq!(
+        (&recorded["samples"], &recorded["file"]),
+        (&Value::from(control::RATE_HZ / 2), &Value::from("still.csv"))
+    );
     assert_eq!(object(&["list"])["primitives"], Value::Array(Vec::new()));
     let uploaded = object(&["upload", "primitive.toml"]);
     assert_eq!((&uploaded["name"], &uploaded["sent"]), (&Value::from(PRIMITIVE), &Value::from(true)));

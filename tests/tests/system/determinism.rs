@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use control::State;
+use control::{RATE_HZ, State};
 use lab::procedure::{self, Recorder};
 use system_tests::execution::{play, watch};
 use system_tests::load::Load;
@@ -18,7 +18,7 @@ type Account = (u64, Vec<u8>);
 /// is moved against his hand jumps when he does.
 fn carry_itself(arm: &mut Arm) {
     expect(arm.hold());
-    watch(arm, 300);
+    watch(arm, RATE_HZ as usize);
 }
 
 /// Start-up, hold, and a short move, recorded.
@@ -27,7 +27,7 @@ fn short_movement(address: &str) -> Account {
     carry_itself(&mut arm);
     let mut recorder = expect(Recorder::start(&mut arm, Vec::new(), "short movement"));
     expect(arm.approach(NEAR_HOME, 0.0));
-    while recorder.rows() < 300 {
+    while recorder.rows() < RATE_HZ as usize {
         expect(recorder.take(&mut arm));
     }
     assert_eq!(expect(arm.status()).fault, 0);

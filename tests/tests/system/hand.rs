@@ -3,8 +3,8 @@
 
 use std::time::Duration;
 
-use control::State;
-use lab::error::HostError;
+use control::{RATE_HZ, State};
+use lab::error::{Capability, HostError};
 use lab::image_file::ImageFile;
 use lab::procedure;
 use lab::simulation::{HAND_IMAGE_VARIABLE, built_image};
@@ -120,7 +120,7 @@ fn grip(address: &str, options: RunOptions) -> Account {
     let (mut hand, stages) = begin(address);
     expect(hand.run(&name(), options));
     let mut telemetry = Vec::new();
-    for cycle in expect(hand.telemetry(1)).take(5 * 300) {
+    for cycle in expect(hand.telemetry(1)).take(5 * RATE_HZ as usize) {
         telemetry.push(expect(cycle));
     }
     let statistics = expect(hand.statistics());
@@ -193,11 +193,11 @@ fn hand_runs_are_equal_bit_by_bit_for_equal_seeds() {
 fn hand_run_stops_on_command_and_lets_the_worms_hold() {
     let (mut hand, _) = begin("hand:seed=34");
     expect(hand.run(&name(), adapt()));
-    let running: Vec<_> = expect(hand.telemetry(1)).take(900).map(expect).collect();
+    let running: Vec<_> = expect(hand.telemetry(1)).take(3 * RATE_HZ as usize).map(expect).collect();
     assert_eq!(running.last().and_then(|cycle| State::from_code(cycle.state)), Some(State::Run));
     expect(hand.stop());
-    let stopped: Vec<_> = expect(hand.telemetry(1)).take(300).map(expect).collect();
-    let (first, last) = (stopped[30], stopped[299]);
+    let stopped: Vec<_> = expect(hand.telemetry(1)).take(RATE_HZ as usize).map(expect).collect();
+    let (first, last) = (stopped[RATE_HZ as usize / 10], stopped[RATE_HZ as usize - 1]);
     assert_eq!(State::from_code(last.state), Some(State::SoftStop));
     assert_eq!(last.tau, [0.0; 7]);
     assert!(first.hand.iter().zip(last.hand).all(|(then, now)| (then - now).abs() < 0.01), "the worms hold");
@@ -214,6 +214,9 @@ fn hand_device_refuses_what_needs_an_arm() {
             other => panic!("{other:?}"),
         }
     }
+    let missing = hand.require(Capability::Arm).unwrap_err();
+    assert_eq!(missing.to_string(), "the device does not drive an arm");
+    assert_eq!((hand.require(Capability::Hand).is_ok(), hand.hello().capabilities.wrench), (true, false));
     let listing = expect(hand.list());
     assert_eq!(listing.len(), 1);
     assert!(listing[0].expectation && listing[0].kernels == KERNELS as u16);

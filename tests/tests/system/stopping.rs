@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use control::State;
+use control::{RATE_HZ, State};
 use device::Stage;
 use lab::client::Incoming;
 use lab::transport::Transport as _;
@@ -53,7 +53,7 @@ fn stop_ends_a_movement_within_two_cycles_and_without_a_jerk() {
     let (mut arm, mut telemetry) = in_the_middle("sim:seed=41");
     let last_heard = telemetry.last().expect("it runs").cycle;
     expect(arm.stop());
-    while telemetry.last().expect("it runs").cycle < last_heard + 300 {
+    while telemetry.last().expect("it runs").cycle < last_heard + RATE_HZ {
         telemetry.extend(next(&mut arm));
     }
     let stopped = telemetry.iter().find(|cycle| state(cycle) == Some(State::SoftStop)).expect("it stopped");

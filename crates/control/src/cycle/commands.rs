@@ -9,7 +9,7 @@ use crate::guard::fault::Fault;
 use crate::guard::supervisor::{State, Trigger};
 use crate::model::hand;
 use crate::plan;
-use crate::plan::approach::{Approach, LONGEST};
+use crate::plan::approach::{Approach, LONGEST_APPROACH};
 use crate::plan::primitive::Primitive;
 use crate::plan::run::Run;
 use crate::real::Real;
@@ -71,7 +71,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Command::Approach { q: target, duration } => {
                 self.may_begin(measured)?;
                 self.supervisor.allows(Trigger::Approach)?;
-                if !(duration >= 0.0 && f64::from(duration) <= LONGEST) || target.iter().any(|q| !q.is_finite()) {
+                if !(duration >= 0.0 && f64::from(duration) <= LONGEST_APPROACH)
+                    || target.iter().any(|q| !q.is_finite())
+                {
                     return Err(Refusal::OutOfRange);
                 }
                 let target = JointPositions::from_f32(target);
@@ -121,10 +123,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         let expected = primitive.expected().ok_or(Refusal::NoExpectation)?;
         let [fx, fy, fz, ..] = expected.at(R::of(0.0));
-        let felt = measured.frames.sensor_to_world() * self.wrench.rest_force();
+        let at_rest = measured.frames.sensor_to_world() * self.wrench.rest_force();
         let limit = R::of(REST_FORCE * REST_FORCE);
         let within = |force: Vector3<R>| force.dot(&force) <= limit;
-        if within(felt) || within(felt - Vector3::new(fx, fy, fz)) { Ok(()) } else { Err(Refusal::ForceAtRest) }
+        if within(at_rest) || within(at_rest - Vector3::new(fx, fy, fz)) { Ok(()) } else { Err(Refusal::ForceAtRest) }
     }
 
     fn move_hand(&mut self, q: &[f32; 4], duration: f32, measured: &Measured<'_, R>) -> Result<(), Refusal> {
@@ -135,7 +137,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if self.hand.answering().is_none() {
             return Err(Refusal::NoHand);
         }
-        let timely = duration >= 0.0 && f64::from(duration) <= plan::hand::LONGEST;
+        let timely = duration >= 0.0 && f64::from(duration) <= plan::hand::LONGEST_MOVE;
         if !timely || !hand::within_range(q) {
             return Err(Refusal::OutOfRange);
         }

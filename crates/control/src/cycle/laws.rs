@@ -8,7 +8,7 @@ use crate::model::kinematics::Frames;
 use crate::plan::primitive::posture_and_hand;
 use crate::plan::reference::{HandReference, JointReference, TaskReference};
 use crate::plan::run::Senses;
-use crate::real::{Real, at_least, at_most};
+use crate::real::{Real, at_least, at_most, sqrt};
 use crate::sense::hand::HandState;
 use crate::time::{PERIOD, periods};
 use crate::units::{JointPositions, JointTorques, Pose, Vector6, Vector7, Wrench};
@@ -180,7 +180,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             torque.0 += ForceController::torque(&measured.frames.jacobian(), &wanted).0;
             set |= flags::FORCE_CONTROL;
         }
-        if run.surprise() > R::of(1.0) {
+        let surprise = run.surprise();
+        if surprise > R::of(1.0) {
             set |= flags::SURPRISE;
         }
         if run.is_faded(primitive) {
@@ -191,14 +192,14 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         torque.0 += handover.step();
         let offset = task.pose.position - measured.pose.position;
-        *lag = Lag { distance: offset.dot(&offset).square_root(), speed: operational.lag() };
-        Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, surprise: run.surprise(), flags: set }
+        *lag = Lag { distance: sqrt(offset.dot(&offset)), speed: operational.lag() };
+        Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, surprise, flags: set }
     }
 }
 
 /// Speed of the hand (m/s).
 fn hand_speed<R: Real>(measured: &Measured<'_, R>) -> R {
-    measured.frames.jacobian().twist(&measured.state.dq.0).fixed_rows::<3>(0).norm_squared().square_root()
+    sqrt(measured.frames.jacobian().twist(&measured.state.dq.0).fixed_rows::<3>(0).norm_squared())
 }
 
 /// The command with its force and its torque cut to these magnitudes (N, N m), their directions kept.
@@ -206,7 +207,7 @@ fn bounded<R: Real>(command: &Vector6<R>, (force, torque): (R, R)) -> Vector6<R>
     let mut bounded = *command;
     for (first, limit) in [(0, force), (3, torque)] {
         let mut part = bounded.fixed_rows_mut::<3>(first);
-        let length = part.dot(&part).square_root();
+        let length = sqrt(part.dot(&part));
         if length > limit {
             part *= limit / length;
         }

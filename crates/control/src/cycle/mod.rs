@@ -31,7 +31,7 @@ use crate::law::gains::Gains;
 use crate::model::arm::ArmModel;
 use crate::model::calibration::{Calibration, Payload};
 use crate::model::kinematics::Frames;
-use crate::plan::load::{Fit, LoadRefusal, Loaded};
+use crate::plan::load::{CheckedPrimitive, LoadRefusal, Loaded};
 use crate::plan::primitive::Primitive;
 use crate::plan::run::{FADE, Run};
 use crate::real::Real;
@@ -207,7 +207,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     ///
     /// # Errors
     /// [`LoadRefusal`] while a run is in progress, or if it was checked for another arm than this.
-    pub fn load(&mut self, fit: &Fit<'_, R, N>) -> Result<(), LoadRefusal> {
+    pub fn load(&mut self, fit: &CheckedPrimitive<'_, R, N>) -> Result<(), LoadRefusal> {
         if self.supervisor.law() == State::Run {
             return Err(LoadRefusal::Running);
         }

@@ -1,11 +1,11 @@
-//! `Watch`: notices, from what successful runs felt like, that this one is not going as it should.
+//! `Watch`: notices, by the sensor values of successful runs, that this one is not going as it should.
 //!
 //! Two things are told. A channel leaves its band: its z-score by the [`SensorStatistics`] is averaged over [`MEMORY`]
 //! with its sign (noise averages out, a missing object does not) and passes [`LIMIT`]. Of a finger only going too far
 //! counts: one that stops early has met something, be it thicker than usual; one that closes farther than ever holds
 //! nothing. And contact is lost: before the fingers move, the force falls to a small part of what it was. No table by
-//! phase can tell that, because objects are met at different phases, but what was met and fell over is not felt any
-//! more.
+//! phase can tell that, because objects are met at different phases, but an object that was met and fell over no longer
+//! pushes back.
 //!
 //! Each is told once per run. The watch only tells; it never touches a torque, since a wrong alarm must not stop an arm
 //! that holds something.
@@ -57,7 +57,7 @@ const LOST: f64 = 2.0;
 /// Largest force that is compared (N); more would be no sample.
 const STRONGEST: f64 = 1e3;
 
-/// What was not as it should be, and when.
+/// A channel that left its band, and when.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surprise {
     /// Channel of the statistics, 0 to 11. For lost contact it is the axis along which the force was largest, 0 to 2.
@@ -126,13 +126,13 @@ impl<R: Real> Watch<R> {
         })
     }
 
-    /// How far each channel is on the way to a surprise (spreads, never negative): the averaged deviation, of fingers
-    /// only that of closing too far.
+    /// Distance of each channel towards a surprise (spreads, never negative): the averaged deviation, of fingers only
+    /// that of closing too far.
     pub fn sizes(&self) -> [R; STATISTICS_CHANNELS] {
         core::array::from_fn(|channel| self.averages.get(channel).map_or(R::of(0.0), |average| size(channel, *average)))
     }
 
-    /// Whether contact was lost before the fingers closed.
+    /// True if contact was lost before the fingers closed.
     pub fn has_lost_contact(&self) -> bool {
         self.contact.lost
     }
@@ -149,7 +149,7 @@ impl<R: Real> Default for Watch<R> {
     }
 }
 
-/// Whether what was met is still felt.
+/// Contact with an object that was met, and its loss.
 #[derive(Clone, Debug)]
 struct Contact<R: Real> {
     /// Averaged force (N, world).
@@ -169,7 +169,7 @@ impl<R: Real> Contact<R> {
         Contact { force: [zero; 3], largest: zero, axis: 0, fingers: None, closing: false, lost: false }
     }
 
-    /// Gives the axis of the force that is no longer felt, once.
+    /// Returns, once, the axis of a force that is gone.
     fn step(&mut self, progress: R, values: &[R; STATISTICS_CHANNELS], has_hand: bool) -> Option<usize> {
         let [fx, fy, fz, .., q1, q2, q3] = *values;
         if has_hand {

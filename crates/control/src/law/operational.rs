@@ -13,7 +13,7 @@ use crate::law::gains::Tracking;
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
 use crate::plan::reference::{JointReference, TaskReference};
-use crate::real::{Real, at_least, at_most};
+use crate::real::{Real, at_least, at_most, sqrt};
 use crate::sense::filter::{Butterworth, LowPass};
 use crate::sense::joints::JointState;
 use crate::time::{PERIOD, RATE};
@@ -99,7 +99,7 @@ impl<R: Real> OperationalController<R> {
         let dq_d = inverse.resolve(&(task.velocity + correction), &preferred);
 
         let rate = task.velocity - jacobian.twist(&dq.0);
-        self.lag = rate.fixed_rows::<3>(0).norm_squared().square_root();
+        self.lag = sqrt(rate.fixed_rows::<3>(0).norm_squared());
         let ddq_d = match acceleration {
             AccelerationSource::Analytic => {
                 let damping = gain(rate.fixed_rows::<3>(0).into(), rate.fixed_rows::<3>(3).into());
@@ -135,5 +135,5 @@ impl<R: Real> OperationalController<R> {
 /// The vector, shortened to this length if it is longer.
 fn within_length<R: Real>(vector: Vector3<R>, longest: R) -> Vector3<R> {
     let squared = vector.norm_squared();
-    if squared <= longest * longest { vector } else { vector * (longest / squared.square_root()) }
+    if squared <= longest * longest { vector } else { vector * (longest / sqrt(squared)) }
 }

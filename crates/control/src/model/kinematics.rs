@@ -8,7 +8,7 @@
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use crate::model::arm::ArmModel;
-use crate::real::{Real, at_least};
+use crate::real::{Real, at_least, sqrt};
 use crate::units::{JOINTS, JointPositions, JointVelocities, Orientation, Pose, Twist, Vector6, Vector7};
 
 /// The geometric Jacobian: 6 rows (linear, angular; world axes), one column per joint.
@@ -40,19 +40,22 @@ impl<R: Real> Jacobian<R> {
 
     /// Factorises `J J^T + damping I`. A positive `damping` (m^2, rad^2) keeps the inverse bounded at a singularity.
     pub fn damped(&self, damping: R) -> DampedInverse<'_, R> {
-        let mut gram = [[R::of(0.0); 6]; 6];
-        for column in self.0.column_iter() {
-            for (row, gram_row) in gram.iter_mut().enumerate() {
-                let left = column[row];
-                for (entry, right) in gram_row.iter_mut().zip(column.iter()).take(row + 1) {
-                    *entry += left * *right;
+        let zero = R::of(0.0);
+        let factor = Factor { lower: [[zero; 6]; 6], pivot_inverse: [zero; 6] };
+        let mut inverse = DampedInverse { jacobian: self, factor };
+        let gram = &mut inverse.factor.lower;
+        for column in &self.0.data.0 {
+            for row in 0..6 {
+                for other in 0..=row {
+                    gram[row][other] += column[row] * column[other];
                 }
             }
         }
         for (index, row) in gram.iter_mut().enumerate() {
             row[index] += damping;
         }
-        DampedInverse { jacobian: self, factor: Factor::new(gram, damping) }
+        inverse.factor.factorise(damping);
+        inverse
     }
 }
 
@@ -63,25 +66,23 @@ struct Factor<R: Real> {
 }
 
 impl<R: Real> Factor<R> {
-    /// Factorises the lower triangle of `matrix`. Every eigenvalue is at least `floor`, and so is every pivot: rounding
-    /// below it is lifted back, so that no division by zero is possible.
-    fn new(mut matrix: [[R; 6]; 6], floor: R) -> Self {
-        let mut pivot_inverse = [R::of(0.0); 6];
+    /// Factorises the lower triangle that stands in `lower`. Every eigenvalue is at least `floor`, and so is every
+    /// pivot: rounding below it is lifted back, so that no division by zero is possible.
+    fn factorise(&mut self, floor: R) {
+        let matrix = &mut self.lower;
         for column in 0..6 {
-            let pivot = at_least(matrix[column][column], floor);
-            let inverse = R::of(1.0) / pivot;
-            pivot_inverse[column] = inverse;
-            // The column below the pivot, before it is divided by it.
-            let below = matrix.map(|row| row[column]);
-            for (row, entries) in matrix.iter_mut().enumerate().skip(column + 1) {
-                let scaled = below[row] * inverse;
-                for (entry, value) in entries.iter_mut().zip(&below).take(row + 1).skip(column + 1) {
-                    *entry -= scaled * *value;
+            let inverse = R::of(1.0) / at_least(matrix[column][column], floor);
+            self.pivot_inverse[column] = inverse;
+            // From below, so that the upper rows of this column are still undivided.
+            for row in (column + 1..6).rev() {
+                let scaled = matrix[row][column] * inverse;
+                for other in column + 1..=row {
+                    let update = scaled * matrix[other][column];
+                    matrix[row][other] -= update;
                 }
-                entries[column] = scaled;
+                matrix[row][column] = scaled;
             }
         }
-        Factor { lower: matrix, pivot_inverse }
     }
 
     fn solve(&self, right: &Vector6<R>) -> Vector6<R> {
@@ -142,20 +143,28 @@ impl<R: Real> Frames<R> {
     /// The frames at posture `q`.
     pub fn new(model: &ArmModel<R>, q: &JointPositions<R>) -> Self {
         let (zero, one) = (R::of(0.0), R::of(1.0));
-        let mut sine = [zero; JOINTS];
-        let mut cosine = [zero; JOINTS];
-        let mut axes = [Vector3::zeros(); JOINTS];
-        let mut origins = [Vector3::zeros(); JOINTS];
+        // Filled in its place: a copy of its arrays costs as much as their contents.
+        let mut frames = Frames {
+            sine: [zero; JOINTS],
+            cosine: [zero; JOINTS],
+            axes: [Vector3::zeros(); JOINTS],
+            origins: [Vector3::zeros(); JOINTS],
+            plate: Vector3::zeros(),
+            plate_to_world: Matrix3::zeros(),
+            tool: Vector3::zeros(),
+            tool_to_world: Matrix3::zeros(),
+            sensor: Vector3::zeros(),
+        };
         let mut x = Vector3::new(one, zero, zero);
         let mut y = Vector3::new(zero, one, zero);
         let mut z = Vector3::new(zero, zero, one);
         let mut origin = Vector3::zeros();
         for joint in 0..JOINTS {
             let (s, c) = q.0[joint].sine_cosine();
-            sine[joint] = s;
-            cosine[joint] = c;
-            axes[joint] = z;
-            origins[joint] = origin;
+            frames.sine[joint] = s;
+            frames.cosine[joint] = c;
+            frames.axes[joint] = z;
+            frames.origins[joint] = origin;
             let turned_x = x * c + y * s;
             let turned_y = y * c - x * s;
             origin += z * model.link_offset[joint] + turned_x * model.link_length[joint];
@@ -163,20 +172,14 @@ impl<R: Real> Frames<R> {
             y = turned_y * model.twist_cosine[joint] + z * model.twist_sine[joint];
             z = z * model.twist_cosine[joint] - turned_y * model.twist_sine[joint];
         }
-        let plate_to_world = Matrix3::from_columns(&[x, y, z]);
         let tool_x = x * model.tool_cosine + y * model.tool_sine;
         let tool_y = y * model.tool_cosine - x * model.tool_sine;
-        Frames {
-            sine,
-            cosine,
-            axes,
-            origins,
-            plate: origin,
-            plate_to_world,
-            tool: origin + z * model.tool_height,
-            tool_to_world: Matrix3::from_columns(&[tool_x, tool_y, z]),
-            sensor: origin + plate_to_world * model.sensor_origin,
-        }
+        frames.plate = origin;
+        frames.plate_to_world = Matrix3::from_columns(&[x, y, z]);
+        frames.tool = origin + z * model.tool_height;
+        frames.tool_to_world = Matrix3::from_columns(&[tool_x, tool_y, z]);
+        frames.sensor = origin + frames.plate_to_world * model.sensor_origin;
+        frames
     }
 
     /// Pose of the tool frame.
@@ -205,17 +208,12 @@ impl<R: Real> Frames<R> {
     }
 
     fn jacobian_at(&self, point: &Vector3<R>) -> Jacobian<R> {
-        let mut jacobian = SMatrix::<R, 6, JOINTS>::zeros();
-        for (mut column, (axis, origin)) in jacobian.column_iter_mut().zip(self.axes.iter().zip(&self.origins)) {
+        let mut jacobian = Jacobian(SMatrix::zeros());
+        for ((axis, origin), column) in self.axes.iter().zip(&self.origins).zip(&mut jacobian.0.data.0) {
             let linear = axis.cross(&(point - origin));
-            column[0] = linear.x;
-            column[1] = linear.y;
-            column[2] = linear.z;
-            column[3] = axis.x;
-            column[4] = axis.y;
-            column[5] = axis.z;
+            *column = [linear.x, linear.y, linear.z, axis.x, axis.y, axis.z];
         }
-        Jacobian(jacobian)
+        jacobian
     }
 
     /// Acceleration of the tool while the joints do not accelerate: `dJ/dt dq` (m/s^2, rad/s^2, world axes).
@@ -245,7 +243,7 @@ impl<R: Real> Frames<R> {
             for joint in 0..joints {
                 velocity += self.axes[joint].cross(&(point - self.origins[joint])) * dq.0[joint];
             }
-            velocity.dot(&velocity).square_root()
+            sqrt(velocity.dot(&velocity))
         };
         [speed(elbow, 3), speed(tip, 4)]
     }

@@ -26,7 +26,7 @@ const SAMPLES: usize = 8;
 const SAMPLE_MARGIN: f64 = 1.05;
 
 /// Longest approach that may be asked for (s).
-pub const LONGEST: f64 = 120.0;
+pub const LONGEST_APPROACH: f64 = 120.0;
 
 /// Longest time that the arm may take to close in on the target after the path has ended: 1 s, in control periods.
 pub const SETTLING: u16 = periods(1.0);
@@ -67,9 +67,9 @@ impl<R: Real> Approach<R> {
             let scale = R::of(SAMPLE_MARGIN / TIP_SPEED);
             needed = crate::real::at_least(needed, crate::real::at_least(elbow, tip) * scale);
         }
-        let longest = R::of(LONGEST);
+        let longest = R::of(LONGEST_APPROACH);
         let needed = crate::real::at_most(needed, longest);
-        let length = (needed * R::of(RATE)).whole_below().to_whole() + 1;
+        let length = (needed * R::of(RATE)).to_whole() + 1;
         Approach { start: start.0, way, length, passed: 0, settled: 0, rate: R::of(RATE) / R::from_counts(length) }
     }
 

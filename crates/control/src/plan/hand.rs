@@ -7,7 +7,7 @@ use crate::real::{Real, at_least, at_most};
 use crate::time::RATE;
 
 /// Longest move that may be asked for (s).
-pub const LONGEST: f64 = 60.0;
+pub const LONGEST_MOVE: f64 = 60.0;
 
 /// Shortest move (s).
 const SHORTEST: f64 = 0.3;
@@ -39,8 +39,8 @@ impl<R: Real> HandMotion<R> {
             let magnitude = if *way < R::of(0.0) { -*way } else { *way };
             needed = at_least(needed, magnitude * R::of(PEAK / limit));
         }
-        let needed = at_most(needed, R::of(LONGEST));
-        HandMotion { start: *start, way, length: (needed * R::of(RATE)).whole_below().to_whole() + 1, passed: 0 }
+        let needed = at_most(needed, R::of(LONGEST_MOVE));
+        HandMotion { start: *start, way, length: (needed * R::of(RATE)).to_whole() + 1, passed: 0 }
     }
 
     /// Returns the goal (rad).

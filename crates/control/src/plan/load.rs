@@ -15,9 +15,9 @@ use crate::real::Real;
 use crate::units::{JointPositions, Orientation};
 
 /// Shortest movement (s).
-pub const SHORTEST: f64 = 0.5;
+pub const SHORTEST_MOVEMENT: f64 = 0.5;
 /// Longest movement (s).
-pub const LONGEST: f64 = 120.0;
+pub const LONGEST_MOVEMENT: f64 = 120.0;
 /// Farthest tool position from the shoulder (m): the outstretched arm with its hand reaches 1.04 m.
 pub const REACH: f64 = 1.05;
 /// Largest distance between the taught pose and the pose of the taught posture (m).
@@ -62,7 +62,9 @@ impl fmt::Display for LoadError {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             LoadError::Primitive(error) => write_error(error, formatter),
-            LoadError::Duration => write!(formatter, "the duration is outside {SHORTEST} to {LONGEST} s"),
+            LoadError::Duration => {
+                write!(formatter, "the duration is outside {SHORTEST_MOVEMENT} to {LONGEST_MOVEMENT} s")
+            }
             LoadError::Posture(end, joint) => {
                 write!(formatter, "J{} of the {end} posture lies outside its soft limits", joint + 1)
             }
@@ -80,18 +82,18 @@ impl core::error::Error for LoadError {}
 /// [`Cycle::load`](crate::Cycle::load) asks for. The check costs two forward kinematics and belongs where there is
 /// time; taking the primitive over is then a copy.
 #[derive(Debug)]
-pub struct Fit<'a, R: Real, const N: usize> {
+pub struct CheckedPrimitive<'a, R: Real, const N: usize> {
     primitive: &'a Primitive<R, N>,
     tool: Tool<R>,
 }
 
-impl<'a, R: Real, const N: usize> Fit<'a, R, N> {
+impl<'a, R: Real, const N: usize> CheckedPrimitive<'a, R, N> {
     /// The primitive.
     pub fn primitive(&self) -> &'a Primitive<R, N> {
         self.primitive
     }
 
-    /// Whether it was checked for an arm with the tool of this one. Nothing else of an arm that a check looks at can
+    /// True if it was checked for an arm with the tool of this one. Nothing else of an arm that a check looks at can
     /// differ: links and limits are constants of the model.
     pub(crate) fn is_for(&self, model: &ArmModel<R>) -> bool {
         self.tool == Tool::of(model)
@@ -111,13 +113,13 @@ impl<R: Real, const N: usize> Loaded<R, N> {
         init!(Loaded { primitive: Primitive::PLACEHOLDER, present: false })
     }
 
-    /// What is there.
+    /// The primitive, if there is one.
     pub(crate) fn get(&self) -> Option<&Primitive<R, N>> {
         self.present.then_some(&self.primitive)
     }
 
     /// Copies a primitive here.
-    pub(crate) fn put(&mut self, fit: &Fit<'_, R, N>) {
+    pub(crate) fn put(&mut self, fit: &CheckedPrimitive<'_, R, N>) {
         self.primitive.clone_from(fit.primitive);
         self.present = true;
     }
@@ -163,14 +165,14 @@ pub fn primitive<R: Real, const N: usize>(
 pub fn check<'a, R: Real, const N: usize>(
     model: &ArmModel<R>,
     primitive: &'a Primitive<R, N>,
-) -> Result<Fit<'a, R, N>, LoadError> {
+) -> Result<CheckedPrimitive<'a, R, N>, LoadError> {
     let duration = primitive.movement().duration();
-    if !(duration >= R::of(SHORTEST) && duration <= R::of(LONGEST)) {
+    if !(duration >= R::of(SHORTEST_MOVEMENT) && duration <= R::of(LONGEST_MOVEMENT)) {
         return Err(LoadError::Duration);
     }
     check_end(model, End::Start, primitive.movement().start())?;
     check_end(model, End::Goal, primitive.movement().goal())?;
-    Ok(Fit { primitive, tool: Tool::of(model) })
+    Ok(CheckedPrimitive { primitive, tool: Tool::of(model) })
 }
 
 fn check_end<R: Real>(model: &ArmModel<R>, end: End, configuration: &Configuration<R>) -> Result<(), LoadError> {
@@ -193,7 +195,7 @@ fn check_end<R: Real>(model: &ArmModel<R>, end: End, configuration: &Configurati
     if near && aligned { Ok(()) } else { Err(LoadError::Inconsistent(end)) }
 }
 
-/// Whether a tool position can be reached at all. False for a NaN.
+/// True if a tool position can be reached at all. False for a NaN.
 pub fn within_reach<R: Real>(position: &nalgebra::Vector3<R>) -> bool {
     position.dot(position) <= R::of(REACH * REACH)
 }

@@ -41,7 +41,7 @@ pub(crate) const FADE: u16 = periods(0.1);
 /// Largest distance of a digit of the hand from where the primitive starts (rad).
 const HAND_DISTANCE: f64 = 0.15;
 
-/// How well this tick's sensors can be believed.
+/// Age of the sensor values of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Senses {
     /// All values are of this tick.
@@ -60,7 +60,7 @@ pub(crate) struct Run<R: Real, const N: usize> {
     /// Feedback as computed last, before it fades.
     coupling: Coupling<R>,
     deviation: Option<Deviation<R>>,
-    /// What a compliant run bends by.
+    /// The filtered deviation, by which a compliant run bends.
     smoothed: SmoothedWrench<R>,
     watch: Watch<R>,
     /// Control periods of fading left: `FADE` in full, 0 gone.
@@ -107,16 +107,8 @@ impl<R: Real, const N: usize> Run<R, N> {
             None => taught_hand,
         };
         let start = StartState::at_rest(configuration(pose.position.into(), pose.orientation.0, q.0.into(), hand));
-        let mut rollout = Rollout::start(primitive.movement(), &start).map_err(reason)?;
-        // The first speed acts at once; later ones are approached at the rollout's slew rate.
-        rollout.set_speed_slew(None).map_err(reason)?;
-        set_speed(&mut rollout, primitive, options.speed)?;
-        rollout.set_speed_slew(Some(R::of(Rollout::<R, N>::DEFAULT_SLEW))).map_err(reason)?;
-        if options.goal != Goal::STORED {
-            set_goal(&mut rollout, primitive, &options.goal)?;
-        }
-        *place = Some(Run {
-            rollout,
+        let mut run = Run {
+            rollout: Rollout::start(primitive.movement(), &start).map_err(reason)?,
             options,
             coupling: Coupling::NONE,
             deviation: None,
@@ -125,7 +117,16 @@ impl<R: Real, const N: usize> Run<R, N> {
             kept: FADE,
             settled: false,
             rested: 0,
-        });
+        };
+        let rollout = &mut run.rollout;
+        // The first speed acts at once; later ones are approached at the rollout's slew rate.
+        rollout.set_speed_slew(None).map_err(reason)?;
+        set_speed(rollout, primitive, options.speed)?;
+        rollout.set_speed_slew(Some(R::of(Rollout::<R, N>::DEFAULT_SLEW))).map_err(reason)?;
+        if options.goal != Goal::STORED {
+            set_goal(rollout, primitive, &options.goal)?;
+        }
+        *place = Some(run);
         Ok(())
     }
 
@@ -225,7 +226,7 @@ impl<R: Real, const N: usize> Run<R, N> {
         R::from_counts(i32::from(self.kept)) * R::of(1.0 / FADE as f64)
     }
 
-    /// Whether the feedback or the force controller acts with less than it would: the sensor is silent, or the run
+    /// True if the feedback or the force controller acts with less than it would: the sensor is silent, or the run
     /// takes another time than the recording of the expectation.
     pub(crate) fn is_faded(&self, primitive: &Primitive<R, N>) -> bool {
         let uses_force = self.options.feedback || self.options.force_control;
@@ -233,13 +234,14 @@ impl<R: Real, const N: usize> Run<R, N> {
         (uses_force && self.kept < FADE) || derated
     }
 
-    /// Whether the movement is over.
+    /// True if the movement is over.
     pub(crate) fn is_over(&self) -> bool {
         let latest = if self.options.feedback { LATEST_WITH_FEEDBACK } else { LATEST };
         self.rested >= SETTLING || self.rollout.progress() > R::of(latest)
     }
 
-    /// What is expected and what is felt beyond it, as of the last complete tick; `None` without an expectation.
+    /// The expected sensor values and the deviation from them, as of the last complete tick; `None` without an
+    /// expectation.
     pub(crate) fn deviation(&self) -> Option<&Deviation<R>> {
         self.deviation.as_ref()
     }

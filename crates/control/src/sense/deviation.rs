@@ -1,8 +1,8 @@
-//! `Deviation`: how what is felt differs from what is expected, the one input of Eq (8), Eq (12) and Eq (14).
+//! `Deviation`: the difference of the measured sensor values from the expected ones, the one input of Eq (8), Eq (12) and Eq (14).
 
 use nalgebra::Vector3;
 
-use crate::real::Real;
+use crate::real::{Real, sqrt};
 use crate::sense::filter::{Butterworth, LowPass};
 use crate::time::RATE;
 use crate::units::{Vector6, Wrench};
@@ -19,11 +19,11 @@ pub const FORCE_DEAD_BAND: f64 = 0.3;
 pub const TORQUE_DEAD_BAND: f64 = 0.02;
 
 /// Cut-off of the filter between the deviation and the plan (Hz). The plan's acceleration is fed forward, the hand's
-/// inertia is felt by the wrist sensor, and the sum bends the plan again: with K1/K = 0.8 m/N that loop has a gain of 3
+/// inertia acts on the wrist sensor, and the sum bends the plan again: with K1/K = 0.8 m/N that loop has a gain of 3
 /// above its resonance and swings at 20 Hz as soon as a bias comes near the dead band.
 pub const FEEDBACK_CUT_OFF: f64 = 8.0;
 
-/// What is expected at one tick, and what is felt beyond it. `F` is what the environment does to the robot.
+/// The expected sensor values of one tick, and the deviation of the measured ones. `F` is what the environment does to the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation<R: Real> {
     /// Expected wrench at the grasp point.
@@ -37,16 +37,16 @@ pub struct Deviation<R: Real> {
 }
 
 impl<R: Real> Deviation<R> {
-    /// From the expected sensor values (force world axes, torque tool axes, gauges) and the felt ones.
-    pub fn new(expected: &[R; SENSORS], felt: &Wrench<R>, felt_gauges: Option<&[R; 3]>) -> Self {
+    /// From the expected sensor values (force world axes, torque tool axes, gauges) and the measured ones.
+    pub fn new(expected: &[R; SENSORS], measured: &Wrench<R>, measured_gauges: Option<&[R; 3]>) -> Self {
         let [fx, fy, fz, nx, ny, nz, expected_gauges @ ..] = *expected;
         let expected = Wrench { force: Vector3::new(fx, fy, fz), torque: Vector3::new(nx, ny, nz) };
         let wrench = Wrench {
-            force: shrunk(felt.force - expected.force, R::of(FORCE_DEAD_BAND)),
-            torque: shrunk(felt.torque - expected.torque, R::of(TORQUE_DEAD_BAND)),
+            force: shrunk(measured.force - expected.force, R::of(FORCE_DEAD_BAND)),
+            torque: shrunk(measured.torque - expected.torque, R::of(TORQUE_DEAD_BAND)),
         };
-        let gauges = match felt_gauges {
-            Some(felt) => core::array::from_fn(|finger| felt[finger] - expected_gauges[finger]),
+        let gauges = match measured_gauges {
+            Some(measured) => core::array::from_fn(|finger| measured[finger] - expected_gauges[finger]),
             None => [R::of(0.0); 3],
         };
         Deviation { expected, expected_gauges, wrench, gauges }
@@ -76,13 +76,13 @@ impl<R: Real> SmoothedWrench<R> {
         SmoothedWrench { filter: LowPass::new(Butterworth::new(FEEDBACK_CUT_OFF, RATE)) }
     }
 
-    /// Takes what is felt in this control period beyond the expected wrench.
-    pub fn step(&mut self, felt: &Wrench<R>, expected: &Wrench<R>) {
-        let (force, torque) = (felt.force - expected.force, felt.torque - expected.torque);
+    /// Takes the measured and the expected wrench of this control period.
+    pub fn step(&mut self, measured: &Wrench<R>, expected: &Wrench<R>) {
+        let (force, torque) = (measured.force - expected.force, measured.torque - expected.torque);
         self.filter.step(&Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z));
     }
 
-    /// What is beyond the dead bands.
+    /// The part of the filtered deviation beyond the dead bands.
     fn beyond_dead_band(&self) -> Wrench<R> {
         let smoothed = self.filter.output();
         let force = Vector3::new(smoothed[0], smoothed[1], smoothed[2]);
@@ -99,6 +99,6 @@ impl<R: Real> Default for SmoothedWrench<R> {
 
 /// The vector made shorter by `band`, without a step; nothing if it is not longer.
 fn shrunk<R: Real>(vector: Vector3<R>, band: R) -> Vector3<R> {
-    let length = vector.dot(&vector).square_root();
+    let length = sqrt(vector.dot(&vector));
     if length > band { vector * ((length - band) / length) } else { Vector3::zeros() }
 }

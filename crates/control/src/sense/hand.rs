@@ -116,7 +116,7 @@ pub struct HandEstimator<R: Real> {
     velocity: LowPass<R, DIGITS>,
     gauge: LowPass<R, FINGERS>,
     /// Last believed torque of each gauge, not tared (N m).
-    felt: [R; FINGERS],
+    torques: [R; FINGERS],
     doubtful: [bool; FINGERS],
     zero: [R; FINGERS],
     tared: bool,
@@ -130,7 +130,7 @@ impl<R: Real> HandEstimator<R> {
             encoders: None,
             velocity: LowPass::new(Butterworth::new(VELOCITY_CUT_OFF, RATE)),
             gauge: LowPass::new(Butterworth::new(WRENCH_CUT_OFF, RATE)),
-            felt: [R::of(0.0); FINGERS],
+            torques: [R::of(0.0); FINGERS],
             doubtful: [false; FINGERS],
             zero: [-gauge::torque(R::from_counts(i32::from(gauge::UNLOADED))); FINGERS],
             tared: false,
@@ -203,24 +203,24 @@ impl<R: Real> HandEstimator<R> {
             return;
         }
         let mut complete = true;
-        for ((felt, doubtful), counts) in self.felt.iter_mut().zip(&mut self.doubtful).zip(counts) {
+        for ((last, doubtful), counts) in self.torques.iter_mut().zip(&mut self.doubtful).zip(counts) {
             let Some(counts) = counts else {
                 complete = false;
                 continue;
             };
             let torque = -gauge::torque(R::from_counts(i32::from(*counts)));
-            let step = torque - *felt;
+            let step = torque - *last;
             let jumped = !first && (step > R::of(GAUGE_STEP) || step < R::of(-GAUGE_STEP));
             *doubtful = jumped && !*doubtful;
             if !*doubtful {
-                *felt = torque;
+                *last = torque;
             }
         }
-        let felt = SVector::from(self.felt);
+        let torques = SVector::from(self.torques);
         if first {
-            self.gauge.settle(&felt);
+            self.gauge.settle(&torques);
         }
-        self.gauge.step(&felt);
+        self.gauge.step(&torques);
         self.gauge_age = Some(if complete { 0 } else { self.gauge_age.unwrap_or(0).saturating_add(1) });
     }
 }

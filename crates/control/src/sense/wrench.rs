@@ -13,7 +13,7 @@ use puck::RawWrench;
 
 use crate::model::kinematics::Frames;
 use crate::model::wam7;
-use crate::real::Real;
+use crate::real::{Real, sqrt};
 use crate::sense::filter::{Butterworth, LowPass};
 use crate::time::{RATE, periods};
 use crate::units::{Vector6, Wrench};
@@ -88,7 +88,7 @@ pub struct WrenchEstimator<R: Real> {
     /// Last believed sample, as the sensor gave it.
     last: Vector6<R>,
     /// The same without the weight of the hand.
-    felt: Vector6<R>,
+    unloaded: Vector6<R>,
     /// True if the filter has had an input without the weight.
     placed: bool,
     rest: RestMean<R>,
@@ -106,7 +106,7 @@ impl<R: Real> WrenchEstimator<R> {
             tare: Vector6::zeros(),
             tared: false,
             last: Vector6::zeros(),
-            felt: Vector6::zeros(),
+            unloaded: Vector6::zeros(),
             placed: false,
             rest: RestMean::new(),
             saturated: false,
@@ -127,17 +127,17 @@ impl<R: Real> WrenchEstimator<R> {
             None => self.age = self.age.map(|age| age.saturating_add(1)),
         }
         let (Some(weight), Some(age)) = (weight, self.age) else { return };
-        self.felt = self.last - weight;
+        self.unloaded = self.last - weight;
         if !self.placed {
             // Not a step from zero: a bias is there from the first sample on.
-            self.filter.settle(&self.felt);
+            self.filter.settle(&self.unloaded);
             self.placed = true;
         }
-        self.filter.step(&self.felt);
+        self.filter.step(&self.unloaded);
         if !at_rest {
             self.rest = RestMean::new();
         } else if age == 0 {
-            self.rest.push(&self.felt);
+            self.rest.push(&self.unloaded);
         }
     }
 
@@ -227,8 +227,8 @@ impl<R: Real> WrenchEstimator<R> {
         if !self.placed {
             return R::of(0.0);
         }
-        let felt = self.felt.fixed_rows::<3>(0) - self.tare.fixed_rows::<3>(0);
-        felt.dot(&felt).square_root()
+        let force = self.unloaded.fixed_rows::<3>(0) - self.tare.fixed_rows::<3>(0);
+        sqrt(force.dot(&force))
     }
 
     /// The wrench of the environment on the robot at the grasp point; zero if none has been measured.
@@ -236,10 +236,10 @@ impl<R: Real> WrenchEstimator<R> {
         if !self.placed {
             return Wrench::zero();
         }
-        let felt = self.filter.output() - self.tare;
+        let tared = self.filter.output() - self.tare;
         let to_world = frames.sensor_to_world();
-        let force = to_world * Vector3::new(felt[0], felt[1], felt[2]);
-        let torque = to_world * Vector3::new(felt[3], felt[4], felt[5]) + frames.tool_to_sensor().cross(&force);
+        let force = to_world * Vector3::new(tared[0], tared[1], tared[2]);
+        let torque = to_world * Vector3::new(tared[3], tared[4], tared[5]) + frames.tool_to_sensor().cross(&force);
         Wrench { force, torque: frames.tool_to_world().tr_mul(&torque) }
     }
 }

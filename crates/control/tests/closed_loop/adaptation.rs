@@ -1,4 +1,4 @@
-//! What the feedback of Eq (8) and the force controller do to a run, and what they must never do (faults B2 to B7).
+//! Effect of the feedback of Eq (8) and of the force controller on a run, and its bounds (faults B2 to B7).
 
 use control::act::limit::STEP_LIMIT;
 use control::command::{Command, PoseFeedback, RunOptions};
@@ -469,8 +469,8 @@ fn a_wall_is_pressed_with_the_force_that_statics_predicts() {
         (f64::from(record.wrench[0]), rig.plant.environment()[0], rig.plant.dq.amax(), record)
     };
     let gains = Gains::<f32>::tuned();
-    let (felt, truth, speed, record) = pressed(gains);
-    assert!((felt - truth).abs() < 0.1 && speed < 0.01, "at rest: {felt} {truth} {speed}");
+    let (measured, truth, speed, record) = pressed(gains);
+    assert!((measured - truth).abs() < 0.1 && speed < 0.01, "at rest: {measured} {truth} {speed}");
 
     // Statics about the start: K_p (q_d - q) + J^T (-F_d - G (F_d - F)) + J^T F = 0 with the posture pulled by Eq (11)
     // as well. The desired posture is where the controller has it; what remains are seven equations for q - q_0 and the
@@ -490,9 +490,9 @@ fn a_wall_is_pressed_with_the_force_that_statics_predicts() {
     // Dead band: the error is 0.3 N smaller than it is.
     let band = control::sense::deviation::FORCE_DEAD_BAND;
     let predicted = expected + (gain * -band * (expected - truth).signum() - lent[0]) / (1.0 + gain);
-    println!("felt {felt} N, predicted {predicted} N, springs lend {} N, G {gain}", lent[0]);
-    assert!((felt - predicted).abs() < 0.25, "{felt} {predicted}");
-    assert!((felt - expected).abs() < 2.5, "near what was expected: {felt}");
+    println!("measured {measured} N, predicted {predicted} N, springs lend {} N, G {gain}", lent[0]);
+    assert!((measured - predicted).abs() < 0.25, "{measured} {predicted}");
+    assert!((measured - expected).abs() < 2.5, "near what was expected: {measured}");
     assert!(record.flags & flags::FORCE_CONTROL != 0);
 
     // Negative control: without the gain of Eq (12) the springs keep more of the force for themselves.
@@ -501,7 +501,7 @@ fn a_wall_is_pressed_with_the_force_that_statics_predicts() {
     weak.compliant.force_integral = 0.0;
     let (without, ..) = pressed(weak);
     println!("without Eq (12): {without} N");
-    assert!((without - expected).abs() > 1.5 * (felt - expected).abs(), "{without} {felt}");
+    assert!((without - expected).abs() > 1.5 * (measured - expected).abs(), "{without} {measured}");
 }
 
 #[test]

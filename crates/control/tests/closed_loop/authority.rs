@@ -199,7 +199,7 @@ fn b8_a_joint_pushed_to_its_limit_is_pushed_back() {
     let mut rig = Rig::<f32>::new(posture, 1);
     rig.command(Command::Gravity);
     rig.run_for(1.0);
-    // Turn the hand about an axis that bends the wrist towards its stop.
+    // The hand is turned about an axis that bends the wrist towards its stop.
     let axis = rig.plant.frames().jacobian().0.column(5).fixed_rows::<3>(3).into_owned();
     let torque = -axis * 0.7;
     rig.plant.push = [0.0, 0.0, 0.0, torque.x, torque.y, torque.z];

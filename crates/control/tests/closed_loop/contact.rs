@@ -98,7 +98,7 @@ fn force_control_gives_way_to_a_moment_about_the_axis_it_acts_on() {
     // Less than friction holds, so that the arm stands still and the difference of torques is Eq (12) alone.
     let moment = [0.05, -0.03, 0.04];
     let length = moment.iter().map(|part| part * part).sum::<f64>().sqrt();
-    let felt = moment.map(|part| part * (length - TORQUE_DEAD_BAND) / length);
+    let beyond = moment.map(|part| part * (length - TORQUE_DEAD_BAND) / length);
     let mut jacobian = None;
     let mut torque = |push: [f64; 6]| -> [f64; 7] {
         let mut rig = Rig::<f32>::new(START, 1);
@@ -120,7 +120,7 @@ fn force_control_gives_way_to_a_moment_about_the_axis_it_acts_on() {
     let jacobian = jacobian.expect("ran");
     let difference: [f64; 7] = std::array::from_fn(|joint| with[joint] - without[joint]);
     let wanted: [f64; 7] =
-        std::array::from_fn(|joint| (0..3).map(|axis| jacobian.0[(3 + axis, joint)] * felt[axis]).sum());
+        std::array::from_fn(|joint| (0..3).map(|axis| jacobian.0[(3 + axis, joint)] * beyond[axis]).sum());
     let dot = |a: &[f64; 7], b: &[f64; 7]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     // -J^T (F_des - F + K_i integral): the gain has grown from 1 towards 1 + K_i Dt.
     let gain = dot(&difference, &wanted) / dot(&wanted, &wanted);

@@ -1,4 +1,4 @@
-//! How exactly a posture is held, under friction that nobody knows exactly.
+//! Accuracy of a held posture, under friction that nobody knows exactly.
 
 use control::act::limit::STEP_LIMIT;
 use control::command::{Command, RunOptions};

@@ -39,9 +39,9 @@ pub(crate) struct Plant {
     pub(crate) hand_weight: f64,
     /// Force that the sensor alone reports, along its x axis (N).
     pub(crate) glitch: f64,
-    /// What the sensor reports whatever it feels.
+    /// The one value that a stuck sensor reports.
     pub(crate) stuck: Option<RawWrench>,
-    /// Whether the sensor's replies are lost.
+    /// True while the sensor's replies are lost.
     pub(crate) deaf: bool,
     /// The hand, if it is on the bus.
     pub(crate) hand: Option<Hand>,
@@ -80,7 +80,7 @@ impl Plant {
         self.calibration.drives().counts(&motor).expect("finite").map(|counts| Some(counts.wrapped()))
     }
 
-    /// What the environment does to the tool right now (world axes).
+    /// Wrench of the environment on the tool right now (world axes).
     pub(crate) fn environment(&self) -> [f64; 6] {
         let mut wrench = self.push;
         if let Some((surface, stiffness)) = self.wall {

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use control::command::{Command, Refusal, RunOptions};
+use control::time::periods;
 use control::{Event, Fault, State};
 
 use crate::primitives::{Design, GOAL, START, primitive};
@@ -12,9 +13,9 @@ use crate::rig::Rig;
 const BRAKED: f64 = 0.25;
 
 /// Length of what the velocity filter still remembers (control periods).
-const FILTER_CYCLES: usize = 9;
+const FILTER_CYCLES: usize = periods(0.03) as usize;
 
-/// What came of one shove.
+/// Outcome of one shove.
 #[derive(Debug)]
 struct Outcome {
     /// Fastest hand while it was pushed, and afterwards (m/s).
@@ -51,8 +52,8 @@ fn shove(rig: &mut Rig<f32>, direction: [f64; 3], force: f64, seconds: f64) -> O
         fault: Fault::None,
     };
     let mut recent = VecDeque::from([rig.plant.dq]);
-    let push = (seconds * 300.0).round() as usize;
-    for cycle in 0..push + 240 {
+    let push = usize::from(periods(seconds));
+    for cycle in 0..push + usize::from(periods(0.8)) {
         let pushing = cycle < push;
         let share = if pushing { force / length } else { 0.0 };
         rig.plant.push = [direction[0] * share, direction[1] * share, direction[2] * share, 0.0, 0.0, 0.0];
@@ -68,7 +69,7 @@ fn shove(rig: &mut Rig<f32>, direction: [f64; 3], force: f64, seconds: f64) -> O
         let speed = hand_speed(rig);
         let part = if pushing { &mut outcome.pushed } else { &mut outcome.after };
         *part = part.max(speed);
-        if cycle == push + 90 {
+        if cycle == push + usize::from(periods(0.3)) {
             outcome.braked = speed;
         }
         recent.push_back(rig.plant.dq);

@@ -1,4 +1,4 @@
-//! How well the arm follows: hold, approach, run.
+//! Accuracy with which the arm follows: hold, approach, run.
 
 use control::command::{AccelerationSource, Command, Goal, PoseFeedback, RunOptions};
 use control::model::ArmModel;

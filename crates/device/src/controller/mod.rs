@@ -6,7 +6,7 @@
 //! | slot | at | what |
 //! |---|---|---|
 //! | [`Slot::Request`] | 0 | empty the reply slots, ask all pucks for their position and the sensor for its wrench |
-//! | [`Slot::Control`] | 1.11 ms | take what has come, advance the control cycle, send both torque frames, then drive and ask the hand |
+//! | [`Slot::Control`] | 1.11 ms | take what has come, compute, send both torque frames, then drive and ask the hand |
 //! | [`Slot::Slow`] | 2.22 ms | one question about modes, pendant or temperatures |
 //!
 //! No torque but zero leaves before the start-up is over, a person has activated the arm, and a person has commanded

@@ -15,7 +15,7 @@ mod waking;
 mod zeroing;
 
 use control::Calibration;
-use puck::{Counts, Group, Node, PropertyId, Reply, force_torque, set};
+use puck::{Counts, Node, PropertyId, Reply, force_torque, set};
 
 use crate::bus::{Answer, Exchange, Outlet};
 use crate::command::Refusal;
@@ -316,16 +316,7 @@ impl Startup {
             Step::Silence { until_us } if outlet.now_us() < until_us => Ok(Next::Stay),
             Step::Silence { .. } => Ok(Next::Go(Step::Verify { device: 0, item: 0 })),
             Step::Verify { device, item } => self.verify(device, item, outlet),
-            Step::Brake { hand } => {
-                // Only ever IDLE: the safety module alone sets TORQUE of the arm, when a person activates.
-                let group = if hand { Group::HAND } else { Group::ARM };
-                let next = if hand || !self.survey.has_digits() {
-                    Step::Read { joint: 0, item: 0 }
-                } else {
-                    Step::Brake { hand: true }
-                };
-                Ok(after(outlet.send(set(group, PropertyId::MODE, puck::MotorMode::Idle.value())), next))
-            }
+            Step::Brake { hand } => Ok(self.brake(hand, outlet)),
             Step::Read { joint, item } => self.read(joint, item, outlet),
             Step::ReadHand { digit, item } => Ok(self.read_digit(digit, item, outlet)),
             Step::AskZero => Ok(match self.ask_safety(self.safety()?.zero, outlet)? {

@@ -1,6 +1,6 @@
 //! The first half of the start-up: from an unknown bus to pucks that are awake, checked and read.
 
-use puck::{Node, PropertyId, SafetyMode, Status, get, set, stop_frames};
+use puck::{Group, MotorMode, Node, PropertyId, SafetyMode, Status, get, set, stop_frames};
 
 use super::survey::{DRIVE_PROPERTIES, Survey};
 use super::{ENUMERATED, Next, POLL_US, Startup, Step, after};
@@ -163,6 +163,17 @@ impl Startup {
         self.survey.note_version(node, version);
         self.survey.motor_table(node)?;
         Ok(Next::Go(next))
+    }
+
+    pub(super) fn brake(&mut self, hand: bool, outlet: &mut impl Outlet) -> Next {
+        // Only ever IDLE: the safety module alone sets TORQUE of the arm, when a person activates.
+        let group = if hand { Group::HAND } else { Group::ARM };
+        let next = if hand || !self.survey.has_digits() {
+            Step::Read { joint: 0, item: 0 }
+        } else {
+            Step::Brake { hand: true }
+        };
+        after(outlet.send(set(group, PropertyId::MODE, MotorMode::Idle.value())), next)
     }
 
     pub(super) fn read(&mut self, joint: u8, item: u8, outlet: &mut impl Outlet) -> Result<Next, StartupError> {

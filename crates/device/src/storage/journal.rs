@@ -102,18 +102,35 @@ impl Journal {
     }
 
     async fn append<F: NorFlash>(&mut self, flash: &mut F, matter: Matter) -> Result<(), F::Error> {
-        if self.next >= notes::<F>() {
-            let half = (self.half + 1) % SECTORS;
-            let start = self.base + half * sector_bytes::<F>();
-            flash.erase(start, start + sector_bytes::<F>()).await?;
-            (self.half, self.next) = (half, 0);
-        }
         let number = self.number.saturating_add(1);
-        let at = self.base + self.half * sector_bytes::<F>() + self.next * NOTE_BYTES as u32;
+        let at = self.next_blank(flash).await?;
         flash.write(at, &encode(number, matter)).await?;
         self.next += 1;
         self.number = number;
         Ok(())
+    }
+}
+
+impl Journal {
+    /// Address of the next note: the next place that is blank, or the first of the other sector, which is erased.
+    async fn next_blank<F: NorFlash>(&mut self, flash: &mut F) -> Result<u32, F::Error> {
+        loop {
+            if self.next >= notes::<F>() {
+                let half = (self.half + 1) % SECTORS;
+                let start = self.base + half * sector_bytes::<F>();
+                flash.erase(start, start + sector_bytes::<F>()).await?;
+                (self.half, self.next) = (half, 0);
+                return Ok(start);
+            }
+            let at = self.base + self.half * sector_bytes::<F>() + self.next * NOTE_BYTES as u32;
+            let mut note = [0; NOTE_BYTES];
+            flash.read(at, &mut note).await?;
+            if note.iter().all(|byte| *byte == 0xFF) {
+                return Ok(at);
+            }
+            // A bit has fallen over in it.
+            self.next += 1;
+        }
     }
 }
 

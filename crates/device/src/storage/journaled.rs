@@ -4,8 +4,12 @@
 //! shows it: here the [`Journal`] knows, and the erase is repeated before anybody reads. And that a marker word at the
 //! edge of a sector is read the same every time: here a marker counts as written as soon as one bit of it is, because
 //! half a marker can be neither trusted nor written again.
+//!
+//! It also trusts that a blank sector is blank. A bit that falls over there would make a sector of nothing the newest
+//! one, and the older ones would be given up: such a sector is erased when the region is opened. Where a word behind
+//! the newest value is not blank, the sector is closed and the next one is used.
 
-use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 
 use super::journal::{Journal, JournalState, SECTORS, sector_bytes};
 
@@ -18,6 +22,24 @@ const LOG_SECTORS: u32 = 2;
 /// Bytes looked at in one go when a sector is tested for being blank.
 const BLANK_CHUNK: usize = 256;
 
+/// Why something was not done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum JournaledError<E> {
+    /// The flash does not work.
+    Flash(E),
+    /// A word that was to be written is not blank.
+    NotBlank,
+}
+
+impl<E: NorFlashError> NorFlashError for JournaledError<E> {
+    fn kind(&self) -> NorFlashErrorKind {
+        match self {
+            Self::Flash(error) => error.kind(),
+            Self::NotBlank => NorFlashErrorKind::Other,
+        }
+    }
+}
+
 /// The region without its journal.
 #[derive(Debug)]
 pub(super) struct JournaledFlash<F> {
@@ -25,6 +47,8 @@ pub(super) struct JournaledFlash<F> {
     journal: Journal,
     /// Bytes of the log: all but the journal.
     capacity: u32,
+    /// Where a word was not blank that was to be written.
+    blocked_at: Option<u32>,
 }
 
 /// How the region was found.
@@ -58,7 +82,7 @@ impl<F: NorFlash> JournaledFlash<F> {
     pub(super) async fn open(mut flash: F, capacity: u32) -> Result<(Self, Found), F::Error> {
         match Journal::read(&mut flash, capacity).await? {
             Some(JournalState { journal, unfinished }) => {
-                let mut sound = Self { flash, journal, capacity };
+                let mut sound = Self { flash, journal, capacity, blocked_at: None };
                 let sector = unfinished.filter(|sector| u32::from(*sector) * sector_bytes::<F>() < capacity);
                 let Some(sector) = sector else { return Ok((sound, Found::Sound)) };
                 let from = u32::from(sector) * sector_bytes::<F>();
@@ -68,9 +92,57 @@ impl<F: NorFlash> JournaledFlash<F> {
             }
             None => {
                 let journal = make_ours(&mut flash, capacity).await?;
-                Ok((Self { flash, journal, capacity }, Found::Formatted))
+                Ok((Self { flash, journal, capacity, blocked_at: None }, Found::Formatted))
             }
         }
+    }
+
+    /// Erases every sector of the log that holds nothing but damage: it is blank but for its first word, or its first
+    /// word is blank and another one is not. Returns how many there were.
+    ///
+    /// # Errors
+    /// Those of the flash.
+    pub(super) async fn clean(&mut self) -> Result<u8, JournaledError<F::Error>> {
+        let word = F::WRITE_SIZE.max(F::READ_SIZE);
+        let mut cleaned: u8 = 0;
+        for sector in (0..self.capacity).step_by(F::ERASE_SIZE) {
+            let mut marker = [0xFF; WORD_LIMIT];
+            let marker = marker.get_mut(..word).unwrap_or_default();
+            self.flash.read(sector, marker).await.map_err(JournaledError::Flash)?;
+            // A whole marker begins a sector in use, or one that is going to be.
+            if marker.iter().all(|byte| *byte == 0) {
+                continue;
+            }
+            let rest = (sector + u32::try_from(word).unwrap_or(0), sector + sector_bytes::<F>());
+            let rest_blank = is_blank(&mut self.flash, rest).await.map_err(JournaledError::Flash)?;
+            let marker_blank = marker.iter().all(|byte| *byte == 0xFF);
+            // A marker that power failed in, with values behind it, counts as a whole one.
+            if rest_blank != marker_blank {
+                self.erase(sector, sector + sector_bytes::<F>()).await?;
+                cleaned = cleaned.saturating_add(1);
+            }
+        }
+        Ok(cleaned)
+    }
+
+    /// Closes the sector in which a word was not blank that was to be written, if the next one is blank; true if it
+    /// did. The log then goes on in that one.
+    ///
+    /// # Errors
+    /// Those of the flash.
+    pub(super) async fn close_blocked(&mut self) -> Result<bool, JournaledError<F::Error>> {
+        let Some(at) = self.blocked_at.take() else { return Ok(false) };
+        let sector = at - at % sector_bytes::<F>();
+        let next = (sector + sector_bytes::<F>()) % self.capacity.max(1);
+        let word = u32::try_from(F::WRITE_SIZE.max(F::READ_SIZE)).unwrap_or(0);
+        // Where the next one is in use its values are being copied here: closed, they would be taken for complete.
+        if !is_blank(&mut self.flash, (next, next + word)).await.map_err(JournaledError::Flash)? {
+            return Ok(false);
+        }
+        let marker = [0; WORD_LIMIT];
+        let end = sector + sector_bytes::<F>() - word;
+        self.flash.write(end, marker.get(..word as usize).unwrap_or_default()).await.map_err(JournaledError::Flash)?;
+        Ok(true)
     }
 
     /// Gives everything up: the region is blank afterwards.
@@ -78,8 +150,15 @@ impl<F: NorFlash> JournaledFlash<F> {
     /// # Errors
     /// Those of the flash.
     pub(super) async fn format(&mut self) -> Result<(), F::Error> {
+        self.blocked_at = None;
         self.journal = make_ours(&mut self.flash, self.capacity).await?;
         Ok(())
+    }
+
+    async fn erase_one(&mut self, sector: u16, start: u32) -> Result<(), F::Error> {
+        self.journal.erasing(&mut self.flash, sector).await?;
+        self.flash.erase(start, start + sector_bytes::<F>()).await?;
+        self.journal.erased(&mut self.flash).await
     }
 
     /// True if these bytes are at a marker word, the first or last of a sector.
@@ -93,45 +172,50 @@ impl<F: NorFlash> JournaledFlash<F> {
 /// Erases what is not blank, the log first: a journal says that the region is ours only when all of it is.
 async fn make_ours<F: NorFlash>(flash: &mut F, log: u32) -> Result<Journal, F::Error> {
     for sector in (0..log).step_by(F::ERASE_SIZE) {
-        if !is_blank(flash, sector).await? {
+        if !is_blank(flash, (sector, sector + sector_bytes::<F>())).await? {
             flash.erase(sector, sector + sector_bytes::<F>()).await?;
         }
     }
     let mut journal_blank = true;
     for sector in (log..log + SECTORS * sector_bytes::<F>()).step_by(F::ERASE_SIZE) {
-        journal_blank &= is_blank(flash, sector).await?;
+        journal_blank &= is_blank(flash, (sector, sector + sector_bytes::<F>())).await?;
     }
     Journal::create(flash, log, journal_blank).await
 }
 
-async fn is_blank<F: NorFlash>(flash: &mut F, sector: u32) -> Result<bool, F::Error> {
+async fn is_blank<F: NorFlash>(flash: &mut F, (from, to): (u32, u32)) -> Result<bool, F::Error> {
     let mut chunk = [0; BLANK_CHUNK];
-    for at in (sector..sector + sector_bytes::<F>()).step_by(BLANK_CHUNK) {
-        flash.read(at, &mut chunk).await?;
-        if chunk.iter().any(|byte| *byte != 0xFF) {
+    let mut at = from;
+    while at < to {
+        let length = BLANK_CHUNK.min((to - at) as usize);
+        let part = chunk.get_mut(..length).unwrap_or_default();
+        flash.read(at, part).await?;
+        // Without an early end, so that many bytes are compared at once.
+        if part.iter().fold(0xFF, |all, byte| all & byte) != 0xFF {
             return Ok(false);
         }
+        at += length as u32;
     }
     Ok(true)
 }
 
 impl<F: NorFlash> ErrorType for JournaledFlash<F> {
-    type Error = F::Error;
+    type Error = JournaledError<F::Error>;
 }
 
 impl<F: NorFlash> ReadNorFlash for JournaledFlash<F> {
     const READ_SIZE: usize = F::READ_SIZE;
 
-    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), F::Error> {
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
         if !Self::is_marker(offset, bytes.len()) {
-            return self.flash.read(offset, bytes).await;
+            return self.flash.read(offset, bytes).await.map_err(JournaledError::Flash);
         }
         // A marker is all zeros; one bit of it is enough.
         let word = F::WRITE_SIZE.max(F::READ_SIZE);
         let mut whole = [0xFF; WORD_LIMIT];
         let whole = whole.get_mut(..word).unwrap_or_default();
         let start = offset - offset % u32::try_from(word).unwrap_or(1);
-        self.flash.read(start, whole).await?;
+        self.flash.read(start, whole).await.map_err(JournaledError::Flash)?;
         bytes.fill(if whole.iter().all(|byte| *byte == 0xFF) { 0xFF } else { 0 });
         Ok(())
     }
@@ -145,17 +229,20 @@ impl<F: NorFlash> NorFlash for JournaledFlash<F> {
     const WRITE_SIZE: usize = F::WRITE_SIZE;
     const ERASE_SIZE: usize = F::ERASE_SIZE;
 
-    async fn erase(&mut self, from: u32, to: u32) -> Result<(), F::Error> {
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
         for start in (from..to).step_by(F::ERASE_SIZE) {
             let sector = u16::try_from(start / sector_bytes::<F>()).unwrap_or(u16::MAX);
-            self.journal.erasing(&mut self.flash, sector).await?;
-            self.flash.erase(start, start + sector_bytes::<F>()).await?;
-            self.journal.erased(&mut self.flash).await?;
+            self.erase_one(sector, start).await.map_err(JournaledError::Flash)?;
         }
         Ok(())
     }
 
-    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), F::Error> {
-        self.flash.write(offset, bytes).await
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
+        let end = offset.saturating_add(u32::try_from(bytes.len()).unwrap_or(u32::MAX));
+        if !is_blank(&mut self.flash, (offset, end)).await.map_err(JournaledError::Flash)? {
+            self.blocked_at = Some(offset);
+            return Err(JournaledError::NotBlank);
+        }
+        self.flash.write(offset, bytes).await.map_err(JournaledError::Flash)
     }
 }

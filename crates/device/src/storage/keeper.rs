@@ -9,7 +9,7 @@ use sequential_storage::Error;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 
-use super::journaled::{Found, JournaledFlash};
+use super::journaled::{Found, JournaledError, JournaledFlash};
 use super::library::Work;
 use super::{HOME_KEY, Opening};
 use crate::calibration::StoredHome;
@@ -114,11 +114,16 @@ async fn pause() {
 /// Reads everything, oldest first, into the library. `None`: the flash does not work.
 async fn open<F: NorFlash, D: LibraryAccess>(flash: F, value: &mut [u8], desk: &mut D) -> Option<(Log<F>, Opening)> {
     let bytes = JournaledFlash::log_bytes(&flash)?;
-    let (sound, found) = JournaledFlash::open(flash, bytes).await.ok()?;
+    let (mut sound, found) = JournaledFlash::open(flash, bytes).await.ok()?;
+    let cleaned = sound.clean().await.ok()?;
     let config = MapConfig::try_new(0..bytes).ok()?;
     let mut log = Log::new(sound, config, Cache::new_uncached());
-    let mut opening =
-        Opening { resumed: found == Found::Resumed, formatted: found == Found::Formatted, ..Opening::default() };
+    let mut opening = Opening {
+        resumed: found == Found::Resumed,
+        cleaned,
+        formatted: found == Found::Formatted,
+        ..Opening::default()
+    };
     match read_all(&mut log, value, desk).await {
         Ok((found, home)) => (opening.found, opening.home) = (found, home),
         Err(Error::Storage { .. }) => return None,
@@ -136,7 +141,7 @@ async fn read_all<F: NorFlash, D: LibraryAccess>(
     log: &mut Log<F>,
     value: &mut [u8],
     desk: &mut D,
-) -> Result<(u8, StoredHome), Error<F::Error>> {
+) -> Result<(u8, StoredHome), Error<JournaledError<F::Error>>> {
     let mut holding = [false; 256];
     let mut home = StoredHome::Nothing;
     let mut values = log.fetch_all_items(value).await?;
@@ -167,7 +172,14 @@ async fn change<F: NorFlash>(log: &mut Log<F>, image: &[u8], value: &mut [u8], w
         Work::Save { slot, length } => (slot, image.get(..length).ok_or(StoreError::TooLarge)?),
         Work::Delete { slot } => (slot, image.get(..0).unwrap_or_default()),
     };
-    log.store_item_generic(value, &slot, &content).await.map_err(refusal)?;
+    // Once for each sector that has to be closed.
+    loop {
+        match log.store_item_generic(value, &slot, &content).await {
+            Err(Error::Storage { value: JournaledError::NotBlank, .. })
+                if log.flash().close_blocked().await.is_ok_and(|closed| closed) => {}
+            outcome => break outcome.map_err(refusal)?,
+        }
+    }
     let kept = log.fetch_item::<&[u8]>(value, &slot).await.map_err(refusal)?;
     if kept == Some(content) { Ok(()) } else { Err(StoreError::Medium) }
 }

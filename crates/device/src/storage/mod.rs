@@ -1,8 +1,8 @@
 //! The library of primitives and the home of the arm on a NOR flash: what survives when the power goes.
 //!
 //! ```text
-//! Session ── Store ──> Library (memory) <── LibraryAccess ── keep() ──> MapStorage ──> JournaledFlash ──> NorFlash of the board
-//!  link requests        what runs read       lowest priority     log of values   erases done over    words and sectors
+//! Session ── Store ──> Library <── LibraryAccess ── keep() ──> MapStorage ──> JournaledFlash ──> NorFlash
+//!  link requests        memory     lowest priority     log of values   erases done over    words and sectors
 //! ```
 //!
 //! The session works with the [`Library`] in memory. What it changes there is a job for [`keep`], the one task that
@@ -35,6 +35,8 @@ pub struct Opening {
     pub formatted: bool,
     /// An erase that power had failed in was done again.
     pub resumed: bool,
+    /// Blank sectors in which bits had fallen over; they were erased.
+    pub cleaned: u8,
     /// The flash does not work: what is stored from now on is refused.
     pub failed: bool,
     /// The home of the arm.
@@ -44,7 +46,7 @@ pub struct Opening {
 impl Opening {
     /// A sound flash with nothing on it.
     pub(crate) const NOTHING: Self =
-        Self { found: 0, formatted: false, resumed: false, failed: false, home: StoredHome::Nothing };
+        Self { found: 0, formatted: false, resumed: false, cleaned: 0, failed: false, home: StoredHome::Nothing };
 }
 
 impl fmt::Display for Opening {
@@ -52,7 +54,7 @@ impl fmt::Display for Opening {
         match self {
             Self { failed: true, .. } => f.write_str("the storage does not work: nothing is kept over a restart"),
             Self { formatted: true, .. } => f.write_str("the storage was blank or foreign; it is empty now"),
-            Self { found, resumed, home, .. } => {
+            Self { found, resumed, cleaned, home, .. } => {
                 write!(f, "{found} images in the storage")?;
                 match home {
                     StoredHome::Nothing => {}
@@ -62,7 +64,10 @@ impl fmt::Display for Opening {
                         f.write_str("; the home of the arm is for another robot model or layout, this model's counts")?;
                     }
                 }
-                if *resumed { f.write_str("; an interrupted erase was finished") } else { Ok(()) }
+                if *resumed {
+                    f.write_str("; an interrupted erase was finished")?;
+                }
+                if *cleaned > 0 { write!(f, "; {cleaned} blank sectors were damaged and erased") } else { Ok(()) }
             }
         }
     }

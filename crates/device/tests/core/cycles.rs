@@ -212,7 +212,10 @@ fn after_a_fault_the_safety_module_is_asked_to_go_idle() {
 #[test]
 fn a12_torque_frames_that_cannot_leave_end_in_a_fault() {
     let (mut core, mut bus) = floating();
+    bus.run_to(&mut core, Slot::Control);
     bus.refuse = 10;
+    bus.run_slots(&mut core, 1);
+    bus.refuse = 0;
     bus.run_slots(&mut core, CYCLE);
     assert_eq!(core.health().state, State::Gravity, "a single cycle is survived");
     bus.refuse = 1_000;
@@ -276,7 +279,7 @@ fn a_bad_or_halved_wrench_is_no_wrench() {
 #[test]
 fn the_first_wrench_after_the_tare_is_thrown_away() {
     let (mut core, mut bus) = started();
-    bus.run_slots(&mut core, CYCLE + 1);
+    bus.run_slots(&mut core, 2 * CYCLE);
     let first = bus.records.first().expect("a record");
     assert!(first.flags & control::flags::WRENCH_STALE != 0);
 }

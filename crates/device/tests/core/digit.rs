@@ -123,42 +123,13 @@ impl Digit {
                 }
             }
             Action::Get { property } => {
-                let Some(name) = table.property(property) else {
-                    return Vec::new();
-                };
-                if name == Property::Sg && self.is_lost() {
-                    return Vec::new();
+                let name = table.property(property);
+                let value = name.and_then(|name| Some((name.is_wide(), self.value(name, awake)?)));
+                match value {
+                    None => Vec::new(),
+                    Some((true, value)) => vec![reply32(node, property, value)],
+                    Some((false, value)) => vec![reply16(node, property, value as i16)],
                 }
-                let [group_a, group_b, group_c] = self.groups;
-                let value = match name {
-                    Property::Stat => if awake { Status::Ready } else { Status::Reset }.value(),
-                    Property::Role => self.role,
-                    Property::Vers => {
-                        if awake {
-                            self.version
-                        } else {
-                            MONITOR_VERSION
-                        }
-                    }
-                    Property::Cts => self.counts,
-                    Property::Ipnm => self.torque_counts,
-                    Property::Pidx => self.place,
-                    Property::Grpa => group_a,
-                    Property::Grpb => group_b,
-                    Property::Grpc => group_c,
-                    Property::Hold => i32::from(self.holds),
-                    Property::Mode => self.mode.value(),
-                    Property::Tstop => self.stall_ms,
-                    Property::Temp => 40 + self.place,
-                    Property::Sg => self.gauge,
-                    _ if !awake => return Vec::new(),
-                    other => panic!("the core asked digit {} for {other:?}", self.place),
-                };
-                vec![if name.is_wide() {
-                    reply32(node, property, value)
-                } else {
-                    reply16(node, property, value as i16)
-                }]
             }
             Action::Set { property: PropertyId::STAT, value } => {
                 assert_eq!(value, Status::Ready.value(), "the core reset a puck of the hand");
@@ -183,6 +154,36 @@ impl Digit {
                 Vec::new()
             }
         }
+    }
+
+    /// Value of a property; `None` if it does not answer.
+    fn value(&mut self, property: Property, awake: bool) -> Option<i32> {
+        let [group_a, group_b, group_c] = self.groups;
+        Some(match property {
+            Property::Sg if self.is_lost() => return None,
+            Property::Stat => if awake { Status::Ready } else { Status::Reset }.value(),
+            Property::Role => self.role,
+            Property::Vers => {
+                if awake {
+                    self.version
+                } else {
+                    MONITOR_VERSION
+                }
+            }
+            Property::Cts => self.counts,
+            Property::Ipnm => self.torque_counts,
+            Property::Pidx => self.place,
+            Property::Grpa => group_a,
+            Property::Grpb => group_b,
+            Property::Grpc => group_c,
+            Property::Hold => i32::from(self.holds),
+            Property::Mode => self.mode.value(),
+            Property::Tstop => self.stall_ms,
+            Property::Temp => 40 + self.place,
+            Property::Sg => self.gauge,
+            _ if !awake => return None,
+            other => panic!("the core asked digit {} for {other:?}", self.place),
+        })
     }
 
     fn set(&mut self, property: Option<Property>, value: i32, now_us: u64) {

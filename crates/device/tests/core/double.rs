@@ -71,6 +71,34 @@ impl Puck {
             lose_properties: 0,
         }
     }
+
+    /// Value of a property; `None` if it does not answer. Joints count from 0.
+    fn value(&self, property: Property, awake: bool, joint: usize) -> Option<i32> {
+        Some(match property {
+            Property::Stat => if awake { Status::Ready } else { Status::Reset }.value(),
+            Property::Role => 0,
+            Property::Vers => {
+                if awake {
+                    self.version
+                } else {
+                    MONITOR_VERSION
+                }
+            }
+            Property::Cts => 4096,
+            Property::Ipnm => self.torque_counts,
+            Property::Pidx => self.place,
+            Property::Grpa => self.groups[0],
+            Property::Grpb => self.groups[1],
+            Property::Grpc => self.groups[2],
+            Property::Mt => self.torque_limit,
+            Property::Poles => self.poles,
+            Property::Mode => self.mode.value(),
+            Property::Temp => 30 + joint as i32,
+            // A puck that has reset under the slow polls: the number means something else to its monitor.
+            _ if !awake => return None,
+            other => panic!("the core asked puck {} for {other:?}", joint + 1),
+        })
+    }
 }
 
 /// The bus with everything on it.
@@ -357,37 +385,9 @@ impl Bus {
                     puck.lose_properties -= 1;
                     return;
                 }
-                let value = match name {
-                    Property::Stat => {
-                        if awake {
-                            Status::Ready.value()
-                        } else {
-                            Status::Reset.value()
-                        }
-                    }
-                    Property::Role => 0,
-                    Property::Vers => {
-                        if awake {
-                            puck.version
-                        } else {
-                            MONITOR_VERSION
-                        }
-                    }
-                    Property::Cts => 4096,
-                    Property::Ipnm => puck.torque_counts,
-                    Property::Pidx => puck.place,
-                    Property::Grpa => puck.groups[0],
-                    Property::Grpb => puck.groups[1],
-                    Property::Grpc => puck.groups[2],
-                    Property::Mt => puck.torque_limit,
-                    Property::Poles => puck.poles,
-                    Property::Mode => puck.mode.value(),
-                    Property::Temp => 30 + joint as i32,
-                    // A puck that has reset under the slow polls: the number means something else to its monitor.
-                    _ if !awake => return,
-                    other => panic!("the core asked puck {} for {other:?}", joint + 1),
-                };
-                self.answer_value(node, property, value, name.is_wide());
+                if let Some(value) = puck.value(name, awake, joint) {
+                    self.answer_value(node, property, value, name.is_wide());
+                }
             }
             Action::Set { property: PropertyId::STAT, value } => {
                 assert_eq!(value, Status::Ready.value(), "the core reset a puck");

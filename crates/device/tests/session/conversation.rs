@@ -4,7 +4,7 @@ use control::State;
 use device::{Command, EventKind};
 use link::frame::FRAME_BYTES;
 use link::message::HostHello;
-use link::{EventKind as LinkKind, LINK_VERSION, Refusal, Reply, Request, SCHEMA_HASH};
+use link::{Capabilities, EventKind as LinkKind, LINK_VERSION, Refusal, Reply, Request, SCHEMA_HASH};
 
 use crate::rig::{Rig, hello};
 
@@ -36,6 +36,7 @@ fn a_matching_hello_is_answered_with_who_the_device_is() {
     let device = rig.greet();
     assert_eq!((device.link_version, device.schema_hash), (LINK_VERSION, SCHEMA_HASH));
     assert_eq!(device.model_hash, control::MODEL_HASH);
+    assert_eq!(device.capabilities, Capabilities { arm: true, hand: true, wrench: true });
     assert_eq!((device.board.as_str(), device.serial.as_str(), device.simulated), ("bench", "B-1", true));
     assert_eq!((device.slots, device.slot_bytes, device.cycles_per_second), (3, 4096, control::RATE_HZ as u16));
     rig.done(Request::Ping);
@@ -92,7 +93,7 @@ fn c9_a_second_host_is_refused_until_the_first_has_been_silent() {
     let mut rig = Rig::greeted();
     rig.wait(100);
     (rig.number, rig.sequence) = (88, 0);
-    assert_eq!(rig.refused(Request::Hello(hello())), (Refusal::Busy, [77, 400]));
+    assert_eq!(rig.refused(Request::Hello(hello())), (Refusal::Busy, [0, 400]));
     assert_eq!(rig.refused(Request::Status).0, Refusal::NoSession);
     rig.wait(400);
     rig.greet();

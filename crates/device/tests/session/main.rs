@@ -5,4 +5,5 @@ mod commands;
 mod conversation;
 mod rig;
 mod saving;
+mod strangers;
 mod uploads;

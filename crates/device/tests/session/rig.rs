@@ -156,6 +156,7 @@ impl<S: device::Store> Rig<S> {
             serial: "B-1",
             simulated: true,
             ticks_per_second: 25_000_000,
+            instructions_per_tick: 0,
         };
         let bench = Bench {
             line: Vec::new(),

@@ -53,6 +53,19 @@ fn a_commit_is_answered_when_the_flash_has_it_and_pings_meanwhile() {
 }
 
 #[test]
+fn h9_a_commit_that_is_worked_on_may_be_repeated_as_a_sign_of_life() {
+    let mut rig = rig();
+    rig.send_parts("reach", &image("reach", 2.0, 10));
+    rig.bench.state = State::Run;
+    assert_eq!(rig.ask(Request::UploadCommit), None);
+    for _ in 0..10 {
+        rig.wait(90);
+        rig.put(rig.sequence, 0, &Request::UploadCommit);
+    }
+    assert!(rig.bench.commands.is_empty(), "{:?}", rig.bench.commands);
+}
+
+#[test]
 fn a_flash_that_fails_refuses_the_commit_and_the_old_image_stays() {
     let mut rig = rig();
     let (old, new) = (image("reach", 2.0, 10), image("reach", 3.0, 10));

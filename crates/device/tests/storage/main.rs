@@ -2,5 +2,6 @@
 
 mod bench;
 mod cuts;
+mod flipped;
 mod refusals;
 mod without_journal;

@@ -215,9 +215,9 @@ pub(crate) mod tests {
     /// A made-up approach: the force rises at contact at 5 s, by much in open loop and little in closed loop.
     pub(crate) fn fixtures() -> (Trace, Trace, Expected) {
         let run = |force: f64| Trace {
-            cycles: (0..4200)
+            cycles: (0..14 * control::RATE_HZ)
                 .map(|k| {
-                    let time = f64::from(k) / 300.0;
+                    let time = f64::from(k) / control::RATE;
                     let s = (time / 8.0).min(1.0);
                     let touch = (time - 5.0).clamp(0.0, 1.0);
                     let mut cycle = cycle(time);

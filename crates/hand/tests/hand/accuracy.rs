@@ -19,16 +19,16 @@ fn error(movement: &Movement, speed: f64, gauges: impl Fn(f64) -> [f64; 3]) -> [
     reference.set_speed(exact, speed).expect("a speed");
     assert!(rollout.set_speed(&fixed, Number::from_f64(speed)));
     let mut worst = [0.0_f64; 2];
-    let ticks = (1.5 * f64::from(movement.duration) / speed * 300.0) as usize;
+    let ticks = (1.5 * f64::from(movement.duration) / speed * control::RATE) as usize;
     for tick in 0..ticks {
-        let measured = gauges(tick as f64 / 300.0);
+        let measured = gauges(tick as f64 / control::RATE);
         let mut error = [0.0; 9];
         if let Some(expected) = sensed.expected() {
             let expected = expected.at(reference.progress());
             (0..3).for_each(|finger| error[6 + finger] = measured[finger] - expected[6 + finger]);
         }
         let coupling = sensed.coupling(&reference, &error).expect("its own");
-        let wanted = reference.step(exact, 1.0 / 300.0, &coupling).expect("its own");
+        let wanted = reference.step(exact, control::PERIOD, &coupling).expect("its own");
         let zeta = rollout.feedback(&fixed, &measured.map(|torque| from_real(torque as f32)), ONE);
         let found = rollout.step(&fixed, &zeta);
         for digit in 0..4 {

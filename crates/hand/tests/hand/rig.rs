@@ -127,8 +127,14 @@ impl Rig {
         let mut world = FreeJoints::weightless(HOME);
         (0..3).for_each(|finger| world.obstruct(finger, obstacle));
         let config = PlantConfig { hand_alone: true, ..PlantConfig::default() };
-        let identity =
-            Identity { firmware: "test", board: "test", serial: "test", simulated: true, ticks_per_second: 25_000_000 };
+        let identity = Identity {
+            firmware: "test",
+            board: "test",
+            serial: "test",
+            simulated: true,
+            ticks_per_second: 25_000_000,
+            instructions_per_tick: 0,
+        };
         let library: &'static mut Library = Box::leak(Box::new(Library::EMPTY));
         let Ok(session) = Box::new_uninit().write_init(HostSession::over(identity, HandApplication::new(library)));
         let mut rig = Rig {

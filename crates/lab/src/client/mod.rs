@@ -19,11 +19,11 @@ use std::time::Duration;
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
 use link::message::{DeviceHello, HostHello};
 use link::{
-    Event, LINK_VERSION, LinkCounters, Listing, Refusal, Reply, Request, SCHEMA_HASH, Statistics, Status, Telemetry,
-    Text,
+    Capabilities, Event, LINK_VERSION, LinkCounters, Listing, Refusal, Reply, Request, SCHEMA_HASH, Statistics, Status,
+    Telemetry, Text,
 };
 
-use crate::error::HostError;
+use crate::error::{Capability, HostError};
 use crate::transport::Transport;
 
 pub use halt::Halted;
@@ -124,7 +124,7 @@ impl<T: Transport> Client<T> {
             session: session_number(transport.is_virtual()),
             transport,
             decoder: Decoder::new(),
-            hello: nobody(),
+            hello: DeviceHello::default(),
             sequence: 0,
             device_ms: 0,
             heard: now,
@@ -189,6 +189,19 @@ impl<T: Transport> Client<T> {
     /// Who the device is.
     pub fn hello(&self) -> &DeviceHello {
         &self.hello
+    }
+
+    /// Succeeds if the program of the device is made for this part.
+    ///
+    /// # Errors
+    /// [`HostError::Lacks`]
+    pub fn require(&self, capability: Capability) -> Result<(), HostError> {
+        let Capabilities { arm, hand, wrench: _ } = self.hello.capabilities;
+        let there = match capability {
+            Capability::Arm => arm,
+            Capability::Hand => hand,
+        };
+        if there { Ok(()) } else { Err(HostError::Lacks(capability)) }
     }
 
     /// Ends waiting, and stops the arm, when the user interrupts.
@@ -455,25 +468,6 @@ impl<T: Transport> Drop for Client<T> {
                 return;
             }
         }
-    }
-}
-
-/// What stands for the device's hello until it has come.
-fn nobody() -> DeviceHello {
-    DeviceHello {
-        link_version: 0,
-        schema_hash: 0,
-        model_hash: 0,
-        image_schema: 0,
-        maximum_kernels: 0,
-        slots: 0,
-        slot_bytes: 0,
-        cycles_per_second: 0,
-        ticks_per_second: 0,
-        simulated: false,
-        firmware: Text::default(),
-        board: Text::default(),
-        serial: Text::default(),
     }
 }
 

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use super::error::{Place, RecordingError};
 use super::layout;
 
-/// Samples that a recording must have at least: 0.2 s at 300 Hz, the shortest movement that can be filtered at
+/// Samples that a recording must have at least: 0.2 s, the shortest movement that can be filtered at
 /// 7.5 Hz and differentiated twice. Fewer would be fitted by chance.
-pub const FEWEST_SAMPLES: usize = 60;
+pub const FEWEST_SAMPLES: usize = control::time::periods(0.2) as usize;
 
 /// Largest distance of a quaternion's norm from 1. Recordings print about 5 digits; an error above this value is
 /// not rounding but a wrong column or a wrong convention.

@@ -75,7 +75,7 @@ pub struct FitReport {
     pub name: String,
     /// Kernels of each row.
     pub kernels: usize,
-    /// Samples at 300 Hz that were fitted.
+    /// Samples at the control rate that were fitted.
     pub samples: usize,
     /// Duration, s.
     pub duration_s: f64,

@@ -20,7 +20,7 @@ pub use recorder::{Recorder, Take, recording_row, recording_text};
 pub use rehearse::play_once;
 pub use run::{CHANNELS, Change, ChangeKind, FlagCounts, RunOutcome, RunRequest, Surprise, play};
 pub use teach::{Demonstrated, record_demonstration, teacher};
-pub use travel::{drives_arm, go_to_start, travel};
+pub use travel::{go_to_start, travel};
 pub use wait::{Ends, after, pass, wait_for};
 
 use control::Fault;

@@ -73,7 +73,7 @@ pub struct Recorder<W: Write> {
 }
 
 impl<W: Write> Recorder<W> {
-    /// Switches the stream on at 300 Hz and writes the head of the file.
+    /// Switches the stream on, every control cycle, and writes the head of the file.
     ///
     /// # Errors
     /// The device refuses, or the output does.

@@ -1,8 +1,8 @@
 //! Playing a stored primitive from its first cycle to its end: what `tactus run`, rehearsals and experiments share.
 //!
-//! The arm must stand at the start of the primitive and hold. Telemetry comes at 300 Hz; changes of goal and speed
-//! are sent when their time has come in the device's cycles, so that a simulated run is the same whatever the machine
-//! does beside it.
+//! The arm must stand at the start of the primitive and hold. Telemetry comes in every control cycle; changes of goal
+//! and speed are sent when their time has come in the device's cycles, so that a simulated run is the same whatever the
+//! machine does beside it.
 
 use std::time::Duration;
 

@@ -3,14 +3,14 @@
 use std::time::Duration;
 
 use control::State;
-use link::{HandStage, Name, Refusal, Request};
+use link::HandStage;
 
 use super::ProcedureError;
 use super::hand::{HandReach, move_hand};
 use super::wait::{Ends, pass, wait_for};
 use crate::client::Client;
 use crate::device::Device;
-use crate::error::HostError;
+use crate::error::Capability;
 use crate::primitive_file::Waypoint;
 
 /// Longest move to a posture, s: what `control` allows.
@@ -25,11 +25,8 @@ const LET_GO: Duration = Duration::from_secs(1);
 /// # Errors
 /// [`ProcedureError`]: the device refuses, the arm stops by itself, or it takes too long.
 pub fn travel(client: &mut Client<Device>, q: [f32; 7], progress: impl FnMut(f64)) -> Result<(), ProcedureError> {
-    // Torque begins with holding: from rest the arm must first carry itself before it may move.
-    if State::from_code(client.status()?.state) != Some(State::Hold) {
-        client.hold()?;
-        pass(client, LET_GO, Ends::OnAnyStop)?;
-    }
+    client.require(Capability::Arm)?;
+    hold(client)?;
     client.take_events();
     client.approach(q, 0.0)?;
     wait_for("the move to the posture", LONGEST_TRAVEL, client, progress)
@@ -55,12 +52,12 @@ pub fn go_to_start(
         at.iter().zip(to).any(|(at, to)| (f64::from(*at) - to).abs() > tolerance)
     };
     let status = client.status()?;
-    if far(&status.q, &start.posture, START_TOLERANCE) || State::from_code(status.state) != Some(State::Hold) {
-        match travel(client, start.posture.map(|angle| angle as f32), progress) {
-            // A hand alone goes to its part of the start.
-            Err(ProcedureError::Host(HostError::Refused { reason: Refusal::NoArm, .. })) => {}
-            outcome => outcome?,
-        }
+    let holds = State::from_code(status.state) == Some(State::Hold);
+    if !client.hello().capabilities.arm {
+        // A hand alone goes to its part of the start.
+        hold(client)?;
+    } else if !holds || far(&status.q, &start.posture, START_TOLERANCE) {
+        travel(client, start.posture.map(|angle| angle as f32), progress)?;
     }
     let status = client.status()?;
     if status.hand_stage == HandStage::Ready && far(&status.hand, &start.hand, HAND_TOLERANCE) {
@@ -74,15 +71,11 @@ pub fn go_to_start(
     Ok(())
 }
 
-/// Whether the device drives an arm, or a hand alone. It is asked for the beginning of a primitive it holds: the
-/// device of a hand alone keeps no images and says why; nothing moves.
-///
-/// # Errors
-/// As [`Client::request`].
-pub fn drives_arm(client: &mut Client<Device>, held: &Name) -> Result<bool, HostError> {
-    match client.request(&Request::Read { name: held.clone(), offset: 0 }) {
-        Ok(_) => Ok(true),
-        Err(HostError::Refused { reason, .. }) => Ok(reason != Refusal::NoArm),
-        Err(error) => Err(error),
+/// Torque begins with holding: from rest the arm must first carry itself before it may move.
+fn hold(client: &mut Client<Device>) -> Result<(), ProcedureError> {
+    if State::from_code(client.status()?.state) != Some(State::Hold) {
+        client.hold()?;
+        pass(client, LET_GO, Ends::OnAnyStop)?;
     }
+    Ok(())
 }

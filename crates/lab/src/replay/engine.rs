@@ -27,6 +27,7 @@ impl Engine {
             serial: "replay",
             simulated: true,
             ticks_per_second: sim::TICKS_PER_SECOND as u32,
+            instructions_per_tick: 0,
         };
         Self {
             core: boxed(DeviceController::init()),

@@ -69,6 +69,9 @@ pub enum SimulationError {
     /// The file that is the device's flash cannot be used.
     #[error("cannot use {0} as the device's flash: {1}")]
     Flash(PathBuf, #[source] io::Error),
+    /// The script of faults cannot be used.
+    #[error("cannot use {0} as a script of faults: {1}")]
+    Faults(PathBuf, String),
     /// The simulated flash lost power, as it was told to, and the device with it.
     #[error("the power of the simulated device failed while it wrote its flash")]
     PowerFailed,

@@ -123,6 +123,7 @@ impl InProcess {
             serial: "simulated",
             simulated: true,
             ticks_per_second: sim::TICKS_PER_SECOND as u32,
+            instructions_per_tick: 0,
         };
         let session = boxed(Session::init(identity, Library::new()));
         let session = SharedSession(Arc::new(Mutex::new(session)));

@@ -10,6 +10,7 @@ mod board;
 mod board_can;
 mod bus_log;
 mod error;
+mod fault_script;
 pub(crate) mod halves;
 mod in_process;
 mod options;
@@ -33,6 +34,7 @@ use sim::{Passage, Plant, PlantConfig, TICKS_PER_SECOND, Ticks, World};
 
 use board::EmulatedBoard;
 use bus_log::BusLog;
+use fault_script::FaultScript;
 use in_process::InProcess;
 use qemu::Qemu;
 
@@ -61,6 +63,9 @@ impl Simulation {
     pub fn start(options: &SimulationOptions) -> Result<Self, SimulationError> {
         let world = options.build_world()?;
         let mut plant = Plant::new(PlantConfig { seed: options.seed, ..options.plant.clone() }, world);
+        if let Some(name) = &options.faults {
+            FaultScript::read(name)?.order(&mut plant);
+        }
         let log = options.bus_log.as_deref().map(BusLog::create).transpose()?;
         if log.is_some() {
             plant.record_bus();

@@ -133,6 +133,8 @@ pub struct SimulationOptions {
     pub board_report: Option<PathBuf>,
     /// The flash in the device.
     pub flash: FlashSource,
+    /// The script of faults that befall the device: a file, or a file and the number of its scenario.
+    pub faults: Option<String>,
     /// What is in the way of the fingers of a hand alone; `None`: there is an arm, and a world around it.
     pub grip: Option<[FingerObstacle; 3]>,
 }
@@ -170,6 +172,7 @@ impl SimulationOptions {
             bus_log: options.bus.clone(),
             board_report: options.board.report.clone(),
             flash: options.flash.clone().map_or(FlashSource::New, FlashSource::File),
+            faults: options.faults.clone(),
             ..Self::new(engine, options.seed.unwrap_or(DEFAULT_SEED), world)
         })
     }
@@ -213,6 +216,7 @@ impl SimulationOptions {
             bus_log: None,
             board_report: None,
             flash: FlashSource::New,
+            faults: None,
             grip: None,
         }
     }

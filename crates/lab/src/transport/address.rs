@@ -9,7 +9,7 @@
 //! unix:PATH              a Unix socket
 //! serial:PORT[@BAUD]     a serial port, 921600 baud unless said otherwise
 //! can:INTERFACE[/N]      device number N (0 unless said otherwise) on a CAN interface
-//! options: seed=7,world=simple|mujoco,line=serial|can,bus=FILE,flash=FILE, separated by commas
+//! options: seed=7,world=simple|mujoco,line=serial|can,bus=FILE,flash=FILE,faults=FILE, separated by commas
 //! of board: also report=FILE,cancellation=skipped|stuck,revision=0xNNNN,fault=KIND@MICROSECONDS[:ARGUMENT]
 //! ```
 
@@ -154,6 +154,7 @@ mod tests {
             "can:can0",
             "can:slcan1/15",
             "sil:seed=3,line=can,bus=run.log",
+            "sil:seed=3,faults=tests/faults/a3.toml:2",
             "board:",
             "board:seed=3,flash=bank2.bin,report=board.json,cancellation=stuck,revision=0x1003,fault=bus-off@5000000,fault=hang@7:2",
         ] {

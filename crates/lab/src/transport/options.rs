@@ -28,6 +28,8 @@ pub struct SimulatorOptions {
     pub bus: Option<PathBuf>,
     /// The file that is the device's flash, so that its library is there again after a restart.
     pub flash: Option<PathBuf>,
+    /// The script of faults that befall the device: a file, or a file and the number of its scenario.
+    pub faults: Option<String>,
     /// What only the emulated board takes.
     pub board: BoardOptions,
 }
@@ -92,6 +94,7 @@ impl SimulatorOptions {
                 Some(("line", "can")) => options.line = LineKind::Can,
                 Some(("bus", value)) => options.bus = Some(value.into()),
                 Some(("flash", value)) => options.flash = Some(value.into()),
+                Some(("faults", value)) => options.faults = Some(value.to_owned()),
                 Some((name, value)) if is_board => options.board.set(part, name, value)?,
                 _ if is_board => return Err(AddressError::BoardOption(part.to_owned())),
                 _ => return Err(AddressError::Option(part.to_owned())),
@@ -129,11 +132,12 @@ impl fmt::Display for SimulatorOptions {
         let line = (self.line == LineKind::Can).then(|| "line=can".to_owned());
         let bus = self.bus.as_ref().map(|path| format!("bus={}", path.display()));
         let flash = self.flash.as_ref().map(|path| format!("flash={}", path.display()));
+        let script = self.faults.as_ref().map(|name| format!("faults={name}"));
         let report = self.board.report.as_ref().map(|path| format!("report={}", path.display()));
         let cancellation = chip.cancellation.map(|reading| format!("cancellation={}", reading.word()));
         let revision = chip.revision.map(|revision| format!("revision={revision:#06x}"));
         let faults = chip.faults.iter().map(|fault| format!("fault={fault}"));
-        let single = [seed, world, line, bus, flash, report, cancellation, revision];
+        let single = [seed, world, line, bus, flash, script, report, cancellation, revision];
         let parts: Vec<String> = single.into_iter().flatten().chain(faults).collect();
         f.write_str(&parts.join(","))
     }

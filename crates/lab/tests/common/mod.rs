@@ -28,10 +28,10 @@ pub(crate) fn posture(fraction: f64) -> [f64; 7] {
 
 /// A recording: half a second of rest, `duration` s of movement, half a second of rest.
 pub(crate) fn rows(duration: f64) -> Vec<RecordingRow> {
-    let count = ((duration + 1.0) * 300.0).round() as u32 + 1;
+    let count = ((duration + 1.0) * control::RATE).round() as u32 + 1;
     (0..count)
         .map(|cycle| {
-            let time = f64::from(cycle) / 300.0;
+            let time = f64::from(cycle) / control::RATE;
             let q = posture((time - 0.5) / duration);
             let ahead = posture((time + 1e-4 - 0.5) / duration);
             let (position, orientation) = arm::tool_pose(&q);

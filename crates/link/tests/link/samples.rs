@@ -5,8 +5,8 @@ use link::image::{
 };
 use link::message::{AccelerationSource, ChunkData, PoseFeedback};
 use link::{
-    Calibration, DeviceHello, Event, EventKind, Goal, HandStage, HomeSource, HostHello, LinkCounters, Listing, Name,
-    Refusal, Reply, Request, RunOptions, Statistics, Status, Telemetry, Text,
+    Calibration, Capabilities, DeviceHello, Event, EventKind, Goal, HandStage, HomeSource, HostHello, LinkCounters,
+    Listing, Name, Refusal, Reply, Request, RunOptions, Statistics, Status, Telemetry, Text,
 };
 
 fn name() -> Name {
@@ -120,6 +120,8 @@ pub(crate) fn replies() -> Vec<Reply> {
         firmware: Text::new("0.1.0 (1a2b3c4)"),
         board: Text::new("mps2-an500"),
         serial: Text::new("SIM-7"),
+        capabilities: Capabilities { arm: true, hand: false, wrench: true },
+        instructions_per_tick: 5,
     };
     let status = Status {
         cycle: 301,

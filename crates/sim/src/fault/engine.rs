@@ -38,8 +38,8 @@ pub(crate) enum Treated {
     Lost,
     /// It comes by itself, later.
     Later,
-    /// It is received so many times, as it is now.
-    Received(CanFrame, usize),
+    /// It is received as it is now; true if the co-controller receives it twice.
+    Received(CanFrame, bool),
 }
 
 /// Everything ordered.
@@ -116,7 +116,7 @@ impl Faults {
 
     /// Fate of a frame that has just left the wire.
     pub(crate) fn treat(&mut self, now: Ticks, passage: &Passage) -> Treated {
-        let (mut frame, mut copies) = (passage.frame, 1);
+        let (mut frame, mut is_repeated) = (passage.frame, false);
         for order in self.orders.iter_mut().filter(|order| order.phase == Phase::During) {
             match &order.kind {
                 FaultKind::BusOff => return Treated::Lost,
@@ -135,7 +135,7 @@ impl Faults {
                 }
                 FaultKind::Repeat(frames) if order.hits < frames.most && frames.mean(passage, &mut self.noise) => {
                     order.hits += 1;
-                    copies += 1;
+                    is_repeated = true;
                 }
                 FaultKind::Flip(frames) if order.hits < frames.most && frames.mean(passage, &mut self.noise) => {
                     order.hits += 1;
@@ -150,7 +150,7 @@ impl Faults {
                 _ => {}
             }
         }
-        Treated::Received(frame, copies)
+        Treated::Received(frame, is_repeated)
     }
 
     /// Error of the sensor at `now`, N and N m, sensor axes.

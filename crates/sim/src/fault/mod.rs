@@ -44,7 +44,7 @@ pub enum FaultKind {
         /// Delay, s.
         by: f64,
     },
-    /// Frames that everybody receives twice.
+    /// Frames that the co-controller receives twice.
     Repeat(Frames),
     /// Frames in which one bit, drawn at random, is wrong although their check sum is right.
     Flip(Frames),

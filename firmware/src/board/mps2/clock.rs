@@ -15,6 +15,8 @@ pub struct Clock;
 
 impl crate::board::Clock for Clock {
     const HZ: u32 = PERIPHERAL_HZ;
+    // QEMU counts 8 ns per instruction (`-icount shift=3`), a tick has 40 ns.
+    const INSTRUCTIONS_PER_TICK: u8 = 5;
 
     fn ticks(self) -> u64 {
         now()

@@ -10,7 +10,7 @@ use control::plan::load;
 use control::{Command as Control, LoadRefusal, Payload, RunOptions, State};
 use link::image::ImageError;
 use link::message::{AccelerationSource, CHUNK_BYTES, ChunkData, Goal, PoseFeedback};
-use link::{Listing, Name, PrimitiveImage, Refusal, Reply, Request};
+use link::{Capabilities, Listing, Name, PrimitiveImage, Refusal, Reply, Request};
 use pinned_init::{Init, init, zeroed};
 
 use crate::application::{Action, Application, Refused, Saved, SessionPort, finite};
@@ -193,6 +193,8 @@ impl<S: Store> ArmApplication<S> {
 
 impl<S: Store> Application for ArmApplication<S> {
     type Controller = DeviceController;
+
+    const CAPABILITIES: Capabilities = Capabilities { arm: true, hand: true, wrench: true };
 
     fn is_open(&mut self, now_ms: u32) -> bool {
         !self.is_opening(now_ms)

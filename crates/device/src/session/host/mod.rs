@@ -3,31 +3,30 @@
 //! Sans-I/O: bytes go in by [`HostSession::receive`], everything else happens in [`HostSession::poll`] through a
 //! [`SessionPort`]. The rules are those of `docs/protocol.md`:
 //!
-//! - nothing is answered before a matching hello; one host at a time;
+//! - nothing is answered before a matching hello; one host at a time, and no other one can delay what it asks;
+//! - a stop is obeyed from anybody, whatever its number;
 //! - every request is answered once, and acted on once however often it is repeated;
 //! - a request for the control half is answered when that half has taken or refused it;
 //! - what moves is stopped when the host has been silent for half a second, before anything else is done;
 //! - an image replaces another only when it is complete, undamaged and fit for this device;
 //! - a change of the store is answered when it is durable.
 
+mod inbox;
 mod owner;
 mod pending;
 mod request;
 mod upload;
 
 use control::State;
-use heapless::Deque;
-use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame, LINK_TIMEOUT_MS};
+use link::frame::{self, Decoder, Envelope, FRAME_BYTES, LINK_TIMEOUT_MS};
 use link::{Event, EventKind, Refusal, Reply, Request, Statistics, Telemetry};
 use pinned_init::{Init, init};
 
 use crate::application::{Application, Controller, CycleReport, Message, Refused, SessionPort, TimedRecord};
+use inbox::Inbox;
 use owner::Owner;
 use pending::{Pending, Requester};
 use upload::Upload;
-
-/// Requests that have arrived and are not handled yet. A host waits for its answers, so two would do.
-const INBOX: usize = 4;
 
 /// Room the session keeps free on the line for an answer before it sends telemetry.
 const ANSWER_ROOM: usize = FRAME_BYTES;
@@ -45,6 +44,8 @@ pub struct Identity {
     pub simulated: bool,
     /// Unit of all `*_ticks`: ticks per second.
     pub ticks_per_second: u32,
+    /// Instructions per tick, where time is counted in instructions as under QEMU; 0 where a clock runs.
+    pub instructions_per_tick: u8,
 }
 
 /// The device's end of the link.
@@ -56,7 +57,7 @@ pub struct HostSession<A: Application> {
     identity: Identity,
     pub(super) application: A,
     decoder: Decoder<FRAME_BYTES>,
-    inbox: Deque<Frame<Request>, INBOX>,
+    inbox: Inbox,
     overrun: u32,
     sequence: u16,
     owner: Option<Owner>,
@@ -79,7 +80,7 @@ impl<A: Application> HostSession<A> {
             identity,
             application <- application,
             decoder: Decoder::new(),
-            inbox: Deque::new(),
+            inbox: Inbox::default(),
             overrun: 0,
             sequence: 0,
             owner: None,
@@ -98,16 +99,11 @@ impl<A: Application> HostSession<A> {
     /// Takes bytes from the line. Never acts on them; [`HostSession::poll`] does.
     pub fn receive(&mut self, mut bytes: &[u8]) {
         while let Some(frame) = self.decoder.next::<Request>(&mut bytes) {
-            if self.inbox.is_full() {
+            let is_owner = self.is_owner(frame.envelope.session);
+            // A host repeats what was not answered.
+            if !self.inbox.push(frame, is_owner) {
                 self.overrun = self.overrun.wrapping_add(1);
-                // The host repeats what was not answered. A stop must not wait for that: the oldest gives way.
-                if frame.message != Request::Stop {
-                    continue;
-                }
-                self.inbox.pop_front();
             }
-            // There is room now: it was made above.
-            let _ = self.inbox.push_back(frame);
         }
     }
 
@@ -121,7 +117,8 @@ impl<A: Application> HostSession<A> {
         let open = self.application.is_open(now_ms);
         // The time-out is served before each request: no host inherits the motion of another.
         while self.watch_host(now_ms, port) && open && port.room() >= 2 * ANSWER_ROOM {
-            let Some(frame) = self.inbox.pop_front() else {
+            let present = self.owner.as_ref().map(Owner::session);
+            let Some(frame) = self.inbox.pop(now_ms, present.is_none(), |session| present == Some(session)) else {
                 break;
             };
             self.handle(now_ms, frame, port);

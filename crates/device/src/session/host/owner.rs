@@ -44,17 +44,21 @@ impl Owner {
         LINK_TIMEOUT_MS.saturating_sub(self.silence(now_ms))
     }
 
-    /// Notes that it was heard, and says what to do with its request of this number.
+    /// Says what to do with its request of this number, and notes that it was heard: by a new request, or by the
+    /// repetition of one that is worked on. Whatever else has its session number may be a replay.
     pub(super) fn order(&mut self, sequence: u16, now_ms: u32) -> RequestOrder {
-        self.heard_ms = now_ms;
         if sequence == self.newest {
-            return if self.answer().is_some() { RequestOrder::Again } else { RequestOrder::Ignore };
+            if self.answer().is_some() {
+                return RequestOrder::Again;
+            }
+            self.heard_ms = now_ms;
+            return RequestOrder::Ignore;
         }
         // Numbers wrap: one that is "behind" by less than half the circle is old.
         if sequence.wrapping_sub(self.newest) >= 0x8000 {
             return RequestOrder::Ignore;
         }
-        self.newest = sequence;
+        (self.newest, self.heard_ms) = (sequence, now_ms);
         RequestOrder::New
     }
 

@@ -23,7 +23,7 @@ pub(super) enum Requester {
         /// Number of its request.
         of: u16,
     },
-    /// A host without a session, which may do nothing but stop.
+    /// A host without a session, which may do nothing but stop, or the owner who repeats a stop.
     OtherHost {
         /// The session number in its request.
         session: u16,
@@ -45,6 +45,11 @@ impl Pending {
     /// True if the control half owes no answer.
     pub(super) fn is_empty(&self) -> bool {
         self.0.is_empty()
+    }
+
+    /// True if a host without a session waits for a stop.
+    pub(super) fn holds_stop_of_others(&self) -> bool {
+        self.0.iter().any(|(requester, _)| matches!(requester, Requester::OtherHost { .. }))
     }
 
     /// A command has been queued.

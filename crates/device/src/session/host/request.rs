@@ -15,6 +15,10 @@ impl<A: Application> HostSession<A> {
     pub(super) fn handle(&mut self, now_ms: u32, frame: Frame<Request>, port: &mut impl SessionPort<A::Controller>) {
         let Frame { envelope, message } = frame;
         let of = envelope.sequence;
+        // Before the order of the requests: a stop must not be taken for a repetition or for a late one.
+        if message == Request::Stop {
+            return self.stop(now_ms, envelope.session, of, port);
+        }
         let order = match &mut self.owner {
             Some(owner) if owner.session() == envelope.session => owner.order(of, now_ms),
             _ => RequestOrder::New,
@@ -28,9 +32,6 @@ impl<A: Application> HostSession<A> {
                 return;
             }
             RequestOrder::Ignore => return,
-        }
-        if message == Request::Stop && !self.is_owner(envelope.session) {
-            return self.stop_for_other_host(now_ms, envelope.session, of, port);
         }
         if let Err((reason, detail)) = self.admit(now_ms, envelope.session, of, &message) {
             return self.send_to(envelope.session, now_ms, &Reply::Refused { of, reason, detail }, port);
@@ -48,14 +49,22 @@ impl<A: Application> HostSession<A> {
         }
     }
 
-    fn is_owner(&self, session: u16) -> bool {
+    pub(super) fn is_owner(&self, session: u16) -> bool {
         self.owner.as_ref().is_some_and(|owner| owner.session() == session)
     }
 
     /// A stop only ever takes motion away: it is honoured whoever sends it, without a hello, under another host's
-    /// session and in none. Repeating it stops again, so nothing is remembered of it.
-    fn stop_for_other_host(&mut self, now_ms: u32, session: u16, of: u16, port: &mut impl SessionPort<A::Controller>) {
-        let requester = Requester::OtherHost { session, of };
+    /// session and in none. Repeating it stops again. One that comes while another is on its way to the control half is
+    /// left unanswered: the arm stops, and its host repeats it.
+    fn stop(&mut self, now_ms: u32, session: u16, of: u16, port: &mut impl SessionPort<A::Controller>) {
+        let is_new = match &mut self.owner {
+            Some(owner) if owner.session() == session => owner.order(of, now_ms) == RequestOrder::New,
+            _ => false,
+        };
+        let requester = if is_new { Requester::Owner { session, of } } else { Requester::OtherHost { session, of } };
+        if !is_new && self.pending.holds_stop_of_others() {
+            return;
+        }
         if let Err(refused) = self.send_command(now_ms, requester, A::Controller::STOP, port) {
             self.pass_on(now_ms, requester, Err(refused), port);
         }
@@ -73,7 +82,7 @@ impl<A: Application> HostSession<A> {
         if let Some(owner) = self.owner.as_ref().filter(|owner| owner.session() != session) {
             let wait = owner.protected_for(now_ms);
             if wait > 0 {
-                return Err((Refusal::Busy, [owner.session().into(), wait]));
+                return Err((Refusal::Busy, [0, wait]));
             }
         }
         self.close();
@@ -109,7 +118,6 @@ impl<A: Application> HostSession<A> {
                     Err((Refusal::NoSuchPrimitive, [places.into(), 0]))
                 };
             }
-            Request::Stop => return self.command(now_ms, of, A::Controller::STOP, port),
             Request::Telemetry { every } => self.telemetry_every = every,
             Request::UploadBegin { name, length, crc } => self.upload_begin(name, length, crc)?,
             Request::UploadChunk { offset, data } => self.upload_chunk(offset, &data)?,
@@ -181,6 +189,8 @@ impl<A: Application> HostSession<A> {
             firmware: Text::new(self.identity.firmware),
             board: Text::new(self.identity.board),
             serial: Text::new(self.identity.serial),
+            capabilities: A::CAPABILITIES,
+            instructions_per_tick: self.identity.instructions_per_tick,
         }
     }
 

@@ -1,0 +1,247 @@
+//! One entry of the catalogue as a file: what happens to the arm, and what it has to do.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use control::{Fault, State};
+use lab::procedure::Mode;
+use serde::Deserialize;
+use sim::fault::Injection;
+
+use crate::figure::Figure;
+
+/// An entry: the file `tests/faults/ID.toml`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Entry {
+    /// Identifier, from the file name.
+    #[serde(skip)]
+    pub id: String,
+    /// The fault, in a few words.
+    pub title: String,
+    /// The bar of the catalogue, in its words.
+    pub bar: String,
+    /// The mark that `docs/faults.md` gives the entry.
+    pub today: String,
+    /// The part that only a board or an arm can show.
+    #[serde(default)]
+    pub hardware: Option<String>,
+    /// Tests of other packages that hold the entry, or a part of it.
+    #[serde(default)]
+    pub test: Vec<String>,
+    /// Scenarios on the simulated arm.
+    #[serde(default)]
+    pub scenario: Vec<Scenario>,
+}
+
+/// An arm in some state, what befalls it, and what must come of it.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Name, unique in its entry.
+    pub name: String,
+    /// The state in which the arm is at time 0.
+    pub from: From,
+    /// Mode of the run: `t` track, `a` open loop, `b` force control, `c` adaptive.
+    #[serde(default)]
+    pub mode: Mode,
+    /// Seed of everything random.
+    #[serde(default = "one")]
+    pub seed: u64,
+    /// Time watched from time 0 on, s.
+    pub watch: f64,
+    /// A defect that is known: the scenario must fail. A sentence that says what happens instead.
+    #[serde(default)]
+    pub known: Option<String>,
+    /// Faults; their times count from time 0.
+    #[serde(default)]
+    pub inject: Vec<Injection>,
+    /// Orders of the host.
+    #[serde(default)]
+    pub order: Vec<Order>,
+    /// What must come of it.
+    #[serde(default)]
+    pub expect: Expect,
+    /// What a person does afterwards, and what must hold then.
+    #[serde(default)]
+    pub recover: Recover,
+}
+
+/// States in which a scenario begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum From {
+    /// Power-up of the device; arm and pucks run already, the safety module is in IDLE. Time 0 is the power-up.
+    PowerUp,
+    /// Weightless in a person's hand.
+    Gravity,
+    /// Holding a posture.
+    Hold,
+    /// On the way to another posture.
+    Approach,
+    /// In the taught movement, from its first cycle on.
+    Run,
+}
+
+/// An order of the host.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Order {
+    /// Time, s.
+    pub at: f64,
+    /// The order.
+    pub give: Given,
+    /// Its answer, if it matters.
+    #[serde(default)]
+    pub answer: Option<Answer>,
+}
+
+/// Orders a host can give.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Given {
+    /// Stop.
+    Stop,
+    /// Clear the fault.
+    Clear,
+    /// Hold the posture.
+    Hold,
+    /// Float.
+    Gravity,
+    /// Give up torque.
+    Release,
+    /// The host says nothing for so many seconds.
+    Silence(f64),
+}
+
+/// Answers of the device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Answer {
+    /// Done.
+    Accepted,
+    /// Not done, with a reason.
+    Refused,
+}
+
+/// What must come of a scenario.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Expect {
+    /// State at the end of the watch, one of these.
+    #[serde(default)]
+    pub state: Vec<String>,
+    /// Latched fault at the end of the watch, one of these.
+    #[serde(default)]
+    pub fault: Vec<String>,
+    /// Largest values of figures, beside those that hold for every scenario.
+    #[serde(default)]
+    pub most: BTreeMap<Figure, f64>,
+    /// Smallest values of figures.
+    #[serde(default)]
+    pub least: BTreeMap<Figure, f64>,
+}
+
+/// The way back.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Recover {
+    /// Rest, activate if need be, clear, hold, back to the start, the whole movement. Nobody may ask for zeroing.
+    #[default]
+    Run,
+    /// The same, and the device must demand zeroing before it lets the arm hold.
+    Zero,
+    /// There is no way back in this scenario.
+    None,
+}
+
+/// Why an entry cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum EntryError {
+    /// The file or folder cannot be read.
+    #[error("{path}: {1}", path = .0.display())]
+    Unreadable(PathBuf, std::io::Error),
+    /// It is no entry.
+    #[error("{path}: {1}", path = .0.display())]
+    Malformed(PathBuf, toml::de::Error),
+    /// A value means nothing.
+    #[error("{path}: {1}", path = .0.display())]
+    Meaningless(PathBuf, String),
+}
+
+impl Entry {
+    /// Reads an entry; `path` gives its identifier.
+    ///
+    /// # Errors
+    /// [`EntryError`]: unreadable, an unknown key, a state or fault that there is not.
+    pub fn read(path: &Path) -> Result<Self, EntryError> {
+        let text = std::fs::read_to_string(path).map_err(|cause| EntryError::Unreadable(path.to_owned(), cause))?;
+        Self::parse(path, &text)
+    }
+
+    /// As [`Entry::read`], from a text.
+    ///
+    /// # Errors
+    /// As [`Entry::read`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self, EntryError> {
+        let mut entry: Entry = toml::from_str(text).map_err(|cause| EntryError::Malformed(path.to_owned(), cause))?;
+        entry.id = path.file_stem().unwrap_or_default().to_string_lossy().to_uppercase();
+        entry.sense().map_err(|cause| EntryError::Meaningless(path.to_owned(), cause))?;
+        Ok(entry)
+    }
+
+    /// Reads every entry of a folder, in the order of the catalogue.
+    ///
+    /// # Errors
+    /// As [`Entry::read`].
+    pub fn all(folder: &Path) -> Result<Vec<Self>, EntryError> {
+        let unreadable = |cause| EntryError::Unreadable(folder.to_owned(), cause);
+        let mut entries = Vec::new();
+        for file in std::fs::read_dir(folder).map_err(unreadable)? {
+            let path = file.map_err(unreadable)?.path();
+            if path.extension().is_some_and(|extension| extension == "toml") {
+                entries.push(Self::read(&path)?);
+            }
+        }
+        entries.sort_by_key(Entry::place);
+        Ok(entries)
+    }
+
+    /// Place in the catalogue: letter, number.
+    fn place(&self) -> (char, u32) {
+        let (letter, number) = self.id.split_at(self.id.len().min(1));
+        (letter.chars().next().unwrap_or(' '), number.parse().unwrap_or(u32::MAX))
+    }
+
+    fn sense(&self) -> Result<(), String> {
+        if self.scenario.is_empty()
+            && self.test.is_empty()
+            && self.hardware.is_none()
+            && !self.today.starts_with("open")
+        {
+            return Err("neither scenario, test nor hardware, and not open".to_owned());
+        }
+        for scenario in &self.scenario {
+            let (states, faults) = (&scenario.expect.state, &scenario.expect.fault);
+            let unknown_state = states.iter().find(|name| State::ALL.iter().all(|state| state.name() != **name));
+            let unknown_fault = faults.iter().find(|name| Fault::ALL.iter().all(|fault| fault_name(*fault) != **name));
+            if let Some(name) = unknown_state.or(unknown_fault) {
+                return Err(format!("{}: no state or fault '{name}'", scenario.name));
+            }
+            if scenario.known.is_some() && self.today == "held" {
+                return Err(format!("{}: a known defect in an entry that is held", scenario.name));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Name of a fault as `docs/faults.md` has it.
+#[must_use]
+pub fn fault_name(fault: Fault) -> String {
+    format!("{fault:?}")
+}
+
+fn one() -> u64 {
+    1
+}

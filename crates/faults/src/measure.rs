@@ -1,0 +1,201 @@
+//! From what was seen to figures.
+
+use control::{Fault, State};
+use puck::SafetyMode;
+use sim::{TICKS_PER_MILLISECOND, Ticks};
+
+use crate::bus::{self, Sent};
+use crate::entry::{Given, Scenario};
+use crate::figure::{Figure, Figures};
+use crate::watch::{Moment, Watched};
+
+/// A joint at rest is slower, rad/s.
+pub const AT_REST: f64 = 0.05;
+
+/// Telemetry tells of an instant at most so long past, s.
+const TELEMETRY_AGE: f64 = 0.012;
+
+/// Torque may still be sent for so long after the safety module has taken the arm out of ACTIVE.
+const NOTICE: Ticks = 30 * TICKS_PER_MILLISECOND;
+
+/// Speed of the hand is taken over so long a time, s.
+const SPEED_WINDOW: f64 = 0.01;
+
+/// The figures that hold in every scenario.
+#[must_use]
+pub fn always(watched: &Watched) -> Figures {
+    let sent = bus::sent(&watched.bus);
+    let speeds = hand_speeds(&watched.moments);
+    let free = speeds.iter().filter(|(moment, _)| is_free(&sent, moment)).map(|(_, speed)| *speed);
+    Figures::from([
+        (Figure::Torque, bus::largest(&sent)),
+        (Figure::TorqueStep, bus::largest_step(&sent)),
+        (Figure::Belief, 1e3 * belief(&watched.moments)),
+        (Figure::FreeSpeed, free.fold(0.0, f64::max)),
+        (Figure::CausesLost, f64::from(causes_lost(watched))),
+        (Figure::TorqueUnasked, f64::from(unasked(&sent, &watched.moments))),
+        (Figure::HandSpeed, speeds.iter().map(|(_, speed)| *speed).fold(0.0, f64::max)),
+    ])
+}
+
+/// All figures of a scenario, those against `nominal` if there is one.
+#[must_use]
+pub fn all(scenario: &Scenario, watched: &Watched, nominal: Option<&Watched>) -> Figures {
+    let moments = &watched.moments;
+    let mut figures = always(watched);
+    let (first, last) = span(scenario);
+    let stopped = moments.iter().find(|moment| moment.time >= first && !is_moving(moment.state));
+    if let Some(stop) = stopped {
+        figures.insert(Figure::Stop, 1e3 * (stop.time - first));
+        let behind: Vec<&Moment> = moments.iter().filter(|moment| moment.time >= stop.time).collect();
+        figures.insert(Figure::Rest, 1e3 * (moved_until(moments) - stop.time).max(0.0));
+        let ways = behind.iter().flat_map(|moment| (0..7).map(|joint| (moment.q[joint] - stop.q[joint]).abs()));
+        figures.insert(Figure::Travel, 1e3 * ways.fold(0.0, f64::max));
+    }
+    figures.insert(Figure::Still, 1e3 * (moved_until(moments) - first).max(0.0));
+    let late = hand_speeds(moments).into_iter().filter(|(moment, _)| moment.time > last + 0.3);
+    figures.insert(Figure::LateSpeed, late.map(|(_, speed)| speed).fold(0.0, f64::max));
+    if let Some(start) = moments.first() {
+        let fall = moments.iter().map(|moment| start.hand[2] - moment.hand[2]).fold(0.0, f64::max);
+        figures.insert(Figure::Fall, 1e3 * fall);
+    }
+    let (before, after) = (&watched.before, &watched.after);
+    let mut count = |figure, after: u32, before: u32| figures.insert(figure, f64::from(after.wrapping_sub(before)));
+    count(Figure::LostReplies, after.lost_replies, before.lost_replies);
+    count(Figure::TorqueMismatches, after.torque_mismatches, before.torque_mismatches);
+    let odd = |statistics: &link::Statistics| statistics.late_replies.wrapping_add(statistics.rejected_frames);
+    count(Figure::BusErrors, after.bus_errors, before.bus_errors);
+    count(Figure::OddFrames, odd(after), odd(before));
+    if let Some(nominal) = nominal {
+        figures.extend(against(moments, &nominal.moments));
+    }
+    figures
+}
+
+/// Last moment at which a joint moved, s.
+fn moved_until(moments: &[Moment]) -> f64 {
+    let moves = |moment: &&Moment| moment.dq.iter().any(|speed| speed.abs() > AT_REST);
+    moments.iter().rfind(moves).map_or(0.0, |moment| moment.time)
+}
+
+/// First begin, and last end or begin, of faults and orders, s.
+fn span(scenario: &Scenario) -> (f64, f64) {
+    let (mut first, mut last) = (f64::INFINITY, 0.0_f64);
+    for fault in &scenario.inject {
+        first = first.min(fault.at);
+        let begin = fault.at + fault.every * f64::from(fault.times.saturating_sub(1));
+        last = last.max(if fault.lasts.is_finite() { begin + fault.lasts } else { begin });
+    }
+    for order in &scenario.order {
+        first = first.min(order.at);
+        let length = if let Given::Silence(seconds) = order.give { seconds } else { 0.0 };
+        last = last.max(order.at + length);
+    }
+    (if first.is_finite() { first } else { 0.0 }, last)
+}
+
+fn is_moving(state: State) -> bool {
+    !matches!(state, State::Idle | State::SoftStop | State::Fault)
+}
+
+/// Speed of the hand at each moment, m/s.
+fn hand_speeds(moments: &[Moment]) -> Vec<(&Moment, f64)> {
+    let mut from = 0;
+    let mut speeds = Vec::new();
+    for moment in moments {
+        while moment.time - moments[from].time > SPEED_WINDOW {
+            from += 1;
+        }
+        let before = &moments[from.saturating_sub(1)];
+        let time = moment.time - before.time;
+        if time > 0.5 * SPEED_WINDOW {
+            speeds.push((moment, distance(&moment.hand, &before.hand) / time));
+        }
+    }
+    speeds
+}
+
+/// True if every motor is told zero torque at that moment and none brakes: they do unless the safety module is ACTIVE.
+fn is_free(sent: &[Sent], moment: &Moment) -> bool {
+    if moment.safety != SafetyMode::Active {
+        return false;
+    }
+    let later = sent.partition_point(|pair| pair.at <= moment.ticks);
+    later.checked_sub(1).and_then(|last| sent.get(last)).is_some_and(|pair| pair.is_zero)
+}
+
+/// Largest distance of the joint angles told from those that were true a moment before, rad.
+fn belief(moments: &[Moment]) -> f64 {
+    let mut worst = 0.0_f64;
+    let mut from = 0;
+    for (index, moment) in moments.iter().enumerate() {
+        while moment.time - moments[from].time > TELEMETRY_AGE {
+            from += 1;
+        }
+        let Some((q, _)) = moment.told else { continue };
+        let off = |truth: &Moment| (0..7).map(|joint| (q[joint] - truth.q[joint]).abs()).fold(0.0, f64::max);
+        let nearest = moments[from..=index].iter().map(off).fold(f64::INFINITY, f64::min);
+        worst = worst.max(nearest);
+    }
+    worst
+}
+
+/// Changes of a latched fault into another, or none, that no clear explains.
+fn causes_lost(watched: &Watched) -> u32 {
+    let changes = watched.moments.windows(2).filter(|pair| {
+        let is_cleared = watched.clears.iter().any(|at| (pair[1].time - at).abs() < 0.1);
+        pair[0].fault != Fault::None && pair[1].fault != pair[0].fault && !is_cleared
+    });
+    changes.count() as u32
+}
+
+/// Torques that are not zero although the safety module has not been ACTIVE for a while.
+fn unasked(sent: &[Sent], moments: &[Moment]) -> u32 {
+    let mut since = None;
+    let mut count = 0;
+    let mut pairs = sent.iter().peekable();
+    for moment in moments {
+        while let Some(pair) = pairs.next_if(|pair| pair.at <= moment.ticks) {
+            count += u32::from(!pair.is_zero && since.is_some_and(|since| pair.at > since + NOTICE));
+        }
+        since = if moment.safety == SafetyMode::Active { None } else { since.or(Some(moment.ticks)) };
+    }
+    count
+}
+
+/// Figures against the same scenario without the faults.
+fn against(moments: &[Moment], nominal: &[Moment]) -> Figures {
+    let mut deviation = 0.0_f64;
+    for moment in moments {
+        let later = nominal.partition_point(|other| other.time < moment.time).clamp(1, nominal.len() - 1);
+        let (before, behind) = (&nominal[later - 1], &nominal[later]);
+        let share = ((moment.time - before.time) / (behind.time - before.time).max(1e-9)).clamp(0.0, 1.0);
+        let off = (0..7).map(|joint| {
+            let wanted = before.q[joint] + share * (behind.q[joint] - before.q[joint]);
+            (moment.q[joint] - wanted).abs()
+        });
+        deviation = deviation.max(off.fold(0.0, f64::max));
+    }
+    let plans = |moments: &[Moment]| -> Vec<(f64, [f64; 3], [f64; 3])> {
+        moments.iter().filter_map(|moment| moment.told.map(|(_, plan)| (moment.time, plan, moment.hand))).collect()
+    };
+    let (planned, wanted) = (plans(moments), plans(nominal));
+    let rms = |plans: &[(f64, [f64; 3], [f64; 3])]| {
+        let squares: f64 = plans.iter().map(|(_, plan, hand)| distance(plan, hand).powi(2)).sum();
+        (squares / plans.len().max(1) as f64).sqrt()
+    };
+    let apart = planned.iter().filter_map(|(time, plan, _)| {
+        let later = wanted.partition_point(|(other, ..)| other < time);
+        let nearest = wanted.get(later.saturating_sub(1)..(later + 1).min(wanted.len()))?;
+        nearest.iter().map(|(_, other, _)| distance(plan, other)).reduce(f64::min)
+    });
+    Figures::from([
+        (Figure::Deviation, 1e3 * deviation),
+        (Figure::Tracking, rms(&planned) / rms(&wanted).max(1e-9)),
+        (Figure::Plan, 1e3 * apart.fold(0.0, f64::max)),
+    ])
+}
+
+fn distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}

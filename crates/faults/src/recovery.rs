@@ -1,0 +1,125 @@
+//! The way back: a person activates, clears, lets the arm hold, and has it do the whole movement.
+
+use std::time::Duration;
+
+use control::{Fault, State};
+use device::Stage;
+use lab::procedure::{self, Ends, Mode, RunRequest};
+use link::Name;
+use puck::SafetyMode;
+use sim::PendantAction;
+
+use crate::bench::{Arm, Failure, plant};
+use crate::entry::Recover;
+use crate::measure::AT_REST;
+use crate::movement::movement;
+
+/// Longest time for the arm to come to rest, and for a start-up.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Time that a person takes between pendant and keyboard.
+const NOTICE: Duration = Duration::from_millis(500);
+
+/// Distance of the joint angles told from the true ones after a zeroing, rad: a count of M7, and what the arm moved.
+const BELIEVED: f64 = 0.02;
+
+/// Goes the whole way back.
+///
+/// # Errors
+/// The step that failed, and why.
+pub fn recover(arm: &mut Arm, way: Recover) -> Result<(), Failure> {
+    if way == Recover::None {
+        return Ok(());
+    }
+    if State::from_code(arm.status()?.state).is_some_and(|state| !matches!(state, State::Idle | State::Fault)) {
+        arm.stop().map_err(|error| format!("stop: {error}"))?;
+    }
+    rest(arm)?;
+    let has_zeroed = start_up(arm, way)?;
+    if has_zeroed != (way == Recover::Zero) {
+        let words = if has_zeroed { "zeroing was demanded" } else { "zeroing was not demanded" };
+        return Err(words.into());
+    }
+    if Fault::from_code(arm.status()?.fault) != Some(Fault::None) {
+        arm.clear_fault().map_err(|error| format!("clear: {error}"))?;
+        // A device with a fault goes on asking for IDLE.
+        start_up(arm, way)?;
+    }
+    arm.take_events();
+    arm.hold().map_err(|error| format!("hold: {error}"))?;
+    procedure::pass(arm, Duration::from_millis(500), Ends::OnAnyStop)?;
+    let told = arm.status()?.q.map(f64::from);
+    let truth = plant(arm).world().joint_positions();
+    if let Some(joint) = (0..7).find(|joint| (told[*joint] - truth[*joint]).abs() > BELIEVED) {
+        return Err(format!("J{} is told as {:.3}, is {:.3} rad", joint + 1, told[joint], truth[joint]).into());
+    }
+    let movement = movement();
+    // Whoever restarted the device has to give it the movement again.
+    arm.upload(&movement.to_image()?, |_, _, _| {}).map_err(|error| format!("upload: {error}"))?;
+    procedure::go_to_start(arm, &movement.start, |_| {}).map_err(|error| format!("to the start: {error}"))?;
+    let request = RunRequest::new(Name::new(&movement.name)?, movement.duration, Mode::Track.options());
+    procedure::play(arm, &request, &mut |_| {}).map_err(|error| format!("run: {error}"))?;
+    Ok(())
+}
+
+/// Waits until the arm rests.
+fn rest(arm: &mut Arm) -> Result<(), Failure> {
+    let deadline = arm.now() + PATIENCE;
+    while arm.now() < deadline {
+        if plant(arm).world().joint_velocities().iter().all(|speed| speed.abs() < AT_REST) {
+            return Ok(());
+        }
+        arm.next(Duration::from_millis(20))?;
+    }
+    Err("the arm does not come to rest".into())
+}
+
+/// Lets time pass; what the device tells meanwhile does not matter.
+fn wait(arm: &mut Arm) -> Result<(), Failure> {
+    let end = arm.now() + NOTICE;
+    while arm.now() < end {
+        arm.next(NOTICE)?;
+    }
+    Ok(())
+}
+
+/// At the pendant, until the device is ready and has noticed it; true if it demanded zeroing, which it then gets at the true posture.
+fn start_up(arm: &mut Arm, way: Recover) -> Result<bool, Failure> {
+    let deadline = arm.now() + PATIENCE;
+    let mut has_zeroed = false;
+    if plant(arm).safety_mode() == SafetyMode::EStop {
+        plant(arm).press(PendantAction::ReleaseEStop);
+        plant(arm).press(PendantAction::ShiftIdle);
+    }
+    loop {
+        let status = arm.status()?;
+        match Stage::from_code(status.startup_stage) {
+            Some(Stage::WaitingForZero) => {
+                if way == Recover::Zero && !has_zeroed && arm.hold().is_ok() {
+                    return Err("hold was accepted before zeroing".into());
+                }
+                let truth = plant(arm).world().joint_positions();
+                has_zeroed = arm.zero(truth.map(|angle| angle as f32)).is_ok() || has_zeroed;
+            }
+            Some(Stage::WaitingForIdle) => plant(arm).press(PendantAction::ShiftIdle),
+            Some(Stage::Blocked) => return Err(format!("the start-up is blocked: {:?}", status.blocked).into()),
+            Some(Stage::WaitingForActive) => {
+                plant(arm).press(PendantAction::ShiftIdle);
+                plant(arm).press(PendantAction::ShiftActivate);
+            }
+            Some(Stage::Ready) if plant(arm).safety_mode() == SafetyMode::Active => {
+                wait(arm)?;
+                return Ok(has_zeroed);
+            }
+            Some(Stage::Ready) => {
+                plant(arm).press(PendantAction::ShiftIdle);
+                plant(arm).press(PendantAction::ShiftActivate);
+            }
+            _ => {}
+        }
+        if arm.now() > deadline {
+            return Err(format!("the start-up hangs in {:?}", Stage::from_code(status.startup_stage)).into());
+        }
+        arm.next(Duration::from_millis(100))?;
+    }
+}

@@ -1,0 +1,72 @@
+//! Scripts are read strictly, compared with the catalogue, and judged by what happens.
+
+use std::path::Path;
+
+use faults::catalogue::differences;
+use faults::entry::Entry;
+use faults::run::run;
+
+/// An entry with one scenario: torque frames cannot leave.
+const SCRIPT: &str = r#"title = "torque frames cannot leave"
+bar = "Fault"
+today = "part"
+test = ["some_test_of_it"]
+
+[[scenario]]
+name = "for ever"
+from = "hold"
+watch = 0.5
+inject = [{ at = 0.1, what.refuse = "torques" }]
+expect = { state = ["fault"], fault = ["BusFault"], most = { stop = 60 } }
+recover = "none"
+"#;
+
+fn read(text: &str) -> Result<Entry, String> {
+    Entry::parse(Path::new("tests/faults/a12.toml"), text).map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_word_that_means_nothing_is_refused_with_its_line() {
+    let refused = |from: &str, to: &str| read(&SCRIPT.replace(from, to)).expect_err("it means nothing");
+    for (from, to) in [
+        ("watch = 0.5", "watches = 0.5"),
+        ("\"hold\"", "\"holding\""),
+        ("what.refuse = \"torques\"", "what.refuse = \"torque\""),
+        ("what.refuse", "what.refused"),
+        ("at = 0.1,", "at = 0.1, until = 2,"),
+        ("stop = 60", "stops = 60"),
+    ] {
+        let error = refused(from, to);
+        assert!(error.contains("line "), "{to}: {error}");
+    }
+    assert!(refused("\"fault\"", "\"faulty\"").contains("no state or fault 'faulty'"));
+    assert!(refused("BusFault", "BusFailure").contains("no state or fault 'BusFailure'"));
+}
+
+#[test]
+fn script_and_catalogue_say_the_same_or_the_difference_is_told() {
+    let entry = read(SCRIPT).expect("sound");
+    let text = "| A12 | torque frames cannot leave | counted | Fault | **part** (`some_test_of_it`) |\n";
+    let found = |text: &str| differences(std::slice::from_ref(&entry), text);
+    assert_eq!(found(text), [""; 0]);
+    for (from, to) in [("cannot leave", "leave"), ("| Fault", "| SoftStop"), ("part", "held"), ("some_test", "no_test")]
+    {
+        assert_eq!(found(&text.replace(from, to)).len(), 1, "{to}");
+    }
+    assert_eq!(found(&text.replace("A12", "A13")).len(), 2, "one entry without row, one row without entry");
+}
+
+#[test]
+fn a_scenario_is_judged_by_its_bars_and_a_known_defect_has_to_fail() {
+    let judged = |text: &str| {
+        let entry = read(text).expect("sound");
+        let verdict = run(&entry, &entry.scenario[0]);
+        (verdict.holds(), verdict.is_as_told())
+    };
+    assert_eq!(judged(SCRIPT), (true, true));
+    assert_eq!(judged(&SCRIPT.replace("stop = 60", "stop = 1")), (false, false));
+    assert_eq!(judged(&SCRIPT.replace("BusFault", "Overrun")), (false, false));
+    let known = SCRIPT.replace("recover", "known = \"nothing\"\nrecover");
+    assert_eq!(judged(&known), (true, false), "a defect that is gone must not stay in the list");
+    assert_eq!(judged(&known.replace("stop = 60", "stop = 1")), (false, true));
+}
