@@ -17,6 +17,8 @@ fn the_torque_is_inertia_bias_feedback_and_friction() {
         missing: 0,
         age: 0,
         implausible: false,
+        stuck: false,
+        still: 0,
         displaced: false,
     };
     let reference = JointReference {

@@ -172,7 +172,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if measured.state.displaced { Err(Refusal::ZeroLost) } else { Ok(()) }
     }
 
+    /// Conditions of a command that moves the arm.
     fn may_move(&self, measured: &Measured<'_, R>) -> Result<(), Refusal> {
+        if self.is_blind(WRENCH_AGE.into()) {
+            return Err(Refusal::WrenchMissing);
+        }
         if self.fastest(measured) > R::of(CALM) { Err(Refusal::Moving) } else { Ok(()) }
     }
 

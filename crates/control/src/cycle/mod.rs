@@ -110,7 +110,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         init!(Cycle {
             bounds: JointBounds::around(&model, &home),
             supervisor: Supervisor::new(),
-            monitor: Monitor::new(),
+            monitor: Monitor::new(calibration.transmission),
             joints: JointEstimator::new(&calibration),
             wrench: WrenchEstimator::new(),
             limiter: TorqueLimiter::new(&calibration),
@@ -179,6 +179,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             return Err(Refusal::WrongState);
         }
         self.joints = JointEstimator::new(&calibration);
+        self.monitor = Monitor::new(calibration.transmission);
         self.limiter = TorqueLimiter::new(&calibration);
         if calibration.payload != self.calibration.payload {
             // It was checked for another tool.
@@ -317,18 +318,32 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             (Law::Run(Running { lag, .. }), Some(run)) => (run.options.feedback || run.options.force_control, *lag),
             _ => (false, Lag::none()),
         };
+        let feedback = match &self.law {
+            Law::Posture(Posture { controller, .. }) | Law::Run(Running { controller, .. }) => {
+                Some(controller.feedback())
+            }
+            _ => None,
+        };
         let seen = Observation {
             frames: measured.frames,
             bounds: &self.bounds,
             force: self.wrench.raw_force(),
             lag: (lag.distance, lag.speed),
             // The feedback fades in the meantime.
-            wrench_lost: depends && self.wrench.age().is_none_or(|age| u16::from(age) > u16::from(WRENCH_AGE) + FADE),
+            wrench_lost: self.is_blind(u16::from(WRENCH_AGE) + FADE),
+            blind: self.is_blind(WRENCH_AGE.into()),
+            feedback,
             full_scale: self.wrench.full_scale().force > 0 || (depends && self.wrench.full_scale().torque > 0),
         };
         if let Some((trigger, fault)) = self.monitor.check(law, measured.state, &seen) {
             self.trigger(trigger, fault, Some(measured));
         }
+    }
+
+    /// True if an arm that has a sensor has had no wrench for so many control periods.
+    fn is_blind(&self, periods: u16) -> bool {
+        self.calibration.payload == Payload::SensorAndHand
+            && self.wrench.age().is_none_or(|age| u16::from(age) > periods)
     }
 
     /// The first rest after start-up is the zero of the sensors; the arm is braked then, and nobody uses the hand.
@@ -379,7 +394,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             record.flags |= flags::ARRIVED;
             self.pending = Some(Event::Arrived);
         }
-        let actuation = Actuation::torque(&torques, &self.calibration);
+        let mut actuation = Actuation::torque(&torques, &self.calibration);
+        if self.supervisor.fault() == Fault::EncoderStuck {
+            // Torque cannot damp a joint that nobody sees: brakes, as soon as the safety module has them on.
+            actuation = actuation.requesting_idle();
+        }
         let keeps = self.supervisor.law() != State::Gravity;
         let hand = self.hand.step(&self.gains.hand, keeps);
         record.hand_d = self.hand.desired().map(Real::single);
@@ -425,6 +444,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         if self.wrench.age() != Some(0) {
             set |= flags::WRENCH_STALE;
+        }
+        if self.is_blind(WRENCH_AGE.into()) {
+            set |= flags::CONTACT_UNSEEN;
         }
         if self.wrench.is_tared() {
             set |= flags::TARED;

@@ -90,6 +90,8 @@ pub mod flags {
     pub const SURPRISE: u32 = 1 << 17;
     /// Replies of the hand were lost for so long that its drives are left alone.
     pub const HAND_LOST: u32 = 1 << 18;
+    /// The wrist sensor has been silent for 16.7 ms: no force tells of a contact.
+    pub const CONTACT_UNSEEN: u32 = 1 << 19;
 }
 
 /// Everything one cycle measured and decided, of constant size; the source of telemetry and fault records.

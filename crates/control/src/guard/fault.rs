@@ -32,17 +32,21 @@ pub enum Fault {
     ContactForce = 9,
     /// The safety module went to IDLE or E-STOP while torque was on.
     SafetyDropped = 10,
-    /// The wrench sensor fell silent while the run depends on it.
+    /// The wrench sensor fell silent while the arm moved by itself.
     WrenchLost = 11,
     /// The device found a fault of the bus or a puck (bus-off, puck reset) and asked for zero torque.
     BusFault = 12,
     /// The control cycle missed its deadline too often.
     Overrun = 13,
+    /// The counts of a motor do not change although it turns.
+    EncoderStuck = 14,
+    /// Something pushed the arm while the wrench sensor was silent.
+    UnseenContact = 15,
 }
 
 impl Fault {
     /// Every fault, in the order of the codes.
-    pub const ALL: [Fault; 14] = [
+    pub const ALL: [Fault; 16] = [
         Fault::None,
         Fault::RepliesLost,
         Fault::RepliesLostForLong,
@@ -57,6 +61,8 @@ impl Fault {
         Fault::WrenchLost,
         Fault::BusFault,
         Fault::Overrun,
+        Fault::EncoderStuck,
+        Fault::UnseenContact,
     ];
 
     /// The stable number of this fault.
@@ -91,9 +97,15 @@ impl Fault {
             Fault::TrackingError => "the arm stayed far behind the plan; look for an obstacle or a wrong payload",
             Fault::ContactForce => "the contact force passed the stop threshold; look for an obstacle",
             Fault::SafetyDropped => "the safety module took torque away; see the pendant, activate again, then clear",
-            Fault::WrenchLost => "the force sensor fell silent during a run that depends on it; check its cable",
+            Fault::WrenchLost => "the force sensor fell silent during a motion; check its cable",
             Fault::BusFault => "the CAN bus or a puck failed; torque was taken off, see the device log",
             Fault::Overrun => "the control cycle missed its deadline too often; this is a defect, keep the record",
+            Fault::EncoderStuck => {
+                "the counts of a motor stood still while it turned; check the encoder cable, then zero the arm again"
+            }
+            Fault::UnseenContact => {
+                "something pushed the arm while the force sensor was silent; look for an obstacle, check the sensor's cable"
+            }
         }
     }
 }

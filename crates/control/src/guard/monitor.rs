@@ -1,5 +1,8 @@
 //! `Monitor`: watches the measured state and says when torque authority has to go down.
 
+use puck::Transmission;
+
+use crate::guard::disagreement::Disagreement;
 use crate::guard::fault::Fault;
 use crate::guard::joint_limits::JointBounds;
 use crate::guard::supervisor::{State, Trigger};
@@ -8,7 +11,7 @@ use crate::model::wam7;
 use crate::real::Real;
 use crate::sense::joints::{COAST_CYCLES, JointState};
 use crate::time::few_periods;
-use crate::units::JOINTS;
+use crate::units::{JOINTS, Vector7};
 
 /// Largest speed of elbow and forearm in any state with torque (m/s); the safety module faults at 1.0.
 pub const TIP_SPEED_LIMIT: f64 = 0.8;
@@ -41,6 +44,7 @@ const SILENCE_CYCLES: u8 = few_periods(0.2);
 pub(crate) struct Monitor<R: Real> {
     speed_limit: [R; JOINTS],
     pressed: u8,
+    disagreement: Disagreement<R>,
 }
 
 /// Input of the monitor besides the joint state.
@@ -51,15 +55,23 @@ pub(crate) struct Observation<'a, R: Real> {
     pub(crate) force: R,
     /// Distance (m) and speed (m/s) of the tool against the plan in the last cycle.
     pub(crate) lag: (R, R),
-    /// True if the run depends on the wrench, and it is gone.
+    /// True if the wrench is gone for so long that nothing moves by itself any more.
     pub(crate) wrench_lost: bool,
+    /// True if no fresh force tells of a contact, on an arm that has a sensor.
+    pub(crate) blind: bool,
+    /// Torque of the joint feedback (N m), where there is one.
+    pub(crate) feedback: Option<&'a Vector7<R>>,
     /// True if the sensor has been at full scale: in a force, or in a torque that the run depends on.
     pub(crate) full_scale: bool,
 }
 
 impl<R: Real> Monitor<R> {
-    pub(crate) fn new() -> Self {
-        Monitor { speed_limit: wam7::VELOCITY_MAX.map(|limit| R::of(limit * SPEED_MARGIN)), pressed: 0 }
+    pub(crate) fn new(transmission: Transmission<R>) -> Self {
+        Monitor {
+            speed_limit: wam7::VELOCITY_MAX.map(|limit| R::of(limit * SPEED_MARGIN)),
+            pressed: 0,
+            disagreement: Disagreement::new(transmission),
+        }
     }
 
     /// The most severe finding of this cycle in a state with torque.
@@ -76,17 +88,27 @@ impl<R: Real> Monitor<R> {
             return Some((Trigger::SoftFault, Fault::ImplausiblePosition));
         }
         if state.age > COAST_CYCLES {
-            let fault = if state.implausible { Fault::ImplausiblePosition } else { Fault::RepliesLost };
+            let fault = match (state.stuck, state.implausible) {
+                (true, _) => Fault::EncoderStuck,
+                (_, true) => Fault::ImplausiblePosition,
+                _ => Fault::RepliesLost,
+            };
             return Some((Trigger::SoftFault, fault));
         }
-        let pressed = seen.force > R::of(FORCE_LIMIT) || seen.full_scale;
+        let (stuck, pushed) = self.disagrees(state, seen);
+        // A value that was measured long ago says nothing of now.
+        let pressed = !seen.blind && (seen.force > R::of(FORCE_LIMIT) || seen.full_scale);
         self.pressed = if pressed { self.pressed.saturating_add(1) } else { 0 };
         let moving_by_itself = matches!(law, State::Hold | State::Approach | State::Run);
         let finding = if moving_by_itself && self.pressed >= FORCE_CYCLES {
             Some(Fault::ContactForce)
+        } else if stuck {
+            Some(Fault::EncoderStuck)
+        } else if pushed {
+            Some(Fault::UnseenContact)
         } else if moving_by_itself && seen.bounds.violated(&state.q) {
             Some(Fault::JointLimit)
-        } else if law == State::Run && seen.wrench_lost {
+        } else if matches!(law, State::Approach | State::Run) && seen.wrench_lost {
             Some(Fault::WrenchLost)
         } else if law == State::Run && (seen.lag.0 > R::of(TRACKING_LIMIT) || seen.lag.1 > R::of(LAG_LIMIT)) {
             Some(Fault::TrackingError)
@@ -102,5 +124,20 @@ impl<R: Real> Monitor<R> {
         }
         let trigger = if state.missing > 0 { Trigger::RepliesMissing } else { Trigger::RepliesBack };
         Some((trigger, Fault::None))
+    }
+
+    /// True if an encoder stands still; true if something pushes that the sensor does not see.
+    fn disagrees(&mut self, state: &JointState<R>, seen: &Observation<'_, R>) -> (bool, bool) {
+        match seen.feedback {
+            Some(feedback) if state.missing == 0 => {
+                let stuck = self.disagreement.encoder_stands_still(feedback, state.still);
+                (stuck, seen.blind && self.disagreement.is_pushed(feedback))
+            }
+            Some(_) => (false, false),
+            None => {
+                self.disagreement.reset();
+                (false, false)
+            }
+        }
     }
 }

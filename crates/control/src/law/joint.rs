@@ -29,6 +29,11 @@ impl<R: Real> JointController<R> {
         JointController { feedback: Vector7::zeros() }
     }
 
+    /// The feedback torque of the last good cycle (N m).
+    pub fn feedback(&self) -> &Vector7<R> {
+        &self.feedback
+    }
+
     /// Forgets the feedback of the last cycle.
     pub fn reset(&mut self) {
         self.feedback = Vector7::zeros();

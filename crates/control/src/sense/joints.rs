@@ -34,6 +34,13 @@ pub const VELOCITY_CUT_OFF: f64 = 50.0;
 /// counts as motion.
 const PLAUSIBLE_CHANGE: f64 = 1.5;
 
+/// Part of the largest change of speed from which on a motor of the arm turns too fast to stand still, to the count, in
+/// the next cycle: nothing but an encoder stops so dead.
+const TURNING: i32 = 8;
+
+/// Motors of the arm. A blow can stop those of the wrist dead, they have little to carry.
+const ARM_MOTORS: usize = 4;
+
 /// State of one motor.
 #[derive(Clone, Copy, Debug)]
 struct Motor {
@@ -70,6 +77,10 @@ pub struct JointState<R: Real> {
     pub age: u8,
     /// True if a reply of this cycle was implausible.
     pub implausible: bool,
+    /// True if a motor that turned fast has not changed by a count since: its encoder stands still.
+    pub stuck: bool,
+    /// Motors whose believed reply did not change by a count, one bit each, M1 lowest.
+    pub still: u8,
     /// True from a jump of a motor on until the estimator begins anew: the positions no longer refer to the zero of the
     /// arm.
     pub displaced: bool,
@@ -145,10 +156,15 @@ impl<R: Real> JointEstimator<R> {
         let mut missing = 0;
         let mut age = 0;
         let mut implausible = false;
+        let (mut stuck, mut still) = (false, 0);
         let mut angles = Vector7::zeros();
         let mut rates = Vector7::zeros();
         for (index, (motor, reply)) in motors.iter_mut().zip(replies).enumerate() {
-            let believed = reply.and_then(|raw| motor.judge::<R>(raw, self.gate[index], torque_on));
+            let frozen =
+                torque_on && index < ARM_MOTORS && reply.is_some_and(|raw| motor.is_frozen(raw, self.gate[index]));
+            stuck |= frozen;
+            let believed = reply.filter(|_| !frozen).and_then(|raw| motor.judge::<R>(raw, self.gate[index], torque_on));
+            still |= u8::from(believed.is_some() && motor.step == 0) << index;
             implausible |= motor.doubtful.is_some() || believed.as_ref().is_some_and(|believed| believed.jumped);
             let carried = match believed {
                 Some(believed) => {
@@ -181,6 +197,8 @@ impl<R: Real> JointEstimator<R> {
             missing,
             age,
             implausible,
+            stuck,
+            still,
             displaced,
         })
     }
@@ -201,6 +219,8 @@ impl<R: Real> JointEstimator<R> {
             missing: 0,
             age: 0,
             implausible: false,
+            stuck: false,
+            still: 0,
             displaced: self.displaced,
         })
     }
@@ -208,6 +228,15 @@ impl<R: Real> JointEstimator<R> {
 
 impl Motor {
     const AT_REST: Motor = Motor { counts: Counts(0), offset: 0, step: 0, age: 0, doubtful: None };
+
+    /// True if the motor turned fast and this reply says that it stands where it was. Not beyond the speeds of its own:
+    /// who throws the arm into a stop is believed. For as long as a bridge lasts: then it is taken as it is.
+    fn is_frozen(&self, raw: Counts, gate: i32) -> bool {
+        self.age <= COAST_CYCLES
+            && (gate / TURNING + 1..=gate).contains(&self.step.saturating_abs())
+            && raw.unwrapped_near(Counts(self.counts.0.wrapping_sub(self.offset))).0.wrapping_add(self.offset)
+                == self.counts.0
+    }
 
     /// Takes a reply; `None` if it is not believed yet. `gate` is the largest change of the counts per cycle.
     fn judge<R: Real>(&mut self, raw: Counts, gate: i32, torque_on: bool) -> Option<Believed<R>> {

@@ -3,6 +3,7 @@
 mod adaptation;
 mod authority;
 mod contact;
+mod disagreement;
 mod hand;
 mod hand_plant;
 mod losses;

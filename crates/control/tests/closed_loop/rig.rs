@@ -190,6 +190,8 @@ pub(crate) struct Rig<R: Real> {
     pub(crate) lose: [bool; 7],
     /// Counts by which the replies of each motor have jumped.
     pub(crate) jump: [i32; 7],
+    /// Motors whose encoders stand still, and where.
+    pub(crate) stuck: [Option<Counts>; 7],
     /// A fault that the device has found.
     pub(crate) external: Option<Fault>,
     pub(crate) last: Option<CycleOutput>,
@@ -204,6 +206,7 @@ impl<R: Real> Rig<R> {
             number: 0,
             lose: [false; 7],
             jump: [0; 7],
+            stuck: [None; 7],
             external: None,
             last: None,
         }
@@ -218,6 +221,9 @@ impl<R: Real> Rig<R> {
         let mut positions = self.plant.counts();
         for ((position, lose), jump) in positions.iter_mut().zip(self.lose).zip(self.jump) {
             *position = position.filter(|_| !lose).map(|counts| Counts(counts.0 + jump).wrapped());
+        }
+        for (position, stuck) in positions.iter_mut().zip(self.stuck) {
+            *position = position.map(|counts| stuck.unwrap_or(counts));
         }
         let sample = BusSample {
             positions,

@@ -1,0 +1,192 @@
+//! Torque and motion that do not fit together: encoders that stand still, contacts that no sensor sees.
+
+use control::command::{Command, Refusal, RunOptions};
+use control::time::periods;
+use control::{Event, Fault, State, flags};
+
+use crate::primitives::{Design, GOAL, START, primitive};
+use crate::rig::Rig;
+
+/// Stretched out to the front.
+const OUT: [f64; 7] = [0.0, 1.45, 0.0, 0.1, 0.0, 0.0, 0.0];
+
+/// Postures to approach: all joints move.
+const TARGET: [f64; 7] = [0.5, 1.0, 0.6, 1.4, 0.5, 0.0, 0.4];
+
+/// The encoder of this motor stands still from now on.
+fn freeze(rig: &mut Rig<f32>, motor: usize) {
+    rig.stuck[motor] = rig.plant.counts()[motor];
+}
+
+/// A rig that moves: a run, or an approach to `TARGET`, for so many seconds. With `frozen` the encoder stands still
+/// from before the movement on.
+fn moving(run: bool, seconds: f64, frozen: Option<usize>) -> Rig<f32> {
+    let mut rig = Rig::<f32>::new(START, 1);
+    rig.load(&primitive(&Design { duration: 3.0, ..Design::default() })).expect("loads");
+    rig.command(Command::Hold);
+    rig.run_for(2.0);
+    if let Some(motor) = frozen {
+        freeze(&mut rig, motor);
+    }
+    rig.command(if run {
+        Command::Run(RunOptions::default())
+    } else {
+        Command::Approach { q: TARGET.map(|q| q as f32), duration: 0.0 }
+    });
+    rig.run_for(seconds);
+    rig
+}
+
+/// How far the joints have gone that nobody has seen (rad).
+fn unseen(rig: &Rig<f32>) -> f64 {
+    let seen = rig.last.expect("ran").record.q;
+    (0..7).map(|joint| (rig.plant.q[joint] - f64::from(seen[joint])).abs()).fold(0.0, f64::max)
+}
+
+/// Ticks until the arm stops, and half a second more: the seconds until the stop, and how far joints have gone unseen
+/// until then and at the end (rad).
+fn stop(rig: &mut Rig<f32>) -> (f64, f64, f64) {
+    let begin = rig.number;
+    while rig.cycle.state() != State::SoftStop && rig.number - begin < 900 {
+        rig.tick(None);
+    }
+    let (seconds, way) = ((rig.number - begin) as f64 / control::RATE, unseen(rig));
+    rig.run_for(0.5);
+    (seconds, way, unseen(rig))
+}
+
+/// Speed of a motor from which on it is asked to stop within 100 ms and 100 mrad (rad/s).
+const FAST: f64 = 5.0;
+
+#[test]
+fn a8_an_encoder_of_the_arm_that_stands_still_while_its_motor_turns_stops_the_arm_within_100_ms_and_100_mrad() {
+    let (mut fast, mut slowest, mut farthest) = (0, 0.0f64, 0.0f64);
+    for (run, moment) in [(false, 0.6), (false, 1.0), (false, 1.5), (true, 0.6), (true, 1.0), (true, 1.5)] {
+        for motor in 0..4 {
+            let mut rig = moving(run, moment, None);
+            let calibration = control::Calibration::<f64>::nominal(control::Payload::SensorAndHand);
+            let speed = calibration.transmission().motor_from_joint(&rig.plant.dq.into())[motor].abs();
+            if speed < FAST {
+                continue;
+            }
+            fast += 1;
+            freeze(&mut rig, motor);
+            let (seconds, way, end) = stop(&mut rig);
+            println!("M{}, run {run}: {seconds:.3} s, {way:.3} rad, {end:.3} rad, at {speed:.1} rad/s", motor + 1);
+            assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::SoftStop, Fault::EncoderStuck));
+            assert!(rig.last.expect("ran").actuation.requests_idle(), "nothing damps what nobody sees: brakes");
+            (slowest, farthest) = (slowest.max(seconds), farthest.max(way));
+        }
+    }
+    println!("{fast} cases: {slowest:.3} s, {farthest:.3} rad");
+    assert!(fast >= 9 && slowest <= 0.1 && farthest <= 0.1, "{fast}, {slowest} s, {farthest} rad");
+}
+
+#[test]
+fn a8_an_encoder_of_the_arm_that_stands_still_before_a_movement_stops_it() {
+    for run in [false, true] {
+        for motor in 0..4 {
+            let mut rig = moving(run, 0.0, Some(motor));
+            let (seconds, way, end) = stop(&mut rig);
+            println!("M{}, run {run}: {seconds:.3} s, {way:.3} rad, {end:.3} rad", motor + 1);
+            assert_eq!(rig.cycle.fault(), Fault::EncoderStuck);
+            // M2 and M3 share their load, so that M2 asks for its torque late.
+            assert!(way < if motor == 1 { 0.2 } else { 0.1 }, "M{}: {way} rad", motor + 1);
+        }
+    }
+}
+
+#[test]
+fn a8_a_stuck_encoder_is_not_cleared_while_its_joint_may_be_elsewhere() {
+    let mut rig = moving(false, 1.0, None);
+    freeze(&mut rig, 0);
+    stop(&mut rig);
+    // The encoder comes back, where its motor is by now.
+    rig.stuck = [None; 7];
+    rig.run_for(0.3);
+    assert_eq!(rig.tick(Some(Command::ClearFault)).event, Some(Event::Refused(Refusal::ZeroLost)));
+    assert_eq!(rig.cycle.fault(), Fault::EncoderStuck, "the first cause");
+}
+
+/// A rig that holds, whose sensor has been silent for 0.3 s.
+fn deaf(posture: [f64; 7]) -> Rig<f32> {
+    let mut rig = Rig::<f32>::new(posture, 1);
+    rig.command(Command::Hold);
+    rig.run_for(2.0);
+    rig.plant.deaf = true;
+    rig.run_for(0.3);
+    rig
+}
+
+/// Pushes the hand with 100 N along each axis; the seconds until the arm stops.
+fn pushed(mut rig: Rig<f32>, axis: usize, force: f64) -> f64 {
+    let begin = rig.number;
+    rig.plant.push[axis] = force;
+    while rig.cycle.state() != State::SoftStop {
+        rig.tick(None);
+        assert!(rig.number - begin < 90, "axis {axis}: {:?}", rig.last);
+    }
+    let faults = [Fault::UnseenContact, Fault::JointSpeed, Fault::TipSpeed];
+    assert!(faults.contains(&rig.cycle.fault()), "{:?}", rig.cycle.fault());
+    let seconds = (rig.number - begin) as f64 / control::RATE;
+    // After it: cleared and held again, as soon as nobody pushes.
+    rig.plant.push = [0.0; 6];
+    rig.run_for(1.0);
+    rig.command(Command::ClearFault);
+    rig.command(Command::Hold);
+    rig.run_for(0.5);
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None));
+    seconds
+}
+
+#[test]
+fn g8_100_n_on_the_hand_stop_an_arm_whose_sensor_is_silent_within_60_ms() {
+    let mut slowest = 0.0f64;
+    for posture in [GOAL, START, OUT] {
+        for (axis, force) in [(0, 100.0), (1, 100.0), (2, 100.0), (0, -100.0), (1, -100.0), (2, -100.0)] {
+            slowest = slowest.max(pushed(deaf(posture), axis, force));
+        }
+    }
+    println!("{slowest:.3} s");
+    assert!(slowest <= 0.06, "{slowest} s");
+}
+
+#[test]
+fn g8_a_silent_sensor_is_told_at_once_and_nothing_moves_by_itself_without_it() {
+    let mut rig = deaf(START);
+    rig.load(&primitive(&Design { duration: 3.0, ..Design::default() })).expect("loads");
+    let record = rig.last.expect("ran").record;
+    assert!(record.state == State::Hold && record.flags & flags::CONTACT_UNSEEN != 0);
+    let approach = Command::Approach { q: TARGET.map(|q| q as f32), duration: 0.0 };
+    for command in [approach, Command::Run(RunOptions::default())] {
+        assert_eq!(rig.tick(Some(command)).event, Some(Event::Refused(Refusal::WrenchMissing)), "{command:?}");
+    }
+    rig.plant.deaf = false;
+    rig.tick(None);
+    assert_eq!(rig.last.expect("ran").record.flags & flags::CONTACT_UNSEEN, 0);
+    for run in [false, true] {
+        let mut rig = moving(run, 0.5, None);
+        rig.plant.deaf = true;
+        let begin = rig.number;
+        let told = (0..60).position(|_| rig.tick(None).record.flags & flags::CONTACT_UNSEEN != 0);
+        assert!(told.is_some_and(|cycles| cycles <= 6), "{told:?}");
+        rig.until(State::SoftStop, 0.2);
+        assert_eq!(rig.cycle.fault(), Fault::WrenchLost);
+        assert!(rig.number - begin <= u64::from(periods(0.13)));
+    }
+}
+
+#[test]
+fn g8_a_force_that_was_measured_before_the_sensor_fell_silent_stops_nothing() {
+    // 60 N, then a sample above the limit that nothing follows.
+    let mut rig = Rig::<f32>::new(GOAL, 1);
+    rig.command(Command::Hold);
+    rig.run_for(2.0);
+    rig.command(Command::Tare);
+    rig.plant.push[0] = -70.0;
+    rig.tick(None);
+    rig.plant.push[0] = 0.0;
+    rig.plant.deaf = true;
+    rig.run_for(0.5);
+    assert_eq!(rig.cycle.state(), State::Hold, "{:?}", rig.cycle.fault());
+}
