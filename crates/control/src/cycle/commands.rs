@@ -167,7 +167,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         Ok(())
     }
 
-    /// What a motor that counts anew has cost no Clear brings back.
+    /// No Clear brings back the zero that a motor has lost which counts anew.
     fn may_trust_zero(&self, measured: &Measured<'_, R>) -> Result<(), Refusal> {
         if measured.state.displaced { Err(Refusal::ZeroLost) } else { Ok(()) }
     }

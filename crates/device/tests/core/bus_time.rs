@@ -10,7 +10,8 @@ use puck::CanFrame;
 
 use crate::double::{Bus, holding_with_ready_hand};
 
-/// A control cycle of 300 Hz, us, whatever the rate is: what fits into it with every stuff bit is 125 % of one of 500 Hz.
+/// A control cycle of 300 Hz, us, whatever the rate is: what fits into it with every stuff bit is 125 % of one of
+/// 500 Hz.
 const CYCLE_US: f64 = 1e6 / 300.0;
 /// Share of it that a full cycle may take in the worst case.
 const MOST: f64 = 0.84;

@@ -132,7 +132,8 @@ impl Case {
     /// The primitive, and its feedback.
     fn build<T: Scalar>(&self) -> Option<(Primitive<T, KERNELS>, Feedback<T>)> {
         let f = T::from_f64;
-        let weights: Vec<T> = self.weights.iter().take(ROWS * self.kernels).map(|&w| f(w)).collect();
+        let weights = self.weights.iter().take(ROWS * self.kernels).map(|&w| f(w).to_weight());
+        let weights = weights.collect::<Option<Vec<T::Weight>>>()?;
         let [k1, k2, displacement, rotation, hand, expected, recorded] = self.feedback.map(f);
         let feedback = Feedback::new([k1; 10], [k2; SENSORS], limits(displacement, rotation, hand)).ok()?;
         let expected = ExpectedWrench::new(&[[expected; SENSORS]], recorded).ok()?;
