@@ -68,6 +68,7 @@ struct Factor<R: Real> {
 impl<R: Real> Factor<R> {
     /// Factorises the lower triangle that stands in `lower`. Every eigenvalue is at least `floor`, and so is every
     /// pivot: rounding below it is lifted back, so that no division by zero is possible.
+    #[allow(clippy::needless_range_loop, reason = "iterators with `skip` and `take` cost three times the instructions")]
     fn factorise(&mut self, floor: R) {
         let matrix = &mut self.lower;
         for column in 0..6 {
