@@ -104,7 +104,7 @@ impl Fault {
                 "the counts of a motor stood still while it turned; check the encoder cable, then zero the arm again"
             }
             Fault::UnseenContact => {
-                "something pushed the arm while the force sensor was silent; look for an obstacle, check the sensor's cable"
+                "something pushed the arm while the force sensor was silent; look for an obstacle, check its cable"
             }
         }
     }
