@@ -9,8 +9,6 @@ mod exponential;
 mod fixed;
 mod float;
 mod kernels;
-#[cfg(feature = "fixed")]
-mod ratios;
 
 #[cfg(feature = "fixed")]
 pub use self::fixed::FixedPoint;

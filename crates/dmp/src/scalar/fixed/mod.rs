@@ -12,13 +12,15 @@
 //!
 //! All arithmetic saturates. It never wraps, because a wrapped velocity changes sign, and it never panics.
 
+mod ratios;
+
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use ::fixed::types::I32F32;
 
 use super::Scalar;
 use super::exponential::decay;
-use super::ratios::Ratios;
+use ratios::Ratios;
 
 /// Fraction bits that a number has beyond a weight.
 const WEIGHT_SHIFT: u32 = 8;

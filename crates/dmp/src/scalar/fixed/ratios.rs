@@ -12,9 +12,10 @@
 //! | `r (E - 1)` | i32, 24 | +-128, saturating | 6e-8 |
 //! | exponent | u64, 48 | 0 to 16 384 | 4e-15 |
 
-use super::exponential::decay;
-use super::kernels::Kernels;
-use super::{FixedPoint, Scalar};
+use super::FixedPoint;
+use crate::Scalar;
+use crate::scalar::exponential::decay;
+use crate::scalar::kernels::Kernels;
 
 /// Fraction bits of `r (E - 1)`.
 const ROOT_BITS: u32 = 24;
