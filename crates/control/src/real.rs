@@ -19,7 +19,7 @@ pub trait Real: RealField + Copy + dmp::Scalar<Weight = Self> + puck::Real {
     /// Sine and cosine.
     fn sine_cosine(self) -> (Self, Self);
 
-    /// As a whole number, saturating; zero for a NaN.
+    /// The largest whole number not above it, saturating; zero for a NaN.
     fn to_whole(self) -> i32;
 
     /// Neither infinite nor a NaN.
@@ -61,9 +61,10 @@ impl Real for f32 {
         }
     }
 
+    /// micromath's floor is exact and needs no call into libm.
     #[inline]
     fn to_whole(self) -> i32 {
-        self as i32
+        micromath::F32Ext::floor(self) as i32
     }
 
     #[inline]
@@ -95,7 +96,7 @@ impl Real for f64 {
 
     #[inline]
     fn to_whole(self) -> i32 {
-        self as i32
+        libm::floor(self) as i32
     }
 
     #[inline]
