@@ -6,7 +6,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
-/// What a board needs from the linker.
+/// Needs of a board from the linker.
 struct Board {
     /// Feature of this package that chooses the board, as cargo tells it to build scripts.
     feature: &'static str,

@@ -125,7 +125,7 @@ fn friction_and_sensor(out: &mut String, model: &Table) {
     }
 }
 
-/// What may be mounted on the arm.
+/// Payloads that may be mounted on the arm.
 fn payloads(out: &mut String, model: &Table) {
     for (name, key, text) in [
         ("PAYLOAD_NONE", "wam7", "The bare arm; the tool frame is the tool plate."),

@@ -1,6 +1,6 @@
 //! The parts of the images that touch a board: its edge, its measurements, its last words, and the bodies of the tasks.
 //!
-//! What the co-controller does (bus start-up, bus rounds, control cycle, link session, storage) is in `device`;
+//! The work of the co-controller (bus start-up, bus rounds, control cycle, link session, storage) is in `device`;
 //! [`application`] wires it to the pieces of any board, and compiles on the host too; the binaries under `src/bin` bind
 //! its tasks to interrupts. Nothing outside [`board`] knows a register.
 

@@ -1,4 +1,4 @@
-//! What the control cycle costs, measured while it runs; read by tasks of lower priority.
+//! The cost of the control cycle, measured while it runs; read by tasks of lower priority.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 

@@ -91,7 +91,7 @@ pub enum Command {
     Run(RunOptions),
     /// Stop softly: gravity compensation and damping.
     Stop,
-    /// Give up torque; the pucks are sent zero torque and then nothing.
+    /// Give up torque: the arm sinks slowly until it rests, then the pucks are sent zero torque.
     Release,
     /// Leave a soft stop or a fault, once its cause is gone.
     ClearFault,
@@ -149,11 +149,13 @@ pub enum Refusal {
     NoHand = 15,
     /// The force at rest differs by more than 5 N from the weight of the hand: a load, a contact, or a sensor adrift.
     ForceAtRest = 16,
+    /// A motor began to count anew: the positions no longer refer to the zero of the arm.
+    ZeroLost = 17,
 }
 
 impl Refusal {
     /// Every reason, for tables and documents.
-    pub const ALL: [Refusal; 16] = [
+    pub const ALL: [Refusal; 17] = [
         Refusal::WrongState,
         Refusal::SafetyNotActive,
         Refusal::PositionsMissing,
@@ -170,6 +172,7 @@ impl Refusal {
         Refusal::HandTooFar,
         Refusal::NoHand,
         Refusal::ForceAtRest,
+        Refusal::ZeroLost,
     ];
 
     /// The stable number of this reason.
@@ -202,6 +205,7 @@ impl fmt::Display for Refusal {
             Refusal::HandTooFar => "the hand is more than 0.15 rad away from where the primitive starts",
             Refusal::NoHand => "there is no initialised hand",
             Refusal::ForceAtRest => "the force at rest is more than 5 N away from the weight of the hand",
+            Refusal::ZeroLost => "the zero of the arm is lost: zero it again",
         })
     }
 }

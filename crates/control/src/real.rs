@@ -6,7 +6,7 @@ use nalgebra::RealField;
 ///
 /// Transcendental functions come from here and not from `RealField`, because on the board each of them has to be the
 /// measured cheap one: `f32` uses its own sine and cosine (7.6e-8 on one turn) and the FPU's square root.
-pub trait Real: RealField + Copy + dmp::Scalar + puck::Real {
+pub trait Real: RealField + Copy + dmp::Scalar<Weight = Self> + puck::Real {
     /// The nearest value to `value`. For constants; not meant for inner loops on the board.
     fn of(value: f64) -> Self;
 

@@ -9,7 +9,7 @@ fn authority(state: State) -> u8 {
     match state {
         State::Idle | State::Fault => 0,
         // A bridge carries on what was there.
-        State::SoftStop | State::Gravity | State::Coast => 1,
+        State::SoftStop | State::Gravity | State::Coast | State::Lower => 1,
         State::Hold | State::Approach | State::Run => 2,
     }
 }
@@ -35,7 +35,7 @@ fn e1_the_whole_table_is_as_documented() {
     use Transition::{Enter, Refuse, Resume, Stay};
     // One row per state, one column per trigger in the order of Trigger::ALL:
     // Gravity Hold Approach Run Stop Release Clear | Missing Back SoftFault HardFault Dropped Arrived
-    let table: [(State, [Transition; 13]); 8] = [
+    let table: [(State, [Transition; 13]); 9] = [
         (Idle, [Enter(Gravity), Enter(Hold), Refuse, Refuse, Stay, Stay, Stay, Stay, Stay, Stay, Stay, Stay, Stay]),
         (
             Gravity,
@@ -45,7 +45,7 @@ fn e1_the_whole_table_is_as_documented() {
                 Enter(Approach),
                 Enter(Run),
                 Enter(SoftStop),
-                Enter(Idle),
+                Enter(Lower),
                 Refuse,
                 Enter(Coast),
                 Stay,
@@ -63,7 +63,7 @@ fn e1_the_whole_table_is_as_documented() {
                 Enter(Approach),
                 Enter(Run),
                 Enter(SoftStop),
-                Enter(Idle),
+                Enter(Lower),
                 Refuse,
                 Enter(Coast),
                 Stay,
@@ -81,7 +81,7 @@ fn e1_the_whole_table_is_as_documented() {
                 Refuse,
                 Refuse,
                 Enter(SoftStop),
-                Enter(Idle),
+                Enter(Lower),
                 Refuse,
                 Enter(Coast),
                 Stay,
@@ -99,7 +99,7 @@ fn e1_the_whole_table_is_as_documented() {
                 Refuse,
                 Refuse,
                 Enter(SoftStop),
-                Enter(Idle),
+                Enter(Lower),
                 Refuse,
                 Enter(Coast),
                 Stay,
@@ -117,7 +117,7 @@ fn e1_the_whole_table_is_as_documented() {
                 Refuse,
                 Refuse,
                 Enter(SoftStop),
-                Enter(Idle),
+                Enter(Lower),
                 Refuse,
                 Stay,
                 Resume,
@@ -135,7 +135,7 @@ fn e1_the_whole_table_is_as_documented() {
                 Refuse,
                 Refuse,
                 Stay,
-                Enter(Idle),
+                Enter(Lower),
                 Enter(Gravity),
                 Stay,
                 Stay,
@@ -146,6 +146,24 @@ fn e1_the_whole_table_is_as_documented() {
             ],
         ),
         (Fault, [Refuse, Refuse, Refuse, Refuse, Stay, Stay, Enter(Idle), Stay, Stay, Stay, Stay, Stay, Stay]),
+        (
+            Lower,
+            [
+                Enter(Gravity),
+                Enter(Hold),
+                Refuse,
+                Refuse,
+                Enter(SoftStop),
+                Stay,
+                Refuse,
+                Stay,
+                Stay,
+                Enter(SoftStop),
+                Enter(Fault),
+                Enter(Idle),
+                Enter(Idle),
+            ],
+        ),
     ];
     for (state, row) in table {
         for (trigger, expected) in Trigger::ALL.into_iter().zip(row) {
@@ -165,6 +183,7 @@ fn in_state(state: State) -> Supervisor {
         State::Coast => &[Trigger::Hold, Trigger::Run, Trigger::RepliesMissing],
         State::SoftStop => &[Trigger::Hold, Trigger::SoftFault],
         State::Fault => &[Trigger::Hold, Trigger::HardFault],
+        State::Lower => &[Trigger::Hold, Trigger::Release],
     };
     let mut supervisor = Supervisor::new();
     for trigger in path {
@@ -202,7 +221,8 @@ fn e1_every_pair_does_what_the_table_says_and_latches_its_fault() {
                 Transition::Enter(next) => {
                     assert_eq!(supervisor.state(), next);
                     if matches!(trigger, Trigger::SoftFault | Trigger::HardFault | Trigger::SafetyDropped) {
-                        assert_eq!(supervisor.fault(), Fault::TipSpeed, "{state:?} {trigger:?}");
+                        let first = if before == Fault::None { Fault::TipSpeed } else { before };
+                        assert_eq!(supervisor.fault(), first, "{state:?} {trigger:?}");
                     }
                 }
             }
@@ -211,10 +231,48 @@ fn e1_every_pair_does_what_the_table_says_and_latches_its_fault() {
 }
 
 #[test]
+fn g6_the_first_cause_outlives_every_pair_of_events_until_a_person_clears_it() {
+    for state in State::ALL {
+        for first in Trigger::ALL {
+            for second in Trigger::ALL {
+                let mut supervisor = in_state(state);
+                for (trigger, fault) in [(first, Fault::TipSpeed), (second, Fault::SafetyDropped)] {
+                    let takes_away =
+                        matches!(trigger, Trigger::SoftFault | Trigger::HardFault | Trigger::SafetyDropped);
+                    let fault = if takes_away { fault } else { Fault::None };
+                    let (before, from) = (supervisor.fault(), supervisor.state());
+                    let taken = supervisor.take(trigger, fault);
+                    let what = format!("{state:?} {first:?} {second:?}: {:?}", supervisor.fault());
+                    let cleared = trigger == Trigger::Clear && taken.is_ok();
+                    if cleared {
+                        assert_eq!(supervisor.fault(), Fault::None, "{what}");
+                    } else if before != Fault::None {
+                        assert_eq!(supervisor.fault(), before, "{what}");
+                    } else if supervisor.state() != from {
+                        assert_eq!(supervisor.fault(), fault, "{what}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn g6_a_fault_that_comes_during_a_stop_that_a_person_asked_for_is_kept() {
+    for next in [Trigger::SafetyDropped, Trigger::HardFault, Trigger::Release] {
+        let mut supervisor = in_state(State::Hold);
+        supervisor.take(Trigger::Stop, Fault::None).expect("allowed");
+        supervisor.take(Trigger::SoftFault, Fault::RepliesLost).expect("no command");
+        supervisor.take(next, Fault::SafetyDropped).expect("allowed");
+        assert_eq!(supervisor.fault(), Fault::RepliesLost, "{next:?}");
+    }
+}
+
+#[test]
 fn codes_are_stable_and_unique() {
-    assert_eq!(State::ALL.map(State::code), [0, 1, 2, 3, 4, 5, 6, 7]);
+    assert_eq!(State::ALL.map(State::code), [0, 1, 2, 3, 4, 5, 6, 7, 8]);
     assert_eq!(Fault::ALL.map(Fault::code), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13]);
-    assert_eq!(Refusal::ALL.map(Refusal::code), [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16]);
+    assert_eq!(Refusal::ALL.map(Refusal::code), [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]);
     for state in State::ALL {
         assert_eq!(State::from_code(state.code()), Some(state));
     }
@@ -225,5 +283,5 @@ fn codes_are_stable_and_unique() {
     for refusal in Refusal::ALL {
         assert_eq!(Refusal::from_code(refusal.code()), Some(refusal));
     }
-    assert_eq!((State::from_code(8), Fault::from_code(14), Refusal::from_code(0)), (None, None, None));
+    assert_eq!((State::from_code(9), Fault::from_code(14), Refusal::from_code(0)), (None, None, None));
 }

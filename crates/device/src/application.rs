@@ -1,4 +1,4 @@
-//! What an arm with its hand and a hand alone have in common, and where they differ.
+//! The two halves of a device as traits: common to an arm with its hand and to a hand alone.
 //!
 //! A device has two halves. The control half is a [`Controller`]: a timer drives it, three slots a control cycle. The
 //! other half is a [`crate::HostSession`] over an [`Application`]: the rules of the link are those of every device, the
@@ -41,9 +41,9 @@ impl Slot {
 pub trait Controller: Sized + 'static {
     /// A request of a person on its way to this half; each is answered by exactly one event.
     type Command: Copy + PartialEq + 'static;
-    /// What it tells.
+    /// News and answers of this half.
     type Event: Copy + 'static;
-    /// What a control cycle measured and decided.
+    /// Measurements and decisions of a control cycle.
     type Record: CycleReport;
     /// A checked primitive, as it is handed over.
     type Primitive<'a>;
@@ -73,7 +73,7 @@ pub trait Controller: Sized + 'static {
     fn message(event: Self::Event, health: &Health) -> Option<Message>;
 }
 
-/// What the control half needs from the world: a CAN controller, and the queues to the session half.
+/// The world of the control half: a CAN controller, and the queues to the session half.
 pub trait ControllerIo<C: Controller> {
     /// The next frame that has come in, oldest first.
     fn receive(&mut self) -> Option<CanFrame>;
@@ -81,7 +81,7 @@ pub trait ControllerIo<C: Controller> {
     fn transmit(&mut self, frame: CanFrame) -> bool;
     /// The next command of a person, oldest first.
     fn command(&mut self) -> Option<C::Command>;
-    /// What a control cycle measured and decided.
+    /// Hands over the measurements and decisions of a control cycle.
     fn record(&mut self, record: C::Record);
     /// Something happened.
     fn event(&mut self, event: C::Event);
@@ -130,11 +130,11 @@ pub trait SessionPort<C: Controller> {
     /// The state of the control half now.
     fn health(&mut self) -> Health;
 
-    /// What the board measured about its processor.
+    /// Returns the board's measurements of its own processor.
     fn timing(&mut self) -> Timing;
 }
 
-/// What the control half tells, as it goes over the link.
+/// A message of the control half, as it goes over the link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Message {
     /// The answer to the oldest command without one.
@@ -143,7 +143,7 @@ pub enum Message {
     News(link::Event),
 }
 
-/// What of a cycle every device tells.
+/// The part of a cycle's record that every device has.
 pub trait CycleReport: Copy + core::fmt::Debug + 'static {
     /// Number of the cycle, modulo 2^32.
     fn number(&self) -> u32;
@@ -158,9 +158,9 @@ pub trait CycleReport: Copy + core::fmt::Debug + 'static {
 /// One control cycle together with what only its caller can measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TimedRecord<R = CycleRecord> {
-    /// What the cycle measured and decided.
+    /// Measurements and decisions of the cycle.
     pub record: R,
-    /// How long its computation took, ticks; 0 where that is not measured.
+    /// Duration of its computation, ticks; 0 where that is not measured.
     pub cost_ticks: u32,
 }
 
@@ -202,10 +202,10 @@ pub trait Application {
     /// Number of places for primitives.
     fn places(&self) -> u8;
 
-    /// Room of a place, bytes of an image.
+    /// Size of a place, bytes of an image.
     fn place_bytes(&self) -> u32;
 
-    /// What is at a place.
+    /// Returns the description of the primitive at a place; `None` if the place is free.
     ///
     /// # Errors
     /// Why that cannot be told.
@@ -232,7 +232,7 @@ pub trait Application {
     /// Checks the image, which is whole, and begins to save it.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// The first thing that is wrong with the image.
     fn commit(&mut self, name: &Name, crc: u32, port: &mut impl SessionPort<Self::Controller>) -> Result<(), Refused>;
 
     /// Begins to delete a primitive.

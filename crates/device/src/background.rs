@@ -35,7 +35,7 @@ const TEMPERATURES: (u32, u32) = (42, 5);
 /// After this many slots everything repeats: a common multiple of the periods, the seven pucks and the four digits.
 const REPEAT: u32 = 42 * 7 * 40;
 
-/// What a slow reply told.
+/// Content of a slow reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PollReply {
     /// MODE of the safety module.

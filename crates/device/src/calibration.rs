@@ -14,14 +14,14 @@ use control::{MODEL_HASH, model};
 use link::frame::CRC;
 use link::{Calibration, HomeSource};
 
-/// How far a joint's home may lie from the model's (rad): 20 degrees.
+/// Largest distance of a joint's home from the model's (rad): 20 degrees.
 ///
 /// Arms differ from the default home by a few degrees. What is to be kept out are angles in degrees, a wrong sign, two
 /// joints exchanged, and an arm that was not at home: all of them are larger, in at least one joint, for an arm folded
 /// at home (J2 -2.0, J4 3.13 rad). A smaller bound would refuse arms whose stops have been rebuilt.
 pub const HOME_DISTANCE: f32 = 0.35;
 
-/// How far beyond the joint's range a home may lie (rad): home is at the stops, and stops are where cables stretch.
+/// Largest distance of a home beyond the joint's range (rad): home is at the stops, and stops are where cables stretch.
 const MARGIN: f32 = 0.05;
 
 /// Bytes of a home as it is kept.
@@ -33,7 +33,7 @@ const MAGIC: [u8; 4] = *b"TacH";
 /// Version of the form.
 const LAYOUT: u16 = 1;
 
-/// What is wrong with an angle of a home.
+/// Reason for which an angle is no home.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum HomeFault {
@@ -61,7 +61,7 @@ impl HomeError {
         [self.joint.into(), self.fault as u32]
     }
 
-    /// What such a detail says; `None` for numbers of another version.
+    /// The error that such a detail stands for; `None` for numbers of another version.
     #[must_use]
     pub fn from_detail([joint, fault]: [u32; 2]) -> Option<Self> {
         let joint = u8::try_from(joint).ok().filter(|joint| usize::from(*joint) < model::HOME.len())?;
@@ -152,7 +152,7 @@ impl Home {
     }
 }
 
-/// What the device keeps of an arm's own home. The first variant is all zeros in memory.
+/// An arm's own home as the device has kept it. The first variant is all zeros in memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum StoredHome {
     /// There is none, or it was forgotten.

@@ -1,4 +1,4 @@
-//! What the link session asks of the control half, and why it may be refused.
+//! Requests of the link session to the control half, and the reasons for which they are refused.
 
 use core::fmt;
 

@@ -1,4 +1,4 @@
-//! What the control half tells a person, unasked or in answer to a command.
+//! Events: messages of the control half to a person, unasked or in answer to a command.
 
 use control::{Fault, State};
 use link::HandStage;
@@ -13,11 +13,11 @@ use crate::stage::{Stage, StartupError};
 pub struct Event {
     /// Control cycle in which it happened.
     pub cycle: u64,
-    /// What.
+    /// Its kind.
     pub kind: EventKind,
 }
 
-/// Description.
+/// Kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EventKind {
     /// The oldest unanswered command was taken up.
@@ -43,7 +43,7 @@ pub enum EventKind {
     },
     /// The hand reached a stage, or was found unfit at the start.
     Hand {
-        /// Which.
+        /// The stage.
         stage: HandStage,
         /// The puck that caused it and why, where something went wrong.
         cause: Option<(Node, HandTrouble)>,

@@ -46,7 +46,7 @@ impl Counters {
     }
 }
 
-/// What only the board can measure about its own processor.
+/// Measurements of a processor by its board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Timing {
     /// Longest control computation, ticks.
@@ -66,7 +66,7 @@ pub struct Timing {
 pub struct Health {
     /// Number of the latest control cycle.
     pub cycle: u64,
-    /// How far the bus start-up has come.
+    /// Stage of the bus start-up.
     pub stage: Stage,
     /// Why it cannot go on, if it cannot.
     pub blocked: Option<StartupError>,
@@ -80,7 +80,7 @@ pub struct Health {
     /// The posture (rad) at which the arm was told to stand when it was zeroed; `None` if that was before the bus was
     /// started.
     pub zeroed_at: Option<[f32; 7]>,
-    /// What is mounted on the arm, as the last start-up found it; sensor and hand until one has.
+    /// Payload mounted on the arm, as the last start-up found it; sensor and hand until one has.
     pub payload: Payload,
     /// True if the wrench has a zero; `None` without a force/torque sensor.
     pub wrench_zeroed: Option<bool>,
@@ -90,7 +90,7 @@ pub struct Health {
     pub pendant: Option<i32>,
     /// Latest temperature of each arm puck, degree Celsius.
     pub temperatures: [Option<i16>; 7],
-    /// How far the hand has come.
+    /// Stage of the hand.
     pub hand: HandStage,
     /// The hand moves by itself, outside a run: its initialisation, or a move that a person asked for.
     pub hand_moves: bool,

@@ -38,7 +38,7 @@ mod session;
 pub mod storage;
 mod store;
 
-pub use port::{FitPrimitive, StoredPrimitive};
+pub use port::{CheckedPrimitive, StoredPrimitive};
 pub use session::{ArmApplication, HostSession, Identity, Session};
 pub use store::{RamStore, STORE_SLOT_BYTES, STORE_SLOTS, Store, StoreError};
 pub use wire::{PrimitiveTrouble, StartupTrouble};

@@ -1,4 +1,4 @@
-//! True if what a primitive expects was recorded through the same filter as the device's own.
+//! Checks that the expectation of a primitive was recorded through the same filter as the device's own.
 //!
 //! Recording and execution must see a contact equally late, or every contact would differ from what is expected of it.
 
@@ -7,7 +7,7 @@ use link::Refusal;
 /// Cut-off of the device's filter on wrench and gauges, Hz.
 const CUT_OFF: f32 = control::sense::wrench::WRENCH_CUT_OFF as f32;
 
-/// How much another cut-off may differ from it, of one.
+/// Largest relative difference of another cut-off from it.
 const TOLERANCE: f32 = 0.01;
 
 /// The expectation was recorded through a filter of this cut-off, mHz.

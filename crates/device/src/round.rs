@@ -16,7 +16,7 @@ const SUSPECT_ROUNDS: u16 = 2;
 /// Half of a wrench sample.
 type WrenchHalf = ([i16; 3], Option<GaugeStatus>);
 
-/// What a round brought in.
+/// Replies of one round.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Gathered {
     pub(crate) positions: [Option<Counts>; 7],

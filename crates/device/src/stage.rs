@@ -1,4 +1,4 @@
-//! How far the start-up has come, and why it may stop.
+//! `Stage` and `StartupError`: the stages of the start-up, and the reasons for which it stops.
 
 use core::fmt;
 
@@ -62,7 +62,7 @@ impl Stage {
         Stage::ALL.into_iter().find(|stage| stage.code() == code)
     }
 
-    /// What happens, or what a person must do, in one phrase.
+    /// Returns in one phrase what happens, or what a person must do.
     pub const fn explanation(self) -> &'static str {
         match self {
             Stage::Enumerating => "looking for devices on the bus",
@@ -100,14 +100,14 @@ pub enum StartupError {
     DidNotWake(Node),
     /// This node has another role than its number demands.
     WrongRole {
-        /// Which node.
+        /// The node.
         node: Node,
         /// Its ROLE.
         role: u16,
     },
     /// There is no property table for the firmware of this node, or an arm must not be run with it.
     UnknownFirmware {
-        /// Which node.
+        /// The node.
         node: Node,
         /// Its VERS.
         version: i32,
@@ -116,14 +116,14 @@ pub enum StartupError {
     WrongGroups(Node),
     /// This puck takes its torque from another place of the frame than its number demands.
     WrongPlace {
-        /// Which node.
+        /// The node.
         node: Node,
         /// Its PIDX.
         place: i32,
     },
     /// This puck accepts no torque (MT), or more than a frame can carry.
     WrongTorqueLimit {
-        /// Which node.
+        /// The node.
         node: Node,
         /// Its MT.
         limit: i32,
@@ -139,6 +139,10 @@ pub enum StartupError {
     ZeroNotTaken(Node),
     /// The safety module did not take the word that the arm is zeroed.
     SafetyNotZeroed,
+    /// This puck of an arm that was zeroed had to be woken: it has restarted, and its counts began anew.
+    CountsAnew(Node),
+    /// The counts of a motor jumped since the arm was zeroed.
+    CountsJumped,
 }
 
 impl fmt::Display for StartupError {
@@ -177,6 +181,10 @@ impl fmt::Display for StartupError {
             StartupError::SafetyNotZeroed => {
                 formatter.write_str("the safety module did not take the word that the arm is zeroed")
             }
+            StartupError::CountsAnew(node) => {
+                write!(formatter, "puck {} has restarted and counts anew: zero the arm", node.number())
+            }
+            StartupError::CountsJumped => formatter.write_str("the counts of a motor jumped: zero the arm"),
         }
     }
 }

@@ -125,7 +125,7 @@ pub trait Store {
     /// As [`Store::keep_home`].
     fn forget_home(&mut self) -> Result<(), StoreError>;
 
-    /// How the change ended that was begun last: told once, as soon as it is durable.
+    /// Returns the outcome of the change that was begun last, once, as soon as it is durable.
     fn finished(&mut self) -> Option<Result<(), StoreError>>;
 }
 

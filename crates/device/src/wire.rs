@@ -46,6 +46,7 @@ pub(crate) fn refusal(reason: Refusal, health: &Health) -> (LinkRefusal, [u32; 2
         Refusal::Control(Control::NoExpectation) => (LinkRefusal::NoExpectation, [0, 0]),
         Refusal::Control(Control::HandTooFar) => (LinkRefusal::HandFarFromStart, [0, 0]),
         Refusal::Control(Control::ForceAtRest) => (LinkRefusal::ForceAtRest, [0, 0]),
+        Refusal::Control(Control::ZeroLost) => (LinkRefusal::NotZeroed, [0, 0]),
         Refusal::Control(Control::NoHand) | Refusal::NoHand => hand(health.hand),
         Refusal::HandBusy => (LinkRefusal::HandBusy, [0, 0]),
     }
@@ -136,6 +137,8 @@ impl From<StartupError> for StartupTrouble {
             StartupError::Calibration(CalibrationError::HandTorqueCounts(digit)) => Self([16, digit.into()]),
             StartupError::ZeroNotTaken(node) => at(14, node, 0),
             StartupError::SafetyNotZeroed => Self([15, 0]),
+            StartupError::CountsAnew(node) => at(17, node, 0),
+            StartupError::CountsJumped => Self([18, 0]),
         }
     }
 }
@@ -163,6 +166,8 @@ impl StartupTrouble {
             14 => StartupError::ZeroNotTaken(node),
             15 => StartupError::SafetyNotZeroed,
             16 => StartupError::Calibration(CalibrationError::HandTorqueCounts(byte)),
+            17 => StartupError::CountsAnew(node),
+            18 => StartupError::CountsJumped,
             _ => return None,
         })
     }
@@ -211,17 +216,17 @@ const TROUBLE_EXPERIENCE: PrimitiveTrouble = PrimitiveTrouble([10, 0]);
 const TABLE_VALUE: u32 = 13;
 
 impl PrimitiveTrouble {
-    /// What is wrong with the feedback.
+    /// The error of the feedback's table as two numbers.
     pub(crate) fn feedback(error: TableError) -> Self {
         Self::value(error).unwrap_or(TROUBLE_FEEDBACK)
     }
 
-    /// What is wrong with the expectation.
+    /// The error of the expectation's table as two numbers.
     pub(crate) fn expectation(error: TableError) -> Self {
         Self::value(error).unwrap_or(TROUBLE_EXPECTATION)
     }
 
-    /// What is wrong with the experience.
+    /// The error of the table of earlier runs as two numbers.
     pub(crate) fn experience(error: TableError) -> Self {
         Self::value(error).unwrap_or(TROUBLE_EXPERIENCE)
     }

@@ -15,7 +15,9 @@ type Arm<T, const N: usize> = Primitive<T, 11, 1, N>;
 
 fn primitive<T: Scalar, const N: usize>(kernels: usize) -> Arm<T, N> {
     let f = T::from_f64;
-    let weights: Vec<T> = (0..Arm::<T, N>::ROWS * kernels).map(|i| f(0.3 * (0.37 * i as f64).sin())).collect();
+    let weights: Option<Vec<T::Weight>> =
+        (0..Arm::<T, N>::ROWS * kernels).map(|i| f(0.3 * (0.37 * i as f64).sin()).to_weight()).collect();
+    let weights = weights.expect("small weights");
     let configuration =
         |x: f64, orientation| Configuration { poses: [Pose { position: [f(x); 3], orientation }], points: [f(x); 11] };
     let turned = Quaternion::from_rotation_vector(&[f(0.4), f(-0.8), f(0.3)]);

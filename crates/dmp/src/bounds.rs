@@ -52,7 +52,6 @@ pub const FASTEST_SLEW: f64 = 1e4;
 pub const LARGEST_CANCELLATION: f64 = 1000.0;
 
 /// Place of the first value whose magnitude is not at most `largest`; a NaN is such a value.
-pub(crate) fn first_beyond<T: Scalar>(values: &[T], largest: f64) -> Option<usize> {
-    let largest = T::from_f64(largest);
+pub(crate) fn first_beyond<T: Scalar>(values: &[T], largest: T) -> Option<usize> {
     values.iter().position(|value| !(value.abs() <= largest))
 }

@@ -69,7 +69,7 @@ impl<T: Scalar, const D: usize, const P: usize> Configuration<T, D, P> {
     /// The first value that no movement needs, orientations apart.
     pub(crate) fn out_of_bounds(&self) -> Option<(Group, u8)> {
         let poses = self.poses.iter().enumerate().map(|(n, pose)| (Group::Position, 3 * n, pose.position.as_slice()));
-        first_beyond(poses.chain([(Group::Points, 0, self.points.as_slice())]), bounds::LARGEST_VALUE)
+        first_beyond(poses.chain([(Group::Points, 0, self.points.as_slice())]), T::from_f64(bounds::LARGEST_VALUE))
     }
 
     /// With the quaternions made exactly unit; `None` if one is off by more than 1e-3.
@@ -117,14 +117,14 @@ impl<T: Scalar, const D: usize, const P: usize> Velocity<T, D, P> {
         let poses = self.poses.iter().enumerate().flat_map(|(n, twist)| {
             [(Group::Position, 3 * n, twist.linear.as_slice()), (Group::Orientation, 3 * n, twist.angular.as_slice())]
         });
-        first_beyond(poses.chain([(Group::Points, 0, self.points.as_slice())]), bounds::LARGEST_SPEED)
+        first_beyond(poses.chain([(Group::Points, 0, self.points.as_slice())]), T::from_f64(bounds::LARGEST_SPEED))
     }
 }
 
 /// Group and place of the first value beyond `largest`; each item holds the place of its first value.
 fn first_beyond<'a, T: Scalar>(
     mut values: impl Iterator<Item = (Group, usize, &'a [T])>,
-    largest: f64,
+    largest: T,
 ) -> Option<(Group, u8)> {
     values.find_map(|(group, first, values)| {
         let place = first + bounds::first_beyond(values, largest)?;

@@ -51,7 +51,7 @@ pub use rollout::{Rollout, StartState};
 pub use rollout_error::RolloutError;
 #[cfg(feature = "fixed")]
 pub use scalar::FixedPoint;
-pub use scalar::Scalar;
+pub use scalar::{Kernels, Scalar};
 pub use sensor_statistics::SensorStatistics;
 pub use table::{Entry, PhaseTable, TableError};
 pub use transformation::{GainError, PointInput, PointState, TransformationSystem};

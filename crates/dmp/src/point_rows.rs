@@ -63,7 +63,7 @@ impl<T: Scalar, const D: usize> PointRows<T, D> {
         if !all_finite(&goal) {
             return Err(RolloutError::NotFinite);
         }
-        if bounds::first_beyond(&goal, bounds::LARGEST_VALUE).is_some() {
+        if bounds::first_beyond(&goal, T::from_f64(bounds::LARGEST_VALUE)).is_some() {
             return Err(RolloutError::TooLarge);
         }
         self.commanded = goal;

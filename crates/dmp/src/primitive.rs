@@ -7,10 +7,10 @@ use crate::forcing::Weights;
 use crate::gains::Systems;
 use crate::orientation::is_near_enough;
 use crate::orientation_rows::Taught;
-use crate::vector::{all_finite, clamp, clamp_norm};
+use crate::vector::{clamp, clamp_norm};
 use crate::{
-    Activations, Basis, CanonicalSystem, Configuration, Coupling, DisplacementLimits, Gains, Group, Hemisphere,
-    OrientationError, Part, PoseCoupling, PrimitiveError, Scalar, TransformationSystem, Velocity, bounds,
+    Basis, CanonicalSystem, Configuration, Coupling, DisplacementLimits, Gains, Group, Hemisphere, OrientationError,
+    Part, PoseCoupling, PrimitiveError, Scalar, TransformationSystem, Velocity, bounds,
 };
 
 /// Rows of a pose: three of the position, three of the orientation.
@@ -18,7 +18,7 @@ pub(crate) const POSE_ROWS: usize = 6;
 
 /// The plain tables of a primitive, as they come from an image or a file: unchecked input of [`Primitive::new`].
 #[derive(Clone, Copy, Debug)]
-pub struct PrimitiveTables<'a, T, const D: usize, const P: usize> {
+pub struct PrimitiveTables<'a, T: Scalar, const D: usize, const P: usize> {
     /// Longest control period of a run, s. [`Rollout::step`](crate::Rollout::step) refuses a longer one.
     pub control_period: T,
     /// Duration tau of the movement, s.
@@ -29,8 +29,9 @@ pub struct PrimitiveTables<'a, T, const D: usize, const P: usize> {
     pub activation: T,
     /// Number of kernels in use, 2..=N.
     pub kernel_count: usize,
-    /// Weights theta, row-major `[6 P + D][kernel_count]`, in the paper's convention (the force is multiplied by K).
-    pub weights: &'a [T],
+    /// Weights theta, row-major `[6 P + D][kernel_count]`, in the paper's convention (the force is multiplied by K), as the
+    /// number type keeps them.
+    pub weights: &'a [T::Weight],
     /// Stiffness and damping.
     pub gains: Gains<T, D, P>,
     /// Orientation error of the poses.
@@ -51,7 +52,7 @@ pub struct PrimitiveTables<'a, T, const D: usize, const P: usize> {
 /// about 8 kB: keep it in a static or behind a reference on a small stack, and fill it there with
 /// [`Primitive::assign`].
 #[derive(Debug, PartialEq)]
-pub struct Primitive<T, const D: usize, const P: usize, const N: usize> {
+pub struct Primitive<T: Scalar, const D: usize, const P: usize, const N: usize> {
     fingerprint: u32,
     control_period: T,
     duration: T,
@@ -105,7 +106,7 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Clone for Primit
 }
 
 /// Results of the check of tables, before anything is written.
-struct Checked<T, const D: usize, const P: usize, const N: usize> {
+struct Checked<T: Scalar, const D: usize, const P: usize, const N: usize> {
     canonical: CanonicalSystem<T>,
     basis: Basis<T, N>,
     systems: Systems<T, D, P>,
@@ -126,7 +127,7 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Primitive<T, D, 
         rate: T::ONE,
         minimum_duration: T::ZERO,
         canonical: CanonicalSystem::UNIT,
-        basis: Basis::fewest(),
+        basis: Basis::FEWEST,
         pose_weights: [const { Weights::ZERO }; P],
         point_weights: Weights::ZERO,
         systems: Systems::UNIT,
@@ -158,7 +159,7 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Primitive<T, D, 
         let checked = Self::check(tables)?;
         let count = tables.kernel_count;
         let (poses, points) = tables.weights.split_at_checked(POSE_ROWS * P * count).unwrap_or_default();
-        for (to, weights) in self.pose_weights.iter_mut().zip(poses.chunks(POSE_ROWS * count)) {
+        for (to, weights) in self.pose_weights.iter_mut().zip(poses.chunks((POSE_ROWS * count).max(1))) {
             to.assign(count, weights);
         }
         self.point_weights.assign(count, points);
@@ -203,7 +204,7 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Primitive<T, D, 
         if tables.weights.len() != Self::ROWS * tables.kernel_count {
             return Err(PrimitiveError::WeightCount);
         }
-        if !all_finite(tables.weights) {
+        if !tables.weights.iter().all(|weight| T::from_weight(*weight).is_finite()) {
             return Err(PrimitiveError::Weight);
         }
         let systems = Systems::new(&tables.gains)?;
@@ -408,7 +409,11 @@ impl<T: Scalar, const D: usize, const P: usize> PrimitiveTables<'_, T, D, P> {
             let poses = end.poses.iter().flat_map(|pose| pose.position.into_iter().chain(pose.orientation.to_array()));
             poses.chain(end.points)
         });
-        let values = numbers.into_iter().chain(gains).chain(ends).chain(self.weights.iter().copied());
+        let values = numbers
+            .into_iter()
+            .chain(gains)
+            .chain(ends)
+            .chain(self.weights.iter().map(|weight| T::from_weight(*weight)));
         let words = choices.into_iter().chain(values.map(|value| value.bits()));
         let hash = words.fold(0xcbf2_9ce4_8422_2325_u64, |hash, word| {
             // Word by word instead of byte by byte; the rotation brings the high bits of a product back to where it
@@ -464,16 +469,17 @@ impl<T: Scalar, const D: usize, const P: usize> PrimitiveTables<'_, T, D, P> {
         for kernel in 0..self.kernel_count {
             let centre = basis.centre(kernel).unwrap_or(T::ONE);
             let half = basis.centre(kernel + 1).map_or(centre, |next| (centre + next) * T::from_f64(0.5));
-            let (at, between) = (basis.evaluate(centre), basis.evaluate(half));
-            for (row, (weights, &largest)) in rows() {
-                let weight = |i: usize| weights.get(i).copied().unwrap_or(T::ZERO);
-                let force = |activations: &Activations<T, N>| {
-                    activations.active().fold(T::ZERO, |sum, i| sum + activations.factor(i) * weight(i))
-                };
-                let alone = weight(kernel) * centre * T::from_f64(1.0 / bounds::LARGEST_CANCELLATION);
-                if [alone, force(&at), force(&between)].into_iter().any(|force| !(force.abs() <= largest)) {
-                    let (group, index) = Group::of_weights(row, P);
-                    return Err(PrimitiveError::WeightTooLarge { group, index: number(index), kernel: number(kernel) });
+            for s in [centre, half] {
+                let activations = basis.evaluate(s);
+                for (row, (weights, &largest)) in rows() {
+                    let weight = |i: usize| weights.get(i).map_or(T::ZERO, |weight| T::from_weight(*weight));
+                    let force = activations.active().fold(T::ZERO, |sum, i| sum + activations.factor(i) * weight(i));
+                    let alone = weight(kernel) * centre * T::from_f64(1.0 / bounds::LARGEST_CANCELLATION);
+                    if [alone, force].into_iter().any(|force| !(force.abs() <= largest)) {
+                        let (group, index) = Group::of_weights(row, P);
+                        let (index, kernel) = (number(index), number(kernel));
+                        return Err(PrimitiveError::WeightTooLarge { group, index, kernel });
+                    }
                 }
             }
         }

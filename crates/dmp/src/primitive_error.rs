@@ -83,7 +83,7 @@ pub enum PrimitiveError {
     WeightCount,
     /// The control period is not a positive number.
     ControlPeriod,
-    /// A weight is NaN or infinite.
+    /// A weight is NaN or infinite, or more than the number type keeps ([`Scalar::to_weight`](crate::Scalar::to_weight)).
     Weight,
     /// The gains of a row are unusable.
     Gains {
@@ -143,7 +143,7 @@ impl fmt::Display for PrimitiveError {
             Self::KernelCount => f.write_str("fewer than two kernels or more than fit"),
             Self::Activation => f.write_str("the kernel activation is outside 0.05..0.95"),
             Self::WeightCount => f.write_str("the number of weights is not rows times kernels"),
-            Self::Weight => f.write_str("a weight is not a number"),
+            Self::Weight => f.write_str("a weight is not a number, or more than the number type keeps"),
             Self::ControlPeriod => f.write_str("the control period is not a positive number"),
             Self::Gains { group, index, error } => write!(f, "{group} row {index} (from 0): {error}"),
             Self::Unstable { group, index } => {

@@ -188,7 +188,7 @@ impl<T: Scalar, const COLUMNS: usize, const CAPACITY: usize> PhaseTable<T, COLUM
 
     /// Point and column of the first value whose magnitude is not at most `largest`.
     pub(crate) fn first_beyond(&self, largest: f64) -> Option<(u8, u8)> {
-        let beyond = |sample: &[T; COLUMNS]| bounds::first_beyond(sample, largest);
+        let beyond = |sample: &[T; COLUMNS]| bounds::first_beyond(sample, T::from_f64(largest));
         let (point, column) =
             self.samples().iter().enumerate().find_map(|(point, sample)| Some((point, beyond(sample)?)))?;
         let number = |place: usize| u8::try_from(place).unwrap_or(u8::MAX);

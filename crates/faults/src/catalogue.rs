@@ -23,7 +23,8 @@ pub fn differences(entries: &[Entry], catalogue: &str) -> Vec<String> {
             continue;
         };
         let mark = row.today.split("**").nth(1).unwrap_or_default();
-        let words = [("title", entry.title.as_str(), row.title), ("bar", &entry.bar, row.bar), ("mark", &entry.today, mark)];
+        let words =
+            [("title", entry.title.as_str(), row.title), ("bar", &entry.bar, row.bar), ("mark", &entry.today, mark)];
         for (what, script, text) in words.into_iter().filter(|(_, script, text)| script != text) {
             found.push(format!("{}: {what} '{script}' in the script, '{text}' in docs/faults.md", entry.id));
         }

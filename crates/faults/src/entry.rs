@@ -184,8 +184,7 @@ impl Entry {
     /// # Errors
     /// As [`Entry::read`].
     pub fn parse(path: &Path, text: &str) -> Result<Self, EntryError> {
-        let mut entry: Entry =
-            toml::from_str(text).map_err(|cause| EntryError::Malformed(path.to_owned(), cause))?;
+        let mut entry: Entry = toml::from_str(text).map_err(|cause| EntryError::Malformed(path.to_owned(), cause))?;
         entry.id = path.file_stem().unwrap_or_default().to_string_lossy().to_uppercase();
         entry.sense().map_err(|cause| EntryError::Meaningless(path.to_owned(), cause))?;
         Ok(entry)
@@ -215,7 +214,11 @@ impl Entry {
     }
 
     fn sense(&self) -> Result<(), String> {
-        if self.scenario.is_empty() && self.test.is_empty() && self.hardware.is_none() && !self.today.starts_with("open") {
+        if self.scenario.is_empty()
+            && self.test.is_empty()
+            && self.hardware.is_none()
+            && !self.today.starts_with("open")
+        {
             return Err("neither scenario, test nor hardware, and not open".to_owned());
         }
         for scenario in &self.scenario {

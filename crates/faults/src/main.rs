@@ -46,11 +46,18 @@ fn go(ids: &[String], json: bool, all: bool) -> Result<bool, Box<dyn std::error:
     }
     let wanted: Vec<&Entry> = entries.iter().filter(|entry| ids.is_empty() || ids.contains(&entry.id)).collect();
     if !json {
-        wanted.iter().filter(|entry| entry.scenario.is_empty()).for_each(|entry| print!("{}", report::elsewhere(entry)));
+        wanted
+            .iter()
+            .filter(|entry| entry.scenario.is_empty())
+            .for_each(|entry| print!("{}", report::elsewhere(entry)));
     }
     let scenarios: Vec<(&Entry, &Scenario)> =
         wanted.iter().flat_map(|entry| entry.scenario.iter().map(move |scenario| (*entry, scenario))).collect();
-    let verdicts = run_all(&scenarios, |verdict| if !json { print!("{}", report::lines(verdict, all)) });
+    let verdicts = run_all(&scenarios, |verdict| {
+        if !json {
+            print!("{}", report::lines(verdict, all))
+        }
+    });
     if json {
         println!("{}", serde_json::to_string_pretty(&verdicts)?);
     }

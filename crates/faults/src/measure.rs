@@ -95,7 +95,7 @@ fn span(scenario: &Scenario) -> (f64, f64) {
 }
 
 fn is_moving(state: State) -> bool {
-    !matches!(state, State::Idle | State::SoftStop | State::Fault)
+    !matches!(state, State::Idle | State::SoftStop | State::Lower | State::Fault)
 }
 
 /// Speed of the hand at each moment, m/s.

@@ -3,12 +3,13 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use control::RATE;
 use control::plan::primitive::SENSORS;
+use control::{RATE, State};
 use lab::arm;
 use lab::demonstration::{Recording, RecordingRow, RecordingWriter};
 use lab::learn::{LearnOptions, learn};
 use lab::primitive_file::{ExpectationTable, PrimitiveFile};
+use link::Telemetry;
 
 /// Posture at its start, rad: the hand in front of the shoulder.
 pub const START: [f64; 7] = [-0.3, 0.5, 0.1, 1.9, 0.2, -0.6, 0.1];
@@ -59,26 +60,15 @@ fn shown() -> Vec<u8> {
         let (q, ahead) = (posture(time), posture(time + 1e-4));
         let ([x, y, z], [qw, qx, qy, qz]) = arm::tool_pose(&q);
         let pose = [x, y, z, qw, qx, qy, qz];
-        let row = RecordingRow {
+        let telemetry = Telemetry {
             cycle,
-            time,
-            state: "gravity",
-            fault: 0,
-            flags: 0,
-            phase: 0.0,
+            state: State::Gravity.code(),
             q: q.map(|angle| angle as f32),
             dq: std::array::from_fn(|joint| ((ahead[joint] - q[joint]) / 1e-4) as f32),
-            tau: [0.0; 7],
-            pose,
             pose_d: pose.map(|value| value as f32),
-            wrench: [0.0; 6],
-            lost_replies: 0,
-            cost_ticks: 0,
-            hand: [0.0; 4],
-            hand_d: [0.0; 4],
-            gauges: [0.0; 3],
-            surprise: 0.0,
+            ..Telemetry::default()
         };
+        let row = RecordingRow { time, pose, telemetry };
         writer.write(&row).expect("in memory");
     }
     writer.finish().expect("in memory")

@@ -14,8 +14,8 @@ use crate::entry::Recover;
 use crate::measure::AT_REST;
 use crate::movement::movement;
 
-/// Longest time for the arm to come to rest, and for a start-up.
-const PATIENCE: Duration = Duration::from_secs(20);
+/// Longest time for the arm to be lowered and come to rest, and for a start-up.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Time that a person takes between pendant and keyboard.
 const NOTICE: Duration = Duration::from_millis(500);
@@ -97,6 +97,10 @@ fn start_up(arm: &mut Arm, way: Recover) -> Result<bool, Failure> {
             Some(Stage::WaitingForZero) => {
                 if way == Recover::Zero && !has_zeroed && arm.hold().is_ok() {
                     return Err("hold was accepted before zeroing".into());
+                }
+                let state = State::from_code(status.state).unwrap_or(State::Idle);
+                if state.has_torque() && state != State::Lower {
+                    arm.release().map_err(|error| format!("release: {error}"))?;
                 }
                 let truth = plant(arm).world().joint_positions();
                 has_zeroed = arm.zero(truth.map(|angle| angle as f32)).is_ok() || has_zeroed;

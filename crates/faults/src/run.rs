@@ -79,7 +79,8 @@ pub fn run(entry: &Entry, scenario: &Scenario) -> Verdict {
 
 fn go_through(scenario: &Scenario, verdict: &mut Verdict) -> Result<(), Failure> {
     let compares = |figure: &Figure| matches!(figure, Figure::Deviation | Figure::Tracking | Figure::Plan);
-    let nominal = scenario.expect.most.keys().any(compares).then(|| watched_without(scenario)).transpose()?;
+    let (most, least) = (&scenario.expect.most, &scenario.expect.least);
+    let nominal = most.keys().chain(least.keys()).any(compares).then(|| watched_without(scenario)).transpose()?;
     let mut arm = bench::arm(scenario, true)?;
     let watched = watch::watch(&mut arm, scenario.watch, &scenario.order)?;
     let figures = measure::all(scenario, &watched, nominal.as_ref());

@@ -144,7 +144,9 @@ impl Observer {
             Given::Silence(seconds) => return self.be_silent(arm, seconds).map(Ok),
         };
         match answer {
-            Err(error) if !matches!(error, HostError::Refused { .. } | HostError::NotStopped { .. }) => Err(error.into()),
+            Err(error) if !matches!(error, HostError::Refused { .. } | HostError::NotStopped { .. }) => {
+                Err(error.into())
+            }
             answer => Ok(answer),
         }
     }
@@ -171,7 +173,12 @@ impl Observer {
         }
         // The device may have ended the session. A host that wakes up opens it again and wants its telemetry.
         let owner = Text::new("fault catalogue");
-        arm.request(&Request::Hello(HostHello { link_version: LINK_VERSION, schema_hash: SCHEMA_HASH, model_hash: MODEL_HASH, owner }))?;
+        arm.request(&Request::Hello(HostHello {
+            link_version: LINK_VERSION,
+            schema_hash: SCHEMA_HASH,
+            model_hash: MODEL_HASH,
+            owner,
+        }))?;
         arm.set_telemetry(1)?;
         Ok(())
     }

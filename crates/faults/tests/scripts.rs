@@ -49,7 +49,8 @@ fn script_and_catalogue_say_the_same_or_the_difference_is_told() {
     let text = "| A12 | torque frames cannot leave | counted | Fault | **part** (`some_test_of_it`) |\n";
     let found = |text: &str| differences(std::slice::from_ref(&entry), text);
     assert_eq!(found(text), [""; 0]);
-    for (from, to) in [("cannot leave", "leave"), ("| Fault", "| SoftStop"), ("part", "held"), ("some_test", "no_test")] {
+    for (from, to) in [("cannot leave", "leave"), ("| Fault", "| SoftStop"), ("part", "held"), ("some_test", "no_test")]
+    {
         assert_eq!(found(&text.replace(from, to)).len(), 1, "{to}");
     }
     assert_eq!(found(&text.replace("A12", "A13")).len(), 2, "one entry without row, one row without entry");

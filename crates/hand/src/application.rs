@@ -100,7 +100,7 @@ impl Application for HandApplication<'_> {
 
     fn commit(&mut self, name: &Name, crc: u32, _: &mut impl SessionPort<DeviceController>) -> Result<(), Refused> {
         let reader = self.reader.take().ok_or((Refusal::NoUpload, [0, 0]))?;
-        let summary = reader.finish(&mut self.library.staging, crc)?;
+        let summary = reader.finish(&self.library.staging, crc)?;
         if summary.model != control::MODEL_HASH {
             return Err((Refusal::ImageModel, [summary.model, control::MODEL_HASH]));
         }
@@ -108,7 +108,7 @@ impl Application for HandApplication<'_> {
             return Err((Refusal::ImageName, [0, 0]));
         }
         let place = self.library.place_for(name).ok_or((Refusal::StoreFull, [PLACES as u32, 0]))?;
-        self.library.commit(place, summary);
+        self.library.commit(place, summary)?;
         self.saved = Some(place);
         Ok(())
     }

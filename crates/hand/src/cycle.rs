@@ -14,6 +14,7 @@
 use control::plan::hand::LONGEST_MOVE;
 use control::{Fault, HandSample, State, flags};
 use device::Refused;
+use dmp::Coupling;
 use link::Refusal;
 use puck::CanFrame;
 
@@ -23,9 +24,8 @@ use crate::estimate::{HandEstimator, HandState};
 use crate::limit::{HandLimiter, Scales};
 use crate::motion::HandMotion;
 use crate::number::{Number, ONE, ZERO, at_least, at_most, constant, magnitude};
-use crate::primitive::FingerPrimitive;
+use crate::primitive::{FingerPrimitive, PERIOD, Rollout};
 use crate::record::Record;
-use crate::rollout::Rollout;
 use crate::{DIGITS, FINGERS, LOST_CYCLES, RANGE_NUMBERS};
 
 /// Cycles over which feedback fades in and out: 100 ms.
@@ -39,7 +39,7 @@ const SPEED_RANGE: [Number; 2] = crate::number::constants([0.1, 2.0]);
 const DURATION_RANGE: [Number; 2] = crate::number::constants([0.0, LONGEST_MOVE]);
 
 /// What the hand is after.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 enum Aim {
     /// Nothing: the worms hold.
     None,
@@ -67,7 +67,7 @@ pub struct Output {
 }
 
 /// The control cycle.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Cycle {
     count: u32,
     state: State,
@@ -114,7 +114,7 @@ impl Cycle {
     pub fn load(&mut self, primitive: &FingerPrimitive) -> bool {
         let running = matches!(self.aim, Aim::Run(..));
         if !running {
-            self.primitive.clone_from(primitive);
+            self.primitive.copy_from(primitive);
         }
         !running
     }
@@ -219,19 +219,20 @@ impl Cycle {
                 (reference, None)
             }
             Aim::Run(rollout, options) => {
-                let expected = rollout.expected(&self.primitive).filter(|_| options.force_control);
-                let zeta = if options.feedback {
-                    rollout.feedback(&self.primitive, &hand.gauges, self.fade)
-                } else {
-                    [ZERO; FINGERS]
-                };
-                let plan = rollout.step(&self.primitive, &zeta);
-                record.phase = plan.phase;
-                record.flags |= if options.feedback { flags::FEEDBACK } else { 0 };
-                if options.feedback && (self.fade < ONE || rollout.is_derated()) {
-                    record.flags |= flags::FEEDBACK_FADED;
+                let expected = self.primitive.expected(rollout).filter(|_| options.force_control);
+                let mut coupling = Coupling::NONE;
+                if options.feedback {
+                    let share = self.primitive.trust(rollout) * self.fade;
+                    coupling = self.primitive.coupling(rollout, &hand.gauges, share);
+                    record.flags |= flags::FEEDBACK | if share < ONE { flags::FEEDBACK_FADED } else { 0 };
                 }
-                let reference = HandReference { q: plan.q, dq: plan.dq }.kept_in_range();
+                let Ok(plan) = rollout.step(self.primitive.movement(), PERIOD, &coupling) else {
+                    // Of another primitive: none is loaded while one runs, so nobody has asked for this.
+                    self.stop(State::SoftStop, Fault::None);
+                    return None;
+                };
+                record.phase = plan.phase;
+                let reference = HandReference { q: plan.points.x, dq: plan.points.v }.kept_in_range();
                 if plan.progress >= ONE && matches!(self.state, State::Run) {
                     *arrived = true;
                     self.aim = Aim::Keep(reference.q, expected);
@@ -296,18 +297,7 @@ impl Cycle {
                 }
                 Ok(())
             }
-            Command::ClearFault => match self.state {
-                // Without a hand nothing can be driven: clearing makes way for its initialisation.
-                State::Fault | State::SoftStop if hand.is_some_and(|hand| hand.oldest() > 0) => {
-                    Err((Refusal::CauseRemains, [0, 0]))
-                }
-                State::Fault | State::SoftStop => {
-                    self.state = State::Idle;
-                    self.fault = Fault::None;
-                    Ok(())
-                }
-                _ => Ok(()),
-            },
+            Command::ClearFault => self.clear_fault(hand),
             _ if matches!(self.state, State::Fault | State::SoftStop) && self.fault != Fault::None => {
                 Err((Refusal::Faulted, [self.fault.code().into(), 0]))
             }
@@ -318,11 +308,11 @@ impl Cycle {
             },
             Command::Hold => {
                 if self.is_active() {
-                    self.aim = match (self.aim, hand) {
-                        (Aim::Move(motion), _) => Aim::Keep(motion.now().q, None),
-                        (Aim::Run(..), Some(hand)) => Aim::Keep(hand.q, None),
-                        (aim, _) => aim,
-                    };
+                    match (&self.aim, hand) {
+                        (Aim::Move(motion), _) => self.aim = Aim::Keep(motion.now().q, None),
+                        (Aim::Run(..), Some(hand)) => self.aim = Aim::Keep(hand.q, None),
+                        _ => {}
+                    }
                 }
                 self.state = State::Hold;
                 Ok(())
@@ -333,8 +323,7 @@ impl Cycle {
                 }
                 match &mut self.aim {
                     Aim::Run(rollout, _) => {
-                        let stable = rollout.set_speed(&self.primitive, factor);
-                        if stable { Ok(()) } else { Err((Refusal::BadValue, [0, 0])) }
+                        rollout.set_speed(self.primitive.movement(), factor).map_err(|_| (Refusal::BadValue, [0, 0]))
                     }
                     _ => Err(state),
                 }
@@ -364,6 +353,18 @@ impl Cycle {
         }
     }
 
+    fn clear_fault(&mut self, hand: Option<&HandState>) -> Result<(), Refused> {
+        if matches!(self.state, State::Fault | State::SoftStop) {
+            // Without a hand nothing can be driven: clearing makes way for its initialisation.
+            if hand.is_some_and(|hand| hand.oldest() > 0) {
+                return Err((Refusal::CauseRemains, [0, 0]));
+            }
+            self.state = State::Idle;
+            self.fault = Fault::None;
+        }
+        Ok(())
+    }
+
     fn run(&mut self, options: RunOptions, hand: &HandState) -> Result<(), Refused> {
         if !self.primitive.is_whole() {
             return Err((Refusal::NoSuchPrimitive, [0, 0]));
@@ -372,18 +373,15 @@ impl Cycle {
             return Err((Refusal::NoExpectation, [0, 0]));
         }
         let from = self.held(hand);
-        let far = from.iter().zip(self.primitive.start()).position(|(at, to)| magnitude(*at - *to) > START_DISTANCE);
+        let start = &self.primitive.movement().start().points;
+        let far = from.iter().zip(start).position(|(at, to)| magnitude(*at - *to) > START_DISTANCE);
         if let Some(digit) = far {
             return Err((Refusal::HandFarFromStart, [u32::try_from(digit).unwrap_or(0), 0]));
         }
         if !in_range(options.speed, SPEED_RANGE) {
             return Err((Refusal::BadValue, [0, 0]));
         }
-        let mut rollout = Rollout::start(&self.primitive, &from, ONE);
-        if !rollout.set_speed(&self.primitive, options.speed) {
-            return Err((Refusal::BadValue, [0, 0]));
-        }
-        let rollout = Rollout::start(&self.primitive, &from, options.speed);
+        let rollout = self.primitive.run(&from, options.speed).map_err(|_| (Refusal::BadValue, [0, 0]))?;
         if !self.estimator.is_tared() {
             self.estimator.tare();
         }

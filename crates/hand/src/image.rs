@@ -1,10 +1,11 @@
-//! `ImageReader`: an uploaded image to a [`FingerPrimitive`], byte by byte.
+//! `ImageReader`: an uploaded image to [`FingerTables`], byte by byte.
 //!
 //! An image has up to 25 kB, of which the hand needs a tenth. So it is never held: header, numbers and check sum pass
-//! through, the hand's columns are converted to fixed point and kept. What a whole image is checked for by
+//! through, the hand's columns are kept. What a whole image is checked for by
 //! `link::PrimitiveImage` is checked here as well; `tests/hand/image.rs` holds the two against each other. Layout:
 //! `docs/image-format.md`.
 
+use dmp::Scalar;
 use link::image::{
     COUPLED_ROWS, EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT, EXPERIENCE_ROWS, GAIN_POINTS_LIMIT, IMAGE_SCHEMA,
     ImageError, KERNEL_LIMIT, MAGIC, SENSOR_ROWS, WEIGHT_ROWS, image_bytes,
@@ -12,9 +13,7 @@ use link::image::{
 use link::name::NAME_BYTES;
 use link::{Name, Refusal};
 
-use crate::forcing::weight;
-use crate::primitive::{FingerPrimitive, Marks, Unfit};
-use crate::profile::Stored;
+use crate::primitive::FingerTables;
 use crate::{DIGITS, FINGERS};
 
 /// Bytes in front of the first real.
@@ -31,36 +30,11 @@ const FIRST_GAUGE: usize = SENSOR_ROWS - FINGERS;
 /// Flags that have a meaning.
 const KNOWN_FLAGS: u16 = 3;
 
-/// Why an image is refused.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Flaw {
-    /// It is no sound image.
-    Image(ImageError),
-    /// It is one, but its movement is not for this device.
-    Unfit(Unfit),
-}
-
-impl From<ImageError> for Flaw {
-    fn from(error: ImageError) -> Self {
-        Flaw::Image(error)
-    }
-}
-
-impl From<Unfit> for Flaw {
-    fn from(unfit: Unfit) -> Self {
-        Flaw::Unfit(unfit)
-    }
-}
-
-impl From<Flaw> for (Refusal, [u32; 2]) {
-    fn from(flaw: Flaw) -> Self {
-        match flaw {
-            Flaw::Image(ImageError::Kernels { found }) => {
-                (Refusal::TooManyKernels, [found, u32::try_from(KERNEL_LIMIT).unwrap_or(u32::MAX)])
-            }
-            Flaw::Image(error) => (Refusal::ImageInvalid, [error.code(), error.number()]),
-            Flaw::Unfit(unfit) => unfit.into(),
-        }
+/// The refusal of an image that is not sound.
+fn refusal(error: ImageError) -> (Refusal, [u32; 2]) {
+    match error {
+        ImageError::Kernels { found } => (Refusal::TooManyKernels, [found, clip(KERNEL_LIMIT)]),
+        error => (Refusal::ImageInvalid, [error.code(), error.number()]),
     }
 }
 
@@ -102,10 +76,9 @@ pub struct ImageReader {
     /// The bytes of the real, or of the check sum, that is not whole yet.
     part: [u8; 4],
     digest: crc::Reader,
-    marks: Marks,
     /// Columns of the sample under way.
     sample: [f32; FINGERS],
-    flaw: Option<Flaw>,
+    flaw: Option<ImageError>,
     stored_crc: u32,
 }
 
@@ -160,16 +133,15 @@ impl ImageReader {
             header: None,
             part: [0; 4],
             digest: crc::Reader::new(),
-            marks: Marks::default(),
             sample: [0.0; FINGERS],
             flaw: None,
             stored_crc: 0,
         }
     }
 
-    /// Takes the next bytes and puts what they hold into `primitive`. A flaw is kept until the end: the host learns of
+    /// Takes the next bytes and puts what they hold into `tables`, which are empty at first. A flaw is kept until the end: the host learns of
     /// it when it asks for the primitive to be stored.
-    pub fn take(&mut self, bytes: &[u8], primitive: &mut FingerPrimitive) {
+    pub fn take(&mut self, bytes: &[u8], tables: &mut FingerTables) {
         for byte in bytes {
             let place = self.received;
             self.received += 1;
@@ -180,7 +152,7 @@ impl ImageReader {
                 self.note_crc(place, *byte);
                 continue;
             }
-            if let Err(flaw) = self.byte(place, *byte, primitive) {
+            if let Err(flaw) = self.byte(place, *byte, tables) {
                 self.flaw = Some(flaw);
             }
             self.note_crc(place, *byte);
@@ -193,7 +165,7 @@ impl ImageReader {
         }
     }
 
-    fn byte(&mut self, place: usize, byte: u8, primitive: &mut FingerPrimitive) -> Result<(), Flaw> {
+    fn byte(&mut self, place: usize, byte: u8, tables: &mut FingerTables) -> Result<(), ImageError> {
         if let Some(target) = self.header_bytes.get_mut(place) {
             *target = byte;
             if place + 1 == HEADER_BYTES {
@@ -207,44 +179,44 @@ impl ImageReader {
         if let Some(target) = self.part.get_mut(index % 4) {
             *target = byte;
         }
-        if index % 4 == 3 { self.real(index / 4, f32::from_le_bytes(self.part), primitive) } else { Ok(()) }
+        if index % 4 == 3 { self.real(index / 4, f32::from_le_bytes(self.part), tables) } else { Ok(()) }
     }
 
-    fn read_header(&self) -> Result<Header, Flaw> {
+    fn read_header(&self) -> Result<Header, ImageError> {
         let bytes = &self.header_bytes;
         let word = |at: usize| bytes.get(at..).and_then(|rest| rest.first_chunk::<4>()).copied().unwrap_or_default();
         let half = |at: usize| {
             u16::from_le_bytes(bytes.get(at..).and_then(|rest| rest.first_chunk::<2>()).copied().unwrap_or_default())
         };
         if word(0) != MAGIC {
-            return Err(ImageError::Magic.into());
+            return Err(ImageError::Magic);
         }
         if half(4) != IMAGE_SCHEMA {
-            return Err(ImageError::Schema { found: half(4) }.into());
+            return Err(ImageError::Schema { found: half(4) });
         }
         let (announced, given) = (u32::from_le_bytes(word(8)), clip(self.length));
         if announced != given {
-            return Err(ImageError::Length { expected: announced, found: given }.into());
+            return Err(ImageError::Length { expected: announced, found: given });
         }
         let [kernels, k1, k2, expected, experience] = [48, 50, 52, 54, 56].map(|at| usize::from(half(at)));
         if !(2..=KERNEL_LIMIT).contains(&kernels) {
-            return Err(ImageError::Kernels { found: clip(kernels) }.into());
+            return Err(ImageError::Kernels { found: clip(kernels) });
         }
         if k1.max(k2) > GAIN_POINTS_LIMIT || (k1 == 0) != (k2 == 0) {
-            return Err(ImageError::GainPoints { found: clip(k1.max(k2)) }.into());
+            return Err(ImageError::GainPoints { found: clip(k1.max(k2)) });
         }
         if expected > EXPECTATION_POINTS_LIMIT {
-            return Err(ImageError::ExpectationPoints { found: clip(expected) }.into());
+            return Err(ImageError::ExpectationPoints { found: clip(expected) });
         }
         if experience > EXPERIENCE_POINTS_LIMIT {
-            return Err(ImageError::ExperiencePoints { found: clip(experience) }.into());
+            return Err(ImageError::ExperiencePoints { found: clip(experience) });
         }
         let whole = image_bytes(kernels, k1, k2, expected, experience);
         if whole != self.length {
-            return Err(ImageError::Length { expected: clip(whole), found: given }.into());
+            return Err(ImageError::Length { expected: clip(whole), found: given });
         }
         if half(6) & !KNOWN_FLAGS != 0 {
-            return Err(ImageError::Flags { found: half(6) }.into());
+            return Err(ImageError::Flags { found: half(6) });
         }
         let name = bytes.get(16..16 + NAME_BYTES).and_then(read_name).ok_or(ImageError::Name)?;
         let mut end = FIXED_REALS;
@@ -257,88 +229,48 @@ impl ImageReader {
         Ok(Header { model: u32::from_le_bytes(word(12)), name, kernels, ends })
     }
 
-    fn real(&mut self, index: usize, value: f32, primitive: &mut FingerPrimitive) -> Result<(), Flaw> {
+    fn real(&mut self, index: usize, value: f32, tables: &mut FingerTables) -> Result<(), ImageError> {
         if !value.is_finite() {
-            return Err(ImageError::NotFinite { real: clip(index) }.into());
+            return Err(ImageError::NotFinite { real: clip(index) });
         }
         let Some(Header { kernels, ends: [k1, k2, weights, expected], .. }) = self.header else {
             return Ok(());
         };
+        tables.kernels = kernels;
         if index < FIXED_REALS {
-            self.mark(index, value);
-            if index + 1 == FIXED_REALS {
-                primitive.begin(&self.marks, kernels)?;
-            }
-            return Ok(());
-        }
-        if index < k1 {
-            self.column((index - FIXED_REALS) % COUPLED_ROWS, FIRST_COUPLED_FINGER, value, |sample| {
-                sample.is_some_and(|sample| primitive.sensitivity.push(sample))
-            })
-            .ok_or(Unfit::Feedback)?;
+            mark(index, value, tables);
+        } else if index < k1 {
+            self.column((index - FIXED_REALS) % COUPLED_ROWS, FIRST_COUPLED_FINGER, value, &mut tables.sensitivity);
         } else if index < k2 {
-            self.column((index - k1) % SENSOR_ROWS, FIRST_GAUGE, value, |sample| {
-                sample.is_some_and(|sample| primitive.weight.push(sample))
-            })
-            .ok_or(Unfit::Feedback)?;
+            self.column((index - k1) % SENSOR_ROWS, FIRST_GAUGE, value, &mut tables.weight);
         } else if index < weights {
-            let (row, kernel) = ((index - k2) / kernels, (index - k2) % kernels);
-            if let Some(digit) = row.checked_sub(FIRST_WEIGHT_ROW) {
-                let value = weight(value).ok_or(dmp::PrimitiveError::Weight).map_err(Unfit::from)?;
-                if let Some(place) = primitive.weights.get_mut(kernel).and_then(|weights| weights.get_mut(digit)) {
-                    *place = value;
-                }
+            if (index - k2) / kernels >= FIRST_WEIGHT_ROW {
+                // There is room for as many as the header may announce, here and below. One that cannot be kept is
+                // missed when they are counted.
+                let _ = crate::number::from_real(value).to_weight().map(|weight| tables.weights.push(weight));
             }
         } else if index < expected {
-            self.column((index - weights) % SENSOR_ROWS, FIRST_GAUGE, value, |sample| {
-                sample.is_some_and(|sample| primitive.expected.push(sample))
-            })
-            .ok_or(Unfit::Expectation)?;
+            self.column((index - weights) % SENSOR_ROWS, FIRST_GAUGE, value, &mut tables.expected);
         }
         Ok(())
     }
 
-    /// A value of a table whose last three columns are the fingers'; `push` gets a whole sample. `None` if it does not
-    /// take it.
-    fn column<T: Stored>(
+    /// A value of a table whose last three columns are the fingers'.
+    fn column<const POINTS: usize>(
         &mut self,
         column: usize,
         first: usize,
         value: f32,
-        push: impl FnOnce(Option<[T; FINGERS]>) -> bool,
-    ) -> Option<()> {
-        let finger = match column.checked_sub(first) {
-            None => return Some(()),
-            Some(finger) => finger,
+        table: &mut heapless::Vec<[f32; FINGERS], POINTS>,
+    ) {
+        let Some(finger) = column.checked_sub(first) else {
+            return;
         };
-        *self.sample.get_mut(finger)? = value;
-        if finger + 1 < FINGERS {
-            return Some(());
-        }
-        let [f1, f2, f3] = self.sample.map(T::stored);
-        let sample = f1.zip(f2).zip(f3).map(|((f1, f2), f3)| [f1, f2, f3]);
-        push(sample).then_some(())
-    }
-
-    /// One of the reals in front of the tables.
-    fn mark(&mut self, index: usize, value: f32) {
-        let marks = &mut self.marks;
-        let place = match index {
-            0 => Some(&mut marks.duration),
-            1 => Some(&mut marks.alpha),
-            2 => Some(&mut marks.activation),
-            6 => Some(&mut marks.stiffness),
-            10 => Some(&mut marks.damping),
-            25..29 => marks.start.get_mut(index - 25),
-            42..46 => marks.start_velocity.get_mut(index - 42),
-            60..64 => marks.goal.get_mut(index - 60),
-            66 => Some(&mut marks.limit),
-            67 => Some(&mut marks.recorded_duration),
-            72 => Some(&mut marks.filter_cut_off),
-            _ => None,
-        };
-        if let Some(place) = place {
+        if let Some(place) = self.sample.get_mut(finger) {
             *place = value;
+        }
+        if finger + 1 == FINGERS {
+            let _ = table.push(self.sample);
         }
     }
 
@@ -352,34 +284,54 @@ impl ImageReader {
     ///
     /// # Errors
     /// The refusal, with the numbers that belong to it.
-    pub fn finish(self, primitive: &mut FingerPrimitive, announced: u32) -> Result<Summary, (Refusal, [u32; 2])> {
+    pub fn finish(self, tables: &FingerTables, announced: u32) -> Result<Summary, (Refusal, [u32; 2])> {
         let computed = self.digest.sum();
         // As a whole image is read: an image of another version is named as such, a damaged one as damaged, the rest as
         // it is.
-        if let Some(Flaw::Image(error @ (ImageError::Magic | ImageError::Schema { .. }))) = self.flaw {
-            return Err(Flaw::Image(error).into());
+        if let Some(error @ (ImageError::Magic | ImageError::Schema { .. })) = self.flaw {
+            return Err(refusal(error));
         }
         if computed != self.stored_crc || computed != announced {
             // Arrived as announced, the image was wrong when it left: then its own check sum is the one that differs.
             let expected = if computed == announced { self.stored_crc } else { announced };
             return Err((Refusal::UploadCrc, [computed, expected]));
         }
-        if let Some(flaw) = self.flaw {
-            return Err(flaw.into());
+        if let Some(error) = self.flaw {
+            return Err(refusal(error));
         }
         let Some(header) = self.header else {
-            return Err(Flaw::Image(ImageError::TooShort { length: clip(self.length) }).into());
+            return Err(refusal(ImageError::TooShort { length: clip(self.length) }));
         };
-        primitive.finish(&self.marks).map_err(Flaw::Unfit)?;
         Ok(Summary {
             name: header.name,
             model: header.model,
             crc: computed,
             length: clip(self.length),
-            duration: self.marks.duration,
+            duration: tables.duration,
             kernels: u16::try_from(header.kernels).unwrap_or(u16::MAX),
-            expectation: primitive.has_expectation(),
+            expectation: !tables.expected.is_empty(),
         })
+    }
+}
+
+/// One of the reals in front of the tables.
+fn mark(index: usize, value: f32, tables: &mut FingerTables) {
+    let place = match index {
+        0 => Some(&mut tables.duration),
+        1 => Some(&mut tables.alpha),
+        2 => Some(&mut tables.activation),
+        6 => Some(&mut tables.stiffness),
+        10 => Some(&mut tables.damping),
+        25..29 => tables.start.get_mut(index - 25),
+        42..46 => tables.start_velocity.get_mut(index - 42),
+        60..64 => tables.goal.get_mut(index - 60),
+        66 => Some(&mut tables.limit),
+        67 => Some(&mut tables.recorded_duration),
+        72 => Some(&mut tables.filter_cut_off),
+        _ => None,
+    };
+    if let Some(place) = place {
+        *place = value;
     }
 }
 

@@ -8,18 +8,14 @@ pub mod controller;
 pub mod cycle;
 pub mod device_controller;
 pub mod estimate;
-mod exponential;
 pub mod filter;
-pub mod forcing;
 pub mod image;
 pub mod library;
 pub mod limit;
 pub mod motion;
 pub mod number;
 pub mod primitive;
-pub mod profile;
 pub mod record;
-pub mod rollout;
 pub mod startup;
 
 pub use application::{HandApplication, Session};
@@ -27,9 +23,8 @@ pub use command::Command;
 pub use device_controller::DeviceController;
 pub use library::Library;
 pub use number::Number;
-pub use primitive::FingerPrimitive;
+pub use primitive::{FingerPrimitive, FingerTables, Rollout};
 pub use record::Record;
-pub use rollout::Rollout;
 
 /// Digits of the hand: spread, F1, F2, F3.
 pub const DIGITS: usize = 4;

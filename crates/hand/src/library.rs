@@ -3,33 +3,33 @@
 use link::{Listing, Name};
 
 use crate::image::Summary;
-use crate::primitive::FingerPrimitive;
+use crate::primitive::{FingerPrimitive, FingerTables, Unfit};
 
-/// Places for primitives, beside the one that is being uploaded.
+/// Places for primitives.
 pub const PLACES: usize = 3;
 
 /// One place.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct Place {
     summary: Option<Summary>,
     primitive: FingerPrimitive,
 }
 
-/// All places, and the one where an upload is converted.
+/// All places, and the tables of an upload.
 ///
-/// About 20 kB: a static of its own, lent to the session.
-#[derive(Clone, Debug)]
+/// About 29 kB: a static of its own, lent to the session.
+#[derive(Debug)]
 pub struct Library {
     places: [Place; PLACES],
-    /// Where an upload is converted.
-    pub(crate) staging: FingerPrimitive,
+    /// What has come of an upload.
+    pub(crate) staging: FingerTables,
 }
 
 impl Library {
     /// Without primitives.
     pub const EMPTY: Library = Library {
         places: [const { Place { summary: None, primitive: FingerPrimitive::EMPTY } }; PLACES],
-        staging: FingerPrimitive::EMPTY,
+        staging: FingerTables::EMPTY,
     };
 
     /// What is at a place.
@@ -52,13 +52,17 @@ impl Library {
         self.places.get(place).filter(|place| place.summary.is_some()).map(|place| &place.primitive)
     }
 
-    /// Puts what was converted into a place.
-    pub(crate) fn commit(&mut self, place: usize, summary: Summary) {
+    /// Makes what was uploaded the primitive of a place.
+    ///
+    /// # Errors
+    /// [`Unfit`]: the place holds what it held.
+    pub(crate) fn commit(&mut self, place: usize, summary: Summary) -> Result<(), Unfit> {
         let Self { places, staging } = self;
         if let Some(place) = places.get_mut(place) {
-            place.primitive.clone_from(staging);
+            place.primitive.assign(staging)?;
             place.summary = Some(summary);
         }
+        Ok(())
     }
 
     /// Empties a place.

@@ -1,30 +1,45 @@
 //! `FingerPrimitive`: the hand's part of a movement primitive, in fixed point, checked.
 //!
-//! Made from the real numbers of an image while it is uploaded ([`crate::image`]); nothing here computes on the control
-//! path.
+//! Four point rows of `dmp` without a pose, and the three gauges that bend them. Made from the real numbers of an image
+//! ([`FingerTables`]) when its upload is complete.
 
 use control::plan::load::{LONGEST_MOVEMENT, LoadError, SHORTEST_MOVEMENT};
 use device::PrimitiveTrouble;
 use device::recorded_filter::{self, OtherFilter};
-use dmp::{GainError, Group, PrimitiveError, TransformationSystem};
+use dmp::{
+    Configuration, Coupling, CouplingGains, DisplacementLimits, ExpectedSensors, Gain, Gains, Group, Hemisphere,
+    OrientationError, PrimitiveError, PrimitiveTables, RolloutError, Scalar, StartState, Velocity, bounds,
+};
 use link::Refusal;
 use link::image::{EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT};
 
-use crate::forcing::Basis;
-use crate::number::{Number, ZERO, from_real};
-use crate::profile::{Profile, Torque};
-use crate::{DIGITS, KERNELS};
+use crate::number::{Number, ZERO, constant, from_real};
+use crate::{DIGITS, FINGERS, KERNELS};
 
 /// Most a start or goal may lie outside the range of its digit (rad): what noise of a demonstration at the stops
 /// leaves.
 const RANGE_MARGIN: f64 = 0.05;
 
-/// Largest magnitude of a feedback limit (rad).
-const FEEDBACK_LIMIT: f32 = 3.2;
+/// The control period (s).
+pub(crate) const PERIOD: Number = constant(control::PERIOD);
 
-/// The real numbers of an image that stand in front of its tables, as far as they concern the hand.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Marks {
+/// Movement of the digits.
+pub type Movement = dmp::Primitive<Number, DIGITS, 0, KERNELS>;
+
+/// One run of it.
+pub type Rollout = dmp::Rollout<Number, DIGITS, 0, KERNELS>;
+
+/// The values of a table as numbers of the control path.
+fn numbers(table: &[[f32; FINGERS]]) -> impl Iterator<Item = Number> + '_ {
+    table.iter().flatten().copied().map(from_real)
+}
+
+/// Values of a table with a column for each finger, point after point.
+type Table<const POINTS: usize> = heapless::Vec<[f32; FINGERS], POINTS>;
+
+/// The hand's part of an image, in its real numbers, not checked yet.
+#[derive(Clone, Debug, Default)]
+pub struct FingerTables {
     /// Duration as taught (s).
     pub duration: f32,
     /// Decay of the phase, Eq (3).
@@ -47,14 +62,81 @@ pub struct Marks {
     pub recorded_duration: f32,
     /// Cut-off of the filter behind it (Hz).
     pub filter_cut_off: f32,
+    /// Kernels of each row.
+    pub kernels: usize,
+    /// Weights, row after row, as [`Number`] keeps them.
+    pub weights: heapless::Vec<i32, { DIGITS * KERNELS }>,
+    /// K1 of the finger rows by phase; empty without feedback.
+    pub sensitivity: Table<GAIN_POINTS_LIMIT>,
+    /// K2 of the gauges by phase.
+    pub weight: Table<GAIN_POINTS_LIMIT>,
+    /// Expected torque of each gauge by phase (N m); empty if none was recorded.
+    pub expected: Table<EXPECTATION_POINTS_LIMIT>,
 }
 
-/// The first row of the hand in a movement of the arm.
-const HAND: (Group, u8) = (Group::Points, control::plan::primitive::POSTURE_ROWS as u8);
+impl FingerTables {
+    /// Without values.
+    pub const EMPTY: FingerTables = FingerTables {
+        duration: 0.0,
+        alpha: 0.0,
+        activation: 0.0,
+        stiffness: 0.0,
+        damping: 0.0,
+        start: [0.0; DIGITS],
+        start_velocity: [0.0; DIGITS],
+        goal: [0.0; DIGITS],
+        limit: 0.0,
+        recorded_duration: 0.0,
+        filter_cut_off: 0.0,
+        kernels: 0,
+        weights: heapless::Vec::new(),
+        sensitivity: heapless::Vec::new(),
+        weight: heapless::Vec::new(),
+        expected: heapless::Vec::new(),
+    };
 
-/// The gains of the hand are unusable.
-fn gains(error: GainError) -> PrimitiveError {
-    PrimitiveError::Gains { group: HAND.0, index: HAND.1, error }
+    /// Forgets all tables.
+    pub(crate) fn clear(&mut self) {
+        self.weights.clear();
+        self.sensitivity.clear();
+        self.weight.clear();
+        self.expected.clear();
+    }
+
+    /// The checks that are the hand's own, and those of the tables that `dmp` fills one after another: a primitive is
+    /// not to be left half filled.
+    fn check(&self) -> Result<(), Unfit> {
+        if !(SHORTEST_MOVEMENT..=LONGEST_MOVEMENT).contains(&f64::from(self.duration)) {
+            return Err(Unfit::Movement(LoadError::Duration));
+        }
+        for (end, error) in [(&self.start, PrimitiveError::Start), (&self.goal, PrimitiveError::Goal)] {
+            let reached = |(angle, [low, high]): (&f32, [f64; 2])| {
+                (low - RANGE_MARGIN..=high + RANGE_MARGIN).contains(&f64::from(*angle))
+            };
+            if !end.iter().zip(crate::RANGES).all(reached) {
+                return Err(Unfit::Movement(LoadError::Primitive(error)));
+            }
+        }
+        let gain = |value: &f32| (0.0..=bounds::LARGEST_COUPLING_GAIN).contains(&f64::from(*value));
+        let gains_hold = self.sensitivity.iter().chain(&self.weight).flatten().all(gain);
+        if !gains_hold || self.limits().check().is_err() {
+            return Err(Unfit::Feedback);
+        }
+        if !self.expected.is_empty() {
+            recorded_filter::check(self.filter_cut_off).map_err(Unfit::Filter)?;
+            let torque = |value: &f32| f64::from(*value).abs() <= bounds::LARGEST_SENSOR_VALUE;
+            let duration = f64::from(self.recorded_duration);
+            if !self.expected.iter().flatten().all(torque) || !(duration > 0.0 && duration <= bounds::LONGEST_DURATION)
+            {
+                return Err(Unfit::Expectation);
+            }
+        }
+        Ok(())
+    }
+
+    fn limits(&self) -> DisplacementLimits<Number, DIGITS, 0> {
+        DisplacementLimits { poses: [], points: [from_real(self.limit); DIGITS] }
+    }
 }
 
 /// Why an image is no primitive of this device.
@@ -71,8 +153,24 @@ pub enum Unfit {
 }
 
 impl From<PrimitiveError> for Unfit {
+    /// Of the rows of the hand, which come behind the posture's in a movement of the arm.
     fn from(error: PrimitiveError) -> Self {
-        Unfit::Movement(LoadError::Primitive(error))
+        let row = |index: u8| index.saturating_add(control::plan::primitive::POSTURE_ROWS as u8);
+        Unfit::Movement(LoadError::Primitive(match error {
+            PrimitiveError::Gains { group: group @ Group::Points, index, error } => {
+                PrimitiveError::Gains { group, index: row(index), error }
+            }
+            PrimitiveError::Unstable { group: group @ Group::Points, index } => {
+                PrimitiveError::Unstable { group, index: row(index) }
+            }
+            PrimitiveError::WeightTooLarge { group: group @ Group::Points, index, kernel } => {
+                PrimitiveError::WeightTooLarge { group, index: row(index), kernel }
+            }
+            PrimitiveError::TooLarge { part, group: group @ Group::Points, index } => {
+                PrimitiveError::TooLarge { part, group, index: row(index) }
+            }
+            error => error,
+        }))
     }
 }
 
@@ -88,156 +186,127 @@ impl From<Unfit> for (Refusal, [u32; 2]) {
 }
 
 /// The four rows of the hand, with feedback and expectation of the three gauges.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct FingerPrimitive {
-    pub(crate) duration: Number,
-    /// 1/duration.
-    pub(crate) rate: Number,
-    pub(crate) shortest: Number,
-    pub(crate) basis: Basis,
-    pub(crate) weights: [[i32; DIGITS]; KERNELS],
-    pub(crate) system: Option<TransformationSystem<Number>>,
-    pub(crate) start: [Number; DIGITS],
-    pub(crate) start_velocity: [Number; DIGITS],
-    pub(crate) goal: [Number; DIGITS],
-    /// K1 of the finger rows by phase; empty without feedback.
-    pub(crate) sensitivity: Profile<Number, GAIN_POINTS_LIMIT>,
-    /// K2 of the gauges by phase.
-    pub(crate) weight: Profile<Number, GAIN_POINTS_LIMIT>,
-    /// Largest zeta: K times the largest displacement.
-    pub(crate) zeta_limit: Number,
-    /// Expected torque of each gauge by phase; empty if none was recorded.
-    pub(crate) expected: Profile<Torque, EXPECTATION_POINTS_LIMIT>,
-    /// Recorded duration over the duration as taught.
-    pub(crate) recorded_speed: Number,
+    movement: Movement,
+    gains: CouplingGains<Number, FINGERS, FINGERS, GAIN_POINTS_LIMIT>,
+    limits: DisplacementLimits<Number, DIGITS, 0>,
+    expected: ExpectedSensors<Number, FINGERS, EXPECTATION_POINTS_LIMIT>,
+    present: bool,
 }
 
 impl FingerPrimitive {
     /// A place for one.
     pub const EMPTY: FingerPrimitive = FingerPrimitive {
-        duration: ZERO,
-        rate: ZERO,
-        shortest: ZERO,
-        basis: Basis::EMPTY,
-        weights: [[0; DIGITS]; KERNELS],
-        system: None,
-        start: [ZERO; DIGITS],
-        start_velocity: [ZERO; DIGITS],
-        goal: [ZERO; DIGITS],
-        sensitivity: Profile::new(),
-        weight: Profile::new(),
-        zeta_limit: ZERO,
-        expected: Profile::new(),
-        recorded_speed: ZERO,
+        movement: Movement::PLACEHOLDER,
+        gains: CouplingGains::EMPTY,
+        limits: DisplacementLimits::NONE,
+        expected: ExpectedSensors::EMPTY,
+        present: false,
     };
 
     /// Forgets what the place held.
     pub fn clear(&mut self) {
-        self.system = None;
-        self.basis = Basis::EMPTY;
-        self.sensitivity.clear();
-        self.weight.clear();
+        self.present = false;
+    }
+
+    /// Takes over another one, without a copy on the stack.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.movement.clone_from(&other.movement);
+        self.gains.copy_from(&other.gains);
+        self.limits = other.limits;
+        self.expected.copy_from(&other.expected);
+        self.present = other.present;
+    }
+
+    /// Takes the tables of an image. Computes in floating point: at upload, never on the control path.
+    ///
+    /// # Errors
+    /// [`Unfit`]: nothing has changed then.
+    pub fn assign(&mut self, tables: &FingerTables) -> Result<(), Unfit> {
+        tables.check()?;
+        let gain = Gain { stiffness: from_real(tables.stiffness), damping: from_real(tables.damping) };
+        let at = |points: [f32; DIGITS]| Configuration { poses: [], points: points.map(from_real) };
+        self.movement.assign(&PrimitiveTables {
+            control_period: PERIOD,
+            duration: from_real(tables.duration),
+            alpha: from_real(tables.alpha),
+            activation: from_real(tables.activation),
+            kernel_count: tables.kernels,
+            weights: &tables.weights,
+            gains: Gains { poses: [], points: [gain; DIGITS] },
+            orientation_error: OrientationError::Quaternion,
+            hemisphere: Hemisphere::Demonstrated,
+            start: at(tables.start),
+            goal: at(tables.goal),
+            start_velocity: Velocity { poses: [], points: tables.start_velocity.map(from_real) },
+        })?;
+        self.gains.clear();
         self.expected.clear();
-    }
-
-    /// Takes the numbers in front of the tables.
-    ///
-    /// # Errors
-    /// [`Unfit`]: the place holds nothing of use then.
-    pub fn begin(&mut self, marks: &Marks, kernels: usize) -> Result<(), Unfit> {
-        self.clear();
-        let duration = f64::from(marks.duration);
-        if !(SHORTEST_MOVEMENT..=LONGEST_MOVEMENT).contains(&duration) {
-            return Err(Unfit::Movement(LoadError::Duration));
+        self.limits = tables.limits();
+        self.present = true;
+        if !tables.sensitivity.is_empty() {
+            let (sensitivity, weight) = (numbers(&tables.sensitivity), numbers(&tables.weight));
+            self.gains.assign(sensitivity, weight).map_err(|_| Unfit::Feedback)?;
         }
-        let (alpha, activation) = (f64::from(marks.alpha), f64::from(marks.activation));
-        if !(2.3..=13.82).contains(&alpha) {
-            return Err(PrimitiveError::Alpha.into());
-        }
-        if !(0.05..=0.95).contains(&activation) {
-            return Err(PrimitiveError::Activation.into());
-        }
-        self.basis = Basis::new(kernels, alpha, activation).ok_or(PrimitiveError::KernelCount)?;
-        let (stiffness, damping) = (from_real(marks.stiffness), from_real(marks.damping));
-        /// Largest K and D: D^2 + 4 K and the products with angles and phase speeds stay far from saturation.
-        const GAIN_LIMITS: [f32; 2] = [1e5, 4e4];
-        let [largest_stiffness, largest_damping] = GAIN_LIMITS;
-        if marks.stiffness.abs() > largest_stiffness {
-            return Err(gains(GainError::Stiffness).into());
-        }
-        if marks.damping.abs() > largest_damping {
-            return Err(gains(GainError::Damping).into());
-        }
-        let system = TransformationSystem::new(stiffness, damping).map_err(gains)?;
-        self.duration = Number::constant(duration);
-        self.rate = Number::constant(1.0 / duration);
-        self.shortest = Number::constant(control::PERIOD) / system.largest_step();
-        if self.duration <= self.shortest {
-            return Err(PrimitiveError::Unstable { group: HAND.0, index: HAND.1 }.into());
-        }
-        let ends = [(&marks.start, PrimitiveError::Start), (&marks.goal, PrimitiveError::Goal)];
-        for (end, error) in ends {
-            let outside = end
-                .iter()
-                .zip(crate::RANGES)
-                .any(|(angle, [low, high])| !(low - RANGE_MARGIN..=high + RANGE_MARGIN).contains(&f64::from(*angle)));
-            if outside {
-                return Err(error.into());
-            }
-        }
-        /// Faster than any digit.
-        const SPEED_LIMIT: f32 = 10.0;
-        if marks.start_velocity.iter().any(|velocity| velocity.abs() > SPEED_LIMIT) {
-            return Err(PrimitiveError::StartVelocity.into());
-        }
-        if !(0.0..=FEEDBACK_LIMIT).contains(&marks.limit) {
-            return Err(Unfit::Feedback);
-        }
-        self.start = marks.start.map(from_real);
-        self.start_velocity = marks.start_velocity.map(from_real);
-        self.goal = marks.goal.map(from_real);
-        self.zeta_limit = from_real(marks.limit) * stiffness;
-        self.system = Some(system);
-        Ok(())
-    }
-
-    /// All tables are in: checks what only they tell.
-    ///
-    /// # Errors
-    /// [`Unfit`]: the place holds nothing of use then.
-    pub fn finish(&mut self, marks: &Marks) -> Result<(), Unfit> {
-        let negative = |value: Number| value < ZERO;
-        if self.sensitivity.any(negative) || self.weight.any(negative) {
-            return Err(Unfit::Feedback);
-        }
-        if !self.expected.is_empty() {
-            recorded_filter::check(marks.filter_cut_off).map_err(Unfit::Filter)?;
-            let speed = f64::from(marks.recorded_duration) / f64::from(marks.duration);
-            if !(speed > 0.0 && speed < 1e3) {
-                return Err(Unfit::Expectation);
-            }
-            self.recorded_speed = Number::constant(speed);
+        if !tables.expected.is_empty() {
+            let recorded_duration = from_real(tables.recorded_duration);
+            self.expected.assign(numbers(&tables.expected), recorded_duration).map_err(|_| Unfit::Expectation)?;
         }
         Ok(())
     }
 
     /// True if it holds a movement.
     pub fn is_whole(&self) -> bool {
-        self.system.is_some()
+        self.present
     }
 
-    /// Duration as taught (s).
-    pub fn duration(&self) -> Number {
-        self.duration
-    }
-
-    /// Where the hand begins (rad), spread first.
-    pub fn start(&self) -> &[Number; DIGITS] {
-        &self.start
+    /// The movement.
+    pub fn movement(&self) -> &Movement {
+        &self.movement
     }
 
     /// True if it knows what the gauges should feel.
     pub fn has_expectation(&self) -> bool {
         !self.expected.is_empty()
+    }
+
+    /// A run from `start` (rad), at rest, at `speed` relative to the taught one; the goal is the stored one.
+    ///
+    /// # Errors
+    /// As [`dmp::Rollout::start`] and [`dmp::Rollout::set_speed`].
+    pub fn run(&self, start: &[Number; DIGITS], speed: Number) -> Result<Rollout, RolloutError> {
+        let start = StartState::at_rest(Configuration { poses: [], points: *start });
+        let mut rollout = Rollout::start(&self.movement, &start)?;
+        // The first speed acts at once; later ones are approached at the rollout's slew rate.
+        rollout.set_speed_slew(None)?;
+        rollout.set_speed(&self.movement, speed)?;
+        rollout.set_speed_slew(Some(Number::from_f64(Rollout::DEFAULT_SLEW)))?;
+        Ok(rollout)
+    }
+
+    /// Torques that the gauges should feel now (N m); `None` if none were recorded.
+    pub fn expected(&self, rollout: &Rollout) -> Option<[Number; FINGERS]> {
+        self.has_expectation().then(|| self.expected.at(rollout.progress()))
+    }
+
+    /// How far the expectation can be believed in this run, 1 to 0; see [`dmp::ExpectedSensors::trust`].
+    pub fn trust(&self, rollout: &Rollout) -> Number {
+        self.expected.trust(self.expected.recorded_duration() * self.movement.rate() * rollout.speed())
+    }
+
+    /// Eq (8) for the fingers: `zeta = K1 K2 (F - F_des)` within the limits; of the error, `share` counts (0 to 1).
+    pub fn coupling(
+        &self,
+        rollout: &Rollout,
+        gauges: &[Number; FINGERS],
+        share: Number,
+    ) -> Coupling<Number, DIGITS, 0> {
+        let Some(expected) = self.expected(rollout).filter(|_| !self.gains.is_empty()) else {
+            return Coupling::NONE;
+        };
+        let error = core::array::from_fn(|finger| (gauges[finger] - expected[finger]) * share);
+        let [f1, f2, f3] = self.gains.zeta(rollout.progress(), &error, |weighted| *weighted);
+        self.movement.limited_coupling(&Coupling { poses: [], points: [ZERO, f1, f2, f3] }, &self.limits)
     }
 }

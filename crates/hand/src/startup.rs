@@ -167,6 +167,26 @@ impl Startup {
         }
     }
 
+    /// All who are there have answered the enumeration.
+    fn listened(&mut self, now_us: u64) -> Result<(), (Node, HandTrouble)> {
+        self.enumerations += 1;
+        let present = self.status.iter().flatten().count();
+        let missing = Node::HAND.into_iter().zip(self.status).find(|(_, status)| status.is_none());
+        match missing {
+            None => self.step = Step::Role { digit: 0 },
+            Some((node, _)) if present > 0 && self.enumerations >= ENUMERATIONS => {
+                return Err((node, HandTrouble::Missing));
+            }
+            // Nobody there yet is nothing to tell: the hand may be switched on later.
+            Some(_) => {
+                let enumerations = if present > 0 { self.enumerations } else { 0 };
+                let step = Step::Rest { until_us: now_us + REST_US / 4 };
+                *self = Startup { step, enumerations, ..Startup::new() };
+            }
+        }
+        Ok(())
+    }
+
     fn attempt(&mut self, now_us: u64, outlet: &mut impl Outlet) -> Result<Option<FoundHand>, (Node, HandTrouble)> {
         match self.step {
             Step::ZeroTorques { frame } => match hand_stop_frames().get(frame) {
@@ -186,26 +206,7 @@ impl Startup {
                 None => self.step = Step::Listen { until_us: now_us + LISTEN_US },
             },
             Step::Listen { until_us } if now_us < until_us => {}
-            Step::Listen { .. } => {
-                self.enumerations += 1;
-                let present = self.status.iter().flatten().count();
-                let missing = Node::HAND.into_iter().zip(self.status).find(|(_, status)| status.is_none());
-                match missing {
-                    None => self.step = Step::Role { digit: 0 },
-                    Some((node, _)) if present > 0 && self.enumerations >= ENUMERATIONS => {
-                        return Err((node, HandTrouble::Missing));
-                    }
-                    // Nobody there yet is nothing to tell: the hand may be switched on later.
-                    Some(_) => {
-                        let enumerations = if present > 0 { self.enumerations } else { 0 };
-                        *self = Startup {
-                            step: Step::Rest { until_us: now_us + REST_US / 4 },
-                            enumerations,
-                            ..Startup::new()
-                        };
-                    }
-                }
-            }
+            Step::Listen { .. } => self.listened(now_us)?,
             Step::Role { digit } => match Node::HAND.get(digit) {
                 None => self.step = Step::Wake { digit: 0, after_us: now_us, woken: false },
                 Some(node) => {

@@ -4,7 +4,7 @@ use std::fmt;
 use std::time::Duration;
 
 use device::{HomeError, PrimitiveTrouble, StartupTrouble};
-use link::{ImageError, Refusal};
+use link::{Capabilities, ImageError, Refusal};
 
 use crate::error_code::ErrorCode;
 use crate::failure::Failure;
@@ -17,6 +17,20 @@ pub enum Capability {
     Arm,
     /// [`link::Capabilities::hand`]
     Hand,
+}
+
+impl Capability {
+    /// Succeeds if it is one of these.
+    ///
+    /// # Errors
+    /// [`HostError::Lacks`]
+    pub fn of(self, capabilities: Capabilities) -> Result<(), HostError> {
+        let there = match self {
+            Self::Arm => capabilities.arm,
+            Self::Hand => capabilities.hand,
+        };
+        if there { Ok(()) } else { Err(HostError::Lacks(self)) }
+    }
 }
 
 impl fmt::Display for Capability {
@@ -201,6 +215,16 @@ mod tests {
             assert!(error.to_string().starts_with("the device refused 'run': "));
             assert!(error.into_failure("run").help.is_some());
         }
+    }
+
+    #[test]
+    fn a_device_without_an_arm_is_refused_by_the_name_of_what_it_lacks() {
+        let hand_alone = Capabilities { arm: false, hand: true, wrench: false };
+        assert!(Capability::Hand.of(hand_alone).is_ok());
+        let error = Capability::Arm.of(hand_alone).unwrap_err();
+        assert_eq!(error.to_string(), "the device does not drive an arm");
+        assert_eq!((error.code().exit() as u8, error.code().to_string()), (4, "E405".to_owned()));
+        assert!(error.code().remedy().contains("--device"));
     }
 
     #[test]

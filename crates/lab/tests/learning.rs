@@ -146,7 +146,7 @@ fn a_recording_cut_out_of_a_motion_keeps_its_initial_velocity() {
     let options = LearnOptions { preparation: Preparation { still_speed: None }, ..LearnOptions::named("cut") };
     let learned = learned(&recording, &options).unwrap();
     let velocity = learned.primitive.start_velocity.posture;
-    let expected = rows[0].dq;
+    let expected = rows[0].telemetry.dq;
     for joint in 0..7 {
         assert!((velocity[joint] - f64::from(expected[joint])).abs() < 0.02, "{velocity:?} {expected:?}");
     }

@@ -18,7 +18,7 @@ fn good() -> Vec<String> {
 }
 
 fn column(name: &str) -> usize {
-    layout::header().iter().position(|known| known == name).expect("a column of the layout")
+    layout::header().iter().position(|known| *known == name).expect("a column of the layout")
 }
 
 /// Replaces one field; `line` and the column as people count them.
@@ -192,12 +192,12 @@ fn what_was_written_is_read() {
     assert_eq!((recording.gaps, recording.missing_samples), (0, 0));
     for (index, row) in rows.iter().enumerate() {
         assert_eq!(recording.time[index], row.time);
-        assert_eq!(recording.cycle.as_ref().unwrap()[index], row.cycle);
-        assert_eq!(recording.state.as_ref().unwrap()[index], row.state);
-        assert_eq!(recording.q.as_ref().unwrap()[index].map(|value| value as f32), row.q);
-        assert_eq!(recording.dq.as_ref().unwrap()[index].map(|value| value as f32), row.dq);
-        assert_eq!(recording.tau.as_ref().unwrap()[index].map(|value| value as f32), row.tau);
-        assert_eq!(recording.wrench.as_ref().unwrap()[index].map(|value| value as f32), row.wrench);
+        assert_eq!(recording.cycle.as_ref().unwrap()[index], row.telemetry.cycle);
+        assert_eq!(recording.state.as_ref().unwrap()[index], row.state());
+        assert_eq!(recording.q.as_ref().unwrap()[index].map(|value| value as f32), row.telemetry.q);
+        assert_eq!(recording.dq.as_ref().unwrap()[index].map(|value| value as f32), row.telemetry.dq);
+        assert_eq!(recording.tau.as_ref().unwrap()[index].map(|value| value as f32), row.telemetry.tau);
+        assert_eq!(recording.wrench.as_ref().unwrap()[index].map(|value| value as f32), row.telemetry.wrench);
         assert_eq!(recording.position.as_ref().unwrap()[index], row.pose[..3]);
         assert_eq!(recording.lines[index], index as u64 + 3);
     }
@@ -205,7 +205,7 @@ fn what_was_written_is_read() {
 
 #[test]
 fn recordings_of_the_time_before_the_hand_are_read() {
-    let old = layout::header().iter().position(|name| name == layout::HAND[0]).unwrap();
+    let old = layout::header().iter().position(|name| *name == layout::HAND[0]).unwrap();
     let cut: Vec<String> =
         good()
             .iter()
@@ -268,7 +268,7 @@ fn an_arm_that_does_not_move_is_no_demonstration() {
     let mut rows = common::rows(2.0);
     let first = rows[0].clone();
     for row in &mut rows {
-        (row.q, row.pose) = (first.q, first.pose);
+        (row.telemetry.q, row.pose) = (first.telemetry.q, first.pose);
     }
     let recording = parse(&common::text(&rows)).unwrap();
     let error = Demonstration::prepare(&recording, &Preparation::default()).unwrap_err();
@@ -335,13 +335,20 @@ fn quaternions_of_either_sign_give_the_same_demonstration() {
 }
 
 #[test]
-fn the_document_names_every_column_in_its_order() {
-    let document = include_str!("../../../docs/recording-format.md");
-    let mut rest = document;
-    for name in layout::header() {
-        let quoted = format!("`{name}`");
-        // q1_rad..q7_rad are documented as one line each group.
-        let found = rest.find(&quoted).unwrap_or_else(|| panic!("{quoted} is missing or out of order"));
-        rest = &rest[found..];
+fn the_table_of_the_document_is_the_layout() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/recording-format.md");
+    let document = std::fs::read_to_string(&path).unwrap();
+    let head = "| columns | unit | meaning |\n|---|---|---|\n";
+    let start = document.find(head).expect("the table") + head.len();
+    let end = start + document[start..].find("\n\n").expect("its end") + 1;
+    let row = |quantity: &layout::Quantity| {
+        let columns = quantity.columns.iter().map(|column| format!("`{column}`")).collect::<Vec<_>>().join(", ");
+        format!("| {columns} | {} | {} |\n", quantity.unit, quantity.meaning)
+    };
+    let table: String = layout::LAYOUT.iter().map(row).collect();
+    if std::env::var_os("UPDATE_DOCUMENTS").is_some() {
+        std::fs::write(&path, [&document[..start], &table, &document[end..]].concat()).unwrap();
+    } else {
+        assert_eq!(document[start..end], table, "UPDATE_DOCUMENTS=1 cargo test -p lab --test recording mends it");
     }
 }

@@ -4,11 +4,12 @@ mod common;
 
 use std::path::Path;
 
-use control::flags;
+use control::{State, flags};
 use lab::demonstration::{Recording, RecordingRow};
 use lab::learn::memory::{MemoryError, Payload, remember_rehearsals, remember_successes};
 use lab::learn::{LearnOptions, learn};
 use lab::primitive_file::PrimitiveFile;
+use link::Telemetry;
 
 const DURATION: f64 = 5.0;
 
@@ -26,16 +27,16 @@ fn rows(alpha: f64, feel: impl Fn(f64) -> f64) -> Vec<RecordingRow> {
             let time = f64::from(cycle) / 300.0;
             let u = (time - 0.5) / DURATION;
             let running = (0.0..=1.0).contains(&u);
-            RecordingRow {
+            let telemetry = Telemetry {
                 cycle,
-                time,
-                state: if running { "run" } else { "hold" },
+                state: if running { State::Run } else { State::Hold }.code(),
                 phase: if running { (-alpha * u).exp() as f32 } else { 0.0 },
                 wrench: [feel(u) as f32, 0.5, 0.0, 0.0, 0.0, 0.0],
                 gauges: [0.0, -0.1, 0.0],
                 hand: [0.0, u as f32, 0.5, 1.0],
-                ..template.clone()
-            }
+                ..template.telemetry
+            };
+            RecordingRow { time, telemetry, ..template.clone() }
         })
         .collect()
 }
@@ -152,9 +153,9 @@ fn recordings_that_tell_nothing_are_refused_and_nothing_is_changed() {
     assert!(matches!(refused(&[]), MemoryError::None));
     let cut = broken(&|rows| rows.truncate(1200));
     assert!(matches!(refused(&[cut]), MemoryError::Incomplete { .. }));
-    let saturated = broken(&|rows| rows[700].flags = flags::SENSOR_SATURATED);
+    let saturated = broken(&|rows| rows[700].telemetry.flags = flags::SENSOR_SATURATED);
     assert!(matches!(refused(&[saturated]), MemoryError::Saturated { samples: 1, .. }));
-    let stale = broken(&|rows| rows[400..500].iter_mut().for_each(|row| row.flags = flags::WRENCH_STALE));
+    let stale = broken(&|rows| rows[400..500].iter_mut().for_each(|row| row.telemetry.flags = flags::WRENCH_STALE));
     assert!(matches!(refused(&[stale]), MemoryError::Stale { samples: 100, .. }));
     let slow = broken(&|rows| rows.iter_mut().for_each(|row| row.time *= 1.1));
     assert!(matches!(refused(&[slow]), MemoryError::Duration { .. }));

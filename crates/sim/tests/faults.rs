@@ -50,13 +50,14 @@ fn a_late_frame_comes_late_and_a_repeated_one_twice() {
 
 #[test]
 fn counts_jump_and_come_back_and_begin_anew_where_a_puck_restarts() {
-    let mut master = befallen(FaultKind::CountJump { node: 4, by: 500 }, 0.01, 0.01);
+    let mut master = befallen(FaultKind::CountJump { node: 4, by: 5000 }, 0.01, 0.01);
     let counts = |master: &mut Master| master.positions()[3].map(|counts| counts.0);
     let before = counts(&mut master).expect("awake");
     master.wait_ms(10);
-    assert!((counts(&mut master).expect("awake") - before - 500).abs() < 5);
+    // The arm sags in the operator's hand meanwhile.
+    assert!((counts(&mut master).expect("awake") - before - 5000).abs() < 200);
     master.wait_ms(10);
-    assert!((counts(&mut master).expect("awake") - before).abs() < 5);
+    assert!((counts(&mut master).expect("awake") - before).abs() < 200);
     let mut master = befallen(FaultKind::Restart { node: 4 }, 0.01, f64::INFINITY);
     master.wait_ms(40);
     assert_eq!(missing(&master.positions()), [3]);

@@ -14,7 +14,7 @@ pub trait Log {
     /// So many frames and events have been lost between the tasks since start-up.
     fn lost(&mut self, count: u32);
 
-    /// What was found in the storage at start-up.
+    /// Tells the content of the storage at start-up.
     fn storage(&mut self, opening: &Opening);
 }
 

@@ -63,7 +63,7 @@ pub type ArmSession = Session<&'static mut PrimitiveLibrary>;
 /// Memory of the task that keeps the library on the flash.
 pub type StorageScratch = Scratch<IMAGE_BYTES_LIMIT, { value_bytes(IMAGE_BYTES_LIMIT) }>;
 
-/// What the tasks hand to each other.
+/// The queues between the tasks.
 struct Queues {
     outgoing: Queue<CanFrame, OUTGOING>,
     incoming: Queue<CanFrame, INCOMING>,

@@ -17,11 +17,11 @@ pub(crate) struct SessionQueues<P, C: Controller> {
     pub(crate) to_core: Producer<'static, C::Command>,
     pub(crate) from_core: Consumer<'static, TimedRecord<C::Record>>,
     pub(crate) news: Consumer<'static, C::Event>,
-    /// What people are told, where there is a log.
+    /// Events for people, where there is a log.
     pub(crate) to_log: Option<Producer<'static, C::Event>>,
 }
 
-/// How much of its stack the image has used.
+/// Use of the stack by the image.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct StackUse {
     /// Bytes never used so far.

@@ -18,7 +18,7 @@ pub(crate) struct SlotQueues<C: Controller> {
     pub(crate) events: Producer<'static, C::Event>,
 }
 
-/// What counts as the cost of a control cycle.
+/// Parts of a slot that count as the cost of a control cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cost {
     /// Its control slot alone, which the torques wait for.
@@ -90,7 +90,7 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
         let begin = self.clock.short_ticks();
         let now = self.clock.now_us();
         let (mut late, mut lost, mut off) = (false, false, false);
-        if self.slot == Slot::Control.next() {
+        if self.slot == Slot::Slow {
             // The torques of the control slot must have left before another frame is queued behind them.
             let (waiting, overruns, offs) = can.lock(|can| (can.waiting(), can.overruns(), can.bus_offs()));
             late = waiting > 0 || !self.queues.to_bus.is_empty();

@@ -1,4 +1,4 @@
-//! What is done when nothing else is to be done: the library is kept on the flash.
+//! The idle task: keeps the library on the flash when nothing else is to be done.
 
 use core::convert::Infallible;
 use core::pin::pin;
@@ -50,7 +50,7 @@ pub async fn keep_library<F: NorFlash>(
     keep(flash, room, &mut SharedLibrary { session, log }).await
 }
 
-/// What a processor does that has nothing to do: asks the `task` whether it can go on, and sleeps until the next
+/// Runs a processor that has nothing else to do: asks the `task` whether it can go on, and sleeps until the next
 /// interrupt. Lower than every task, so it may take its time; slots make an interrupt every 1.1 ms, so nothing needs to
 /// wake it.
 pub fn rest(task: impl Future<Output = Infallible>, mut sleep: impl FnMut()) -> ! {

@@ -5,7 +5,7 @@
 //! whose check sum is right; then that line is chosen, its frame is handed on, and what is sent goes there from then
 //! on. Noise on a line that nobody uses, an open input or another program's chatter never takes the conversation away.
 //!
-//! True if a new host may take over from the old one is the session's decision, not the line's: it refuses a second
+//! The session decides if a new host may take over from the old one, not the line: it refuses a second
 //! host while the first is heard, and the refusal goes back on the line the request came from.
 
 use link::Request;
@@ -58,7 +58,7 @@ pub struct LineSelector<A, B> {
     pending: heapless::Deque<u8, PENDING_BYTES>,
 }
 
-/// Room for a frame and the portion behind it.
+/// Bytes of a frame and the portion behind it.
 const PENDING_BYTES: usize = FRAME_BYTES + PORTION;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

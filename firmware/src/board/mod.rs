@@ -49,18 +49,19 @@ pub trait Board: Sized {
     #[cfg(target_os = "none")]
     fn start(core: cortex_m::Peripherals) -> Self;
 
-    /// What tells this board from others of its kind.
+    /// Serial number, which tells this board from others of its kind.
     fn serial(&self) -> &'static str;
 
     /// The peripherals, for the tasks that own them.
     fn split(self) -> Parts<Self>;
 
-    /// What a processor does that has nothing to do: sleeps until the next interrupt, or only a moment. Called with
+    /// Rests a processor that has nothing to do: sleeps until the next interrupt, or only a moment. Called with
     /// interrupts unmasked.
     fn sleep();
 
     /// The end: sends these frames, waits until they are on the bus as far as the bus allows, says why, and stops or
-    /// restarts the processor. Called with interrupts masked, from anywhere, perhaps with peripherals in mid-sentence.
+    /// restarts the processor. Called with interrupts masked, from anywhere, perhaps with peripherals in the middle of a
+    /// transfer.
     fn stop(frames: &[CanFrame], reason: core::fmt::Arguments<'_>) -> !;
 }
 
@@ -114,7 +115,7 @@ pub trait SlotTimer {
     fn is_due(&self) -> bool;
 }
 
-/// What a CAN controller knows about its frames.
+/// Counts of a CAN controller about its frames.
 pub trait CanStatus {
     /// Frames handed over that have not been on the wire yet.
     fn waiting(&self) -> usize;

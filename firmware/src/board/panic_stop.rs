@@ -1,4 +1,4 @@
-//! What the image does when it cannot go on: interrupts off, zero torque, arm and hand to idle, a reason, the end.
+//! The end of an image that cannot go on: interrupts off, zero torque, arm and hand to idle, a reason, the end.
 //!
 //! The pucks hold the last torque they were sent until their watchdog or the safety module stops them, so the zero
 //! torques go first. The panic may have come from anywhere: nothing here depends on the state of the application.

@@ -23,7 +23,7 @@ const RECORDS: usize = 8 + 1;
 /// Events on their way to the session.
 const EVENTS: usize = 12 + 1;
 
-/// What the tasks hand to each other.
+/// The queues between the tasks.
 struct Queues {
     outgoing: Queue<CanFrame, OUTGOING>,
     incoming: Queue<CanFrame, INCOMING>,

@@ -44,7 +44,7 @@ impl board::Clock for Clock {
     }
 }
 
-/// What would be registers.
+/// State that would be registers.
 #[derive(Default)]
 pub(crate) struct Silicon {
     /// When the next slot begins; `None`: the timer stands still.

@@ -50,7 +50,7 @@ impl<T> Mutex for Lock<T> {
     }
 }
 
-/// What people would read.
+/// The lines that people would read.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Heard {
     pub(crate) events: usize,
@@ -133,7 +133,7 @@ impl Host {
         }
     }
 
-    /// What the log was told.
+    /// The log so far.
     pub(crate) fn log(&self) -> Heard {
         *self.notes.0.borrow()
     }

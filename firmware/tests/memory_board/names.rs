@@ -1,4 +1,4 @@
-//! What is for all boards names none.
+//! Sources for all boards name none.
 
 use std::fs;
 use std::path::Path;

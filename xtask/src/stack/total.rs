@@ -48,7 +48,7 @@ impl Image<'_> {
 
     /// The deepest that a panic or a fault may be.
     pub(super) fn end(&self) -> Result<Ways> {
-        let last = self.last_words()?;
+        let last = self.panic_stop()?;
         let ends = BTreeMap::from([(self.calls.end()?, last.bytes)]);
         let start = self.start()?;
         let service = self.service()?;
@@ -124,7 +124,7 @@ impl Image<'_> {
     }
 
     /// Last actions of a panic.
-    fn last_words(&self) -> Result<Way> {
+    fn panic_stop(&self) -> Result<Way> {
         let end = self.calls.end()?;
         let frame = self.calls.frame(end).context("the end of a panic has no frame")?;
         let mut deepest = Way { bytes: frame.bytes, stops: Vec::new() };

@@ -50,6 +50,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Command::Stop => self.change(Trigger::Stop, measured),
             Command::Release => self.change(Trigger::Release, measured),
             Command::ClearFault => {
+                self.may_trust_zero(measured)?;
                 let waits = matches!(self.supervisor.state(), State::SoftStop | State::Fault);
                 let moving = self.fastest(measured) > R::of(STANDING);
                 if waits && (measured.outside_fault || measured.state.missing > 0 || moving) {
@@ -155,6 +156,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if measured.state.missing > 0 {
             return Err(Refusal::PositionsMissing);
         }
+        self.may_trust_zero(measured)?;
         let latched = !matches!(self.supervisor.fault(), Fault::None | Fault::SafetyDropped);
         if latched {
             return Err(Refusal::FaultLatched);
@@ -163,6 +165,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             return Err(Refusal::Moving);
         }
         Ok(())
+    }
+
+    /// No Clear brings back the zero that a motor has lost which counts anew.
+    fn may_trust_zero(&self, measured: &Measured<'_, R>) -> Result<(), Refusal> {
+        if measured.state.displaced { Err(Refusal::ZeroLost) } else { Ok(()) }
     }
 
     fn may_move(&self, measured: &Measured<'_, R>) -> Result<(), Refusal> {

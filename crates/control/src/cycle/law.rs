@@ -5,8 +5,8 @@ use crate::law::joint::JointController;
 use crate::law::operational::OperationalController;
 use crate::plan::approach::Approach;
 use crate::plan::reference::JointReference;
-use crate::real::{Real, within};
-use crate::time::PERIOD;
+use crate::real::{Real, at_least, at_most, within};
+use crate::time::{PERIOD, periods};
 use crate::units::{JointPositions, Vector7};
 
 /// Speed at which a held posture returns after somebody pushed the arm away from it (rad/s).
@@ -18,8 +18,9 @@ const RETURN_SPEED: f64 = 0.2;
     reason = "there is no heap, and one of these at a time is what memory is needed for"
 )]
 pub(super) enum Law<R: Real> {
-    /// `Idle` and `Fault`: no torque. Frames of zero torque are sent this many cycles more.
-    Off { zero_cycles: u8 },
+    /// `Idle` and `Fault`: no torque. Frames of zero torque are sent this many cycles more; the safety module is asked
+    /// for its brakes until it has put them on.
+    Off { zero_cycles: u8, brakes: bool },
     /// `Gravity`.
     Gravity,
     /// `Hold` and `Approach`.
@@ -28,6 +29,8 @@ pub(super) enum Law<R: Real> {
     Run(Running<R>),
     /// `SoftStop`: the torque beyond gravity when it began is ramped away.
     SoftStop(Ramp<R>),
+    /// `Lower`: as `SoftStop`, and gravity is taken away as the arm sinks.
+    Lower(Lowering<R>),
 }
 
 /// A posture that is held, or moved along an approach.
@@ -140,5 +143,58 @@ impl<R: Real> Ramp<R> {
         let share = R::from_counts(i32::from(self.left)) * self.slope;
         self.left = self.left.saturating_sub(1);
         self.torque * share
+    }
+}
+
+/// Speed of the hand at which the arm sinks (m/s): half of the 0.25 m/s of the standards for work beside a person.
+const SINKING_SPEED: f64 = 0.12;
+
+/// Change of the share of gravity for each m/s that the hand is faster than that (1/s).
+const SINKING_GAIN: f64 = 6.0;
+
+/// Joint speed below which a lowered arm rests (rad/s).
+const RESTING: f64 = 0.02;
+
+/// Time for which it has to rest without torque: 0.5 s, in control periods.
+const REST: u16 = periods(0.5);
+
+/// Longest time of lowering: 30 s, in control periods. What has not come to rest by then is left to the brakes.
+const LOWERING: u16 = periods(30.0);
+
+/// An arm that is let down until it rests.
+pub(super) struct Lowering<R: Real> {
+    /// Torque beyond gravity when it began.
+    pub(super) rest: Ramp<R>,
+    /// Share of gravity that is carried.
+    pub(super) share: R,
+    /// Control periods for which it has rested without torque, and those left.
+    rested: u16,
+    left: u16,
+}
+
+impl<R: Real> Lowering<R> {
+    /// Begins with all of gravity.
+    pub(super) fn new(rest: Ramp<R>) -> Self {
+        Lowering { rest, share: R::of(1.0), rested: 0, left: LOWERING }
+    }
+
+    /// Takes the speed of the hand (m/s) and of the fastest joint (rad/s).
+    pub(super) fn step(&mut self, hand: R, joint: R) {
+        let zero = R::of(0.0);
+        let change = (hand - R::of(SINKING_SPEED)) * R::of(SINKING_GAIN * PERIOD);
+        self.share = at_most(at_least(self.share + change, zero), R::of(1.0));
+        let rests = self.share == zero && joint < R::of(RESTING);
+        self.rested = if rests { self.rested.saturating_add(1) } else { 0 };
+        self.left = self.left.saturating_sub(1);
+    }
+
+    /// True once it rests without torque.
+    pub(super) fn rests(&self) -> bool {
+        self.rested >= REST
+    }
+
+    /// True once it rests, or nobody waits any longer.
+    pub(super) fn is_over(&self) -> bool {
+        self.rests() || self.left == 0
     }
 }

@@ -38,15 +38,19 @@ pub(super) struct Demand<R: Real> {
 impl<R: Real, const N: usize> Cycle<R, N> {
     /// The law of the present state; `None` where no torque is sent.
     pub(super) fn demand(&mut self, measured: &Measured<'_, R>) -> Option<Demand<R>> {
-        let repulsion = self.bounds.repulsion(&measured.state.q, &measured.state.dq);
+        let mut repulsion = self.bounds.repulsion(&measured.state.q, &measured.state.dq);
         let near = if repulsion.0.amax() > R::of(0.0) { flags::NEAR_LIMIT } else { 0 };
         let mut demand = match &self.law {
             Law::Off { .. } => return None,
             Law::Gravity => self.float(measured),
             Law::Posture(_) => self.hold_to(measured),
             Law::Run(_) => self.run_primitive(measured),
-            Law::SoftStop(_) => self.stop(measured),
+            Law::SoftStop(_) | Law::Lower(_) => self.stop(measured),
         };
+        if let Law::Lower(lowering) = &self.law {
+            // The arm comes down to its stops, not to what pushes back before them.
+            repulsion.0 *= lowering.share;
+        }
         demand.torque.0 += repulsion.0;
         demand.flags |= near;
         Some(demand)
@@ -78,12 +82,19 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.plain(measured, torque)
     }
 
-    /// Gravity compensation and damping; what else was there is ramped away. Not inlined, as [`Cycle::hold_to`].
+    /// Gravity compensation and damping; what else was there is ramped away, and gravity too where the arm is lowered.
+    /// Not inlined, as [`Cycle::hold_to`].
     #[inline(never)]
     fn stop(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
-        let Law::SoftStop(ramp) = &mut self.law else { return self.float(measured) };
-        let rest = ramp.step();
-        let gravity = self.model.gravity_torque(measured.frames).0;
+        let (rest, share) = match &mut self.law {
+            Law::SoftStop(ramp) => (ramp.step(), R::of(1.0)),
+            Law::Lower(lowering) => {
+                lowering.step(hand_speed(measured), measured.state.dq.0.amax());
+                (lowering.rest.step(), lowering.share)
+            }
+            _ => return self.float(measured),
+        };
+        let gravity = self.model.gravity_torque(measured.frames).0 * share;
         let damping = self.gains.stop_damping.component_mul(&measured.state.dq.0);
         self.plain(measured, gravity + rest - damping)
     }

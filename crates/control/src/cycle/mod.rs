@@ -114,7 +114,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             joints: JointEstimator::new(&calibration),
             wrench: WrenchEstimator::new(),
             limiter: TorqueLimiter::new(&calibration),
-            law: Law::Off { zero_cycles: 0 },
+            law: Law::Off { zero_cycles: 0, brakes: false },
             run: None,
             force <- ForceController::init(gains.stiff.force_window),
             hand <- HandDrive::init(&gains.hand),
@@ -159,6 +159,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.hand.is_moving()
     }
 
+    /// True if a motor began to count anew since the positions were learned.
+    pub fn is_zero_lost(&self) -> bool {
+        self.joints.is_displaced()
+    }
+
     /// True if the wrench has a zero; see [`WrenchEstimator::is_tared`].
     pub fn is_wrench_zeroed(&self) -> bool {
         self.wrench.is_tared()
@@ -192,6 +197,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         // Every state allows this trigger, so there is nothing to refuse.
         let _ = self.supervisor.take(Trigger::SafetyDropped, Fault::SafetyDropped);
         self.leave_torque();
+        // The start-up that follows puts the brakes on.
+        self.law = Law::Off { zero_cycles: ZERO_CYCLES, brakes: false };
     }
 
     /// Takes a primitive for the next run: no more than a copy, because its caller keeps the control task waiting. A
@@ -297,7 +304,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     }
 
     fn monitor(&mut self, measured: &Measured<'_, R>) {
-        if !self.supervisor.state().has_torque() {
+        let law = self.supervisor.law();
+        if measured.state.displaced && matches!(law, State::Idle | State::Lower) {
+            // Nothing has to stop; nothing may begin either.
+            self.supervisor.latch(Fault::ImplausiblePosition);
+        }
+        if !law.has_torque() {
             return;
         }
         self.bounds.tighten(&self.model, &measured.state.q);
@@ -314,7 +326,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             wrench_lost: depends && self.wrench.age().is_none_or(|age| u16::from(age) > u16::from(WRENCH_AGE) + FADE),
             full_scale: self.wrench.full_scale().force > 0 || (depends && self.wrench.full_scale().torque > 0),
         };
-        if let Some((trigger, fault)) = self.monitor.check(self.supervisor.law(), measured.state, &seen) {
+        if let Some((trigger, fault)) = self.monitor.check(law, measured.state, &seen) {
             self.trigger(trigger, fault, Some(measured));
         }
     }
@@ -358,6 +370,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             }
         }
         record.tau = torques.torques().to_f32();
+        if matches!(&self.law, Law::Lower(lowering) if lowering.is_over()) {
+            self.trigger(Trigger::Arrived, Fault::None, Some(measured));
+            return self.actuate_without_torque();
+        }
         if self.is_over(measured) {
             self.trigger(Trigger::Arrived, Fault::None, Some(measured));
             record.flags |= flags::ARRIVED;
@@ -390,18 +406,16 @@ impl<R: Real, const N: usize> Cycle<R, N> {
 
     fn actuate_without_torque(&mut self) -> Actuation {
         self.limiter.reset();
-        if let Law::Off { zero_cycles } = &mut self.law
-            && *zero_cycles > 0
-        {
-            *zero_cycles -= 1;
-            return Actuation::zero();
-        }
-        match self.supervisor.state() {
-            // An ACTIVE puck applies the last torque it was sent, whoever sent it: keep it at zero.
-            State::Idle if self.is_active() => Actuation::zero(),
-            State::Fault if self.is_active() => Actuation::zero().requesting_idle(),
-            _ => Actuation::silent(),
-        }
+        let active = self.is_active();
+        let braked = matches!(self.safety, Some((mode, _)) if mode != SafetyMode::Active);
+        let faulty = self.supervisor.state() == State::Fault;
+        let Law::Off { zero_cycles, brakes } = &mut self.law else { return Actuation::zero() };
+        *brakes &= !braked;
+        // An ACTIVE puck applies the last torque it was sent, whoever sent it: keep it at zero.
+        let sends = active || *zero_cycles > 0;
+        *zero_cycles = zero_cycles.saturating_sub(1);
+        let actuation = if sends { Actuation::zero() } else { Actuation::silent() };
+        if *brakes || (faulty && active) { actuation.requesting_idle() } else { actuation }
     }
 
     fn standing_flags(&self) -> u32 {

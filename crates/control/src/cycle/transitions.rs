@@ -2,7 +2,7 @@
 
 use crate::act::limit::LimitReport;
 use crate::command::RunOptions;
-use crate::cycle::law::{Lag, Law, Posture, Ramp, Running};
+use crate::cycle::law::{Lag, Law, Lowering, Posture, Ramp, Running};
 use crate::cycle::{Cycle, HANDOVER, Measured, STOP_RAMP, ZERO_CYCLES};
 use crate::guard::fault::Fault;
 use crate::guard::joint_limits::JointBounds;
@@ -55,9 +55,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             (State::Hold, Law::Posture(posture)) => posture.follow(None),
             (State::Hold, Law::Run(_)) => self.law = Law::Posture(self.after_run(measured)),
             (State::Hold, _) => self.law = Law::Posture(Posture::at(measured.state.q)),
-            (State::SoftStop, _) => {
+            (State::SoftStop | State::Lower, _) => {
                 let gravity = self.model.gravity_torque(measured.frames);
-                self.law = Law::SoftStop(Ramp::new(self.limiter.last().torques().0 - gravity.0, STOP_RAMP));
+                let rest = Ramp::new(self.limiter.last().torques().0 - gravity.0, STOP_RAMP);
+                self.law = if state == State::Lower { Law::Lower(Lowering::new(rest)) } else { Law::SoftStop(rest) };
             }
             _ => self.law = Law::Gravity,
         }
@@ -128,9 +129,14 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
-    /// No torque from now on.
+    /// No torque from now on. What has not come to rest needs the brakes of the safety module.
     pub(super) fn leave_torque(&mut self) {
-        self.law = Law::Off { zero_cycles: ZERO_CYCLES };
+        let brakes = match &self.law {
+            Law::Off { brakes, .. } => *brakes,
+            Law::Lower(lowering) => !lowering.rests(),
+            _ => true,
+        };
+        self.law = Law::Off { zero_cycles: ZERO_CYCLES, brakes };
         self.limiter.reset();
         self.hand.release();
         self.cut = LimitReport::default();

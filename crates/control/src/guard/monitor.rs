@@ -72,7 +72,7 @@ impl<R: Real> Monitor<R> {
         if state.age > SILENCE_CYCLES {
             return Some((Trigger::HardFault, Fault::RepliesLostForLong));
         }
-        if state.displaced {
+        if state.displaced && law != State::Lower {
             return Some((Trigger::SoftFault, Fault::ImplausiblePosition));
         }
         if state.age > COAST_CYCLES {

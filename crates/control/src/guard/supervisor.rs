@@ -3,11 +3,13 @@
 //! ```text
 //!            Gravity, Hold (a person, safety ACTIVE)        Approach, Run (a person)
 //!   Idle ------------------------------------------> Gravity, Hold ------> Approach, Run
-//!    ^  <-- Release, safety not ACTIVE (any state)        ^                      |  Arrived -> Hold
-//!    |                                                    | Clear                | reply missing <-> Coast (5 cycles)
+//!    ^  <-- Lower <-- Release (any state with torque)     ^                      |  Arrived -> Hold
+//!    |  <-- safety not ACTIVE (any state)                 | Clear                | reply missing <-> Coast (5 cycles)
 //!  Fault <------- SoftStop <------------------------------+----------------------+ Stop, limits, 6 bad cycles
 //!    Clear -> Idle
 //! ```
+//!
+//! The first cause of a stop stays until a person clears it, whatever follows from it.
 
 use crate::command::Refusal;
 use crate::guard::fault::Fault;
@@ -32,11 +34,13 @@ pub enum State {
     SoftStop = 6,
     /// Torque is off until a person clears the fault.
     Fault = 7,
+    /// Sinks slowly after a release, until it rests.
+    Lower = 8,
 }
 
 impl State {
     /// Every state, in the order of the codes.
-    pub const ALL: [State; 8] = [
+    pub const ALL: [State; 9] = [
         State::Idle,
         State::Gravity,
         State::Hold,
@@ -45,6 +49,7 @@ impl State {
         State::Coast,
         State::SoftStop,
         State::Fault,
+        State::Lower,
     ];
 
     /// The stable number of this state.
@@ -73,6 +78,7 @@ impl State {
             State::Coast => "coast",
             State::SoftStop => "soft stop",
             State::Fault => "fault",
+            State::Lower => "lowering",
         }
     }
 }
@@ -110,7 +116,7 @@ pub enum Trigger {
     HardFault,
     /// The safety module is no longer ACTIVE.
     SafetyDropped,
-    /// The movement is over.
+    /// The movement is over; of a lowered arm, that it rests.
     Arrived,
 }
 
@@ -179,11 +185,13 @@ pub const fn transition(state: State, trigger: Trigger) -> Transition {
         (State::Coast, Trigger::RepliesBack) => Resume,
         (_, Trigger::RepliesBack) => Stay,
         (State::Approach | State::Run, Trigger::Arrived) => Enter(State::Hold),
+        (State::Lower, Trigger::Arrived) => Enter(State::Idle),
         (_, Trigger::Arrived) => Stay,
 
         (State::Fault, Trigger::Release | Trigger::Stop) => Stay,
         (State::Idle, Trigger::Release | Trigger::Stop) => Stay,
-        (_, Trigger::Release) => Enter(State::Idle),
+        (State::Lower, Trigger::Release) => Stay,
+        (_, Trigger::Release) => Enter(State::Lower),
         (State::SoftStop, Trigger::Stop) => Stay,
         (_, Trigger::Stop) => Enter(State::SoftStop),
 
@@ -193,13 +201,15 @@ pub const fn transition(state: State, trigger: Trigger) -> Transition {
         (_, Trigger::Clear) => Refuse,
 
         (State::Gravity, Trigger::Gravity) => Stay,
-        (State::Idle | State::Hold | State::Approach | State::Run | State::SoftStop, Trigger::Gravity) => {
-            Enter(State::Gravity)
-        }
+        (
+            State::Idle | State::Hold | State::Approach | State::Run | State::SoftStop | State::Lower,
+            Trigger::Gravity,
+        ) => Enter(State::Gravity),
         (State::Hold, Trigger::Hold) => Stay,
-        (State::Idle | State::Gravity | State::Approach | State::Run | State::SoftStop, Trigger::Hold) => {
-            Enter(State::Hold)
-        }
+        (
+            State::Idle | State::Gravity | State::Approach | State::Run | State::SoftStop | State::Lower,
+            Trigger::Hold,
+        ) => Enter(State::Hold),
         (State::Gravity | State::Hold, Trigger::Approach) => Enter(State::Approach),
         (State::Gravity | State::Hold, Trigger::Run) => Enter(State::Run),
         (_, Trigger::Gravity | Trigger::Hold | Trigger::Approach | Trigger::Run) => Refuse,
@@ -249,7 +259,16 @@ impl Supervisor {
         }
     }
 
-    /// Takes a trigger; true if the control law changed. `fault` is latched if the trigger takes torque authority away.
+    /// Latches a fault, unless an earlier one waits for a person. A loss that goes on is the same cause.
+    pub fn latch(&mut self, fault: Fault) {
+        let goes_on = (self.fault, fault) == (Fault::RepliesLost, Fault::RepliesLostForLong);
+        if self.fault == Fault::None || goes_on {
+            self.fault = fault;
+        }
+    }
+
+    /// Takes a trigger; true if the control law changed. `fault` is latched if the trigger takes torque authority away,
+    /// or finds it taken by a stop. A person clears it: with Clear, or by arming again after the safety module's drop.
     ///
     /// # Errors
     /// [`Refusal::WrongState`] for a command that the state does not allow.
@@ -258,8 +277,10 @@ impl Supervisor {
         match transition(self.state, trigger) {
             Transition::Refuse => return Err(Refusal::WrongState),
             Transition::Stay => {
-                if matches!(trigger, Trigger::Clear) {
-                    self.fault = Fault::None;
+                match trigger {
+                    Trigger::Clear => self.fault = Fault::None,
+                    Trigger::SoftFault if self.state == State::SoftStop => self.latch(fault),
+                    _ => {}
                 }
                 return Ok(false);
             }
@@ -270,11 +291,10 @@ impl Supervisor {
             }
             Transition::Enter(next) => {
                 self.state = next;
+                let arms = matches!(trigger, Trigger::Gravity | Trigger::Hold);
                 if !trigger.is_command() {
-                    if !matches!(fault, Fault::None) {
-                        self.fault = fault;
-                    }
-                } else if !matches!(trigger, Trigger::Stop | Trigger::Release) {
+                    self.latch(fault);
+                } else if trigger == Trigger::Clear || (arms && self.fault == Fault::SafetyDropped) {
                     self.fault = Fault::None;
                 }
             }

@@ -1,4 +1,5 @@
-//! `Deviation`: the difference of the measured sensor values from the expected ones, the one input of Eq (8), Eq (12) and Eq (14).
+//! `Deviation`: the difference of the measured sensor values from the expected ones, the one input of Eqs (8), (12)
+//! and (14).
 
 use nalgebra::Vector3;
 
@@ -23,7 +24,8 @@ pub const TORQUE_DEAD_BAND: f64 = 0.02;
 /// above its resonance and swings at 20 Hz as soon as a bias comes near the dead band.
 pub const FEEDBACK_CUT_OFF: f64 = 8.0;
 
-/// The expected sensor values of one tick, and the deviation of the measured ones. `F` is what the environment does to the robot.
+/// The expected sensor values of one tick, and the deviation of the measured ones. `F` is what the environment does to
+/// the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation<R: Real> {
     /// Expected wrench at the grasp point.

@@ -128,6 +128,11 @@ impl<R: Real> JointEstimator<R> {
         self.filter.settle(&Vector7::zeros());
     }
 
+    /// True from a jump of a motor on until a reset: see [`JointState::displaced`].
+    pub fn is_displaced(&self) -> bool {
+        self.displaced
+    }
+
     /// Takes the replies of one cycle. `None` until all seven motors have answered once in the same cycle.
     ///
     /// A jump is carried over where `torque_on` is true, because a step of the position would be a step of the torque.

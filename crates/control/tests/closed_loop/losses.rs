@@ -1,9 +1,9 @@
 //! Lost replies: the bridge, and what happens when it ends.
 
 use control::act::limit::STEP_LIMIT;
-use control::command::{Command, RunOptions};
+use control::command::{Command, Refusal, RunOptions};
 use control::sense::joints::COAST_CYCLES;
-use control::{Fault, RATE_HZ, State};
+use control::{Event, Fault, RATE_HZ, State};
 
 use crate::primitives::{Design, START, primitive};
 use crate::rig::Rig;
@@ -97,7 +97,7 @@ fn replies_that_stay_away_take_torque_off() {
     let mut rig = running(0.9);
     rig.lose = [true; 7];
     rig.until(State::Fault, 0.3);
-    assert_eq!(rig.cycle.fault(), Fault::RepliesLostForLong);
+    assert_eq!(rig.cycle.fault(), Fault::RepliesLostForLong, "the same loss, gone on");
     assert_eq!(rig.tick(None).record.tau, [0.0; 7]);
 }
 
@@ -161,14 +161,14 @@ fn a7_a_motor_that_begins_to_count_anew_stops_the_arm_softly_without_a_step_and_
         }
         assert_eq!(rig.cycle.fault(), Fault::ImplausiblePosition);
         assert!(rig.plant.dq.amax() < 1e-3, "{}", rig.plant.dq);
-        // A cleared fault comes back: nobody knows where zero is.
-        rig.command(Command::ClearFault);
-        rig.tick(None);
+        // No Clear leads on: nobody knows where zero is.
+        assert_eq!(rig.tick(Some(Command::ClearFault)).event, Some(Event::Refused(Refusal::ZeroLost)));
         assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::SoftStop, Fault::ImplausiblePosition));
         // A new start with a new zero: the arm can be used again.
         rig.cycle.reset();
         rig.jump = [0; 7];
         rig.tick(None);
+        rig.command(Command::ClearFault);
         rig.command(Command::Hold);
         rig.run_for(0.3);
         assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None));

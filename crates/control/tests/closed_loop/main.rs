@@ -6,6 +6,7 @@ mod contact;
 mod hand;
 mod hand_plant;
 mod losses;
+mod lowering;
 mod postures;
 mod primitives;
 mod rig;

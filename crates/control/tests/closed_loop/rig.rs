@@ -14,7 +14,8 @@ use control::plan::load;
 use control::plan::primitive::Primitive;
 use control::units::{JointPositions, JointVelocities, Vector7};
 use control::{
-    BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, LoadRefusal, Payload, RATE, Real, State, model,
+    BusSample, Calibration, Cycle, CycleInput, CycleOutput, Event, Fault, LoadRefusal, Payload, RATE, Real, State,
+    model,
 };
 use nalgebra::{SMatrix, Vector3};
 use pinned_init::InPlaceWrite;
@@ -189,6 +190,8 @@ pub(crate) struct Rig<R: Real> {
     pub(crate) lose: [bool; 7],
     /// Counts by which the replies of each motor have jumped.
     pub(crate) jump: [i32; 7],
+    /// A fault that the device has found.
+    pub(crate) external: Option<Fault>,
     pub(crate) last: Option<CycleOutput>,
 }
 
@@ -201,6 +204,7 @@ impl<R: Real> Rig<R> {
             number: 0,
             lose: [false; 7],
             jump: [0; 7],
+            external: None,
             last: None,
         }
     }
@@ -221,7 +225,7 @@ impl<R: Real> Rig<R> {
             safety: Some(self.safety),
             hand: self.plant.hand.as_ref().map(Hand::sample),
         };
-        let input = CycleInput { cycle: self.number, sample, command, external_fault: None };
+        let input = CycleInput { cycle: self.number, sample, command, external_fault: self.external };
         let output = self.cycle.step(&input);
         self.plant.receive(output.actuation.frames());
         if let Some(hand) = &mut self.plant.hand {

@@ -2,9 +2,9 @@
 
 use std::collections::VecDeque;
 
-use control::command::{Command, RunOptions};
+use control::command::{Command, Refusal, RunOptions};
 use control::time::periods;
-use control::{Fault, State};
+use control::{Event, Fault, State};
 
 use crate::primitives::{Design, GOAL, START, primitive};
 use crate::rig::Rig;
@@ -111,11 +111,13 @@ fn fraction(index: usize, of: f64) -> f64 {
 /// The arm can be used again after a stop: a person clears it and asks it to hold. True if its zero was lost, which
 /// takes a new start and a new zero in between.
 fn recovers(rig: &mut Rig<f32>) -> bool {
-    rig.command(Command::ClearFault);
-    let zero_lost = rig.tick(None).record.fault == Fault::ImplausiblePosition;
+    let zero_lost = rig.tick(Some(Command::ClearFault)).event == Some(Event::Refused(Refusal::ZeroLost));
     if zero_lost {
         rig.cycle.reset();
         rig.tick(None);
+        rig.command(Command::ClearFault);
+        // The brakes hold the arm meanwhile.
+        rig.plant.dq *= 0.0;
     }
     rig.command(Command::Hold);
     rig.run_for(0.3);

@@ -4,12 +4,12 @@ use puck::{Node, PropertyId, get};
 
 use crate::bus::Outlet;
 
-/// How long an answer may take, us. A puck in wake-up needs up to 50 ms; all others answer within 1 ms.
+/// Longest wait for an answer, us. A puck in wake-up needs up to 50 ms; all others answer within 1 ms.
 const TIMEOUT_US: u64 = 50_000;
-/// How often a question is put before the node counts as silent. A lost frame must not fail a start-up.
+/// Times that a question is put before the node counts as silent. A lost frame must not fail a start-up.
 const ATTEMPTS: u8 = 3;
 
-/// What has come of a question.
+/// State of a question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// Not yet.

@@ -1,7 +1,7 @@
 //! The high-priority half of the device: the bus, its start-up, and the control cycle.
 //!
 //! A hardware timer calls [`DeviceController::slot`] three times per control cycle. In the start-up each slot sends at
-//! most one frame. After that the three slots do different things:
+//! most one frame. After that the three slots do different things, at 300 Hz in this order ([`Slot::next`]):
 //!
 //! | slot | at | what |
 //! |---|---|---|
@@ -28,7 +28,7 @@ use crate::command::{Command, Refusal};
 use crate::event::{Event, EventKind};
 use crate::hand::Hand;
 use crate::health::{Counters, Health};
-use crate::port::FitPrimitive;
+use crate::port::CheckedPrimitive;
 use crate::round::Round;
 use crate::stage::{Stage, StartupError};
 use crate::startup::Startup;
@@ -51,7 +51,7 @@ const BRAKING_ANSWERS: u8 = 2;
 /// Time between two requests to the safety module to go IDLE: 0.25 s, in slow slots.
 const IDLE_REQUEST_SLOTS: u16 = periods(0.25);
 
-/// How much an overrun counts against the cycles without one.
+/// Weight of an overrun against one cycle without.
 const OVERRUN_WEIGHT: u16 = 50;
 /// The sum at which the control cycle is too late too often: six overruns within a few cycles. One in fifty is
 /// tolerated.
@@ -130,7 +130,7 @@ impl DeviceController {
         self.cycle.unload();
     }
 
-    /// How far the start-up has come.
+    /// Stage of the start-up.
     pub fn stage(&self) -> Stage {
         let stage = self.startup.stage();
         if stage == Stage::WaitingForActive && self.safety_mode == Some(SafetyMode::Active) {
@@ -337,6 +337,9 @@ impl DeviceController {
             self.outlet(now_us, io).send(frame);
         }
         self.wants_idle = output.actuation.requests_idle();
+        if self.cycle.is_zero_lost() {
+            self.startup.lose_zero();
+        }
         io.record(output.record);
         if let Some(event) = output.event {
             self.tell(event.into(), io);
@@ -344,7 +347,7 @@ impl DeviceController {
         self.leave_if_lost();
     }
 
-    /// What the cycle hears of the safety module: its own word, unless a braking puck contradicts.
+    /// Mode of the safety module for the cycle: the one it told itself, unless a braking puck contradicts.
     fn safety_of_cycle(&mut self) -> Option<SafetyMode> {
         let told = self.fresh_safety.take();
         if self.braking >= BRAKING_ANSWERS { Some(SafetyMode::Idle) } else { told }
@@ -432,6 +435,10 @@ impl DeviceController {
             return;
         };
         let mut outlet = SlotOutlet { io, counters: &mut self.counters, pacer: &mut self.pacer, now_us, cyclic: true };
+        // Not under torque: unzeroed, the safety module watches other speeds.
+        if !self.cycle.state().has_torque() && self.startup.revoke_zero(&mut outlet) {
+            return;
+        }
         let question = match (poll.begin(), self.round.suspect()) {
             (Some(safety), _) => Some(safety),
             (None, Some(node)) => Some(poll.suspect(node)),
@@ -472,7 +479,7 @@ impl Controller for DeviceController {
     type Command = Command;
     type Event = Event;
     type Record = CycleRecord;
-    type Primitive<'a> = &'a FitPrimitive<'a>;
+    type Primitive<'a> = &'a CheckedPrimitive<'a>;
 
     const STOP: Command = Command::Control(control::Command::Stop);
 
@@ -495,7 +502,7 @@ impl Controller for DeviceController {
         }
     }
 
-    fn load(&mut self, fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
+    fn load(&mut self, fit: &CheckedPrimitive<'_>) -> Result<(), LoadRefusal> {
         self.cycle.load(fit)
     }
 

@@ -1,4 +1,4 @@
-//! True if the hand's motors take torque: MODE of its four pucks.
+//! The mode of the hand's drives: MODE of its four pucks.
 //!
 //! Nobody but us sets the mode of a hand puck. TORQUE is entered before the first torque frame and left when none has
 //! come for some cycles: then the worm drives hold the fingers without current. A puck keeps its last torque until it
@@ -71,7 +71,7 @@ impl Drive {
         }
     }
 
-    /// What [`Drive::mode_frame`] returned has left.
+    /// Notes that the frame of [`Drive::mode_frame`] has left.
     pub fn mode_sent(&mut self) {
         self.due = false;
         self.astray = None;

@@ -1,4 +1,4 @@
-//! What the start-up found out about a hand.
+//! `Found`: the result of the start-up for a hand.
 
 use puck::hand::HandCommander;
 use puck::{Node, PropertyId};

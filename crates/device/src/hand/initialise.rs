@@ -1,8 +1,8 @@
 //! The initialisation of the hand (HI): its digits drive to their open stops and count from there.
 //!
 //! Fingers first, then the spread; meanwhile the hand hears nothing but GET MODE, for any other request can break it
-//! off. True if something has, for example the safety module's own broadcast of MODE, shows in the positions: they must
-//! be zero. Afterwards no digit ends a torque because it stalls (TSTOP 0): a grasp is a stall.
+//! off. If something has, for example the safety module's own broadcast of MODE, the positions show it: they must be
+//! zero. Afterwards no digit ends a torque because it stalls (TSTOP 0): a grasp is a stall.
 
 use puck::hand::HandCommand;
 use puck::{Counts, Group, MotorMode, Node, PropertyId, get, set};
@@ -13,16 +13,16 @@ use crate::bus::{Answer, Exchange, Outlet};
 
 /// Between two looks at the modes, us.
 const POLL_US: u64 = 100_000;
-/// How long the answers to a look are awaited, us.
+/// Wait for the answers to a look, us.
 const LISTEN_US: u64 = 20_000;
-/// How long fingers, and then the spread, may take, us. Barrett waits 3 s and 2 s.
+/// Longest time for the fingers, and then for the spread, us. Barrett waits 3 s and 2 s.
 const LIMIT_US: u64 = 10_000_000;
 /// Looks in a row that a digit may leave unanswered.
 const SILENT_POLLS: u8 = 5;
-/// How far a digit may stand from zero after its initialisation, counts: 0.025 rad of a finger, 0.18 rad of the spread,
-/// whose brake is soft. What an uninitialised puck counts from is anything.
+/// Largest distance of a digit from zero after its initialisation, counts: 0.025 rad of a finger, 0.18 rad of the
+/// spread, whose brake is soft. A puck that was not initialised counts from anywhere.
 const ZERO_TOLERANCE: i32 = 2000;
-/// How often a setting is written, and positions are asked for, before they count as not taken, or missing.
+/// Times that a setting is written, or positions are asked for, before it counts as not taken, or they as missing.
 const ATTEMPTS: u8 = 3;
 
 /// Which digits are under way.
@@ -62,7 +62,7 @@ enum Step {
     Check { digit: usize, attempt: u8 },
 }
 
-/// What has come of the initialisation.
+/// State of the initialisation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// Under way.
@@ -81,7 +81,7 @@ pub struct Initialisation {
     limit_us: u64,
     /// Digits that wait for their CMD.
     waiting: [bool; 4],
-    /// What the digits said to the latest look.
+    /// Answers of the digits to the latest look.
     modes: [Option<i32>; 4],
     /// Digits that were seen at work since their first CMD.
     worked: [bool; 4],

@@ -90,12 +90,12 @@ impl Hand {
         *self = Hand { told: self.told, was_ready: self.stage == HandStage::Ready, ..Hand::new() };
     }
 
-    /// How far it has come.
+    /// Its stage.
     pub(crate) fn stage(&self) -> HandStage {
         self.stage
     }
 
-    /// What is new since the last call: the stage, and why.
+    /// Stage and cause, if either has changed since the last call.
     pub(crate) fn news(&mut self) -> Option<(HandStage, Option<(Node, HandTrouble)>)> {
         let now = (self.stage, self.cause);
         (now != core::mem::replace(&mut self.told, now)).then_some(now)
@@ -172,7 +172,7 @@ impl Hand {
         self.drive.hear_mode(node, value);
     }
 
-    /// What it told since the last cycle; `None` unless it is ready.
+    /// The replies since the last cycle; `None` unless it is ready.
     pub(crate) fn sample(&mut self, counters: &mut Counters) -> Option<HandSample> {
         let sample = self.round.close(counters);
         if let Some(node) = self.round.silent_for(SILENT_ROUNDS).filter(|_| self.stage == HandStage::Ready) {

@@ -4,7 +4,7 @@ use core::fmt;
 
 use puck::Node;
 
-/// What is wrong with a puck of the hand. The codes travel over the link and are never renumbered.
+/// Reason for which a puck of the hand cannot be used. The codes travel over the link and are never renumbered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum HandTrouble {

@@ -8,7 +8,7 @@ use super::{Next, Startup, Step};
 use crate::bus::{Answer, Outlet};
 use crate::hand::{Found, HandProperties, HandTrouble};
 
-/// What is read of each hand puck, in this order.
+/// Properties that are read of each hand puck, in this order.
 pub(super) const DIGIT_PROPERTIES: [Property; 7] =
     [Property::Cts, Property::Ipnm, Property::Pidx, Property::Grpa, Property::Grpb, Property::Grpc, Property::Hold];
 
@@ -18,7 +18,7 @@ const COUNTS_PER_REVOLUTION: i32 = puck::hand::COUNTS_PER_REVOLUTION as i32;
 const HAND_GROUP: i32 = 5;
 const ARM_GROUPS: core::ops::RangeInclusive<i32> = 1..=4;
 
-/// What the start-up knows of the hand.
+/// State of the hand as the start-up knows it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct HandSurvey {
     /// A puck that made it unfit, and why.
@@ -218,7 +218,7 @@ impl Startup {
         })
     }
 
-    /// What was found, once after each time it was read.
+    /// Returns the result for the hand, once after each time it was read.
     pub(crate) fn take_hand(&mut self) -> Option<Found> {
         self.hand.found.take()
     }

@@ -26,7 +26,7 @@ use survey::Survey;
 
 /// Between two looks at the mode of the safety module while a person is awaited, us.
 const POLL_US: u64 = 250_000;
-/// How long a failed start-up rests before it is tried again, us.
+/// Rest of a failed start-up before it is tried again, us.
 const RETRY_US: u64 = 1_000_000;
 /// Velocity faults the safety module shall ignore when positions are rewritten.
 const IGNORED_AT_ZERO: i32 = 8;
@@ -83,6 +83,8 @@ enum Step {
     TellZero,
     /// GET ZERO.
     ConfirmZero,
+    /// SET ZERO = 0: what the safety module believes is no longer so.
+    RevokeZero,
     /// Tare the force/torque sensor.
     Tare,
     /// IFAULT before polling begins.
@@ -95,7 +97,7 @@ enum Step {
     Blocked { until_us: u64 },
 }
 
-/// What a step decides.
+/// Decision of a step.
 enum Next {
     /// Wait for an answer, a pause or a person.
     Stay,
@@ -116,6 +118,10 @@ pub(crate) struct Startup {
     targets: [Counts; 7],
     positions: [Option<Counts>; 7],
     zeroed: bool,
+    /// Why the counts do not refer to the zero of the arm, whatever the safety module says, until a person zeroes.
+    doubt: Option<StartupError>,
+    /// True while the safety module has not been told so.
+    owes_revocation: bool,
     /// The posture that `targets` are the counts of (rad).
     home: [f32; 7],
     /// The same once the arm has been zeroed there.
@@ -124,7 +130,7 @@ pub(crate) struct Startup {
     error: Option<StartupError>,
 }
 
-/// What has become of a person's command to zero the arm.
+/// State of a person's command to zero the arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum ZeroRequest {
     /// There is none, or its answer has been fetched.
@@ -132,7 +138,7 @@ enum ZeroRequest {
     None,
     /// The safety module is being asked whether the arm is IDLE: what it said last may be 250 ms old.
     Pending,
-    /// Taken up or refused.
+    /// Accepted or refused.
     Answered(Result<(), Refusal>),
 }
 
@@ -151,6 +157,8 @@ impl Startup {
             targets: [Counts(0); 7],
             positions: [None; 7],
             zeroed: false,
+            doubt: None,
+            owes_revocation: false,
             home: [0.0; 7],
             zeroed_at: None,
             zero_request: ZeroRequest::None,
@@ -158,12 +166,27 @@ impl Startup {
         }
     }
 
-    /// Begins anew after the cyclic loop.
+    /// Begins anew after the cyclic loop. A doubt about the zero stays.
     pub(crate) fn restart(&mut self) {
-        *self = Startup::new();
+        *self = Startup { doubt: self.doubt, ..Startup::new() };
     }
 
-    /// How far it has come.
+    /// The counts of a motor have jumped in the cyclic loop.
+    pub(crate) fn lose_zero(&mut self) {
+        self.owes_revocation |= self.doubt.is_none();
+        self.doubt.get_or_insert(StartupError::CountsJumped);
+        self.zeroed = false;
+        self.zeroed_at = None;
+    }
+
+    /// Tells the safety module that the zero is lost, once; true if there was something to tell.
+    pub(crate) fn revoke_zero(&mut self, outlet: &mut impl Outlet) -> bool {
+        let Some(safety) = self.safety.filter(|_| self.owes_revocation) else { return false };
+        self.owes_revocation = !outlet.send(set(Node::SAFETY_MODULE, safety.zero, 0));
+        true
+    }
+
+    /// Its stage.
     pub(crate) fn stage(&self) -> Stage {
         match self.step {
             Step::ZeroTorques { .. } | Step::Enumerate { .. } | Step::Listen { .. } => Stage::Enumerating,
@@ -172,13 +195,14 @@ impl Startup {
             Step::Identify { .. } | Step::Wake { .. } | Step::Silence { .. } => Stage::Waking,
             Step::Verify { .. } => Stage::Verifying,
             Step::Brake { .. } | Step::Read { .. } | Step::ReadHand { .. } | Step::AskZero => Stage::Reading,
-            Step::AwaitZero { .. } | Step::ConfirmIdle => Stage::WaitingForZero,
+            Step::AwaitZero { .. } | Step::ConfirmIdle | Step::RevokeZero => Stage::WaitingForZero,
             Step::IgnoreFaults
             | Step::WritePosition { .. }
             | Step::CheckPositions { .. }
             | Step::TellZero
             | Step::ConfirmZero => Stage::Zeroing,
             Step::Tare | Step::IgnoreFirstFaults | Step::FirstPositions { .. } => Stage::Preparing,
+            Step::Done if !self.zeroed => Stage::WaitingForZero,
             Step::Done => Stage::WaitingForActive,
             Step::Blocked { .. } => Stage::Blocked,
         }
@@ -295,17 +319,12 @@ impl Startup {
             Step::Brake { hand } => Ok(self.brake(hand, outlet)),
             Step::Read { joint, item } => self.read(joint, item, outlet),
             Step::ReadHand { digit, item } => Ok(self.read_digit(digit, item, outlet)),
-            Step::AskZero => Ok(match self.ask_safety(self.safety()?.zero, outlet)? {
-                None => Next::Stay,
-                Some(0) => {
-                    self.error = None;
-                    Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US })
-                }
-                Some(_) => {
-                    self.zeroed = true;
-                    Next::Go(Step::Tare)
-                }
-            }),
+            Step::AskZero => self.ask_zero(outlet),
+            Step::RevokeZero => {
+                let frame = set(Node::SAFETY_MODULE, self.safety()?.zero, 0);
+                let next_us = outlet.now_us() + POLL_US;
+                Ok(after(outlet.send(frame), Step::AwaitZero { next_us }))
+            }
             Step::AwaitZero { next_us } => self.await_zero(next_us, outlet),
             Step::ConfirmIdle => self.confirm_idle(outlet),
             Step::IgnoreFaults => {
@@ -323,6 +342,7 @@ impl Startup {
                 Some(0) => return Err(StartupError::SafetyNotZeroed),
                 Some(_) => {
                     self.zeroed = true;
+                    self.doubt = None;
                     self.zeroed_at = Some(self.home);
                     Next::Go(Step::Tare)
                 }
@@ -339,11 +359,30 @@ impl Startup {
             Step::Done => Ok(Next::Stay),
             Step::Blocked { until_us } if outlet.now_us() < until_us => Ok(Next::Stay),
             Step::Blocked { .. } => {
-                let (error, hand) = (self.error, self.hand.again());
-                *self = Startup { error, hand, ..Startup::new() };
+                let (error, doubt, hand) = (self.error, self.doubt, self.hand.again());
+                *self = Startup { error, doubt, hand, ..Startup::new() };
                 Ok(Next::Stay)
             }
         }
+    }
+
+    /// Asks the safety module if positions count from a known pose.
+    fn ask_zero(&mut self, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
+        Ok(match self.ask_safety(self.safety()?.zero, outlet)? {
+            None => Next::Stay,
+            Some(0) => {
+                self.error = None;
+                Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US })
+            }
+            Some(_) if self.doubt.is_some() => {
+                self.error = self.doubt;
+                Next::Go(Step::RevokeZero)
+            }
+            Some(_) => {
+                self.zeroed = true;
+                Next::Go(Step::Tare)
+            }
+        })
     }
 
     fn safety(&self) -> Result<&SafetyProperties, StartupError> {

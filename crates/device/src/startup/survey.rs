@@ -1,4 +1,4 @@
-//! What the devices say of themselves during start-up, and the checks it must pass.
+//! `Survey`: the answers of the devices during start-up, and the checks that they must pass.
 
 use control::{Calibration, Payload};
 use puck::{Node, Property, PropertyId, PropertyTable, Role};
@@ -8,7 +8,7 @@ use crate::stage::StartupError;
 /// Number of nodes an identifier can name.
 const NODES: usize = 32;
 
-/// What one node has answered.
+/// Answers of one node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Seen {
     /// STAT, once it answered at all.
@@ -17,7 +17,7 @@ pub(crate) struct Seen {
     pub(crate) version: Option<i32>,
 }
 
-/// What is read of each arm puck, in this order.
+/// Properties that are read of each arm puck, in this order.
 pub(crate) const DRIVE_PROPERTIES: [Property; 8] = [
     Property::Cts,
     Property::Ipnm,
@@ -93,7 +93,7 @@ impl Survey {
         Survey { nodes: [Seen { status: None, version: None }; NODES], drives: [[0; DRIVE_PROPERTIES.len()]; 7] }
     }
 
-    /// What is known of a node.
+    /// Answers of a node so far.
     pub(crate) fn seen(&self, node: Node) -> Seen {
         self.nodes.get(usize::from(node.number())).copied().unwrap_or_default()
     }

@@ -7,9 +7,9 @@ use super::{ENUMERATED, Next, POLL_US, Startup, Step, after};
 use crate::bus::{Answer, Outlet};
 use crate::stage::StartupError;
 
-/// How long a device may take to answer in an enumeration, us: a puck that boots needs up to 50 ms.
+/// Longest time to an answer in an enumeration, us: a puck that boots needs up to 50 ms.
 const LISTEN_US: u64 = 50_000;
-/// How often the bus is searched for the pucks after IDLE: they get power at that moment and need time to boot.
+/// Times that the bus is searched for the pucks after IDLE: they get power at that moment and need time to boot.
 const ENUMERATIONS: u8 = 6;
 /// Silence after the last wake, us: whoever talks while transceivers come up may be put off the bus.
 const WAKE_SILENCE_US: u64 = 1_000_000;
@@ -126,6 +126,10 @@ impl Startup {
         };
         if self.survey.seen(node).status == Some(Status::Ready.value()) {
             return Next::Go(Step::Wake { device: index + 1, woken });
+        }
+        if node.arm_index().is_some() {
+            // Its counts began with its firmware.
+            self.doubt.get_or_insert(StartupError::CountsAnew(node));
         }
         let frame = set(node, PropertyId::STAT, Status::Ready.value());
         after(outlet.send(frame), Step::Wake { device: index + 1, woken: true })

@@ -8,9 +8,9 @@ use crate::bus::Outlet;
 use crate::command::Refusal;
 use crate::stage::StartupError;
 
-/// How long the seven replies to one position request may take, us.
+/// Longest time for the seven replies to one position request, us.
 const POSITIONS_US: u64 = 10_000;
-/// How far a puck may stand from the position just written, counts (0.3 rad of a motor, 7 mrad of J1): a braked arm
+/// Largest distance of a puck from the position just written, counts (0.3 rad of a motor, 7 mrad of J1): a braked arm
 /// sinks a little between the write and the read.
 const ZERO_TOLERANCE: i32 = 200;
 

@@ -21,7 +21,7 @@ const MAGIC: [u8; 6] = *b"TacJ\x01\x00";
 /// Sectors of the journal, the last two of the region.
 pub(super) const SECTORS: u32 = 2;
 
-/// What a note says.
+/// Content of a note.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Matter {
     /// The region is ours.
@@ -42,7 +42,7 @@ pub(super) struct Journal {
     number: u32,
 }
 
-/// What the journal says at start-up.
+/// Content of the journal at start-up.
 pub(super) struct JournalState {
     pub(super) journal: Journal,
     /// The sector whose erase was not ticked off.

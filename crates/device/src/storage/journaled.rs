@@ -51,7 +51,7 @@ pub(super) struct JournaledFlash<F> {
     blocked_at: Option<u32>,
 }
 
-/// How the region was found.
+/// State of the region at start-up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Found {
     /// In order.

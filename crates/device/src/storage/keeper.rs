@@ -50,7 +50,7 @@ pub trait LibraryAccess {
     /// An image was found on the flash.
     fn restore(&mut self, slot: u8, image: &[u8]);
 
-    /// What stands on the flash for this place is that it was deleted.
+    /// Notes that the flash holds a deletion for this place.
     fn forget(&mut self, slot: u8);
 
     /// All of the flash has been read.
@@ -64,7 +64,7 @@ pub trait LibraryAccess {
 }
 
 /// Opens the library on this flash and makes its changes durable, for ever. Poll it when nothing else is to be done,
-/// again after every interrupt: it waits for the flash and for work by being pending, and wakes nobody.
+/// again after every interrupt: it waits for the flash and for work by being pending, and wakes no task.
 pub async fn keep<F: NorFlash, D: LibraryAccess, const IMAGE: usize, const VALUE: usize>(
     flash: F,
     room: &mut Scratch<IMAGE, VALUE>,

@@ -29,7 +29,7 @@ impl Work {
     }
 }
 
-/// How far a change has come.
+/// Progress of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Job {
     /// Nothing to do.
@@ -37,7 +37,7 @@ enum Job {
     /// Asked for.
     Asked(Work),
     /// In the hands of the keeper.
-    Taken(Work),
+    Begun(Work),
     /// Over; the session has not asked yet.
     Over(Result<(), StoreError>),
 }
@@ -70,7 +70,7 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         }
     }
 
-    /// What was found at start-up; `None` until then.
+    /// Content of the flash at start-up; `None` until it was read.
     #[must_use]
     pub fn opening(&self) -> Option<Opening> {
         self.is_open.then_some(self.opening)
@@ -114,13 +114,13 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
             };
             to.copy_from_slice(from);
         }
-        self.job = Job::Taken(work);
+        self.job = Job::Begun(work);
         Some(work)
     }
 
     /// The keeper is done with the change: it is durable, or the flash is as before.
     pub fn settle(&mut self, outcome: Result<(), StoreError>) {
-        let Job::Taken(work) = self.job else { return };
+        let Job::Begun(work) = self.job else { return };
         let outcome = match work {
             Work::Save { slot: HOME_KEY, .. } => outcome.map(|()| self.home = StoredHome::read(&self.staged_home)),
             Work::Delete { slot: HOME_KEY } => outcome.map(|()| self.home = StoredHome::Nothing),
@@ -145,7 +145,7 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
     /// True if the image being written is on its way to the flash.
     fn is_saving(&self) -> bool {
         match self.job {
-            Job::Asked(work) | Job::Taken(work) => matches!(work, Work::Save { .. }) && !work.is_of_home(),
+            Job::Asked(work) | Job::Begun(work) => matches!(work, Work::Save { .. }) && !work.is_of_home(),
             Job::None | Job::Over(_) => false,
         }
     }

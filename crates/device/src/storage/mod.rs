@@ -26,7 +26,7 @@ use crate::calibration::StoredHome;
 /// The key of the arm's home in the log; those below it are the places of images.
 pub const HOME_KEY: u8 = 0xC0;
 
-/// What the device found in its flash at start-up.
+/// Content of the flash at start-up.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Opening {
     /// Images found, sound or not.

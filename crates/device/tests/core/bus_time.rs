@@ -1,4 +1,4 @@
-//! What a control cycle costs on the bus, with every stuff bit there can be: summed, and played through bit by bit.
+//! The time of a control cycle on the bus with every stuff bit there can be: summed, and played through bit by bit.
 //!
 //! A standard frame of n data bytes has 47 + 8 n bits with the three bits behind it, and at worst one stuff bit for
 //! every four bits after the first of the 34 + 8 n bits in which stuffing happens. One bit takes a microsecond.
@@ -10,7 +10,8 @@ use puck::CanFrame;
 
 use crate::double::{Bus, holding_with_ready_hand};
 
-/// A control cycle of 300 Hz, us, whatever the rate is: what fits into it with every stuff bit is 125 % of one of 500 Hz.
+/// A control cycle of 300 Hz, us, whatever the rate is: what fits into it with every stuff bit is 125 % of one of
+/// 500 Hz.
 const CYCLE_US: f64 = 1e6 / 300.0;
 /// Share of it that a full cycle may take in the worst case.
 const MOST: f64 = 0.84;

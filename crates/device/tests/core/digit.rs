@@ -10,7 +10,7 @@ use crate::double::{BOOT_US, MONITOR_VERSION};
 /// CMD of the initialisation.
 const INITIALISE: i32 = 13;
 
-/// What a puck counts from before its initialisation: anything.
+/// Position of a puck before its initialisation: anything.
 const UNINITIALISED: Counts = Counts(-31_000);
 
 /// A puck of the hand.
@@ -32,7 +32,7 @@ pub(crate) struct Digit {
     pub(crate) torque_counts: i32,
     pub(crate) holds: bool,
     pub(crate) stall_ms: i32,
-    /// How long its initialisation takes, us.
+    /// Duration of its initialisation, us.
     pub(crate) work_us: u64,
     /// When its initialisation ends.
     working_until: Option<u64>,
@@ -92,7 +92,7 @@ impl Digit {
         }
     }
 
-    /// What it answers.
+    /// Its answers to a frame.
     pub(crate) fn serve(&mut self, node: Node, now_us: u64, action: Action) -> Vec<CanFrame> {
         let awake = match self.awake_at {
             Some(at) if now_us < at => return Vec::new(),

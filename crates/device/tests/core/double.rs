@@ -292,7 +292,7 @@ impl Bus {
         self.answer(0, frame);
     }
 
-    /// What the devices do with a frame of the core.
+    /// Has the devices act on a frame of the controller.
     fn serve(&mut self, frame: CanFrame) {
         let request = Request::decode(&frame).expect("every frame of the core is a valid request");
         assert_eq!(request.sender, Node::HOST);

@@ -314,7 +314,7 @@ fn torque_mode_comes_before_torque_and_goes_after_it() {
     // Without a law the worm drives hold: zeros at once, then IDLE, then nothing.
     let begin = bus.log.len();
     bus.commands.push_back(Control::Release.into());
-    bus.run(&mut core, 0.5);
+    bus.run(&mut core, 2.5);
     assert_eq!(core.health().state, State::Idle);
     let torques = hand_torques(&bus, begin);
     let driven = torques.iter().rposition(|torques| *torques != [PuckTorque::ZERO; 4]).map_or(0, |last| last + 1);

@@ -7,3 +7,4 @@ mod digit;
 mod double;
 mod hand;
 mod startup;
+mod zero;

@@ -195,7 +195,7 @@ fn a_puck_that_never_wakes_is_named_and_tried_again() {
     assert_eq!(core.health().blocked, None);
 }
 
-/// What the start-up says of a bus with one thing wrong.
+/// The error of the start-up on a bus with one thing wrong.
 fn refusal(break_something: impl FnOnce(&mut Bus)) -> Option<StartupError> {
     let (mut core, mut bus) = (silent_device(), Bus::idle());
     break_something(&mut bus);

@@ -198,6 +198,7 @@ fn every_refusal_of_the_control_half_reaches_the_host() {
         (control(control::Refusal::NoExpectation), Refusal::NoExpectation, [0, 0]),
         (control(control::Refusal::HandTooFar), Refusal::HandFarFromStart, [0, 0]),
         (control(control::Refusal::ForceAtRest), Refusal::ForceAtRest, [0, 0]),
+        (control(control::Refusal::ZeroLost), Refusal::NotZeroed, [0, 0]),
         (control(control::Refusal::NoHand), Refusal::HandNotReady, [HandStage::NotInitialised.code().into(), 0]),
         (ControlRefusal::NoHand, Refusal::HandNotReady, [HandStage::NotInitialised.code().into(), 0]),
         (ControlRefusal::HandBusy, Refusal::HandBusy, [0, 0]),

@@ -6,7 +6,7 @@ use control::model::{ArmModel, Frames};
 use control::units::JointPositions;
 use control::{CycleRecord, Fault, LoadRefusal, Payload, State};
 use device::{
-    Command, Counters, DeviceController, Event, EventKind, FitPrimitive, Health, Identity, QueueFull, RamStore,
+    CheckedPrimitive, Command, Counters, DeviceController, Event, EventKind, Health, Identity, QueueFull, RamStore,
     Session, SessionPort, Stage, StoredPrimitive, TimedRecord, Timing,
 };
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame};
@@ -28,7 +28,7 @@ pub(crate) type Store = RamStore<SLOTS, SLOT_BYTES>;
 pub(crate) struct Bench {
     /// Bytes the session has sent.
     pub(crate) line: Vec<u8>,
-    /// Room on the line.
+    /// Bytes that the line can take.
     pub(crate) room: usize,
     /// Commands that have reached the control half.
     pub(crate) commands: Vec<Command>,
@@ -42,7 +42,7 @@ pub(crate) struct Bench {
     pub(crate) loaded: Vec<f32>,
     /// The one loaded last.
     pub(crate) primitive: Option<StoredPrimitive>,
-    /// What the control half says to a load.
+    /// Answer of the control half to a load.
     pub(crate) load: Result<(), LoadRefusal>,
     /// The state of the control half.
     pub(crate) state: State,
@@ -50,7 +50,7 @@ pub(crate) struct Bench {
     pub(crate) fault: Fault,
     /// The hand moves by itself.
     pub(crate) hand_moves: bool,
-    /// What is mounted on its arm.
+    /// Payload of its arm.
     pub(crate) payload: Payload,
     /// Where its arm was zeroed.
     pub(crate) zeroed_at: Option<[f32; 7]>,
@@ -76,7 +76,7 @@ impl SessionPort<DeviceController> for Bench {
         Ok(())
     }
 
-    fn load(&mut self, fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
+    fn load(&mut self, fit: &CheckedPrimitive<'_>) -> Result<(), LoadRefusal> {
         assert_ne!(self.state, State::Run, "a primitive was exchanged under a run");
         self.load?;
         self.loaded.push(fit.primitive().movement().duration());
@@ -122,7 +122,7 @@ impl SessionPort<DeviceController> for Bench {
 pub(crate) struct Rig<S: device::Store = Store> {
     /// The session under test.
     pub(crate) session: Box<Session<S>>,
-    /// What is around it.
+    /// Everything around it.
     pub(crate) bench: Bench,
     /// The device's time, ms.
     pub(crate) now_ms: u64,

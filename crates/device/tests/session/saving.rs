@@ -22,7 +22,7 @@ fn name(text: &str) -> Name {
     Name::new(text).unwrap()
 }
 
-/// What the session says in its next poll.
+/// Replies of the session in its next poll.
 fn said(rig: &mut Rig) -> Vec<Reply> {
     rig.poll();
     rig.sent().into_iter().map(|frame| frame.message).collect()

@@ -63,7 +63,7 @@ fn h9_a_refused_host_does_not_learn_the_number_of_the_session() {
     assert_eq!(rig.refused(Request::Hello(hello())), (Refusal::Busy, [0, 400]));
 }
 
-/// What strangers send in each millisecond, by number.
+/// Bytes that other hosts send in each millisecond, by number.
 fn flood(kind: usize, stranger: u16) -> Vec<u8> {
     let request = match kind {
         0 => Request::Stop,

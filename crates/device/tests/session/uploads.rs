@@ -29,7 +29,7 @@ fn read_back(rig: &mut Rig, text: &str) -> Vec<u8> {
     }
 }
 
-/// What the commit of an upload is refused with, after checking that the old image has survived.
+/// Refusal of the commit of an upload, after a check that the old image has survived.
 fn refused(rig: &mut Rig, text: &str, image: &[u8]) -> (Refusal, [u32; 2]) {
     let before: Vec<_> = (0..3).map(|slot| rig.session.store().image(slot).map(<[u8]>::to_vec)).collect();
     let answer = rig.upload(text, image);
@@ -229,9 +229,9 @@ fn a_primitive_beyond_all_bounds_is_refused_with_the_value_that_is() {
         "the sensitivity at point 0, column 0 (from 0) is larger than anything real"
     );
     static FELT: [f32; 18] = {
-        let mut felt = [1.0; 18];
-        felt[16] = 1e30;
-        felt
+        let mut statistics = [1.0; 18];
+        statistics[16] = 1e30;
+        statistics
     };
     assert_eq!(
         words(|content| {
@@ -308,13 +308,13 @@ fn expectation_and_experience_reach_the_control_half() {
         content.marks.recorded_duration = 3.0;
         content.marks.filter_cutoff = control::sense::wrench::WRENCH_CUT_OFF as f32;
     };
-    rig.store("felt", &image_with("felt", 3.0, 10, whole));
+    rig.store("sensing", &image_with("sensing", 3.0, 10, whole));
     rig.store("plain", &image("plain", 4.0, 10));
-    for (text, felt) in [("felt", true), ("plain", false), ("felt", true)] {
+    for (text, expects) in [("sensing", true), ("plain", false), ("sensing", true)] {
         rig.commanded(Request::Run { name: name(text), options: link::RunOptions::default() });
         let loaded = rig.bench.primitive.as_ref().expect("a primitive");
-        assert_eq!(loaded.expected().is_some(), felt, "{text}: nothing may be left of the one before");
-        assert_eq!(loaded.statistics().map(|statistics| statistics.trials()), felt.then_some(5));
+        assert_eq!(loaded.expected().is_some(), expects, "{text}: nothing may be left of the one before");
+        assert_eq!(loaded.statistics().map(|statistics| statistics.trials()), expects.then_some(5));
     }
 }
 

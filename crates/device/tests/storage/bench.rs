@@ -44,7 +44,7 @@ impl<const SLOTS: usize> LibraryAccess for Shared<SLOTS> {
     }
 }
 
-/// What the host asks for.
+/// A request of the host.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Wish {
     /// Store the image of this number at a place.

@@ -8,13 +8,13 @@ use crate::bench::{TINY, Wish, chip, home, image, run_on};
 /// Places of the library here.
 const SLOTS: usize = 4;
 
-/// What a torn word leaves behind is drawn this many times for each word; there are a thousand words.
+/// Times that the rest of a torn word is drawn for each word; there are a thousand words.
 const WORD_DRAWS: u64 = 1;
 
-/// What a torn erase leaves behind is drawn this many times for each erase: at least twice each of its kinds.
+/// Times that the rest of a torn erase is drawn for each erase: at least twice each of its kinds.
 const ERASE_DRAWS: u64 = 24;
 
-/// What the flash holds, by number.
+/// Content of the flash, by number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Content {
     images: [Option<u8>; SLOTS],

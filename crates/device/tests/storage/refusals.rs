@@ -1,4 +1,4 @@
-//! What the storage refuses, and what it makes of a flash that is not its own.
+//! Refusals of the storage, and its treatment of a flash that is not its own.
 
 use device::{Store, StoreError, StoredHome};
 use flash::{FLASH_BYTES, FlashPort, VirtualClock};

@@ -28,7 +28,7 @@ fn store(chip: &FlashChip, values: &[(u8, u8)]) -> bool {
     })
 }
 
-/// How many of these values are not there any more.
+/// Number of these values that are not there any more.
 fn lost(chip: &FlashChip, values: &[(u8, u8)]) -> usize {
     let port = FlashPort::new(chip.clone(), VirtualClock::default());
     let config = MapConfig::new(0..FLASH_BYTES as u32);

@@ -174,11 +174,12 @@ impl<const D: usize, const P: usize> Learned<D, P> {
     /// # Errors
     /// [`PrimitiveError`], e.g. more kernels than `N`.
     pub fn primitive<T: Scalar, const N: usize>(&self) -> Result<Primitive<T, D, P, N>, PrimitiveError> {
-        let weights: Vec<T> = self.weights.iter().map(|&w| T::from_f64(w)).collect();
+        let weights: Option<Vec<T::Weight>> = self.weights.iter().map(|&w| T::from_f64(w).to_weight()).collect();
+        let weights = weights.ok_or(PrimitiveError::Weight)?;
         Primitive::new(&self.tables_with(&weights))
     }
 
-    fn tables_with<'a, T: Scalar>(&self, weights: &'a [T]) -> PrimitiveTables<'a, T, D, P> {
+    fn tables_with<'a, T: Scalar>(&self, weights: &'a [T::Weight]) -> PrimitiveTables<'a, T, D, P> {
         PrimitiveTables {
             control_period: T::from_f64(self.control_period),
             duration: T::from_f64(self.duration),

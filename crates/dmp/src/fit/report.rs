@@ -42,7 +42,7 @@ pub struct OrientationReport {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
-    /// Row by row in the order of the weights.
+    /// One report for each row, in the order of the weights.
     pub rows: Vec<RowReport>,
     /// Orientation of each pose as a whole.
     pub orientations: Vec<OrientationReport>,

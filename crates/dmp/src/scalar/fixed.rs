@@ -17,6 +17,11 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 use ::fixed::types::I32F32;
 
 use super::Scalar;
+use super::exponential::decay;
+use super::ratios::Ratios;
+
+/// Fraction bits that a number has beyond a weight.
+const WEIGHT_SHIFT: u32 = 8;
 
 /// Saturating fixed-point number, resolution 2^-32 (2.3e-10), range about +-2.1e9.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -55,9 +60,21 @@ impl FixedPoint {
         Self::from_bits((value * 4_294_967_296.0) as i64)
     }
 
+    /// Constants of the program, as [`constant`](Self::constant).
+    #[must_use]
+    pub const fn constants<const N: usize>(values: [f64; N]) -> [Self; N] {
+        let mut numbers = [Self(I32F32::ZERO); N];
+        let mut index = 0;
+        while index < N {
+            numbers[index] = Self::constant(values[index]);
+            index += 1;
+        }
+        numbers
+    }
+
     /// Polynomial with the constant term first.
-    fn polynomial(self, coefficients: &[f64]) -> Self {
-        coefficients.iter().rev().fold(Self::ZERO, |sum, &c| sum * self + Self::constant(c))
+    fn polynomial(self, coefficients: &[Self]) -> Self {
+        coefficients.iter().rev().fold(Self::ZERO, |sum, &c| sum * self + c)
     }
 
     /// Nearest integer, with the remainder `self - n * unit` for the given unit and its reciprocal.
@@ -73,7 +90,7 @@ impl FixedPoint {
         // Beyond tan(pi/8) turn by pi/4, so that the series only sees arguments up to 0.414.
         let (offset, t) =
             if self > TAN_EIGHTH { (QUARTER, (self - Self::ONE) / (self + Self::ONE)) } else { (Self::ZERO, self) };
-        const SERIES: [f64; 11] = [
+        const SERIES: [FixedPoint; 11] = FixedPoint::constants([
             1.0,
             -1.0 / 3.0,
             1.0 / 5.0,
@@ -85,7 +102,7 @@ impl FixedPoint {
             1.0 / 17.0,
             -1.0 / 19.0,
             1.0 / 21.0,
-        ];
+        ]);
         offset + t * (t * t).polynomial(&SERIES)
     }
 }
@@ -133,6 +150,36 @@ const fn product_by_halves(a: i64, b: i64) -> i64 {
     }
 }
 
+/// floor(2^32 a / b), at least 2^63 where that is too large; 0/0 = 0.
+///
+/// By divisions of 64 bits and at worst 32 subtractions: the 128-bit routine of the compiler's library costs thousands
+/// of instructions on a processor of 32 bits.
+fn quotient(a: u64, b: u64) -> u64 {
+    if a >> 32 == 0 {
+        return (a << 32).checked_div(b).unwrap_or(if a == 0 { 0 } else { u64::MAX });
+    }
+    let (Some(whole), Some(mut rest)) = (a.checked_div(b), a.checked_rem(b)) else {
+        return u64::MAX;
+    };
+    if whole >> 31 != 0 {
+        return u64::MAX;
+    }
+    let mut fraction = 0;
+    if b >> 32 == 0 {
+        fraction = (rest << 32).checked_div(b).unwrap_or(0);
+    } else {
+        for _ in 0..32 {
+            rest <<= 1;
+            fraction <<= 1;
+            if rest >= b {
+                rest -= b;
+                fraction |= 1;
+            }
+        }
+    }
+    (whole << 32) | fraction
+}
+
 impl Add for FixedPoint {
     type Output = Self;
     #[inline]
@@ -160,18 +207,16 @@ impl Mul for FixedPoint {
 
 impl Div for FixedPoint {
     type Output = Self;
-    /// Division by zero saturates towards the sign of the numerator; 0/0 = 0.
+    /// Toward zero. Division by zero saturates towards the sign of the numerator; 0/0 = 0.
+    #[inline]
     fn div(self, other: Self) -> Self {
-        if other == Self::ZERO {
-            return if self > Self::ZERO {
-                Self::MAX
-            } else if self < Self::ZERO {
-                Self(I32F32::MIN)
-            } else {
-                Self::ZERO
-            };
-        }
-        Self(self.0.saturating_div(other.0))
+        let (a, b) = (self.to_bits(), other.to_bits());
+        let magnitude = quotient(a.unsigned_abs(), b.unsigned_abs());
+        Self::from_bits(if (a < 0) == (b < 0) {
+            i64::try_from(magnitude).unwrap_or(i64::MAX)
+        } else {
+            0_i64.checked_sub_unsigned(magnitude).unwrap_or(i64::MIN)
+        })
     }
 }
 
@@ -187,13 +232,21 @@ impl Scalar for FixedPoint {
     const ZERO: Self = Self(I32F32::ZERO);
     const ONE: Self = Self(I32F32::ONE);
     const MAX: Self = Self(I32F32::MAX);
+    type Kernels<const N: usize> = Ratios;
+    /// 24 fraction bits: +-128 to 6e-8, in half the memory of a number.
+    type Weight = i32;
+    const NO_WEIGHT: i32 = 0;
     /// exp(-22.2) is one unit in the last place.
     const NEGLIGIBLE_EXPONENT: Self = Self::constant(22.0);
 
     /// NaN becomes 0, values out of range saturate.
+    #[inline]
     fn from_f64(value: f64) -> Self {
+        let scaled = value * 4_294_967_296.0;
+        // By plain arithmetic, so that a constant costs nothing where it is used. From 2^52 on there is no fraction.
+        let half = if scaled.abs() >= 4_503_599_627_370_496.0 { 0.0 } else { f64::copysign(0.5, scaled) };
         // A float-to-integer cast saturates and maps NaN to 0.
-        Self::from_bits(libm::rint(value * 4_294_967_296.0) as i64)
+        Self::from_bits((scaled + half) as i64)
     }
 
     fn to_f64(self) -> f64 {
@@ -204,7 +257,7 @@ impl Scalar for FixedPoint {
         const LN_2: FixedPoint = FixedPoint::constant(core::f64::consts::LN_2);
         const LOG2_E: FixedPoint = FixedPoint::constant(core::f64::consts::LOG2_E);
         // Taylor to r^9 for |r| <= ln2/2: remainder 7e-12.
-        const SERIES: [f64; 10] = [
+        const SERIES: [FixedPoint; 10] = FixedPoint::constants([
             1.0,
             1.0,
             1.0 / 2.0,
@@ -215,7 +268,7 @@ impl Scalar for FixedPoint {
             1.0 / 5_040.0,
             1.0 / 40_320.0,
             1.0 / 362_880.0,
-        ];
+        ]);
         let (n, r) = self.reduce(LN_2, LOG2_E);
         let mantissa = r.polynomial(&SERIES).0.to_bits();
         if n >= 31 {
@@ -233,7 +286,25 @@ impl Scalar for FixedPoint {
 
     #[inline]
     fn kernel(self) -> Self {
-        Scalar::exp(-self)
+        Self::from_bits(decay(self.to_bits().unsigned_abs()))
+    }
+
+    #[inline]
+    fn to_weight(self) -> Option<i32> {
+        // Rounded.
+        i32::try_from(self.to_bits().saturating_add(1 << (WEIGHT_SHIFT - 1)) >> WEIGHT_SHIFT).ok()
+    }
+
+    #[inline]
+    fn from_weight(weight: i32) -> Self {
+        Self::from_bits(i64::from(weight) << WEIGHT_SHIFT)
+    }
+
+    #[inline]
+    fn add_weighted(self, kernel: Self, weight: i32) -> Self {
+        // 30 fraction bits of the kernel: the product of two 32-bit numbers is one instruction.
+        let product = i64::from((kernel.to_bits() >> 2) as i32) * i64::from(weight);
+        self + Self::from_bits(product >> (30 - WEIGHT_SHIFT))
     }
 
     fn sqrt(self) -> Self {
@@ -243,9 +314,17 @@ impl Scalar for FixedPoint {
     fn sin_cos(self) -> (Self, Self) {
         const HALF_PI: FixedPoint = FixedPoint::constant(core::f64::consts::FRAC_PI_2);
         const RECIPROCAL: FixedPoint = FixedPoint::constant(core::f64::consts::FRAC_2_PI);
-        const SIN: [f64; 6] = [1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5_040.0, 1.0 / 362_880.0, -1.0 / 39_916_800.0];
-        const COS: [f64; 7] =
-            [1.0, -1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40_320.0, -1.0 / 3_628_800.0, 1.0 / 479_001_600.0];
+        const SIN: [FixedPoint; 6] =
+            FixedPoint::constants([1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5_040.0, 1.0 / 362_880.0, -1.0 / 39_916_800.0]);
+        const COS: [FixedPoint; 7] = FixedPoint::constants([
+            1.0,
+            -1.0 / 2.0,
+            1.0 / 24.0,
+            -1.0 / 720.0,
+            1.0 / 40_320.0,
+            -1.0 / 3_628_800.0,
+            1.0 / 479_001_600.0,
+        ]);
         let (n, r) = self.reduce(HALF_PI, RECIPROCAL);
         let r2 = r * r;
         let (sin, cos) = (r * r2.polynomial(&SIN), r2.polynomial(&COS));
@@ -295,7 +374,7 @@ impl Scalar for FixedPoint {
 
 #[cfg(test)]
 mod tests {
-    use super::{product_by_halves, product_whole};
+    use super::{product_by_halves, product_whole, quotient};
 
     /// Numbers of all magnitudes and signs.
     fn numbers() -> impl Iterator<Item = i64> {
@@ -315,6 +394,17 @@ mod tests {
         for a in numbers() {
             for b in numbers() {
                 assert_eq!(product_by_halves(a, b), product_whole(a, b), "{a} x {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_quotient_is_that_of_wide_integers() {
+        for a in numbers().map(i64::unsigned_abs) {
+            for b in numbers().map(i64::unsigned_abs).filter(|b| *b != 0) {
+                let exact = (u128::from(a) << 32) / u128::from(b);
+                let found = u128::from(quotient(a, b));
+                assert!(found == exact || (found >> 63 != 0 && exact >> 63 != 0), "{a} / {b}: {found} and {exact}");
             }
         }
     }

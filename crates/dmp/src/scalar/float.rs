@@ -4,6 +4,7 @@
 //! general `exp` branches and divides. Both are replaced here by polynomials.
 
 use super::Scalar;
+use super::kernels::Tabulated;
 
 /// log2(e).
 const LOG2_E: f64 = core::f64::consts::LOG2_E;
@@ -12,7 +13,25 @@ impl Scalar for f64 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
     const MAX: Self = f64::MAX;
+    type Kernels<const N: usize> = Tabulated<Self, N>;
+    type Weight = Self;
+    const NO_WEIGHT: Self = 0.0;
     const NEGLIGIBLE_EXPONENT: Self = 37.0;
+
+    #[inline]
+    fn to_weight(self) -> Option<Self> {
+        self.is_finite().then_some(self)
+    }
+
+    #[inline]
+    fn from_weight(weight: Self) -> Self {
+        weight
+    }
+
+    #[inline]
+    fn add_weighted(self, kernel: Self, weight: Self) -> Self {
+        self + kernel * weight
+    }
 
     #[inline]
     fn from_f64(value: f64) -> Self {
@@ -93,7 +112,25 @@ impl Scalar for f32 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
     const MAX: Self = f32::MAX;
+    type Kernels<const N: usize> = Tabulated<Self, N>;
+    type Weight = Self;
+    const NO_WEIGHT: Self = 0.0;
     const NEGLIGIBLE_EXPONENT: Self = 20.0;
+
+    #[inline]
+    fn to_weight(self) -> Option<Self> {
+        self.is_finite().then_some(self)
+    }
+
+    #[inline]
+    fn from_weight(weight: Self) -> Self {
+        weight
+    }
+
+    #[inline]
+    fn add_weighted(self, kernel: Self, weight: Self) -> Self {
+        self + kernel * weight
+    }
 
     #[inline]
     fn from_f64(value: f64) -> Self {

@@ -4,11 +4,17 @@
 //! software routines with and without `std`, so that a host and a board with the same type agree bit for bit.
 
 #[cfg(feature = "fixed")]
+mod exponential;
+#[cfg(feature = "fixed")]
 mod fixed;
 mod float;
+mod kernels;
+#[cfg(feature = "fixed")]
+mod ratios;
 
 #[cfg(feature = "fixed")]
 pub use self::fixed::FixedPoint;
+pub use self::kernels::Kernels;
 
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -39,6 +45,20 @@ pub trait Scalar:
     /// A kernel that far away weighs less than the rounding error of the nearest one (about `exp(-37)` in f64,
     /// `exp(-20)` in f32), so leaving it out is not visible in the result.
     const NEGLIGIBLE_EXPONENT: Self;
+
+    /// The kernels of Eq. (2) as this type evaluates them.
+    type Kernels<const N: usize>: Kernels<Self, N>;
+    /// A weight of Eq. (2) as it is kept: hundreds of them have to fit into a small memory.
+    type Weight: Copy + Debug + PartialEq + 'static;
+    /// Weight 0.
+    const NO_WEIGHT: Self::Weight;
+
+    /// The value as a weight; `None` for what is no number, or too large to be kept.
+    fn to_weight(self) -> Option<Self::Weight>;
+    /// The value of a weight.
+    fn from_weight(weight: Self::Weight) -> Self;
+    /// `self + kernel * weight` for a kernel between 0 and 1: the sum of Eq. (2).
+    fn add_weighted(self, kernel: Self, weight: Self::Weight) -> Self;
 
     /// Nearest (or saturated) value of this type.
     fn from_f64(value: f64) -> Self;

@@ -1,4 +1,4 @@
-//! What the tests share: golden tables, primitives in any number type, rollouts that collect rows.
+//! Common parts of the tests: golden tables, primitives in any number type, rollouts that collect rows.
 
 use std::collections::HashMap;
 
@@ -130,7 +130,8 @@ impl Plan {
 
     /// The primitive in the number type `T` with critically damped rows.
     pub(crate) fn build<T: Scalar>(&self) -> Primitive<T, 100> {
-        let weights: Vec<T> = self.weights.iter().map(|&w| T::from_f64(w)).collect();
+        let weights =
+            self.weights.iter().map(|&w| T::from_f64(w).to_weight()).collect::<Option<Vec<T::Weight>>>().unwrap();
         let damping = 2.0 * self.stiffness.sqrt();
         let damping_o = self.orientation_error.critical_damping(self.stiffness);
         Primitive::new(&Tables {

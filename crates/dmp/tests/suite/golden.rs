@@ -19,7 +19,8 @@ fn basis<T: Scalar>() -> Basis<T, N> {
 }
 
 fn forcing<T: Scalar, const R: usize>(set: &str) -> ForcingTerm<T, R, N> {
-    let weights: Vec<T> = theta(set).into_iter().flatten().map(T::from_f64).collect();
+    let weights = theta(set).into_iter().flatten().map(|weight| T::from_f64(weight).to_weight());
+    let weights = weights.collect::<Option<Vec<T::Weight>>>().unwrap();
     ForcingTerm::new(basis(), &weights).unwrap()
 }
 
@@ -73,6 +74,37 @@ fn forcing_term_is_exact_even_beyond_the_last_centre() {
     assert!(f64_error < 1e-13);
     assert!(f32_error < 1e-6);
     assert!(fixed_error < 1e-5);
+}
+
+#[test]
+fn forcing_term_in_fixed_point_matches_f64_for_all_kernels() {
+    for (count, alpha, activation) in
+        [(100, 4.605, 0.7), (50, 2.3, 0.95), (7, 13.82, 0.5), (100, 6.9, 0.05), (4, 4.605, 0.7), (2, 4.605, 0.7)]
+    {
+        let canonical = CanonicalSystem::new(alpha).unwrap();
+        let fixed_canonical = CanonicalSystem::new(FixedPoint::from_f64(alpha)).unwrap();
+        let exact_basis = Basis::<f64, 100>::new(&canonical, count, activation).unwrap();
+        let basis = Basis::<_, 100>::new(&fixed_canonical, count, FixedPoint::from_f64(activation)).unwrap();
+        // The second set is as large as fixed point keeps, of one sign: what wraps shows.
+        for amplitude in [1.0, 127.99] {
+            let sign = |i: usize| if amplitude > 1.0 { -1.0 } else { (0.9 * i as f64).sin() };
+            let weights: Vec<f64> = (0..4 * count).map(|i| amplitude * sign(i)).collect();
+            let exact = ForcingTerm::<f64, 4, 100>::new(exact_basis.clone(), &weights).unwrap();
+            let fixed = weights.iter().map(|weight| FixedPoint::from_f64(*weight).to_weight());
+            let fixed = fixed.collect::<Option<Vec<i32>>>().unwrap();
+            let fixed = ForcingTerm::<FixedPoint, 4, 100>::new(basis.clone(), &fixed).unwrap();
+            let mut worst = 0.0_f64;
+            for step in 0..1500 {
+                let s = canonical.phase_at(f64::from(step) / 1000.0);
+                let (wanted, found) = (exact.evaluate(s), fixed.evaluate(FixedPoint::from_f64(s)));
+                let errors = wanted.iter().zip(found).map(|(wanted, found)| (found.to_f64() - wanted).abs());
+                worst = errors.fold(worst, f64::max);
+            }
+            println!("f(s), {count} kernels, alpha {alpha}, activation {activation}: {worst:.1e}");
+            assert!(worst < 1e-6, "{worst:e}");
+        }
+    }
+    assert!(FixedPoint::from_f64(128.0).to_weight().is_none(), "it would be cut");
 }
 
 #[test]

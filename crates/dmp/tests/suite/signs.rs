@@ -9,9 +9,9 @@ use dmp::{
     TransformationSystem,
 };
 
-type Row = Reference<f64>;
+type Sample = Reference<f64>;
 
-fn nominal(plan: &Plan, seconds: f64) -> Vec<Row> {
+fn nominal(plan: &Plan, seconds: f64) -> Vec<Sample> {
     let primitive = plan.build::<f64>();
     run(&primitive, (seconds * 300.0) as usize, DT, |_, _| Coupling::NONE)
 }
@@ -221,8 +221,8 @@ fn check_6_feedback_on_rotation_vectors_does_the_work_of_the_moment() {
             let beside = |sign: f64| chart.orientation(&std::array::from_fn(|i| y[i] + sign * step * dy[i]));
             let turn = beside(-1.0).conjugate().product(&beside(1.0)).rotation_vector();
             let power = dot(&zeta, &turn) / (2.0 * step);
-            let felt = dot(&chart.generalised(&y, &zeta), &dy);
-            assert!((power - felt).abs() < 1e-6, "at {y:?} along {dy:?}: {power} {felt}");
+            let along = dot(&chart.generalised(&y, &zeta), &dy);
+            assert!((power - along).abs() < 1e-6, "at {y:?} along {dy:?}: {power} {along}");
             // Negative control: the Jacobian where its transpose belongs does another work.
             separation = separation.max((dot(&chart.omega(&y, &zeta), &dy) - power).abs());
         }
@@ -345,11 +345,11 @@ fn check_10_reported_rates_are_the_derivatives_of_the_reported_path() {
                 continue;
             }
             for i in 0..3 {
-                let x = |row: &Row| row.poses[0].position.x[i];
-                let rate = |row: &Row| row.poses[0].position.v[i];
+                let x = |row: &Sample| row.poses[0].position.x[i];
+                let rate = |row: &Sample| row.poses[0].position.v[i];
                 v = v.max(((x(after) - x(before)) / (2.0 * dt) - rate(now)).abs());
                 a = a.max(((rate(after) - rate(before)) / (2.0 * dt) - now.poses[0].position.a[i]).abs());
-                let omega = |row: &Row| row.poses[0].orientation.omega[i];
+                let omega = |row: &Sample| row.poses[0].orientation.omega[i];
                 dw = dw.max(((omega(after) - omega(before)) / (2.0 * dt) - now.poses[0].orientation.domega[i]).abs());
             }
             let (q0, q1) = (before.poses[0].orientation.quaternion, after.poses[0].orientation.quaternion);
@@ -401,7 +401,7 @@ fn a_plan_that_settles_stays_where_its_feedback_has_bent_it() {
         };
         let (kept, freed) = (play(true), play(false));
         let (at_end, settled, sprung) = (&kept[ticks], &kept[4 * ticks - 1], &freed[4 * ticks - 1]);
-        let apart = |a: &Row, b: &Row| {
+        let apart = |a: &Sample, b: &Sample| {
             let way = (0..3).map(|i| (a.poses[0].position.x[i] - b.poses[0].position.x[i]).powi(2)).sum::<f64>().sqrt();
             let turn =
                 a.poses[0].orientation.quaternion.conjugate().product(&b.poses[0].orientation.quaternion).angle();

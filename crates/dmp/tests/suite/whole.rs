@@ -132,7 +132,8 @@ impl Case {
     /// The primitive, and its feedback.
     fn build<T: Scalar>(&self) -> Option<(Primitive<T, KERNELS>, Feedback<T>)> {
         let f = T::from_f64;
-        let weights: Vec<T> = self.weights.iter().take(ROWS * self.kernels).map(|&w| f(w)).collect();
+        let weights = self.weights.iter().take(ROWS * self.kernels).map(|&w| f(w).to_weight());
+        let weights = weights.collect::<Option<Vec<T::Weight>>>()?;
         let [k1, k2, displacement, rotation, hand, expected, recorded] = self.feedback.map(f);
         let feedback = Feedback::new([k1; 10], [k2; SENSORS], limits(displacement, rotation, hand)).ok()?;
         let expected = ExpectedWrench::new(&[[expected; SENSORS]], recorded).ok()?;
@@ -158,7 +159,7 @@ impl Case {
         Some((primitive, Feedback { expected, ..feedback }))
     }
 
-    /// How far a row of a group can get from 0: what drives it, over what a swinging system makes of it.
+    /// Largest distance of a row of a group from 0: its drive, times the overshoot of a system that swings.
     fn farthest(&self, group: usize) -> f64 {
         let (k, d) = (self.stiffness[group], self.damping[group]);
         let moves = self.duration / k * (self.duration * bounds::LARGEST_ACCELERATION + d * bounds::LARGEST_SPEED);
@@ -183,7 +184,7 @@ fn velocity<T: Scalar>(row: &[f64; 17]) -> Velocity<T> {
     Velocity { poses: [twist], points: core::array::from_fn(|i| part(6 + i)) }
 }
 
-/// What is asked of a run between two ticks.
+/// A change in flight between two ticks.
 #[derive(Clone, Debug)]
 enum Ask {
     Nothing,

@@ -2,10 +2,9 @@
 
 use control::plan::primitive::StartState;
 use dmp::Scalar;
-use hand::number::{Number, ONE, ZERO, from_real};
-use hand::{Rollout, forcing};
+use hand::number::{Number, ZERO, from_real};
 
-use crate::common::Movement;
+use crate::common::{Movement, demonstrated, step};
 
 /// The bound of the issue, rad.
 const BOUND: f64 = 5e-4;
@@ -15,9 +14,9 @@ fn error(movement: &Movement, speed: f64, gauges: impl Fn(f64) -> [f64; 3]) -> [
     let (fixed, sensed) = (movement.fixed(), movement.exact());
     let exact = sensed.movement();
     let mut reference = dmp::Rollout::start(exact, &StartState::demonstrated(exact)).expect("a start");
-    let mut rollout = Rollout::demonstrated(&fixed);
+    let mut rollout = demonstrated(&fixed);
     reference.set_speed(exact, speed).expect("a speed");
-    assert!(rollout.set_speed(&fixed, Number::from_f64(speed)));
+    rollout.set_speed(fixed.movement(), Number::from_f64(speed)).expect("a speed");
     let mut worst = [0.0_f64; 2];
     let ticks = (1.5 * f64::from(movement.duration) / speed * control::RATE) as usize;
     for tick in 0..ticks {
@@ -29,11 +28,10 @@ fn error(movement: &Movement, speed: f64, gauges: impl Fn(f64) -> [f64; 3]) -> [
         }
         let coupling = sensed.coupling(&reference, &error).expect("its own");
         let wanted = reference.step(exact, control::PERIOD, &coupling).expect("its own");
-        let zeta = rollout.feedback(&fixed, &measured.map(|torque| from_real(torque as f32)), ONE);
-        let found = rollout.step(&fixed, &zeta);
+        let found = step(&fixed, &mut rollout, &measured.map(|torque| from_real(torque as f32)));
         for digit in 0..4 {
-            worst[0] = worst[0].max((found.q[digit].to_f64() - wanted.points.x[7 + digit]).abs());
-            worst[1] = worst[1].max((found.dq[digit].to_f64() - wanted.points.v[7 + digit]).abs());
+            worst[0] = worst[0].max((found.x[digit].to_f64() - wanted.points.x[7 + digit]).abs());
+            worst[1] = worst[1].max((found.v[digit].to_f64() - wanted.points.v[7 + digit]).abs());
         }
     }
     worst
@@ -86,46 +84,6 @@ fn wide_weights_early_kernels_and_moving_starts_stay_within_the_bound() {
     assert!(x <= BOUND, "{x:e}");
 }
 
-#[test]
-fn forcing_term_matches_f64_everywhere() {
-    for (kernels, alpha, activation) in
-        [(100, 4.605, 0.7), (50, 2.3, 0.95), (7, 13.82, 0.5), (100, 6.9, 0.05), (4, 4.605, 0.7), (2, 4.605, 0.7)]
-    {
-        let canonical = dmp::CanonicalSystem::new(alpha).expect("alpha");
-        let exact = dmp::Basis::<f64, 100>::new(&canonical, kernels, activation).expect("a basis");
-        let Some(basis) = forcing::Basis::new(kernels, alpha, activation) else {
-            panic!("{kernels} kernels, alpha {alpha}, activation {activation}: refused");
-        };
-        let rows: Vec<f32> = (0..4 * kernels).map(|i| (0.9 * i as f32).sin()).collect();
-        let mut weights = [[0; 4]; 100];
-        for (i, value) in rows.iter().enumerate() {
-            weights[i % kernels][i / kernels] = forcing::weight(*value).expect("small");
-        }
-        let mut doubles = vec![0.0; 0];
-        doubles.extend(rows.iter().map(|value| f64::from(*value)));
-        let term = dmp::ForcingTerm::<f64, 4, 100>::new(exact, &doubles).expect("weights");
-        let mut worst = 0.0_f64;
-        for step in 0..3000 {
-            let u = step as f64 / 2000.0;
-            let wanted = term.evaluate(canonical.phase_at(u));
-            let found = forcing::evaluate(&basis, &weights, Number::from_f64(u));
-            for row in 0..4 {
-                worst = worst.max((found[row].to_f64() - wanted[row]).abs());
-            }
-        }
-        println!("f(s), {kernels} kernels, alpha {alpha}, activation {activation}: {worst:.1e}");
-        assert!(worst < 2e-5, "{worst:e}");
-    }
-}
-
-#[test]
-fn bases_that_the_integers_cannot_hold_are_refused() {
-    assert!(forcing::Basis::new(2, 13.8, 0.7).is_none(), "kernels that reach farther than a ratio can tell");
-    assert!(forcing::Basis::new(101, 4.6, 0.7).is_none());
-    assert!(forcing::Basis::new(1, 4.6, 0.7).is_none());
-    assert!(forcing::Basis::new(50, f64::NAN, 0.7).is_none());
-}
-
 /// Columns of a golden table.
 fn golden<const D: usize>(name: &str, columns: [&str; D]) -> Vec<(usize, [f64; D])> {
     let path = format!(concat!(env!("CARGO_MANIFEST_DIR"), "/../dmp/tests/vectors/{}.csv"), name);
@@ -162,18 +120,20 @@ fn golden_finger_rows_are_followed() {
     let forces = golden("dmp_coupling_force", ["z7", "z8", "z9"]);
     for (name, coupled) in [("dmp_nocoupling", false), ("dmp_coupling", true)] {
         let wanted = golden(name, ["f1_e", "f2_e", "f3_e"]);
-        let mut rollout = Rollout::demonstrated(&primitive);
+        let mut rollout = demonstrated(&primitive);
         let (mut tick, mut worst) = (0, 0.0_f64);
         for (at, angles) in wanted {
             loop {
                 let zeta = match forces.get(tick).filter(|_| coupled) {
-                    Some((_, zeta)) => zeta.map(Number::from_f64),
-                    None => [ZERO; 3],
+                    Some((_, [z1, z2, z3])) => [0.0, *z1, *z2, *z3].map(Number::from_f64),
+                    None => [ZERO; 4],
                 };
-                let plan = rollout.step(&primitive, &zeta);
+                let coupling = dmp::Coupling { poses: [], points: zeta };
+                let period = Number::constant(control::PERIOD);
+                let plan = rollout.step(primitive.movement(), period, &coupling).expect("its own").points;
                 tick += 1;
                 if tick > at {
-                    for (q, angle) in plan.q.iter().skip(1).zip(angles) {
+                    for (q, angle) in plan.x.iter().skip(1).zip(angles) {
                         worst = worst.max((q.to_f64() - angle).abs());
                     }
                     break;
@@ -191,12 +151,11 @@ fn a_flipped_sign_of_the_feedback_is_seen() {
     let movement = Movement::closing(50, 4.0, 0.4).feeling();
     let primitive = movement.fixed();
     let run = |sign: f64| {
-        let mut rollout = Rollout::demonstrated(&primitive);
+        let mut rollout = demonstrated(&primitive);
         for _ in 0..900 {
-            let zeta = rollout.feedback(&primitive, &[Number::from_f64(sign * 0.2); 3], ONE);
-            rollout.step(&primitive, &zeta);
+            step(&primitive, &mut rollout, &[Number::from_f64(sign * 0.2); 3]);
         }
-        rollout.step(&primitive, &[ZERO; 3]).q[1].to_f64()
+        step(&primitive, &mut rollout, &[ZERO; 3]).x[1].to_f64()
     };
     assert!((run(1.0) - run(-1.0)).abs() > 100.0 * BOUND);
     assert!(run(1.0) > run(-1.0), "a torque that opens less lets the plan close further");

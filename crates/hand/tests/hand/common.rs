@@ -1,8 +1,9 @@
 //! What the tests share: primitives as images, in fixed point and in f64.
 
 use control::plan::primitive::{MovementTables, Primitive, ROWS, configuration as rows, gains, limits, velocity};
-use hand::FingerPrimitive;
 use hand::image::ImageReader;
+use hand::number::Number;
+use hand::{FingerPrimitive, FingerTables, Rollout};
 use link::Name;
 use link::image::{
     ExpectationMarks, FeedbackClamps, Hemisphere, ImageContent, OrientationError, Waypoint, WaypointVelocity,
@@ -127,12 +128,12 @@ impl Movement {
     /// In fixed point, by way of the image.
     pub(crate) fn fixed(&self) -> Box<FingerPrimitive> {
         let image = self.image("movement");
-        let mut primitive = Box::new(FingerPrimitive::EMPTY);
+        let mut tables = Box::new(FingerTables::EMPTY);
         let mut reader = ImageReader::new(image.len() as u32);
-        image.chunks(192).for_each(|chunk| reader.take(chunk, &mut primitive));
-        if let Err(refusal) = reader.finish(&mut primitive, link::image::stored_crc(&image)) {
-            panic!("{refusal:?}");
-        }
+        image.chunks(192).for_each(|chunk| reader.take(chunk, &mut tables));
+        reader.finish(&tables, link::image::stored_crc(&image)).expect("a sound image");
+        let mut primitive = Box::new(FingerPrimitive::EMPTY);
+        primitive.assign(&tables).expect("a movement of the hand");
         primitive
     }
 
@@ -173,6 +174,22 @@ impl Movement {
         }
         primitive
     }
+}
+
+/// A run as the demonstration started, with its initial velocity.
+pub(crate) fn demonstrated(primitive: &FingerPrimitive) -> Rollout {
+    let movement = primitive.movement();
+    Rollout::start(movement, &dmp::StartState::demonstrated(movement)).expect("a start")
+}
+
+/// The plan at this tick under the feedback of these gauges.
+pub(crate) fn step(
+    primitive: &FingerPrimitive,
+    rollout: &mut Rollout,
+    gauges: &[Number; 3],
+) -> dmp::Trajectory<Number, 4> {
+    let coupling = primitive.coupling(rollout, gauges, primitive.trust(rollout));
+    rollout.step(primitive.movement(), Number::constant(control::PERIOD), &coupling).expect("its own").points
 }
 
 /// Pseudo-random numbers, always the same.

@@ -1,17 +1,20 @@
 //! The reader that never holds an image against the one that does.
 
-use hand::FingerPrimitive;
 use hand::image::{ImageReader, Summary};
+use hand::{FingerPrimitive, FingerTables};
 use link::image::{PrimitiveImage, stored_crc};
 use link::{Name, Refusal};
 
 use crate::common::{Movement, Random};
 
 fn read(image: &[u8], chunk: usize) -> Result<Summary, (Refusal, [u32; 2])> {
-    let mut primitive = Box::new(FingerPrimitive::EMPTY);
+    let mut tables = Box::new(FingerTables::EMPTY);
     let mut reader = ImageReader::new(image.len() as u32);
-    image.chunks(chunk).for_each(|part| reader.take(part, &mut primitive));
-    reader.finish(&mut primitive, stored_crc(image))
+    image.chunks(chunk).for_each(|part| reader.take(part, &mut tables));
+    let summary = reader.finish(&tables, stored_crc(image))?;
+    let mut primitive = Box::new(FingerPrimitive::EMPTY);
+    primitive.assign(&tables)?;
+    Ok(summary)
 }
 
 #[test]
@@ -35,10 +38,10 @@ fn each_damaged_byte_is_refused() {
         damaged[place] ^= 0x10;
         assert!(PrimitiveImage::parse(&damaged).is_err());
         // Announced with the check sum of what left the host, as a damaged line would have it.
-        let mut primitive = Box::new(FingerPrimitive::EMPTY);
+        let mut tables = Box::new(FingerTables::EMPTY);
         let mut reader = ImageReader::new(damaged.len() as u32);
-        reader.take(&damaged, &mut primitive);
-        let result = reader.finish(&mut primitive, stored_crc(&image));
+        reader.take(&damaged, &mut tables);
+        let result = reader.finish(&tables, stored_crc(&image));
         assert!(result.is_err(), "byte {place}");
     }
 }
@@ -101,10 +104,19 @@ fn movements_outside_the_numbers_are_refused_with_a_reason() {
         Movement { start_velocity: [99.0; 4], ..movement() },
         Movement { limit: 100.0, ..movement() },
         Movement { k1: vec![[-1.0; 3]; 2], k2: vec![[1.0; 3]; 2], ..movement() },
-        Movement { expected: vec![[1e4; 3]; 4], ..movement() },
+        Movement { expected: vec![[2e5; 3]; 4], ..movement() },
     ] {
         assert_eq!(refused(unfit), Refusal::PrimitiveInvalid);
     }
+}
+
+#[test]
+fn a_refused_upload_leaves_the_movement_that_was_there() {
+    let mut primitive = Movement::closing(10, 5.0, 0.3).feeling().fixed();
+    let sound = FingerTables { duration: 5.0, ..FingerTables::EMPTY };
+    assert!(primitive.assign(&sound).is_err(), "no kernels");
+    assert!(primitive.is_whole() && primitive.has_expectation());
+    assert_eq!(primitive.movement().basis().count(), 10);
 }
 
 #[test]

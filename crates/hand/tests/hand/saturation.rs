@@ -9,10 +9,9 @@ use hand::filter::{GAUGE, LowPass};
 use hand::limit::{HandLimiter, Scales};
 use hand::motion::HandMotion;
 use hand::number::{Number, share, within};
-use hand::{Rollout, forcing};
 use puck::Counts;
 
-use crate::common::{Movement, Random};
+use crate::common::{Movement, Random, demonstrated};
 
 /// Cases of each test.
 const CASES: usize = 1_000_000;
@@ -109,50 +108,24 @@ fn a_torque_points_where_wide_arithmetic_says_whatever_the_error() {
 }
 
 #[test]
-fn a_million_random_progresses_and_weights_stay_below_the_largest_weight() {
-    let mut random = Random(4);
-    let mut basis = forcing::Basis::new(50, 4.605, 0.7).expect("a basis");
-    let mut weights = Box::new([[0; 4]; 100]);
-    for case in 0..CASES {
-        if case % 1000 == 0 {
-            let kernels = 2 + (random.bits() % 99) as usize;
-            let alpha = 8.06 + 5.76 * random.unit();
-            if let Some(found) = forcing::Basis::new(kernels, alpha, 0.5 + 0.45 * random.unit()) {
-                basis = found;
-            }
-            // Every weight at an end of its range.
-            for weight in weights.iter_mut().flatten() {
-                *weight = if random.bits().is_multiple_of(2) { i32::MAX } else { -i32::MAX };
-            }
-        }
-        let u = any(&mut random);
-        let f = forcing::evaluate(&basis, &weights, u);
-        // A weighted mean of weights of at most 128, times s <= 1.
-        assert!(f.iter().all(|f| f.to_f64().abs() <= 128.001), "u = {u:?}: {f:?}");
-    }
-}
-
-#[test]
 fn a_rollout_under_random_feedback_never_turns_its_torque_round() {
     let mut random = Random(5);
     let movement = Movement::closing(50, 2.0, 0.4).feeling();
     let primitive = movement.fixed();
     let bound = movement.limit * movement.stiffness;
-    let mut rollout = Rollout::demonstrated(&primitive);
+    let mut rollout = demonstrated(&primitive);
     for case in 0..CASES {
         if case % 5000 == 0 {
-            rollout = Rollout::start(
-                &primitive,
-                &core::array::from_fn(|_| within(any(&mut random), Number::ONE)),
-                Number::ONE,
-            );
+            let start = core::array::from_fn(|_| within(any(&mut random), Number::ONE));
+            rollout = primitive.run(&start, Number::ONE).expect("a start");
         }
         let gauges = [any(&mut random), any(&mut random), any(&mut random)];
-        let zeta = rollout.feedback(&primitive, &gauges, Number::ONE);
-        assert!(zeta.iter().all(|zeta| zeta.to_f64().abs() <= f64::from(bound) + 1e-6), "{zeta:?}");
-        let plan = rollout.step(&primitive, &zeta);
+        let zeta = primitive.coupling(&rollout, &gauges, Number::ONE);
+        assert!(zeta.points.iter().all(|zeta| zeta.to_f64().abs() <= f64::from(bound) + 1e-6), "{zeta:?}");
+        let period = Number::constant(control::PERIOD);
+        let plan = rollout.step(primitive.movement(), period, &zeta).expect("its own").points;
         // Feedback at its limit displaces by half a radian at rest, transients by a little more.
-        assert!(plan.q.iter().all(|q| q.to_f64().abs() < 6.0), "{plan:?}");
+        assert!(plan.x.iter().all(|q| q.to_f64().abs() < 6.0), "{plan:?}");
     }
 }
 

@@ -19,8 +19,8 @@ use std::time::Duration;
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
 use link::message::{DeviceHello, HostHello};
 use link::{
-    Capabilities, Event, LINK_VERSION, LinkCounters, Listing, Refusal, Reply, Request, SCHEMA_HASH, Statistics, Status,
-    Telemetry, Text,
+    Event, LINK_VERSION, LinkCounters, Listing, Refusal, Reply, Request, SCHEMA_HASH, Statistics, Status, Telemetry,
+    Text,
 };
 
 use crate::error::{Capability, HostError};
@@ -196,12 +196,7 @@ impl<T: Transport> Client<T> {
     /// # Errors
     /// [`HostError::Lacks`]
     pub fn require(&self, capability: Capability) -> Result<(), HostError> {
-        let Capabilities { arm, hand, wrench: _ } = self.hello.capabilities;
-        let there = match capability {
-            Capability::Arm => arm,
-            Capability::Hand => hand,
-        };
-        if there { Ok(()) } else { Err(HostError::Lacks(capability)) }
+        capability.of(self.hello.capabilities)
     }
 
     /// Ends waiting, and stops the arm, when the user interrupts.

@@ -1,6 +1,10 @@
 //! Names, units and order of the columns of a recording: one layout to write, two spellings to read.
 //!
-//! `docs/recording-format.md` describes the same for people; a test keeps the two equal.
+//! The table in `docs/recording-format.md` is written from [`LAYOUT`] by
+//! `UPDATE_DOCUMENTS=1 cargo test -p lab --test recording`.
+
+use control::State;
+use link::Telemetry;
 
 /// Joints of the arm.
 pub const JOINTS: usize = 7;
@@ -37,56 +41,149 @@ pub const GAUGES: [&str; 3] = ["gauge1_Nm", "gauge2_Nm", "gauge3_Nm"];
 /// Column of the statistic of the watch for unusual runs.
 pub const SURPRISE: &str = "surprise";
 
-/// `q1_rad` and so on: the name of one joint's column.
-pub fn joint_column(symbol: &str, joint: usize, unit: &str) -> String {
-    format!("{symbol}{}_{unit}", joint + 1)
+/// Columns of the joint angles.
+pub const JOINT_POSITIONS: [&str; JOINTS] = ["q1_rad", "q2_rad", "q3_rad", "q4_rad", "q5_rad", "q6_rad", "q7_rad"];
+/// Columns of the joint velocities.
+pub const JOINT_VELOCITIES: [&str; JOINTS] =
+    ["dq1_rad_s", "dq2_rad_s", "dq3_rad_s", "dq4_rad_s", "dq5_rad_s", "dq6_rad_s", "dq7_rad_s"];
+/// Columns of the joint torques commanded on the bus.
+pub const JOINT_TORQUES: [&str; JOINTS] = ["tau1_Nm", "tau2_Nm", "tau3_Nm", "tau4_Nm", "tau5_Nm", "tau6_Nm", "tau7_Nm"];
+
+/// One line of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordingRow {
+    /// Time since the first line, s.
+    pub time: f64,
+    /// Tool frame computed from the joint angles: x, y, z (m, world), w, x, y, z.
+    pub pose: [f64; 7],
+    /// Everything else, as the device told it.
+    pub telemetry: Telemetry,
 }
 
-/// Columns of the joint angles, rad.
-pub fn joint_positions() -> [String; JOINTS] {
-    std::array::from_fn(|joint| joint_column("q", joint, "rad"))
+impl RecordingRow {
+    /// State of the supervisor, a word.
+    pub fn state(&self) -> &'static str {
+        State::from_code(self.telemetry.state).map_or("unknown", State::name)
+    }
 }
 
-/// Columns of the joint velocities, rad/s.
-pub fn joint_velocities() -> [String; JOINTS] {
-    std::array::from_fn(|joint| joint_column("dq", joint, "rad_s"))
+/// Columns of one quantity.
+#[derive(Debug, Clone, Copy)]
+pub struct Quantity {
+    /// Names of the columns.
+    pub columns: &'static [&'static str],
+    /// Unit, 1 for a number without one.
+    pub unit: &'static str,
+    /// Meaning, for `docs/recording-format.md`.
+    pub meaning: &'static str,
+    /// Fields of the columns for one row, separated by commas.
+    pub fields: fn(&RecordingRow) -> String,
 }
 
-/// Columns of the joint torques commanded on the bus, N m.
-pub fn joint_torques() -> [String; JOINTS] {
-    std::array::from_fn(|joint| joint_column("tau", joint, "Nm"))
+const fn quantity(
+    columns: &'static [&'static str],
+    unit: &'static str,
+    meaning: &'static str,
+    fields: fn(&RecordingRow) -> String,
+) -> Quantity {
+    Quantity { columns, unit, meaning, fields }
 }
+
+fn list<T: ToString>(values: &[T]) -> String {
+    values.iter().map(T::to_string).collect::<Vec<_>>().join(",")
+}
+
+/// Every quantity of our own layout in the order of its columns: what is written, in the file and in the document.
+pub const LAYOUT: &[Quantity] = &[
+    quantity(
+        &[CYCLE],
+        "1",
+        "number of the control cycle on the device, 300 a second; a step of more than one is a gap",
+        |row| row.telemetry.cycle.to_string(),
+    ),
+    quantity(&[TIME], "s", "time since the first line, computed from `cycle`", |row| row.time.to_string()),
+    quantity(
+        &[STATE],
+        "word",
+        "state of the supervisor: `idle`, `gravity`, `hold`, `approach`, `run`, `coast`, `soft stop`, \
+         `fault`",
+        |row| row.state().to_owned(),
+    ),
+    quantity(&["fault"], "1", "code of the latched fault, 0 for none", |row| row.telemetry.fault.to_string()),
+    quantity(&[FLAGS], "1", "flag bits of the cycle record, see `control::cycle::record::flags`", |row| {
+        row.telemetry.flags.to_string()
+    }),
+    quantity(&[PHASE], "1", "phase s of the movement: 1 at its start, towards 0 at its end, 0 outside a run", |row| {
+        row.telemetry.phase.to_string()
+    }),
+    quantity(&JOINT_POSITIONS, "rad", "measured joint angles", |row| list(&row.telemetry.q)),
+    quantity(&JOINT_VELOCITIES, "rad/s", "estimated joint velocities", |row| list(&row.telemetry.dq)),
+    quantity(&JOINT_TORQUES, "N m", "joint torques sent on the bus, after all limits", |row| list(&row.telemetry.tau)),
+    quantity(&POSITION, "m", "position of the tool frame, world; computed by the host from `q`", |row| {
+        list(&row.pose[..3])
+    }),
+    quantity(
+        &ORIENTATION,
+        "1",
+        "orientation of the tool frame, unit quaternion tool to world; computed by the host from `q`",
+        |row| list(&row.pose[3..]),
+    ),
+    quantity(&POSITION_D, "m", "desired position; the measured one where nothing is desired", |row| {
+        list(&row.telemetry.pose_d[..3])
+    }),
+    quantity(&ORIENTATION_D, "1", "desired orientation", |row| list(&row.telemetry.pose_d[3..])),
+    quantity(
+        &["fx_N", "fy_N", "fz_N"],
+        "N",
+        "force of the environment on the robot, world axes, filtered, tared",
+        |row| list(&row.telemetry.wrench[..3]),
+    ),
+    quantity(
+        &["tx_Nm", "ty_Nm", "tz_Nm"],
+        "N m",
+        "torque of the environment on the robot about the grasp point, tool axes",
+        |row| list(&row.telemetry.wrench[3..]),
+    ),
+    quantity(&["lost_replies"], "1", "position replies that were missing in this cycle, 0 to 7", |row| {
+        row.telemetry.lost_replies.to_string()
+    }),
+    quantity(&["cost_ticks"], "1", "cost of the control cycle in ticks of the device's clock", |row| {
+        row.telemetry.cost_ticks.to_string()
+    }),
+    quantity(&HAND, "rad", "measured hand: spread and inner links of the fingers; 0 without a hand", |row| {
+        list(&row.telemetry.hand)
+    }),
+    quantity(&HAND_D, "rad", "desired hand; the measured one where nothing is desired", |row| {
+        list(&row.telemetry.hand_d)
+    }),
+    quantity(
+        &GAUGES,
+        "N m",
+        "torque of the environment on each finger about its outer joint, by the strain gauges, filtered, \
+         tared: negative when it closes on an object",
+        |row| list(&row.telemetry.gauges),
+    ),
+    quantity(
+        &[SURPRISE],
+        "1",
+        "how much this run differs from the successful ones before it; 0 when nothing is compared",
+        |row| row.telemetry.surprise.to_string(),
+    ),
+];
 
 /// Every column of our own layout in its order.
-pub fn header() -> Vec<String> {
-    let mut names: Vec<String> = [CYCLE, TIME, STATE, "fault", FLAGS, PHASE].map(String::from).to_vec();
-    names.extend(joint_positions());
-    names.extend(joint_velocities());
-    names.extend(joint_torques());
-    names.extend(POSITION.map(String::from));
-    names.extend(ORIENTATION.map(String::from));
-    names.extend(POSITION_D.map(String::from));
-    names.extend(ORIENTATION_D.map(String::from));
-    names.extend(WRENCH.map(String::from));
-    names.extend(["lost_replies", "cost_ticks"].map(String::from));
-    // Appended: recordings of the time before the hand have none of these.
-    names.extend(HAND.map(String::from));
-    names.extend(HAND_D.map(String::from));
-    names.extend(GAUGES.map(String::from));
-    names.push(SURPRISE.to_owned());
-    names
+pub fn header() -> Vec<&'static str> {
+    LAYOUT.iter().flat_map(|quantity| quantity.columns).copied().collect()
 }
 
 /// The name a column should have had, if `name` is a known quantity with another unit.
 pub fn intended(name: &str) -> Option<String> {
-    let known = header()
-        .into_iter()
-        .chain(POSITION_ALIAS.map(String::from))
-        .filter(|known| !matches!(known.as_str(), "lost_replies" | "cost_ticks"));
+    let known =
+        header().into_iter().chain(POSITION_ALIAS).filter(|known| !matches!(*known, "lost_replies" | "cost_ticks"));
     let stem = |text: &str| text.split('_').next().unwrap_or_default().to_owned();
     for candidate in known {
         let desired = candidate.contains("_d_") || candidate.ends_with("_d");
-        if !desired && candidate != name && candidate.contains('_') && stem(name) == stem(&candidate) {
+        if !desired && candidate != name && candidate.contains('_') && stem(name) == stem(candidate) {
             // `x_d_m` shares its stem with `x_m` but is a column of its own, `x_extra` is nobody's.
             let unit = &name[stem(name).len()..];
             let is_unit = matches!(
@@ -109,7 +206,7 @@ pub fn intended(name: &str) -> Option<String> {
                     | "_rad_s"
             );
             if is_unit {
-                return Some(candidate);
+                return Some(candidate.to_owned());
             }
         }
     }

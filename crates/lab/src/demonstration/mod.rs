@@ -11,8 +11,9 @@ pub mod resample;
 pub mod writer;
 
 pub use error::{DemonstrationError, Place, RecordingError};
+pub use layout::RecordingRow;
 pub use recording::{FEWEST_SAMPLES, Recording};
-pub use writer::{RecordingRow, RecordingWriter};
+pub use writer::RecordingWriter;
 
 use crate::arm;
 

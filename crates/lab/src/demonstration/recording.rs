@@ -94,9 +94,9 @@ impl Recording {
         if table.column(layout::TIME).is_none() {
             missing.push(layout::TIME.to_owned());
         }
-        let q = table.vectors(&layout::joint_positions(), &mut missing);
-        let dq = table.vectors(&layout::joint_velocities(), &mut missing);
-        let tau = table.vectors(&layout::joint_torques(), &mut missing);
+        let q = table.vectors(&layout::JOINT_POSITIONS, &mut missing);
+        let dq = table.vectors(&layout::JOINT_VELOCITIES, &mut missing);
+        let tau = table.vectors(&layout::JOINT_TORQUES, &mut missing);
         let has_alias = layout::POSITION_ALIAS.iter().any(|name| table.column(name).is_some());
         let position_names = if has_alias { layout::POSITION_ALIAS } else { layout::POSITION };
         let position = table.vectors(&position_names, &mut missing);

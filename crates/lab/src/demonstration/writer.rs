@@ -4,48 +4,7 @@
 
 use std::io::{self, Write};
 
-use super::layout;
-
-/// One line of a recording; what it holds, in which unit and frame, is described in `docs/recording-format.md`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RecordingRow {
-    /// Number of the control cycle.
-    pub cycle: u32,
-    /// Time since the first line, s.
-    pub time: f64,
-    /// State of the supervisor, one lower-case word.
-    pub state: &'static str,
-    /// Stable code of the latched fault, 0 for none.
-    pub fault: u8,
-    /// Flags of the telemetry message.
-    pub flags: u32,
-    /// Phase of the movement.
-    pub phase: f32,
-    /// Joint angles, rad.
-    pub q: [f32; layout::JOINTS],
-    /// Joint velocities, rad/s.
-    pub dq: [f32; layout::JOINTS],
-    /// Joint torques commanded on the bus, N m.
-    pub tau: [f32; layout::JOINTS],
-    /// Tool frame computed from `q`: x, y, z (m, world), w, x, y, z.
-    pub pose: [f64; 7],
-    /// Desired tool frame: x, y, z (m, world), w, x, y, z.
-    pub pose_d: [f32; 7],
-    /// Wrench of the environment on the robot: force N (world axes), torque N m.
-    pub wrench: [f32; 6],
-    /// Position replies that were missing in this cycle.
-    pub lost_replies: u8,
-    /// Cost of the control cycle in ticks of the device's clock.
-    pub cost_ticks: u32,
-    /// Measured hand: spread and fingers 1 to 3, rad.
-    pub hand: [f32; 4],
-    /// Desired hand: spread and fingers 1 to 3, rad.
-    pub hand_d: [f32; 4],
-    /// Torque of the environment on fingers 1 to 3, N m.
-    pub gauges: [f32; 3],
-    /// Statistic of the watch for unusual runs.
-    pub surprise: f32,
-}
+use super::layout::{self, RecordingRow};
 
 /// A recording that is being written.
 #[derive(Debug)]
@@ -72,22 +31,8 @@ impl<W: Write> RecordingWriter<W> {
     /// # Errors
     /// The output's error.
     pub fn write(&mut self, row: &RecordingRow) -> io::Result<()> {
-        let output = &mut self.output;
-        write!(output, "{},{},{},{},{},{}", row.cycle, row.time, row.state, row.fault, row.flags, row.phase)?;
-        for value in row.q.iter().chain(&row.dq).chain(&row.tau) {
-            write!(output, ",{value}")?;
-        }
-        for value in &row.pose {
-            write!(output, ",{value}")?;
-        }
-        for value in row.pose_d.iter().chain(&row.wrench) {
-            write!(output, ",{value}")?;
-        }
-        write!(output, ",{},{}", row.lost_replies, row.cost_ticks)?;
-        for value in row.hand.iter().chain(&row.hand_d).chain(&row.gauges).chain([&row.surprise]) {
-            write!(output, ",{value}")?;
-        }
-        writeln!(output)?;
+        let fields: Vec<String> = layout::LAYOUT.iter().map(|quantity| (quantity.fields)(row)).collect();
+        writeln!(self.output, "{}", fields.join(","))?;
         self.rows += 1;
         Ok(())
     }

@@ -3,14 +3,13 @@
 use std::io::Write;
 use std::time::Duration;
 
-use control::State;
 use link::{Event, Telemetry};
 
 use super::ProcedureError;
 use crate::arm;
 use crate::client::{Client, Incoming};
 use crate::demonstration::RATE;
-use crate::demonstration::writer::{RecordingRow, RecordingWriter};
+use crate::demonstration::{RecordingRow, RecordingWriter};
 use crate::device::Device;
 
 /// Silence on the stream after which the device counts as lost.
@@ -31,26 +30,7 @@ pub fn recording_row(telemetry: &Telemetry, first: u32) -> RecordingRow {
     let mut pose = [0.0; 7];
     pose[..3].copy_from_slice(&position);
     pose[3..].copy_from_slice(&orientation);
-    RecordingRow {
-        cycle: telemetry.cycle,
-        time: f64::from(telemetry.cycle.wrapping_sub(first)) / RATE,
-        state: State::from_code(telemetry.state).map_or("unknown", State::name),
-        fault: telemetry.fault,
-        flags: telemetry.flags,
-        phase: telemetry.phase,
-        q: telemetry.q,
-        dq: telemetry.dq,
-        tau: telemetry.tau,
-        pose,
-        pose_d: telemetry.pose_d,
-        wrench: telemetry.wrench,
-        lost_replies: telemetry.lost_replies,
-        cost_ticks: telemetry.cost_ticks,
-        hand: telemetry.hand,
-        hand_d: telemetry.hand_d,
-        gauges: telemetry.gauges,
-        surprise: telemetry.surprise,
-    }
+    RecordingRow { time: f64::from(telemetry.cycle.wrapping_sub(first)) / RATE, pose, telemetry: *telemetry }
 }
 
 /// The text of a recording of these cycles.

@@ -70,10 +70,10 @@ pub fn after(code: u16, detail: u32) -> Result<(), ProcedureError> {
     let state = u8::try_from(code).ok().and_then(State::from_code);
     let fault = u8::try_from(detail).ok().and_then(Fault::from_code).unwrap_or(Fault::None);
     match state {
-        Some(State::Idle | State::SoftStop | State::Fault) if fault != Fault::None => {
+        Some(State::Idle | State::SoftStop | State::Lower | State::Fault) if fault != Fault::None => {
             Err(ProcedureError::Stopped(fault))
         }
-        Some(state @ (State::Idle | State::SoftStop | State::Fault | State::Gravity)) => {
+        Some(state @ (State::Idle | State::SoftStop | State::Lower | State::Fault | State::Gravity)) => {
             Err(ProcedureError::Diverted(state.name()))
         }
         _ => Ok(()),

@@ -45,7 +45,9 @@ impl FaultScript {
         let scenario = number.checked_sub(1).and_then(|index| file.scenario.into_iter().nth(index));
         let scenario = scenario.ok_or_else(|| failed(format!("there is no scenario {number}")))?;
         if scenario.inject.is_empty() {
-            return Err(failed(format!("scenario {number} has no faults: what befalls the arm there comes from the host")));
+            return Err(failed(format!(
+                "scenario {number} has no faults: what befalls the arm there comes from the host"
+            )));
         }
         Ok(Self { is_from_power_up: scenario.from == "power-up", injections: scenario.inject })
     }

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use control::{CycleRecord, LoadRefusal};
 use device::time::{CYCLE_SLOTS, SLOT_HZ};
 use device::{
-    Command, Controller, ControllerIo, DeviceController, Event, FitPrimitive, Health, QueueFull, SessionPort,
+    CheckedPrimitive, Command, Controller, ControllerIo, DeviceController, Event, Health, QueueFull, SessionPort,
     TimedRecord, Timing,
 };
 use puck::CanFrame;
@@ -98,7 +98,7 @@ impl SessionPort<DeviceController> for Port<'_> {
         Ok(())
     }
 
-    fn load(&mut self, fit: &FitPrimitive<'_>) -> Result<(), LoadRefusal> {
+    fn load(&mut self, fit: &CheckedPrimitive<'_>) -> Result<(), LoadRefusal> {
         self.core.load(fit)
     }
 

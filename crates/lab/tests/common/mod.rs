@@ -4,8 +4,10 @@
 
 use std::path::{Path, PathBuf};
 
+use control::State;
 use lab::arm;
 use lab::demonstration::{RecordingRow, RecordingWriter};
+use link::Telemetry;
 
 /// Posture at the start of the movement, rad: hand in front of the shoulder.
 pub(crate) const START: [f64; 7] = [-0.3, 0.5, 0.1, 1.9, 0.2, -0.6, 0.1];
@@ -37,26 +39,22 @@ pub(crate) fn rows(duration: f64) -> Vec<RecordingRow> {
             let (position, orientation) = arm::tool_pose(&q);
             let pose =
                 [position[0], position[1], position[2], orientation[0], orientation[1], orientation[2], orientation[3]];
-            RecordingRow {
+            let telemetry = Telemetry {
                 cycle: 1000 + cycle,
-                time,
-                state: "gravity",
-                fault: 0,
-                flags: 0,
-                phase: 0.0,
+                state: State::Gravity.code(),
                 q: q.map(|value| value as f32),
                 dq: std::array::from_fn(|joint| ((ahead[joint] - q[joint]) / 1e-4) as f32),
                 tau: [0.0, 20.0, 0.0, 5.0, 0.0, 0.5, 0.0],
-                pose,
                 pose_d: pose.map(|value| value as f32),
                 wrench: [0.5, -0.25, 1.0, 0.0, 0.0, 0.125],
-                lost_replies: 0,
                 cost_ticks: 20_000,
                 hand: [0.0, 0.25, 0.5, 0.75],
                 hand_d: [0.0, 0.25, 0.5, 1.0],
                 gauges: [0.0, -0.5, 0.125],
                 surprise: 1.5,
-            }
+                ..Telemetry::default()
+            };
+            RecordingRow { time, pose, telemetry }
         })
         .collect()
 }

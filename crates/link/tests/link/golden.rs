@@ -79,13 +79,36 @@ fn hash_of(text: &str) -> u32 {
     text.bytes().fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
 }
 
+/// Names and types of the telemetry, as its struct says, for the table of `docs/protocol.md`.
+fn telemetry_fields() -> String {
+    let source = include_str!("../../src/report.rs").replace('\r', "");
+    let (_, after) = source.split_once("pub struct Telemetry {\n").expect("the struct");
+    let (fields, _) = after.split_once("\n}").expect("its end");
+    let field = |line: &str| {
+        let (name, kind) = line.trim().strip_prefix("pub ")?.strip_suffix(',')?.split_once(": ")?;
+        let array = kind.strip_prefix('[').and_then(|kind| kind.strip_suffix(']')?.split_once("; "));
+        Some(array.map_or(format!("{name} {kind}"), |(kind, count)| format!("{name} {count} {kind}")))
+    };
+    fields.lines().filter_map(field).collect::<Vec<_>>().join(", ")
+}
+
+/// Line of `docs/protocol.md` with the fields of the telemetry.
+fn telemetry_line() -> String {
+    format!("| 7 | Telemetry | {} |", telemetry_fields())
+}
+
 /// Writes the schema text, and its hash into the documents in place of the old one.
 fn update(root: &Path, expected: &str) {
     std::fs::write(root.join("crates/link/src/schema.txt"), expected).unwrap();
     for document in WITH_HASH {
         let text = std::fs::read_to_string(root.join(document)).unwrap();
         let (old, new) = (format!("{SCHEMA_HASH:#010x}"), format!("{:#010x}", hash_of(expected)));
-        std::fs::write(root.join(document), text.replace(&old, &new)).unwrap();
+        let text: Vec<String> = text
+            .replace(&old, &new)
+            .split_inclusive('\n')
+            .map(|line| if line.starts_with("| 7 | Telemetry |") { telemetry_line() + "\n" } else { line.to_owned() })
+            .collect();
+        std::fs::write(root.join(document), text.concat()).unwrap();
     }
 }
 
@@ -108,6 +131,8 @@ fn every_layout_is_the_one_in_the_schema_text_and_its_hash_in_the_documents() {
     for document in WITH_HASH {
         assert!(read(document).contains(&hash), "{document} should show {hash}");
     }
+    let line = telemetry_line();
+    assert!(read("docs/protocol.md").contains(&line), "docs/protocol.md should show: {line}");
 }
 
 #[test]

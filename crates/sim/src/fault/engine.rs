@@ -191,7 +191,8 @@ impl Faults {
 
     /// Delay of packed torques beyond the plant's own.
     pub(crate) fn torque_delay(&self) -> Ticks {
-        let delays = self.present().map(|order| if let FaultKind::TorqueDelay(by) = order.kind { ticks(by) } else { 0 });
+        let delays =
+            self.present().map(|order| if let FaultKind::TorqueDelay(by) = order.kind { ticks(by) } else { 0 });
         delays.sum()
     }
 

@@ -8,8 +8,8 @@ use crate::board::LinkPort;
 /// Bytes the transmitter holds: 22 ms of a full line, several of the longest messages.
 const TRANSMIT_DEPTH: u64 = 2048;
 
-/// Bits per second of the line: 921 600 at 300 Hz. At another rate the telemetry of a control period still fits.
-const BAUD: u32 = 3_072 * control::RATE_HZ;
+/// Bits per second of the line.
+const BAUD: u32 = 921_600;
 
 /// Ticks of one byte on the line: start bit, eight bits, stop bit; rounded up, so that the transmitter is never faster
 /// than the line.

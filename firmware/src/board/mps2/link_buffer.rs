@@ -1,4 +1,4 @@
-//! What the host has sent and nobody has fetched.
+//! `Buffer`: bytes from the host that the session has not fetched yet.
 
 /// Received bytes held until the session fetches them: 11 ms of a full line.
 const DEPTH: usize = 1024;

@@ -22,7 +22,7 @@ const REPLY_BYTES: usize = 32;
 /// Set while an exchange is under way. A failure in the middle leaves the streams out of step for good.
 static BROKEN: AtomicBool = AtomicBool::new(false);
 
-/// What the image tells the simulator.
+/// A message of the image to the simulator.
 pub(super) enum Request<'a> {
     /// A frame for the bus.
     Send(&'a CanFrame),
@@ -47,7 +47,7 @@ pub(super) enum FlashRequest<'a> {
     Erase(u32),
 }
 
-/// What the flash answers beside bytes.
+/// The flash's answer beside bytes.
 #[derive(Clone, Copy)]
 pub(super) struct FlashReply {
     /// Tick at which the operation is over.
@@ -56,7 +56,7 @@ pub(super) struct FlashReply {
     pub(super) status: u8,
 }
 
-/// What the simulator answers.
+/// The simulator's answer.
 pub(super) struct Reply {
     /// A frame arrived.
     pub(super) received: Option<CanFrame>,

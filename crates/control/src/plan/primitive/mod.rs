@@ -83,7 +83,7 @@ impl<T: Scalar> Feedback<T> {
 /// For f32 and N = 100 about 23 kB: keep it in a static or behind a reference on a small stack, and fill it there with
 /// [`Primitive::assign`] and the other `assign_` functions.
 #[derive(Debug, PartialEq)]
-pub struct Primitive<T, const N: usize> {
+pub struct Primitive<T: Scalar, const N: usize> {
     movement: Movement<T, N>,
     // An empty table stands for one that is not there: an `Option` of kilobytes would be moved through the stack.
     feedback: Feedback<T>,

@@ -12,7 +12,7 @@ use crate::session::arm::saving::Change;
 use crate::store::Store;
 
 impl<S: Store> ArmApplication<S> {
-    /// What is known of the arm's zero.
+    /// Returns the home of the arm and where its zero is.
     pub(super) fn calibration(&self, of: u16, port: &mut impl SessionPort<DeviceController>) -> Result<Reply, Refused> {
         self.need_open()?;
         let calibration = self.store.home().calibration(port.health().zeroed_at);

@@ -1,4 +1,4 @@
-//! What the store holds, by name: read once at start-up, kept up to date by the session.
+//! `Directory`: the content of the store by name, read once at start-up, kept up to date by the session.
 //!
 //! Checking an image costs a check sum over all its bytes; looking a name up must not.
 

@@ -45,10 +45,10 @@ impl<S: Store> Session<S> {
     }
 }
 
-/// What an arm's session has beside the conversation with its host.
+/// The part of an arm's session beside the conversation with its host.
 #[derive(Debug)]
 pub struct ArmApplication<S> {
-    /// What is mounted on the arm that primitives are checked against, and that arm.
+    /// Payload of the arm that primitives are checked against; the model below is that arm.
     payload: Payload,
     model: ArmModel<f32>,
     store: S,

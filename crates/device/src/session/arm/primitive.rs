@@ -11,7 +11,7 @@ use link::image::{
 };
 
 use crate::application::Refused;
-use crate::port::{FitPrimitive, StoredPrimitive};
+use crate::port::{CheckedPrimitive, StoredPrimitive};
 use crate::recorded_filter::{self, OtherFilter};
 use crate::wire::PrimitiveTrouble;
 
@@ -60,7 +60,7 @@ pub(crate) fn build<'a>(
     content: &ImageContent<Reals<'_>>,
     weights_buffer: &mut WeightBuffer,
     primitive: &'a mut StoredPrimitive,
-) -> Result<FitPrimitive<'a>, Unfit> {
+) -> Result<CheckedPrimitive<'a>, Unfit> {
     let recorded = !content.expected_mean.is_empty() || !content.experience_mean.is_empty();
     if recorded {
         recorded_filter::check(content.marks.filter_cutoff).map_err(Unfit::Filter)?;

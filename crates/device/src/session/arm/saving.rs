@@ -12,13 +12,13 @@ use crate::store::{Store, StoreError};
 /// it; one that must first be repaired takes seconds, and then the host is told so instead of waiting.
 const OPENING_TIMEOUT_MS: u32 = 1000;
 
-/// What changes.
+/// A change that is being saved.
 #[derive(Debug)]
 pub(super) enum Change {
     /// A place of the library.
     Place {
         slot: u8,
-        /// What will stand there: nothing after a delete.
+        /// The new entry: none after a delete.
         entry: Option<Entry>,
         /// The primitive that was built is still that of the image.
         built: bool,

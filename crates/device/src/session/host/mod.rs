@@ -28,7 +28,7 @@ use owner::Owner;
 use pending::{Pending, Requester};
 use upload::Upload;
 
-/// Room the session keeps free on the line for an answer before it sends telemetry.
+/// Bytes that the session keeps free on the line for an answer before it sends telemetry.
 const ANSWER_ROOM: usize = FRAME_BYTES;
 
 /// Who the device is, for its hello.

@@ -3,7 +3,7 @@
 use link::Reply;
 use link::frame::LINK_TIMEOUT_MS;
 
-/// What to do with a request, by its number.
+/// Treatment of a request, by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum RequestOrder {
     /// Handle it.
@@ -39,7 +39,7 @@ impl Owner {
         now_ms.wrapping_sub(self.heard_ms)
     }
 
-    /// How long another host must wait to take over, ms; 0 if it need not.
+    /// Time that another host must wait to take over, ms; 0 if it need not.
     pub(super) fn protected_for(&self, now_ms: u32) -> u32 {
         LINK_TIMEOUT_MS.saturating_sub(self.silence(now_ms))
     }

@@ -15,7 +15,7 @@ pub const HSE_HZ: u32 = 8_000_000;
 /// temperature, so the bus cannot be driven by it.
 pub const HSI_HZ: u32 = 64_000_000;
 
-/// How long HSE may take before the light begins to blink, us: a clock that is there is ready within microseconds.
+/// Longest wait for HSE before the light begins to blink, us: a clock that is there is ready within microseconds.
 pub const HSE_SOON_US: u32 = 2_000;
 
 /// Half a period of that blinking, us: 10 Hz, which nobody takes for the steady light of torque.
@@ -57,7 +57,7 @@ impl PhaseLockedLoop {
 /// the start-up would wait for it for ever.
 pub const MEDIUM_OSCILLATOR_HZ_LIMIT: u32 = 420_000_000;
 
-/// Core and CAN.
+/// Clock of processor and CAN.
 pub const PLL1: PhaseLockedLoop = PhaseLockedLoop { input_divider: 1, multiplier: 100, p: Some(2), q: Some(10) };
 
 /// USB and the serial line.
@@ -71,7 +71,7 @@ const fn output(pll: &PhaseLockedLoop, divider: Option<u32>) -> u32 {
     }
 }
 
-/// Core clock, Hz. 400 MHz is the most at voltage scale 1, which every revision of the chip has: 480 MHz needs scale 0
+/// Clock of the processor, Hz. 400 MHz is the most at voltage scale 1, which every revision of the chip has: 480 MHz needs scale 0
 /// and revision V. The control slot has 444 000 cycles at 400 MHz and needs a tenth of that.
 pub const CORE_HZ: u32 = output(&PLL1, PLL1.p);
 

@@ -1,4 +1,4 @@
-//! What lies where: code in bank 1 of the flash and in ITCM, stack and the control half in DTCM, the rest in AXI
+//! The memory map: code in bank 1 of the flash and in ITCM, stack and the control half in DTCM, the rest in AXI
 //! memory, the primitives in bank 2. `firmware/memory/stm32h743.x` says the same to the linker; a test compares the
 //! two.
 
@@ -43,7 +43,7 @@ pub const ITCM: Region = Region { start: 0, length: 64 * 1024 };
 /// Its first bytes hold nothing and may not be touched, so that a null pointer is noticed.
 pub const NULL_GUARD: Region = Region { start: 0, length: 1024 };
 
-/// What is left: the code of the control cycle.
+/// The rest of it: the code of the control cycle.
 pub const HOT_CODE: Region = Region { start: 0x400, length: 63 * 1024 };
 
 /// All of the tightly coupled data memory.

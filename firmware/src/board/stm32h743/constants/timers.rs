@@ -18,12 +18,12 @@ pub const CLOCK_HZ: u32 = TIMER_HZ;
 /// Divider in front of the watchdog's counter, its value after a reset.
 pub const WATCHDOG_PRESCALER: u32 = 4;
 
-/// What the watchdog counts down from the start of the image until the first slot is due, its value after a reset: 512
+/// Value that the watchdog counts down from the start of the image until the first slot is due, that after a reset: 512
 /// ms. The clock tree and the building of both halves take this long at most, or the chip starts again.
 pub const WATCHDOG_START_TICKS: u32 = 4096;
 
-/// What the watchdog counts down in service: 80 ticks of 8 kHz are 10 ms, nine slots. The control slot may legally be
-/// late by one; pucks keep the last torque until the safety module's heartbeat runs out, so this must be the first to
+/// Value that the watchdog counts down in service: 80 ticks of 8 kHz are 10 ms, nine slots. The control slot may
+/// legally be late by one; pucks keep the last torque until the safety module's heartbeat runs out, so this must be the first to
 /// act.
 pub const WATCHDOG_TICKS: u32 = 80;
 

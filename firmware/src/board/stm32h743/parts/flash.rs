@@ -155,7 +155,7 @@ fn judge(status: Sr) -> Result<(), Error> {
 fn read_word(address: u32) -> [u8; WORD_BYTES] {
     let mut parts = [0_u32; PARTS];
     // What was noted before this read must not be taken for it: `damaged` is judged by both below. Bus faults noted
-    // earlier are nobody's business any more, those that matter never return; flags of an operation were judged at its
+    // earlier do not count any more, those that matter never return; flags of an operation were judged at its
     // end.
     bank().ccr().write_value(every_flag());
     // SAFETY: clears the bits of bus faults, see above.

@@ -23,7 +23,7 @@ const BUFFER_BYTES: usize = 4096;
 /// Channel flag: skip what does not fit.
 const SKIP: u32 = 0;
 
-/// What the probe searches for in memory.
+/// The block that the probe searches for in memory.
 #[repr(C)]
 struct ControlBlock {
     id: [u8; 16],

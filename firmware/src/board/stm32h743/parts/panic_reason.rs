@@ -12,7 +12,7 @@ use link::frame::CRC;
 /// Bytes of words that are kept; the rest of a longer reason is lost.
 const WORDS_BYTES: usize = 500;
 
-/// Marks a record, so that random memory is refused before its length is believed.
+/// First word of a record, so that random memory is refused before its length is believed.
 const MAGIC: u32 = 0x5441_4354;
 
 #[repr(C)]

@@ -10,7 +10,7 @@ use core::mem::MaybeUninit;
 use cortex_m::peripheral::SCB;
 use embassy_stm32::pac::RCC;
 
-/// How far the image is; numbers that memory holds by chance once in a billion times.
+/// Progress of the image; numbers that memory holds by chance once in a billion times.
 #[derive(Clone, Copy)]
 #[repr(u32)]
 pub(super) enum Phase {

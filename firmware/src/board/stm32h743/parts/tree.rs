@@ -18,7 +18,7 @@ const AXI_MEMORY_READS: *mut u32 = 0x5100_8108 as *mut u32;
 // The dividers below are written out as embassy-stm32's names; these lines keep them equal to the constants.
 const _: () = assert!(AHB_DIVIDER == 2 && APB_DIVIDER == 2);
 
-/// What [`super::super::constants::clocks`] says.
+/// The clock tree of [`super::super::constants::clocks`].
 pub(super) fn config() -> Config {
     let mut config = Config::default();
     config.rcc.hse = Some(Hse { freq: Hertz(HSE_HZ), mode: HseMode::Bypass });
@@ -63,7 +63,7 @@ const fn divider(divider: Option<u32>) -> Option<PllDiv> {
     }
 }
 
-/// What the maker's errata ask for at start-up: before revision V, reading the AXI memory while something else reads it
+/// Applies the maker's errata at start-up: before revision V, reading the AXI memory while something else reads it
 /// may give wrong data unless the matrix issues one read at a time.
 pub(super) fn repair() {
     if revision() < REVISION_V {

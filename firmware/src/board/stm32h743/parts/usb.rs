@@ -66,7 +66,7 @@ unsafe impl UsbPeripheral for Peripheral {
 
 type Bus = UsbBus<Peripheral>;
 
-/// What the interrupt owns.
+/// The part that the interrupt owns.
 struct Device {
     device: UsbDevice<'static, Bus>,
     serial: SerialPort<'static, Bus>,

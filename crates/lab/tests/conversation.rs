@@ -1,39 +1,235 @@
 //! The client against the device's own session: handshake, loss, silence, uploads, stopping.
 
-mod fixture;
-
 use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::io::Write as _;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-use control::State;
-use device::Command;
+use control::model::ArmModel;
+use control::{CycleRecord, LoadRefusal, Payload, State};
+use device::{
+    CheckedPrimitive, Command, Counters, DeviceController, Event, EventKind, Health, Identity, QueueFull, RamStore,
+    Session, SessionPort, Stage, TimedRecord, Timing,
+};
 use lab::client::{Client, Halted, Incoming, Interrupt, UploadOutcome, UploadPhase};
-use lab::error::{Capability, HostError};
+use lab::error::HostError;
 use lab::transport::{StreamTransport, Transport, TransportError};
+use link::image::{FeedbackClamps, Hemisphere, ImageContent, OrientationError, Waypoint, WaypointVelocity};
 use link::{LINK_VERSION, Name, Refusal, Request, SCHEMA_HASH};
+use pinned_init::InPlaceWrite;
 
-use fixture::{Device, connected, image};
+/// One step of the virtual clock: a third of a control cycle.
+const STEP: Duration = Duration::from_nanos(1_111_111);
+
+/// A control half that takes every command and does what it says at once.
+struct Half {
+    state: State,
+    commands: Vec<Command>,
+    events: VecDeque<Event>,
+    records: VecDeque<TimedRecord>,
+    line: Vec<u8>,
+}
+
+impl SessionPort<DeviceController> for Half {
+    fn send(&mut self, bytes: &[u8]) {
+        self.line.extend_from_slice(bytes);
+    }
+
+    fn command(&mut self, command: Command) -> Result<(), QueueFull> {
+        self.commands.push(command);
+        if let Command::Control(command) = command {
+            self.state = match command {
+                control::Command::Gravity => State::Gravity,
+                control::Command::Run(_) => State::Run,
+                control::Command::Stop => State::SoftStop,
+                _ => State::Hold,
+            };
+        }
+        self.events.push_back(Event { cycle: 0, kind: EventKind::Accepted });
+        Ok(())
+    }
+
+    fn load(&mut self, _fit: &CheckedPrimitive<'_>) -> Result<(), LoadRefusal> {
+        Ok(())
+    }
+
+    fn record(&mut self) -> Option<TimedRecord> {
+        self.records.pop_front()
+    }
+
+    fn event(&mut self) -> Option<Event> {
+        self.events.pop_front()
+    }
+
+    fn health(&mut self) -> Health {
+        Health {
+            cycle: 0,
+            stage: Stage::Ready,
+            blocked: None,
+            state: self.state,
+            fault: control::Fault::None,
+            zeroed: true,
+            zeroed_at: None,
+            payload: Payload::SensorAndHand,
+            wrench_zeroed: Some(true),
+            safety_mode: None,
+            pendant: None,
+            temperatures: [None; 7],
+            hand: link::HandStage::Absent,
+            hand_moves: false,
+            hand_temperatures: [None; 4],
+            counters: Counters::default(),
+        }
+    }
+
+    fn timing(&mut self) -> Timing {
+        Timing::default()
+    }
+}
+
+/// A device in virtual time, with a line that can be cut or lose frames.
+struct Device {
+    session: Box<Session<RamStore<3, 4096>>>,
+    half: Half,
+    steps: u32,
+    /// Every so many portions from the host are lost; 0: none.
+    lose_every: u32,
+    /// Every so many portions to the host are lost; 0: none.
+    lose_answers_every: u32,
+    portions: u32,
+    answers: u32,
+    /// The device is dead.
+    dead: bool,
+    /// The cable is out.
+    unplugged: bool,
+}
+
+impl Device {
+    fn new() -> Self {
+        let identity = Identity {
+            firmware: "1.2.3",
+            board: "test",
+            serial: "T-1",
+            simulated: true,
+            ticks_per_second: 25_000_000,
+            instructions_per_tick: 0,
+        };
+        let Ok(session) = Box::new_uninit().write_init(Session::init(identity, RamStore::new()));
+        Self {
+            session,
+            half: Half {
+                state: State::Hold,
+                commands: Vec::new(),
+                events: VecDeque::new(),
+                records: VecDeque::new(),
+                line: Vec::new(),
+            },
+            steps: 0,
+            lose_every: 0,
+            lose_answers_every: 0,
+            portions: 0,
+            answers: 0,
+            dead: false,
+            unplugged: false,
+        }
+    }
+
+    fn step(&mut self) {
+        self.steps += 1;
+        if self.steps.is_multiple_of(3) {
+            let cycle = u64::from(self.steps / 3);
+            let record = CycleRecord { cycle, state: self.half.state, ..CycleRecord::EMPTY };
+            self.half.records.push_back(TimedRecord { record, cost_ticks: 7 });
+        }
+        if !self.dead {
+            self.session.poll((STEP * self.steps).as_micros() as u64, &mut self.half);
+        }
+    }
+}
+
+/// True if the present one of a series is one that gets lost.
+fn is_lost(every: u32, count: &mut u32) -> bool {
+    *count += 1;
+    every > 0 && count.is_multiple_of(every)
+}
+
+impl Transport for Device {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
+        if self.unplugged {
+            return Err(TransportError::Closed);
+        }
+        if !is_lost(self.lose_every, &mut self.portions) {
+            self.session.receive(bytes);
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
+        let until = self.now() + timeout;
+        while self.half.line.is_empty() && self.now() < until {
+            self.step();
+        }
+        let bytes = std::mem::take(&mut self.half.line);
+        if !bytes.is_empty() && !is_lost(self.lose_answers_every, &mut self.answers) {
+            out.extend_from_slice(&bytes);
+        }
+        Ok(())
+    }
+
+    fn now(&self) -> Duration {
+        STEP * self.steps
+    }
+
+    fn is_virtual(&self) -> bool {
+        true
+    }
+}
+
+fn connected() -> Client<Device> {
+    Client::connect(Device::new(), "test").unwrap()
+}
+
+fn image(name: &str, duration: f32) -> Vec<u8> {
+    let posture = [0.0, 0.5, 0.0, 1.5, 0.0, 0.5, 0.0];
+    let model = ArmModel::<f32>::new(Payload::SensorAndHand);
+    let q = control::units::JointPositions::from_array(posture);
+    let [x, y, z, w, i, j, k] = control::model::Frames::new(&model, &q).tool_pose().to_f32();
+    let there = Waypoint { position: [x, y, z], orientation: [w, i, j, k], posture, hand: [0.0; 4] };
+    let content: ImageContent<&[f32]> = ImageContent {
+        model_hash: control::MODEL_HASH,
+        duration,
+        alpha: 4.605,
+        activation: 0.7,
+        stiffness: [200.0; 4],
+        damping: [28.28, 20.0, 28.28, 28.28],
+        orientation_error: OrientationError::Quaternion,
+        hemisphere: Hemisphere::Demonstrated,
+        start: there,
+        start_velocity: WaypointVelocity::default(),
+        goal: there,
+        clamps: FeedbackClamps { position: 0.2, orientation: 0.5, hand: 0.5 },
+        marks: Default::default(),
+        kernels: 20,
+        k1: &[],
+        k2: &[],
+        weights: &[0.0; 17 * 20],
+        expected_mean: &[],
+        experience_trials: 0,
+        experience_mean: &[],
+        experience_spread: &[],
+    };
+    let mut bytes = vec![0; 4096];
+    let length = content.encode(&Name::new(name).unwrap(), &mut bytes).unwrap();
+    bytes.truncate(length);
+    bytes
+}
 
 #[test]
 fn connecting_compares_versions_within_200_ms() {
     let client = connected();
     assert!(client.now() < Duration::from_millis(200), "{:?}", client.now());
     assert_eq!(client.hello().serial.as_str(), "T-1");
-}
-
-#[test]
-fn a_device_without_an_arm_is_refused_by_the_name_of_what_it_lacks() {
-    let arm = connected();
-    assert!(arm.require(Capability::Arm).is_ok() && arm.require(Capability::Hand).is_ok());
-
-    let hand = Client::connect(Device { armless: true, ..Device::new() }, "test").unwrap();
-    assert!(hand.require(Capability::Hand).is_ok());
-    let error = hand.require(Capability::Arm).unwrap_err();
-    assert_eq!(error.to_string(), "the device does not drive an arm");
-    assert_eq!((error.code().exit() as u8, error.code().to_string()), (4, "E405".to_owned()));
-    assert!(error.code().remedy().contains("--device"));
 }
 
 #[test]

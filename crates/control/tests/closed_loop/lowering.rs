@@ -1,0 +1,222 @@
+//! Release, and the other ends of torque, with the arm up: lowered or braked, never dropped.
+
+use control::command::{Command, Refusal, RunOptions};
+use control::time::periods;
+use control::{Event, Fault, State};
+use puck::SafetyMode;
+
+use crate::primitives::{Design, GOAL, START, primitive};
+use crate::rig::Rig;
+
+/// Speed that the standards allow beside a person (m/s).
+const SLOW: f64 = 0.25;
+
+/// Stretched out to the front.
+const OUT: [f64; 7] = [0.0, 1.45, 0.0, 0.1, 0.0, 0.0, 0.0];
+
+fn hand_speed(rig: &Rig<f32>) -> f64 {
+    rig.plant.frames().jacobian().twist(&rig.plant.dq).fixed_rows::<3>(0).norm()
+}
+
+/// Fastest speed of the hand in `seconds` (m/s).
+fn fastest(rig: &mut Rig<f32>, seconds: f64) -> f64 {
+    (0..periods(seconds)).fold(0.0, |fastest: f64, _| {
+        rig.tick(None);
+        fastest.max(hand_speed(rig))
+    })
+}
+
+/// An arm that is released: fastest speed of the hand until it is idle, and the seconds that took.
+fn lowered(rig: &mut Rig<f32>) -> (f64, f64) {
+    rig.command(Command::Release);
+    let (mut speed, begin) = (0.0f64, rig.number);
+    while rig.cycle.state() != State::Idle {
+        assert_eq!(rig.cycle.state(), State::Lower);
+        rig.tick(None);
+        speed = speed.max(hand_speed(rig));
+    }
+    (speed, (rig.number - begin) as f64 / control::RATE)
+}
+
+#[test]
+fn g7_a_released_arm_sinks_slowly_until_it_rests_and_can_be_armed_again() {
+    for (posture, friction, delay) in [(OUT, 1.0, 1), (OUT, 0.7, 2), (OUT, 0.0, 1), (START, 1.3, 1), (GOAL, 1.0, 0)] {
+        let mut rig = Rig::<f32>::new(posture, delay);
+        rig.plant.coulomb *= friction;
+        rig.command(Command::Hold);
+        rig.run_for(1.0);
+        let before = rig.plant.frames().tool_pose().position.z;
+        let (speed, seconds) = lowered(&mut rig);
+        let way = before - rig.plant.frames().tool_pose().position.z;
+        println!("{posture:?}, friction {friction}: {way:.2} m down in {seconds:.1} s, {speed:.2} m/s");
+        assert!(speed < SLOW && seconds < 29.0, "{speed} m/s, {seconds} s");
+        assert!(!rig.last.expect("ran").actuation.requests_idle(), "it rests without brakes");
+        let after = fastest(&mut rig, 2.0);
+        assert_eq!(rig.last.expect("ran").record.tau, [0.0; 7]);
+        assert!(after < 0.05, "{after} m/s without torque");
+        rig.command(Command::Hold);
+        assert!(fastest(&mut rig, 1.0) < SLOW);
+        assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None));
+    }
+}
+
+#[test]
+fn h3_an_arm_that_is_released_while_it_moves_is_braked_and_lowered() {
+    for seconds in [0.3, 1.0, 2.0] {
+        for run in [false, true] {
+            let mut rig = Rig::<f32>::new(START, 1);
+            rig.load(&primitive(&Design { duration: 3.0, ..Design::default() })).expect("loads");
+            rig.command(Command::Hold);
+            rig.run_for(2.0);
+            let target = OUT.map(|q| q as f32);
+            rig.command(if run {
+                Command::Run(RunOptions::default())
+            } else {
+                Command::Approach { q: target, duration: 0.0 }
+            });
+            rig.run_for(seconds);
+            let moving = hand_speed(&rig);
+            rig.command(Command::Release);
+            let stopping = fastest(&mut rig, 0.3);
+            assert!(stopping < moving.max(SLOW) + 0.05, "{stopping} after {moving} m/s");
+            let mut after = 0.0f64;
+            while rig.cycle.state() == State::Lower {
+                rig.tick(None);
+                after = after.max(hand_speed(&rig));
+            }
+            println!("run {run}, {seconds} s: {moving:.2}, {stopping:.2}, then {after:.2} m/s");
+            assert!(after < SLOW, "{after} m/s");
+            assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Idle, Fault::None));
+        }
+    }
+}
+
+#[test]
+fn g7_a_person_may_catch_or_stop_an_arm_that_is_being_lowered() {
+    for (command, state) in
+        [(Command::Hold, State::Hold), (Command::Gravity, State::Gravity), (Command::Stop, State::SoftStop)]
+    {
+        let mut rig = Rig::<f32>::new(OUT, 1);
+        rig.command(Command::Hold);
+        rig.run_for(1.0);
+        rig.command(Command::Release);
+        rig.run_for(3.0);
+        rig.command(command);
+        assert!(fastest(&mut rig, 1.0) < SLOW);
+        assert_eq!(rig.cycle.state(), state);
+        assert!(rig.plant.dq.amax() < 0.01, "{}", rig.plant.dq);
+    }
+}
+
+#[test]
+fn g7_an_arm_that_does_not_come_to_rest_is_left_to_the_brakes_of_the_safety_module() {
+    let mut rig = Rig::<f32>::new(OUT, 1);
+    rig.command(Command::Hold);
+    rig.run_for(1.0);
+    rig.command(Command::Release);
+    while rig.cycle.state() == State::Lower {
+        // Somebody plays with it.
+        rig.plant.push[1] = if (rig.number / 150).is_multiple_of(2) { 15.0 } else { -15.0 };
+        rig.tick(None);
+        assert!(rig.number < 40 * u64::from(control::RATE_HZ));
+    }
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Idle, Fault::None));
+    brakes_are_asked_for_until_they_are_on(&mut rig);
+}
+
+/// The safety module is asked for IDLE until it says so, and not any more once it has.
+fn brakes_are_asked_for_until_they_are_on(rig: &mut Rig<f32>) {
+    for cycle in 0..50 {
+        assert!(rig.tick(None).actuation.requests_idle(), "cycle {cycle} in {:?}", rig.cycle.state());
+    }
+    rig.safety = SafetyMode::Idle;
+    for _ in 0..5 {
+        assert!(!rig.tick(None).actuation.requests_idle());
+    }
+    rig.command(Command::ClearFault);
+    rig.safety = SafetyMode::Active;
+    rig.tick(None);
+    assert!(!rig.tick(None).actuation.requests_idle(), "a person has activated again");
+    rig.command(Command::Hold);
+}
+
+#[test]
+fn g7_brakes_are_asked_for_wherever_torque_ends_with_the_arm_up() {
+    // A fault of the bus, cleared before the safety module has answered.
+    let mut rig = Rig::<f32>::new(OUT, 1);
+    rig.command(Command::Hold);
+    rig.run_for(1.0);
+    rig.external = Some(Fault::BusFault);
+    rig.tick(None);
+    rig.external = None;
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Fault, Fault::BusFault));
+    rig.plant.dq *= 0.0;
+    rig.command(Command::ClearFault);
+    assert_eq!(rig.cycle.state(), State::Idle);
+    brakes_are_asked_for_until_they_are_on(&mut rig);
+}
+
+#[test]
+fn g6_what_takes_the_torque_off_during_a_stop_leaves_the_first_cause_to_be_cleared() {
+    for (second, state) in [(SafetyMode::Idle, State::Idle), (SafetyMode::EStop, State::Idle)] {
+        let mut rig = Rig::<f32>::new(GOAL, 1);
+        rig.command(Command::Hold);
+        rig.run_for(1.0);
+        rig.command(Command::Tare);
+        rig.plant.push[0] = -80.0;
+        rig.until(State::SoftStop, 0.1);
+        rig.plant.push[0] = 0.0;
+        rig.safety = second;
+        rig.run_for(0.1);
+        assert_eq!((rig.cycle.state(), rig.cycle.fault()), (state, Fault::ContactForce));
+        rig.safety = SafetyMode::Active;
+        rig.tick(None);
+        assert_eq!(rig.tick(Some(Command::Hold)).event, Some(Event::Refused(Refusal::FaultLatched)));
+        rig.plant.dq *= 0.0;
+        rig.run_for(0.1);
+        rig.plant.dq *= 0.0;
+        rig.command(Command::ClearFault);
+        rig.command(Command::Hold);
+        rig.run_for(0.3);
+        assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None));
+    }
+}
+
+#[test]
+fn g6_a_jump_of_counts_during_a_stop_is_not_cleared_but_zeroed() {
+    for (first, state) in [(Command::Stop, State::SoftStop), (Command::Release, State::Lower)] {
+        let mut rig = Rig::<f32>::new(GOAL, 1);
+        rig.command(Command::Hold);
+        rig.run_for(1.0);
+        rig.command(first);
+        rig.jump[3] = 12_000;
+        rig.run_for(0.5);
+        assert_eq!((rig.cycle.state(), rig.cycle.fault()), (state, Fault::ImplausiblePosition));
+        for command in [Command::ClearFault, Command::Hold, Command::Gravity] {
+            assert_eq!(rig.tick(Some(command)).event, Some(Event::Refused(Refusal::ZeroLost)), "{command:?}");
+        }
+        // Down, and still nothing leads on but a new start with a new zero.
+        lowered(&mut rig);
+        assert_eq!(rig.cycle.fault(), Fault::ImplausiblePosition);
+        for command in [Command::ClearFault, Command::Hold, Command::Gravity] {
+            assert_eq!(rig.tick(Some(command)).event, Some(Event::Refused(Refusal::ZeroLost)), "{command:?}");
+        }
+        rig.cycle.reset();
+        rig.jump = [0; 7];
+        rig.tick(None);
+        rig.command(Command::ClearFault);
+        rig.command(Command::Hold);
+        rig.run_for(0.3);
+        assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None));
+    }
+}
+
+#[test]
+fn g2_counts_that_jump_while_no_torque_is_on_cost_the_zero_with_the_reason() {
+    let mut rig = Rig::<f32>::new(GOAL, 1);
+    rig.run_for(0.1);
+    rig.jump[3] = 12_000;
+    let told = (0..6).filter_map(|_| rig.tick(None).event).next();
+    assert_eq!(told, Some(Event::Entered(State::Idle, Fault::ImplausiblePosition)));
+    assert_eq!(rig.tick(Some(Command::Hold)).event, Some(Event::Refused(Refusal::ZeroLost)));
+}

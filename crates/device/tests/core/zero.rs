@@ -1,0 +1,113 @@
+//! G2: what makes the zero of the arm doubtful, and that nothing but a person's zeroing leads on.
+
+use control::{Command as Control, Fault, State};
+use device::{Command, Controller, DeviceController, EventKind, Refusal, Stage, StartupError};
+use puck::{Counts, Node, SafetyMode};
+
+use crate::double::{Bus, HOME, floating, silent_device, started};
+
+/// Puck 4 begins to count anew, by so much that its joint seems 0.7 rad away.
+fn restart_puck_4(bus: &mut Bus) {
+    bus.pucks[3].position = Counts(bus.pucks[3].position.0 - 8_000);
+}
+
+/// Neither clearing nor arming leads on.
+fn assert_nothing_leads_on(core: &mut DeviceController, bus: &mut Bus) {
+    for command in [Control::ClearFault, Control::Hold, Control::Gravity] {
+        bus.commands.push_back(command.into());
+        bus.run(core, 0.05);
+        let refused =
+            bus.events.iter().rev().find(|event| matches!(event, EventKind::Refused(_) | EventKind::Accepted));
+        let zero_lost = Refusal::Control(control::Refusal::ZeroLost);
+        let waiting = Refusal::NotReady(Stage::WaitingForZero);
+        assert!(
+            [EventKind::Refused(zero_lost), EventKind::Refused(waiting)].iter().any(|event| Some(event) == refused),
+            "{command:?}: {refused:?}"
+        );
+    }
+    assert!(!core.health().zeroed && !core.health().state.has_torque());
+    assert_eq!(core.stage(), Stage::WaitingForZero);
+}
+
+/// A person zeroes the arm, clears what is latched, activates and lets the arm hold.
+fn assert_zeroing_leads_on(core: &mut DeviceController, bus: &mut Bus) {
+    bus.press_idle();
+    bus.run(core, 0.1);
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run(core, 0.05);
+    bus.run_until(core, Stage::WaitingForActive);
+    bus.run(core, 0.1);
+    bus.commands.push_back(Control::ClearFault.into());
+    bus.press_activate();
+    bus.run_until(core, Stage::Ready);
+    bus.commands.push_back(Control::Hold.into());
+    bus.run(core, 0.2);
+    let health = core.health();
+    assert_eq!((health.state, health.fault, health.zeroed), (State::Hold, Fault::None, true), "{:?}", bus.events);
+    assert!(health.blocked.is_none() && bus.safety_zero);
+}
+
+#[test]
+fn g2_a_puck_that_had_to_be_woken_is_not_believed_whatever_the_safety_module_says() {
+    let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
+    bus.pucks[3].awake_at = None;
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.run(&mut core, 0.1);
+    let reason = StartupError::CountsAnew(Node::ARM[3]);
+    assert_eq!(core.health().blocked, Some(reason));
+    assert_eq!(bus.events.iter().filter(|event| **event == EventKind::Blocked(reason)).count(), 1);
+    assert!(!bus.safety_zero, "the safety module no longer says so either");
+    assert_nothing_leads_on(&mut core, &mut bus);
+    assert_zeroing_leads_on(&mut core, &mut bus);
+}
+
+#[test]
+fn g2_counts_that_begin_anew_end_the_torque_and_the_zero_within_20_ms() {
+    for torque in [false, true] {
+        let (mut core, mut bus) = if torque { floating() } else { started() };
+        bus.press_activate();
+        bus.run(&mut core, 0.2);
+        if torque {
+            bus.commands.push_back(Control::Hold.into());
+            bus.run(&mut core, 0.1);
+            assert_eq!(core.health().state, State::Hold);
+        }
+        let begin = bus.now_us;
+        restart_puck_4(&mut bus);
+        while core.health().fault != Fault::ImplausiblePosition {
+            bus.run_slots(&mut core, 1);
+            assert!(bus.now_us - begin <= 20_000, "{:?}", core.health());
+        }
+        bus.run_slots(&mut core, 3);
+        let state = if torque { State::SoftStop } else { State::Idle };
+        assert_eq!((core.health().state, core.health().zeroed), (state, false));
+        assert_eq!(core.stage(), Stage::WaitingForZero);
+        bus.commands.push_back(Control::Release.into());
+        bus.run(&mut core, 3.0);
+        assert_nothing_leads_on(&mut core, &mut bus);
+        assert!(!bus.safety_zero, "who asks the safety module is not told that the arm is zeroed");
+        if torque {
+            assert_zeroing_leads_on(&mut core, &mut bus);
+        } else {
+            // Not even a board that knows nothing of it goes on.
+            bus.press_idle();
+            let mut other = silent_device();
+            bus.run_until(&mut other, Stage::WaitingForZero);
+            assert_zeroing_leads_on(&mut other, &mut bus);
+        }
+    }
+}
+
+#[test]
+fn g2_a_puck_that_resets_under_torque_costs_the_zero_with_its_name() {
+    let (mut core, mut bus) = floating();
+    bus.pucks[5].awake_at = None;
+    bus.run(&mut core, 0.1);
+    assert_eq!(core.health().fault, Fault::BusFault);
+    assert_eq!(bus.safety_mode, SafetyMode::Idle, "the brakes are on");
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.run(&mut core, 0.1);
+    assert_eq!(core.health().blocked, Some(StartupError::CountsAnew(Node::ARM[5])));
+    assert!(!bus.safety_zero && !core.health().zeroed);
+    assert_zeroing_leads_on(&mut core, &mut bus);
+}
