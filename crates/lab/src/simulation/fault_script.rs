@@ -1,8 +1,8 @@
 //! Scripts of faults for a simulated device, `faults=FILE` or `faults=FILE:NUMBER`: the files of `tests/faults`.
 //!
 //! A file has scenarios (`docs/faults.md`); the number, 1 unless given, says which. Only its faults are read here:
-//! orders, figures and bars are for `cargo xtask faults`. Times count from the first torque on the bus that is not zero,
-//! in a scenario that begins at the power-up from there.
+//! orders, figures and bars are for `cargo xtask faults`. Times count from the first torque on the bus that is not
+//! zero, in a scenario that begins at the power-up from there.
 
 use std::path::PathBuf;
 
