@@ -60,8 +60,7 @@ pub trait Board: Sized {
     fn sleep();
 
     /// The end: sends these frames, waits until they are on the bus as far as the bus allows, says why, and stops or
-    /// restarts the processor. Called with interrupts masked, from anywhere, perhaps with peripherals in the middle of a
-    /// transfer.
+    /// restarts the processor. Called with interrupts masked, from anywhere, perhaps in the middle of a transfer.
     fn stop(frames: &[CanFrame], reason: core::fmt::Arguments<'_>) -> !;
 }
 

@@ -17,8 +17,8 @@ use crate::units::{JointTorques, Vector6};
 /// Longest window: 0.5 s, in control periods.
 pub const WINDOW_CAPACITY: usize = periods(0.5) as usize;
 
-/// Force (N) and torque (N m) that may be applied to nothing. More is applied only where the environment is felt to
-/// press back: a run that expects to press on what is not there would else throw the arm (30 N: 1.7 m/s).
+/// Force (N) and torque (N m) that may be applied to nothing. More is applied only where the sensor measures that
+/// something presses back: a run that expects to press on what is not there would else throw the arm (30 N: 1.7 m/s).
 const UNCONFIRMED: [f64; 2] = [5.0, 0.5];
 
 /// Fastest rise of what counts as pressing back (N/s, N m/s). The sensor also feels the inertia of the hand, which

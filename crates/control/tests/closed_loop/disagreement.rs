@@ -37,7 +37,7 @@ fn moving(run: bool, seconds: f64, frozen: Option<usize>) -> Rig<f32> {
     rig
 }
 
-/// How far the joints have gone that nobody has seen (rad).
+/// Largest way of a joint that the record does not show (rad).
 fn unseen(rig: &Rig<f32>) -> f64 {
     let seen = rig.last.expect("ran").record.q;
     (0..7).map(|joint| (rig.plant.q[joint] - f64::from(seen[joint])).abs()).fold(0.0, f64::max)

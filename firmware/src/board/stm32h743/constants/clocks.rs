@@ -71,8 +71,8 @@ const fn output(pll: &PhaseLockedLoop, divider: Option<u32>) -> u32 {
     }
 }
 
-/// Clock of the processor, Hz. 400 MHz is the most at voltage scale 1, which every revision of the chip has: 480 MHz needs scale 0
-/// and revision V. The control slot has 444 000 cycles at 400 MHz and needs a tenth of that.
+/// Clock of the processor, Hz. 400 MHz is the most at voltage scale 1, which every revision of the chip has: 480 MHz
+/// needs scale 0 and revision V. The control slot has 444 000 cycles at 400 MHz and needs a tenth of that.
 pub const CORE_HZ: u32 = output(&PLL1, PLL1.p);
 
 /// The most at voltage scale 1, Hz.

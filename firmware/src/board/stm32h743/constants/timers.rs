@@ -23,8 +23,8 @@ pub const WATCHDOG_PRESCALER: u32 = 4;
 pub const WATCHDOG_START_TICKS: u32 = 4096;
 
 /// Value that the watchdog counts down in service: 80 ticks of 8 kHz are 10 ms, nine slots. The control slot may
-/// legally be late by one; pucks keep the last torque until the safety module's heartbeat runs out, so this must be the first to
-/// act.
+/// legally be late by one; pucks keep the last torque until the safety module's heartbeat runs out, so this must be
+/// the first to act.
 pub const WATCHDOG_TICKS: u32 = 80;
 
 /// Time until the watchdog resets the chip, us, at the nominal frequency of its oscillator.
