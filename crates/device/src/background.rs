@@ -88,8 +88,8 @@ impl BackgroundPoll {
     /// The question whose turn it is, if there is one; `hand`: its pucks may be asked too.
     pub(crate) fn other(&mut self, hand: bool) -> Option<CanFrame> {
         let tick = self.tick;
-        let due = |(period, offset): (u32, u32)| tick % period == offset;
-        let turn = |period: u32, pucks: usize| (tick / period) as usize % pucks;
+        let due = |(period, offset): (u32, u32)| tick.checked_rem(period) == Some(offset);
+        let turn = |period: u32, pucks: usize| (tick.checked_div(period)? as usize).checked_rem(pucks);
         let [first, ..] = Node::ARM;
         let (node, property) = if due(PUCK_MODE) {
             (first, PropertyId::MODE)
@@ -100,9 +100,9 @@ impl BackgroundPoll {
         } else if due(PENDANT) {
             (Node::SAFETY_MODULE, self.pendant)
         } else if hand && due(HAND_TEMPERATURES) {
-            (*Node::HAND.get(turn(HAND_TEMPERATURES.0, Node::HAND.len()))?, TEMPERATURE)
+            (*Node::HAND.get(turn(HAND_TEMPERATURES.0, Node::HAND.len())?)?, TEMPERATURE)
         } else if due(TEMPERATURES) {
-            (*Node::ARM.get(turn(TEMPERATURES.0, Node::ARM.len()))?, TEMPERATURE)
+            (*Node::ARM.get(turn(TEMPERATURES.0, Node::ARM.len())?)?, TEMPERATURE)
         } else {
             return None;
         };

@@ -91,7 +91,8 @@ impl Round {
         Gathered { positions, wrench: self.wrench(counters) }
     }
 
-    /// Both halves of one sample, or nothing: force of one sample and torque of another are no wrench.
+    /// Both halves of one sample, or nothing: force of one sample and torque of another are no wrench. One that the
+    /// sensor itself calls bad is handed on: its gauges may say that something presses.
     fn wrench(&mut self, counters: &mut Counters) -> Option<RawWrench> {
         let (Some((force, _)), Some((torque, status))) = (self.force.reply(), self.torque.reply()) else {
             if self.has_sensor {
@@ -99,7 +100,7 @@ impl Round {
             }
             return None;
         };
-        if core::mem::take(&mut self.discard_wrench) || status.is_some_and(GaugeStatus::is_bad) {
+        if core::mem::take(&mut self.discard_wrench) {
             return None;
         }
         Some(RawWrench { force, torque, status })
@@ -171,8 +172,10 @@ mod tests {
         assert_eq!(round_of(&[force(2), torque(3), torque(4)]), None);
         let judged =
             |status| Reply::Torque { node: Node::FORCE_TORQUE, counts: [3, 0, 0], status: Some(GaugeStatus(status)) };
-        assert_eq!(round_of(&[force(2), judged(0x40)]), None, "the sensor itself calls the sample bad");
-        assert!(round_of(&[force(2), judged(0x81)]).is_some(), "saturated once, and a tare suggested: a warning only");
+        for status in [0x40, 0x81] {
+            let handed_on = round_of(&[force(2), judged(status)]).and_then(|wrench| wrench.status);
+            assert_eq!(handed_on, Some(GaugeStatus(status)), "judged by the controller, not here");
+        }
     }
 
     #[test]

@@ -42,7 +42,7 @@ use Kind::{Abort, Borrow, Division, Index, Message, Resumed, Unwrap};
 
 /// Our own code: single modules, for single reasons. Anything else in it fails the build.
 const OURS: &[Allowed] = &[
-    row("dmp::forcing", &[Index], "a basis has 2 <= count <= N kernels by its constructor: every slice of it exists"),
+    row("dmp::scalar::kernels", &[Index], "2 <= count <= N kernels by the constructor: every slice of them exists"),
     row("control::act::limit", &[Index], "a group is a constant list of motors"),
     row("device::storage", &[Resumed], "each is awaited once, by the library's task, which never ends"),
     row("hand::image::ImageReader::real", &[Division], "a header with fewer than two kernels is refused"),

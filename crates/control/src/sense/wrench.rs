@@ -124,7 +124,15 @@ impl<R: Real> WrenchEstimator<R> {
         let believed = sample.filter(|raw| !raw.status.is_some_and(|status| status.is_bad()));
         match believed {
             Some(raw) => self.take(raw),
-            None => self.age = self.age.map(|age| age.saturating_add(1)),
+            None => {
+                self.age = self.age.map(|age| age.saturating_add(1));
+                // The sensor calls a sample bad whose gauges are at their end: its numbers mean nothing, but it presses.
+                let overloaded = |raw: &RawWrench| raw.status.is_some_and(|status| status.saturated_gauges() != 0);
+                if sample.is_some_and(overloaded) {
+                    self.saturated = true;
+                    self.full_scale.force = self.full_scale.force.saturating_add(1);
+                }
+            }
         }
         let (Some(weight), Some(age)) = (weight, self.age) else { return };
         self.unloaded = self.last - weight;

@@ -277,6 +277,23 @@ fn a_bad_or_halved_wrench_is_no_wrench() {
 }
 
 #[test]
+fn b6_bad_samples_of_gauges_at_their_end_stop_an_arm_that_holds() {
+    for (status, state, fault) in [
+        (0x40, State::Hold, Fault::None),
+        (0x03, State::Hold, Fault::None),
+        (0x43, State::SoftStop, Fault::ContactForce),
+    ] {
+        let (mut core, mut bus) = floating();
+        bus.commands.push_back(Command::Hold.into());
+        bus.run(&mut core, 0.5);
+        assert_eq!(core.health().state, State::Hold);
+        bus.sensor.status = Some(GaugeStatus(status));
+        bus.run_slots(&mut core, 4 * CYCLE);
+        assert_eq!((core.health().state, core.health().fault), (state, fault), "status {status:#x}");
+    }
+}
+
+#[test]
 fn the_first_wrench_after_the_tare_is_thrown_away() {
     let (mut core, mut bus) = started();
     bus.run_slots(&mut core, 2 * CYCLE);
