@@ -298,8 +298,11 @@ impl Results {
     }
 }
 
-/// Columns of `results.csv`: name with unit, and value.
-const COLUMNS: [(&str, fn(&Report) -> String); 32] = [
+/// A column of `results.csv`: name with unit, and value.
+type Column = (&'static str, fn(&Report) -> String);
+
+/// All columns of `results.csv`.
+const COLUMNS: [Column; 32] = [
     ("cell", |r| r.key.index.to_string()),
     ("along_m", |r| number(r.key.cell.along())),
     ("sideways_m", |r| number(r.key.cell.sideways())),

@@ -116,8 +116,8 @@ fn start_up(arm: &mut Arm, way: Recover) -> Result<bool, Failure> {
                 plant(arm).press(PendantAction::ShiftActivate);
             }
             Some(Stage::Ready) if plant(arm).safety_mode() == SafetyMode::Active => {
-                // A device that still wants the brakes may take the arm out of ACTIVE once more; with a fault it does so
-                // until that is cleared.
+                // A device that still wants the brakes may take the arm out of ACTIVE once more; with a fault it does
+                // so until that is cleared.
                 wait(arm)?;
                 if status.fault != Fault::None.code() || plant(arm).safety_mode() == SafetyMode::Active {
                     return Ok(has_zeroed);

@@ -53,6 +53,11 @@ const OURS: &[Allowed] = &[
 /// The boards' code below the application.
 const BOARDS: &[Allowed] = &[
     row("Reset", &[Abort], "behind `main`, which does not return"),
+    emulated(
+        "device::startup::Startup::perform",
+        &[Division],
+        "the ring of a heapless::spsc queue, inlined: its length is a constant; the compiler merged two such places",
+    ),
     emulated("firmware::board::mps2", &[Message], "the simulator is gone, or was never there: the image ends"),
     emulated("firmware::board::mps2", &[Resumed], "each is awaited once, by the library's task"),
     emulated(

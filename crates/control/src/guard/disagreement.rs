@@ -82,8 +82,8 @@ impl<R: Real> Disagreement<R> {
         stuck
     }
 
-    /// True if the feedback torque (N m) has been that of a push for 10 ms. Not inlined: it is asked while the sensor is
-    /// silent.
+    /// True if the feedback torque (N m) has been that of a push for 10 ms. Not inlined: it is asked while the sensor
+    /// is silent.
     #[inline(never)]
     pub(crate) fn is_pushed(&mut self, feedback: &Vector7<R>) -> bool {
         let beyond = feedback.iter().zip(wam7::FRICTION_COULOMB).any(|(torque, friction)| {

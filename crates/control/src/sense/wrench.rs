@@ -126,7 +126,7 @@ impl<R: Real> WrenchEstimator<R> {
             Some(raw) => self.take(raw),
             None => {
                 self.age = self.age.map(|age| age.saturating_add(1));
-                // The sensor calls a sample bad whose gauges are at their end: its numbers mean nothing, but it presses.
+                // The sensor calls a sample bad whose gauges are at their end: no number, but something presses.
                 let overloaded = |raw: &RawWrench| raw.status.is_some_and(|status| status.saturated_gauges() != 0);
                 if sample.is_some_and(overloaded) {
                     self.saturated = true;

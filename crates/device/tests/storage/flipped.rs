@@ -16,8 +16,7 @@ fn library(uploads: u8) -> Vec<u8> {
     wishes.extend([Wish::Save(0, 1), Wish::Save(1, 2), Wish::Save(2, 3)]);
     let (_, answers) = run_on::<4>(&chip, &wishes);
     assert!(answers.iter().all(|answer| *answer == Some(Ok(()))));
-    let content = chip.lock().content().to_vec();
-    content
+    chip.lock().content().to_vec()
 }
 
 /// Words of a bank.

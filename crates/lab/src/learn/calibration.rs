@@ -40,8 +40,7 @@ pub(super) struct Calibrated {
 ///
 /// - the farthest success, judged by the experience of the others, comes to half the limit ([`ROOM`]);
 /// - where a finger that closes on nothing goes clearly farther than that, the limit lies halfway (geometrically)
-/// between the two. How
-///   an empty hand closes is known without trying it: as planned.
+///   between the two. How an empty hand closes is known without trying it: as planned.
 ///
 /// Factors below 1 are only for fingers: what few runs agree in by chance is no reason for a narrow band.
 pub(super) fn calibrated(
