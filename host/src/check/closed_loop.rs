@@ -101,7 +101,7 @@ impl ClosedLoop {
                 cycle: number,
                 sample: BusSample {
                     positions: counts.map(Some),
-                    wrench: None,
+                    wrench: Some(plant.wrench()),
                     safety: Some(SafetyMode::Active),
                     hand: None,
                 },

@@ -6,7 +6,8 @@
 use control::model;
 use control::model::{ArmModel, Calibration, Frames};
 use control::units::{JointAccelerations, JointPositions, JointVelocities, Vector7};
-use puck::Counts;
+use puck::force_torque::{NEWTON_METRE_PER_COUNT, NEWTON_PER_COUNT};
+use puck::{Counts, RawWrench};
 
 use lab::arm;
 use lab::plan::PERIOD;
@@ -39,6 +40,13 @@ impl Plant {
     /// Frames at the present position.
     pub(super) fn frames(&self) -> Frames<f64> {
         Frames::new(&arm::MODEL, &JointPositions(self.q))
+    }
+
+    /// What the wrist sensor measures: the weight of the hand, and nothing of its inertia.
+    pub(super) fn wrench(&self) -> RawWrench {
+        let weight = arm::MODEL.hanging_weight(&self.frames());
+        let counts = |first: usize, unit: f64| [0, 1, 2].map(|axis| (weight[first + axis] / unit).round() as i16);
+        RawWrench { force: counts(0, NEWTON_PER_COUNT), torque: counts(3, NEWTON_METRE_PER_COUNT), status: None }
     }
 
     /// Moves for one control period under constant torque (N m).

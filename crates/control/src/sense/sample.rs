@@ -21,7 +21,7 @@ pub struct HandSample {
 pub struct BusSample {
     /// Motor positions of pucks 1 to 7; `None` where the reply was lost or malformed.
     pub positions: [Option<Counts>; 7],
-    /// Wrist wrench; `None` where one of its two frames was lost or the sensor marked it bad.
+    /// Wrist wrench; `None` where one of its two frames was lost.
     pub wrench: Option<RawWrench>,
     /// Latest mode of the safety module, where it was polled since the last cycle.
     pub safety: Option<SafetyMode>,
