@@ -42,7 +42,7 @@ impl Plant {
         Frames::new(&arm::MODEL, &JointPositions(self.q))
     }
 
-    /// What the wrist sensor measures: the weight of the hand, and nothing of its inertia.
+    /// Returns what the wrist sensor measures: the weight of the hand, and nothing of its inertia.
     pub(super) fn wrench(&self) -> RawWrench {
         let weight = arm::MODEL.hanging_weight(&self.frames());
         let counts = |first: usize, unit: f64| [0, 1, 2].map(|axis| (weight[first + axis] / unit).round() as i16);

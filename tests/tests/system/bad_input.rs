@@ -81,8 +81,8 @@ fn another_model_is_refused_with_both_hashes_and_nothing_is_answered_before_hell
     // The right one is welcome on the same line, and a third is told that it is busy.
     let answer = raw::ask(&mut device, 9, 4, &hello(ours, "friend"));
     assert!(matches!(&answer, Some(Reply::Hello { hello: DeviceHello { model_hash, .. }, .. }) if *model_hash == ours));
-    let (reason, [owner, wait]) = refusal(raw::ask(&mut device, 10, 1, &hello(ours, "third")));
-    assert_eq!((reason, owner), (Refusal::Busy, 9));
+    let (reason, [disclosed, wait]) = refusal(raw::ask(&mut device, 10, 1, &hello(ours, "third")));
+    assert_eq!((reason, disclosed), (Refusal::Busy, 0));
     assert!(wait <= LINK_TIMEOUT_MS, "{wait} ms");
 }
 

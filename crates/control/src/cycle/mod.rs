@@ -320,7 +320,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         };
         let feedback = match &self.law {
             Law::Posture(Posture { controller, .. }) | Law::Run(Running { controller, .. }) => {
-                Some(controller.feedback())
+                Some((controller.feedback(), controller.desired()))
             }
             _ => None,
         };

@@ -15,6 +15,13 @@ use crate::units::{JOINTS, Vector7};
 /// holds 2.6 of it, from one direction to the other.
 const SWING: f64 = 3.0;
 
+/// Desired speed of a motor from which on it has to turn (rad/s): 0.02 to 0.06 rad/s of the joint. A motor that is to
+/// stand may be held by contact, whatever its torque does: closing fingers and a table swing it by more than friction.
+const MOVING: f64 = 1.0;
+
+/// Force (N) that explains why a motor does not turn.
+const CONTACT: f64 = 10.0;
+
 /// Time without a count, before a swing means anything: 50 ms, in control periods.
 const STILL: u8 = few_periods(0.05);
 
@@ -57,18 +64,31 @@ impl<R: Real> Disagreement<R> {
         self.pushing = 0;
     }
 
-    /// Takes the feedback torque (N m) and the motors whose counts have not changed, one bit each; true if an encoder
-    /// stands still while its motor cannot.
-    pub(crate) fn encoder_stands_still(&mut self, feedback: &Vector7<R>, unchanged: u8) -> bool {
-        if unchanged == 0 {
+    /// Every motor has turned.
+    pub(crate) fn all_turn(&mut self) {
+        self.still = [0; JOINTS];
+    }
+
+    /// Takes the feedback torque (N m), the desired velocities (rad/s), the measured force (N) and the motors whose
+    /// counts have not changed, one bit each; true if an encoder stands still while its motor cannot. Not inlined: it is
+    /// asked where a motor stands.
+    #[inline(never)]
+    pub(crate) fn encoder_stands_still(
+        &mut self,
+        (feedback, desired): (&Vector7<R>, &Vector7<R>),
+        force: R,
+        unchanged: u8,
+    ) -> bool {
+        if force > R::of(CONTACT) {
             self.still = [0; JOINTS];
             return false;
         }
         let torques = self.transmission.motor_torques_from_joint(&(*feedback).into());
+        let speeds = self.transmission.motor_from_joint(&(*desired).into());
         let mut stuck = false;
-        let motors = self.still.iter_mut().zip(&mut self.anchor).zip(&self.swing).zip(torques).enumerate();
-        for (motor, (((still, anchor), limit), torque)) in motors {
-            if unchanged >> motor & 1 == 0 {
+        let motors = self.still.iter_mut().zip(&mut self.anchor).zip(&self.swing).zip(torques).zip(speeds).enumerate();
+        for (motor, ((((still, anchor), limit), torque), speed)) in motors {
+            if unchanged >> motor & 1 == 0 || at_least(speed, -speed) < R::of(MOVING) {
                 *still = 0;
                 continue;
             }

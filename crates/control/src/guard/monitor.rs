@@ -59,8 +59,8 @@ pub(crate) struct Observation<'a, R: Real> {
     pub(crate) wrench_lost: bool,
     /// True if no fresh force tells of a contact, on an arm that has a sensor.
     pub(crate) blind: bool,
-    /// Torque of the joint feedback (N m), where there is one.
-    pub(crate) feedback: Option<&'a Vector7<R>>,
+    /// Torque of the joint feedback (N m) and desired velocity (rad/s), where there are such.
+    pub(crate) feedback: Option<(&'a Vector7<R>, &'a Vector7<R>)>,
     /// True if the sensor has been at full scale: in a force, or in a torque that the run depends on.
     pub(crate) full_scale: bool,
 }
@@ -129,8 +129,13 @@ impl<R: Real> Monitor<R> {
     /// True if an encoder stands still; true if something pushes that the sensor does not see.
     fn disagrees(&mut self, state: &JointState<R>, seen: &Observation<'_, R>) -> (bool, bool) {
         match seen.feedback {
-            Some(feedback) if state.missing == 0 => {
-                let stuck = self.disagreement.encoder_stands_still(feedback, state.still);
+            Some((feedback, desired)) if state.missing == 0 => {
+                let stuck = if state.still == 0 {
+                    self.disagreement.all_turn();
+                    false
+                } else {
+                    self.disagreement.encoder_stands_still((feedback, desired), seen.force, state.still)
+                };
                 (stuck, seen.blind && self.disagreement.is_pushed(feedback))
             }
             Some(_) => (false, false),

@@ -21,12 +21,14 @@ const FRICTION_SPEED: f64 = 0.01;
 pub struct JointController<R: Real> {
     /// Feedback torque of the last good cycle (N m).
     feedback: Vector7<R>,
+    /// Desired velocity of the same cycle (rad/s).
+    desired: Vector7<R>,
 }
 
 impl<R: Real> JointController<R> {
     /// A controller without history.
     pub fn new() -> Self {
-        JointController { feedback: Vector7::zeros() }
+        JointController { feedback: Vector7::zeros(), desired: Vector7::zeros() }
     }
 
     /// The feedback torque of the last good cycle (N m).
@@ -34,9 +36,14 @@ impl<R: Real> JointController<R> {
         &self.feedback
     }
 
+    /// The desired velocity of the last good cycle (rad/s).
+    pub fn desired(&self) -> &Vector7<R> {
+        &self.desired
+    }
+
     /// Forgets the feedback of the last cycle.
     pub fn reset(&mut self) {
-        self.feedback = Vector7::zeros();
+        *self = JointController::new();
     }
 
     /// The torque of one tick. With `frozen` feedback (a reply is missing, `state` is extrapolated) the feedback torque
@@ -51,6 +58,7 @@ impl<R: Real> JointController<R> {
         frozen: bool,
     ) -> JointTorques<R> {
         if !frozen {
+            self.desired = reference.dq.0;
             self.feedback = gains.stiffness.component_mul(&(reference.q.0 - state.q.0))
                 + gains.damping.component_mul(&(reference.dq.0 - state.dq.0));
         }

@@ -22,6 +22,20 @@ const LOG_SECTORS: u32 = 2;
 /// Bytes looked at in one go when a sector is tested for being blank.
 const BLANK_CHUNK: usize = 256;
 
+/// Bytes looked at before others have their turn.
+const PART_BYTES: u32 = 4096;
+
+/// The first word of a sector.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Marker {
+    /// The sector is free.
+    Blank,
+    /// The sector is in use, or is going to be.
+    Whole,
+    /// Neither.
+    Damaged,
+}
+
 /// Why something was not done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum JournaledError<E> {
@@ -97,32 +111,55 @@ impl<F: NorFlash> JournaledFlash<F> {
         }
     }
 
-    /// Erases every sector of the log that holds nothing but damage: it is blank but for its first word, or its first
-    /// word is blank and another one is not. Returns how many there were.
+    /// Erases every sector of the log that is blank but for a damaged first word. Returns how many there were.
     ///
     /// # Errors
     /// Those of the flash.
-    pub(super) async fn clean(&mut self) -> Result<u8, JournaledError<F::Error>> {
-        let word = F::WRITE_SIZE.max(F::READ_SIZE);
+    pub(super) async fn clean_markers(&mut self) -> Result<u8, JournaledError<F::Error>> {
         let mut cleaned: u8 = 0;
         for sector in (0..self.capacity).step_by(F::ERASE_SIZE) {
-            let mut marker = [0xFF; WORD_LIMIT];
-            let marker = marker.get_mut(..word).unwrap_or_default();
-            self.flash.read(sector, marker).await.map_err(JournaledError::Flash)?;
-            // A whole marker begins a sector in use, or one that is going to be.
-            if marker.iter().all(|byte| *byte == 0) {
-                continue;
-            }
-            let rest = (sector + u32::try_from(word).unwrap_or(0), sector + sector_bytes::<F>());
-            let rest_blank = is_blank(&mut self.flash, rest).await.map_err(JournaledError::Flash)?;
-            let marker_blank = marker.iter().all(|byte| *byte == 0xFF);
+            let marker = self.marker(sector).await?;
+            let rest = (sector + word_bytes::<F>(), sector + sector_bytes::<F>());
             // A marker that power failed in, with values behind it, counts as a whole one.
-            if rest_blank != marker_blank {
+            if marker == Marker::Damaged && is_blank(&mut self.flash, rest).await.map_err(JournaledError::Flash)? {
                 self.erase(sector, sector + sector_bytes::<F>()).await?;
                 cleaned = cleaned.saturating_add(1);
             }
         }
         Ok(cleaned)
+    }
+
+    /// Looks at the part of the log from `at` on, and erases its sector if that is one of nothing but damage: its first
+    /// word is blank, and another one is not. Returns where to look next; `None`: that was all.
+    ///
+    /// # Errors
+    /// Those of the flash.
+    pub(super) async fn clean_part(&mut self, at: u32) -> Result<Option<u32>, JournaledError<F::Error>> {
+        let sector = at - at % sector_bytes::<F>();
+        let next = sector + sector_bytes::<F>();
+        let part = (at + PART_BYTES).min(next);
+        let after = if self.marker(sector).await? != Marker::Blank {
+            next
+        } else if is_blank(&mut self.flash, (at, part)).await.map_err(JournaledError::Flash)? {
+            part
+        } else {
+            self.erase(sector, next).await?;
+            next
+        };
+        Ok((after < self.capacity).then_some(after))
+    }
+
+    async fn marker(&mut self, sector: u32) -> Result<Marker, JournaledError<F::Error>> {
+        let mut marker = [0xFF; WORD_LIMIT];
+        let marker = marker.get_mut(..word_bytes::<F>() as usize).unwrap_or_default();
+        self.flash.read(sector, marker).await.map_err(JournaledError::Flash)?;
+        Ok(if marker.iter().all(|byte| *byte == 0xFF) {
+            Marker::Blank
+        } else if marker.iter().all(|byte| *byte == 0) {
+            Marker::Whole
+        } else {
+            Marker::Damaged
+        })
     }
 
     /// Closes the sector in which a word was not blank that was to be written, if the next one is blank; true if it
@@ -134,7 +171,7 @@ impl<F: NorFlash> JournaledFlash<F> {
         let Some(at) = self.blocked_at.take() else { return Ok(false) };
         let sector = at - at % sector_bytes::<F>();
         let next = (sector + sector_bytes::<F>()) % self.capacity.max(1);
-        let word = u32::try_from(F::WRITE_SIZE.max(F::READ_SIZE)).unwrap_or(0);
+        let word = word_bytes::<F>();
         // Where the next one is in use its values are being copied here: closed, they would be taken for complete.
         if !is_blank(&mut self.flash, (next, next + word)).await.map_err(JournaledError::Flash)? {
             return Ok(false);
@@ -167,6 +204,11 @@ impl<F: NorFlash> JournaledFlash<F> {
         let (start, end) = (offset as usize % F::ERASE_SIZE, offset as usize % F::ERASE_SIZE + length);
         end <= word || start >= F::ERASE_SIZE - word
     }
+}
+
+/// Bytes of a word, which the markers take.
+fn word_bytes<F: NorFlash>() -> u32 {
+    u32::try_from(F::WRITE_SIZE.max(F::READ_SIZE)).unwrap_or(0)
 }
 
 /// Erases what is not blank, the log first: a journal says that the region is ours only when all of it is.

@@ -81,6 +81,11 @@ pub async fn keep<F: NorFlash, D: LibraryAccess, const IMAGE: usize, const VALUE
             None
         }
     };
+    if let Some(open) = &mut log
+        && clean(open).await.is_err()
+    {
+        log = None;
+    }
     loop {
         let Some(work) = desk.take(image) else {
             pause().await;
@@ -96,6 +101,17 @@ pub async fn keep<F: NorFlash, D: LibraryAccess, const IMAGE: usize, const VALUE
         }
         desk.settle(outcome);
     }
+}
+
+/// Erases blank sectors in which bits have fallen over, before anything is written. It takes a while, and others have
+/// work to do: a host that connects is not kept waiting.
+async fn clean<F: NorFlash>(log: &mut Log<F>) -> Result<(), JournaledError<F::Error>> {
+    let mut at = Some(0);
+    while let Some(from) = at {
+        at = log.flash().clean_part(from).await?;
+        pause().await;
+    }
+    Ok(())
 }
 
 /// Lets the caller do something else.
@@ -115,7 +131,7 @@ async fn pause() {
 async fn open<F: NorFlash, D: LibraryAccess>(flash: F, value: &mut [u8], desk: &mut D) -> Option<(Log<F>, Opening)> {
     let bytes = JournaledFlash::log_bytes(&flash)?;
     let (mut sound, found) = JournaledFlash::open(flash, bytes).await.ok()?;
-    let cleaned = sound.clean().await.ok()?;
+    let cleaned = sound.clean_markers().await.ok()?;
     let config = MapConfig::try_new(0..bytes).ok()?;
     let mut log = Log::new(sound, config, Cache::new_uncached());
     let mut opening = Opening {

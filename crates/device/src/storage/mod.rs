@@ -35,7 +35,7 @@ pub struct Opening {
     pub formatted: bool,
     /// An erase that power had failed in was done again.
     pub resumed: bool,
-    /// Blank sectors in which bits had fallen over; they were erased.
+    /// Sectors that looked as if they were in use, because bits of their first word had fallen over; they were erased.
     pub cleaned: u8,
     /// The flash does not work: what is stored from now on is refused.
     pub failed: bool,
@@ -67,7 +67,7 @@ impl fmt::Display for Opening {
                 if *resumed {
                     f.write_str("; an interrupted erase was finished")?;
                 }
-                if *cleaned > 0 { write!(f, "; {cleaned} blank sectors were damaged and erased") } else { Ok(()) }
+                if *cleaned > 0 { write!(f, "; {cleaned} damaged sectors were erased") } else { Ok(()) }
             }
         }
     }
