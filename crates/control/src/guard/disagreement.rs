@@ -70,8 +70,9 @@ impl<R: Real> Disagreement<R> {
     }
 
     /// Takes the feedback torque (N m), the desired velocities (rad/s), the measured force (N) and the motors whose
-    /// counts have not changed, one bit each; true if an encoder stands still while its motor cannot. Not inlined: it is
-    /// asked where a motor stands.
+    /// counts have not changed, one bit each; true if an encoder stands still while its motor cannot.
+    ///
+    /// Not inlined: it is asked where a motor stands.
     #[inline(never)]
     pub(crate) fn encoder_stands_still(
         &mut self,
