@@ -36,7 +36,7 @@ pub struct HostHello {
     pub owner: Text,
 }
 
-/// The parts that the program of a device is made for. The [`Status`](crate::Status) tells which of them answer.
+/// The parts that the program of a device is made for. The [`Status`] tells which of them answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Capabilities {
     /// It drives an arm.
