@@ -140,11 +140,12 @@ fn belief(moments: &[Moment]) -> f64 {
     worst
 }
 
-/// Changes of a latched fault into another, or none, that no clear explains.
+/// Changes of a latched fault into another, or none, that no person made. A loss that goes on is the same cause.
 fn causes_lost(watched: &Watched) -> u32 {
     let changes = watched.moments.windows(2).filter(|pair| {
         let is_cleared = watched.clears.iter().any(|at| (pair[1].time - at).abs() < 0.1);
-        pair[0].fault != Fault::None && pair[1].fault != pair[0].fault && !is_cleared
+        let goes_on = (pair[0].fault, pair[1].fault) == (Fault::RepliesLost, Fault::RepliesLostForLong);
+        pair[0].fault != Fault::None && pair[1].fault != pair[0].fault && !is_cleared && !goes_on
     });
     changes.count() as u32
 }

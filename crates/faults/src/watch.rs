@@ -8,12 +8,13 @@ use lab::error::HostError;
 use lab::simulation::CYCLE_TICKS;
 use lab::transport::Transport as _;
 use link::frame::Decoder;
-use link::{EventKind, HostHello, LINK_VERSION, Reply, Request, SCHEMA_HASH, Statistics, Telemetry, Text};
+use link::{EventKind, Goal, HostHello, LINK_VERSION, Reply, Request, SCHEMA_HASH, Statistics, Telemetry, Text};
 use puck::SafetyMode;
 use sim::{Passage, Ticks};
 
 use crate::bench::{Arm, Failure, plant};
 use crate::entry::{Answer, Given, Order};
+use crate::movement::GOAL;
 
 /// Telemetry missing for so long makes the runner ask for the state.
 const SILENT: f64 = 0.05;
@@ -54,7 +55,7 @@ pub struct Watched {
     pub after: Statistics,
     /// Orders that were not answered as they must be.
     pub surprises: Vec<String>,
-    /// Times at which a clear was accepted, s.
+    /// Times at which a person ended a fault, s: with a clear, or by arming again after the safety module's drop.
     pub clears: Vec<f64>,
 }
 
@@ -80,7 +81,8 @@ pub fn watch(arm: &mut Arm, length: f64, orders: &[Order]) -> Result<Watched, Fa
         let now = observer.time(arm);
         if let Some(order) = orders.pop_if(|order| order.at <= now) {
             let answer = observer.give(arm, order.give)?;
-            if order.give == Given::Clear && answer.is_ok() {
+            let arms = matches!(order.give, Given::Hold | Given::Gravity) && observer.fault == Fault::SafetyDropped;
+            if (order.give == Given::Clear || arms) && answer.is_ok() {
                 clears.push(now);
             }
             let expected = match order.answer {
@@ -141,6 +143,12 @@ impl Observer {
             Given::Hold => arm.hold(),
             Given::Gravity => arm.gravity(),
             Given::Release => arm.release(),
+            Given::Speed(factor) => arm.set_speed(factor as f32),
+            Given::Goal(shift) => {
+                let (taught, _) = lab::arm::tool_pose(&GOAL);
+                let position = std::array::from_fn(|axis| (taught[axis] + shift[axis]) as f32);
+                arm.set_goal(Goal { position: Some(position), orientation: None })
+            }
             Given::Silence(seconds) => return self.be_silent(arm, seconds).map(Ok),
         };
         match answer {
