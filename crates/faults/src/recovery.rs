@@ -41,6 +41,8 @@ pub fn recover(arm: &mut Arm, way: Recover) -> Result<(), Failure> {
         return Err(words.into());
     }
     if Fault::from_code(arm.status()?.fault) != Some(Fault::None) {
+        // Activated under a fault, it sinks until it is braked again.
+        rest(arm)?;
         arm.clear_fault().map_err(|error| format!("clear: {error}"))?;
         // A device with a fault goes on asking for IDLE.
         start_up(arm, way)?;

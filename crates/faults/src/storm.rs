@@ -79,7 +79,7 @@ fn bars(inject: &[Injection]) -> std::collections::BTreeMap<Figure, f64> {
         _ => false,
     };
     let belief = if inject.iter().any(blinds) { f64::INFINITY } else { 20.0 };
-    [(Figure::Belief, belief)].into()
+    [(Figure::Belief, belief), (Figure::FreeSpeed, f64::INFINITY), (Figure::FallSpeed, 0.25)].into()
 }
 
 /// Draws of one storm.
@@ -163,14 +163,18 @@ impl Dice {
                 (FaultKind::Delay { frames: self.frames(), by }, self.scale(0.003, 0.5))
             }
             4 => (FaultKind::Repeat(self.frames()), self.scale(0.003, 1.0)),
-            5 | 6 => (FaultKind::Flip(self.frames()), self.scale(0.003, 1.0)),
+            5 | 6 => {
+                let most = self.scale(1.0, 9.0) as u32;
+                (FaultKind::Flip(Frames { most, ..self.frames() }), self.scale(0.003, 1.0))
+            }
             7 => {
                 let kind = self.of(&[FrameKind::Position, FrameKind::Force, FrameKind::Moment]);
                 let from = if kind == FrameKind::Position { vec![self.node()] } else { Vec::new() };
                 (FaultKind::Freeze(Frames { kind, from, ..Frames::default() }), self.scale(0.01, 1.0))
             }
             8 => {
-                let by = (self.sign() * self.scale(1.0, 2_097_151.0)) as i32;
+                // Beyond what a motor can have done in a cycle. Below that nobody can tell it from a motion (A7).
+                let by = (self.sign() * self.scale(2_000.0, 2_097_151.0)) as i32;
                 (FaultKind::CountJump { node: self.node(), by }, if self.below(2) == 0 { once } else { 0.3 })
             }
             9 => (FaultKind::Restart { node: self.node() }, once),

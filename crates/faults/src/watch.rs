@@ -40,6 +40,8 @@ pub struct Moment {
     pub hand: [f64; 3],
     /// Mode of the safety module.
     pub safety: SafetyMode,
+    /// True if no motor pulls or brakes.
+    pub is_free: bool,
 }
 
 /// Everything seen of one scenario.
@@ -209,10 +211,10 @@ impl Observer {
             (cycle.q.map(f64::from), plan.map(f64::from))
         });
         let plant = plant(arm);
-        let (ticks, safety) = (plant.now(), plant.safety_mode());
+        let (ticks, safety, is_free) = (plant.now(), plant.safety_mode(), plant.is_free());
         let world = plant.world();
         let (q, dq, hand) = (world.joint_positions(), world.joint_velocities(), world.grasp_pose().position);
-        self.moments.push(Moment { time, ticks, state, fault, told, q, dq, hand, safety });
+        self.moments.push(Moment { time, ticks, state, fault, told, q, dq, hand, safety, is_free });
         Ok(())
     }
 }
