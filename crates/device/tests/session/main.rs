@@ -3,6 +3,8 @@
 mod calibration;
 mod commands;
 mod conversation;
+mod library;
+mod observers;
 mod rig;
 mod saving;
 mod strangers;
