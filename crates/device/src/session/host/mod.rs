@@ -8,7 +8,7 @@
 //! - observers are told what the host is told, and can change nothing;
 //! - every request is answered once, and acted on once however often it is repeated;
 //! - a request for the control half is answered when that half has taken or refused it;
-//! - what moves is stopped when the host has been silent for half a second, before anything else is done;
+//! - what moves is stopped when the host has been silent for half a second ([`LINK_TIMEOUT_MS`]), before anything else;
 //! - an image replaces another only when it is complete, undamaged and fit for this device;
 //! - a change of the store is answered when it is durable.
 
