@@ -152,6 +152,9 @@ error_codes! {
     AttachMayReset = 223: "attaching the debug probe can restart the board", "`logs` on a live board without leave",
         "take the torque from the arm (Shift-Idle), then `tactus logs --attach-may-reset`; better, start it before \
          the arm is switched on: once attached it only reads";
+    WouldReplace = 230: "something else of that name is there already",
+        "an earlier version in the device, or an earlier file",
+        "choose another name; `--force` replaces it";
     DeviceNotFound = 301: "there is no such device", "cable, power, or a misspelt port",
         "check cable and name of the device; for a simulated arm use `--device sim:`";
     PermissionDenied = 302: "no permission to use the device",
