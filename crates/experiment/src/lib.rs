@@ -14,6 +14,7 @@ pub mod figures;
 #[cfg(test)]
 pub mod fixtures;
 pub mod grid;
+pub mod interval;
 pub mod inverse;
 #[cfg(feature = "mujoco")]
 pub mod lift;
@@ -34,6 +35,7 @@ pub mod results;
 mod runner;
 pub mod scenario;
 pub mod seed;
+pub mod shaking;
 pub mod statistics;
 pub mod trace;
 #[cfg(feature = "mujoco")]
