@@ -37,6 +37,7 @@ pub mod scenario;
 pub mod seed;
 pub mod shaking;
 pub mod statistics;
+pub mod sweep;
 pub mod trace;
 #[cfg(feature = "mujoco")]
 pub mod trial;
@@ -53,4 +54,5 @@ pub use results::Results;
 pub use runner::{Experiment, ExperimentError, Progress, run};
 pub use scenario::{PlantKind, Scenario};
 pub use statistics::Summary;
+pub use sweep::Sweep;
 pub use variation::Variation;

@@ -18,10 +18,13 @@ pub trait Kernels<T, const N: usize>: Clone + Debug + PartialEq {
     fn centre(&self, i: usize) -> Option<T>;
     /// Width `h_i`; `None` beyond the last kernel.
     fn width(&self, i: usize) -> Option<T>;
-    /// Gives each kernel that matters at the phase `s` to `take`, in order and such that the largest is 1; returns
-    /// `s / sum psi`.
-    fn each(&self, s: T, take: impl FnMut(usize, T)) -> T;
+    /// Gives the kernels that matter at the phase `s` to `take`, some at a time with the index of the first, in order
+    /// and such that the largest is 1; returns `s / sum psi`.
+    fn each(&self, s: T, take: impl FnMut(usize, &[T])) -> T;
 }
+
+/// Kernels that are evaluated together.
+const AT_A_TIME: usize = 16;
 
 /// Kernels by a table of centres and widths.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,7 +74,7 @@ impl<T: Scalar, const N: usize> Kernels<T, N> for Tabulated<T, N> {
     }
 
     #[inline]
-    fn each(&self, s: T, mut take: impl FnMut(usize, T)) -> T {
+    fn each(&self, s: T, mut take: impl FnMut(usize, &[T])) -> T {
         let count = if self.count < N { self.count } else { N };
         let (centres, roots) = (&self.centres[..count], &self.root_widths[..count]);
         let exponent = |i: usize| {
@@ -92,13 +95,32 @@ impl<T: Scalar, const N: usize> Kernels<T, N> for Tabulated<T, N> {
         let matters = |i: usize| exponent(i) - smallest <= T::NEGLIGIBLE_EXPONENT;
         let first = (0..nearest).rev().take_while(|&i| matters(i)).last().unwrap_or(nearest);
         let mut sum = T::ZERO;
-        for i in first..count {
-            if i > nearest && !matters(i) {
+        // Some at a time: a loop without a branch over a few numbers becomes vector instructions where there are any.
+        let mut i = first;
+        for (centres, roots) in centres[first..].chunks(AT_A_TIME).zip(roots[first..].chunks(AT_A_TIME)) {
+            let mut kernels = [T::ZERO; AT_A_TIME];
+            for ((kernel, centre), root) in kernels.iter_mut().zip(centres).zip(roots) {
+                let z = *root * (s - *centre);
+                *kernel = z * z - smallest;
+            }
+            if let Some(kernel) = nearest.checked_sub(i).and_then(|place| kernels.get_mut(place)) {
+                *kernel = T::ZERO;
+            }
+            let begun = (nearest + 1).saturating_sub(i);
+            let some = kernels.iter().take(centres.len());
+            let used = some.skip(begun).take_while(|e| **e <= T::NEGLIGIBLE_EXPONENT).count() + begun.min(centres.len());
+            let used = kernels.get_mut(..used).unwrap_or_default();
+            for kernel in used.iter_mut() {
+                *kernel = T::kernel(*kernel);
+            }
+            for kernel in used.iter() {
+                sum = sum + *kernel;
+            }
+            take(i, used);
+            i += used.len();
+            if used.len() < centres.len() {
                 break;
             }
-            let kernel = if i == nearest { T::kernel(T::ZERO) } else { T::kernel(exponent(i) - smallest) };
-            sum = sum + kernel;
-            take(i, kernel);
         }
         s / sum
     }
