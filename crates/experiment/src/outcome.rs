@@ -48,7 +48,7 @@ pub enum Outcome {
     Crushed,
     /// Grasped by two fingers or more, but the arm did not raise the hand.
     NotLifted,
-    /// The arm shook, whatever became of the object.
+    /// The arm shook, whether it held the object or not.
     Unstable,
     /// The arm stopped by itself; the name of the fault.
     Stopped(String),
@@ -184,12 +184,13 @@ pub fn judge(
 
     let outcome = if let Some(fault) = fault {
         Outcome::Stopped(fault.to_owned())
-    } else if shaking > UNSTABLE {
-        Outcome::Unstable
     } else if observation.crushed {
         Outcome::Crushed
     } else if rule.upright && tilt > TILT_LIMIT {
+        // What falls knocks against the hand: its shaking then is none of the arm's.
         Outcome::KnockedOver
+    } else if shaking > UNSTABLE {
+        Outcome::Unstable
     } else if is_lifted(last, first) && observation.at(marks.hold).is_some_and(|sample| is_lifted(sample, first)) {
         Outcome::Held
     } else if lifted.iter().any(|sample| height(sample) > RAISED) {
@@ -375,9 +376,9 @@ mod tests {
     #[test]
     fn an_arm_that_shakes_has_no_success() {
         let conduct = |shaking| ArmConduct { fault: None, shaking };
-        let (outcome, measures) = judge(&good(), &MILESTONES, UPRIGHT, conduct(0.2));
-        assert_eq!((outcome, measures.shaking_rad_s), (Outcome::Unstable, 0.2));
-        assert_eq!(judge(&good(), &MILESTONES, UPRIGHT, conduct(0.1)).0, Outcome::Held);
+        let (outcome, measures) = judge(&good(), &MILESTONES, UPRIGHT, conduct(0.4));
+        assert_eq!((outcome, measures.shaking_rad_s), (Outcome::Unstable, 0.4));
+        assert_eq!(judge(&good(), &MILESTONES, UPRIGHT, conduct(0.25)).0, Outcome::Held);
     }
 
     #[test]

@@ -95,20 +95,21 @@ impl<T: Scalar, const N: usize> Kernels<T, N> for Tabulated<T, N> {
         let matters = |i: usize| exponent(i) - smallest <= T::NEGLIGIBLE_EXPONENT;
         let first = (0..nearest).rev().take_while(|&i| matters(i)).last().unwrap_or(nearest);
         let mut sum = T::ZERO;
-        // Some at a time: a loop without a branch over a few numbers becomes vector instructions where there are any.
+        // Some at a time: the loop over their exponentials has no branch, so it becomes vector instructions where there
+        // are any.
         let mut i = first;
         for (centres, roots) in centres[first..].chunks(AT_A_TIME).zip(roots[first..].chunks(AT_A_TIME)) {
             let mut kernels = [T::ZERO; AT_A_TIME];
-            for ((kernel, centre), root) in kernels.iter_mut().zip(centres).zip(roots) {
+            let mut used = 0;
+            for ((place, centre), root) in kernels.iter_mut().zip(centres).zip(roots) {
                 let z = *root * (s - *centre);
-                *kernel = z * z - smallest;
+                let exponent = z * z - smallest;
+                if i + used > nearest && !(exponent <= T::NEGLIGIBLE_EXPONENT) {
+                    break;
+                }
+                *place = exponent;
+                used += 1;
             }
-            if let Some(kernel) = nearest.checked_sub(i).and_then(|place| kernels.get_mut(place)) {
-                *kernel = T::ZERO;
-            }
-            let begun = (nearest + 1).saturating_sub(i);
-            let some = kernels.iter().take(centres.len());
-            let used = some.skip(begun).take_while(|e| **e <= T::NEGLIGIBLE_EXPONENT).count() + begun.min(centres.len());
             let used = kernels.get_mut(..used).unwrap_or_default();
             for kernel in used.iter_mut() {
                 *kernel = T::kernel(*kernel);
