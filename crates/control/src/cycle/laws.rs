@@ -1,4 +1,5 @@
-//! The laws of the states: from what is measured to the torque that is wanted.
+//! The laws of the states: from what is measured to the torque that is wanted. What a law remembers, its ramp for one,
+//! is in `law.rs`; the length of a ramp is a constant of `mod.rs`.
 
 use crate::cycle::law::{Lag, Law, Running};
 use crate::cycle::record::{Event, flags};

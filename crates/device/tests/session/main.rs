@@ -4,6 +4,8 @@ mod bounds;
 mod calibration;
 mod commands;
 mod conversation;
+mod library;
+mod observers;
 mod rig;
 mod saving;
 mod strangers;

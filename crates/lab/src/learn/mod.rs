@@ -59,7 +59,8 @@ pub struct LearnOptions {
 }
 
 impl LearnOptions {
-    /// The recommended values: 50 kernels, 7.5 Hz, quaternion error, an open hand.
+    /// The recommended values: 50 kernels, 7.5 Hz, quaternion error, an open hand. `tactus learn` repeats them as the
+    /// defaults of its options.
     pub fn named(name: impl Into<String>) -> LearnOptions {
         LearnOptions {
             name: name.into(),
