@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use link::{Goal, RunOptions, Statistics};
+use link::{Goal, Name, RunOptions, Statistics};
 use serde::Serialize;
 
-use super::{ErrorCode, Failure, Global, Output, Table, connection, upload};
+use super::{ErrorCode, Failure, Global, Output, Table, connection, get, upload};
 use lab::client::Client;
 use lab::demonstration::{RATE, Recording};
 use lab::device::Device;
@@ -23,7 +23,7 @@ const POST_ROLL: f64 = 1.0;
 /// Options of `run`.
 #[derive(Debug, Clone, Args)]
 pub struct Cmd {
-    /// The primitive, TOML; it is uploaded unless the device has it already
+    /// The primitive: a TOML file, uploaded unless the device has it already, or the name of one in the device
     #[arg(value_name = "PRIMITIVE")]
     pub primitive: PathBuf,
     /// Where the recording goes, CSV (see docs/recording-format.md)
@@ -130,16 +130,25 @@ pub struct BusReport {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "run";
     let output = global.output();
-    let file = upload::read(&command.primitive, DOING)?;
+    let stored = stored_name(&command.primitive);
+    let mut opened = stored.is_some().then(|| open(command, global)).transpose()?;
+    let file = match (&stored, &mut opened) {
+        (Some(name), Some(client)) => get::fetch(client, name, DOING)?,
+        _ => upload::read(&command.primitive, DOING)?,
+    };
     check_expectation(&file, command, output)?;
     upload::precheck(&file, command.speed, output, DOING)?;
     let started = Instant::now();
-    let mut client = connection::open(global, DOING, |options| {
-        options.bus_log = command.bus_log.clone().or(options.bus_log.take());
-    })?;
+    let mut client = match opened {
+        Some(client) => client,
+        None => open(command, global)?,
+    };
     if command.bus_log.is_some() && client.transport().simulation().is_none() {
         let cause = std::io::Error::other("only a simulated bus can be written down");
         return Err(connection::failure(ProcedureError::Recording(cause), DOING));
+    }
+    if let Some(old) = upload::other_version(&mut client, &file, DOING)? {
+        output.say(format!("replaces another version of '{}' in the device (checksum 0x{:08x})", file.name, old.crc));
     }
     upload::send(&mut client, &file, output, DOING)?;
     output.say(format!("'{}' is in the device", file.name));
@@ -159,6 +168,18 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         output.say("the arm holds its goal; `tactus stop` makes it soft");
     }
     output.result(&report, report.to_text())
+}
+
+/// The name of a primitive in the device, where the argument is that and no file.
+fn stored_name(primitive: &Path) -> Option<Name> {
+    let is_file = primitive.exists() || primitive.extension().is_some_and(|extension| extension == "toml");
+    Name::new(primitive.to_str()?).ok().filter(|_| !is_file)
+}
+
+fn open(command: &Cmd, global: &Global) -> Result<Client<Device>, Failure> {
+    connection::open(global, "run", |options| {
+        options.bus_log = command.bus_log.clone().or(options.bus_log.take());
+    })
 }
 
 fn play(

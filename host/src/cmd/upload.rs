@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use link::image::stored_crc;
+use link::{Listing, Name};
 use serde_json::json;
 
 use super::{ErrorCode, Failure, Global, Output, connection};
@@ -17,6 +19,9 @@ pub struct Cmd {
     /// The primitive, TOML
     #[arg(value_name = "PRIMITIVE")]
     pub primitive: PathBuf,
+    /// Replace another version of the same name in the device without asking
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Uploads a primitive.
@@ -28,6 +33,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let file = read(&command.primitive, DOING)?;
     let mut client = connection::open(global, DOING, |_| {})?;
+    may_replace(&mut client, &file, command.force, global)?;
     let outcome = send(&mut client, &file, output, DOING)?;
     if let (UploadOutcome::Stored(_), Some(line)) = (&outcome, client.transport().line_rate()) {
         let rate = client.transfer().sending_rate();
@@ -52,6 +58,31 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         &data,
         format!("{}: {word} ({} bytes, CRC 0x{:08x})", listing.name.as_str(), listing.length, listing.crc),
     )
+}
+
+/// Makes sure that a person wants another version of the same name replaced.
+fn may_replace(client: &mut Client<Device>, file: &PrimitiveFile, force: bool, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "upload refused";
+    let Some(there) = other_version(client, file, DOING)?.filter(|_| !force) else { return Ok(()) };
+    let checksum = there.crc;
+    let what = format!("the device stores another version of '{}' (checksum 0x{checksum:08x})", file.name);
+    if super::ask(global, &format!("{what}; replace it?")) {
+        return Ok(());
+    }
+    Err(Failure::new(ErrorCode::WouldReplace, DOING, what)
+        .help("keep that one first: `tactus rename` or `tactus get`; or replace it with `--force`"))
+}
+
+/// The listing of another version of the primitive in the device.
+pub(super) fn other_version(
+    client: &mut Client<Device>,
+    file: &PrimitiveFile,
+    doing: &str,
+) -> Result<Option<Listing>, Failure> {
+    let image = file.to_image().map_err(|cause| super::check::failure(cause, &file.file, doing))?;
+    let name = Name::new(&file.name).map_err(|cause| Failure::new(ErrorCode::NameInvalid, doing, cause))?;
+    let there = client.find(&name).map_err(|error| error.into_failure(doing))?;
+    Ok(there.filter(|there| there.crc != stored_crc(&image)))
 }
 
 /// Reads a primitive that fits this arm.

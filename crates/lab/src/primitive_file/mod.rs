@@ -7,6 +7,7 @@
 
 mod convert;
 mod error;
+mod readback;
 mod text;
 
 use std::path::{Path, PathBuf};
@@ -134,7 +135,8 @@ pub struct ExpectationTable {
     pub spread_floor: f64,
     /// Mean by phase, 9 sensor rows a point: force N (world), torque N m, finger gauges N m.
     pub mean: Vec<Vec<f64>>,
-    /// Standard deviation, same shape. It stays on the host: K2 was made from it.
+    /// Standard deviation, same shape; empty where it is not known. It stays on the host: K2 was made from it, and a
+    /// primitive that was read back from a device has none.
     pub spread: Vec<Vec<f64>>,
 }
 
@@ -405,7 +407,9 @@ impl PrimitiveFile {
             columns("feedback.k2", &feedback.k2, link::image::SENSOR_ROWS)?;
         }
         if let Some(expectation) = &self.expectation {
-            shape("expectation.spread", expectation.spread.len(), expectation.mean.len())?;
+            if !expectation.spread.is_empty() {
+                shape("expectation.spread", expectation.spread.len(), expectation.mean.len())?;
+            }
             columns("expectation.mean", &expectation.mean, link::image::SENSOR_ROWS)?;
             columns("expectation.spread", &expectation.spread, link::image::SENSOR_ROWS)?;
         }
