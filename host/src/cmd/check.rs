@@ -58,7 +58,7 @@ pub(super) fn failure(cause: PrimitiveFileError, path: &Path, doing: &str) -> Fa
         PrimitiveFileError::Image { .. } | PrimitiveFileError::Invalid { .. } => ErrorCode::PrimitiveInvalid,
         _ => ErrorCode::PrimitiveUnreadable,
     };
-    Failure::new(code, format!("{doing} refused {}", path.display()), cause)
+    Failure::of_file(code, format!("{doing} refused {}", path.display()), cause)
 }
 
 /// A speed factor the device takes.

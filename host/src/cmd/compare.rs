@@ -28,7 +28,7 @@ pub struct Cmd {
 /// A recording cannot be read, or lacks what is compared.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let invalid =
-        |cause: Box<dyn std::error::Error + Send + Sync>| Failure::new(ErrorCode::CompareInput, "compare", cause);
+        |cause: Box<dyn std::error::Error + Send + Sync>| Failure::of_file(ErrorCode::CompareInput, "compare", cause);
     let one = Recording::read(&command.one).map_err(|cause| invalid(cause.into()))?;
     let other = Recording::read(&command.other).map_err(|cause| invalid(cause.into()))?;
     let difference = Difference::between(&one, &other, command.contact).map_err(|cause| invalid(cause.into()))?;

@@ -1,12 +1,13 @@
 //! `tactus plot`: one figure of demonstration, plan and execution.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
 
-use super::{ErrorCode, Failure, Global};
+use super::{ErrorCode, Failure, Global, files};
 use lab::demonstration::{Demonstration, Preparation, Recording};
+use lab::output_file::OutputFile;
 use lab::plan;
 use lab::plot::{self, Movement, movement::PosePath};
 use lab::primitive_file::PrimitiveFile;
@@ -45,7 +46,16 @@ pub struct Cmd {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let doing = "plot";
-    let invalid = |cause: Box<dyn std::error::Error + Send + Sync>| Failure::new(ErrorCode::PlotInput, doing, cause);
+    let invalid =
+        |cause: Box<dyn std::error::Error + Send + Sync>| Failure::of_file(ErrorCode::PlotInput, doing, cause);
+    let inputs: Vec<&Path> = [&command.demonstration, &command.primitive, &command.run]
+        .into_iter()
+        .flatten()
+        .map(PathBuf::as_path)
+        .collect();
+    let create = |file: &PathBuf| files::create(file, global, &inputs, doing);
+    let outputs = command.output.iter().map(create).collect::<Result<Vec<_>, _>>()?;
+    let picture_file = command.picture.as_ref().map(create).transpose()?;
     let demonstration = match &command.demonstration {
         None => None,
         Some(file) => {
@@ -86,22 +96,31 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     };
     let page = movement.page().map_err(|cause| Failure::new(ErrorCode::NothingToDraw, doing, cause))?;
     let spinner = output.spinner("drawing");
-    for file in &command.output {
-        plot::write(&page, file).map_err(|cause| {
+    for (file, output_file) in command.output.iter().zip(outputs) {
+        let bytes = plot::encode(&page, file).map_err(|cause| {
             let is_format = matches!(cause, plot::PlotError::Format { .. });
             let code = if is_format { ErrorCode::FigureFormat } else { ErrorCode::FigureNotWritten };
             Failure::new(code, doing, cause)
         })?;
+        files::fill(output_file, &bytes, doing)?;
     }
     if let (Some(file), Some(run)) = (&command.picture, &movement.execution) {
         spinner.set_message("rendering");
-        picture(run, file)?;
+        let part = picture_file.as_ref().map_or(file.as_path(), OutputFile::part);
+        picture(run, part)?;
+        if let Some(picture_file) = picture_file {
+            picture_file.commit().map_err(|error| files::failure(error, doing))?;
+        }
     }
     spinner.finish_and_clear();
     let files = command.output.iter().chain(&command.picture);
     let text: Vec<String> = files.map(|file| file.display().to_string()).collect();
     output.result(
-        &json!({ "figures": command.output, "picture": command.picture, "tracking": tracking }),
+        &json!({
+            "figures": command.output.iter().map(|file| files::text(file)).collect::<Vec<_>>(),
+            "picture": command.picture.as_deref().map(files::text),
+            "tracking": tracking,
+        }),
         text.join("\n"),
     )
 }

@@ -1,5 +1,6 @@
 //! `tactus run`: the arm plays a primitive, watched and written down.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -7,13 +8,15 @@ use clap::Args;
 use link::{Goal, RunOptions, Statistics};
 use serde::Serialize;
 
+use super::files::{self, RecordingFile};
 use super::{ErrorCode, Failure, Global, Output, Table, connection, upload};
 use lab::client::Client;
-use lab::demonstration::{RATE, Recording};
+use lab::demonstration::{Origin, RATE, Recording};
 use lab::device::Device;
 use lab::primitive_file::PrimitiveFile;
 use lab::procedure::{
-    self, Change, ChangeKind, FlagCounts, Mode, ProcedureError, RunOutcome, RunRequest, Surprise, recording_text,
+    self, Change, ChangeKind, CycleWriter, FlagCounts, Mode, ProcedureError, RunOutcome, RunRequest, Surprise,
+    recording_text,
 };
 use lab::tracking::{HandTracking, Tracking};
 
@@ -133,6 +136,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let file = upload::read(&command.primitive, DOING)?;
     check_expectation(&file, command, output)?;
     upload::precheck(&file, command.speed, output, DOING)?;
+    let record = command.record.as_ref().filter(|_| !command.dry_run);
+    let mut record =
+        record.map(|path| RecordingFile::create(path, global, &[&command.primitive], DOING)).transpose()?;
     let started = Instant::now();
     let mut client = connection::open(global, DOING, |options| {
         options.bus_log = command.bus_log.clone().or(options.bus_log.take());
@@ -149,12 +155,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let ready_s = client.is_virtual().then(|| client.now().as_secs_f64());
-    let report = play(command, &mut client, &file, output).map_err(|error| connection::failure(error, DOING))?;
-    let report = Report { ready_s, ..report };
+    let played = play(command, &mut client, &file, record.as_mut(), output);
     connection::tell_speed(&client, started, output);
-    if let Some(path) = &command.record {
-        output.say(format!("wrote {}", path.display()));
-    }
+    let played = played.map_err(|error| connection::failure(error, DOING));
+    let report = match record {
+        Some(record) => record.end(played, output)?,
+        None => played?,
+    };
+    let report = Report { ready_s, ..report };
     if !client.is_simulated() {
         output.say("the arm holds its goal; `tactus stop` makes it soft");
     }
@@ -165,6 +173,7 @@ fn play(
     command: &Cmd,
     client: &mut Client<Device>,
     file: &PrimitiveFile,
+    record: Option<&mut RecordingFile>,
     output: Output,
 ) -> Result<Report, ProcedureError> {
     let spinner = output.spinner("moving to the start");
@@ -187,20 +196,25 @@ fn play(
     let request = RunRequest { rest: POST_ROLL, changes, ..RunRequest::new(name, file.movement.duration, options) };
 
     output.say(format!("running '{}' ({})", file.name, command.mode.name()));
-    let notes = notes(client, file);
+    let notes = notes(client, file, command);
+    let mut writer = record.map(|record| start(record, &notes)).transpose()?;
     let bar = output.bar((file.movement.duration / command.speed * RATE) as u64, "running");
-    let mut cycles = Vec::new();
+    let (mut cycles, mut written) = (Vec::new(), Ok(()));
     let outcome = procedure::play(client, &request, &mut |cycle| {
         cycles.push(*cycle);
         bar.set_position(cycles.len() as u64);
+        // A disk that is full is no reason to stop an arm: the run goes on, and is told of at its end.
+        if let (Some(writer), Ok(())) = (&mut writer, &written) {
+            written = writer.write(cycle);
+        }
     });
     bar.finish_and_clear();
-    let bytes = recording_text(&cycles, &notes)?;
-    // What led to an early end is worth reading as well.
-    if let Some(path) = &command.record {
-        std::fs::write(path, &bytes)?;
-    }
     let outcome = outcome?;
+    written?;
+    if let Some(writer) = writer {
+        writer.finish()?;
+    }
+    let bytes = recording_text(&cycles, &notes)?;
     tell(&outcome, output);
     let statistics = client.statistics()?;
     report(client, file, command.mode, &bytes, outcome, &statistics)
@@ -271,10 +285,21 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
     Ok(())
 }
 
-fn notes(client: &Client<Device>, file: &PrimitiveFile) -> String {
-    let simulated = if client.is_simulated() { " (simulated arm)" } else { "" };
-    let (rate, board) = (control::RATE_HZ, client.hello().board.as_str());
-    format!("Tactus recording of a run of '{}', {rate} Hz, on {board}{simulated}", file.name)
+/// The notes above a recording of this run.
+fn notes(client: &Client<Device>, file: &PrimitiveFile, command: &Cmd) -> String {
+    let origin = Origin {
+        speed: Some(command.speed),
+        mode: Some(command.mode.name().to_owned()),
+        goal: command.goal,
+        ..files::origin(client, Some(file))
+    };
+    format!("Tactus recording of a run of '{}', {} Hz\n{origin}", file.name, control::RATE_HZ)
+}
+
+/// Begins the file of a recording.
+fn start<'a>(record: &'a mut RecordingFile, notes: &str) -> std::io::Result<CycleWriter<impl Write + use<'a>>> {
+    record.expect_notes(notes);
+    CycleWriter::new(&mut record.file, notes)
 }
 
 fn report(

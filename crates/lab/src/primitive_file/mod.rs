@@ -21,6 +21,7 @@ pub use dmp::{Hemisphere, OrientationError};
 pub use error::PrimitiveFileError;
 
 use crate::demonstration::recording::checksum;
+use crate::output_file;
 
 /// Version of the layout. A file that names another one is refused.
 pub const SCHEMA: &str = "tactus-primitive/1";
@@ -252,13 +253,17 @@ impl PrimitiveFile {
     /// # Errors
     /// A number is not finite, a table has the wrong size, or the operating system refuses.
     pub fn write(&self, file: &Path) -> Result<(), PrimitiveFileError> {
+        let text = self.checked_text()?;
+        output_file::replace(file, text.as_bytes()).map_err(PrimitiveFileError::Output)
+    }
+
+    /// The text of the file, its values checked.
+    ///
+    /// # Errors
+    /// A number is not finite, or a table has the wrong size.
+    pub fn checked_text(&self) -> Result<String, PrimitiveFileError> {
         self.check_values()?;
-        let failed = |cause| PrimitiveFileError::Io { file: file.to_owned(), cause };
-        let mut half_written = file.as_os_str().to_owned();
-        half_written.push(".part");
-        let half_written = PathBuf::from(half_written);
-        std::fs::write(&half_written, self.to_text()).map_err(failed)?;
-        std::fs::rename(&half_written, file).map_err(failed)
+        Ok(self.to_text())
     }
 
     /// The text of the file.
