@@ -8,7 +8,7 @@ use std::path::Path;
 use lab::demonstration::Recording;
 use lab::learn::{LearnOptions, learn};
 use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
-use tactus::check::{CheckReport, Limit, check};
+use tactus::check::{Asked, CheckReport, Limit, check};
 
 fn reach(duration: f64) -> PrimitiveFile {
     let text = common::text(&common::rows(duration));
@@ -17,15 +17,15 @@ fn reach(duration: f64) -> PrimitiveFile {
 }
 
 fn checked(primitive: &PrimitiveFile) -> CheckReport {
-    check(primitive, 1.0, |_| {}).unwrap()
+    check(primitive, Asked { speed: 1.0, ..Asked::default() }, |_| {}).unwrap()
 }
 
 #[test]
 fn a_calm_movement_passes_with_every_margin_reported() {
     let mut heard = Vec::new();
-    let report = check(&reach(5.0), 1.0, |fraction| heard.push(fraction)).unwrap();
+    let report = check(&reach(5.0), Asked { speed: 1.0, ..Asked::default() }, |fraction| heard.push(fraction)).unwrap();
     assert!(report.passed(), "{}", report.to_text());
-    assert_eq!(report.margins.len(), 1 + 7 + 7 + 7 + 1 + 2);
+    assert_eq!(report.margins.len(), 4 + 1 + 7 + 7 + 7 + 1 + 2);
     assert_eq!(report.limited_cycles, 0);
     assert!(report.tracking_max_m < 5e-3, "{}", report.tracking_max_m);
     for margin in &report.margins {
@@ -61,9 +61,9 @@ fn a_movement_that_is_too_fast_is_refused() {
 #[test]
 fn the_same_movement_passes_at_half_speed_and_fails_at_double() {
     let primitive = reach(1.6);
-    let slow = check(&primitive, 0.5, |_| {}).unwrap();
+    let slow = check(&primitive, Asked { speed: 0.5, ..Asked::default() }, |_| {}).unwrap();
     assert!(slow.passed(), "{}", slow.to_text());
-    let fast = check(&primitive, 2.0, |_| {}).unwrap();
+    let fast = check(&primitive, Asked { speed: 2.0, ..Asked::default() }, |_| {}).unwrap();
     assert!(!fast.passed(), "{}", fast.to_text());
 }
 
@@ -100,7 +100,7 @@ fn a_plan_that_leaves_the_workspace_is_refused() {
 fn a_primitive_of_another_arm_is_refused() {
     let mut primitive = reach(3.0);
     primitive.model_hash ^= 1;
-    let error = check(&primitive, 1.0, |_| {}).unwrap_err();
+    let error = check(&primitive, Asked { speed: 1.0, ..Asked::default() }, |_| {}).unwrap_err();
     assert!(matches!(error, PrimitiveFileError::Model { .. }), "{error}");
 }
 
@@ -108,6 +108,6 @@ fn a_primitive_of_another_arm_is_refused() {
 fn a_duration_that_the_integration_cannot_follow_is_refused() {
     let mut primitive = reach(3.0);
     primitive.movement.duration = 0.05;
-    let error = check(&primitive, 1.0, |_| {}).unwrap_err();
+    let error = check(&primitive, Asked { speed: 1.0, ..Asked::default() }, |_| {}).unwrap_err();
     assert!(matches!(error, PrimitiveFileError::Invalid { .. }), "{error}");
 }

@@ -63,7 +63,7 @@ fn json_is_one_object_on_stdout_with_what_the_text_says() {
     let checked = json(&tactus(folder.path(), &["check", "demo.toml", "--json"]).success());
     assert_eq!(checked["name"], "a");
     assert_eq!(checked["violations"].as_array().unwrap().len(), 0);
-    assert_eq!(checked["margins"][1]["limit"], "joint_position");
+    assert_eq!(checked["margins"][5]["limit"], "joint_position");
 }
 
 #[test]

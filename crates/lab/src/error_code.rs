@@ -137,6 +137,8 @@ error_codes! {
         "tactus plot --demonstration demo.csv --primitive reach.toml --run run.csv --output figure.png";
     FigureFormat = 211: "the format of the figure is unknown", "the file's name ends with another extension",
         "name a file that ends in .png or .svg";
+    NoStudyOfWeights = 270: "the experiment with a weight knows neither lessons nor sweeps", "`experiment lift`",
+        "leave out `--lessons` and `--sweep`";
     BoardOption = 212: "the emulated board does not take an option, or not this image", "an option of `board:`",
         "the options of `--device board:` are in docs/board-stm32h743.md";
     FlashFile = 213: "the file cannot be used as the device's flash",
@@ -152,8 +154,9 @@ error_codes! {
     AttachMayReset = 223: "attaching the debug probe can restart the board", "`logs` on a live board without leave",
         "take the torque from the arm (Shift-Idle), then `tactus logs --attach-may-reset`; better, start it before \
          the arm is switched on: once attached it only reads";
-    OutputExists = 230: "the file to be written exists already", "an earlier command wrote it",
-        "name another file, or replace it with `--force`";
+    WouldReplace = 230: "something else of that name is there already",
+        "an earlier version in the device, or an earlier file",
+        "choose another name; `--force` replaces it";
     OutputNotAFile = 231: "the place of the file to be written is taken by something else",
         "a folder, a device, a pipe, or a link to nothing", "name a file";
     OutputIsInput = 232: "the file to be written is one that the command reads", "the same file is named twice",
@@ -167,8 +170,6 @@ error_codes! {
         "read the cause; name another file";
     ChangeTooLate = 237: "a change comes after the end of the run", "the time of `--goal-at` or `--speed-at`",
         "give a time within the run";
-    HandOutOfRange = 238: "an angle for the hand is out of its range", "degrees instead of radians, or a misspelt number",
-        "spread 0 to 3.1 rad, fingers 0 to 2.4 rad";
     DeviceNotFound = 301: "there is no such device", "cable, power, or a misspelt port",
         "check cable and name of the device; for a simulated arm use `--device sim:`";
     PermissionDenied = 302: "no permission to use the device",

@@ -16,13 +16,13 @@ const MOST_UNFINISHED: u32 = 99;
 #[derive(Debug, Error)]
 pub enum OutputError {
     /// It is there already.
-    #[error("{file}: exists already", file = file.display())]
+    #[error("{file} exists", file = file.display())]
     Exists {
         /// The file.
         file: PathBuf,
     },
     /// Something else than a regular file is there.
-    #[error("{file}: is {found}, not a file that can be replaced", file = file.display())]
+    #[error("{file} is {found}, not a file that can be replaced", file = file.display())]
     NotAFile {
         /// The place.
         file: PathBuf,
@@ -30,7 +30,7 @@ pub enum OutputError {
         found: &'static str,
     },
     /// The command reads it.
-    #[error("{file}: is read by this command, and would be replaced", file = file.display())]
+    #[error("{file} is read by this command, and would be replaced", file = file.display())]
     IsInput {
         /// The file.
         file: PathBuf,
@@ -51,7 +51,7 @@ impl OutputError {
     #[must_use]
     pub fn code(&self) -> ErrorCode {
         match self {
-            Self::Exists { .. } => ErrorCode::OutputExists,
+            Self::Exists { .. } => ErrorCode::WouldReplace,
             Self::NotAFile { .. } => ErrorCode::OutputNotAFile,
             Self::IsInput { .. } => ErrorCode::OutputIsInput,
             Self::System { cause, .. } => ErrorCode::of_file(cause).unwrap_or(ErrorCode::FileFailed),

@@ -6,9 +6,10 @@ use control::plan::load;
 use control::plan::primitive::posture_and_hand;
 use control::time::periods;
 use control::units::{JointVelocities, Vector7};
-use control::{BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, RunOptions, State, flags};
+use control::{BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, Goal, RunOptions, State, flags};
 use puck::SafetyMode;
 
+use super::Asked;
 use super::plant::Plant;
 use lab::arm;
 use lab::boxed::boxed;
@@ -68,8 +69,10 @@ pub(super) struct ClosedLoop {
 }
 
 impl ClosedLoop {
-    /// Plays the primitive at `speed` times its taught speed; `progress` hears the fraction done now and then.
-    pub(super) fn play(primitive: &HostPrimitive, speed: f64, mut progress: impl FnMut(f64)) -> ClosedLoop {
+    /// Plays the primitive as it is `asked`; `progress` hears the fraction done now and then.
+    pub(super) fn play(primitive: &HostPrimitive, asked: Asked, mut progress: impl FnMut(f64)) -> ClosedLoop {
+        let speed = asked.speed;
+        let goal = Goal { position: asked.goal.map(|goal| goal.map(|value| value as f32)), orientation: None };
         let mut run = ClosedLoop { samples: Vec::new(), ending: Ending::Endless };
         let mut cycle: Box<Cycle<f64>> = boxed(Cycle::init(Calibration::nominal(arm::PAYLOAD), Gains::tuned()));
         let loaded = load::check(cycle.model(), primitive).map(|fit| cycle.load(&fit));
@@ -94,7 +97,7 @@ impl ClosedLoop {
             };
             let command = match number {
                 1 => Some(Command::Hold),
-                SETTLING => Some(Command::Run(RunOptions { speed: speed as f32, ..RunOptions::default() })),
+                SETTLING => Some(Command::Run(RunOptions { goal, speed: speed as f32, ..RunOptions::default() })),
                 _ => None,
             };
             let output = cycle.step(&CycleInput {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::{ErrorCode, Failure, Global};
-use crate::check;
+use crate::check::{self, Asked};
 use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
 
 /// Options of `check`.
@@ -17,6 +17,9 @@ pub struct Cmd {
     /// Speed factor at which it will be run, 0.1 to 2
     #[arg(long, default_value_t = 1.0, value_parser = factor)]
     pub speed: f64,
+    /// Another goal of the grasp point, as for `run`: world frame, m
+    #[arg(long, value_name = "X,Y,Z", value_parser = super::learn::numbers::<3>, allow_hyphen_values = true)]
+    pub goal: Option<[f64; 3]>,
 }
 
 /// Checks the primitive; a violation ends with exit code 6.
@@ -27,7 +30,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let file = PrimitiveFile::read(&command.primitive).map_err(|cause| failure(cause, &command.primitive, "check"))?;
     let bar = output.bar(100, "playing the plan");
-    let report = check::check(&file, command.speed, |fraction| bar.set_position((fraction * 100.0) as u64))
+    let report = check::check(&file, Asked { speed: command.speed, goal: command.goal }, |fraction| bar.set_position((fraction * 100.0) as u64))
         .map_err(|cause| failure(cause, &command.primitive, "check"))?;
     bar.finish_and_clear();
     if report.passed() {

@@ -33,6 +33,16 @@ pub(super) fn open(
     Ok(set_up(client, global))
 }
 
+/// Opens the device that the options name to look on, whoever commands its arm. Nothing can be changed, but stopped.
+///
+/// # Errors
+/// As [`open`]; the device is busy only if too many look on.
+pub(super) fn observe(global: &Global, doing: &str) -> Result<Client<Device>, Failure> {
+    let (device, owner) = reach(global, doing, |_| {})?;
+    let client = Client::observe(device, &owner).map_err(|error| error.into_failure(doing))?;
+    Ok(set_up(client, global))
+}
+
 /// Stops the arm of the device that the options name, whoever has it in his hands, and says hello then.
 ///
 /// # Errors

@@ -55,6 +55,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         bar.inc(1);
     }
     bar.finish_and_clear();
+    for recording in recordings.iter().filter(|recording| recording.origin.primitive.is_none()) {
+        output.warn(format!("{} does not name its movement", recording.file.display()));
+    }
     let summary = remember_successes(&mut file, &recordings)
         .map_err(|cause| rehearse::memory_failure(cause, "experience: nothing was remembered"))?;
     rehearse::write(&file, output_file, &target, DOING)?;

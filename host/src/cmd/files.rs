@@ -11,12 +11,17 @@ use super::{Failure, Global, Output};
 use lab::client::Client;
 use lab::device::Device;
 
-/// Opens a file to be written; none of `inputs` is replaced, and nothing is without `--force`.
+/// Opens a file to be written; none of `inputs` is replaced, and nothing is without `--force` or a person's yes.
 ///
 /// # Errors
 /// It cannot be written, or is there already.
 pub(super) fn create(path: &Path, global: &Global, inputs: &[&Path], doing: &str) -> Result<OutputFile, Failure> {
-    OutputFile::create(path, global.force, inputs).map_err(|error| failure(error, doing))
+    let mut opened = OutputFile::create(path, global.force, inputs);
+    let exists = matches!(opened, Err(OutputError::Exists { .. }));
+    if exists && super::ask(global, &format!("{} exists; replace it?", path.display())) {
+        opened = OutputFile::create(path, true, inputs);
+    }
+    opened.map_err(|error| failure(error, doing))
 }
 
 /// Fills a file and puts it at its place.
@@ -48,7 +53,7 @@ pub(super) fn origin(client: &Client<Device>, file: Option<&PrimitiveFile>) -> O
     let hello = client.hello();
     let simulated = if client.is_simulated() { " (simulated arm)" } else { "" };
     Origin {
-        primitive: file.map(|file| Played { name: file.name.clone(), movement: file.without_memory().checksum() }),
+        primitive: file.map(|file| Played { name: file.name.clone(), movement: file.movement_checksum() }),
         device: Some(format!("{}{simulated}", hello.board.as_str())),
         firmware: Some(hello.firmware.as_str().to_owned()),
         // Where time is simulated a recording is the same whenever it is made.

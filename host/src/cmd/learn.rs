@@ -137,6 +137,7 @@ fn failure(error: LearnError, command: &Cmd) -> Failure {
         LearnError::Demonstration(_) => ErrorCode::NoDemonstration,
         LearnError::TurnsTooFar { .. } => ErrorCode::TurnsTooFar,
         LearnError::Fit { .. } => ErrorCode::FitFailed,
+        LearnError::Poor { .. } => ErrorCode::FitPoor,
         LearnError::Primitive(_) => ErrorCode::LearnedInvalid,
     };
     let failure = Failure::new(code, "learn refused", error);

@@ -5,10 +5,12 @@ pub mod can;
 pub mod check;
 pub mod compare;
 mod connection;
+pub mod delete;
 pub mod experience;
 pub mod experiment;
 mod files;
 pub mod flash;
+pub mod get;
 pub mod hand;
 pub mod learn;
 pub mod list;
@@ -17,6 +19,7 @@ pub mod output;
 pub mod plot;
 pub mod record;
 pub mod rehearse;
+pub mod rename;
 pub mod run;
 pub mod sim;
 pub mod status;
@@ -24,7 +27,7 @@ pub mod stop;
 pub mod teach;
 pub mod upload;
 
-use std::io::Write;
+use std::io::{IsTerminal as _, Write};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -35,6 +38,7 @@ pub use output::Output;
 use lab::error_code::ErrorCode;
 use lab::failure::Failure;
 use lab::table::Table;
+use lab::transport::Address;
 
 /// Teach, learn, check, upload, run and watch movement primitives on a Barrett WAM.
 ///
@@ -76,6 +80,12 @@ pub struct Global {
 }
 
 impl Global {
+    /// True if the device is simulated in this process: nobody else can use it.
+    fn is_simulated_here(&self) -> bool {
+        let address = self.device.as_deref().map(str::parse::<Address>);
+        matches!(address, Some(Ok(Address::Simulated(..))))
+    }
+
     /// Where output goes.
     pub fn output(&self) -> Output {
         Output { json: self.json, quiet: self.quiet }
@@ -102,6 +112,12 @@ pub enum Command {
     Upload(upload::Cmd),
     /// List the primitives in the device
     List(list::Cmd),
+    /// Read a primitive back from the device into a file
+    Get(get::Cmd),
+    /// Give a primitive in the device another name
+    Rename(rename::Cmd),
+    /// Delete a primitive in the device
+    Delete(delete::Cmd),
     /// Play a primitive on the arm
     Run(run::Cmd),
     /// Show what the device says of itself and its arm
@@ -136,6 +152,9 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Teach(command) => teach::run(&command, &global),
         Command::Upload(command) => upload::run(&command, &global),
         Command::List(command) => list::run(&command, &global),
+        Command::Get(command) => get::run(&command, &global),
+        Command::Rename(command) => rename::run(&command, &global),
+        Command::Delete(command) => delete::run(&command, &global),
         Command::Run(command) => run::run(&command, &global),
         Command::Stop(command) => stop::run(&command, &global),
         Command::Status(command) => status::run(&command, &global),
@@ -164,6 +183,17 @@ pub fn run(cli: Cli) -> ExitCode {
             ExitCode::from(failure.code.exit() as u8)
         }
     }
+}
+
+/// Asks a person on a terminal; false where nobody may be asked, or for any answer but yes.
+fn ask(global: &Global, question: &str) -> bool {
+    if global.non_interactive || !std::io::stdin().is_terminal() || !std::io::stderr().is_terminal() {
+        return false;
+    }
+    eprint!("{question} [y/N] ");
+    let mut answer = String::new();
+    let read = std::io::stdin().read_line(&mut answer);
+    read.is_ok() && matches!(answer.trim(), "y" | "Y" | "yes")
 }
 
 /// A positive time in seconds.

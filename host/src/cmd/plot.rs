@@ -11,7 +11,7 @@ use lab::output_file::OutputFile;
 use lab::plan;
 use lab::plot::{self, Movement, movement::PosePath};
 use lab::primitive_file::PrimitiveFile;
-use lab::tracking::Tracking;
+use lab::tracking::{ComparisonError, Lack, Tracking};
 
 /// Options of `plot`.
 #[derive(Debug, Clone, Args)]
@@ -56,11 +56,13 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let create = |file: &PathBuf| files::create(file, global, &inputs, doing);
     let outputs = command.output.iter().map(create).collect::<Result<Vec<_>, _>>()?;
     let picture_file = command.picture.as_ref().map(create).transpose()?;
+    let mut shown = None;
     let demonstration = match &command.demonstration {
         None => None,
         Some(file) => {
             let preparation = if command.no_trim { Preparation { still_speed: None } } else { Preparation::default() };
             let recording = Recording::read(file).map_err(|cause| invalid(cause.into()))?;
+            shown = Some(recording.checksum);
             Some(Demonstration::prepare(&recording, &preparation).map_err(|cause| invalid(cause.into()))?)
         }
     };
@@ -75,9 +77,22 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         }
     };
     let execution = command.run.as_deref().map(Recording::read).transpose().map_err(|cause| invalid(cause.into()))?;
-    let tracking = match &execution {
+    if let (Some(file), Some(recording)) = (&primitive, &execution) {
+        same_movement(file, recording)?;
+    }
+    if let (Some(file), Some(recording)) = (&primitive, &shown)
+        && file.provenance.as_ref().is_some_and(|from| from.demonstration_checksum != *recording)
+    {
+        output.warn("the primitive was learned from another demonstration than the one that is drawn");
+    }
+    let tracking = match execution.as_ref().map(Tracking::of_run) {
         None => None,
-        Some(recording) => Some(Tracking::of_run(recording).map_err(|cause| invalid(cause.into()))?),
+        Some(Ok(tracking)) => Some(tracking),
+        Some(Err(ComparisonError { lack: Lack::Run, .. })) => {
+            output.warn("nothing was played in this recording: all of it is drawn, without figures of tracking");
+            None
+        }
+        Some(Err(cause)) => return Err(invalid(cause.into())),
     };
     let name = command
         .title
@@ -92,7 +107,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         name,
         demonstration: demonstration.as_ref().map(PosePath::of_demonstration),
         plan,
-        execution: execution.map(|recording| recording.running()),
+        execution: execution.map(|recording| if tracking.is_some() { recording.running() } else { recording }),
     };
     let page = movement.page().map_err(|cause| Failure::new(ErrorCode::NothingToDraw, doing, cause))?;
     let spinner = output.spinner("drawing");
@@ -123,6 +138,22 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         }),
         text.join("\n"),
     )
+}
+
+/// Refuses a run of another movement than the primitive's.
+fn same_movement(file: &PrimitiveFile, recording: &Recording) -> Result<(), Failure> {
+    let Some(played) = recording.origin.primitive.as_ref().filter(|played| played.movement != file.movement_checksum())
+    else {
+        return Ok(());
+    };
+    let text = format!(
+        "{} shows the movement {played}, {} is {} 0x{:08x}",
+        recording.file.display(),
+        file.file.display(),
+        file.name,
+        file.movement_checksum()
+    );
+    Err(Failure::new(ErrorCode::RecordingOfOthers, "plot refused", text))
 }
 
 /// Renders the scene at the end of the run, the way of the grasp point, and ghosts of the arm along it.

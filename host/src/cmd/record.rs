@@ -30,11 +30,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let mut file = RecordingFile::create(&command.output, global, &[], DOING)?;
     let started = Instant::now();
-    let mut client = connection::open(global, DOING, |_| {})?;
-    // A simulated device has just been switched on: without this there would be nothing to see.
-    if client.is_simulated() {
+    let mut client = if global.is_simulated_here() {
+        // It has just been switched on: without this there would be nothing to see.
+        let mut client = connection::open(global, DOING, |_| {})?;
         connection::ready(&mut client, false, output, DOING)?;
-    }
+        client
+    } else {
+        connection::observe(global, DOING)?
+    };
     let wanted = (command.duration * lab::demonstration::RATE).round() as usize;
     let bar = output.bar(wanted as u64, "recording");
     let notes = format!("Tactus recording, {} Hz\n{}", control::RATE_HZ, files::origin(&client, None));

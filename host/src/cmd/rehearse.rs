@@ -7,11 +7,13 @@ use clap::{Args, ValueEnum};
 use link::RunOptions;
 use serde::Serialize;
 
+use crate::check::Asked;
+
 use super::{ErrorCode, Failure, Global, Table, connection, files, upload};
 use lab::demonstration::{Origin, RATE, Recording};
 use lab::learn::memory::{MemoryError, MemorySummary, Payload, remember_rehearsals};
 use lab::output_file::OutputFile;
-use lab::primitive_file::PrimitiveFile;
+use lab::primitive_file::{LARGEST_DURATION_DEVIATION, PrimitiveFile};
 use lab::procedure::{self, CHANNELS, FlagCounts, Mode, ProcedureError};
 
 /// Options of `rehearse`.
@@ -86,7 +88,20 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let mut file = upload::read(&command.primitive, DOING)?;
     let movement = file.without_memory();
-    upload::precheck(&movement, command.speed, output, DOING)?;
+    let recorded = movement.movement.duration / command.speed;
+    if (recorded - movement.movement.duration).abs() > LARGEST_DURATION_DEVIATION * recorded {
+        return Err(Failure::new(
+            ErrorCode::ExpectationSpeed,
+            "rehearse refused",
+            format!(
+                "at speed {} the movement takes {recorded:.2} s instead of {:.2} s: an expectation more than 50 % apart \
+                 from its movement is not kept",
+                command.speed, movement.movement.duration
+            ),
+        )
+        .help("a speed from 0.5 to 2"));
+    }
+    upload::precheck(&movement, Asked { speed: command.speed, goal: None }, output, DOING)?;
     if let Some(folder) = &command.record_dir {
         std::fs::create_dir_all(folder)
             .map_err(|cause| connection::failure(ProcedureError::Recording(cause), DOING))?;
@@ -201,6 +216,9 @@ pub(super) fn memory_failure(cause: MemoryError, doing: &str) -> Failure {
             "check the force sensor and its cable, and that the hand touches nothing"
         }
         MemoryError::Duration { .. } => "give recordings of this primitive, all at the same speed",
+        MemoryError::Others { .. } => {
+            return Failure::new(ErrorCode::RecordingOfOthers, doing, cause);
+        }
         MemoryError::Table(_) => "give other recordings",
     };
     Failure::new(ErrorCode::NotRemembered, doing, cause).help(help)

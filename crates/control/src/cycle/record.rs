@@ -15,7 +15,8 @@ pub struct CycleInput {
     pub sample: BusSample,
     /// A person's command, if one is waiting.
     pub command: Option<Command>,
-    /// A fault that the caller found outside the cycle (bus-off, puck reset, overrun); `None` otherwise.
+    /// A fault that the caller found outside the cycle (bus-off, puck reset, overrun); `None` otherwise. It takes all
+    /// torque off at once, but for an overrun, which stops softly.
     pub external_fault: Option<Fault>,
 }
 

@@ -7,6 +7,7 @@
 
 mod convert;
 mod error;
+mod readback;
 mod text;
 
 use std::path::{Path, PathBuf};
@@ -135,7 +136,8 @@ pub struct ExpectationTable {
     pub spread_floor: f64,
     /// Mean by phase, 9 sensor rows a point: force N (world), torque N m, finger gauges N m.
     pub mean: Vec<Vec<f64>>,
-    /// Standard deviation, same shape. It stays on the host: K2 was made from it.
+    /// Standard deviation, same shape; empty where it is not known. It stays on the host: K2 was made from it, and a
+    /// primitive that was read back from a device has none.
     pub spread: Vec<Vec<f64>>,
 }
 
@@ -316,6 +318,12 @@ impl PrimitiveFile {
         PrimitiveFile { expectation: None, experience: None, ..self.clone() }
     }
 
+    /// Check sum of the movement alone: what is remembered of it, and the weights that follow from that, do not change
+    /// it.
+    pub fn movement_checksum(&self) -> u32 {
+        PrimitiveFile { feedback: None, ..self.without_memory() }.checksum()
+    }
+
     /// Number of kernels of each row.
     pub fn kernels(&self) -> usize {
         self.weights.position.first().map_or(0, Vec::len)
@@ -410,7 +418,9 @@ impl PrimitiveFile {
             columns("feedback.k2", &feedback.k2, link::image::SENSOR_ROWS)?;
         }
         if let Some(expectation) = &self.expectation {
-            shape("expectation.spread", expectation.spread.len(), expectation.mean.len())?;
+            if !expectation.spread.is_empty() {
+                shape("expectation.spread", expectation.spread.len(), expectation.mean.len())?;
+            }
             columns("expectation.mean", &expectation.mean, link::image::SENSOR_ROWS)?;
             columns("expectation.spread", &expectation.spread, link::image::SENSOR_ROWS)?;
         }

@@ -18,7 +18,7 @@ pub use mode::Mode;
 pub use ready::{Readiness, make_ready, start_up};
 pub use recorder::{CycleWriter, Recorder, Take, recording_row, recording_text};
 pub use rehearse::play_once;
-pub use run::{CHANNELS, Change, ChangeKind, FlagCounts, RunOutcome, RunRequest, Surprise, play};
+pub use run::{CHANNELS, Change, ChangeKind, FlagCounts, RunOutcome, RunRequest, Surprise, planned, play};
 pub use teach::{Demonstrated, record_demonstration, teacher};
 pub use travel::{go_to_start, travel};
 pub use wait::{Ends, after, pass, wait_for};
