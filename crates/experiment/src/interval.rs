@@ -13,7 +13,7 @@ const CONFIDENCE: f64 = 0.95;
 /// the same kind.
 ///
 /// Arms and demonstrations are drawn anew, each with replacement and independently, and every demonstration meets the
-/// arms that were drawn. Cells are not drawn: they are chosen, not found. Of five arms the interval is rough, and rather
+/// arms that were drawn. Cells are not drawn: they are chosen, not found. Of five arms the interval is rough and rather
 /// too narrow.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Interval {
