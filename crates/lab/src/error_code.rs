@@ -155,6 +155,8 @@ error_codes! {
     WouldReplace = 230: "something else of that name is there already",
         "an earlier version in the device, or an earlier file",
         "choose another name; `--force` replaces it";
+    NoTerminal = 231: "there is no terminal to draw on", "standard output is a file or a pipe",
+        "run it in a terminal, or with `--json` for a line ten times a second";
     DeviceNotFound = 301: "there is no such device", "cable, power, or a misspelt port",
         "check cable and name of the device; for a simulated arm use `--device sim:`";
     PermissionDenied = 302: "no permission to use the device",

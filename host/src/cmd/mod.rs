@@ -14,11 +14,13 @@ pub mod hand;
 pub mod learn;
 pub mod list;
 pub mod logs;
+pub mod monitor;
 pub mod output;
 pub mod plot;
 pub mod record;
 pub mod rehearse;
 pub mod rename;
+pub mod report;
 pub mod run;
 pub mod sim;
 pub mod status;
@@ -124,6 +126,8 @@ pub enum Command {
     Hand(hand::Cmd),
     /// Bring the arm to rest
     Stop(stop::Cmd),
+    /// Watch the arm on one screen, beside whoever commands it
+    Monitor(monitor::Cmd),
     /// Write down what the arm does
     Record(record::Cmd),
     /// Write the firmware image to a board
@@ -134,6 +138,8 @@ pub enum Command {
     Experiment(experiment::Cmd),
     /// Draw demonstration, plan and execution
     Plot(plot::Cmd),
+    /// Write a page of HTML about one run or several
+    Report(report::Cmd),
     /// Tell how two recordings of the same movement differ
     Compare(compare::Cmd),
     /// Read logs of the arm's CAN bus, or play them to the device's application
@@ -155,6 +161,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Stop(command) => stop::run(&command, &global),
         Command::Status(command) => status::run(&command, &global),
         Command::Calibrate(command) => calibrate::run(&command, &global),
+        Command::Monitor(command) => monitor::run(&command, &global),
         Command::Record(command) => record::run(&command, &global),
         Command::Learn(command) => learn::run(&command, &global),
         Command::Check(command) => check::run(&command, &global),
@@ -165,6 +172,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Logs(command) => logs::run(&command, &global),
         Command::Experiment(command) => experiment::run(&command, &global),
         Command::Plot(command) => plot::run(&command, &global),
+        Command::Report(command) => report::run(&command, &global),
         Command::Compare(command) => compare::run(&command, &global),
         Command::Can(command) => can::run(&command, &global),
     };
