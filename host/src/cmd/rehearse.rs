@@ -8,6 +8,7 @@ use link::RunOptions;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, Table, connection, upload};
+use crate::check::Course;
 use lab::demonstration::{RATE, Recording};
 use lab::learn::memory::{MemoryError, MemorySummary, Payload, remember_rehearsals};
 use lab::primitive_file::PrimitiveFile;
@@ -85,7 +86,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let mut file = upload::read(&command.primitive, DOING)?;
     let movement = file.without_memory();
-    upload::precheck(&movement, command.speed, output, DOING)?;
+    upload::precheck(&movement, &Course::stored(command.speed), output, DOING)?;
     if let Some(folder) = &command.record_dir {
         std::fs::create_dir_all(folder)
             .map_err(|cause| connection::failure(ProcedureError::Recording(cause), DOING))?;

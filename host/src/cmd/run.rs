@@ -8,6 +8,7 @@ use link::{Goal, Name, RunOptions, Statistics};
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, Output, Table, connection, get, upload};
+use crate::check::Course;
 use lab::client::Client;
 use lab::demonstration::{RATE, Recording};
 use lab::device::Device;
@@ -137,7 +138,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         _ => upload::read(&command.primitive, DOING)?,
     };
     check_expectation(&file, command, output)?;
-    upload::precheck(&file, command.speed, output, DOING)?;
+    let changes = command.goal_at.iter().chain(&command.speed_at).copied().collect();
+    let course = Course { speed: command.speed, goal: super::check::goal(command.goal), changes };
+    upload::precheck(&file, &course, output, DOING)?;
     let started = Instant::now();
     let mut client = match opened {
         Some(client) => client,

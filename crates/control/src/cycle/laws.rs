@@ -4,15 +4,17 @@
 use crate::cycle::law::{Lag, Law, Running};
 use crate::cycle::record::{Event, flags};
 use crate::cycle::{Cycle, Measured, WRENCH_AGE};
+use crate::guard::monitor::{TIP_REACH, TIP_SPEED_LIMIT, TRACKING_LIMIT};
 use crate::law::force::ForceController;
 use crate::model::kinematics::Frames;
+use crate::model::wam7;
 use crate::plan::primitive::posture_and_hand;
 use crate::plan::reference::{HandReference, JointReference, TaskReference};
 use crate::plan::run::Senses;
 use crate::real::{Real, at_least, at_most, sqrt};
 use crate::sense::hand::HandState;
 use crate::time::{PERIOD, periods};
-use crate::units::{JointPositions, JointTorques, Pose, Vector6, Vector7, Wrench};
+use crate::units::{JointPositions, JointTorques, JointVelocities, Pose, Vector6, Vector7, Wrench};
 
 /// Length of the damping that carries the arm while gravity torque builds up after arming: 0.5 s, in control periods.
 const ARMING: u16 = periods(0.5);
@@ -24,6 +26,9 @@ const TAUGHT_SPEED: f64 = 0.18;
 /// reduced speed of the standards for work beside a person, lies in between: an arm that was shoved falls below it by
 /// itself.
 const BRAKED_SPEED: f64 = 0.30;
+
+/// Largest speed of the hand to which a change of goal may add (m/s).
+const HAND_SPEED: f64 = 0.8;
 
 /// Output of a law: the torque wanted, and values for the record.
 pub(super) struct Demand<R: Real> {
@@ -148,7 +153,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.pending = Some(Event::Surprised { phase: surprise.progress, channel: surprise.channel });
             }
         }
-        let deviation = run.deviation().filter(|_| options.force_control);
+        let deviation = run.deviation().copied().filter(|_| options.force_control);
         let expected_gauges = deviation.map(|deviation| deviation.expected_gauges);
         self.hand.follow(
             &HandReference { q: posture_and_hand(&plan.points.x).1, dq: posture_and_hand(&plan.points.v).1 },
@@ -163,8 +168,13 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             &task,
             (options.pose_feedback, options.acceleration),
         );
+        if run.goal_moves() {
+            // A goal that the joints cannot follow is not led away from the tool.
+            let behind = lag.distance * R::of(1.0 / TRACKING_LIMIT);
+            run.crowd(at_least(speed_load(measured.frames, &reference.dq), behind));
+        }
         let mut torque = controller.torque(&self.model, tracking, measured.frames, measured.state, &reference, frozen);
-        let mut set = if options.feedback { flags::FEEDBACK } else { 0 };
+        let mut set = if run.bends(primitive) { flags::FEEDBACK } else { 0 };
         if let Some(deviation) = deviation {
             let to_world = measured.frames.tool_to_world();
             let error = Wrench { torque: deviation.wrench.torque * tracking.moment_share, ..deviation.wrench };
@@ -197,6 +207,18 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         *lag = Lag { distance: sqrt(offset.dot(&offset)), speed: operational.lag() };
         Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, surprise, flags: set }
     }
+}
+
+/// Part of the speed limits that these joint speeds use, at most one of them in full: of the joints, of elbow and
+/// forearm, and of the hand.
+#[inline(never)]
+fn speed_load<R: Real>(frames: &Frames<R>, dq: &JointVelocities<R>) -> R {
+    let [elbow, tip] = frames.elbow_speeds(dq, R::of(TIP_REACH));
+    let hand = sqrt(frames.jacobian().twist(&dq.0).fixed_rows::<3>(0).norm_squared());
+    let load = at_least(at_least(elbow, tip) * R::of(1.0 / TIP_SPEED_LIMIT), hand * R::of(1.0 / HAND_SPEED));
+    dq.0.iter().zip(&wam7::VELOCITY_MAX).fold(load, |load, (dq, limit)| {
+        at_least(load, (if *dq < R::of(0.0) { -*dq } else { *dq }) * R::of(1.0 / limit))
+    })
 }
 
 /// Speed of the hand (m/s).

@@ -46,6 +46,9 @@ pub const MAX_KERNELS: usize = 100;
 /// Frames of zero torque, one a cycle, after torque went off: one lost frame must not leave a motor pulling.
 const ZERO_CYCLES: u8 = 3;
 
+/// Words of the safety module in a row that its brakes are on: one of them may be wrong.
+const BRAKE_WORDS: u8 = 2;
+
 /// Age at which the mode of the safety module is no longer believed: 1 s, in control periods.
 const SAFETY_AGE: u16 = periods(1.0);
 
@@ -114,7 +117,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             joints: JointEstimator::new(&calibration),
             wrench: WrenchEstimator::new(),
             limiter: TorqueLimiter::new(&calibration),
-            law: Law::Off { zero_cycles: 0, brakes: false },
+            law: Law::Off { zero_cycles: 0, brakes: 0 },
             run: None,
             force <- ForceController::init(gains.stiff.force_window),
             hand <- HandDrive::init(&gains.hand),
@@ -199,7 +202,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let _ = self.supervisor.take(Trigger::SafetyDropped, Fault::SafetyDropped);
         self.leave_torque();
         // The start-up that follows puts the brakes on.
-        self.law = Law::Off { zero_cycles: ZERO_CYCLES, brakes: false };
+        self.law = Law::Off { zero_cycles: ZERO_CYCLES, brakes: 0 };
     }
 
     /// Takes a primitive for the next run: no more than a copy, because its caller keeps the control task waiting. A
@@ -426,15 +429,18 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     fn actuate_without_torque(&mut self) -> Actuation {
         self.limiter.reset();
         let active = self.is_active();
-        let braked = matches!(self.safety, Some((mode, _)) if mode != SafetyMode::Active);
         let faulty = self.supervisor.state() == State::Fault;
         let Law::Off { zero_cycles, brakes } = &mut self.law else { return Actuation::zero() };
-        *brakes &= !braked;
+        *brakes = match self.safety {
+            Some((SafetyMode::Active, 0)) if *brakes > 0 => BRAKE_WORDS,
+            Some((mode, 0)) if mode != SafetyMode::Active => brakes.saturating_sub(1),
+            _ => *brakes,
+        };
         // An ACTIVE puck applies the last torque it was sent, whoever sent it: keep it at zero.
         let sends = active || *zero_cycles > 0;
         *zero_cycles = zero_cycles.saturating_sub(1);
         let actuation = if sends { Actuation::zero() } else { Actuation::silent() };
-        if *brakes || (faulty && active) { actuation.requesting_idle() } else { actuation }
+        if *brakes > 0 || (faulty && active) { actuation.requesting_idle() } else { actuation }
     }
 
     fn standing_flags(&self) -> u32 {

@@ -4,6 +4,7 @@ mod adaptation;
 mod authority;
 mod contact;
 mod disagreement;
+mod goals;
 mod hand;
 mod hand_plant;
 mod losses;

@@ -1,5 +1,6 @@
 //! The session against a bench: what a host may do, what it is refused, and what survives.
 
+mod bounds;
 mod calibration;
 mod commands;
 mod conversation;

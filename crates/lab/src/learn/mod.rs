@@ -14,6 +14,7 @@ pub mod report;
 
 use std::path::{Path, PathBuf};
 
+use control::plan::bounds::{DISPLACEMENT, GAIN};
 use control::plan::primitive::Reference;
 use dmp::fit::{LARGEST_ANGLE, LARGEST_ROTATION_VECTOR, WARNING_ANGLE};
 use thiserror::Error;
@@ -216,19 +217,21 @@ fn check_options(options: &LearnOptions) -> Result<(), LearnError> {
         return wrong("--dwell", &format!("a time between 0 and {LONGEST_DWELL} s is expected"));
     }
     let feedback = &options.feedback;
-    let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value <= 1e6);
+    let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value <= GAIN);
     if !positive(feedback.stiffness) {
-        return wrong("--stiffness", "a number between 0 and 1e6 is expected");
+        return wrong("--stiffness", "a number between 0 and 1e4 is expected");
     }
     if !positive(feedback.orientation_stiffness) {
-        return wrong("--orientation-stiffness", "a number between 0 and 1e6 is expected");
+        return wrong("--orientation-stiffness", "a number between 0 and 1e4 is expected");
     }
     if feedback.sensitivity.is_some_and(|k1| !k1.iter().all(|k1| (0.0..=1e6).contains(k1))) {
         return wrong("--k1", "numbers between 0 and 1e6 are expected: a negative one would run towards what pushes");
     }
     match feedback.limits {
         Some([metres, degrees, hand])
-            if !((0.0..=1.0).contains(&metres) && (0.0..=180.0).contains(&degrees) && (0.0..=3.0).contains(&hand)) =>
+            if !(0.0..=DISPLACEMENT[0]).contains(&metres)
+                || !(0.0..=DISPLACEMENT[1]).contains(&degrees.to_radians())
+                || !(0.0..=DISPLACEMENT[2]).contains(&hand) =>
         {
             wrong("--clamp", "metres up to 1, degrees up to 180 and radians up to 3 are expected")
         }
