@@ -159,6 +159,8 @@ error_codes! {
         "choose another name; `--force` replaces it";
     NoTerminal = 231: "there is no terminal to draw on", "standard output is a file or a pipe",
         "run it in a terminal, or with `--json` for a line ten times a second";
+    UnknownCode = 232: "there is no error or fault of that name", "a misspelt code",
+        "docs/errors.md lists them all; for example `tactus explain E504`";
     DeviceNotFound = 301: "there is no such device", "cable, power, or a misspelt port",
         "check cable and name of the device; for a simulated arm use `--device sim:`";
     PermissionDenied = 302: "no permission to use the device",

@@ -4,9 +4,11 @@ pub mod calibrate;
 pub mod can;
 pub mod check;
 pub mod compare;
+pub mod completions;
 mod connection;
 pub mod delete;
 pub mod experience;
+pub mod explain;
 pub mod experiment;
 pub mod flash;
 pub mod get;
@@ -140,6 +142,10 @@ pub enum Command {
     Plot(plot::Cmd),
     /// Write a page of HTML about one run or several
     Report(report::Cmd),
+    /// Explain an error or a fault
+    Explain(explain::Cmd),
+    /// Write what a shell needs to complete command lines
+    Completions(completions::Cmd),
     /// Tell how two recordings of the same movement differ
     Compare(compare::Cmd),
     /// Read logs of the arm's CAN bus, or play them to the device's application
@@ -173,6 +179,8 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Experiment(command) => experiment::run(&command, &global),
         Command::Plot(command) => plot::run(&command, &global),
         Command::Report(command) => report::run(&command, &global),
+        Command::Explain(command) => explain::run(&command, &global),
+        Command::Completions(command) => completions::run(&command),
         Command::Compare(command) => compare::run(&command, &global),
         Command::Can(command) => can::run(&command, &global),
     };

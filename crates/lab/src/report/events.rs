@@ -1,4 +1,4 @@
-//! What happened in a run, in its order: changes of state, and the stretches in which something was out of the ordinary.
+//! The course of a run: changes of state, and the stretches in which something was out of the ordinary.
 
 use control::{Fault, flags};
 
