@@ -51,7 +51,7 @@ fn codes_and_faults_are_explained_without_a_device() {
     assert!(explained("E702").contains("usual cause: no power"));
     assert!(explained("contactforce").starts_with("ContactForce: the contact force"));
     for unknown in ["E999", "None", "", "E", "99999999"] {
-        assert!(stderr(&tactus(folder.path(), &["explain", unknown]).code(2)).contains("E232"), "{unknown}");
+        assert!(stderr(&tactus(folder.path(), &["explain", unknown]).code(2)).contains("E241"), "{unknown}");
     }
 }
 
@@ -67,5 +67,5 @@ fn shells_complete_every_command() {
 #[test]
 fn the_monitor_wants_a_terminal_or_json_before_it_looks_for_a_device() {
     let folder = tempfile::tempdir().unwrap();
-    assert!(stderr(&tactus(folder.path(), &["monitor"]).code(2)).contains("E231"));
+    assert!(stderr(&tactus(folder.path(), &["monitor"]).code(2)).contains("E240"));
 }

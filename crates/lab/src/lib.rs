@@ -12,6 +12,7 @@ pub mod error_code;
 pub mod failure;
 pub mod image_file;
 pub mod learn;
+pub mod output_file;
 pub mod plan;
 pub mod plot;
 pub mod primitive_file;

@@ -10,6 +10,7 @@ pub mod delete;
 pub mod experience;
 pub mod explain;
 pub mod experiment;
+mod files;
 pub mod flash;
 pub mod get;
 pub mod hand;
@@ -30,7 +31,7 @@ pub mod stop;
 pub mod teach;
 pub mod upload;
 
-use std::io::IsTerminal as _;
+use std::io::{IsTerminal as _, Write};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -71,6 +72,9 @@ pub struct Global {
     /// Never ask; what would be asked is refused.
     #[arg(long, global = true)]
     pub non_interactive: bool,
+    /// Replace files that exist.
+    #[arg(long, global = true)]
+    pub force: bool,
     /// The device: `sim:`, `sil:`, `board:`, `serial:PATH`, `can:INTERFACE`, `tcp:HOST:PORT` or `unix:PATH`.
     #[arg(long, global = true, env = "TACTUS_DEVICE", value_name = "DEVICE")]
     pub device: Option<String>,
@@ -187,10 +191,11 @@ pub fn run(cli: Cli) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
+            // Nobody may be there any more to read it; the exit code still tells.
             if global.json {
-                println!("{}", failure.to_json());
+                let _ = writeln!(std::io::stdout(), "{}", failure.to_json());
             }
-            eprintln!("{failure}");
+            let _ = writeln!(std::io::stderr(), "{failure}");
             ExitCode::from(failure.code.exit() as u8)
         }
     }

@@ -184,7 +184,7 @@ impl Drawing {
         let png = folder.join(format!("{name}.png"));
         let pixels = self.to_png(1.5).map_err(|reason| PlotError::Encode { file: png.clone(), reason })?;
         for (file, bytes) in [(folder.join(format!("{name}.svg")), self.to_svg().into_bytes()), (png, pixels)] {
-            std::fs::write(&file, bytes).map_err(|cause| PlotError::Write { file, cause })?;
+            crate::output_file::replace(&file, &bytes)?;
         }
         Ok(())
     }
