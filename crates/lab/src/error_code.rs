@@ -170,6 +170,10 @@ error_codes! {
         "read the cause; name another file";
     ChangeTooLate = 237: "a change comes after the end of the run", "the time of `--goal-at` or `--speed-at`",
         "give a time within the run";
+    NoTerminal = 240: "there is no terminal to draw on", "standard output is a file or a pipe",
+        "run it in a terminal, or with `--json` for a line ten times a second";
+    UnknownCode = 241: "there is no error or fault of that name", "a misspelt code",
+        "docs/errors.md lists them all; for example `tactus explain E504`";
     DeviceNotFound = 301: "there is no such device", "cable, power, or a misspelt port",
         "check cable and name of the device; for a simulated arm use `--device sim:`";
     PermissionDenied = 302: "no permission to use the device",

@@ -4,9 +4,11 @@ pub mod calibrate;
 pub mod can;
 pub mod check;
 pub mod compare;
+pub mod completions;
 mod connection;
 pub mod delete;
 pub mod experience;
+pub mod explain;
 pub mod experiment;
 mod files;
 pub mod flash;
@@ -15,11 +17,13 @@ pub mod hand;
 pub mod learn;
 pub mod list;
 pub mod logs;
+pub mod monitor;
 pub mod output;
 pub mod plot;
 pub mod record;
 pub mod rehearse;
 pub mod rename;
+pub mod report;
 pub mod run;
 pub mod sim;
 pub mod status;
@@ -128,6 +132,8 @@ pub enum Command {
     Hand(hand::Cmd),
     /// Bring the arm to rest
     Stop(stop::Cmd),
+    /// Watch the arm on one screen, beside whoever commands it
+    Monitor(monitor::Cmd),
     /// Write down what the arm does
     Record(record::Cmd),
     /// Write the firmware image to a board
@@ -138,6 +144,12 @@ pub enum Command {
     Experiment(experiment::Cmd),
     /// Draw demonstration, plan and execution
     Plot(plot::Cmd),
+    /// Write a page of HTML about one run or several
+    Report(report::Cmd),
+    /// Explain an error or a fault
+    Explain(explain::Cmd),
+    /// Write what a shell needs to complete command lines
+    Completions(completions::Cmd),
     /// Tell how two recordings of the same movement differ
     Compare(compare::Cmd),
     /// Read logs of the arm's CAN bus, or play them to the device's application
@@ -159,6 +171,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Stop(command) => stop::run(&command, &global),
         Command::Status(command) => status::run(&command, &global),
         Command::Calibrate(command) => calibrate::run(&command, &global),
+        Command::Monitor(command) => monitor::run(&command, &global),
         Command::Record(command) => record::run(&command, &global),
         Command::Learn(command) => learn::run(&command, &global),
         Command::Check(command) => check::run(&command, &global),
@@ -169,6 +182,9 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Logs(command) => logs::run(&command, &global),
         Command::Experiment(command) => experiment::run(&command, &global),
         Command::Plot(command) => plot::run(&command, &global),
+        Command::Report(command) => report::run(&command, &global),
+        Command::Explain(command) => explain::run(&command, &global),
+        Command::Completions(command) => completions::run(&command),
         Command::Compare(command) => compare::run(&command, &global),
         Command::Can(command) => can::run(&command, &global),
     };
