@@ -112,7 +112,7 @@ fn a_full_device_says_which_command_frees_a_place() {
     common::demonstration(folder, 3.0);
     let _arm = served(folder);
     for number in 0..8 {
-        object(folder, &["learn", "demo.csv", "--kernels", "10", "--name", &format!("p{number}"), "-o", "p.toml"]);
+        object(folder, &["learn", "demo.csv", "--kernels", "10", "--name", &format!("p{number}"), "-o", "p.toml", "--force"]);
         object(folder, &["upload", "p.toml"]);
     }
     object(folder, &["learn", "demo.csv", "--name", "ninth", "-o", "ninth.toml"]);

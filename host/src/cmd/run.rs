@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
+use control::State;
 use link::{Goal, Name, RunOptions, Statistics};
 use serde::Serialize;
 
@@ -257,12 +258,15 @@ fn play(
     let changes = command.goal_at.iter().chain(&command.speed_at).copied().collect();
     let request = RunRequest { rest: POST_ROLL, changes, ..RunRequest::new(name, file.movement.duration, options) };
 
-    output.say(format!("running '{}' ({})", file.name, command.mode.name()));
     let notes = notes(client, file, command);
     let mut writer = record.map(|record| start(record, &notes)).transpose()?;
     let bar = output.bar((file.movement.duration / command.speed * RATE) as u64, "running");
-    let (mut cycles, mut written) = (Vec::new(), Ok(()));
+    let (mut cycles, mut written, mut is_running) = (Vec::new(), Ok(()), false);
     let outcome = procedure::play(client, &request, &mut |cycle| {
+        if !is_running && State::from_code(cycle.state) == Some(State::Run) {
+            is_running = true;
+            bar.suspend(|| output.say(format!("running '{}' ({})", file.name, command.mode.name())));
+        }
         cycles.push(*cycle);
         bar.set_position(cycles.len() as u64);
         // A disk that is full is no reason to stop an arm: the run goes on, and is told of at its end.
