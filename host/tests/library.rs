@@ -112,7 +112,10 @@ fn a_full_device_says_which_command_frees_a_place() {
     common::demonstration(folder, 3.0);
     let _arm = served(folder);
     for number in 0..8 {
-        object(folder, &["learn", "demo.csv", "--kernels", "10", "--name", &format!("p{number}"), "-o", "p.toml", "--force"]);
+        object(
+            folder,
+            &["learn", "demo.csv", "--kernels", "10", "--name", &format!("p{number}"), "-o", "p.toml", "--force"],
+        );
         object(folder, &["upload", "p.toml"]);
     }
     object(folder, &["learn", "demo.csv", "--name", "ninth", "-o", "ninth.toml"]);
@@ -140,7 +143,7 @@ fn a_stored_primitive_runs_by_its_name_and_others_look_on_without_costing_it_a_c
     assert_eq!(object(folder, &["list"])["primitives"][0]["loaded"], true);
     let seen = object(folder, &["record", "--duration", "2", "-o", "seen.csv"]);
     assert_eq!((&seen["samples"], &seen["gaps"]), (&Value::from(600), &Value::from(0)));
-    refused(folder, &["delete", "reach"], "E504", "another host");
+    refused(folder, &["delete", "reach"], "E504", "another program");
 
     let status = run.0.wait().unwrap();
     assert!(status.success(), "the run ended otherwise because others looked on");

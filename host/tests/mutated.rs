@@ -98,9 +98,25 @@ fn damaged_files_are_refused_or_used_and_nothing_is_replaced() {
         (read("demo.csv"), read("reach.toml"), read("run.csv"), read("bus.log"));
     std::fs::write(at.join("there.toml"), "precious").unwrap();
     let kinds: [(&[u8], &str, &[&str]); 4] = [
-        (&demonstration, "bad.csv", &["learn bad.csv --name a -o new.toml", "learn bad.csv --name a -o there.toml", "plot -d bad.csv -o new.svg"]),
-        (&primitive, "bad.toml", &["check bad.toml", "plot -p bad.toml -o new.svg", "experience bad.toml run.csv -o new.toml"]),
-        (&recording, "bad.csv", &["compare run.csv bad.csv", "experience reach.toml bad.csv -o new.toml", "plot -r bad.csv -o new.svg"]),
+        (
+            &demonstration,
+            "bad.csv",
+            &[
+                "learn bad.csv --name a -o new.toml",
+                "learn bad.csv --name a -o there.toml",
+                "plot -d bad.csv -o new.svg",
+            ],
+        ),
+        (
+            &primitive,
+            "bad.toml",
+            &["check bad.toml", "plot -p bad.toml -o new.svg", "experience bad.toml run.csv -o new.toml"],
+        ),
+        (
+            &recording,
+            "bad.csv",
+            &["compare run.csv bad.csv", "experience reach.toml bad.csv -o new.toml", "plot -r bad.csv -o new.svg"],
+        ),
         (&log, "bad.log", &["can decode bad.log", "can replay bad.log"]),
     ];
     let count = std::env::var("TACTUS_MUTATIONS").ok().and_then(|count| count.parse().ok()).unwrap_or(FEW);
@@ -112,7 +128,10 @@ fn damaged_files_are_refused_or_used_and_nothing_is_replaced() {
         std::fs::write(at.join(name), &bad).unwrap();
         for line in lines {
             let (code, said, took) = run(at, line);
-            assert!(matches!(code, Some(0 | 2 | 4 | 6)) && !said.contains("panicked"), "seed {seed}, {line}: {code:?} {said}");
+            assert!(
+                matches!(code, Some(0 | 2 | 4 | 6)) && !said.contains("panicked"),
+                "seed {seed}, {line}: {code:?} {said}"
+            );
             assert_eq!(std::fs::read(at.join(name)).unwrap(), bad, "seed {seed}, {line}");
             worst = worst.max(took);
             refused += u32::from(code != Some(0));

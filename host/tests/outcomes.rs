@@ -47,20 +47,12 @@ fn a_goal_out_of_reach_is_refused_by_check_and_by_a_dry_run() {
 }
 
 #[test]
-fn an_arm_that_does_not_reach_its_goal_ends_with_6_and_the_distance() {
+fn a_figure_that_nobody_measured_is_null_and_not_zero() {
     let folder = learned(3.0, "");
     let at = folder.path();
-    // Near enough to be tried, and still where no posture of this arm brings the hand.
-    let line = format!("{DEVICE} --json run reach.toml --goal-at 1:0.5,0.5,-0.4 --record run.csv");
-    let missed = tactus(at, &line).failure().code(6);
-    let report = json(&missed);
-    let away = report["result"]["tracking"]["position_end_m"].as_f64().unwrap();
-    assert!(away > 0.05 && stderr(&missed).contains(&format!("ended {:.0} mm and", away * 1e3)), "{}", stderr(&missed));
-    assert_eq!(report["error"]["code"], "E637");
-    assert!(lab::demonstration::Recording::read(&at.join("run.csv")).is_ok(), "the recording is whole all the same");
     let clean = json(&tactus(at, &format!("{DEVICE} --json run reach.toml")).success());
     assert!(clean["tracking"]["position_end_m"].as_f64().unwrap() < 0.005);
-    // In this process nobody measures: null, not 0.
+    // In this process nobody measures.
     for name in ["worst_instructions", "mean_instructions", "worst_computation_us", "worst_latency_us", "stack_used"] {
         assert_eq!(clean[name], Value::Null, "{name}");
     }
@@ -117,7 +109,8 @@ fn a_primitive_that_leaves_the_way_it_was_shown_is_not_written() {
             format!("{t},{x},0.1,0.2,1,0,0,0")
         })
         .collect();
-    std::fs::write(folder.path().join("wild.csv"), format!("t_s,x_m,y_m,z_m,qw,qx,qy,qz\n{}\n", rows.join("\n"))).unwrap();
+    std::fs::write(folder.path().join("wild.csv"), format!("t_s,x_m,y_m,z_m,qw,qx,qy,qz\n{}\n", rows.join("\n")))
+        .unwrap();
     let refused = tactus(folder.path(), "learn wild.csv --kernels 2 -o wild.toml").failure().code(6);
     let said = stderr(&refused);
     assert!(said.contains("error[E625]") && said.contains(" mm and ") && said.contains("--kernels"), "{said}");

@@ -29,7 +29,9 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("control::guard::supervisor", "once, when a state changes"),
     ("control::cycle::commands", "once, when a person commands"),
     ("control::command::Command", "once, when a person commands"),
-    ("control::plan::run::", "once, when a run begins or its goal changes"),
+    ("control::plan::run::", "once, when a run begins; while its goal changes"),
+    ("control::plan::goal", "while the goal of a run changes"),
+    ("control::cycle::laws::speed_load", "while the goal of a run changes"),
     ("control::plan::approach", "once, when an approach begins"),
     ("control::model::arm::ArmModel", "when a payload is found"),
     (

@@ -18,7 +18,9 @@ use lab::arm::TORQUE_LIMITS;
 use lab::demonstration::angle_between;
 use lab::plan;
 use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
+use lab::procedure::{Change, ChangeKind};
 use lab::table::Table;
+use link::Goal;
 
 /// Largest distance of the arm from the goal when the run is over, m.
 pub const GOAL_DISTANCE: f64 = 3e-3;
@@ -31,21 +33,6 @@ pub const DIGITS: [(&str, [f64; 2]); 4] =
 
 /// How far a plan of the hand may go beyond its range, rad: what a smooth plan between two ends of it overshoots by.
 const HAND_SLACK: f64 = 0.05;
-
-/// The run that is checked.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Asked {
-    /// Speed relative to the taught one.
-    pub speed: f64,
-    /// Goal of the grasp point instead of the stored one, world frame, m.
-    pub goal: Option<[f64; 3]>,
-}
-
-impl Default for Asked {
-    fn default() -> Self {
-        Self { speed: 1.0, goal: None }
-    }
-}
 
 /// Which limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -201,12 +188,46 @@ impl CheckReport {
     }
 }
 
-/// Checks the run of a primitive that is `asked` for; `progress` hears the fraction done now and then.
+/// The run that is checked.
+#[derive(Debug, Clone)]
+pub struct Course {
+    /// Speed relative to the taught one.
+    pub speed: f64,
+    /// Goal from the start on.
+    pub goal: Goal,
+    /// Changes on the way.
+    pub changes: Vec<Change>,
+}
+
+impl Course {
+    /// To the stored goal, at `speed` times the taught speed.
+    pub fn stored(speed: f64) -> Self {
+        Course { speed, goal: Goal::default(), changes: Vec::new() }
+    }
+
+    /// Position of the last goal (m), and its orientation, where they are not the stored ones.
+    fn last_goal(&self) -> Goal {
+        let mut changes = self.changes.clone();
+        changes.sort_by(|a, b| a.time.total_cmp(&b.time));
+        changes.iter().fold(self.goal, |last, change| match change.kind {
+            ChangeKind::Goal(goal) => {
+                Goal { position: goal.position.or(last.position), orientation: goal.orientation.or(last.orientation) }
+            }
+            ChangeKind::Speed(_) => last,
+        })
+    }
+}
+
+/// Checks a primitive that was read from its file for a run; `progress` hears the fraction done now and then.
 ///
 /// # Errors
 /// The file cannot be turned into a primitive or an image at all, or belongs to another model of the arm. Everything
 /// that can be measured is in the report instead.
-pub fn check(file: &PrimitiveFile, asked: Asked, progress: impl FnMut(f64)) -> Result<CheckReport, PrimitiveFileError> {
+pub fn check(
+    file: &PrimitiveFile,
+    course: &Course,
+    progress: impl FnMut(f64),
+) -> Result<CheckReport, PrimitiveFileError> {
     file.require_model(control::MODEL_HASH)?;
     let image = file.to_image()?;
     let primitive = file.to_primitive()?;
@@ -217,8 +238,8 @@ pub fn check(file: &PrimitiveFile, asked: Asked, progress: impl FnMut(f64)) -> R
         image: (image.len(), format!("0x{:08x}", image_checksum(&image))),
         kernels: file.kernels(),
         duration_s: file.movement.duration,
-        speed: asked.speed,
-        goal_m: asked.goal,
+        speed: course.speed,
+        goal_m: course.last_goal().position.map(|goal| goal.map(f64::from)),
         run_duration_s: 0.0,
         margins: Vec::new(),
         tracking_max_m: 0.0,
@@ -227,8 +248,8 @@ pub fn check(file: &PrimitiveFile, asked: Asked, progress: impl FnMut(f64)) -> R
         violations: Vec::new(),
     };
     check_plan(&primitive, &mut report);
-    let run = ClosedLoop::play(&primitive, asked, progress);
-    check_run(file, asked, &run, &mut report);
+    let run = ClosedLoop::play(&primitive, course, progress);
+    check_run(file, course, &run, &mut report);
     for margin in &report.margins {
         // A NaN is no margin either.
         if margin.margin.is_nan() || margin.margin < 0.0 {
@@ -301,7 +322,7 @@ fn check_plan(primitive: &lab::primitive_file::HostPrimitive, report: &mut Check
 }
 
 /// The plan as the arm follows it.
-fn check_run(file: &PrimitiveFile, asked: Asked, run: &ClosedLoop, report: &mut CheckReport) {
+fn check_run(file: &PrimitiveFile, course: &Course, run: &ClosedLoop, report: &mut CheckReport) {
     match run.ending {
         Ending::Arrived => {}
         Ending::Unfit(reason) => report.violations.push(format!("the control code refuses the primitive: {reason}")),
@@ -357,9 +378,11 @@ fn check_run(file: &PrimitiveFile, asked: Asked, run: &ClosedLoop, report: &mut 
     report.tool_speed_max_m_s = maximum(&|sample| sample.tool_speed);
     report.tracking_max_m = maximum(&|sample| distance(&sample.position, &sample.record.pose_d));
     if run.ending == Ending::Arrived {
-        let goal = asked.goal.unwrap_or(file.goal.position);
-        let away = (0..3).map(|axis| (last.position[axis] - goal[axis]).powi(2)).sum::<f64>().sqrt();
-        let turned = angle_between(&last.orientation, &file.goal.orientation);
+        let goal = course.last_goal();
+        let place = goal.position.map_or(file.goal.position, |place| place.map(f64::from));
+        let orientation = goal.orientation.map_or(file.goal.orientation, |parts| parts.map(f64::from));
+        let away = (0..3).map(|axis| (last.position[axis] - place[axis]).powi(2)).sum::<f64>().sqrt();
+        let turned = angle_between(&last.orientation, &orientation);
         for (limit, value, bound) in
             [(Limit::GoalPosition, away, GOAL_DISTANCE), (Limit::GoalOrientation, turned, GOAL_ANGLE)]
         {

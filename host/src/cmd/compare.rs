@@ -32,7 +32,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let one = Recording::read(&command.one).map_err(|cause| invalid(cause.into()))?;
     let other = Recording::read(&command.other).map_err(|cause| invalid(cause.into()))?;
     if one.origin.contradicts(&other.origin) {
-        let name = |recording: &Recording| recording.origin.primitive.as_ref().map(ToString::to_string).unwrap_or_default();
+        let name =
+            |recording: &Recording| recording.origin.primitive.as_ref().map(ToString::to_string).unwrap_or_default();
         let text = format!(
             "{} shows the movement {}, {} shows {}",
             one.file.display(),

@@ -262,7 +262,11 @@ mod tests {
             assert!(!examples.is_empty(), "{name} has no example");
             for example in examples {
                 let parsed = Cli::try_parse_from(example.split_whitespace());
-                assert!(parsed.is_ok(), "{name}: {example}\n{}", parsed.err().map(|e| e.to_string()).unwrap_or_default());
+                assert!(
+                    parsed.is_ok(),
+                    "{name}: {example}\n{}",
+                    parsed.err().map(|e| e.to_string()).unwrap_or_default()
+                );
             }
         }
     }

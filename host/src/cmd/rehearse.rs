@@ -7,9 +7,8 @@ use clap::{Args, ValueEnum};
 use link::RunOptions;
 use serde::Serialize;
 
-use crate::check::Asked;
-
 use super::{ErrorCode, Failure, Global, Table, connection, files, upload};
+use crate::check::Course;
 use lab::demonstration::{Origin, RATE, Recording};
 use lab::learn::memory::{MemoryError, MemorySummary, Payload, remember_rehearsals};
 use lab::output_file::OutputFile;
@@ -90,18 +89,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let movement = file.without_memory();
     let recorded = movement.movement.duration / command.speed;
     if (recorded - movement.movement.duration).abs() > LARGEST_DURATION_DEVIATION * recorded {
-        return Err(Failure::new(
-            ErrorCode::ExpectationSpeed,
-            "rehearse refused",
-            format!(
-                "at speed {} the movement takes {recorded:.2} s instead of {:.2} s: an expectation more than 50 % apart \
-                 from its movement is not kept",
-                command.speed, movement.movement.duration
-            ),
-        )
-        .help("a speed from 0.5 to 2"));
+        let text = format!(
+            "at speed {} the movement takes {recorded:.2} s instead of {:.2} s: an expectation more than 50 % apart from \
+             its movement is not kept",
+            command.speed, movement.movement.duration
+        );
+        return Err(Failure::new(ErrorCode::ExpectationSpeed, "rehearse refused", text).help("a speed from 0.5 to 2"));
     }
-    upload::precheck(&movement, Asked { speed: command.speed, goal: None }, output, DOING)?;
+    upload::precheck(&movement, &Course::stored(command.speed), output, DOING)?;
     if let Some(folder) = &command.record_dir {
         std::fs::create_dir_all(folder)
             .map_err(|cause| connection::failure(ProcedureError::Recording(cause), DOING))?;

@@ -4,7 +4,7 @@
 use crate::cycle::law::{Lag, Law, Running};
 use crate::cycle::record::{Event, flags};
 use crate::cycle::{Cycle, Measured, WRENCH_AGE};
-use crate::guard::monitor::{TIP_REACH, TIP_SPEED_LIMIT};
+use crate::guard::monitor::{TIP_REACH, TIP_SPEED_LIMIT, TRACKING_LIMIT};
 use crate::law::force::ForceController;
 use crate::model::kinematics::Frames;
 use crate::model::wam7;
@@ -169,7 +169,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             (options.pose_feedback, options.acceleration),
         );
         if run.goal_moves() {
-            run.crowd(speed_load(measured.frames, &reference.dq));
+            // A goal that the joints cannot follow is not led away from the tool.
+            let behind = lag.distance * R::of(1.0 / TRACKING_LIMIT);
+            run.crowd(at_least(speed_load(measured.frames, &reference.dq), behind));
         }
         let mut torque = controller.torque(&self.model, tracking, measured.frames, measured.state, &reference, frozen);
         let mut set = if run.bends(primitive) { flags::FEEDBACK } else { 0 };

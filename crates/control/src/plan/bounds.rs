@@ -25,8 +25,8 @@ pub const SPEED: [f64; 4] = [2.0, 8.0, 8.0, 12.0];
 /// Largest acceleration of the plan, in the same order (m/s^2, rad/s^2).
 pub const ACCELERATION: [f64; 4] = [40.0, 400.0, 400.0, 2000.0];
 
-/// Largest values of a sensor in the memory of earlier runs: force (N), torque (N m), torque of a finger (N m), angle of
-/// a finger (rad). A frame of the sensor can carry no more.
+/// Largest values of a sensor in the memory of earlier runs: force (N), torque (N m), torque of a finger (N m), angle
+/// of a finger (rad). A frame of the sensor can carry no more.
 pub const MEASURED: [f64; 4] = [128.0, 8.0, 2.0 * wam7::FINGER_TORQUE_MAX, 7.0];
 
 /// Heaviest load that the expectation may have been recorded with (kg): what the arm is built to carry.

@@ -165,7 +165,8 @@ impl<R: Real, const N: usize> Run<R, N> {
         self.options.feedback && !self.settled && primitive.feedback().is_some()
     }
 
-    /// Moves the goal.
+    /// Moves the goal. Not inlined: it is rare, and a board may keep the code of every cycle in a small fast memory.
+    #[inline(never)]
     fn lead_goal(&mut self, primitive: &Primitive<R, N>) {
         if !self.goal.moves() {
             return;

@@ -370,7 +370,8 @@ impl DeviceController {
                 None
             }
             Command::Zero { home } => {
-                if self.cycle.state() == State::Idle && self.safety_mode == Some(SafetyMode::Idle) {
+                // Under a latched fault too: what has lost its zero cannot be cleared before.
+                if !self.cycle.state().has_torque() && self.safety_mode == Some(SafetyMode::Idle) {
                     self.startup.zero(&home);
                 } else {
                     self.tell(EventKind::Refused(Refusal::ZeroNeedsIdle), io);

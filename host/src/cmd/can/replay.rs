@@ -35,7 +35,11 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Err(error) => Err(refused(error)),
     })?;
     if interrupt.is_raised() {
-        return Err(Failure::new(ErrorCode::Interrupted, DOING, "interrupted before the end of the log: nothing can be said"));
+        return Err(Failure::new(
+            ErrorCode::Interrupted,
+            DOING,
+            "interrupted before the end of the log: nothing can be said",
+        ));
     }
     let outcome = replay.finish().map_err(refused)?;
     if !outcome.has_host {
