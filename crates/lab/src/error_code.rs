@@ -137,8 +137,8 @@ error_codes! {
         "tactus plot --demonstration demo.csv --primitive reach.toml --run run.csv --output figure.png";
     FigureFormat = 211: "the format of the figure is unknown", "the file's name ends with another extension",
         "name a file that ends in .png or .svg";
-    NoStudyOfWeights = 270: "the experiment with a weight knows neither lessons nor sweeps", "`experiment lift`",
-        "leave out `--lessons` and `--sweep`";
+    NoStudyOfWeights = 270: "the experiment with a weight knows neither demonstrations nor sweeps", "`experiment lift`",
+        "leave out `--demonstrations` and `--sweep`";
     BoardOption = 212: "the emulated board does not take an option, or not this image", "an option of `board:`",
         "the options of `--device board:` are in docs/board-stm32h743.md";
     FlashFile = 213: "the file cannot be used as the device's flash",
@@ -170,6 +170,10 @@ error_codes! {
         "read the cause; name another file";
     ChangeTooLate = 237: "a change comes after the end of the run", "the time of `--goal-at` or `--speed-at`",
         "give a time within the run";
+    NoTerminal = 240: "there is no terminal to draw on", "standard output is a file or a pipe",
+        "run it in a terminal, or with `--json` for a line ten times a second";
+    UnknownCode = 241: "there is no error or fault of that name", "a misspelt code",
+        "docs/errors.md lists them all; for example `tactus explain E504`";
     DeviceNotFound = 301: "there is no such device", "cable, power, or a misspelt port",
         "check cable and name of the device; for a simulated arm use `--device sim:`";
     PermissionDenied = 302: "no permission to use the device",

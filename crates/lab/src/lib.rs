@@ -18,6 +18,7 @@ pub mod plot;
 pub mod primitive_file;
 pub mod procedure;
 pub mod replay;
+pub mod report;
 pub mod simulation;
 pub mod table;
 pub mod tracking;

@@ -113,6 +113,22 @@ pub(super) const PLOT: &str = "\
 Examples:
   tactus plot --run run.csv --output run.png
   tactus plot -d grasp.csv -p grasp.toml -r run.csv -o run.svg --picture arm.png";
+/// `report`
+pub(super) const REPORT: &str = "\
+Example:
+  tactus report run-1.csv run-2.csv --primitive grasp.toml --output report.html";
+/// `monitor`
+pub(super) const MONITOR: &str = "\
+Example:
+  tactus --device unix:tactus.sock monitor --primitive grasp.toml";
+/// `explain`
+pub(super) const EXPLAIN: &str = "\
+Example:
+  tactus explain E230";
+/// `completions`
+pub(super) const COMPLETIONS: &str = "\
+Example:
+  tactus completions bash";
 /// `compare`
 pub(super) const COMPARE: &str = "\
 Example:

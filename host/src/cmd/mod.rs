@@ -4,11 +4,13 @@ pub mod calibrate;
 pub mod can;
 pub mod check;
 pub mod compare;
+pub mod completions;
 mod connection;
 pub mod delete;
 mod examples;
 pub mod experience;
 pub mod experiment;
+pub mod explain;
 mod files;
 pub mod flash;
 pub mod get;
@@ -16,11 +18,13 @@ pub mod hand;
 pub mod learn;
 pub mod list;
 pub mod logs;
+pub mod monitor;
 pub mod output;
 pub mod plot;
 pub mod record;
 pub mod rehearse;
 pub mod rename;
+pub mod report;
 pub mod run;
 pub mod sim;
 pub mod status;
@@ -150,6 +154,9 @@ pub enum Command {
     /// Bring the arm to rest
     #[command(after_help = examples::STOP)]
     Stop(stop::Cmd),
+    /// Watch the arm on one screen, beside whoever commands it
+    #[command(after_help = examples::MONITOR)]
+    Monitor(monitor::Cmd),
     /// Write down what the arm does
     #[command(after_help = examples::RECORD)]
     Record(record::Cmd),
@@ -165,6 +172,15 @@ pub enum Command {
     /// Draw demonstration, plan and execution
     #[command(after_help = examples::PLOT)]
     Plot(plot::Cmd),
+    /// Write a page of HTML about one run or several
+    #[command(after_help = examples::REPORT)]
+    Report(report::Cmd),
+    /// Explain an error or a fault
+    #[command(after_help = examples::EXPLAIN)]
+    Explain(explain::Cmd),
+    /// Write what a shell needs to complete command lines
+    #[command(after_help = examples::COMPLETIONS)]
+    Completions(completions::Cmd),
     /// Tell how two recordings of the same movement differ
     #[command(after_help = examples::COMPARE)]
     Compare(compare::Cmd),
@@ -188,6 +204,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Stop(command) => stop::run(&command, &global),
         Command::Status(command) => status::run(&command, &global),
         Command::Calibrate(command) => calibrate::run(&command, &global),
+        Command::Monitor(command) => monitor::run(&command, &global),
         Command::Record(command) => record::run(&command, &global),
         Command::Learn(command) => learn::run(&command, &global),
         Command::Check(command) => check::run(&command, &global),
@@ -198,6 +215,9 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Logs(command) => logs::run(&command, &global),
         Command::Experiment(command) => experiment::run(&command, &global),
         Command::Plot(command) => plot::run(&command, &global),
+        Command::Report(command) => report::run(&command, &global),
+        Command::Explain(command) => explain::run(&command, &global),
+        Command::Completions(command) => completions::run(&command),
         Command::Compare(command) => compare::run(&command, &global),
         Command::Can(command) => can::run(&command, &global),
     };

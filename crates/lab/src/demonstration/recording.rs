@@ -41,6 +41,8 @@ pub struct Recording {
     pub cycle: Option<Vec<u32>>,
     /// State of the supervisor, a word.
     pub state: Option<Vec<String>>,
+    /// Code of the latched fault, 0 for none.
+    pub fault: Option<Vec<u32>>,
     /// Phase of the movement, 1.
     pub phase: Option<Vec<f64>>,
     /// Joint angles, rad.
@@ -128,6 +130,7 @@ impl Recording {
             phase: table.numbers(layout::PHASE),
             surprise: table.numbers(layout::SURPRISE),
             flags: table.whole_numbers(layout::FLAGS)?,
+            fault: table.whole_numbers(layout::FAULT)?,
             orientation: table.unit_quaternions(orientation, layout::ORIENTATION[0])?,
             orientation_d: table.unit_quaternions(orientation_d, layout::ORIENTATION_D[0])?,
             state: table.states,
@@ -188,6 +191,7 @@ impl Recording {
             columns: self.columns,
             lines: pick(&self.lines, keep),
             state: self.state.as_ref().map(|values| pick(values, keep)),
+            fault: self.fault.as_ref().map(|values| pick(values, keep)),
             phase: self.phase.as_ref().map(|values| pick(values, keep)),
             q: self.q.as_ref().map(|values| pick(values, keep)),
             dq: self.dq.as_ref().map(|values| pick(values, keep)),

@@ -155,6 +155,14 @@ impl Drawing {
         self.scene.elements.push(Primitive::Text { x, y, content, size, anchor, rotate, bold: false, color });
     }
 
+    /// The page as SVG for a page of HTML: it takes the width that it is given, and the fonts of the reader.
+    pub fn to_inline_svg(&self) -> String {
+        let svg = SvgBackend::new().render_scene(&self.scene);
+        let (width, height) = (self.scene.width, self.scene.height);
+        let body = svg.split_once('>').map_or("", |(_, body)| body);
+        format!("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\">{body}")
+    }
+
     /// The page as SVG with its font inside.
     pub fn to_svg(&self) -> String {
         SvgBackend::new().with_embedded_font(true).render_scene(&self.scene)
