@@ -8,6 +8,7 @@ mod application;
 mod background;
 pub mod bus;
 pub mod calibration;
+mod caution;
 pub mod command;
 pub mod controller;
 pub mod event;

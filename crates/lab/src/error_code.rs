@@ -137,8 +137,8 @@ error_codes! {
         "tactus plot --demonstration demo.csv --primitive reach.toml --run run.csv --output figure.png";
     FigureFormat = 211: "the format of the figure is unknown", "the file's name ends with another extension",
         "name a file that ends in .png or .svg";
-    NoStudyOfWeights = 270: "the experiment with a weight knows neither lessons nor sweeps", "`experiment lift`",
-        "leave out `--lessons` and `--sweep`";
+    NoStudyOfWeights = 270: "the experiment with a weight knows neither demonstrations nor sweeps", "`experiment lift`",
+        "leave out `--demonstrations` and `--sweep`";
     BoardOption = 212: "the emulated board does not take an option, or not this image", "an option of `board:`",
         "the options of `--device board:` are in docs/board-stm32h743.md";
     FlashFile = 213: "the file cannot be used as the device's flash",

@@ -104,6 +104,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.wrench.tare_drift();
                 self.hand.tare_drift();
                 self.begin_run(options, measured);
+                self.hold_back();
                 Ok(())
             }
             Command::SetGoal(goal) => match (&self.law, &mut self.run, self.loaded.get()) {

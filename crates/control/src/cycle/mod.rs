@@ -89,6 +89,19 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     /// Limits that cut the last torque.
     cut: LimitReport,
     pending: Option<Event>,
+    caution: Caution,
+}
+
+/// What the device has found about heat and the pendant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Caution {
+    /// Nothing.
+    #[default]
+    None,
+    /// A person should know.
+    Warned,
+    /// Runs are held to half of the taught speed.
+    Slowed,
 }
 
 /// Measurements of one cycle.
@@ -126,6 +139,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             armed_for: 0,
             cut: LimitReport::default(),
             pending: None,
+            caution: Caution::None,
             calibration,
             model,
             gains,
@@ -228,14 +242,25 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
+    /// Takes what was found about heat and the pendant, and holds a run to it.
+    pub fn set_caution(&mut self, caution: Caution) {
+        if caution != self.caution {
+            self.caution = caution;
+            self.hold_back();
+        }
+    }
+
     /// Advances one control period.
     pub fn step(&mut self, input: &CycleInput) -> CycleOutput {
         // A bridged reply is no news: the law stays.
         let before = (self.supervisor.law(), self.supervisor.fault());
         self.watch_safety(input.sample.safety);
         if let Some(fault) = input.external_fault {
-            let trigger = if fault == Fault::Overrun { Trigger::SoftFault } else { Trigger::HardFault };
-            self.trigger(trigger, fault, None);
+            let soft = matches!(fault, Fault::Overrun | Fault::MotorHot);
+            // An arm that is let down is on the way to where no motor heats.
+            if fault != Fault::MotorHot || self.supervisor.law() != State::Lower {
+                self.trigger(if soft { Trigger::SoftFault } else { Trigger::HardFault }, fault, None);
+            }
         }
         let torque_on = self.supervisor.state().has_torque();
         let state = self.joints.update(&input.sample.positions, torque_on);
@@ -463,6 +488,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if self.wrench.is_saturated() {
             set |= flags::SENSOR_SATURATED;
         }
+        set |= match self.caution {
+            Caution::None => 0,
+            Caution::Warned => flags::CAUTION,
+            Caution::Slowed => flags::CAUTION | flags::SLOWED,
+        };
         match self.hand.state() {
             Some(hand) if hand.is_lost() => set |= flags::HAND_LOST,
             Some(_) => set |= flags::HAND_READY,

@@ -20,6 +20,9 @@ pub(crate) const START_DISTANCE: f64 = 0.05;
 /// Allowed speed factors.
 pub(crate) const SPEEDS: (f32, f32) = (0.1, 2.0);
 
+/// Speed factor of a run that is held back.
+const SLOW: f32 = 0.5;
+
 /// The plan counts as at rest below these speeds (m/s, rad/s).
 const REST: (f64, f64) = (2e-3, 1e-2);
 
@@ -77,6 +80,8 @@ pub(crate) struct Run<R: Real, const N: usize> {
     end: R,
     /// Part of the speed limits that the plan uses.
     load: R,
+    /// Speed factor that was asked for, and whether it is held to [`SLOW`].
+    speed: (f32, bool),
 }
 
 impl<R: Real, const N: usize> Run<R, N> {
@@ -129,6 +134,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             goal: GoalFilter::at(primitive.movement().goal().poses[0]),
             end: R::of(1.0),
             load: R::of(0.0),
+            speed: (options.speed, false),
         };
         let rollout = &mut run.rollout;
         // The first speed acts at once; later ones are approached at the rollout's slew rate.
@@ -187,7 +193,20 @@ impl<R: Real, const N: usize> Run<R, N> {
 
     /// Takes a new speed factor.
     pub(crate) fn set_speed(&mut self, primitive: &Primitive<R, N>, factor: f32) -> Result<(), Refusal> {
-        set_speed(&mut self.rollout, primitive, factor)
+        if !(factor >= SPEEDS.0 && factor <= SPEEDS.1) {
+            return Err(Refusal::OutOfRange);
+        }
+        let held = if self.speed.1 && factor > SLOW { SLOW } else { factor };
+        set_speed(&mut self.rollout, primitive, held)?;
+        self.speed.0 = factor;
+        Ok(())
+    }
+
+    /// Holds the speed to half of the taught one, or lets it go back to what was asked for.
+    pub(crate) fn hold_back(&mut self, primitive: &Primitive<R, N>, slow: bool) {
+        self.speed.1 = slow;
+        // The factor was accepted before, and a slower one always is.
+        let _ = self.set_speed(primitive, self.speed.0);
     }
 
     /// The plan of this tick.

@@ -2,6 +2,7 @@
 
 mod adaptation;
 mod authority;
+mod caution;
 mod contact;
 mod disagreement;
 mod goals;

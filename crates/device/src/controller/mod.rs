@@ -24,6 +24,7 @@ use puck::{CanFrame, Group, MotorMode, Node, PropertyId, Reply, SafetyMode, Stat
 use crate::application::{Controller, ControllerIo, CycleReport, Message, Slot};
 use crate::background::{BackgroundPoll, PollReply};
 use crate::bus::{Outlet, Pacer};
+use crate::caution::Watch;
 use crate::command::{Command, Refusal};
 use crate::event::{Event, EventKind};
 use crate::hand::Hand;
@@ -83,6 +84,7 @@ pub struct DeviceController {
     pendant: Option<i32>,
     temperatures: [Option<i16>; 7],
     hand_temperatures: [Option<i16>; 4],
+    watch: Watch,
     stage: Stage,
     blocked: Option<StartupError>,
     /// A fault of the bus, to be told to the next cycle, and the cycles left until the bus is started anew.
@@ -114,6 +116,7 @@ impl DeviceController {
             pendant: None,
             temperatures: [None; 7],
             hand_temperatures: [None; 4],
+            watch: Watch::default(),
             stage: Stage::Enumerating,
             blocked: None,
             fault: None,
@@ -330,7 +333,7 @@ impl DeviceController {
                 hand,
             },
             command: self.next_command(now_us, io),
-            external_fault: self.fault.take(),
+            external_fault: self.fault.take().or(self.watch.is_too_hot().then_some(Fault::MotorHot)),
         };
         let output = self.cycle.step(&input);
         self.send_torques(output.actuation.frames(), now_us, io);
@@ -423,6 +426,8 @@ impl DeviceController {
     #[inline(never)]
     fn ask_slowly(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
         self.idle_request_in = self.idle_request_in.saturating_sub(1);
+        let known = Iterator::chain(self.temperatures.iter(), &self.hand_temperatures).copied().flatten();
+        self.cycle.set_caution(self.watch.look(known, self.pendant));
         let writable = self.startup.safety_properties().is_some_and(|safety| safety.mode_is_writable);
         // Asked for even of a module that has told IDLE: the word may be wrong, and then nothing brakes.
         let estop = self.safety_mode == Some(SafetyMode::EStop);

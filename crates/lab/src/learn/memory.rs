@@ -242,7 +242,8 @@ fn runs<const CHANNELS: usize>(
     recordings
         .iter()
         .map(|recording| {
-            if let Some(found) = recording.origin.primitive.clone().filter(|found| found.movement != expected.movement) {
+            if let Some(found) = recording.origin.primitive.clone().filter(|found| found.movement != expected.movement)
+            {
                 return Err(MemoryError::Others { file: recording.file.clone(), found, expected: expected.clone() });
             }
             let run = recording.running();
