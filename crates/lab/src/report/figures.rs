@@ -107,7 +107,7 @@ impl Figures<'_> {
                 Some(all.get(place(run)?)?.get(at)?[axis].to_degrees())
             };
             self.panel(
-                format!("Turn to the goal about {}", ["x", "y", "z"][axis]),
+                format!("Angle to the goal about {}", ["x", "y", "z"][axis]),
                 "deg",
                 4.0,
                 None,
