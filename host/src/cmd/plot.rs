@@ -78,7 +78,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     };
     let execution = command.run.as_deref().map(Recording::read).transpose().map_err(|cause| invalid(cause.into()))?;
     if let (Some(file), Some(recording)) = (&primitive, &execution) {
-        same_movement(file, recording)?;
+        same_movement(file, recording, "plot refused")?;
     }
     if let (Some(file), Some(recording)) = (&primitive, &shown)
         && file.provenance.as_ref().is_some_and(|from| from.demonstration_checksum != *recording)
@@ -141,7 +141,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 }
 
 /// Refuses a run of another movement than the primitive's.
-fn same_movement(file: &PrimitiveFile, recording: &Recording) -> Result<(), Failure> {
+pub(super) fn same_movement(file: &PrimitiveFile, recording: &Recording, doing: &str) -> Result<(), Failure> {
     let Some(played) = recording.origin.primitive.as_ref().filter(|played| played.movement != file.movement_checksum())
     else {
         return Ok(());
@@ -153,7 +153,7 @@ fn same_movement(file: &PrimitiveFile, recording: &Recording) -> Result<(), Fail
         file.name,
         file.movement_checksum()
     );
-    Err(Failure::new(ErrorCode::RecordingOfOthers, "plot refused", text))
+    Err(Failure::new(ErrorCode::RecordingOfOthers, doing, text))
 }
 
 /// Renders the scene at the end of the run, the way of the grasp point, and ghosts of the arm along it.

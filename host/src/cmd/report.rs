@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use super::{ErrorCode, Failure, Global, files};
+use super::{ErrorCode, Failure, Global, files, plot};
 use lab::primitive_file::PrimitiveFile;
 use lab::report::{ReportedRun, page};
 
@@ -29,18 +29,21 @@ pub struct Cmd {
 /// Writes the report.
 ///
 /// # Errors
-/// A file cannot be read or is wrong, or the page is there already or cannot be written.
+/// A file cannot be read or is wrong, a run played another primitive, or the page is there already or cannot be
+/// written.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "report";
-    let file = &command.output;
     let inputs: Vec<&Path> = command.runs.iter().chain(&command.primitive).map(PathBuf::as_path).collect();
-    let output_file = files::create(file, global, &inputs, DOING)?;
+    let output_file = files::create(&command.output, global, &inputs, "report refused")?;
     let invalid =
         |cause: Box<dyn std::error::Error + Send + Sync>| Failure::of_file(ErrorCode::PlotInput, DOING, cause);
     let primitive = command.primitive.as_deref().map(PrimitiveFile::read).transpose();
     let primitive = primitive.map_err(|cause| invalid(cause.into()))?;
     let read = |file: &PathBuf| ReportedRun::read(file, primitive.as_ref()).map_err(|cause| invalid(cause.into()));
     let runs = command.runs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+    if let Some(file) = &primitive {
+        runs.iter().try_for_each(|run| plot::same_movement(file, &run.running, "report refused"))?;
+    }
     let name = primitive.as_ref().map(|primitive| primitive.name.clone());
     let title = command.title.clone().or(name).or_else(|| Some(runs.first()?.name.clone())).unwrap_or_default();
     let html = page(&title, &runs, primitive.as_ref());
@@ -48,7 +51,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let outcomes: Vec<_> = runs.iter().map(|run| json!({ "run": run.name, "outcome": run.outcome.words() })).collect();
     let lines: Vec<String> = runs.iter().map(|run| format!("{}: {}", run.name, run.outcome.words())).collect();
     global.output().result(
-        &json!({ "file": files::text(file), "runs": outcomes }),
-        format!("{}\nwrote {}", lines.join("\n"), file.display()),
+        &json!({ "file": files::text(&command.output), "runs": outcomes }),
+        format!("{}\nwrote {}", lines.join("\n"), command.output.display()),
     )
 }

@@ -1,4 +1,4 @@
-//! What is known of a device that is watched: the newest of everything it told.
+//! The state of a device that is watched: the newest of everything it told.
 
 mod screen;
 
@@ -78,7 +78,7 @@ impl Watch {
         }
     }
 
-    /// How far the movement has come, 0 to 1; `None` outside a run.
+    /// Progress of the movement, 0 to 1; `None` outside a run.
     pub fn progress(&self) -> Option<f64> {
         let telemetry = self.telemetry.filter(|telemetry| {
             matches!(State::from_code(telemetry.state), Some(State::Run | State::Coast)) && telemetry.phase > 0.0

@@ -107,7 +107,7 @@ impl Figures<'_> {
                 Some(all.get(place(run)?)?.get(at)?[axis].to_degrees())
             };
             self.panel(
-                format!("Turn to the goal about {}", ["x", "y", "z"][axis]),
+                format!("Angle to the goal about {}", ["x", "y", "z"][axis]),
                 "deg",
                 4.0,
                 None,
@@ -167,9 +167,10 @@ impl Figures<'_> {
         let taught = taught.map(|references| plan::pose_path(&references).position).unwrap_or_default();
         let beside = |run: &ReportedRun, at: usize| {
             let planned = run.running.position_d.as_ref()?.get(at)?;
-            let there = taught.get((run.progress.get(at)? * (taught.len().checked_sub(1)?) as f64).round() as usize)?;
-            let distance: f64 = planned.iter().zip(there).map(|(a, b)| (a - b) * (a - b)).sum();
-            Some(1e3 * distance.sqrt())
+            let place = run.progress.get(at)? * taught.len().checked_sub(1)? as f64;
+            let (before, after) = (taught.get(place as usize)?, taught.get(place.ceil() as usize)?);
+            let distance = |axis: usize| planned[axis] - before[axis] - place.fract() * (after[axis] - before[axis]);
+            Some(1e3 * (0..3).map(|axis| distance(axis).powi(2)).sum::<f64>().sqrt())
         };
         let share = |run: &ReportedRun, at: usize| {
             let tau = run.running.tau.as_ref()?.get(at)?;

@@ -28,7 +28,7 @@ pub struct ReportedRun {
     pub running: Recording,
     /// Progress of the movement at each of its samples, 0 to 1.
     pub progress: Vec<f64>,
-    /// How it ended.
+    /// Its end.
     pub outcome: Outcome,
     /// Everything out of the ordinary, and the changes of state, in their order.
     pub happenings: Vec<Happening>,
