@@ -112,7 +112,10 @@ fn a_full_device_says_which_command_frees_a_place() {
     common::demonstration(folder, 3.0);
     let _arm = served(folder);
     for number in 0..8 {
-        object(folder, &["learn", "demo.csv", "--kernels", "10", "--name", &format!("p{number}"), "-o", "p.toml"]);
+        object(
+            folder,
+            &["learn", "demo.csv", "--kernels", "10", "--name", &format!("p{number}"), "-o", "p.toml", "--force"],
+        );
         object(folder, &["upload", "p.toml"]);
     }
     object(folder, &["learn", "demo.csv", "--name", "ninth", "-o", "ninth.toml"]);
@@ -127,7 +130,7 @@ fn a_full_device_says_which_command_frees_a_place() {
 fn a_stored_primitive_runs_by_its_name_and_others_look_on_without_costing_it_a_cycle() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    common::demonstration(folder, 5.0);
+    common::demonstration(folder, 8.0);
     object(folder, &["learn", "demo.csv", "--name", "reach", "-o", "reach.toml"]);
     let _arm = served(folder);
     object(folder, &["upload", "reach.toml"]);
@@ -141,6 +144,10 @@ fn a_stored_primitive_runs_by_its_name_and_others_look_on_without_costing_it_a_c
     let seen = object(folder, &["record", "--duration", "2", "-o", "seen.csv"]);
     assert_eq!((&seen["samples"], &seen["gaps"]), (&Value::from(600), &Value::from(0)));
     refused(folder, &["delete", "reach"], "E504", "another host");
+    let watched = tactus(folder, &["--json", "monitor", "--primitive", "reach.toml", "--duration", "0.5"]);
+    let lines = String::from_utf8(watched.stdout).unwrap();
+    let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert!(lines.len() >= 4 && lines.iter().all(|line| line["state"] == "run"), "{lines:?}");
 
     let status = run.0.wait().unwrap();
     assert!(status.success(), "the run ended otherwise because others looked on");

@@ -1,19 +1,20 @@
-//! A mean over arms and lessons with the interval in which it lies.
+//! A mean over arms and demonstrations with the interval in which it lies.
 
 use serde::Serialize;
 
 use super::seed::mix;
 
-/// Drawings from the arms and lessons that were tried.
+/// Drawings from the arms and demonstrations that were tried.
 const DRAWINGS: u64 = 10_000;
 /// Probability that the mean lies in the interval.
 const CONFIDENCE: f64 = 0.95;
 
-/// A mean with the 95 % interval of the bootstrap (percentiles): what it would be with other arms and lessons of the
-/// same kind.
+/// A mean with the 95 % interval of the bootstrap (percentiles): what it would be with other arms and demonstrations of
+/// the same kind.
 ///
-/// Arms and lessons are drawn anew, each with replacement and independently, and every lesson meets the arms that were
-/// drawn. Cells are not drawn: they are chosen, not found. Of five arms the interval is rough, and rather too narrow.
+/// Arms and demonstrations are drawn anew, each with replacement and independently, and every demonstration meets the
+/// arms that were drawn. Cells are not drawn: they are chosen, not found. Of five arms the interval is rough and rather
+/// too narrow.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Interval {
     /// Mean.
@@ -25,16 +26,20 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// From counts, lesson by lesson, of the same arms in the same order; `None` of fewer than two arms and two lessons.
+    /// From counts, demonstration by demonstration, of the same arms in the same order; `None` of one arm with one
+    /// demonstration.
     pub fn of(counts: &[Vec<usize>]) -> Option<Interval> {
         let arms = counts.iter().map(Vec::len).min()?;
         if arms == 0 || (arms < 2 && counts.len() < 2) {
             return None;
         }
-        let at = |lesson: usize, arm: usize| counts[lesson][arm] as f64;
-        let mean_of = |lessons: &[usize], drawn: &[usize]| {
-            let sum: f64 = lessons.iter().flat_map(|&lesson| drawn.iter().map(move |&arm| at(lesson, arm))).sum();
-            sum / (lessons.len() * drawn.len()) as f64
+        let at = |demonstration: usize, arm: usize| counts[demonstration][arm] as f64;
+        let mean_of = |demonstrations: &[usize], drawn: &[usize]| {
+            let sum: f64 = demonstrations
+                .iter()
+                .flat_map(|&demonstration| drawn.iter().map(move |&arm| at(demonstration, arm)))
+                .sum();
+            sum / (demonstrations.len() * drawn.len()) as f64
         };
         let all = |count: usize| (0..count).collect::<Vec<_>>();
         let mut state = 0;

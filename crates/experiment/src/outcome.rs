@@ -147,7 +147,7 @@ pub struct Rule {
     pub upright: bool,
 }
 
-/// How the arm itself fared in a trial.
+/// Conduct of the arm itself in a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ArmConduct<'a> {
     /// Name of the fault that stopped the arm, if one did.
@@ -177,11 +177,10 @@ pub fn judge(
     let lifted = observation.between(marks.lift, f64::INFINITY);
     let height = |sample: &Sample| sample.object[2] - first.object[2];
     let moved = |sample: &Sample| (sample.object[0] - first.object[0]).hypot(sample.object[1] - first.object[1]);
-    let tilt = run.iter().map(|sample| sample.tilt).fold(0.0, f64::max);
     let forces: Vec<f64> = before.iter().map(|sample| sample.contact.horizontal()).collect();
     let touching: Vec<f64> = forces.iter().copied().filter(|force| *force > TOUCH).collect();
     let grasp_moved = run.last().map_or(0.0, moved);
-
+    let tilt = run.iter().map(|sample| sample.tilt).fold(0.0, f64::max);
     let outcome = if let Some(fault) = fault {
         Outcome::Stopped(fault.to_owned())
     } else if observation.crushed {

@@ -27,8 +27,8 @@ use lab::simulation::Engine;
 
 /// Seed of arm, noise and person while a primitive is made. Experiments begin with 1, so their arms are others.
 const TEACHER_SEED: u64 = 0;
-/// Seeds of further lessons begin here: another hand that trembles, on another arm.
-const FURTHER_LESSONS: u64 = 2_000_000;
+/// Seeds of further demonstrations begin here: another hand that trembles, on another arm.
+const FURTHER_TEACHINGS: u64 = 2_000_000;
 /// Rest recorded after the simulated teacher has let go, s.
 const POST_ROLL: f64 = 0.5;
 /// Longest demonstration, s.
@@ -125,38 +125,38 @@ impl From<lab::simulation::SimulationError> for PreparationError {
     }
 }
 
-/// A lesson: what is taught, and by which of the simulated people, on which of the arms.
+/// A demonstration: what is taught, and by which of the simulated people, on which of the arms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Lesson {
-    /// What is taught.
+pub struct Teaching {
+    /// Movement that is taught, and the object it is for.
     pub scenario: Scenario,
     /// The difference between plant and model.
     pub plant: PlantKind,
-    /// Which lesson, from 1. Each has a person who trembles in another way, and an arm of its own.
+    /// Which demonstration, from 1. Each has a person who trembles in another way, and an arm of its own.
     pub number: u64,
 }
 
-impl Lesson {
+impl Teaching {
     /// Seed of arm, noise and person.
     fn seed(&self) -> u64 {
-        if self.number <= 1 { TEACHER_SEED } else { FURTHER_LESSONS + self.number }
+        if self.number <= 1 { TEACHER_SEED } else { FURTHER_TEACHINGS + self.number }
     }
 }
 
-/// Makes the primitive of a lesson on `jobs` processors. `say` hears what is being done; `file` is where it will be
-/// written.
+/// Makes the primitive of a demonstration on `jobs` processors. `say` hears what is being done; `file` is where it will
+/// be written.
 ///
 /// # Errors
 /// [`PreparationError`]
 pub fn make(
-    lesson: Lesson,
+    teaching: Teaching,
     file: &Path,
     jobs: usize,
     interrupt: &Interrupt,
     say: &mut dyn FnMut(&str),
 ) -> Result<PrimitiveFile, PreparationError> {
-    let Lesson { scenario, plant, .. } = lesson;
-    let arm = Arm { engine: Engine::InProcess, kind: plant, variation: Variation::default(), seed: lesson.seed() };
+    let Teaching { scenario, plant, .. } = teaching;
+    let arm = Arm { engine: Engine::InProcess, kind: plant, variation: Variation::default(), seed: teaching.seed() };
     say("teaching");
     let recording = teach(scenario, &arm, interrupt)?;
     say("learning");

@@ -2,12 +2,12 @@
 
 use link::Telemetry;
 
-/// What is slower than this is movement, Hz.
+/// Frequency below which speed is movement, Hz.
 const CORNER: f64 = 15.0;
 /// Time over which the amplitude is averaged, s.
 const WINDOW: f64 = 0.2;
-/// An arm whose joint speed shakes by this much is not stable, rad/s. The compliant arm with its nominal friction shakes
-/// by 0.17 to 0.25 in its lift; one that sustains its swing, by 0.6 and more.
+/// An arm whose joint speed shakes by this much is not stable, rad/s. The compliant arm with its nominal friction
+/// shakes by 0.17 to 0.25 in its lift; one that sustains its swing, by 0.6 and more.
 pub const UNSTABLE: f64 = 0.3;
 
 /// Largest amplitude of any joint's speed above 15 Hz, in the mean over 0.2 s, rad/s. Zero of fewer cycles.

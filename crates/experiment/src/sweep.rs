@@ -68,19 +68,19 @@ impl FromStr for Sweep {
     }
 }
 
-/// Cells that were held, for one plant: mode by mode, lesson by lesson, arm by arm.
+/// Cells that were held, for one plant: mode by mode, demonstration by demonstration, arm by arm.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Point {
     /// Value of the factor that is swept; `None` of a study without a sweep.
     pub value: Option<f64>,
     /// Cells that were tried with each arm.
     pub cells: usize,
-    /// The modes with their counts, `[lesson][arm]`.
+    /// The modes with their counts, `[demonstration][arm]`.
     pub held: Vec<(Mode, Vec<Vec<usize>>)>,
 }
 
 impl Point {
-    /// Adds a lesson: the statistics of its modes.
+    /// Adds a demonstration: the statistics of its modes.
     pub fn add(&mut self, modes: &[Summary]) {
         for summary in modes {
             self.cells = summary.cells;
@@ -93,7 +93,7 @@ impl Point {
         }
     }
 
-    /// Mean of a mode with its interval; of one arm and one lesson the count alone.
+    /// Mean of a mode with its interval; of one arm and one demonstration the count alone.
     pub fn interval(&self, mode: Mode) -> Option<Interval> {
         let (_, counts) = self.held.iter().find(|(held, _)| *held == mode)?;
         Interval::of(counts).or_else(|| {

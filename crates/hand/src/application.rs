@@ -124,7 +124,7 @@ impl Application for HandApplication<'_> {
         Ok(())
     }
 
-    /// What is kept of an image is not the image: its new name would have no check sum.
+    /// Refused: only parts of an image are kept, and a new name would need the check sum of the whole.
     fn rename(&mut self, _: &Name, _: &Name, _: &mut impl SessionPort<DeviceController>) -> Result<(), Refused> {
         Err(NO_ARM)
     }

@@ -63,7 +63,7 @@ pub(super) fn failure(cause: PrimitiveFileError, path: &Path, doing: &str) -> Fa
         PrimitiveFileError::Image { .. } | PrimitiveFileError::Invalid { .. } => ErrorCode::PrimitiveInvalid,
         _ => ErrorCode::PrimitiveUnreadable,
     };
-    Failure::new(code, format!("{doing} refused {}", path.display()), cause)
+    Failure::of_file(code, format!("{doing} refused {}", path.display()), cause)
 }
 
 /// A goal of the grasp point (m), or the stored one.

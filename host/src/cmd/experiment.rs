@@ -35,9 +35,9 @@ pub struct Cmd {
     /// Try every cell with this seed only
     #[arg(long)]
     pub seed: Option<u64>,
-    /// Teach N times, each time by another person, and try every lesson on every arm
+    /// Teach N times, each time by another person, and try every demonstration on every arm
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100), conflicts_with = "primitive")]
-    pub lessons: Option<u64>,
+    pub demonstrations: Option<u64>,
     /// Repeat with a factor of `--vary` over a range, until less than half is held: `joint-friction=1:0`,
     /// `bias=0:2:4` (steps)
     #[arg(long, value_name = "NAME=FROM:TO[:STEPS]")]
@@ -108,7 +108,7 @@ mod work {
     use super::{Cmd, ErrorCode, Failure, Global};
     use crate::cmd::{Output, connection, upload};
     use experiment::lift::{self, Case};
-    use experiment::preparation::{self, Lesson, PreparationError};
+    use experiment::preparation::{self, PreparationError, Teaching};
     use experiment::sweep::{self, Point};
     use experiment::trial::TrialError;
     use experiment::{Comparison, Config, Experiment, ExperimentError, Progress, Scenario, figures, map};
@@ -125,7 +125,7 @@ mod work {
         let output = global.output();
         let interrupt = connection::interrupt();
         let out = command.out.clone().unwrap_or_else(|| command.scenario.name().into());
-        if command.lessons.is_some() || command.sweep.is_some() {
+        if command.demonstrations.is_some() || command.sweep.is_some() {
             return study(command, global, &out, &interrupt, output);
         }
         let config = configuration(command, global, &out, 1, &interrupt, output)?;
@@ -137,7 +137,7 @@ mod work {
         output.result(&data, text)
     }
 
-    /// The experiment as asked for, with the primitive of the lesson `number`; results go into `out`.
+    /// The experiment as asked for, with the primitive of the demonstration `number`; results go into `out`.
     fn configuration(
         command: &Cmd,
         global: &Global,
@@ -169,16 +169,16 @@ mod work {
         })
     }
 
-    /// Several lessons, or several plants, or both: one experiment for each, and what they say together.
+    /// Several demonstrations, or several plants, or both: one experiment for each, and what they say together.
     fn study(command: &Cmd, global: &Global, out: &Path, interrupt: &Interrupt, output: Output) -> Result<(), Failure> {
         if command.scenario == Scenario::Lift {
             let cause = "the experiment with a weight has three cases of its own";
             return Err(Failure::new(ErrorCode::NoStudyOfWeights, DOING, cause));
         }
-        let lessons = command.lessons.unwrap_or(1);
+        let demonstrations = command.demonstrations.unwrap_or(1);
         let mut configs = Vec::new();
-        for number in 1..=lessons {
-            let folder = if lessons > 1 { out.join(format!("lesson-{number}")) } else { out.to_owned() };
+        for number in 1..=demonstrations {
+            let folder = if demonstrations > 1 { out.join(format!("demonstration-{number}")) } else { out.to_owned() };
             configs.push(configuration(command, global, &folder, number, interrupt, output)?);
         }
         let name = command.sweep.as_ref().map(|sweep| sweep.name.as_str());
@@ -206,7 +206,7 @@ mod work {
             }
         }
         let data = serde_json::json!({
-            "experiment": command.scenario, "folder": out, "lessons": lessons, "sweep": name, "points": points,
+            "experiment": command.scenario, "folder": out, "demonstrations": demonstrations, "sweep": name, "points": points,
         });
         let file = out.join("study.json");
         let json = serde_json::to_string_pretty(&data)
@@ -321,8 +321,8 @@ mod work {
         let spinner = output.spinner("teaching");
         let jobs =
             command.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from);
-        let lesson = Lesson { scenario: command.scenario, plant: command.plant, number };
-        let made = preparation::make(lesson, &file, jobs, interrupt, &mut |doing| {
+        let teaching = Teaching { scenario: command.scenario, plant: command.plant, number };
+        let made = preparation::make(teaching, &file, jobs, interrupt, &mut |doing| {
             spinner.set_message(doing.to_owned());
         })
         .and_then(|mut primitive| {

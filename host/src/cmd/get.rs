@@ -6,7 +6,7 @@ use clap::Args;
 use link::{Name, PrimitiveImage};
 use serde_json::json;
 
-use super::{ErrorCode, Failure, Global, connection};
+use super::{ErrorCode, Failure, Global, connection, files};
 use lab::client::Client;
 use lab::device::Device;
 use lab::primitive_file::PrimitiveFile;
@@ -20,9 +20,6 @@ pub struct Cmd {
     /// Where it goes, TOML; NAME.toml if it is not given
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// Replace a file that is there already
-    #[arg(long)]
-    pub force: bool,
 }
 
 /// Reads a primitive back. The file gives the same image when it is uploaded again.
@@ -32,16 +29,14 @@ pub struct Cmd {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "get";
     let path = command.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", command.name)));
-    if path.exists() && !command.force && !super::ask(global, &format!("{} exists; replace it?", path.display())) {
-        let cause = format!("{} exists", path.display());
-        return Err(Failure::new(ErrorCode::WouldReplace, "get refused", cause));
-    }
+    let output_file = files::create(&path, global, &[], "get refused")?;
     let mut client = connection::open(global, DOING, |_| {})?;
     let file = fetch(&mut client, &command.name, DOING)?;
-    file.write(&path).map_err(|cause| Failure::new(ErrorCode::PrimitiveNotWritten, DOING, cause))?;
+    let text = file.checked_text().map_err(|cause| super::check::failure(cause, &path, DOING))?;
+    files::fill(output_file, text.as_bytes(), DOING)?;
     let content = file.checksum();
     global.output().result(
-        &json!({ "name": file.name, "file": path, "content": format!("0x{content:08x}") }),
+        &json!({ "name": file.name, "file": files::text(&path), "content": format!("0x{content:08x}") }),
         format!("wrote {} (content 0x{content:08x})", path.display()),
     )
 }

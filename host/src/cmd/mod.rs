@@ -4,21 +4,26 @@ pub mod calibrate;
 pub mod can;
 pub mod check;
 pub mod compare;
+pub mod completions;
 mod connection;
 pub mod delete;
 pub mod experience;
+pub mod explain;
 pub mod experiment;
+mod files;
 pub mod flash;
 pub mod get;
 pub mod hand;
 pub mod learn;
 pub mod list;
 pub mod logs;
+pub mod monitor;
 pub mod output;
 pub mod plot;
 pub mod record;
 pub mod rehearse;
 pub mod rename;
+pub mod report;
 pub mod run;
 pub mod sim;
 pub mod status;
@@ -26,7 +31,7 @@ pub mod stop;
 pub mod teach;
 pub mod upload;
 
-use std::io::IsTerminal as _;
+use std::io::{IsTerminal as _, Write};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -67,6 +72,9 @@ pub struct Global {
     /// Never ask; what would be asked is refused.
     #[arg(long, global = true)]
     pub non_interactive: bool,
+    /// Replace files that exist.
+    #[arg(long, global = true)]
+    pub force: bool,
     /// The device: `sim:`, `sil:`, `board:`, `serial:PATH`, `can:INTERFACE`, `tcp:HOST:PORT` or `unix:PATH`.
     #[arg(long, global = true, env = "TACTUS_DEVICE", value_name = "DEVICE")]
     pub device: Option<String>,
@@ -124,6 +132,8 @@ pub enum Command {
     Hand(hand::Cmd),
     /// Bring the arm to rest
     Stop(stop::Cmd),
+    /// Watch the arm on one screen, beside whoever commands it
+    Monitor(monitor::Cmd),
     /// Write down what the arm does
     Record(record::Cmd),
     /// Write the firmware image to a board
@@ -134,6 +144,12 @@ pub enum Command {
     Experiment(experiment::Cmd),
     /// Draw demonstration, plan and execution
     Plot(plot::Cmd),
+    /// Write a page of HTML about one run or several
+    Report(report::Cmd),
+    /// Explain an error or a fault
+    Explain(explain::Cmd),
+    /// Write what a shell needs to complete command lines
+    Completions(completions::Cmd),
     /// Tell how two recordings of the same movement differ
     Compare(compare::Cmd),
     /// Read logs of the arm's CAN bus, or play them to the device's application
@@ -155,6 +171,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Stop(command) => stop::run(&command, &global),
         Command::Status(command) => status::run(&command, &global),
         Command::Calibrate(command) => calibrate::run(&command, &global),
+        Command::Monitor(command) => monitor::run(&command, &global),
         Command::Record(command) => record::run(&command, &global),
         Command::Learn(command) => learn::run(&command, &global),
         Command::Check(command) => check::run(&command, &global),
@@ -165,16 +182,20 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Logs(command) => logs::run(&command, &global),
         Command::Experiment(command) => experiment::run(&command, &global),
         Command::Plot(command) => plot::run(&command, &global),
+        Command::Report(command) => report::run(&command, &global),
+        Command::Explain(command) => explain::run(&command, &global),
+        Command::Completions(command) => completions::run(&command),
         Command::Compare(command) => compare::run(&command, &global),
         Command::Can(command) => can::run(&command, &global),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
+            // Nobody may be there any more to read it; the exit code still tells.
             if global.json {
-                println!("{}", failure.to_json());
+                let _ = writeln!(std::io::stdout(), "{}", failure.to_json());
             }
-            eprintln!("{failure}");
+            let _ = writeln!(std::io::stderr(), "{failure}");
             ExitCode::from(failure.code.exit() as u8)
         }
     }

@@ -16,9 +16,6 @@ pub struct Cmd {
     /// Its name from then on
     #[arg(value_name = "NEW")]
     pub new: Name,
-    /// Delete a primitive that has the new name already
-    #[arg(long)]
-    pub force: bool,
 }
 
 /// Renames a primitive.
@@ -32,7 +29,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut renamed = client.rename(old, new);
     if old != new && matches!(renamed, Err(HostError::Refused { reason: Refusal::NameTaken, .. })) {
         let what = format!("the device stores another primitive '{new}'");
-        if !command.force && !super::ask(global, &format!("{what}; delete it?")) {
+        if !global.force && !super::ask(global, &format!("{what}; delete it?")) {
             return Err(Failure::new(ErrorCode::WouldReplace, "rename refused", what));
         }
         client.delete(new).map_err(|error| error.into_failure(DOING))?;

@@ -115,7 +115,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         let comma = if device.ends_with(':') { "" } else { "," };
         device = format!("{device}{comma}{option}");
     }
-    let (mut device, interrupt) = connection::simulated(&device, DOING)?;
+    let (mut device, interrupt) = connection::simulated(&device, global.force, DOING)?;
     let listener = listen(&command.listen).map_err(|cause| {
         Failure::new(ErrorCode::CannotListen, format!("sim: cannot listen on {}", command.listen), cause)
     })?;

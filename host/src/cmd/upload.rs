@@ -19,9 +19,6 @@ pub struct Cmd {
     /// The primitive, TOML
     #[arg(value_name = "PRIMITIVE")]
     pub primitive: PathBuf,
-    /// Replace another version of the same name in the device without asking
-    #[arg(long)]
-    pub force: bool,
 }
 
 /// Uploads a primitive.
@@ -33,7 +30,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let file = read(&command.primitive, DOING)?;
     let mut client = connection::open(global, DOING, |_| {})?;
-    may_replace(&mut client, &file, command.force, global)?;
+    may_replace(&mut client, &file, global)?;
     let outcome = send(&mut client, &file, output, DOING)?;
     if let (UploadOutcome::Stored(_), Some(line)) = (&outcome, client.transport().line_rate()) {
         let rate = client.transfer().sending_rate();
@@ -61,9 +58,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 }
 
 /// Makes sure that a person wants another version of the same name replaced.
-fn may_replace(client: &mut Client<Device>, file: &PrimitiveFile, force: bool, global: &Global) -> Result<(), Failure> {
+fn may_replace(client: &mut Client<Device>, file: &PrimitiveFile, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "upload refused";
-    let Some(there) = other_version(client, file, DOING)?.filter(|_| !force) else { return Ok(()) };
+    let Some(there) = other_version(client, file, DOING)?.filter(|_| !global.force) else { return Ok(()) };
     let checksum = there.crc;
     let what = format!("the device stores another version of '{}' (checksum 0x{checksum:08x})", file.name);
     if super::ask(global, &format!("{what}; replace it?")) {

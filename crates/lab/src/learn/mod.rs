@@ -111,6 +111,23 @@ pub enum LearnError {
         /// The reason that `dmp::fit` gives.
         reason: String,
     },
+    /// The primitive leaves the way that was shown.
+    #[error(
+        "{file}: the primitive leaves the way that was shown by {:.0} mm and {:.0} degrees, at most {:.0} mm and {:.0} degrees are accepted",
+        position * 1e3,
+        orientation.to_degrees(),
+        WORST_REPRODUCTION.0 * 1e3,
+        WORST_REPRODUCTION.1.to_degrees(),
+        file = file.display()
+    )]
+    Poor {
+        /// The recording.
+        file: PathBuf,
+        /// Largest distance, m.
+        position: f64,
+        /// Largest angle, rad.
+        orientation: f64,
+    },
     /// The fitted primitive is no valid primitive.
     #[error(transparent)]
     Primitive(#[from] PrimitiveFileError),
@@ -131,6 +148,9 @@ pub struct Learned {
 const COARSE_POSITION: f64 = 2e-3;
 /// Reproductions worse than this (rad, RMS: half a degree) deserve more kernels.
 const COARSE_ORIENTATION: f64 = 0.5 * std::f64::consts::PI / 180.0;
+
+/// Reproductions that leave the way by more than this somewhere (m, rad) are no reproductions: 3 cm, 10 degrees.
+const WORST_REPRODUCTION: (f64, f64) = (0.03, 10.0 * std::f64::consts::PI / 180.0);
 
 /// Learns a primitive from a recording; `file` is where the primitive will be written.
 ///
@@ -184,6 +204,10 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
     let mut report = compare(&primitive, recording, &demonstration, &posture, &hand, largest_angle, warnings)?;
     report.feedback = FeedbackReport::of(&primitive);
     report.warnings.extend(report.feedback.as_ref().map(FeedbackReport::warnings).unwrap_or_default());
+    let (position, orientation) = (report.position_max_m, report.orientation_max_rad);
+    if position > WORST_REPRODUCTION.0 || orientation > WORST_REPRODUCTION.1 {
+        return Err(LearnError::Poor { file: recording.file.clone(), position, orientation });
+    }
     let coarse = report.position_rms_m > COARSE_POSITION || report.orientation_rms_rad > COARSE_ORIENTATION;
     if coarse && options.kernels < KERNEL_CAPACITY {
         report.warnings.push(format!(

@@ -85,6 +85,24 @@ impl RunRequest {
     }
 }
 
+/// Duration of a movement of `duration` s begun at `speed`, with its changes of speed on the way, s.
+pub fn planned(duration: f64, speed: f64, changes: &[Change]) -> f64 {
+    let mut speeds: Vec<(f64, f64)> = changes
+        .iter()
+        .filter_map(|change| match change.kind {
+            ChangeKind::Speed(factor) => Some((change.time, f64::from(factor))),
+            ChangeKind::Goal(_) => None,
+        })
+        .collect();
+    speeds.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut time, mut left, mut speed) = (0.0, duration, speed);
+    for (at, factor) in speeds {
+        let passed = (at - time).min(left / speed);
+        (time, left, speed) = (time + passed, left - passed * speed, factor);
+    }
+    time + left / speed
+}
+
 /// The device told that a run does not go as the successful ones did.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Surprise {

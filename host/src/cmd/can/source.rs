@@ -66,7 +66,11 @@ impl Source {
             (Some(path), _) if path == Path::new("-") => Ok(Self::Input(BufReader::new(std::io::stdin()))),
             (Some(path), _) => {
                 let file = File::open(path).map_err(|cause| {
-                    Failure::new(ErrorCode::LogUnreadable, format!("{doing}: cannot read {}", path.display()), cause)
+                    Failure::of_file(
+                        ErrorCode::LogUnreadable,
+                        format!("{doing}: cannot read {}", path.display()),
+                        cause,
+                    )
                 })?;
                 Ok(Self::File { reader: BufReader::new(file), path: path.to_owned(), follow })
             }

@@ -112,7 +112,7 @@ impl<A: Application> HostSession<A> {
         port: &mut impl SessionPort<A::Controller>,
     ) -> Result<Option<Reply>, Refused> {
         match request {
-            // Taken before: an observer's hello has an answer of its own.
+            // Answered before it comes here.
             Request::Observe(_) => {}
             Request::Hello(_) => return Ok(Some(Reply::Hello { of, hello: self.hello() })),
             Request::Goodbye => {
