@@ -8,7 +8,7 @@
 //! | PEN | 5 Hz | lights and warnings for a person |
 //! | MODE of each hand puck | 10 Hz, while there is a hand | a SET has no acknowledge, and others may set modes too |
 //! | TEMP | 1 Hz for each puck | heat |
-//! | STAT of a device that did not answer at the start-up | 10 Hz, sensor and hand in turn | the arm carries it all the same |
+//! | STAT of sensor or hand, if the start-up missed it | 10 Hz, in turn | the arm carries it all the same |
 //!
 //! The odd slots may be taken by the hand for something more urgent. A property that is new here has to be named in
 //! [`BackgroundPoll::take`], which takes every other answer for the pendant word.

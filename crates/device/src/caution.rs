@@ -1,11 +1,11 @@
-//! `Watch`: what temperatures and the pendant ask for: to be told, to run slowly, to stop.
+//! `Watch`: temperatures and warnings of the pendant, and the caution that they ask for.
 //!
 //! | | told | held to half speed | stopped |
 //! |---|---|---|---|
 //! | hottest motor | 60 degrees C | 70 | 80 |
 //! | pendant | | a warning of velocity, torque, voltage, heartbeat or another quantity | the safety module does it |
 //!
-//! What began at a temperature ends 5 degrees below it. Supply that falls is the pendant's voltage warning.
+//! Each ends 5 degrees below the temperature at which it began. Supply that falls is the pendant's voltage warning.
 
 use control::Caution;
 use puck::{PendantState, safety};
@@ -20,7 +20,7 @@ const HYSTERESIS: i16 = 5;
 /// The present findings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Watch {
-    /// How many of the three temperatures have been passed.
+    /// Number of the three temperatures that have been passed.
     heat: u8,
 }
 

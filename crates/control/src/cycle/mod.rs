@@ -92,7 +92,7 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     caution: Caution,
 }
 
-/// What the device has found about heat and the pendant.
+/// Findings of the device about heat and the pendant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Caution {
     /// Nothing.
