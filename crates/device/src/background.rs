@@ -8,6 +8,7 @@
 //! | PEN | 5 Hz | lights and warnings for a person |
 //! | MODE of each hand puck | 10 Hz, while there is a hand | a SET has no acknowledge, and others may set modes too |
 //! | TEMP | 1 Hz for each puck | heat |
+//! | STAT of sensor or hand, if the start-up missed it | 10 Hz, in turn | the arm carries it all the same |
 //!
 //! The odd slots may be taken by the hand for something more urgent. A property that is new here has to be named in
 //! [`BackgroundPoll::take`], which takes every other answer for the pendant word.
@@ -33,6 +34,8 @@ const PENDANT: (u32, u32) = (60, 3);
 const HAND_TEMPERATURES: (u32, u32) = (60, 33);
 /// Slow slots between two looks at a temperature; the seven pucks take turns.
 const TEMPERATURES: (u32, u32) = (42, 5);
+/// Slow slots between two questions to devices that were absent at the start-up; the sensor and the hand take turns.
+const ABSENT: (u32, u32) = (30, 9);
 /// After this many slots everything repeats: a common multiple of the periods, the seven pucks and the four digits.
 const REPEAT: u32 = 42 * 7 * 40;
 
@@ -47,6 +50,8 @@ pub(crate) enum PollReply {
     Pendant(i32),
     /// TEMP of a puck (0..=6), degree Celsius.
     Temperature(usize, i32),
+    /// STAT of the sensor or of a hand puck, whether it was found at the start-up or not.
+    Present(Node),
     /// STAT of a suspected puck.
     Status(Node, i32),
     /// MODE of a hand puck.
@@ -87,7 +92,7 @@ impl BackgroundPoll {
     }
 
     /// The question whose turn it is, if there is one; `hand`: its pucks may be asked too.
-    pub(crate) fn other(&mut self, hand: bool) -> Option<CanFrame> {
+    pub(crate) fn other(&mut self, hand: bool, absent: (bool, bool)) -> Option<CanFrame> {
         let tick = self.tick;
         let due = |(period, offset): (u32, u32)| tick.checked_rem(period) == Some(offset);
         let turn = |period: u32, pucks: usize| (tick.checked_div(period)? as usize).checked_rem(pucks);
@@ -102,6 +107,10 @@ impl BackgroundPoll {
             (Node::SAFETY_MODULE, self.pendant)
         } else if hand && due(HAND_TEMPERATURES) {
             (*Node::HAND.get(turn(HAND_TEMPERATURES.0, Node::HAND.len())?)?, TEMPERATURE)
+        } else if (absent.0 || absent.1) && due(ABSENT) {
+            let turn = turn(ABSENT.0, 2)? == 0;
+            let node = if absent.0 && (turn || !absent.1) { Node::FORCE_TORQUE } else { *Node::HAND.first()? };
+            (node, PropertyId::STAT)
         } else if due(TEMPERATURES) {
             (*Node::ARM.get(turn(TEMPERATURES.0, Node::ARM.len())?)?, TEMPERATURE)
         } else {
@@ -122,6 +131,7 @@ impl BackgroundPoll {
         }
         self.asked = None;
         Some(match property {
+            PropertyId::STAT if node.arm_index().is_none() => PollReply::Present(node),
             PropertyId::STAT => PollReply::Status(node, value),
             TEMPERATURE if node.hand_index().is_some() => PollReply::HandTemperature(node.hand_index()?, value),
             TEMPERATURE if node != Node::SAFETY_MODULE => PollReply::Temperature(node.arm_index()?, value),
@@ -158,7 +168,7 @@ mod tests {
         let mut poll = BackgroundPoll::new(&safety);
         let mut counts = BTreeMap::new();
         for _ in 0..control::RATE_HZ as usize * seconds {
-            if let Some(frame) = poll.begin().or_else(|| poll.other(hand)) {
+            if let Some(frame) = poll.begin().or_else(|| poll.other(hand, (false, false))) {
                 let request = Request::decode(&frame).expect("a request");
                 let puck::Destination::Node(node) = request.to else { panic!("a poll to a group") };
                 let puck::Action::Get { property } = request.action else { panic!("a poll that sets") };

@@ -1,11 +1,11 @@
-//! `Watch`: what temperatures and the pendant ask for: to be told, to run slowly, to stop.
+//! `Watch`: temperatures and warnings of the pendant, and the caution that they ask for.
 //!
 //! | | told | held to half speed | stopped |
 //! |---|---|---|---|
 //! | hottest motor | 60 degrees C | 70 | 80 |
 //! | pendant | | a warning of velocity, torque, voltage, heartbeat or another quantity | the safety module does it |
 //!
-//! What began at a temperature ends 5 degrees below it. Supply that falls is the pendant's voltage warning.
+//! Each ends 5 degrees below the temperature at which it began. Supply that falls is the pendant's voltage warning.
 
 use control::Caution;
 use puck::{PendantState, safety};
@@ -20,7 +20,7 @@ const HYSTERESIS: i16 = 5;
 /// The present findings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Watch {
-    /// How many of the three temperatures have been passed.
+    /// Number of the three temperatures that have been passed.
     heat: u8,
 }
 
@@ -51,4 +51,43 @@ fn warns(state: &PendantState) -> bool {
     [state.velocity, state.torque, state.voltage, state.heartbeat, state.other]
         .into_iter()
         .any(|health| health == safety::Health::Warning)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SAFE: i32 = 1 | 1 << 3 | 1 << 6 | 1 << 9 | 1 << 12;
+
+    #[test]
+    fn g14_temperatures_and_warnings_ask_for_what_the_table_says() {
+        let mut watch = Watch::default();
+        let mut look = |celsius: i16, word: i32| {
+            let found = watch.look([20, celsius, 30].into_iter(), Some(word));
+            (found, watch.is_too_hot())
+        };
+        // Upwards, and down again with five degrees of play.
+        for (celsius, found, stops) in [
+            (59, Caution::None, false),
+            (60, Caution::Warned, false),
+            (56, Caution::Warned, false),
+            (54, Caution::None, false),
+            (70, Caution::Slowed, false),
+            (66, Caution::Slowed, false),
+            (64, Caution::Warned, false),
+            (80, Caution::Slowed, true),
+            (75, Caution::Slowed, true),
+            (74, Caution::Slowed, false),
+            (20, Caution::None, false),
+        ] {
+            assert_eq!(look(celsius, SAFE), (found, stops), "{celsius} degrees");
+        }
+        // Each of the five quantities, as a warning; a fault is the safety module's own matter.
+        for place in [0, 3, 6, 9, 12] {
+            let word = |health: i32| SAFE & !(1 << place) | health << place;
+            assert_eq!(look(20, word(2)).0, Caution::Slowed, "quantity {place}");
+            assert_eq!(look(20, word(4)).0, Caution::None);
+        }
+        assert_eq!(Watch::default().look(core::iter::empty(), None), Caution::None, "nothing is known yet");
+    }
 }

@@ -143,6 +143,8 @@ pub enum StartupError {
     CountsAnew(Node),
     /// The counts of a motor jumped since the arm was zeroed.
     CountsJumped,
+    /// The sensor or the hand answers now and did not at the start-up.
+    AnswersLate(Node),
 }
 
 impl fmt::Display for StartupError {
@@ -185,6 +187,13 @@ impl fmt::Display for StartupError {
                 write!(formatter, "puck {} has restarted and counts anew: zero the arm", node.number())
             }
             StartupError::CountsJumped => formatter.write_str("the counts of a motor jumped: zero the arm"),
+            StartupError::AnswersLate(node) => {
+                write!(
+                    formatter,
+                    "node {} answers now and did not at the start-up: everything is asked anew",
+                    node.number()
+                )
+            }
         }
     }
 }

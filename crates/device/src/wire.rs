@@ -140,6 +140,7 @@ impl From<StartupError> for StartupTrouble {
             StartupError::SafetyNotZeroed => Self([15, 0]),
             StartupError::CountsAnew(node) => at(17, node, 0),
             StartupError::CountsJumped => Self([18, 0]),
+            StartupError::AnswersLate(node) => at(19, node, 0),
         }
     }
 }
@@ -169,6 +170,7 @@ impl StartupTrouble {
             16 => StartupError::Calibration(CalibrationError::HandTorqueCounts(byte)),
             17 => StartupError::CountsAnew(node),
             18 => StartupError::CountsJumped,
+            19 => StartupError::AnswersLate(node),
             _ => return None,
         })
     }

@@ -92,7 +92,7 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     caution: Caution,
 }
 
-/// What the device has found about heat and the pendant.
+/// Findings of the device about heat and the pendant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Caution {
     /// Nothing.
@@ -256,9 +256,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let before = (self.supervisor.law(), self.supervisor.fault());
         self.watch_safety(input.sample.safety);
         if let Some(fault) = input.external_fault {
-            let soft = matches!(fault, Fault::Overrun | Fault::MotorHot);
-            // An arm that is let down is on the way to where no motor heats.
-            if fault != Fault::MotorHot || self.supervisor.law() != State::Lower {
+            let lasts = matches!(fault, Fault::MotorHot | Fault::OtherPayload);
+            let soft = lasts || fault == Fault::Overrun;
+            // An arm that is let down is on the way to where both end.
+            if !lasts || self.supervisor.law() != State::Lower {
                 self.trigger(if soft { Trigger::SoftFault } else { Trigger::HardFault }, fault, None);
             }
         }

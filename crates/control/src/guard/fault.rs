@@ -44,11 +44,13 @@ pub enum Fault {
     UnseenContact = 15,
     /// A motor is too hot to go on.
     MotorHot = 16,
+    /// A device answers that the start-up had not found: what hangs on the arm is not what the model carries.
+    OtherPayload = 17,
 }
 
 impl Fault {
     /// Every fault, in the order of the codes.
-    pub const ALL: [Fault; 17] = [
+    pub const ALL: [Fault; 18] = [
         Fault::None,
         Fault::RepliesLost,
         Fault::RepliesLostForLong,
@@ -66,6 +68,7 @@ impl Fault {
         Fault::EncoderStuck,
         Fault::UnseenContact,
         Fault::MotorHot,
+        Fault::OtherPayload,
     ];
 
     /// The stable number of this fault.
@@ -108,6 +111,9 @@ impl Fault {
             }
             Fault::UnseenContact => {
                 "something pushed the arm while the force sensor was silent; look for an obstacle, check its cable"
+            }
+            Fault::OtherPayload => {
+                "the sensor or the hand answers now and did not at the start-up; support and release the arm, the bus is then started anew"
             }
             Fault::MotorHot => {
                 "a motor is hotter than 80 degrees C; release the arm and let it cool below 75, then clear"

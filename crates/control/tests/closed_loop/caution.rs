@@ -1,6 +1,5 @@
 //! Heat, warnings and overruns (faults A15, E8, G12, G14): what they do, what they leave behind, and the way back.
 
-use control::act::limit::STEP_LIMIT;
 use control::command::{Command, Refusal, RunOptions};
 use control::units::JointPositions;
 use control::{Caution, CycleOutput, Event, Fault, Goal, PERIOD, State, flags};

@@ -85,6 +85,8 @@ pub struct DeviceController {
     temperatures: [Option<i16>; 7],
     hand_temperatures: [Option<i16>; 4],
     watch: Watch,
+    /// A device that answers now and did not at the start-up.
+    late: Option<Node>,
     stage: Stage,
     blocked: Option<StartupError>,
     /// A fault of the bus, to be told to the next cycle, and the cycles left until the bus is started anew.
@@ -117,6 +119,7 @@ impl DeviceController {
             temperatures: [None; 7],
             hand_temperatures: [None; 4],
             watch: Watch::default(),
+            late: None,
             stage: Stage::Enumerating,
             blocked: None,
             fault: None,
@@ -210,6 +213,7 @@ impl DeviceController {
                     *place = Some(value as i16);
                 }
             }
+            PollReply::Present(node) => self.late = Some(node),
             PollReply::Status(_, value) => {
                 if Status::from_value(value) != Some(Status::Ready) {
                     self.fail();
@@ -291,6 +295,7 @@ impl DeviceController {
         self.cycle.reset();
         self.startup.restart();
         self.hand.suspend();
+        self.late = None;
         self.hand_temperatures = [None; 4];
     }
 
@@ -333,7 +338,7 @@ impl DeviceController {
                 hand,
             },
             command: self.next_command(now_us, io),
-            external_fault: self.fault.take().or(self.watch.is_too_hot().then_some(Fault::MotorHot)),
+            external_fault: self.fault.take().or(self.standing_fault()),
         };
         let output = self.cycle.step(&input);
         self.send_torques(output.actuation.frames(), now_us, io);
@@ -349,6 +354,12 @@ impl DeviceController {
             self.tell(event.into(), io);
         }
         self.leave_if_lost();
+    }
+
+    /// A reason against torque that lasts.
+    fn standing_fault(&self) -> Option<Fault> {
+        let hot = self.watch.is_too_hot().then_some(Fault::MotorHot);
+        self.late.map(|_| Fault::OtherPayload).or(hot)
     }
 
     /// Mode of the safety module for the cycle: the one it told itself, unless a braking puck contradicts.
@@ -415,6 +426,12 @@ impl DeviceController {
             self.restart();
             return;
         }
+        if let Some(node) = self.late.filter(|_| !self.cycle.state().has_torque()) {
+            // What the arm carries decides its gravity: everything is asked anew.
+            self.restart();
+            self.startup.note_late(node);
+            return;
+        }
         match &mut self.last_cycles {
             Some(0) => self.restart(),
             Some(left) => *left -= 1,
@@ -456,7 +473,7 @@ impl DeviceController {
             (Some(safety), _) => Some(safety),
             (None, Some(node)) => Some(poll.suspect(node)),
             (None, None) if self.hand.act(&mut outlet) => None,
-            (None, None) => poll.other(self.hand.answers_questions()),
+            (None, None) => poll.other(self.hand.answers_questions(), self.startup.absent()),
         };
         if let Some(frame) = question {
             outlet.send(frame);

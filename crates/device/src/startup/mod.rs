@@ -243,6 +243,17 @@ impl Startup {
         self.survey.is_present(Node::FORCE_TORQUE)
     }
 
+    /// Tells which of the sensor and the hand did not answer.
+    pub(crate) fn absent(&self) -> (bool, bool) {
+        let hand = Node::HAND.into_iter().any(|node| self.survey.is_present(node));
+        (!self.has_sensor(), !hand)
+    }
+
+    /// A device that had not answered does now: the reason for which the start-up begins anew.
+    pub(crate) fn note_late(&mut self, node: Node) {
+        self.error = Some(StartupError::AnswersLate(node));
+    }
+
     /// A reply has come in; whether it was expected.
     pub(crate) fn receive(&mut self, reply: &Reply) -> bool {
         match *reply {

@@ -6,5 +6,6 @@ mod cycles;
 mod digit;
 mod double;
 mod hand;
+mod late;
 mod startup;
 mod zero;

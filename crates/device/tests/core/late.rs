@@ -1,0 +1,48 @@
+//! A sensor that misses the questions of the start-up (fault G4): what hangs on the arm is not "nothing".
+
+use control::{Command as Control, Fault, Payload, State};
+use device::{Controller, EventKind, Stage, StartupError};
+use puck::Node;
+
+use crate::double::{Bus, silent_device};
+
+#[test]
+fn g4_a_sensor_that_answers_late_is_found_before_torque_or_stops_it_softly() {
+    for torque in [false, true] {
+        let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
+        bus.sensor_present = false;
+        bus.run_until(&mut core, Stage::WaitingForActive);
+        assert_eq!(core.health().payload, Payload::None);
+        if torque {
+            bus.press_activate();
+            bus.run_until(&mut core, Stage::Ready);
+            bus.commands.push_back(Control::Gravity.into());
+            bus.run(&mut core, 0.2);
+            assert_eq!(core.health().state, State::Gravity, "{:?}", bus.events);
+        }
+        bus.sensor_present = true;
+        bus.run(&mut core, 0.3);
+        let reason = EventKind::Blocked(StartupError::AnswersLate(Node::FORCE_TORQUE));
+        if torque {
+            let health = core.health();
+            assert_eq!((health.state, health.fault), (State::SoftStop, Fault::OtherPayload), "{:?}", bus.events);
+            bus.commands.push_back(Control::ClearFault.into());
+            bus.run(&mut core, 0.1);
+            assert_eq!(core.health().fault, Fault::OtherPayload, "not while it carries what it does not know");
+            bus.press_idle();
+            bus.run(&mut core, 0.1);
+        }
+        assert!(bus.events.contains(&reason), "{:?}", bus.events);
+        // What comes after: started anew with what is there, cleared, armed.
+        bus.run_until(&mut core, Stage::WaitingForActive);
+        assert_eq!(core.health().payload, Payload::SensorAndHand);
+        bus.press_activate();
+        bus.run_until(&mut core, Stage::Ready);
+        bus.run(&mut core, 0.1);
+        bus.commands.push_back(Control::ClearFault.into());
+        bus.run(&mut core, 0.1);
+        bus.commands.push_back(Control::Hold.into());
+        bus.run(&mut core, 0.3);
+        assert_eq!((core.health().state, core.health().fault), (State::Hold, Fault::None), "{:?}", bus.events);
+    }
+}
