@@ -1,11 +1,11 @@
 //! `tactus report`: one page of HTML about one run or several.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
 
-use super::{ErrorCode, Failure, Global};
+use super::{ErrorCode, Failure, Global, files};
 use lab::primitive_file::PrimitiveFile;
 use lab::report::{ReportedRun, page};
 
@@ -24,9 +24,6 @@ pub struct Cmd {
     /// Where the page goes, HTML
     #[arg(long, short, value_name = "FILE", default_value = "report.html")]
     pub output: PathBuf,
-    /// Replace a file that is there already
-    #[arg(long)]
-    pub force: bool,
 }
 
 /// Writes the report.
@@ -36,11 +33,10 @@ pub struct Cmd {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "report";
     let file = &command.output;
-    if file.exists() && !command.force && !super::ask(global, &format!("{} exists; replace it?", file.display())) {
-        let cause = format!("{} exists", file.display());
-        return Err(Failure::new(ErrorCode::WouldReplace, "report refused", cause));
-    }
-    let invalid = |cause: Box<dyn std::error::Error + Send + Sync>| Failure::new(ErrorCode::PlotInput, DOING, cause);
+    let inputs: Vec<&Path> = command.runs.iter().chain(&command.primitive).map(PathBuf::as_path).collect();
+    let output_file = files::create(file, global, &inputs, DOING)?;
+    let invalid =
+        |cause: Box<dyn std::error::Error + Send + Sync>| Failure::of_file(ErrorCode::PlotInput, DOING, cause);
     let primitive = command.primitive.as_deref().map(PrimitiveFile::read).transpose();
     let primitive = primitive.map_err(|cause| invalid(cause.into()))?;
     let read = |file: &PathBuf| ReportedRun::read(file, primitive.as_ref()).map_err(|cause| invalid(cause.into()));
@@ -48,10 +44,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let name = primitive.as_ref().map(|primitive| primitive.name.clone());
     let title = command.title.clone().or(name).or_else(|| Some(runs.first()?.name.clone())).unwrap_or_default();
     let html = page(&title, &runs, primitive.as_ref());
-    std::fs::write(file, html).map_err(|cause| Failure::new(ErrorCode::FigureNotWritten, DOING, cause))?;
+    files::fill(output_file, html.as_bytes(), DOING)?;
     let outcomes: Vec<_> = runs.iter().map(|run| json!({ "run": run.name, "outcome": run.outcome.words() })).collect();
     let lines: Vec<String> = runs.iter().map(|run| format!("{}: {}", run.name, run.outcome.words())).collect();
-    global
-        .output()
-        .result(&json!({ "file": file, "runs": outcomes }), format!("{}\nwrote {}", lines.join("\n"), file.display()))
+    global.output().result(
+        &json!({ "file": files::text(file), "runs": outcomes }),
+        format!("{}\nwrote {}", lines.join("\n"), file.display()),
+    )
 }
