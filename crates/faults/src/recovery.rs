@@ -112,7 +112,8 @@ fn start_up(arm: &mut Arm, way: Recover) -> Result<bool, Failure> {
                 }
             }
             Some(Stage::WaitingForIdle) => plant(arm).press(PendantAction::ShiftIdle),
-            Some(Stage::Blocked) => return Err(format!("the start-up is blocked: {:?}", status.blocked).into()),
+            // It tries again by itself, each second.
+            Some(Stage::Blocked) => refused = format!(", blocked: {:?}", status.blocked),
             Some(Stage::WaitingForActive) => {
                 plant(arm).press(PendantAction::ShiftIdle);
                 plant(arm).press(PendantAction::ShiftActivate);

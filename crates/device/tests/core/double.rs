@@ -447,6 +447,8 @@ impl Bus {
             Action::Set { property: PropertyId::STAT, .. } if !awake => {
                 self.sensor_awake_at = Some(self.now_us + BOOT_US);
             }
+            // Woken once more by a core to which something else said that it sleeps.
+            Action::Set { property: PropertyId::STAT, .. } => {}
             Action::Set { property: PropertyId::FORCE_TORQUE, value: 0 } => {}
             // The monitor knows nothing but STAT.
             _ if !awake => {}
