@@ -90,8 +90,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let recorded = movement.movement.duration / command.speed;
     if (recorded - movement.movement.duration).abs() > LARGEST_DURATION_DEVIATION * recorded {
         let text = format!(
-            "at speed {} the movement takes {recorded:.2} s instead of {:.2} s: an expectation more than 50 % apart from \
-             its movement is not kept",
+            "at speed {} the movement takes {recorded:.2} s instead of {:.2} s: an expectation more than 50 % apart \
+             from its movement is not kept",
             command.speed, movement.movement.duration
         );
         return Err(Failure::new(ErrorCode::ExpectationSpeed, "rehearse refused", text).help("a speed from 0.5 to 2"));
