@@ -137,8 +137,6 @@ error_codes! {
         "tactus plot --demonstration demo.csv --primitive reach.toml --run run.csv --output figure.png";
     FigureFormat = 211: "the format of the figure is unknown", "the file's name ends with another extension",
         "name a file that ends in .png or .svg";
-    NoStudyOfWeights = 270: "the experiment with a weight knows neither demonstrations nor sweeps", "`experiment lift`",
-        "leave out `--demonstrations` and `--sweep`";
     BoardOption = 212: "the emulated board does not take an option, or not this image", "an option of `board:`",
         "the options of `--device board:` are in docs/board-stm32h743.md";
     FlashFile = 213: "the file cannot be used as the device's flash",
@@ -174,6 +172,8 @@ error_codes! {
         "run it in a terminal, or with `--json` for a line ten times a second";
     UnknownCode = 241: "there is no error or fault of that name", "a misspelt code",
         "docs/errors.md lists them all; for example `tactus explain E504`";
+    NoStudyOfWeights = 270: "the experiment with a weight knows neither demonstrations nor sweeps", "`experiment lift`",
+        "leave out `--demonstrations` and `--sweep`";
     DeviceNotFound = 301: "there is no such device", "cable, power, or a misspelt port",
         "check cable and name of the device; for a simulated arm use `--device sim:`";
     PermissionDenied = 302: "no permission to use the device",

@@ -47,7 +47,7 @@ use lab::transport::Address;
 
 /// Teach, learn, check, upload, run and watch movement primitives on a Barrett WAM.
 ///
-/// Data goes to stdout, words and progress to stderr. Exit codes: 0 success, 1 internal error, 2 usage,
+/// Data goes to stdout, words and progress to stderr. Exit codes: 0 success, 1 internal error, 2 usage or a file,
 /// 3 device not found, 4 incompatible versions, 5 device refused or faulted, 6 validation failed, 7 link lost,
 /// 130 interrupted after a confirmed stop.
 #[derive(Debug, Parser)]

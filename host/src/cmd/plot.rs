@@ -5,13 +5,16 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use super::{ErrorCode, Failure, Global, files};
+use super::{ErrorCode, Failure, Global, Output, files};
 use lab::demonstration::{Demonstration, Preparation, Recording};
 use lab::output_file::OutputFile;
 use lab::plan;
 use lab::plot::{self, Movement, movement::PosePath};
 use lab::primitive_file::PrimitiveFile;
 use lab::tracking::{ComparisonError, Lack, Tracking};
+
+/// The action that fails.
+const DOING: &str = "plot";
 
 /// Options of `plot`.
 #[derive(Debug, Clone, Args)]
@@ -45,15 +48,14 @@ pub struct Cmd {
 /// A file cannot be read or is wrong, or the figure cannot be written.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
-    let doing = "plot";
     let invalid =
-        |cause: Box<dyn std::error::Error + Send + Sync>| Failure::of_file(ErrorCode::PlotInput, doing, cause);
+        |cause: Box<dyn std::error::Error + Send + Sync>| Failure::of_file(ErrorCode::PlotInput, DOING, cause);
     let inputs: Vec<&Path> = [&command.demonstration, &command.primitive, &command.run]
         .into_iter()
         .flatten()
         .map(PathBuf::as_path)
         .collect();
-    let create = |file: &PathBuf| files::create(file, global, &inputs, doing);
+    let create = |file: &PathBuf| files::create(file, global, &inputs, DOING);
     let outputs = command.output.iter().map(create).collect::<Result<Vec<_>, _>>()?;
     let picture_file = command.picture.as_ref().map(create).transpose()?;
     let mut shown = None;
@@ -85,15 +87,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     {
         output.warn("the primitive was learned from another demonstration than the one that is drawn");
     }
-    let tracking = match execution.as_ref().map(Tracking::of_run) {
-        None => None,
-        Some(Ok(tracking)) => Some(tracking),
-        Some(Err(ComparisonError { lack: Lack::Run, .. })) => {
-            output.warn("nothing was played in this recording: all of it is drawn, without figures of tracking");
-            None
-        }
-        Some(Err(cause)) => return Err(invalid(cause.into())),
-    };
+    let tracking = execution.as_ref().map(|recording| tracking(recording, output)).transpose()?.flatten();
     let name = command
         .title
         .clone()
@@ -109,22 +103,15 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         plan,
         execution: execution.map(|recording| if tracking.is_some() { recording.running() } else { recording }),
     };
-    let page = movement.page().map_err(|cause| Failure::new(ErrorCode::NothingToDraw, doing, cause))?;
+    let page = movement.page().map_err(|cause| Failure::new(ErrorCode::NothingToDraw, DOING, cause))?;
     let spinner = output.spinner("drawing");
-    for (file, output_file) in command.output.iter().zip(outputs) {
-        let bytes = plot::encode(&page, file).map_err(|cause| {
-            let is_format = matches!(cause, plot::PlotError::Format { .. });
-            let code = if is_format { ErrorCode::FigureFormat } else { ErrorCode::FigureNotWritten };
-            Failure::new(code, doing, cause)
-        })?;
-        files::fill(output_file, &bytes, doing)?;
-    }
+    write(&page, &command.output, outputs)?;
     if let (Some(file), Some(run)) = (&command.picture, &movement.execution) {
         spinner.set_message("rendering");
         let part = picture_file.as_ref().map_or(file.as_path(), OutputFile::part);
         picture(run, part)?;
         if let Some(picture_file) = picture_file {
-            picture_file.commit().map_err(|error| files::failure(error, doing))?;
+            picture_file.commit().map_err(|error| files::failure(error, DOING))?;
         }
     }
     spinner.finish_and_clear();
@@ -138,6 +125,31 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         }),
         text.join("\n"),
     )
+}
+
+/// Fills the files of the figure.
+fn write(page: &plot::Page, names: &[PathBuf], outputs: Vec<OutputFile>) -> Result<(), Failure> {
+    for (file, output_file) in names.iter().zip(outputs) {
+        let bytes = plot::encode(page, file).map_err(|cause| {
+            let is_format = matches!(cause, plot::PlotError::Format { .. });
+            let code = if is_format { ErrorCode::FigureFormat } else { ErrorCode::FigureNotWritten };
+            Failure::new(code, DOING, cause)
+        })?;
+        files::fill(output_file, &bytes, DOING)?;
+    }
+    Ok(())
+}
+
+/// Tracking of the plan in a recording; `None` where nothing was played.
+fn tracking(recording: &Recording, output: Output) -> Result<Option<Tracking>, Failure> {
+    match Tracking::of_run(recording) {
+        Ok(tracking) => Ok(Some(tracking)),
+        Err(ComparisonError { lack: Lack::Run, .. }) => {
+            output.warn("nothing was played in this recording: all of it is drawn, without figures of tracking");
+            Ok(None)
+        }
+        Err(cause) => Err(Failure::new(ErrorCode::PlotInput, "plot", cause)),
+    }
 }
 
 /// Refuses a run of another movement than the primitive's.

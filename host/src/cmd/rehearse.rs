@@ -87,15 +87,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let mut file = upload::read(&command.primitive, DOING)?;
     let movement = file.without_memory();
-    let recorded = movement.movement.duration / command.speed;
-    if (recorded - movement.movement.duration).abs() > LARGEST_DURATION_DEVIATION * recorded {
-        let text = format!(
-            "at speed {} the movement takes {recorded:.2} s instead of {:.2} s: an expectation more than 50 % apart from \
-             its movement is not kept",
-            command.speed, movement.movement.duration
-        );
-        return Err(Failure::new(ErrorCode::ExpectationSpeed, "rehearse refused", text).help("a speed from 0.5 to 2"));
-    }
+    keepable(&movement, command.speed)?;
     upload::precheck(&movement, &Course::stored(command.speed), output, DOING)?;
     if let Some(folder) = &command.record_dir {
         std::fs::create_dir_all(folder)
@@ -103,11 +95,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     let target = command.output.clone().unwrap_or_else(|| command.primitive.clone());
     let output_file = memory_target(&target, &command.primitive, &[], global, DOING)?;
-    let trials = 1..=if command.record_dir.is_some() { command.trials } else { 0 };
-    let records: Vec<_> = trials
-        .map(|trial| files::create(&path_of(command, &file.name, trial), global, &[&command.primitive], DOING))
-        .collect::<Result<_, _>>()?;
-    let mut records = records.into_iter();
+    let mut records = record_files(command, &file.name, global)?.into_iter();
     let started = Instant::now();
     let mut client = connection::open(global, DOING, |options| surround(options, command.surroundings))?;
     upload::send(&mut client, &movement, output, DOING)?;
@@ -170,6 +158,28 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         gaps,
     };
     output.result(&report, report.to_text())
+}
+
+/// Refuses a speed at which the expectation could not be kept.
+fn keepable(movement: &PrimitiveFile, speed: f64) -> Result<(), Failure> {
+    let recorded = movement.movement.duration / speed;
+    if (recorded - movement.movement.duration).abs() > LARGEST_DURATION_DEVIATION * recorded {
+        let text = format!(
+            "at speed {} the movement takes {recorded:.2} s instead of {:.2} s: an expectation more than 50 % apart \
+             from its movement is not kept",
+            speed, movement.movement.duration
+        );
+        return Err(Failure::new(ErrorCode::ExpectationSpeed, "rehearse refused", text).help("a speed from 0.5 to 2"));
+    }
+    Ok(())
+}
+
+/// Opens the files of the recordings, if they are to be kept.
+fn record_files(command: &Cmd, name: &str, global: &Global) -> Result<Vec<OutputFile>, Failure> {
+    let trials = 1..=if command.record_dir.is_some() { command.trials } else { 0 };
+    trials
+        .map(|trial| files::create(&path_of(command, name, trial), global, &[&command.primitive], "rehearse"))
+        .collect()
 }
 
 /// Where the recording of a trial goes, or what it is called.

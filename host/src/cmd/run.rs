@@ -25,8 +25,8 @@ use lab::tracking::{HandTracking, Tracking};
 /// Rest that is recorded at the goal, s.
 const POST_ROLL: f64 = 1.0;
 
-/// Distance (m) and angle (rad) from the end of its plan within which an arm counts as arrived. Force control leaves the
-/// plan by millimetres where the hand touches something; by more than this it was held up.
+/// Distance (m) and angle (rad) from the end of its plan within which an arm counts as arrived. Force control leaves
+/// the plan by millimetres where the hand touches something; by more than this it was held up.
 const GOAL_TOLERANCE: (f64, f64) = (0.05, 15.0 * std::f64::consts::PI / 180.0);
 
 /// Options of `run`.
@@ -470,7 +470,8 @@ fn missed(tracking: &Tracking) -> Option<String> {
     let is_there = away <= GOAL_TOLERANCE.0 && turned <= GOAL_TOLERANCE.1;
     (!is_there).then(|| {
         format!(
-            "the arm ended {:.0} mm and {:.0} degrees away from its goal; at most {:.0} mm and {:.0} degrees count as there",
+            "the arm ended {:.0} mm and {:.0} degrees away from its goal; at most {:.0} mm and {:.0} degrees count as \
+             there",
             away * 1e3,
             turned.to_degrees(),
             GOAL_TOLERANCE.0 * 1e3,

@@ -133,7 +133,12 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     connection::tell_speed(&client, started, output);
     let (rows, gaps) = file.end(recorded.map_err(failed), output)?;
     output.result(
-        &json!({ "file": files::text(&command.output), "samples": rows, "duration_s": rows as f64 / RATE, "gaps": gaps }),
+        &json!({
+            "file": files::text(&command.output),
+            "samples": rows,
+            "duration_s": rows as f64 / RATE,
+            "gaps": gaps,
+        }),
         format!("{rows} samples, {:.1} s, {gaps} lost", rows as f64 / RATE),
     )
 }
