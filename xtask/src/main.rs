@@ -60,6 +60,7 @@ cargo xtask <verb>
   faults [--all] [--json] [ID...]   the fault catalogue: every script of tests/faults against the simulated arm
   faults storm [--runs N] [--seed S]   random faults and orders; one run prints itself as a scenario
   fuzz [COUNT]   COUNT random link frames and as many CAN frames, a tenth of it random sessions; 1000000 unless given
+  margins  every control law on an arm without friction, kicked: what is left, worst pose, frequency
   house    module circles, sizes, old words, arrows between crates; cargo xtask house RULE: one of the rules
 
 Every verb does the set-up it needs. Environment:
@@ -83,6 +84,21 @@ fn main() -> ExitCode {
 fn faults(words: &[&str]) -> Result<()> {
     shell::step("fault catalogue: what the simulated arm does, and the way back");
     shell::run(shell::cargo().args(["run", "--quiet", "--package", "faults", "--"]).args(words))
+}
+
+/// Prints the margins of the control laws; `cargo xtask test` holds them, too.
+fn margins() -> Result<()> {
+    shell::step("margins of the control laws, without friction");
+    shell::run(shell::cargo().args([
+        "test",
+        "--release",
+        "--package",
+        "control",
+        "--test",
+        "margins",
+        "--",
+        "--nocapture",
+    ]))
 }
 
 fn dispatch(words: &[&str]) -> Result<()> {
@@ -126,6 +142,7 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["faults", rest @ ..] => faults(rest)?,
         ["fuzz"] => fuzz::run(fuzz::USUAL)?,
         ["fuzz", count] => fuzz::run(count.parse().with_context(|| format!("no number: {count}"))?)?,
+        ["margins"] => margins()?,
         ["package"] => package::run()?,
         ["mutants"] => mutants::run("")?,
         ["mutants", part] => mutants::run(part)?,
