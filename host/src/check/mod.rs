@@ -239,7 +239,7 @@ pub fn check(
         kernels: file.kernels(),
         duration_s: file.movement.duration,
         speed: course.speed,
-        goal_m: course.last_goal().position.map(|place| place.map(f64::from)),
+        goal_m: course.last_goal().position.map(|goal| goal.map(f64::from)),
         run_duration_s: 0.0,
         margins: Vec::new(),
         tracking_max_m: 0.0,

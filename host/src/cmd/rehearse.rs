@@ -89,16 +89,12 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let movement = file.without_memory();
     let recorded = movement.movement.duration / command.speed;
     if (recorded - movement.movement.duration).abs() > LARGEST_DURATION_DEVIATION * recorded {
-        return Err(Failure::new(
-            ErrorCode::ExpectationSpeed,
-            "rehearse refused",
-            format!(
-                "at speed {} the movement takes {recorded:.2} s instead of {:.2} s: an expectation more than 50 % apart \
-                 from its movement is not kept",
-                command.speed, movement.movement.duration
-            ),
-        )
-        .help("a speed from 0.5 to 2"));
+        let text = format!(
+            "at speed {} the movement takes {recorded:.2} s instead of {:.2} s: an expectation more than 50 % apart from \
+             its movement is not kept",
+            command.speed, movement.movement.duration
+        );
+        return Err(Failure::new(ErrorCode::ExpectationSpeed, "rehearse refused", text).help("a speed from 0.5 to 2"));
     }
     upload::precheck(&movement, &Course::stored(command.speed), output, DOING)?;
     if let Some(folder) = &command.record_dir {

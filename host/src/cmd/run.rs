@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
+use control::State;
 use link::{Goal, Name, RunOptions, Statistics};
 use serde::Serialize;
 
@@ -145,8 +146,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         _ => upload::read(&command.primitive, DOING)?,
     };
     check_expectation(&file, command, output)?;
-    check_changes(&file, command)?;
-    let changes = command.goal_at.iter().chain(&command.speed_at).copied().collect();
+    let changes = changes(&file, command)?;
     let course = Course { speed: command.speed, goal: super::check::goal(command.goal), changes };
     upload::precheck(&file, &course, output, DOING)?;
     let record = command.record.as_ref().filter(|_| !command.dry_run);
@@ -183,7 +183,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     if !client.is_simulated() {
         output.say("the arm holds its goal; `tactus stop` makes it soft");
     }
-    let Some(missed) = report.missed() else {
+    let Some(missed) = report.tracking.as_ref().and_then(missed) else {
         return output.result(&report, report.to_text());
     };
     if !global.json {
@@ -196,28 +196,17 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     })
 }
 
-/// Refuses changes that would come after the run, and goals that no arm reaches.
-fn check_changes(file: &PrimitiveFile, command: &Cmd) -> Result<(), Failure> {
-    const REFUSED: &str = "run refused";
+/// The changes on the way; one that would come after the run is refused.
+fn changes(file: &PrimitiveFile, command: &Cmd) -> Result<Vec<Change>, Failure> {
     let changes: Vec<Change> = command.goal_at.iter().chain(&command.speed_at).copied().collect();
     let end = procedure::planned(file.movement.duration, command.speed, &changes);
-    if let Some(late) = changes.iter().map(|change| change.time).find(|time| *time >= end) {
-        let text = format!("a change at {late} s comes too late: the movement takes {end:.2} s");
-        return Err(Failure::new(ErrorCode::ChangeTooLate, REFUSED, text));
-    }
-    for change in &changes {
-        let ChangeKind::Goal(Goal { position: Some(goal), .. }) = change.kind else { continue };
-        let distance = goal.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>().sqrt();
-        if distance > control::plan::load::REACH {
-            let text = format!(
-                "the goal at {} s is {distance:.2} m from the shoulder, the arm reaches {:.2} m",
-                change.time,
-                control::plan::load::REACH
-            );
-            return Err(Failure::new(ErrorCode::CheckFailed, REFUSED, text).help("give a goal within the reach"));
+    match changes.iter().map(|change| change.time).find(|time| *time >= end) {
+        None => Ok(changes),
+        Some(late) => {
+            let text = format!("a change at {late} s comes too late: the movement takes {end:.2} s");
+            Err(Failure::new(ErrorCode::ChangeTooLate, "run refused", text))
         }
     }
-    Ok(())
 }
 
 /// The name of a primitive in the device, where the argument is that and no file.
@@ -258,12 +247,15 @@ fn play(
     let changes = command.goal_at.iter().chain(&command.speed_at).copied().collect();
     let request = RunRequest { rest: POST_ROLL, changes, ..RunRequest::new(name, file.movement.duration, options) };
 
-    output.say(format!("running '{}' ({})", file.name, command.mode.name()));
     let notes = notes(client, file, command);
     let mut writer = record.map(|record| start(record, &notes)).transpose()?;
     let bar = output.bar((file.movement.duration / command.speed * RATE) as u64, "running");
-    let (mut cycles, mut written) = (Vec::new(), Ok(()));
+    let (mut cycles, mut written, mut is_running) = (Vec::new(), Ok(()), false);
     let outcome = procedure::play(client, &request, &mut |cycle| {
+        if !is_running && State::from_code(cycle.state) == Some(State::Run) {
+            is_running = true;
+            bar.suspend(|| output.say(format!("running '{}' ({})", file.name, command.mode.name())));
+        }
         cycles.push(*cycle);
         bar.set_position(cycles.len() as u64);
         // A disk that is full is no reason to stop an arm: the run goes on, and is told of at its end.
@@ -424,23 +416,6 @@ fn report(
 }
 
 impl Report {
-    /// Words for an arm that rests elsewhere than its plan ends; `None` where it is at its goal.
-    fn missed(&self) -> Option<String> {
-        let tracking = self.tracking.as_ref()?;
-        let (away, turned) = (tracking.position_end_m, tracking.orientation_end_rad);
-        // Not a number is no goal reached either.
-        let is_there = away <= GOAL_TOLERANCE.0 && turned <= GOAL_TOLERANCE.1;
-        (!is_there).then(|| {
-            format!(
-                "the arm ended {:.0} mm and {:.0} degrees away from its goal; at most {:.0} mm and {:.0} degrees count as there",
-                away * 1e3,
-                turned.to_degrees(),
-                GOAL_TOLERANCE.0 * 1e3,
-                GOAL_TOLERANCE.1.to_degrees()
-            )
-        })
-    }
-
     /// The report as a table for people.
     pub fn to_text(&self) -> String {
         let mut table = Table::new(["run", &self.name]);
@@ -488,6 +463,22 @@ impl Report {
     }
 }
 
+/// Words for an arm that rests elsewhere than its plan ends; `None` where it is at its goal.
+fn missed(tracking: &Tracking) -> Option<String> {
+    let (away, turned) = (tracking.position_end_m, tracking.orientation_end_rad);
+    // Not a number is no goal reached either.
+    let is_there = away <= GOAL_TOLERANCE.0 && turned <= GOAL_TOLERANCE.1;
+    (!is_there).then(|| {
+        format!(
+            "the arm ended {:.0} mm and {:.0} degrees away from its goal; at most {:.0} mm and {:.0} degrees count as there",
+            away * 1e3,
+            turned.to_degrees(),
+            GOAL_TOLERANCE.0 * 1e3,
+            GOAL_TOLERANCE.1.to_degrees()
+        )
+    })
+}
+
 /// A time and a goal, as in `3.5:0.7,0.1,0.2`.
 fn goal_at(text: &str) -> Result<Change, String> {
     let (time, goal) = timed(text)?;
@@ -512,6 +503,25 @@ fn timed(text: &str) -> Result<(f64, &str), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_arm_that_ends_away_from_its_goal_has_missed_it_and_the_distance_is_told() {
+        let ended = |position_end_m: f64, orientation_end_rad: f64| {
+            missed(&Tracking {
+                samples: 1,
+                position_rms_m: 0.0,
+                position_max_m: 0.0,
+                position_end_m,
+                orientation_rms_rad: 0.0,
+                orientation_max_rad: 0.0,
+                orientation_end_rad,
+            })
+        };
+        assert_eq!(ended(0.012, 0.05), None);
+        let words = ended(0.22, 75f64.to_radians()).unwrap();
+        assert!(words.contains("220 mm and 75 degrees away"), "{words}");
+        assert!(ended(0.0, 0.3).is_some() && ended(0.06, 0.0).is_some() && ended(f64::NAN, 0.0).is_some());
+    }
 
     #[test]
     fn changes_carry_their_time_and_nonsense_is_refused() {

@@ -29,7 +29,7 @@ pub struct Cmd {
     #[arg(long, short, value_name = "FILE", default_value = "demonstration.csv")]
     pub output: PathBuf,
     /// Posture the arm moves to before it becomes weightless: seven joint angles, rad. A simulated arm has a default
-    #[arg(long, value_name = "Q1,...,Q7", value_parser = posture, allow_hyphen_values = true)]
+    #[arg(long, value_name = "Q1,...,Q7", value_parser = start_posture, allow_hyphen_values = true)]
     pub from: Option<Posture>,
     /// Duration of the recording, s. Without it: until Enter is pressed, or until the simulated teacher has let go
     #[arg(long, value_name = "SECONDS", value_parser = duration)]
@@ -186,6 +186,18 @@ fn clear_the_table(options: &mut SimulationOptions) {
 /// Where the simulated teacher's path begins, if there is one.
 fn default_posture(client: &mut Client<Device>, movement: MovementName) -> Option<Posture> {
     teacher::is_present(client).then(|| movement.movement().start().map(|angle| angle as f32))
+}
+
+/// Seven joint angles that the arm may stand at.
+fn start_posture(text: &str) -> Result<Posture, String> {
+    let angles = posture(text)?;
+    for (joint, angle) in angles.iter().enumerate() {
+        let (min, max) = (control::model::SOFT_MIN[joint], control::model::SOFT_MAX[joint]);
+        if !(min..=max).contains(&f64::from(*angle)) {
+            return Err(format!("J{}: {angle} rad is outside {min:.2} to {max:.2} rad", joint + 1));
+        }
+    }
+    Ok(angles)
 }
 
 /// Seven numbers separated by commas.
