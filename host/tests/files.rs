@@ -71,7 +71,7 @@ fn no_command_replaces_a_file_unless_it_is_forced() {
 }
 
 #[test]
-fn an_output_that_is_an_input_a_device_or_a_folder_is_refused_even_when_forced() {
+fn h14_an_output_that_is_an_input_a_device_or_a_folder_is_refused_even_when_forced() {
     let folder = learned(2.0);
     let at = folder.path();
     let demonstration = std::fs::read(at.join("demo.csv")).unwrap();
@@ -115,7 +115,7 @@ fn grown(file: &Path, bytes: u64) {
 }
 
 #[test]
-fn what_was_recorded_before_a_signal_is_kept_and_named() {
+fn h14_what_was_recorded_before_a_signal_is_kept_and_named() {
     for (signal, code) in [("INT", 130), ("TERM", 130), ("HUP", 130)] {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();

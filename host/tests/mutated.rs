@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 const FEW: u64 = 60;
 
 /// Longest time a command may take with one of them.
-const LONGEST: Duration = Duration::from_secs(10);
+const TIME_LIMIT: Duration = Duration::from_secs(10);
 
 /// Numbers that look random, the same in every run.
 struct Numbers(u64);
@@ -73,7 +73,7 @@ fn run(folder: &Path, line: &str) -> (Option<i32>, String, Duration) {
     command.current_dir(folder).env_remove("TACTUS_DEVICE").args(line.split_whitespace());
     let said = std::fs::File::create(folder.join("said")).unwrap();
     let mut child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(said).spawn().unwrap();
-    while begun.elapsed() < LONGEST {
+    while begun.elapsed() < TIME_LIMIT {
         if let Some(status) = child.try_wait().unwrap() {
             return (status.code(), std::fs::read_to_string(folder.join("said")).unwrap_or_default(), begun.elapsed());
         }

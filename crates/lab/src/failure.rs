@@ -19,7 +19,7 @@ pub struct Failure {
     pub cause: Box<dyn Error + Send + Sync>,
     /// A command or an action that helps.
     pub help: Option<String>,
-    /// What was recorded before the failure.
+    /// File of the recording up to the failure.
     pub kept: Option<PathBuf>,
     /// Data found before the failure, for `--json`.
     pub data: Option<serde_json::Value>,

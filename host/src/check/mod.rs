@@ -31,7 +31,7 @@ pub const GOAL_ANGLE: f64 = std::f64::consts::PI / 180.0;
 pub const DIGITS: [(&str, [f64; 2]); 4] =
     [("spread", SPREAD_RANGE), ("finger 1", FINGER_RANGE), ("finger 2", FINGER_RANGE), ("finger 3", FINGER_RANGE)];
 
-/// How far a plan of the hand may go beyond its range, rad: what a smooth plan between two ends of it overshoots by.
+/// Angle by which a plan of the hand may leave its range, rad: a smooth plan between two ends of it overshoots by that.
 const HAND_SLACK: f64 = 0.05;
 
 /// Which limit.

@@ -35,7 +35,7 @@ Examples:
 pub(super) const REHEARSE: &str = "\
 Examples:
   tactus --device sil: rehearse grasp.toml
-  tactus --device sil: rehearse grasp.toml --trials 5 --record-dir rehearsals --output felt.toml";
+  tactus --device sil: rehearse grasp.toml --trials 5 --record-dir rehearsals --output rehearsed.toml";
 /// `experience`
 pub(super) const EXPERIENCE: &str = "\
 Examples:

@@ -32,7 +32,7 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// What the notes of a recording say.
+    /// Read from the notes of a recording.
     #[must_use]
     pub fn of_notes<'a>(notes: impl Iterator<Item = &'a str>) -> Origin {
         let mut origin = Origin::default();

@@ -184,7 +184,8 @@ impl Replay {
     /// Takes the next line of the log. `number`: its place in the file.
     ///
     /// # Errors
-    /// [`ReplayError::Leap`]; [`ReplayError::Middle`] when the first frames of the device show that the log begins too late.
+    /// [`ReplayError::Leap`]; [`ReplayError::Middle`] when the first frames of the device show that the log begins too
+    /// late.
     pub fn take(&mut self, number: u64, line: LogLine) -> Result<(), ReplayError> {
         self.line = number;
         let from_us = self.first_us.map_or(line.time_us, |_| self.last_us);
