@@ -56,6 +56,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("control::guard::disagreement::Disagreement<R>::is_pushed", "the force sensor is silent"),
     ("control::guard::disagreement::Disagreement<R>::encoder_stands_still", "a motor stands still"),
     ("control::sense::joints::Motor::doubt", "a reply that does not fit the ones before"),
+    ("control::cycle::Cycle<R,_>::actuate_without_torque", "no torque: no plan and no law is computed"),
     ("control::cycle::Cycle<R,_>::reset", "after a fault of the bus"),
     ("device::controller::DeviceController::restart", "after a fault of the bus"),
     ("device::startup", "a person zeroes the arm again"),

@@ -23,8 +23,9 @@ pub trait Kernels<T, const N: usize>: Clone + Debug + PartialEq {
     fn each(&self, s: T, take: impl FnMut(usize, &[T])) -> T;
 }
 
-/// Kernels that are evaluated together.
-const AT_A_TIME: usize = 16;
+/// Kernels that are evaluated together: as many as matter at a phase where there are vector instructions; one on a
+/// microcontroller, which has none and little room for code.
+const AT_A_TIME: usize = if cfg!(target_arch = "arm") { 1 } else { 16 };
 
 /// Kernels by a table of centres and widths.
 #[derive(Clone, Debug, PartialEq)]
