@@ -22,7 +22,7 @@ pub struct Failure {
     /// File of the recording up to the failure.
     pub kept: Option<PathBuf>,
     /// Data found before the failure, for `--json`.
-    pub data: Option<serde_json::Value>,
+    pub data: Option<Box<serde_json::Value>>,
 }
 
 impl Failure {
@@ -67,7 +67,7 @@ impl Failure {
     /// The same with what was found out: a script gets it under `result`.
     #[must_use]
     pub fn data(mut self, data: serde_json::Value) -> Failure {
-        self.data = Some(data);
+        self.data = Some(Box::new(data));
         self
     }
 
@@ -86,7 +86,7 @@ impl Failure {
             object["error"]["kept"] = json!(kept.display().to_string());
         }
         if let Some(data) = &self.data {
-            object["result"] = data.clone();
+            object["result"] = (**data).clone();
         }
         object
     }

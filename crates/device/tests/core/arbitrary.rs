@@ -129,7 +129,9 @@ fn judged_frames(count: u32) -> impl Iterator<Item = CanFrame> {
         [0x426, 0x446, 0x4E6, 0x423, 0x4E3, 0x50A, 0x50B, 0x506, 0x540, 0x546, 0x563, 0x566, 0x5C6, 0x404];
     let mut state = 0x2545_F491_4F6C_DD1D_u64;
     let mut draw = move || {
-        (state ^= state << 13, state ^= state >> 7, state ^= state << 17);
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
         state
     };
     (0..count).map(move |_| {
