@@ -48,7 +48,7 @@ pub enum Outcome {
     Crushed,
     /// Grasped by two fingers or more, but the arm did not raise the hand.
     NotLifted,
-    /// The arm shook, whether it held the object or not.
+    /// Not held, by an arm that shook.
     Unstable,
     /// The arm stopped by itself; the name of the fault.
     Stopped(String),
@@ -188,10 +188,10 @@ pub fn judge(
     } else if rule.upright && tilt > TILT_LIMIT {
         // What falls knocks against the hand: its shaking then is none of the arm's.
         Outcome::KnockedOver
-    } else if shaking > UNSTABLE {
-        Outcome::Unstable
     } else if is_lifted(last, first) && observation.at(marks.hold).is_some_and(|sample| is_lifted(sample, first)) {
         Outcome::Held
+    } else if shaking > UNSTABLE {
+        Outcome::Unstable
     } else if lifted.iter().any(|sample| height(sample) > RAISED) {
         Outcome::Dropped
     } else if is_grasped(last) && last.hand[2] - run.last().map_or(0.0, |sample| sample.hand[2]) < RAISED {
@@ -373,11 +373,14 @@ mod tests {
     }
 
     #[test]
-    fn an_arm_that_shakes_has_no_success() {
+    fn an_arm_that_shakes_is_the_cause_of_a_failure_and_is_told_with_a_success() {
         let conduct = |shaking| ArmConduct { fault: None, shaking };
         let (outcome, measures) = judge(&good(), &MILESTONES, UPRIGHT, conduct(0.4));
-        assert_eq!((outcome, measures.shaking_rad_s), (Outcome::Unstable, 0.4));
-        assert_eq!(judge(&good(), &MILESTONES, UPRIGHT, conduct(0.25)).0, Outcome::Held);
+        assert_eq!((outcome, measures.shaking_rad_s), (Outcome::Held, 0.4));
+        let mut observation = good();
+        observation.samples.iter_mut().for_each(|sample| sample.object[2] = 0.0);
+        assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, conduct(0.4)).0, Outcome::Unstable);
+        assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, conduct(0.25)).0, Outcome::Missed);
     }
 
     #[test]

@@ -4,12 +4,12 @@
 pub(super) const ALL: &str = "\
 Devices:
   sil:      the application in this process, on a simulated arm     sil:seed=7,world=simple
-  sim:      the firmware image under QEMU                            board:  the real board's image, emulated
+  sim:      the firmware image under QEMU         board:  the emulated board with its image
   hand:     a hand alone under QEMU
   serial:/dev/ttyACM0   can:can0   tcp:HOST:PORT   unix:tactus.sock
 Options of simulated devices, behind the colon and separated by commas:
   seed=N               everything random          world=mujoco|simple   the physics
-  line=serial|can      the line to the host       bus=FILE              log of the buses, as candump -L writes it
+  line=serial|can      the line to the host       bus=FILE              log of both buses
   flash=FILE           keeps its primitives       faults=FILE[:N]       faults that befall the arm
 Examples:
   tactus --device sil: teach -o grasp.csv
