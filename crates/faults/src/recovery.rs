@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use control::{Fault, State};
 use device::Stage;
+use lab::error::HostError;
 use lab::procedure::{self, Ends, Mode, RunRequest};
-use link::Name;
+use link::{Name, Refusal};
 use puck::SafetyMode;
 use sim::PendantAction;
 
@@ -19,6 +20,9 @@ const TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Time that a person takes between pendant and keyboard.
 const NOTICE: Duration = Duration::from_millis(500);
+
+/// Time for which a cause may still be seen after it is gone.
+const LOOKING_AGAIN: Duration = Duration::from_secs(5);
 
 /// Distance of the joint angles told from the true ones after a zeroing, rad: a count of M7, and what the arm moved.
 const BELIEVED: f64 = 0.02;
@@ -43,7 +47,7 @@ pub fn recover(arm: &mut Arm, way: Recover) -> Result<(), Failure> {
     if Fault::from_code(arm.status()?.fault) != Some(Fault::None) {
         // Activated under a fault, it sinks until it is braked again.
         rest(arm)?;
-        arm.clear_fault().map_err(|error| format!("clear: {error}"))?;
+        clear(arm)?;
         // A device with a fault goes on asking for IDLE.
         start_up(arm, way)?;
     }
@@ -74,6 +78,18 @@ fn rest(arm: &mut Arm) -> Result<(), Failure> {
         arm.next(Duration::from_millis(20))?;
     }
     Err("the arm does not come to rest".into())
+}
+
+/// Clears the fault. A person who is told that the cause is still there looks again: motors are asked for their
+/// temperature once a second.
+fn clear(arm: &mut Arm) -> Result<(), Failure> {
+    let deadline = arm.now() + LOOKING_AGAIN;
+    loop {
+        match arm.clear_fault() {
+            Err(HostError::Refused { reason: Refusal::CauseRemains, .. }) if arm.now() < deadline => wait(arm)?,
+            cleared => return cleared.map_err(|error| format!("clear: {error}").into()),
+        }
+    }
 }
 
 /// Lets time pass; what the device tells meanwhile does not matter.

@@ -495,7 +495,7 @@ impl Plant {
                     self.pucks[puck(node)].restart(self.now);
                     self.bus.withdraw(Node::ARM[puck(node)]);
                 }
-                FaultKind::Temperature { node, celsius } if begins => self.pucks[puck(node)].heat(celsius),
+                FaultKind::Temperature { node, celsius } => self.pucks[puck(node)].heat(begins.then_some(celsius)),
                 FaultKind::Pendant(action) if begins => {
                     self.operator.observe(action);
                     self.safety.press(self.now, action);

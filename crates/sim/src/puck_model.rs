@@ -127,9 +127,10 @@ impl Puck {
         self.offset += i64::from(counts);
     }
 
-    /// Puck and motor are this hot, degree Celsius.
-    pub(crate) fn heat(&mut self, celsius: i32) {
-        [Property::Temp, Property::Therm].into_iter().for_each(|property| self.firmware.store(property, celsius));
+    /// Puck and motor are this hot, degree Celsius; `None`: as usual.
+    pub(crate) fn heat(&mut self, celsius: Option<i32>) {
+        self.firmware.store(Property::Temp, celsius.unwrap_or(TEMPERATURES.0));
+        self.firmware.store(Property::Therm, celsius.unwrap_or(TEMPERATURES.1));
     }
 
     /// A request on the bus at time `at`; packed torques act at once, the rest waits its turn.
