@@ -57,6 +57,7 @@ cargo xtask <verb>
   package  packages for strangers: packed, unpacked outside the repository, tested there
   mutants  wrong changes of the code that named tests must catch; cargo xtask mutants WORDS: those whose name has WORDS
   faults [--all] [--json] [ID...]   the fault catalogue: every script of tests/faults against the simulated arm
+  margins  every control law on an arm without friction, kicked: what is left, worst pose, frequency
   house    module circles, sizes, old words, arrows between crates; cargo xtask house RULE: one of the rules
 
 Every verb does the set-up it needs. Environment:
@@ -80,6 +81,21 @@ fn main() -> ExitCode {
 fn faults(words: &[&str]) -> Result<()> {
     shell::step("fault catalogue: what the simulated arm does, and the way back");
     shell::run(shell::cargo().args(["run", "--quiet", "--package", "faults", "--"]).args(words))
+}
+
+/// Prints the margins of the control laws; `cargo xtask test` holds them, too.
+fn margins() -> Result<()> {
+    shell::step("margins of the control laws, without friction");
+    shell::run(shell::cargo().args([
+        "test",
+        "--release",
+        "--package",
+        "control",
+        "--test",
+        "margins",
+        "--",
+        "--nocapture",
+    ]))
 }
 
 fn dispatch(words: &[&str]) -> Result<()> {
@@ -121,6 +137,7 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["doc"] => build::documentation()?,
         ["docs"] => docs::run()?,
         ["faults", rest @ ..] => faults(rest)?,
+        ["margins"] => margins()?,
         ["package"] => package::run()?,
         ["mutants"] => mutants::run("")?,
         ["mutants", part] => mutants::run(part)?,

@@ -1,0 +1,214 @@
+//! One loop: a law, a pose and a variation, kicked; how much of the kick is left.
+
+use control::command::{Command, PoseFeedback, RunOptions};
+use control::law::Gains;
+use control::model::{ArmModel, Frames};
+use control::plan::load;
+use control::plan::primitive::{
+    ExpectedWrench, Feedback, GainSchedule, MovementTables, Primitive, ROWS, SENSORS, Velocity, configuration, gains,
+    limits,
+};
+use control::units::{JointPositions, Vector7};
+use control::{BusSample, Cycle, CycleInput, Event, PERIOD, Payload, RATE, State};
+use dmp::{Hemisphere, OrientationError};
+use nalgebra::Vector3;
+use pinned_init::InPlaceWrite;
+use puck::SafetyMode;
+
+use crate::plant::{Plant, Variation};
+
+const KERNELS: usize = 10;
+
+/// Duration of the movement that stays where it is (s): that of the lesson, for which the gains of Eq (8) were chosen.
+const DURATION: f64 = 12.0;
+
+/// Speed of each motor after the kick (rad/s).
+const KICK: f64 = 0.1;
+
+/// Time after the kick until its rest is measured, and for how long (s).
+const WAIT: f64 = 1.5;
+const WINDOW: f64 = 0.35;
+
+/// State and options that decide the torque.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Law {
+    Hold,
+    /// Led by hand.
+    Teach,
+    SoftStop,
+    /// A run with stiff or compliant gains.
+    Run {
+        compliant: bool,
+        feedback: bool,
+        force: bool,
+    },
+}
+
+/// Rest of a kick.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rest {
+    /// Largest swing of a motor's speed, in parts of the kick.
+    pub(crate) share: f64,
+    /// Its frequency (Hz), and its joint (1 to 7).
+    pub(crate) frequency: f64,
+    pub(crate) joint: usize,
+}
+
+struct Loop {
+    cycle: Box<Cycle<f64, KERNELS>>,
+    plant: Plant,
+    number: u64,
+}
+
+impl Loop {
+    fn tick(&mut self, command: Option<Command>) -> control::CycleOutput {
+        let sample = BusSample {
+            positions: self.plant.counts(),
+            wrench: Some(self.plant.wrench()),
+            safety: Some(SafetyMode::Active),
+            hand: None,
+        };
+        let output = self.cycle.step(&CycleInput { cycle: self.number, sample, command, external_fault: None });
+        let on = output.record.state.has_torque();
+        self.plant.advance(on.then(|| Vector7::from(output.record.tau.map(f64::from))));
+        self.number += 1;
+        output
+    }
+
+    fn command(&mut self, command: Command) {
+        let output = self.tick(Some(command));
+        assert_eq!(output.event, Some(Event::Accepted), "{command:?} in {:?}", output.record.state);
+    }
+
+    /// Runs for a time (s); false if the arm was stopped.
+    fn run_for(&mut self, seconds: f64) -> bool {
+        for _ in 0..(seconds * RATE).round() as usize {
+            self.tick(None);
+        }
+        self.cycle.fault() == control::Fault::None
+    }
+}
+
+/// Kicks one loop. `None`: it never came to rest, or a monitor stopped the arm.
+pub(crate) fn kick(
+    gains: &Gains<f64>,
+    law: Law,
+    q: [f64; 7],
+    variation: Variation,
+    bias: Vector3<f64>,
+) -> Option<Rest> {
+    let kicked = course(gains, law, q, variation, bias, KICK)?;
+    let alone = course(gains, law, q, variation, bias, 0.0)?;
+    Some(rest(&kicked.iter().zip(&alone).map(|(kicked, alone)| kicked - alone).collect::<Vec<_>>()))
+}
+
+/// Speeds of the motors, some time after a kick.
+fn course(
+    gains: &Gains<f64>,
+    law: Law,
+    q: [f64; 7],
+    variation: Variation,
+    bias: Vector3<f64>,
+    kick: f64,
+) -> Option<Vec<Vector7<f64>>> {
+    // Rest comes first, with the nominal loop and time; then what varies is switched on.
+    let plant = Plant::new(q, variation);
+    let Ok(cycle) = Box::new_uninit().write_init(Cycle::init(plant.calibration(), *gains));
+    let mut arm = Loop { cycle, plant, number: 0 };
+    arm.run_for(0.01);
+    match law {
+        Law::Teach => arm.command(Command::Gravity),
+        _ => arm.command(Command::Hold),
+    }
+    arm.run_for(1.0);
+    match law {
+        Law::Hold | Law::Teach => {}
+        Law::SoftStop => arm.command(Command::Stop),
+        Law::Run { compliant, feedback, force } => {
+            arm.command(Command::Tare);
+            while arm.number < 3000 && arm.tick(None).record.dq.iter().any(|v| v.abs() > 0.02) {}
+            let there = arm.tick(None).record.q.map(f64::from);
+            let primitive = staying(there);
+            arm.cycle.load(&load::check(arm.cycle.model(), &primitive).expect("runs")).expect("loads");
+            arm.command(Command::Run(RunOptions {
+                feedback,
+                force_control: force,
+                compliant,
+                pose_feedback: PoseFeedback::Planned,
+                finger_feedback: false,
+                ..RunOptions::default()
+            }));
+            arm.run_for(0.3);
+            arm.plant.bias = bias;
+            arm.run_for(3.0);
+        }
+    }
+    arm.run_for(0.2);
+    arm.plant.settle();
+    for (joint, speed) in arm.plant.omega.iter_mut().enumerate() {
+        *speed += if joint % 2 == 0 { kick } else { -kick };
+    }
+    arm.run_for(WAIT);
+    let mut seen = Vec::new();
+    for _ in 0..(WINDOW * RATE) as usize {
+        arm.tick(None);
+        seen.push(arm.plant.omega);
+    }
+    let wanted = match law {
+        Law::Hold => State::Hold,
+        Law::Teach => State::Gravity,
+        Law::SoftStop => State::SoftStop,
+        Law::Run { .. } => State::Run,
+    };
+    (arm.cycle.state() == wanted && arm.plant.omega.amax().is_finite()).then_some(seen)
+}
+
+fn rest(seen: &[Vector7<f64>]) -> Rest {
+    // About a straight line: an arm that floats may drift.
+    let middle = (seen.len() - 1) as f64 / 2.0;
+    let mean = seen.iter().sum::<Vector7<f64>>() / seen.len() as f64;
+    let spread: f64 = (0..seen.len()).map(|at| (at as f64 - middle).powi(2)).sum();
+    let slope = seen.iter().enumerate().map(|(at, omega)| omega * (at as f64 - middle)).sum::<Vector7<f64>>() / spread;
+    let seen: Vec<_> = seen.iter().enumerate().map(|(at, omega)| omega - mean - slope * (at as f64 - middle)).collect();
+    let swing = |joint: usize| seen.iter().map(|omega| omega[joint].abs()).fold(0.0, f64::max);
+    let joint = (0..7).max_by(|a, b| swing(*a).total_cmp(&swing(*b))).unwrap_or(0);
+    let turns = seen.windows(2).filter(|w| (w[0][joint] > 0.0) != (w[1][joint] > 0.0)).count();
+    Rest { share: swing(joint) / KICK, frequency: turns as f64 / 2.0 / (seen.len() as f64 * PERIOD), joint: joint + 1 }
+}
+
+/// A movement that stays at `q`, with the feedback gains that a lesson of this duration gets.
+fn staying(q: [f64; 7]) -> Primitive<f64, KERNELS> {
+    let model = ArmModel::new(Payload::SensorAndHand);
+    let frames = Frames::new(&model, &JointPositions::from_array(q));
+    let pose = frames.tool_pose();
+    let upright = (0..3).find(|axis| frames.tool_to_world()[(2, *axis)].abs() > 0.9);
+    let at = configuration(pose.position.into(), pose.orientation.0, q, [0.0, 0.25, 0.25, 0.25]);
+    let mut k1 = [320.0, 320.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    if let Some(axis) = upright {
+        k1[3 + axis] = 740.0;
+    }
+    let feedback = Feedback::new(
+        GainSchedule::constant(k1).expect("gains"),
+        GainSchedule::constant([1.0; SENSORS]).expect("gains"),
+        limits(0.25, 0.436, 0.6),
+    );
+    let tables = MovementTables {
+        control_period: PERIOD,
+        duration: DURATION,
+        alpha: -(0.01f64).ln(),
+        activation: 0.7,
+        kernel_count: KERNELS,
+        weights: &[0.0; ROWS * KERNELS],
+        gains: gains([400.0, 200.0, 200.0, 200.0], [40.0, 20.0, 800f64.sqrt(), 800f64.sqrt()]),
+        orientation_error: OrientationError::Quaternion,
+        hemisphere: Hemisphere::Nearest,
+        start: at,
+        goal: at,
+        start_velocity: Velocity::ZERO,
+    };
+    let mut primitive = load::primitive(&model, &tables).expect("a movement this arm can run");
+    let none = [0.0; SENSORS];
+    primitive.set_feedback(Some(&feedback.expect("feedback")));
+    primitive.set_expected(Some(&ExpectedWrench::new(&[none, none], DURATION).expect("an expectation")));
+    primitive
+}
