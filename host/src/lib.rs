@@ -2,4 +2,5 @@
 
 pub mod check;
 pub mod cmd;
+pub mod monitor;
 pub mod probe;

@@ -192,8 +192,8 @@ fn json_is_one_object_a_line_and_the_summary_last() {
 #[test]
 fn a_log_that_is_not_there_and_no_log_at_all_are_told_apart() {
     let folder = tempfile::tempdir().unwrap();
-    let missing = stderr(&tactus(folder.path(), &["can", "decode", "nothing.log"]).code(6));
-    assert!(missing.starts_with("error[E670]: can decode: cannot read nothing.log"), "{missing}");
+    let missing = stderr(&tactus(folder.path(), &["can", "decode", "nothing.log"]).code(2));
+    assert!(missing.starts_with("error[E233]: can decode: cannot read nothing.log"), "{missing}");
     let none = stderr(&tactus(folder.path(), &["can", "decode"]).code(2));
     assert!(none.starts_with("error[E209]: can decode: neither a log nor an interface is named"), "{none}");
     let live = stderr(&tactus(folder.path(), &["can", "decode", "--interface", "nocan7"]).code(3));

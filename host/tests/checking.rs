@@ -8,7 +8,9 @@ use std::path::Path;
 use lab::demonstration::Recording;
 use lab::learn::{LearnOptions, learn};
 use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
-use tactus::check::{CheckReport, Limit, check};
+use lab::procedure::{Change, ChangeKind};
+use link::Goal;
+use tactus::check::{CheckReport, Course, Limit, check};
 
 fn reach(duration: f64) -> PrimitiveFile {
     let text = common::text(&common::rows(duration));
@@ -17,15 +19,15 @@ fn reach(duration: f64) -> PrimitiveFile {
 }
 
 fn checked(primitive: &PrimitiveFile) -> CheckReport {
-    check(primitive, 1.0, |_| {}).unwrap()
+    check(primitive, &Course::stored(1.0), |_| {}).unwrap()
 }
 
 #[test]
 fn a_calm_movement_passes_with_every_margin_reported() {
     let mut heard = Vec::new();
-    let report = check(&reach(5.0), 1.0, |fraction| heard.push(fraction)).unwrap();
+    let report = check(&reach(5.0), &Course::stored(1.0), |fraction| heard.push(fraction)).unwrap();
     assert!(report.passed(), "{}", report.to_text());
-    assert_eq!(report.margins.len(), 1 + 7 + 7 + 7 + 1 + 2);
+    assert_eq!(report.margins.len(), 4 + 1 + 7 + 7 + 7 + 1 + 2);
     assert_eq!(report.limited_cycles, 0);
     assert!(report.tracking_max_m < 5e-3, "{}", report.tracking_max_m);
     for margin in &report.margins {
@@ -52,18 +54,42 @@ fn a_movement_that_is_too_fast_is_refused() {
     let report = checked(&primitive);
     assert!(!report.passed(), "{}", report.to_text());
     assert!(
-        report.violations.iter().any(|text| text.contains("speed") || text.contains("limiter")),
+        report
+            .violations
+            .iter()
+            .any(|text| text.contains("speed") || text.contains("limiter") || text.contains("faster")),
         "{:?}",
         report.violations
     );
 }
 
 #[test]
+fn h4_a_goal_that_is_changed_is_checked_with_the_run() {
+    let primitive = reach(5.0);
+    let [x, y, z] = primitive.goal.position;
+    let to = |x: f64, y: f64, z: f64| Goal { position: Some([x, y, z].map(|part| part as f32)), orientation: None };
+    let changed = |goal: Goal| {
+        let changes = vec![Change { time: 1.0, kind: ChangeKind::Goal(goal) }];
+        check(&primitive, &Course { changes, ..Course::stored(2.0) }, |_| {}).unwrap()
+    };
+    let near = changed(to(x - 0.05, y, z + 0.1));
+    assert!(near.passed(), "{}", near.to_text());
+    let end = near.margins.iter().find(|margin| margin.limit == Limit::GoalPosition).unwrap();
+    assert!(end.value < 3e-3, "{end:?}");
+    // Where the joints cannot follow, and out of reach.
+    for goal in [to(0.0, 0.0, -0.2), to(1.2, 0.0, 0.0)] {
+        assert!(!changed(goal).passed(), "on the way: {goal:?}");
+        let course = Course { goal, ..Course::stored(2.0) };
+        assert!(!check(&primitive, &course, |_| {}).unwrap().passed(), "from the start on: {goal:?}");
+    }
+}
+
+#[test]
 fn the_same_movement_passes_at_half_speed_and_fails_at_double() {
     let primitive = reach(1.6);
-    let slow = check(&primitive, 0.5, |_| {}).unwrap();
+    let slow = check(&primitive, &Course::stored(0.5), |_| {}).unwrap();
     assert!(slow.passed(), "{}", slow.to_text());
-    let fast = check(&primitive, 2.0, |_| {}).unwrap();
+    let fast = check(&primitive, &Course::stored(2.0), |_| {}).unwrap();
     assert!(!fast.passed(), "{}", fast.to_text());
 }
 
@@ -100,7 +126,7 @@ fn a_plan_that_leaves_the_workspace_is_refused() {
 fn a_primitive_of_another_arm_is_refused() {
     let mut primitive = reach(3.0);
     primitive.model_hash ^= 1;
-    let error = check(&primitive, 1.0, |_| {}).unwrap_err();
+    let error = check(&primitive, &Course::stored(1.0), |_| {}).unwrap_err();
     assert!(matches!(error, PrimitiveFileError::Model { .. }), "{error}");
 }
 
@@ -108,6 +134,6 @@ fn a_primitive_of_another_arm_is_refused() {
 fn a_duration_that_the_integration_cannot_follow_is_refused() {
     let mut primitive = reach(3.0);
     primitive.movement.duration = 0.05;
-    let error = check(&primitive, 1.0, |_| {}).unwrap_err();
+    let error = check(&primitive, &Course::stored(1.0), |_| {}).unwrap_err();
     assert!(matches!(error, PrimitiveFileError::Invalid { .. }), "{error}");
 }

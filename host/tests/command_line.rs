@@ -63,7 +63,7 @@ fn json_is_one_object_on_stdout_with_what_the_text_says() {
     let checked = json(&tactus(folder.path(), &["check", "demo.toml", "--json"]).success());
     assert_eq!(checked["name"], "a");
     assert_eq!(checked["violations"].as_array().unwrap().len(), 0);
-    assert_eq!(checked["margins"][1]["limit"], "joint_position");
+    assert_eq!(checked["margins"][5]["limit"], "joint_position");
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn the_same_input_gives_the_same_bytes() {
     common::demonstration(folder.path(), 3.0);
     let twice: Vec<(Vec<u8>, Vec<u8>, Vec<u8>)> = (0..2)
         .map(|_| {
-            let learned = tactus(folder.path(), &["learn", "demo.csv", "--json"]).success();
+            let learned = tactus(folder.path(), &["learn", "demo.csv", "--json", "--force"]).success();
             let checked = tactus(folder.path(), &["check", "demo.toml", "--json"]).success();
             let file = std::fs::read(folder.path().join("demo.toml")).unwrap();
             (learned.get_output().stdout.clone(), checked.get_output().stdout.clone(), file)
@@ -106,10 +106,22 @@ fn a_bad_demonstration_ends_with_6_and_names_file_line_and_column() {
 }
 
 #[test]
-fn a_missing_file_ends_with_6_and_the_reason() {
+fn a_missing_file_is_a_wrong_command_line_and_the_reason_is_told() {
     let folder = tempfile::tempdir().unwrap();
-    let failed = tactus(folder.path(), &["learn", "nothing.csv"]).failure().code(6);
-    assert!(stderr(&failed).contains("nothing.csv: cannot be read: No such file"), "{}", stderr(&failed));
+    for line in [
+        &["learn", "nothing.csv"][..],
+        &["check", "nothing.csv"],
+        &["plot", "-d", "nothing.csv", "-o", "a.png"],
+        &["compare", "nothing.csv", "nothing.csv"],
+        &["can", "decode", "nothing.csv"],
+        &["experience", "nothing.csv", "nothing.csv"],
+    ] {
+        let failed = tactus(folder.path(), line).failure().code(2);
+        let said = stderr(&failed);
+        assert!(said.starts_with("error[E233]") && said.contains("nothing.csv"), "{line:?}: {said}");
+        assert!(said.contains("No such file"), "{line:?}: {said}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
 #[test]

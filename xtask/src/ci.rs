@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use crate::board::Board;
 use crate::setup::{self, ARM, HAND, Machine};
-use crate::{budget, build, docs, emulated, hand, house, package, shell, test};
+use crate::{budget, build, docs, emulated, fuzz, hand, house, package, shell, test};
 
 /// Runs every check; the first failure ends it.
 pub(crate) fn run() -> Result<()> {
@@ -19,6 +19,8 @@ pub(crate) fn run() -> Result<()> {
     libraries_without_std(&machine)?;
     plain_root()?;
     crate::faults(&[])?;
+    crate::faults(&["storm", "--runs", "300"])?;
+    fuzz::run(fuzz::USUAL)?;
     package::run()?;
     emulated::lint()?;
     emulated::run(None)?;

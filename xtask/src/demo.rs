@@ -18,13 +18,13 @@ struct Step {
 /// From a person's hand to a recording.
 const TEACH: Step = Step {
     sentence: "teach: a person guides the weightless arm to a side grasp",
-    words: &["--device", "sim:", "teach", "--output", "grasp.csv"],
+    words: &["--force", "--device", "sim:", "teach", "--output", "grasp.csv"],
 };
 
 /// From the recording to a primitive; its report is shown in the summary.
 const LEARN: Step = Step {
     sentence: "learn: the recording becomes a movement primitive",
-    words: &["--json", "learn", "grasp.csv", "--output", "grasp.toml"],
+    words: &["--force", "--json", "learn", "grasp.csv", "--output", "grasp.toml"],
 };
 
 /// On the host first.
@@ -34,7 +34,7 @@ const CHECK: Step =
 /// On the arm; its report is shown in the summary.
 const RUN: Step = Step {
     sentence: "upload and run: the image under QEMU takes the primitive and plays it on the simulated arm",
-    words: &["--json", "--device", "sim:", "run", "grasp.toml", "--record", "run.csv"],
+    words: &["--force", "--json", "--device", "sim:", "run", "grasp.toml", "--record", "run.csv"],
 };
 
 /// The pictures for readers.
@@ -42,6 +42,7 @@ const PLOT: Step = Step {
     sentence: "plot: demonstration, plan and execution; and a picture of the arm",
     words: &[
         "--quiet",
+        "--force",
         "plot",
         "--demonstration",
         "grasp.csv",
@@ -64,13 +65,13 @@ pub(crate) const LARGEST: &str = "largest.toml";
 /// The same movement with the most kernels a device holds, for the budget.
 const LEARN_LARGEST: Step = Step {
     sentence: "learn: the same movement with 100 kernels",
-    words: &["learn", "grasp.csv", "--kernels", "100", "--output", LARGEST],
+    words: &["--force", "learn", "grasp.csv", "--kernels", "100", "--output", LARGEST],
 };
 
 /// Records expected sensor values, so that a run may use all its sensors.
 const REHEARSE_LARGEST: Step = Step {
     sentence: "rehearse: what that movement feels like",
-    words: &["--device", "sil:", "rehearse", LARGEST, "--trials", "3", "--record-dir", "rehearsals"],
+    words: &["--force", "--device", "sil:", "rehearse", LARGEST, "--trials", "3", "--record-dir", "rehearsals"],
 };
 
 /// Records the spread of successful runs, so that the device watches the run.

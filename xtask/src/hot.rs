@@ -29,7 +29,9 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("control::guard::supervisor", "once, when a state changes"),
     ("control::cycle::commands", "once, when a person commands"),
     ("control::command::Command", "once, when a person commands"),
-    ("control::plan::run::", "once, when a run begins or its goal changes"),
+    ("control::plan::run::", "once, when a run begins; while its goal changes"),
+    ("control::plan::goal", "while the goal of a run changes"),
+    ("control::cycle::laws::speed_load", "while the goal of a run changes"),
     ("control::plan::approach", "once, when an approach begins"),
     ("control::model::arm::ArmModel", "when a payload is found"),
     (
@@ -51,6 +53,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "control::cycle::laws::<impl control::cycle::Cycle<R,_>>::stop",
         "a soft stop: no plan and no feedback is computed",
     ),
+    ("control::sense::observer", "the memory is full; a few loops that the cache keeps from one cycle to the next"),
     ("control::guard::disagreement::Disagreement<R>::is_pushed", "the force sensor is silent"),
     ("control::guard::disagreement::Disagreement<R>::encoder_stands_still", "a motor stands still"),
     ("control::sense::joints::Motor::doubt", "a reply that does not fit the ones before"),

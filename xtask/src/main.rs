@@ -10,6 +10,7 @@ mod docs;
 mod elf;
 mod emulated;
 mod files;
+mod fuzz;
 mod hand;
 mod hot;
 mod house;
@@ -57,6 +58,8 @@ cargo xtask <verb>
   package  packages for strangers: packed, unpacked outside the repository, tested there
   mutants  wrong changes of the code that named tests must catch; cargo xtask mutants WORDS: those whose name has WORDS
   faults [--all] [--json] [ID...]   the fault catalogue: every script of tests/faults against the simulated arm
+  faults storm [--runs N] [--seed S]   random faults and orders; one run prints itself as a scenario
+  fuzz [COUNT]   COUNT random link frames and as many CAN frames, a tenth of it random sessions; 1000000 unless given
   margins  every control law on an arm without friction, kicked: what is left, worst pose, frequency
   house    module circles, sizes, old words, arrows between crates; cargo xtask house RULE: one of the rules
 
@@ -137,6 +140,8 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["doc"] => build::documentation()?,
         ["docs"] => docs::run()?,
         ["faults", rest @ ..] => faults(rest)?,
+        ["fuzz"] => fuzz::run(fuzz::USUAL)?,
+        ["fuzz", count] => fuzz::run(count.parse().with_context(|| format!("no number: {count}"))?)?,
         ["margins"] => margins()?,
         ["package"] => package::run()?,
         ["mutants"] => mutants::run("")?,

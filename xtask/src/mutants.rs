@@ -33,11 +33,16 @@ struct Mutant {
     /// Text in its place.
     replace: String,
     /// Package of the tests.
+    #[serde(default)]
     package: String,
     /// Test target of the package.
+    #[serde(default)]
     target: String,
     /// Tests that must fail, by path or by the end of it.
+    #[serde(default)]
     caught_by: Vec<String>,
+    /// Entry of the fault catalogue of which a scenario must fail.
+    entry: Option<String>,
 }
 
 /// Checks that every change can still be made and every test that is to catch one exists.
@@ -76,8 +81,10 @@ pub(crate) fn run(part: &str) -> Result<()> {
         let failed = mutant.failures(&tree);
         fs::write(&file, sound)?;
         let failed = failed.with_context(|| format!("with the change '{}'", mutant.name))?;
+        let mut killers = mutant.caught_by.iter().chain(&mutant.entry);
+        ensure!(killers.clone().count() > 0, "'{}': neither a test nor an entry is to catch it", mutant.name);
         let missed: Vec<_> =
-            mutant.caught_by.iter().filter(|test| !failed.iter().any(|failed| failed.ends_with(*test))).collect();
+            killers.by_ref().filter(|test| !failed.iter().any(|failed| failed.ends_with(*test))).collect();
         let outcome = if missed.is_empty() { "caught".to_owned() } else { format!("LIVES: {missed:?} passed") };
         shell::step(&format!("{:3} of {}  {outcome}  {}", n + 1, mutants.len(), mutant.name));
         if !missed.is_empty() {
@@ -102,8 +109,16 @@ impl Mutant {
         Ok(text.replacen(&self.find, &self.replace, 1))
     }
 
-    /// Runs the tests that must catch the change; paths of those that failed.
+    /// Runs what must catch the change; paths of the tests, and the entry, that failed.
     fn failures(&self, tree: &Path) -> Result<Vec<String>> {
+        let mut failed = self.entry.as_ref().map_or(Ok(Vec::new()), |entry| failed_entry(tree, entry))?;
+        if !self.caught_by.is_empty() {
+            failed.extend(self.failed_tests(tree)?);
+        }
+        Ok(failed)
+    }
+
+    fn failed_tests(&self, tree: &Path) -> Result<Vec<String>> {
         let mut test = shell::cargo();
         test.current_dir(tree).env("CARGO_TARGET_DIR", shell::target_dir().join("mutants/target"));
         test.args(["test", "--package", &self.package, "--test", &self.target, "--"]).args(&self.caught_by);
@@ -121,6 +136,21 @@ impl Mutant {
         let failed = |line: &str| Some(line.strip_prefix("test ")?.strip_suffix(" ... FAILED")?.to_owned());
         Ok(text.lines().filter_map(failed).collect())
     }
+}
+
+/// Runs an entry of the fault catalogue; its identifier if a scenario failed.
+fn failed_entry(tree: &Path, entry: &str) -> Result<Vec<String>> {
+    let mut run = shell::cargo();
+    run.current_dir(tree).env("CARGO_TARGET_DIR", shell::target_dir().join("mutants/target"));
+    run.args(["run", "--quiet", "--package", "faults", "--", entry]);
+    let output = run.output().with_context(|| format!("cannot start: {}", shell::line(&run)))?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    let of_the_entry = |line: &&str| line.split_whitespace().next() == Some(entry);
+    if !text.lines().any(|line| of_the_entry(&line)) {
+        bail!("does not build or run:\n{}", String::from_utf8_lossy(&output.stderr));
+    }
+    let has_failed = text.lines().filter(of_the_entry).any(|line| line.ends_with(": FAIL"));
+    Ok(if has_failed { vec![entry.to_owned()] } else { Vec::new() })
 }
 
 /// Copies the files of the repository; those that are equal already keep their times, so that they are not built anew.

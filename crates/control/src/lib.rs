@@ -19,7 +19,7 @@ pub mod units;
 pub use act::Actuation;
 pub use command::{AccelerationSource, Command, Goal, PoseFeedback, Refusal, RunOptions};
 pub use cycle::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
-pub use cycle::{Cycle, MAX_KERNELS};
+pub use cycle::{Caution, Cycle, MAX_KERNELS};
 pub use guard::{Fault, State};
 pub use model::{Calibration, CalibrationError, MODEL_HASH, Payload};
 pub use plan::load::{CheckedPrimitive, LoadError, LoadRefusal};

@@ -241,6 +241,12 @@ pub trait Application {
     /// Why it stays.
     fn delete(&mut self, name: &Name, port: &mut impl SessionPort<Self::Controller>) -> Result<(), Refused>;
 
+    /// Begins to give a primitive another name.
+    ///
+    /// # Errors
+    /// Why it keeps its name.
+    fn rename(&mut self, name: &Name, to: &Name, port: &mut impl SessionPort<Self::Controller>) -> Result<(), Refused>;
+
     /// A change that is over now. `calm`: no command is on its way to the control half.
     fn saved(&mut self, calm: bool, port: &mut impl SessionPort<Self::Controller>) -> Option<Saved>;
 

@@ -9,7 +9,8 @@
 //! | MODE of each hand puck | 10 Hz, while there is a hand | a SET has no acknowledge, and others may set modes too |
 //! | TEMP | 1 Hz for each puck | heat |
 //!
-//! The odd slots may be taken by the hand for something more urgent.
+//! The odd slots may be taken by the hand for something more urgent. A property that is new here has to be named in
+//! [`BackgroundPoll::take`], which takes every other answer for the pendant word.
 
 use puck::{CanFrame, Node, PropertyId, get};
 

@@ -8,6 +8,7 @@ mod application;
 mod background;
 pub mod bus;
 pub mod calibration;
+mod caution;
 pub mod command;
 pub mod controller;
 pub mod event;
@@ -40,5 +41,5 @@ mod store;
 
 pub use port::{CheckedPrimitive, StoredPrimitive};
 pub use session::{ArmApplication, HostSession, Identity, Session};
-pub use store::{RamStore, STORE_SLOT_BYTES, STORE_SLOTS, Store, StoreError};
+pub use store::{RamStore, STORE_SLOT_BYTES, STORE_SLOTS, Store, StoreError, stage_copy};
 pub use wire::{PrimitiveTrouble, StartupTrouble};

@@ -7,6 +7,8 @@
 
 use core::fmt;
 
+use link::frame::CRC;
+
 use crate::calibration::{Home, StoredHome};
 
 /// Places of the store of a device without flash of its own.
@@ -127,6 +129,33 @@ pub trait Store {
 
     /// Returns the outcome of the change that was begun last, once, as soon as it is durable.
     fn finished(&mut self) -> Option<Result<(), StoreError>>;
+}
+
+/// Opens the spare place for a copy of the image at `slot` that begins with `head`, its check sum made anew.
+///
+/// # Errors
+/// [`StoreError::NoPlace`] if there is no image longer than `head`; as [`Store::begin`] and [`Store::write`].
+pub fn stage_copy(store: &mut impl Store, slot: u8, head: &[u8]) -> Result<(), StoreError> {
+    const SUM_BYTES: usize = 4;
+    // A store cannot be read and written at once: the copy goes through here.
+    let mut part = [0; 64];
+    let length = store.image(slot).ok_or(StoreError::NoPlace)?.len();
+    let end = length.checked_sub(SUM_BYTES).filter(|end| *end >= head.len()).ok_or(StoreError::NoPlace)?;
+    store.begin(length)?;
+    store.write(0, head)?;
+    let mut sum = CRC.digest();
+    sum.update(head);
+    let mut at = head.len();
+    while at < end {
+        let next = end.min(at + part.len());
+        let from = store.image(slot).and_then(|image| image.get(at..next)).ok_or(StoreError::NoPlace)?;
+        let to = part.get_mut(..from.len()).ok_or(StoreError::TooLarge)?;
+        to.copy_from_slice(from);
+        sum.update(to);
+        store.write(at, to)?;
+        at = next;
+    }
+    store.write(end, &sum.finalize().to_le_bytes())
 }
 
 impl<S: Store + ?Sized> Store for &mut S {

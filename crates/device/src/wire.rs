@@ -4,6 +4,7 @@
 
 use core::fmt;
 
+use control::plan::bounds::Quantity;
 use control::plan::load::{End, LoadError};
 use control::plan::primitive::{ORIENTATION_ROWS, POSITION_ROWS, RowGroup};
 use control::{CalibrationError, CycleRecord};
@@ -314,6 +315,19 @@ impl From<LoadError> for PrimitiveTrouble {
             LoadError::OutOfReach(which) => [6, end(which)],
             LoadError::Inconsistent(which) => [7, end(which)],
             LoadError::Expected(sensor) => [14, sensor.into()],
+            LoadError::Bound(quantity) => {
+                let (kind, which) = match quantity {
+                    Quantity::Gain(rows) => (0, number(rows)),
+                    Quantity::Displacement(rows) => (1, number(rows)),
+                    Quantity::StartVelocity(rows) => (2, number(rows)),
+                    Quantity::Speed(rows) => (3, number(rows)),
+                    Quantity::Acceleration(rows) => (4, number(rows)),
+                    Quantity::Measured(sensor) => (5, sensor.into()),
+                    Quantity::Load => (6, 0),
+                    Quantity::Recording => (7, 0),
+                };
+                [15, kind << 8 | which]
+            }
         })
     }
 }
@@ -347,6 +361,21 @@ impl PrimitiveTrouble {
                 LoadError::Primitive(PrimitiveError::TooLarge { part, group, index })
             }
             14 => LoadError::Expected(u8::try_from(detail).ok()?),
+            15 => {
+                let [which, kind, _, _] = detail.to_le_bytes();
+                let rows = || item(&RowGroup::ALL, which.into());
+                LoadError::Bound(match kind {
+                    0 => Quantity::Gain(rows()?),
+                    1 => Quantity::Displacement(rows()?),
+                    2 => Quantity::StartVelocity(rows()?),
+                    3 => Quantity::Speed(rows()?),
+                    4 => Quantity::Acceleration(rows()?),
+                    5 => Quantity::Measured(which),
+                    6 => Quantity::Load,
+                    7 => Quantity::Recording,
+                    _ => return None,
+                })
+            }
             _ => return None,
         })
     }

@@ -49,20 +49,20 @@ impl<T: Scalar, const N: usize> Basis<T, N> {
     /// Evaluates all kernels at the phase `s`.
     pub fn evaluate(&self, s: T) -> Activations<T, N> {
         let mut activations = Activations { first: N, last: 0, kernels: [T::ZERO; N], scale: T::ZERO };
-        activations.scale = self.each(s, |i, kernel| {
-            if let Some(place) = activations.kernels.get_mut(i) {
-                *place = kernel;
+        activations.scale = self.each(s, |i, kernels| {
+            for (place, kernel) in activations.kernels.iter_mut().skip(i).zip(kernels) {
+                *place = *kernel;
             }
             activations.first = activations.first.min(i);
-            activations.last = i + 1;
+            activations.last = i + kernels.len();
         });
         activations
     }
 
-    /// Gives each kernel that matters at the phase `s` to `take`, in order; returns `s / sum psi`. Without the array of
-    /// [`Basis::evaluate`], which costs more to clear than a tick needs of it.
+    /// Gives the kernels that matter at the phase `s` to `take`, some at a time with the index of the first; returns
+    /// `s / sum psi`. Without the array of [`Basis::evaluate`], which costs more to clear than a tick needs of it.
     #[inline]
-    pub(crate) fn each(&self, s: T, take: impl FnMut(usize, T)) -> T {
+    pub(crate) fn each(&self, s: T, take: impl FnMut(usize, &[T])) -> T {
         self.0.each(s, take)
     }
 }
@@ -118,12 +118,13 @@ impl<T: Scalar, const ROWS: usize, const N: usize> Weights<T, ROWS, N> {
         self.0.get(i)?.get(row).map(|weight| T::from_weight(*weight))
     }
 
-    /// Adds the share of kernel `i` to the sum of each row.
+    /// Adds the shares of the kernels from `i` on to the sum of each row.
     #[inline]
-    pub(crate) fn add(&self, i: usize, kernel: T, sums: &mut [T; ROWS]) {
-        let weights = self.0.get(i).into_iter().flatten();
-        for (sum, weight) in sums.iter_mut().zip(weights) {
-            *sum = sum.add_weighted(kernel, *weight);
+    pub(crate) fn add(&self, i: usize, kernels: &[T], sums: &mut [T; ROWS]) {
+        for (kernel, weights) in kernels.iter().zip(self.0.get(i..).unwrap_or_default()) {
+            for (sum, weight) in sums.iter_mut().zip(weights) {
+                *sum = sum.add_weighted(*kernel, *weight);
+            }
         }
     }
 }
@@ -166,7 +167,7 @@ impl<T: Scalar, const ROWS: usize, const N: usize> ForcingTerm<T, ROWS, N> {
     #[must_use]
     pub fn evaluate(&self, s: T) -> [T; ROWS] {
         let mut f = [T::ZERO; ROWS];
-        let scale = self.basis.each(s, |i, kernel| self.weights.add(i, kernel, &mut f));
+        let scale = self.basis.each(s, |i, kernels| self.weights.add(i, kernels, &mut f));
         f.map(|f| f * scale)
     }
 }

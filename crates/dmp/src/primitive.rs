@@ -289,11 +289,11 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Primitive<T, D, 
     #[must_use]
     pub fn forces(&self, s: T) -> ([[T; 6]; P], [T; D]) {
         let (mut poses, mut points) = ([[T::ZERO; POSE_ROWS]; P], [T::ZERO; D]);
-        let scale = self.basis.each(s, |i, kernel| {
+        let scale = self.basis.each(s, |i, kernels| {
             for (sums, weights) in poses.iter_mut().zip(&self.pose_weights) {
-                weights.add(i, kernel, sums);
+                weights.add(i, kernels, sums);
             }
-            self.point_weights.add(i, kernel, &mut points);
+            self.point_weights.add(i, kernels, &mut points);
         });
         (poses.map(|sums| sums.map(|f| f * scale)), points.map(|f| f * scale))
     }

@@ -65,6 +65,7 @@ pub fn results(seeds: &[u64]) -> Results {
                         finger_n: [6.0, 6.0, 8.0],
                         table_peak_n: 0.0,
                         finger_peak_n: 8.0,
+                        shaking_rad_s: 0.02,
                     },
                     adaptation_m: share * cell.distance(),
                     adaptation_deg: share * 80.0 * cell.distance(),

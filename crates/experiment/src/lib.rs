@@ -14,6 +14,7 @@ pub mod figures;
 #[cfg(test)]
 pub mod fixtures;
 pub mod grid;
+pub mod interval;
 pub mod inverse;
 #[cfg(feature = "mujoco")]
 pub mod lift;
@@ -34,7 +35,9 @@ pub mod results;
 mod runner;
 pub mod scenario;
 pub mod seed;
+pub mod shaking;
 pub mod statistics;
+pub mod sweep;
 pub mod trace;
 #[cfg(feature = "mujoco")]
 pub mod trial;
@@ -51,4 +54,5 @@ pub use results::Results;
 pub use runner::{Experiment, ExperimentError, Progress, run};
 pub use scenario::{PlantKind, Scenario};
 pub use statistics::Summary;
+pub use sweep::Sweep;
 pub use variation::Variation;

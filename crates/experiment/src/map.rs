@@ -19,7 +19,8 @@ pub fn draw(results: &Results, grid: &Grid) -> String {
     let modes = results.modes();
     let mut text = format!(
         "columns: object along the approach, {} .. {} cm (negative = nearer the arm); rows: sideways\n\
-         S held, K knocked over, M missed, P pushed away, D dropped, C crushed, F stopped by a fault{}\n",
+         S held, K knocked over, M missed, P pushed away, D dropped, C crushed, L not lifted,\n\
+         U unstable, F stopped by a fault{}\n",
         centimetres(columns.first().copied().unwrap_or(0)),
         centimetres(columns.last().copied().unwrap_or(0)),
         if results.seeds().len() > 1 { "; a number: seeds of which it was held where they differ" } else { "" },
@@ -90,11 +91,17 @@ pub fn table(summaries: &[Summary]) -> String {
         table.row(cells.collect::<Vec<_>>());
     };
     row("held", &|s| format!("{} of {}", short(s.success), s.cells));
+    if summaries.iter().any(|summary| summary.success_interval.is_some()) {
+        row("held, 95 % interval over the arms", &|s| {
+            s.success_interval.map_or_else(|| "-".to_owned(), |i| i.bounds())
+        });
+    }
     row("held, seed by seed", &|s| s.success_by_seed.iter().map(usize::to_string).collect::<Vec<_>>().join(" "));
     row("knocked over, missed, pushed away", &|s| {
         format!("{} {} {}", short(s.knocked_over), short(s.missed), short(s.pushed_away))
     });
     row("dropped, crushed, stopped", &|s| format!("{} {} {}", short(s.dropped), short(s.crushed), short(s.stopped)));
+    row("not lifted, unstable", &|s| format!("{} {}", short(s.not_lifted), short(s.unstable)));
     row("farthest success", &|s| format!("{:.1} cm", s.farthest_success_m * 100.0));
     row("largest adaptation", &|s| format!("{:.1} cm  {:.1} deg", s.adaptation_m * 100.0, s.adaptation_deg));
     row("peak force before closing, median, max", &|s| {
@@ -111,6 +118,9 @@ pub fn table(summaries: &[Summary]) -> String {
     row("finger on object, median, max", &|s| format!("{:.1} N  {:.1} N", s.finger_peak_n.median, s.finger_peak_n.max));
     row("hand on table, max", &|s| format!("{:.1} N", s.table_peak_n.max));
     row("sag when lifted, median, max", &|s| format!("{:.1} mm  {:.1} mm", s.sag_m.median * 1e3, s.sag_m.max * 1e3));
+    row("shaking above 15 Hz, median, max", &|s| {
+        format!("{:.2}  {:.2} rad/s", s.shaking_rad_s.median, s.shaking_rad_s.max)
+    });
     row("false alarms", &|s| format!("{} of {}", s.detection.false_alarms, s.detection.successes));
     row("failures reported before the lift", &|s| {
         format!("{} of {}", s.detection.flagged_before_lift, s.detection.failures)
@@ -140,10 +150,10 @@ mod tests {
         }
         let text = draw(&results, &Grid::paper());
         let lines: Vec<&str> = text.lines().collect();
-        assert!(lines[2].contains("(a) 46/48") && lines[2].contains("(c) 46/48"), "{}", lines[2]);
-        assert_eq!(lines[3], "    +8  M S S S S S S S   M S S S S S S S   M S S S S S S S");
-        assert_eq!(lines[8], "   -12  S S S S S S S D   S S S S S S S D   S S S S S S S D");
-        assert_eq!(lines.len(), 9);
+        assert!(lines[3].contains("(a) 46/48") && lines[3].contains("(c) 46/48"), "{}", lines[3]);
+        assert_eq!(lines[4], "    +8  M S S S S S S S   M S S S S S S S   M S S S S S S S");
+        assert_eq!(lines[9], "   -12  S S S S S S S D   S S S S S S S D   S S S S S S S D");
+        assert_eq!(lines.len(), 10);
     }
 
     #[test]
@@ -154,7 +164,7 @@ mod tests {
                 if report.key.index == 0 && report.key.seed == 2 { Outcome::KnockedOver } else { Outcome::Held };
         }
         let text = draw(&results, &Grid::paper());
-        assert!(text.lines().nth(3).is_some_and(|line| line.starts_with("    +8  2 S S")), "{text}");
+        assert!(text.lines().nth(4).is_some_and(|line| line.starts_with("    +8  2 S S")), "{text}");
         assert!(text.contains("(a) 47.7/48"), "{text}");
     }
 

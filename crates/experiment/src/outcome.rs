@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::observation::{Milestones, Observation, SAMPLE_SECONDS, Sample};
 use super::quantile::quantile;
+use super::shaking::UNSTABLE;
 
 /// An object that leaned farther than this before the grasp closed counts as knocked over.
 pub const TILT_LIMIT: f64 = 30.0 * std::f64::consts::PI / 180.0;
@@ -45,6 +46,10 @@ pub enum Outcome {
     Dropped,
     /// A finger pressed harder than the object bears.
     Crushed,
+    /// Grasped by two fingers or more, but the arm did not raise the hand.
+    NotLifted,
+    /// The arm shook, whether it held the object or not.
+    Unstable,
     /// The arm stopped by itself; the name of the fault.
     Stopped(String),
 }
@@ -59,6 +64,8 @@ impl Outcome {
             Outcome::PushedAway => 'P',
             Outcome::Dropped => 'D',
             Outcome::Crushed => 'C',
+            Outcome::NotLifted => 'L',
+            Outcome::Unstable => 'U',
             Outcome::Stopped(_) => 'F',
         }
     }
@@ -77,6 +84,8 @@ impl Outcome {
             Outcome::PushedAway => "pushed away",
             Outcome::Dropped => "dropped",
             Outcome::Crushed => "crushed",
+            Outcome::NotLifted => "not lifted",
+            Outcome::Unstable => "unstable",
             Outcome::Stopped(_) => "stopped",
         }
     }
@@ -126,6 +135,9 @@ pub struct Measures {
     /// Largest force of one finger on the object, 10 ms average, N.
     #[serde(default)]
     pub finger_peak_n: f64,
+    /// Largest [amplitude](crate::shaking::amplitude) of a joint's speed above 15 Hz, rad/s.
+    #[serde(default)]
+    pub shaking_rad_s: f64,
 }
 
 /// The rule by which a trial is judged.
@@ -135,8 +147,22 @@ pub struct Rule {
     pub upright: bool,
 }
 
-/// Judges a trial. `fault` is the name of the fault that stopped the arm, if one did.
-pub fn judge(observation: &Observation, marks: &Milestones, rule: Rule, fault: Option<&str>) -> (Outcome, Measures) {
+/// Conduct of the arm itself in a trial.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ArmConduct<'a> {
+    /// Name of the fault that stopped the arm, if one did.
+    pub fault: Option<&'a str>,
+    /// Amplitude of its [shaking](crate::shaking), rad/s.
+    pub shaking: f64,
+}
+
+/// Judges a trial.
+pub fn judge(
+    observation: &Observation,
+    marks: &Milestones,
+    rule: Rule,
+    ArmConduct { fault, shaking }: ArmConduct<'_>,
+) -> (Outcome, Measures) {
     let (Some(first), Some(last)) =
         (observation.at(marks.run).or(observation.samples.first()), observation.samples.last())
     else {
@@ -151,21 +177,25 @@ pub fn judge(observation: &Observation, marks: &Milestones, rule: Rule, fault: O
     let lifted = observation.between(marks.lift, f64::INFINITY);
     let height = |sample: &Sample| sample.object[2] - first.object[2];
     let moved = |sample: &Sample| (sample.object[0] - first.object[0]).hypot(sample.object[1] - first.object[1]);
-    let tilt = run.iter().map(|sample| sample.tilt).fold(0.0, f64::max);
     let forces: Vec<f64> = before.iter().map(|sample| sample.contact.horizontal()).collect();
     let touching: Vec<f64> = forces.iter().copied().filter(|force| *force > TOUCH).collect();
     let grasp_moved = run.last().map_or(0.0, moved);
-
+    let tilt = run.iter().map(|sample| sample.tilt).fold(0.0, f64::max);
     let outcome = if let Some(fault) = fault {
         Outcome::Stopped(fault.to_owned())
     } else if observation.crushed {
         Outcome::Crushed
     } else if rule.upright && tilt > TILT_LIMIT {
+        // What falls knocks against the hand: its shaking then is none of the arm's.
         Outcome::KnockedOver
+    } else if shaking > UNSTABLE {
+        Outcome::Unstable
     } else if is_lifted(last, first) && observation.at(marks.hold).is_some_and(|sample| is_lifted(sample, first)) {
         Outcome::Held
     } else if lifted.iter().any(|sample| height(sample) > RAISED) {
         Outcome::Dropped
+    } else if is_grasped(last) && last.hand[2] - run.last().map_or(0.0, |sample| sample.hand[2]) < RAISED {
+        Outcome::NotLifted
     } else if grasp_moved > PUSHED {
         Outcome::PushedAway
     } else {
@@ -185,7 +215,7 @@ pub fn judge(observation: &Observation, marks: &Milestones, rule: Rule, fault: O
         Outcome::Dropped => {
             lifted.iter().rfind(|sample| sample.contact.touches()).map(|sample| sample.time - marks.run)
         }
-        Outcome::Crushed | Outcome::Held | Outcome::Stopped(_) => None,
+        Outcome::Crushed | Outcome::Held | Outcome::NotLifted | Outcome::Unstable | Outcome::Stopped(_) => None,
     };
     let whole = observation.between(marks.run, f64::INFINITY);
     let measures = Measures {
@@ -203,6 +233,7 @@ pub fn judge(observation: &Observation, marks: &Milestones, rule: Rule, fault: O
         finger_n: last.contact.fingers,
         table_peak_n: whole.iter().map(|sample| sample.contact.table).fold(0.0, f64::max),
         finger_peak_n: whole.iter().flat_map(|sample| sample.contact.fingers).fold(0.0, f64::max),
+        shaking_rad_s: shaking,
     };
     (outcome, measures)
 }
@@ -210,6 +241,12 @@ pub fn judge(observation: &Observation, marks: &Milestones, rule: Rule, fault: O
 fn is_lifted(sample: &Sample, first: &Sample) -> bool {
     let distance = (0..3).map(|axis| (sample.object[axis] - sample.hand[axis]).powi(2)).sum::<f64>().sqrt();
     sample.object[2] - first.object[2] >= LIFTED && distance < IN_HAND && sample.contact.touches()
+}
+
+/// Two fingers or more on the object, or one against the palm.
+fn is_grasped(sample: &Sample) -> bool {
+    let fingers = sample.contact.fingers.iter().filter(|force| **force > TOUCH).count();
+    fingers + usize::from(sample.contact.palm > TOUCH) >= 2
 }
 
 /// Mean of forces; zero of none.
@@ -263,7 +300,7 @@ mod tests {
 
     #[test]
     fn a_lifted_object_that_stays_in_the_hand_is_held() {
-        let (outcome, measures) = judge(&good(), &MILESTONES, UPRIGHT, None);
+        let (outcome, measures) = judge(&good(), &MILESTONES, UPRIGHT, ArmConduct::default());
         assert_eq!(outcome, Outcome::Held);
         assert!((measures.lift_m - 0.1).abs() < 1e-9);
         assert!((measures.contact_peak_n - 3.0).abs() < 1e-12 && (measures.contact_median_n - 3.0).abs() < 1e-12);
@@ -281,18 +318,18 @@ mod tests {
         // It rocked once and came back; half a second before it falls it leaves its foot for good.
         observation.samples[700].tilt = 0.3;
         observation.samples[750..800].iter_mut().for_each(|sample| sample.tilt = 0.2);
-        let (outcome, measures) = judge(&observation, &MILESTONES, UPRIGHT, None);
+        let (outcome, measures) = judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default());
         assert_eq!(outcome, Outcome::KnockedOver);
         assert!((measures.failure_s.unwrap() - 6.5).abs() < 1e-9);
         // A bottle that lies has no upright to lean from.
-        assert_eq!(judge(&observation, &MILESTONES, Rule { upright: false }, None).0, Outcome::Held);
+        assert_eq!(judge(&observation, &MILESTONES, Rule { upright: false }, ArmConduct::default()).0, Outcome::Held);
     }
 
     #[test]
     fn a_crushed_object_is_no_success_however_well_it_is_held() {
         let mut observation = good();
         observation.crushed = true;
-        let (outcome, measures) = judge(&observation, &MILESTONES, UPRIGHT, None);
+        let (outcome, measures) = judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default());
         assert_eq!((outcome.is_success(), outcome.word(), measures.finger_peak_n), (false, "crushed", 8.0));
     }
 
@@ -300,29 +337,53 @@ mod tests {
     fn an_object_that_falls_while_it_is_held_was_dropped() {
         let mut observation = good();
         observation.samples.iter_mut().filter(|sample| sample.time > 16.0).for_each(|sample| sample.object[2] = 0.0);
-        assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, None).0, Outcome::Dropped);
+        assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default()).0, Outcome::Dropped);
         observation.samples[1620..].iter_mut().for_each(|sample| sample.contact = Contact::default());
-        assert!((judge(&observation, &MILESTONES, UPRIGHT, None).1.failure_s.unwrap() - 15.19).abs() < 1e-9);
+        assert!(
+            (judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default()).1.failure_s.unwrap() - 15.19).abs()
+                < 1e-9
+        );
         // Thrown up and out of the hand is not held either.
         let mut observation = good();
         observation.samples.iter_mut().filter(|sample| sample.time > 15.5).for_each(|sample| sample.object[0] = 1.3);
-        assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, None).0, Outcome::Dropped);
+        assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default()).0, Outcome::Dropped);
     }
 
     #[test]
     fn an_object_that_stays_was_missed_and_one_that_went_was_pushed_away() {
         let mut observation = good();
         observation.samples.iter_mut().for_each(|sample| sample.object[2] = 0.0);
-        assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, None).0, Outcome::Missed);
+        assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default()).0, Outcome::Missed);
         observation.samples.iter_mut().filter(|sample| sample.time > 7.0).for_each(|sample| sample.object[1] = 0.26);
-        let (outcome, measures) = judge(&observation, &MILESTONES, UPRIGHT, None);
+        let (outcome, measures) = judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default());
         assert_eq!(outcome, Outcome::PushedAway);
         assert!((measures.push_m - 0.06).abs() < 1e-12 && (measures.failure_s.unwrap() - 6.01).abs() < 1e-9);
     }
 
     #[test]
+    fn an_arm_that_leaves_a_grasped_object_on_the_table_did_not_lift_it() {
+        let mut observation = good();
+        for sample in &mut observation.samples {
+            (sample.object[2], sample.hand[2]) = (0.0, -0.03);
+        }
+        let judged = |observation: &Observation| judge(observation, &MILESTONES, UPRIGHT, ArmConduct::default()).0;
+        assert_eq!(judged(&observation), Outcome::NotLifted);
+        observation.samples.iter_mut().for_each(|sample| sample.contact = Contact::default());
+        assert_eq!(judged(&observation), Outcome::Missed, "nothing is grasped");
+    }
+
+    #[test]
+    fn an_arm_that_shakes_has_no_success() {
+        let conduct = |shaking| ArmConduct { fault: None, shaking };
+        let (outcome, measures) = judge(&good(), &MILESTONES, UPRIGHT, conduct(0.4));
+        assert_eq!((outcome, measures.shaking_rad_s), (Outcome::Unstable, 0.4));
+        assert_eq!(judge(&good(), &MILESTONES, UPRIGHT, conduct(0.25)).0, Outcome::Held);
+    }
+
+    #[test]
     fn a_fault_outweighs_everything_and_keeps_its_name() {
-        let (outcome, _) = judge(&good(), &MILESTONES, UPRIGHT, Some("soft limits"));
+        let (outcome, _) =
+            judge(&good(), &MILESTONES, UPRIGHT, ArmConduct { fault: Some("soft limits"), ..ArmConduct::default() });
         assert_eq!(outcome, Outcome::Stopped("soft limits".into()));
         let text = serde_json::to_string(&outcome).unwrap();
         assert_eq!(text, r#"{"outcome":"stopped","fault":"soft limits"}"#);
@@ -333,7 +394,7 @@ mod tests {
     fn a_short_peak_is_a_peak_but_no_sustained_force() {
         let mut observation = good();
         observation.samples[650].contact.hand_on_object = [0.0, 30.0, 400.0];
-        let (_, measures) = judge(&observation, &MILESTONES, UPRIGHT, None);
+        let (_, measures) = judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default());
         assert!((measures.contact_peak_n - 30.0).abs() < 1e-12);
         assert!((measures.contact_sustained_n - 5.7).abs() < 1e-9, "{}", measures.contact_sustained_n);
         assert!((measures.contact_median_n - 3.0).abs() < 1e-12);

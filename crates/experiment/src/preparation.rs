@@ -27,6 +27,8 @@ use lab::simulation::Engine;
 
 /// Seed of arm, noise and person while a primitive is made. Experiments begin with 1, so their arms are others.
 const TEACHER_SEED: u64 = 0;
+/// Seeds of further demonstrations begin here: another hand that trembles, on another arm.
+const FURTHER_TEACHINGS: u64 = 2_000_000;
 /// Rest recorded after the simulated teacher has let go, s.
 const POST_ROLL: f64 = 0.5;
 /// Longest demonstration, s.
@@ -123,20 +125,38 @@ impl From<lab::simulation::SimulationError> for PreparationError {
     }
 }
 
-/// Makes the primitive of a scenario on `jobs` processors. `say` hears what is being done; `file` is where it will be
-/// written.
+/// A demonstration: what is taught, and by which of the simulated people, on which of the arms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Teaching {
+    /// Movement that is taught, and the object it is for.
+    pub scenario: Scenario,
+    /// The difference between plant and model.
+    pub plant: PlantKind,
+    /// Which demonstration, from 1. Each has a person who trembles in another way, and an arm of its own.
+    pub number: u64,
+}
+
+impl Teaching {
+    /// Seed of arm, noise and person.
+    fn seed(&self) -> u64 {
+        if self.number <= 1 { TEACHER_SEED } else { FURTHER_TEACHINGS + self.number }
+    }
+}
+
+/// Makes the primitive of a demonstration on `jobs` processors. `say` hears what is being done; `file` is where it will
+/// be written.
 ///
 /// # Errors
 /// [`PreparationError`]
 pub fn make(
-    scenario: Scenario,
-    plant: PlantKind,
+    teaching: Teaching,
     file: &Path,
     jobs: usize,
     interrupt: &Interrupt,
     say: &mut dyn FnMut(&str),
 ) -> Result<PrimitiveFile, PreparationError> {
-    let arm = Arm { engine: Engine::InProcess, kind: plant, variation: Variation::default(), seed: TEACHER_SEED };
+    let Teaching { scenario, plant, .. } = teaching;
+    let arm = Arm { engine: Engine::InProcess, kind: plant, variation: Variation::default(), seed: teaching.seed() };
     say("teaching");
     let recording = teach(scenario, &arm, interrupt)?;
     say("learning");
@@ -198,8 +218,8 @@ fn in_parallel<Item: Sync, Done: Send>(jobs: usize, items: &[Item], work: impl F
 fn teach(scenario: Scenario, arm: &Arm, interrupt: &Interrupt) -> Result<Recording, PreparationError> {
     let movement = scenario.taught_movement();
     let scene = if scenario == Scenario::Bottle { Scene::NOTHING } else { Scene::EMPTY };
-    let mut options = plant::options(arm, TEACHER_SEED, movement.start(), scene);
-    (options.teacher, options.movement) = (Some(TEACHER_SEED), movement);
+    let mut options = plant::options(arm, arm.seed, movement.start(), scene);
+    (options.teacher, options.movement) = (Some(arm.seed), movement);
     let mut client = trial::connect(&options, interrupt)?;
     procedure::make_ready(&mut client, true, |_| {})?;
     procedure::travel(&mut client, movement.start().map(|angle| angle as f32), |_| {})?;

@@ -302,7 +302,7 @@ impl Results {
 type Column = (&'static str, fn(&Report) -> String);
 
 /// All columns of `results.csv`.
-const COLUMNS: [Column; 32] = [
+const COLUMNS: [Column; 33] = [
     ("cell", |r| r.key.index.to_string()),
     ("along_m", |r| number(r.key.cell.along())),
     ("sideways_m", |r| number(r.key.cell.sideways())),
@@ -327,6 +327,7 @@ const COLUMNS: [Column; 32] = [
     ("table_peak_n", |r| number(r.measures.table_peak_n)),
     ("finger_peak_n", |r| number(r.measures.finger_peak_n)),
     ("sag_m", |r| number(r.sag_m)),
+    ("shaking_rad_s", |r| number(r.measures.shaking_rad_s)),
     ("touch_s", |r| optional(r.measures.touch_s)),
     ("closing_s", |r| number(r.measures.closing_s)),
     ("lift_s", |r| number(r.measures.lift_s)),

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::interval::Interval;
 use super::outcome::Outcome;
 use super::quantile::quantile;
 use super::results::{Report, Results};
@@ -41,7 +42,7 @@ pub struct Detection {
     pub successes: usize,
     /// Of these, how many were reported as surprising, at any time.
     pub false_alarms: usize,
-    /// Trials that failed, but for those that a fault of the arm stopped.
+    /// Trials that failed, but for those that a fault of the arm stopped, or in which it shook or did not lift.
     pub failures: usize,
     /// Of these, how many were reported before the lift.
     pub flagged_before_lift: usize,
@@ -85,8 +86,8 @@ impl Detection {
                     detection.false_alarms += usize::from(alarm.is_some());
                     continue;
                 }
-                // A fault of the arm reports itself.
-                Outcome::Stopped(_) => continue,
+                // A fault of the arm reports itself; an arm that shakes or does not lift is none of the watch's.
+                Outcome::Stopped(_) | Outcome::NotLifted | Outcome::Unstable => continue,
                 Outcome::KnockedOver => &mut detection.knocked_over,
                 Outcome::Missed => &mut detection.missed,
                 Outcome::PushedAway => &mut detection.pushed_away,
@@ -119,6 +120,8 @@ pub struct Summary {
     pub seeds: usize,
     /// Cells in which it succeeded, mean over the seeds.
     pub success: f64,
+    /// The same with its interval over the arms; `None` of one arm.
+    pub success_interval: Option<Interval>,
     /// Cells in which it succeeded, seed by seed.
     pub success_by_seed: Vec<usize>,
     /// Objects that were knocked over, mean over the seeds; and so on.
@@ -131,6 +134,10 @@ pub struct Summary {
     pub dropped: f64,
     /// Crushed.
     pub crushed: f64,
+    /// Grasped, but not raised.
+    pub not_lifted: f64,
+    /// Shaken by the arm.
+    pub unstable: f64,
     /// Stopped by a fault.
     pub stopped: f64,
     /// Largest displacement with success in at least half of the seeds, m.
@@ -152,6 +159,8 @@ pub struct Summary {
     pub table_peak_n: Spread,
     /// Distance of the hand below its plan when it has lifted, m.
     pub sag_m: Spread,
+    /// Amplitude of the fast part of the joint speeds, rad/s.
+    pub shaking_rad_s: Spread,
     /// Failure detection.
     pub detection: Detection,
 }
@@ -173,20 +182,22 @@ impl Summary {
             .iter()
             .filter(|report| results.success_share(mode, report.key.index).is_some_and(|share| share >= 0.5))
             .map(|report| report.key.cell.distance());
+        let success_by_seed: Vec<usize> =
+            seeds.iter().map(|seed| count(&|report| report.key.seed == *seed && report.outcome.is_success())).collect();
         Summary {
             mode,
             cells: cells.len(),
             seeds: seeds.len(),
             success: results.success_count(mode),
-            success_by_seed: seeds
-                .iter()
-                .map(|seed| count(&|report| report.key.seed == *seed && report.outcome.is_success()))
-                .collect(),
+            success_interval: Interval::of(std::slice::from_ref(&success_by_seed)),
+            success_by_seed,
             knocked_over: mean("knocked over"),
             missed: mean("missed"),
             pushed_away: mean("pushed away"),
             dropped: mean("dropped"),
             crushed: mean("crushed"),
+            not_lifted: mean("not lifted"),
+            unstable: mean("unstable"),
             stopped: mean("stopped"),
             farthest_success_m: farthest.fold(0.0, f64::max),
             adaptation_m: successes().map(|report| report.adaptation_m).fold(0.0, f64::max),
@@ -199,6 +210,7 @@ impl Summary {
             finger_peak_n: spread(|report| report.measures.finger_peak_n),
             table_peak_n: spread(|report| report.measures.table_peak_n),
             sag_m: spread(|report| report.sag_m),
+            shaking_rad_s: spread(|report| report.measures.shaking_rad_s),
             detection: Detection::of(reports.iter().copied()),
         }
     }

@@ -13,9 +13,10 @@ use super::grid::ApproachFrame;
 use super::inverse;
 use super::observation::{Milestones, Observation};
 use super::observed::{ObservedWorld, Snapshot};
-use super::outcome;
+use super::outcome::{self, ArmConduct};
 use super::plant::{self, Arm};
 use super::results::{Key, PlanarPath, Report, Surprise};
+use super::shaking;
 use super::trace::{Cycle, Trace};
 use lab::client::{Client, Incoming, Interrupt};
 use lab::device::Device;
@@ -191,7 +192,8 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
     let lift = if config.scenario.lifts_itself() { run + rise(&trace, arrived - run) } else { arrived };
     let marks = Milestones { run, lift, hold };
     let (observation, snapshots) = take_observation(&mut client);
-    let (outcome, measures) = outcome::judge(&observation, &marks, config.rule(), fault.as_deref());
+    let conduct = ArmConduct { fault: fault.as_deref(), shaking: shaking::amplitude(&telemetry) };
+    let (outcome, measures) = outcome::judge(&observation, &marks, config.rule(), conduct);
     let movement = config.primitive.movement.duration.min(measures.lift_s);
     let (adaptation_m, adaptation_deg) = trace.adaptation(&prepared.taught, movement);
     let report = Report {

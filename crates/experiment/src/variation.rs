@@ -68,7 +68,13 @@ impl Variation {
         ]
     }
 
-    fn set(&mut self, part: usize, value: f64) {
+    /// Number of the part of this name.
+    pub(crate) fn part(name: &str) -> Option<usize> {
+        PARTS.iter().position(|(known, ..)| *known == name)
+    }
+
+    /// Replaces a part; the value is one that [`FromStr`] accepts for it.
+    pub(crate) fn set(&mut self, part: usize, value: f64) {
         match part {
             0 => self.mass = value,
             1 => self.table_friction = value,
@@ -101,7 +107,7 @@ impl FromStr for Variation {
         let mut variation = Variation::default();
         for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
             let (name, value) = part.split_once('=').ok_or_else(|| format!("'{part}' lacks its value"))?;
-            let Some(index) = PARTS.iter().position(|(known, ..)| *known == name.trim()) else {
+            let Some(index) = Variation::part(name.trim()) else {
                 let known: Vec<&str> = PARTS.iter().map(|(name, ..)| *name).collect();
                 return Err(format!("'{name}' cannot be varied; there are {}", known.join(", ")));
             };

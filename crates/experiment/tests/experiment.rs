@@ -4,13 +4,15 @@
 
 use std::path::Path;
 
+use experiment::preparation::Teaching;
 use experiment::{Config, ExperimentError, Mode, PlantKind, Progress, Scenario, preparation};
 use lab::client::Interrupt;
 use lab::primitive_file::PrimitiveFile;
 
 fn primitive() -> PrimitiveFile {
     let file = Path::new("flashlight.toml");
-    preparation::make(Scenario::Flashlight, PlantKind::Perturbed, file, 2, &Interrupt::never(), &mut |_| {})
+    let teaching = Teaching { scenario: Scenario::Flashlight, plant: PlantKind::Perturbed, number: 1 };
+    preparation::make(teaching, file, 2, &Interrupt::never(), &mut |_| {})
         .expect("the person teaches, and the arm learns")
 }
 

@@ -63,6 +63,7 @@ fn begin(arm: &mut Arm, scenario: &Scenario, with_faults: bool) -> Result<(), Fa
         From::Gravity => arm.gravity()?,
         From::Approach => arm.approach(GOAL.map(|angle| angle as f32), 0.0)?,
         From::Run => arm.run(&Name::new(&movement().name)?, scenario.mode.options())?,
+        From::Lowering => arm.release()?,
     }
     let wanted = match scenario.from {
         From::PowerUp => State::Idle,
@@ -70,6 +71,7 @@ fn begin(arm: &mut Arm, scenario: &Scenario, with_faults: bool) -> Result<(), Fa
         From::Hold => State::Hold,
         From::Approach => State::Approach,
         From::Run => State::Run,
+        From::Lowering => State::Lower,
     };
     arm.set_telemetry(1)?;
     let deadline = arm.now() + BEGIN;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use control::{Fault, State};
 use lab::procedure::Mode;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use sim::fault::Injection;
 
 use crate::figure::Figure;
@@ -35,7 +35,7 @@ pub struct Entry {
 }
 
 /// An arm in some state, what befalls it, and what must come of it.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
     /// Name, unique in its entry.
@@ -68,7 +68,7 @@ pub struct Scenario {
 }
 
 /// States in which a scenario begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum From {
     /// Power-up of the device; arm and pucks run already, the safety module is in IDLE. Time 0 is the power-up.
@@ -81,10 +81,12 @@ pub enum From {
     Approach,
     /// In the taught movement, from its first cycle on.
     Run,
+    /// Sinking after a release.
+    Lowering,
 }
 
 /// An order of the host.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Order {
     /// Time, s.
@@ -97,7 +99,7 @@ pub struct Order {
 }
 
 /// Orders a host can give.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Given {
     /// Stop.
@@ -110,12 +112,16 @@ pub enum Given {
     Gravity,
     /// Give up torque.
     Release,
+    /// End the movement so far from the taught place, m, world axes.
+    Goal([f64; 3]),
+    /// Move by this factor faster.
+    Speed(f64),
     /// The host says nothing for so many seconds.
     Silence(f64),
 }
 
 /// Answers of the device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Answer {
     /// Done.
@@ -125,7 +131,7 @@ pub enum Answer {
 }
 
 /// Bars for the outcome of a scenario.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expect {
     /// State at the end of the watch, one of these.
@@ -143,7 +149,7 @@ pub struct Expect {
 }
 
 /// The way back.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Recover {
     /// Rest, activate if need be, clear, hold, back to the start, the whole movement. Nobody may ask for zeroing.
@@ -151,6 +157,8 @@ pub enum Recover {
     Run,
     /// The same, and the device must demand zeroing before it lets the arm hold.
     Zero,
+    /// The same, zeroing if the device demands it.
+    Either,
     /// There is no way back in this scenario.
     None,
 }

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// A measured quantity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Figure {
     /// Largest joint torque on the bus, of what the limiter grants.
@@ -16,6 +16,8 @@ pub enum Figure {
     Belief,
     /// Largest true speed of the hand while no torque is sent and no motor brakes, m/s.
     FreeSpeed,
+    /// The same, from 10 ms after the end of the torque on: so long takes the request for the brakes.
+    FallSpeed,
     /// Number of times the latched fault changed without a clear.
     CausesLost,
     /// Largest difference of a true joint angle from the same scenario without the faults, mrad.
@@ -76,6 +78,7 @@ impl Figure {
             Self::TorqueStep => ("torque step", "of limit"),
             Self::Belief => ("told from true", "mrad"),
             Self::FreeSpeed => ("hand speed in free fall", "m/s"),
+            Self::FallSpeed => ("hand speed in free fall after 10 ms", "m/s"),
             Self::CausesLost => ("causes overwritten", ""),
             Self::Deviation => ("off nominal", "mrad"),
             Self::Tracking => ("tracking", "of nominal"),

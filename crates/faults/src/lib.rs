@@ -12,4 +12,5 @@ pub mod movement;
 pub mod recovery;
 pub mod report;
 pub mod run;
+pub mod storm;
 pub mod watch;

@@ -1,4 +1,5 @@
-//! `faults [--json] [--all] [--folder FOLDER] [ID...]`: runs the fault catalogue, or some of it.
+//! `faults [--json] [--all] [ID...]`: runs the fault catalogue, or some of it.
+//! `faults storm [--runs N] [--seed S]`: runs storms of random faults, the seeds in a row from S on.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -7,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use faults::entry::{Entry, Scenario};
 use faults::run::{self, Verdict};
-use faults::{catalogue, report};
+use faults::{catalogue, report, storm};
 
 /// Scripts, relative to the root of the repository.
 const FOLDER: &str = "tests/faults";
@@ -16,15 +17,17 @@ const FOLDER: &str = "tests/faults";
 const CATALOGUE: &str = "docs/faults.md";
 
 fn main() -> ExitCode {
-    let (mut json, mut all, mut ids) = (false, false, Vec::new());
-    for argument in std::env::args().skip(1) {
-        match argument.as_str() {
-            "--json" => json = true,
-            "--all" => all = true,
-            id => ids.push(id.to_uppercase()),
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let is_good = match words.split_first() {
+        Some((first, rest)) if first == "storm" => storms(rest),
+        _ => {
+            let ids: Vec<String> =
+                words.iter().filter(|word| !word.starts_with('-')).map(|id| id.to_uppercase()).collect();
+            let has = |flag: &str| words.iter().any(|word| word == flag);
+            go(&ids, has("--json"), has("--all"))
         }
-    }
-    match go(&ids, json, all) {
+    };
+    match is_good {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(error) => {
@@ -32,6 +35,34 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Runs storms; one that fails, or that is alone, is told with its seed and as a scenario.
+fn storms(words: &[String]) -> Result<bool, Box<dyn std::error::Error>> {
+    let (mut runs, mut first) = (300_u64, 1_u64);
+    for pair in words.chunks(2) {
+        match pair {
+            [flag, number] if flag == "--runs" => runs = number.parse()?,
+            [flag, number] if flag == "--seed" => first = number.parse()?,
+            _ => return Err(format!("unknown: {}", pair.join(" ")).into()),
+        }
+    }
+    let seeds: Vec<u64> = (first..first.saturating_add(runs)).collect();
+    let mut outcomes = on_every_processor(&seeds, |seed| {
+        let outcome = storm::run(*seed);
+        if runs == 1 || !outcome.verdict.holds() {
+            print!("{}", report::storm(&outcome, runs == 1));
+        }
+        outcome
+    });
+    outcomes.sort_by_key(|outcome| outcome.seed);
+    let failed: Vec<u64> =
+        outcomes.iter().filter(|outcome| !outcome.verdict.holds()).map(|outcome| outcome.seed).collect();
+    eprintln!("{}", report::storms(&outcomes));
+    if !failed.is_empty() {
+        eprintln!("failed: {failed:?}; again: cargo xtask faults storm --runs 1 --seed {}", failed[0]);
+    }
+    Ok(failed.is_empty())
 }
 
 fn go(ids: &[String], json: bool, all: bool) -> Result<bool, Box<dyn std::error::Error>> {
@@ -72,27 +103,35 @@ fn go(ids: &[String], json: bool, all: bool) -> Result<bool, Box<dyn std::error:
     Ok(is_good && failed == 0)
 }
 
-/// Runs the scenarios on every processor; the verdicts in the order of the scenarios.
+/// Runs the scenarios; the verdicts in the order of the scenarios.
 fn run_all(scenarios: &[(&Entry, &Scenario)], tell: impl Fn(&Verdict) + Sync) -> Vec<Verdict> {
-    let next = AtomicUsize::new(0);
-    let done = Mutex::new(Vec::new());
-    std::thread::scope(|scope| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
-            scope.spawn(|| {
-                while let Some((entry, scenario)) = scenarios.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let verdict = run::run(entry, scenario);
-                    tell(&verdict);
-                    if let Ok(mut done) = done.lock() {
-                        done.push(verdict);
-                    }
-                }
-            });
-        }
+    let mut verdicts = on_every_processor(scenarios, |(entry, scenario)| {
+        let verdict = run::run(entry, scenario);
+        tell(&verdict);
+        verdict
     });
-    let mut verdicts = done.into_inner().unwrap_or_default();
     let place = |verdict: &Verdict| {
         scenarios.iter().position(|(entry, scenario)| entry.id == verdict.id && scenario.name == verdict.scenario)
     };
     verdicts.sort_by_key(place);
     verdicts
+}
+
+/// Does a piece of work for every item, on every processor; the results in the order in which they came.
+fn on_every_processor<I: Sync, O: Send>(items: &[I], work: impl Fn(&I) -> O + Sync) -> Vec<O> {
+    let next = AtomicUsize::new(0);
+    let done = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                while let Some(item) = items.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let result = work(item);
+                    if let Ok(mut done) = done.lock() {
+                        done.push(result);
+                    }
+                }
+            });
+        }
+    });
+    done.into_inner().unwrap_or_default()
 }

@@ -18,6 +18,9 @@ const TELEMETRY_AGE: f64 = 0.012;
 /// Torque may still be sent this long after the safety module has taken the arm out of ACTIVE.
 const NOTICE: Ticks = 30 * TICKS_PER_MILLISECOND;
 
+/// Longest time from the end of the torque until the motors brake, s.
+const BRAKES: f64 = 0.01;
+
 /// Speed of the hand is taken over so long a time, s.
 const SPEED_WINDOW: f64 = 0.01;
 
@@ -26,12 +29,23 @@ const SPEED_WINDOW: f64 = 0.01;
 pub fn always(watched: &Watched) -> Figures {
     let sent = bus::sent(&watched.bus);
     let speeds = hand_speeds(&watched.moments);
-    let free = speeds.iter().filter(|(moment, _)| is_free(&sent, moment)).map(|(_, speed)| *speed);
+    let free = |least: f64| {
+        let mut since = None;
+        let mut fastest = 0.0_f64;
+        for (moment, speed) in &speeds {
+            since = if moment.is_free { since.or(Some(moment.time)) } else { None };
+            if since.is_some_and(|since| moment.time - since >= least) {
+                fastest = fastest.max(*speed);
+            }
+        }
+        fastest
+    };
     Figures::from([
         (Figure::Torque, bus::largest(&sent)),
         (Figure::TorqueStep, bus::largest_step(&sent)),
         (Figure::Belief, 1e3 * belief(&watched.moments)),
-        (Figure::FreeSpeed, free.fold(0.0, f64::max)),
+        (Figure::FreeSpeed, free(0.0)),
+        (Figure::FallSpeed, free(BRAKES)),
         (Figure::CausesLost, f64::from(causes_lost(watched))),
         (Figure::TorqueUnasked, f64::from(unasked(&sent, &watched.moments))),
         (Figure::HandSpeed, speeds.iter().map(|(_, speed)| *speed).fold(0.0, f64::max)),
@@ -115,15 +129,6 @@ fn hand_speeds(moments: &[Moment]) -> Vec<(&Moment, f64)> {
     speeds
 }
 
-/// True if every motor is told zero torque at that moment and none brakes: they do unless the safety module is ACTIVE.
-fn is_free(sent: &[Sent], moment: &Moment) -> bool {
-    if moment.safety != SafetyMode::Active {
-        return false;
-    }
-    let later = sent.partition_point(|pair| pair.at <= moment.ticks);
-    later.checked_sub(1).and_then(|last| sent.get(last)).is_some_and(|pair| pair.is_zero)
-}
-
 /// Largest distance of the joint angles told from those that were true a moment before, rad.
 fn belief(moments: &[Moment]) -> f64 {
     let mut worst = 0.0_f64;
@@ -140,11 +145,12 @@ fn belief(moments: &[Moment]) -> f64 {
     worst
 }
 
-/// Changes of a latched fault into another, or none, that no clear explains.
+/// Changes of a latched fault into another, or none, that no person made. A loss that goes on is the same cause.
 fn causes_lost(watched: &Watched) -> u32 {
     let changes = watched.moments.windows(2).filter(|pair| {
         let is_cleared = watched.clears.iter().any(|at| (pair[1].time - at).abs() < 0.1);
-        pair[0].fault != Fault::None && pair[1].fault != pair[0].fault && !is_cleared
+        let goes_on = (pair[0].fault, pair[1].fault) == (Fault::RepliesLost, Fault::RepliesLostForLong);
+        pair[0].fault != Fault::None && pair[1].fault != pair[0].fault && !is_cleared && !goes_on
     });
     changes.count() as u32
 }

@@ -36,11 +36,13 @@ pub fn recover(arm: &mut Arm, way: Recover) -> Result<(), Failure> {
     }
     rest(arm)?;
     let has_zeroed = start_up(arm, way)?;
-    if has_zeroed != (way == Recover::Zero) {
+    if way != Recover::Either && has_zeroed != (way == Recover::Zero) {
         let words = if has_zeroed { "zeroing was demanded" } else { "zeroing was not demanded" };
         return Err(words.into());
     }
     if Fault::from_code(arm.status()?.fault) != Some(Fault::None) {
+        // Activated under a fault, it sinks until it is braked again.
+        rest(arm)?;
         arm.clear_fault().map_err(|error| format!("clear: {error}"))?;
         // A device with a fault goes on asking for IDLE.
         start_up(arm, way)?;
@@ -97,7 +99,7 @@ fn start_up(arm: &mut Arm, way: Recover) -> Result<bool, Failure> {
         let status = arm.status()?;
         match Stage::from_code(status.startup_stage) {
             Some(Stage::WaitingForZero) => {
-                if way == Recover::Zero && !has_zeroed && arm.hold().is_ok() {
+                if way != Recover::Run && !has_zeroed && arm.hold().is_ok() {
                     return Err("hold was accepted before zeroing".into());
                 }
                 if plant(arm).safety_mode() == SafetyMode::Active {

@@ -1,7 +1,12 @@
 //! Verdicts as lines for people.
 
-use crate::entry::Entry;
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::entry::{Entry, Scenario};
 use crate::run::{Judged, Verdict};
+use crate::storm::Outcome;
 
 /// The lines of one scenario.
 #[must_use]
@@ -42,4 +47,49 @@ pub fn elsewhere(entry: &Entry) -> String {
     let parts: Vec<&str> = [tests.as_str(), hardware.as_str()].into_iter().filter(|part| !part.is_empty()).collect();
     let parts = if parts.is_empty() { "nothing shows it yet".to_owned() } else { parts.join("; ") };
     format!("{:4} {}: {parts}\n", entry.id, entry.title)
+}
+
+/// A storm: its faults and orders, what came of it, and with `whole` its scenario for a file of `tests/faults`.
+#[must_use]
+pub fn storm(outcome: &Outcome, whole: bool) -> String {
+    let mut text = lines(&outcome.verdict, whole);
+    if whole {
+        #[derive(Serialize)]
+        struct File<'a> {
+            scenario: [&'a Scenario; 1],
+        }
+        text += &toml::to_string(&File { scenario: [&outcome.scenario] }).unwrap_or_default();
+    } else {
+        text += &format!("       {:?}\n", outcome.scenario.from);
+        let faults = outcome
+            .scenario
+            .inject
+            .iter()
+            .map(|fault| format!("{:.3} s, {:.3} s: {:?}", fault.at, fault.lasts, fault.what));
+        let orders = outcome.scenario.order.iter().map(|order| format!("{:.3} s: {:?}", order.at, order.give));
+        faults.chain(orders).for_each(|line| text += &format!("       {line}\n"));
+    }
+    text
+}
+
+/// Sums over storms: how many, how they ended, how many failed, the worst of each figure that has a bar.
+#[must_use]
+pub fn storms(outcomes: &[Outcome]) -> String {
+    let mut ends: BTreeMap<String, usize> = BTreeMap::new();
+    let mut worst: BTreeMap<&str, (f64, u64)> = BTreeMap::new();
+    for Outcome { seed, verdict, .. } in outcomes {
+        *ends.entry(format!("{} ({})", verdict.state, verdict.fault)).or_default() += 1;
+        for judged in verdict.figures.iter().filter(|judged| judged.bar.is_finite()) {
+            let value = judged.value.unwrap_or(f64::INFINITY);
+            let most = worst.entry(judged.figure).or_insert((value, *seed));
+            if value > most.0 {
+                *most = (value, *seed);
+            }
+        }
+    }
+    let failed = outcomes.iter().filter(|outcome| !outcome.verdict.holds()).count();
+    let mut text = format!("{} storms, {failed} failed\n", outcomes.len());
+    ends.iter().for_each(|(end, count)| text += &format!("{count:6} end in {end}\n"));
+    worst.iter().for_each(|(figure, (value, seed))| text += &format!("{value:9.3} worst {figure} (seed {seed})\n"));
+    text
 }

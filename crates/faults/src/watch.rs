@@ -8,12 +8,13 @@ use lab::error::HostError;
 use lab::simulation::CYCLE_TICKS;
 use lab::transport::Transport as _;
 use link::frame::Decoder;
-use link::{EventKind, HostHello, LINK_VERSION, Reply, Request, SCHEMA_HASH, Statistics, Telemetry, Text};
+use link::{EventKind, Goal, HostHello, LINK_VERSION, Reply, Request, SCHEMA_HASH, Statistics, Telemetry, Text};
 use puck::SafetyMode;
 use sim::{Passage, Ticks};
 
 use crate::bench::{Arm, Failure, plant};
 use crate::entry::{Answer, Given, Order};
+use crate::movement::GOAL;
 
 /// Telemetry missing for so long makes the runner ask for the state.
 const SILENT: f64 = 0.05;
@@ -39,6 +40,8 @@ pub struct Moment {
     pub hand: [f64; 3],
     /// Mode of the safety module.
     pub safety: SafetyMode,
+    /// True if no motor pulls or brakes.
+    pub is_free: bool,
 }
 
 /// Everything seen of one scenario.
@@ -54,7 +57,7 @@ pub struct Watched {
     pub after: Statistics,
     /// Orders that were not answered as they must be.
     pub surprises: Vec<String>,
-    /// Times at which a clear was accepted, s.
+    /// Times at which a person ended a fault, s: with a clear, or by arming again after the safety module's drop.
     pub clears: Vec<f64>,
 }
 
@@ -80,7 +83,8 @@ pub fn watch(arm: &mut Arm, length: f64, orders: &[Order]) -> Result<Watched, Fa
         let now = observer.time(arm);
         if let Some(order) = orders.pop_if(|order| order.at <= now) {
             let answer = observer.give(arm, order.give)?;
-            if order.give == Given::Clear && answer.is_ok() {
+            let arms = matches!(order.give, Given::Hold | Given::Gravity) && observer.fault == Fault::SafetyDropped;
+            if (order.give == Given::Clear || arms) && answer.is_ok() {
                 clears.push(now);
             }
             let expected = match order.answer {
@@ -141,6 +145,12 @@ impl Observer {
             Given::Hold => arm.hold(),
             Given::Gravity => arm.gravity(),
             Given::Release => arm.release(),
+            Given::Speed(factor) => arm.set_speed(factor as f32),
+            Given::Goal(shift) => {
+                let (taught, _) = lab::arm::tool_pose(&GOAL);
+                let position = std::array::from_fn(|axis| (taught[axis] + shift[axis]) as f32);
+                arm.set_goal(Goal { position: Some(position), orientation: None })
+            }
             Given::Silence(seconds) => return self.be_silent(arm, seconds).map(Ok),
         };
         match answer {
@@ -201,10 +211,10 @@ impl Observer {
             (cycle.q.map(f64::from), plan.map(f64::from))
         });
         let plant = plant(arm);
-        let (ticks, safety) = (plant.now(), plant.safety_mode());
+        let (ticks, safety, is_free) = (plant.now(), plant.safety_mode(), plant.is_free());
         let world = plant.world();
         let (q, dq, hand) = (world.joint_positions(), world.joint_velocities(), world.grasp_pose().position);
-        self.moments.push(Moment { time, ticks, state, fault, told, q, dq, hand, safety });
+        self.moments.push(Moment { time, ticks, state, fault, told, q, dq, hand, safety, is_free });
         Ok(())
     }
 }

@@ -8,7 +8,7 @@
 
 mod port;
 
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -115,9 +115,14 @@ impl Flash {
     /// A chip whose content is kept in a file, so that it outlives this program. The file is made if there is none.
     ///
     /// # Errors
-    /// The file cannot be opened or read, or has another size than the flash.
+    /// The file cannot be opened or read, another device uses it, or it has another size than the flash.
     pub fn in_file(path: &Path, times: FlashTimes) -> io::Result<Self> {
         let mut file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
+        // Two devices on one flash would each write what the other does not know.
+        file.try_lock().map_err(|cause| match cause {
+            TryLockError::WouldBlock => io::Error::new(io::ErrorKind::ResourceBusy, "another simulated device uses it"),
+            TryLockError::Error(cause) => cause,
+        })?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
         if bytes.is_empty() {

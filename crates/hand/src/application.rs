@@ -124,6 +124,11 @@ impl Application for HandApplication<'_> {
         Ok(())
     }
 
+    /// Refused: only parts of an image are kept, and a new name would need the check sum of the whole.
+    fn rename(&mut self, _: &Name, _: &Name, _: &mut impl SessionPort<DeviceController>) -> Result<(), Refused> {
+        Err(NO_ARM)
+    }
+
     fn saved(&mut self, _calm: bool, _: &mut impl SessionPort<DeviceController>) -> Option<Saved> {
         let place = self.saved.take()?;
         Some(Saved { outcome: Ok(()), place: u8::try_from(place).ok() })

@@ -327,7 +327,11 @@ fn mark(index: usize, value: f32, tables: &mut FingerTables) {
         60..64 => tables.goal.get_mut(index - 60),
         66 => Some(&mut tables.limit),
         67 => Some(&mut tables.recorded_duration),
+        68 => Some(&mut tables.load_mass),
+        69..72 => tables.load_centre.get_mut(index - 69),
         72 => Some(&mut tables.filter_cut_off),
+        73 => Some(&mut tables.trials),
+        74 => Some(&mut tables.spread_floor),
         _ => None,
     };
     if let Some(place) = place {

@@ -3,7 +3,10 @@
 //! Four point rows of `dmp` without a pose, and the three gauges that bend them. Made from the real numbers of an image
 //! ([`FingerTables`]) when its upload is complete.
 
+use control::model::FINGER_TORQUE_MAX;
+use control::plan::bounds::{self as arm, Quantity};
 use control::plan::load::{LONGEST_MOVEMENT, LoadError, SHORTEST_MOVEMENT};
+use control::plan::primitive::RowGroup;
 use device::PrimitiveTrouble;
 use device::recorded_filter::{self, OtherFilter};
 use dmp::{
@@ -60,6 +63,14 @@ pub struct FingerTables {
     pub limit: f32,
     /// Duration at which the expectation was recorded (s).
     pub recorded_duration: f32,
+    /// Mass (kg) and centre (m) of the load that it was recorded with.
+    pub load_mass: f32,
+    /// See `load_mass`.
+    pub load_centre: [f32; 3],
+    /// Runs behind it.
+    pub trials: f32,
+    /// Smallest relative spread that counts.
+    pub spread_floor: f32,
     /// Cut-off of the filter behind it (Hz).
     pub filter_cut_off: f32,
     /// Kernels of each row.
@@ -87,6 +98,10 @@ impl FingerTables {
         goal: [0.0; DIGITS],
         limit: 0.0,
         recorded_duration: 0.0,
+        load_mass: 0.0,
+        load_centre: [0.0; 3],
+        trials: 0.0,
+        spread_floor: 0.0,
         filter_cut_off: 0.0,
         kernels: 0,
         weights: heapless::Vec::new(),
@@ -117,6 +132,7 @@ impl FingerTables {
                 return Err(Unfit::Movement(LoadError::Primitive(error)));
             }
         }
+        self.check_bounds().map_err(|quantity| Unfit::Movement(LoadError::Bound(quantity)))?;
         let gain = |value: &f32| (0.0..=bounds::LARGEST_COUPLING_GAIN).contains(&f64::from(*value));
         let gains_hold = self.sensitivity.iter().chain(&self.weight).flatten().all(gain);
         if !gains_hold || self.limits().check().is_err() {
@@ -124,7 +140,7 @@ impl FingerTables {
         }
         if !self.expected.is_empty() {
             recorded_filter::check(self.filter_cut_off).map_err(Unfit::Filter)?;
-            let torque = |value: &f32| f64::from(*value).abs() <= bounds::LARGEST_SENSOR_VALUE;
+            let torque = |value: &f32| f64::from(*value).abs() <= FINGER_TORQUE_MAX;
             let duration = f64::from(self.recorded_duration);
             let is_real = duration > 0.0 && duration <= bounds::LONGEST_DURATION;
             if !(is_real && self.expected.iter().flatten().all(torque)) {
@@ -132,6 +148,21 @@ impl FingerTables {
             }
         }
         Ok(())
+    }
+
+    /// The numbers that an arm bounds in the same way.
+    fn check_bounds(&self) -> Result<(), Quantity> {
+        let rows = RowGroup::Hand;
+        if !arm::within(&[self.stiffness, self.damping], arm::GAIN) {
+            return Err(Quantity::Gain(rows));
+        }
+        if !arm::within(&[self.limit], arm::DISPLACEMENT[2]) {
+            return Err(Quantity::Displacement(rows));
+        }
+        if !arm::within(&self.start_velocity, arm::of(&arm::SPEED, rows)) {
+            return Err(Quantity::StartVelocity(rows));
+        }
+        arm::check_marks(self.load_mass, &self.load_centre, self.trials, self.spread_floor)
     }
 
     fn limits(&self) -> DisplacementLimits<Number, DIGITS, 0> {

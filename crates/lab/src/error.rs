@@ -112,7 +112,9 @@ pub enum HostError {
 fn explain(reason: Refusal, detail: [u32; 2]) -> String {
     let [first, second] = detail;
     match reason {
-        Refusal::Busy => format!("{reason}; it can be taken over in {second} ms"),
+        Refusal::Busy => format!(
+            "another program is using the arm: stop it there, or `tactus stop`; if it has fallen silent it gives way in {second} ms"
+        ),
         Refusal::Stale => format!("{reason} ({first} ms, at most {second} ms are allowed)"),
         Refusal::Faulted => match u8::try_from(first).ok().and_then(control::Fault::from_code) {
             Some(fault) => format!("{reason}: {fault}"),

@@ -4,7 +4,7 @@
 //! refusals of the device in their order. `docs/errors.md` is written from this table, from the refusals and from the
 //! faults (`crates/lab/tests/errors.rs`).
 
-use std::fmt;
+use std::{fmt, io};
 
 use link::Refusal;
 
@@ -14,7 +14,7 @@ use link::Refusal;
 pub enum Exit {
     /// A defect of the tool itself.
     Internal = 1,
-    /// The command line is wrong.
+    /// The command line is wrong, or a file it names cannot be read or written.
     Usage = 2,
     /// No such device, or no permission to use it.
     NoDevice = 3,
@@ -137,6 +137,8 @@ error_codes! {
         "tactus plot --demonstration demo.csv --primitive reach.toml --run run.csv --output figure.png";
     FigureFormat = 211: "the format of the figure is unknown", "the file's name ends with another extension",
         "name a file that ends in .png or .svg";
+    NoStudyOfWeights = 270: "the experiment with a weight knows neither demonstrations nor sweeps", "`experiment lift`",
+        "leave out `--demonstrations` and `--sweep`";
     BoardOption = 212: "the emulated board does not take an option, or not this image", "an option of `board:`",
         "the options of `--device board:` are in docs/board-stm32h743.md";
     FlashFile = 213: "the file cannot be used as the device's flash",
@@ -152,6 +154,26 @@ error_codes! {
     AttachMayReset = 223: "attaching the debug probe can restart the board", "`logs` on a live board without leave",
         "take the torque from the arm (Shift-Idle), then `tactus logs --attach-may-reset`; better, start it before \
          the arm is switched on: once attached it only reads";
+    WouldReplace = 230: "something else of that name is there already",
+        "an earlier version in the device, or an earlier file",
+        "choose another name; `--force` replaces it";
+    OutputNotAFile = 231: "the place of the file to be written is taken by something else",
+        "a folder, a device, a pipe, or a link to nothing", "name a file";
+    OutputIsInput = 232: "the file to be written is one that the command reads", "the same file is named twice",
+        "name another file for the output";
+    FileMissing = 233: "a file or folder does not exist", "a misspelt name", "check the name; `ls` lists what is there";
+    FileNotPermitted = 234: "the system does not permit the use of a file or folder",
+        "a read-only folder or file system, or another user's file", "check its rights with `ls -l`, or name another";
+    DiskFull = 235: "there is no room left to write", "the disk, the quota or the limit for a file is used up",
+        "make room, or name a file on another disk";
+    FileFailed = 236: "the system cannot read or write a file", "the disk, or a folder where a file is expected",
+        "read the cause; name another file";
+    ChangeTooLate = 237: "a change comes after the end of the run", "the time of `--goal-at` or `--speed-at`",
+        "give a time within the run";
+    NoTerminal = 240: "there is no terminal to draw on", "standard output is a file or a pipe",
+        "run it in a terminal, or with `--json` for a line ten times a second";
+    UnknownCode = 241: "there is no error or fault of that name", "a misspelt code",
+        "docs/errors.md lists them all; for example `tactus explain E504`";
     DeviceNotFound = 301: "there is no such device", "cable, power, or a misspelt port",
         "check cable and name of the device; for a simulated arm use `--device sim:`";
     PermissionDenied = 302: "no permission to use the device",
@@ -244,6 +266,8 @@ error_codes! {
     LearnedInvalid = 624: "what was learned is no valid primitive",
         "a bound of the primitive is exceeded; the message names it",
         "show the movement again, or change the option that the message names";
+    FitPoor = 625: "the primitive does not reproduce the demonstration",
+        "too few kernels for so long or so fast a movement", "more kernels (`--kernels 100`), or learn it in two parts";
     PrimitiveUnreadable = 630: "the file is no primitive", "the file does not exist, or is of another kind",
         "`tactus learn DEMO -o FILE` writes a primitive";
     CheckFailed = 631: "the check of the primitive failed", "the movement comes too near to a limit of the arm",
@@ -259,8 +283,12 @@ error_codes! {
         "record it with `tactus rehearse`, or run with `--mode open-loop`";
     ExpectationSpeed = 636: "the expected force was recorded at a speed too different", "`--speed`",
         "run at the speed of the rehearsal, or rehearse at this one";
+    GoalMissed = 637: "the arm did not reach its goal",
+        "something was in the way, or the goal is out of the arm's reach", "`tactus plot --run FILE` shows where it went";
     NotRemembered = 640: "nothing could be remembered from the recordings",
         "they are of another movement, or too few", "give recordings of this primitive, all at the same speed";
+    RecordingOfOthers = 641: "the recordings are not of the same movement", "another file was meant",
+        "give recordings of this primitive; their first lines name it";
     ImageInvalid = 651: "the image to be uploaded is not sound", "a defect of the tool",
         "make the primitive again with `tactus learn`";
     ReadBackDiffers = 652: "reading the primitive back gave other bytes", "the device's storage, or the line",
@@ -307,6 +335,18 @@ error_codes! {
 }
 
 impl ErrorCode {
+    /// The reason for which the system refuses a file, where it says one that a person can do something about.
+    #[must_use]
+    pub fn of_file(cause: &io::Error) -> Option<Self> {
+        Some(match cause.kind() {
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Self::FileMissing,
+            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => Self::FileNotPermitted,
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => Self::DiskFull,
+            io::ErrorKind::IsADirectory => Self::FileFailed,
+            _ => return None,
+        })
+    }
+
     /// Exit code of a command that fails with it: the hundreds of the number.
     #[must_use]
     pub const fn exit(self) -> Exit {

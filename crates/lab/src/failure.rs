@@ -2,6 +2,7 @@
 
 use std::error::Error;
 use std::fmt::{self, Write as _};
+use std::path::PathBuf;
 
 use serde_json::json;
 
@@ -18,6 +19,8 @@ pub struct Failure {
     pub cause: Box<dyn Error + Send + Sync>,
     /// A command or an action that helps.
     pub help: Option<String>,
+    /// What was recorded before the failure.
+    pub kept: Option<PathBuf>,
     /// Data found before the failure, for `--json`.
     pub data: Option<serde_json::Value>,
 }
@@ -26,13 +29,38 @@ impl Failure {
     /// A failure with its reason; its help is what the code advises.
     pub fn new(code: ErrorCode, doing: impl Into<String>, cause: impl Into<Box<dyn Error + Send + Sync>>) -> Failure {
         let help = Some(code.remedy()).filter(|remedy| !remedy.is_empty()).map(str::to_owned);
-        Failure { code, doing: doing.into(), cause: cause.into(), help, data: None }
+        Failure { code, doing: doing.into(), cause: cause.into(), help, kept: None, data: None }
+    }
+
+    /// The failure of a file: with the number of the system's reason where `cause` comes from one, else `otherwise`.
+    pub fn of_file(
+        otherwise: ErrorCode,
+        doing: impl Into<String>,
+        cause: impl Into<Box<dyn Error + Send + Sync>>,
+    ) -> Failure {
+        let cause = cause.into();
+        let mut link: Option<&(dyn Error + 'static)> = Some(&*cause);
+        let mut code = otherwise;
+        while let Some(error) = link {
+            if let Some(found) = error.downcast_ref().and_then(ErrorCode::of_file) {
+                code = found;
+            }
+            link = error.source();
+        }
+        Failure::new(code, doing, cause)
     }
 
     /// The same with a hint that knows more than the code.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Failure {
         self.help = Some(help.into());
+        self
+    }
+
+    /// The same with what was recorded before it.
+    #[must_use]
+    pub fn kept(mut self, file: impl Into<PathBuf>) -> Failure {
+        self.kept = Some(file.into());
         self
     }
 
@@ -54,6 +82,9 @@ impl Failure {
                 "help": self.help,
             }
         });
+        if let Some(kept) = &self.kept {
+            object["error"]["kept"] = json!(kept.display().to_string());
+        }
         if let Some(data) = &self.data {
             object["result"] = data.clone();
         }
@@ -82,6 +113,9 @@ impl fmt::Display for Failure {
         let mut text = format!("error[{}]: {}: {}", self.code, self.doing, self.cause);
         for cause in self.causes() {
             write!(text, "\n  because: {cause}")?;
+        }
+        if let Some(kept) = &self.kept {
+            write!(text, "\n  kept: what was recorded until then is in {}", kept.display())?;
         }
         if let Some(help) = &self.help {
             write!(text, "\n  help: {help}")?;

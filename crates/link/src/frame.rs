@@ -12,6 +12,8 @@
 //! version and its schema hash: both sides must be able to say that they do not fit, and a dropped hello looks like a
 //! dead line.
 //!
+//! The two time limits of the link are here as well: [`REQUEST_AGE_LIMIT_MS`] and [`LINK_TIMEOUT_MS`].
+//!
 //! Invariants: [`Decoder`] takes any bytes in any portions, never panics, needs constant memory, and counts
 //! every non-empty run between zero bytes exactly once, as accepted or under its reason.
 

@@ -261,6 +261,16 @@ pub enum Request {
     },
     /// Forgets that home: the model's counts again. Refused while the arm has torque, answered when it is durable.
     ForgetCalibration,
+    /// Opens the session of an observer, beside that of the host that commands: it may look and stop, nothing else.
+    /// Answer: [`Reply::Hello`].
+    Observe(HostHello),
+    /// Gives a stored primitive another name. Answered when it is durable.
+    Rename {
+        /// Name of the primitive.
+        name: Name,
+        /// Its name from then on; none that the store holds.
+        to: Name,
+    },
 }
 
 impl Request {
@@ -299,7 +309,9 @@ impl Request {
             // Only the next zeroing uses what they change, and that moves.
             | Self::Calibration
             | Self::Calibrate { .. }
-            | Self::ForgetCalibration => false,
+            | Self::ForgetCalibration
+            | Self::Observe(_)
+            | Self::Rename { .. } => false,
         }
     }
 
@@ -336,6 +348,8 @@ impl Request {
             Self::Calibration => "calibration",
             Self::Calibrate { .. } => "calibrate",
             Self::ForgetCalibration => "forget calibration",
+            Self::Observe(_) => "observe",
+            Self::Rename { .. } => "rename",
         }
     }
 }

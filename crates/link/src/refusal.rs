@@ -105,11 +105,15 @@ pub enum Refusal {
     HomeImplausible,
     /// The arm has torque. `detail` = state code.
     HasTorque,
+    /// The host observes: it may look and stop, nothing else.
+    Observing,
+    /// Another primitive in the store has this name.
+    NameTaken,
 }
 
 impl Refusal {
     /// Every refusal, in the order of its code.
-    pub const ALL: [Self; 47] = [
+    pub const ALL: [Self; 49] = [
         Self::LinkVersion,
         Self::Schema,
         Self::Model,
@@ -157,6 +161,8 @@ impl Refusal {
         Self::NoArm,
         Self::HomeImplausible,
         Self::HasTorque,
+        Self::Observing,
+        Self::NameTaken,
     ];
 
     /// Number on the wire.
@@ -216,6 +222,8 @@ impl Refusal {
             Self::NoArm => "the device drives a hand alone, without an arm",
             Self::HomeImplausible => "the home posture cannot be that of this arm",
             Self::HasTorque => "the arm has torque",
+            Self::Observing => "an observer may look and stop, nothing else",
+            Self::NameTaken => "the device stores another primitive of that name",
         }
     }
 
@@ -238,7 +246,7 @@ impl Refusal {
             Self::State => "stop the present motion first: `tactus stop`",
             Self::CommandQueueFull => "send the request again",
             Self::NoSuchPrimitive => "`tactus list` shows what is stored; `tactus upload` adds one",
-            Self::StoreFull => "delete a primitive that is no longer needed",
+            Self::StoreFull => "`tactus list` shows what is stored; `tactus delete NAME` frees a place",
             Self::ImageTooLarge => "learn the primitive with fewer kernels, or leave out its expectation",
             Self::NoUpload | Self::UploadOrder | Self::UploadIncomplete | Self::UploadCrc => "start the upload again",
             Self::ImageInvalid | Self::ImageName => "make the image again with `tactus upload`",
@@ -265,6 +273,8 @@ impl Refusal {
             Self::NoArm => "ask the device that drives the arm",
             Self::HomeImplausible => "measure that joint again; angles are in rad, from J1 to J7",
             Self::HasTorque => "support the arm, press Shift+Idle on the pendant, then try again",
+            Self::Observing => "connect as the host that commands",
+            Self::NameTaken => "choose another name, or delete that primitive first: `tactus delete NAME`",
         }
     }
 }

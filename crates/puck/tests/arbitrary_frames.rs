@@ -15,6 +15,11 @@ fn any_frame() -> impl Strategy<Value = CanFrame> {
         .prop_map(|(id, data)| CanFrame::from_slice(CanId::new(id).expect("eleven bits"), &data).expect("a frame"))
 }
 
+/// Number of random cases: that of the environment variable, which `cargo xtask fuzz` sets, or `usual`.
+fn cases(variable: &str, usual: u32) -> u32 {
+    std::env::var(variable).ok().and_then(|number| number.parse().ok()).unwrap_or(usual)
+}
+
 fn any_node() -> impl Strategy<Value = Node> {
     (1..=31_u8).prop_map(|number| Node::new(number).expect("a node"))
 }
@@ -88,7 +93,7 @@ fn the_unsolicited_broadcasts_of_the_safety_module_are_recognised() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(20_000))]
+    #![proptest_config(ProptestConfig::with_cases(cases("TACTUS_FUZZ_FRAMES", 20_000)))]
 
     #[test]
     fn a6_any_frame_is_read_or_refused_and_never_panics(frame in any_frame(), word in any::<i32>()) {
@@ -110,6 +115,11 @@ proptest! {
         prop_assert_eq!(Request::decode(&foreign), request);
         prop_assert_eq!(CanFrame::copy_of(&foreign), Some(frame));
     }
+
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(20_000))]
 
     #[test]
     fn requests_round_trip(to in any_destination(), property in any_property(), value in any::<i32>()) {

@@ -8,7 +8,7 @@ use crate::time::{TICKS_PER_MILLISECOND, Ticks};
 use puck::SafetyMode;
 
 /// An action of the operator at the pendant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PendantAction {
     /// Hits the E-stop button; it latches. Motor power is cut at once.

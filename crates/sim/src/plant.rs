@@ -19,7 +19,7 @@ use crate::link_wire::{LinkLine, SerialLine};
 use crate::motors::Motors;
 use crate::noise::Noise;
 use crate::operator::{Operator, OperatorConfig, PendantAction};
-use crate::puck_model::{Puck, PuckConfig};
+use crate::puck_model::{Drive, Puck, PuckConfig};
 use crate::safety::{SafetyConfig, SafetyModule};
 use crate::speed::SpeedMonitor;
 use crate::time::{STEP_TICKS, TICKS_PER_SECOND, Ticks};
@@ -303,6 +303,12 @@ impl Plant {
     #[must_use]
     pub fn safety_mode(&self) -> SafetyMode {
         self.safety.mode()
+    }
+
+    /// True if no motor of the arm pulls or brakes.
+    #[must_use]
+    pub fn is_free(&self) -> bool {
+        self.pucks.iter().all(|puck| puck.drive(self.now) == Drive::Torque(0))
     }
 
     /// Both pendants.

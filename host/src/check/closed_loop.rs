@@ -9,17 +9,26 @@ use control::units::{JointVelocities, Vector7};
 use control::{BusSample, Command, Cycle, CycleInput, CycleRecord, Event, Fault, RunOptions, State, flags};
 use puck::SafetyMode;
 
+use super::Course;
 use super::plant::Plant;
 use lab::arm;
 use lab::boxed::boxed;
 use lab::plan::PERIOD;
 use lab::primitive_file::HostPrimitive;
+use lab::procedure::{Change, ChangeKind};
 
 /// Time in which the arm is taken up and comes to rest before the run begins: 1.5 s, in control periods.
 const SETTLING: u64 = periods(1.5) as u64;
 
 /// Cycles that a run may take beyond its duration: the cycle settles for 1 s and gives up at 1.5 durations.
 const OVERTIME: f64 = 1.5;
+
+/// Longest time that a goal takes to a new place: 30 s, after which the control code leaves it.
+const GOAL_CHANGE: f64 = 30.0;
+
+fn goal(goal: &link::Goal) -> control::Goal {
+    control::Goal { position: goal.position, orientation: goal.orientation }
+}
 
 /// One cycle of the run.
 #[derive(Debug, Clone, Copy)]
@@ -68,8 +77,9 @@ pub(super) struct ClosedLoop {
 }
 
 impl ClosedLoop {
-    /// Plays the primitive at `speed` times its taught speed; `progress` hears the fraction done now and then.
-    pub(super) fn play(primitive: &HostPrimitive, speed: f64, mut progress: impl FnMut(f64)) -> ClosedLoop {
+    /// Plays the primitive as it will be run; `progress` hears the fraction done now and then.
+    pub(super) fn play(primitive: &HostPrimitive, course: &Course, mut progress: impl FnMut(f64)) -> ClosedLoop {
+        let speed = course.speed;
         let mut run = ClosedLoop { samples: Vec::new(), ending: Ending::Endless };
         let mut cycle: Box<Cycle<f64>> = boxed(Cycle::init(Calibration::nominal(arm::PAYLOAD), Gains::tuned()));
         let loaded = load::check(cycle.model(), primitive).map(|fit| cycle.load(&fit));
@@ -85,8 +95,13 @@ impl ClosedLoop {
             }
         }
         let mut plant = Plant::at(posture_and_hand(&primitive.movement().start().points).0);
-        let expected = (primitive.movement().duration() / speed / PERIOD).ceil();
-        let last = SETTLING + (expected * (1.0 + OVERTIME)) as u64 + u64::from(periods(3.0));
+        let slowest = course.changes.iter().filter_map(Change::speed).fold(speed, f64::min);
+        let expected = (primitive.movement().duration() / slowest / PERIOD).ceil();
+        let mut last = SETTLING + (expected * (1.0 + OVERTIME)) as u64 + u64::from(periods(3.0));
+        if course.goal != link::Goal::default() || !course.changes.is_empty() {
+            last += u64::from(periods(GOAL_CHANGE)) + expected as u64;
+        }
+        let due = |change: &&Change| SETTLING + 1 + (change.time / PERIOD) as u64;
         for number in 0..last {
             let Some(counts) = plant.counts() else {
                 run.ending = Ending::Diverged;
@@ -94,8 +109,14 @@ impl ClosedLoop {
             };
             let command = match number {
                 1 => Some(Command::Hold),
-                SETTLING => Some(Command::Run(RunOptions { speed: speed as f32, ..RunOptions::default() })),
-                _ => None,
+                SETTLING => {
+                    let (speed, goal) = (speed as f32, goal(&course.goal));
+                    Some(Command::Run(RunOptions { speed, goal, ..RunOptions::default() }))
+                }
+                _ => course.changes.iter().find(|change| due(change) == number).map(|change| match change.kind {
+                    ChangeKind::Goal(new) => Command::SetGoal(goal(&new)),
+                    ChangeKind::Speed(factor) => Command::SetSpeed { factor },
+                }),
             };
             let output = cycle.step(&CycleInput {
                 cycle: number,
@@ -108,7 +129,7 @@ impl ClosedLoop {
                 command,
                 external_fault: None,
             });
-            if let (Some(Event::Refused(reason)), SETTLING) = (output.event, number) {
+            if let (Some(Event::Refused(reason)), SETTLING..) = (output.event, number) {
                 run.ending = Ending::Refused(reason);
                 return run;
             }

@@ -8,8 +8,9 @@ mod closed_loop;
 mod plant;
 
 use control::guard::monitor::TIP_SPEED_LIMIT;
-use control::model::{SOFT_MAX, SOFT_MIN, VELOCITY_MAX};
+use control::model::{FINGER_RANGE, SOFT_MAX, SOFT_MIN, SPREAD_RANGE, VELOCITY_MAX};
 use control::plan::load::{REACH, within_reach};
+use control::plan::primitive::posture_and_hand;
 use serde::Serialize;
 
 use closed_loop::{ClosedLoop, Ending, Sample};
@@ -17,12 +18,21 @@ use lab::arm::TORQUE_LIMITS;
 use lab::demonstration::angle_between;
 use lab::plan;
 use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
+use lab::procedure::{Change, ChangeKind};
 use lab::table::Table;
+use link::Goal;
 
 /// Largest distance of the arm from the goal when the run is over, m.
 pub const GOAL_DISTANCE: f64 = 3e-3;
 /// Largest angle from the goal when the run is over, rad: 1 degree.
 pub const GOAL_ANGLE: f64 = std::f64::consts::PI / 180.0;
+
+/// The digits of the hand and the angles they can have, rad.
+pub const DIGITS: [(&str, [f64; 2]); 4] =
+    [("spread", SPREAD_RANGE), ("finger 1", FINGER_RANGE), ("finger 2", FINGER_RANGE), ("finger 3", FINGER_RANGE)];
+
+/// How far a plan of the hand may go beyond its range, rad: what a smooth plan between two ends of it overshoots by.
+const HAND_SLACK: f64 = 0.05;
 
 /// Which limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -38,6 +48,8 @@ pub enum Limit {
     TipSpeed,
     /// Distance of the planned tool position from the shoulder, m.
     Reach,
+    /// Angle of a digit of the hand, rad.
+    HandPosition,
     /// Distance from the goal at the end of the run, m.
     GoalPosition,
     /// Angle from the goal at the end of the run, rad.
@@ -53,6 +65,7 @@ impl Limit {
             Limit::JointTorque => ("torque", "N m"),
             Limit::TipSpeed => ("elbow/forearm speed", "m/s"),
             Limit::Reach => ("reach", "m"),
+            Limit::HandPosition => ("range", "rad"),
             Limit::GoalPosition => ("goal distance", "m"),
             Limit::GoalOrientation => ("goal angle", "rad"),
         }
@@ -64,7 +77,7 @@ impl Limit {
 pub struct Margin {
     /// The limit.
     pub limit: Limit,
-    /// The joint it concerns, 1 to 7.
+    /// The joint it concerns, 1 to 7; of the hand: spread 1, fingers 2 to 4.
     pub joint: Option<u8>,
     /// The value at the worst moment.
     pub value: f64,
@@ -74,6 +87,19 @@ pub struct Margin {
     pub margin: f64,
     /// When, s since the start of the movement.
     pub time_s: f64,
+}
+
+impl Margin {
+    /// The joint or digit it concerns, as a word; empty for none.
+    fn part(&self) -> String {
+        match (self.limit, self.joint) {
+            (_, None) => String::new(),
+            (Limit::HandPosition, Some(digit)) => {
+                DIGITS.get(usize::from(digit).wrapping_sub(1)).map_or(String::new(), |(name, _)| (*name).to_owned())
+            }
+            (_, Some(joint)) => format!("J{joint}"),
+        }
+    }
 }
 
 /// The result of a check.
@@ -93,6 +119,8 @@ pub struct CheckReport {
     pub duration_s: f64,
     /// Speed factor of the check.
     pub speed: f64,
+    /// Goal of the check instead of the stored one, world frame, m.
+    pub goal_m: Option<[f64; 3]>,
     /// Duration of the checked run until the arm rests at the goal, s.
     pub run_duration_s: f64,
     /// Worst margins.
@@ -131,7 +159,7 @@ impl CheckReport {
             let (name, unit) = margin.limit.name();
             table.row([
                 name.to_owned(),
-                margin.joint.map_or_else(|| "-".to_owned(), |joint| format!("J{joint}")),
+                Some(margin.part()).filter(|part| !part.is_empty()).unwrap_or_else(|| "-".to_owned()),
                 format!("{:.4}", margin.value),
                 format!("{:.4}", margin.bound),
                 format!("{:.4}{}", margin.margin, if margin.margin < 0.0 { " !" } else { "" }),
@@ -160,13 +188,46 @@ impl CheckReport {
     }
 }
 
-/// Checks a primitive that was read from its file at `speed` times the taught speed; `progress` hears the fraction
-/// done now and then.
+/// The run that is checked.
+#[derive(Debug, Clone)]
+pub struct Course {
+    /// Speed relative to the taught one.
+    pub speed: f64,
+    /// Goal from the start on.
+    pub goal: Goal,
+    /// Changes on the way.
+    pub changes: Vec<Change>,
+}
+
+impl Course {
+    /// To the stored goal, at `speed` times the taught speed.
+    pub fn stored(speed: f64) -> Self {
+        Course { speed, goal: Goal::default(), changes: Vec::new() }
+    }
+
+    /// Position of the last goal (m), and its orientation, where they are not the stored ones.
+    fn last_goal(&self) -> Goal {
+        let mut changes = self.changes.clone();
+        changes.sort_by(|a, b| a.time.total_cmp(&b.time));
+        changes.iter().fold(self.goal, |last, change| match change.kind {
+            ChangeKind::Goal(goal) => {
+                Goal { position: goal.position.or(last.position), orientation: goal.orientation.or(last.orientation) }
+            }
+            ChangeKind::Speed(_) => last,
+        })
+    }
+}
+
+/// Checks a primitive that was read from its file for a run; `progress` hears the fraction done now and then.
 ///
 /// # Errors
 /// The file cannot be turned into a primitive or an image at all, or belongs to another model of the arm. Everything
 /// that can be measured is in the report instead.
-pub fn check(file: &PrimitiveFile, speed: f64, progress: impl FnMut(f64)) -> Result<CheckReport, PrimitiveFileError> {
+pub fn check(
+    file: &PrimitiveFile,
+    course: &Course,
+    progress: impl FnMut(f64),
+) -> Result<CheckReport, PrimitiveFileError> {
     file.require_model(control::MODEL_HASH)?;
     let image = file.to_image()?;
     let primitive = file.to_primitive()?;
@@ -174,10 +235,11 @@ pub fn check(file: &PrimitiveFile, speed: f64, progress: impl FnMut(f64)) -> Res
         name: file.name.clone(),
         checksum: format!("0x{:08x}", file.checksum()),
         model_hash: format!("0x{:08x}", file.model_hash),
-        image: (image.len(), format!("0x{:08x}", lab::demonstration::recording::checksum(&image))),
+        image: (image.len(), format!("0x{:08x}", image_checksum(&image))),
         kernels: file.kernels(),
         duration_s: file.movement.duration,
-        speed,
+        speed: course.speed,
+        goal_m: course.last_goal().position.map(|goal| goal.map(f64::from)),
         run_duration_s: 0.0,
         margins: Vec::new(),
         tracking_max_m: 0.0,
@@ -186,20 +248,27 @@ pub fn check(file: &PrimitiveFile, speed: f64, progress: impl FnMut(f64)) -> Res
         violations: Vec::new(),
     };
     check_plan(&primitive, &mut report);
-    let run = ClosedLoop::play(&primitive, speed, progress);
-    check_run(file, &run, &mut report);
+    let run = ClosedLoop::play(&primitive, course, progress);
+    check_run(file, course, &run, &mut report);
     for margin in &report.margins {
         // A NaN is no margin either.
         if margin.margin.is_nan() || margin.margin < 0.0 {
             let (name, unit) = margin.limit.name();
-            let joint = margin.joint.map_or_else(String::new, |joint| format!("J{joint} "));
+            let part = margin.part();
+            let space = if part.is_empty() { "" } else { " " };
             report.violations.push(format!(
-                "{joint}{name}: {:.4} {unit} against {:.4} {unit} at {:.3} s",
+                "{part}{space}{name}: {:.4} {unit} against {:.4} {unit} at {:.3} s",
                 margin.value, margin.bound, margin.time_s
             ));
         }
     }
     Ok(report)
+}
+
+/// Check sum of an image as the device tells it: of everything before the check sum at its end.
+fn image_checksum(image: &[u8]) -> u32 {
+    let sum = image.len().saturating_sub(size_of::<u32>());
+    lab::demonstration::recording::checksum(image.get(..sum).unwrap_or_default())
 }
 
 /// The plan alone: finite everywhere, within reach, ending at its goal.
@@ -225,6 +294,16 @@ fn check_plan(primitive: &lab::primitive_file::HostPrimitive, report: &mut Check
         report.violations.push(format!("the plan is not finite at {:.3} s", reference.time));
         return;
     }
+    for (digit, (_, [min, max])) in DIGITS.into_iter().enumerate() {
+        let (min, max) = (min - HAND_SLACK, max + HAND_SLACK);
+        let margins = references.iter().map(|reference| {
+            let value = posture_and_hand(&reference.points.x).1[digit];
+            let (bound, margin) = if value - min < max - value { (min, value - min) } else { (max, max - value) };
+            let joint = Some(digit as u8 + 1);
+            Margin { limit: Limit::HandPosition, joint, value, bound, margin, time_s: reference.time }
+        });
+        report.margins.extend(margins.min_by(|a, b| a.margin.total_cmp(&b.margin)));
+    }
     let farthest = references.iter().map(|reference| {
         let distance = reference.poses[0].position.x.iter().map(|x| x * x).sum::<f64>().sqrt();
         (reference.time, distance)
@@ -243,7 +322,7 @@ fn check_plan(primitive: &lab::primitive_file::HostPrimitive, report: &mut Check
 }
 
 /// The plan as the arm follows it.
-fn check_run(file: &PrimitiveFile, run: &ClosedLoop, report: &mut CheckReport) {
+fn check_run(file: &PrimitiveFile, course: &Course, run: &ClosedLoop, report: &mut CheckReport) {
     match run.ending {
         Ending::Arrived => {}
         Ending::Unfit(reason) => report.violations.push(format!("the control code refuses the primitive: {reason}")),
@@ -299,8 +378,11 @@ fn check_run(file: &PrimitiveFile, run: &ClosedLoop, report: &mut CheckReport) {
     report.tool_speed_max_m_s = maximum(&|sample| sample.tool_speed);
     report.tracking_max_m = maximum(&|sample| distance(&sample.position, &sample.record.pose_d));
     if run.ending == Ending::Arrived {
-        let away = (0..3).map(|axis| (last.position[axis] - file.goal.position[axis]).powi(2)).sum::<f64>().sqrt();
-        let turned = angle_between(&last.orientation, &file.goal.orientation);
+        let goal = course.last_goal();
+        let place = goal.position.map_or(file.goal.position, |place| place.map(f64::from));
+        let orientation = goal.orientation.map_or(file.goal.orientation, |parts| parts.map(f64::from));
+        let away = (0..3).map(|axis| (last.position[axis] - place[axis]).powi(2)).sum::<f64>().sqrt();
+        let turned = angle_between(&last.orientation, &orientation);
         for (limit, value, bound) in
             [(Limit::GoalPosition, away, GOAL_DISTANCE), (Limit::GoalOrientation, turned, GOAL_ANGLE)]
         {

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::{ErrorCode, Failure, Global};
-use crate::check;
+use crate::check::{self, Course};
 use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
+use link::Goal;
 
 /// Options of `check`.
 #[derive(Debug, Clone, Args)]
@@ -17,6 +18,9 @@ pub struct Cmd {
     /// Speed factor at which it will be run, 0.1 to 2
     #[arg(long, default_value_t = 1.0, value_parser = factor)]
     pub speed: f64,
+    /// Another goal of the grasp point, world frame, m
+    #[arg(long, value_name = "X,Y,Z", value_parser = super::learn::numbers::<3>, allow_hyphen_values = true)]
+    pub goal: Option<[f64; 3]>,
 }
 
 /// Checks the primitive; a violation ends with exit code 6.
@@ -27,7 +31,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let file = PrimitiveFile::read(&command.primitive).map_err(|cause| failure(cause, &command.primitive, "check"))?;
     let bar = output.bar(100, "playing the plan");
-    let report = check::check(&file, command.speed, |fraction| bar.set_position((fraction * 100.0) as u64))
+    let course = Course { goal: goal(command.goal), ..Course::stored(command.speed) };
+    let report = check::check(&file, &course, |fraction| bar.set_position((fraction * 100.0) as u64))
         .map_err(|cause| failure(cause, &command.primitive, "check"))?;
     bar.finish_and_clear();
     if report.passed() {
@@ -58,7 +63,12 @@ pub(super) fn failure(cause: PrimitiveFileError, path: &Path, doing: &str) -> Fa
         PrimitiveFileError::Image { .. } | PrimitiveFileError::Invalid { .. } => ErrorCode::PrimitiveInvalid,
         _ => ErrorCode::PrimitiveUnreadable,
     };
-    Failure::new(code, format!("{doing} refused {}", path.display()), cause)
+    Failure::of_file(code, format!("{doing} refused {}", path.display()), cause)
+}
+
+/// A goal of the grasp point (m), or the stored one.
+pub(super) fn goal(position: Option<[f64; 3]>) -> Goal {
+    Goal { position: position.map(|place| place.map(|value| value as f32)), orientation: None }
 }
 
 /// A speed factor the device takes.

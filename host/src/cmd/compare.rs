@@ -28,9 +28,27 @@ pub struct Cmd {
 /// A recording cannot be read, or lacks what is compared.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let invalid =
-        |cause: Box<dyn std::error::Error + Send + Sync>| Failure::new(ErrorCode::CompareInput, "compare", cause);
+        |cause: Box<dyn std::error::Error + Send + Sync>| Failure::of_file(ErrorCode::CompareInput, "compare", cause);
     let one = Recording::read(&command.one).map_err(|cause| invalid(cause.into()))?;
     let other = Recording::read(&command.other).map_err(|cause| invalid(cause.into()))?;
+    if one.origin.contradicts(&other.origin) {
+        let name =
+            |recording: &Recording| recording.origin.primitive.as_ref().map(ToString::to_string).unwrap_or_default();
+        let text = format!(
+            "{} shows the movement {}, {} shows {}",
+            one.file.display(),
+            name(&one),
+            other.file.display(),
+            name(&other)
+        );
+        return Err(Failure::new(ErrorCode::RecordingOfOthers, "compare refused", text));
+    }
+    for recording in [&one, &other].into_iter().filter(|recording| recording.origin.primitive.is_none()) {
+        global.output().warn(format!("{} does not name its movement", recording.file.display()));
+    }
+    if one.origin.speed != other.origin.speed || one.origin.mode != other.origin.mode {
+        global.output().warn("the runs were made at different speeds or in different modes");
+    }
     let difference = Difference::between(&one, &other, command.contact).map_err(|cause| invalid(cause.into()))?;
     global.output().result(&difference, difference.to_string())
 }

@@ -1,10 +1,12 @@
 //! From the options of the command line to a conversation with a device.
 
-use std::sync::Arc;
-use std::time::Instant;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 
 use device::Stage;
 use link::HomeSource;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
 
 use super::{ErrorCode, Failure, Global, Output};
 use lab::client::{Client, Halted, Interrupt};
@@ -13,6 +15,9 @@ use lab::error::HostError;
 use lab::procedure::{self, ProcedureError, Readiness};
 use lab::simulation::{SimulationError, SimulationOptions};
 use lab::transport::Address;
+
+/// Two signals within this time are one.
+const SAME_SIGNAL: Duration = Duration::from_millis(500);
 
 /// Opens the device that the options name and says hello. Ctrl-C then stops the arm and ends the command.
 ///
@@ -25,6 +30,16 @@ pub(super) fn open(
 ) -> Result<Client<Device>, Failure> {
     let (device, owner) = reach(global, doing, adjust)?;
     let client = Client::connect(device, &owner).map_err(|error| error.into_failure(doing))?;
+    Ok(set_up(client, global))
+}
+
+/// Opens the device that the options name to look on, whoever commands its arm. Nothing can be changed, but stopped.
+///
+/// # Errors
+/// As [`open`]; the device is busy only if too many look on.
+pub(super) fn observe(global: &Global, doing: &str) -> Result<Client<Device>, Failure> {
+    let (device, owner) = reach(global, doing, |_| {})?;
+    let client = Client::observe(device, &owner).map_err(|error| error.into_failure(doing))?;
     Ok(set_up(client, global))
 }
 
@@ -56,6 +71,10 @@ fn reach(
         return Err(Failure::new(ErrorCode::NoDeviceNamed, doing, "no device is named"));
     };
     let address: Address = text.parse().map_err(|error| HostError::Address(error).into_failure(doing))?;
+    let adjust = |options: &mut SimulationOptions| {
+        options.replace_logs = global.force;
+        adjust(options);
+    };
     let device = Device::open(&address, adjust).map_err(|error| match error {
         OpenError::Transport(error) => HostError::Transport(error).into_failure(doing),
         OpenError::Simulation(error) => simulation_failure(error, doing),
@@ -143,7 +162,7 @@ pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
         ProcedureError::Diverted(_) => ErrorCode::Diverted,
         ProcedureError::TooLong { .. } => ErrorCode::TooLong,
         ProcedureError::Hand(_) => ErrorCode::HandNotReady,
-        ProcedureError::Recording(_) => ErrorCode::RecordingNotWritten,
+        ProcedureError::Recording(_) => return Failure::of_file(ErrorCode::RecordingNotWritten, doing, error),
     };
     Failure::new(code, doing, error)
 }
@@ -164,8 +183,11 @@ pub(super) fn simulation_failure(error: SimulationError, doing: &str) -> Failure
             return Failure::new(ErrorCode::SimulatorFailed, doing, error)
                 .help("`cargo xtask board` checks emulator and image");
         }
-        SimulationError::BusLog(..) => ErrorCode::BusLogFile,
-        SimulationError::Flash(..) => ErrorCode::FlashFile,
+        SimulationError::BusLog(cause) => match cause.code() {
+            ErrorCode::FileFailed => ErrorCode::BusLogFile,
+            code => code,
+        },
+        SimulationError::Flash(..) => return Failure::of_file(ErrorCode::FlashFile, doing, error),
         SimulationError::Faults(..) => ErrorCode::FaultScript,
         _ => ErrorCode::SimulatorFailed,
     };
@@ -182,19 +204,24 @@ fn owner(simulated: bool) -> String {
     format!("{user} (process {})", std::process::id())
 }
 
-/// Raised by the first Ctrl-C. A second one ends the process at once.
+/// Raised by the first Ctrl-C, by a terminal that is closed, and by `kill`. A second one ends the process at once,
+/// unless it is the same one, delivered twice: by the terminal and by the program that started this one.
 pub(super) fn interrupt() -> Interrupt {
     let interrupt = Interrupt::never();
     let flag = interrupt.flag();
-    // Registered first, acts last: ends the process only if the flag was already raised.
-    let registered = signal_hook::flag::register_conditional_shutdown(
-        signal_hook::consts::SIGINT,
-        lab::error_code::Exit::Interrupted as i32,
-        Arc::clone(&flag),
-    )
-    .and_then(|_| signal_hook::flag::register(signal_hook::consts::SIGINT, flag));
-    if let Err(cause) = registered {
-        eprintln!("warning: Ctrl-C will not stop the arm before the program ends ({cause})");
+    match Signals::new([SIGINT, SIGTERM, SIGHUP]) {
+        Ok(mut signals) => {
+            std::thread::spawn(move || {
+                let mut first: Option<Instant> = None;
+                for _ in signals.forever() {
+                    if first.get_or_insert_with(Instant::now).elapsed() > SAME_SIGNAL {
+                        std::process::exit(lab::error_code::Exit::Interrupted as i32);
+                    }
+                    flag.store(true, Ordering::SeqCst);
+                }
+            });
+        }
+        Err(cause) => Output::default().warn(format!("Ctrl-C will not stop the arm before the program ends ({cause})")),
     }
     interrupt
 }
@@ -203,12 +230,12 @@ pub(super) fn interrupt() -> Interrupt {
 ///
 /// # Errors
 /// The address is not that of a simulated device, or the simulation cannot be started.
-pub(super) fn simulated(text: &str, doing: &str) -> Result<(Device, Interrupt), Failure> {
+pub(super) fn simulated(text: &str, force: bool, doing: &str) -> Result<(Device, Interrupt), Failure> {
     let address: Address = text.parse().map_err(|error| HostError::Address(error).into_failure(doing))?;
     if !matches!(address, Address::Simulated(..)) {
         return Err(Failure::new(ErrorCode::NotSimulated, doing, format!("'{text}' is not a simulated device")));
     }
-    let device = Device::open(&address, |_| {}).map_err(|error| match error {
+    let device = Device::open(&address, |options| options.replace_logs = force).map_err(|error| match error {
         OpenError::Transport(error) => HostError::Transport(error).into_failure(doing),
         OpenError::Simulation(error) => simulation_failure(error, doing),
     })?;

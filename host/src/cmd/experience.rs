@@ -1,11 +1,11 @@
 //! `tactus experience`: makes the statistics of successful runs, by which the device watches the next runs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
 
-use super::{ErrorCode, Failure, Global, rehearse, upload};
+use super::{ErrorCode, Failure, Global, files, rehearse, upload};
 use lab::demonstration::Recording;
 use lab::learn::memory::remember_successes;
 
@@ -35,12 +35,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let mut file = upload::read(&command.primitive, DOING)?;
     let target = command.output.clone().unwrap_or_else(|| command.primitive.clone());
+    let inputs: Vec<&Path> = command.recordings.iter().map(PathBuf::as_path).collect();
+    let output_file = rehearse::memory_target(&target, &command.primitive, &inputs, global, DOING)?;
     if command.forget {
         file.experience = None;
-        rehearse::write(&file, &target, DOING)?;
+        rehearse::write(&file, output_file, &target, DOING)?;
         let checksum = format!("0x{:08x}", file.checksum());
         return output.result(
-            &json!({ "name": file.name, "file": target, "checksum": checksum, "experience": null }),
+            &json!({ "name": file.name, "file": files::text(&target), "checksum": checksum, "experience": null }),
             format!("{}: without experience; content {checksum}", file.name),
         );
     }
@@ -48,14 +50,17 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut recordings = Vec::new();
     for path in &command.recordings {
         let recording = Recording::read(path)
-            .map_err(|cause| Failure::new(ErrorCode::RecordingInvalid, "experience refused", cause))?;
+            .map_err(|cause| Failure::of_file(ErrorCode::RecordingInvalid, "experience refused", cause))?;
         recordings.push(recording);
         bar.inc(1);
     }
     bar.finish_and_clear();
+    for recording in recordings.iter().filter(|recording| recording.origin.primitive.is_none()) {
+        output.warn(format!("{} does not name its movement", recording.file.display()));
+    }
     let summary = remember_successes(&mut file, &recordings)
         .map_err(|cause| rehearse::memory_failure(cause, "experience: nothing was remembered"))?;
-    rehearse::write(&file, &target, DOING)?;
+    rehearse::write(&file, output_file, &target, DOING)?;
     output.say(format!("wrote {}", target.display()));
     if recordings.len() < dmp::fit::FEWEST_TRIALS {
         output.warn("the spread of fewer than 3 runs is chance: the watch will go by its smallest spread");
@@ -65,7 +70,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     let checksum = format!("0x{:08x}", file.checksum());
     output.result(
-        &json!({ "name": file.name, "file": target, "checksum": checksum, "experience": summary }),
+        &json!({ "name": file.name, "file": files::text(&target), "checksum": checksum, "experience": summary }),
         format!(
             "{}: {} run(s) of {:.2} s, {} points; content {checksum}\n\n{}",
             file.name,

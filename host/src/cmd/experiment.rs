@@ -7,7 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use sim::world::ObjectKind;
 
 use super::{ErrorCode, Failure, Global};
-use experiment::{Grid, Mode, PlantKind, Scenario, Variation};
+use experiment::{Grid, Mode, PlantKind, Scenario, Sweep, Variation};
 
 /// Options of `experiment`.
 #[derive(Debug, Clone, Args)]
@@ -35,6 +35,13 @@ pub struct Cmd {
     /// Try every cell with this seed only
     #[arg(long)]
     pub seed: Option<u64>,
+    /// Teach N times, each time by another person, and try every demonstration on every arm
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100), conflicts_with = "primitive")]
+    pub demonstrations: Option<u64>,
+    /// Repeat with a factor of `--vary` over a range, until less than half is held: `joint-friction=1:0`,
+    /// `bias=0:2:4` (steps)
+    #[arg(long, value_name = "NAME=FROM:TO[:STEPS]")]
+    pub sweep: Option<Sweep>,
     /// The primitive, TOML; without it one is taught, learned and rehearsed first
     #[arg(long, value_name = "FILE")]
     pub primitive: Option<PathBuf>,
@@ -101,7 +108,8 @@ mod work {
     use super::{Cmd, ErrorCode, Failure, Global};
     use crate::cmd::{Output, connection, upload};
     use experiment::lift::{self, Case};
-    use experiment::preparation::{self, PreparationError};
+    use experiment::preparation::{self, PreparationError, Teaching};
+    use experiment::sweep::{self, Point};
     use experiment::trial::TrialError;
     use experiment::{Comparison, Config, Experiment, ExperimentError, Progress, Scenario, figures, map};
     use lab::client::Interrupt;
@@ -117,12 +125,33 @@ mod work {
         let output = global.output();
         let interrupt = connection::interrupt();
         let out = command.out.clone().unwrap_or_else(|| command.scenario.name().into());
+        if command.demonstrations.is_some() || command.sweep.is_some() {
+            return study(command, global, &out, &interrupt, output);
+        }
+        let config = configuration(command, global, &out, 1, &interrupt, output)?;
+        if config.scenario == Scenario::Lift {
+            return lift(&config, command.render, &interrupt, output);
+        }
+        let (experiment, wall) = carry(&config, &interrupt, output)?;
+        let (data, text) = report(&config, &experiment, &out, command.render, output, wall)?;
+        output.result(&data, text)
+    }
+
+    /// The experiment as asked for, with the primitive of the demonstration `number`; results go into `out`.
+    fn configuration(
+        command: &Cmd,
+        global: &Global,
+        out: &Path,
+        number: u64,
+        interrupt: &Interrupt,
+        output: Output,
+    ) -> Result<Config, Failure> {
         let engine = engine(global)?;
-        std::fs::create_dir_all(&out).map_err(|cause| unwritable(&out, cause))?;
-        let primitive = primitive(command, &out, &interrupt, output)?;
+        std::fs::create_dir_all(out).map_err(|cause| unwritable(out, cause))?;
+        let primitive = primitive(command, out, number, interrupt, output)?;
         let usual = Config::new(command.scenario, primitive);
         let grid = command.grid.clone().unwrap_or_else(|| usual.grid.clone());
-        let config = Config {
+        Ok(Config {
             object: command.object.unwrap_or(usual.object),
             grid: grid.moved(command.rotate, command.shift.map(|value| value * 0.01)),
             modes: modes(command).unwrap_or(usual.modes),
@@ -131,20 +160,66 @@ mod work {
             plant: command.plant,
             variation: command.vary,
             jobs: command.jobs.map_or(usual.jobs, usize::from),
-            out: Some(out.clone()),
+            out: Some(out.to_owned()),
             resume: command.resume,
             as_it_is: command.figures_only,
             keep_traces: true,
             keep_recordings: command.keep_recordings,
             ..usual
-        };
-        if config.scenario == Scenario::Lift {
-            return lift(&config, command.render, &interrupt, output);
+        })
+    }
+
+    /// Several demonstrations, or several plants, or both: one experiment for each, and what they say together.
+    fn study(command: &Cmd, global: &Global, out: &Path, interrupt: &Interrupt, output: Output) -> Result<(), Failure> {
+        if command.scenario == Scenario::Lift {
+            let cause = "the experiment with a weight has three cases of its own";
+            return Err(Failure::new(ErrorCode::NoStudyOfWeights, DOING, cause));
         }
-        let (experiment, wall) = carry(&config, &interrupt, output)?;
-        let folder = config.out.as_deref().unwrap_or(&out);
-        let (data, text) = report(&config, &experiment, folder, command.render, output, wall)?;
-        output.result(&data, text)
+        let demonstrations = command.demonstrations.unwrap_or(1);
+        let mut configs = Vec::new();
+        for number in 1..=demonstrations {
+            let folder = if demonstrations > 1 { out.join(format!("demonstration-{number}")) } else { out.to_owned() };
+            configs.push(configuration(command, global, &folder, number, interrupt, output)?);
+        }
+        let name = command.sweep.as_ref().map(|sweep| sweep.name.as_str());
+        let values =
+            command.sweep.as_ref().map_or_else(|| vec![None], |s| s.values.iter().copied().map(Some).collect());
+        let mut points: Vec<Point> = Vec::new();
+        for value in values {
+            let mut point = Point { value, cells: 0, held: Vec::new() };
+            for config in &configs {
+                let mut config = config.clone();
+                if let (Some(sweep), Some(value)) = (&command.sweep, value) {
+                    config.variation = sweep.variation(config.variation, value);
+                    config.out = config.out.map(|out| out.join(format!("{}-{value}", sweep.name)));
+                }
+                let (experiment, wall) = carry(&config, interrupt, output)?;
+                let folder = config.out.clone().unwrap_or_default();
+                report(&config, &experiment, &folder, command.render, output, wall)?;
+                point.add(&experiment.summaries(&config));
+            }
+            points.push(point);
+            output.say(sweep::table(&points, name));
+            if sweep::has_failed(&points) {
+                output.say("less than half of what was held at first: the boundary is found");
+                break;
+            }
+        }
+        let data = serde_json::json!({
+            "experiment": command.scenario, "folder": out, "demonstrations": demonstrations, "sweep": name, "points": points,
+        });
+        let file = out.join("study.json");
+        let json = serde_json::to_string_pretty(&data)
+            .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
+        std::fs::write(&file, json).map_err(|cause| unwritable(&file, cause))?;
+        if let (Some(name), Some(config)) = (name, configs.first()) {
+            let title = format!("{}: held along {name}", config.object.row().title);
+            figures::curve::draw(&points, name, &title).write(out, "sweep").map_err(|cause| {
+                Failure::new(ErrorCode::ExperimentFigure, "experiment: a figure cannot be made", cause)
+            })?;
+            output.say(format!("wrote {}", out.join("sweep.png").display()));
+        }
+        output.result(&data, sweep::table(&points, name))
     }
 
     /// Carries all trials through with a progress bar; gives the time it took as well, s.
@@ -228,7 +303,13 @@ mod work {
     }
 
     /// The primitive that is given, the one that was made here before, or a new one.
-    fn primitive(command: &Cmd, out: &Path, interrupt: &Interrupt, output: Output) -> Result<PrimitiveFile, Failure> {
+    fn primitive(
+        command: &Cmd,
+        out: &Path,
+        number: u64,
+        interrupt: &Interrupt,
+        output: Output,
+    ) -> Result<PrimitiveFile, Failure> {
         if let Some(file) = &command.primitive {
             return upload::read(file, DOING);
         }
@@ -240,7 +321,8 @@ mod work {
         let spinner = output.spinner("teaching");
         let jobs =
             command.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from);
-        let made = preparation::make(command.scenario, command.plant, &file, jobs, interrupt, &mut |doing| {
+        let teaching = Teaching { scenario: command.scenario, plant: command.plant, number };
+        let made = preparation::make(teaching, &file, jobs, interrupt, &mut |doing| {
             spinner.set_message(doing.to_owned());
         })
         .and_then(|mut primitive| {

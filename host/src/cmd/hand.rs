@@ -4,6 +4,8 @@ use clap::{Args, Subcommand};
 use link::HandStage;
 use serde_json::json;
 
+use crate::check::DIGITS;
+
 use super::{ErrorCode, Failure, Global, connection};
 use lab::client::Client;
 use lab::device::Device;
@@ -96,5 +98,11 @@ fn go(client: &mut Client<Device>, target: Posture) -> Result<HandReach, Procedu
 
 /// Four angles separated by commas.
 fn digits(text: &str) -> Result<Posture, String> {
-    super::learn::numbers::<4>(text).map(|angles| angles.map(|angle| angle as f32))
+    let angles = super::learn::numbers::<4>(text)?;
+    for (angle, (digit, [min, max])) in angles.iter().zip(DIGITS) {
+        if !(min..=max).contains(angle) {
+            return Err(format!("{digit}: {angle} rad is outside {min:.2} to {max:.2} rad"));
+        }
+    }
+    Ok(angles.map(|angle| angle as f32))
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use super::{ErrorCode, Failure, Global};
+use super::{ErrorCode, Failure, Global, files};
 use lab::demonstration::{Preparation, Recording};
 use lab::learn::feedback::FeedbackOptions;
 use lab::learn::hand::HandMotion;
@@ -103,20 +103,20 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             limits: Some(command.clamp),
         },
     };
+    let target = files::create(&file, global, &[&command.demonstration], "learn")?;
     let spinner = output.spinner("learning");
     let recording = Recording::read(&command.demonstration)
-        .map_err(|cause| Failure::new(ErrorCode::RecordingInvalid, "learn refused", cause))?;
+        .map_err(|cause| Failure::of_file(ErrorCode::RecordingInvalid, "learn refused", cause))?;
     let learned = learn::learn(&recording, &file, &options).map_err(|error| failure(error, command))?;
-    learned.primitive.write(&file).map_err(|cause| {
-        Failure::new(ErrorCode::PrimitiveNotWritten, "learn: the primitive cannot be written", cause)
-    })?;
+    let text = learned.primitive.checked_text().map_err(|cause| super::check::failure(cause, &file, "learn"))?;
+    files::fill(target, text.as_bytes(), "learn: the primitive cannot be written")?;
     spinner.finish_and_clear();
     for warning in &learned.report.warnings {
         output.warn(warning);
     }
     output.say(format!("wrote {}", file.display()));
     output.result(
-        &json!({ "file": file, "checksum": format!("0x{:08x}", learned.primitive.checksum()), "fit": learned.report }),
+        &json!({ "file": files::text(&file), "checksum": format!("0x{:08x}", learned.primitive.checksum()), "fit": learned.report }),
         learned.report.to_text(),
     )
 }
@@ -137,6 +137,7 @@ fn failure(error: LearnError, command: &Cmd) -> Failure {
         LearnError::Demonstration(_) => ErrorCode::NoDemonstration,
         LearnError::TurnsTooFar { .. } => ErrorCode::TurnsTooFar,
         LearnError::Fit { .. } => ErrorCode::FitFailed,
+        LearnError::Poor { .. } => ErrorCode::FitPoor,
         LearnError::Primitive(_) => ErrorCode::LearnedInvalid,
     };
     let failure = Failure::new(code, "learn refused", error);

@@ -15,9 +15,9 @@ pub struct Cmd {}
 /// The device cannot be reached.
 pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "list";
-    let mut client = connection::open(global, DOING, |_| {})?;
+    let mut client = connection::observe(global, DOING)?;
     let stored = client.list().map_err(|error| error.into_failure(DOING))?;
-    let mut table = Table::new(["name", "duration", "kernels", "bytes", "CRC", "expectation"]);
+    let mut table = Table::new(["name", "duration", "kernels", "bytes", "checksum", "expectation", "in use"]);
     for listing in &stored {
         table.row([
             listing.name.as_str().to_owned(),
@@ -25,7 +25,8 @@ pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
             listing.kernels.to_string(),
             listing.length.to_string(),
             format!("0x{:08x}", listing.crc),
-            if listing.expectation { "yes" } else { "no" }.to_owned(),
+            word(listing.expectation).to_owned(),
+            word(listing.loaded).to_owned(),
         ]);
     }
     let data: Vec<_> = stored
@@ -38,9 +39,15 @@ pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
             })
         })
         .collect();
-    let slots = client.hello().slots;
+    let (taken, places) = (stored.len(), usize::from(client.hello().slots));
+    let free = places.saturating_sub(taken);
+    let help = if free == 0 { "; `tactus delete NAME` frees one" } else { "" };
     global.output().result(
-        &json!({ "primitives": data, "places": slots }),
-        format!("{table}{} of {slots} places taken", stored.len()),
+        &json!({ "primitives": data, "places": places, "free": free }),
+        format!("{table}{taken} of {places} places taken, {free} free{help}"),
     )
+}
+
+fn word(yes: bool) -> &'static str {
+    if yes { "yes" } else { "no" }
 }

@@ -4,18 +4,27 @@ pub mod calibrate;
 pub mod can;
 pub mod check;
 pub mod compare;
+pub mod completions;
 mod connection;
+pub mod delete;
+mod examples;
 pub mod experience;
 pub mod experiment;
+pub mod explain;
+mod files;
 pub mod flash;
+pub mod get;
 pub mod hand;
 pub mod learn;
 pub mod list;
 pub mod logs;
+pub mod monitor;
 pub mod output;
 pub mod plot;
 pub mod record;
 pub mod rehearse;
+pub mod rename;
+pub mod report;
 pub mod run;
 pub mod sim;
 pub mod status;
@@ -23,16 +32,18 @@ pub mod stop;
 pub mod teach;
 pub mod upload;
 
+use std::io::{IsTerminal as _, Write};
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{ArgAction, Args, Parser, Subcommand};
 
 pub use output::Output;
 
 use lab::error_code::ErrorCode;
 use lab::failure::Failure;
 use lab::table::Table;
+use lab::transport::Address;
 
 /// Teach, learn, check, upload, run and watch movement primitives on a Barrett WAM.
 ///
@@ -40,7 +51,7 @@ use lab::table::Table;
 /// 3 device not found, 4 incompatible versions, 5 device refused or faulted, 6 validation failed, 7 link lost,
 /// 130 interrupted after a confirmed stop.
 #[derive(Debug, Parser)]
-#[command(name = "tactus", version, propagate_version = true)]
+#[command(name = "tactus", version, propagate_version = true, disable_help_flag = true, after_help = examples::ALL)]
 pub struct Cli {
     /// Options of every command.
     #[command(flatten)]
@@ -62,6 +73,15 @@ pub struct Global {
     /// Never ask; what would be asked is refused.
     #[arg(long, global = true)]
     pub non_interactive: bool,
+    /// Replace files that exist.
+    #[arg(long, global = true)]
+    pub force: bool,
+    /// Show this help; `--help-all` shows more of it.
+    #[arg(long, short, global = true, action = ArgAction::HelpShort)]
+    pub help: Option<bool>,
+    /// Show the help with every explanation.
+    #[arg(long, global = true, action = ArgAction::HelpLong, hide_short_help = true)]
+    pub help_all: Option<bool>,
     /// The device: `sim:`, `sil:`, `board:`, `serial:PATH`, `can:INTERFACE`, `tcp:HOST:PORT` or `unix:PATH`.
     #[arg(long, global = true, env = "TACTUS_DEVICE", value_name = "DEVICE")]
     pub device: Option<String>,
@@ -71,6 +91,12 @@ pub struct Global {
 }
 
 impl Global {
+    /// True if the device is simulated in this process: nobody else can use it.
+    fn is_simulated_here(&self) -> bool {
+        let address = self.device.as_deref().map(str::parse::<Address>);
+        matches!(address, Some(Ok(Address::Simulated(..))))
+    }
+
     /// Where output goes.
     pub fn output(&self) -> Output {
         Output { json: self.json, quiet: self.quiet }
@@ -81,45 +107,85 @@ impl Global {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Serve a simulated arm to other terminals
+    #[command(after_help = examples::SIM)]
     Sim(sim::Cmd),
     /// Make the arm weightless and record what a person shows
+    #[command(after_help = examples::TEACH)]
     Teach(teach::Cmd),
     /// Make a primitive from a demonstration
+    #[command(after_help = examples::LEARN)]
     Learn(learn::Cmd),
     /// Play a primitive without feedback and remember what it feels like
+    #[command(after_help = examples::REHEARSE)]
     Rehearse(rehearse::Cmd),
     /// Remember successful runs, so that the device notices when one goes wrong
-    #[command(name = "experience")]
+    #[command(name = "experience", after_help = examples::EXPERIENCE)]
     Statistics(experience::Cmd),
     /// Validate a primitive before it moves an arm
+    #[command(after_help = examples::CHECK)]
     Check(check::Cmd),
     /// Put a primitive into the device
+    #[command(after_help = examples::UPLOAD)]
     Upload(upload::Cmd),
     /// List the primitives in the device
+    #[command(after_help = examples::LIST)]
     List(list::Cmd),
+    /// Read a primitive back from the device into a file
+    #[command(after_help = examples::GET)]
+    Get(get::Cmd),
+    /// Give a primitive in the device another name
+    #[command(after_help = examples::RENAME)]
+    Rename(rename::Cmd),
+    /// Delete a primitive in the device
+    #[command(after_help = examples::DELETE)]
+    Delete(delete::Cmd),
     /// Play a primitive on the arm
+    #[command(after_help = examples::RUN)]
     Run(run::Cmd),
     /// Show what the device says of itself and its arm
+    #[command(after_help = examples::STATUS)]
     Status(status::Cmd),
     /// Show or correct where the arm stands when it is zeroed
+    #[command(after_help = examples::CALIBRATE)]
     Calibrate(calibrate::Cmd),
     /// Initialise, open, close or move the hand
+    #[command(after_help = examples::HAND)]
     Hand(hand::Cmd),
     /// Bring the arm to rest
+    #[command(after_help = examples::STOP)]
     Stop(stop::Cmd),
+    /// Watch the arm on one screen, beside whoever commands it
+    #[command(after_help = examples::MONITOR)]
+    Monitor(monitor::Cmd),
     /// Write down what the arm does
+    #[command(after_help = examples::RECORD)]
     Record(record::Cmd),
     /// Write the firmware image to a board
+    #[command(after_help = examples::FLASH)]
     Flash(flash::Cmd),
     /// Show what a device logs
+    #[command(after_help = examples::LOGS)]
     Logs(logs::Cmd),
     /// Try a movement on objects that are not where it expects them
+    #[command(after_help = examples::EXPERIMENT)]
     Experiment(experiment::Cmd),
     /// Draw demonstration, plan and execution
+    #[command(after_help = examples::PLOT)]
     Plot(plot::Cmd),
+    /// Write a page of HTML about one run or several
+    #[command(after_help = examples::REPORT)]
+    Report(report::Cmd),
+    /// Explain an error or a fault
+    #[command(after_help = examples::EXPLAIN)]
+    Explain(explain::Cmd),
+    /// Write what a shell needs to complete command lines
+    #[command(after_help = examples::COMPLETIONS)]
+    Completions(completions::Cmd),
     /// Tell how two recordings of the same movement differ
+    #[command(after_help = examples::COMPARE)]
     Compare(compare::Cmd),
     /// Read logs of the arm's CAN bus, or play them to the device's application
+    #[command(after_help = examples::CAN)]
     Can(can::Cmd),
 }
 
@@ -131,10 +197,14 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Teach(command) => teach::run(&command, &global),
         Command::Upload(command) => upload::run(&command, &global),
         Command::List(command) => list::run(&command, &global),
+        Command::Get(command) => get::run(&command, &global),
+        Command::Rename(command) => rename::run(&command, &global),
+        Command::Delete(command) => delete::run(&command, &global),
         Command::Run(command) => run::run(&command, &global),
         Command::Stop(command) => stop::run(&command, &global),
         Command::Status(command) => status::run(&command, &global),
         Command::Calibrate(command) => calibrate::run(&command, &global),
+        Command::Monitor(command) => monitor::run(&command, &global),
         Command::Record(command) => record::run(&command, &global),
         Command::Learn(command) => learn::run(&command, &global),
         Command::Check(command) => check::run(&command, &global),
@@ -145,19 +215,34 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Logs(command) => logs::run(&command, &global),
         Command::Experiment(command) => experiment::run(&command, &global),
         Command::Plot(command) => plot::run(&command, &global),
+        Command::Report(command) => report::run(&command, &global),
+        Command::Explain(command) => explain::run(&command, &global),
+        Command::Completions(command) => completions::run(&command),
         Command::Compare(command) => compare::run(&command, &global),
         Command::Can(command) => can::run(&command, &global),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
+            // Nobody may be there any more to read it; the exit code still tells.
             if global.json {
-                println!("{}", failure.to_json());
+                let _ = writeln!(std::io::stdout(), "{}", failure.to_json());
             }
-            eprintln!("{failure}");
+            let _ = writeln!(std::io::stderr(), "{failure}");
             ExitCode::from(failure.code.exit() as u8)
         }
     }
+}
+
+/// Asks a person on a terminal; false where nobody may be asked, or for any answer but yes.
+fn ask(global: &Global, question: &str) -> bool {
+    if global.non_interactive || !std::io::stdin().is_terminal() || !std::io::stderr().is_terminal() {
+        return false;
+    }
+    eprint!("{question} [y/N] ");
+    let mut answer = String::new();
+    let read = std::io::stdin().read_line(&mut answer);
+    read.is_ok() && matches!(answer.trim(), "y" | "Y" | "yes")
 }
 
 /// A positive time in seconds.
@@ -180,6 +265,30 @@ mod tests {
     #[test]
     fn command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_help_fits_a_screen_and_has_examples_that_the_tool_takes() {
+        let mut all = Cli::command();
+        all.build();
+        let mut commands = vec![all.clone()];
+        commands.extend(all.get_subcommands().filter(|command| command.get_name() != "help").cloned());
+        for mut command in commands {
+            let name = command.get_name().to_owned();
+            let help = command.render_help().to_string();
+            let lines: usize = help.lines().map(|line| line.chars().count().max(1).div_ceil(120)).sum();
+            assert!(lines <= 60, "{name}: {lines} lines\n{help}");
+            let examples: Vec<&str> = help.lines().map(str::trim).filter(|line| line.starts_with("tactus ")).collect();
+            assert!(!examples.is_empty(), "{name} has no example");
+            for example in examples {
+                let parsed = Cli::try_parse_from(example.split_whitespace());
+                assert!(
+                    parsed.is_ok(),
+                    "{name}: {example}\n{}",
+                    parsed.err().map(|e| e.to_string()).unwrap_or_default()
+                );
+            }
+        }
     }
 
     #[test]

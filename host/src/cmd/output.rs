@@ -1,13 +1,16 @@
 //! The output of a command: data on stdout, words and progress on stderr, JSON when asked.
 
 use std::borrow::Cow;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::{ErrorCode, Failure};
+
+/// The action that fails when standard output does.
+const WRITING: &str = "writing the result to standard output";
 
 /// Where the output of one command goes.
 #[derive(Debug, Clone, Copy, Default)]
@@ -22,30 +25,35 @@ impl Output {
     /// Says something to a person.
     pub fn say(&self, words: impl AsRef<str>) {
         if !self.quiet {
-            eprintln!("{}", words.as_ref());
+            // A terminal that was closed is no reason to end: an arm may be moving.
+            let _ = writeln!(std::io::stderr(), "{}", words.as_ref());
         }
     }
 
     /// Warns, also when quiet.
     pub fn warn(&self, words: impl AsRef<str>) {
-        eprintln!("warning: {}", words.as_ref());
+        let _ = writeln!(std::io::stderr(), "warning: {}", words.as_ref());
     }
 
     /// Writes the result: `data` as one line of JSON, or `text`.
     ///
     /// # Errors
-    /// The output was closed, or the data cannot be expressed in JSON.
+    /// The output cannot take it, or the data cannot be expressed in JSON.
     pub fn result(&self, data: &impl Serialize, text: impl AsRef<str>) -> Result<(), Failure> {
-        let broken = |cause: Box<dyn std::error::Error + Send + Sync>| {
-            Failure::new(ErrorCode::ResultNotWritten, "writing the result", cause)
-        };
         let line: Cow<'_, str> = if self.json {
-            serde_json::to_string(data).map_err(|cause| broken(cause.into()))?.into()
+            serde_json::to_string(data)
+                .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, WRITING, cause))?
+                .into()
         } else {
             text.as_ref().trim_end().into()
         };
         let mut stdout = std::io::stdout().lock();
-        writeln!(stdout, "{line}").and_then(|()| stdout.flush()).map_err(|cause| broken(cause.into()))
+        match writeln!(stdout, "{line}").and_then(|()| stdout.flush()) {
+            // `tactus check FILE | head -1` is a way to use it.
+            Err(cause) if cause.kind() == ErrorKind::BrokenPipe => Ok(()),
+            Err(cause) => Err(Failure::of_file(ErrorCode::ResultNotWritten, WRITING, cause)),
+            Ok(()) => Ok(()),
+        }
     }
 
     /// A bar for work of `steps` steps; it hides itself when stderr is no terminal.

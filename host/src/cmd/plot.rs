@@ -1,16 +1,17 @@
 //! `tactus plot`: one figure of demonstration, plan and execution.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
 
-use super::{ErrorCode, Failure, Global};
+use super::{ErrorCode, Failure, Global, files};
 use lab::demonstration::{Demonstration, Preparation, Recording};
+use lab::output_file::OutputFile;
 use lab::plan;
 use lab::plot::{self, Movement, movement::PosePath};
 use lab::primitive_file::PrimitiveFile;
-use lab::tracking::Tracking;
+use lab::tracking::{ComparisonError, Lack, Tracking};
 
 /// Options of `plot`.
 #[derive(Debug, Clone, Args)]
@@ -45,12 +46,23 @@ pub struct Cmd {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let doing = "plot";
-    let invalid = |cause: Box<dyn std::error::Error + Send + Sync>| Failure::new(ErrorCode::PlotInput, doing, cause);
+    let invalid =
+        |cause: Box<dyn std::error::Error + Send + Sync>| Failure::of_file(ErrorCode::PlotInput, doing, cause);
+    let inputs: Vec<&Path> = [&command.demonstration, &command.primitive, &command.run]
+        .into_iter()
+        .flatten()
+        .map(PathBuf::as_path)
+        .collect();
+    let create = |file: &PathBuf| files::create(file, global, &inputs, doing);
+    let outputs = command.output.iter().map(create).collect::<Result<Vec<_>, _>>()?;
+    let picture_file = command.picture.as_ref().map(create).transpose()?;
+    let mut shown = None;
     let demonstration = match &command.demonstration {
         None => None,
         Some(file) => {
             let preparation = if command.no_trim { Preparation { still_speed: None } } else { Preparation::default() };
             let recording = Recording::read(file).map_err(|cause| invalid(cause.into()))?;
+            shown = Some(recording.checksum);
             Some(Demonstration::prepare(&recording, &preparation).map_err(|cause| invalid(cause.into()))?)
         }
     };
@@ -65,9 +77,22 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         }
     };
     let execution = command.run.as_deref().map(Recording::read).transpose().map_err(|cause| invalid(cause.into()))?;
-    let tracking = match &execution {
+    if let (Some(file), Some(recording)) = (&primitive, &execution) {
+        same_movement(file, recording)?;
+    }
+    if let (Some(file), Some(recording)) = (&primitive, &shown)
+        && file.provenance.as_ref().is_some_and(|from| from.demonstration_checksum != *recording)
+    {
+        output.warn("the primitive was learned from another demonstration than the one that is drawn");
+    }
+    let tracking = match execution.as_ref().map(Tracking::of_run) {
         None => None,
-        Some(recording) => Some(Tracking::of_run(recording).map_err(|cause| invalid(cause.into()))?),
+        Some(Ok(tracking)) => Some(tracking),
+        Some(Err(ComparisonError { lack: Lack::Run, .. })) => {
+            output.warn("nothing was played in this recording: all of it is drawn, without figures of tracking");
+            None
+        }
+        Some(Err(cause)) => return Err(invalid(cause.into())),
     };
     let name = command
         .title
@@ -82,28 +107,53 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         name,
         demonstration: demonstration.as_ref().map(PosePath::of_demonstration),
         plan,
-        execution: execution.map(|recording| recording.running()),
+        execution: execution.map(|recording| if tracking.is_some() { recording.running() } else { recording }),
     };
     let page = movement.page().map_err(|cause| Failure::new(ErrorCode::NothingToDraw, doing, cause))?;
     let spinner = output.spinner("drawing");
-    for file in &command.output {
-        plot::write(&page, file).map_err(|cause| {
+    for (file, output_file) in command.output.iter().zip(outputs) {
+        let bytes = plot::encode(&page, file).map_err(|cause| {
             let is_format = matches!(cause, plot::PlotError::Format { .. });
             let code = if is_format { ErrorCode::FigureFormat } else { ErrorCode::FigureNotWritten };
             Failure::new(code, doing, cause)
         })?;
+        files::fill(output_file, &bytes, doing)?;
     }
     if let (Some(file), Some(run)) = (&command.picture, &movement.execution) {
         spinner.set_message("rendering");
-        picture(run, file)?;
+        let part = picture_file.as_ref().map_or(file.as_path(), OutputFile::part);
+        picture(run, part)?;
+        if let Some(picture_file) = picture_file {
+            picture_file.commit().map_err(|error| files::failure(error, doing))?;
+        }
     }
     spinner.finish_and_clear();
     let files = command.output.iter().chain(&command.picture);
     let text: Vec<String> = files.map(|file| file.display().to_string()).collect();
     output.result(
-        &json!({ "figures": command.output, "picture": command.picture, "tracking": tracking }),
+        &json!({
+            "figures": command.output.iter().map(|file| files::text(file)).collect::<Vec<_>>(),
+            "picture": command.picture.as_deref().map(files::text),
+            "tracking": tracking,
+        }),
         text.join("\n"),
     )
+}
+
+/// Refuses a run of another movement than the primitive's.
+fn same_movement(file: &PrimitiveFile, recording: &Recording) -> Result<(), Failure> {
+    let Some(played) = recording.origin.primitive.as_ref().filter(|played| played.movement != file.movement_checksum())
+    else {
+        return Ok(());
+    };
+    let text = format!(
+        "{} shows the movement {played}, {} is {} 0x{:08x}",
+        recording.file.display(),
+        file.file.display(),
+        file.name,
+        file.movement_checksum()
+    );
+    Err(Failure::new(ErrorCode::RecordingOfOthers, "plot refused", text))
 }
 
 /// Renders the scene at the end of the run, the way of the grasp point, and ghosts of the arm along it.

@@ -1,13 +1,12 @@
 //! `tactus record`: writes down what the arm does, without asking it to do anything.
 
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
 use serde_json::json;
 
+use super::files::{self, RecordingFile};
 use super::{Failure, Global, connection, teach};
 use lab::procedure::{ProcedureError, Recorder};
 
@@ -29,30 +28,37 @@ pub struct Cmd {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "record";
     let output = global.output();
+    let mut file = RecordingFile::create(&command.output, global, &[], DOING)?;
     let started = Instant::now();
-    let mut client = connection::open(global, DOING, |_| {})?;
-    // A simulated device has just been switched on: without this there would be nothing to see.
-    if client.is_simulated() {
+    let mut client = if global.is_simulated_here() {
+        // It has just been switched on: without this there would be nothing to see.
+        let mut client = connection::open(global, DOING, |_| {})?;
         connection::ready(&mut client, false, output, DOING)?;
-    }
-    let failed = |error| connection::failure(error, DOING);
-    let file = File::create(&command.output).map_err(|cause| failed(ProcedureError::Recording(cause)))?;
+        client
+    } else {
+        connection::observe(global, DOING)?
+    };
     let wanted = (command.duration * lab::demonstration::RATE).round() as usize;
     let bar = output.bar(wanted as u64, "recording");
-    let notes = format!("Tactus recording, {} Hz", control::RATE_HZ);
-    let mut recorder = Recorder::start(&mut client, BufWriter::new(file), &notes).map_err(failed)?;
-    while recorder.rows() < wanted {
-        recorder.take(&mut client).map_err(failed)?;
-        bar.set_position(recorder.rows() as u64);
-    }
+    let notes = format!("Tactus recording, {} Hz\n{}", control::RATE_HZ, files::origin(&client, None));
+    file.expect_notes(&notes);
+    let mut record = || -> Result<usize, ProcedureError> {
+        let mut recorder = Recorder::start(&mut client, &mut file.file, &notes)?;
+        while recorder.rows() < wanted {
+            recorder.take(&mut client)?;
+            bar.set_position(recorder.rows() as u64);
+        }
+        let rows = recorder.rows();
+        recorder.finish(&mut client)?;
+        Ok(rows)
+    };
+    let recorded = record();
     bar.finish_and_clear();
-    let rows = recorder.rows();
-    recorder.finish(&mut client).map_err(failed)?;
     let gaps = client.gaps().telemetry;
     connection::tell_speed(&client, started, output);
-    output.say(format!("wrote {}", command.output.display()));
+    let rows = file.end(recorded.map_err(|error| connection::failure(error, DOING)), output)?;
     output.result(
-        &json!({ "file": command.output, "samples": rows, "gaps": gaps }),
+        &json!({ "file": files::text(&command.output), "samples": rows, "gaps": gaps }),
         format!("{rows} samples, {gaps} lost"),
     )
 }

@@ -7,10 +7,12 @@ use clap::{Args, ValueEnum};
 use link::RunOptions;
 use serde::Serialize;
 
-use super::{ErrorCode, Failure, Global, Table, connection, upload};
-use lab::demonstration::{RATE, Recording};
+use super::{ErrorCode, Failure, Global, Table, connection, files, upload};
+use crate::check::Course;
+use lab::demonstration::{Origin, RATE, Recording};
 use lab::learn::memory::{MemoryError, MemorySummary, Payload, remember_rehearsals};
-use lab::primitive_file::PrimitiveFile;
+use lab::output_file::OutputFile;
+use lab::primitive_file::{LARGEST_DURATION_DEVIATION, PrimitiveFile};
 use lab::procedure::{self, CHANNELS, FlagCounts, Mode, ProcedureError};
 
 /// Options of `rehearse`.
@@ -63,7 +65,7 @@ pub struct Report {
     /// Name of the primitive.
     pub name: String,
     /// The file that was written.
-    pub file: PathBuf,
+    pub file: String,
     /// Its check sum.
     pub checksum: String,
     /// The measured wrench and gauges.
@@ -85,17 +87,37 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let mut file = upload::read(&command.primitive, DOING)?;
     let movement = file.without_memory();
-    upload::precheck(&movement, command.speed, output, DOING)?;
+    let recorded = movement.movement.duration / command.speed;
+    if (recorded - movement.movement.duration).abs() > LARGEST_DURATION_DEVIATION * recorded {
+        let text = format!(
+            "at speed {} the movement takes {recorded:.2} s instead of {:.2} s: an expectation more than 50 % apart from \
+             its movement is not kept",
+            command.speed, movement.movement.duration
+        );
+        return Err(Failure::new(ErrorCode::ExpectationSpeed, "rehearse refused", text).help("a speed from 0.5 to 2"));
+    }
+    upload::precheck(&movement, &Course::stored(command.speed), output, DOING)?;
     if let Some(folder) = &command.record_dir {
         std::fs::create_dir_all(folder)
             .map_err(|cause| connection::failure(ProcedureError::Recording(cause), DOING))?;
     }
+    let target = command.output.clone().unwrap_or_else(|| command.primitive.clone());
+    let output_file = memory_target(&target, &command.primitive, &[], global, DOING)?;
+    let trials = 1..=if command.record_dir.is_some() { command.trials } else { 0 };
+    let records: Vec<_> = trials
+        .map(|trial| files::create(&path_of(command, &file.name, trial), global, &[&command.primitive], DOING))
+        .collect::<Result<_, _>>()?;
+    let mut records = records.into_iter();
     let started = Instant::now();
     let mut client = connection::open(global, DOING, |options| surround(options, command.surroundings))?;
     upload::send(&mut client, &movement, output, DOING)?;
     connection::ready(&mut client, command.at_home, output, DOING)?;
-    let simulated = if client.is_simulated() { " (simulated arm)" } else { "" };
-    let notes = format!("Tactus recording of a rehearsal of '{}', {} Hz{simulated}", movement.name, control::RATE_HZ);
+    let origin = Origin {
+        speed: Some(command.speed),
+        mode: Some(Mode::OpenLoop.name().to_owned()),
+        ..files::origin(&client, Some(&movement))
+    };
+    let notes = format!("Tactus recording of a rehearsal of '{}', {} Hz\n{origin}", movement.name, control::RATE_HZ);
     // The same gains and the same pose feedback as in the runs that will compare themselves with this one.
     let options = RunOptions { speed: command.speed as f32, ..Mode::OpenLoop.options() };
     let mut recordings = Vec::new();
@@ -108,15 +130,10 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         });
         bar.finish_and_clear();
         let (bytes, outcome) = played.map_err(|error| connection::failure(error, DOING))?;
-        let path = match &command.record_dir {
-            None => PathBuf::from(format!("rehearsal {trial}")),
-            Some(folder) => {
-                let path = folder.join(format!("{}-{trial}.csv", file.name));
-                std::fs::write(&path, &bytes)
-                    .map_err(|cause| connection::failure(ProcedureError::Recording(cause), DOING))?;
-                path
-            }
-        };
+        let path = path_of(command, &file.name, trial);
+        if let Some(record) = records.next() {
+            files::fill(record, &bytes, DOING)?;
+        }
         let recording = Recording::parse(&path, &bytes).map_err(|cause| {
             Failure::new(ErrorCode::RecordingReadsBackWrong, "rehearse: the recording reads back wrong", cause)
         })?;
@@ -135,8 +152,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         !command.equal_weights,
     )
     .map_err(|cause| memory_failure(cause, "rehearse: nothing was remembered"))?;
-    let target = command.output.clone().unwrap_or_else(|| command.primitive.clone());
-    write(&file, &target, "rehearse")?;
+    write(&file, output_file, &target, DOING)?;
     output.say(format!("wrote {}", target.display()));
     if flags.iter().any(|flags| flags.limited > 0) {
         output.warn("the torque limiter was at work: the arm did not follow its plan everywhere");
@@ -146,7 +162,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     let report = Report {
         name: file.name.clone(),
-        file: target,
+        file: files::text(&target),
         checksum: format!("0x{:08x}", file.checksum()),
         weighted: file.feedback.as_ref().is_some_and(|feedback| feedback.k2.len() > 1),
         expectation: summary,
@@ -156,14 +172,32 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     output.result(&report, report.to_text())
 }
 
+/// Where the recording of a trial goes, or what it is called.
+fn path_of(command: &Cmd, name: &str, trial: u8) -> PathBuf {
+    match &command.record_dir {
+        None => PathBuf::from(format!("rehearsal {trial}")),
+        Some(folder) => folder.join(format!("{name}-{trial}.csv")),
+    }
+}
+
+/// Opens the file for a primitive that learns something: the primitive itself, or another that is not there yet.
+pub(super) fn memory_target(
+    target: &Path,
+    primitive: &Path,
+    inputs: &[&Path],
+    global: &Global,
+    doing: &str,
+) -> Result<OutputFile, Failure> {
+    let force = global.force || target == primitive;
+    OutputFile::create(target, force, inputs).map_err(|error| files::failure(error, doing))
+}
+
 /// Writes a primitive that has learned something.
-pub(super) fn write(file: &PrimitiveFile, target: &Path, doing: &str) -> Result<(), Failure> {
-    let failed = |cause| {
-        Failure::new(ErrorCode::PrimitiveNotWritten, format!("{doing}: the primitive cannot be written"), cause)
-    };
+pub(super) fn write(file: &PrimitiveFile, output: OutputFile, target: &Path, doing: &str) -> Result<(), Failure> {
+    let refused = |cause| super::check::failure(cause, target, doing);
     // What a device would refuse is not written.
-    file.to_image().map_err(|cause| super::check::failure(cause, target, doing))?;
-    file.write(target).map_err(failed)
+    file.to_image().map_err(refused)?;
+    files::fill(output, file.checked_text().map_err(refused)?.as_bytes(), doing)
 }
 
 /// The failure of what could not be remembered.
@@ -177,6 +211,9 @@ pub(super) fn memory_failure(cause: MemoryError, doing: &str) -> Failure {
             "check the force sensor and its cable, and that the hand touches nothing"
         }
         MemoryError::Duration { .. } => "give recordings of this primitive, all at the same speed",
+        MemoryError::Others { .. } => {
+            return Failure::new(ErrorCode::RecordingOfOthers, doing, cause);
+        }
         MemoryError::Table(_) => "give other recordings",
     };
     Failure::new(ErrorCode::NotRemembered, doing, cause).help(help)

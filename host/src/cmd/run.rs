@@ -1,29 +1,38 @@
 //! `tactus run`: the arm plays a primitive, watched and written down.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use link::{Goal, RunOptions, Statistics};
+use control::State;
+use link::{Goal, Name, RunOptions, Statistics};
 use serde::Serialize;
 
-use super::{ErrorCode, Failure, Global, Output, Table, connection, upload};
+use super::files::{self, RecordingFile};
+use super::{ErrorCode, Failure, Global, Output, Table, connection, get, upload};
+use crate::check::Course;
 use lab::client::Client;
-use lab::demonstration::{RATE, Recording};
+use lab::demonstration::{Origin, RATE, Recording};
 use lab::device::Device;
 use lab::primitive_file::PrimitiveFile;
 use lab::procedure::{
-    self, Change, ChangeKind, FlagCounts, Mode, ProcedureError, RunOutcome, RunRequest, Surprise, recording_text,
+    self, Change, ChangeKind, CycleWriter, FlagCounts, Mode, ProcedureError, RunOutcome, RunRequest, Surprise,
+    recording_text,
 };
 use lab::tracking::{HandTracking, Tracking};
 
 /// Rest that is recorded at the goal, s.
 const POST_ROLL: f64 = 1.0;
 
+/// Distance (m) and angle (rad) from the end of its plan within which an arm counts as arrived. Force control leaves the
+/// plan by millimetres where the hand touches something; by more than this it was held up.
+const GOAL_TOLERANCE: (f64, f64) = (0.05, 15.0 * std::f64::consts::PI / 180.0);
+
 /// Options of `run`.
 #[derive(Debug, Clone, Args)]
 pub struct Cmd {
-    /// The primitive, TOML; it is uploaded unless the device has it already
+    /// The primitive: a TOML file, uploaded unless the device has it already, or the name of one in the device
     #[arg(value_name = "PRIMITIVE")]
     pub primitive: PathBuf,
     /// Where the recording goes, CSV (see docs/recording-format.md)
@@ -94,16 +103,16 @@ pub struct Report {
     pub missed_deadlines: u32,
     /// Replies of pucks or sensor that did not come in their cycle.
     pub lost_replies: u32,
-    /// Worst control computation, instructions; 0 where the board cannot tell.
-    pub worst_instructions: u32,
-    /// Mean control computation, instructions.
-    pub mean_instructions: u32,
-    /// Worst control computation by the board's own clock, us.
-    pub worst_computation_us: f64,
-    /// Worst delay from timer to control task, us.
-    pub worst_latency_us: f64,
-    /// Stack used at the most, bytes.
-    pub stack_used: u32,
+    /// Worst control computation, instructions; none where the board cannot tell.
+    pub worst_instructions: Option<u32>,
+    /// Mean control computation, instructions; likewise.
+    pub mean_instructions: Option<u32>,
+    /// Worst control computation by the board's own clock, us; none in this process, where nobody measures.
+    pub worst_computation_us: Option<f64>,
+    /// Worst delay from timer to control task, us; likewise.
+    pub worst_latency_us: Option<f64>,
+    /// Stack used at the most, bytes; likewise.
+    pub stack_used: Option<u32>,
     /// Telemetry left out because the line was full.
     pub telemetry_dropped: u32,
     /// Counters of the simulated bus.
@@ -130,16 +139,30 @@ pub struct BusReport {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "run";
     let output = global.output();
-    let file = upload::read(&command.primitive, DOING)?;
+    let stored = stored_name(&command.primitive);
+    let mut opened = stored.is_some().then(|| open(command, global)).transpose()?;
+    let file = match (&stored, &mut opened) {
+        (Some(name), Some(client)) => get::fetch(client, name, DOING)?,
+        _ => upload::read(&command.primitive, DOING)?,
+    };
     check_expectation(&file, command, output)?;
-    upload::precheck(&file, command.speed, output, DOING)?;
+    let changes = changes(&file, command)?;
+    let course = Course { speed: command.speed, goal: super::check::goal(command.goal), changes };
+    upload::precheck(&file, &course, output, DOING)?;
+    let record = command.record.as_ref().filter(|_| !command.dry_run);
+    let mut record =
+        record.map(|path| RecordingFile::create(path, global, &[&command.primitive], DOING)).transpose()?;
     let started = Instant::now();
-    let mut client = connection::open(global, DOING, |options| {
-        options.bus_log = command.bus_log.clone().or(options.bus_log.take());
-    })?;
+    let mut client = match opened {
+        Some(client) => client,
+        None => open(command, global)?,
+    };
     if command.bus_log.is_some() && client.transport().simulation().is_none() {
         let cause = std::io::Error::other("only a simulated bus can be written down");
         return Err(connection::failure(ProcedureError::Recording(cause), DOING));
+    }
+    if let Some(old) = upload::other_version(&mut client, &file, DOING)? {
+        output.say(format!("replaces another version of '{}' in the device (checksum 0x{:08x})", file.name, old.crc));
     }
     upload::send(&mut client, &file, output, DOING)?;
     output.say(format!("'{}' is in the device", file.name));
@@ -149,22 +172,60 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let ready_s = client.is_virtual().then(|| client.now().as_secs_f64());
-    let report = play(command, &mut client, &file, output).map_err(|error| connection::failure(error, DOING))?;
-    let report = Report { ready_s, ..report };
+    let played = play(command, &mut client, &file, record.as_mut(), output);
     connection::tell_speed(&client, started, output);
-    if let Some(path) = &command.record {
-        output.say(format!("wrote {}", path.display()));
-    }
+    let played = played.map_err(|error| connection::failure(error, DOING));
+    let report = match record {
+        Some(record) => record.end(played, output)?,
+        None => played?,
+    };
+    let report = Report { ready_s, ..report };
     if !client.is_simulated() {
         output.say("the arm holds its goal; `tactus stop` makes it soft");
     }
-    output.result(&report, report.to_text())
+    let Some(missed) = report.tracking.as_ref().and_then(missed) else {
+        return output.result(&report, report.to_text());
+    };
+    if !global.json {
+        output.result(&report, report.to_text())?;
+    }
+    let failure = Failure::new(ErrorCode::GoalMissed, DOING, missed);
+    Err(match serde_json::to_value(&report) {
+        Ok(data) => failure.data(data),
+        Err(_) => failure,
+    })
+}
+
+/// The changes on the way; one that would come after the run is refused.
+fn changes(file: &PrimitiveFile, command: &Cmd) -> Result<Vec<Change>, Failure> {
+    let changes: Vec<Change> = command.goal_at.iter().chain(&command.speed_at).copied().collect();
+    let end = procedure::planned(file.movement.duration, command.speed, &changes);
+    match changes.iter().map(|change| change.time).find(|time| *time >= end) {
+        None => Ok(changes),
+        Some(late) => {
+            let text = format!("a change at {late} s comes too late: the movement takes {end:.2} s");
+            Err(Failure::new(ErrorCode::ChangeTooLate, "run refused", text))
+        }
+    }
+}
+
+/// The name of a primitive in the device, where the argument is that and no file.
+fn stored_name(primitive: &Path) -> Option<Name> {
+    let is_file = primitive.exists() || primitive.extension().is_some_and(|extension| extension == "toml");
+    Name::new(primitive.to_str()?).ok().filter(|_| !is_file)
+}
+
+fn open(command: &Cmd, global: &Global) -> Result<Client<Device>, Failure> {
+    connection::open(global, "run", |options| {
+        options.bus_log = command.bus_log.clone().or(options.bus_log.take());
+    })
 }
 
 fn play(
     command: &Cmd,
     client: &mut Client<Device>,
     file: &PrimitiveFile,
+    record: Option<&mut RecordingFile>,
     output: Output,
 ) -> Result<Report, ProcedureError> {
     let spinner = output.spinner("moving to the start");
@@ -186,21 +247,29 @@ fn play(
     let changes = command.goal_at.iter().chain(&command.speed_at).copied().collect();
     let request = RunRequest { rest: POST_ROLL, changes, ..RunRequest::new(name, file.movement.duration, options) };
 
-    output.say(format!("running '{}' ({})", file.name, command.mode.name()));
-    let notes = notes(client, file);
+    let notes = notes(client, file, command);
+    let mut writer = record.map(|record| start(record, &notes)).transpose()?;
     let bar = output.bar((file.movement.duration / command.speed * RATE) as u64, "running");
-    let mut cycles = Vec::new();
+    let (mut cycles, mut written, mut is_running) = (Vec::new(), Ok(()), false);
     let outcome = procedure::play(client, &request, &mut |cycle| {
+        if !is_running && State::from_code(cycle.state) == Some(State::Run) {
+            is_running = true;
+            bar.suspend(|| output.say(format!("running '{}' ({})", file.name, command.mode.name())));
+        }
         cycles.push(*cycle);
         bar.set_position(cycles.len() as u64);
+        // A disk that is full is no reason to stop an arm: the run goes on, and is told of at its end.
+        if let (Some(writer), Ok(())) = (&mut writer, &written) {
+            written = writer.write(cycle);
+        }
     });
     bar.finish_and_clear();
-    let bytes = recording_text(&cycles, &notes)?;
-    // What led to an early end is worth reading as well.
-    if let Some(path) = &command.record {
-        std::fs::write(path, &bytes)?;
-    }
     let outcome = outcome?;
+    written?;
+    if let Some(writer) = writer {
+        writer.finish()?;
+    }
+    let bytes = recording_text(&cycles, &notes)?;
     tell(&outcome, output);
     let statistics = client.statistics()?;
     report(client, file, command.mode, &bytes, outcome, &statistics)
@@ -271,10 +340,21 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
     Ok(())
 }
 
-fn notes(client: &Client<Device>, file: &PrimitiveFile) -> String {
-    let simulated = if client.is_simulated() { " (simulated arm)" } else { "" };
-    let (rate, board) = (control::RATE_HZ, client.hello().board.as_str());
-    format!("Tactus recording of a run of '{}', {rate} Hz, on {board}{simulated}", file.name)
+/// The notes above a recording of this run.
+fn notes(client: &Client<Device>, file: &PrimitiveFile, command: &Cmd) -> String {
+    let origin = Origin {
+        speed: Some(command.speed),
+        mode: Some(command.mode.name().to_owned()),
+        goal: command.goal,
+        ..files::origin(client, Some(file))
+    };
+    format!("Tactus recording of a run of '{}', {} Hz\n{origin}", file.name, control::RATE_HZ)
+}
+
+/// Begins the file of a recording.
+fn start<'a>(record: &'a mut RecordingFile, notes: &str) -> std::io::Result<CycleWriter<impl Write + use<'a>>> {
+    record.expect_notes(notes);
+    CycleWriter::new(&mut record.file, notes)
 }
 
 fn report(
@@ -291,6 +371,8 @@ fn report(
     let per_tick = u32::from(client.hello().instructions_per_tick);
     let instructions = |ticks: u32| ticks.saturating_mul(per_tick);
     let microseconds = |ticks: u32| f64::from(ticks) * 1e6 / f64::from(ticks_per_second.max(1));
+    let measures = statistics.cost_worst_ticks > 0;
+    let counts = measures && per_tick > 0;
     let gaps = client.gaps().telemetry;
     let bus = client.transport().simulation().map(|simulation| {
         let elapsed = simulation.ticks();
@@ -323,11 +405,11 @@ fn report(
         cycles: statistics.cycles,
         missed_deadlines: statistics.missed_deadlines,
         lost_replies: statistics.lost_replies,
-        worst_instructions: instructions(statistics.cost_worst_ticks),
-        mean_instructions: instructions(statistics.cost_mean_ticks),
-        worst_computation_us: microseconds(statistics.cost_worst_ticks),
-        worst_latency_us: microseconds(statistics.latency_worst_ticks),
-        stack_used: statistics.stack_size.saturating_sub(statistics.stack_free),
+        worst_instructions: counts.then(|| instructions(statistics.cost_worst_ticks)),
+        mean_instructions: counts.then(|| instructions(statistics.cost_mean_ticks)),
+        worst_computation_us: measures.then(|| microseconds(statistics.cost_worst_ticks)),
+        worst_latency_us: measures.then(|| microseconds(statistics.latency_worst_ticks)),
+        stack_used: measures.then(|| statistics.stack_size.saturating_sub(statistics.stack_free)),
         telemetry_dropped: statistics.telemetry_dropped,
         bus,
     })
@@ -362,16 +444,15 @@ impl Report {
         row("samples, lost on the link", format!("{}, {}", self.samples, self.gaps));
         row("samples with limited torque", self.limited_samples.to_string());
         row("surprises", self.surprises.len().to_string());
-        if self.worst_instructions > 0 {
-            row("control cycle, worst", format!("{} instructions", self.worst_instructions));
-            row("control cycle, mean", format!("{} instructions", self.mean_instructions));
-        } else if self.worst_computation_us > 0.0 {
-            row("control cycle, worst", format!("{:.1} us", self.worst_computation_us));
+        if let (Some(worst), Some(mean)) = (self.worst_instructions, self.mean_instructions) {
+            row("control cycle, worst", format!("{worst} instructions"));
+            row("control cycle, mean", format!("{mean} instructions"));
+        } else if let Some(worst) = self.worst_computation_us {
+            row("control cycle, worst", format!("{worst:.1} us"));
         }
-        // In this process nobody measures.
-        if self.worst_computation_us > 0.0 {
-            row("timer latency, worst", format!("{:.1} us", self.worst_latency_us));
-            row("stack used", format!("{} bytes", self.stack_used));
+        if let (Some(latency), Some(stack)) = (self.worst_latency_us, self.stack_used) {
+            row("timer latency, worst", format!("{latency:.1} us"));
+            row("stack used", format!("{stack} bytes"));
         }
         if let Some(bus) = &self.bus {
             row("bus load", format!("{:.1} %", bus.load * 100.0));
@@ -380,6 +461,22 @@ impl Report {
         }
         table.to_string()
     }
+}
+
+/// Words for an arm that rests elsewhere than its plan ends; `None` where it is at its goal.
+fn missed(tracking: &Tracking) -> Option<String> {
+    let (away, turned) = (tracking.position_end_m, tracking.orientation_end_rad);
+    // Not a number is no goal reached either.
+    let is_there = away <= GOAL_TOLERANCE.0 && turned <= GOAL_TOLERANCE.1;
+    (!is_there).then(|| {
+        format!(
+            "the arm ended {:.0} mm and {:.0} degrees away from its goal; at most {:.0} mm and {:.0} degrees count as there",
+            away * 1e3,
+            turned.to_degrees(),
+            GOAL_TOLERANCE.0 * 1e3,
+            GOAL_TOLERANCE.1.to_degrees()
+        )
+    })
 }
 
 /// A time and a goal, as in `3.5:0.7,0.1,0.2`.
@@ -406,6 +503,25 @@ fn timed(text: &str) -> Result<(f64, &str), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_arm_that_ends_away_from_its_goal_has_missed_it_and_the_distance_is_told() {
+        let ended = |position_end_m: f64, orientation_end_rad: f64| {
+            missed(&Tracking {
+                samples: 1,
+                position_rms_m: 0.0,
+                position_max_m: 0.0,
+                position_end_m,
+                orientation_rms_rad: 0.0,
+                orientation_max_rad: 0.0,
+                orientation_end_rad,
+            })
+        };
+        assert_eq!(ended(0.012, 0.05), None);
+        let words = ended(0.22, 75f64.to_radians()).unwrap();
+        assert!(words.contains("220 mm and 75 degrees away"), "{words}");
+        assert!(ended(0.0, 0.3).is_some() && ended(0.06, 0.0).is_some() && ended(f64::NAN, 0.0).is_some());
+    }
 
     #[test]
     fn changes_carry_their_time_and_nonsense_is_refused() {

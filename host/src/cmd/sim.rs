@@ -1,7 +1,10 @@
 //! `tactus sim`: a simulated arm that stays, for other terminals to connect to.
 
-use std::io::{ErrorKind, Read, Write};
+mod party;
+
+use std::io::ErrorKind;
 use std::net::TcpListener;
+use std::os::unix::fs::FileTypeExt;
 use std::os::unix::net::UnixListener;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -12,9 +15,14 @@ use super::{ErrorCode, Failure, Global, connection};
 use lab::client::Interrupt;
 use lab::device::Device;
 use lab::transport::{Address, Transport, TransportError};
+use party::{Party, Peer};
 
 /// Virtual time simulated between two looks at the socket: a human does not notice, a link time-out neither.
 const STRIDE: Duration = Duration::from_millis(5);
+
+/// Bytes that go on to the device in that time: less than its serial line carries (921600 baud), so that none wait in
+/// between and a stop is never behind more than this.
+const STRIDE_BYTES: usize = 440;
 
 /// Options of `sim`.
 #[derive(Debug, Clone, Args)]
@@ -37,66 +45,9 @@ pub struct Cmd {
     pub faults: Option<String>,
 }
 
-/// A connection that can be read without waiting.
-trait Peer: Read + Write {}
-impl<T: Read + Write> Peer for T {}
-
 enum Listener {
     Unix(UnixListener, PathBuf),
     Tcp(TcpListener),
-}
-
-/// Most connections at a time: the host that uses the arm, and others that may stop it. Each further one waits.
-const GUESTS: usize = 4;
-
-/// A message is shorter than this; what is longer without an end is none.
-const LONGEST_MESSAGE: usize = 4096;
-
-/// One connection. The others speak on the same line, so messages go on as wholes.
-struct Guest {
-    peer: Box<dyn Peer>,
-    /// The beginning of a message.
-    begun: Vec<u8>,
-}
-
-impl Guest {
-    /// Messages that have arrived as wholes; `None`: nobody is there any more.
-    fn messages(&mut self) -> Option<Vec<u8>> {
-        let mut buffer = [0; 4096];
-        match self.peer.read(&mut buffer) {
-            Ok(0) => return None,
-            Ok(count) => self.begun.extend_from_slice(&buffer[..count]),
-            Err(error) if error.kind() == ErrorKind::WouldBlock => {}
-            Err(_) => return None,
-        }
-        let end = self.begun.iter().rposition(|byte| *byte == 0).map_or(0, |zero| zero + 1);
-        let messages = self.begun.drain(..end).collect();
-        if self.begun.len() > LONGEST_MESSAGE {
-            self.begun.clear();
-        }
-        Some(messages)
-    }
-}
-
-/// Everybody who is connected.
-#[derive(Default)]
-struct Party(Vec<Guest>);
-
-impl Party {
-    /// Bytes sent to the device; those who are gone leave once their last words are heard.
-    fn hear(&mut self) -> Vec<u8> {
-        let mut said = Vec::new();
-        self.0.retain_mut(|guest| guest.messages().map(|messages| said.extend(messages)).is_some());
-        said
-    }
-
-    /// Hands over what the device says. One that does not read loses bytes, as on a serial line. Nobody leaves here:
-    /// one that has hung up may have said its last words before.
-    fn tell(&mut self, bytes: &[u8]) {
-        for guest in &mut self.0 {
-            let _ = guest.peer.write_all(bytes);
-        }
-    }
 }
 
 /// Serves a simulated arm until it is interrupted.
@@ -115,7 +66,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         let comma = if device.ends_with(':') { "" } else { "," };
         device = format!("{device}{comma}{option}");
     }
-    let (mut device, interrupt) = connection::simulated(&device, DOING)?;
+    let (mut device, interrupt) = connection::simulated(&device, global.force, DOING)?;
     let listener = listen(&command.listen).map_err(|cause| {
         Failure::new(ErrorCode::CannotListen, format!("sim: cannot listen on {}", command.listen), cause)
     })?;
@@ -134,9 +85,10 @@ fn listen(text: &str) -> Result<Listener, Box<dyn std::error::Error + Send + Syn
     match text.parse::<Address>()? {
         Address::Unix(path) => {
             let listener = match UnixListener::bind(&path) {
-                // A socket nobody answers on is the left-over of one that was killed.
+                // A socket nobody answers on is the left-over of one that was killed. Anything else is somebody's.
                 Err(error)
                     if error.kind() == ErrorKind::AddrInUse
+                        && std::fs::symlink_metadata(&path)?.file_type().is_socket()
                         && std::os::unix::net::UnixStream::connect(&path).is_err() =>
                 {
                     std::fs::remove_file(&path)?;
@@ -183,12 +135,12 @@ fn serve(command: &Cmd, device: &mut Device, listener: &Listener, interrupt: &In
         if command.duration.is_some_and(|limit| device.now().as_secs_f64() >= limit) {
             break;
         }
-        while party.0.len() < GUESTS
+        while party.has_room()
             && let Some(peer) = accept(listener).map_err(TransportError::Io)?
         {
-            party.0.push(Guest { peer, begun: Vec::new() });
+            party.welcome(peer);
         }
-        let said = party.hear();
+        let said = party.hear(STRIDE_BYTES);
         if !said.is_empty() {
             device.send(&said)?;
         }
@@ -203,26 +155,4 @@ fn serve(command: &Cmd, device: &mut Device, listener: &Listener, interrupt: &In
         }
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use std::os::unix::net::UnixStream;
-
-    use super::*;
-
-    #[test]
-    fn the_last_words_of_one_who_has_hung_up_are_heard_whatever_he_is_told_meanwhile() {
-        let (mut host, arm) = UnixStream::pair().unwrap();
-        arm.set_nonblocking(true).unwrap();
-        let mut party = Party(vec![Guest { peer: Box::new(arm), begun: Vec::new() }]);
-        assert_eq!((party.hear(), party.0.len()), (Vec::new(), 1), "who says nothing is still there");
-        // A stop and a goodbye, and the process ends while telemetry goes on.
-        host.write_all(b"stop\0goodbye\0").unwrap();
-        drop(host);
-        party.tell(b"telemetry");
-        party.tell(b"telemetry");
-        assert_eq!(party.hear(), b"stop\0goodbye\0");
-        assert_eq!((party.hear(), party.0.len()), (Vec::new(), 0), "who is gone has left");
-    }
 }

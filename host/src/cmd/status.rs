@@ -19,7 +19,7 @@ pub struct Cmd {}
 /// The device cannot be reached.
 pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "status";
-    let mut client = connection::open(global, DOING, |_| {})?;
+    let mut client = connection::observe(global, DOING)?;
     let status = client.status().map_err(|error| error.into_failure(DOING))?;
     let source = match client.calibration() {
         Ok(calibration) => Some(calibration.source),

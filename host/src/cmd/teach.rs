@@ -1,7 +1,5 @@
 //! `tactus teach`: the arm becomes weightless, a person shows a movement, and it is recorded.
 
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -9,7 +7,8 @@ use clap::Args;
 use serde_json::json;
 use sim::teacher::TaughtMovement;
 
-use super::{ErrorCode, Failure, Global, connection};
+use super::files::{Counted, RecordingFile};
+use super::{ErrorCode, Failure, Global, connection, files};
 use lab::client::Client;
 use lab::demonstration::RATE;
 use lab::device::Device;
@@ -30,7 +29,7 @@ pub struct Cmd {
     #[arg(long, short, value_name = "FILE", default_value = "demonstration.csv")]
     pub output: PathBuf,
     /// Posture the arm moves to before it becomes weightless: seven joint angles, rad. A simulated arm has a default
-    #[arg(long, value_name = "Q1,...,Q7", value_parser = posture, allow_hyphen_values = true)]
+    #[arg(long, value_name = "Q1,...,Q7", value_parser = start_posture, allow_hyphen_values = true)]
     pub from: Option<Posture>,
     /// Duration of the recording, s. Without it: until Enter is pressed, or until the simulated teacher has let go
     #[arg(long, value_name = "SECONDS", value_parser = duration)]
@@ -84,6 +83,7 @@ pub type Posture = [f32; 7];
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "teach";
     let output = global.output();
+    let mut file = RecordingFile::create(&command.output, global, &[], DOING)?;
     let started = Instant::now();
     let mut client = connection::open(global, DOING, |options| {
         options.teacher = Some(command.teacher);
@@ -118,24 +118,22 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         travelled.map_err(failed)?;
     }
 
-    let file = File::create(&command.output).map_err(|cause| failed(ProcedureError::Recording(cause)))?;
     let notes = format!(
-        "Tactus recording of a demonstration by hand, {} Hz, from {} {}",
+        "Tactus recording of a demonstration by hand, {} Hz\n{}",
         control::RATE_HZ,
-        client.hello().board.as_str(),
-        if client.is_simulated() { "(simulated arm, simulated teacher)" } else { "" }
+        files::origin(&client, None)
     );
+    file.expect_notes(&notes);
     client.gravity().map_err(|error| failed(error.into()))?;
-    let recorder = Recorder::start(&mut client, BufWriter::new(file), notes.trim_end()).map_err(failed)?;
-    let recorded = record(command, global, &mut client, recorder);
+    let recorded = Recorder::start(&mut client, &mut file.file, &notes)
+        .and_then(|recorder| record(command, global, &mut client, recorder));
     // Whatever happened, nobody holds the arm any more: let it hold itself.
     let held = client.hold();
-    let (rows, gaps) = recorded.map_err(failed)?;
-    held.map_err(|error| failed(error.into()))?;
+    let recorded = recorded.and_then(|recorded| Ok(held.map(|()| recorded)?));
     connection::tell_speed(&client, started, output);
-    output.say(format!("wrote {}", command.output.display()));
+    let (rows, gaps) = file.end(recorded.map_err(failed), output)?;
     output.result(
-        &json!({ "file": command.output, "samples": rows, "duration_s": rows as f64 / RATE, "gaps": gaps }),
+        &json!({ "file": files::text(&command.output), "samples": rows, "duration_s": rows as f64 / RATE, "gaps": gaps }),
         format!("{rows} samples, {:.1} s, {gaps} lost", rows as f64 / RATE),
     )
 }
@@ -145,7 +143,7 @@ fn record(
     command: &Cmd,
     global: &Global,
     client: &mut Client<Device>,
-    recorder: Recorder<BufWriter<File>>,
+    recorder: Recorder<&mut Counted>,
 ) -> Result<(usize, u32), ProcedureError> {
     let output = global.output();
     let guided = teacher::begin(client);
@@ -188,6 +186,18 @@ fn clear_the_table(options: &mut SimulationOptions) {
 /// Where the simulated teacher's path begins, if there is one.
 fn default_posture(client: &mut Client<Device>, movement: MovementName) -> Option<Posture> {
     teacher::is_present(client).then(|| movement.movement().start().map(|angle| angle as f32))
+}
+
+/// Seven joint angles that the arm may stand at.
+fn start_posture(text: &str) -> Result<Posture, String> {
+    let angles = posture(text)?;
+    for (joint, angle) in angles.iter().enumerate() {
+        let (min, max) = (control::model::SOFT_MIN[joint], control::model::SOFT_MAX[joint]);
+        if !(min..=max).contains(&f64::from(*angle)) {
+            return Err(format!("J{}: {angle} rad is outside {min:.2} to {max:.2} rad", joint + 1));
+        }
+    }
+    Ok(angles)
 }
 
 /// Seven numbers separated by commas.

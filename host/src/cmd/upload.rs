@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use link::image::stored_crc;
+use link::{Listing, Name};
 use serde_json::json;
 
 use super::{ErrorCode, Failure, Global, Output, connection};
-use crate::check;
+use crate::check::{self, Course};
 use lab::client::{Client, UploadOutcome, UploadPhase};
 use lab::device::Device;
 use lab::primitive_file::PrimitiveFile;
@@ -28,6 +30,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let file = read(&command.primitive, DOING)?;
     let mut client = connection::open(global, DOING, |_| {})?;
+    may_replace(&mut client, &file, global)?;
     let outcome = send(&mut client, &file, output, DOING)?;
     if let (UploadOutcome::Stored(_), Some(line)) = (&outcome, client.transport().line_rate()) {
         let rate = client.transfer().sending_rate();
@@ -54,6 +57,31 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     )
 }
 
+/// Makes sure that a person wants another version of the same name replaced.
+fn may_replace(client: &mut Client<Device>, file: &PrimitiveFile, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "upload refused";
+    let Some(there) = other_version(client, file, DOING)?.filter(|_| !global.force) else { return Ok(()) };
+    let checksum = there.crc;
+    let what = format!("the device stores another version of '{}' (checksum 0x{checksum:08x})", file.name);
+    if super::ask(global, &format!("{what}; replace it?")) {
+        return Ok(());
+    }
+    Err(Failure::new(ErrorCode::WouldReplace, DOING, what)
+        .help("keep that one first: `tactus rename` or `tactus get`; or replace it with `--force`"))
+}
+
+/// The listing of another version of the primitive in the device.
+pub(super) fn other_version(
+    client: &mut Client<Device>,
+    file: &PrimitiveFile,
+    doing: &str,
+) -> Result<Option<Listing>, Failure> {
+    let image = file.to_image().map_err(|cause| super::check::failure(cause, &file.file, doing))?;
+    let name = Name::new(&file.name).map_err(|cause| Failure::new(ErrorCode::NameInvalid, doing, cause))?;
+    let there = client.find(&name).map_err(|error| error.into_failure(doing))?;
+    Ok(there.filter(|there| there.crc != stored_crc(&image)))
+}
+
 /// Reads a primitive that fits this arm.
 pub(super) fn read(path: &Path, doing: &str) -> Result<PrimitiveFile, Failure> {
     let refused = |cause| super::check::failure(cause, path, doing);
@@ -63,9 +91,9 @@ pub(super) fn read(path: &Path, doing: &str) -> Result<PrimitiveFile, Failure> {
 }
 
 /// Plays the primitive on the host first, and refuses what would break a limit of the arm.
-pub(super) fn precheck(file: &PrimitiveFile, speed: f64, output: Output, doing: &str) -> Result<(), Failure> {
+pub(super) fn precheck(file: &PrimitiveFile, course: &Course, output: Output, doing: &str) -> Result<(), Failure> {
     let bar = output.bar(100, "checking");
-    let report = check::check(file, speed, |fraction| bar.set_position((fraction * 100.0) as u64))
+    let report = check::check(file, course, |fraction| bar.set_position((fraction * 100.0) as u64))
         .map_err(|cause| super::check::failure(cause, &file.file, doing))?;
     bar.finish_and_clear();
     match report.violations.first() {

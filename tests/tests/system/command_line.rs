@@ -55,7 +55,7 @@ fn failures_are_one_json_object_with_number_and_exit_code() {
         (&["--json", "--device", "unix:nowhere.sock", "list"], 3),
         (&["--json", "--device", DEVICE, "upload", "nonsense.toml"], 6),
         (&["--json", "check", "nonsense.toml"], 6),
-        (&["--json", "learn", "nowhere.csv"], 6),
+        (&["--json", "learn", "nowhere.csv"], 2),
     ] {
         let failed = tactus(folder.path(), arguments).code(exit);
         let object = one_object(&failed.get_output().stdout);

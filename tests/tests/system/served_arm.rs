@@ -61,15 +61,16 @@ fn an_arm_that_stays_serves_one_command_after_the_other() {
 }
 
 #[test]
-fn a_second_terminal_stops_the_run_of_the_first_and_can_do_nothing_else() {
+fn a_second_terminal_looks_on_and_stops_the_run_of_the_first_and_can_do_nothing_else() {
     let folder = expect(tempfile::tempdir());
     let folder = folder.path();
     expect(taught().write(&folder.join("primitive.toml")));
     let arm = served(folder);
     let mut run = start(folder, &[&ARM[..], &["run", "primitive.toml", "--speed", "0.3"]].concat());
     run.hear("running");
-    let listed = tactus(folder, &[&ARM[..], &["list"]].concat()).code(5);
-    assert!(String::from_utf8_lossy(&listed.get_output().stderr).contains("E504"), "the arm is the first one's");
+    assert_eq!(object(folder, &["list"])["primitives"][0]["loaded"], true);
+    let deleted = tactus(folder, &[&ARM[..], &["delete", PRIMITIVE]].concat()).code(5);
+    assert!(String::from_utf8_lossy(&deleted.get_output().stderr).contains("E504"), "the arm is the first one's");
     // Whether the first one is still there when the second asks depends on how quickly it leaves.
     object(folder, &["stop"]);
     let output = run.finish();

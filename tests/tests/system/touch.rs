@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 
 use control::{Fault, RATE, State};
 use experiment::plant::{self, Arm};
+use experiment::preparation::Teaching;
 use experiment::{Config, Experiment, Grid, Mode, Outcome, PlantKind, Scenario, Variation, preparation};
 use lab::client::{Client, Interrupt};
 use lab::demonstration::Recording;
@@ -53,7 +54,8 @@ fn primitive() -> &'static PrimitiveFile {
     static PRIMITIVE: OnceLock<PrimitiveFile> = OnceLock::new();
     PRIMITIVE.get_or_init(|| {
         let file = Path::new("flashlight.toml");
-        expect(preparation::make(Scenario::Flashlight, PlantKind::Perturbed, file, 2, &Interrupt::never(), &mut |_| {}))
+        let teaching = Teaching { scenario: Scenario::Flashlight, plant: PlantKind::Perturbed, number: 1 };
+        expect(preparation::make(teaching, file, 2, &Interrupt::never(), &mut |_| {}))
     })
 }
 

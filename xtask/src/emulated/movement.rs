@@ -69,9 +69,9 @@ pub(super) fn play(table: &mut Table, emulator: &Path, image: &Path, tactus: &Pa
     fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
     let bench = Bench { emulator, image, tactus, folder };
     shell::step("teach: a person guides the weightless arm; the image for the real board makes it so");
-    shell::run(&mut bench.command(&["--device", "board:", "teach", "--output", "grasp.csv"]))?;
+    shell::run(&mut bench.command(&["--force", "--device", "board:", "teach", "--output", "grasp.csv"]))?;
     shell::step("learn: the recording becomes a movement primitive");
-    shell::capture(&mut bench.command(&["--quiet", "learn", "grasp.csv", "--output", "grasp.toml"]))?;
+    shell::capture(&mut bench.command(&["--force", "--quiet", "learn", "grasp.csv", "--output", "grasp.toml"]))?;
     shell::step("upload into bank 2, and run; twice with one seed");
     let begun = Instant::now();
     let (run, report) = bench.play("first")?;

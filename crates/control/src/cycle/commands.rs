@@ -23,6 +23,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// Commands before any position is known.
     pub(super) fn command_blind(&mut self, command: Command) -> Result<(), Refusal> {
         match command {
+            Command::ClearFault if self.needs_clear() => Err(Refusal::CauseRemains),
             Command::Stop | Command::Release | Command::ClearFault => {
                 let trigger = if command == Command::ClearFault { Trigger::Clear } else { Trigger::Release };
                 self.supervisor.take(trigger, Fault::None).map(|_| ())
@@ -52,8 +53,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Command::ClearFault => {
                 self.may_trust_zero(measured)?;
                 let waits = matches!(self.supervisor.state(), State::SoftStop | State::Fault);
-                let moving = self.fastest(measured) > R::of(STANDING);
-                if waits && (measured.outside_fault || measured.state.missing > 0 || moving) {
+                let moving = waits && self.fastest(measured) > R::of(STANDING);
+                let remains = measured.outside_fault || measured.state.missing > 0 || moving;
+                if (waits || self.needs_clear()) && remains {
                     return Err(Refusal::CauseRemains);
                 }
                 self.change(Trigger::Clear, measured)
@@ -102,6 +104,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.wrench.tare_drift();
                 self.hand.tare_drift();
                 self.begin_run(options, measured);
+                self.hold_back();
                 Ok(())
             }
             Command::SetGoal(goal) => match (&self.law, &mut self.run, self.loaded.get()) {
@@ -157,14 +160,18 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             return Err(Refusal::PositionsMissing);
         }
         self.may_trust_zero(measured)?;
-        let latched = !matches!(self.supervisor.fault(), Fault::None | Fault::SafetyDropped);
-        if latched {
+        if self.needs_clear() {
             return Err(Refusal::FaultLatched);
         }
         if self.supervisor.state() == State::SoftStop && self.fastest(measured) > R::of(STANDING) {
             return Err(Refusal::Moving);
         }
         Ok(())
+    }
+
+    /// True if a fault is latched that arming alone does not clear.
+    fn needs_clear(&self) -> bool {
+        !matches!(self.supervisor.fault(), Fault::None | Fault::SafetyDropped)
     }
 
     /// No Clear brings back the zero that a motor has lost which counts anew.

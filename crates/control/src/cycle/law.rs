@@ -19,8 +19,8 @@ const RETURN_SPEED: f64 = 0.2;
 )]
 pub(super) enum Law<R: Real> {
     /// `Idle` and `Fault`: no torque. Frames of zero torque are sent this many cycles more; the safety module is asked
-    /// for its brakes until it has put them on.
-    Off { zero_cycles: u8, brakes: bool },
+    /// for its brakes until it has said so many times in a row that they are on.
+    Off { zero_cycles: u8, brakes: u8 },
     /// `Gravity`.
     Gravity,
     /// `Hold` and `Approach`.

@@ -1,17 +1,20 @@
-//! The laws of the states: from what is measured to the torque that is wanted.
+//! The laws of the states: from what is measured to the torque that is wanted. What a law remembers, its ramp for one,
+//! is in `law.rs`; the length of a ramp is a constant of `mod.rs`.
 
 use crate::cycle::law::{Lag, Law, Running};
 use crate::cycle::record::{Event, flags};
 use crate::cycle::{Cycle, Measured, WRENCH_AGE};
+use crate::guard::monitor::{TIP_REACH, TIP_SPEED_LIMIT, TRACKING_LIMIT};
 use crate::law::force::ForceController;
 use crate::model::kinematics::Frames;
+use crate::model::wam7;
 use crate::plan::primitive::posture_and_hand;
 use crate::plan::reference::{HandReference, JointReference, TaskReference};
 use crate::plan::run::Senses;
 use crate::real::{Real, at_least, at_most, sqrt};
 use crate::sense::hand::HandState;
 use crate::time::{PERIOD, periods};
-use crate::units::{JointPositions, JointTorques, Pose, Vector6, Vector7, Wrench};
+use crate::units::{JointPositions, JointTorques, JointVelocities, Pose, Vector6, Vector7, Wrench};
 
 /// Length of the damping that carries the arm while gravity torque builds up after arming: 0.5 s, in control periods.
 const ARMING: u16 = periods(0.5);
@@ -23,6 +26,9 @@ const TAUGHT_SPEED: f64 = 0.18;
 /// reduced speed of the standards for work beside a person, lies in between: an arm that was shoved falls below it by
 /// itself.
 const BRAKED_SPEED: f64 = 0.30;
+
+/// Largest speed of the hand to which a change of goal may add (m/s).
+const HAND_SPEED: f64 = 0.8;
 
 /// Output of a law: the torque wanted, and values for the record.
 pub(super) struct Demand<R: Real> {
@@ -154,7 +160,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.pending = Some(Event::Surprised { phase: surprise.progress, channel: surprise.channel });
             }
         }
-        let deviation = run.deviation().filter(|_| options.force_control);
+        let deviation = run.deviation().copied().filter(|_| options.force_control);
         let expected_gauges = deviation.map(|deviation| deviation.expected_gauges);
         self.hand.follow(
             &HandReference { q: posture_and_hand(&plan.points.x).1, dq: posture_and_hand(&plan.points.v).1 },
@@ -169,12 +175,17 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             &task,
             (options.pose_feedback, options.acceleration),
         );
+        if run.goal_moves() {
+            // A goal that the joints cannot follow is not led away from the tool.
+            let behind = lag.distance * R::of(1.0 / TRACKING_LIMIT);
+            run.crowd(at_least(speed_load(measured.frames, &reference.dq), behind));
+        }
         let observed = self.observer.velocity(measured.state);
         let velocity = if options.compliant { &observed } else { &measured.state.dq.0 };
         let mut torque =
             controller.torque(&self.model, tracking, measured.frames, measured.state, velocity, &reference, frozen);
         let explained = (torque.0 - controller.feedback(), reference.ddq.0);
-        let mut set = if options.feedback { flags::FEEDBACK } else { 0 };
+        let mut set = if run.bends(primitive) { flags::FEEDBACK } else { 0 };
         if let Some(deviation) = deviation {
             let to_world = measured.frames.tool_to_world();
             let error = Wrench { torque: deviation.wrench.torque * tracking.moment_share, ..deviation.wrench };
@@ -207,6 +218,18 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         *lag = Lag { distance: sqrt(offset.dot(&offset)), speed: operational.lag() };
         Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, surprise, flags: set, explained }
     }
+}
+
+/// Part of the speed limits that these joint speeds use, at most one of them in full: of the joints, of elbow and
+/// forearm, and of the hand.
+#[inline(never)]
+fn speed_load<R: Real>(frames: &Frames<R>, dq: &JointVelocities<R>) -> R {
+    let [elbow, tip] = frames.elbow_speeds(dq, R::of(TIP_REACH));
+    let hand = sqrt(frames.jacobian().twist(&dq.0).fixed_rows::<3>(0).norm_squared());
+    let load = at_least(at_least(elbow, tip) * R::of(1.0 / TIP_SPEED_LIMIT), hand * R::of(1.0 / HAND_SPEED));
+    dq.0.iter().zip(&wam7::VELOCITY_MAX).fold(load, |load, (dq, limit)| {
+        at_least(load, (if *dq < R::of(0.0) { -*dq } else { *dq }) * R::of(1.0 / limit))
+    })
 }
 
 /// Speed of the hand (m/s).

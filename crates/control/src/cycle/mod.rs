@@ -47,6 +47,9 @@ pub const MAX_KERNELS: usize = 100;
 /// Frames of zero torque, one a cycle, after torque went off: one lost frame must not leave a motor pulling.
 const ZERO_CYCLES: u8 = 3;
 
+/// Words of the safety module in a row that its brakes are on: one of them may be wrong.
+const BRAKE_WORDS: u8 = 2;
+
 /// Age at which the mode of the safety module is no longer believed: 1 s, in control periods.
 const SAFETY_AGE: u16 = periods(1.0);
 
@@ -88,6 +91,19 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     /// Limits that cut the last torque.
     cut: LimitReport,
     pending: Option<Event>,
+    caution: Caution,
+}
+
+/// What the device has found about heat and the pendant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Caution {
+    /// Nothing.
+    #[default]
+    None,
+    /// A person should know.
+    Warned,
+    /// Runs are held to half of the taught speed.
+    Slowed,
 }
 
 /// Measurements of one cycle.
@@ -117,7 +133,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             observer: MotionObserver::new(),
             wrench: WrenchEstimator::new(),
             limiter: TorqueLimiter::new(&calibration),
-            law: Law::Off { zero_cycles: 0, brakes: false },
+            law: Law::Off { zero_cycles: 0, brakes: 0 },
             run: None,
             force <- ForceController::init(gains.stiff.force_window),
             hand <- HandDrive::init(&gains.hand),
@@ -126,6 +142,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             armed_for: 0,
             cut: LimitReport::default(),
             pending: None,
+            caution: Caution::None,
             calibration,
             model,
             gains,
@@ -203,7 +220,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let _ = self.supervisor.take(Trigger::SafetyDropped, Fault::SafetyDropped);
         self.leave_torque();
         // The start-up that follows puts the brakes on.
-        self.law = Law::Off { zero_cycles: ZERO_CYCLES, brakes: false };
+        self.law = Law::Off { zero_cycles: ZERO_CYCLES, brakes: 0 };
     }
 
     /// Takes a primitive for the next run: no more than a copy, because its caller keeps the control task waiting. A
@@ -229,14 +246,25 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
+    /// Takes what was found about heat and the pendant, and holds a run to it.
+    pub fn set_caution(&mut self, caution: Caution) {
+        if caution != self.caution {
+            self.caution = caution;
+            self.hold_back();
+        }
+    }
+
     /// Advances one control period.
     pub fn step(&mut self, input: &CycleInput) -> CycleOutput {
         // A bridged reply is no news: the law stays.
         let before = (self.supervisor.law(), self.supervisor.fault());
         self.watch_safety(input.sample.safety);
         if let Some(fault) = input.external_fault {
-            let trigger = if fault == Fault::Overrun { Trigger::SoftFault } else { Trigger::HardFault };
-            self.trigger(trigger, fault, None);
+            let soft = matches!(fault, Fault::Overrun | Fault::MotorHot);
+            // An arm that is let down is on the way to where no motor heats.
+            if fault != Fault::MotorHot || self.supervisor.law() != State::Lower {
+                self.trigger(if soft { Trigger::SoftFault } else { Trigger::HardFault }, fault, None);
+            }
         }
         let torque_on = self.supervisor.state().has_torque();
         let state = self.joints.update(&input.sample.positions, torque_on);
@@ -437,15 +465,18 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     fn actuate_without_torque(&mut self) -> Actuation {
         self.limiter.reset();
         let active = self.is_active();
-        let braked = matches!(self.safety, Some((mode, _)) if mode != SafetyMode::Active);
         let faulty = self.supervisor.state() == State::Fault;
         let Law::Off { zero_cycles, brakes } = &mut self.law else { return Actuation::zero() };
-        *brakes &= !braked;
+        *brakes = match self.safety {
+            Some((SafetyMode::Active, 0)) if *brakes > 0 => BRAKE_WORDS,
+            Some((mode, 0)) if mode != SafetyMode::Active => brakes.saturating_sub(1),
+            _ => *brakes,
+        };
         // An ACTIVE puck applies the last torque it was sent, whoever sent it: keep it at zero.
         let sends = active || *zero_cycles > 0;
         *zero_cycles = zero_cycles.saturating_sub(1);
         let actuation = if sends { Actuation::zero() } else { Actuation::silent() };
-        if *brakes || (faulty && active) { actuation.requesting_idle() } else { actuation }
+        if *brakes > 0 || (faulty && active) { actuation.requesting_idle() } else { actuation }
     }
 
     fn standing_flags(&self) -> u32 {
@@ -468,6 +499,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if self.wrench.is_saturated() {
             set |= flags::SENSOR_SATURATED;
         }
+        set |= match self.caution {
+            Caution::None => 0,
+            Caution::Warned => flags::CAUTION,
+            Caution::Slowed => flags::CAUTION | flags::SLOWED,
+        };
         match self.hand.state() {
             Some(hand) if hand.is_lost() => set |= flags::HAND_LOST,
             Some(_) => set |= flags::HAND_READY,

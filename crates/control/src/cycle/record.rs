@@ -15,7 +15,8 @@ pub struct CycleInput {
     pub sample: BusSample,
     /// A person's command, if one is waiting.
     pub command: Option<Command>,
-    /// A fault that the caller found outside the cycle (bus-off, puck reset, overrun); `None` otherwise.
+    /// A fault that the caller found outside the cycle (bus-off, puck reset, overrun); `None` otherwise. It takes all
+    /// torque off at once, but for an overrun, which stops softly.
     pub external_fault: Option<Fault>,
 }
 
@@ -92,6 +93,10 @@ pub mod flags {
     pub const HAND_LOST: u32 = 1 << 18;
     /// The wrist sensor has been silent for 16.7 ms: no force tells of a contact.
     pub const CONTACT_UNSEEN: u32 = 1 << 19;
+    /// A motor is warm, or the pendant warns.
+    pub const CAUTION: u32 = 1 << 20;
+    /// Because of that a run is held to half of the taught speed.
+    pub const SLOWED: u32 = 1 << 21;
 }
 
 /// Everything one cycle measured and decided, of constant size; the source of telemetry and fault records.

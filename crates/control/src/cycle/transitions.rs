@@ -3,7 +3,7 @@
 use crate::act::limit::LimitReport;
 use crate::command::RunOptions;
 use crate::cycle::law::{Lag, Law, Lowering, Posture, Ramp, Running};
-use crate::cycle::{Cycle, HANDOVER, Measured, STOP_RAMP, ZERO_CYCLES};
+use crate::cycle::{BRAKE_WORDS, Caution, Cycle, HANDOVER, Measured, STOP_RAMP, ZERO_CYCLES};
 use crate::guard::fault::Fault;
 use crate::guard::joint_limits::JointBounds;
 use crate::guard::supervisor::{State, Trigger};
@@ -61,6 +61,14 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.law = if state == State::Lower { Law::Lower(Lowering::new(rest)) } else { Law::SoftStop(rest) };
             }
             _ => self.law = Law::Gravity,
+        }
+    }
+
+    /// Holds the run to what heat and the pendant allow.
+    #[inline(never)]
+    pub(super) fn hold_back(&mut self) {
+        if let (Law::Run(_), Some(run), Some(primitive)) = (&self.law, &mut self.run, self.loaded.get()) {
+            run.hold_back(primitive, self.caution == Caution::Slowed);
         }
     }
 
@@ -134,8 +142,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     pub(super) fn leave_torque(&mut self) {
         let brakes = match &self.law {
             Law::Off { brakes, .. } => *brakes,
-            Law::Lower(lowering) => !lowering.rests(),
-            _ => true,
+            Law::Lower(lowering) if lowering.rests() => 0,
+            _ => BRAKE_WORDS,
         };
         self.law = Law::Off { zero_cycles: ZERO_CYCLES, brakes };
         self.limiter.reset();

@@ -42,11 +42,13 @@ pub enum Fault {
     EncoderStuck = 14,
     /// Something pushed the arm while the wrench sensor was silent.
     UnseenContact = 15,
+    /// A motor is too hot to go on.
+    MotorHot = 16,
 }
 
 impl Fault {
     /// Every fault, in the order of the codes.
-    pub const ALL: [Fault; 16] = [
+    pub const ALL: [Fault; 17] = [
         Fault::None,
         Fault::RepliesLost,
         Fault::RepliesLostForLong,
@@ -63,6 +65,7 @@ impl Fault {
         Fault::Overrun,
         Fault::EncoderStuck,
         Fault::UnseenContact,
+        Fault::MotorHot,
     ];
 
     /// The stable number of this fault.
@@ -105,6 +108,9 @@ impl Fault {
             }
             Fault::UnseenContact => {
                 "something pushed the arm while the force sensor was silent; look for an obstacle, check its cable"
+            }
+            Fault::MotorHot => {
+                "a motor is hotter than 80 degrees C; release the arm and let it cool below 75, then clear"
             }
         }
     }

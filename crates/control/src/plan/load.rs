@@ -11,6 +11,7 @@ use pinned_init::{Init, init};
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
 use crate::model::wam7;
+use crate::plan::bounds::{self, Quantity};
 use crate::plan::primitive::{Configuration, MovementTables, Primitive, posture_and_hand, write_error};
 use crate::real::Real;
 use crate::units::{JointPositions, Orientation};
@@ -62,6 +63,8 @@ pub enum LoadError {
     Inconsistent(End),
     /// A sensor (0 = force x) is expected to measure more than [`EXPECTED_FORCE`], or more than it can.
     Expected(u8),
+    /// A number of the image, or of the plan that it gives, is beyond its bound.
+    Bound(Quantity),
 }
 
 impl fmt::Display for LoadError {
@@ -80,6 +83,7 @@ impl fmt::Display for LoadError {
             }
             LoadError::Expected(0..3) => write!(formatter, "a force of more than {EXPECTED_FORCE} N is expected"),
             LoadError::Expected(_) => formatter.write_str("a torque is expected that the sensor cannot measure"),
+            LoadError::Bound(quantity) => quantity.fmt(formatter),
         }
     }
 }
@@ -181,6 +185,7 @@ pub fn check<'a, R: Real, const N: usize>(
     check_end(model, End::Start, primitive.movement().start())?;
     check_end(model, End::Goal, primitive.movement().goal())?;
     check_expected(primitive)?;
+    bounds::check(primitive).map_err(LoadError::Bound)?;
     Ok(CheckedPrimitive { primitive, tool: Tool::of(model) })
 }
 

@@ -1,6 +1,8 @@
 //! Plans of arm and hand: moves in joint space, and the run of a primitive.
 
 pub mod approach;
+pub mod bounds;
+pub(crate) mod goal;
 pub mod hand;
 pub mod load;
 pub mod primitive;

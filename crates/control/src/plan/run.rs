@@ -1,13 +1,14 @@
 //! `Run`: the loaded primitive in motion: its rollout, the options of this run, and the decision that it is over.
 
-use dmp::{Quaternion, RolloutError};
+use dmp::{Pose as Place, PoseReference, Quaternion, RolloutError};
 use nalgebra::Vector3;
 
 use crate::command::{Goal, Refusal, RunOptions};
 use crate::guard::watch::{Surprise, Watch};
+use crate::plan::goal::GoalFilter;
 use crate::plan::load::within_reach;
 use crate::plan::primitive::{Coupling, Primitive, Reference, Rollout, StartState, configuration, posture_and_hand};
-use crate::real::Real;
+use crate::real::{Real, at_least};
 use crate::sense::deviation::{Deviation, SmoothedWrench};
 use crate::sense::hand::HandState;
 use crate::time::{PERIOD, periods};
@@ -19,6 +20,9 @@ pub(crate) const START_DISTANCE: f64 = 0.05;
 /// Allowed speed factors.
 pub(crate) const SPEEDS: (f32, f32) = (0.1, 2.0);
 
+/// Speed factor of a run that is held back.
+const SLOW: f32 = 0.5;
+
 /// The plan counts as at rest below these speeds (m/s, rad/s).
 const REST: (f64, f64) = (2e-3, 1e-2);
 
@@ -29,11 +33,14 @@ const HAND_REST: f64 = 5e-2;
 /// pose feedback of Eq (11), so that the arm has closed the last millimetres.
 const SETTLING: u16 = periods(1.0);
 
-/// Progress beyond which a plan that never comes to rest (feedback still bends it) is over as well.
-const LATEST: f64 = 1.5;
+/// Progress beyond the end from which a plan that never comes to rest is over as well.
+const OVERTIME: f64 = 0.5;
 
 /// The same for a run that the feedback bends: it never comes to rest while something presses.
-const LATEST_WITH_FEEDBACK: f64 = 1.15;
+const OVERTIME_WITH_FEEDBACK: f64 = 0.15;
+
+/// Progress that a plan needs to follow a goal that has stopped moving: seven time constants of the usual spring.
+const FOLLOWING: f64 = 0.5;
 
 /// Time in which the feedback fades out when the sensor falls silent: 100 ms, in control periods.
 pub(crate) const FADE: u16 = periods(0.1);
@@ -68,6 +75,13 @@ pub(crate) struct Run<R: Real, const N: usize> {
     /// The movement has ended, and the plan stays as the feedback has bent it.
     settled: bool,
     rested: u16,
+    goal: GoalFilter<R>,
+    /// Progress at which the movement ends: 1, or later if the goal has moved.
+    end: R,
+    /// Part of the speed limits that the plan uses.
+    load: R,
+    /// Speed factor that was asked for, and whether it is held to [`SLOW`].
+    speed: (f32, bool),
 }
 
 impl<R: Real, const N: usize> Run<R, N> {
@@ -117,15 +131,17 @@ impl<R: Real, const N: usize> Run<R, N> {
             kept: FADE,
             settled: false,
             rested: 0,
+            goal: GoalFilter::at(primitive.movement().goal().poses[0]),
+            end: R::of(1.0),
+            load: R::of(0.0),
+            speed: (options.speed, false),
         };
         let rollout = &mut run.rollout;
         // The first speed acts at once; later ones are approached at the rollout's slew rate.
         rollout.set_speed_slew(None).map_err(reason)?;
         set_speed(rollout, primitive, options.speed)?;
         rollout.set_speed_slew(Some(R::of(Rollout::<R, N>::DEFAULT_SLEW))).map_err(reason)?;
-        if options.goal != Goal::STORED {
-            set_goal(rollout, primitive, &options.goal)?;
-        }
+        run.set_goal(primitive, &options.goal)?;
         *place = Some(run);
         Ok(())
     }
@@ -133,15 +149,64 @@ impl<R: Real, const N: usize> Run<R, N> {
     /// Takes a new goal, or leaves everything as it was.
     pub(crate) fn set_goal(&mut self, primitive: &Primitive<R, N>, goal: &Goal) -> Result<(), Refusal> {
         if *goal != Goal::STORED {
-            set_goal(&mut self.rollout, primitive, goal)?;
+            let (position, orientation) = checked_goal(&self.rollout, primitive, goal)?;
+            self.goal.command(position, orientation);
             self.rested = 0;
         }
         Ok(())
     }
 
+    /// True while the goal is on its way to the one that was commanded.
+    pub(crate) fn goal_moves(&self) -> bool {
+        self.goal.moves()
+    }
+
+    /// Takes the part of the speed limits that the plan uses: a goal on its way waits for what is left.
+    pub(crate) fn crowd(&mut self, load: R) {
+        self.load = load;
+    }
+
+    /// True if the feedback of Eq (8) bends the plan.
+    pub(crate) fn bends(&self, primitive: &Primitive<R, N>) -> bool {
+        self.options.feedback && !self.settled && primitive.feedback().is_some()
+    }
+
+    /// Moves the goal. Not inlined: it is rare, and a board may keep the code of every cycle in a small fast memory.
+    #[inline(never)]
+    fn lead_goal(&mut self, primitive: &Primitive<R, N>) {
+        if !self.goal.moves() {
+            return;
+        }
+        if let Some(goal) = self.goal.step(self.rollout.phase(), self.load) {
+            // Both were allowed for the goal that was commanded; what cannot be set on the way to it is left out.
+            let _ = self.rollout.set_goal_position(0, goal.position);
+            if self.goal.turns() {
+                let _ = self.rollout.set_goal_orientation(primitive.movement(), 0, goal.orientation);
+            }
+        }
+        self.end = at_least(self.end, self.rollout.progress() + R::of(FOLLOWING));
+    }
+
+    fn is_finished(&self) -> bool {
+        self.rollout.is_finished() && self.rollout.progress() >= self.end
+    }
+
     /// Takes a new speed factor.
     pub(crate) fn set_speed(&mut self, primitive: &Primitive<R, N>, factor: f32) -> Result<(), Refusal> {
-        set_speed(&mut self.rollout, primitive, factor)
+        if !(factor >= SPEEDS.0 && factor <= SPEEDS.1) {
+            return Err(Refusal::OutOfRange);
+        }
+        let held = if self.speed.1 && factor > SLOW { SLOW } else { factor };
+        set_speed(&mut self.rollout, primitive, held)?;
+        self.speed.0 = factor;
+        Ok(())
+    }
+
+    /// Holds the speed to half of the taught one, or lets it go back to what was asked for.
+    pub(crate) fn hold_back(&mut self, primitive: &Primitive<R, N>, slow: bool) {
+        self.speed.1 = slow;
+        // The factor was accepted before, and a slower one always is.
+        let _ = self.set_speed(primitive, self.speed.0);
     }
 
     /// The plan of this tick.
@@ -177,7 +242,9 @@ impl<R: Real, const N: usize> Run<R, N> {
             self.coupling = primitive.coupling(&self.rollout, &seen.error())?;
         }
         // A plan that springs back tips what has just been grasped, and one that goes on giving way pulls at it.
-        if bends && self.rollout.is_finished() && self.kept == FADE {
+        self.lead_goal(primitive);
+        let settles = bends && self.is_finished() && self.kept == FADE;
+        if settles {
             self.rollout.settle();
             self.coupling = Coupling::NONE;
             self.settled = true;
@@ -185,10 +252,14 @@ impl<R: Real, const N: usize> Run<R, N> {
         let kept = self.kept();
         let coupling = self.coupling.map(|value| value * kept);
         let plan = self.rollout.step(primitive.movement(), R::of(PERIOD), &coupling)?;
+        if settles {
+            let [PoseReference { position, orientation }] = &plan.poses;
+            self.goal = GoalFilter::at(Place { position: position.x, orientation: orientation.quaternion });
+        }
         let (posture, hand) = posture_and_hand(&plan.points.v);
         let slow =
             |speeds: &[R], limit: f64| speeds.iter().all(|speed| *speed < R::of(limit) && *speed > R::of(-limit));
-        let resting = self.rollout.is_finished()
+        let resting = self.is_finished()
             && plan.poses.iter().all(|pose| slow(&pose.position.v, REST.0) && slow(&pose.orientation.omega, REST.1))
             && slow(&posture, REST.1)
             && slow(&hand, HAND_REST);
@@ -236,8 +307,8 @@ impl<R: Real, const N: usize> Run<R, N> {
 
     /// True if the movement is over.
     pub(crate) fn is_over(&self) -> bool {
-        let latest = if self.options.feedback { LATEST_WITH_FEEDBACK } else { LATEST };
-        self.rested >= SETTLING || self.rollout.progress() > R::of(latest)
+        let overtime = if self.options.feedback { OVERTIME_WITH_FEEDBACK } else { OVERTIME };
+        self.rested >= SETTLING || self.rollout.progress() > self.end + R::of(overtime)
     }
 
     /// The expected sensor values and the deviation from them, as of the last complete tick; `None` without an
@@ -247,29 +318,34 @@ impl<R: Real, const N: usize> Run<R, N> {
     }
 }
 
-/// Takes a new goal, or leaves everything as it was.
-fn set_goal<R: Real, const N: usize>(
-    rollout: &mut Rollout<R, N>,
+/// Returns what is new in a goal, if all of it can be set.
+#[allow(clippy::type_complexity, reason = "two parts of a goal, each given or not")]
+fn checked_goal<R: Real, const N: usize>(
+    rollout: &Rollout<R, N>,
     primitive: &Primitive<R, N>,
     goal: &Goal,
-) -> Result<(), Refusal> {
+) -> Result<(Option<[R; 3]>, Option<Quaternion<R>>), Refusal> {
     let mut next = rollout.clone();
-    if let Some(position) = goal.position {
-        if position.iter().any(|value| !value.is_finite()) {
+    let mut position = None;
+    if let Some(wanted) = goal.position {
+        if wanted.iter().any(|value| !value.is_finite()) {
             return Err(Refusal::OutOfRange);
         }
-        let position = position.map(|value| R::of(f64::from(value)));
-        if !within_reach(&Vector3::from(position)) {
+        let wanted = wanted.map(|value| R::of(f64::from(value)));
+        if !within_reach(&Vector3::from(wanted)) {
             return Err(Refusal::OutsideWorkspace);
         }
-        next.set_goal_position(0, position).map_err(reason)?;
+        next.set_goal_position(0, wanted).map_err(reason)?;
+        position = Some(wanted);
     }
-    if let Some(orientation) = goal.orientation {
-        let [w, x, y, z] = orientation.map(|value| R::of(f64::from(value)));
-        next.set_goal_orientation(primitive.movement(), 0, Quaternion::new(w, x, y, z)).map_err(reason)?;
+    let mut orientation = None;
+    if let Some(wanted) = goal.orientation {
+        let [w, x, y, z] = wanted.map(|value| R::of(f64::from(value)));
+        let wanted = Quaternion::new(w, x, y, z);
+        next.set_goal_orientation(primitive.movement(), 0, wanted).map_err(reason)?;
+        orientation = Some(wanted.renormalised());
     }
-    *rollout = next;
-    Ok(())
+    Ok((position, orientation))
 }
 
 /// Takes a new speed factor; what the rollout refuses as too fast is out of range as well.

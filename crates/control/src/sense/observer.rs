@@ -97,12 +97,14 @@ impl<R: Real> MotionObserver<R> {
     }
 
     /// Velocities where the next torque acts (rad/s), kept near the measured ones.
+    #[inline(never)]
     pub fn velocity(&self, state: &JointState<R>) -> Vector7<R> {
         let ahead = self.dq + (self.sent[0] + self.disturbance) * R::of(LATENCY * PERIOD);
         ahead.zip_map(&state.dq.0, |observed, measured| measured + within(observed - measured, R::of(FARTHEST)))
     }
 
     /// One control period on, corrected by what is measured.
+    #[inline(never)]
     pub fn update(&mut self, state: &JointState<R>) {
         let acceleration = self.sent[1] * R::of(LATENCY) + self.sent[0] * R::of(1.0 - LATENCY) + self.disturbance;
         self.q += (self.dq + acceleration * R::of(0.5 * PERIOD)) * R::of(PERIOD);
@@ -117,6 +119,7 @@ impl<R: Real> MotionObserver<R> {
 
     /// Takes what was sent: the acceleration that was wanted, and the torque (N m) beyond the one that the model needs
     /// for it.
+    #[inline(never)]
     pub fn send(&mut self, model: &ArmModel<R>, frames: &Frames<R>, wanted: &Vector7<R>, beyond: &Vector7<R>) {
         if !self.ready {
             self.mass = model.mass_matrix(frames);
@@ -137,6 +140,7 @@ impl<R: Real> MotionObserver<R> {
     }
 
     /// `L D L^T` of the mass matrix: `L` below the diagonal, `1/D` on it.
+    #[inline(never)]
     fn factorise(&mut self) {
         let mut factor = self.mass;
         for j in 0..JOINTS {
@@ -159,6 +163,7 @@ impl<R: Real> MotionObserver<R> {
     }
 
     /// Acceleration of the joints by a torque (N m).
+    #[inline(never)]
     fn accelerated(&self, torque: &Vector7<R>) -> Vector7<R> {
         let mut x = *torque;
         for j in 0..JOINTS {

@@ -129,7 +129,9 @@ fn brakes_are_asked_for_until_they_are_on(rig: &mut Rig<f32>) {
     for cycle in 0..50 {
         assert!(rig.tick(None).actuation.requests_idle(), "cycle {cycle} in {:?}", rig.cycle.state());
     }
+    // One word may be wrong.
     rig.safety = SafetyMode::Idle;
+    assert!(rig.tick(None).actuation.requests_idle());
     for _ in 0..5 {
         assert!(!rig.tick(None).actuation.requests_idle());
     }
@@ -153,6 +155,19 @@ fn g7_brakes_are_asked_for_wherever_torque_ends_with_the_arm_up() {
     rig.plant.dq *= 0.0;
     rig.command(Command::ClearFault);
     assert_eq!(rig.cycle.state(), State::Idle);
+    brakes_are_asked_for_until_they_are_on(&mut rig);
+}
+
+#[test]
+fn g7_one_wrong_word_of_the_safety_module_ends_torque_but_not_without_its_brakes() {
+    let mut rig = Rig::<f32>::new(OUT, 1);
+    rig.command(Command::Hold);
+    rig.run_for(1.0);
+    rig.safety = SafetyMode::Idle;
+    assert!(rig.tick(None).actuation.requests_idle());
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Idle, Fault::SafetyDropped));
+    rig.safety = SafetyMode::Active;
+    rig.plant.dq *= 0.0;
     brakes_are_asked_for_until_they_are_on(&mut rig);
 }
 

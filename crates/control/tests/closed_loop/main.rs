@@ -2,8 +2,10 @@
 
 mod adaptation;
 mod authority;
+mod caution;
 mod contact;
 mod disagreement;
+mod goals;
 mod hand;
 mod hand_plant;
 mod losses;

@@ -19,11 +19,12 @@ use control::time::periods;
 use control::{Calibration, Cycle, CycleInput, CycleRecord, Fault, LoadRefusal, Payload, State};
 use link::HandStage;
 use pinned_init::{Init, init};
-use puck::{CanFrame, MotorMode, Node, PropertyId, Reply, SafetyMode, Status, set, zero_torques};
+use puck::{CanFrame, Group, MotorMode, Node, PropertyId, Reply, SafetyMode, Status, set, zero_torques};
 
 use crate::application::{Controller, ControllerIo, CycleReport, Message, Slot};
 use crate::background::{BackgroundPoll, PollReply};
 use crate::bus::{Outlet, Pacer};
+use crate::caution::Watch;
 use crate::command::{Command, Refusal};
 use crate::event::{Event, EventKind};
 use crate::hand::Hand;
@@ -48,8 +49,9 @@ const REFUSED_CYCLES: u8 = 6;
 /// Answers in a row of a braking puck 1 under an ACTIVE safety module that mean IDLE: one may be older than the
 /// activation.
 const BRAKING_ANSWERS: u8 = 2;
-/// Time between two requests to the safety module to go IDLE: 0.25 s, in slow slots.
-const IDLE_REQUEST_SLOTS: u16 = periods(0.25);
+/// Time between two requests to the safety module to go IDLE: 20 ms, in slow slots; an arm whose first request was lost
+/// falls as long.
+const IDLE_REQUEST_SLOTS: u16 = periods(0.02);
 
 /// Weight of an overrun against one cycle without.
 const OVERRUN_WEIGHT: u16 = 50;
@@ -82,6 +84,7 @@ pub struct DeviceController {
     pendant: Option<i32>,
     temperatures: [Option<i16>; 7],
     hand_temperatures: [Option<i16>; 4],
+    watch: Watch,
     stage: Stage,
     blocked: Option<StartupError>,
     /// A fault of the bus, to be told to the next cycle, and the cycles left until the bus is started anew.
@@ -113,6 +116,7 @@ impl DeviceController {
             pendant: None,
             temperatures: [None; 7],
             hand_temperatures: [None; 4],
+            watch: Watch::default(),
             stage: Stage::Enumerating,
             blocked: None,
             fault: None,
@@ -329,7 +333,7 @@ impl DeviceController {
                 hand,
             },
             command: self.next_command(now_us, io),
-            external_fault: self.fault.take(),
+            external_fault: self.fault.take().or(self.watch.is_too_hot().then_some(Fault::MotorHot)),
         };
         let output = self.cycle.step(&input);
         self.send_torques(output.actuation.frames(), now_us, io);
@@ -369,7 +373,8 @@ impl DeviceController {
                 None
             }
             Command::Zero { home } => {
-                if self.cycle.state() == State::Idle && self.safety_mode == Some(SafetyMode::Idle) {
+                // Under a latched fault too: what has lost its zero cannot be cleared before.
+                if !self.cycle.state().has_torque() && self.safety_mode == Some(SafetyMode::Idle) {
                     self.startup.zero(&home);
                 } else {
                     self.tell(EventKind::Refused(Refusal::ZeroNeedsIdle), io);
@@ -421,14 +426,22 @@ impl DeviceController {
     #[inline(never)]
     fn ask_slowly(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
         self.idle_request_in = self.idle_request_in.saturating_sub(1);
+        let known = Iterator::chain(self.temperatures.iter(), &self.hand_temperatures).copied().flatten();
+        self.cycle.set_caution(self.watch.look(known, self.pendant));
         let writable = self.startup.safety_properties().is_some_and(|safety| safety.mode_is_writable);
-        let lower =
-            self.wants_idle && writable && self.idle_request_in == 0 && self.safety_mode == Some(SafetyMode::Active);
+        // Asked for even of a module that has told IDLE: the word may be wrong, and then nothing brakes.
+        let estop = self.safety_mode == Some(SafetyMode::EStop);
+        let lower = self.wants_idle && writable && self.idle_request_in == 0 && !estop;
         if lower {
             let frame = set(Node::SAFETY_MODULE, PropertyId::MODE, SafetyMode::Idle.value());
             if self.outlet(now_us, io).send(frame) {
                 self.idle_request_in = IDLE_REQUEST_SLOTS;
             }
+            return;
+        }
+        if self.idle_request_in == IDLE_REQUEST_SLOTS - 1 {
+            // The module's word to the pucks may be lost, and with it the brakes.
+            self.outlet(now_us, io).send(set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value()));
             return;
         }
         let BusPhase::Cyclic(poll) = &mut self.phase else {

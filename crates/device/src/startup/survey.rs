@@ -1,4 +1,5 @@
-//! `Survey`: the answers of the devices during start-up, and the checks that they must pass.
+//! `Survey`: the properties that are read of the arm's pucks during start-up, the answers of all devices, and the
+//! checks that they must pass. The properties of the hand's pucks are in `hand.rs`.
 
 use control::{Calibration, Payload};
 use puck::{Node, Property, PropertyId, PropertyTable, Role};

@@ -60,6 +60,10 @@ impl Startup {
             return Ok(Next::Go(Step::IgnoreFaults));
         }
         self.zero_request = ZeroRequest::Answered(Err(Refusal::ZeroNeedsIdle));
+        if SafetyMode::from_value(mode) == Some(SafetyMode::EStop) {
+            self.power_is_off();
+            return Ok(Next::Stay);
+        }
         // Back to where the command came in: toward the loop if the arm is zeroed, else to the person.
         let next_us = outlet.now_us() + POLL_US;
         Ok(Next::Go(if self.zeroed { Step::AskZero } else { Step::AwaitZero { next_us } }))
@@ -73,11 +77,16 @@ impl Startup {
             return Ok(Next::Stay);
         };
         if SafetyMode::from_value(mode) == Some(SafetyMode::EStop) {
-            // The pucks have lost power, and with it everything read and written.
-            *self = Startup { hand: self.hand.again(), ..Startup::new() };
+            self.power_is_off();
             return Ok(Next::Stay);
         }
         Ok(Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US }))
+    }
+
+    /// The pucks have lost power, and with it everything read and written.
+    fn power_is_off(&mut self) {
+        let (hand, zero_request) = (self.hand.again(), self.zero_request);
+        *self = Startup { hand, zero_request, ..Startup::new() };
     }
 
     pub(super) fn write_position(&mut self, joint: u8, outlet: &mut impl Outlet) -> Next {

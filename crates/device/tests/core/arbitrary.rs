@@ -6,7 +6,7 @@ use device::{Command, Controller, DeviceController, Stage};
 use proptest::prelude::*;
 use puck::{CanFrame, CanId, Counts, Node, PuckTorque, SafetyMode};
 
-use crate::double::{Bus, HOME, silent_device};
+use crate::double::{Bus, HOME, silent_device, started};
 
 /// Something that happens to the device.
 #[derive(Clone, Debug)]
@@ -118,8 +118,58 @@ fn happen(core: &mut DeviceController, bus: &mut Bus, happening: &Happening) {
     }
 }
 
+/// Number of random cases: that of the environment variable, which `cargo xtask fuzz` sets, or `usual`.
+fn cases(variable: &str, usual: u32) -> u32 {
+    std::env::var(variable).ok().and_then(|number| number.parse().ok()).unwrap_or(usual)
+}
+
+/// Frames that a device has to judge: any identifier, and those of its own conversation, with any length.
+fn judged_frames(count: u32) -> impl Iterator<Item = CanFrame> {
+    const OWN: [u16; 14] =
+        [0x426, 0x446, 0x4E6, 0x423, 0x4E3, 0x50A, 0x50B, 0x506, 0x540, 0x546, 0x563, 0x566, 0x5C6, 0x404];
+    let mut state = 0x2545_F491_4F6C_DD1D_u64;
+    let mut draw = move || {
+        (state ^= state << 13, state ^= state >> 7, state ^= state << 17);
+        state
+    };
+    (0..count).map(move |_| {
+        let id = if draw() & 1 == 0 { (draw() & 0x7FF) as u16 } else { OWN[draw() as usize % OWN.len()] };
+        let mut bytes = draw().to_le_bytes();
+        if draw() & 3 != 0 {
+            // The value of a property or a command as they stand in a frame.
+            bytes[0] = (draw() as u8 & 0x3F) | 0x80;
+            bytes[1..6].copy_from_slice(&[0, draw() as u8 & 3, 0, 0, 0]);
+        }
+        let length = if draw() & 3 == 0 { draw() as usize % 9 } else { [3, 4, 6, 6][draw() as usize % 4] };
+        CanFrame::from_slice(CanId::new(id).expect("eleven bits"), &bytes[..length]).expect("at most eight bytes")
+    })
+}
+
+/// A6: four random frames in every slot, to a device that is started and zeroed and that nobody has told to move: no
+/// panic, and no torque, whatever the frames say about the safety module.
+#[test]
+fn a6_no_frame_on_the_bus_makes_a_device_send_torque_that_nobody_asked_for() {
+    let (mut core, mut bus) = started();
+    for (number, frame) in judged_frames(cases("TACTUS_FUZZ_FRAMES", 100_000)).enumerate() {
+        bus.inject(frame);
+        if number % 4 == 3 {
+            bus.run_slots(&mut core, 1);
+        }
+        if bus.log.len() > 10_000 {
+            assert!(bus.torques_since(0).all(|torque| torque == PuckTorque::ZERO), "frame {number}");
+            bus.log.clear();
+            bus.events.clear();
+            bus.records.clear();
+            bus.answers.clear();
+        }
+    }
+    assert!(bus.torques_since(0).all(|torque| torque == PuckTorque::ZERO));
+    let counters = core.health().counters;
+    assert!(counters.foreign_frames > 0 && counters.malformed_frames > 0, "{counters:?}");
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
+    #![proptest_config(ProptestConfig::with_cases(cases("TACTUS_FUZZ_STORIES", 300)))]
 
     /// The double panics on any request that no master may send (setting TORQUE, pulling the emergency stop, zeroing
     /// under torque, malformed frames, disturbing a hand that is initialised, driving one that never was), so this is a

@@ -3,7 +3,7 @@
 use control::{Command, Fault, State};
 use device::{Controller, DeviceController, EventKind, Slot, Stage};
 use puck::device::{position_frame, reply16};
-use puck::{CanFrame, CanId, Counts, Destination, GaugeStatus, Node, PropertyId, PuckTorque};
+use puck::{CanFrame, CanId, Counts, Destination, GaugeStatus, Node, PropertyId, PuckTorque, SafetyMode};
 
 use crate::double::{ARM, Bus, floating, started};
 
@@ -136,6 +136,8 @@ fn a15_idle_ends_torque_within_three_cycles() {
         bus.run_slots(&mut core, 3 * CYCLE);
         assert_ne!(core.health().state, State::Gravity);
         let settled = bus.log.len();
+        // No person is faster; until the module has said twice that it brakes, it is asked for that.
+        bus.run(&mut core, 0.03);
         bus.press_activate();
         bus.run(&mut core, 0.5);
         assert!(!has_torque(&bus, settled), "no torque without a new command");
@@ -206,6 +208,27 @@ fn after_a_fault_the_safety_module_is_asked_to_go_idle() {
     });
     assert_eq!(asked.count(), 1);
     assert_eq!(bus.safety_mode, puck::SafetyMode::Idle);
+}
+
+/// G7: torque has ended at one wrong word of the safety module, and the request for its brakes is lost twice.
+#[test]
+fn g7_brakes_are_asked_for_every_20_ms_until_they_are_on_even_if_the_module_was_misheard() {
+    let (mut core, mut bus) = floating();
+    bus.wrong_safety_mode = Some(SafetyMode::Idle);
+    bus.lose_safety_writes = 2;
+    while core.health().state == State::Gravity {
+        bus.run_slots(&mut core, 1);
+    }
+    assert_eq!(bus.safety_mode, SafetyMode::Active, "it has only been misheard");
+    bus.run(&mut core, 0.05);
+    assert_eq!(bus.safety_mode, SafetyMode::Idle);
+    bus.run(&mut core, 0.03);
+    bus.press_activate();
+    bus.run(&mut core, 0.1);
+    assert_eq!(bus.safety_mode, SafetyMode::Active, "a person has activated again");
+    bus.commands.push_back(Command::Gravity.into());
+    bus.run(&mut core, 0.1);
+    assert_eq!(core.health().state, State::Gravity, "{:?}", bus.events);
 }
 
 /// A12: a controller without room is counted, never waited for, and ends in a fault after six cycles.

@@ -122,6 +122,10 @@ pub(crate) struct Bus {
     pub(crate) sensor: RawWrench,
     /// The controller has no room for this many more frames.
     pub(crate) refuse: u32,
+    /// Writes to the safety module that are lost from now on.
+    pub(crate) lose_safety_writes: u32,
+    /// The mode that the safety module tells next, once, instead of its own.
+    pub(crate) wrong_safety_mode: Option<SafetyMode>,
     /// When a button of the pendant was pressed last.
     pressed_us: u64,
     ticks: u64,
@@ -152,6 +156,8 @@ impl Bus {
             sensor_awake_at: None,
             sensor: RawWrench { force: [256, 0, 0], torque: [0, 0, 0], status: None },
             refuse: 0,
+            lose_safety_writes: 0,
+            wrong_safety_mode: None,
             pressed_us: 0,
             ticks: 0,
             answers: Vec::new(),
@@ -332,13 +338,14 @@ impl Bus {
                     Some(Property::Stat) => Status::Ready.value(),
                     Some(Property::Role) => 2,
                     Some(Property::Vers) => self.safety_version,
-                    Some(Property::Mode) => self.safety_mode.value(),
+                    Some(Property::Mode) => self.wrong_safety_mode.take().unwrap_or(self.safety_mode).value(),
                     Some(Property::Zero) => i32::from(self.safety_zero),
                     Some(Property::Pen) => 0x0F3F_1249,
                     other => panic!("the core asked the safety module for {other:?}"),
                 };
                 self.answer_value(node, property, value, table.property(property) == Some(Property::Pen));
             }
+            Action::Set { .. } if self.lose_safety_writes > 0 => self.lose_safety_writes -= 1,
             Action::Set { property, value } => match table.property(property) {
                 Some(Property::Zero) => self.safety_zero = value == 1,
                 Some(Property::Mode) => {

@@ -111,3 +111,37 @@ fn g2_a_puck_that_resets_under_torque_costs_the_zero_with_its_name() {
     assert!(!bus.safety_zero && !core.health().zeroed);
     assert_zeroing_leads_on(&mut core, &mut bus);
 }
+
+/// G2: the emergency stop is noticed behind the demand for zeroing, however often a person tries to zero.
+#[test]
+fn g2_an_emergency_stop_that_comes_while_zeroing_is_demanded_is_noticed_by_who_tries_to_zero() {
+    let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
+    bus.pucks[3].awake_at = None;
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.press_emergency_stop();
+    for _ in 0..10 {
+        bus.commands.push_back(Command::Zero { home: HOME });
+        bus.run(&mut core, 0.1);
+    }
+    assert_eq!(core.stage(), Stage::WaitingForIdle, "{:?}", bus.events);
+    bus.press_idle();
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    assert_zeroing_leads_on(&mut core, &mut bus);
+}
+
+/// G2: counts that begin anew under a latched fault, which no Clear ends before the arm is zeroed.
+#[test]
+fn g2_an_arm_whose_zero_is_lost_under_a_fault_is_zeroed_and_then_cleared() {
+    let (mut core, mut bus) = floating();
+    // Torque frames do not leave for six cycles: the bus itself goes on.
+    bus.refuse = 60;
+    bus.run(&mut core, 0.2);
+    assert_eq!((core.health().state, core.health().fault), (State::Fault, Fault::BusFault));
+    assert_eq!(bus.refuse, 0);
+    restart_puck_4(&mut bus);
+    bus.run(&mut core, 0.1);
+    bus.commands.push_back(Control::ClearFault.into());
+    bus.run(&mut core, 0.05);
+    assert_eq!(bus.events.last(), Some(&EventKind::Refused(Refusal::Control(control::Refusal::ZeroLost))));
+    assert_zeroing_leads_on(&mut core, &mut bus);
+}

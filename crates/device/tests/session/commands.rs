@@ -373,7 +373,14 @@ fn any_request() -> impl Strategy<Value = Request> {
     ]
 }
 
+/// Number of random cases: that of the environment variable, which `cargo xtask fuzz` sets, or `usual`.
+fn cases(variable: &str, usual: u32) -> u32 {
+    std::env::var(variable).ok().and_then(|number| number.parse().ok()).unwrap_or(usual)
+}
+
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(cases("TACTUS_FUZZ_SESSIONS", 256)))]
+
     /// C2: any requests in any order; every one is answered or handed on, no number that is none gets through,
     /// and the primitive that was stored is still there, whole.
     #[test]

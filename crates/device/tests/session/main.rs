@@ -1,8 +1,11 @@
 //! The session against a bench: what a host may do, what it is refused, and what survives.
 
+mod bounds;
 mod calibration;
 mod commands;
 mod conversation;
+mod library;
+mod observers;
 mod rig;
 mod saving;
 mod strangers;

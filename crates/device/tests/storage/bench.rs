@@ -52,6 +52,8 @@ pub(crate) enum Wish {
     /// Store [`TINY`] at a place.
     Tiny(u8),
     Delete(u8),
+    /// Let the image at a place begin with another number, as a rename does with its name.
+    Rename(u8, u8),
     /// Keep the home of this number.
     Home(u8),
     ForgetHome,
@@ -98,6 +100,7 @@ pub(crate) fn run<const SLOTS: usize, F: NorFlash>(
             Wish::Save(slot, number) => save(&mut shared.library(), slot, &image(number)),
             Wish::Tiny(slot) => save(&mut shared.library(), slot, &TINY),
             Wish::Delete(slot) => shared.library().delete(slot),
+            Wish::Rename(slot, number) => rename(&mut shared.library(), slot, number),
             Wish::Home(number) => shared.library().keep_home(&home(number)),
             Wish::ForgetHome => shared.library().forget_home(),
         };
@@ -115,6 +118,20 @@ fn save<const SLOTS: usize>(library: &mut Library<SLOTS, IMAGE>, slot: u8, image
     library.begin(image.len())?;
     library.write(0, image)?;
     library.commit(slot)
+}
+
+fn rename<const SLOTS: usize>(library: &mut Library<SLOTS, IMAGE>, slot: u8, number: u8) -> Result<(), StoreError> {
+    device::stage_copy(library, slot, &[number])?;
+    library.commit(slot)
+}
+
+/// The image of one number after it was made to begin with another.
+pub(crate) fn renamed(number: u8, to: u8) -> Vec<u8> {
+    let mut image = image(number);
+    image[0] = to;
+    let (covered, sum) = image.split_last_chunk_mut::<4>().expect("longer than its check sum");
+    *sum = link::frame::CRC.checksum(covered).to_le_bytes();
+    image
 }
 
 /// As [`run`], on a simulated chip.

@@ -3,7 +3,7 @@
 use device::{Store, StoredHome};
 use flash::FlashChip;
 
-use crate::bench::{TINY, Wish, chip, home, image, run_on};
+use crate::bench::{TINY, Wish, chip, home, image, renamed, run_on};
 
 /// Places of the library here.
 const SLOTS: usize = 4;
@@ -13,6 +13,9 @@ const WORD_DRAWS: u64 = 1;
 
 /// Times that the rest of a torn erase is drawn for each erase: at least twice each of its kinds.
 const ERASE_DRAWS: u64 = 24;
+
+/// Number of the image that is renamed, and what it begins with then.
+const RENAMED: (u8, u8) = (41, 210);
 
 /// Content of the flash, by number.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +34,8 @@ fn found(chip: &FlashChip) -> Content {
     let images = std::array::from_fn(|slot| {
         let bytes = library.image(slot as u8)?;
         // An image begins with its number.
-        assert!(bytes == image(bytes[0]) || bytes == TINY, "an image that nobody ever stored");
+        let is_ours = bytes == image(bytes[0]) || bytes == TINY || bytes == renamed(RENAMED.0, RENAMED.1);
+        assert!(is_ours, "an image that nobody ever stored");
         Some(bytes[0])
     });
     let home = match library.home() {
@@ -92,6 +96,7 @@ fn cut_everywhere(before: &[u8], wish: Wish) -> usize {
         Wish::Save(slot, number) => put(slot, Some(number)),
         Wish::Tiny(slot) => put(slot, Some(TINY[0])),
         Wish::Delete(slot) => put(slot, None),
+        Wish::Rename(slot, number) => put(slot, Some(number)),
         Wish::Home(number) => {
             new.home = Some(number);
             0
@@ -195,6 +200,20 @@ fn power_fails_at_every_operation_of_a_delete_that_needs_an_erase_and_the_image_
     // An image of a few bytes takes as much room as the note that one was deleted: fill the sector with such.
     let cuts = cut_everywhere(&full_for(Wish::Tiny(3)), Wish::Delete(0));
     assert!(cuts > 500, "{cuts} cuts: no sector was emptied");
+}
+
+#[test]
+fn power_fails_at_every_word_of_a_rename_and_the_image_has_the_old_name_or_the_new() {
+    let blank = vec![0xFF; flash::FLASH_BYTES];
+    let before = after(&blank, &[Wish::Save(0, 1), Wish::Save(1, RENAMED.0), Wish::Save(2, 3)]);
+    let cuts = cut_everywhere(&before, Wish::Rename(1, RENAMED.1));
+    assert!(cuts > 490 * WORD_DRAWS as usize, "{cuts} cuts are too few for an image of 16 kB in words of 32 bytes");
+}
+
+#[test]
+fn power_fails_at_every_operation_of_a_rename_that_needs_an_erase_and_the_image_has_the_old_name_or_the_new() {
+    let cuts = cut_everywhere(&crowded(), Wish::Rename(1, RENAMED.1));
+    assert!(cuts > 1000 * WORD_DRAWS as usize, "{cuts} cuts: the images in the emptied sector were not copied");
 }
 
 /// A crowded flash in which what is left of the sector is filled with small images, until this wish would need an

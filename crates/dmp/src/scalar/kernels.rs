@@ -18,10 +18,13 @@ pub trait Kernels<T, const N: usize>: Clone + Debug + PartialEq {
     fn centre(&self, i: usize) -> Option<T>;
     /// Width `h_i`; `None` beyond the last kernel.
     fn width(&self, i: usize) -> Option<T>;
-    /// Gives each kernel that matters at the phase `s` to `take`, in order and such that the largest is 1; returns
-    /// `s / sum psi`.
-    fn each(&self, s: T, take: impl FnMut(usize, T)) -> T;
+    /// Gives the kernels that matter at the phase `s` to `take`, some at a time with the index of the first, in order
+    /// and such that the largest is 1; returns `s / sum psi`.
+    fn each(&self, s: T, take: impl FnMut(usize, &[T])) -> T;
 }
+
+/// Kernels that are evaluated together.
+const AT_A_TIME: usize = 16;
 
 /// Kernels by a table of centres and widths.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,7 +74,7 @@ impl<T: Scalar, const N: usize> Kernels<T, N> for Tabulated<T, N> {
     }
 
     #[inline]
-    fn each(&self, s: T, mut take: impl FnMut(usize, T)) -> T {
+    fn each(&self, s: T, mut take: impl FnMut(usize, &[T])) -> T {
         let count = if self.count < N { self.count } else { N };
         let (centres, roots) = (&self.centres[..count], &self.root_widths[..count]);
         let exponent = |i: usize| {
@@ -92,13 +95,33 @@ impl<T: Scalar, const N: usize> Kernels<T, N> for Tabulated<T, N> {
         let matters = |i: usize| exponent(i) - smallest <= T::NEGLIGIBLE_EXPONENT;
         let first = (0..nearest).rev().take_while(|&i| matters(i)).last().unwrap_or(nearest);
         let mut sum = T::ZERO;
-        for i in first..count {
-            if i > nearest && !matters(i) {
+        // Some at a time: the loop over their exponentials has no branch, so it becomes vector instructions where there
+        // are any.
+        let mut i = first;
+        for (centres, roots) in centres[first..].chunks(AT_A_TIME).zip(roots[first..].chunks(AT_A_TIME)) {
+            let mut kernels = [T::ZERO; AT_A_TIME];
+            let mut used = 0;
+            for ((place, centre), root) in kernels.iter_mut().zip(centres).zip(roots) {
+                let z = *root * (s - *centre);
+                let exponent = z * z - smallest;
+                if i + used > nearest && !(exponent <= T::NEGLIGIBLE_EXPONENT) {
+                    break;
+                }
+                *place = exponent;
+                used += 1;
+            }
+            let used = kernels.get_mut(..used).unwrap_or_default();
+            for kernel in used.iter_mut() {
+                *kernel = T::kernel(*kernel);
+            }
+            for kernel in used.iter() {
+                sum = sum + *kernel;
+            }
+            take(i, used);
+            i += used.len();
+            if used.len() < centres.len() {
                 break;
             }
-            let kernel = if i == nearest { T::kernel(T::ZERO) } else { T::kernel(exponent(i) - smallest) };
-            sum = sum + kernel;
-            take(i, kernel);
         }
         s / sum
     }

@@ -139,7 +139,7 @@ impl<const N: usize> Kernels<FixedPoint, N> for Ratios {
     }
 
     #[inline]
-    fn each(&self, s: FixedPoint, mut take: impl FnMut(usize, FixedPoint)) -> FixedPoint {
+    fn each(&self, s: FixedPoint, mut take: impl FnMut(usize, &[FixedPoint])) -> FixedPoint {
         // The phase 1 is that of the first tick; one less of 2^-32 fits into 32 bits.
         let phase = s.to_bits().clamp(0, u32::MAX.into()) as u32;
         let near = self.near(phase.max(1));
@@ -171,7 +171,7 @@ impl<const N: usize> Kernels<FixedPoint, N> for Ratios {
             }
             let kernel = FixedPoint::from_bits(decay(above >> (2 * ROOT_BITS - 32)));
             sum = sum + kernel;
-            take(i, kernel);
+            take(i, core::slice::from_ref(&kernel));
             ratio = next(ratio);
         }
         // Of the kernels the nearest is 1, so this is at most 1.

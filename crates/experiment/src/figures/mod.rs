@@ -1,6 +1,7 @@
 //! Figures of an experiment.
 
 pub mod bars;
+pub mod curve;
 pub mod forces;
 pub mod paths;
 pub mod series;

@@ -134,3 +134,32 @@ fn random_bytes_are_refused_and_nothing_panics() {
         assert!(read(&bytes, 61).is_err());
     }
 }
+
+#[test]
+fn h5_no_number_that_a_hand_reads_may_be_absurd() {
+    let sound = Movement::closing(10, 5.0, 0.3).feeling().image("grip");
+    let forged = |place: usize, value: f32| {
+        let mut image = sound.clone();
+        image[60 + 4 * place..][..4].copy_from_slice(&value.to_le_bytes());
+        let covered = image.len() - 4;
+        let crc = link::frame::CRC.checksum(&image[..covered]);
+        image[covered..].copy_from_slice(&crc.to_le_bytes());
+        image
+    };
+    assert!(read(&sound, 192).is_ok());
+    // Timing, K, D, start, its velocity, goal, clamp, the marks of the recording; then the gains of the fingers.
+    let (k1, k2, weights) = (75, 75 + 9 * 10, 75 + 9 * 10 + 9 * 9);
+    let expected = weights + 17 * 10;
+    let own = [0, 1, 2, 6, 10, 66, 67, 68, 69, 70, 71, 72, 73, 74].into_iter();
+    let own = own.chain(25..29).chain(42..46).chain(60..64);
+    let own = own.chain(k1 + 7..k1 + 10).chain(k2 + 6..k2 + 9).chain(weights + 130..weights + 170);
+    for place in own.chain(expected + 6..expected + 9) {
+        for value in [1e30, -1e30, 3e38, 1e7, -1e7, f32::NAN, f32::INFINITY] {
+            assert!(read(&forged(place, value), 192).is_err(), "real {place} of {value}");
+        }
+    }
+    // No gauge measures more than its drive can press with.
+    for (place, value) in [(expected + 6, 1.3), (expected + 8, -20.0), (42, 40.0), (68, -5.0)] {
+        assert!(read(&forged(place, value), 192).is_err(), "real {place} of {value}");
+    }
+}

@@ -9,6 +9,7 @@ mod calibration;
 mod halt;
 mod interrupt;
 mod motion;
+mod observe;
 mod telemetry;
 mod transfer;
 mod upload;
@@ -90,6 +91,7 @@ pub struct Client<T: Transport> {
     gaps: Gaps,
     round_trips: RoundTrips,
     moving: bool,
+    observing: bool,
     open: bool,
     timeout: Duration,
     transfer: Transfer,
@@ -134,6 +136,7 @@ impl<T: Transport> Client<T> {
             gaps: Gaps::default(),
             round_trips: RoundTrips::default(),
             moving: false,
+            observing: false,
             open: false,
             timeout: ANSWER_TIMEOUT,
             transfer: Transfer::default(),
@@ -148,15 +151,15 @@ impl<T: Transport> Client<T> {
     /// Says hello; waits for so long until another host is gone.
     fn open(&mut self, owner: &str, link_version: u16, schema_hash: u32, patience: Duration) -> Result<(), HostError> {
         let hello = HostHello { link_version, schema_hash, model_hash: control::MODEL_HASH, owner: Text::new(owner) };
-        self.hello = self.greet(&hello, patience)?;
+        self.hello = self.greet(&Request::Hello(hello.clone()), &hello, patience)?;
         self.open = true;
         Ok(())
     }
 
-    fn greet(&mut self, hello: &HostHello, patience: Duration) -> Result<DeviceHello, HostError> {
+    fn greet(&mut self, greeting: &Request, hello: &HostHello, patience: Duration) -> Result<DeviceHello, HostError> {
         let started = self.transport.now();
         loop {
-            match self.exchange(&Request::Hello(hello.clone())) {
+            match self.exchange(greeting) {
                 Ok(Reply::Hello { hello: device, .. }) => {
                     // The device has compared; comparing here too catches a device that does not.
                     differs(Refusal::LinkVersion, hello.link_version, device.link_version)?;
@@ -284,9 +287,11 @@ impl<T: Transport> Client<T> {
         self.send(envelope, request)?;
         let mut repeat_at = started + REPEAT_AFTER;
         let timeout = match request {
-            Request::UploadCommit | Request::Delete { .. } | Request::Calibrate { .. } | Request::ForgetCalibration => {
-                self.timeout.max(STORE_TIMEOUT)
-            }
+            Request::UploadCommit
+            | Request::Delete { .. }
+            | Request::Rename { .. }
+            | Request::Calibrate { .. }
+            | Request::ForgetCalibration => self.timeout.max(STORE_TIMEOUT),
             _ => self.timeout,
         };
         loop {
@@ -355,7 +360,9 @@ impl<T: Transport> Client<T> {
         while let Some(frame) = self.decoder.next::<Reply>(&mut rest) {
             // What the device says to others carries numbers of the same series.
             self.gaps.message(frame.envelope.sequence);
-            if frame.envelope.session == self.session {
+            // An observer takes what the device tells the one that commands.
+            let is_told = matches!(frame.message, Reply::Telemetry(_) | Reply::Event(_));
+            if frame.envelope.session == self.session || (self.observing && is_told) {
                 self.sort(frame);
             }
         }

@@ -90,6 +90,14 @@ impl<T: Transport> Client<T> {
         Ok(self.list()?.into_iter().find(|listing| listing.name == *name))
     }
 
+    /// Gives a stored primitive another name.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn rename(&mut self, name: &Name, to: &Name) -> Result<(), HostError> {
+        self.order(&Request::Rename { name: name.clone(), to: to.clone() })
+    }
+
     /// Removes a primitive.
     ///
     /// # Errors

@@ -15,6 +15,8 @@ pub const TIME: &str = "t_s";
 pub const CYCLE: &str = "cycle";
 /// Name of the column of the supervisor's state, a word.
 pub const STATE: &str = "state";
+/// Code of the latched fault.
+pub const FAULT: &str = "fault";
 /// Name of the column of the phase of the movement, 1 at its start, towards 0 at its end.
 pub const PHASE: &str = "phase";
 /// Columns of the measured position of the tool frame in the world frame.
@@ -109,7 +111,7 @@ pub const LAYOUT: &[Quantity] = &[
          `fault`",
         |row| row.state().to_owned(),
     ),
-    quantity(&["fault"], "1", "code of the latched fault, 0 for none", |row| row.telemetry.fault.to_string()),
+    quantity(&[FAULT], "1", "code of the latched fault, 0 for none", |row| row.telemetry.fault.to_string()),
     quantity(&[FLAGS], "1", "flag bits of the cycle record, see `control::cycle::record::flags`", |row| {
         row.telemetry.flags.to_string()
     }),

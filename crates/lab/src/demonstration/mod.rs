@@ -6,12 +6,14 @@
 
 pub mod error;
 pub mod layout;
+pub mod origin;
 pub mod recording;
 pub mod resample;
 pub mod writer;
 
 pub use error::{DemonstrationError, Place, RecordingError};
 pub use layout::RecordingRow;
+pub use origin::{Origin, Played};
 pub use recording::{FEWEST_SAMPLES, Recording};
 pub use writer::RecordingWriter;
 

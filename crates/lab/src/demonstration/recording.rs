@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::{Place, RecordingError};
 use super::layout;
+use super::origin::Origin;
 
 /// Samples that a recording must have at least: 0.2 s, the shortest movement that can be filtered at
 /// 7.5 Hz and differentiated twice. Fewer would be fitted by chance.
@@ -26,6 +27,8 @@ pub struct Recording {
     pub file: PathBuf,
     /// CRC-32/ISCSI of the file's bytes.
     pub checksum: u32,
+    /// Where it comes from, as far as its notes say.
+    pub origin: Origin,
     /// Line of the header in the file, from 1.
     pub header_line: u64,
     /// Number of columns in the header.
@@ -38,6 +41,8 @@ pub struct Recording {
     pub cycle: Option<Vec<u32>>,
     /// State of the supervisor, a word.
     pub state: Option<Vec<String>>,
+    /// Code of the latched fault, 0 for none.
+    pub fault: Option<Vec<u32>>,
     /// Phase of the movement, 1.
     pub phase: Option<Vec<f64>>,
     /// Joint angles, rad.
@@ -119,11 +124,13 @@ impl Recording {
         Ok(Recording {
             file: file.to_owned(),
             checksum: checksum(bytes),
+            origin: origin(bytes),
             header_line: table.header_line,
             columns: table.names.len(),
             phase: table.numbers(layout::PHASE),
             surprise: table.numbers(layout::SURPRISE),
             flags: table.whole_numbers(layout::FLAGS)?,
+            fault: table.whole_numbers(layout::FAULT)?,
             orientation: table.unit_quaternions(orientation, layout::ORIENTATION[0])?,
             orientation_d: table.unit_quaternions(orientation_d, layout::ORIENTATION_D[0])?,
             state: table.states,
@@ -179,10 +186,12 @@ impl Recording {
         Recording {
             file: self.file.clone(),
             checksum: self.checksum,
+            origin: self.origin.clone(),
             header_line: self.header_line,
             columns: self.columns,
             lines: pick(&self.lines, keep),
             state: self.state.as_ref().map(|values| pick(values, keep)),
+            fault: self.fault.as_ref().map(|values| pick(values, keep)),
             phase: self.phase.as_ref().map(|values| pick(values, keep)),
             q: self.q.as_ref().map(|values| pick(values, keep)),
             dq: self.dq.as_ref().map(|values| pick(values, keep)),
@@ -231,6 +240,13 @@ impl std::fmt::Debug for Recording {
 /// CRC-32/ISCSI of a file's bytes, the same polynomial that guards the link and the primitive image.
 pub fn checksum(bytes: &[u8]) -> u32 {
     link::frame::CRC.checksum(bytes)
+}
+
+/// Where a recording comes from: the notes before its header.
+fn origin(bytes: &[u8]) -> Origin {
+    let lines = bytes.split(|byte| *byte == b'\n').take_while(|line| line.first() == Some(&b'#'));
+    let notes: Vec<String> = lines.map(|line| String::from_utf8_lossy(&line[1..]).trim().to_owned()).collect();
+    Origin::of_notes(notes.iter().map(String::as_str))
 }
 
 /// Number of gaps, samples missing in them, and the longest step with the index of its later end.

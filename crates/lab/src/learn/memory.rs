@@ -11,7 +11,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::calibration::calibrated;
-use crate::demonstration::Recording;
+use crate::demonstration::{Played, Recording};
 use crate::primitive_file::{ExpectationTable, ExperienceTable, PrimitiveFile};
 
 /// Points of the weights K2: coarse, because the spread of a few runs is itself uncertain.
@@ -95,6 +95,16 @@ pub enum MemoryError {
         found: f64,
         /// Duration expected, s.
         expected: f64,
+    },
+    /// A recording says that it shows another movement.
+    #[error("{file}: shows the movement {found}, the primitive is {expected}", file = file.display())]
+    Others {
+        /// The recording.
+        file: PathBuf,
+        /// The movement in it.
+        found: Played,
+        /// The movement of the primitive.
+        expected: Played,
     },
     /// The statistics refuse.
     #[error("the recordings cannot be averaged: {0}")]
@@ -228,9 +238,14 @@ fn runs<const CHANNELS: usize>(
     if recordings.is_empty() {
         return Err(MemoryError::None);
     }
+    let expected = Played { name: primitive.name.clone(), movement: primitive.movement_checksum() };
     recordings
         .iter()
         .map(|recording| {
+            if let Some(found) = recording.origin.primitive.clone().filter(|found| found.movement != expected.movement)
+            {
+                return Err(MemoryError::Others { file: recording.file.clone(), found, expected: expected.clone() });
+            }
             let run = recording.running();
             let (samples, found) = progress(&run, primitive.movement.alpha)?;
             if (found - duration).abs() > SAME_DURATION * duration || !found.is_finite() {

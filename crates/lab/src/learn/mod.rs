@@ -14,6 +14,7 @@ pub mod report;
 
 use std::path::{Path, PathBuf};
 
+use control::plan::bounds::{DISPLACEMENT, GAIN};
 use control::plan::primitive::Reference;
 use dmp::fit::{LARGEST_ANGLE, LARGEST_ROTATION_VECTOR, WARNING_ANGLE};
 use thiserror::Error;
@@ -58,7 +59,8 @@ pub struct LearnOptions {
 }
 
 impl LearnOptions {
-    /// The recommended values: 50 kernels, 7.5 Hz, quaternion error, an open hand.
+    /// The recommended values: 50 kernels, 7.5 Hz, quaternion error, an open hand. `tactus learn` repeats them as the
+    /// defaults of its options.
     pub fn named(name: impl Into<String>) -> LearnOptions {
         LearnOptions {
             name: name.into(),
@@ -109,6 +111,23 @@ pub enum LearnError {
         /// The reason that `dmp::fit` gives.
         reason: String,
     },
+    /// The primitive leaves the way that was shown.
+    #[error(
+        "{file}: the primitive leaves the way that was shown by {:.0} mm and {:.0} degrees, at most {:.0} mm and {:.0} degrees are accepted",
+        position * 1e3,
+        orientation.to_degrees(),
+        WORST_REPRODUCTION.0 * 1e3,
+        WORST_REPRODUCTION.1.to_degrees(),
+        file = file.display()
+    )]
+    Poor {
+        /// The recording.
+        file: PathBuf,
+        /// Largest distance, m.
+        position: f64,
+        /// Largest angle, rad.
+        orientation: f64,
+    },
     /// The fitted primitive is no valid primitive.
     #[error(transparent)]
     Primitive(#[from] PrimitiveFileError),
@@ -129,6 +148,9 @@ pub struct Learned {
 const COARSE_POSITION: f64 = 2e-3;
 /// Reproductions worse than this (rad, RMS: half a degree) deserve more kernels.
 const COARSE_ORIENTATION: f64 = 0.5 * std::f64::consts::PI / 180.0;
+
+/// Reproductions that leave the way by more than this somewhere (m, rad) are no reproductions: 3 cm, 10 degrees.
+const WORST_REPRODUCTION: (f64, f64) = (0.03, 10.0 * std::f64::consts::PI / 180.0);
 
 /// Learns a primitive from a recording; `file` is where the primitive will be written.
 ///
@@ -182,6 +204,10 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
     let mut report = compare(&primitive, recording, &demonstration, &posture, &hand, largest_angle, warnings)?;
     report.feedback = FeedbackReport::of(&primitive);
     report.warnings.extend(report.feedback.as_ref().map(FeedbackReport::warnings).unwrap_or_default());
+    let (position, orientation) = (report.position_max_m, report.orientation_max_rad);
+    if position > WORST_REPRODUCTION.0 || orientation > WORST_REPRODUCTION.1 {
+        return Err(LearnError::Poor { file: recording.file.clone(), position, orientation });
+    }
     let coarse = report.position_rms_m > COARSE_POSITION || report.orientation_rms_rad > COARSE_ORIENTATION;
     if coarse && options.kernels < KERNEL_CAPACITY {
         report.warnings.push(format!(
@@ -215,19 +241,21 @@ fn check_options(options: &LearnOptions) -> Result<(), LearnError> {
         return wrong("--dwell", &format!("a time between 0 and {LONGEST_DWELL} s is expected"));
     }
     let feedback = &options.feedback;
-    let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value <= 1e6);
+    let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value <= GAIN);
     if !positive(feedback.stiffness) {
-        return wrong("--stiffness", "a number between 0 and 1e6 is expected");
+        return wrong("--stiffness", "a number between 0 and 1e4 is expected");
     }
     if !positive(feedback.orientation_stiffness) {
-        return wrong("--orientation-stiffness", "a number between 0 and 1e6 is expected");
+        return wrong("--orientation-stiffness", "a number between 0 and 1e4 is expected");
     }
     if feedback.sensitivity.is_some_and(|k1| !k1.iter().all(|k1| (0.0..=1e6).contains(k1))) {
         return wrong("--k1", "numbers between 0 and 1e6 are expected: a negative one would run towards what pushes");
     }
     match feedback.limits {
         Some([metres, degrees, hand])
-            if !((0.0..=1.0).contains(&metres) && (0.0..=180.0).contains(&degrees) && (0.0..=3.0).contains(&hand)) =>
+            if !(0.0..=DISPLACEMENT[0]).contains(&metres)
+                || !(0.0..=DISPLACEMENT[1]).contains(&degrees.to_radians())
+                || !(0.0..=DISPLACEMENT[2]).contains(&hand) =>
         {
             wrong("--clamp", "metres up to 1, degrees up to 180 and radians up to 3 are expected")
         }

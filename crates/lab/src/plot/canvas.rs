@@ -4,7 +4,7 @@
 //! crate), the Okabe-Ito colours that people with any kind of colour blindness tell apart, and line styles that
 //! differ as well, so that a black-and-white print still reads.
 
-use super::drawing::{Anchor, Colour, Drawing, Frame, INK};
+use super::drawing::{Anchor, BAND, Colour, Drawing, Frame, INK};
 
 /// Width of the page, px.
 const PAGE_WIDTH: f64 = 1600.0;
@@ -33,6 +33,8 @@ pub enum Ink {
     Plan,
     /// The motion of the arm.
     Execution,
+    /// A range that is expected; its points go around it.
+    Band,
     /// A limit.
     Limit,
     /// First of several quantities in one panel (x).
@@ -49,6 +51,7 @@ impl Ink {
             Ink::Demonstration => "#999999",
             Ink::Plan => "#0072B2",
             Ink::Execution => "#D55E00",
+            Ink::Band => BAND,
             Ink::Limit => "#000000",
             Ink::First => "#CC79A7",
             Ink::Second => "#009E73",
@@ -59,6 +62,7 @@ impl Ink {
     fn width(self) -> f64 {
         match self {
             Ink::Demonstration => 5.0,
+            Ink::Band => 12.0,
             Ink::Execution => 1.8,
             Ink::Plan => 2.4,
             Ink::Limit => 1.2,
@@ -73,7 +77,7 @@ impl Ink {
             Ink::Limit => Some([3.0, 4.0]),
             Ink::Second => Some([12.0, 4.0]),
             Ink::Third => Some([4.0, 3.0]),
-            Ink::Demonstration | Ink::Execution | Ink::First => None,
+            Ink::Demonstration | Ink::Band | Ink::Execution | Ink::First => None,
         }
     }
 
@@ -172,6 +176,13 @@ impl Panel {
         drawing.upward_text([frame.corner[0] - 64.0, middle[1]], self.y_label.clone(), 14, INK);
         frame.grid(drawing, 13, [5, 5]);
         for curve in &self.curves {
+            if curve.ink == Ink::Band {
+                let around: Vec<_> = curve.points.iter().map(|(x, y)| frame.at([*x, *y])).collect();
+                drawing.polygon(&around, BAND);
+                // An expectation without a spread is a line.
+                drawing.line(&around, BAND, 1.0);
+                continue;
+            }
             curve.ink.line(drawing, &frame.curve(thin(&curve.points).into_iter().map(Into::into)));
         }
         frame.axes(drawing);

@@ -155,6 +155,14 @@ impl Drawing {
         self.scene.elements.push(Primitive::Text { x, y, content, size, anchor, rotate, bold: false, color });
     }
 
+    /// The page as SVG for a page of HTML: it takes the width that it is given, and the fonts of the reader.
+    pub fn to_inline_svg(&self) -> String {
+        let svg = SvgBackend::new().render_scene(&self.scene);
+        let (width, height) = (self.scene.width, self.scene.height);
+        let body = svg.split_once('>').map_or("", |(_, body)| body);
+        format!("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\">{body}")
+    }
+
     /// The page as SVG with its font inside.
     pub fn to_svg(&self) -> String {
         SvgBackend::new().with_embedded_font(true).render_scene(&self.scene)
@@ -176,7 +184,7 @@ impl Drawing {
         let png = folder.join(format!("{name}.png"));
         let pixels = self.to_png(1.5).map_err(|reason| PlotError::Encode { file: png.clone(), reason })?;
         for (file, bytes) in [(folder.join(format!("{name}.svg")), self.to_svg().into_bytes()), (png, pixels)] {
-            std::fs::write(&file, bytes).map_err(|cause| PlotError::Write { file, cause })?;
+            crate::output_file::replace(&file, &bytes)?;
         }
         Ok(())
     }

@@ -32,28 +32,19 @@ pub enum PlotError {
         reason: String,
     },
     /// The file could not be written.
-    #[error("{file}: cannot be written: {cause}", file = file.display())]
-    Write {
-        /// The file.
-        file: PathBuf,
-        /// The operating system's reason.
-        #[source]
-        cause: std::io::Error,
-    },
+    #[error(transparent)]
+    Write(#[from] crate::output_file::OutputError),
 }
 
-/// Writes a page; the end of the file's name chooses SVG or PNG.
+/// A page as it stands in a file; the end of the file's name chooses SVG or PNG.
 ///
 /// # Errors
-/// [`PlotError`] other than [`PlotError::Nothing`].
-pub fn write(page: &Page, file: &Path) -> Result<(), PlotError> {
+/// [`PlotError::Format`], [`PlotError::Encode`].
+pub fn encode(page: &Page, file: &Path) -> Result<Vec<u8>, PlotError> {
     let extension = file.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-    let bytes = match extension.as_deref() {
-        Some("svg") => page.draw().to_svg().into_bytes(),
-        Some("png") => page.draw().to_png(1.0).map_err(|reason| PlotError::Encode { file: file.to_owned(), reason })?,
-        _ => {
-            return Err(PlotError::Format { file: file.to_owned() });
-        }
-    };
-    std::fs::write(file, bytes).map_err(|cause| PlotError::Write { file: file.to_owned(), cause })
+    match extension.as_deref() {
+        Some("svg") => Ok(page.draw().to_svg().into_bytes()),
+        Some("png") => page.draw().to_png(1.0).map_err(|reason| PlotError::Encode { file: file.to_owned(), reason }),
+        _ => Err(PlotError::Format { file: file.to_owned() }),
+    }
 }

@@ -85,6 +85,7 @@ impl Movement {
                 rows.extend(torque_panels(run));
                 legend.push((Ink::Limit, "torque limit of the joint".to_owned()));
             }
+            rows.extend(hand_panels(run));
             if run.wrench.is_some() {
                 for (ink, label) in [(Ink::First, "force x"), (Ink::Second, "force y"), (Ink::Third, "force z")] {
                     legend.push((ink, label.to_owned()));
@@ -211,6 +212,26 @@ fn error_panels(run: &Recording) -> Vec<Panel> {
         });
     }
     panels
+}
+
+/// Spread and fingers, measured and planned, where a hand was recorded.
+fn hand_panels(run: &Recording) -> Option<Vec<Panel>> {
+    let hand = run.hand.as_ref()?;
+    let time = relative_time(run);
+    let panel = |digit: usize| {
+        let mut curves = vec![curve(Ink::Execution, &time, hand.iter().map(|angles| angles[digit]))];
+        if let Some(planned) = &run.hand_d {
+            curves.push(curve(Ink::Plan, &time, planned.iter().map(|angles| angles[digit])));
+        }
+        Panel {
+            title: ["Spread", "Finger F1", "Finger F2", "Finger F3"][digit].to_owned(),
+            y_label: "angle (rad)".to_owned(),
+            curves,
+            least_height: 0.1,
+            from_zero: false,
+        }
+    };
+    Some((0..4).map(panel).collect())
 }
 
 /// Two rows of four: the seven joints, and the share of each joint's limit that was used at most.

@@ -1,6 +1,7 @@
 //! From the file to what a controller runs: `dmp::Primitive` on the host, the image for a device.
 
 use control::LoadError;
+use control::plan::bounds;
 use control::plan::primitive::{
     Configuration, ExpectedWrench, Feedback, GainSchedule, MovementTables, Primitive, SensorStatistics, configuration,
     gains, limits, velocity,
@@ -44,6 +45,11 @@ impl PrimitiveFile {
             .map(|table| ExpectedWrench::new(&points(&table.mean), table.recorded_duration))
             .transpose()
             .map_err(|error| refused(format!("expectation: {error}")))?;
+        if let Some(table) = &self.expectation {
+            let (mass, centre) = (table.payload_mass as f32, table.payload_centre.map(|value| value as f32));
+            bounds::check_marks(mass, &centre, table.trials as f32, table.spread_floor as f32)
+                .map_err(|quantity| refused(quantity.to_string()))?;
+        }
         let experience = self
             .experience
             .as_ref()

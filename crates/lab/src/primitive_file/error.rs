@@ -7,7 +7,10 @@ use thiserror::Error;
 /// Why a file is not a primitive.
 #[derive(Debug, Error)]
 pub enum PrimitiveFileError {
-    /// The file cannot be read or written.
+    /// The file cannot be written.
+    #[error(transparent)]
+    Output(crate::output_file::OutputError),
+    /// The file cannot be read.
     #[error("{file}: {cause}", file = file.display())]
     Io {
         /// The file.

@@ -7,6 +7,7 @@
 
 mod convert;
 mod error;
+mod readback;
 mod text;
 
 use std::path::{Path, PathBuf};
@@ -21,6 +22,7 @@ pub use dmp::{Hemisphere, OrientationError};
 pub use error::PrimitiveFileError;
 
 use crate::demonstration::recording::checksum;
+use crate::output_file;
 
 /// Version of the layout. A file that names another one is refused.
 pub const SCHEMA: &str = "tactus-primitive/1";
@@ -134,7 +136,8 @@ pub struct ExpectationTable {
     pub spread_floor: f64,
     /// Mean by phase, 9 sensor rows a point: force N (world), torque N m, finger gauges N m.
     pub mean: Vec<Vec<f64>>,
-    /// Standard deviation, same shape. It stays on the host: K2 was made from it.
+    /// Standard deviation, same shape; empty where it is not known. It stays on the host: K2 was made from it, and a
+    /// primitive that was read back from a device has none.
     pub spread: Vec<Vec<f64>>,
 }
 
@@ -252,13 +255,17 @@ impl PrimitiveFile {
     /// # Errors
     /// A number is not finite, a table has the wrong size, or the operating system refuses.
     pub fn write(&self, file: &Path) -> Result<(), PrimitiveFileError> {
+        let text = self.checked_text()?;
+        output_file::replace(file, text.as_bytes()).map_err(PrimitiveFileError::Output)
+    }
+
+    /// The text of the file, its values checked.
+    ///
+    /// # Errors
+    /// A number is not finite, or a table has the wrong size.
+    pub fn checked_text(&self) -> Result<String, PrimitiveFileError> {
         self.check_values()?;
-        let failed = |cause| PrimitiveFileError::Io { file: file.to_owned(), cause };
-        let mut half_written = file.as_os_str().to_owned();
-        half_written.push(".part");
-        let half_written = PathBuf::from(half_written);
-        std::fs::write(&half_written, self.to_text()).map_err(failed)?;
-        std::fs::rename(&half_written, file).map_err(failed)
+        Ok(self.to_text())
     }
 
     /// The text of the file.
@@ -309,6 +316,12 @@ impl PrimitiveFile {
     /// The movement alone, as it can be rehearsed: without expectation and experience.
     pub fn without_memory(&self) -> PrimitiveFile {
         PrimitiveFile { expectation: None, experience: None, ..self.clone() }
+    }
+
+    /// Check sum of the movement alone: what is remembered of it, and the weights that follow from that, do not change
+    /// it.
+    pub fn movement_checksum(&self) -> u32 {
+        PrimitiveFile { feedback: None, ..self.without_memory() }.checksum()
     }
 
     /// Number of kernels of each row.
@@ -405,7 +418,9 @@ impl PrimitiveFile {
             columns("feedback.k2", &feedback.k2, link::image::SENSOR_ROWS)?;
         }
         if let Some(expectation) = &self.expectation {
-            shape("expectation.spread", expectation.spread.len(), expectation.mean.len())?;
+            if !expectation.spread.is_empty() {
+                shape("expectation.spread", expectation.spread.len(), expectation.mean.len())?;
+            }
             columns("expectation.mean", &expectation.mean, link::image::SENSOR_ROWS)?;
             columns("expectation.spread", &expectation.spread, link::image::SENSOR_ROWS)?;
         }

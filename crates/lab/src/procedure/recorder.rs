@@ -38,18 +38,55 @@ pub fn recording_row(telemetry: &Telemetry, first: u32) -> RecordingRow {
 /// # Errors
 /// None that a memory could give; the type is that of [`RecordingWriter`].
 pub fn recording_text(cycles: &[Telemetry], notes: &str) -> std::io::Result<Vec<u8>> {
-    let mut writer = RecordingWriter::new(Vec::new(), notes)?;
-    let first = cycles.first().map_or(0, |telemetry| telemetry.cycle);
+    let mut writer = CycleWriter::new(Vec::new(), notes)?;
     for telemetry in cycles {
-        writer.write(&recording_row(telemetry, first))?;
+        writer.write(telemetry)?;
     }
     writer.finish()
 }
 
-/// A recording that is being made.
-pub struct Recorder<W: Write> {
+/// A recording that is written cycle by cycle.
+#[derive(Debug)]
+pub struct CycleWriter<W: Write> {
     writer: RecordingWriter<W>,
     first: Option<u32>,
+}
+
+impl<W: Write> CycleWriter<W> {
+    /// Writes the head of the file.
+    ///
+    /// # Errors
+    /// The output's error.
+    pub fn new(output: W, notes: &str) -> std::io::Result<Self> {
+        Ok(Self { writer: RecordingWriter::new(output, notes)?, first: None })
+    }
+
+    /// Writes one cycle.
+    ///
+    /// # Errors
+    /// The output's error.
+    pub fn write(&mut self, telemetry: &Telemetry) -> std::io::Result<()> {
+        let first = *self.first.get_or_insert(telemetry.cycle);
+        self.writer.write(&recording_row(telemetry, first))
+    }
+
+    /// Cycles written so far.
+    pub fn rows(&self) -> usize {
+        self.writer.rows()
+    }
+
+    /// Hands every byte to the output and gives it back.
+    ///
+    /// # Errors
+    /// The output's error.
+    pub fn finish(self) -> std::io::Result<W> {
+        self.writer.finish()
+    }
+}
+
+/// A recording that is being made.
+pub struct Recorder<W: Write> {
+    writer: CycleWriter<W>,
 }
 
 impl<W: Write> Recorder<W> {
@@ -58,9 +95,9 @@ impl<W: Write> Recorder<W> {
     /// # Errors
     /// The device refuses, or the output does.
     pub fn start(client: &mut Client<Device>, output: W, notes: &str) -> Result<Self, ProcedureError> {
-        let writer = RecordingWriter::new(output, notes)?;
+        let writer = CycleWriter::new(output, notes)?;
         client.set_telemetry(1)?;
-        Ok(Self { writer, first: None })
+        Ok(Self { writer })
     }
 
     /// Waits for the next cycle or event, and writes a cycle down.
@@ -70,17 +107,12 @@ impl<W: Write> Recorder<W> {
     pub fn take(&mut self, client: &mut Client<Device>) -> Result<Take, ProcedureError> {
         match client.next(SILENCE)? {
             Some(Incoming::Telemetry(telemetry)) => {
-                self.write(&telemetry)?;
+                self.writer.write(&telemetry)?;
                 Ok(Take::Cycle(telemetry))
             }
             Some(Incoming::Event(event)) => Ok(Take::Event(event)),
             None => Err(crate::error::HostError::NoAnswer { request: "telemetry", after: SILENCE }.into()),
         }
-    }
-
-    fn write(&mut self, telemetry: &Telemetry) -> std::io::Result<()> {
-        let first = *self.first.get_or_insert(telemetry.cycle);
-        self.writer.write(&recording_row(telemetry, first))
     }
 
     /// Cycles written so far.

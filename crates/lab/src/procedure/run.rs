@@ -23,6 +23,9 @@ const SILENCE: Duration = Duration::from_secs(1);
 /// more.
 const SETTLING_ALLOWANCE: f64 = 5.0;
 
+/// Longest time that a goal takes to a new place, s.
+const GOAL_ALLOWANCE: f64 = 30.0;
+
 /// Something that changes while a primitive runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Change {
@@ -30,6 +33,16 @@ pub struct Change {
     pub time: f64,
     /// What.
     pub kind: ChangeKind,
+}
+
+impl Change {
+    /// The new speed, if it is one.
+    pub fn speed(&self) -> Option<f64> {
+        match self.kind {
+            ChangeKind::Speed(factor) => Some(f64::from(factor)),
+            ChangeKind::Goal(_) => None,
+        }
+    }
 }
 
 /// A change during a run.
@@ -64,13 +77,30 @@ impl RunRequest {
 
     /// Longest time the movement may take until it arrives, s: at the slowest speed of the run all the way, and more.
     pub fn longest(&self) -> f64 {
-        let speeds = self.changes.iter().filter_map(|change| match change.kind {
-            ChangeKind::Speed(factor) => Some(f64::from(factor)),
-            ChangeKind::Goal(_) => None,
-        });
-        let slowest = speeds.fold(f64::from(self.options.speed), f64::min);
-        self.duration / slowest.max(0.05) + SETTLING_ALLOWANCE
+        let slowest = self.changes.iter().filter_map(Change::speed).fold(f64::from(self.options.speed), f64::min);
+        let taught = self.duration / slowest.max(0.05) + SETTLING_ALLOWANCE;
+        let changed = self.options.goal != Goal::default()
+            || self.changes.iter().any(|change| matches!(change.kind, ChangeKind::Goal(_)));
+        if changed { taught + 0.5 * self.duration / slowest.max(0.05) + GOAL_ALLOWANCE } else { taught }
     }
+}
+
+/// Duration of a movement of `duration` s begun at `speed`, with its changes of speed on the way, s.
+pub fn planned(duration: f64, speed: f64, changes: &[Change]) -> f64 {
+    let mut speeds: Vec<(f64, f64)> = changes
+        .iter()
+        .filter_map(|change| match change.kind {
+            ChangeKind::Speed(factor) => Some((change.time, f64::from(factor))),
+            ChangeKind::Goal(_) => None,
+        })
+        .collect();
+    speeds.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut time, mut left, mut speed) = (0.0, duration, speed);
+    for (at, factor) in speeds {
+        let passed = (at - time).min(left / speed);
+        (time, left, speed) = (time + passed, left - passed * speed, factor);
+    }
+    time + left / speed
 }
 
 /// The device told that a run does not go as the successful ones did.

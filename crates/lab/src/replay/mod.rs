@@ -106,7 +106,20 @@ pub enum ReplayError {
         /// The frame in their place, in words.
         frame: String,
     },
+    /// Its times leap: a damaged line, or two logs in one.
+    #[error("line {line}: time leaps from {from:.6} s to {to:.6} s", from = *from_us as f64 * 1e-6, to = *to_us as f64 * 1e-6)]
+    Leap {
+        /// The line.
+        line: u64,
+        /// Latest time before it, us.
+        from_us: u64,
+        /// Its time, us.
+        to_us: u64,
+    },
 }
+
+/// Longest silence in a log, us: a device asks its bus something all the time, and its slots in between are computed.
+const LONGEST_SILENCE_US: u64 = 60_000_000;
 
 /// A frame of the device in the log, to be matched.
 struct Logged {
@@ -171,9 +184,13 @@ impl Replay {
     /// Takes the next line of the log. `number`: its place in the file.
     ///
     /// # Errors
-    /// [`ReplayError::Middle`] when the first frames of the device show that the log begins too late.
+    /// [`ReplayError::Leap`]; [`ReplayError::Middle`] when the first frames of the device show that the log begins too late.
     pub fn take(&mut self, number: u64, line: LogLine) -> Result<(), ReplayError> {
         self.line = number;
+        let from_us = self.first_us.map_or(line.time_us, |_| self.last_us);
+        if line.time_us.saturating_sub(from_us) > LONGEST_SILENCE_US {
+            return Err(ReplayError::Leap { line: number, from_us, to_us: line.time_us });
+        }
         self.first_us.get_or_insert(line.time_us);
         self.last_us = self.last_us.max(line.time_us);
         if self.clock.is_none() {

@@ -10,6 +10,7 @@ use std::path::Path;
 use sim::{Passage, TICKS_PER_MICROSECOND, Ticks};
 
 use super::SimulationError;
+use crate::output_file::create_log;
 use canlog::{ARM_INTERFACE, AnyFrame, HOST_INTERFACE, LogLine};
 
 /// The file, and the frames whose time has not come: both buses go into it in order of time.
@@ -20,8 +21,8 @@ pub(super) struct BusLog {
 
 impl BusLog {
     /// Begins a file.
-    pub(super) fn create(path: &Path) -> Result<Self, SimulationError> {
-        let file = File::create(path).map_err(|cause| SimulationError::BusLog(path.to_owned(), cause))?;
+    pub(super) fn create(path: &Path, replace: bool) -> Result<Self, SimulationError> {
+        let file = create_log(path, replace)?;
         Ok(Self { file: BufWriter::new(file), waiting: Vec::new() })
     }
 

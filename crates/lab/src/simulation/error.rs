@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::image_file::ImageFileError;
+use crate::output_file::OutputError;
 
 /// Why a simulated device cannot be had, or came to its end.
 #[derive(Debug, thiserror::Error)]
@@ -64,8 +65,8 @@ pub enum SimulationError {
     #[error("cannot write the firmware's log: {0}")]
     Log(#[source] io::Error),
     /// The file for the log of the buses cannot be written.
-    #[error("cannot write the log of the buses to {0}: {1}")]
-    BusLog(PathBuf, #[source] io::Error),
+    #[error("the log of the buses: {0}")]
+    BusLog(#[from] OutputError),
     /// The file that is the device's flash cannot be used.
     #[error("cannot use {0} as the device's flash: {1}")]
     Flash(PathBuf, #[source] io::Error),

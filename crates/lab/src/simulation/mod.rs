@@ -66,7 +66,7 @@ impl Simulation {
         if let Some(name) = &options.faults {
             FaultScript::read(name)?.order(&mut plant);
         }
-        let log = options.bus_log.as_deref().map(BusLog::create).transpose()?;
+        let log = options.bus_log.as_deref().map(|path| BusLog::create(path, options.replace_logs)).transpose()?;
         if log.is_some() {
             plant.record_bus();
         }

@@ -129,6 +129,8 @@ pub struct SimulationOptions {
     pub line: LineKind,
     /// Where a log of the buses goes, in the format of `candump -L`; `None` keeps none.
     pub bus_log: Option<PathBuf>,
+    /// Logs may replace files that exist.
+    pub replace_logs: bool,
     /// Where the emulated board writes its report when its power is switched off, JSON; other engines have none.
     pub board_report: Option<PathBuf>,
     /// The flash in the device.
@@ -214,6 +216,7 @@ impl SimulationOptions {
             firmware_log: None,
             line: LineKind::Serial,
             bus_log: None,
+            replace_logs: false,
             board_report: None,
             flash: FlashSource::New,
             faults: None,

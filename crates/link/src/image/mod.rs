@@ -26,3 +26,4 @@ pub use layout::{
     IMAGE_BYTES_LIMIT, IMAGE_SCHEMA, KERNEL_LIMIT, MAGIC, SENSOR_ROWS, WEIGHT_ROWS, image_bytes,
 };
 pub use read::{PrimitiveImage, Reals, stored_crc};
+pub use write::{NAMED_HEAD_BYTES, renamed_head};

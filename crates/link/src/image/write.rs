@@ -10,6 +10,26 @@ use super::layout::{
 use crate::frame::CRC;
 use crate::name::{NAME_BYTES, Name};
 
+/// Bytes of an image up to the end of its name.
+pub const NAMED_HEAD_BYTES: usize = 16 + NAME_BYTES;
+
+/// The first bytes of `image` with another name in them. What follows is the same for every name, but for the check
+/// sum at the end. `None`: `image` is shorter than that.
+#[must_use]
+pub fn renamed_head(image: &[u8], name: &Name) -> Option<[u8; NAMED_HEAD_BYTES]> {
+    let mut head = *image.first_chunk::<NAMED_HEAD_BYTES>()?;
+    head.last_chunk_mut::<NAME_BYTES>()?.copy_from_slice(&padded(name));
+    Some(head)
+}
+
+fn padded(name: &Name) -> [u8; NAME_BYTES] {
+    let mut padded = [0; NAME_BYTES];
+    for (place, byte) in padded.iter_mut().zip(name.as_str().bytes()) {
+        *place = byte;
+    }
+    padded
+}
+
 impl ImageContent<&[f32]> {
     /// Writes the image to the front of `out` and returns its length.
     ///
@@ -40,17 +60,13 @@ impl ImageContent<&[f32]> {
         if self.hemisphere == Hemisphere::Nearest {
             flags |= FLAG_NEAREST_HEMISPHERE;
         }
-        let mut padded = [0_u8; NAME_BYTES];
-        for (place, byte) in padded.iter_mut().zip(name.as_str().bytes()) {
-            *place = byte;
-        }
         let mut writer = Writer { out, position: 0 };
         writer.bytes(&MAGIC)?;
         writer.bytes(&IMAGE_SCHEMA.to_le_bytes())?;
         writer.bytes(&flags.to_le_bytes())?;
         writer.bytes(&clip(length).to_le_bytes())?;
         writer.bytes(&self.model_hash.to_le_bytes())?;
-        writer.bytes(&padded)?;
+        writer.bytes(&padded(name))?;
         for count in
             [counts.kernels, counts.k1_points, counts.k2_points, counts.expectation_points, counts.experience_points]
         {

@@ -36,7 +36,9 @@ fn can_move(request: &Request) -> bool {
         | Request::Read { .. }
         | Request::Calibration
         | Request::Calibrate { .. }
-        | Request::ForgetCalibration => false,
+        | Request::ForgetCalibration
+        | Request::Observe(_)
+        | Request::Rename { .. } => false,
     }
 }
 

@@ -242,14 +242,20 @@ fn c1_a_truncated_frame_is_never_accepted() {
     }
 }
 
-/// 10^6 frames of noise: nothing accepted, nothing lost from the count.
+/// Number of random cases: that of the environment variable, which `cargo xtask fuzz` sets, or `usual`.
+fn cases(variable: &str, usual: u32) -> u32 {
+    std::env::var(variable).ok().and_then(|number| number.parse().ok()).unwrap_or(usual)
+}
+
+/// 10^6 frames of noise, or as many as `cargo xtask fuzz` wants: nothing accepted, nothing lost from the count.
 #[test]
 fn c1_noise_is_dropped_and_every_frame_of_it_counted() {
     let mut noise = Noise(0x1234_5678_9ABC_DEF1);
     let mut decoder: Decoder = Decoder::new();
     let mut frames = 0;
     let mut open = false;
-    while frames < 1_000_000 {
+    let wanted = cases("TACTUS_FUZZ_FRAMES", 1_000_000);
+    while frames < wanted {
         // Mostly short runs, some longer than any frame.
         let size = if noise.next().is_multiple_of(512) { 400 } else { 64 };
         let mut bytes = noise.bytes(size);
@@ -263,6 +269,27 @@ fn c1_noise_is_dropped_and_every_frame_of_it_counted() {
     let counters = decoder.counters();
     assert_eq!(counters.accepted, 0);
     assert_eq!(dropped(counters), frames);
+}
+
+/// A sound request in which one to eight bytes are others, and nothing else: it is never accepted, unless the damage
+/// left it as it was or cut it into a frame that is sound.
+#[test]
+fn c1_a_damaged_request_is_never_accepted() {
+    let mut noise = Noise(0x0BAD_CAFE);
+    let mut decoder: Decoder = Decoder::new();
+    let samples: Vec<Vec<u8>> = requests().iter().map(frame_of).collect();
+    for _ in 0..cases("TACTUS_FUZZ_FRAMES", 100_000) {
+        let sound = &samples[noise.next() as usize % samples.len()];
+        let mut frame = sound.clone();
+        for _ in 0..1 + noise.next() % 8 {
+            let place = noise.next() as usize % (frame.len() - 1);
+            frame[place] = noise.next() as u8;
+        }
+        if frame != *sound {
+            assert_eq!(read(&mut decoder, &[frame, vec![0]].concat()), []);
+        }
+    }
+    assert_eq!(decoder.counters().accepted, 0);
 }
 
 /// Good frames among damaged ones: exactly the good ones come through.

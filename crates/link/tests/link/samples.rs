@@ -67,6 +67,8 @@ pub(crate) fn requests() -> Vec<Request> {
         Request::Calibration,
         Request::Calibrate { home: ramp(-2.0) },
         Request::ForgetCalibration,
+        Request::Observe(HostHello { link_version: 6, schema_hash: 1, model_hash: 2, owner: Text::new("eve@lab4") }),
+        Request::Rename { name: name(), to: Name::new("other.2").unwrap() },
     ]
 }
 
@@ -102,6 +104,8 @@ pub(crate) fn request_index(request: &Request) -> usize {
         Request::Calibration => 26,
         Request::Calibrate { .. } => 27,
         Request::ForgetCalibration => 28,
+        Request::Observe(_) => 29,
+        Request::Rename { .. } => 30,
     }
 }
 

@@ -5,7 +5,7 @@
 
 mod engine;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::operator::PendantAction;
 use puck::{CanFrame, Destination, Group, Node, Request};
@@ -13,7 +13,7 @@ use puck::{CanFrame, Destination, Group, Node, Request};
 pub(crate) use engine::{Faults, Treated};
 
 /// A fault, when it begins and when it ends.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Injection {
     /// Begin, s.
@@ -32,7 +32,7 @@ pub struct Injection {
 }
 
 /// The faults there are.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum FaultKind {
     /// Frames that nobody receives; their sender believes them sent.
@@ -101,7 +101,7 @@ pub enum FaultKind {
 }
 
 /// Frames on the arm's bus. Without any key: all of them.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Frames {
     /// Their kind.
@@ -121,7 +121,7 @@ impl Default for Frames {
 }
 
 /// Kinds of frames of a control cycle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FrameKind {
     /// Every frame.
@@ -170,7 +170,7 @@ impl FrameKind {
 }
 
 /// Quantities that the safety module supervises.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Supervised {
     /// Velocity of the arm.

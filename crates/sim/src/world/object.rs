@@ -1,4 +1,5 @@
-//! The kinds of objects that can stand or lie on the table. Adding a kind touches this file only.
+//! The kinds of objects that can stand or lie on the table. Adding an upright or lying cylinder touches this file
+//! only; the bodies of another shape are made in `mujoco/object.rs`.
 //!
 //! A kind is a variant of [`ObjectKind`], its place in [`ObjectKind::ALL`], and its row: names, figures and appearance.
 //! The physical worlds, the command line, files and figures read all of them from here.

@@ -34,6 +34,13 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Ok(()) => Ok(true),
         Err(error) => Err(refused(error)),
     })?;
+    if interrupt.is_raised() {
+        return Err(Failure::new(
+            ErrorCode::Interrupted,
+            DOING,
+            "interrupted before the end of the log: nothing can be said",
+        ));
+    }
     let outcome = replay.finish().map_err(refused)?;
     if !outcome.has_host {
         output.warn("the log does not hold the host's bus: orders are missing, and what they caused will differ");

@@ -1,7 +1,7 @@
 //! Where lines come from: a file, standard input, or an interface.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Stdin};
+use std::io::{BufRead, BufReader, Read, Stdin};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
@@ -16,6 +16,9 @@ const REPORTED: u64 = 20;
 
 /// Letters of a wrong line that are shown.
 const SHOWN: usize = 60;
+
+/// Bytes of the longest line that is read as one: candump's have less than a hundred.
+const LONGEST_LINE: u64 = 4096;
 
 /// Period at which a growing file and an interface are polled.
 const PAUSE: Duration = Duration::from_millis(100);
@@ -66,7 +69,11 @@ impl Source {
             (Some(path), _) if path == Path::new("-") => Ok(Self::Input(BufReader::new(std::io::stdin()))),
             (Some(path), _) => {
                 let file = File::open(path).map_err(|cause| {
-                    Failure::new(ErrorCode::LogUnreadable, format!("{doing}: cannot read {}", path.display()), cause)
+                    Failure::of_file(
+                        ErrorCode::LogUnreadable,
+                        format!("{doing}: cannot read {}", path.display()),
+                        cause,
+                    )
                 })?;
                 Ok(Self::File { reader: BufReader::new(file), path: path.to_owned(), follow })
             }
@@ -102,8 +109,9 @@ impl Source {
                     continue;
                 }
                 Self::File { reader, path, follow } => {
-                    let count = reader.read_until(b'\n', &mut text).map_err(|cause| {
-                        Failure::new(
+                    let room = LONGEST_LINE.saturating_sub(text.len() as u64);
+                    let count = reader.take(room).read_until(b'\n', &mut text).map_err(|cause| {
+                        Failure::of_file(
                             ErrorCode::LogUnreadable,
                             format!("{doing}: cannot read {}", path.display()),
                             cause,
@@ -112,13 +120,17 @@ impl Source {
                     (count, *follow)
                 }
                 Self::Input(reader) => {
-                    let count = reader.read_until(b'\n', &mut text).map_err(|cause| {
+                    let count = reader.take(LONGEST_LINE).read_until(b'\n', &mut text).map_err(|cause| {
                         Failure::new(ErrorCode::LogUnreadable, format!("{doing}: cannot read standard input"), cause)
                     })?;
                     (count, false)
                 }
             };
             let whole = text.ends_with(b"\n");
+            if text.len() as u64 >= LONGEST_LINE && !whole {
+                let cause = format!("line {} has more than {LONGEST_LINE} bytes", number + 1);
+                return Err(Failure::new(ErrorCode::LogLines, doing, cause));
+            }
             if follow && !whole {
                 // The rest of the line, or the next one, is still to be written.
                 std::thread::sleep(PAUSE);

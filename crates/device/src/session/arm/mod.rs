@@ -8,7 +8,7 @@ mod saving;
 use control::model::ArmModel;
 use control::plan::load;
 use control::{Command as Control, LoadRefusal, Payload, RunOptions, State};
-use link::image::ImageError;
+use link::image::{ImageError, renamed_head};
 use link::message::{AccelerationSource, CHUNK_BYTES, ChunkData, Goal, PoseFeedback};
 use link::{Capabilities, Listing, Name, PrimitiveImage, Refusal, Reply, Request};
 use pinned_init::{Init, init, zeroed};
@@ -19,7 +19,7 @@ use crate::controller::DeviceController;
 use crate::health::Health;
 use crate::port::StoredPrimitive;
 use crate::session::host::{HostSession, Identity};
-use crate::store::{Store, StoreError};
+use crate::store::{Store, StoreError, stage_copy};
 use directory::{Directory, Entry};
 use primitive::WeightBuffer;
 use saving::Change;
@@ -106,7 +106,7 @@ impl<S: Store> ArmApplication<S> {
     fn load(&mut self, name: &Name, calm: bool, port: &mut impl SessionPort<DeviceController>) -> Result<(), Refused> {
         self.need_open()?;
         let (slot, entry) = self.directory.find(name).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
-        if self.is_deleting(slot) {
+        if self.is_leaving(slot, name) {
             return Err(StoreError::Busy.into());
         }
         let entry = entry.clone();
@@ -152,6 +152,29 @@ impl<S: Store> ArmApplication<S> {
         let part = rest.get(..CHUNK_BYTES.min(rest.len())).unwrap_or_default();
         let data = ChunkData::from_slice(part).unwrap_or_default();
         Ok(Reply::Chunk { of, offset, data })
+    }
+
+    /// The place of a primitive that no run uses.
+    fn find_unused(&self, name: &Name, port: &mut impl SessionPort<DeviceController>) -> Result<u8, Refused> {
+        self.need_open()?;
+        let (slot, entry) = self.directory.find(name).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
+        let loaded = self.loaded.as_ref().is_some_and(|loaded| loaded.is_same(entry));
+        if loaded && matches!(port.health().state, State::Run | State::Coast) {
+            return Err((Refusal::InUse, [0, 0]));
+        }
+        Ok(slot)
+    }
+
+    /// Writes the image of a place, under another name, to where an upload would grow.
+    fn stage_renamed(&mut self, slot: u8, to: &Name) -> Result<Entry, Refused> {
+        let invalid = |error: ImageError| (Refusal::ImageInvalid, [error.code(), error.number()]);
+        let image = self.store.image(slot).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
+        // Memory may have been damaged since the upload: a new check sum must not hide it.
+        PrimitiveImage::parse(image).map_err(invalid)?;
+        let head = renamed_head(image, to).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
+        stage_copy(&mut self.store, slot, &head)?;
+        let staged = self.store.staged().ok_or((Refusal::NoUpload, [0, 0]))?;
+        Ok(Entry::of(&PrimitiveImage::parse(staged).map_err(invalid)?))
     }
 
     fn check_and_commit(&mut self, name: &Name, crc: u32) -> Result<(u8, Entry), Refused> {
@@ -244,14 +267,20 @@ impl<S: Store> Application for ArmApplication<S> {
     }
 
     fn delete(&mut self, name: &Name, port: &mut impl SessionPort<DeviceController>) -> Result<(), Refused> {
-        self.need_open()?;
-        let (slot, entry) = self.directory.find(name).ok_or((Refusal::NoSuchPrimitive, [0, 0]))?;
-        let loaded = self.loaded.as_ref().is_some_and(|loaded| loaded.is_same(entry));
-        if loaded && matches!(port.health().state, State::Run | State::Coast) {
-            return Err((Refusal::InUse, [0, 0]));
-        }
+        let slot = self.find_unused(name, port)?;
         self.store.delete(slot)?;
         self.saving = Some(Change::Place { slot, built: false, entry: None });
+        Ok(())
+    }
+
+    fn rename(&mut self, name: &Name, to: &Name, port: &mut impl SessionPort<DeviceController>) -> Result<(), Refused> {
+        let slot = self.find_unused(name, port)?;
+        if self.directory.find(to).is_some() {
+            return Err((Refusal::NameTaken, [0, 0]));
+        }
+        let entry = self.stage_renamed(slot, to)?;
+        self.store.commit(slot)?;
+        self.saving = Some(Change::Place { slot, built: false, entry: Some(entry) });
         Ok(())
     }
 
@@ -314,7 +343,9 @@ impl<S: Store> Application for ArmApplication<S> {
             | Request::UploadChunk { .. }
             | Request::UploadCommit
             | Request::UploadAbort
-            | Request::Delete { .. } => return Ok(Action::Answer(Reply::Accepted { of })),
+            | Request::Delete { .. }
+            | Request::Observe(_)
+            | Request::Rename { .. } => return Ok(Action::Answer(Reply::Accepted { of })),
         };
         Ok(Action::Command(command.into()))
     }

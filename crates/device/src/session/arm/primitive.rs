@@ -1,6 +1,7 @@
 //! From an image in the store to the primitive the control half runs.
 
 use control::model::ArmModel;
+use control::plan::bounds;
 use control::plan::load;
 use control::plan::load::LoadError;
 use control::plan::primitive::{self, Configuration, MovementTables, configuration, gains, limits, velocity};
@@ -65,6 +66,9 @@ pub(crate) fn build<'a>(
     if recorded {
         recorded_filter::check(content.marks.filter_cutoff).map_err(Unfit::Filter)?;
     }
+    let marks = &content.marks;
+    bounds::check_marks(marks.payload_mass, &marks.payload_centre, marks.trials, marks.spread_floor)
+        .map_err(|quantity| PrimitiveTrouble::from(LoadError::Bound(quantity)))?;
     let weights = content.weights.copy_to(weights_buffer).unwrap_or_default();
     let start_velocity = &content.start_velocity;
     let tables = MovementTables {

@@ -1,6 +1,6 @@
 //! A change of the store on its way to being durable: the host is answered when it is.
 
-use link::Refusal;
+use link::{Name, Refusal};
 
 use crate::application::{Refused, Saved, SessionPort};
 use crate::controller::DeviceController;
@@ -37,9 +37,10 @@ impl Change {
 }
 
 impl<S: Store> ArmApplication<S> {
-    /// True while a place is being emptied.
-    pub(super) fn is_deleting(&self, place: u8) -> bool {
-        matches!(&self.saving, Some(Change::Place { slot, entry: None, .. }) if *slot == place)
+    /// True while the primitive at a place is on its way out under this name: deleted or renamed.
+    pub(super) fn is_leaving(&self, place: u8, name: &Name) -> bool {
+        matches!(&self.saving, Some(Change::Place { slot, entry, .. })
+            if *slot == place && entry.as_ref().is_none_or(|entry| entry.name != *name))
     }
 
     /// True while requests must wait because the store does not know yet what it holds.
@@ -69,9 +70,10 @@ impl<S: Store> ArmApplication<S> {
     /// Notes what stands at a place now.
     fn replace(&mut self, slot: u8, entry: Option<Entry>) {
         let old = self.directory.get(slot).cloned();
-        let deleted = entry.is_none();
+        // A name that is gone cannot be that of the primitive in use.
+        let gone = old.as_ref().is_some_and(|old| entry.as_ref().is_none_or(|entry| entry.name != old.name));
         self.directory.set(slot, entry);
-        if deleted && self.loaded.as_ref().zip(old.as_ref()).is_some_and(|(loaded, old)| loaded.is_same(old)) {
+        if gone && self.loaded.as_ref().zip(old.as_ref()).is_some_and(|(loaded, old)| loaded.is_same(old)) {
             self.loaded = None;
         }
     }

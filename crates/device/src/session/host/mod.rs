@@ -5,13 +5,15 @@
 //!
 //! - nothing is answered before a matching hello; one host at a time, and no other one can delay what it asks;
 //! - a stop is obeyed from anybody, whatever its number;
+//! - observers are told what the host is told, and can change nothing;
 //! - every request is answered once, and acted on once however often it is repeated;
 //! - a request for the control half is answered when that half has taken or refused it;
-//! - what moves is stopped when the host has been silent for half a second, before anything else is done;
+//! - what moves is stopped when the host has been silent for half a second ([`LINK_TIMEOUT_MS`]), before anything else;
 //! - an image replaces another only when it is complete, undamaged and fit for this device;
 //! - a change of the store is answered when it is durable.
 
 mod inbox;
+mod observers;
 mod owner;
 mod pending;
 mod request;
@@ -24,6 +26,7 @@ use pinned_init::{Init, init};
 
 use crate::application::{Application, Controller, CycleReport, Message, Refused, SessionPort, TimedRecord};
 use inbox::Inbox;
+use observers::Observers;
 use owner::Owner;
 use pending::{Pending, Requester};
 use upload::Upload;
@@ -61,6 +64,7 @@ pub struct HostSession<A: Application> {
     overrun: u32,
     sequence: u16,
     owner: Option<Owner>,
+    observers: Observers,
     pending: Pending,
     upload: Option<Upload>,
     /// Session and number of the request whose change is being saved.
@@ -84,6 +88,7 @@ impl<A: Application> HostSession<A> {
             overrun: 0,
             sequence: 0,
             owner: None,
+            observers: Observers::default(),
             pending: Pending::default(),
             upload: None,
             saving: None,
@@ -111,6 +116,7 @@ impl<A: Application> HostSession<A> {
     /// millisecond or two; `now_us` is the device's time.
     pub fn poll(&mut self, now_us: u64, port: &mut impl SessionPort<A::Controller>) {
         let now_ms = milliseconds(now_us);
+        self.observers.forget_silent(now_ms);
         self.forward_events(now_ms, port);
         self.drop_unanswered(now_ms, port);
         self.settle(now_ms, port);
@@ -203,13 +209,14 @@ impl<A: Application> HostSession<A> {
             if timed.record.flags() & LIMITED != 0 {
                 self.limited_cycles = self.limited_cycles.wrapping_add(1);
             }
-            let due = self.owner.is_some() && timed.record.number().checked_rem(self.telemetry_every.into()) == Some(0);
-            if !due {
-                continue;
-            }
+            let number = timed.record.number();
+            let is_due = number.checked_rem(self.telemetry_every.into()) == Some(0);
+            let owner = self.owner.as_ref().filter(|_| is_due).map(Owner::session);
+            // Once for all: observers take what the owner is told as well, for the line has no room for it twice.
+            let Some(session) = owner.or_else(|| self.observers.awaiting(number)) else { continue };
             if port.room() >= FRAME_BYTES + ANSWER_ROOM {
                 let telemetry = Telemetry { cost_ticks: timed.cost_ticks, ..timed.record.telemetry() };
-                self.send(now_ms, &Reply::Telemetry(telemetry), port);
+                self.send_to(session, now_ms, &Reply::Telemetry(telemetry), port);
             } else {
                 self.telemetry_dropped = self.telemetry_dropped.wrapping_add(1);
             }
@@ -261,11 +268,10 @@ impl<A: Application> HostSession<A> {
 
     /// Sends an event if anybody listens and the line has room.
     fn tell(&mut self, now_ms: u32, event: Event, port: &mut impl SessionPort<A::Controller>) {
-        if self.owner.is_none() {
-            return;
-        }
+        let owner = self.owner.as_ref().map(Owner::session);
+        let Some(session) = owner.or_else(|| self.observers.any()) else { return };
         if port.room() >= FRAME_BYTES {
-            self.send(now_ms, &Reply::Event(event), port);
+            self.send_to(session, now_ms, &Reply::Event(event), port);
         } else {
             self.events_dropped = self.events_dropped.wrapping_add(1);
         }

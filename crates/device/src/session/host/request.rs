@@ -19,6 +19,18 @@ impl<A: Application> HostSession<A> {
         if message == Request::Stop {
             return self.stop(now_ms, envelope.session, of, port);
         }
+        if let Request::Observe(hello) = &message {
+            let reply = match self.admit_observer(now_ms, envelope.session, hello) {
+                Ok(()) => Reply::Hello { of, hello: self.hello() },
+                Err((reason, detail)) => Reply::Refused { of, reason, detail },
+            };
+            return self.send_to(envelope.session, now_ms, &reply, port);
+        }
+        if !matches!(message, Request::Hello(_)) && self.observers.hear(envelope.session, now_ms) {
+            let reply = self.show(envelope.session, of, message, port);
+            let reply = reply.unwrap_or_else(|(reason, detail)| Reply::Refused { of, reason, detail });
+            return self.send_to(envelope.session, now_ms, &reply, port);
+        }
         let order = match &mut self.owner {
             Some(owner) if owner.session() == envelope.session => owner.order(of, now_ms),
             _ => RequestOrder::New,
@@ -86,6 +98,7 @@ impl<A: Application> HostSession<A> {
             }
         }
         self.close();
+        self.observers.leave(session);
         self.owner = Some(Owner::new(session, of, now_ms));
         Ok(())
     }
@@ -99,6 +112,8 @@ impl<A: Application> HostSession<A> {
         port: &mut impl SessionPort<A::Controller>,
     ) -> Result<Option<Reply>, Refused> {
         match request {
+            // Answered before it comes here.
+            Request::Observe(_) => {}
             Request::Hello(_) => return Ok(Some(Reply::Hello { of, hello: self.hello() })),
             Request::Goodbye => {
                 // Answered before the session is gone: the answer carries its number.
@@ -109,15 +124,7 @@ impl<A: Application> HostSession<A> {
             Request::Ping => {}
             Request::Status => return Ok(Some(Reply::Status { of, status: self.status(port) })),
             Request::Statistics => return Ok(Some(Reply::Statistics { of, statistics: self.statistics(port) })),
-            Request::List { index } => {
-                let places = self.application.places();
-                let listing = self.application.listing(index)?;
-                return if index < places {
-                    Ok(Some(Reply::Listing { of, listing }))
-                } else {
-                    Err((Refusal::NoSuchPrimitive, [places.into(), 0]))
-                };
-            }
+            Request::List { index } => return self.listing(of, index).map(Some),
             Request::Telemetry { every } => self.telemetry_every = every,
             Request::UploadBegin { name, length, crc } => self.upload_begin(name, length, crc)?,
             Request::UploadChunk { offset, data } => self.upload_chunk(offset, &data)?,
@@ -130,6 +137,16 @@ impl<A: Application> HostSession<A> {
                 self.application.delete(&name, port)?;
                 return self.save(of);
             }
+            Request::Rename { name, to } => {
+                // The new image grows where an upload would.
+                self.upload_abort();
+                let begun = self.application.rename(&name, &to, port);
+                if begun.is_err() {
+                    self.application.abort();
+                }
+                begun?;
+                return self.save(of);
+            }
             request => {
                 return match self.application.act(of, request, self.pending.is_empty(), port)? {
                     Action::Command(command) => self.command(now_ms, of, command, port),
@@ -139,6 +156,51 @@ impl<A: Application> HostSession<A> {
             }
         }
         Ok(Some(Reply::Accepted { of }))
+    }
+
+    /// Admits a host that only looks, beside the one that has the session.
+    fn admit_observer(&mut self, now_ms: u32, session: u16, hello: &HostHello) -> Result<(), Refused> {
+        compare(hello)?;
+        if session == 0 || self.is_owner(session) {
+            return Err((Refusal::BadValue, [0, 0]));
+        }
+        self.observers.admit(session, now_ms).map_err(|wait| (Refusal::Busy, [0, wait]))
+    }
+
+    /// Answers an observer. Nothing of this changes anything but what it is sent.
+    fn show(
+        &mut self,
+        session: u16,
+        of: u16,
+        request: Request,
+        port: &mut impl SessionPort<A::Controller>,
+    ) -> Result<Reply, Refused> {
+        match request {
+            Request::Ping => {}
+            Request::Goodbye => self.observers.leave(session),
+            Request::Telemetry { every } => self.observers.set_telemetry(session, every),
+            Request::Status => return Ok(Reply::Status { of, status: self.status(port) }),
+            Request::Statistics => return Ok(Reply::Statistics { of, statistics: self.statistics(port) }),
+            Request::List { index } => return self.listing(of, index),
+            Request::Calibration => {
+                let calm = self.pending.is_empty();
+                if let Action::Answer(reply) = self.application.act(of, Request::Calibration, calm, port)? {
+                    return Ok(reply);
+                }
+            }
+            _ => return Err((Refusal::Observing, [0, 0])),
+        }
+        Ok(Reply::Accepted { of })
+    }
+
+    fn listing(&self, of: u16, index: u8) -> Result<Reply, Refused> {
+        let places = self.application.places();
+        let listing = self.application.listing(index)?;
+        if index < places {
+            Ok(Reply::Listing { of, listing })
+        } else {
+            Err((Refusal::NoSuchPrimitive, [places.into(), 0]))
+        }
     }
 
     /// Notes who is answered when the change that has begun is saved.

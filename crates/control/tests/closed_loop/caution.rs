@@ -1,0 +1,200 @@
+//! Heat, warnings and overruns (faults A15, E8, G12, G14): what they do, what they leave behind, and the way back.
+
+use control::act::limit::STEP_LIMIT;
+use control::command::{Command, Refusal, RunOptions};
+use control::units::JointPositions;
+use control::{Caution, CycleOutput, Event, Fault, Goal, PERIOD, State, flags};
+use puck::SafetyMode;
+
+use crate::primitives::{Design, GOAL, START, primitive};
+use crate::rig::Rig;
+
+fn holding() -> Rig<f32> {
+    let mut rig = Rig::<f32>::new(START, 1);
+    rig.command(Command::Hold);
+    rig.run_for(1.0);
+    rig.load(&primitive(&Design { duration: 3.0, ..Design::default() })).expect("loads");
+    rig
+}
+
+fn refused(output: CycleOutput, reason: Refusal) {
+    assert_eq!(output.event, Some(Event::Refused(reason)), "{:?}", output.record.state);
+}
+
+/// Goes on for so many cycles while the brakes hold the arm.
+fn braked(rig: &mut Rig<f32>, cycles: usize) {
+    let q = rig.plant.q;
+    for _ in 0..cycles {
+        rig.tick(None);
+        (rig.plant.q, rig.plant.dq) = (q, q * 0.0);
+    }
+}
+
+/// The way back that a person goes: clear, hold, to the start, the whole movement.
+fn recover(rig: &mut Rig<f32>) {
+    rig.run_for(1.5);
+    if rig.cycle.state() != State::Hold {
+        rig.command(Command::ClearFault);
+        rig.command(Command::Hold);
+    }
+    rig.command(Command::Approach { q: START.map(|q| q as f32), duration: 0.0 });
+    rig.until(State::Hold, 20.0);
+    rig.command(Command::Run(RunOptions::default()));
+    rig.until(State::Hold, 10.0);
+    assert_eq!(rig.cycle.fault(), Fault::None);
+}
+
+/// Time that a run takes while this is found, from its middle on (s).
+fn time(caution: Caution) -> (f64, u32) {
+    let mut rig = holding();
+    rig.command(Command::Run(RunOptions { speed: 1.5, ..RunOptions::default() }));
+    let begin = rig.number;
+    rig.run_for(0.5);
+    rig.cycle.set_caution(caution);
+    let told = rig.tick(None).record.flags;
+    rig.until(State::Hold, 20.0);
+    ((rig.number - begin) as f64 * PERIOD, told & (flags::CAUTION | flags::SLOWED))
+}
+
+#[test]
+fn g14_a_warning_is_told_and_a_derated_run_goes_on_at_half_speed() {
+    let (free, none) = time(Caution::None);
+    let (warned, flag) = time(Caution::Warned);
+    let (slow, flags) = time(Caution::Slowed);
+    println!("{free} {warned} {slow} s");
+    assert_eq!((none, flag, flags), (0, flags::CAUTION, flags::CAUTION | flags::SLOWED));
+    assert!((warned - free).abs() < 0.01 && slow > free + 1.0, "{free} {warned} {slow}");
+    // No command makes it faster; once the cause is gone it goes on as was asked for last.
+    let mut rig = holding();
+    rig.cycle.set_caution(Caution::Slowed);
+    rig.command(Command::Run(RunOptions { speed: 2.0, ..RunOptions::default() }));
+    rig.run_for(1.0);
+    rig.command(Command::SetSpeed { factor: 1.8 });
+    refused(rig.tick(Some(Command::SetSpeed { factor: 2.5 })), Refusal::OutOfRange);
+    let phase = |rig: &mut Rig<f32>| -> f32 {
+        let before = rig.tick(None).record.phase.ln();
+        rig.run_for(0.3);
+        before - rig.last.expect("ran").record.phase.ln()
+    };
+    let held = phase(&mut rig);
+    rig.cycle.set_caution(Caution::None);
+    rig.run_for(1.0);
+    let free = phase(&mut rig);
+    assert!((free / held - 3.6).abs() < 0.1, "{free} against {held}");
+}
+
+#[test]
+fn g14_a_motor_that_is_too_hot_stops_the_arm_and_lets_it_be_lowered() {
+    for command in [Command::Gravity, Command::Hold, Command::Run(RunOptions::default())] {
+        let mut rig = holding();
+        rig.command(command);
+        rig.run_for(1.0);
+        rig.external = Some(Fault::MotorHot);
+        rig.run_for(1.0);
+        assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::SoftStop, Fault::MotorHot), "{command:?}");
+        refused(rig.tick(Some(Command::ClearFault)), Refusal::CauseRemains);
+        refused(rig.tick(Some(Command::Hold)), Refusal::CauseRemains);
+        rig.command(Command::Release);
+        rig.run_for(0.5);
+        assert_eq!(rig.cycle.state(), State::Lower, "heat is no reason to stay up");
+        rig.command(Command::Stop);
+        rig.external = None;
+        recover(&mut rig);
+    }
+    // An idle arm is not armed while it is hot.
+    let mut rig = Rig::<f32>::new(GOAL, 1);
+    rig.run_for(0.2);
+    rig.external = Some(Fault::MotorHot);
+    refused(rig.tick(Some(Command::Hold)), Refusal::CauseRemains);
+    rig.external = None;
+    rig.command(Command::Hold);
+}
+
+#[test]
+fn g12_an_overrun_at_any_transition_leaves_nothing_of_the_state_behind() {
+    let goal = Command::SetGoal(Goal { position: Some([0.6, 0.2, 0.0]), ..Goal::STORED });
+    let speed = Command::SetSpeed { factor: 0.5 };
+    let approach = Command::Approach { q: GOAL.map(|q| q as f32), duration: 3.0 };
+    for command in [Command::Gravity, Command::Hold, approach, Command::Run(RunOptions::default())] {
+        // With the command, in the cycle after it, on the way, and where a movement ends by itself.
+        for late in [0u32, 1, 200, 1201] {
+            let mut rig = holding();
+            let first = rig.tick(Some(command).filter(|_| late > 0));
+            assert!(late == 0 || first.event == Some(Event::Accepted));
+            for _ in 1..late {
+                rig.tick(None);
+            }
+            rig.external = Some(Fault::Overrun);
+            let output = rig.tick(Some(command).filter(|_| late == 0));
+            rig.external = None;
+            assert_eq!((output.record.state, output.record.fault), (State::SoftStop, Fault::Overrun));
+            for changes in [goal, speed] {
+                refused(rig.tick(Some(changes)), Refusal::WrongState);
+            }
+            let rest = rig.plant.q;
+            rig.run_for(1.5);
+            rig.command(Command::ClearFault);
+            rig.command(Command::Hold);
+            for _ in 0..900 {
+                let record = rig.tick(None).record;
+                assert_eq!((record.state, record.phase), (State::Hold, 0.0), "nothing goes on by itself");
+            }
+            assert!((rig.plant.q - rest).amax() < 0.1, "{command:?} {late}: {}", rig.plant.q - rest);
+            recover(&mut rig);
+        }
+    }
+}
+
+#[test]
+fn e8_a_clear_is_refused_while_the_motors_are_silent_even_after_the_safety_module_dropped() {
+    let mut rig = holding();
+    rig.lose = [true; 7];
+    rig.run_for(0.1);
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::SoftStop, Fault::RepliesLost));
+    rig.safety = SafetyMode::Idle;
+    braked(&mut rig, 90);
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Idle, Fault::RepliesLost));
+    refused(rig.tick(Some(Command::ClearFault)), Refusal::CauseRemains);
+    // Nor before any position is known again.
+    rig.cycle.reset();
+    refused(rig.tick(Some(Command::ClearFault)), Refusal::CauseRemains);
+    rig.safety = SafetyMode::Active;
+    refused(rig.tick(Some(Command::Hold)), Refusal::PositionsMissing);
+    rig.lose = [false; 7];
+    braked(&mut rig, 30);
+    refused(rig.tick(Some(Command::Hold)), Refusal::FaultLatched);
+    rig.command(Command::ClearFault);
+    rig.command(Command::Hold);
+    recover(&mut rig);
+}
+
+#[test]
+fn a15_what_an_integral_had_gathered_is_gone_after_a_drop_of_the_safety_module() {
+    let mut rig = holding();
+    // A person leans on the arm until the integrals are full.
+    rig.plant.push = [0.0, 15.0, 0.0, 0.0, 0.0, 0.0];
+    rig.run_for(3.0);
+    rig.plant.push = [0.0; 6];
+    rig.safety = SafetyMode::Idle;
+    rig.tick(None);
+    assert_eq!(rig.cycle.state(), State::Idle);
+    let q = rig.plant.q;
+    braked(&mut rig, 100);
+    rig.safety = SafetyMode::Active;
+    for _ in 0..100 {
+        let output = rig.tick(None);
+        assert_eq!(output.record.tau, [0.0; 7], "not before a person arms it");
+        (rig.plant.q, rig.plant.dq) = (q, q * 0.0);
+    }
+    let frames = control::model::Frames::new(rig.cycle.model(), &JointPositions::from_f32(q.map(|q| q as f32).into()));
+    let gravity = rig.cycle.model().gravity_torque(&frames).0;
+    let mut output = rig.command(Command::Hold);
+    for _ in 0..30 {
+        (rig.plant.q, rig.plant.dq) = (q, q * 0.0);
+        output = rig.tick(None);
+    }
+    for (joint, (torque, gravity)) in output.record.tau.iter().zip(gravity.iter()).enumerate() {
+        assert!((torque - gravity).abs() < 0.3, "J{}: {torque} N m, gravity {gravity}", joint + 1);
+    }
+    recover(&mut rig);
+}

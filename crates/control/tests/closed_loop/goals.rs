@@ -1,0 +1,222 @@
+//! Goals that are changed at any time (faults G9 and H4): no limit is broken, they are reached, flags tell the truth.
+
+use control::command::{Command, RunOptions};
+use control::guard::monitor::{TIP_REACH, TIP_SPEED_LIMIT};
+use control::model::{ArmModel, Frames, VELOCITY_MAX};
+use control::units::{JointPositions, JointVelocities};
+use control::{Event, Fault, Goal, PERIOD, Payload, State, flags};
+use nalgebra::Vector3;
+
+use crate::primitives::{Design, GOAL, START, primitive};
+use crate::rig::Rig;
+
+/// Repeatable numbers from 0 to 1.
+struct Dice(u64);
+
+impl Dice {
+    fn roll(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// A place in a ball.
+    fn place(&mut self, radius: f64) -> Vector3<f64> {
+        loop {
+            let place = Vector3::from_fn(|_, _| 2.0 * self.roll() - 1.0);
+            if place.norm() <= 1.0 {
+                return place * radius;
+            }
+        }
+    }
+}
+
+/// A rig at the start of the movement, that holds.
+fn ready(duration: f64, feels: bool) -> Rig<f32> {
+    let mut rig = Rig::<f32>::new(START, 1);
+    rig.command(Command::Hold);
+    rig.run_for(1.0);
+    let expected = feels.then_some([0.0; 6]);
+    rig.load(&primitive(&Design { duration, expected, ..Design::default() })).expect("loads");
+    rig
+}
+
+/// The worst of a run.
+#[derive(Default, Debug)]
+struct Worst {
+    /// Part of the speed limits of the joints.
+    joint: f64,
+    /// Speed of the hand (m/s).
+    hand: f64,
+    /// Angular speed of the hand (rad/s).
+    turn: f64,
+    /// Speeds of elbow and forearm (m/s).
+    tip: f64,
+    /// Acceleration of the plan (m/s^2).
+    acceleration: f64,
+}
+
+impl Worst {
+    fn see(&mut self, rig: &Rig<f32>) {
+        let dq = rig.plant.dq;
+        for (dq, limit) in dq.iter().zip(VELOCITY_MAX) {
+            self.joint = self.joint.max(dq.abs() / limit);
+        }
+        let frames = rig.plant.frames();
+        let twist = frames.jacobian().twist(&dq);
+        self.hand = self.hand.max(twist.fixed_rows::<3>(0).norm());
+        self.turn = self.turn.max(twist.fixed_rows::<3>(3).norm());
+        let tips = frames.elbow_speeds(&JointVelocities(dq), TIP_REACH);
+        self.tip = tips.into_iter().fold(self.tip, f64::max);
+    }
+}
+
+fn model() -> ArmModel<f64> {
+    ArmModel::new(Payload::SensorAndHand)
+}
+
+/// Where the stored goal is.
+fn stored() -> Vector3<f64> {
+    Frames::new(&model(), &JointPositions::from_array(GOAL)).tool_pose().position
+}
+
+fn goal(place: Vector3<f64>) -> Goal {
+    Goal { position: Some([0, 1, 2].map(|axis| place[axis] as f32)), ..Goal::STORED }
+}
+
+/// Runs the movement; `change` gives a goal in a control period. Returns the worst, and the arm where it ended.
+fn run((duration, speed, feels): (f64, f32, bool), mut change: impl FnMut(u64) -> Option<Goal>) -> (Worst, Rig<f32>) {
+    let mut rig = ready(duration, feels);
+    let mut worst = Worst::default();
+    rig.command(Command::Run(RunOptions { speed, feedback: feels, ..RunOptions::default() }));
+    let (mut places, mut over) = (Vec::new(), false);
+    for cycle in 0..(60.0 / PERIOD) as u64 {
+        let goal = change(cycle);
+        let output = rig.tick(goal.map(Command::SetGoal));
+        over |= output.record.state != State::Run;
+        if over {
+            break;
+        }
+        if goal.is_some() {
+            assert_eq!(output.event, Some(Event::Accepted), "{goal:?}");
+        }
+        worst.see(&rig);
+        places.push(Vector3::from_fn(|axis, _| f64::from(output.record.pose_d[axis])));
+    }
+    assert!(over, "the run ends");
+    // Over five cycles: the record of the plan is in single precision.
+    let step = 5.0 * PERIOD;
+    let speeds: Vec<_> = places.windows(6).map(|some| (some[5] - some[0]) / step).collect();
+    worst.acceleration =
+        speeds.windows(6).map(|some| (some[5] - some[0]).norm() / step).fold(worst.acceleration, f64::max);
+    (worst, rig)
+}
+
+/// Fails unless the run kept its limits, and ended in hold where it should.
+fn judge(case: &str, (worst, rig): &(Worst, Rig<f32>), nominal: &Worst, place: &Vector3<f64>) {
+    let away = (rig.plant.frames().tool_pose().position - place).norm();
+    let record = rig.last.expect("ran").record;
+    println!("{case}: {worst:.2?}, {:.1} mm from the goal", away * 1e3);
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None), "{case}");
+    assert!(worst.joint < 1.0 && worst.tip < TIP_SPEED_LIMIT, "{case}: {worst:?}");
+    assert!(worst.turn < nominal.turn + 0.6, "{case}: {worst:?}");
+    assert!(worst.hand < nominal.hand.max(0.5) + 0.05, "{case}: {worst:?}");
+    assert!(worst.acceleration < nominal.acceleration + 1.0, "{case}: {worst:?}");
+    // Where a joint is at its limit the arm goes as far as it can.
+    let limited = record.flags & (flags::CLAMPED | flags::NEAR_LIMIT) != 0;
+    assert!(limited || away < 8e-3, "{case}: {away} m from the goal");
+}
+
+#[test]
+fn g9_a_goal_that_is_changed_at_any_time_breaks_no_limit_and_is_reached() {
+    let mut dice = Dice(1);
+    let (mut cases, mut reached) = (0, 0);
+    // The faster one uses nine tenths of the speed that the forearm may have.
+    for (duration, feels, count) in [(3.0, false, 8), (3.0, true, 8), (2.0, false, 12), (2.0, true, 6)] {
+        for _ in 0..count {
+            let (speed, place) = (0.5 + 1.5 * dice.roll(), stored() + dice.place(0.3));
+            let speed = if cases % 3 == 0 { 2.0 } else { speed };
+            let (time, speed) = (dice.roll() * duration / speed * 1.1, speed as f32);
+            if place.norm() > 0.95 {
+                continue;
+            }
+            let (nominal, _) = run((duration, speed, feels), |_| None);
+            let due = (time / PERIOD) as u64;
+            let outcome = run((duration, speed, feels), |cycle| (cycle == due).then(|| goal(place)));
+            let case = format!("{duration} s, speed {speed:.2}, feedback {feels}, at {time:.2} s to {place:.2?}");
+            judge(&case, &outcome, &nominal, &place);
+            cases += 1;
+            let record = outcome.1.last.expect("ran").record;
+            reached += usize::from(record.flags & flags::CLAMPED == 0);
+        }
+    }
+    assert!(cases > 25 && reached * 3 > cases * 2, "{reached} of {cases} within reach of the joints");
+}
+
+#[test]
+fn g9_a_goal_that_is_changed_in_every_cycle_breaks_no_limit_and_the_last_one_is_reached() {
+    for (duration, speed, feels) in [(3.0, 2.0, false), (2.0, 2.0, true)] {
+        let mut dice = Dice(7);
+        let last = stored() + Vector3::new(-0.1, -0.1, 0.1);
+        let (nominal, _) = run((duration, speed, feels), |_| None);
+        let outcome = run((duration, speed, feels), |cycle| match cycle {
+            0..300 => Some(goal(stored() + dice.place(0.2))),
+            300 => Some(goal(last)),
+            _ => None,
+        });
+        judge("every cycle", &outcome, &nominal, &last);
+    }
+}
+
+#[test]
+fn g9_a_goal_that_turns_the_hand_breaks_no_limit() {
+    let q = JointPositions::from_array([GOAL[0], GOAL[1], GOAL[2], GOAL[3], GOAL[4], GOAL[5], GOAL[6] - 1.5]);
+    let turned = Frames::new(&model(), &q).tool_pose();
+    let wanted = Goal { orientation: Some(turned.orientation.0.map(|part| part as f32)), ..Goal::STORED };
+    for due in [0, 200, 440] {
+        let (nominal, _) = run((3.0, 2.0, false), |_| None);
+        let outcome = run((3.0, 2.0, false), |cycle| (cycle == due).then_some(wanted));
+        judge("turn", &outcome, &nominal, &stored());
+        let rest = outcome.1.plant.frames().tool_pose().orientation.error_to(&turned.orientation).norm();
+        assert!(rest < 0.03, "{rest} rad from the goal");
+    }
+}
+
+#[test]
+fn g9_a_goal_at_the_start_acts_as_softly_as_a_late_one() {
+    let place = stored() + Vector3::new(-0.15, -0.15, 0.15);
+    let mut rig = ready(2.0, false);
+    rig.command(Command::Run(RunOptions { speed: 2.0, goal: goal(place), ..RunOptions::default() }));
+    let mut worst = Worst::default();
+    while rig.tick(None).record.state == State::Run {
+        worst.see(&rig);
+    }
+    let (nominal, _) = run((2.0, 2.0, false), |_| None);
+    judge("at the start", &(worst, rig), &nominal, &place);
+}
+
+#[test]
+fn g9_the_flag_of_the_feedback_tells_whether_it_bends_the_plan() {
+    let mut rig = ready(3.0, true);
+    rig.command(Command::Run(RunOptions { feedback: true, ..RunOptions::default() }));
+    let (mut told, mut bent) = (Vec::new(), Vec::new());
+    for (from, push) in [(1.0, 3.0), (3.2, 3.0)] {
+        // A late change keeps the run going after its plan has settled.
+        while rig.last.expect("ran").record.state == State::Run && (rig.number as f64) * PERIOD < 1.0 + from {
+            rig.tick(None);
+        }
+        if from > 3.0 {
+            rig.command(Command::SetGoal(goal(stored() + Vector3::new(0.0, 0.0, 0.05))));
+        }
+        let before = rig.last.expect("ran").record.pose_d[1];
+        rig.plant.push[1] = push;
+        rig.run_for(0.4);
+        rig.plant.push[1] = 0.0;
+        let record = rig.last.expect("ran").record;
+        assert_eq!(record.state, State::Run);
+        told.push(record.flags & flags::FEEDBACK != 0);
+        bent.push((record.pose_d[1] - before).abs());
+    }
+    println!("{told:?} {bent:?}");
+    assert_eq!(told, [true, false]);
+    assert!(bent[0] > 5e-3 && bent[1] < 2e-3, "{bent:?}");
+}

@@ -1,0 +1,182 @@
+//! `Sweep`: one factor of the plant over a range, and what is held along it.
+
+use std::str::FromStr;
+
+use serde::Serialize;
+
+use super::interval::Interval;
+use super::statistics::Summary;
+use super::variation::Variation;
+use lab::procedure::Mode;
+use lab::table::Table;
+
+/// Steps unless said otherwise.
+const STEPS: usize = 5;
+/// Most steps.
+const MOST_STEPS: usize = 50;
+/// Share of what was held at the beginning, below which a sweep has found its boundary.
+const FAILED: f64 = 0.5;
+
+/// A factor of the plant and the values it takes, in order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sweep {
+    /// Name of the factor, as in [`Variation`].
+    pub name: String,
+    /// Its values.
+    pub values: Vec<f64>,
+    /// Its number among the parts of a variation.
+    part: usize,
+}
+
+impl Sweep {
+    /// The plant at one of the values: `usual` with this factor replaced.
+    pub fn variation(&self, mut usual: Variation, value: f64) -> Variation {
+        usual.set(self.part, value);
+        usual
+    }
+}
+
+/// `NAME=FROM:TO` or `NAME=FROM:TO:STEPS`.
+impl FromStr for Sweep {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Sweep, String> {
+        let usage = || format!("'{text}' is no sweep; joint-friction=1:0 or delay=0:3:3 is (NAME=FROM:TO[:STEPS])");
+        let (name, range) = text.split_once('=').ok_or_else(usage)?;
+        let mut parts = range.split(':').map(str::trim);
+        let mut number = || parts.next().and_then(|part| part.parse::<f64>().ok()).ok_or_else(usage);
+        let (from, to) = (number()?, number()?);
+        let steps = match parts.next() {
+            None if name.trim() == "delay" => (to - from).abs() as usize,
+            None => STEPS,
+            Some(steps) => steps.parse().map_err(|_| usage())?,
+        };
+        if parts.next().is_some() || !(1..=MOST_STEPS).contains(&steps) || from == to {
+            return Err(usage());
+        }
+        // Rounded, so that a tenth is written as one.
+        let value = |step: usize| {
+            let value = from + (to - from) * step as f64 / steps as f64;
+            (value * 1e6).round() / 1e6
+        };
+        let (name, values) = (name.trim().to_owned(), (0..=steps).map(value).collect::<Vec<_>>());
+        for value in &values {
+            format!("{name}={value}").parse::<Variation>()?;
+        }
+        let part = Variation::part(&name).ok_or_else(usage)?;
+        Ok(Sweep { name, values, part })
+    }
+}
+
+/// Cells that were held, for one plant: mode by mode, demonstration by demonstration, arm by arm.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Point {
+    /// Value of the factor that is swept; `None` of a study without a sweep.
+    pub value: Option<f64>,
+    /// Cells that were tried with each arm.
+    pub cells: usize,
+    /// The modes with their counts, `[demonstration][arm]`.
+    pub held: Vec<(Mode, Vec<Vec<usize>>)>,
+}
+
+impl Point {
+    /// Adds a demonstration: the statistics of its modes.
+    pub fn add(&mut self, modes: &[Summary]) {
+        for summary in modes {
+            self.cells = summary.cells;
+            let place = self.held.iter().position(|(mode, _)| *mode == summary.mode);
+            let place = place.unwrap_or_else(|| {
+                self.held.push((summary.mode, Vec::new()));
+                self.held.len() - 1
+            });
+            self.held[place].1.push(summary.success_by_seed.clone());
+        }
+    }
+
+    /// Mean of a mode with its interval; of one arm and one demonstration the count alone.
+    pub fn interval(&self, mode: Mode) -> Option<Interval> {
+        let (_, counts) = self.held.iter().find(|(held, _)| *held == mode)?;
+        Interval::of(counts).or_else(|| {
+            let mean = *counts.first()?.first()? as f64;
+            Some(Interval { mean, low: mean, high: mean })
+        })
+    }
+
+    /// Cells that the best mode held, in the mean.
+    fn best(&self) -> f64 {
+        self.held.iter().filter_map(|(mode, _)| self.interval(*mode)).map(|held| held.mean).fold(0.0, f64::max)
+    }
+}
+
+/// True once no mode holds half of what the best one held at first: farther out there is nothing to learn.
+pub fn has_failed(points: &[Point]) -> bool {
+    matches!(points, [first, .., last] if last.best() < FAILED * first.best())
+}
+
+/// Value by value and mode by mode, as a table; `name` is what is swept.
+pub fn table(points: &[Point], name: Option<&str>) -> String {
+    let modes: Vec<Mode> =
+        points.first().map(|point| point.held.iter().map(|(mode, _)| *mode).collect()).unwrap_or_default();
+    let mut heading = vec![name.unwrap_or("held").to_owned()];
+    heading.extend(modes.iter().map(|mode| format!("({mode}) {}", mode.title())));
+    let mut table = Table::new(heading);
+    for point in points {
+        let mut row = vec![point.value.map_or_else(|| format!("of {}", point.cells), |value| value.to_string())];
+        row.extend(modes.iter().map(|mode| {
+            point.interval(*mode).map_or_else(
+                || "-".to_owned(),
+                |held| {
+                    let ends = if held.low < held.high { format!(" ({})", held.bounds()) } else { String::new() };
+                    format!("{:.1}{ends}", held.mean)
+                },
+            )
+        }));
+        table.row(row);
+    }
+    table.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(value: f64, held: usize) -> Point {
+        Point { value: Some(value), cells: 48, held: vec![(Mode::Adaptive, vec![vec![held, held + 2]])] }
+    }
+
+    #[test]
+    fn a_sweep_goes_through_its_range_and_refuses_what_the_plant_cannot_be() {
+        let sweep: Sweep = "joint-friction=1:0".parse().unwrap();
+        assert_eq!(sweep.values, [1.0, 0.8, 0.6, 0.4, 0.2, 0.0]);
+        assert_eq!("delay=0:3".parse::<Sweep>().unwrap().values, [0.0, 1.0, 2.0, 3.0]);
+        assert_eq!("bias=0:1:2".parse::<Sweep>().unwrap().values, [0.0, 0.5, 1.0]);
+        let usual: Variation = "mass=1.3,joint-friction=0.7".parse().unwrap();
+        assert_eq!(sweep.variation(usual, 0.2).to_string(), "mass=1.3,joint-friction=0.2");
+        for (wrong, words) in [
+            ("bias=0:9", "between 0 and 2"),
+            ("colour=0:1", "cannot be varied"),
+            ("delay=0:1:2", "whole number"),
+            ("bias=1:1", "is no sweep"),
+            ("bias=0:1:0", "is no sweep"),
+            ("bias=0:1:2:3", "is no sweep"),
+            ("bias", "is no sweep"),
+            ("bias=nan:1", "between"),
+        ] {
+            let refused = wrong.parse::<Sweep>().unwrap_err();
+            assert!(refused.contains(words), "{wrong}: {refused}");
+        }
+    }
+
+    #[test]
+    fn a_sweep_has_failed_when_less_than_half_is_held() {
+        assert!(!has_failed(&[point(1.0, 40)]));
+        assert!(!has_failed(&[point(1.0, 40), point(0.5, 20)]));
+        assert!(has_failed(&[point(1.0, 40), point(0.5, 20), point(0.0, 19)]));
+    }
+
+    #[test]
+    fn the_table_gives_mean_and_interval() {
+        let text = table(&[point(1.0, 44), point(0.5, 40)], Some("joint-friction"));
+        assert!(text.contains("45.0 (44.0 to 46.0)") && text.contains("joint-friction"), "{text}");
+    }
+}

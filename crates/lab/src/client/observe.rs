@@ -1,0 +1,45 @@
+//! Looking on beside the host that commands the arm.
+
+use link::message::HostHello;
+use link::{LINK_VERSION, Request, SCHEMA_HASH, Text};
+
+use super::{BUSY_TIMEOUT, Client};
+use crate::error::HostError;
+use crate::transport::Transport;
+
+impl<T: Transport> Client<T> {
+    /// Opens a conversation that may look and stop, nothing else, whoever commands the arm: status, counters, listing,
+    /// calibration, telemetry. Telemetry comes at least as often as it is asked for; while the other host has a stream
+    /// of its own, that one is seen.
+    ///
+    /// # Errors
+    /// As [`Client::connect`]; [`HostError::Refused`] with [`link::Refusal::Busy`] if too many look on already.
+    pub fn observe(transport: T, owner: &str) -> Result<Self, HostError> {
+        let mut client = Self::begin(transport)?;
+        let hello = HostHello {
+            link_version: LINK_VERSION,
+            schema_hash: SCHEMA_HASH,
+            model_hash: control::MODEL_HASH,
+            owner: Text::new(owner),
+        };
+        match client.greet(&Request::Observe(hello.clone()), &hello, BUSY_TIMEOUT) {
+            Ok(device) => client.hello = device,
+            // A device of an older version does not know the request; it knows a hello, and says what it is.
+            Err(HostError::NoAnswer { .. }) => {
+                client.open(owner, LINK_VERSION, SCHEMA_HASH, BUSY_TIMEOUT)?;
+                return Ok(client);
+            }
+            Err(error) => return Err(error),
+        }
+        (client.open, client.observing) = (true, true);
+        Ok(client)
+    }
+
+    /// Stops the arm, whoever commands it. Returns when the device has taken the stop.
+    ///
+    /// # Errors
+    /// As [`Client::request`].
+    pub fn order_stop(&mut self) -> Result<(), HostError> {
+        self.order(&Request::Stop)
+    }
+}

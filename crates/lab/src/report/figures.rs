@@ -1,0 +1,204 @@
+//! The figures of a report: every run over the progress of the movement, so that runs of any speed lie on one another.
+
+use crate::arm::TORQUE_LIMITS;
+use crate::plan;
+use crate::plot::Page;
+use crate::plot::canvas::{Curve, Ink, Panel};
+use crate::plot::movement::rotation_vectors;
+use crate::primitive_file::PrimitiveFile;
+
+use super::ReportedRun;
+
+/// The looks of runs, in their order.
+const RUNS: [Ink; 4] = [Ink::Execution, Ink::First, Ink::Second, Ink::Third];
+
+/// Standard deviations on either side of the expected value that the band covers.
+const BAND: f64 = 2.0;
+
+/// The look of a run.
+fn ink(run: usize) -> Ink {
+    RUNS[run % RUNS.len()]
+}
+
+/// Every figure for which there are data, with its heading.
+pub(super) fn all(runs: &[ReportedRun], primitive: Option<&PrimitiveFile>) -> Vec<(&'static str, Page)> {
+    let figures = Figures { runs, primitive };
+    let mut legend: Vec<(Ink, String)> =
+        runs.iter().take(RUNS.len()).enumerate().map(|(at, run)| (ink(at), run.name.clone())).collect();
+    legend.push((Ink::Plan, format!("plan{}", if runs.len() > 1 { " of the first" } else { "" })));
+    legend.push((Ink::Band, "expected, \u{b1} 2 standard deviations".to_owned()));
+    legend.push((Ink::Limit, "limit".to_owned()));
+    let page = |rows: Vec<Vec<Panel>>| {
+        let is_drawn = |ink: Ink| rows.iter().flatten().flat_map(|panel| &panel.curves).any(|curve| curve.ink == ink);
+        Page {
+            title: String::new(),
+            x_label: "progress of the movement (%)".to_owned(),
+            x_range: (0.0, 100.0),
+            legend: legend.iter().filter(|(ink, _)| is_drawn(*ink)).cloned().collect(),
+            rows: rows.into_iter().filter(|row| !row.is_empty()).collect(),
+        }
+    };
+    let pages = vec![
+        ("Pose of the grasp point", page(vec![figures.positions(), figures.orientations()])),
+        ("Force and torque of the environment", page(figures.wrench())),
+        ("Fingers", page(vec![figures.hand(), figures.gauges()])),
+        ("Adaptation, surprise and torque", page(vec![figures.rest()])),
+    ];
+    pages.into_iter().filter(|(_, page)| !page.rows.is_empty()).collect()
+}
+
+struct Figures<'a> {
+    runs: &'a [ReportedRun],
+    primitive: Option<&'a PrimitiveFile>,
+}
+
+impl Figures<'_> {
+    /// One panel; `value` gives a sample of a run, `planned` the same of its plan.
+    fn panel(
+        &self,
+        title: impl Into<String>,
+        unit: &str,
+        least_height: f64,
+        band: Option<Curve>,
+        value: impl Fn(&ReportedRun, usize) -> Option<f64>,
+        planned: impl Fn(&ReportedRun, usize) -> Option<f64>,
+    ) -> Option<Panel> {
+        let curve = |ink, run: &ReportedRun, value: &dyn Fn(&ReportedRun, usize) -> Option<f64>| {
+            let points = run.progress.iter().enumerate().filter_map(|(at, u)| Some((100.0 * u, value(run, at)?)));
+            Curve { ink, points: points.collect() }
+        };
+        let mut curves: Vec<Curve> = band.into_iter().collect();
+        curves.extend(self.runs.iter().enumerate().map(|(at, run)| curve(ink(at), run, &value)));
+        curves.extend(self.runs.first().map(|run| curve(Ink::Plan, run, &planned)));
+        curves.retain(|curve| !curve.points.is_empty());
+        let is_measured = curves.iter().any(|curve| curve.ink != Ink::Band);
+        is_measured.then(|| Panel {
+            title: title.into(),
+            y_label: unit.to_owned(),
+            curves,
+            least_height,
+            from_zero: false,
+        })
+    }
+
+    fn positions(&self) -> Vec<Panel> {
+        let panel = |axis: usize| {
+            self.panel(
+                format!("Position {}", ["x", "y", "z"][axis]),
+                "m",
+                0.02,
+                None,
+                |run, at| Some(run.running.position.as_ref()?.get(at)?[axis]),
+                |run, at| Some(run.running.position_d.as_ref()?.get(at)?[axis]),
+            )
+        };
+        (0..3).filter_map(panel).collect()
+    }
+
+    fn orientations(&self) -> Vec<Panel> {
+        let goal = self.runs.first().and_then(|run| run.running.orientation_d.as_ref()?.last().copied());
+        let Some(goal) = goal else { return Vec::new() };
+        let vectors = |path: &Option<Vec<[f64; 4]>>| rotation_vectors(&goal, path.as_deref().unwrap_or_default());
+        let measured: Vec<_> = self.runs.iter().map(|run| vectors(&run.running.orientation)).collect();
+        let planned: Vec<_> = self.runs.iter().map(|run| vectors(&run.running.orientation_d)).collect();
+        let place = |run: &ReportedRun| self.runs.iter().position(|other| std::ptr::eq(other, run));
+        let panel = |axis: usize| {
+            let of = |all: &[Vec<[f64; 3]>], run: &ReportedRun, at: usize| {
+                Some(all.get(place(run)?)?.get(at)?[axis].to_degrees())
+            };
+            self.panel(
+                format!("Turn to the goal about {}", ["x", "y", "z"][axis]),
+                "deg",
+                4.0,
+                None,
+                |run, at| of(&measured, run, at),
+                |run, at| of(&planned, run, at),
+            )
+        };
+        (0..3).filter_map(panel).collect()
+    }
+
+    fn wrench(&self) -> Vec<Vec<Panel>> {
+        let panel = |axis: usize| {
+            let (what, unit, least) = if axis < 3 { ("Force", "N", 2.0) } else { ("Torque", "N m", 0.2) };
+            self.panel(
+                format!("{what} {}", ["x", "y", "z"][axis % 3]),
+                unit,
+                least,
+                self.expected(axis),
+                |run, at| Some(run.running.wrench.as_ref()?.get(at)?[axis]),
+                |_, _| None,
+            )
+        };
+        vec![(0..3).filter_map(panel).collect(), (3..6).filter_map(panel).collect()]
+    }
+
+    fn hand(&self) -> Vec<Panel> {
+        let panel = |digit: usize| {
+            self.panel(
+                ["Spread", "Finger F1", "Finger F2", "Finger F3"][digit],
+                "rad",
+                0.1,
+                None,
+                |run, at| Some(run.running.hand.as_ref()?.get(at)?[digit]),
+                |run, at| Some(run.running.hand_d.as_ref()?.get(at)?[digit]),
+            )
+        };
+        (0..4).filter_map(panel).collect()
+    }
+
+    fn gauges(&self) -> Vec<Panel> {
+        let panel = |finger: usize| {
+            self.panel(
+                format!("Gauge of F{}", finger + 1),
+                "N m",
+                0.1,
+                self.expected(6 + finger),
+                |run, at| Some(run.running.gauges.as_ref()?.get(at)?[finger]),
+                |_, _| None,
+            )
+        };
+        (0..3).filter_map(panel).collect()
+    }
+
+    /// Plan beside the taught one, surprise, and the torque as a share of its limit.
+    fn rest(&self) -> Vec<Panel> {
+        let taught = self.primitive.and_then(|file| plan::roll_out(&file.to_primitive().ok()?).ok());
+        let taught = taught.map(|references| plan::pose_path(&references).position).unwrap_or_default();
+        let beside = |run: &ReportedRun, at: usize| {
+            let planned = run.running.position_d.as_ref()?.get(at)?;
+            let there = taught.get((run.progress.get(at)? * (taught.len().checked_sub(1)?) as f64).round() as usize)?;
+            let distance: f64 = planned.iter().zip(there).map(|(a, b)| (a - b) * (a - b)).sum();
+            Some(1e3 * distance.sqrt())
+        };
+        let share = |run: &ReportedRun, at: usize| {
+            let tau = run.running.tau.as_ref()?.get(at)?;
+            Some(100.0 * tau.iter().zip(&*TORQUE_LIMITS).map(|(tau, limit)| tau.abs() / limit).fold(0.0, f64::max))
+        };
+        let limit = Curve { ink: Ink::Limit, points: vec![(0.0, 100.0), (100.0, 100.0)] };
+        let surprise = |run: &ReportedRun, at: usize| run.running.surprise.as_ref()?.get(at).copied();
+        let panels = [
+            self.panel("Plan beside the taught one", "mm", 5.0, None, beside, |_, _| None),
+            self.panel("Surprise", "1", 1.0, None, surprise, |_, _| None),
+            self.panel("Largest share of a torque limit", "%", 1.0, Some(limit), share, |_, _| None),
+        ];
+        panels.into_iter().flatten().map(|panel| Panel { from_zero: true, ..panel }).collect()
+    }
+
+    /// The band of the expected values of a sensor row; where their spread is not known, a band without width.
+    fn expected(&self, row: usize) -> Option<Curve> {
+        let table = self.primitive?.expectation.as_ref()?;
+        let last = table.mean.len().checked_sub(1)?.max(1) as f64;
+        let side = |sign: f64| {
+            let spread = |at: usize| table.spread.get(at).and_then(|point| point.get(row)).copied().unwrap_or(0.0);
+            let value = move |at: usize, point: &Vec<f64>| Some(point.get(row)? + sign * BAND * spread(at));
+            table
+                .mean
+                .iter()
+                .enumerate()
+                .filter_map(move |(at, point)| Some((100.0 * at as f64 / last, value(at, point)?)))
+        };
+        let back: Vec<_> = side(-1.0).collect();
+        Some(Curve { ink: Ink::Band, points: side(1.0).chain(back.into_iter().rev()).collect() })
+    }
+}

@@ -1,0 +1,158 @@
+//! A report of runs as one page of HTML: what was asked, what happened, and figures of it over the progress of the
+//! movement. It needs no network and no other file.
+
+mod events;
+mod figures;
+mod html;
+
+use std::path::Path;
+
+use control::{Fault, State};
+use dmp::CanonicalSystem;
+
+use crate::demonstration::{Recording, RecordingError};
+use crate::primitive_file::PrimitiveFile;
+use crate::procedure::FlagCounts;
+use crate::tracking::Tracking;
+
+pub use events::Happening;
+pub use html::page;
+
+/// A run as its recording tells it.
+pub struct ReportedRun {
+    /// Its file, without the folder.
+    pub name: String,
+    /// Notes at the head of the recording.
+    pub notes: Vec<String>,
+    /// The part in which a plan was played.
+    pub running: Recording,
+    /// Progress of the movement at each of its samples, 0 to 1.
+    pub progress: Vec<f64>,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Everything out of the ordinary, and the changes of state, in their order.
+    pub happenings: Vec<Happening>,
+    /// Samples in which something was out of the ordinary.
+    pub flags: FlagCounts,
+    /// Samples that the recording lacks.
+    pub missing: usize,
+    /// Tracking of the plan, where poses were recorded.
+    pub tracking: Option<Tracking>,
+}
+
+/// The end of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// No plan was played.
+    NeverBegan,
+    /// The arm came to the end of the movement and held.
+    Arrived,
+    /// A fault stopped it.
+    Faulted(Fault),
+    /// It was stopped, by a person or another program.
+    Stopped,
+    /// The recording ends before the movement does.
+    Unfinished,
+}
+
+impl Outcome {
+    /// True for the one that was wanted.
+    #[must_use]
+    pub fn is_good(self) -> bool {
+        self == Self::Arrived
+    }
+
+    /// One sentence without full stop.
+    #[must_use]
+    pub fn words(self) -> String {
+        match self {
+            Self::NeverBegan => "no movement was played".to_owned(),
+            Self::Arrived => "arrived, and held the goal".to_owned(),
+            Self::Faulted(fault) => format!("stopped by a fault ({fault:?}): {fault}"),
+            Self::Stopped => "stopped by a person or by another program".to_owned(),
+            Self::Unfinished => {
+                "the recording ends in the middle of the movement, as when somebody stops it".to_owned()
+            }
+        }
+    }
+}
+
+impl ReportedRun {
+    /// Reads a recording. `primitive` is the one that ran, if it is known.
+    ///
+    /// # Errors
+    /// [`RecordingError`].
+    pub fn read(file: &Path, primitive: Option<&PrimitiveFile>) -> Result<ReportedRun, RecordingError> {
+        let bytes = std::fs::read(file).map_err(|cause| RecordingError::Unreadable { file: file.to_owned(), cause })?;
+        let recording = Recording::parse(file, &bytes)?;
+        let text = String::from_utf8_lossy(&bytes);
+        let notes = text.lines().map_while(|line| line.strip_prefix('#')).map(|note| note.trim().to_owned()).collect();
+        let alpha = primitive.map_or(CanonicalSystem::<f64>::DEFAULT_ALPHA, |primitive| primitive.movement.alpha);
+        let running = recording.running();
+        let mut flags = FlagCounts::default();
+        running.flags.iter().flatten().for_each(|sample| flags.add(*sample));
+        Ok(ReportedRun {
+            name: file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
+            notes,
+            progress: running.phase.iter().flatten().map(|phase| progress(*phase, alpha)).collect(),
+            outcome: outcome(&recording, &running),
+            happenings: events::of(&recording, alpha),
+            flags,
+            missing: running.missing_samples,
+            tracking: Tracking::of_run(&recording).ok(),
+            running,
+        })
+    }
+
+    /// Duration of the movement, s.
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        self.running.time.last().zip(self.running.time.first()).map_or(0.0, |(last, first)| last - first)
+    }
+
+    /// The largest of a value over the movement, and the progress there.
+    fn peak(&self, value: impl Fn(usize) -> Option<f64>) -> Option<(f64, f64)> {
+        let values = (0..self.running.len()).filter_map(|at| Some((value(at)?, *self.progress.get(at)?)));
+        values.max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Largest force on the hand, N, and the progress there.
+    #[must_use]
+    pub fn largest_force(&self) -> Option<(f64, f64)> {
+        let wrench = self.running.wrench.as_ref()?;
+        self.peak(|at| wrench.get(at).map(|[x, y, z, ..]| (x * x + y * y + z * z).sqrt()))
+    }
+
+    /// Largest surprise, and the progress there.
+    #[must_use]
+    pub fn largest_surprise(&self) -> Option<(f64, f64)> {
+        let surprise = self.running.surprise.as_ref()?;
+        self.peak(|at| surprise.get(at).copied())
+    }
+}
+
+/// Progress of a movement at a phase, 0 to 1.
+fn progress(phase: f64, alpha: f64) -> f64 {
+    // Added so that no progress is not written as -0.
+    if phase > 0.0 { (-phase.ln() / alpha).clamp(0.0, 1.0) + 0.0 } else { 0.0 }
+}
+
+fn outcome(recording: &Recording, running: &Recording) -> Outcome {
+    if running.is_empty() {
+        return Outcome::NeverBegan;
+    }
+    let last = recording.state.as_ref().and_then(|states| states.last()).map(String::as_str);
+    let fault = recording
+        .fault
+        .iter()
+        .flatten()
+        .rev()
+        .find_map(|code| u8::try_from(*code).ok().and_then(Fault::from_code).filter(|fault| *fault != Fault::None));
+    match (fault, last) {
+        (Some(fault), _) => Outcome::Faulted(fault),
+        (None, Some(state)) if state == State::Hold.name() => Outcome::Arrived,
+        (None, Some(state)) if state == State::Run.name() || state == State::Coast.name() => Outcome::Unfinished,
+        (None, Some(_)) => Outcome::Stopped,
+        (None, None) => Outcome::Unfinished,
+    }
+}

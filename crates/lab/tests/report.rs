@@ -1,0 +1,112 @@
+//! The page about runs: what a stranger reads in it, and that it needs nothing but itself.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use control::{Fault, State, flags};
+use lab::demonstration::Recording;
+use lab::learn::{LearnOptions, learn};
+use lab::primitive_file::{ExpectationTable, PrimitiveFile};
+use lab::report::{Outcome, ReportedRun, page};
+
+/// A run of 4 s between two rests; what comes behind its samples is in this state, with this fault.
+fn recorded(folder: &Path, name: &str, end: Option<(State, Fault)>) -> PathBuf {
+    let mut rows = common::rows(4.0);
+    let alpha = 4.605_170_185_988_091;
+    for (at, row) in rows.iter_mut().enumerate() {
+        let progress = (at as f64 - 150.0) / 1200.0;
+        let (state, fault) = match (progress, end) {
+            (..0.0, _) => (State::Hold, Fault::None),
+            (0.6.., Some(end)) => end,
+            (1.0.., None) => (State::Hold, Fault::None),
+            _ => (State::Run, Fault::None),
+        };
+        row.telemetry.state = state.code();
+        row.telemetry.fault = fault.code();
+        row.telemetry.phase = if state == State::Run { (-alpha * progress).exp() as f32 } else { 0.0 };
+        row.telemetry.wrench[2] = if (0.4..0.5).contains(&progress) { 31.0 } else { 1.0 };
+        row.telemetry.flags = if (0.45..0.5).contains(&progress) { flags::SURPRISE } else { 0 };
+    }
+    let file = folder.join(name);
+    std::fs::write(&file, common::text(&rows)).unwrap();
+    file
+}
+
+/// What was learned from the movement, and expects 2 N along z with a spread of 3 N.
+fn primitive(folder: &Path) -> PrimitiveFile {
+    let recording = Recording::read(&common::demonstration(folder, 4.0)).unwrap();
+    let mut learned = learn(&recording, Path::new("reach.toml"), &LearnOptions::named("reach")).unwrap().primitive;
+    let table = |value: f64| vec![(0..9).map(|row| if row == 2 { value } else { 0.0 }).collect(); 16];
+    learned.expectation = Some(ExpectationTable {
+        model_hash: learned.model_hash,
+        recorded_duration: learned.movement.duration,
+        payload_mass: 0.0,
+        payload_centre: [0.0; 3],
+        filter_cutoff: 7.5,
+        trials: 3,
+        spread_floor: 0.05,
+        mean: table(2.0),
+        spread: table(3.0),
+    });
+    learned
+}
+
+#[test]
+fn the_end_of_a_run_is_told_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let outcome = |name, end| ReportedRun::read(&recorded(folder.path(), name, end), None).unwrap().outcome;
+    assert_eq!(outcome("a.csv", None), Outcome::Arrived);
+    assert_eq!(outcome("b.csv", Some((State::SoftStop, Fault::ContactForce))), Outcome::Faulted(Fault::ContactForce));
+    assert_eq!(outcome("c.csv", Some((State::SoftStop, Fault::None))), Outcome::Stopped);
+    assert_eq!(outcome("d.csv", Some((State::Run, Fault::None))), Outcome::Unfinished);
+    let still = ReportedRun::read(&common::demonstration(folder.path(), 3.0), None).unwrap();
+    assert_eq!(still.outcome, Outcome::NeverBegan);
+    assert!(page("still", &[still], None).contains("no movement was played"));
+}
+
+#[test]
+fn a_failed_run_says_what_happened_when_and_how_far_it_came() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recorded(folder.path(), "run.csv", Some((State::SoftStop, Fault::ContactForce)));
+    let run = ReportedRun::read(&file, None).unwrap();
+    let (force, at) = run.largest_force().unwrap();
+    assert!((force - 31.0).abs() < 0.1 && (0.39..0.51).contains(&at), "{force} N at {at}");
+    let surprise = run.happenings.iter().find(|happening| happening.words.contains("successful")).unwrap();
+    assert!((surprise.progress - 0.45).abs() < 0.01 && (surprise.time - 1.8).abs() < 0.01, "{surprise:?}");
+    assert!(surprise.words.ends_with("for 0.20 s"), "{surprise:?}");
+    let html = page("A <failed> run", &[run], None);
+    for words in ["A &lt;failed&gt; run", "Recorded by nobody, for tests.", "stopped by a fault (ContactForce)", "60 %"]
+    {
+        assert!(html.contains(words), "{words}");
+    }
+}
+
+#[test]
+fn the_page_needs_no_other_file_and_draws_several_runs_over_one_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = primitive(folder.path());
+    let good = recorded(folder.path(), "good.csv", None);
+    let bad = recorded(folder.path(), "bad.csv", Some((State::SoftStop, Fault::ContactForce)));
+    let runs = [good, bad].map(|run| ReportedRun::read(&run, Some(&file)).unwrap());
+    let html = page("reach", &runs, Some(&file));
+    let alone = page("reach", &runs[..1], None);
+    for words in [
+        "Finger F1",
+        "Gauge of F3",
+        "Surprise",
+        "Plan beside the taught one",
+        "expected, \u{b1}",
+        "good.csv",
+        "bad.csv",
+    ] {
+        assert!(html.contains(words), "{words}");
+    }
+    assert!(!alone.contains("expected, \u{b1}") && !alone.contains("Plan beside"), "of a primitive that is not given");
+    // No network: but for the name of SVG itself there is no address, nor anything that loads one.
+    assert!(!html.replace("http://www.w3.org/2000/svg", "").contains("://"));
+    assert!(!html.contains("<script") && !html.contains("<link") && !html.contains("url("));
+    assert!(html.len() < 2_000_000, "{} bytes", html.len());
+    // The band goes from 2 N - 2 x 3 N to 2 N + 2 x 3 N, and the axis shows all of it and the 31 N measured.
+    assert_eq!(html.matches("<svg").count(), html.matches("viewBox").count());
+}

@@ -1,0 +1,27 @@
+//! `tactus delete`: frees a place in the device.
+
+use clap::Args;
+use link::Name;
+use serde_json::json;
+
+use super::{Failure, Global, connection};
+
+/// Options of `delete`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// Name of the primitive in the device, as `tactus list` shows it
+    #[arg(value_name = "NAME")]
+    pub name: Name,
+}
+
+/// Deletes a primitive.
+///
+/// # Errors
+/// The device stores none of that name, or a run uses it.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "delete";
+    let mut client = connection::open(global, DOING, |_| {})?;
+    client.delete(&command.name).map_err(|error| error.into_failure(DOING))?;
+    let name = command.name.as_str();
+    global.output().result(&json!({ "deleted": name }), format!("deleted '{name}'"))
+}

@@ -1,0 +1,140 @@
+//! Examples at the end of each command's help.
+
+/// The whole tool.
+pub(super) const ALL: &str = "\
+Devices:
+  sil:      the application in this process, on a simulated arm     sil:seed=7,world=simple
+  sim:      the firmware image under QEMU                            board:  the real board's image, emulated
+  hand:     a hand alone under QEMU
+  serial:/dev/ttyACM0   can:can0   tcp:HOST:PORT   unix:tactus.sock
+Options of simulated devices, behind the colon and separated by commas:
+  seed=N               everything random          world=mujoco|simple   the physics
+  line=serial|can      the line to the host       bus=FILE              log of the buses, as candump -L writes it
+  flash=FILE           keeps its primitives       faults=FILE[:N]       faults that befall the arm
+Examples:
+  tactus --device sil: teach -o grasp.csv
+  tactus learn grasp.csv -o grasp.toml
+  tactus --device sil:seed=7 run grasp.toml --record run.csv";
+
+/// `sim`
+pub(super) const SIM: &str = "\
+Examples:
+  tactus --device sil: sim
+  tactus --device sil:world=simple sim --listen unix:arm.sock --flash arm.flash";
+/// `teach`
+pub(super) const TEACH: &str = "\
+Examples:
+  tactus --device sil: teach --output grasp.csv
+  tactus --device serial:/dev/ttyACM0 teach --at-home --duration 20 --output grasp.csv";
+/// `learn`
+pub(super) const LEARN: &str = "\
+Examples:
+  tactus learn grasp.csv --output grasp.toml
+  tactus learn grasp.csv --kernels 100 --dwell 3.5 --hand-goal 0,2.3,2.3,2.3 --output grasp.toml";
+/// `rehearse`
+pub(super) const REHEARSE: &str = "\
+Examples:
+  tactus --device sil: rehearse grasp.toml
+  tactus --device sil: rehearse grasp.toml --trials 5 --record-dir rehearsals --output felt.toml";
+/// `experience`
+pub(super) const EXPERIENCE: &str = "\
+Examples:
+  tactus experience grasp.toml run-1.csv run-2.csv run-3.csv
+  tactus experience grasp.toml --forget";
+/// `check`
+pub(super) const CHECK: &str = "\
+Examples:
+  tactus check grasp.toml
+  tactus check grasp.toml --speed 0.5 --goal 0.6,0.1,0.2";
+/// `run`
+pub(super) const RUN: &str = "\
+Examples:
+  tactus --device sil: run grasp.toml --record run.csv
+  tactus --device sil: run grasp.toml --mode adapt --speed 0.5 --goal 0.6,0.1,0.2
+  tactus --device serial:/dev/ttyACM0 run grasp";
+/// `upload`
+pub(super) const UPLOAD: &str = "\
+Example:
+  tactus --device unix:tactus.sock upload grasp.toml";
+/// `list`
+pub(super) const LIST: &str = "\
+Example:
+  tactus --device unix:tactus.sock list";
+/// `get`
+pub(super) const GET: &str = "\
+Example:
+  tactus --device unix:tactus.sock get grasp --output grasp-of-the-device.toml";
+/// `rename`
+pub(super) const RENAME: &str = "\
+Example:
+  tactus --device unix:tactus.sock rename grasp grasp-old";
+/// `delete`
+pub(super) const DELETE: &str = "\
+Example:
+  tactus --device unix:tactus.sock delete grasp-old";
+/// `status`
+pub(super) const STATUS: &str = "\
+Example:
+  tactus --device unix:tactus.sock --json status";
+/// `calibrate`
+pub(super) const CALIBRATE: &str = "\
+Example:
+  tactus --device unix:tactus.sock calibrate show";
+/// `hand`
+pub(super) const HAND: &str = "\
+Examples:
+  tactus --device unix:tactus.sock hand init
+  tactus --device unix:tactus.sock hand to 0,1.2,1.2,1.2";
+/// `stop`
+pub(super) const STOP: &str = "\
+Example:
+  tactus --device unix:tactus.sock stop";
+/// `record`
+pub(super) const RECORD: &str = "\
+Example:
+  tactus --device unix:tactus.sock record --duration 30 --output what-it-does.csv";
+/// `flash`
+pub(super) const FLASH: &str = "\
+Examples:
+  tactus flash --dry-run
+  tactus flash";
+/// `logs`
+pub(super) const LOGS: &str = "\
+Examples:
+  tactus logs --dry-run
+  tactus logs --attach-may-reset";
+/// `experiment`
+pub(super) const EXPERIMENT: &str = "\
+Examples:
+  tactus --device sil: experiment flashlight --grid 4x3 --modes a,c
+  tactus experiment flashlight --figures-only";
+/// `plot`
+pub(super) const PLOT: &str = "\
+Examples:
+  tactus plot --run run.csv --output run.png
+  tactus plot -d grasp.csv -p grasp.toml -r run.csv -o run.svg --picture arm.png";
+/// `report`
+pub(super) const REPORT: &str = "\
+Example:
+  tactus report run-1.csv run-2.csv --primitive grasp.toml --output report.html";
+/// `monitor`
+pub(super) const MONITOR: &str = "\
+Example:
+  tactus --device unix:tactus.sock monitor --primitive grasp.toml";
+/// `explain`
+pub(super) const EXPLAIN: &str = "\
+Example:
+  tactus explain E230";
+/// `completions`
+pub(super) const COMPLETIONS: &str = "\
+Example:
+  tactus completions bash";
+/// `compare`
+pub(super) const COMPARE: &str = "\
+Example:
+  tactus compare run-1.csv run-2.csv";
+/// `can`
+pub(super) const CAN: &str = "\
+Examples:
+  tactus can decode bus.log --summary
+  tactus can replay bus.log";

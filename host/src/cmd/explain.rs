@@ -1,0 +1,53 @@
+//! `tactus explain`: what an error or a fault means, without a device.
+
+use clap::Args;
+use control::Fault;
+use link::Refusal;
+use serde_json::json;
+
+use super::{ErrorCode, Failure, Global};
+
+/// Options of `explain`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// The code of an error, `E504` or 504, or the name of a fault, for example `ContactForce`
+    #[arg(value_name = "CODE")]
+    pub code: String,
+}
+
+/// Explains a code.
+///
+/// # Errors
+/// There is no such code.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    let text = command.code.as_str();
+    let mut faults = Fault::ALL.into_iter().filter(|fault| *fault != Fault::None);
+    let fault = faults.find(|fault| format!("{fault:?}").eq_ignore_ascii_case(text));
+    let (code, meaning, cause, remedy) = match (error(text), fault) {
+        (Some(code), _) => (code.to_string(), code.meaning(), code.cause(), code.remedy()),
+        (None, Some(fault)) => {
+            let remedy = "remove the cause, then `tactus stop --clear-fault`";
+            (format!("{fault:?}"), fault.explanation(), "", remedy)
+        }
+        (None, None) => {
+            let cause = format!("'{text}' is neither the code of an error nor the name of a fault");
+            return Err(Failure::new(ErrorCode::UnknownCode, "explain", cause));
+        }
+    };
+    let exit = error(text).map(|code| code.exit() as u8);
+    let mut words = format!("{code}: {meaning}");
+    for (name, text) in [("usual cause", cause), ("help", remedy)] {
+        if !text.is_empty() {
+            words += &format!("\n  {name}: {text}");
+        }
+    }
+    let data = json!({ "code": code, "meaning": meaning, "cause": cause, "help": remedy, "exit": exit });
+    global.output().result(&data, words)
+}
+
+/// The error with this number, with or without the letter.
+fn error(text: &str) -> Option<ErrorCode> {
+    let number: u16 = text.strip_prefix(['E', 'e']).unwrap_or(text).parse().ok()?;
+    let refusals = Refusal::ALL.map(ErrorCode::Refused);
+    ErrorCode::ALL.iter().chain(&refusals).copied().find(|code| code.number() == number)
+}

@@ -1,0 +1,52 @@
+//! `tactus get`: reads a primitive back from the device into a file.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use link::{Name, PrimitiveImage};
+use serde_json::json;
+
+use super::{ErrorCode, Failure, Global, connection, files};
+use lab::client::Client;
+use lab::device::Device;
+use lab::primitive_file::PrimitiveFile;
+
+/// Options of `get`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// Name of the primitive in the device, as `tactus list` shows it
+    #[arg(value_name = "NAME")]
+    pub name: Name,
+    /// Where it goes, TOML; NAME.toml if it is not given
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+}
+
+/// Reads a primitive back. The file gives the same image when it is uploaded again.
+///
+/// # Errors
+/// The device stores none of that name, or the file is there already or cannot be written.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "get";
+    let path = command.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", command.name)));
+    let output_file = files::create(&path, global, &[], "get refused")?;
+    let mut client = connection::open(global, DOING, |_| {})?;
+    let file = fetch(&mut client, &command.name, DOING)?;
+    let text = file.checked_text().map_err(|cause| super::check::failure(cause, &path, DOING))?;
+    files::fill(output_file, text.as_bytes(), DOING)?;
+    let content = file.checksum();
+    global.output().result(
+        &json!({ "name": file.name, "file": files::text(&path), "content": format!("0x{content:08x}") }),
+        format!("wrote {} (content 0x{content:08x})", path.display()),
+    )
+}
+
+/// The primitive that the device stores under a name.
+pub(super) fn fetch(client: &mut Client<Device>, name: &Name, doing: &str) -> Result<PrimitiveFile, Failure> {
+    let image = client.read_image(name, |_| {}).map_err(|error| error.into_failure(doing))?;
+    let image =
+        PrimitiveImage::parse(&image).map_err(|cause| Failure::new(ErrorCode::ReadBackDiffers, doing, cause))?;
+    let file = PrimitiveFile::from_image(Path::new(name.as_str()), &image);
+    file.require_model(control::MODEL_HASH).map_err(|cause| super::check::failure(cause, &file.file, doing))?;
+    Ok(file)
+}

@@ -1,0 +1,162 @@
+//! `tactus monitor`: the arm on one screen, beside whoever commands it.
+
+use std::io::IsTerminal as _;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event::{self, Event as Input, KeyCode, KeyEventKind, KeyModifiers};
+
+use super::{ErrorCode, Failure, Global, Output, connection, teach, upload};
+use crate::monitor::{Watch, draw};
+use lab::client::{Client, Incoming};
+use lab::device::Device;
+use lab::error::HostError;
+
+/// Cycles between two that are asked for: 30 a second.
+const EVERY: u8 = 10;
+
+/// Cycles between two lines of the stream: ten a second.
+const LINE_EVERY: u32 = 30;
+
+/// Time between two questions for state and counters.
+const ASK_EVERY: Duration = Duration::from_millis(500);
+
+/// Time between two looks at the keyboard.
+const LOOK_EVERY: Duration = Duration::from_millis(60);
+
+/// Options of `monitor`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// The primitive that runs, TOML: the wrench that it expects is shown beside the measured one
+    #[arg(long, short, value_name = "PRIMITIVE")]
+    pub primitive: Option<PathBuf>,
+    /// End after this time, s
+    #[arg(long, value_name = "SECONDS", value_parser = teach::duration)]
+    pub duration: Option<f64>,
+}
+
+/// Shows the arm until somebody has seen enough. Nothing is asked to move; a key stops the arm, whoever commands it.
+///
+/// # Errors
+/// The device cannot be reached or falls silent; there is no terminal, and no JSON is asked for.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "monitor";
+    if !global.json && !std::io::stdout().is_terminal() {
+        return Err(Failure::new(ErrorCode::NoTerminal, DOING, "standard output is no terminal"));
+    }
+    let mut watch = Watch::default();
+    if let Some(path) = &command.primitive {
+        let file = upload::read(path, DOING)?;
+        watch.alpha = Some(file.movement.alpha);
+        watch.primitive = Some(file.to_primitive().map_err(|cause| super::check::failure(cause, path, DOING))?);
+    }
+    let mut client = connection::observe(global, DOING)?;
+    watch.hello = client.hello().clone();
+    let mut view = if global.json {
+        View::Lines(global.output())
+    } else {
+        View::Screen(ratatui::try_init().map_err(|cause| Failure::new(ErrorCode::NoTerminal, DOING, cause))?)
+    };
+    let watched = follow(&mut client, &mut watch, &mut view, command.duration);
+    if let View::Screen(_) = view {
+        ratatui::restore();
+    }
+    match watched {
+        Err(Ended::Host(HostError::Interrupted)) | Ok(()) => Ok(()),
+        Err(Ended::Host(error)) => Err(error.into_failure(DOING)),
+        Err(Ended::View(failure)) => Err(failure),
+    }
+}
+
+/// Why watching ended before somebody wanted it to.
+enum Ended {
+    Host(HostError),
+    View(Failure),
+}
+
+impl From<HostError> for Ended {
+    fn from(error: HostError) -> Self {
+        Self::Host(error)
+    }
+}
+
+/// Where it is shown.
+enum View {
+    Screen(DefaultTerminal),
+    Lines(Output),
+}
+
+/// A wish of the person at the keyboard.
+#[derive(PartialEq)]
+enum Wish {
+    Stop,
+    Leave,
+}
+
+fn follow(client: &mut Client<Device>, watch: &mut Watch, view: &mut View, duration: Option<f64>) -> Result<(), Ended> {
+    client.set_telemetry(EVERY)?;
+    let started = client.now();
+    let (mut asked, mut drawn, mut line) = (None, None, None);
+    loop {
+        let now = client.now();
+        if duration.is_some_and(|seconds| (now - started).as_secs_f64() >= seconds) {
+            return Ok(());
+        }
+        if asked.is_none_or(|asked| now.saturating_sub(asked) >= ASK_EVERY) {
+            watch.status = client.status()?;
+            watch.statistics = client.statistics()?;
+            asked = Some(now);
+        }
+        match client.next(LOOK_EVERY)? {
+            Some(Incoming::Telemetry(telemetry)) => {
+                watch.cycle(telemetry);
+                let is_due = line.is_none_or(|last| telemetry.cycle.wrapping_sub(last) >= LINE_EVERY);
+                if let (View::Lines(output), true) = (&mut *view, is_due) {
+                    output.result(&watch.to_json(), "").map_err(Ended::View)?;
+                    line = Some(telemetry.cycle);
+                }
+            }
+            Some(Incoming::Event(event)) => {
+                let words = watch.event(&event).to_owned();
+                if let View::Lines(output) = view {
+                    let data = serde_json::json!({ "event": words, "cycle": event.cycle });
+                    output.result(&data, "").map_err(Ended::View)?;
+                }
+            }
+            None => {}
+        }
+        watch.gaps = client.gaps();
+        if let View::Screen(terminal) = view
+            && drawn.is_none_or(|drawn| client.now().saturating_sub(drawn) >= LOOK_EVERY)
+        {
+            let broken = |cause| Ended::View(Failure::new(ErrorCode::NoTerminal, "monitor", cause));
+            terminal.draw(|frame| draw(frame, watch)).map_err(broken)?;
+            drawn = Some(client.now());
+            match wish().map_err(broken)? {
+                Some(Wish::Stop) => client.order_stop()?,
+                Some(Wish::Leave) => return Ok(()),
+                None => {}
+            }
+        }
+    }
+}
+
+/// The key that was pressed since the last look. A stop counts more than all else.
+fn wish() -> std::io::Result<Option<Wish>> {
+    let mut wish = None;
+    while event::poll(Duration::ZERO)? {
+        let Input::Key(key) = event::read()? else { continue };
+        if key.kind != KeyEventKind::Press || wish == Some(Wish::Stop) {
+            continue;
+        }
+        wish = match key.code {
+            KeyCode::Char('s' | ' ') => Some(Wish::Stop),
+            KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => Some(Wish::Leave),
+            KeyCode::Char('q') | KeyCode::Esc => Some(Wish::Leave),
+            _ => wish,
+        };
+    }
+    Ok(wish)
+}

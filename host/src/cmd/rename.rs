@@ -1,0 +1,40 @@
+//! `tactus rename`: gives a primitive in the device another name.
+
+use clap::Args;
+use link::{Name, Refusal};
+use serde_json::json;
+
+use super::{ErrorCode, Failure, Global, connection};
+use lab::error::HostError;
+
+/// Options of `rename`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// Name of the primitive in the device, as `tactus list` shows it
+    #[arg(value_name = "OLD")]
+    pub old: Name,
+    /// Its name from then on
+    #[arg(value_name = "NEW")]
+    pub new: Name,
+}
+
+/// Renames a primitive.
+///
+/// # Errors
+/// The device stores none of the old name, or one of the new; a run uses it.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "rename";
+    let (old, new) = (&command.old, &command.new);
+    let mut client = connection::open(global, DOING, |_| {})?;
+    let mut renamed = client.rename(old, new);
+    if old != new && matches!(renamed, Err(HostError::Refused { reason: Refusal::NameTaken, .. })) {
+        let what = format!("the device stores another primitive '{new}'");
+        if !global.force && !super::ask(global, &format!("{what}; delete it?")) {
+            return Err(Failure::new(ErrorCode::WouldReplace, "rename refused", what));
+        }
+        client.delete(new).map_err(|error| error.into_failure(DOING))?;
+        renamed = client.rename(old, new);
+    }
+    renamed.map_err(|error| error.into_failure(DOING))?;
+    global.output().result(&json!({ "old": old.as_str(), "new": new.as_str() }), format!("'{old}' is '{new}' now"))
+}

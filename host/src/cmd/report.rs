@@ -1,0 +1,54 @@
+//! `tactus report`: one page of HTML about one run or several.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::json;
+
+use super::{ErrorCode, Failure, Global, files};
+use lab::primitive_file::PrimitiveFile;
+use lab::report::{ReportedRun, page};
+
+/// Options of `report`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// Recordings of `tactus run --record`; several are laid over one another by the progress of the movement
+    #[arg(value_name = "RUN", required = true)]
+    pub runs: Vec<PathBuf>,
+    /// The primitive that ran, TOML: its expectation becomes a band in the figures
+    #[arg(long, short, value_name = "PRIMITIVE")]
+    pub primitive: Option<PathBuf>,
+    /// Heading; otherwise the name of the primitive or of the first run
+    #[arg(long)]
+    pub title: Option<String>,
+    /// Where the page goes, HTML
+    #[arg(long, short, value_name = "FILE", default_value = "report.html")]
+    pub output: PathBuf,
+}
+
+/// Writes the report.
+///
+/// # Errors
+/// A file cannot be read or is wrong, or the page is there already or cannot be written.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    const DOING: &str = "report";
+    let file = &command.output;
+    let inputs: Vec<&Path> = command.runs.iter().chain(&command.primitive).map(PathBuf::as_path).collect();
+    let output_file = files::create(file, global, &inputs, DOING)?;
+    let invalid =
+        |cause: Box<dyn std::error::Error + Send + Sync>| Failure::of_file(ErrorCode::PlotInput, DOING, cause);
+    let primitive = command.primitive.as_deref().map(PrimitiveFile::read).transpose();
+    let primitive = primitive.map_err(|cause| invalid(cause.into()))?;
+    let read = |file: &PathBuf| ReportedRun::read(file, primitive.as_ref()).map_err(|cause| invalid(cause.into()));
+    let runs = command.runs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+    let name = primitive.as_ref().map(|primitive| primitive.name.clone());
+    let title = command.title.clone().or(name).or_else(|| Some(runs.first()?.name.clone())).unwrap_or_default();
+    let html = page(&title, &runs, primitive.as_ref());
+    files::fill(output_file, html.as_bytes(), DOING)?;
+    let outcomes: Vec<_> = runs.iter().map(|run| json!({ "run": run.name, "outcome": run.outcome.words() })).collect();
+    let lines: Vec<String> = runs.iter().map(|run| format!("{}: {}", run.name, run.outcome.words())).collect();
+    global.output().result(
+        &json!({ "file": files::text(file), "runs": outcomes }),
+        format!("{}\nwrote {}", lines.join("\n"), file.display()),
+    )
+}

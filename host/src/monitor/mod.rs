@@ -1,0 +1,163 @@
+//! What is known of a device that is watched: the newest of everything it told.
+
+mod screen;
+
+use std::collections::VecDeque;
+
+use control::{Fault, State, flags};
+use device::Stage;
+use dmp::CanonicalSystem;
+use lab::client::Gaps;
+use lab::error::explain_blocked;
+use lab::primitive_file::HostPrimitive;
+use lab::procedure::CHANNELS;
+use link::{DeviceHello, Event, EventKind, HandStage, Statistics, Status, Telemetry};
+use serde_json::{Value, json};
+
+pub use screen::draw;
+
+/// Events that are kept.
+const EVENTS: usize = 20;
+
+/// The newest of everything a device told.
+#[derive(Default)]
+pub struct Watch {
+    /// Who the device is.
+    pub hello: DeviceHello,
+    /// Its state, asked for now and then.
+    pub status: Status,
+    /// Its counters, asked for now and then.
+    pub statistics: Statistics,
+    /// The newest cycle, once one has come.
+    pub telemetry: Option<Telemetry>,
+    /// Cycles and messages that did not arrive.
+    pub gaps: Gaps,
+    /// The primitive that is expected to run, where the forces that it expects are known.
+    pub primitive: Option<HostPrimitive>,
+    /// Decay of its phase; the usual one where it is not known.
+    pub alpha: Option<f64>,
+    /// Events in words, oldest first.
+    pub events: VecDeque<String>,
+}
+
+impl Watch {
+    /// Takes a new cycle.
+    pub fn cycle(&mut self, telemetry: Telemetry) {
+        self.telemetry = Some(telemetry);
+    }
+
+    /// Takes an event; in words.
+    pub fn event(&mut self, event: &Event) -> &str {
+        if self.events.len() == EVENTS {
+            self.events.pop_front();
+        }
+        self.events.push_back(format!("cycle {}: {}", event.cycle, words(event)));
+        self.events.back().map_or("", String::as_str)
+    }
+
+    /// The state of the arm; the newest cycle knows it better than the last answer.
+    pub fn state(&self) -> &'static str {
+        let code = self.telemetry.map_or(self.status.state, |telemetry| telemetry.state);
+        State::from_code(code).map_or("unknown", State::name)
+    }
+
+    /// The latched fault.
+    pub fn fault(&self) -> Option<Fault> {
+        let code = self.telemetry.map_or(self.status.fault, |telemetry| telemetry.fault);
+        Fault::from_code(code).filter(|fault| *fault != Fault::None)
+    }
+
+    /// The reason for the present state: the fault, the start-up, or nothing.
+    pub fn cause(&self) -> String {
+        let stage = Stage::from_code(self.status.startup_stage);
+        match (self.fault(), self.status.blocked, stage) {
+            (Some(fault), ..) => format!("{fault:?}: {fault}"),
+            (None, Some(numbers), _) => format!("start-up: {}", explain_blocked(numbers)),
+            (None, None, Some(stage)) if stage != Stage::Ready => format!("start-up: {stage}"),
+            _ => String::new(),
+        }
+    }
+
+    /// How far the movement has come, 0 to 1; `None` outside a run.
+    pub fn progress(&self) -> Option<f64> {
+        let telemetry = self.telemetry.filter(|telemetry| {
+            matches!(State::from_code(telemetry.state), Some(State::Run | State::Coast)) && telemetry.phase > 0.0
+        })?;
+        let alpha = self.alpha.unwrap_or(CanonicalSystem::<f64>::DEFAULT_ALPHA);
+        Some((-f64::from(telemetry.phase).ln() / alpha).clamp(0.0, 1.0))
+    }
+
+    /// The wrench that the primitive expects now, N and N m.
+    pub fn expected(&self) -> Option<[f64; 6]> {
+        let values = self.primitive.as_ref()?.expected()?.at(self.progress()?);
+        values.first_chunk().copied()
+    }
+
+    /// The adaptation in a few words.
+    pub fn adaptation(&self) -> &'static str {
+        let bits = self.telemetry.map_or(0, |telemetry| telemetry.flags);
+        let has = |mask: u32| bits & mask != 0;
+        match () {
+            () if !has(flags::FEEDBACK) => "off",
+            () if has(flags::CLAMPED) => "at its limits",
+            () if has(flags::FEEDBACK_FADED) => "derated",
+            () => "on",
+        }
+    }
+
+    /// Duration of the newest control computation and of the longest, us.
+    pub fn computation_us(&self) -> (f64, f64) {
+        let us = |ticks: u32| f64::from(ticks) * 1e6 / f64::from(self.hello.ticks_per_second.max(1));
+        (us(self.telemetry.map_or(0, |telemetry| telemetry.cost_ticks)), us(self.statistics.cost_worst_ticks))
+    }
+
+    /// All of it as one object; what is not known is null.
+    pub fn to_json(&self) -> Value {
+        let telemetry = self.telemetry.as_ref();
+        let (now, worst) = self.computation_us();
+        let hand = (self.status.hand_stage == HandStage::Ready).then_some(telemetry).flatten();
+        json!({
+            "state": self.state(), "fault": self.fault().map(|fault| format!("{fault:?}")), "cause": self.cause(),
+            "loaded": self.status.loaded.as_ref().map(|name| name.as_str()), "progress": self.progress(),
+            "cycle": telemetry.map(|t| t.cycle), "phase": telemetry.map(|t| t.phase),
+            "q_rad": telemetry.map(|t| t.q), "dq_rad_s": telemetry.map(|t| t.dq), "tau_Nm": telemetry.map(|t| t.tau),
+            "wrench_N_Nm": telemetry.map(|t| t.wrench), "expected_N_Nm": self.expected(),
+            "hand_rad": hand.map(|t| t.hand), "hand_d_rad": hand.map(|t| t.hand_d), "gauges_Nm": hand.map(|t| t.gauges),
+            "adaptation": self.adaptation(), "surprise": telemetry.map(|t| t.surprise),
+            "computation_us": telemetry.map(|_| now), "computation_worst_us": worst,
+            "missed_deadlines": self.statistics.missed_deadlines, "lost_replies": self.statistics.lost_replies,
+            "bus_errors": self.statistics.bus_errors, "bus_restarts": self.statistics.bus_restarts,
+            "telemetry_lost": self.gaps.telemetry, "telemetry_dropped": self.statistics.telemetry_dropped,
+        })
+    }
+}
+
+/// An event in a few words.
+fn words(event: &Event) -> String {
+    let code = u8::try_from(event.code).unwrap_or(u8::MAX);
+    match event.kind {
+        EventKind::State => {
+            let state = State::from_code(code).map_or("unknown state", State::name);
+            let fault =
+                u8::try_from(event.detail).ok().and_then(Fault::from_code).filter(|fault| *fault != Fault::None);
+            fault.map_or_else(|| state.to_owned(), |fault| format!("{state}: {fault}"))
+        }
+        EventKind::Arrived => "the movement has ended".to_owned(),
+        EventKind::Startup => {
+            Stage::from_code(code).map_or_else(|| "start-up".to_owned(), |stage| format!("start-up: {stage}"))
+        }
+        EventKind::SafetyMode => format!(
+            "safety module: {}",
+            ["emergency stop", "idle", "active"].get(usize::from(code)).unwrap_or(&"unknown")
+        ),
+        EventKind::LinkTimeout => format!("the host was silent for {} ms: stopped", event.detail),
+        EventKind::Store => format!("place {code} of the library changed"),
+        EventKind::CommandRefused => "a command was refused".to_owned(),
+        EventKind::Blocked => format!("start-up: {}", explain_blocked([event.code.into(), event.detail])),
+        EventKind::Surprise => {
+            let channel = CHANNELS.get(usize::from(event.code)).unwrap_or(&"a channel");
+            format!("not as the successful runs: {channel}, {:.0} % on the way", f64::from(event.detail) / 10.0)
+        }
+        EventKind::Hand => format!("hand: {}", HandStage::from_code(code).map_or("unknown", HandStage::name)),
+    }
+}

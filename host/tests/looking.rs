@@ -1,0 +1,71 @@
+//! Commands that only tell: reports of runs, the meaning of codes, completions. None of them needs a device.
+
+#[path = "../../crates/lab/tests/common/mod.rs"]
+mod common;
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use assert_cmd::assert::Assert;
+
+fn tactus(folder: &Path, arguments: &[&str]) -> Assert {
+    Command::new(env!("CARGO_BIN_EXE_tactus")).current_dir(folder).env_remove("TACTUS_DEVICE").args(arguments).assert()
+}
+
+fn stdout(assert: &Assert) -> String {
+    String::from_utf8(assert.get_output().stdout.clone()).unwrap()
+}
+
+fn stderr(assert: &Assert) -> String {
+    String::from_utf8(assert.get_output().stderr.clone()).unwrap()
+}
+
+#[test]
+fn a_report_is_written_once_and_replaced_only_when_told_to() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    common::demonstration(folder, 3.0);
+    tactus(folder, &["learn", "demo.csv", "-o", "reach.toml"]).success();
+    let report = ["report", "demo.csv", "--primitive", "reach.toml", "-o", "page.html"];
+    let written = tactus(folder, &report).success();
+    assert_eq!(stdout(&written), "demo.csv: no movement was played\nwrote page.html\n");
+    let page = std::fs::read_to_string(folder.join("page.html")).unwrap();
+    assert!(page.starts_with("<!DOCTYPE html>") && page.contains("<title>reach</title>"));
+
+    std::fs::write(folder.join("page.html"), "mine").unwrap();
+    assert!(stderr(&tactus(folder, &report).code(2)).contains("E230"));
+    assert_eq!(std::fs::read_to_string(folder.join("page.html")).unwrap(), "mine");
+    tactus(folder, &[&report[..], &["--force"]].concat()).success();
+    assert_eq!(std::fs::read_to_string(folder.join("page.html")).unwrap(), page, "the same input, the same page");
+
+    assert!(stderr(&tactus(folder, &["report", "reach.toml", "-o", "other.html"]).code(6)).contains("E610"));
+    assert!(!folder.join("other.html").exists());
+}
+
+#[test]
+fn codes_and_faults_are_explained_without_a_device() {
+    let folder = tempfile::tempdir().unwrap();
+    let explained = |code: &str| stdout(&tactus(folder.path(), &["explain", code]).success());
+    assert!(explained("E504").starts_with("E504: another host is connected to the device\n  help: end the other"));
+    assert_eq!(explained("504"), explained("e504"));
+    assert!(explained("E702").contains("usual cause: no power"));
+    assert!(explained("contactforce").starts_with("ContactForce: the contact force"));
+    for unknown in ["E999", "None", "", "E", "99999999"] {
+        assert!(stderr(&tactus(folder.path(), &["explain", unknown]).code(2)).contains("E241"), "{unknown}");
+    }
+}
+
+#[test]
+fn shells_complete_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish"] {
+        let text = stdout(&tactus(folder.path(), &["completions", shell]).success());
+        assert!(["monitor", "rename", "explain"].iter().all(|word| text.contains(word)), "{shell}");
+    }
+}
+
+#[test]
+fn the_monitor_wants_a_terminal_or_json_before_it_looks_for_a_device() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(stderr(&tactus(folder.path(), &["monitor"]).code(2)).contains("E240"));
+}

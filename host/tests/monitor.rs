@@ -1,0 +1,114 @@
+//! The screen of the monitor, cell by cell: an arm at rest, in contact, and stopped by a fault.
+
+use std::path::Path;
+
+use control::{Fault, State, flags};
+use device::Stage;
+use link::{Capabilities, DeviceHello, Event, EventKind, HandStage, Name, Statistics, Status, Telemetry, Text};
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use tactus::monitor::{Watch, draw};
+
+fn watch() -> Watch {
+    Watch {
+        hello: DeviceHello {
+            board: Text::new("nucleo-h743zi2"),
+            firmware: Text::new("0.1.0 (1a2b3c4)"),
+            ticks_per_second: 400_000_000,
+            capabilities: Capabilities { arm: true, hand: true, wrench: true },
+            ..DeviceHello::default()
+        },
+        status: Status { cycle: 1200, startup_stage: Stage::WaitingForIdle.code(), ..Status::default() },
+        statistics: Statistics { cost_worst_ticks: 62_000, ..Statistics::default() },
+        ..Watch::default()
+    }
+}
+
+/// An arm that plays a movement and touches something.
+fn contact() -> Watch {
+    let telemetry = Telemetry {
+        cycle: 45_123,
+        state: State::Run.code(),
+        flags: flags::FEEDBACK | flags::CLAMPED,
+        phase: 0.2,
+        q: [-0.87, 0.62, 0.1, 1.92, -0.2, -0.61, 2.9],
+        dq: [0.12, -0.3, 0.0, 0.45, 0.0, -0.1, 0.02],
+        tau: [1.2, -33.5, 0.4, 11.9, -0.2, 0.7, 0.1],
+        wrench: [-8.4, 3.1, 22.5, 0.41, -0.02, 0.0],
+        cost_ticks: 41_000,
+        hand: [0.1, 1.4, 1.45, 0.9],
+        hand_d: [0.1, 1.6, 1.6, 1.6],
+        gauges: [-0.42, -0.38, 0.01],
+        surprise: 6.3,
+        ..Telemetry::default()
+    };
+    let mut watch = watch();
+    watch.status = Status {
+        startup_stage: Stage::Ready.code(),
+        zeroed: true,
+        loaded: Some(Name::new("reach-and-grasp").unwrap()),
+        hand_stage: HandStage::Ready,
+        ..Status::default()
+    };
+    watch.cycle(telemetry);
+    watch.event(&Event { cycle: 44_200, kind: EventKind::State, code: State::Run.code().into(), detail: 0 });
+    watch.event(&Event { cycle: 45_100, kind: EventKind::Surprise, code: 2, detail: 349 });
+    watch
+}
+
+fn fault() -> Watch {
+    let mut watch = contact();
+    let cycle =
+        Telemetry { state: State::SoftStop.code(), fault: Fault::ContactForce.code(), ..watch.telemetry.unwrap() };
+    watch.cycle(cycle);
+    watch.statistics = Statistics { missed_deadlines: 1, lost_replies: 12, bus_errors: 3, ..watch.statistics };
+    let (code, detail) = (State::SoftStop.code().into(), Fault::ContactForce.code().into());
+    watch.event(&Event { cycle: 45_124, kind: EventKind::State, code, detail });
+    watch
+}
+
+/// The screen as text, a line a row.
+fn screen(watch: &Watch, width: u16, height: u16) -> String {
+    let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+    terminal.draw(|frame| draw(frame, watch)).unwrap();
+    let buffer = terminal.backend().buffer();
+    let row = |y| (0..width).map(|x| buffer[(x, y)].symbol()).collect::<String>().trim_end().to_owned() + "\n";
+    (0..height).map(row).collect()
+}
+
+/// Compares with the file; `UPDATE_DOCUMENTS=1` writes it.
+fn is_golden(name: &str, watch: &Watch, size: (u16, u16)) {
+    let shown = screen(watch, size.0, size.1);
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/screens").join(name);
+    if std::env::var_os("UPDATE_DOCUMENTS").is_some() {
+        std::fs::write(&file, &shown).unwrap();
+    }
+    assert_eq!(shown, std::fs::read_to_string(&file).unwrap(), "{name}");
+}
+
+#[test]
+fn screens_are_as_they_were_looked_at() {
+    is_golden("idle.txt", &watch(), (80, 24));
+    is_golden("contact.txt", &contact(), (80, 24));
+    is_golden("fault.txt", &fault(), (80, 24));
+    is_golden("wide.txt", &fault(), (110, 30));
+}
+
+#[test]
+fn a_screen_that_is_too_small_says_so() {
+    assert!(screen(&watch(), 79, 24).starts_with("80 x 24 are needed, here are 79 x 24"));
+    assert!(screen(&watch(), 200, 23).starts_with("80 x 24 are needed, here are 200 x 23"));
+}
+
+#[test]
+fn what_is_not_known_is_null_for_a_script() {
+    let idle = watch().to_json();
+    for key in
+        ["fault", "loaded", "progress", "cycle", "q_rad", "wrench_N_Nm", "hand_rad", "surprise", "computation_us"]
+    {
+        assert!(idle[key].is_null(), "{key}: {}", idle[key]);
+    }
+    let fault = fault().to_json();
+    assert_eq!((&fault["state"], &fault["fault"]), (&"soft stop".into(), &"ContactForce".into()));
+    assert_eq!((&fault["cycle"], &fault["adaptation"]), (&45_123.into(), &"at its limits".into()));
+}

@@ -1,0 +1,218 @@
+//! "Ok" is true: a command that ends with 0 did what was asked, and one that did not says by how much.
+
+#[path = "../../crates/lab/tests/common/mod.rs"]
+mod common;
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use assert_cmd::assert::Assert;
+use serde_json::Value;
+
+fn tactus(folder: &Path, line: &str) -> Assert {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    command.current_dir(folder).env_remove("TACTUS_DEVICE").args(line.split_whitespace()).assert()
+}
+
+fn stderr(assert: &Assert) -> String {
+    String::from_utf8(assert.get_output().stderr.clone()).unwrap()
+}
+
+fn json(assert: &Assert) -> Value {
+    serde_json::from_slice(&assert.get_output().stdout).unwrap()
+}
+
+fn learned(duration: f64, options: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    common::demonstration(folder.path(), duration);
+    tactus(folder.path(), &format!("learn demo.csv -o reach.toml {options}")).success();
+    folder
+}
+
+const DEVICE: &str = "--device sil:world=simple --non-interactive";
+
+#[test]
+fn a_goal_out_of_reach_is_refused_by_check_and_by_a_dry_run() {
+    let folder = learned(3.0, "");
+    for line in [
+        "check reach.toml --goal=5,5,5".to_owned(),
+        format!("{DEVICE} run reach.toml --goal=5,5,5 --dry-run"),
+        format!("{DEVICE} run reach.toml --goal-at 1:5,5,5 --dry-run"),
+    ] {
+        let refused = tactus(folder.path(), &line).failure().code(6);
+        assert!(stderr(&refused).contains("error[E631]"), "{line}: {}", stderr(&refused));
+    }
+    let report = json(&tactus(folder.path(), "--json check reach.toml --goal=5,5,5").code(6));
+    assert_eq!(report["result"]["goal_m"], serde_json::json!([5.0, 5.0, 5.0]));
+}
+
+#[test]
+fn a_figure_that_nobody_measured_is_null_and_not_zero() {
+    let folder = learned(3.0, "");
+    let at = folder.path();
+    let clean = json(&tactus(at, &format!("{DEVICE} --json run reach.toml")).success());
+    assert!(clean["tracking"]["position_end_m"].as_f64().unwrap() < 0.005);
+    // In this process nobody measures.
+    for name in ["worst_instructions", "mean_instructions", "worst_computation_us", "worst_latency_us", "stack_used"] {
+        assert_eq!(clean[name], Value::Null, "{name}");
+    }
+}
+
+#[test]
+fn a_hand_posture_out_of_its_range_is_refused_with_the_finger_and_the_range() {
+    let folder = learned(3.0, "--name wide --hand-goal 0,3,0,0");
+    let refused = tactus(folder.path(), "check reach.toml").failure().code(6);
+    assert!(stderr(&refused).contains("finger 1 range: 3.0"), "{}", stderr(&refused));
+    let refused = tactus(folder.path(), &format!("{DEVICE} hand to 0,0,0,2.8")).failure().code(2);
+    assert!(stderr(&refused).contains("finger 3: 2.8 rad is outside 0.00 to 2.4"), "{}", stderr(&refused));
+}
+
+#[test]
+fn every_primitive_has_its_own_image_checksum_and_the_device_tells_the_same() {
+    let folder = learned(3.0, "");
+    let at = folder.path();
+    tactus(at, "learn demo.csv --name other --kernels 40 -o other.toml").success();
+    let sum = |file: &str| json(&tactus(at, &format!("--json check {file}")).success())["image"][1].clone();
+    assert_ne!(sum("reach.toml"), sum("other.toml"));
+    let uploaded = json(&tactus(at, &format!("{DEVICE} --json upload reach.toml")).success());
+    assert_eq!(uploaded["crc"], sum("reach.toml"));
+}
+
+#[test]
+fn a_change_after_the_end_of_the_run_is_refused_before_anything_moves() {
+    let folder = learned(3.0, "");
+    for (change, taken) in [
+        ("--speed-at 100:0.5", false),
+        ("--goal-at 5:0.5,0.1,0.2", false),
+        ("--speed 0.5 --speed-at 5:0.6", true),
+        ("--speed-at 1:0.5 --speed-at 4:1", true),
+        ("--speed-at 1:2 --speed-at 3:1", false),
+    ] {
+        let run = tactus(folder.path(), &format!("{DEVICE} run reach.toml {change} --dry-run"));
+        if taken {
+            run.success();
+        } else {
+            let run = run.failure().code(2);
+            assert!(stderr(&run).contains("error[E237]"), "{change}: {}", stderr(&run));
+        }
+    }
+}
+
+#[test]
+fn a_primitive_that_leaves_the_way_it_was_shown_is_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    // Far more to and fro than two kernels can hold.
+    let rows: Vec<String> = (0..3000)
+        .map(|k| {
+            let t = f64::from(k) / 300.0;
+            let x = 0.5 + 0.15 * (4.0 * t).sin() * (t * 0.314).sin();
+            format!("{t},{x},0.1,0.2,1,0,0,0")
+        })
+        .collect();
+    std::fs::write(folder.path().join("wild.csv"), format!("t_s,x_m,y_m,z_m,qw,qx,qy,qz\n{}\n", rows.join("\n")))
+        .unwrap();
+    let refused = tactus(folder.path(), "learn wild.csv --kernels 2 -o wild.toml").failure().code(6);
+    let said = stderr(&refused);
+    assert!(said.contains("error[E625]") && said.contains(" mm and ") && said.contains("--kernels"), "{said}");
+    assert!(!folder.path().join("wild.toml").exists());
+}
+
+#[test]
+fn recordings_say_where_they_come_from_and_no_command_mixes_movements() {
+    let folder = learned(3.0, "");
+    let at = folder.path();
+    std::fs::write(at.join("longer.csv"), common::text(&common::rows(3.05))).unwrap();
+    tactus(at, "learn longer.csv --name longer -o longer.toml").success();
+    tactus(at, &format!("{DEVICE} run reach.toml --speed 0.9 --record reach.csv")).success();
+    tactus(at, &format!("{DEVICE} run longer.toml --record other.csv")).success();
+    let recording = lab::demonstration::Recording::read(&at.join("reach.csv")).unwrap();
+    let origin = recording.origin;
+    let primitive = lab::primitive_file::PrimitiveFile::read(&at.join("reach.toml")).unwrap();
+    let played = origin.primitive.unwrap();
+    assert_eq!((played.name.as_str(), played.movement), ("reach", primitive.movement_checksum()));
+    assert_eq!((origin.speed, origin.mode.as_deref()), (Some(0.9), Some("track")));
+    assert!(origin.device.is_some_and(|device| device.contains("in-process")) && origin.firmware.is_some());
+    let before = std::fs::read(at.join("reach.toml")).unwrap();
+    for line in [
+        "experience reach.toml other.csv",
+        "experience reach.toml reach.csv other.csv",
+        "compare reach.csv other.csv",
+        "plot -p reach.toml -r other.csv -o figure.svg",
+    ] {
+        let refused = tactus(at, line).failure().code(6);
+        assert!(stderr(&refused).contains("error[E641]"), "{line}: {}", stderr(&refused));
+    }
+    assert_eq!(std::fs::read(at.join("reach.toml")).unwrap(), before);
+    assert!(!at.join("figure.svg").exists());
+    tactus(at, "plot -p reach.toml -r reach.csv -o figure.svg").success();
+    let foreign = stderr(&tactus(at, "compare demo.csv demo.csv").failure().code(6));
+    assert!(foreign.contains("demo.csv does not name its movement"), "{foreign}");
+}
+
+#[test]
+fn experience_leaves_the_movement_what_it_was() {
+    let folder = learned(3.0, "");
+    let at = folder.path();
+    tactus(at, &format!("{DEVICE} rehearse reach.toml --trials 3 --record-dir kept")).success();
+    let gather = "experience reach.toml kept/reach-1.csv kept/reach-2.csv kept/reach-3.csv";
+    tactus(at, gather).success();
+    // The primitive has K2, an expectation and an experience now, and is still the movement of those runs.
+    tactus(at, gather).success();
+    tactus(at, "plot -p reach.toml -r kept/reach-1.csv -o figure.svg").success();
+}
+
+#[test]
+fn a_speed_whose_expectation_could_not_be_kept_is_refused_before_the_arm_moves() {
+    let folder = learned(3.0, "");
+    let refused = tactus(folder.path(), "--device unix:nobody.sock rehearse reach.toml --speed 0.3").failure().code(6);
+    assert!(stderr(&refused).contains("error[E636]"), "{}", stderr(&refused));
+}
+
+#[test]
+fn a_recording_in_which_nothing_was_played_is_drawn_as_a_whole() {
+    let folder = learned(3.0, "");
+    let drawn = tactus(folder.path(), "plot -r demo.csv -o figure.svg").success();
+    assert!(stderr(&drawn).contains("all of it is drawn"), "{}", stderr(&drawn));
+}
+
+#[test]
+fn h13_a_log_with_an_altered_time_or_an_endless_line_ends_at_once_with_its_line() {
+    let folder = learned(1.0, "");
+    let at = folder.path();
+    tactus(at, "--device sil:world=simple,line=can,bus=bus.log list").success();
+    let text = std::fs::read_to_string(at.join("bus.log")).unwrap();
+    let mut lines: Vec<&str> = text.lines().collect();
+    let altered = lines[40].replacen("(", "(9", 1);
+    lines[40] = &altered;
+    std::fs::write(at.join("altered.log"), lines.join("\n")).unwrap();
+    std::fs::write(at.join("endless.log"), vec![b'('; 50_000_000]).unwrap();
+    let begun = std::time::Instant::now();
+    let leap = stderr(&tactus(at, "can replay altered.log").failure().code(6));
+    assert!(leap.contains("line 41: time leaps"), "{leap}");
+    for command in ["replay", "decode"] {
+        let endless = stderr(&tactus(at, &format!("can {command} endless.log")).failure().code(6));
+        assert!(endless.contains("line 1 has more than 4096 bytes"), "{endless}");
+    }
+    assert!(begun.elapsed().as_secs() < 20, "{:?}", begun.elapsed());
+}
+
+#[test]
+fn h12_two_simulated_devices_do_not_share_a_flash_and_a_served_arm_takes_no_file_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("precious"), "precious").unwrap();
+    let refused = tactus(at, "--device sil:world=simple sim --listen unix:precious --duration 1").failure().code(3);
+    assert!(stderr(&refused).contains("error[E320]"), "{}", stderr(&refused));
+    assert_eq!(std::fs::read(at.join("precious")).unwrap(), b"precious");
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_tactus"));
+    let line = "--device sil:world=simple sim --listen unix:one.sock --flash flash.bin";
+    let mut first = command.current_dir(at).args(line.split(' ')).stderr(std::process::Stdio::null()).spawn().unwrap();
+    while !at.join("one.sock").exists() {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let second = tactus(at, "--device sil:world=simple,flash=flash.bin list").failure().code(2);
+    first.kill().unwrap();
+    first.wait().unwrap();
+    assert!(stderr(&second).contains("another simulated device uses it"), "{}", stderr(&second));
+    tactus(at, "--device sil:world=simple,flash=flash.bin list").success();
+}
