@@ -136,6 +136,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     }
 
     /// Eqs (8), (9), (11), (10), (12), (13), and the hand's part for Eq (14).
+    #[inline(never)]
     fn run_primitive(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
         let (Law::Run(running), Some(run), Some(primitive)) = (&mut self.law, &mut self.run, self.loaded.get()) else {
             // A run begins with a primitive, and no other is loaded meanwhile; else the arm floats.
