@@ -52,6 +52,16 @@ impl<R: Real> ArmModel<R> {
         JointTorques(torque)
     }
 
+    /// One column of the mass matrix as the motors feel it (kg m^2).
+    pub fn mass_column(&self, frames: &Frames<R>, joint: usize) -> Vector7<R> {
+        let mut unit = Vector7::zeros();
+        if let Some(entry) = unit.get_mut(joint) {
+            *entry = R::of(1.0);
+        }
+        let links = self.newton_euler::<false>(frames, &Vector7::zeros(), &unit, Vector3::zeros());
+        links + self.rotor_torque(&JointAccelerations(unit)).0
+    }
+
     /// Mass matrix of the links and the payload, without rotors (kg m^2).
     pub fn link_mass_matrix(&self, frames: &Frames<R>) -> SMatrix<R, JOINTS, JOINTS> {
         let mut matrix = SMatrix::<R, JOINTS, JOINTS>::zeros();
