@@ -1,4 +1,4 @@
-//! What the model of the arm costs: kinematics, inverse dynamics and mass matrix, in the number types of host and board.
+//! Cost of the model of the arm: kinematics, inverse dynamics and mass matrix, in f64 and f32.
 
 use control::model::{ArmModel, Frames, Payload};
 use control::real::Real;

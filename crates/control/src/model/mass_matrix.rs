@@ -1,6 +1,6 @@
-//! Mass matrix by composite rigid bodies: everything beyond a joint is one body, whose inertia one inward sweep gathers.
+//! Mass matrix by composite rigid bodies: all links beyond a joint are one body, and one inward sweep gathers them.
 //!
-//! Half the price of a column of inverse dynamics per joint, because nothing is swept twice (method of Walker and Orin).
+//! Less than half the price of a column of inverse dynamics per joint (method of Walker and Orin).
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
