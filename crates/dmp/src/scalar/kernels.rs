@@ -45,8 +45,8 @@ const STRIDE: usize = 8;
 
 /// Kernels before and after the nearest one that can matter, for centres of this ratio `r`.
 ///
-/// With `x = s/c_n` kernel `n - k` has the exponent `(p (1 - x r^k))^2` and `n + k` has `(p (x r^-k - 1))^2`, where
-/// `p = sqrt(-ln a)/(1 - r)`. Kernel `n` is the nearest for `x` from `2r/(1 + r)` to `2/(1 + r)`, and its neighbours come
+/// With `x = s/c_n` kernel `n - k` has the exponent `(p (1 - x r^k))^2` and `n + k` has `(p (x r^-k - 1))^2`, `p` being
+/// `sqrt(-ln a)/(1 - r)`. Kernel `n` is the nearest for `x` from `2r/(1 + r)` to `2/(1 + r)`, and its neighbours come
 /// closest to it at the ends. One more after it, because the last kernel is as wide as the one before it.
 fn reach<T: Scalar>(count: usize, ratio: T, root_log: T) -> (usize, usize) {
     let per_gap = root_log / (T::ONE - ratio);
