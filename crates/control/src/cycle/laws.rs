@@ -126,9 +126,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             &self.gains.stiff,
             measured.frames,
             measured.state,
-            &measured.state.dq.0,
+            (!frozen).then_some(&measured.state.dq.0),
             &shifted,
-            frozen,
         );
         let pose_d = Frames::new(&self.model, &reference.q).tool_pose();
         let explained = (torque.0 - posture.controller.feedback(), reference.ddq.0);
@@ -164,10 +163,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             }
         }
         let deviation = run.deviation().copied().filter(|_| options.force_control);
-        let expected_gauges = deviation.map(|deviation| deviation.expected_gauges);
         self.hand.follow(
             &HandReference { q: posture_and_hand(&plan.points.x).1, dq: posture_and_hand(&plan.points.v).1 },
-            expected_gauges,
+            deviation.map(|deviation| deviation.expected_gauges),
         );
         let task = TaskReference::from_plan(&plan);
         let reference = operational.step(
@@ -183,10 +181,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             let behind = lag.distance * R::of(1.0 / TRACKING_LIMIT);
             run.crowd(at_least(speed_load(measured.frames, &reference.dq), behind));
         }
-        let observed = self.observer.velocity(measured.state);
-        let velocity = if options.compliant { &observed } else { &measured.state.dq.0 };
+        let velocity = if options.compliant { self.observer.velocity(measured.state) } else { measured.state.dq.0 };
+        let velocity = (!frozen).then_some(&velocity);
         let mut torque =
-            controller.torque(&self.model, tracking, measured.frames, measured.state, velocity, &reference, frozen);
+            controller.torque(&self.model, tracking, measured.frames, measured.state, velocity, &reference);
         let explained = (torque.0 - controller.feedback(), reference.ddq.0);
         let mut set = if run.bends(primitive) { flags::FEEDBACK } else { 0 };
         if let Some(deviation) = deviation {
@@ -199,9 +197,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 R::of(PERIOD),
                 self.cut.joint || self.cut.motor || senses != Senses::Fresh,
             );
-            let bounded = bounded(&command, tracking.force_limit) * run.kept();
             // The expected wrench is fed forward, because the gain of the integral is finite.
-            let wanted = bounded - deviation.expected.in_world(to_world);
+            let wanted = bounded(&command, tracking.force_limit) * run.kept() - deviation.expected.in_world(to_world);
             let wanted = self.force.confirmed(&wanted, &measured.wrench.in_world(to_world));
             torque.0 += ForceController::torque(&measured.frames.jacobian(), &wanted).0;
             set |= flags::FORCE_CONTROL;

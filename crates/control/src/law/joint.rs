@@ -47,20 +47,19 @@ impl<R: Real> JointController<R> {
         *self = JointController::new();
     }
 
-    /// The torque of one tick. With `frozen` feedback (a reply is missing, `state` is extrapolated) the feedback torque
-    /// of the last good tick is kept, while the feed-forward follows the extrapolated posture. `velocity` is the
-    /// one that is fed back (rad/s): measured or observed.
+    /// The torque of one tick. `velocity` is fed back (rad/s), measured or observed. Without it (a reply is missing,
+    /// `state` is extrapolated) the feedback torque of the last good tick is kept, while the feed-forward follows the
+    /// extrapolated posture.
     pub fn torque(
         &mut self,
         model: &ArmModel<R>,
         gains: &Tracking<R>,
         frames: &Frames<R>,
         state: &JointState<R>,
-        velocity: &Vector7<R>,
+        velocity: Option<&Vector7<R>>,
         reference: &JointReference<R>,
-        frozen: bool,
     ) -> JointTorques<R> {
-        if !frozen {
+        if let Some(velocity) = velocity {
             self.desired = reference.dq.0;
             self.feedback = gains.stiffness.component_mul(&(reference.q.0 - state.q.0))
                 + gains.damping.component_mul(&(reference.dq.0 - velocity));
