@@ -22,7 +22,10 @@ pub fn run(script: &str, arguments: &[&OsStr]) -> String {
     let python: PathBuf = build.join("python").join("bin").join("python");
     assert!(python.is_file(), "there is no {}; `cargo xtask setup` makes it", python.display());
     let path = root().join("tests").join("python").join(script);
-    let output = Command::new(python).arg(path).args(arguments).output().expect("python can be started");
+    let mut command = Command::new(python);
+    // Nothing of the reader is built or installed: the folder is the package.
+    command.env("PYTHONPATH", root().join("python").join("tactus_reader")).env("PYTHONDONTWRITEBYTECODE", "1");
+    let output = command.arg(path).args(arguments).output().expect("python can be started");
     let printed = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{script}: {printed}{}", String::from_utf8_lossy(&output.stderr));
     printed

@@ -1,6 +1,34 @@
 //! Programs of others in Python: python-can on the served bus, as it comes from its registry.
 
+#[path = "../../../crates/lab/tests/common/mod.rs"]
+mod common;
+
+use std::path::Path;
+
 use system_tests::{command, expect, python};
+
+/// A movement, learned, and run at two speeds: demo.csv, reach.toml, run.csv, fast.csv.
+fn two_runs(folder: &Path) {
+    common::demonstration(folder, 3.0);
+    for line in [
+        "learn demo.csv --name reach -o reach.toml",
+        "--device sil:world=simple run reach.toml --record run.csv",
+        "--device sil:world=simple run reach.toml --speed 1.5 --record fast.csv",
+    ] {
+        command::tactus(folder, &line.split(' ').collect::<Vec<_>>()).success();
+    }
+}
+
+#[test]
+fn the_python_reader_reads_what_was_written_and_compares_runs_by_phase() {
+    let folder = expect(tempfile::tempdir());
+    two_runs(folder.path());
+    let printed = python::run("reader.py", &[folder.path().as_os_str()]);
+    assert!(
+        printed.starts_with("progress  distance, mm  force, N\n     0.0 ") && printed.lines().count() == 12,
+        "{printed}"
+    );
+}
 
 #[test]
 fn unmodified_python_can_drives_the_simulated_pucks_and_can_decode_reads_what_it_did() {
