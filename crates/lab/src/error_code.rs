@@ -172,6 +172,9 @@ error_codes! {
         "run it in a terminal, or with `--json` for a line ten times a second";
     UnknownCode = 241: "there is no error or fault of that name", "a misspelt code",
         "docs/errors.md lists them all; for example `tactus explain E504`";
+    NoResults = 242: "there are no results to draw figures of",
+        "another folder was meant, or nothing was tried in it yet",
+        "name the folder with `--out`, or leave out `--figures-only`";
     NoStudyOfWeights = 270: "the experiment with a weight knows neither demonstrations nor sweeps", "`experiment lift`",
         "leave out `--demonstrations` and `--sweep`";
     DeviceNotFound = 301: "there is no such device", "cable, power, or a misspelt port",
