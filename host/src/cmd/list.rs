@@ -55,7 +55,7 @@ pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
 /// Data of `tactus --json list`.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Listed {
-    /// What the device stores.
+    /// Primitives that the device stores.
     pub primitives: Vec<Stored>,
     /// Places it has.
     pub places: usize,
