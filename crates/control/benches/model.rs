@@ -1,7 +1,8 @@
-//! Cost of the model of the arm: kinematics, inverse dynamics and mass matrix, in f64 and f32.
+//! Cost of the model of the arm: kinematics, inverse dynamics, mass matrix and the observer of motion, in f64 and f32.
 
 use control::model::{ArmModel, Frames, Payload};
 use control::real::Real;
+use control::sense::{JointState, MotionObserver};
 use control::units::{JointAccelerations, JointPositions, JointVelocities};
 use divan::{Bencher, black_box};
 
@@ -42,4 +43,27 @@ fn inverse_dynamics<R: Real>(bencher: Bencher<'_, '_>) {
 #[divan::bench(types = [f64, f32])]
 fn mass_matrix<R: Real>(bencher: Bencher<'_, '_>) {
     each::<R, _>(bencher, |model, _, frames| model.mass_matrix(frames));
+}
+
+/// A cycle of the observer, in the mean: every eighth renews the mass matrix.
+#[divan::bench(types = [f64, f32])]
+fn observer<R: Real>(bencher: Bencher<'_, '_>) {
+    let observer = core::cell::RefCell::new(MotionObserver::<R>::new());
+    each::<R, _>(bencher, |model, q, frames| {
+        let mut observer = observer.borrow_mut();
+        let state = JointState {
+            q: *q,
+            dq: JointVelocities(q.0),
+            missing: 0,
+            age: 0,
+            implausible: false,
+            stuck: false,
+            still: 0,
+            displaced: false,
+        };
+        observer.update(&state);
+        let velocity = observer.velocity(&state);
+        observer.send(model, frames, &velocity, &q.0);
+        velocity
+    });
 }
