@@ -112,6 +112,8 @@ error_codes! {
     ResultsNotWritten = 124: "results of an experiment cannot be written",
         "the folder does not exist, or the disk is full", "check the disk and the rights of the folder";
     Interrupted = 130: "the user interrupted, and the arm has stopped", "Ctrl-C", "";
+    CommandLine = 200: "the command line is wrong", "a misspelt option, or one that is missing",
+        "`tactus COMMAND --help` shows what it takes";
     AddressInvalid = 201: "the address of the device cannot be read", "a misspelt `--device`",
         "for a simulated arm use `--device sim:`";
     NoDeviceNamed = 202: "no device is named", "neither `--device` nor TACTUS_DEVICE is given",
@@ -257,6 +259,8 @@ error_codes! {
         "give a recording of `tactus run --record`";
     CompareInput = 613: "a recording cannot be compared", "it cannot be read, or lacks a column",
         "tactus run PRIMITIVE --record FILE makes a recording";
+    ExportInput = 614: "the recording cannot be exported", "it cannot be read, or is none",
+        "give a recording of `tactus teach`, `record` or `run --record`";
     RecordingInvalid = 620: "a recording is not valid",
         "a column, unit or value is wrong; the message names line and column",
         "docs/recording-format.md describes the file";

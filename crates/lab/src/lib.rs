@@ -9,6 +9,7 @@ pub mod device;
 pub mod difference;
 pub mod error;
 pub mod error_code;
+pub mod export;
 pub mod failure;
 pub mod image_file;
 pub mod learn;

@@ -57,6 +57,10 @@ Examples:
 pub(super) const UPLOAD: &str = "\
 Example:
   tactus --device unix:tactus.sock upload grasp.toml";
+/// `export`
+pub(super) const EXPORT: &str = "\
+Example:
+  tactus export run.csv --output run.mcap";
 /// `list`
 pub(super) const LIST: &str = "\
 Example:

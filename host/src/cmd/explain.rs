@@ -3,7 +3,8 @@
 use clap::Args;
 use control::Fault;
 use link::Refusal;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global};
 
@@ -41,8 +42,25 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             words += &format!("\n  {name}: {text}");
         }
     }
-    let data = json!({ "code": code, "meaning": meaning, "cause": cause, "help": remedy, "exit": exit });
+    let text = str::to_owned;
+    let data =
+        Explained { code: code.to_string(), meaning: text(meaning), cause: text(cause), help: text(remedy), exit };
     global.output().result(&data, words)
+}
+
+/// Data of `tactus --json explain`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Explained {
+    /// Code of the error or fault.
+    pub code: String,
+    /// Its meaning.
+    pub meaning: String,
+    /// The usual cause; empty where the meaning says it.
+    pub cause: String,
+    /// The remedy; empty where nothing helps in general.
+    pub help: String,
+    /// Exit code of a command that fails so; null for a fault of the device.
+    pub exit: Option<u8>,
 }
 
 /// The error with this number, with or without the letter.
