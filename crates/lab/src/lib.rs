@@ -10,6 +10,7 @@ pub mod difference;
 pub mod error;
 pub mod error_code;
 pub mod failure;
+pub mod fault_guide;
 pub mod image_file;
 pub mod learn;
 pub mod output_file;
