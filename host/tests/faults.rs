@@ -11,7 +11,7 @@ use control::{Fault, State};
 use lab::fault_guide::FaultGuide;
 use serde_json::Value;
 
-/// The replies of one puck are lost for 50 ms, 1.5 s after the first torque.
+/// The replies of one puck are lost for 50 ms, 1.5 s after the first torque: on the way to the start of the movement.
 const SCRIPT: &str = "
 title = \"six lost cycles\"
 bar = \"stops\"
@@ -107,13 +107,13 @@ fn cli_2_a_fault_of_a_run_is_told_unprompted_and_its_last_second_can_be_read_bef
     assert_eq!((cycles.len(), &told["last"]["latched"]), (300, &true.into()));
     let (fault, before) = cycles.split_last().unwrap();
     assert_eq!((&fault["fault"], &fault["state"]), (&1.into(), &State::SoftStop.name().into()));
-    // Six cycles without the elbow end in the fault; the run went well before.
+    // Six cycles without the elbow end in the fault; the approach went well before.
     let lost: Vec<u64> = before.iter().map(|cycle| cycle["lost_replies"].as_u64().unwrap()).collect();
     assert_eq!((&lost[294..], lost[..290].iter().sum()), (&[1; 5][..], 0), "{lost:?}");
     assert!(before.iter().all(|cycle| cycle["fault"] == 0));
     assert_eq!(
         (&before[280]["state"], &before[298]["state"]),
-        (&State::Run.name().into(), &State::Coast.name().into())
+        (&State::Approach.name().into(), &State::Coast.name().into())
     );
     let numbers: Vec<u64> = cycles.iter().map(|cycle| cycle["cycle"].as_u64().unwrap()).collect();
     assert!(numbers.windows(2).all(|pair| pair[1] == pair[0] + 1), "a second without a gap");

@@ -43,7 +43,7 @@ const NOT_A_NUMBER: i16 = i16::MIN;
 
 type Cycle = [u32; CYCLE_WORDS];
 
-/// What is known of the half that is kept.
+/// The half that is kept, and the one that runs.
 #[derive(Clone, Copy, Debug, Default)]
 struct Head {
     /// Half that runs, 0 or 1; the other one is kept.

@@ -262,7 +262,7 @@ pub struct Telemetry {
     pub surprise: f32,
 }
 
-/// What the device has kept of the last second before a fault.
+/// The last second before a fault, as far as the device has kept it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct FaultRecord {
     /// Number of the record, from 1: another number is another record.

@@ -16,7 +16,7 @@ pub struct LastSecond {
 }
 
 impl<T: Transport> Client<T> {
-    /// What the device has kept of the last fault; `None` if there was none, or if it keeps no record.
+    /// The record of the last fault, without its cycles; `None` if there was none, or if it keeps no record.
     ///
     /// # Errors
     /// As [`Client::request`].

@@ -284,7 +284,7 @@ impl<A: Application> HostSession<A> {
     }
 }
 
-/// What the device keeps of the time before the last fault.
+/// Answers from the record of the last fault.
 fn fault_record<C: Controller>(of: u16, request: &Request, port: &mut impl SessionPort<C>) -> Reply {
     let memory = port.fault_memory();
     match *request {
