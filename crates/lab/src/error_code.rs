@@ -328,6 +328,8 @@ error_codes! {
     BoardImageUnreadable = 685: "the file is no image for the emulated board",
         "another kind of file, or a damaged one",
         "`cargo xtask board --build` makes the image for the emulated board";
+    NoFaultRecord = 690: "the device keeps no record of a fault",
+        "no fault has happened since it got power, or it is a hand alone", "";
     LineClosed = 701: "the line to the device was closed", "cable, power, or the other end ended",
         "check the cable; the device stops the arm by itself after half a second";
     NoAnswer = 702: "the device did not answer in time", "no power, or another program has the line",

@@ -11,6 +11,7 @@ pub mod error;
 pub mod error_code;
 pub mod export;
 pub mod failure;
+pub mod fault_guide;
 pub mod image_file;
 pub mod learn;
 pub mod output_file;

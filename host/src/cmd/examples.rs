@@ -90,6 +90,11 @@ pub(super) const HAND: &str = "\
 Examples:
   tactus --device unix:tactus.sock hand init
   tactus --device unix:tactus.sock hand to 0,1.2,1.2,1.2";
+/// `faults`
+pub(super) const FAULTS: &str = "\
+Examples:
+  tactus --device unix:tactus.sock faults
+  tactus --device unix:tactus.sock faults --record fault.csv";
 /// `stop`
 pub(super) const STOP: &str = "\
 Example:

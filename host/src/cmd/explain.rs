@@ -2,6 +2,7 @@
 
 use clap::Args;
 use control::Fault;
+use lab::fault_guide::FaultGuide;
 use link::Refusal;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -27,8 +28,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let (code, meaning, cause, remedy) = match (error(text), fault) {
         (Some(code), _) => (code.to_string(), code.meaning(), code.cause(), code.remedy()),
         (None, Some(fault)) => {
-            let remedy = "remove the cause, then `tactus stop --clear-fault`";
-            (format!("{fault:?}"), fault.explanation(), "", remedy)
+            let FaultGuide { cause, clear, .. } = FaultGuide::of(fault);
+            (format!("{fault:?}"), fault.explanation(), cause, clear)
         }
         (None, None) => {
             let cause = format!("'{text}' is neither the code of an error nor the name of a fault");

@@ -12,6 +12,7 @@ pub mod experience;
 pub mod experiment;
 pub mod explain;
 pub mod export;
+pub mod faults;
 mod files;
 pub mod flash;
 pub mod get;
@@ -152,6 +153,9 @@ pub enum Command {
     /// Initialise, open, close or move the hand
     #[command(after_help = examples::HAND)]
     Hand(hand::Cmd),
+    /// Tell the last fault, what to do about it, and the second before it
+    #[command(after_help = examples::FAULTS)]
+    Faults(faults::Cmd),
     /// Bring the arm to rest
     #[command(after_help = examples::STOP)]
     Stop(stop::Cmd),
@@ -207,6 +211,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Run(command) => run::run(&command, &global),
         Command::Stop(command) => stop::run(&command, &global),
         Command::Status(command) => status::run(&command, &global),
+        Command::Faults(command) => faults::run(&command, &global),
         Command::Calibrate(command) => calibrate::run(&command, &global),
         Command::Monitor(command) => monitor::run(&command, &global),
         Command::Record(command) => record::run(&command, &global),
