@@ -13,7 +13,7 @@ use crate::plan::approach::{Approach, LONGEST_APPROACH};
 use crate::plan::primitive::Primitive;
 use crate::plan::run::Run;
 use crate::real::Real;
-use crate::sense::wrench::{ARMING_FORCE, REST_FORCE};
+use crate::sense::wrench::REST_FORCE;
 use crate::units::JointPositions;
 
 /// Below this joint speed (rad/s) a movement may begin.
@@ -165,12 +165,6 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         if self.supervisor.state() == State::SoftStop && self.fastest(measured) > R::of(STANDING) {
             return Err(Refusal::Moving);
-        }
-        // The arm would stop at once, and a tare while the hand was pressed is taken back with the hand free alone.
-        let rest = self.wrench.rest_force();
-        let is_pressed = self.wrench.is_tared() && rest.dot(&rest) > R::of(ARMING_FORCE * ARMING_FORCE);
-        if self.supervisor.state() == State::Idle && is_pressed {
-            return Err(Refusal::ForceAtRest);
         }
         Ok(())
     }

@@ -35,10 +35,6 @@ const DRIFT: f64 = 1.0;
 /// Largest force at rest (N) with which a run that uses force begins.
 pub const REST_FORCE: f64 = 5.0;
 
-/// Largest force at rest (N) with which an arm without torque is armed: a grasped load is less, and what is more was
-/// pressed on the hand while it was tared, or presses now.
-pub const ARMING_FORCE: f64 = 40.0;
-
 /// Part of the sensor's range from which on a sample counts as full scale.
 const FULL_SCALE: f64 = 0.99;
 

@@ -324,26 +324,6 @@ fn the_first_rest_after_start_up_is_the_zero_of_the_sensor() {
 }
 
 #[test]
-fn b5_an_arm_that_was_tared_while_something_pressed_on_it_is_not_armed_before_a_new_tare() {
-    let mut rig = Rig::<f32>::new(START, 1);
-    rig.plant.glitch = 84.0;
-    // The pucks brake.
-    rig.plant.coulomb *= 100.0;
-    rig.run_for(1.0);
-    assert!(rig.last.expect("ran").record.flags & flags::TARED != 0);
-    rig.plant.glitch = 0.0;
-    rig.run_for(1.0);
-    for command in [Command::Hold, Command::Gravity] {
-        assert_eq!(rig.tick(Some(command)).event, Some(Event::Refused(Refusal::ForceAtRest)));
-    }
-    rig.command(Command::Tare);
-    rig.command(Command::Hold);
-    rig.run_for(1.0);
-    let record = rig.last.expect("ran").record;
-    assert_eq!((record.state, record.fault), (State::Hold, Fault::None));
-}
-
-#[test]
 fn force_without_an_expectation_is_refused_and_an_expectation_of_another_duration_is_derated() {
     let mut rig = holding(START);
     rig.load(&primitive(&Design { expected: None, ..staying(START) })).expect("loads");

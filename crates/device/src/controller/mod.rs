@@ -52,9 +52,6 @@ const BRAKING_ANSWERS: u8 = 2;
 /// Time between two requests to the safety module to go IDLE: 20 ms, in slow slots; an arm whose first request was lost
 /// falls as long.
 const IDLE_REQUEST_SLOTS: u16 = periods(0.02);
-/// Time for which the pucks are told to brake after the module has said that they do: 0.5 s, in slow slots. A bus that
-/// loses frames may have lost its word to them and ours.
-const BRAKE_SLOTS: u16 = periods(0.5);
 
 /// Weight of an overrun against one cycle without.
 const OVERRUN_WEIGHT: u16 = 50;
@@ -101,7 +98,6 @@ pub struct DeviceController {
     overruns: u16,
     wants_idle: bool,
     idle_request_in: u16,
-    brake_slots: u16,
 }
 
 impl DeviceController {
@@ -133,7 +129,6 @@ impl DeviceController {
             overruns: 0,
             wants_idle: false,
             idle_request_in: 0,
-            brake_slots: 0,
         })
     }
 
@@ -291,7 +286,6 @@ impl DeviceController {
         self.overruns = 0;
         self.wants_idle = false;
         self.idle_request_in = 0;
-        self.brake_slots = 0;
     }
 
     /// Leaves the cyclic loop.
@@ -461,10 +455,6 @@ impl DeviceController {
                 self.idle_request_in = IDLE_REQUEST_SLOTS;
             }
             return;
-        }
-        self.brake_slots = if self.wants_idle { BRAKE_SLOTS } else { self.brake_slots.saturating_sub(1) };
-        if self.idle_request_in == 0 && self.brake_slots > 0 && self.safety_mode != Some(SafetyMode::Active) {
-            self.idle_request_in = IDLE_REQUEST_SLOTS - 1;
         }
         if self.idle_request_in == IDLE_REQUEST_SLOTS - 1 {
             // The module's word to the pucks may be lost, and with it the brakes.

@@ -231,25 +231,6 @@ fn g7_brakes_are_asked_for_every_20_ms_until_they_are_on_even_if_the_module_was_
     assert_eq!(core.health().state, State::Gravity, "{:?}", bus.events);
 }
 
-/// G7: the module has told IDLE, but its word to the pucks and those of the device were lost on the way.
-#[test]
-fn g7_pucks_that_missed_the_word_to_brake_are_told_again_for_half_a_second() {
-    let (mut core, mut bus) = floating();
-    bus.wrong_safety_mode = Some(SafetyMode::Idle);
-    bus.run(&mut core, 0.1);
-    assert_eq!(bus.safety_mode, SafetyMode::Idle);
-    for _ in 0..4 {
-        bus.pucks.iter_mut().for_each(|puck| puck.mode = puck::MotorMode::Torque);
-        bus.run(&mut core, 0.025);
-        assert!(bus.pucks.iter().all(|puck| puck.mode == puck::MotorMode::Idle), "braked within 25 ms");
-    }
-    bus.run(&mut core, 0.5);
-    let end = bus.now_us;
-    bus.run(&mut core, 0.1);
-    let told = bus.sets().any(|(time, to, property, _)| time > end && (to, property) == (ARM, PropertyId::MODE));
-    assert!(!told, "not for ever");
-}
-
 /// A12: a controller without room is counted, never waited for, and ends in a fault after six cycles.
 #[test]
 fn a12_torque_frames_that_cannot_leave_end_in_a_fault() {
