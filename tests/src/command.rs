@@ -79,6 +79,19 @@ impl Running {
         }
     }
 
+    /// The word that follows on stderr.
+    ///
+    /// # Panics
+    /// It ends before.
+    pub fn next_word(&mut self) -> String {
+        let stderr = self.0.as_mut().and_then(|child| child.stderr.as_mut()).expect("stderr is a pipe");
+        let (mut word, mut byte) = (Vec::new(), [0]);
+        while stderr.read(&mut byte).expect("stderr can be read") > 0 && byte[0] > b' ' {
+            word.push(byte[0]);
+        }
+        String::from_utf8(word).expect("text")
+    }
+
     /// Presses Ctrl-C.
     ///
     /// # Panics

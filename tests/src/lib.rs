@@ -8,6 +8,7 @@ pub mod command;
 pub mod execution;
 pub mod image;
 pub mod load;
+pub mod python;
 pub mod raw;
 
 use std::fmt::Display;

@@ -53,6 +53,11 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "control::cycle::laws::<impl control::cycle::Cycle<R,_>>::stop",
         "a soft stop: no plan and no feedback is computed",
     ),
+    ("control::sense::observer", "the memory is full; a few loops that the cache keeps from one cycle to the next"),
+    (
+        "control::model::mass_matrix",
+        "the memory is full; every eighth cycle, which has nothing else to do for the observer",
+    ),
     ("control::guard::disagreement::Disagreement<R>::is_pushed", "the force sensor is silent"),
     ("control::guard::disagreement::Disagreement<R>::encoder_stands_still", "a motor stands still"),
     ("control::sense::joints::Motor::doubt", "a reply that does not fit the ones before"),

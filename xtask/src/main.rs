@@ -35,7 +35,7 @@ use crate::board::Board;
 const HELP: &str = "\
 cargo xtask <verb>
 
-  setup    install what is missing: QEMU, Cortex-M target, MuJoCo library, EGL
+  setup    install what is missing: QEMU, Cortex-M target, MuJoCo library, EGL, Python packages
   build    build everything: host tools with the MuJoCo world, the image for the emulated board
            --board stm32h743 | mps2: the image for one board alone, with what it takes of each memory
            --image hand: the hand image (Cortex-M3, fixed point), with its sizes

@@ -6,6 +6,7 @@ mod host_link;
 pub mod names;
 mod puck_state;
 mod reader;
+pub mod socketcand;
 mod summary;
 mod value;
 

@@ -134,7 +134,7 @@ fn single_precision_stays_within_the_stated_bounds() {
         let worst = compare::<f32>(file, payload);
         assert!(worst.position <= 2e-6, "{worst:?}");
         assert!(worst.rotation <= 1e-5 && worst.jacobian <= 1e-5, "{worst:?}");
-        assert!(worst.torque <= 1e-4, "{worst:?}");
+        assert!(worst.mass <= 2e-6 && worst.torque <= 1e-4, "{worst:?}");
     }
 }
 

@@ -25,13 +25,14 @@ fn the_torque_is_inertia_bias_feedback_and_friction() {
         q: JointPositions(state.q.0 + Vector7::from([0.01, -0.02, 0.01, 0.02, -0.03, 0.01, 0.02])),
         dq: JointVelocities::from_array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]),
         ddq: JointAccelerations::from_array([1.0, -2.0, 0.5, 3.0, -4.0, 2.0, 5.0]),
+        planned: JointVelocities::from_array([-1.0, -1.0, -1.0, 1.0, 1.0, -1.0, 1.0]),
     };
     let frames = Frames::new(&arm, &state.q);
     let mut controller = JointController::new();
-    let torque = controller.torque(&arm, &gains, &frames, &state, &reference, false).0;
+    let torque = controller.torque(&arm, &gains, &frames, &state, Some(&state.dq.0), &reference).0;
 
     let friction = Vector7::from_fn(|joint, _| {
-        let rate = reference.dq.0[joint];
+        let rate = reference.planned.0[joint];
         // At 1 rad/s the smoothed sign is 1/1.01.
         model::FRICTION_VISCOUS[joint] * rate + 0.8 * model::FRICTION_COULOMB[joint] * rate / 1.01
     });
@@ -46,6 +47,6 @@ fn the_torque_is_inertia_bias_feedback_and_friction() {
 
     // Frozen, the feedback of the last good cycle stays, whatever the extrapolated state is.
     let elsewhere = JointState { q: JointPositions(state.q.0 * 1.1), ..state };
-    let frozen = controller.torque(&arm, &gains, &frames, &elsewhere, &reference, true).0;
+    let frozen = controller.torque(&arm, &gains, &frames, &elsewhere, None, &reference).0;
     assert!((frozen - torque).amax() < 1e-10);
 }

@@ -156,6 +156,7 @@ impl Config {
         let cells: Vec<String> = self.grid.cells.iter().map(Cell::to_string).collect();
         let engine = match &self.engine {
             Engine::InProcess => "in this process".to_owned(),
+            Engine::Absent => "nowhere".to_owned(),
             Engine::Qemu { image } | Engine::Hand { image } => format!("{} under QEMU", firmware(image)),
             Engine::Board(board) => {
                 let given =

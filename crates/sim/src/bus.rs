@@ -22,6 +22,13 @@ struct Waiting {
     frame: CanFrame,
 }
 
+/// Under this number the frames of foreign programs queue and are kept: no device of an arm has it. The identifiers of
+/// their frames are theirs to choose.
+pub const FOREIGN: Node = match Node::new(31) {
+    Some(node) => node,
+    None => unreachable!(),
+};
+
 /// One transmit queue for each of the 32 node numbers.
 type Queues = [VecDeque<Waiting>; 32];
 

@@ -15,6 +15,7 @@ mod motors;
 mod noise;
 mod operator;
 mod plant;
+mod plant_error;
 mod properties;
 mod puck_model;
 #[cfg(feature = "render")]
@@ -29,14 +30,15 @@ mod trace;
 pub mod wire;
 pub mod world;
 
-pub use bus::Bus;
+pub use bus::{Bus, FOREIGN};
 pub use force_torque::ForceTorqueConfig;
 pub use hand::HandConfig;
 pub use link_wire::{BYTE_TICKS, CHUNK, LinkLine, PlainLine};
 pub use lockstep::{Lockstep, LockstepError, Served};
 pub use noise::Noise;
 pub use operator::{OperatorConfig, PendantAction};
-pub use plant::{Event, Plant, PlantConfig, PlantError, STEPS_PER_SECOND};
+pub use plant::{Event, Plant, PlantConfig, STEPS_PER_SECOND};
+pub use plant_error::PlantError;
 pub use puck_model::PuckConfig;
 pub use safety::SafetyConfig;
 pub use time::*;

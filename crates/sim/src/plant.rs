@@ -11,7 +11,7 @@
 //! a frame, the devices, the safety module, the operator, and arbitration last, when all who compete have spoken.
 //! Nothing here looks at a clock of the computer, and no order depends on a hash: equal calls give equal runs.
 
-use crate::bus::Bus;
+use crate::bus::{Bus, FOREIGN};
 use crate::fault::{FaultKind, Faults, FrameKind, Injection, Treated};
 use crate::force_torque::{ForceTorque, ForceTorqueConfig};
 use crate::hand::{Hand, HandConfig};
@@ -19,6 +19,7 @@ use crate::link_wire::{LinkLine, SerialLine};
 use crate::motors::Motors;
 use crate::noise::Noise;
 use crate::operator::{Operator, OperatorConfig, PendantAction};
+use crate::plant_error::PlantError;
 use crate::puck_model::{Drive, Puck, PuckConfig};
 use crate::safety::{SafetyConfig, SafetyModule};
 use crate::speed::SpeedMonitor;
@@ -26,10 +27,7 @@ use crate::time::{STEP_TICKS, TICKS_PER_SECOND, Ticks};
 use crate::trace::BusTrace;
 use crate::wire::Passage;
 use crate::world::World;
-use puck::{
-    Action, CanFrame, Drives, Node, PendantState, Ratios, Request, SafetyMode, Transmission, TransmissionError,
-    UnknownFirmware,
-};
+use puck::{Action, CanFrame, Drives, Node, PendantState, Ratios, Request, SafetyMode, Transmission};
 use std::collections::VecDeque;
 
 /// Set-up of a plant. The default is a healthy seven-joint arm with a sensor and an obliging operator.
@@ -73,29 +71,6 @@ impl Default for PlantConfig {
             hand_alone: false,
             torque_delay: 0,
         }
-    }
-}
-
-/// A configuration that describes no arm.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PlantError {
-    /// Ratio, CTS or IPNM is not positive.
-    #[error("the arm's drives: {0}")]
-    Drives(TransmissionError),
-    /// No property table for a firmware version.
-    #[error("the arm's firmware: {0}")]
-    Firmware(UnknownFirmware),
-}
-
-impl From<TransmissionError> for PlantError {
-    fn from(error: TransmissionError) -> Self {
-        Self::Drives(error)
-    }
-}
-
-impl From<UnknownFirmware> for PlantError {
-    fn from(error: UnknownFirmware) -> Self {
-        Self::Firmware(error)
     }
 }
 
@@ -218,6 +193,13 @@ impl Plant {
     pub fn submit(&mut self, t: Ticks, frame: CanFrame) {
         self.run_to(t);
         self.bus.queue(self.now, Node::HOST, frame);
+        self.arbitrate();
+    }
+
+    /// Somebody who is neither co-controller nor device of the arm hands a frame to the bus, now. All receive it,
+    /// the co-controller too, and whoever its identifier names as the sender.
+    pub fn submit_foreign(&mut self, frame: CanFrame) {
+        self.bus.queue(self.now, FOREIGN, frame);
         self.arbitrate();
     }
 

@@ -226,16 +226,21 @@ pub(super) fn interrupt() -> Interrupt {
     interrupt
 }
 
-/// Opens a simulated device without a conversation, together with the flag that Ctrl-C raises.
+/// Opens a simulated device without a conversation, together with the flag that Ctrl-C raises; `adjust` may change how
+/// it is set up before.
 ///
 /// # Errors
 /// The address is not that of a simulated device, or the simulation cannot be started.
-pub(super) fn simulated(text: &str, force: bool, doing: &str) -> Result<(Device, Interrupt), Failure> {
+pub(super) fn simulated(
+    text: &str,
+    doing: &str,
+    adjust: impl FnOnce(&mut SimulationOptions),
+) -> Result<(Device, Interrupt), Failure> {
     let address: Address = text.parse().map_err(|error| HostError::Address(error).into_failure(doing))?;
     if !matches!(address, Address::Simulated(..)) {
         return Err(Failure::new(ErrorCode::NotSimulated, doing, format!("'{text}' is not a simulated device")));
     }
-    let device = Device::open(&address, |options| options.replace_logs = force).map_err(|error| match error {
+    let device = Device::open(&address, adjust).map_err(|error| match error {
         OpenError::Transport(error) => HostError::Transport(error).into_failure(doing),
         OpenError::Simulation(error) => simulation_failure(error, doing),
     })?;

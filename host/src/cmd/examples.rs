@@ -20,7 +20,8 @@ Examples:
 pub(super) const SIM: &str = "\
 Examples:
   tactus --device sil: sim
-  tactus --device sil:world=simple sim --listen unix:arm.sock --flash arm.flash";
+  tactus --device sil:world=simple sim --listen unix:arm.sock --flash arm.flash
+  tactus sim --can 127.0.0.1:29536 --can-only";
 /// `teach`
 pub(super) const TEACH: &str = "\
 Examples:

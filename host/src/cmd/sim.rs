@@ -1,5 +1,6 @@
 //! `tactus sim`: a simulated arm that stays, for other terminals to connect to.
 
+mod bus;
 mod party;
 
 use std::io::ErrorKind;
@@ -9,16 +10,22 @@ use std::os::unix::net::UnixListener;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use canlog::ARM_INTERFACE;
 use clap::Args;
 
 use super::{ErrorCode, Failure, Global, connection};
+use bus::BusServer;
 use lab::client::Interrupt;
 use lab::device::Device;
+use lab::simulation::Engine;
 use lab::transport::{Address, Transport, TransportError};
 use party::{Party, Peer};
 
 /// Virtual time simulated between two looks at the socket: a human does not notice, a link time-out neither.
 const STRIDE: Duration = Duration::from_millis(5);
+
+/// The same where programs at the arm's bus wait for answers of pucks.
+const BUS_STRIDE: Duration = Duration::from_micros(500);
 
 /// Bytes that go on to the device in that time: less than its serial line carries (921600 baud), so that none wait in
 /// between and a stop is never behind more than this.
@@ -43,6 +50,12 @@ pub struct Cmd {
     /// its scenarios
     #[arg(long, value_name = "FILE")]
     pub faults: Option<String>,
+    /// Serve the arm's CAN bus to programs that speak socketcand, such as python-can, in real time
+    #[arg(long, value_name = "HOST:PORT", conflicts_with = "fast")]
+    pub can: Option<String>,
+    /// Leave the co-controller out: the bus with its pucks, safety module, sensor and hand is all there is
+    #[arg(long, requires = "can", conflicts_with_all = ["listen", "flash"])]
+    pub can_only: bool,
 }
 
 enum Listener {
@@ -59,20 +72,41 @@ enum Listener {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "sim";
     let output = global.output();
-    let mut device = global.device.clone().unwrap_or_else(|| "sim:".to_owned());
+    // Without co-controller there is no image to look for.
+    let usual = if command.can_only { "sil:" } else { "sim:" };
+    let mut device = global.device.clone().unwrap_or_else(|| usual.to_owned());
     let flash = command.flash.as_ref().map(|file| format!("flash={}", file.display()));
     let faults = command.faults.as_ref().map(|file| format!("faults={file}"));
     for option in flash.into_iter().chain(faults) {
         let comma = if device.ends_with(':') { "" } else { "," };
         device = format!("{device}{comma}{option}");
     }
-    let (mut device, interrupt) = connection::simulated(&device, global.force, DOING)?;
-    let listener = listen(&command.listen).map_err(|cause| {
-        Failure::new(ErrorCode::CannotListen, format!("sim: cannot listen on {}", command.listen), cause)
+    let (mut device, interrupt) = connection::simulated(&device, DOING, |options| {
+        options.replace_logs = global.force;
+        if command.can_only {
+            options.engine = Engine::Absent;
+        }
     })?;
-    output.say(format!("a simulated arm listens; in another terminal: `tactus --device {} list`", command.listen));
-    let served = serve(command, &mut device, &listener, &interrupt);
-    if let Listener::Unix(_, path) = &listener {
+    let refused = |address: &str, cause: Box<dyn std::error::Error + Send + Sync>| {
+        Failure::new(ErrorCode::CannotListen, format!("sim: cannot listen on {address}"), cause)
+    };
+    let mut bus = None;
+    if let Some(address) = &command.can {
+        let server = BusServer::listen(address).map_err(|cause| refused(address, cause.into()))?;
+        let served = server.address().map_err(|cause| refused(address, cause.into()))?;
+        if let Some(simulation) = device.simulation() {
+            simulation.keep_traffic();
+        }
+        output.say(format!("the arm's bus is served at {served} (socketcand, interface {ARM_INTERFACE})"));
+        bus = Some(server);
+    }
+    let mut listener = None;
+    if !command.can_only {
+        listener = Some(listen(&command.listen).map_err(|cause| refused(&command.listen, cause))?);
+        output.say(format!("a simulated arm listens; in another terminal: `tactus --device {} list`", command.listen));
+    }
+    let served = serve(command, &mut device, listener.as_ref(), bus.as_mut(), &interrupt);
+    if let Some(Listener::Unix(_, path)) = &listener {
         // Left behind it would only confuse the next one.
         let _ = std::fs::remove_file(path);
     }
@@ -127,7 +161,13 @@ fn accept(listener: &Listener) -> std::io::Result<Option<Box<dyn Peer>>> {
     }
 }
 
-fn serve(command: &Cmd, device: &mut Device, listener: &Listener, interrupt: &Interrupt) -> Result<(), TransportError> {
+fn serve(
+    command: &Cmd,
+    device: &mut Device,
+    listener: Option<&Listener>,
+    mut bus: Option<&mut BusServer>,
+    interrupt: &Interrupt,
+) -> Result<(), TransportError> {
     let started = Instant::now();
     let mut party = Party::default();
     let mut bytes = Vec::new();
@@ -135,7 +175,8 @@ fn serve(command: &Cmd, device: &mut Device, listener: &Listener, interrupt: &In
         if command.duration.is_some_and(|limit| device.now().as_secs_f64() >= limit) {
             break;
         }
-        while party.has_room()
+        while let Some(listener) = listener
+            && party.has_room()
             && let Some(peer) = accept(listener).map_err(TransportError::Io)?
         {
             party.welcome(peer);
@@ -146,12 +187,18 @@ fn serve(command: &Cmd, device: &mut Device, listener: &Listener, interrupt: &In
         }
         let target = device.now() + STRIDE;
         while device.now() < target {
-            bytes.clear();
-            device.receive(target.saturating_sub(device.now()), &mut bytes)?;
-            party.tell(&bytes);
-        }
-        if !command.fast {
-            std::thread::sleep(device.now().saturating_sub(started.elapsed()));
+            let next = if bus.is_some() { target.min(device.now() + BUS_STRIDE) } else { target };
+            while device.now() < next {
+                bytes.clear();
+                device.receive(next.saturating_sub(device.now()), &mut bytes)?;
+                party.tell(&bytes);
+            }
+            if let (Some(bus), Some(simulation)) = (bus.as_deref_mut(), device.simulation()) {
+                bus.serve(simulation).map_err(TransportError::Io)?;
+            }
+            if !command.fast {
+                std::thread::sleep(device.now().saturating_sub(started.elapsed()));
+            }
         }
     }
     Ok(())

@@ -11,6 +11,7 @@ mod firmware_ends;
 mod hand;
 mod journey;
 mod metadata;
+mod python;
 mod served_arm;
 mod sil_and_qemu;
 mod stopping;

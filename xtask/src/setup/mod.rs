@@ -7,6 +7,7 @@ mod apt;
 mod emulator;
 mod mujoco;
 mod pictures;
+mod python;
 mod qemu;
 mod toolchain;
 
@@ -33,6 +34,7 @@ pub(crate) fn all() -> Result<Machine> {
     let toolchain = toolchain::ensure()?;
     mujoco::ensure()?;
     pictures::ensure()?;
+    python::ensure()?;
     Ok(Machine { qemu, toolchain })
 }
 

@@ -39,6 +39,8 @@ pub(super) struct Demand<R: Real> {
     /// Statistic of the watch for unusual runs.
     pub(super) surprise: R,
     pub(super) flags: u32,
+    /// Torque that the model needs for the acceleration wanted (N m), and that acceleration (rad/s^2).
+    pub(super) explained: (Vector7<R>, Vector7<R>),
 }
 
 impl<R: Real, const N: usize> Cycle<R, N> {
@@ -70,13 +72,15 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             phase: R::of(0.0),
             surprise: R::of(0.0),
             flags: 0,
+            explained: (torque, Vector7::zeros()),
         }
     }
 
     /// Gravity compensation; damped while it builds up after arming, and while the hand is faster than a person
     /// teaches.
     fn float(&self, measured: &Measured<'_, R>) -> Demand<R> {
-        let mut torque = self.model.gravity_torque(measured.frames).0;
+        let gravity = self.model.gravity_torque(measured.frames).0;
+        let mut torque = gravity;
         let mut share = (hand_speed(measured) - R::of(TAUGHT_SPEED)) * R::of(1.0 / (BRAKED_SPEED - TAUGHT_SPEED));
         if self.armed_for < ARMING {
             let arming = R::from_counts(i32::from(ARMING - self.armed_for)) / R::from_counts(i32::from(ARMING));
@@ -85,7 +89,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if share > R::of(0.0) {
             torque -= self.gains.stop_damping.component_mul(&measured.state.dq.0) * at_most(share, R::of(1.0));
         }
-        self.plain(measured, torque)
+        Demand { explained: (gravity, Vector7::zeros()), ..self.plain(measured, torque) }
     }
 
     /// Gravity compensation and damping; what else was there is ramped away, and gravity too where the arm is lowered.
@@ -100,9 +104,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             }
             _ => return self.float(measured),
         };
-        let gravity = self.model.gravity_torque(measured.frames).0 * share;
+        let gravity = self.model.gravity_torque(measured.frames).0;
         let damping = self.gains.stop_damping.component_mul(&measured.state.dq.0);
-        self.plain(measured, gravity + rest - damping)
+        let demand = self.plain(measured, gravity * share + rest - damping);
+        Demand { explained: (gravity, Vector7::zeros()), ..demand }
     }
 
     /// Eq (10) along a joint reference, with the integral that takes away what friction leaves.
@@ -121,11 +126,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             &self.gains.stiff,
             measured.frames,
             measured.state,
+            (!frozen).then_some(&measured.state.dq.0),
             &shifted,
-            frozen,
         );
         let pose_d = Frames::new(&self.model, &reference.q).tool_pose();
-        Demand { torque, q_d: reference.q, pose_d, ..self.plain(measured, Vector7::zeros()) }
+        let explained = (torque.0 - posture.controller.feedback(), reference.ddq.0);
+        Demand { torque, q_d: reference.q, pose_d, explained, ..self.plain(measured, Vector7::zeros()) }
     }
 
     /// Eqs (8), (9), (11), (10), (12), (13), and the hand's part for Eq (14).
@@ -157,10 +163,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             }
         }
         let deviation = run.deviation().copied().filter(|_| options.force_control);
-        let expected_gauges = deviation.map(|deviation| deviation.expected_gauges);
         self.hand.follow(
             &HandReference { q: posture_and_hand(&plan.points.x).1, dq: posture_and_hand(&plan.points.v).1 },
-            expected_gauges,
+            deviation.map(|deviation| deviation.expected_gauges),
         );
         let task = TaskReference::from_plan(&plan);
         let reference = operational.step(
@@ -176,7 +181,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             let behind = lag.distance * R::of(1.0 / TRACKING_LIMIT);
             run.crowd(at_least(speed_load(measured.frames, &reference.dq), behind));
         }
-        let mut torque = controller.torque(&self.model, tracking, measured.frames, measured.state, &reference, frozen);
+        let velocity = if options.compliant { self.observer.velocity(measured.state) } else { measured.state.dq.0 };
+        let velocity = (!frozen).then_some(&velocity);
+        let mut torque =
+            controller.torque(&self.model, tracking, measured.frames, measured.state, velocity, &reference);
+        let explained = (torque.0 - controller.feedback(), reference.ddq.0);
         let mut set = if run.bends(primitive) { flags::FEEDBACK } else { 0 };
         if let Some(deviation) = deviation {
             let to_world = measured.frames.tool_to_world();
@@ -188,9 +197,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 R::of(PERIOD),
                 self.cut.joint || self.cut.motor || senses != Senses::Fresh,
             );
-            let bounded = bounded(&command, tracking.force_limit) * run.kept();
             // The expected wrench is fed forward, because the gain of the integral is finite.
-            let wanted = bounded - deviation.expected.in_world(to_world);
+            let wanted = bounded(&command, tracking.force_limit) * run.kept() - deviation.expected.in_world(to_world);
             let wanted = self.force.confirmed(&wanted, &measured.wrench.in_world(to_world));
             torque.0 += ForceController::torque(&measured.frames.jacobian(), &wanted).0;
             set |= flags::FORCE_CONTROL;
@@ -208,7 +216,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         torque.0 += handover.step();
         let offset = task.pose.position - measured.pose.position;
         *lag = Lag { distance: sqrt(offset.dot(&offset)), speed: operational.lag() };
-        Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, surprise, flags: set }
+        Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, surprise, flags: set, explained }
     }
 }
 

@@ -36,6 +36,7 @@ use crate::plan::primitive::Primitive;
 use crate::plan::run::{FADE, Run};
 use crate::real::Real;
 use crate::sense::joints::{JointEstimator, JointState};
+use crate::sense::observer::MotionObserver;
 use crate::sense::wrench::WrenchEstimator;
 use crate::time::{few_periods, periods};
 use crate::units::{JointPositions, Pose, Wrench};
@@ -73,6 +74,7 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     supervisor: Supervisor,
     monitor: Monitor<R>,
     joints: JointEstimator<R>,
+    observer: MotionObserver<R>,
     wrench: WrenchEstimator<R>,
     limiter: TorqueLimiter<R>,
     bounds: JointBounds<R>,
@@ -128,6 +130,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             supervisor: Supervisor::new(),
             monitor: Monitor::new(calibration.transmission),
             joints: JointEstimator::new(&calibration),
+            observer: MotionObserver::new(),
             wrench: WrenchEstimator::new(),
             limiter: TorqueLimiter::new(&calibration),
             law: Law::Off { zero_cycles: 0, brakes: 0 },
@@ -203,6 +206,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             self.loaded.clear();
         }
         self.model = ArmModel::new(calibration.payload);
+        self.observer = MotionObserver::new();
         self.calibration = calibration;
         Ok(())
     }
@@ -296,6 +300,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                     wrench: self.wrench.wrench(&frames),
                     outside_fault: input.external_fault.is_some(),
                 };
+                if self.supervisor.state().has_torque() {
+                    self.observer.update(&state);
+                } else {
+                    self.observer.settle(&state);
+                }
                 self.monitor(&measured);
                 answer = input.command.map(|command| self.command(command, &measured)).or(answer);
                 self.act(&measured, &mut record)
@@ -397,6 +406,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             return self.actuate_without_torque();
         };
         let (torques, report) = self.limiter.limit(&demand.torque);
+        let (model, wanted) = &demand.explained;
+        self.observer.send(&self.model, measured.frames, wanted, &(torques.torques().0 - model));
         self.cut = report;
         self.armed_for = self.armed_for.saturating_add(1);
         record.q_d = demand.q_d.to_f32();

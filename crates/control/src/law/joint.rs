@@ -1,8 +1,9 @@
 //! `JointController`: inverse dynamics with joint feedback.
 //!
 //! Eq (10): `tau = M ddq_d + h + K_p (q_d - q) + K_d (dq_d - dq)`, with `M` including the rotors and `h` Coriolis,
-//! centrifugal and gravity torque at the measured state. Friction is fed forward along the *desired* velocity: along
-//! the measured one it would be positive feedback. External forces are deliberately absent, Eq (12) deals with them.
+//! centrifugal and gravity torque at the measured state. Friction is fed forward along the *planned* velocity: along
+//! the measured one, or one that contains a measured error, it would be feedback of a large gain. External forces are
+//! deliberately absent, Eq (12) deals with them.
 
 use crate::law::gains::Tracking;
 use crate::model::arm::ArmModel;
@@ -12,7 +13,7 @@ use crate::real::Real;
 use crate::sense::joints::JointState;
 use crate::units::{JointTorques, JointVelocities, Vector7};
 
-/// Desired speed at which half of the Coulomb friction is fed forward (rad/s): smooths the sign, so that a plan at rest
+/// Planned speed at which half of the Coulomb friction is fed forward (rad/s): smooths the sign, so that a plan at rest
 /// does not chatter.
 const FRICTION_SPEED: f64 = 0.01;
 
@@ -46,25 +47,26 @@ impl<R: Real> JointController<R> {
         *self = JointController::new();
     }
 
-    /// The torque of one tick. With `frozen` feedback (a reply is missing, `state` is extrapolated) the feedback torque
-    /// of the last good tick is kept, while the feed-forward follows the extrapolated posture.
+    /// The torque of one tick. `velocity` is fed back (rad/s), measured or observed. Without it (a reply is missing,
+    /// `state` is extrapolated) the feedback torque of the last good tick is kept, while the feed-forward follows the
+    /// extrapolated posture.
     pub fn torque(
         &mut self,
         model: &ArmModel<R>,
         gains: &Tracking<R>,
         frames: &Frames<R>,
         state: &JointState<R>,
+        velocity: Option<&Vector7<R>>,
         reference: &JointReference<R>,
-        frozen: bool,
     ) -> JointTorques<R> {
-        if !frozen {
+        if let Some(velocity) = velocity {
             self.desired = reference.dq.0;
             self.feedback = gains.stiffness.component_mul(&(reference.q.0 - state.q.0))
-                + gains.damping.component_mul(&(reference.dq.0 - state.dq.0));
+                + gains.damping.component_mul(&(reference.dq.0 - velocity));
         }
         let inertial = model.inverse_dynamics(frames, &state.dq, &reference.ddq).0;
         let rotors = model.rotor_torque(&reference.ddq).0;
-        JointTorques(inertial + rotors + friction(gains, &reference.dq) + self.feedback)
+        JointTorques(inertial + rotors + friction(gains, &reference.planned) + self.feedback)
     }
 }
 

@@ -98,6 +98,13 @@ impl<R: Real> OperationalController<R> {
         let preferred = (task.posture - state.q.0) * gains.posture;
         let dq_d = inverse.resolve(&(task.velocity + correction), &preferred);
 
+        // An error of the measured pose is closed against friction. Where the plan alone moves the joints, feedback
+        // through the sign of the friction would only have a large gain.
+        let planned = match feedback {
+            PoseFeedback::Measured => dq_d,
+            PoseFeedback::Planned => inverse.resolve(&task.velocity, &task.posture_velocity),
+        };
+
         let rate = task.velocity - jacobian.twist(&dq.0);
         self.lag = sqrt(rate.fixed_rows::<3>(0).norm_squared());
         let ddq_d = match acceleration {
@@ -128,7 +135,7 @@ impl<R: Real> OperationalController<R> {
             }
         }
         self.q_d = JointPositions(q_d);
-        JointReference { q: self.q_d, dq: self.dq_d, ddq: JointAccelerations(ddq_d) }
+        JointReference { q: self.q_d, dq: self.dq_d, ddq: JointAccelerations(ddq_d), planned: JointVelocities(planned) }
     }
 }
 

@@ -1,11 +1,11 @@
-//! Inverse dynamics by the recursive Newton-Euler method: gravity, Coriolis and inertial torques, mass matrix.
+//! Inverse dynamics by the recursive Newton-Euler method: gravity, Coriolis and inertial torques.
 //!
 //! `tau = M(q) ddq + c(q, dq) + g(q)`. Link frames are standard (distal): frame j rides on link j, joint j turns about
 //! z of frame j-1. Moments are therefore taken about the origin of frame j-1, which lies on the joint axis. Rotor
 //! inertia acts at the joints only (`reflected`): what the fast rotors add to the gyroscopic torques of the links is
 //! below 1 % of them and left out, as the manufacturer's model does.
 
-use nalgebra::{SMatrix, Vector3};
+use nalgebra::Vector3;
 
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
@@ -50,29 +50,6 @@ impl<R: Real> ArmModel<R> {
         torque[4] += self.reflected_inertia_j5_j6 * ddq.0[5];
         torque[5] += self.reflected_inertia_j5_j6 * ddq.0[4];
         JointTorques(torque)
-    }
-
-    /// Mass matrix of the links and the payload, without rotors (kg m^2).
-    pub fn link_mass_matrix(&self, frames: &Frames<R>) -> SMatrix<R, JOINTS, JOINTS> {
-        let mut matrix = SMatrix::<R, JOINTS, JOINTS>::zeros();
-        for joint in 0..JOINTS {
-            let mut unit = Vector7::zeros();
-            unit[joint] = R::of(1.0);
-            let column = self.newton_euler::<false>(frames, &Vector7::zeros(), &unit, Vector3::zeros());
-            matrix.set_column(joint, &column);
-        }
-        matrix
-    }
-
-    /// Mass matrix as the motors feel it: links, payload and reflected rotors (kg m^2).
-    pub fn mass_matrix(&self, frames: &Frames<R>) -> SMatrix<R, JOINTS, JOINTS> {
-        let mut matrix = self.link_mass_matrix(frames);
-        for (joint, inertia) in self.reflected_inertia.iter().enumerate() {
-            matrix[(joint, joint)] += *inertia;
-        }
-        matrix[(4, 5)] += self.reflected_inertia_j5_j6;
-        matrix[(5, 4)] += self.reflected_inertia_j5_j6;
-        matrix
     }
 
     /// One outward and one inward sweep. `MOVING = false` skips the velocity terms.
@@ -136,7 +113,7 @@ impl<R: Real> ArmModel<R> {
 
     /// From the origin of frame j-1 to that of frame j, in axes of frame j (m).
     #[inline]
-    fn link_vector(&self, joint: usize) -> Vector3<R> {
+    pub(crate) fn link_vector(&self, joint: usize) -> Vector3<R> {
         let offset = self.link_offset[joint];
         Vector3::new(self.link_length[joint], offset * self.twist_sine[joint], offset * self.twist_cosine[joint])
     }
@@ -152,7 +129,7 @@ impl<R: Real> ArmModel<R> {
 
     /// A vector given in frame j, in frame j-1.
     #[inline]
-    fn inward(&self, frames: &Frames<R>, joint: usize, v: &Vector3<R>) -> Vector3<R> {
+    pub(crate) fn inward(&self, frames: &Frames<R>, joint: usize, v: &Vector3<R>) -> Vector3<R> {
         let (s, c) = (frames.sine[joint], frames.cosine[joint]);
         let (ts, tc) = (self.twist_sine[joint], self.twist_cosine[joint]);
         let y = v.y * tc - v.z * ts;

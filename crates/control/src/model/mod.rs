@@ -5,6 +5,7 @@ pub mod calibration;
 pub mod dynamics;
 pub mod hand;
 pub mod kinematics;
+mod mass_matrix;
 pub mod wam7;
 
 pub use arm::ArmModel;

@@ -101,9 +101,11 @@ impl<R: Real> Approach<R> {
         } else {
             self.settled = self.settled.saturating_add(1);
         }
+        let dq = JointVelocities(self.way * (speed * self.rate));
         JointReference {
             q: JointPositions(self.start + self.way * position),
-            dq: JointVelocities(self.way * (speed * self.rate)),
+            dq,
+            planned: dq,
             ddq: JointAccelerations(self.way * (acceleration * self.rate * self.rate)),
         }
     }

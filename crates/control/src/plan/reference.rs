@@ -17,12 +17,19 @@ pub struct JointReference<R: Real> {
     pub dq: JointVelocities<R>,
     /// Desired accelerations (rad/s^2).
     pub ddq: JointAccelerations<R>,
+    /// Velocities of the plan alone, without what a measured error adds (rad/s): along them friction is fed forward.
+    pub planned: JointVelocities<R>,
 }
 
 impl<R: Real> JointReference<R> {
     /// To stand still at `q`.
     pub fn at_rest(q: JointPositions<R>) -> Self {
-        JointReference { q, dq: JointVelocities::zero(), ddq: JointAccelerations::zero() }
+        JointReference {
+            q,
+            dq: JointVelocities::zero(),
+            ddq: JointAccelerations::zero(),
+            planned: JointVelocities::zero(),
+        }
     }
 }
 

@@ -4,8 +4,7 @@
 use nalgebra::Vector3;
 
 use crate::real::{Real, sqrt};
-use crate::sense::filter::{Butterworth, LowPass};
-use crate::time::RATE;
+use crate::time::PERIOD;
 use crate::units::{Vector6, Wrench};
 
 /// Sensor values: force x, y, z (N, world axes), torque x, y, z (N m, tool axes at the grasp point), torque of the
@@ -19,10 +18,17 @@ pub const FORCE_DEAD_BAND: f64 = 0.3;
 /// Torque (N m) that counts as none.
 pub const TORQUE_DEAD_BAND: f64 = 0.02;
 
-/// Cut-off of the filter between the deviation and the plan (Hz). The plan's acceleration is fed forward, the hand's
-/// inertia acts on the wrist sensor, and the sum bends the plan again: with K1/K = 0.8 m/N that loop has a gain of 3
-/// above its resonance and swings at 20 Hz as soon as a bias comes near the dead band.
-pub const FEEDBACK_CUT_OFF: f64 = 8.0;
+/// Cut-off of the filter of first order between the deviation and the plan (Hz). The plan's acceleration is fed
+/// forward, the hand's inertia acts on the wrist sensor, and the sum bends the plan again: with K1/K = 0.8 m/N that
+/// loop has a gain of 3 above its resonance. A filter of second order and 8 Hz turns its phase by more; see
+/// `cargo xtask margins`.
+pub const FEEDBACK_CUT_OFF: f64 = 4.0;
+
+/// Share of a new value in the filtered one, from one control period to the next.
+const FEEDBACK_SHARE: f64 = {
+    let turn = core::f64::consts::TAU * FEEDBACK_CUT_OFF * PERIOD;
+    turn / (1.0 + turn)
+};
 
 /// The expected sensor values of one tick, and the deviation of the measured ones. `F` is what the environment does to
 /// the robot.
@@ -69,24 +75,25 @@ impl<R: Real> Deviation<R> {
 /// The deviation of the wrench through a low-pass of [`FEEDBACK_CUT_OFF`], before its dead band.
 #[derive(Clone, Debug)]
 pub struct SmoothedWrench<R: Real> {
-    filter: LowPass<R, 6>,
+    value: Vector6<R>,
 }
 
 impl<R: Real> SmoothedWrench<R> {
     /// No deviation so far.
     pub fn new() -> Self {
-        SmoothedWrench { filter: LowPass::new(Butterworth::new(FEEDBACK_CUT_OFF, RATE)) }
+        SmoothedWrench { value: Vector6::zeros() }
     }
 
     /// Takes the measured and the expected wrench of this control period.
     pub fn step(&mut self, measured: &Wrench<R>, expected: &Wrench<R>) {
         let (force, torque) = (measured.force - expected.force, measured.torque - expected.torque);
-        self.filter.step(&Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z));
+        let now = Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
+        self.value += (now - self.value) * R::of(FEEDBACK_SHARE);
     }
 
     /// The part of the filtered deviation beyond the dead bands.
     fn beyond_dead_band(&self) -> Wrench<R> {
-        let smoothed = self.filter.output();
+        let smoothed = &self.value;
         let force = Vector3::new(smoothed[0], smoothed[1], smoothed[2]);
         let torque = Vector3::new(smoothed[3], smoothed[4], smoothed[5]);
         Wrench { force: shrunk(force, R::of(FORCE_DEAD_BAND)), torque: shrunk(torque, R::of(TORQUE_DEAD_BAND)) }

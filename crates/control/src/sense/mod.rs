@@ -4,11 +4,13 @@ pub mod deviation;
 pub mod filter;
 pub mod hand;
 pub mod joints;
+pub mod observer;
 pub mod sample;
 pub mod wrench;
 
 pub use deviation::Deviation;
 pub use hand::{HandEstimator, HandState};
 pub use joints::{JointEstimator, JointState};
+pub use observer::MotionObserver;
 pub use sample::{BusSample, HandSample};
 pub use wrench::WrenchEstimator;

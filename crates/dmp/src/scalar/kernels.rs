@@ -25,7 +25,10 @@ pub trait Kernels<T, const N: usize>: Clone + Debug + PartialEq {
 
 /// Kernels that are evaluated together: as many as matter at a phase where there are vector instructions; one on a
 /// microcontroller, which has none and little room for code.
-const AT_A_TIME: usize = if cfg!(target_arch = "arm") { 1 } else { 16 };
+const AT_A_TIME: usize = if cfg!(target_arch = "arm") { 1 } else { 64 };
+
+/// Kernels that are evaluated in one step at most.
+const LANES: usize = 8;
 
 /// Kernels by a table of centres and widths.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,26 +36,59 @@ pub struct Tabulated<T, const N: usize> {
     count: usize,
     centres: [T; N],
     root_widths: [T; N],
+    /// Kernels before and after the nearest one that can matter.
+    reach: (usize, usize),
+}
+
+/// Kernels between two that the search for the nearest one looks at first.
+const STRIDE: usize = 8;
+
+/// Kernels before and after the nearest one that can matter, for centres of this ratio `r`.
+///
+/// With `x = s/c_n` kernel `n - k` has the exponent `(p (1 - x r^k))^2` and `n + k` has `(p (x r^-k - 1))^2`, `p` being
+/// `sqrt(-ln a)/(1 - r)`. Kernel `n` is the nearest for `x` from `2r/(1 + r)` to `2/(1 + r)`, and its neighbours come
+/// closest to it at the ends. One more after it, because the last kernel is as wide as the one before it.
+fn reach<T: Scalar>(count: usize, ratio: T, root_log: T) -> (usize, usize) {
+    let per_gap = root_log / (T::ONE - ratio);
+    let matters = |distance: T, nearest: T| {
+        let (z, least) = (per_gap * distance, per_gap * nearest);
+        z * z - least * least <= T::NEGLIGIBLE_EXPONENT
+    };
+    let mean = (T::ONE + ratio) / T::from_f64(2.0);
+    let (largest, smallest) = (T::ONE / mean, ratio / mean);
+    let (mut power, mut before, mut after) = (ratio, 0, 1);
+    while before < count && matters(T::ONE - largest * power, largest - T::ONE) {
+        power = power * ratio;
+        before += 1;
+    }
+    power = ratio;
+    while after < count && matters(smallest / power - T::ONE, T::ONE - smallest) {
+        power = power * ratio;
+        after += 1;
+    }
+    (before, after)
 }
 
 impl<T: Scalar, const N: usize> Kernels<T, N> for Tabulated<T, N> {
     const FEWEST: Self = {
         let mut centres = [T::ZERO; N];
         centres[0] = T::ONE;
-        Self { count: 2, centres, root_widths: [T::ONE; N] }
+        Self { count: 2, centres, root_widths: [T::ONE; N], reach: (1, 1) }
     };
 
     fn new(alpha: T, count: usize, activation: T) -> Option<Self> {
         let phase_at = |u: T| T::exp(-alpha * u);
         let intervals = T::from_index(count - 1);
-        let mut basis = Self { count, centres: [T::ZERO; N], root_widths: [T::ZERO; N] };
+        let mut basis = Self { count, centres: [T::ZERO; N], root_widths: [T::ZERO; N], reach: (0, 0) };
         for (i, centre) in basis.centres.iter_mut().take(count).enumerate() {
             *centre = phase_at(T::from_index(i) / intervals);
         }
         // h_i = -ln(a)/(c_{i+1} - c_i)^2; neighbours keep a constant ratio, so the difference is c_i (1 - ratio),
         // which does not cancel.
         let root_log = T::from_f64(libm::sqrt(-libm::log(activation.to_f64())));
-        let gap = T::ONE - phase_at(T::ONE / intervals);
+        let ratio = phase_at(T::ONE / intervals);
+        let gap = T::ONE - ratio;
+        basis.reach = reach(count, ratio, root_log);
         for i in 0..count {
             let left = basis.centres[if i + 1 < count { i } else { i - 1 }];
             basis.root_widths[i] = root_log / (left * gap);
@@ -84,7 +120,10 @@ impl<T: Scalar, const N: usize> Kernels<T, N> for Tabulated<T, N> {
         };
         // Centres fall with i, and so do the signed distances in units of the width: the exponents have one minimum,
         // beside the place where s would be sorted in.
-        let upper = centres.partition_point(|&c| c > s);
+        // A linear search in two strides, because its branches go the same way as in the tick before.
+        let above = |c: &&T| **c > s;
+        let stride = centres.iter().step_by(STRIDE).skip(1).take_while(above).count() * STRIDE;
+        let upper = stride + centres.iter().skip(stride).take_while(above).count();
         let nearest = if upper == 0 {
             0
         } else if upper == count || exponent(upper - 1) < exponent(upper) {
@@ -93,36 +132,38 @@ impl<T: Scalar, const N: usize> Kernels<T, N> for Tabulated<T, N> {
             upper
         };
         let smallest = exponent(nearest);
-        let matters = |i: usize| exponent(i) - smallest <= T::NEGLIGIBLE_EXPONENT;
-        let first = (0..nearest).rev().take_while(|&i| matters(i)).last().unwrap_or(nearest);
+        // Beyond the last centre the exponents come closer to each other, until at s = 0 all kernels are the same.
+        let first = if upper == count {
+            let matters = |i: &usize| exponent(*i) - smallest <= T::NEGLIGIBLE_EXPONENT;
+            (0..nearest).rev().take_while(matters).last().unwrap_or(nearest)
+        } else {
+            nearest.saturating_sub(self.reach.0)
+        };
+        let last = nearest.saturating_add(self.reach.1).saturating_add(1).min(count);
+        let (centres, roots) =
+            (centres.get(first..last).unwrap_or_default(), roots.get(first..last).unwrap_or_default());
         let mut sum = T::ZERO;
-        // Some at a time: the loop over their exponentials has no branch, so it becomes vector instructions where there
-        // are any.
-        let mut i = first;
-        for (centres, roots) in centres[first..].chunks(AT_A_TIME).zip(roots[first..].chunks(AT_A_TIME)) {
+        // Some at a time: the loops have no branch, so they become vector instructions where there are any.
+        let chunks = centres.chunks(AT_A_TIME).zip(roots.chunks(AT_A_TIME));
+        for (i, (centres, roots)) in (first..).step_by(AT_A_TIME).zip(chunks) {
             let mut kernels = [T::ZERO; AT_A_TIME];
-            let mut used = 0;
             for ((place, centre), root) in kernels.iter_mut().zip(centres).zip(roots) {
                 let z = *root * (s - *centre);
-                let exponent = z * z - smallest;
-                if i + used > nearest && !(exponent <= T::NEGLIGIBLE_EXPONENT) {
-                    break;
-                }
-                *place = exponent;
-                used += 1;
+                *place = z * z - smallest;
             }
-            let used = kernels.get_mut(..used).unwrap_or_default();
-            for kernel in used.iter_mut() {
-                *kernel = T::kernel(*kernel);
+            if AT_A_TIME == 1 && !kernels.iter().all(|exponent| *exponent <= T::NEGLIGIBLE_EXPONENT) {
+                continue;
             }
-            for kernel in used.iter() {
+            // Up to a multiple of the widest vectors: the few that are left over would be evaluated one by one.
+            for kernel in kernels.iter_mut().take(centres.len().next_multiple_of(LANES)) {
+                let value = T::kernel(*kernel);
+                *kernel = if *kernel <= T::NEGLIGIBLE_EXPONENT { value } else { T::ZERO };
+            }
+            let kernels = kernels.get(..centres.len()).unwrap_or_default();
+            for kernel in kernels {
                 sum = sum + *kernel;
             }
-            take(i, used);
-            i += used.len();
-            if used.len() < centres.len() {
-                break;
-            }
+            take(i, kernels);
         }
         s / sum
     }

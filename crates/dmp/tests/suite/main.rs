@@ -6,6 +6,7 @@ mod common;
 mod fit;
 mod golden;
 mod groups;
+mod kernels;
 mod memory;
 mod robustness;
 mod signs;

@@ -6,6 +6,7 @@
 //! moves unless the host waits: virtual time advances only inside [`Transport::receive`], so a whole session is one
 //! deterministic sequence of events, whatever the load of the machine.
 
+mod absent;
 mod board;
 mod board_can;
 mod bus_log;
@@ -32,6 +33,7 @@ use std::time::Duration;
 
 use sim::{Passage, Plant, PlantConfig, TICKS_PER_SECOND, Ticks, World};
 
+use absent::Absent;
 use board::EmulatedBoard;
 use bus_log::BusLog;
 use fault_script::FaultScript;
@@ -52,6 +54,8 @@ pub struct Simulation {
     engine: Box<dyn Execute>,
     now: Ticks,
     log: Option<BusLog>,
+    /// Frames of the arm's bus for [`Simulation::take_traffic`]; `None`: nobody wants them.
+    traffic: Option<Vec<Passage>>,
 }
 
 impl Simulation {
@@ -81,8 +85,9 @@ impl Simulation {
                 Box::new(Qemu::spawn(qemu::HAND_MACHINE, image, log, options.flash.chip()?)?)
             }
             Engine::Board(engine) => Box::new(EmulatedBoard::spawn(engine, options, &mut plant)?),
+            Engine::Absent => Box::new(Absent),
         };
-        Ok(Self { plant, engine, now: 0, log })
+        Ok(Self { plant, engine, now: 0, log, traffic: None })
     }
 
     /// The simulated bus and everything on it.
@@ -147,6 +152,29 @@ impl Simulation {
         Ok(())
     }
 
+    /// Keeps every frame of the arm's bus from now on for [`take_traffic`](Self::take_traffic).
+    pub fn keep_traffic(&mut self) {
+        self.plant.record_bus();
+        self.traffic.get_or_insert_default();
+    }
+
+    /// Frames of the arm's bus since this was last called; the last one may still be on the wire.
+    pub fn take_traffic(&mut self) -> Vec<Passage> {
+        self.collect();
+        self.traffic.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// Hands what the arm's bus has carried to those who want it.
+    fn collect(&mut self) {
+        let passages = self.plant.take_recorded();
+        if let Some(log) = &mut self.log {
+            log.arm(&passages);
+        }
+        if let Some(traffic) = &mut self.traffic {
+            traffic.extend(passages);
+        }
+    }
+
     /// True if the traffic of the buses is written to a file.
     pub(crate) fn keeps_bus_log(&self) -> bool {
         self.log.is_some()
@@ -154,8 +182,10 @@ impl Simulation {
 
     /// Writes what the arm's bus, and the `host`'s, have carried since this was last called.
     pub(crate) fn log_buses(&mut self, host: &[Passage]) -> Result<(), TransportError> {
+        if self.log.is_some() || self.traffic.is_some() {
+            self.collect();
+        }
         if let Some(log) = &mut self.log {
-            log.arm(&self.plant.take_recorded());
             log.host(host);
             log.write_until(self.now).map_err(TransportError::Io)?;
         }

@@ -59,6 +59,8 @@ pub enum Engine {
         /// The image, an ELF file.
         image: PathBuf,
     },
+    /// No co-controller: the bus is left to foreign programs.
+    Absent,
 }
 
 /// Which physics.

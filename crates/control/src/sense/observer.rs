@@ -1,0 +1,242 @@
+//! `MotionObserver`: velocity of the joints, from the torque that was sent and the model of the arm, slowly corrected
+//! by what is measured.
+//!
+//! A velocity that is differentiated from encoders shows the swing of the cables, late: fed back, it drives them. The
+//! model has no cables. What it predicts from the torque is fast, and what is measured corrects it with poles of a few
+//! hertz, below every swing of the cables. An acceleration that the torque does not explain (friction, contact, masses
+//! that differ from the model) is a third state, slower still.
+
+use nalgebra::SMatrix;
+
+use crate::model::arm::ArmModel;
+use crate::model::kinematics::Frames;
+use crate::real::{Real, within};
+use crate::sense::joints::JointState;
+use crate::time::PERIOD;
+use crate::units::{JOINTS, Vector7};
+
+/// Time from the latch of the positions to the torque that answers them, in control periods: 1.35 ms.
+const LATENCY: f64 = 0.4;
+
+/// Poles of the correction (Hz). The shoulder's lie well below the first swing of its cables (24 Hz), the wrist's are
+/// fast enough to damp it against a wall (8 to 10 Hz).
+const POLES: [f64; JOINTS] = [4.0, 4.0, 4.0, 6.0, 15.0, 15.0, 15.0];
+
+/// Pole with which the unexplained acceleration is followed (Hz).
+const DISTURBANCE_POLE: f64 = 2.0;
+
+/// Control periods after which the mass matrix is renewed: 27 ms.
+const RENEWAL: u8 = 8;
+
+/// Largest difference from the measured velocity (rad/s): a person who shoves the arm is in no model.
+const FARTHEST: f64 = 0.5;
+
+/// Gains of the correction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Correction<R: Real> {
+    position: Vector7<R>,
+    velocity: Vector7<R>,
+    acceleration: Vector7<R>,
+}
+
+impl<R: Real> Correction<R> {
+    /// Two poles at `motion` and one at `disturbance` (Hz), joint by joint.
+    fn with_poles(motion: &[f64; JOINTS], disturbance: f64) -> Self {
+        let away = |frequency: f64| 1.0 - libm::exp(-core::f64::consts::TAU * frequency * PERIOD);
+        let slow = away(disturbance);
+        let mut correction =
+            Correction { position: Vector7::zeros(), velocity: Vector7::zeros(), acceleration: Vector7::zeros() };
+        for (joint, motion) in motion.iter().enumerate() {
+            let fast = away(*motion);
+            let third = fast * fast * slow;
+            let second = fast * fast + 2.0 * fast * slow - 1.5 * third;
+            let first = 2.0 * fast + slow - second - 0.5 * third;
+            correction.position[joint] = R::of(first);
+            correction.velocity[joint] = R::of(second / PERIOD);
+            correction.acceleration[joint] = R::of(third / (PERIOD * PERIOD));
+        }
+        correction
+    }
+}
+
+/// Motion of the joints, as the model tells it.
+#[derive(Clone, Debug)]
+pub struct MotionObserver<R: Real> {
+    correction: Correction<R>,
+    q: Vector7<R>,
+    dq: Vector7<R>,
+    /// Acceleration that the torque does not explain (rad/s^2).
+    disturbance: Vector7<R>,
+    /// Accelerations by the torques sent last and before.
+    sent: [Vector7<R>; 2],
+    mass: SMatrix<R, JOINTS, JOINTS>,
+    /// Lower triangle of its `L D L^T`: `L` below the diagonal, `1/D` on it.
+    factor: SMatrix<R, JOINTS, JOINTS>,
+    /// Control periods since the mass matrix was renewed.
+    cycle: u8,
+    ready: bool,
+}
+
+impl<R: Real> MotionObserver<R> {
+    /// Nothing is known yet.
+    pub fn new() -> Self {
+        MotionObserver {
+            correction: Correction::with_poles(&POLES, DISTURBANCE_POLE),
+            q: Vector7::zeros(),
+            dq: Vector7::zeros(),
+            disturbance: Vector7::zeros(),
+            sent: [Vector7::zeros(); 2],
+            mass: SMatrix::zeros(),
+            factor: SMatrix::zeros(),
+            cycle: 0,
+            ready: false,
+        }
+    }
+
+    /// Takes the measured motion as it is: nothing is predicted where no torque is sent.
+    pub fn settle(&mut self, state: &JointState<R>) {
+        (self.q, self.dq) = (state.q.0, state.dq.0);
+        self.disturbance = Vector7::zeros();
+        self.sent = [Vector7::zeros(); 2];
+    }
+
+    /// Velocities where the next torque acts (rad/s), kept near the measured ones.
+    #[inline(never)]
+    pub fn velocity(&self, state: &JointState<R>) -> Vector7<R> {
+        let ahead = self.dq + (self.sent[0] + self.disturbance) * R::of(LATENCY * PERIOD);
+        ahead.zip_map(&state.dq.0, |observed, measured| measured + within(observed - measured, R::of(FARTHEST)))
+    }
+
+    /// One control period on, corrected by what is measured.
+    #[inline(never)]
+    pub fn update(&mut self, state: &JointState<R>) {
+        let acceleration = self.sent[1] * R::of(LATENCY) + self.sent[0] * R::of(1.0 - LATENCY) + self.disturbance;
+        self.q += (self.dq + acceleration * R::of(0.5 * PERIOD)) * R::of(PERIOD);
+        self.dq += acceleration * R::of(PERIOD);
+        if state.missing == 0 {
+            let error = state.q.0 - self.q;
+            self.q += error.component_mul(&self.correction.position);
+            self.dq += error.component_mul(&self.correction.velocity);
+            self.disturbance += error.component_mul(&self.correction.acceleration);
+        }
+    }
+
+    /// Takes what was sent: the acceleration that was wanted, and the torque (N m) beyond the one that the model needs
+    /// for it.
+    #[inline(never)]
+    pub fn send(&mut self, model: &ArmModel<R>, frames: &Frames<R>, wanted: &Vector7<R>, beyond: &Vector7<R>) {
+        // The posture changes little within [`RENEWAL`] cycles; the two halves of the work never fall into one but the
+        // first.
+        match self.cycle {
+            0 => self.mass = model.mass_matrix(frames),
+            1 => self.factorise(),
+            _ => {}
+        }
+        if !self.ready {
+            self.factorise();
+            self.ready = true;
+        }
+        self.cycle = (self.cycle + 1) % RENEWAL;
+        let next = wanted + self.accelerated(beyond);
+        // What is not a number would stay for good.
+        let known = next.iter().all(|value| value.is_finite_number());
+        self.sent = [if known { next } else { Vector7::zeros() }, self.sent[0]];
+    }
+
+    /// `L D L^T` of the mass matrix: `L` below the diagonal, `1/D` on it.
+    #[inline(never)]
+    fn factorise(&mut self) {
+        let mut factor = self.mass;
+        for j in 0..JOINTS {
+            for i in j..JOINTS {
+                let mut sum = factor[(i, j)];
+                for k in 0..j {
+                    // Rows of `L` hold `L D` until their diagonal is reached.
+                    sum -= factor[(i, k)] * factor[(j, k)] * self.factor[(k, k)];
+                }
+                factor[(i, j)] = sum;
+            }
+            self.factor[(j, j)] = R::of(1.0) / factor[(j, j)];
+        }
+        for j in 0..JOINTS {
+            let inverse = self.factor[(j, j)];
+            for i in j + 1..JOINTS {
+                self.factor[(i, j)] = factor[(i, j)] * inverse;
+            }
+        }
+    }
+
+    /// Acceleration of the joints by a torque (N m).
+    #[inline(never)]
+    fn accelerated(&self, torque: &Vector7<R>) -> Vector7<R> {
+        let mut x = *torque;
+        for j in 0..JOINTS {
+            for i in j + 1..JOINTS {
+                let part = self.factor[(i, j)] * x[j];
+                x[i] -= part;
+            }
+        }
+        for j in 0..JOINTS {
+            x[j] *= self.factor[(j, j)];
+        }
+        for j in (0..JOINTS).rev() {
+            for i in j + 1..JOINTS {
+                let part = self.factor[(i, j)] * x[i];
+                x[j] -= part;
+            }
+        }
+        x
+    }
+}
+
+impl<R: Real> Default for MotionObserver<R> {
+    fn default() -> Self {
+        MotionObserver::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::calibration::Payload;
+    use crate::units::JointPositions;
+
+    const POSTURE: [f64; JOINTS] = [-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75];
+
+    #[test]
+    fn a_torque_is_taken_for_the_acceleration_that_the_mass_matrix_gives_it_in_every_cycle() {
+        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
+        let frames = Frames::new(&model, &JointPositions::from_array(POSTURE));
+        let wanted = Vector7::from([0.5, -1.0, 2.0, 0.3, -4.0, 5.0, 6.0]);
+        let torque = model.mass_matrix(&frames) * wanted;
+        let mut observer = MotionObserver::new();
+        for _ in 0..3 * RENEWAL {
+            observer.send(&model, &frames, &Vector7::zeros(), &torque);
+            assert!((observer.sent[0] - wanted).amax() < 1e-9, "{}", observer.sent[0]);
+        }
+    }
+
+    #[test]
+    fn the_mass_matrix_follows_the_posture_within_two_renewals() {
+        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
+        let [before, now] = [[0.0; JOINTS], POSTURE].map(|q| Frames::new(&model, &JointPositions::from_array(q)));
+        let wanted = Vector7::from([0.5, -1.0, 2.0, 0.3, -4.0, 5.0, 6.0]);
+        let torque = model.mass_matrix(&now) * wanted;
+        let mut observer = MotionObserver::new();
+        observer.send(&model, &before, &Vector7::zeros(), &torque);
+        assert!((observer.sent[0] - wanted).amax() > 0.1, "{}", observer.sent[0]);
+        for _ in 0..2 * RENEWAL {
+            observer.send(&model, &now, &Vector7::zeros(), &torque);
+        }
+        assert!((observer.sent[0] - wanted).amax() < 1e-9, "{}", observer.sent[0]);
+    }
+
+    #[test]
+    fn a_torque_that_is_no_number_is_forgotten() {
+        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
+        let frames = Frames::new(&model, &JointPositions::from_array(POSTURE));
+        let mut observer = MotionObserver::new();
+        observer.send(&model, &frames, &Vector7::zeros(), &Vector7::repeat(f64::NAN));
+        assert_eq!(observer.sent[0], Vector7::zeros());
+    }
+}
