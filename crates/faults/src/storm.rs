@@ -17,9 +17,6 @@ const STREAM: u64 = 0x5702;
 /// Faults and orders begin within this time, s.
 const BEGIN: f64 = 2.5;
 
-/// Torque frames that may follow an IDLE whose word is lost: a safety module that is not heard for 100 ms is a fault.
-const UNHEARD: f64 = 36.0;
-
 /// A storm and what came of it.
 #[derive(Debug, Serialize)]
 pub struct Outcome {
@@ -82,21 +79,7 @@ fn bars(inject: &[Injection]) -> std::collections::BTreeMap<Figure, f64> {
         _ => false,
     };
     let belief = if inject.iter().any(blinds) { f64::INFINITY } else { 20.0 };
-    let deafens = |fault: &Injection| match &fault.what {
-        FaultKind::Drop(frames) | FaultKind::Flip(frames) => {
-            matches!(frames.kind, FrameKind::Any | FrameKind::Property)
-        }
-        FaultKind::Delay { .. } | FaultKind::BusOff => true,
-        _ => false,
-    };
-    let unasked = if inject.iter().any(deafens) { UNHEARD } else { 0.0 };
-    [
-        (Figure::TorqueUnasked, unasked),
-        (Figure::Belief, belief),
-        (Figure::FreeSpeed, f64::INFINITY),
-        (Figure::FallSpeed, 0.25),
-    ]
-    .into()
+    [(Figure::Belief, belief), (Figure::FreeSpeed, f64::INFINITY), (Figure::FallSpeed, 0.25)].into()
 }
 
 /// Draws of one storm.

@@ -28,10 +28,6 @@ use survey::Survey;
 const POLL_US: u64 = 250_000;
 /// Rest of a failed start-up before it is tried again, us.
 const RETRY_US: u64 = 1_000_000;
-/// Time for which the pucks are told to brake again and again, us: on a bus that loses frames one word is not enough.
-const BRAKE_US: u64 = 500_000;
-/// Between two such words, us; an arm that missed the last one falls as long.
-const BRAKE_AGAIN_US: u64 = 5_000;
 /// Velocity faults the safety module shall ignore when positions are rewritten.
 const IGNORED_AT_ZERO: i32 = 8;
 /// Velocity faults it shall ignore when polling begins: the length of its history.
@@ -132,8 +128,6 @@ pub(crate) struct Startup {
     zeroed_at: Option<[f32; 7]>,
     zero_request: ZeroRequest,
     error: Option<StartupError>,
-    /// When the pucks are told to brake again, and until when, us.
-    braking: Option<(u64, u64)>,
 }
 
 /// State of a person's command to zero the arm.
@@ -169,7 +163,6 @@ impl Startup {
             zeroed_at: None,
             zero_request: ZeroRequest::None,
             error: None,
-            braking: None,
         }
     }
 
@@ -291,9 +284,6 @@ impl Startup {
 
     /// One slot. Returns whether the start-up has ended and the cyclic loop may take over.
     pub(crate) fn advance(&mut self, outlet: &mut impl Outlet) -> bool {
-        if self.brake_again(outlet) {
-            return false;
-        }
         for _ in 0..TRANSITIONS {
             match self.perform(outlet) {
                 Ok(Next::Stay) => break,

@@ -3,7 +3,7 @@
 use puck::{Group, MotorMode, Node, PropertyId, SafetyMode, Status, get, set, stop_frames};
 
 use super::survey::{DRIVE_PROPERTIES, Survey};
-use super::{BRAKE_AGAIN_US, BRAKE_US, ENUMERATED, Next, POLL_US, Startup, Step, after};
+use super::{ENUMERATED, Next, POLL_US, Startup, Step, after};
 use crate::bus::{Answer, Outlet};
 use crate::stage::StartupError;
 
@@ -15,33 +15,11 @@ const ENUMERATIONS: u8 = 6;
 const WAKE_SILENCE_US: u64 = 1_000_000;
 
 impl Startup {
-    pub(super) fn take_torque_off(&mut self, frame: u8, outlet: &mut impl Outlet) -> Next {
+    pub(super) fn take_torque_off(&self, frame: u8, outlet: &mut impl Outlet) -> Next {
         match stop_frames().get(usize::from(frame)) {
             Some(content) => after(outlet.send(*content), Step::ZeroTorques { frame: frame + 1 }),
-            None => {
-                let now_us = outlet.now_us();
-                self.braking = Some((now_us + BRAKE_AGAIN_US, now_us + BRAKE_US));
-                Next::Go(Step::Enumerate { node: *ENUMERATED.start(), powered: false })
-            }
+            None => Next::Go(Step::Enumerate { node: *ENUMERATED.start(), powered: false }),
         }
-    }
-
-    /// Tells the pucks once more to brake, where it is time; true if that has taken the slot. Only before the safety
-    /// module is heard, or where it was not: a person may activate it later, and a bus it is heard on loses no more.
-    pub(super) fn brake_again(&mut self, outlet: &mut impl Outlet) -> bool {
-        let now_us = outlet.now_us();
-        let Some((_, until_us)) = self.braking.filter(|(next, until)| (*next..*until).contains(&now_us)) else {
-            return false;
-        };
-        let is_early = matches!(
-            self.step,
-            Step::Enumerate { powered: false, .. } | Step::Listen { powered: false, .. } | Step::Blocked { .. }
-        );
-        let is_sent = is_early && outlet.send(set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value()));
-        if is_sent {
-            self.braking = Some((now_us + BRAKE_AGAIN_US, until_us));
-        }
-        is_sent
     }
 
     pub(super) fn enumerate(&mut self, number: u8, powered: bool, outlet: &mut impl Outlet) -> Next {

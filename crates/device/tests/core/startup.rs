@@ -102,12 +102,9 @@ fn from_emergency_stop_to_ready_in_the_documented_order() {
 fn the_frames_of_the_start_up_are_those_of_the_reference() {
     let (mut core, mut bus) = started();
     bus.run(&mut core, 0.1);
-    let mut sets: Vec<_> = bus.sets().map(|(_, to, property, value)| (to, property, value)).collect();
-    // Until the safety module is heard the pucks are told to brake again and again.
-    sets.dedup();
+    let sets: Vec<_> = bus.sets().map(|(_, to, property, value)| (to, property, value)).collect();
     let limit = |property| i32::from(safety_property(property).number());
     let mut expected = vec![(ARM, PropertyId::MODE, 0), (Group::HAND.into(), PropertyId::MODE, 0)];
-    expected.push((ARM, PropertyId::MODE, 0));
     for property in [Property::Vl1, Property::Vl2, Property::Tl1, Property::Tl2] {
         expected.push((SAFETY, safety_property(Property::Def), limit(property)));
         expected.push((SAFETY, safety_property(Property::Load), limit(property)));
@@ -170,30 +167,6 @@ fn g3_a_device_that_restarts_takes_off_the_torque_before_it_asks_anything() {
     let begun = bus.log.first().map(|(time, _)| *time).expect("a frame");
     let zeroed = bus.log.get(1).map(|(time, _)| *time).expect("a second frame");
     assert!(zeroed - begun <= 2_000, "both torque frames leave within two slots, not {} us", zeroed - begun);
-}
-
-/// The words of the first frames were lost on the way to the pucks.
-#[test]
-fn g3_pucks_that_missed_the_first_frames_are_told_to_brake_again_but_not_under_a_person_who_activates() {
-    let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
-    bus.press_activate();
-    bus.safety_present = false;
-    bus.run(&mut core, 0.01);
-    for _ in 0..15 {
-        bus.pucks.iter_mut().for_each(|puck| puck.mode = MotorMode::Torque);
-        bus.run(&mut core, 0.03);
-        assert!(bus.pucks.iter().all(|puck| puck.mode == MotorMode::Idle), "braked within 30 ms, at {} us", bus.now_us);
-    }
-    bus.safety_present = true;
-    bus.run_until(&mut core, Stage::WaitingForIdle);
-    bus.press_idle();
-    bus.run_until(&mut core, Stage::WaitingForActive);
-    bus.press_activate();
-    let activated = bus.now_us;
-    bus.run(&mut core, 1.0);
-    let is_word = |to: Destination, property| (to, property) == (ARM, PropertyId::MODE);
-    assert!(!bus.sets().any(|(time, to, property, _)| time > activated && is_word(to, property)));
-    assert_eq!(core.stage(), Stage::Ready);
 }
 
 #[test]
