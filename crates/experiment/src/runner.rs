@@ -111,12 +111,7 @@ pub fn run(
     if !cells.is_empty() {
         return Err(ExperimentError::OutOfReach(cells));
     }
-    if let Some(folder) = config.out.as_deref().filter(|_| config.as_it_is) {
-        Log::must_exist(folder)?;
-    }
-    let resume = config.resume || config.as_it_is;
-    let opened = config.out.as_deref().map(|folder| Log::open(folder, &config.header(), resume)).transpose()?;
-    let (mut log, mut reports) = opened.map_or((None, Vec::new()), |(log, reports)| (Some(log), reports));
+    let (mut log, mut reports) = opened(config)?;
     let keys = config.keys();
     let all = keys.len();
     let wanted: Vec<Key> = keys
@@ -183,6 +178,16 @@ pub fn run(
     }
     trials.sort_by_key(|trial| trial.report.key);
     Ok(Experiment { results, trials, prepared })
+}
+
+/// The log of results in the folder of an experiment, and what it holds; none without a folder.
+fn opened(config: &Config) -> Result<(Option<Log>, Vec<Report>), ExperimentError> {
+    let Some(folder) = config.out.as_deref() else { return Ok((None, Vec::new())) };
+    if config.as_it_is {
+        Log::must_exist(folder)?;
+    }
+    let (log, reports) = Log::open(folder, &config.header(), config.resume || config.as_it_is)?;
+    Ok((Some(log), reports))
 }
 
 /// Writes a trial into the log of results, and its telemetry where recordings are kept.

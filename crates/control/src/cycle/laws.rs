@@ -152,15 +152,13 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         };
         let options = run.options;
         let tracking = self.gains.tracking(options.compliant);
-        let gauges = self.hand.answering().filter(HandState::feels).map(|state| state.gauges);
+        let hand = self.hand.answering().filter(HandState::feels);
+        let gauges = hand.as_ref().map(|state| state.gauges);
         let Ok(plan) = run.step(primitive, &measured.wrench, gauges.as_ref(), senses) else {
             return self.float(measured);
         };
         if senses == Senses::Fresh {
-            if let Some(deviation) = run.deviation() {
-                self.wrench.follow(drift, &measured.wrench, &deviation.expected, measured.frames);
-            }
-            let hand = self.hand.answering().filter(HandState::feels);
+            self.wrench.follow(drift, &measured.wrench, run.deviation(), measured.frames);
             if let Some(surprise) = run.watch(primitive, &measured.wrench, hand.as_ref()) {
                 self.pending = Some(Event::Surprised { phase: surprise.progress, channel: surprise.channel });
             }

@@ -71,7 +71,7 @@ mod tests {
     use super::*;
     use crate::time::RATE;
 
-    /// What is left of the force along x after so many seconds of `error(t)`, and the largest on the way.
+    /// Deviation of the force along x after so many seconds of `error(t)`, and the largest on the way.
     fn left(seconds: f64, error: impl Fn(f64) -> f64) -> (f64, f64) {
         let (mut drift, mut tare, mut worst) = (Drift::<f64>::new(), 0.0, 0.0);
         let mut deviation = 0.0;

@@ -14,6 +14,7 @@ use puck::RawWrench;
 use crate::model::kinematics::Frames;
 use crate::model::wam7;
 use crate::real::{Real, sqrt};
+use crate::sense::deviation::Deviation;
 use crate::sense::drift::Drift;
 use crate::sense::filter::{Butterworth, LowPass};
 use crate::time::{RATE, periods};
@@ -240,11 +241,19 @@ impl<R: Real> WrenchEstimator<R> {
         sqrt(force.dot(&force))
     }
 
-    /// Moves the tare by what deviates from the expected wrench, as far as that is an error of the sensor.
+    /// Moves the tare by what deviates from the expected wrench, as far as that is an error of the sensor; nothing
+    /// moves without an expectation.
     ///
     /// Not inlined: it runs from flash on a board whose fast memory is full.
     #[inline(never)]
-    pub fn follow(&mut self, drift: &mut Drift<R>, measured: &Wrench<R>, expected: &Wrench<R>, frames: &Frames<R>) {
+    pub fn follow(
+        &mut self,
+        drift: &mut Drift<R>,
+        measured: &Wrench<R>,
+        deviation: Option<&Deviation<R>>,
+        frames: &Frames<R>,
+    ) {
+        let Some(Deviation { expected, .. }) = deviation else { return };
         let to_world = frames.sensor_to_world();
         let force = measured.force - expected.force;
         let torque =
