@@ -158,7 +158,7 @@ fn table(cycles: &[Telemetry]) -> String {
     let head = ["ms", "state", "phase"].map(str::to_owned).into_iter().chain(joints);
     let mut table = Table::new(head.chain(["rad/s", "N m", "N", "lost"].map(str::to_owned)));
     for cycle in &cycles[cycles.len().saturating_sub(SHOWN)..] {
-        let before = f64::from(end.cycle.wrapping_sub(cycle.cycle)) * 1000.0 / f64::from(control::RATE_HZ as u32);
+        let before = f64::from(end.cycle.wrapping_sub(cycle.cycle)) * 1000.0 / f64::from(control::RATE_HZ);
         let [x, y, z, ..] = cycle.wrench;
         let mut row = vec![format!("{:.0}", -before), state(cycle).to_owned(), format!("{:.3}", cycle.phase)];
         row.extend(cycle.q.map(|angle| format!("{angle:.3}")));

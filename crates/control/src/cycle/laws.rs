@@ -153,8 +153,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let options = run.options;
         let tracking = self.gains.tracking(options.compliant);
         let hand = self.hand.answering().filter(HandState::feels);
-        let gauges = hand.as_ref().map(|state| state.gauges);
-        let Ok(plan) = run.step(primitive, &measured.wrench, gauges.as_ref(), senses) else {
+        let Ok(plan) = run.step(primitive, &measured.wrench, hand.as_ref().map(|hand| &hand.gauges), senses) else {
             return self.float(measured);
         };
         if senses == Senses::Fresh {
