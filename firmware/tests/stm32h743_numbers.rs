@@ -234,7 +234,7 @@ fn image_and_store_share_no_byte_of_flash_and_begin_at_sectors() {
 
 #[test]
 fn regions_of_memory_do_not_overlap_and_stay_inside_what_there_is() {
-    let all = [HOT_DATA, EMERGENCY_STACK, DATA, STACK, NULL_GUARD, HOT_CODE];
+    let all = [HOT_DATA, EMERGENCY_STACK, DATA, RETAINED, STACK, NULL_GUARD, HOT_CODE];
     for (index, region) in all.iter().enumerate() {
         let inside = |memory: &Region| region.start >= memory.start && region.end() <= memory.end();
         assert_eq!([ITCM, DTCM, AXI].iter().filter(|memory| inside(memory)).count(), 1, "{region:?}");
@@ -292,6 +292,7 @@ fn linker_script_and_constants_say_the_same() {
         ("EMERGENCY", EMERGENCY_STACK),
         ("STACK", STACK),
         ("RAM", DATA),
+        ("RETAINED", RETAINED),
     ];
     let expected: BTreeMap<String, Region> = expected.map(|(name, region)| (name.to_owned(), region)).into();
     assert_eq!(regions_of_the_linker(), expected);

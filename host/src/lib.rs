@@ -4,3 +4,4 @@ pub mod check;
 pub mod cmd;
 pub mod monitor;
 pub mod probe;
+pub mod schemas;

@@ -12,5 +12,8 @@ fn main() -> ExitCode {
     if let Err(cause) = signal_hook::flag::register(SIGXFSZ, Arc::default()) {
         let _ = writeln!(std::io::stderr(), "warning: a limit for files may end this program ({cause})");
     }
-    tactus::cmd::run(tactus::cmd::Cli::parse())
+    match tactus::cmd::Cli::try_parse() {
+        Ok(cli) => tactus::cmd::run(cli),
+        Err(error) => tactus::cmd::usage(&error),
+    }
 }

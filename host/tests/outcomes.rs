@@ -216,3 +216,14 @@ fn h12_two_simulated_devices_do_not_share_a_flash_and_a_served_arm_takes_no_file
     assert!(stderr(&second).contains("another simulated device uses it"), "{}", stderr(&second));
     tactus(at, "--device sil:world=simple,flash=flash.bin list").success();
 }
+
+#[cfg(feature = "mujoco")]
+#[test]
+fn figures_only_draws_results_that_are_there_and_teaches_nothing() {
+    let folder = learned(3.0, "");
+    let empty = tactus(folder.path(), "experiment flashlight --figures-only --out none").failure().code(2);
+    assert!(stderr(&empty).contains("error[E242]"), "{}", stderr(&empty));
+    let empty = tactus(folder.path(), "experiment flashlight --figures-only --out none --primitive reach.toml");
+    assert!(stderr(&empty.failure().code(2)).contains("there are no results in none"));
+    assert!(!folder.path().join("none").join("results.jsonl").exists());
+}

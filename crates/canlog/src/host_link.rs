@@ -115,5 +115,7 @@ fn words(message: &Message) -> String {
         Message::Reply(Reply::Telemetry(telemetry)) => format!("telemetry of cycle {}", telemetry.cycle),
         Message::Reply(Reply::Event(event)) => format!("event {:?}", event.kind),
         Message::Reply(Reply::Calibration { .. }) => "calibration".to_owned(),
+        Message::Reply(Reply::FaultRecord { .. }) => "fault record".to_owned(),
+        Message::Reply(Reply::FaultCycle { .. }) => "fault cycle".to_owned(),
     }
 }

@@ -8,6 +8,7 @@ use control::{CycleRecord, LoadRefusal, State};
 use link::{Capabilities, Listing, Name, Refusal, Reply, Request, Telemetry};
 use puck::CanFrame;
 
+use crate::fault_memory::FaultMemory;
 use crate::health::{Health, Timing};
 use crate::time::{ANSWERS_US, SLOT_HZ};
 
@@ -132,6 +133,11 @@ pub trait SessionPort<C: Controller> {
 
     /// Returns the board's measurements of its own processor.
     fn timing(&mut self) -> Timing;
+
+    /// Memory for the last second before a fault, which the board keeps over a restart; `None` where there is no room.
+    fn fault_memory(&mut self) -> Option<&mut FaultMemory> {
+        None
+    }
 }
 
 /// A message of the control half, as it goes over the link.

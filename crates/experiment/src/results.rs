@@ -112,6 +112,12 @@ pub enum ResultsError {
         /// The difference, `was -> is`.
         differences: Vec<String>,
     },
+    /// Figures are asked for, and there are no results to draw.
+    #[error("there are no results in {}", folder.display())]
+    None {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// A line is no report.
     #[error("{}: line {line} is no report: {cause}", file.display())]
     Line {
@@ -140,6 +146,14 @@ pub struct Log {
 }
 
 impl Log {
+    /// Checks that there is a file in `folder`.
+    ///
+    /// # Errors
+    /// [`ResultsError::None`].
+    pub fn must_exist(folder: &Path) -> Result<(), ResultsError> {
+        if folder.join(LINES).is_file() { Ok(()) } else { Err(ResultsError::None { folder: folder.to_owned() }) }
+    }
+
     /// Opens the file in `folder`; gives what it holds if `resume` allows that.
     ///
     /// A last line that broke off when the program was ended is cut away: that trial is tried again.

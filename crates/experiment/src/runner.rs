@@ -111,6 +111,9 @@ pub fn run(
     if !cells.is_empty() {
         return Err(ExperimentError::OutOfReach(cells));
     }
+    if let Some(folder) = config.out.as_deref().filter(|_| config.as_it_is) {
+        Log::must_exist(folder)?;
+    }
     let resume = config.resume || config.as_it_is;
     let opened = config.out.as_deref().map(|folder| Log::open(folder, &config.header(), resume)).transpose()?;
     let (mut log, mut reports) = opened.map_or((None, Vec::new()), |(log, reports)| (Some(log), reports));

@@ -112,6 +112,8 @@ error_codes! {
     ResultsNotWritten = 124: "results of an experiment cannot be written",
         "the folder does not exist, or the disk is full", "check the disk and the rights of the folder";
     Interrupted = 130: "the user interrupted, and the arm has stopped", "Ctrl-C", "";
+    CommandLine = 200: "the command line is wrong", "a misspelt option, or one that is missing",
+        "`tactus COMMAND --help` shows what it takes";
     AddressInvalid = 201: "the address of the device cannot be read", "a misspelt `--device`",
         "for a simulated arm use `--device sim:`";
     NoDeviceNamed = 202: "no device is named", "neither `--device` nor TACTUS_DEVICE is given",
@@ -172,6 +174,9 @@ error_codes! {
         "run it in a terminal, or with `--json` for a line ten times a second";
     UnknownCode = 241: "there is no error or fault of that name", "a misspelt code",
         "docs/errors.md lists them all; for example `tactus explain E504`";
+    NoResults = 242: "there are no results to draw figures of",
+        "another folder was meant, or nothing was tried in it yet",
+        "name the folder with `--out`, or leave out `--figures-only`";
     NoStudyOfWeights = 270: "the experiment with a weight knows neither demonstrations nor sweeps", "`experiment lift`",
         "leave out `--demonstrations` and `--sweep`";
     DeviceNotFound = 301: "there is no such device", "cable, power, or a misspelt port",
@@ -254,6 +259,8 @@ error_codes! {
         "give a recording of `tactus run --record`";
     CompareInput = 613: "a recording cannot be compared", "it cannot be read, or lacks a column",
         "tactus run PRIMITIVE --record FILE makes a recording";
+    ExportInput = 614: "the recording cannot be exported", "it cannot be read, or is none",
+        "give a recording of `tactus teach`, `record` or `run --record`";
     RecordingInvalid = 620: "a recording is not valid",
         "a column, unit or value is wrong; the message names line and column",
         "docs/recording-format.md describes the file";
@@ -321,6 +328,8 @@ error_codes! {
     BoardImageUnreadable = 685: "the file is no image for the emulated board",
         "another kind of file, or a damaged one",
         "`cargo xtask board --build` makes the image for the emulated board";
+    NoFaultRecord = 690: "the device keeps no record of a fault",
+        "no fault has happened since it got power, or it is a hand alone", "";
     LineClosed = 701: "the line to the device was closed", "cable, power, or the other end ended",
         "check the cable; the device stops the arm by itself after half a second";
     NoAnswer = 702: "the device did not answer in time", "no power, or another program has the line",

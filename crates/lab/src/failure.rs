@@ -4,7 +4,8 @@ use std::error::Error;
 use std::fmt::{self, Write as _};
 use std::path::PathBuf;
 
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::error_code::ErrorCode;
 
@@ -73,22 +74,17 @@ impl Failure {
 
     /// The failure as one JSON object.
     pub fn to_json(&self) -> serde_json::Value {
-        let mut object = json!({
-            "error": {
-                "exit": self.code.exit() as u8,
-                "code": self.code.to_string(),
-                "message": format!("{}: {}", self.doing, self.cause),
-                "causes": self.causes(),
-                "help": self.help,
-            }
-        });
-        if let Some(kept) = &self.kept {
-            object["error"]["kept"] = json!(kept.display().to_string());
-        }
-        if let Some(data) = &self.data {
-            object["result"] = (**data).clone();
-        }
-        object
+        let error = ErrorData {
+            exit: self.code.exit() as u8,
+            code: self.code.to_string(),
+            message: format!("{}: {}", self.doing, self.cause),
+            causes: self.causes(),
+            help: self.help.clone(),
+            kept: self.kept.as_ref().map(|kept| kept.display().to_string()),
+        };
+        let data = FailureData { error, result: self.data.as_deref().cloned() };
+        // Texts, numbers and what is JSON already.
+        serde_json::to_value(data).unwrap_or_default()
     }
 
     fn causes(&self) -> Vec<String> {
@@ -125,3 +121,31 @@ impl fmt::Display for Failure {
 }
 
 impl Error for Failure {}
+
+/// A failure as `--json` shows it.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct FailureData {
+    /// The failure.
+    pub error: ErrorData,
+    /// Findings of a command that failed with a result: the same object as after a success.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub result: Option<serde_json::Value>,
+}
+
+/// Why a command failed.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ErrorData {
+    /// Exit code of the process.
+    pub exit: u8,
+    /// Code of the error, such as `E504`; `tactus explain` tells more.
+    pub code: String,
+    /// The action and the cause.
+    pub message: String,
+    /// Causes of the cause, the nearest first.
+    pub causes: Vec<String>,
+    /// The remedy.
+    pub help: Option<String>,
+    /// The file that holds what was recorded until then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kept: Option<String>,
+}

@@ -7,13 +7,15 @@ use std::path::Path;
 
 use control::Fault;
 use lab::error_code::ErrorCode;
+use lab::fault_guide::FaultGuide;
 use link::Refusal;
 
 const HEAD: &str = "\
 # Errors, refusals and faults
 
 Who reads this: whoever has a number in front of them. This file is written from `crates/lab/src/error_code.rs`,
-`crates/link/src/refusal.rs` and `crates/control/src/guard/fault.rs`; change it there (`crates/lab/tests/errors.rs`).
+`crates/link/src/refusal.rs`, `crates/control/src/guard/fault.rs` and `crates/lab/src/fault_guide.rs`; change it there
+(`crates/lab/tests/errors.rs`).
 
 A command that fails prints `error[E...]`, the cause and a help line, with `--json` as an object too. The hundreds of the
 number are the exit code of the process; E130 ends with exit code 130. Numbers never change.
@@ -33,10 +35,13 @@ fn document() -> String {
     text += &format!("\n## Of the tool\n\n{}", table(ErrorCode::ALL.iter().copied()));
     text += "\n## Refusals of the device\n\n";
     text += &table(Refusal::ALL.into_iter().map(ErrorCode::Refused));
-    text += "\n## Faults\n\nA fault stops the arm and stays until `tactus stop --clear-fault`. [faults.md](faults.md) says how each is found.\n\n";
-    text += "| fault | name | meaning and what to do |\n|---|---|---|\n";
+    text += "\n## Faults\n\nA fault stops the arm and stays until `tactus stop --clear-fault`; `tactus faults` tells the last one. [faults.md](faults.md) says how each is found.\n\n";
+    text +=
+        "| fault | name | meaning and what to do | usual cause | check | how to go on |\n|---|---|---|---|---|---|\n";
     for fault in Fault::ALL.into_iter().filter(|fault| *fault != Fault::None) {
-        writeln!(text, "| {} | `{fault:?}` | {} |", fault.code(), fault.explanation()).expect("a text");
+        let FaultGuide { cause, check, clear } = FaultGuide::of(fault);
+        let (code, meaning) = (fault.code(), fault.explanation());
+        writeln!(text, "| {code} | `{fault:?}` | {meaning} | {cause} | {check} | {clear} |").expect("a text");
     }
     text
 }

@@ -33,6 +33,7 @@ pub use metadata::ImageMetadata;
 pub use name::{Name, NameError, Text};
 pub use refusal::Refusal;
 pub use report::{
-    Calibration, Event, EventKind, HandStage, HomeSource, LinkCounters, Listing, Statistics, Status, Telemetry,
+    Calibration, Event, EventKind, FaultRecord, HandStage, HomeSource, LinkCounters, Listing, Statistics, Status,
+    Telemetry,
 };
 pub use schema::{LINK_VERSION, SCHEMA_HASH};

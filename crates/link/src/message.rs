@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::name::{Name, Text};
 use crate::refusal::Refusal;
-use crate::report::{Calibration, Event, Listing, Statistics, Status, Telemetry};
+use crate::report::{Calibration, Event, FaultRecord, Listing, Statistics, Status, Telemetry};
 
 /// Most bytes of an image in one [`Request::UploadChunk`] or [`Reply::Chunk`].
 ///
@@ -271,6 +271,15 @@ pub enum Request {
         /// Its name from then on; none that the store holds.
         to: Name,
     },
+    /// Asks for [`Reply::FaultRecord`].
+    FaultRecord,
+    /// Asks for [`Reply::FaultCycle`].
+    FaultCycle {
+        /// Number of the record, [`FaultRecord::number`].
+        record: u16,
+        /// Cycle of it, 0 for the oldest.
+        index: u16,
+    },
 }
 
 impl Request {
@@ -311,7 +320,9 @@ impl Request {
             | Self::Calibrate { .. }
             | Self::ForgetCalibration
             | Self::Observe(_)
-            | Self::Rename { .. } => false,
+            | Self::Rename { .. }
+            | Self::FaultRecord
+            | Self::FaultCycle { .. } => false,
         }
     }
 
@@ -350,6 +361,8 @@ impl Request {
             Self::ForgetCalibration => "forget calibration",
             Self::Observe(_) => "observe",
             Self::Rename { .. } => "rename",
+            Self::FaultRecord => "fault record",
+            Self::FaultCycle { .. } => "fault cycle",
         }
     }
 }
@@ -423,6 +436,21 @@ pub enum Reply {
         /// Where the arm's zero is.
         calibration: Calibration,
     },
+    /// Answer to [`Request::FaultRecord`].
+    FaultRecord {
+        /// Request answered.
+        of: u16,
+        /// The record of the last fault; `None` if there was none, or the device keeps none.
+        record: Option<FaultRecord>,
+    },
+    /// Answer to [`Request::FaultCycle`].
+    FaultCycle {
+        /// Request answered.
+        of: u16,
+        /// The cycle, its values rounded to 16 bits; `None` behind the last one, if another record has taken the place
+        /// of this one, and if a reset has damaged it.
+        cycle: Option<Telemetry>,
+    },
 }
 
 impl Reply {
@@ -437,7 +465,9 @@ impl Reply {
             | Self::Statistics { of, .. }
             | Self::Listing { of, .. }
             | Self::Chunk { of, .. }
-            | Self::Calibration { of, .. } => Some(*of),
+            | Self::Calibration { of, .. }
+            | Self::FaultRecord { of, .. }
+            | Self::FaultCycle { of, .. } => Some(*of),
             Self::Telemetry(_) | Self::Event(_) => None,
         }
     }

@@ -262,6 +262,19 @@ pub struct Telemetry {
     pub surprise: f32,
 }
 
+/// The last second before a fault, as far as the device has kept it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct FaultRecord {
+    /// Number of the record, from 1: another number is another record.
+    pub number: u16,
+    /// Code of the fault that ended it; 0: the device restarted.
+    pub fault: u8,
+    /// The fault has not been cleared.
+    pub latched: bool,
+    /// Control cycles in it, the last one being that of the fault.
+    pub cycles: u16,
+}
+
 /// Kind of an event. Append-only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum EventKind {

@@ -23,7 +23,7 @@ mod storage;
 use core::mem::MaybeUninit;
 
 use device::storage::{Library, Scratch, value_bytes};
-use device::{Command, DeviceController, Event, Identity, Session, TimedRecord};
+use device::{Command, DeviceController, Event, FaultMemory, Identity, Session, TimedRecord};
 use heapless::spsc::Queue;
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
@@ -134,14 +134,17 @@ pub struct Application<B: Board> {
 }
 
 /// Joins the application to the pieces of a board, and starts the timer of the slots: the first comes a slot later at
-/// the earliest. `firmware` is the version of the image, for people; `serial` tells this board from others of its kind.
+/// the earliest. `firmware` is the version of the image, for people; `serial` tells this board from others of its kind;
+/// `faults` holds what it held before the restart, or anything.
 pub fn start<B: Board>(
     firmware: &'static str,
     serial: &'static str,
     parts: Parts<B>,
     memory: &'static mut Memory,
     core: &'static mut CorePlace,
+    faults: &'static mut FaultMemory,
 ) -> Application<B> {
+    faults.resume();
     let identity = Identity {
         firmware,
         board: B::NAME,
@@ -161,7 +164,8 @@ pub fn start<B: Board>(
     let core = in_place::build(core, DeviceController::init());
     let session = in_place::build(session, Session::init(identity, shelf));
     let slot_queues = SlotQueues { from_bus, to_bus, commands, records, events };
-    let session_queues = SessionQueues { port: link, to_core, from_core, news, to_log: Some(to_log) };
+    let session_queues =
+        SessionQueues { port: link, to_core, from_core, news, to_log: Some(to_log), faults: Some(faults) };
     // When everything is built, which takes a while: the first slot must find its task ready.
     slot_timer.start();
     Application {

@@ -1,7 +1,7 @@
 //! Talks with the host.
 
 use control::LoadRefusal;
-use device::{Application, Controller, Health, HostSession, QueueFull, SessionPort, TimedRecord, Timing};
+use device::{Application, Controller, FaultMemory, Health, HostSession, QueueFull, SessionPort, TimedRecord, Timing};
 use heapless::spsc::{Consumer, Producer};
 use rtic_core::Mutex;
 
@@ -19,6 +19,8 @@ pub(crate) struct SessionQueues<P, C: Controller> {
     pub(crate) news: Consumer<'static, C::Event>,
     /// Events for people, where there is a log.
     pub(crate) to_log: Option<Producer<'static, C::Event>>,
+    /// The last second before a fault, where there is room for it.
+    pub(crate) faults: Option<&'static mut FaultMemory>,
 }
 
 /// Use of the stack by the image.
@@ -87,6 +89,10 @@ impl<P: LinkPort, C: Controller, M: Mutex<T = &'static mut C>> SessionPort<C> fo
             stack_free: free,
             stack_size: size,
         }
+    }
+
+    fn fault_memory(&mut self) -> Option<&mut FaultMemory> {
+        self.queues.faults.as_deref_mut()
     }
 }
 

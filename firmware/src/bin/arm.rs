@@ -19,7 +19,7 @@ static METADATA: [u8; link::metadata::METADATA_BYTES] = {
 #[cfg(target_os = "none")]
 #[rtic::app(device = firmware::board::device, peripherals = false, dispatchers = [DISPATCH_LOG, DISPATCH_SESSION])]
 mod app {
-    use device::DeviceController;
+    use device::{DeviceController, FaultMemory};
     use firmware::application::{
         self, Application, ArmSession, CorePlace, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse,
         StorageScratch, TransmitTask,
@@ -54,14 +54,19 @@ mod app {
         // Beside what the tasks own, for which RTIC uses this section.
         #[unsafe(link_section = ".uninit.core")]
         core: CorePlace = CorePlace::uninit(),
+        // Nobody clears it: it holds what it held before a restart.
+        #[unsafe(link_section = ".uninit.fault_memory")]
+        faults: FaultMemory = FaultMemory::BLANK,
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let board = SelectedBoard::start(cx.core);
         let version = metadata::FIRMWARE;
         defmt::info!("tactus arm {=str} on {=str}", version, SelectedBoard::NAME);
         let serial = board.serial();
+        // The compiler would take it for blank.
+        let faults = core::hint::black_box(cx.local.faults);
         let Application { core, can, session, slot_task, receive_task, transmit_task, session_task, log_task, flash } =
-            application::start(version, serial, board.split(), cx.local.memory, cx.local.core);
+            application::start(version, serial, board.split(), cx.local.memory, cx.local.core, faults);
         (Shared { core, can, session }, Local { slot_task, receive_task, transmit_task, session_task, log_task, flash })
     }
 

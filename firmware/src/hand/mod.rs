@@ -110,7 +110,7 @@ pub fn start<B: Board>(
     let core = in_place::keep(core, DeviceController::new);
     let session = in_place::build(session, HostSession::over(identity, HandApplication::new(library)));
     let slot_queues = SlotQueues { from_bus, to_bus, commands, records, events };
-    let session_queues = SessionQueues { port: link, to_core, from_core, news, to_log: None };
+    let session_queues = SessionQueues { port: link, to_core, from_core, news, to_log: None, faults: None };
     // When everything is built, which takes a while: the first slot must find its task ready.
     slot_timer.start();
     Application {

@@ -10,7 +10,7 @@ use control::Payload;
 use control::model::{ArmModel, Frames};
 use control::units::JointPositions;
 use device::storage::Opening;
-use device::{DeviceController, Store};
+use device::{DeviceController, FaultMemory, Store};
 use firmware::application::{
     self, Application, ArmSession, CorePlace, Log, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse,
     StorageScratch, TransmitTask,
@@ -106,8 +106,9 @@ impl Host {
         let board = MemoryBoard { silicon: silicon.clone(), flash: FlashPort::new(chip, flash_clock.clone()) };
         let serial = board.serial();
         let memory = Box::leak(Box::new(Memory::new()));
+        let (core, faults) = (Box::new(CorePlace::uninit()), Box::new(FaultMemory::BLANK));
         let Application { core, can, session, slot_task, receive_task, transmit_task, session_task, log_task, flash } =
-            application::start("test", serial, board.split(), memory, Box::leak(Box::new(CorePlace::uninit())));
+            application::start("test", serial, board.split(), memory, Box::leak(core), Box::leak(faults));
         let (session, notes) = (Lock::new(session), Notes::default());
         let room = Box::leak(Box::new(StorageScratch::new()));
         Self {

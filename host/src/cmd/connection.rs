@@ -3,6 +3,7 @@
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+use control::Fault;
 use device::Stage;
 use link::HomeSource;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -12,6 +13,7 @@ use super::{ErrorCode, Failure, Global, Output};
 use lab::client::{Client, Halted, Interrupt};
 use lab::device::{Device, OpenError};
 use lab::error::HostError;
+use lab::fault_guide::FaultGuide;
 use lab::procedure::{self, ProcedureError, Readiness};
 use lab::simulation::{SimulationError, SimulationOptions};
 use lab::transport::Address;
@@ -153,6 +155,11 @@ pub(super) fn tell_speed(client: &Client<Device>, started: Instant, output: Outp
 /// The failure of a procedure.
 pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
     let code = match error {
+        ProcedureError::Stopped(fault) if fault != Fault::None => {
+            let FaultGuide { cause, check, clear } = FaultGuide::of(fault);
+            let help = format!("usually {cause}; check {check}; then {clear}. `tactus faults` shows the second before");
+            return Failure::new(ErrorCode::ArmStopped, doing, error).help(help);
+        }
         ProcedureError::Host(error) => return error.into_failure(doing),
         ProcedureError::NotReady(_) => ErrorCode::NotReady,
         ProcedureError::NotZeroed => ErrorCode::NotZeroed,

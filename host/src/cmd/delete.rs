@@ -2,7 +2,8 @@
 
 use clap::Args;
 use link::Name;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{Failure, Global, connection};
 
@@ -23,5 +24,12 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut client = connection::open(global, DOING, |_| {})?;
     client.delete(&command.name).map_err(|error| error.into_failure(DOING))?;
     let name = command.name.as_str();
-    global.output().result(&json!({ "deleted": name }), format!("deleted '{name}'"))
+    global.output().result(&Deleted { deleted: name.to_owned() }, format!("deleted '{name}'"))
+}
+
+/// Data of `tactus --json delete`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Deleted {
+    /// Name of the primitive.
+    pub deleted: String,
 }

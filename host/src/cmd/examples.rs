@@ -57,6 +57,10 @@ Examples:
 pub(super) const UPLOAD: &str = "\
 Example:
   tactus --device unix:tactus.sock upload grasp.toml";
+/// `export`
+pub(super) const EXPORT: &str = "\
+Example:
+  tactus export run.csv --output run.mcap";
 /// `list`
 pub(super) const LIST: &str = "\
 Example:
@@ -86,6 +90,11 @@ pub(super) const HAND: &str = "\
 Examples:
   tactus --device unix:tactus.sock hand init
   tactus --device unix:tactus.sock hand to 0,1.2,1.2,1.2";
+/// `faults`
+pub(super) const FAULTS: &str = "\
+Examples:
+  tactus --device unix:tactus.sock faults
+  tactus --device unix:tactus.sock faults --record fault.csv";
 /// `stop`
 pub(super) const STOP: &str = "\
 Example:

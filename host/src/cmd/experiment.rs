@@ -310,13 +310,23 @@ mod work {
         interrupt: &Interrupt,
         output: Output,
     ) -> Result<PrimitiveFile, Failure> {
-        if let Some(file) = &command.primitive {
-            return upload::read(file, DOING);
-        }
         let file = out.join(format!("{}.toml", command.scenario));
+        if let Some(given) = &command.primitive {
+            let primitive = upload::read(given, DOING)?;
+            if !file.exists() {
+                // The folder tells by itself what was tried in it.
+                primitive.write(&file).map_err(|error| preparation_failure(error.into()))?;
+            }
+            return Ok(primitive);
+        }
         if file.is_file() {
             output.say(format!("the primitive is {}", file.display()));
             return upload::read(&file, DOING);
+        }
+        if command.figures_only {
+            let cause = format!("{} is not there", file.display());
+            return Err(Failure::new(ErrorCode::NoResults, "experiment refused", cause)
+                .help("name the primitive that was tried with `--primitive`, or the folder with `--out`"));
         }
         let spinner = output.spinner("teaching");
         let jobs =
@@ -404,6 +414,7 @@ mod work {
                 Failure::new(ErrorCode::OtherExperiment, refused, error)
                     .help(format!("choose another folder with `--out`, or remove {}", out.display()))
             }
+            ExperimentError::Results(ResultsError::None { .. }) => Failure::new(ErrorCode::NoResults, refused, error),
             ExperimentError::Results(ResultsError::Line { .. }) => {
                 Failure::new(ErrorCode::ResultsDamaged, refused, error)
             }

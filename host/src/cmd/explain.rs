@@ -2,8 +2,10 @@
 
 use clap::Args;
 use control::Fault;
+use lab::fault_guide::FaultGuide;
 use link::Refusal;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global};
 
@@ -26,8 +28,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let (code, meaning, cause, remedy) = match (error(text), fault) {
         (Some(code), _) => (code.to_string(), code.meaning(), code.cause(), code.remedy()),
         (None, Some(fault)) => {
-            let remedy = "remove the cause, then `tactus stop --clear-fault`";
-            (format!("{fault:?}"), fault.explanation(), "", remedy)
+            let FaultGuide { cause, clear, .. } = FaultGuide::of(fault);
+            (format!("{fault:?}"), fault.explanation(), cause, clear)
         }
         (None, None) => {
             let cause = format!("'{text}' is neither the code of an error nor the name of a fault");
@@ -41,8 +43,25 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             words += &format!("\n  {name}: {text}");
         }
     }
-    let data = json!({ "code": code, "meaning": meaning, "cause": cause, "help": remedy, "exit": exit });
+    let text = str::to_owned;
+    let data =
+        Explained { code: code.to_string(), meaning: text(meaning), cause: text(cause), help: text(remedy), exit };
     global.output().result(&data, words)
+}
+
+/// Data of `tactus --json explain`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Explained {
+    /// Code of the error or fault.
+    pub code: String,
+    /// Its meaning.
+    pub meaning: String,
+    /// The usual cause; empty where the meaning says it.
+    pub cause: String,
+    /// The remedy; empty where nothing helps in general.
+    pub help: String,
+    /// Exit code of a command that fails so; null for a fault of the device.
+    pub exit: Option<u8>,
 }
 
 /// The error with this number, with or without the letter.

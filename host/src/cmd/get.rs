@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use link::{Name, PrimitiveImage};
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, connection, files};
 use lab::client::Client;
@@ -36,9 +37,20 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     files::fill(output_file, text.as_bytes(), DOING)?;
     let content = file.checksum();
     global.output().result(
-        &json!({ "name": file.name, "file": files::text(&path), "content": format!("0x{content:08x}") }),
+        &Gotten { name: file.name, file: files::text(&path), content: format!("0x{content:08x}") },
         format!("wrote {} (content 0x{content:08x})", path.display()),
     )
+}
+
+/// Data of `tactus --json get`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Gotten {
+    /// Name of the primitive.
+    pub name: String,
+    /// The file that was written.
+    pub file: String,
+    /// Check sum of its content, hexadecimal.
+    pub content: String,
 }
 
 /// The primitive that the device stores under a name.

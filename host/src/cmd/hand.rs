@@ -2,7 +2,8 @@
 
 use clap::{Args, Subcommand};
 use link::HandStage;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::check::DIGITS;
 
@@ -82,9 +83,18 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         None => "initialised",
     };
     output.result(
-        &json!({ "hand_rad": hand, "result": word }),
+        &Moved { hand_rad: hand, result: word.to_owned() },
         format!("{word}: spread {spread:.3}, fingers {first:.3}, {second:.3}, {third:.3} rad"),
     )
+}
+
+/// Data of `tactus --json hand`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Moved {
+    /// Spread and fingers 1 to 3, rad.
+    pub hand_rad: Posture,
+    /// `initialised`, `reached` or `stopped by something`.
+    pub result: String,
 }
 
 /// The hand moves only while the arm has torque.

@@ -1,7 +1,8 @@
 //! `tactus list`: the primitives a device stores.
 
 use clap::Args;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{Failure, Global, Table, connection};
 
@@ -29,23 +30,58 @@ pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
             word(listing.loaded).to_owned(),
         ]);
     }
-    let data: Vec<_> = stored
+    let primitives: Vec<_> = stored
         .iter()
-        .map(|listing| {
-            json!({
-                "name": listing.name.as_str(), "place": listing.index, "duration_s": listing.duration,
-                "kernels": listing.kernels, "bytes": listing.length, "crc": format!("0x{:08x}", listing.crc),
-                "expectation": listing.expectation, "loaded": listing.loaded,
-            })
+        .map(|listing| Stored {
+            name: listing.name.as_str().to_owned(),
+            place: listing.index,
+            duration_s: listing.duration,
+            kernels: listing.kernels,
+            bytes: listing.length,
+            crc: format!("0x{:08x}", listing.crc),
+            expectation: listing.expectation,
+            loaded: listing.loaded,
         })
         .collect();
     let (taken, places) = (stored.len(), usize::from(client.hello().slots));
     let free = places.saturating_sub(taken);
     let help = if free == 0 { "; `tactus delete NAME` frees one" } else { "" };
     global.output().result(
-        &json!({ "primitives": data, "places": places, "free": free }),
+        &Listed { primitives, places, free },
         format!("{table}{taken} of {places} places taken, {free} free{help}"),
     )
+}
+
+/// Data of `tactus --json list`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Listed {
+    /// Primitives that the device stores.
+    pub primitives: Vec<Stored>,
+    /// Places it has.
+    pub places: usize,
+    /// Places that are free.
+    pub free: usize,
+}
+
+/// A stored primitive.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Stored {
+    /// Its name.
+    pub name: String,
+    /// Number of its place.
+    pub place: u8,
+    /// Duration as taught, s.
+    pub duration_s: f32,
+    /// Kernels of each row.
+    pub kernels: u16,
+    /// Length of its image.
+    pub bytes: u32,
+    /// Check sum of its image, hexadecimal.
+    pub crc: String,
+    /// True if it knows what it should feel.
+    pub expectation: bool,
+    /// True if the control cycle has it.
+    pub loaded: bool,
 }
 
 fn word(yes: bool) -> &'static str {

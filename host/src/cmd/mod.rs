@@ -11,6 +11,8 @@ mod examples;
 pub mod experience;
 pub mod experiment;
 pub mod explain;
+pub mod export;
+pub mod faults;
 mod files;
 pub mod flash;
 pub mod get;
@@ -151,6 +153,9 @@ pub enum Command {
     /// Initialise, open, close or move the hand
     #[command(after_help = examples::HAND)]
     Hand(hand::Cmd),
+    /// Tell the last fault, what to do about it, and the second before it
+    #[command(after_help = examples::FAULTS)]
+    Faults(faults::Cmd),
     /// Bring the arm to rest
     #[command(after_help = examples::STOP)]
     Stop(stop::Cmd),
@@ -175,6 +180,9 @@ pub enum Command {
     /// Write a page of HTML about one run or several
     #[command(after_help = examples::REPORT)]
     Report(report::Cmd),
+    /// Write a recording for the viewers of others, as MCAP
+    #[command(after_help = examples::EXPORT)]
+    Export(export::Cmd),
     /// Explain an error or a fault
     #[command(after_help = examples::EXPLAIN)]
     Explain(explain::Cmd),
@@ -203,6 +211,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Run(command) => run::run(&command, &global),
         Command::Stop(command) => stop::run(&command, &global),
         Command::Status(command) => status::run(&command, &global),
+        Command::Faults(command) => faults::run(&command, &global),
         Command::Calibrate(command) => calibrate::run(&command, &global),
         Command::Monitor(command) => monitor::run(&command, &global),
         Command::Record(command) => record::run(&command, &global),
@@ -216,6 +225,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Experiment(command) => experiment::run(&command, &global),
         Command::Plot(command) => plot::run(&command, &global),
         Command::Report(command) => report::run(&command, &global),
+        Command::Export(command) => export::run(&command, &global),
         Command::Explain(command) => explain::run(&command, &global),
         Command::Completions(command) => completions::run(&command),
         Command::Compare(command) => compare::run(&command, &global),
@@ -232,6 +242,21 @@ pub fn run(cli: Cli) -> ExitCode {
             ExitCode::from(failure.code.exit() as u8)
         }
     }
+}
+
+/// Says what is wrong with the command line, or shows the help or version that was asked for; gives the exit code of
+/// the process. With `--json` anywhere on the line the error is an object too.
+pub fn usage(error: &clap::Error) -> ExitCode {
+    let wants_json = std::env::args_os().any(|argument| argument == "--json");
+    if error.use_stderr() && wants_json {
+        let text = error.render().to_string();
+        let words = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
+        let failure = Failure::new(ErrorCode::CommandLine, "tactus", words);
+        // Nobody may be there any more to read it.
+        let _ = writeln!(std::io::stdout(), "{}", failure.to_json());
+    }
+    let _ = error.print();
+    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }
 
 /// Asks a person on a terminal; false where nobody may be asked, or for any answer but yes.

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::files::{self, RecordingFile};
 use super::{Failure, Global, connection, teach};
@@ -58,7 +59,18 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     connection::tell_speed(&client, started, output);
     let rows = file.end(recorded.map_err(|error| connection::failure(error, DOING)), output)?;
     output.result(
-        &json!({ "file": files::text(&command.output), "samples": rows, "gaps": gaps }),
+        &Recorded { file: files::text(&command.output), samples: rows, gaps },
         format!("{rows} samples, {gaps} lost"),
     )
+}
+
+/// Data of `tactus --json record`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Recorded {
+    /// The file that was written.
+    pub file: String,
+    /// Cycles in it.
+    pub samples: usize,
+    /// Cycles that were lost on the way.
+    pub gaps: u32,
 }

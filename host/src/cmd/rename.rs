@@ -2,7 +2,8 @@
 
 use clap::Args;
 use link::{Name, Refusal};
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, connection};
 use lab::error::HostError;
@@ -36,5 +37,15 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         renamed = client.rename(old, new);
     }
     renamed.map_err(|error| error.into_failure(DOING))?;
-    global.output().result(&json!({ "old": old.as_str(), "new": new.as_str() }), format!("'{old}' is '{new}' now"))
+    let data = Renamed { old: old.as_str().to_owned(), new: new.as_str().to_owned() };
+    global.output().result(&data, format!("'{old}' is '{new}' now"))
+}
+
+/// Data of `tactus --json rename`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Renamed {
+    /// Name before.
+    pub old: String,
+    /// Name now.
+    pub new: String,
 }

@@ -12,6 +12,8 @@ use std::time::{Duration, Instant};
 
 use canlog::ARM_INTERFACE;
 use clap::Args;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, connection};
 use bus::BusServer;
@@ -112,7 +114,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     served.map_err(|error| lab::error::HostError::Transport(error).into_failure(DOING))?;
     let seconds = device.now().as_secs_f64();
-    output.result(&serde_json::json!({ "simulated_s": seconds }), format!("{seconds:.1} s simulated"))
+    output.result(&Simulated { simulated_s: seconds }, format!("{seconds:.1} s simulated"))
+}
+
+/// Data of `tactus --json sim`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Simulated {
+    /// Virtual time that has passed, s.
+    pub simulated_s: f64,
 }
 
 fn listen(text: &str) -> Result<Listener, Box<dyn std::error::Error + Send + Sync>> {

@@ -2,7 +2,8 @@
 
 use clap::Args;
 use control::{Fault, State};
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{Failure, Global, connection};
 use lab::client::{Client, Halted};
@@ -31,7 +32,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             Err(error.into_failure("stop: stopped, but no fault was cleared"))
         }
         Halted::Others(_) => global.output().result(
-            &json!({ "state": null, "fault": null, "cleared": false, "others": true }),
+            &Stopped { state: None, fault: None, cleared: false, others: true },
             "stopped; another host is connected and keeps the arm",
         ),
     }
@@ -53,6 +54,19 @@ fn report(mut client: Client<Device>, command: &Cmd, global: &Global) -> Result<
             global.output().say("when its cause is removed: `tactus stop --clear-fault`");
         }
     }
-    let data = json!({ "state": state, "fault": status.fault, "cleared": cleared, "others": false });
+    let data = Stopped { state: Some(state.to_owned()), fault: Some(status.fault), cleared, others: false };
     global.output().result(&data, text)
+}
+
+/// Data of `tactus --json stop`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Stopped {
+    /// State of the supervisor afterwards; null where another host keeps the arm.
+    pub state: Option<String>,
+    /// Code of the fault, 0 for none; null where another host keeps the arm.
+    pub fault: Option<u8>,
+    /// True if a fault was cleared.
+    pub cleared: bool,
+    /// True if another host keeps the arm.
+    pub others: bool,
 }

@@ -48,3 +48,60 @@ fn unmodified_python_can_drives_the_simulated_pucks_and_can_decode_reads_what_it
     let decoded = command::stdout(&decoded);
     assert!(decoded.contains("SET CMD = HI: initialise (13)") && decoded.contains("every frame named"), "{decoded}");
 }
+
+#[test]
+fn an_export_is_read_by_the_mcap_package_and_agrees_with_the_recording() {
+    let folder = expect(tempfile::tempdir());
+    let at = folder.path();
+    two_runs(at);
+    command::tactus(at, &["export", "run.csv"]).success();
+    let refused = command::tactus(at, &["export", "run.csv"]).code(2);
+    assert!(command::stderr(&refused).contains("E230"), "{}", command::stderr(&refused));
+    let refused = command::tactus(at, &["export", "reach.toml", "-o", "other.mcap"]).code(6);
+    assert!(
+        command::stderr(&refused).contains("E614") && !at.join("other.mcap").exists(),
+        "{}",
+        command::stderr(&refused)
+    );
+    let (run, export) = (at.join("run.csv"), at.join("run.mcap"));
+    let printed = python::run("read_mcap.py", &[run.as_os_str(), export.as_os_str()]);
+    assert!(printed.ends_with("cycles agree\n"), "{printed}");
+}
+
+#[test]
+fn real_outputs_and_failures_are_valid_by_their_schemas() {
+    let folder = expect(tempfile::tempdir());
+    let at = folder.path();
+    two_runs(at);
+    let mut arm = command::start(at, &["--device", "sil:world=simple", "sim"]);
+    arm.hear("in another terminal");
+    let device = ["--json", "--device", "unix:tactus.sock"];
+    let mut outputs = Vec::new();
+    let mut ask = |schema: &str, line: &str, device: &[&str]| {
+        let output = command::tactus(at, &[device, &line.split(' ').collect::<Vec<_>>()].concat());
+        let text = command::one_object(&output.get_output().stdout).to_string();
+        assert_eq!(output.get_output().status.success(), schema != "error", "{line}: {text}");
+        outputs.push(format!("{schema} {text}\n"));
+    };
+    command::tactus(at, &[&device[..], &["upload", "reach.toml"]].concat()).success();
+    ask("list", "list", &device);
+    ask("rename", "rename reach other", &device);
+    ask("get", "get other -o other.toml", &device);
+    ask("delete", "delete other", &device);
+    ask("error", "delete other", &device);
+    ask("hand", "hand --at-home init", &device);
+    ask("record", "record --duration 1 -o some.csv", &device);
+    ask("stop", "stop", &device);
+    ask("export", "export run.csv", &["--json"]);
+    ask("explain", "explain E504", &["--json"]);
+    ask("explain", "explain TrackingError", &["--json"]);
+    ask("error", "explain E999", &["--json"]);
+    ask("error", "check missing.toml", &["--json"]);
+    ask("error", "check --no-such-option", &["--json"]);
+    ask("sim", "--device sil:world=simple sim --listen unix:b.sock --fast --duration 0.1", &["--json"]);
+    arm.interrupt();
+    expect(std::fs::write(at.join("outputs.txt"), outputs.concat()));
+    let schemas = python::root().join("docs/schemas");
+    let printed = python::run("validate.py", &[schemas.as_os_str(), at.join("outputs.txt").as_os_str()]);
+    assert_eq!(printed, "15 outputs are valid\n");
+}

@@ -6,6 +6,7 @@ use crate::law::operational::OperationalController;
 use crate::plan::approach::Approach;
 use crate::plan::reference::JointReference;
 use crate::real::{Real, at_least, at_most, within};
+use crate::sense::drift::Drift;
 use crate::time::{PERIOD, periods};
 use crate::units::{JointPositions, Vector7};
 
@@ -99,6 +100,8 @@ pub(super) struct Running<R: Real> {
     /// Torque beyond what the arm itself needs when a compliant run began.
     pub(super) handover: Ramp<R>,
     pub(super) lag: Lag<R>,
+    /// Error of the force sensor in free motion.
+    pub(super) drift: Drift<R>,
 }
 
 /// The tool against the plan in the last cycle.

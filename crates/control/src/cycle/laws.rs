@@ -143,7 +143,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             // A run begins with a primitive, and no other is loaded meanwhile; else the arm floats.
             return self.float(measured);
         };
-        let Running { operational, controller, handover, lag } = running;
+        let Running { operational, controller, handover, lag, drift } = running;
         let frozen = measured.state.missing > 0;
         let senses = match self.wrench.age() {
             Some(0) if !frozen => Senses::Fresh,
@@ -157,6 +157,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             return self.float(measured);
         };
         if senses == Senses::Fresh {
+            if let Some(deviation) = run.deviation() {
+                self.wrench.follow(drift, &measured.wrench, &deviation.expected, measured.frames);
+            }
             let hand = self.hand.answering().filter(HandState::feels);
             if let Some(surprise) = run.watch(primitive, &measured.wrench, hand.as_ref()) {
                 self.pending = Some(Event::Surprised { phase: surprise.progress, channel: surprise.channel });

@@ -14,6 +14,7 @@ use crate::plan::approach::Approach;
 use crate::plan::primitive::Primitive;
 use crate::real::{Real, within};
 use crate::sense::deviation::Deviation;
+use crate::sense::drift::Drift;
 use crate::units::{JointAccelerations, JointPositions, Vector7, Wrench};
 
 impl<R: Real, const N: usize> Cycle<R, N> {
@@ -104,6 +105,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             controller: JointController::new(),
             handover,
             lag: Lag::none(),
+            drift: Drift::new(),
         });
     }
 

@@ -1,6 +1,7 @@
 //! From the replies of the bus to what is known: joints, wrench, hand, and how they deviate from what is expected.
 
 pub mod deviation;
+pub mod drift;
 pub mod filter;
 pub mod hand;
 pub mod joints;
@@ -9,6 +10,7 @@ pub mod sample;
 pub mod wrench;
 
 pub use deviation::Deviation;
+pub use drift::Drift;
 pub use hand::{HandEstimator, HandState};
 pub use joints::{JointEstimator, JointState};
 pub use observer::MotionObserver;

@@ -14,6 +14,7 @@ use puck::RawWrench;
 use crate::model::kinematics::Frames;
 use crate::model::wam7;
 use crate::real::{Real, sqrt};
+use crate::sense::drift::Drift;
 use crate::sense::filter::{Butterworth, LowPass};
 use crate::time::{RATE, periods};
 use crate::units::{Vector6, Wrench};
@@ -237,6 +238,19 @@ impl<R: Real> WrenchEstimator<R> {
         }
         let force = self.unloaded.fixed_rows::<3>(0) - self.tare.fixed_rows::<3>(0);
         sqrt(force.dot(&force))
+    }
+
+    /// Moves the tare by what deviates from the expected wrench, as far as that is an error of the sensor.
+    ///
+    /// Not inlined: it runs from flash on a board whose fast memory is full.
+    #[inline(never)]
+    pub fn follow(&mut self, drift: &mut Drift<R>, measured: &Wrench<R>, expected: &Wrench<R>, frames: &Frames<R>) {
+        let to_world = frames.sensor_to_world();
+        let force = measured.force - expected.force;
+        let torque =
+            frames.tool_to_world() * (measured.torque - expected.torque) - frames.tool_to_sensor().cross(&force);
+        let (force, torque) = (to_world.tr_mul(&force), to_world.tr_mul(&torque));
+        self.tare += drift.step(&Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z));
     }
 
     /// The wrench of the environment on the robot at the grasp point; zero if none has been measured.

@@ -4,6 +4,7 @@ mod bounds;
 mod calibration;
 mod commands;
 mod conversation;
+mod fault_record;
 mod library;
 mod observers;
 mod rig;

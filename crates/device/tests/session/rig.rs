@@ -6,8 +6,8 @@ use control::model::{ArmModel, Frames};
 use control::units::JointPositions;
 use control::{CycleRecord, Fault, LoadRefusal, Payload, State};
 use device::{
-    CheckedPrimitive, Command, Counters, DeviceController, Event, EventKind, Health, Identity, QueueFull, RamStore,
-    Session, SessionPort, Stage, StoredPrimitive, TimedRecord, Timing,
+    CheckedPrimitive, Command, Counters, DeviceController, Event, EventKind, FaultMemory, Health, Identity, QueueFull,
+    RamStore, Session, SessionPort, Stage, StoredPrimitive, TimedRecord, Timing,
 };
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame};
 use link::image::{FeedbackClamps, Hemisphere, ImageContent, OrientationError, Waypoint, WaypointVelocity};
@@ -56,6 +56,8 @@ pub(crate) struct Bench {
     pub(crate) zeroed_at: Option<[f32; 7]>,
     /// Counters of the control half.
     pub(crate) counters: Counters,
+    /// The last second before a fault.
+    pub(crate) faults: Box<FaultMemory>,
 }
 
 impl SessionPort<DeviceController> for Bench {
@@ -116,6 +118,10 @@ impl SessionPort<DeviceController> for Bench {
     fn timing(&mut self) -> Timing {
         Timing { cost_worst_ticks: 30_000, ..Timing::default() }
     }
+
+    fn fault_memory(&mut self) -> Option<&mut FaultMemory> {
+        Some(&mut self.faults)
+    }
 }
 
 /// A session with its bench and one host.
@@ -158,7 +164,7 @@ impl<S: device::Store> Rig<S> {
             ticks_per_second: 25_000_000,
             instructions_per_tick: 0,
         };
-        let bench = Bench {
+        let mut bench = Bench {
             line: Vec::new(),
             room: 4096,
             commands: Vec::new(),
@@ -174,7 +180,9 @@ impl<S: device::Store> Rig<S> {
             payload: Payload::SensorAndHand,
             zeroed_at: None,
             counters: Counters::default(),
+            faults: Box::new(FaultMemory::BLANK),
         };
+        bench.faults.resume();
         let Ok(session) = Box::new_uninit().write_init(Session::init(identity, store));
         Self { session, bench, now_ms: 10_000, number: 77, sequence: 0, decoder: Decoder::new() }
     }

@@ -6,6 +6,7 @@
 //! request the device hears from this host often enough not to stop the arm; when nobody does, it stops it.
 
 mod calibration;
+mod fault_record;
 mod halt;
 mod interrupt;
 mod motion;
@@ -27,6 +28,7 @@ use link::{
 use crate::error::{Capability, HostError};
 use crate::transport::Transport;
 
+pub use fault_record::LastSecond;
 pub use halt::Halted;
 pub use interrupt::Interrupt;
 pub use telemetry::{Gaps, TelemetryStream};

@@ -1,12 +1,12 @@
 //! The device's application without a bus: what comes is put in, what it sends is taken out, slot by slot.
 
-use device::{Controller, DeviceController, Identity, RamStore, STORE_SLOTS, Session, Slot};
+use device::{Controller, DeviceController, FaultMemory, Identity, RamStore, STORE_SLOTS, Session, Slot};
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
 use sim::{TICKS_PER_MICROSECOND, Ticks};
 
 use crate::boxed::boxed;
-use crate::simulation::queues::{FIRST_SLOT, LINE_ROOM, Port, Queues, SLOT_TICKS};
+use crate::simulation::queues::{FIRST_SLOT, LINE_ROOM, Port, Queues, SLOT_TICKS, fault_memory};
 
 /// The application of a device at power-up, and the time of its next slot.
 pub(super) struct Engine {
@@ -16,6 +16,7 @@ pub(super) struct Engine {
     slot: Slot,
     next: Ticks,
     slots: u64,
+    faults: Box<FaultMemory>,
 }
 
 impl Engine {
@@ -36,6 +37,7 @@ impl Engine {
             slot: Slot::Request,
             next: FIRST_SLOT * SLOT_TICKS,
             slots: 0,
+            faults: fault_memory(),
         }
     }
 
@@ -72,7 +74,8 @@ impl Engine {
         let frames = std::mem::take(&mut self.queues.transmitted);
         let mut line = Vec::new();
         let room = LINE_ROOM.saturating_sub(backlog);
-        let mut port = Port { queues: &mut self.queues, core: &mut self.core, line: &mut line, room };
+        let mut port =
+            Port { queues: &mut self.queues, core: &mut self.core, line: &mut line, room, faults: &mut self.faults };
         self.session.poll(now_us, &mut port);
         self.slot = self.slot.next();
         self.next += SLOT_TICKS;

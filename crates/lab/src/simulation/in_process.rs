@@ -11,13 +11,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 
 use device::storage::{Library, LibraryAccess, Opening, Scratch, Work, keep, value_bytes};
-use device::{Controller, DeviceController, Identity, Session, Slot, StoreError};
+use device::{Controller, DeviceController, FaultMemory, Identity, Session, Slot, StoreError};
 use flash::{FlashChip, FlashPort, VirtualClock};
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
 use sim::{Plant, TICKS_PER_MICROSECOND, Ticks};
 
-use super::queues::{FIRST_SLOT, LINE_ROOM, Port, Queues, SLOT_TICKS};
+use super::queues::{FIRST_SLOT, LINE_ROOM, Port, Queues, SLOT_TICKS, fault_memory};
 use super::{Execute, SimulationError};
 use crate::boxed::boxed;
 
@@ -112,6 +112,7 @@ pub(super) struct InProcess {
     leaving: VecDeque<(Ticks, CanFrame)>,
     is_bus_off: bool,
     line: Vec<u8>,
+    faults: Box<FaultMemory>,
 }
 
 impl InProcess {
@@ -137,6 +138,7 @@ impl InProcess {
             leaving: VecDeque::new(),
             is_bus_off: false,
             line: Vec::new(),
+            faults: fault_memory(),
         }
     }
 
@@ -154,7 +156,13 @@ impl InProcess {
         let leave = now + computing(self.slot);
         self.leaving.extend(self.queues.transmitted.drain(..).map(|frame| (leave, frame)));
         let room = LINE_ROOM.saturating_sub(plant.link_backlog());
-        let mut port = Port { queues: &mut self.queues, core: &mut self.core, line: &mut self.line, room };
+        let mut port = Port {
+            queues: &mut self.queues,
+            core: &mut self.core,
+            line: &mut self.line,
+            room,
+            faults: &mut self.faults,
+        };
         self.session.lock().poll(now_us, &mut port);
         if !self.line.is_empty() {
             plant.link_from_device(now, &self.line);

@@ -6,8 +6,8 @@ use std::collections::VecDeque;
 use control::{CycleRecord, LoadRefusal};
 use device::time::{CYCLE_SLOTS, SLOT_HZ};
 use device::{
-    CheckedPrimitive, Command, Controller, ControllerIo, DeviceController, Event, Health, QueueFull, SessionPort,
-    TimedRecord, Timing,
+    CheckedPrimitive, Command, Controller, ControllerIo, DeviceController, Event, FaultMemory, Health, QueueFull,
+    SessionPort, TimedRecord, Timing,
 };
 use puck::CanFrame;
 use sim::Ticks;
@@ -70,6 +70,13 @@ impl ControllerIo<DeviceController> for Queues {
     }
 }
 
+/// A memory that has never held a fault.
+pub(crate) fn fault_memory() -> Box<FaultMemory> {
+    let mut memory = Box::new(FaultMemory::BLANK);
+    memory.resume();
+    memory
+}
+
 /// The low-priority half's view while it is polled.
 pub(crate) struct Port<'a> {
     pub(crate) queues: &'a mut Queues,
@@ -78,6 +85,8 @@ pub(crate) struct Port<'a> {
     pub(crate) line: &'a mut Vec<u8>,
     /// Bytes the line still takes.
     pub(crate) room: usize,
+    /// The last second before a fault.
+    pub(crate) faults: &'a mut FaultMemory,
 }
 
 impl SessionPort<DeviceController> for Port<'_> {
@@ -116,5 +125,9 @@ impl SessionPort<DeviceController> for Port<'_> {
 
     fn timing(&mut self) -> Timing {
         Timing::default()
+    }
+
+    fn fault_memory(&mut self) -> Option<&mut FaultMemory> {
+        Some(self.faults)
     }
 }

@@ -6,8 +6,8 @@ use link::image::{
 };
 use link::message::{AccelerationSource, ChunkData, PoseFeedback};
 use link::{
-    Calibration, Capabilities, DeviceHello, Event, EventKind, Goal, HandStage, HomeSource, HostHello, LinkCounters,
-    Listing, Name, Refusal, Reply, Request, RunOptions, Statistics, Status, Telemetry, Text,
+    Calibration, Capabilities, DeviceHello, Event, EventKind, FaultRecord, Goal, HandStage, HomeSource, HostHello,
+    LinkCounters, Listing, Name, Refusal, Reply, Request, RunOptions, Statistics, Status, Telemetry, Text,
 };
 
 fn name() -> Name {
@@ -69,6 +69,8 @@ pub(crate) fn requests() -> Vec<Request> {
         Request::ForgetCalibration,
         Request::Observe(HostHello { link_version: 6, schema_hash: 1, model_hash: 2, owner: Text::new("eve@lab4") }),
         Request::Rename { name: name(), to: Name::new("other.2").unwrap() },
+        Request::FaultRecord,
+        Request::FaultCycle { record: 300, index: 299 },
     ]
 }
 
@@ -106,6 +108,8 @@ pub(crate) fn request_index(request: &Request) -> usize {
         Request::ForgetCalibration => 28,
         Request::Observe(_) => 29,
         Request::Rename { .. } => 30,
+        Request::FaultRecord => 31,
+        Request::FaultCycle { .. } => 32,
     }
 }
 
@@ -199,6 +203,8 @@ pub(crate) fn replies() -> Vec<Reply> {
             of: 9,
             calibration: Calibration { home: ramp(-2.0), source: HomeSource::Stored, zeroed_at: Some(ramp(-1.75)) },
         },
+        Reply::FaultRecord { of: 10, record: Some(FaultRecord { number: 300, fault: 9, latched: true, cycles: 299 }) },
+        Reply::FaultCycle { of: 11, cycle: Some(telemetry) },
     ]
 }
 
@@ -215,6 +221,8 @@ pub(crate) fn reply_index(reply: &Reply) -> usize {
         Reply::Telemetry(_) => 7,
         Reply::Event(_) => 8,
         Reply::Calibration { .. } => 9,
+        Reply::FaultRecord { .. } => 10,
+        Reply::FaultCycle { .. } => 11,
     }
 }
 

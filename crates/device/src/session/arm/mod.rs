@@ -345,7 +345,9 @@ impl<S: Store> Application for ArmApplication<S> {
             | Request::UploadAbort
             | Request::Delete { .. }
             | Request::Observe(_)
-            | Request::Rename { .. } => return Ok(Action::Answer(Reply::Accepted { of })),
+            | Request::Rename { .. }
+            | Request::FaultRecord
+            | Request::FaultCycle { .. } => return Ok(Action::Answer(Reply::Accepted { of })),
         };
         Ok(Action::Command(command.into()))
     }

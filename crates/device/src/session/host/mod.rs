@@ -209,13 +209,16 @@ impl<A: Application> HostSession<A> {
             if timed.record.flags() & LIMITED != 0 {
                 self.limited_cycles = self.limited_cycles.wrapping_add(1);
             }
+            let telemetry = Telemetry { cost_ticks: timed.cost_ticks, ..timed.record.telemetry() };
+            if let Some(memory) = port.fault_memory() {
+                memory.take(&telemetry);
+            }
             let number = timed.record.number();
             let is_due = number.checked_rem(self.telemetry_every.into()) == Some(0);
             let owner = self.owner.as_ref().filter(|_| is_due).map(Owner::session);
             // Once for all: observers take what the owner is told as well, for the line has no room for it twice.
             let Some(session) = owner.or_else(|| self.observers.awaiting(number)) else { continue };
             if port.room() >= FRAME_BYTES + ANSWER_ROOM {
-                let telemetry = Telemetry { cost_ticks: timed.cost_ticks, ..timed.record.telemetry() };
                 self.send_to(session, now_ms, &Reply::Telemetry(telemetry), port);
             } else {
                 self.telemetry_dropped = self.telemetry_dropped.wrapping_add(1);

@@ -147,6 +147,7 @@ impl<A: Application> HostSession<A> {
                 begun?;
                 return self.save(of);
             }
+            Request::FaultRecord | Request::FaultCycle { .. } => return Ok(Some(fault_record(of, &request, port))),
             request => {
                 return match self.application.act(of, request, self.pending.is_empty(), port)? {
                     Action::Command(command) => self.command(now_ms, of, command, port),
@@ -182,6 +183,7 @@ impl<A: Application> HostSession<A> {
             Request::Status => return Ok(Reply::Status { of, status: self.status(port) }),
             Request::Statistics => return Ok(Reply::Statistics { of, statistics: self.statistics(port) }),
             Request::List { index } => return self.listing(of, index),
+            Request::FaultRecord | Request::FaultCycle { .. } => return Ok(fault_record(of, &request, port)),
             Request::Calibration => {
                 let calm = self.pending.is_empty();
                 if let Action::Answer(reply) = self.application.act(of, Request::Calibration, calm, port)? {
@@ -279,6 +281,17 @@ impl<A: Application> HostSession<A> {
             hand_temperatures: health.hand_temperatures,
             wrench_zeroed: health.wrench_zeroed,
         }
+    }
+}
+
+/// Answers from the record of the last fault.
+fn fault_record<C: Controller>(of: u16, request: &Request, port: &mut impl SessionPort<C>) -> Reply {
+    let memory = port.fault_memory();
+    match *request {
+        Request::FaultCycle { record, index } => {
+            Reply::FaultCycle { of, cycle: memory.and_then(|memory| memory.cycle(record, index)) }
+        }
+        _ => Reply::FaultRecord { of, record: memory.and_then(|memory| memory.record()) },
     }
 }
 

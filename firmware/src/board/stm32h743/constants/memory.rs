@@ -67,4 +67,7 @@ pub const EMERGENCY_STACK: Region = Region { start: 0x2001_F000, length: 4 * 102
 pub const AXI: Region = Region { start: 0x2400_0000, length: 512 * 1024 };
 
 /// Initialised and zeroed data: the session, the library, queues. Cached; no peripheral reads it by itself.
-pub const DATA: Region = Region { start: 0x2400_0000, length: 512 * 1024 };
+pub const DATA: Region = Region { start: 0x2400_0000, length: 384 * 1024 };
+
+/// The last second before a fault, kept over a restart. Not cached: a reset loses what only the cache holds.
+pub const RETAINED: Region = Region { start: 0x2406_0000, length: 128 * 1024 };

@@ -1,9 +1,10 @@
 //! Memory protection and caches, and which faults have a handler: set up before anything else runs.
 //!
-//! Three regions of the memory protection unit on top of the processor's default map. The guard below the stack and the
+//! Four regions of the memory protection unit on top of the processor's default map. The guard below the stack and the
 //! one at address 0 may not be touched by anybody. Bank 2 of the flash is *device* memory: the processor then neither
 //! caches it nor reads ahead in it, so it is only touched when the store asks, and a running erasure never holds up a
 //! read nobody meant. That holds at every priority (`docs/decisions/0026-bank-2-is-never-cached.md`).
+//! The retained memory is not cached: a reset loses what only the cache holds.
 //!
 //! No peripheral reads or writes memory by itself (there is no direct memory access anywhere in the image), so the data
 //! cache needs no further rule.
@@ -14,12 +15,14 @@ use cortex_m::Peripherals;
 use cortex_m::peripheral::MPU;
 use cortex_m::peripheral::scb::Exception;
 
-use super::super::constants::memory::{IMAGE, NULL_GUARD, Region, STACK_GUARD, STORE};
+use super::super::constants::memory::{IMAGE, NULL_GUARD, RETAINED, Region, STACK_GUARD, STORE};
 
 /// Region attributes: nobody may read, write or execute.
 const NO_ACCESS: u32 = 1 << 28;
 /// Region attributes: read and write, never execute, shareable device.
 const DEVICE: u32 = 1 << 28 | 0b011 << 24 | 1 << 18 | 1 << 16;
+/// Region attributes: read and write, never execute, normal memory that is not cached.
+const NOT_CACHED: u32 = 1 << 28 | 0b011 << 24 | 0b001 << 19;
 /// Unit on, with the default map behind it, also inside hard faults and while everything but those is masked
 /// (HFNMIENA): bank 2 is read so, and by the default map it would go through the data cache and be stale after the next
 /// write.
@@ -35,7 +38,8 @@ pub(super) fn start(core: &mut Peripherals) {
     region(&mut core.MPU, 0, &STACK_GUARD, NO_ACCESS);
     region(&mut core.MPU, 1, &NULL_GUARD, NO_ACCESS);
     region(&mut core.MPU, 2, &STORE, DEVICE);
-    // SAFETY: the three regions above take nothing away that is used.
+    region(&mut core.MPU, 3, &RETAINED, NOT_CACHED);
+    // SAFETY: the four regions above take nothing away that is used.
     unsafe { core.MPU.ctrl.write(ENABLE) };
     cortex_m::asm::dsb();
     cortex_m::asm::isb();

@@ -1,0 +1,215 @@
+//! The last second before a fault: what is in it, how long it is kept, and what a restart makes of it.
+
+use control::{CycleRecord, Fault, State};
+use device::{FAULT_CYCLES, FaultMemory, TimedRecord};
+use link::{FaultRecord, Reply, Request, Telemetry};
+use proptest::prelude::*;
+
+use crate::rig::{Rig, hello};
+
+fn record(rig: &mut Rig) -> Option<FaultRecord> {
+    match rig.ask(Request::FaultRecord) {
+        Some(Reply::FaultRecord { record, .. }) => record,
+        other => panic!("no record but {other:?}"),
+    }
+}
+
+fn cycle(rig: &mut Rig, record: u16, index: u16) -> Option<Telemetry> {
+    match rig.ask(Request::FaultCycle { record, index }) {
+        Some(Reply::FaultCycle { cycle, .. }) => cycle,
+        other => panic!("no cycle but {other:?}"),
+    }
+}
+
+/// Numbers of the cycles in a record.
+fn cycles(rig: &mut Rig, of: FaultRecord) -> Vec<u32> {
+    (0..of.cycles).map(|index| cycle(rig, of.number, index).expect("a whole cycle").cycle).collect()
+}
+
+fn run(rig: &mut Rig, numbers: std::ops::Range<u64>, fault: Fault) {
+    numbers.for_each(|number| rig.cycle(number, fault));
+}
+
+#[test]
+fn a_record_ends_with_the_cycle_of_the_fault_and_stays_until_the_next_one() {
+    let mut rig = Rig::greeted();
+    run(&mut rig, 0..700, Fault::None);
+    assert_eq!(record(&mut rig), None);
+    run(&mut rig, 700..900, Fault::ContactForce);
+    let first = FaultRecord { number: 1, fault: Fault::ContactForce.code(), latched: true, cycles: 300 };
+    assert_eq!(record(&mut rig), Some(first));
+    assert_eq!(cycles(&mut rig, first), Vec::from_iter(401..=700));
+    let last = cycle(&mut rig, 1, 299).expect("the cycle of the fault");
+    assert_eq!((last.fault, last.cost_ticks), (Fault::ContactForce.code(), 99));
+    assert_eq!(cycle(&mut rig, 1, 298).map(|cycle| cycle.fault), Some(0));
+    assert_eq!((cycle(&mut rig, 1, 300), cycle(&mut rig, 2, 0)), (None, None));
+    // Cleared: it can still be read, however long the arm goes on.
+    run(&mut rig, 900..2000, Fault::None);
+    let cleared = FaultRecord { latched: false, ..first };
+    assert_eq!(record(&mut rig), Some(cleared));
+    assert_eq!(cycles(&mut rig, cleared), Vec::from_iter(401..=700));
+    // The next fault, 50 cycles after a clear: it holds these, and nothing from before.
+    run(&mut rig, 2000..2001, Fault::JointSpeed);
+    run(&mut rig, 2001..2051, Fault::None);
+    run(&mut rig, 2051..2052, Fault::TipSpeed);
+    let third = FaultRecord { number: 3, fault: Fault::TipSpeed.code(), latched: true, cycles: 51 };
+    assert_eq!(record(&mut rig), Some(third));
+    assert_eq!(cycles(&mut rig, third), Vec::from_iter(2001..=2051));
+    assert_eq!(cycle(&mut rig, 1, 0), None, "the old record is gone, and is not mistaken for the new one");
+}
+
+#[test]
+fn an_observer_reads_the_record_too() {
+    let mut rig = Rig::greeted();
+    run(&mut rig, 0..10, Fault::None);
+    run(&mut rig, 10..11, Fault::Overrun);
+    rig.number = 88;
+    assert!(matches!(rig.ask(Request::Observe(hello())), Some(Reply::Hello { .. })));
+    let seen = record(&mut rig).expect("a record");
+    for index in 0..seen.cycles {
+        // As fast as others may ask beside an owner.
+        rig.wait(10);
+        assert_eq!(cycle(&mut rig, seen.number, index).map(|cycle| cycle.cycle), Some(index.into()));
+    }
+}
+
+/// A cycle with a value in each field.
+fn full(number: u32) -> Telemetry {
+    let values = |first: f32| core::array::from_fn(|index| first + 0.1 * index as f32);
+    Telemetry {
+        cycle: number,
+        state: State::Run.code(),
+        fault: 0,
+        flags: 0x0031_8001,
+        phase: 0.25,
+        q: [-2.6, 2.0, -2.8, 3.1, -4.0, 1.5, 3.0],
+        dq: [-3.0, 2.5, 0.001, 0.0, 9.9, -20.0, 0.5],
+        tau: [80.0, -77.0, 0.5, 0.004, -0.25, 3.0, 1.0],
+        pose_d: [0.7, -0.3, 1.9, 0.5, -0.5, 0.5, -0.5],
+        wrench: [-150.0, 0.02, 33.3, 1.5, -4.0, 0.1],
+        lost_replies: 3,
+        cost_ticks: 123_456,
+        hand: values(0.2),
+        hand_d: values(0.3),
+        gauges: [-0.5, 0.25, 1.125],
+        surprise: 12.5,
+    }
+}
+
+#[test]
+fn values_are_kept_to_their_step_and_what_is_no_number_is_told() {
+    let mut memory = Box::new(FaultMemory::BLANK);
+    memory.resume();
+    let mut broken = full(2);
+    (broken.tau[3], broken.dq[0], broken.wrench[2], broken.fault) = (f32::NAN, f32::INFINITY, -1e9, 6);
+    memory.take(&full(1));
+    memory.take(&broken);
+    let kept = memory.cycle(1, 0).expect("the first");
+    let near = |a: &[f32], b: &[f32], step: f32| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 0.5 * step + 1e-6);
+    let all = full(1);
+    assert_eq!((kept.cycle, kept.state, kept.fault, kept.flags), (1, State::Run.code(), 0, all.flags));
+    assert_eq!((kept.lost_replies, kept.cost_ticks, kept.surprise), (3, 123_456, 12.5));
+    assert!(near(&kept.q, &all.q, 125e-6) && near(&kept.dq, &all.dq, 1e-3) && near(&kept.tau, &all.tau, 4e-3));
+    assert!(near(&kept.pose_d, &all.pose_d, 1e-4) && near(&kept.wrench, &all.wrench, 0.02) && kept.phase == 0.25);
+    assert!(near(&kept.hand, &all.hand, 125e-6) && near(&kept.hand_d, &all.hand_d, 125e-6));
+    assert!(near(&kept.gauges, &all.gauges, 250e-6));
+    let kept = memory.cycle(1, 1).expect("the second");
+    assert!(kept.tau[3].is_nan() && kept.tau[2] == 0.5);
+    assert!(near(&[kept.dq[0], kept.wrench[2]], &[32.767, -655.34], 1e-3), "{:?}", kept.wrench);
+}
+
+/// A device that has run for so many cycles since a fault that a person has cleared.
+fn cleared(after: u32) -> Box<FaultMemory> {
+    let mut memory = Box::new(FaultMemory::BLANK);
+    memory.resume();
+    (0..400).for_each(|number| memory.take(&full(number)));
+    memory.take(&Telemetry { fault: 9, ..full(400) });
+    (0..after).for_each(|number| memory.take(&full(1000 + number)));
+    memory
+}
+
+#[test]
+fn a_restart_keeps_a_fault_that_nobody_cleared_and_otherwise_the_last_second() {
+    // Latched when the device restarted.
+    let mut memory = cleared(0);
+    memory.resume();
+    let kept = FaultRecord { number: 1, fault: 9, latched: false, cycles: 300 };
+    assert_eq!(memory.record(), Some(kept));
+    assert_eq!(memory.cycle(1, 299).map(|cycle| cycle.cycle), Some(400));
+    // Restarted again before anything ran: still there. The next fault replaces it.
+    memory.resume();
+    assert_eq!(memory.record(), Some(kept));
+    memory.take(&Telemetry { fault: 4, ..full(7) });
+    assert_eq!(memory.record(), Some(FaultRecord { number: 2, fault: 4, latched: true, cycles: 1 }));
+    // Cleared, and 20 cycles later the device restarted: these are what there is to look at.
+    for after in [20, 300, 777] {
+        let mut memory = cleared(after);
+        memory.resume();
+        let cycles = after.min(300) as u16;
+        assert_eq!(memory.record(), Some(FaultRecord { number: 2, fault: 0, latched: false, cycles }));
+        assert_eq!(memory.cycle(2, cycles - 1).map(|cycle| cycle.cycle), Some(999 + after));
+        assert_eq!(memory.cycle(2, 0).map(|cycle| cycle.cycle), Some(1000 + after - u32::from(cycles)));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    #[test]
+    fn foreign_memory_is_refused_and_used_from_then_on(seed in any::<u32>()) {
+        let mut next = seed;
+        let mut memory = Box::new(FaultMemory::BLANK);
+        for word in memory.words() {
+            next = next.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            *word = next;
+        }
+        memory.resume();
+        prop_assert_eq!(memory.record(), None);
+        memory.take(&full(5));
+        memory.take(&Telemetry { fault: 3, ..full(6) });
+        prop_assert_eq!(memory.record().map(|record| (record.number, record.cycles)), Some((1, 2)));
+        prop_assert_eq!(memory.cycle(1, 0).map(|cycle| cycle.cycle), Some(5));
+    }
+
+    #[test]
+    fn a_word_that_was_damaged_costs_its_cycle_or_the_record_and_is_never_told(
+        place in 0.0..1.0_f64, mask in 1..=u32::MAX, after in 0..700_u32,
+    ) {
+        let mut memory = cleared(after);
+        let place = (place * memory.words().count() as f64) as usize;
+        *memory.words().nth(place).expect("one of the words") ^= mask;
+        memory.resume();
+        let mut lost = 0;
+        if let Some(record) = memory.record() {
+            prop_assert!(usize::from(record.cycles) <= FAULT_CYCLES);
+            for index in 0..record.cycles {
+                let Some(cycle) = memory.cycle(record.number, index) else { lost += 1; continue };
+                let whole = full(cycle.cycle);
+                prop_assert!(cycle.cycle < 400 || cycle.cycle >= 1000 || cycle.fault == 9, "{:?}", cycle);
+                prop_assert!((cycle.flags, cycle.cost_ticks) == (whole.flags, whole.cost_ticks));
+                prop_assert!((cycle.q[4] - whole.q[4]).abs() < 1e-3);
+            }
+        }
+        prop_assert!(lost <= 1, "{}", lost);
+        // And the device goes on as if nothing had been.
+        memory.take(&full(5000));
+        memory.take(&Telemetry { fault: 3, ..full(5001) });
+        let record = memory.record().expect("a record");
+        prop_assert_eq!((record.fault, record.latched, record.cycles), (3, true, 2));
+        prop_assert_eq!(memory.cycle(record.number, 1).map(|cycle| cycle.cycle), Some(5001));
+    }
+}
+
+#[test]
+fn a_session_takes_every_record_even_while_the_line_is_full() {
+    let mut rig = Rig::greeted();
+    rig.bench.room = 0;
+    for number in 0..16 {
+        let record = CycleRecord { cycle: number, ..CycleRecord::EMPTY };
+        rig.bench.records.push_back(TimedRecord { record, cost_ticks: 1 });
+    }
+    rig.cycle(16, Fault::Overrun);
+    rig.bench.room = 4096;
+    let seen = record(&mut rig).expect("a record");
+    assert_eq!(cycles(&mut rig, seen), Vec::from_iter(0..=16));
+}

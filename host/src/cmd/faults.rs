@@ -1,0 +1,178 @@
+//! `tactus faults`: the present fault and the last one, what to do about them, and the second before it.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use control::{Fault, State};
+use lab::client::LastSecond;
+use lab::fault_guide::FaultGuide;
+use lab::procedure::recording_text;
+use lab::table::Table;
+use link::{Status, Telemetry};
+use puck::PendantState;
+use puck::safety::Health;
+use serde_json::{Value, json};
+
+use super::{ErrorCode, Failure, Global, connection, files};
+
+/// Options of `faults`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {
+    /// Where the last second before the fault goes, a recording for `plot` and `report`
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+}
+
+const DOING: &str = "faults";
+/// Cycles in the table: 67 ms.
+const SHOWN: usize = 20;
+/// Quantities that the safety module judges, in the order of its word.
+const SUPERVISED: [&str; 5] = ["velocity", "torque", "voltage", "heartbeat", "other"];
+
+/// Tells the present fault and the last one.
+///
+/// # Errors
+/// The device cannot be reached, or the file cannot be written.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    let output = global.output();
+    let file = command.record.as_deref().map(|path| files::create(path, global, &[], DOING)).transpose()?;
+    let mut client = connection::observe(global, DOING)?;
+    let status = client.status().map_err(|error| error.into_failure(DOING))?;
+    let last = client.last_second().map_err(|error| error.into_failure(DOING))?;
+    if let Some(file) = file {
+        let Some(LastSecond { cycles, .. }) = &last else {
+            return Err(Failure::new(ErrorCode::NoFaultRecord, DOING, "there is nothing to write"));
+        };
+        let notes = format!("Tactus fault record, {} Hz\n{}", control::RATE_HZ, files::origin(&client, None));
+        let text =
+            recording_text(cycles, &notes).map_err(|error| Failure::of_file(ErrorCode::FileFailed, DOING, error))?;
+        files::fill(file, &text, DOING)?;
+        output.say(format!("wrote {} cycles", cycles.len()));
+    }
+    output.result(&data(&status, last.as_ref()), text(&status, last.as_ref()))
+}
+
+/// The present fault, the last one with its cycles, and the pendant, for a script.
+pub(super) fn data(status: &Status, last: Option<&LastSecond>) -> Value {
+    json!({
+        "present": fault_data(status.fault),
+        "last": last.map(|last| json!({
+            "number": last.record.number,
+            "fault": fault_data(last.record.fault),
+            "restart": last.record.fault == 0,
+            "latched": last.record.latched,
+            "damaged_cycles": usize::from(last.record.cycles) - last.cycles.len(),
+            "cycles": last.cycles.iter().map(cycle_data).collect::<Vec<_>>(),
+        })),
+        "pendant": pendant(status).map(|state| json!({
+            "supervised": SUPERVISED.iter().zip(state.health()).map(|(name, health)| (*name, word(health)))
+                .collect::<std::collections::BTreeMap<_, _>>(),
+            "display": state.display(), "idle_light": state.idle_light, "activate_light": state.activate_light,
+            "button": format!("{:?}", state.button),
+        })),
+        "pendant_word": status.pendant,
+    })
+}
+
+fn fault_data(code: u8) -> Option<Value> {
+    let fault = Fault::from_code(code).filter(|fault| *fault != Fault::None)?;
+    let FaultGuide { cause, check, clear } = FaultGuide::of(fault);
+    Some(json!({
+        "code": code, "name": format!("{fault:?}"), "meaning": fault.explanation(),
+        "cause": cause, "check": check, "clear": clear,
+    }))
+}
+
+fn cycle_data(cycle: &Telemetry) -> Value {
+    json!({
+        "cycle": cycle.cycle, "state": state(cycle), "fault": cycle.fault, "flags": cycle.flags, "phase": cycle.phase,
+        "q_rad": cycle.q, "dq_rad_per_s": cycle.dq, "tau_nm": cycle.tau, "wrench": cycle.wrench,
+        "hand_rad": cycle.hand, "lost_replies": cycle.lost_replies, "cost_ticks": cycle.cost_ticks,
+    })
+}
+
+fn text(status: &Status, last: Option<&LastSecond>) -> String {
+    let mut text = match fault_text(status.fault) {
+        Some(fault) => format!("present fault: {fault}"),
+        None => "present fault: none\n".to_owned(),
+    };
+    text += &pendant_text(status);
+    let Some(last) = last else {
+        return text + "last fault: none that the device remembers";
+    };
+    text += &match fault_text(last.record.fault) {
+        Some(_) if last.record.fault == status.fault => "last second before it:\n".to_owned(),
+        Some(fault) => format!("last fault, cleared: {fault}"),
+        None => "last fault: none; the device restarted, and this is the second before\n".to_owned(),
+    };
+    let damaged = usize::from(last.record.cycles) - last.cycles.len();
+    if damaged > 0 {
+        text += &format!("{damaged} of {} cycles were lost in a restart\n", last.record.cycles);
+    }
+    text + &table(&last.cycles)
+}
+
+/// Name, meaning, cause, what to check, how to go on; `None` for no fault.
+fn fault_text(code: u8) -> Option<String> {
+    let fault = Fault::from_code(code)?;
+    let FaultGuide { cause, check, clear } = FaultGuide::of(fault);
+    let words = format!("{fault:?}: {fault}\n  usual cause: {cause}\n  check: {check}\n  to go on: {clear}\n");
+    (fault != Fault::None).then_some(words)
+}
+
+fn pendant(status: &Status) -> Option<PendantState> {
+    PendantState::from_value(status.pendant?.cast_signed()).ok()
+}
+
+fn pendant_text(status: &Status) -> String {
+    let Some(state) = pendant(status) else {
+        return match status.pendant {
+            Some(word) => format!("pendant: a word that no document explains ({word:#010x})\n"),
+            None => "pendant: not read yet\n".to_owned(),
+        };
+    };
+    let judged = SUPERVISED.iter().zip(state.health()).map(|(name, health)| format!("{name} {}", word(health)));
+    let display = state.display().map_or("?".to_owned(), String::from);
+    let light = |on| if on { "on" } else { "off" };
+    let (idle, activate) = (light(state.idle_light), light(state.activate_light));
+    let judged = judged.collect::<Vec<_>>().join(", ");
+    format!("pendant: {judged}; display {display}; idle light {idle}, activate light {activate}\n")
+}
+
+const fn word(health: Health) -> &'static str {
+    match health {
+        Health::Safe => "ok",
+        Health::Warning => "warning",
+        Health::Fault => "fault",
+    }
+}
+
+fn state(cycle: &Telemetry) -> &'static str {
+    State::from_code(cycle.state).map_or("unknown", State::name)
+}
+
+/// The last cycles, the newest at the end.
+fn table(cycles: &[Telemetry]) -> String {
+    let Some(end) = cycles.last() else { return String::new() };
+    let joints = (1..=7).map(|joint| format!("J{joint}"));
+    let head = ["ms", "state", "phase"].map(str::to_owned).into_iter().chain(joints);
+    let mut table = Table::new(head.chain(["rad/s", "N m", "N", "lost"].map(str::to_owned)));
+    for cycle in &cycles[cycles.len().saturating_sub(SHOWN)..] {
+        let before = f64::from(end.cycle.wrapping_sub(cycle.cycle)) * 1000.0 / f64::from(control::RATE_HZ as u32);
+        let [x, y, z, ..] = cycle.wrench;
+        let mut row = vec![format!("{:.0}", -before), state(cycle).to_owned(), format!("{:.3}", cycle.phase)];
+        row.extend(cycle.q.map(|angle| format!("{angle:.3}")));
+        row.extend([largest(&cycle.dq), largest(&cycle.tau), format!("{:.1}", (x * x + y * y + z * z).sqrt())]);
+        row.push(cycle.lost_replies.to_string());
+        table.row(row);
+    }
+    let of = format!("joint angles in rad; the fastest joint, the largest torque, the force; {SHOWN} cycles at most\n");
+    of + &table.to_string()
+}
+
+/// The value of the joint that has the largest, with its number. One that is not a number is the largest.
+fn largest(values: &[f32; 7]) -> String {
+    let size = |value: f32| if value.is_nan() { f32::INFINITY } else { value.abs() };
+    let joint = (0..7).max_by(|a, b| size(values[*a]).total_cmp(&size(values[*b]))).unwrap_or(0);
+    format!("J{} {:.2}", joint + 1, values[joint])
+}

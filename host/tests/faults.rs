@@ -1,0 +1,138 @@
+//! `tactus faults`: the last second before a fault, read from beside, after the clear, and on paper.
+
+#[path = "../../crates/lab/tests/common/mod.rs"]
+mod common;
+
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use control::{Fault, State};
+use lab::fault_guide::FaultGuide;
+use serde_json::Value;
+
+/// The replies of one puck are lost for 50 ms, 1.5 s after the first torque: on the way to the start of the movement.
+const SCRIPT: &str = "
+title = \"six lost cycles\"
+bar = \"stops\"
+today = \"held\"
+
+[[scenario]]
+name = \"the replies of the elbow are lost\"
+from = \"run\"
+watch = 3.0
+inject = [{ at = 1.5, lasts = 0.05, what.drop = { kind = \"position\", from = [4] } }]
+expect = { state = [\"soft stop\"] }
+";
+
+fn command(folder: &Path, line: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    command.current_dir(folder).env("TACTUS_DEVICE", "unix:arm.sock").stdin(Stdio::null());
+    command.args(line.split_whitespace());
+    command
+}
+
+fn tactus(folder: &Path, line: &str) -> Output {
+    command(folder, line).output().unwrap()
+}
+
+#[track_caller]
+fn object(folder: &Path, line: &str) -> Value {
+    let output = tactus(folder, &format!("--json {line}"));
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// A simulated arm in a process of its own, which ends with the test.
+struct Arm(Child);
+
+impl Arm {
+    fn start(folder: &Path) -> Arm {
+        std::fs::write(folder.join("lost.toml"), SCRIPT).unwrap();
+        let serve = "--device sil:world=simple sim --listen unix:arm.sock --faults lost.toml";
+        let arm = Arm(command(folder, serve).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+        let started = Instant::now();
+        while !folder.join("arm.sock").exists() {
+            assert!(started.elapsed() < Duration::from_secs(20), "the simulated arm does not listen");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        arm
+    }
+}
+
+impl Drop for Arm {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn cli_2_every_fault_has_a_name_a_cause_a_check_and_a_way_on() {
+    let folder = tempfile::tempdir().unwrap();
+    for fault in Fault::ALL.into_iter().filter(|fault| *fault != Fault::None) {
+        let FaultGuide { cause, check, clear } = FaultGuide::of(fault);
+        for words in [fault.explanation(), cause, check, clear] {
+            assert!(words.len() > 10 && !words.ends_with('.'), "{fault:?}: {words}");
+        }
+        assert!(clear.contains("clear-fault") || fault == Fault::OtherPayload, "{fault:?}");
+        let output = tactus(folder.path(), &format!("explain {fault:?}"));
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert!(output.status.success() && said.contains(cause) && said.contains(clear), "{said}");
+    }
+}
+
+#[test]
+fn cli_2_a_fault_of_a_run_is_told_unprompted_and_its_last_second_can_be_read_before_and_after_the_clear() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    common::demonstration(folder, 3.0);
+    assert!(tactus(folder, "learn demo.csv -o reach.toml").status.success());
+    let _arm = Arm::start(folder);
+    let quiet = object(folder, "faults");
+    assert_eq!((&quiet["present"], &quiet["last"]), (&Value::Null, &Value::Null));
+    let nothing = tactus(folder, "faults --record fault.csv");
+    assert!(nothing.status.code() == Some(6) && !folder.join("fault.csv").exists());
+    assert!(String::from_utf8_lossy(&nothing.stderr).contains("E690"));
+
+    let run = tactus(folder, "run reach.toml --non-interactive");
+    let said = String::from_utf8(run.stderr).unwrap();
+    assert_eq!(run.status.code(), Some(5), "{said}");
+    assert!(said.contains(Fault::RepliesLost.explanation()) && said.contains("`tactus faults`"), "{said}");
+    assert!(said.contains(FaultGuide::of(Fault::RepliesLost).check), "{said}");
+
+    let told = object(folder, "faults --record fault.csv");
+    assert_eq!((&told["present"]["name"], &told["last"]["fault"]["code"]), (&"RepliesLost".into(), &1.into()));
+    let cycles = told["last"]["cycles"].as_array().unwrap();
+    assert_eq!((cycles.len(), &told["last"]["latched"]), (300, &true.into()));
+    let (fault, before) = cycles.split_last().unwrap();
+    assert_eq!((&fault["fault"], &fault["state"]), (&1.into(), &State::SoftStop.name().into()));
+    // Six cycles without the elbow end in the fault; the approach went well before.
+    let lost: Vec<u64> = before.iter().map(|cycle| cycle["lost_replies"].as_u64().unwrap()).collect();
+    assert_eq!((&lost[294..], lost[..290].iter().sum()), (&[1; 5][..], 0), "{lost:?}");
+    assert!(before.iter().all(|cycle| cycle["fault"] == 0));
+    assert_eq!(
+        (&before[280]["state"], &before[298]["state"]),
+        (&State::Approach.name().into(), &State::Coast.name().into())
+    );
+    let numbers: Vec<u64> = cycles.iter().map(|cycle| cycle["cycle"].as_u64().unwrap()).collect();
+    assert!(numbers.windows(2).all(|pair| pair[1] == pair[0] + 1), "a second without a gap");
+
+    // What reads recordings reads it, and it is not replaced unasked.
+    let plot = tactus(folder, "plot --run fault.csv --output fault.svg");
+    assert!(plot.status.success(), "{}", String::from_utf8_lossy(&plot.stderr));
+    let before = std::fs::read(folder.join("fault.csv")).unwrap();
+    assert_eq!(tactus(folder, "faults --record fault.csv").status.code(), Some(2));
+    assert_eq!(std::fs::read(folder.join("fault.csv")).unwrap(), before);
+
+    // Cleared, and the arm runs again: the record is still that of the fault.
+    assert!(tactus(folder, "stop --clear-fault").status.success());
+    let again = tactus(folder, "run reach.toml --non-interactive");
+    assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
+    let later = object(folder, "faults");
+    assert_eq!((&later["present"], &later["last"]["latched"]), (&Value::Null, &false.into()));
+    assert_eq!(later["last"]["cycles"], told["last"]["cycles"]);
+    assert_eq!(later["pendant"]["supervised"]["heartbeat"], "ok");
+    let words = String::from_utf8(tactus(folder, "faults").stdout).unwrap();
+    assert!(words.contains("last fault, cleared: RepliesLost") && words.lines().count() == 28, "{words}");
+}
