@@ -1,7 +1,7 @@
 //! `docs/cli.md`: the twenty features that the command line tool shall have, with the tests that hold them.
 //!
-//! A test whose name begins with `cli_N_` is a proof of row N, in whatever crate it is. After a change of the rows or of
-//! such names: `UPDATE_DOCUMENTS=1 cargo test -p tactus --test features` writes the document anew.
+//! A test whose name begins with `cli_N_` is a proof of row N, in whatever crate it is. After a change of the rows or
+//! of such names: `UPDATE_DOCUMENTS=1 cargo test -p tactus --test features` writes the document anew.
 
 #[path = "../../crates/lab/tests/common/mod.rs"]
 mod common;
@@ -26,9 +26,9 @@ const ROWS: [Row; 20] = [
     ),
     (
         "faults in words",
-        "`status`, `explain`",
-        "every code has meaning and remedy, without a device as well",
-        "the last second before a fault is not kept with it",
+        "`faults`, `explain`",
+        "every code has meaning and remedy, without a device as well; the last second before it is kept",
+        "",
     ),
     (
         "a stop that is confirmed",
@@ -85,8 +85,8 @@ const ROWS: [Row; 20] = [
     (
         "output for scripts",
         "`--json` everywhere",
-        "one object, or one a line; exit codes as documented",
-        "no schema files; wrong usage is told in words only",
+        "one object, or one a line; schemas in docs/schemas; exit codes as documented",
+        "",
     ),
     ("errors that help", "all", "code, cause and a command that helps; no input ends in a panic", ""),
     ("calibration", "`calibrate`", "before and after, kept over a restart", "the report is not written to a file"),
@@ -107,8 +107,8 @@ const HEAD: &str = "\
 # Features of the command line tool
 
 Who reads this: whoever wants to know which of the twenty features is proven. This file is written from
-`host/tests/features.rs`; change it there. A test whose name begins with `cli_N_` belongs to row N. A row is held when a test
-proves it and nothing of its bar is missing.
+`host/tests/features.rs`; change it there. A test whose name begins with `cli_N_` belongs to row N. A row is held when
+a test proves it and nothing of its bar is missing.
 
 | | feature | command | bar | tests | state |
 |---|---|---|---|---|---|
