@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | MODE of the safety module | 150 Hz | torque must end within 3 cycles of IDLE or E-STOP |
 //! | STAT of a puck that fell silent | 150 Hz, while it is silent | a puck that has reset must be found within 20 ms |
-//! | MODE of puck 1 | 10 Hz | braking pucks under an ACTIVE safety module mean that IDLE was pressed |
+//! | MODE of puck 1 | 10 Hz, up to 150 Hz when torque has ended | it brakes if, and only if, the safety module is IDLE |
 //! | PEN | 5 Hz | lights and warnings for a person |
 //! | MODE of each hand puck | 10 Hz, while there is a hand | a SET has no acknowledge, and others may set modes too |
 //! | TEMP | 1 Hz for each puck | heat |
@@ -89,6 +89,12 @@ impl BackgroundPoll {
     /// The question to a puck that fell silent.
     pub(crate) fn suspect(&mut self, node: Node) -> CanFrame {
         self.ask(node, PropertyId::STAT)
+    }
+
+    /// The question to puck 1 for its MODE.
+    pub(crate) fn first_mode(&mut self) -> CanFrame {
+        let [first, ..] = Node::ARM;
+        self.ask(first, PropertyId::MODE)
     }
 
     /// The question whose turn it is, if there is one; `hand`: its pucks may be asked too.

@@ -12,6 +12,7 @@
 //! No torque but zero leaves before the start-up is over, a person has activated the arm, and a person has commanded
 //! it: the frames of a cycle come from [`control::Actuation`] or are zero.
 
+mod brakes;
 mod outlet;
 
 use control::law::Gains;
@@ -19,7 +20,7 @@ use control::time::periods;
 use control::{Calibration, Cycle, CycleInput, CycleRecord, Fault, LoadRefusal, Payload, State};
 use link::HandStage;
 use pinned_init::{Init, init};
-use puck::{CanFrame, Group, MotorMode, Node, PropertyId, Reply, SafetyMode, Status, set, zero_torques};
+use puck::{CanFrame, MotorMode, Node, PropertyId, Reply, SafetyMode, Status, zero_torques};
 
 use crate::application::{Controller, ControllerIo, CycleReport, Message, Slot};
 use crate::background::{BackgroundPoll, PollReply};
@@ -34,6 +35,7 @@ use crate::round::Round;
 use crate::stage::{Stage, StartupError};
 use crate::startup::Startup;
 use crate::wire;
+use brakes::Brakes;
 use outlet::SlotOutlet;
 
 /// Time that a puck may be silent before the bus is started anew: 1 s, in control periods; long after the supervisor
@@ -49,9 +51,6 @@ const REFUSED_CYCLES: u8 = 6;
 /// Answers in a row of a braking puck 1 under an ACTIVE safety module that mean IDLE: one may be older than the
 /// activation.
 const BRAKING_ANSWERS: u8 = 2;
-/// Time between two requests to the safety module to go IDLE: 20 ms, in slow slots; an arm whose first request was lost
-/// falls as long.
-const IDLE_REQUEST_SLOTS: u16 = periods(0.02);
 
 /// Weight of an overrun against one cycle without.
 const OVERRUN_WEIGHT: u16 = 50;
@@ -96,8 +95,7 @@ pub struct DeviceController {
     refused: u8,
     /// Overruns of late: up by [`OVERRUN_WEIGHT`] with each, down by one with each cycle.
     overruns: u16,
-    wants_idle: bool,
-    idle_request_in: u16,
+    brakes: Brakes,
 }
 
 impl DeviceController {
@@ -127,8 +125,7 @@ impl DeviceController {
             braking: 0,
             refused: 0,
             overruns: 0,
-            wants_idle: false,
-            idle_request_in: 0,
+            brakes: Brakes::default(),
         })
     }
 
@@ -200,6 +197,7 @@ impl DeviceController {
                 let braking = MotorMode::from_value(value) == Some(MotorMode::Idle);
                 let active = self.safety_mode == Some(SafetyMode::Active);
                 self.braking = if braking && active { self.braking.saturating_add(1) } else { 0 };
+                self.brakes.hear_puck(braking);
             }
             PollReply::Pendant(value) => self.pendant = Some(value),
             PollReply::Temperature(joint, value) => {
@@ -227,6 +225,7 @@ impl DeviceController {
     fn hear_safety(&mut self, value: i32, io: &mut impl ControllerIo<Self>) {
         let mode = SafetyMode::from_value(value).unwrap_or(SafetyMode::Idle);
         self.fresh_safety = Some(mode);
+        self.brakes.hear_safety(mode);
         if self.safety_mode != Some(mode) {
             self.safety_mode = Some(mode);
             self.braking = 0;
@@ -284,8 +283,7 @@ impl DeviceController {
         self.braking = 0;
         self.refused = 0;
         self.overruns = 0;
-        self.wants_idle = false;
-        self.idle_request_in = 0;
+        self.brakes = Brakes::default();
     }
 
     /// Leaves the cyclic loop.
@@ -345,7 +343,7 @@ impl DeviceController {
         for frame in self.hand.frames(output.actuation.hand_frame()).into_iter().flatten() {
             self.outlet(now_us, io).send(frame);
         }
-        self.wants_idle = output.actuation.requests_idle();
+        self.brakes.want(output.actuation.requests_idle());
         if self.cycle.is_zero_lost() {
             self.startup.lose_zero();
         }
@@ -442,23 +440,13 @@ impl DeviceController {
     /// The slot that asks one slow question.
     #[inline(never)]
     fn ask_slowly(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
-        self.idle_request_in = self.idle_request_in.saturating_sub(1);
         let known = Iterator::chain(self.temperatures.iter(), &self.hand_temperatures).copied().flatten();
         self.cycle.set_caution(self.watch.look(known, self.pendant));
         let writable = self.startup.safety_properties().is_some_and(|safety| safety.mode_is_writable);
-        // Asked for even of a module that has told IDLE: the word may be wrong, and then nothing brakes.
-        let estop = self.safety_mode == Some(SafetyMode::EStop);
-        let lower = self.wants_idle && writable && self.idle_request_in == 0 && !estop;
-        if lower {
-            let frame = set(Node::SAFETY_MODULE, PropertyId::MODE, SafetyMode::Idle.value());
-            if self.outlet(now_us, io).send(frame) {
-                self.idle_request_in = IDLE_REQUEST_SLOTS;
+        if let Some(frame) = self.brakes.frame(self.safety_mode, writable) {
+            if !self.outlet(now_us, io).send(frame) {
+                self.brakes.ask_again();
             }
-            return;
-        }
-        if self.idle_request_in == IDLE_REQUEST_SLOTS - 1 {
-            // The module's word to the pucks may be lost, and with it the brakes.
-            self.outlet(now_us, io).send(set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value()));
             return;
         }
         let BusPhase::Cyclic(poll) = &mut self.phase else {
@@ -473,6 +461,7 @@ impl DeviceController {
             (Some(safety), _) => Some(safety),
             (None, Some(node)) => Some(poll.suspect(node)),
             (None, None) if self.hand.act(&mut outlet) => None,
+            (None, None) if self.brakes.look() => Some(poll.first_mode()),
             (None, None) => poll.other(self.hand.answers_questions(), self.startup.absent()),
         };
         if let Some(frame) = question {

@@ -31,9 +31,11 @@ impl Startup {
 
     pub(super) fn count_pucks(&mut self) -> Result<Next, StartupError> {
         self.enumerations += 1;
+        // One damaged question is not to decide what the arm carries.
+        let sensor_may_come = !self.has_sensor() && self.enumerations < 2;
         let hand_may_come = self.survey.hand_is_partial() && self.enumerations < ENUMERATIONS;
         match self.survey.missing_puck() {
-            None if !hand_may_come => {
+            None if !hand_may_come && !sensor_may_come => {
                 self.survey_hand();
                 Ok(Next::Go(Step::Identify { device: 0 }))
             }

@@ -3,7 +3,10 @@
 use control::{Command, Fault, State};
 use device::{Controller, DeviceController, EventKind, Slot, Stage};
 use puck::device::{position_frame, reply16};
-use puck::{CanFrame, CanId, Counts, Destination, GaugeStatus, Node, PropertyId, PuckTorque, SafetyMode};
+use puck::{
+    Action, CanFrame, CanId, Counts, Destination, GaugeStatus, MotorMode, Node, PropertyId, PuckTorque, Request,
+    SafetyMode,
+};
 
 use crate::double::{ARM, Bus, floating, started};
 
@@ -226,6 +229,32 @@ fn g7_brakes_are_asked_for_every_20_ms_until_they_are_on_even_if_the_module_was_
     bus.press_activate();
     bus.run(&mut core, 0.1);
     assert_eq!(bus.safety_mode, SafetyMode::Active, "a person has activated again");
+    bus.commands.push_back(Command::Gravity.into());
+    bus.run(&mut core, 0.1);
+    assert_eq!(core.health().state, State::Gravity, "{:?}", bus.events);
+}
+
+/// G7: the safety module is IDLE, but its frame to the pucks was lost, and so are those of the device for 0.1 s.
+#[test]
+fn g7_pucks_that_did_not_hear_the_safety_module_are_told_to_brake() {
+    let (mut core, mut bus) = floating();
+    bus.safety_mode = SafetyMode::Idle;
+    for _ in 0..30 {
+        bus.run_slots(&mut core, CYCLE);
+        for puck in &mut bus.pucks {
+            puck.mode = MotorMode::Torque;
+        }
+    }
+    assert_eq!(core.health().state, State::Idle);
+    bus.run(&mut core, 0.05);
+    assert!(bus.pucks.iter().all(|puck| puck.mode == MotorMode::Idle), "nobody asked again");
+    bus.run(&mut core, 0.1);
+    let begin = bus.log.len();
+    bus.run(&mut core, 0.5);
+    let sets = bus.log[begin..].iter().filter_map(|(_, frame)| Request::decode(frame).ok());
+    assert_eq!(sets.filter(|request| matches!(request.action, Action::Set { .. })).count(), 0, "they brake");
+    bus.press_activate();
+    bus.run(&mut core, 0.1);
     bus.commands.push_back(Command::Gravity.into());
     bus.run(&mut core, 0.1);
     assert_eq!(core.health().state, State::Gravity, "{:?}", bus.events);

@@ -2,7 +2,7 @@
 
 use control::{Command as Control, Fault, Payload, State};
 use device::{Controller, EventKind, Stage, StartupError};
-use puck::Node;
+use puck::{Node, PropertyId, get};
 
 use crate::double::{Bus, silent_device};
 
@@ -45,4 +45,17 @@ fn g4_a_sensor_that_answers_late_is_found_before_torque_or_stops_it_softly() {
         bus.run(&mut core, 0.3);
         assert_eq!((core.health().state, core.health().fault), (State::Hold, Fault::None), "{:?}", bus.events);
     }
+}
+
+#[test]
+fn g4_one_lost_question_to_the_sensor_does_not_decide_what_the_arm_carries() {
+    let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
+    let question = get(Node::FORCE_TORQUE, PropertyId::STAT);
+    while core.stage() != Stage::WaitingForActive {
+        // The question of the search before the arm has power, and the first one after it.
+        bus.sensor_present = bus.log.iter().filter(|(_, frame)| *frame == question).count() >= 2;
+        bus.run_slots(&mut core, 1);
+        assert!(bus.now_us < 10_000_000, "stuck in {:?}", core.stage());
+    }
+    assert_eq!(core.health().payload, Payload::SensorAndHand, "{:?}", bus.events);
 }

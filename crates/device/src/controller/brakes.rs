@@ -1,0 +1,71 @@
+//! `Brakes`: whom the device asks to brake when torque has ended, and how often.
+
+use control::time::periods;
+use puck::{CanFrame, Group, MotorMode, Node, PropertyId, SafetyMode, set};
+
+/// Time between two requests to the safety module to go IDLE: 20 ms, in slow slots; an arm whose first request was lost
+/// falls as long.
+const REQUEST_SLOTS: u16 = periods(0.02);
+/// Time for which puck 1 is asked in every second cycle if it brakes, after the safety module has said so: 0.5 s, in
+/// slow slots.
+const LOOK_SLOTS: u16 = periods(0.5);
+
+/// The requests to brake.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Brakes {
+    wanted: bool,
+    request_in: u16,
+    look_slots: u16,
+    /// Puck 1 did not brake when it was asked; nothing has been heard of the safety module since.
+    pulling: bool,
+    /// The pucks did not brake, and afterwards the safety module said that it is IDLE: its frame to them was lost.
+    owed: bool,
+}
+
+impl Brakes {
+    /// The control cycle wants the safety module to go to IDLE, or no longer does.
+    pub(super) fn want(&mut self, wanted: bool) {
+        self.wanted = wanted;
+    }
+
+    /// Puck 1 has told if it brakes.
+    pub(super) fn hear_puck(&mut self, braking: bool) {
+        self.pulling = !braking;
+    }
+
+    /// The safety module has told its mode.
+    pub(super) fn hear_safety(&mut self, mode: SafetyMode) {
+        self.owed = core::mem::take(&mut self.pulling) && mode == SafetyMode::Idle;
+    }
+
+    /// One slow slot: what has to leave in it. `mode` is that of the safety module, `writable` says that it takes one.
+    pub(super) fn frame(&mut self, mode: Option<SafetyMode>, writable: bool) -> Option<CanFrame> {
+        self.request_in = self.request_in.saturating_sub(1);
+        self.look_slots = match mode {
+            _ if self.wanted => LOOK_SLOTS,
+            // A person has activated the arm again.
+            Some(SafetyMode::Active) => 0,
+            _ => self.look_slots.saturating_sub(1),
+        };
+        // Asked for even of a module that has told IDLE: the word may be wrong, and then nothing brakes.
+        if self.wanted && writable && self.request_in == 0 && mode != Some(SafetyMode::EStop) {
+            self.request_in = REQUEST_SLOTS;
+            return Some(set(Node::SAFETY_MODULE, PropertyId::MODE, SafetyMode::Idle.value()));
+        }
+        // The module's word to the pucks may be lost, and with it the brakes.
+        let told = self.request_in == REQUEST_SLOTS - 1;
+        let due = core::mem::take(&mut self.owed) || told;
+        due.then(|| set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value()))
+    }
+
+    /// The frame could not leave.
+    pub(super) fn ask_again(&mut self) {
+        self.request_in = 0;
+    }
+
+    /// True while puck 1 is to be asked more often if it brakes: not before the safety module is IDLE, because pucks
+    /// that brake under an ACTIVE one would hide that.
+    pub(super) fn look(&self) -> bool {
+        self.look_slots > 0 && !self.wanted
+    }
+}
