@@ -13,10 +13,10 @@ use std::process::{Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// A feature: name, commands, bar, and what is still missing (empty: held).
-type Row = (&'static str, &'static str, &'static str, &'static str);
+type Feature = (&'static str, &'static str, &'static str, &'static str);
 
 /// The rows from 1 on.
-const ROWS: [Row; 20] = [
+const ROWS: [Feature; 20] = [
     (
         "versions are compared first",
         "every one with a device",
