@@ -201,7 +201,7 @@ fn a_log_that_is_not_there_and_no_log_at_all_are_told_apart() {
 }
 
 #[test]
-fn a_whole_start_up_and_run_replays_without_a_difference() {
+fn cli_20_a_whole_start_up_and_run_replays_without_a_difference() {
     let (folder, log) = recorded();
     let text = stdout(&tactus(folder.path(), &["--json", "can", "replay", "bus.log"]).success());
     let outcome: Value = serde_json::from_str(&text).unwrap();

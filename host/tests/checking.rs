@@ -23,7 +23,7 @@ fn checked(primitive: &PrimitiveFile) -> CheckReport {
 }
 
 #[test]
-fn a_calm_movement_passes_with_every_margin_reported() {
+fn cli_5_a_calm_movement_passes_with_every_margin_reported() {
     let mut heard = Vec::new();
     let report = check(&reach(5.0), &Course::stored(1.0), |fraction| heard.push(fraction)).unwrap();
     assert!(report.passed(), "{}", report.to_text());

@@ -53,7 +53,7 @@ fn learn_check_plot_work_one_after_the_other() {
 }
 
 #[test]
-fn json_is_one_object_on_stdout_with_what_the_text_says() {
+fn cli_13_json_is_one_object_on_stdout_with_what_the_text_says() {
     let folder = tempfile::tempdir().unwrap();
     common::demonstration(folder.path(), 3.0);
     let learned = json(&tactus(folder.path(), &["--json", "learn", "demo.csv", "--name", "a"]).success());
@@ -82,7 +82,7 @@ fn the_same_input_gives_the_same_bytes() {
 }
 
 #[test]
-fn a_bad_demonstration_ends_with_6_and_names_file_line_and_column() {
+fn cli_7_a_bad_demonstration_ends_with_6_and_names_file_line_and_column() {
     let folder = tempfile::tempdir().unwrap();
     let file = common::demonstration(folder.path(), 3.0);
     let text = std::fs::read_to_string(&file).unwrap();
@@ -137,7 +137,7 @@ fn a_turn_too_far_ends_with_6_and_the_command_that_helps() {
 }
 
 #[test]
-fn a_changed_primitive_ends_with_6_and_another_model_with_4() {
+fn cli_1_a_changed_primitive_ends_with_6_and_another_model_with_4() {
     let folder = tempfile::tempdir().unwrap();
     common::demonstration(folder.path(), 3.0);
     tactus(folder.path(), &["learn", "demo.csv"]).success();

@@ -142,7 +142,7 @@ fn send(signal: &str, process: u32) {
 }
 
 #[test]
-fn a_killed_run_leaves_its_recording_beside_the_one_it_was_to_replace() {
+fn cli_8_a_killed_run_leaves_its_recording_beside_the_one_it_was_to_replace() {
     let folder = learned(20.0);
     let at = folder.path();
     std::fs::write(at.join("run.csv"), "precious").unwrap();

@@ -60,7 +60,7 @@ fn stdout(assert: &Assert) -> String {
 }
 
 #[test]
-fn an_image_is_written_verified_and_started_and_every_command_is_shown() {
+fn cli_16_an_image_is_written_verified_and_started_and_every_command_is_shown() {
     let folder = laboratory(&elf(Some(&real().encode()), 0x0800_0000), Some(0));
     let done = tactus(folder.path(), &["flash", "--image", "arm.elf"]).success();
     let expected = ["probe-rs download --chip STM32H743ZITx --verify arm.elf", "probe-rs reset --chip STM32H743ZITx"];
@@ -72,7 +72,7 @@ fn an_image_is_written_verified_and_started_and_every_command_is_shown() {
 }
 
 #[test]
-fn nothing_that_is_run_could_erase_the_stored_primitives() {
+fn cli_16_nothing_that_is_run_could_erase_the_stored_primitives() {
     let folder = laboratory(&elf(Some(&real().encode()), 0x0800_0000), Some(0));
     tactus(folder.path(), &["flash", "--image", "arm.elf", "--probe", "0483:374e"]).success();
     for call in calls(folder.path()) {

@@ -43,7 +43,7 @@ fn a_report_is_written_once_and_replaced_only_when_told_to() {
 }
 
 #[test]
-fn codes_and_faults_are_explained_without_a_device() {
+fn cli_2_codes_and_faults_are_explained_without_a_device() {
     let folder = tempfile::tempdir().unwrap();
     let explained = |code: &str| stdout(&tactus(folder.path(), &["explain", code]).success());
     assert!(explained("E504").starts_with("E504: another host is connected to the device\n  help: end the other"));
@@ -56,7 +56,7 @@ fn codes_and_faults_are_explained_without_a_device() {
 }
 
 #[test]
-fn shells_complete_every_command() {
+fn cli_18_shells_complete_every_command() {
     let folder = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish"] {
         let text = stdout(&tactus(folder.path(), &["completions", shell]).success());

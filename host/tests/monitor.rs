@@ -87,7 +87,7 @@ fn is_golden(name: &str, watch: &Watch, size: (u16, u16)) {
 }
 
 #[test]
-fn screens_are_as_they_were_looked_at() {
+fn cli_9_screens_are_as_they_were_looked_at() {
     is_golden("idle.txt", &watch(), (80, 24));
     is_golden("contact.txt", &contact(), (80, 24));
     is_golden("fault.txt", &fault(), (80, 24));

@@ -85,7 +85,7 @@ fn run(folder: &Path, line: &str) -> (Option<i32>, String, Duration) {
 }
 
 #[test]
-fn damaged_files_are_refused_or_used_and_nothing_is_replaced() {
+fn cli_14_damaged_files_are_refused_or_used_and_nothing_is_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let succeeds = |line: &str| assert_eq!(run(at, line).0, Some(0), "{line}: {}", run(at, line).1);

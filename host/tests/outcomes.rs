@@ -32,7 +32,7 @@ fn learned(duration: f64, options: &str) -> tempfile::TempDir {
 const DEVICE: &str = "--device sil:world=simple --non-interactive";
 
 #[test]
-fn a_goal_out_of_reach_is_refused_by_check_and_by_a_dry_run() {
+fn cli_5_a_goal_out_of_reach_is_refused_by_check_and_by_a_dry_run() {
     let folder = learned(3.0, "");
     for line in [
         "check reach.toml --goal=5,5,5".to_owned(),

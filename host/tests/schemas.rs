@@ -3,7 +3,7 @@
 use std::path::Path;
 
 #[test]
-fn the_schema_files_are_those_of_the_types_and_nothing_else_is_there() {
+fn cli_13_the_schema_files_are_those_of_the_types_and_nothing_else_is_there() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/schemas");
     let update = std::env::var_os("UPDATE_DOCUMENTS").is_some();
     let mut names = vec!["README.md".to_owned()];

@@ -19,12 +19,12 @@ pub struct Largest {
     pub position_m: f64,
     /// Between the measured orientations, rad.
     pub orientation_rad: f64,
-    /// Between the planned positions, m; 0 without those columns.
-    pub plan_m: f64,
+    /// Between the planned positions, m; `None` if a run lacks those columns, or nothing was compared.
+    pub plan_m: Option<f64>,
     /// Of any component of the force, N.
     pub force_n: f64,
-    /// Of any joint torque, N m; 0 without those columns.
-    pub torque_nm: f64,
+    /// Of any joint torque, N m; `None` if a run lacks those columns, or nothing was compared.
+    pub torque_nm: Option<f64>,
 }
 
 /// Differences of two runs.
@@ -83,10 +83,10 @@ impl Largest {
         self.orientation_rad = self.orientation_rad.max(angle_between(&one.orientation[a], &other.orientation[b]));
         self.force_n = self.force_n.max(apart(&one.wrench[a][..3], &other.wrench[b][..3]));
         if let (Some(one), Some(other)) = (one.plan, other.plan) {
-            self.plan_m = self.plan_m.max(distance(&one[a], &other[b]));
+            self.plan_m = Some(self.plan_m.unwrap_or(0.0).max(distance(&one[a], &other[b])));
         }
         if let (Some(one), Some(other)) = (one.torque, other.torque) {
-            self.torque_nm = self.torque_nm.max(apart(&one[a], &other[b]));
+            self.torque_nm = Some(self.torque_nm.unwrap_or(0.0).max(apart(&one[a], &other[b])));
         }
     }
 }
@@ -134,18 +134,22 @@ impl fmt::Display for Difference {
             "cycles compared         {:>14}{:>26}{:>14}",
             parts[0].samples, parts[1].samples, parts[2].samples
         )?;
-        type Line = (&'static str, fn(&Largest) -> f64, &'static str);
+        type Line = (&'static str, fn(&Largest) -> Option<f64>, &'static str);
         let rows: [Line; 6] = [
-            ("joint angle", |part| part.joint_rad * 1e3, "mrad"),
-            ("position", |part| part.position_m * 1e3, "mm"),
-            ("orientation", |part| part.orientation_rad.to_degrees(), "deg"),
-            ("planned position", |part| part.plan_m * 1e3, "mm"),
-            ("force", |part| part.force_n, "N"),
+            ("joint angle", |part| Some(part.joint_rad * 1e3), "mrad"),
+            ("position", |part| Some(part.position_m * 1e3), "mm"),
+            ("orientation", |part| Some(part.orientation_rad.to_degrees()), "deg"),
+            ("planned position", |part| part.plan_m.map(|m| m * 1e3), "mm"),
+            ("force", |part| Some(part.force_n), "N"),
             ("joint torque", |part| part.torque_nm, "N m"),
         ];
         for (name, value, unit) in rows {
-            let [start, before, whole] = parts.map(value);
-            writeln!(f, "{:<24}{start:>14.3}{before:>26.3}{whole:>14.3}", format!("{name}, {unit}"))?;
+            let [start, before, whole] = parts.map(|part| match value(part) {
+                _ if part.samples == 0 => "-".to_owned(),
+                None => "not recorded".to_owned(),
+                Some(value) => format!("{value:.3}"),
+            });
+            writeln!(f, "{:<24}{start:>14}{before:>26}{whole:>14}", format!("{name}, {unit}"))?;
         }
         Ok(())
     }

@@ -76,3 +76,17 @@ fn a_demonstration_without_forces_is_refused_by_name() {
         "{refused:?}"
     );
 }
+
+#[test]
+fn columns_that_a_run_lacks_are_null_and_named_and_not_a_difference_of_0() {
+    let run = recording(|_, _| true);
+    let difference = Difference::between(&run, &run, 1.0).expect("comparable");
+    let json = serde_json::to_value(difference.clone()).expect("a value");
+    for part in ["start", "before_contact", "whole"] {
+        assert!(json[part]["plan_m"].is_null() && json[part]["torque_nm"].is_null(), "{json}");
+    }
+    let table = difference.to_string();
+    let line = |name: &str| table.lines().find(|line| line.starts_with(name)).expect("a line").to_owned();
+    assert_eq!(line("joint torque").matches("not recorded").count(), 3, "{table}");
+    assert_eq!(line("planned position").matches("not recorded").count(), 3, "{table}");
+}

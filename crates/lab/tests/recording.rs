@@ -228,7 +228,7 @@ fn recordings_of_the_time_before_the_hand_are_read() {
 }
 
 #[test]
-fn lost_samples_are_counted_by_the_cycle_counter_and_by_time() {
+fn cli_8_lost_samples_are_counted_by_the_cycle_counter_and_by_time() {
     let mut rows = common::rows(2.0);
     rows.drain(100..103);
     rows.drain(200..201);

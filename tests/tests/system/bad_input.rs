@@ -46,7 +46,7 @@ fn random_bytes_are_dropped_counted_and_survived() {
 }
 
 #[test]
-fn another_link_version_or_schema_is_refused_with_both_versions() {
+fn cli_1_another_link_version_or_schema_is_refused_with_both_versions() {
     let other = LINK_VERSION + 1;
     match Client::connect_as(boot(DEVICE), "stranger", other, SCHEMA_HASH).err() {
         Some(HostError::Incompatible { what: Refusal::LinkVersion, host, device }) => {

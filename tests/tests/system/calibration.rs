@@ -105,7 +105,7 @@ fn a_home_is_not_changed_under_torque_nor_to_one_the_arm_cannot_have() {
 }
 
 #[test]
-fn the_command_calibrates_an_arm_and_the_next_process_finds_its_home() {
+fn cli_15_the_command_calibrates_an_arm_and_the_next_process_finds_its_home() {
     let folder = expect(tempfile::tempdir());
     let run = |arguments: &[&str]| {
         let all = [&["--json", "--device", "sil:world=simple,flash=arm.flash", "calibrate"], arguments].concat();

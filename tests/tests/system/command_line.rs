@@ -16,7 +16,7 @@ fn object(folder: &Path, arguments: &[&str]) -> Value {
 }
 
 #[test]
-fn every_command_gives_one_json_object_and_nothing_else() {
+fn cli_13_every_command_gives_one_json_object_and_nothing_else() {
     let folder = expect(tempfile::tempdir());
     let folder = folder.path();
     expect(taught().write(&folder.join("primitive.toml")));

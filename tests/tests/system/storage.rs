@@ -243,7 +243,7 @@ fn a_restart_under_qemu_finds_the_library_again_and_what_was_deleted_is_gone() {
 }
 
 #[test]
-fn power_that_fails_under_qemu_leaves_the_old_primitive_or_the_new_one() {
+fn cli_4_power_that_fails_under_qemu_leaves_the_old_primitive_or_the_new_one() {
     let (old, new) = (image("reach", 3.0), image("reach", 5.0));
     let chip = FlashChip::new(Flash::blank(FlashTimes::TYPICAL));
     let mut arm = connect("sim:world=simple", &chip);

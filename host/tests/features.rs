@@ -1,0 +1,257 @@
+//! `docs/cli.md`: the twenty features that the command line tool shall have, with the tests that hold them.
+//!
+//! A test whose name begins with `cli_N_` is a proof of row N, in whatever crate it is. After a change of the rows or
+//! of such names: `UPDATE_DOCUMENTS=1 cargo test -p tactus --test features` writes the document anew.
+
+#[path = "../../crates/lab/tests/common/mod.rs"]
+mod common;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// A feature: name, commands, bar, and what is still missing (empty: held).
+type Feature = (&'static str, &'static str, &'static str, &'static str);
+
+/// The rows from 1 on.
+const ROWS: [Feature; 20] = [
+    (
+        "versions are compared first",
+        "every one with a device",
+        "link version, schema and robot model; another one ends \
+     with 4, names both, and nothing else is sent",
+        "",
+    ),
+    (
+        "faults in words",
+        "`faults`, `explain`",
+        "every code has meaning and remedy, without a device as well; the last second before it is kept",
+        "",
+    ),
+    (
+        "a stop that is confirmed",
+        "`run`, `record`, `monitor`, `stop`",
+        "Ctrl-C ends with 130 after the device confirmed \
+     the stop; a second one ends at once; a host that dies is noticed within 500 ms",
+        "no test of this number shows the second Ctrl-C; silent hosts are proven as C10 in faults.md",
+    ),
+    (
+        "upload in one piece",
+        "`upload`",
+        "check sums of pieces and image, read back; a cut leaves the old primitive or \
+     the new one; the same image is not sent again",
+        "",
+    ),
+    (
+        "check before motion",
+        "`check`, `run --dry-run`",
+        "the control crate plays the movement; the worst margin of each \
+     limit with its time; a violation ends with 6",
+        "",
+    ),
+    (
+        "simulated device",
+        "`--device sil:`, `sim`",
+        "every command works without hardware; equal seeds give equal output \
+     to the byte",
+        "",
+    ),
+    ("learning", "`learn`", "fit error, kernels and duration are told; a bad file is named with line and column", ""),
+    (
+        "recording",
+        "`record`, `run --record`",
+        "one layout with units; lost samples are counted; what was recorded is \
+     kept",
+        "",
+    ),
+    ("live view", "`monitor`", "joints, wrench, times, bus and faults on 80 x 24; a line stream with `--json`", ""),
+    (
+        "a run with preconditions",
+        "`run`",
+        "what is missing is named, and nothing moves; the end tells duration, \
+     tracking, limits and lost samples",
+        "the preconditions are not listed with their values",
+    ),
+    ("settings", "`config`", "read, written, compared and restored, with a report of differences", "not built"),
+    (
+        "health of the line",
+        "`status`, the end of each `run`",
+        "success rate, longest gap, times of answers, bus errors, \
+     and which side was late",
+        "no command measures the line alone",
+    ),
+    (
+        "output for scripts",
+        "`--json` everywhere",
+        "one object, or one a line; schemas in docs/schemas; exit codes as documented",
+        "",
+    ),
+    ("errors that help", "all", "code, cause and a command that helps; no input ends in a panic", ""),
+    ("calibration", "`calibrate`", "before and after, kept over a restart", "the report is not written to a file"),
+    ("flashing and logs", "`flash`, `logs`", "the probe's command is shown; verified; stored primitives are kept", ""),
+    ("doctor", "`doctor`", "permissions, versions, faults and settings in one file", "not built"),
+    ("completions and manual", "`completions`", "bash, zsh and fish know every command", "no manual pages"),
+    ("defaults", "`TACTUS_DEVICE`", "option before environment before file", "no configuration file"),
+    (
+        "replay",
+        "`can replay`",
+        "the device's application, given the recorded frames, sends the same torque frames to the \
+     bit",
+        "",
+    ),
+];
+
+const HEAD: &str = "\
+# Features of the command line tool
+
+Who reads this: whoever wants to know which of the twenty features is proven. This file is written from
+`host/tests/features.rs`; change it there. A test whose name begins with `cli_N_` belongs to row N. A row is held when
+a test proves it and nothing of its bar is missing.
+
+| | feature | command | bar | tests | state |
+|---|---|---|---|---|---|
+";
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Rust files of a folder and of those below it.
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.is_dir() && !path.ends_with("target") {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|kind| kind == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// Names of the tests of each row.
+fn proofs() -> BTreeMap<usize, BTreeSet<String>> {
+    let mut files = Vec::new();
+    ["host", "crates", "tests"].iter().for_each(|folder| sources(&root().join(folder), &mut files));
+    let mut proofs: BTreeMap<usize, BTreeSet<String>> = BTreeMap::new();
+    for file in files {
+        let text = std::fs::read_to_string(&file).unwrap();
+        for rest in text.lines().filter_map(|line| line.trim_start().strip_prefix("fn cli_")) {
+            let (number, _) = rest.split_once('_').unwrap();
+            let name = rest.split('(').next().unwrap();
+            proofs.entry(number.parse().unwrap()).or_default().insert(format!("cli_{name}"));
+        }
+    }
+    proofs
+}
+
+#[test]
+fn the_table_of_features_is_what_the_tests_hold() {
+    let proofs = proofs();
+    assert!(proofs.keys().all(|number| (1..=ROWS.len()).contains(number)), "a test of no row: {proofs:?}");
+    let mut text = HEAD.to_owned();
+    for (number, (feature, command, bar, missing)) in (1..).zip(ROWS) {
+        let tests: Vec<String> = proofs.get(&number).into_iter().flatten().map(|name| format!("`{name}`")).collect();
+        assert!(!missing.is_empty() || !tests.is_empty(), "row {number} is said to be held, and no test proves it");
+        let state = if missing.is_empty() { "**held**".to_owned() } else { format!("open: {missing}") };
+        let tests = if tests.is_empty() { "-".to_owned() } else { tests.join(", ") };
+        writeln!(text, "| {number} | {feature} | {command} | {bar} | {tests} | {state} |").unwrap();
+    }
+    let path = root().join("docs/cli.md");
+    if std::env::var_os("UPDATE_DOCUMENTS").is_some() {
+        std::fs::write(&path, &text).unwrap();
+    }
+    let found = std::fs::read_to_string(&path).unwrap();
+    let differs = found.lines().zip(text.lines()).find(|(found, text)| found != text);
+    assert!(found == text, "UPDATE_DOCUMENTS=1 cargo test -p tactus --test features mends it; first: {differs:?}");
+}
+
+fn command(folder: &Path, line: &str) -> std::process::Command {
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_tactus"));
+    command.current_dir(folder).env_remove("TACTUS_DEVICE").args(line.split_whitespace());
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+#[track_caller]
+fn succeeds(folder: &Path, line: &str) -> Output {
+    let output = command(folder, line).output().unwrap();
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+    output
+}
+
+/// A folder with the primitive `reach.toml` of so many seconds.
+fn learned(duration: f64) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    common::demonstration(folder.path(), duration);
+    succeeds(folder.path(), "learn demo.csv -o reach.toml");
+    folder
+}
+
+#[test]
+fn cli_3_an_interrupted_run_ends_with_130_and_what_was_recorded_is_kept() {
+    let folder = learned(20.0);
+    let part = folder.path().join("run.csv.part");
+    let mut run = command(folder.path(), "--device sil:world=simple --non-interactive run reach.toml --record run.csv");
+    let child = run.spawn().unwrap();
+    let begun = Instant::now();
+    while !std::fs::metadata(&part).is_ok_and(|file| file.len() > 300_000) {
+        assert!(begun.elapsed() < Duration::from_secs(120), "nothing is recorded");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let sent = std::process::Command::new("kill").args(["-s", "INT", &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    let ended = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(130), "{said}");
+    assert!(said.contains("error[E130]") && said.contains("run.csv.part"), "{said}");
+}
+
+#[test]
+fn cli_4_an_image_that_is_there_already_is_not_sent_again() {
+    let folder = learned(3.0);
+    let upload = "--device sil:world=simple,flash=arm.flash --non-interactive --json upload reach.toml";
+    for sent in [true, false] {
+        let told: serde_json::Value = serde_json::from_slice(&succeeds(folder.path(), upload).stdout).unwrap();
+        assert_eq!(told["sent"], sent, "{told}");
+    }
+}
+
+#[test]
+fn cli_6_equal_seeds_give_equal_output_to_the_byte_and_another_seed_does_not() {
+    let folder = learned(3.0);
+    let recorded = |seed: u32| {
+        let device = format!("--device sil:world=simple,seed={seed} --non-interactive --json --force");
+        let told = succeeds(folder.path(), &format!("{device} run reach.toml --record run.csv")).stdout;
+        (told, std::fs::read(folder.path().join("run.csv")).unwrap())
+    };
+    let one = recorded(3);
+    assert!(one == recorded(3), "equal seeds differ");
+    assert!(one.1 != recorded(4).1, "the seed changes nothing");
+}
+
+#[test]
+fn cli_10_a_run_that_lacks_something_names_it_and_another_tells_how_it_ended() {
+    let folder = learned(3.0);
+    let device = "--device sil:world=simple --non-interactive --json";
+    let refused = command(folder.path(), &format!("{device} run reach.toml --mode adapt")).output().unwrap();
+    assert_eq!(refused.status.code(), Some(6));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("tactus rehearse reach.toml"));
+    let told = succeeds(folder.path(), &format!("{device} run reach.toml")).stdout;
+    let told: serde_json::Value = serde_json::from_slice(&told).unwrap();
+    assert!(told["tracking"]["position_max_m"].is_number() && told["flags"]["limited"].is_number(), "{told}");
+}
+
+#[test]
+fn cli_19_an_option_counts_before_the_environment() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |line: &str| {
+        let output = command(folder.path(), line).env("TACTUS_DEVICE", "nonsense-of-the-environment").output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let (code, said) = refused("list");
+    assert!(code == Some(2) && said.contains("nonsense-of-the-environment"), "{said}");
+    let (code, said) = refused("--device nonsense-of-the-option list");
+    assert!(code == Some(2) && said.contains("nonsense-of-the-option"), "{said}");
+}
