@@ -53,6 +53,10 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "control::cycle::laws::<impl control::cycle::Cycle<R,_>>::stop",
         "a soft stop: no plan and no feedback is computed",
     ),
+    (
+        "control::sense::wrench::WrenchEstimator<R>::follow",
+        "the memory is full; a few dozen instructions without a loop over time",
+    ),
     ("control::sense::observer", "the memory is full; a few loops that the cache keeps from one cycle to the next"),
     (
         "control::model::mass_matrix",
