@@ -110,7 +110,8 @@ fn firmware_grasps_what_the_application_in_this_process_grasps() {
         let (start, before) = (difference.start, difference.before_contact);
         assert!(start.joint_rad < 2e-6, "{name:?} does not begin alike: {start:?}");
         assert!(before.samples > 600, "{name:?}: {before:?}");
-        let alike = before.joint_rad < 1.5e-3 && before.position_m < 1e-3 && before.plan_m.is_some_and(|m| m < SAME_PLAN);
+        let alike =
+            before.joint_rad < 1.5e-3 && before.position_m < 1e-3 && before.plan_m.is_some_and(|m| m < SAME_PLAN);
         assert!(alike, "{name:?}: {before:?}");
         let later = expect(Difference::between(&planned_a_cycle_later(in_process), &firmware, TOUCH)).before_contact;
         assert!(later.plan_m.is_some_and(|m| m > SAME_PLAN), "{name:?}: a cycle more would not be noticed: {later:?}");
