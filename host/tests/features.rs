@@ -88,7 +88,12 @@ const ROWS: [Feature; 20] = [
         "one object, or one a line; schemas in docs/schemas; exit codes as documented",
         "",
     ),
-    ("errors that help", "all", "code, cause and a command that helps; no input ends in a panic", ""),
+    (
+        "errors that help",
+        "all",
+        "code, cause and a command that helps; no input ends in a panic",
+        "`report` and `get` are not tried with damaged files",
+    ),
     ("calibration", "`calibrate`", "before and after, kept over a restart", "the report is not written to a file"),
     ("flashing and logs", "`flash`, `logs`", "the probe's command is shown; verified; stored primitives are kept", ""),
     ("doctor", "`doctor`", "permissions, versions, faults and settings in one file", "not built"),
@@ -99,7 +104,7 @@ const ROWS: [Feature; 20] = [
         "`can replay`",
         "the device's application, given the recorded frames, sends the same torque frames to the \
      bit",
-        "",
+        "from logs of the bus; recordings of telemetry cannot be replayed",
     ),
 ];
 
