@@ -181,6 +181,7 @@ impl fmt::Display for StartupTrouble {
         match (self.error(), self.0) {
             (Some(error), _) => error.fmt(f),
             (None, [13, _]) => f.write_str("the scales of the pucks do not fit the arm's transmission"),
+            (None, [0, _]) => f.write_str("it goes on, and has met nothing that stops it"),
             (None, [code, detail]) => write!(f, "unknown reason {code} ({detail:#x})"),
         }
     }

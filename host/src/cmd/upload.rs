@@ -59,14 +59,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 
 /// Makes sure that a person wants another version of the same name replaced.
 fn may_replace(client: &mut Client<Device>, file: &PrimitiveFile, global: &Global) -> Result<(), Failure> {
-    const DOING: &str = "upload refused";
+    const DOING: &str = "upload";
     let Some(there) = other_version(client, file, DOING)?.filter(|_| !global.force) else { return Ok(()) };
     let checksum = there.crc;
     let what = format!("the device stores another version of '{}' (checksum 0x{checksum:08x})", file.name);
     if super::ask(global, &format!("{what}; replace it?")) {
         return Ok(());
     }
-    Err(Failure::new(ErrorCode::WouldReplace, DOING, what)
+    Err(Failure::new(ErrorCode::WouldReplace, "upload refused", what)
         .help("keep that one first: `tactus rename` or `tactus get`; or replace it with `--force`"))
 }
 
