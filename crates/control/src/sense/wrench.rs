@@ -86,6 +86,8 @@ pub struct WrenchEstimator<R: Real> {
     doubtful: bool,
     filter: LowPass<R, 6>,
     tare: Vector6<R>,
+    /// The tare as it was taken, before anything was followed in a run.
+    taken: Vector6<R>,
     tared: bool,
     /// Last believed sample, as the sensor gave it.
     last: Vector6<R>,
@@ -106,6 +108,7 @@ impl<R: Real> WrenchEstimator<R> {
             doubtful: false,
             filter: LowPass::new(Butterworth::new(WRENCH_CUT_OFF, RATE)),
             tare: Vector6::zeros(),
+            taken: Vector6::zeros(),
             tared: false,
             last: Vector6::zeros(),
             unloaded: Vector6::zeros(),
@@ -185,6 +188,7 @@ impl<R: Real> WrenchEstimator<R> {
             return false;
         }
         self.tare = self.offset();
+        self.taken = self.tare;
         self.tared = true;
         true
     }
@@ -199,8 +203,12 @@ impl<R: Real> WrenchEstimator<R> {
     /// Tares, unless the wrench has been tared already and differs from that by more than a sensor drifts: then the
     /// hand holds or touches something, which must stay in the wrench.
     pub fn tare_drift(&mut self) {
-        let drift = self.rest_force();
-        if !self.tared || drift.dot(&drift) <= R::of(DRIFT * DRIFT) {
+        // What was followed in a run may have been a slow touch: the tare before it counts as well.
+        let near = |tare: &Vector6<R>| {
+            let drift = (self.offset() - tare).fixed_rows::<3>(0).into_owned();
+            drift.dot(&drift) <= R::of(DRIFT * DRIFT)
+        };
+        if !self.tared || near(&self.tare) || near(&self.taken) {
             self.tare();
         }
     }
@@ -278,5 +286,75 @@ impl<R: Real> WrenchEstimator<R> {
 impl<R: Real> Default for WrenchEstimator<R> {
     fn default() -> Self {
         WrenchEstimator::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::arm::ArmModel;
+    use crate::model::calibration::Payload;
+    use crate::units::JointPositions;
+
+    fn frames(q: [f64; 7]) -> Frames<f64> {
+        Frames::new(&ArmModel::new(Payload::SensorAndHand), &JointPositions::from_array(q))
+    }
+
+    /// A sample of these errors (N, N m, sensor axes).
+    fn sample(force: [f64; 3], torque: [f64; 3]) -> RawWrench {
+        let counts = |values: [f64; 3], scale: f64| values.map(|value| (value * scale).round() as i16);
+        RawWrench { force: counts(force, 256.0), torque: counts(torque, 4096.0), status: None }
+    }
+
+    /// A cycle of free motion, of which nothing is expected; returns the wrench.
+    fn follow(
+        estimator: &mut WrenchEstimator<f64>,
+        drift: &mut Drift<f64>,
+        raw: &RawWrench,
+        frames: &Frames<f64>,
+    ) -> Wrench<f64> {
+        estimator.update(Some(raw), Some(&Vector6::zeros()), false);
+        let measured = estimator.wrench(frames);
+        let deviation = Deviation::new(&[0.0; 9], &measured, None);
+        estimator.follow(drift, &measured, Some(&deviation), frames);
+        measured
+    }
+
+    fn tared() -> WrenchEstimator<f64> {
+        let mut estimator = WrenchEstimator::new();
+        for _ in 0..200 {
+            estimator.update(Some(&sample([0.0; 3], [0.0; 3])), Some(&Vector6::zeros()), true);
+        }
+        assert!(estimator.tare());
+        estimator
+    }
+
+    #[test]
+    fn an_error_of_the_sensor_is_followed_in_its_own_axes_and_holds_when_the_hand_turns() {
+        let (mut estimator, mut drift) = (tared(), Drift::new());
+        let raw = sample([0.3, -0.2, 0.1], [0.01, 0.02, -0.01]);
+        let before = frames([-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75]);
+        for _ in 0..1500 {
+            follow(&mut estimator, &mut drift, &raw, &before);
+        }
+        let turned = frames([0.3, 0.9, -0.4, 1.6, -1.5, 0.9, -1.0]);
+        let left = follow(&mut estimator, &mut drift, &raw, &turned);
+        assert!(left.force.norm() < 0.01 && left.torque.norm() < 0.002, "{left:?}");
+    }
+
+    #[test]
+    fn a_slow_touch_that_was_taken_for_an_error_is_forgotten_at_the_next_rest() {
+        let (mut estimator, mut drift) = (tared(), Drift::new());
+        let here = frames([-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75]);
+        for tick in 0..3000_u32 {
+            let touch = f64::min(0.4 * f64::from(tick) / RATE, 1.9);
+            follow(&mut estimator, &mut drift, &sample([touch, 0.0, 0.0], [0.0; 3]), &here);
+        }
+        for _ in 0..200 {
+            estimator.update(Some(&sample([0.0; 3], [0.0; 3])), Some(&Vector6::zeros()), true);
+        }
+        assert!(estimator.rest_force().norm() > 1.5, "nothing was followed: {}", estimator.rest_force());
+        estimator.tare_drift();
+        assert!(estimator.rest_force().norm() < 0.01, "{}", estimator.rest_force());
     }
 }
