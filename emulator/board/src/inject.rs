@@ -19,8 +19,9 @@ const SYSTEM_RESET: u32 = 0x05FA_0004;
 const POWER_FLAGS: u64 = 0x00FE_0000;
 const BROWN_OUT_FLAGS: u64 = 0x007E_0000;
 
-/// Where injected instructions and the place of an injected panic lie: the end of the AXI memory, which no image fills.
-const SCRATCH: u32 = 0x2407_FFC0;
+/// Where injected instructions and the place of an injected panic lie: the end of the part of the AXI memory that holds
+/// data, which no image fills. Behind it lies the memory that is kept over a restart, where nothing may be executed.
+const SCRATCH: u32 = 0x2405_FFC0;
 
 /// Two instructions each: branch to itself, undefined as compilers write it.
 const LOOP: u32 = 0xE7FE_E7FE;
