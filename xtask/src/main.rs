@@ -58,6 +58,7 @@ cargo xtask <verb>
   package  packages for strangers: packed, unpacked outside the repository, tested there
   mutants  wrong changes of the code that named tests must catch; cargo xtask mutants WORDS: those whose name has WORDS
   faults [--all] [--json] [ID...]   the fault catalogue: every script of tests/faults against the simulated arm
+           --device sim: | board: the scenarios marked for it, with the image under QEMU or on the emulated board
   faults storm [--runs N] [--seed S]   random faults and orders; one run prints itself as a scenario
   fuzz [COUNT]   COUNT random link frames and as many CAN frames, a tenth of it random sessions; 1000000 unless given
   margins  every control law on an arm without friction, kicked: what is left, worst pose, frequency

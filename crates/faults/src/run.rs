@@ -1,5 +1,6 @@
 //! Runs scenarios and judges them.
 
+use lab::transport::SimulatorKind;
 use serde::Serialize;
 
 use crate::bench::{self, Failure};
@@ -61,7 +62,7 @@ impl Verdict {
 
 /// Runs one scenario of an entry, and the same without the faults if a bar compares the two.
 #[must_use]
-pub fn run(entry: &Entry, scenario: &Scenario) -> Verdict {
+pub fn run(entry: &Entry, scenario: &Scenario, kind: SimulatorKind) -> Verdict {
     let mut verdict = Verdict {
         id: entry.id.clone(),
         scenario: scenario.name.clone(),
@@ -71,17 +72,17 @@ pub fn run(entry: &Entry, scenario: &Scenario) -> Verdict {
         failures: Vec::new(),
         known: scenario.known.clone(),
     };
-    if let Err(failure) = go_through(scenario, &mut verdict) {
+    if let Err(failure) = go_through(scenario, kind, &mut verdict) {
         verdict.failures.push(failure.to_string());
     }
     verdict
 }
 
-fn go_through(scenario: &Scenario, verdict: &mut Verdict) -> Result<(), Failure> {
+fn go_through(scenario: &Scenario, kind: SimulatorKind, verdict: &mut Verdict) -> Result<(), Failure> {
     let compares = |figure: &Figure| matches!(figure, Figure::Deviation | Figure::Tracking | Figure::Plan);
     let (most, least) = (&scenario.expect.most, &scenario.expect.least);
-    let nominal = most.keys().chain(least.keys()).any(compares).then(|| watched_without(scenario)).transpose()?;
-    let mut arm = bench::arm(scenario, true)?;
+    let nominal = most.keys().chain(least.keys()).any(compares).then(|| watched_without(scenario, kind)).transpose()?;
+    let mut arm = bench::arm(scenario, true, kind)?;
     let watched = watch::watch(&mut arm, scenario.watch, &scenario.order)?;
     let figures = measure::all(scenario, &watched, nominal.as_ref());
     let last = watched.moments.last().ok_or("nothing was seen")?;
@@ -120,8 +121,8 @@ fn recovered(arm: &mut bench::Arm, scenario: &Scenario, verdict: &mut Verdict) -
     outcome.map_err(|failure| format!("on the way back: {failure}").into())
 }
 
-fn watched_without(scenario: &Scenario) -> Result<Watched, Failure> {
-    let mut arm = bench::arm(scenario, false)?;
+fn watched_without(scenario: &Scenario, kind: SimulatorKind) -> Result<Watched, Failure> {
+    let mut arm = bench::arm(scenario, false, kind)?;
     watch::watch(&mut arm, scenario.watch, &[])
 }
 
