@@ -33,6 +33,11 @@ const fn computing(slot: Slot) -> Ticks {
     }
 }
 
+/// Time from one slot to the next by a clock that is slow by this share.
+fn slot_length(slow: f64) -> Ticks {
+    if slow == 0.0 { SLOT_TICKS } else { (SLOT_TICKS as f64 * (1.0 + slow)).round() as Ticks }
+}
+
 type ArmSession = Session<Library<STORE_SLOTS, IMAGE_BYTES_LIMIT>>;
 
 /// The session, shared with whoever keeps its library on the flash; never by two at a time.
@@ -108,6 +113,8 @@ pub(super) struct InProcess {
     queues: Queues,
     slot: Slot,
     next_slot: Ticks,
+    /// Time of the next slot on the device's own clock.
+    next_slot_told: Ticks,
     /// Frames that are still being computed, with the time at which they leave.
     leaving: VecDeque<(Ticks, CanFrame)>,
     is_bus_off: bool,
@@ -135,6 +142,7 @@ impl InProcess {
             queues: Queues::default(),
             slot: Slot::Request,
             next_slot: FIRST_SLOT * SLOT_TICKS,
+            next_slot_told: FIRST_SLOT * SLOT_TICKS,
             leaving: VecDeque::new(),
             is_bus_off: false,
             line: Vec::new(),
@@ -145,8 +153,9 @@ impl InProcess {
     fn slot(&mut self, plant: &mut Plant) -> Result<(), SimulationError> {
         let now = self.next_slot;
         plant.advance(now);
-        let now_us = now / TICKS_PER_MICROSECOND;
+        let now_us = self.next_slot_told / TICKS_PER_MICROSECOND;
         self.queues.refused = plant.refused();
+        self.queues.waiting = plant.waiting() + self.leaving.len();
         if plant.is_bus_off() && !self.is_bus_off {
             self.leaving.clear();
             self.core.note_bus_error(true);
@@ -169,7 +178,8 @@ impl InProcess {
             self.line.clear();
         }
         self.slot = self.slot.next();
-        self.next_slot += SLOT_TICKS;
+        self.next_slot += slot_length(plant.clock_error());
+        self.next_slot_told += SLOT_TICKS;
         self.keeper.run(now, self.next_slot)
     }
 }
