@@ -9,6 +9,7 @@ use std::convert::Infallible;
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
+use std::time::Duration;
 
 use device::storage::{Library, LibraryAccess, Opening, Scratch, Work, keep, value_bytes};
 use device::{Controller, DeviceController, FaultMemory, Identity, Session, Slot, StoreError};
@@ -123,8 +124,8 @@ pub(super) struct InProcess {
 }
 
 impl InProcess {
-    /// The device at power-up, with this flash.
-    pub(super) fn new(flash: FlashChip) -> Self {
+    /// The device at power-up, with this flash and a clock that has run for `uptime`.
+    pub(super) fn new(flash: FlashChip, uptime: Duration) -> Self {
         let identity = Identity {
             firmware: env!("CARGO_PKG_VERSION"),
             board: "in-process",
@@ -142,7 +143,7 @@ impl InProcess {
             queues: Queues::default(),
             slot: Slot::Request,
             next_slot: FIRST_SLOT * SLOT_TICKS,
-            next_slot_told: FIRST_SLOT * SLOT_TICKS,
+            next_slot_told: FIRST_SLOT * SLOT_TICKS + sim::ticks(uptime.as_secs_f64()),
             leaving: VecDeque::new(),
             is_bus_off: false,
             line: Vec::new(),

@@ -36,6 +36,15 @@ struct Order {
     first: Vec<CanFrame>,
 }
 
+impl Order {
+    /// True if nothing comes of it any more.
+    fn is_over(&self) -> bool {
+        let is_of_a_moment =
+            matches!(self.kind, FaultKind::CountJump { .. } | FaultKind::Restart { .. } | FaultKind::Pendant(_));
+        self.phase == Phase::After || (self.phase == Phase::During && is_of_a_moment && self.ends == Ticks::MAX)
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     Before,
@@ -75,6 +84,7 @@ impl Faults {
 
     /// Orders faults whose times count from `zero`.
     pub(crate) fn order(&mut self, zero: Ticks, injections: &[Injection]) {
+        self.orders.retain(|order| !order.is_over());
         for injection in injections {
             for time in 0..injection.times {
                 let begins = zero + ticks(injection.at + injection.every * f64::from(time));
