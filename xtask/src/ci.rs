@@ -26,6 +26,7 @@ pub(crate) fn run() -> Result<()> {
     emulated::lint()?;
     emulated::run(None)?;
     test::run(&machine)?;
+    crate::faults(&["--device", "sim:"])?;
     build::documentation()?;
     budget::run(&machine)?;
     hand::run(&machine)?;

@@ -1,6 +1,7 @@
 //! Torque limits leave room for what the arm weighs, and nothing finite or not gets past them.
 
 use control::act::TorqueLimiter;
+use control::act::hand::{HandLimiter, TORQUE_LIMIT};
 use control::act::limit::{LimitReport, MOTOR_COUNTS_LIMIT, STEP_LIMIT, WORST_GRAVITY};
 use control::model::{ArmModel, Frames};
 use control::units::{JointPositions, JointTorques};
@@ -122,6 +123,47 @@ proptest! {
                 prop_assert!((torques[joint] - last[joint]).abs() <= STEP_LIMIT[joint] as f32 * 1.00001);
             }
             last = torques;
+        }
+    }
+
+    /// Torques that did not leave do not count: no step from one torque on the bus to the next is above the rate.
+    #[test]
+    fn a12_the_step_after_torques_that_did_not_leave_is_within_the_limit(
+        cycles in prop::collection::vec((prop::array::uniform7(-60.0f64..60.0), any::<bool>(), any::<bool>()), 1..60)
+    ) {
+        let mut limiter = limiter();
+        let mut bus = [0.0f64; 7];
+        for (wanted, arm_left, wrist_left) in cycles {
+            let torques: [f64; 7] = limiter.limit(&JointTorques::from_array(wanted)).0.torques().0.into();
+            limiter.not_sent(!arm_left, !wrist_left);
+            for joint in 0..7 {
+                if if joint < 4 { arm_left } else { wrist_left } {
+                    prop_assert!((torques[joint] - bus[joint]).abs() <= STEP_LIMIT[joint] * 1.00001, "J{}", joint + 1);
+                    bus[joint] = torques[joint];
+                }
+                prop_assert_eq!(limiter.last().torques().0[joint], bus[joint]);
+            }
+        }
+    }
+
+    /// The same for the hand.
+    #[test]
+    fn a12_the_step_of_the_hand_after_torques_that_did_not_leave_is_within_the_limit(
+        cycles in prop::collection::vec((prop::array::uniform4(-9.0f64..9.0), any::<bool>()), 1..60)
+    ) {
+        let mut limiter = HandLimiter::new();
+        let mut bus = [0.0f64; 4];
+        for (wanted, left) in cycles {
+            let torques = *limiter.limit(&wanted).torques();
+            if left {
+                for digit in 0..4 {
+                    let largest = TORQUE_LIMIT[digit] / 15.0 * 1.00001;
+                    prop_assert!((torques[digit] - bus[digit]).abs() <= largest, "digit {digit}");
+                }
+                bus = torques;
+            } else {
+                limiter.not_sent();
+            }
         }
     }
 }

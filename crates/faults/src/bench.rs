@@ -7,7 +7,8 @@ use control::State;
 use lab::client::{Client, Incoming};
 use lab::device::Device;
 use lab::procedure::{self, Ends};
-use lab::simulation::{Engine, Simulation, SimulationOptions, WorldKind};
+use lab::simulation::{Simulation, SimulationOptions};
+use lab::transport::{SimulatorKind, SimulatorOptions};
 use link::Name;
 use sim::{OperatorConfig, Plant, PlantConfig, TICKS_PER_MILLISECOND, Ticks};
 
@@ -27,11 +28,12 @@ const LET_GO: Ticks = 900 * TICKS_PER_MILLISECOND;
 const BEGIN: Duration = Duration::from_millis(200);
 
 /// The arm of a scenario, in the state where it begins, its telemetry on. Faults of a power-up are ordered already.
+/// `kind` says what executes the co-controller's application: this process, or its image under an emulator.
 ///
 /// # Errors
 /// The arm does not get there.
-pub fn arm(scenario: &Scenario, with_faults: bool) -> Result<Arm, Failure> {
-    let mut simulation = simulation(scenario.seed, Duration::ZERO)?;
+pub fn arm(scenario: &Scenario, with_faults: bool, kind: SimulatorKind) -> Result<Arm, Failure> {
+    let mut simulation = simulation(scenario.seed, Duration::ZERO, kind)?;
     if scenario.from == From::PowerUp && with_faults {
         simulation.plant().inject(&scenario.inject);
     }
@@ -48,8 +50,9 @@ pub fn arm(scenario: &Scenario, with_faults: bool) -> Result<Arm, Failure> {
 ///
 /// # Errors
 /// The simulation does not start.
-pub fn simulation(seed: u64, uptime: Duration) -> Result<Simulation, Failure> {
-    let mut options = SimulationOptions::new(Engine::InProcess, seed, WorldKind::Simple);
+pub fn simulation(seed: u64, uptime: Duration, kind: SimulatorKind) -> Result<Simulation, Failure> {
+    let simple = SimulatorOptions { seed: Some(seed), world: Some("simple".to_owned()), ..SimulatorOptions::default() };
+    let mut options = SimulationOptions::from_address(kind, &simple)?;
     options.posture = START;
     options.uptime = uptime;
     options.plant = PlantConfig {

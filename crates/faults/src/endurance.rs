@@ -4,6 +4,7 @@
 use std::path::Path;
 use std::time::Duration;
 
+use lab::transport::SimulatorKind;
 use sim::{PendantAction, seconds};
 
 use crate::bench::{self, Arm, Failure, plant};
@@ -67,7 +68,7 @@ impl Course {
 /// The arm does not come back even by an E-stop, or the process cannot be looked at.
 pub fn run(hours: f64, first: u64, mut tell: impl FnMut(f64, u64, usize, Process)) -> Result<Course, Failure> {
     let uptime = WRAP.saturating_sub(Duration::from_secs_f64(1800.0 * hours));
-    let mut arm = bench::connected(bench::simulation(first, uptime)?)?;
+    let mut arm = bench::connected(bench::simulation(first, uptime, SimulatorKind::InProcess)?)?;
     let (mut rounds, mut failed, mut warm) = (0, Vec::new(), None);
     loop {
         let verdict = round(&mut arm, first.wrapping_add(rounds))?;

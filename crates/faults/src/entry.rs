@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use control::{Fault, State};
 use lab::procedure::Mode;
 use serde::{Deserialize, Serialize};
-use sim::fault::Injection;
+use sim::fault::{FaultKind, Injection};
 
 use crate::figure::Figure;
 
@@ -50,6 +50,9 @@ pub struct Scenario {
     pub seed: u64,
     /// Time watched from time 0 on, s.
     pub watch: f64,
+    /// The images of the co-controller go through it too: with `--device sim:` and `--device board:`.
+    #[serde(default)]
+    pub firmware: bool,
     /// A defect that is known: the scenario must fail. A sentence that says what happens instead.
     #[serde(default)]
     pub known: Option<String>,
@@ -65,6 +68,15 @@ pub struct Scenario {
     /// The way back, and whether zeroing must be demanded on it.
     #[serde(default)]
     pub recover: Recover,
+}
+
+impl Scenario {
+    /// True if a fault of it lies in the co-controller's own bus controller, which images have from their emulator.
+    #[must_use]
+    pub fn is_of_the_port(&self) -> bool {
+        let is = |kind: &FaultKind| matches!(kind, FaultKind::BusOff | FaultKind::Refuse(_) | FaultKind::Clock(_));
+        self.inject.iter().any(|injection| is(&injection.what))
+    }
 }
 
 /// States in which a scenario begins.

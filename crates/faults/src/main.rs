@@ -1,4 +1,4 @@
-//! `faults [--json] [--all] [ID...]`: runs the fault catalogue, or some of it.
+//! `faults [--json] [--all] [--device sim:|board:] [ID...]`: runs the fault catalogue, or some of it.
 //! `faults storm [--runs N] [--seed S]`: runs storms of random faults, the seeds in a row from S on.
 //! `faults endurance [--hours H] [--seed S]`: the same on one arm in one process, for hours of simulated time.
 
@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use faults::entry::{Entry, Scenario};
 use faults::run::{self, Verdict};
 use faults::{catalogue, endurance, report, storm};
+use lab::transport::SimulatorKind;
 
 /// Scripts, relative to the root of the repository.
 const FOLDER: &str = "tests/faults";
@@ -22,12 +23,7 @@ fn main() -> ExitCode {
     let is_good = match words.split_first() {
         Some((first, rest)) if first == "storm" => storms(rest),
         Some((first, rest)) if first == "endurance" => endures(rest),
-        _ => {
-            let ids: Vec<String> =
-                words.iter().filter(|word| !word.starts_with('-')).map(|id| id.to_uppercase()).collect();
-            let has = |flag: &str| words.iter().any(|word| word == flag);
-            go(&ids, has("--json"), has("--all"))
-        }
+        _ => Wanted::parse(&words).and_then(|wanted| go(&wanted)),
     };
     match is_good {
         Ok(true) => ExitCode::SUCCESS,
@@ -93,7 +89,55 @@ fn endures(words: &[String]) -> Result<bool, Box<dyn std::error::Error>> {
     Ok(course.holds())
 }
 
-fn go(ids: &[String], json: bool, all: bool) -> Result<bool, Box<dyn std::error::Error>> {
+/// The words of the command line.
+struct Wanted {
+    /// Entries; none: all.
+    ids: Vec<String>,
+    json: bool,
+    all: bool,
+    /// The engine of the co-controller's application.
+    kind: SimulatorKind,
+}
+
+impl Wanted {
+    fn parse(words: &[String]) -> Result<Self, Box<dyn std::error::Error>> {
+        let mut wanted = Self { ids: Vec::new(), json: false, all: false, kind: SimulatorKind::InProcess };
+        let mut words = words.iter().map(String::as_str);
+        while let Some(word) = words.next() {
+            match word {
+                "--json" => wanted.json = true,
+                "--all" => wanted.all = true,
+                "--device" => {
+                    wanted.kind = match words.next() {
+                        Some("sil:") => SimulatorKind::InProcess,
+                        Some("sim:") => SimulatorKind::Qemu,
+                        Some("board:") => SimulatorKind::Board,
+                        other => {
+                            let other = other.unwrap_or("nothing");
+                            return Err(format!("--device is sil:, sim: or board:, not {other}").into());
+                        }
+                    };
+                }
+                flag if flag.starts_with('-') => return Err(format!("unknown: {flag}").into()),
+                id => wanted.ids.push(id.to_uppercase()),
+            }
+        }
+        Ok(wanted)
+    }
+
+    /// True for a scenario that is to run. With an image: one that is marked for it, or that can run there if its
+    /// entry was named.
+    fn has(&self, entry: &Entry, scenario: &Scenario) -> bool {
+        let is_in_process = self.kind == SimulatorKind::InProcess;
+        match self.ids.is_empty() {
+            true => is_in_process || scenario.firmware,
+            false => self.ids.contains(&entry.id) && (is_in_process || !scenario.is_of_the_port()),
+        }
+    }
+}
+
+fn go(wanted: &Wanted) -> Result<bool, Box<dyn std::error::Error>> {
+    let &Wanted { ref ids, json, all, kind } = wanted;
     let entries = Entry::all(Path::new(FOLDER))?;
     let mut is_good = true;
     for difference in catalogue::differences(&entries, &std::fs::read_to_string(CATALOGUE)?) {
@@ -103,16 +147,16 @@ fn go(ids: &[String], json: bool, all: bool) -> Result<bool, Box<dyn std::error:
     if let Some(id) = ids.iter().find(|id| entries.iter().all(|entry| entry.id != **id)) {
         return Err(format!("there is no entry {id}").into());
     }
-    let wanted: Vec<&Entry> = entries.iter().filter(|entry| ids.is_empty() || ids.contains(&entry.id)).collect();
-    if !json {
-        wanted
-            .iter()
-            .filter(|entry| entry.scenario.is_empty())
-            .for_each(|entry| print!("{}", report::elsewhere(entry)));
+    let named: Vec<&Entry> = entries.iter().filter(|entry| ids.is_empty() || ids.contains(&entry.id)).collect();
+    if !json && kind == SimulatorKind::InProcess {
+        named.iter().filter(|entry| entry.scenario.is_empty()).for_each(|entry| print!("{}", report::elsewhere(entry)));
     }
-    let scenarios: Vec<(&Entry, &Scenario)> =
-        wanted.iter().flat_map(|entry| entry.scenario.iter().map(move |scenario| (*entry, scenario))).collect();
-    let verdicts = run_all(&scenarios, |verdict| {
+    let scenarios: Vec<(&Entry, &Scenario)> = named
+        .iter()
+        .flat_map(|entry| entry.scenario.iter().map(move |scenario| (*entry, scenario)))
+        .filter(|(entry, scenario)| wanted.has(entry, scenario))
+        .collect();
+    let verdicts = run_all(&scenarios, kind, |verdict| {
         if !json {
             print!("{}", report::lines(verdict, all))
         }
@@ -124,7 +168,7 @@ fn go(ids: &[String], json: bool, all: bool) -> Result<bool, Box<dyn std::error:
     let known = verdicts.iter().filter(|verdict| verdict.known.is_some()).count();
     eprintln!(
         "{} entries, {} scenarios: {} within their bars, {known} known defects, {failed} failed",
-        wanted.len(),
+        named.len(),
         verdicts.len(),
         verdicts.iter().filter(|verdict| verdict.holds()).count(),
     );
@@ -132,9 +176,9 @@ fn go(ids: &[String], json: bool, all: bool) -> Result<bool, Box<dyn std::error:
 }
 
 /// Runs the scenarios; the verdicts in the order of the scenarios.
-fn run_all(scenarios: &[(&Entry, &Scenario)], tell: impl Fn(&Verdict) + Sync) -> Vec<Verdict> {
+fn run_all(scenarios: &[(&Entry, &Scenario)], kind: SimulatorKind, tell: impl Fn(&Verdict) + Sync) -> Vec<Verdict> {
     let mut verdicts = on_every_processor(scenarios, |(entry, scenario)| {
-        let verdict = run::run(entry, scenario);
+        let verdict = run::run(entry, scenario, kind);
         tell(&verdict);
         verdict
     });

@@ -1,5 +1,6 @@
 //! Runs scenarios and judges them.
 
+use lab::transport::SimulatorKind;
 use serde::Serialize;
 
 use crate::bench::{self, Failure};
@@ -75,19 +76,19 @@ impl Verdict {
 
 /// Runs one scenario of an entry, and the same without the faults if a bar compares the two.
 #[must_use]
-pub fn run(entry: &Entry, scenario: &Scenario) -> Verdict {
+pub fn run(entry: &Entry, scenario: &Scenario, kind: SimulatorKind) -> Verdict {
     let mut verdict = Verdict::open(&entry.id, scenario);
-    if let Err(failure) = go_through(scenario, &mut verdict) {
+    if let Err(failure) = go_through(scenario, kind, &mut verdict) {
         verdict.failures.push(failure.to_string());
     }
     verdict
 }
 
-fn go_through(scenario: &Scenario, verdict: &mut Verdict) -> Result<(), Failure> {
+fn go_through(scenario: &Scenario, kind: SimulatorKind, verdict: &mut Verdict) -> Result<(), Failure> {
     let compares = |figure: &Figure| matches!(figure, Figure::Deviation | Figure::Tracking | Figure::Plan);
     let (most, least) = (&scenario.expect.most, &scenario.expect.least);
-    let nominal = most.keys().chain(least.keys()).any(compares).then(|| watched_without(scenario)).transpose()?;
-    judged(&mut bench::arm(scenario, true)?, scenario, nominal.as_ref(), verdict)
+    let nominal = most.keys().chain(least.keys()).any(compares).then(|| watched_without(scenario, kind)).transpose()?;
+    judged(&mut bench::arm(scenario, true, kind)?, scenario, nominal.as_ref(), verdict)
 }
 
 /// Watches an arm in the state where the scenario begins, judges what comes of it, and goes the way back.
@@ -138,8 +139,8 @@ fn recovered(arm: &mut bench::Arm, scenario: &Scenario, verdict: &mut Verdict) -
     outcome.map_err(|failure| format!("on the way back: {failure}").into())
 }
 
-fn watched_without(scenario: &Scenario) -> Result<Watched, Failure> {
-    let mut arm = bench::arm(scenario, false)?;
+fn watched_without(scenario: &Scenario, kind: SimulatorKind) -> Result<Watched, Failure> {
+    let mut arm = bench::arm(scenario, false, kind)?;
     watch::watch(&mut arm, scenario.watch, &[])
 }
 

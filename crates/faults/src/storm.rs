@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use lab::procedure::Mode;
+use lab::transport::SimulatorKind;
 use serde::Serialize;
 use sim::fault::{FaultKind, FrameKind, Frames, Injection, Supervised};
 use sim::{Noise, PendantAction};
@@ -41,7 +42,7 @@ pub fn run(seed: u64) -> Outcome {
         test: Vec::new(),
         scenario: Vec::new(),
     };
-    let verdict = run::run(&entry, &scenario);
+    let verdict = run::run(&entry, &scenario, SimulatorKind::InProcess);
     Outcome { seed, scenario, verdict }
 }
 
@@ -64,7 +65,19 @@ pub fn draw(seed: u64) -> Scenario {
     let watch = ends.fold(BEGIN, f64::max) + 1.0;
     let expect = Expect { most: bars(&inject), ..Expect::default() };
     let name = format!("storm {seed}");
-    Scenario { name, from, mode, seed, watch, known: None, inject, order, expect, recover: Recover::Either }
+    Scenario {
+        name,
+        from,
+        mode,
+        seed,
+        watch,
+        firmware: false,
+        known: None,
+        inject,
+        order,
+        expect,
+        recover: Recover::Either,
+    }
 }
 
 /// Bars other than those of every scenario. What a device is told wrong with a right check sum, or not told at all, it

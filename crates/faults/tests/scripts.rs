@@ -5,6 +5,7 @@ use std::path::Path;
 use faults::catalogue::differences;
 use faults::entry::Entry;
 use faults::run::run;
+use lab::transport::SimulatorKind;
 
 /// An entry with one scenario: torque frames cannot leave.
 const SCRIPT: &str = r#"title = "torque frames cannot leave"
@@ -60,7 +61,7 @@ fn script_and_catalogue_say_the_same_or_the_difference_is_told() {
 fn a_scenario_is_judged_by_its_bars_and_a_known_defect_has_to_fail() {
     let judged = |text: &str| {
         let entry = read(text).expect("sound");
-        let verdict = run(&entry, &entry.scenario[0]);
+        let verdict = run(&entry, &entry.scenario[0], SimulatorKind::InProcess);
         (verdict.holds(), verdict.is_as_told())
     };
     assert_eq!(judged(SCRIPT), (true, true));

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use link::frame::{Decoder, Envelope, FRAME_BYTES, encode};
 use link::message::{DeviceHello, HostHello};
-use link::{LINK_VERSION, Reply, Request, SCHEMA_HASH, Statistics, Status, Text};
+use link::{FaultRecord, LINK_VERSION, Refusal, Reply, Request, SCHEMA_HASH, Statistics, Status, Telemetry, Text};
 use puck::{CanFrame, Node};
 use sim::{HOME, TICKS_PER_MILLISECOND, Ticks};
 
@@ -35,6 +35,10 @@ pub struct Learned {
     pub status: Option<Status>,
     /// The last counters.
     pub statistics: Option<Statistics>,
+    /// The last second before a fault or a restart, if the device has kept one.
+    pub fault_record: Option<FaultRecord>,
+    /// The newest cycle of it.
+    pub fault_cycle: Option<Telemetry>,
     /// Questions, and those that were answered.
     pub asked: u64,
     /// See above.
@@ -100,9 +104,15 @@ impl Inquirer {
         }
         let stage = learned.status.as_ref().map(|status| status.startup_stage);
         self.turn += 1;
-        match self.turn % 3 {
+        match self.turn % 4 {
             0 if stage == Some(WAITING_FOR_ZERO) => Request::Zero { home: HOME.map(|angle| angle as f32) },
             1 => Request::Statistics,
+            2 => match learned.fault_record {
+                Some(record) if learned.fault_cycle.is_none() => {
+                    Request::FaultCycle { record: record.number, index: record.cycles.saturating_sub(1) }
+                }
+                _ => Request::FaultRecord,
+            },
             _ => Request::Status,
         }
     }
@@ -124,6 +134,14 @@ impl Inquirer {
                 learned.status = Some(status);
             }
             Reply::Statistics { statistics, .. } => learned.statistics = Some(statistics),
+            Reply::FaultRecord { record, .. } => {
+                if learned.fault_record != record {
+                    (learned.fault_record, learned.fault_cycle) = (record, None);
+                }
+            }
+            // The device has restarted.
+            Reply::Refused { reason: Refusal::NoSession, .. } => learned.hello = None,
+            Reply::FaultCycle { cycle, .. } => learned.fault_cycle = cycle,
             _ => {}
         }
     }

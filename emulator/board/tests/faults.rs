@@ -6,6 +6,7 @@ use common::{Story, safe_frames, tell, tell_with};
 use emulated_board::setup::Setup;
 use fdcan_model::Cancellation;
 use puck::CanFrame;
+use sim::HOME;
 
 /// In service: the arm is ready long before.
 const SERVICE_US: u64 = 2_100_000;
@@ -154,4 +155,45 @@ fn a_crystal_that_dies_in_service_ends_the_image_and_not_the_arm() {
     let resets = story.resets();
     assert!(!resets.is_empty(), "it goes on at another rate");
     assert!(resets[0].0 - SERVICE_US < 12_000, "{resets:?}");
+}
+
+/// Runs the image for a second beyond a fault that ends in a restart.
+fn restarted(fault: &str, us: u64) -> Story {
+    let story =
+        tell(us as f64 / 1e6 + 1.0, Setup { faults: vec![fault.parse().expect("a fault")], ..Setup::default() });
+    assert_eq!(story.resets().len(), 1, "{fault}: {:?}", story.resets());
+    assert!(story.learned.lock().hello.is_some(), "{fault}: the host was let in again");
+    story
+}
+
+#[test]
+fn the_last_second_before_a_restart_is_kept_if_the_memory_has_kept_its_power() {
+    const RESTART_US: u64 = 2_400_000;
+    const LATER_US: u64 = 100_000;
+    let newest = |fault: &str, us: u64| {
+        let story = restarted(fault, us);
+        let learned = story.learned.lock();
+        let record = learned.fault_record.unwrap_or_else(|| panic!("{fault}: no record"));
+        assert_eq!((record.number, record.fault, record.latched), (1, 0, false), "{fault}");
+        let cycle = learned.fault_cycle.unwrap_or_else(|| panic!("{fault}: no cycle of {record:?}"));
+        // Nothing holds the arm, so it has begun to sink by some thousandths.
+        for (told, stands) in cycle.q.iter().zip(HOME) {
+            assert!((f64::from(*told) - stands).abs() < 0.01, "{fault}: {:?}", cycle.q);
+        }
+        (cycle.cycle, record.cycles)
+    };
+    let pressed = newest(&format!("reset@{RESTART_US}:pin"), RESTART_US);
+    // A watchdog and a panic end it a few cycles later.
+    for fault in ["hang", "panic"] {
+        let (number, _) = newest(&format!("{fault}@{RESTART_US}"), RESTART_US);
+        assert!((pressed.0..pressed.0 + 4).contains(&number), "{fault}: {number}, button: {}", pressed.0);
+    }
+    // A tenth of a second later there are thirty cycles more: the newest of all was kept, and none is missing.
+    let us = RESTART_US + LATER_US;
+    let later = newest(&format!("reset@{us}:pin"), us);
+    assert!((29..=31).contains(&(later.0 - pressed.0)), "{pressed:?} {later:?}");
+    assert!((29..=31).contains(&(later.1 - pressed.1)), "{pressed:?} {later:?}");
+    // Power was away: whatever the memory holds then is not a record.
+    let story = restarted(&format!("reset@{RESTART_US}:power"), RESTART_US);
+    assert_eq!(story.learned.lock().fault_record, None);
 }

@@ -26,17 +26,24 @@ impl<R: Real> LimitedHandTorques<R> {
 #[derive(Clone, Debug)]
 pub struct HandLimiter<R: Real> {
     last: [R; DIGITS],
+    /// The torques before the last, in case those do not leave.
+    before: [R; DIGITS],
 }
 
 impl<R: Real> HandLimiter<R> {
     /// A limiter at zero torque.
     pub fn new() -> Self {
-        HandLimiter { last: [R::of(0.0); DIGITS] }
+        HandLimiter { last: [R::of(0.0); DIGITS], before: [R::of(0.0); DIGITS] }
     }
 
     /// Back to zero torque at once: nothing is being sent.
     pub fn reset(&mut self) {
-        self.last = [R::of(0.0); DIGITS];
+        *self = HandLimiter::new();
+    }
+
+    /// The torques of the last cycle did not leave: the next step counts from those before.
+    pub fn not_sent(&mut self) {
+        self.last = self.before;
     }
 
     /// The torques of the last cycle (N m).
@@ -47,6 +54,7 @@ impl<R: Real> HandLimiter<R> {
     /// Cuts the wanted torques (N m) of one cycle to magnitude and rate. What is not finite counts as zero: the worm
     /// holds.
     pub fn limit(&mut self, wanted: &[R; DIGITS]) -> LimitedHandTorques<R> {
+        self.before = self.last;
         for ((last, wanted), limit) in self.last.iter_mut().zip(wanted).zip(TORQUE_LIMIT) {
             let finite = if wanted.is_finite_number() { *wanted } else { R::of(0.0) };
             let step = within(finite, R::of(limit)) - *last;

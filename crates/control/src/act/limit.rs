@@ -38,6 +38,9 @@ pub const MOTOR_COUNTS_LIMIT: f64 = 4600.0;
 /// Joints that share motors.
 const GROUPS: [&[usize]; 5] = [&[0], &[1, 2], &[3], &[4, 5], &[6]];
 
+/// Joints whose torques travel in the first frame of a cycle: no pair of motors is parted.
+const ARM_JOINTS: usize = 4;
+
 /// Joint torques within every limit. No public constructor: the limiter makes them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitedTorques<R: Real>(JointTorques<R>);
@@ -77,6 +80,8 @@ pub struct TorqueLimiter<R: Real> {
     motor_limit: [R; JOINTS],
     step_limit: [R; JOINTS],
     last: JointTorques<R>,
+    /// The torques before the last, in case those do not leave.
+    before: JointTorques<R>,
 }
 
 impl<R: Real> TorqueLimiter<R> {
@@ -96,12 +101,24 @@ impl<R: Real> TorqueLimiter<R> {
             motor_limit,
             step_limit: STEP_LIMIT.map(R::of),
             last: JointTorques::zero(),
+            before: JointTorques::zero(),
         }
     }
 
     /// Back to zero torque at once: nothing is being sent, so the next torque starts from nothing.
     pub fn reset(&mut self) {
         self.last = JointTorques::zero();
+        self.before = self.last;
+    }
+
+    /// Torques of the last cycle did not leave: those of J1 to J4, those of J5 to J7. The motors still have the torques
+    /// before, so the next step counts from these.
+    pub fn not_sent(&mut self, arm: bool, wrist: bool) {
+        for (joint, (last, before)) in self.last.0.iter_mut().zip(&self.before.0).enumerate() {
+            if if joint < ARM_JOINTS { arm } else { wrist } {
+                *last = *before;
+            }
+        }
     }
 
     /// The torques of the last cycle.
@@ -122,6 +139,7 @@ impl<R: Real> TorqueLimiter<R> {
     /// Cuts the wanted torques of one cycle.
     pub fn limit(&mut self, wanted: &JointTorques<R>) -> (LimitedTorques<R>, LimitReport) {
         let mut report = LimitReport::default();
+        self.before = self.last;
         if !wanted.is_finite() {
             report.not_finite = true;
             return (LimitedTorques(self.last), report);

@@ -182,6 +182,11 @@ impl<R: Real> HandDrive<R> {
         Some(limited)
     }
 
+    /// The last torques did not leave.
+    pub(super) fn not_sent(&mut self) {
+        self.limiter.not_sent();
+    }
+
     fn stop_driving(&mut self) {
         if self.driven {
             self.controller.reset();

@@ -254,6 +254,15 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
+    /// Frames of the last cycle did not leave: torques of M1 to M4, torques of M5 to M7, torques of the hand. The next
+    /// step of a torque counts from what the motors still have.
+    pub fn not_sent(&mut self, arm: bool, wrist: bool, hand: bool) {
+        self.limiter.not_sent(arm, wrist);
+        if hand {
+            self.hand.not_sent();
+        }
+    }
+
     /// Advances one control period.
     pub fn step(&mut self, input: &CycleInput) -> CycleOutput {
         // A bridged reply is no news: the law stays.

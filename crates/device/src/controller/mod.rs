@@ -340,7 +340,11 @@ impl DeviceController {
         };
         let output = self.cycle.step(&input);
         self.send_torques(output.actuation.frames(), now_us, io);
-        for frame in self.hand.frames(output.actuation.hand_frame()).into_iter().flatten() {
+        let [torques, position, gauge] = self.hand.frames(output.actuation.hand_frame());
+        if torques.is_some_and(|torques| !self.outlet(now_us, io).send(torques)) {
+            self.cycle.not_sent(false, false, true);
+        }
+        for frame in [position, gauge].into_iter().flatten() {
             self.outlet(now_us, io).send(frame);
         }
         self.brakes.want(output.actuation.requests_idle());
@@ -402,6 +406,7 @@ impl DeviceController {
             self.refused = 0;
             return;
         }
+        self.cycle.not_sent(!sent.0, !sent.1, false);
         if sent != (false, false) {
             Counters::count(&mut self.counters.torque_mismatches);
         }
