@@ -20,6 +20,7 @@ pub(crate) fn run() -> Result<()> {
     plain_root()?;
     crate::faults(&[])?;
     crate::faults(&["storm", "--runs", "300"])?;
+    crate::faults(&["endurance"])?;
     fuzz::run(fuzz::USUAL)?;
     package::run()?;
     emulated::lint()?;

@@ -41,8 +41,9 @@ struct Mutant {
     /// Tests that must fail, by path or by the end of it.
     #[serde(default)]
     caught_by: Vec<String>,
-    /// Entry of the fault catalogue of which a scenario must fail.
-    entry: Option<String>,
+    /// Entries of the fault catalogue of which a scenario each must fail.
+    #[serde(default)]
+    entries: Vec<String>,
 }
 
 /// Checks that every change can still be made and every test that is to catch one exists.
@@ -71,17 +72,19 @@ pub(crate) fn run(part: &str) -> Result<()> {
     let tree = copy_of_the_tree()?;
     let mutants: Vec<Mutant> = list()?.into_iter().filter(|mutant| mutant.name.contains(part)).collect();
     ensure!(!mutants.is_empty(), "no mutant's name contains '{part}'");
+    for mutant in &mutants {
+        let before = mutant.failures(&tree)?;
+        ensure!(before.is_empty(), "'{}': {} fail without the change", mutant.name, before.join(", "));
+    }
     let mut lived = Vec::new();
     for (n, mutant) in mutants.iter().enumerate() {
         let file = tree.join(&mutant.file);
         let sound = fs::read_to_string(&file)?;
-        let before = mutant.failures(&tree)?;
-        ensure!(before.is_empty(), "'{}': {} fail without the change", mutant.name, before.join(", "));
         fs::write(&file, mutant.changed(&sound)?)?;
         let failed = mutant.failures(&tree);
         fs::write(&file, sound)?;
         let failed = failed.with_context(|| format!("with the change '{}'", mutant.name))?;
-        let mut killers = mutant.caught_by.iter().chain(&mutant.entry);
+        let mut killers = mutant.caught_by.iter().chain(&mutant.entries);
         ensure!(killers.clone().count() > 0, "'{}': neither a test nor an entry is to catch it", mutant.name);
         let missed: Vec<_> =
             killers.by_ref().filter(|test| !failed.iter().any(|failed| failed.ends_with(*test))).collect();
@@ -109,9 +112,9 @@ impl Mutant {
         Ok(text.replacen(&self.find, &self.replace, 1))
     }
 
-    /// Runs what must catch the change; paths of the tests, and the entry, that failed.
+    /// Runs what must catch the change; paths of the tests, and the entries, that failed.
     fn failures(&self, tree: &Path) -> Result<Vec<String>> {
-        let mut failed = self.entry.as_ref().map_or(Ok(Vec::new()), |entry| failed_entry(tree, entry))?;
+        let mut failed = failed_entries(tree, &self.entries)?;
         if !self.caught_by.is_empty() {
             failed.extend(self.failed_tests(tree)?);
         }
@@ -138,19 +141,22 @@ impl Mutant {
     }
 }
 
-/// Runs an entry of the fault catalogue; its identifier if a scenario failed.
-fn failed_entry(tree: &Path, entry: &str) -> Result<Vec<String>> {
+/// Runs entries of the fault catalogue; the identifiers of those of which a scenario failed.
+fn failed_entries(tree: &Path, entries: &[String]) -> Result<Vec<String>> {
+    if entries.is_empty() {
+        return Ok(Vec::new());
+    }
     let mut run = shell::cargo();
     run.current_dir(tree).env("CARGO_TARGET_DIR", shell::target_dir().join("mutants/target"));
-    run.args(["run", "--quiet", "--package", "faults", "--", entry]);
+    run.args(["run", "--quiet", "--package", "faults", "--"]).args(entries);
     let output = run.output().with_context(|| format!("cannot start: {}", shell::line(&run)))?;
     let text = String::from_utf8_lossy(&output.stdout);
-    let of_the_entry = |line: &&str| line.split_whitespace().next() == Some(entry);
-    if !text.lines().any(|line| of_the_entry(&line)) {
-        bail!("does not build or run:\n{}", String::from_utf8_lossy(&output.stderr));
+    let of = |entry: &str, line: &str| line.split_whitespace().next() == Some(entry);
+    if let Some(entry) = entries.iter().find(|entry| !text.lines().any(|line| of(entry, line))) {
+        bail!("{entry} does not build or run:\n{}", String::from_utf8_lossy(&output.stderr));
     }
-    let has_failed = text.lines().filter(of_the_entry).any(|line| line.ends_with(": FAIL"));
-    Ok(if has_failed { vec![entry.to_owned()] } else { Vec::new() })
+    let has_failed = |entry: &&String| text.lines().any(|line| of(entry, line) && line.ends_with(": FAIL"));
+    Ok(entries.iter().filter(has_failed).cloned().collect())
 }
 
 /// Copies the files of the repository; those that are equal already keep their times, so that they are not built anew.

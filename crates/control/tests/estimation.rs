@@ -41,6 +41,27 @@ fn the_transmission_of_the_bus_is_that_of_the_arm_model() {
 }
 
 #[test]
+fn d8_a_clock_that_is_off_by_one_percent_scales_velocities_by_one_percent() {
+    let calibration = nominal::<f64>();
+    let speed = [0.8, -0.6, 0.9, -1.2, 1.5, -1.1, 2.0];
+    for slow in [-0.01, 0.0, 0.01] {
+        let mut estimator = JointEstimator::new(&calibration);
+        let mut sum = Vector7::zeros();
+        for cycle in 0..400 {
+            let time = f64::from(cycle) * (1.0 + slow) / RATE;
+            let state = estimator.update(&replies(&calibration, speed.map(|speed| speed * time)), true);
+            if cycle >= 100 {
+                sum += state.expect("whole").dq.0;
+            }
+        }
+        for joint in 0..7 {
+            let scale = sum[joint] / 300.0 / speed[joint] - 1.0;
+            assert!((scale - slow).abs() < 0.003, "J{}: {scale} for {slow}", joint + 1);
+        }
+    }
+}
+
+#[test]
 fn a_calibration_with_garbage_scales_is_refused() {
     let good = ([4096; 7], [2472; 7]);
     assert!(Calibration::<f32>::new(good.0, good.1, Payload::None).is_ok());

@@ -33,21 +33,11 @@ const BEGIN: Duration = Duration::from_millis(200);
 /// # Errors
 /// The arm does not get there.
 pub fn arm(scenario: &Scenario, with_faults: bool, kind: SimulatorKind) -> Result<Arm, Failure> {
-    let simple =
-        SimulatorOptions { seed: Some(scenario.seed), world: Some("simple".to_owned()), ..SimulatorOptions::default() };
-    let mut options = SimulationOptions::from_address(kind, &simple)?;
-    options.posture = START;
-    options.plant = PlantConfig {
-        started: true,
-        operator: OperatorConfig { holds_until_active_for: Some(LET_GO), ..OperatorConfig::prompt() },
-        ..PlantConfig::default()
-    };
-    let mut simulation = Simulation::start(&options)?;
-    simulation.plant().record_bus();
+    let mut simulation = simulation(scenario.seed, Duration::ZERO, kind)?;
     if scenario.from == From::PowerUp && with_faults {
         simulation.plant().inject(&scenario.inject);
     }
-    let mut arm = Client::connect(Device::Simulated(Box::new(simulation)), "fault catalogue")?;
+    let mut arm = connected(simulation)?;
     if scenario.from != From::PowerUp {
         begin(&mut arm, scenario, with_faults)?;
     }
@@ -56,8 +46,39 @@ pub fn arm(scenario: &Scenario, with_faults: bool, kind: SimulatorKind) -> Resul
     Ok(arm)
 }
 
-/// From power-up to the state of the scenario; the faults are ordered at its first moment.
-fn begin(arm: &mut Arm, scenario: &Scenario, with_faults: bool) -> Result<(), Failure> {
+/// The simulated arm at power-up; the clock of its device has run for `uptime`.
+///
+/// # Errors
+/// The simulation does not start.
+pub fn simulation(seed: u64, uptime: Duration, kind: SimulatorKind) -> Result<Simulation, Failure> {
+    let simple = SimulatorOptions { seed: Some(seed), world: Some("simple".to_owned()), ..SimulatorOptions::default() };
+    let mut options = SimulationOptions::from_address(kind, &simple)?;
+    options.posture = START;
+    options.uptime = uptime;
+    options.plant = PlantConfig {
+        started: true,
+        operator: OperatorConfig { holds_until_active_for: Some(LET_GO), ..OperatorConfig::prompt() },
+        ..PlantConfig::default()
+    };
+    let mut simulation = Simulation::start(&options)?;
+    simulation.plant().record_bus();
+    Ok(simulation)
+}
+
+/// Begins the conversation with it.
+///
+/// # Errors
+/// It does not answer.
+pub fn connected(simulation: Simulation) -> Result<Arm, Failure> {
+    Ok(Client::connect(Device::Simulated(Box::new(simulation)), "fault catalogue")?)
+}
+
+/// From power-up, or from the way back of another scenario, to the state of this one; the faults are ordered at its
+/// first moment.
+///
+/// # Errors
+/// The arm does not get there.
+pub fn begin(arm: &mut Arm, scenario: &Scenario, with_faults: bool) -> Result<(), Failure> {
     arm.upload(&movement().to_image()?, |_, _, _| {})?;
     procedure::make_ready(arm, true, |_| {})?;
     procedure::go_to_start(arm, &movement().start, |_| {})?;

@@ -74,7 +74,8 @@ impl Scenario {
     /// True if a fault of it lies in the co-controller's own bus controller, which images have from their emulator.
     #[must_use]
     pub fn is_of_the_port(&self) -> bool {
-        self.inject.iter().any(|injection| matches!(injection.what, FaultKind::BusOff | FaultKind::Refuse(_)))
+        let is = |kind: &FaultKind| matches!(kind, FaultKind::BusOff | FaultKind::Refuse(_) | FaultKind::Clock(_));
+        self.inject.iter().any(|injection| is(&injection.what))
     }
 }
 

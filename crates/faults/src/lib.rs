@@ -5,6 +5,7 @@
 pub mod bench;
 pub mod bus;
 pub mod catalogue;
+pub mod endurance;
 pub mod entry;
 pub mod figure;
 pub mod measure;

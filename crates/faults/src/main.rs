@@ -1,5 +1,6 @@
 //! `faults [--json] [--all] [--device sim:|board:] [ID...]`: runs the fault catalogue, or some of it.
 //! `faults storm [--runs N] [--seed S]`: runs storms of random faults, the seeds in a row from S on.
+//! `faults endurance [--hours H] [--seed S]`: the same on one arm in one process, for hours of simulated time.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -8,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use faults::entry::{Entry, Scenario};
 use faults::run::{self, Verdict};
-use faults::{catalogue, report, storm};
+use faults::{catalogue, endurance, report, storm};
 use lab::transport::SimulatorKind;
 
 /// Scripts, relative to the root of the repository.
@@ -21,6 +22,7 @@ fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let is_good = match words.split_first() {
         Some((first, rest)) if first == "storm" => storms(rest),
+        Some((first, rest)) if first == "endurance" => endures(rest),
         _ => Wanted::parse(&words).and_then(|wanted| go(&wanted)),
     };
     match is_good {
@@ -59,6 +61,32 @@ fn storms(words: &[String]) -> Result<bool, Box<dyn std::error::Error>> {
         eprintln!("failed: {failed:?}; again: cargo xtask faults storm --runs 1 --seed {}", failed[0]);
     }
     Ok(failed.is_empty())
+}
+
+/// Runs a course of endurance; tells how it goes about every tenth of it.
+fn endures(words: &[String]) -> Result<bool, Box<dyn std::error::Error>> {
+    let (mut hours, mut first) = (0.25, 1_u64);
+    for pair in words.chunks(2) {
+        match pair {
+            [flag, number] if flag == "--hours" => hours = number.parse()?,
+            [flag, number] if flag == "--seed" => first = number.parse()?,
+            _ => return Err(format!("unknown: {}", pair.join(" ")).into()),
+        }
+    }
+    let mut next = 0.0;
+    let course = endurance::run(hours, first, |now, rounds, failed, process| {
+        if now >= next {
+            next += hours / 10.0;
+            eprintln!("{}", report::endurance(now, rounds, failed, process));
+        }
+    });
+    let course = course.map_err(|error| error.to_string())?;
+    course.failed.iter().for_each(|verdict| print!("{}", report::lines(verdict, false)));
+    eprintln!("{}", report::endurance(course.hours, course.rounds, course.failed.len(), course.process[1]));
+    if !course.is_constant() {
+        eprintln!("memory or descriptors have grown: {:?}", course.process);
+    }
+    Ok(course.holds())
 }
 
 /// The words of the command line.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::endurance::Process;
 use crate::entry::{Entry, Scenario};
 use crate::run::{Judged, Verdict};
 use crate::storm::Outcome;
@@ -70,6 +71,13 @@ pub fn storm(outcome: &Outcome, whole: bool) -> String {
         faults.chain(orders).for_each(|line| text += &format!("       {line}\n"));
     }
     text
+}
+
+/// A course of endurance so far: hours, rounds, failures, the process.
+#[must_use]
+pub fn endurance(hours: f64, rounds: u64, failed: usize, process: Process) -> String {
+    let Process { memory, descriptors } = process;
+    format!("{hours:6.2} h, {rounds} rounds, {failed} failed; {memory} kiB, {descriptors} descriptors")
 }
 
 /// Sums over storms: how many, how they ended, how many failed, the worst of each figure that has a bar.

@@ -47,6 +47,20 @@ pub struct Verdict {
 }
 
 impl Verdict {
+    /// The verdict on a scenario of this entry before it has run.
+    #[must_use]
+    pub fn open(id: &str, scenario: &Scenario) -> Self {
+        Self {
+            id: id.to_owned(),
+            scenario: scenario.name.clone(),
+            state: "",
+            fault: String::new(),
+            figures: Vec::new(),
+            failures: Vec::new(),
+            known: scenario.known.clone(),
+        }
+    }
+
     /// True if everything is as it must be.
     #[must_use]
     pub fn holds(&self) -> bool {
@@ -63,15 +77,7 @@ impl Verdict {
 /// Runs one scenario of an entry, and the same without the faults if a bar compares the two.
 #[must_use]
 pub fn run(entry: &Entry, scenario: &Scenario, kind: SimulatorKind) -> Verdict {
-    let mut verdict = Verdict {
-        id: entry.id.clone(),
-        scenario: scenario.name.clone(),
-        state: "",
-        fault: String::new(),
-        figures: Vec::new(),
-        failures: Vec::new(),
-        known: scenario.known.clone(),
-    };
+    let mut verdict = Verdict::open(&entry.id, scenario);
     if let Err(failure) = go_through(scenario, kind, &mut verdict) {
         verdict.failures.push(failure.to_string());
     }
@@ -82,9 +88,21 @@ fn go_through(scenario: &Scenario, kind: SimulatorKind, verdict: &mut Verdict) -
     let compares = |figure: &Figure| matches!(figure, Figure::Deviation | Figure::Tracking | Figure::Plan);
     let (most, least) = (&scenario.expect.most, &scenario.expect.least);
     let nominal = most.keys().chain(least.keys()).any(compares).then(|| watched_without(scenario, kind)).transpose()?;
-    let mut arm = bench::arm(scenario, true, kind)?;
-    let watched = watch::watch(&mut arm, scenario.watch, &scenario.order)?;
-    let figures = measure::all(scenario, &watched, nominal.as_ref());
+    judged(&mut bench::arm(scenario, true, kind)?, scenario, nominal.as_ref(), verdict)
+}
+
+/// Watches an arm in the state where the scenario begins, judges what comes of it, and goes the way back.
+///
+/// # Errors
+/// The arm does not answer, or the way back fails.
+pub fn judged(
+    arm: &mut bench::Arm,
+    scenario: &Scenario,
+    nominal: Option<&Watched>,
+    verdict: &mut Verdict,
+) -> Result<(), Failure> {
+    let watched = watch::watch(arm, scenario.watch, &scenario.order)?;
+    let figures = measure::all(scenario, &watched, nominal);
     let last = watched.moments.last().ok_or("nothing was seen")?;
     (verdict.state, verdict.fault) = (last.state.name(), fault_name(last.fault));
     let expected = &scenario.expect;
@@ -100,7 +118,7 @@ fn go_through(scenario: &Scenario, kind: SimulatorKind, verdict: &mut Verdict) -
     verdict.figures.extend(most.map(|(figure, bar)| judge(&figures, figure, bar, false)));
     verdict.figures.extend(expected.least.iter().map(|(figure, bar)| judge(&figures, *figure, *bar, true)));
     if scenario.recover != Recover::None {
-        recovered(&mut arm, scenario, verdict)?;
+        recovered(arm, scenario, verdict)?;
     }
     Ok(())
 }

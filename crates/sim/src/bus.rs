@@ -102,6 +102,12 @@ impl Bus {
         true
     }
 
+    /// Frames of a node that wait for the bus.
+    #[must_use]
+    pub fn waiting(&self, sender: Node) -> usize {
+        self.queues[usize::from(sender.number())].len()
+    }
+
     /// True while a frame is on the wire.
     #[must_use]
     pub fn is_busy(&self) -> bool {

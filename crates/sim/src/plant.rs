@@ -12,7 +12,7 @@
 //! Nothing here looks at a clock of the computer, and no order depends on a hash: equal calls give equal runs.
 
 use crate::bus::{Bus, FOREIGN};
-use crate::fault::{FaultKind, Faults, FrameKind, Injection, Treated};
+use crate::fault::{FLOODER, FaultKind, Faults, FrameKind, Injection, Treated};
 use crate::force_torque::{ForceTorque, ForceTorqueConfig};
 use crate::hand::{Hand, HandConfig};
 use crate::link_wire::{LinkLine, SerialLine};
@@ -212,6 +212,12 @@ impl Plant {
         self.bus.sender() == Some(Node::HOST) || self.deliveries.iter().any(|delivery| delivery.received.is_none())
     }
 
+    /// Frames of the co-controller that wait for the bus.
+    #[must_use]
+    pub fn waiting(&self) -> usize {
+        self.bus.waiting(Node::HOST)
+    }
+
     /// When the co-controller has to call [`Plant::event`] next, as far as can be known before it gets there.
     ///
     /// A time that has passed means: at once. `None` means never, unless it submits something.
@@ -357,6 +363,12 @@ impl Plant {
         self.faults.refused()
     }
 
+    /// Share by which the co-controller's clock is slow, because of a fault.
+    #[must_use]
+    pub fn clock_error(&self) -> f64 {
+        self.faults.clock_error()
+    }
+
     /// The physical world.
     pub fn world(&mut self) -> &mut dyn World {
         &mut *self.world
@@ -486,6 +498,10 @@ impl Plant {
                 FaultKind::Push { .. } | FaultKind::Payload(_) => self.world.push(self.faults.push(), [0.0; 3]),
                 _ => {}
             }
+        }
+        if let Some(frame) = self.faults.take_flood(self.now) {
+            self.bus.withdraw(FLOODER);
+            self.bus.queue(self.now, FLOODER, frame);
         }
         while let Some(passage) = self.faults.take_late(self.now) {
             self.receive(&passage, passage.end);

@@ -49,6 +49,20 @@ fn a_late_frame_comes_late_and_a_repeated_one_twice() {
 }
 
 #[test]
+fn a11_a_flood_wins_every_arbitration_and_ends() {
+    let mut master = befallen(FaultKind::Flood { rate: 20_000.0, bytes: 8 }, 0.01, 0.01);
+    master.wait_ms(11);
+    master.heard.clear();
+    master.send(puck::get(puck::Group::ARM, PropertyId::POSITION));
+    master.wait_ms(5);
+    assert!(master.heard.len() > 35, "{}", master.heard.len());
+    let others = master.heard.iter().filter(|(_, frame)| frame.can_id().raw() != 0);
+    assert_eq!(others.count(), 0, "nobody gets a word in");
+    master.wait_ms(10);
+    assert_eq!(missing(&master.positions()), []);
+}
+
+#[test]
 fn counts_jump_and_come_back_and_begin_anew_where_a_puck_restarts() {
     let mut master = befallen(FaultKind::CountJump { node: 4, by: 5000 }, 0.01, 0.01);
     let counts = |master: &mut Master| master.positions()[3].map(|counts| counts.0);

@@ -357,6 +357,17 @@ fn any_request() -> impl Strategy<Value = Request> {
         Just(Request::Release),
         Just(Request::UploadCommit),
         Just(Request::UploadAbort),
+        Just(Request::Statistics),
+        Just(Request::Tare),
+        Just(Request::InitialiseHand),
+        Just(Request::Calibration),
+        Just(Request::FaultRecord),
+        any::<(u16, u16)>().prop_map(|(record, index)| Request::FaultCycle { record, index }),
+        prop::array::uniform7(real.clone()).prop_map(|home| Request::Zero { home }),
+        (prop::array::uniform4(real.clone()), real.clone()).prop_map(|(q, duration)| Request::MoveHand { q, duration }),
+        (prop::option::of(prop::array::uniform3(real.clone())), prop::option::of(prop::array::uniform4(real.clone())))
+            .prop_map(|(position, orientation)| Request::SetGoal(Goal { position, orientation })),
+        Just(Request::Delete { name: self::name("none") }),
         any::<u8>().prop_map(|index| Request::List { index }),
         any::<u8>().prop_map(|every| Request::Telemetry { every }),
         (prop::array::uniform7(real.clone()), real.clone()).prop_map(|(q, duration)| Request::Approach { q, duration }),
@@ -406,6 +417,14 @@ proptest! {
                 }
                 Command::Control(control::Command::SetSpeed { factor }) => factor.is_finite(),
                 Command::Control(control::Command::Run(options)) => options.speed.is_finite(),
+                Command::Control(control::Command::MoveHand { q, duration }) => {
+                    q.iter().all(|q| q.is_finite()) && duration.is_finite()
+                }
+                Command::Control(control::Command::SetGoal(goal)) => {
+                    let mut values = goal.position.iter().flatten().chain(goal.orientation.iter().flatten());
+                    values.all(|value| value.is_finite())
+                }
+                Command::Zero { home } => home.iter().all(|q| q.is_finite()),
                 _ => true,
             };
             prop_assert!(finite);

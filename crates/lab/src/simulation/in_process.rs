@@ -9,6 +9,7 @@ use std::convert::Infallible;
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
+use std::time::Duration;
 
 use device::storage::{Library, LibraryAccess, Opening, Scratch, Work, keep, value_bytes};
 use device::{Controller, DeviceController, FaultMemory, Identity, Session, Slot, StoreError};
@@ -31,6 +32,11 @@ const fn computing(slot: Slot) -> Ticks {
         Slot::Control => 200 * TICKS_PER_MICROSECOND,
         Slot::Request | Slot::Slow => 10 * TICKS_PER_MICROSECOND,
     }
+}
+
+/// Time from one slot to the next by a clock that is slow by this share.
+fn slot_length(slow: f64) -> Ticks {
+    if slow == 0.0 { SLOT_TICKS } else { (SLOT_TICKS as f64 * (1.0 + slow)).round() as Ticks }
 }
 
 type ArmSession = Session<Library<STORE_SLOTS, IMAGE_BYTES_LIMIT>>;
@@ -108,6 +114,8 @@ pub(super) struct InProcess {
     queues: Queues,
     slot: Slot,
     next_slot: Ticks,
+    /// Time of the next slot on the device's own clock.
+    next_slot_told: Ticks,
     /// Frames that are still being computed, with the time at which they leave.
     leaving: VecDeque<(Ticks, CanFrame)>,
     is_bus_off: bool,
@@ -116,8 +124,8 @@ pub(super) struct InProcess {
 }
 
 impl InProcess {
-    /// The device at power-up, with this flash.
-    pub(super) fn new(flash: FlashChip) -> Self {
+    /// The device at power-up, with this flash and a clock that has run for `uptime`.
+    pub(super) fn new(flash: FlashChip, uptime: Duration) -> Self {
         let identity = Identity {
             firmware: env!("CARGO_PKG_VERSION"),
             board: "in-process",
@@ -135,6 +143,7 @@ impl InProcess {
             queues: Queues::default(),
             slot: Slot::Request,
             next_slot: FIRST_SLOT * SLOT_TICKS,
+            next_slot_told: FIRST_SLOT * SLOT_TICKS + sim::ticks(uptime.as_secs_f64()),
             leaving: VecDeque::new(),
             is_bus_off: false,
             line: Vec::new(),
@@ -145,8 +154,9 @@ impl InProcess {
     fn slot(&mut self, plant: &mut Plant) -> Result<(), SimulationError> {
         let now = self.next_slot;
         plant.advance(now);
-        let now_us = now / TICKS_PER_MICROSECOND;
+        let now_us = self.next_slot_told / TICKS_PER_MICROSECOND;
         self.queues.refused = plant.refused();
+        self.queues.waiting = plant.waiting() + self.leaving.len();
         if plant.is_bus_off() && !self.is_bus_off {
             self.leaving.clear();
             self.core.note_bus_error(true);
@@ -169,7 +179,8 @@ impl InProcess {
             self.line.clear();
         }
         self.slot = self.slot.next();
-        self.next_slot += SLOT_TICKS;
+        self.next_slot += slot_length(plant.clock_error());
+        self.next_slot_told += SLOT_TICKS;
         self.keeper.run(now, self.next_slot)
     }
 }

@@ -75,7 +75,7 @@ impl Simulation {
             plant.record_bus();
         }
         let engine: Box<dyn Execute> = match &options.engine {
-            Engine::InProcess => Box::new(InProcess::new(options.flash.chip()?)),
+            Engine::InProcess => Box::new(InProcess::new(options.flash.chip()?, options.uptime)),
             Engine::Qemu { image } => {
                 let log = options.firmware_log.as_deref();
                 Box::new(Qemu::spawn(qemu::ARM_MACHINE, image, log, options.flash.chip()?)?)

@@ -1,6 +1,7 @@
 //! The parts of a simulated device: engine, seed, world, teacher.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use flash::{Flash, FlashChip, FlashTimes};
 use sim::teacher::TaughtMovement;
@@ -135,6 +136,8 @@ pub struct SimulationOptions {
     pub replace_logs: bool,
     /// Where the emulated board writes its report when its power is switched off, JSON; other engines have none.
     pub board_report: Option<PathBuf>,
+    /// Time for which the clock of the device has run already. [`Engine::InProcess`] only.
+    pub uptime: Duration,
     /// The flash in the device.
     pub flash: FlashSource,
     /// The script of faults that befall the device: a file, or a file and the number of its scenario.
@@ -175,6 +178,7 @@ impl SimulationOptions {
             line: options.line,
             bus_log: options.bus.clone(),
             board_report: options.board.report.clone(),
+            uptime: Duration::ZERO,
             flash: options.flash.clone().map_or(FlashSource::New, FlashSource::File),
             faults: options.faults.clone(),
             ..Self::new(engine, options.seed.unwrap_or(DEFAULT_SEED), world)
@@ -220,6 +224,7 @@ impl SimulationOptions {
             bus_log: None,
             replace_logs: false,
             board_report: None,
+            uptime: Duration::ZERO,
             flash: FlashSource::New,
             faults: None,
             grip: None,

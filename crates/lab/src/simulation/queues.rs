@@ -17,6 +17,8 @@ use sim::fault::FrameKind;
 const COMMANDS: usize = 8;
 /// Records that may wait for the session, as in the firmware.
 const RECORDS: usize = 16;
+/// Frames that may wait for the bus: 16 in the firmware's queue, 8 in the controller's.
+const OUTGOING: usize = 16 + 8;
 /// Bytes that may wait for the line before telemetry is left out; the firmware's port has the same capacity.
 pub(crate) const LINE_ROOM: usize = 2048;
 
@@ -38,6 +40,8 @@ pub(crate) struct Queues {
     pub(crate) transmitted: Vec<CanFrame>,
     /// Frames that the CAN controller does not take now.
     pub(crate) refused: Option<FrameKind>,
+    /// Frames that wait for the bus since earlier slots.
+    pub(crate) waiting: usize,
     commands: VecDeque<Command>,
     records: VecDeque<TimedRecord>,
     events: VecDeque<Event>,
@@ -49,7 +53,8 @@ impl ControllerIo<DeviceController> for Queues {
     }
 
     fn transmit(&mut self, frame: CanFrame) -> bool {
-        let is_taken = self.refused.is_none_or(|kind| !kind.fits(&frame));
+        let has_room = self.waiting + self.transmitted.len() < OUTGOING;
+        let is_taken = has_room && self.refused.is_none_or(|kind| !kind.fits(&frame));
         self.transmitted.extend(is_taken.then_some(frame));
         is_taken
     }

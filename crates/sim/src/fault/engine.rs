@@ -4,11 +4,23 @@ use super::{FaultKind, FrameKind, Frames, Injection};
 use crate::noise::Noise;
 use crate::time::{Ticks, seconds, ticks};
 use crate::wire::Passage;
-use puck::CanFrame;
+use puck::{CanFrame, CanId, Node};
 use std::collections::VecDeque;
 
 /// Stream of noise that no node number names.
 const STREAM: u64 = 0x0FA1;
+
+/// Sender of a flood: no device of an arm has this number.
+pub(crate) const FLOODER: Node = match Node::new(30) {
+    Some(node) => node,
+    None => unreachable!(),
+};
+
+/// Identifier that wins against every other.
+const FIRST: CanId = match CanId::new(0) {
+    Some(id) => id,
+    None => unreachable!(),
+};
 
 /// One injection, once.
 #[derive(Clone, Debug)]
@@ -22,6 +34,15 @@ struct Order {
     hits: u32,
     /// First frame of each identifier since the begin.
     first: Vec<CanFrame>,
+}
+
+impl Order {
+    /// True if nothing comes of it any more.
+    fn is_over(&self) -> bool {
+        let is_of_a_moment =
+            matches!(self.kind, FaultKind::CountJump { .. } | FaultKind::Restart { .. } | FaultKind::Pendant(_));
+        self.phase == Phase::After || (self.phase == Phase::During && is_of_a_moment && self.ends == Ticks::MAX)
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,16 +71,20 @@ pub(crate) struct Faults {
     on_torque: Vec<Injection>,
     noise: Noise,
     late: VecDeque<(Ticks, Passage)>,
+    /// When the next frame of a flood is due.
+    flood_at: Ticks,
 }
 
 impl Faults {
     /// Nothing ordered; `seed` draws frames and bits.
     pub(crate) fn new(seed: u64) -> Self {
-        Self { orders: Vec::new(), on_torque: Vec::new(), noise: Noise::new(seed, STREAM), late: VecDeque::new() }
+        let noise = Noise::new(seed, STREAM);
+        Self { orders: Vec::new(), on_torque: Vec::new(), noise, late: VecDeque::new(), flood_at: 0 }
     }
 
     /// Orders faults whose times count from `zero`.
     pub(crate) fn order(&mut self, zero: Ticks, injections: &[Injection]) {
+        self.orders.retain(|order| !order.is_over());
         for injection in injections {
             for time in 0..injection.times {
                 let begins = zero + ticks(injection.at + injection.every * f64::from(time));
@@ -93,7 +118,8 @@ impl Faults {
             Phase::During if order.ends < Ticks::MAX => Some(order.ends),
             _ => None,
         });
-        changes.chain(self.late.front().map(|(at, _)| *at)).min()
+        let flood = self.flood().map(|_| self.flood_at);
+        changes.chain(self.late.front().map(|(at, _)| *at)).chain(flood).min()
     }
 
     /// Begins or ends one fault whose time has come: the fault, and true if it begins.
@@ -112,6 +138,30 @@ impl Faults {
     /// A late frame whose time has come.
     pub(crate) fn take_late(&mut self, now: Ticks) -> Option<Passage> {
         self.late.pop_front_if(|(at, _)| *at <= now).map(|(_, passage)| passage)
+    }
+
+    /// A frame of a flood that is due.
+    pub(crate) fn take_flood(&mut self, now: Ticks) -> Option<CanFrame> {
+        let (every, bytes) = self.flood()?;
+        if self.flood_at > now {
+            return None;
+        }
+        self.flood_at = now + every;
+        CanFrame::from_slice(FIRST, [0x55; 8].get(..usize::from(bytes))?)
+    }
+
+    /// Time between two frames of the flood that goes on, and their bytes.
+    fn flood(&self) -> Option<(Ticks, u8)> {
+        self.present().find_map(|order| match order.kind {
+            FaultKind::Flood { rate, bytes } if rate > 0.0 => Some((ticks(1.0 / rate).max(1), bytes.min(8))),
+            _ => None,
+        })
+    }
+
+    /// Share by which the co-controller's clock is slow.
+    pub(crate) fn clock_error(&self) -> f64 {
+        let errors = self.present().map(|order| if let FaultKind::Clock(share) = order.kind { share } else { 0.0 });
+        errors.sum()
     }
 
     /// Fate of a frame that has just left the wire.

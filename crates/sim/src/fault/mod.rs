@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::operator::PendantAction;
 use puck::{CanFrame, Destination, Group, Node, Request};
 
-pub(crate) use engine::{Faults, Treated};
+pub(crate) use engine::{FLOODER, Faults, Treated};
 
 /// A fault, when it begins and when it ends.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -87,6 +87,16 @@ pub enum FaultKind {
     BusOff,
     /// The CAN controller of the co-controller takes no such frames. `sil:` only.
     Refuse(FrameKind),
+    /// A node that goes on sending frames of the highest priority, identifier 0. Its next frame takes the place of one
+    /// that could not leave.
+    Flood {
+        /// Frames in a second.
+        rate: f64,
+        /// Payload of each, 0 to 8 bytes.
+        bytes: u8,
+    },
+    /// The co-controller's clock is slow by this share of a second in each; negative if it is fast. `sil:` only.
+    Clock(f64),
     /// Somebody pushes at the grasp point.
     Push {
         /// N, world frame.
