@@ -22,8 +22,8 @@ impl Startup {
         }
     }
 
-    /// Repeats a stop frame if one is due, for half a second after the cyclic loop: pucks keep the last torque they were
-    /// sent, or the arm falls because nothing brakes it, and a frame can be lost. Ends before a puck is woken, for then
+    /// Repeats a stop frame if one is due, for half a second after the cyclic loop: pucks keep the torque they have,
+    /// or the arm falls because nothing brakes it, and a frame can be lost. Ends before a puck is woken, for then
     /// the bus has to be quiet. True if the slot is used.
     pub(super) fn repeats_stop(&mut self, outlet: &mut impl Outlet) -> bool {
         let (Step::Enumerate { powered: false, .. }
