@@ -37,7 +37,7 @@ pub struct Configured {
     pub file: Option<String>,
     /// The file exists.
     pub exists: bool,
-    /// What counts.
+    /// Those that count.
     pub settings: Settings,
 }
 
