@@ -29,6 +29,18 @@ fn destination(number: u16) -> Destination {
 }
 
 #[test]
+fn a_frame_is_what_it_says_to_any_driver_and_to_a_person() {
+    use embedded_can::{Frame, Id};
+    let frame = CanFrame::from_slice(CanId::new(0x426).expect("eleven bits"), &[0x88, 0, 2, 0]).expect("short");
+    assert!(!Frame::is_extended(&frame) && !Frame::is_remote_frame(&frame));
+    assert_eq!((Frame::dlc(&frame), Frame::data(&frame)), (4, &[0x88, 0, 2, 0][..]));
+    assert!(matches!(Frame::id(&frame), Id::Standard(id) if id.as_raw() == 0x426));
+    assert_eq!(CanFrame::copy_of(&frame), Some(frame));
+    assert_eq!(frame.convert::<CanFrame>(), Some(frame));
+    assert_eq!(format!("{frame:?} {:?}", frame.can_id()), "0x426#88 00 02 00 0x426");
+}
+
+#[test]
 fn identifiers_equal_the_vectors_in_both_directions() {
     for row in rows("can_id") {
         let to: u16 = row.number("to");
