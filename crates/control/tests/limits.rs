@@ -72,6 +72,14 @@ fn every_posture_can_be_held_with_room_for_control() {
 }
 
 #[test]
+fn a_step_is_the_full_scale_of_the_manufacturers_controllers_in_50_ms() {
+    let wanted = [5.0 / 3.0, 4.0 / 3.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0];
+    for (joint, (limit, wanted)) in control::act::limit::STEP_LIMIT.iter().zip(wanted).enumerate() {
+        assert!((limit - wanted).abs() < 1e-12, "J{}: {limit}", joint + 1);
+    }
+}
+
+#[test]
 fn motors_stay_below_the_warning_of_the_safety_module_in_every_corner() {
     let calibration = Calibration::<f64>::nominal(Payload::SensorAndHand);
     for corner in 0..128u32 {

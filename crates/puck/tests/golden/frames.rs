@@ -41,6 +41,24 @@ fn a_frame_is_what_it_says_to_any_driver_and_to_a_person() {
 }
 
 #[test]
+fn what_is_no_reply_is_refused_with_its_reason() {
+    let spread = node(14);
+    let reply = |sender: Node, to: Group, bytes: &[u8]| {
+        Reply::decode(&CanFrame::from_slice(CanId::encode(sender, to), bytes).expect("at most eight bytes"))
+    };
+    assert_eq!(reply(spread, Group::TACTILE_FULL_REPLIES, &[0; 7]), Err(ReplyError::Length));
+    assert_eq!(reply(spread, Group::TACTILE_FULL_REPLIES, &[0xF0; 8]), Err(ReplyError::Sequence));
+    assert_eq!(reply(spread, Group::TACTILE_TOP_REPLIES, &[0; 7]), Err(ReplyError::Length));
+    assert!(matches!(reply(spread, Group::TACTILE_TOP_REPLIES, &[0; 8]), Ok(Reply::TactileTop { .. })));
+    assert_eq!(reply(Node::SAFETY_MODULE, Group::ALL_MOTORS, &[0; 4]), Ok(Reply::SafetyBroadcast));
+    assert_eq!(reply(spread, Group::ALL_MOTORS, &[0; 4]), Err(ReplyError::UnknownGroup));
+    assert_eq!(reply(spread, Group::PROPERTY_REPLIES, &[0x80, 1, 0, 0]), Err(ReplyError::Header));
+    assert_eq!(reply(spread, Group::PROPERTY_REPLIES, &[0x00, 0, 0, 0]), Err(ReplyError::Header));
+    assert_eq!(reply(Node::HOST, Group::PROPERTY_REPLIES, &[0x80, 0, 0, 0]), Err(ReplyError::FromHost));
+    assert_eq!(ReplyError::Header.to_string(), "malformed header of an ordinary reply");
+}
+
+#[test]
 fn identifiers_equal_the_vectors_in_both_directions() {
     for row in rows("can_id") {
         let to: u16 = row.number("to");
