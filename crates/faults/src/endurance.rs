@@ -31,7 +31,7 @@ pub struct Process {
     pub descriptors: usize,
 }
 
-/// What came of a course.
+/// Result of a course.
 #[derive(Debug)]
 pub struct Course {
     /// Simulated time, h.

@@ -51,6 +51,8 @@ pub enum Figure {
     TorqueMismatches,
     /// Torque frames on the bus that are not zero while they must not be: bus off, or the safety module not ACTIVE.
     TorqueUnasked,
+    /// The same, if the device may not have been told: its patience with a silent safety module is granted.
+    TorqueUnheard,
 }
 
 /// Values of figures.
@@ -95,6 +97,7 @@ impl Figure {
             Self::BusErrors => ("bus errors", ""),
             Self::TorqueMismatches => ("torque mismatches", ""),
             Self::TorqueUnasked => ("torque unasked for", ""),
+            Self::TorqueUnheard => ("torque unasked for, unheard", ""),
         }
     }
 }

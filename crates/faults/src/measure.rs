@@ -18,6 +18,9 @@ const TELEMETRY_AGE: f64 = 0.012;
 /// Torque may still be sent this long after the safety module has taken the arm out of ACTIVE.
 const NOTICE: Ticks = 30 * TICKS_PER_MILLISECOND;
 
+/// The same where the safety module's word can be lost: 100 ms of silence end the torque.
+const UNHEARD: Ticks = NOTICE + 100 * TICKS_PER_MILLISECOND;
+
 /// Longest time from the end of the torque until the motors brake, s.
 const BRAKES: f64 = 0.01;
 
@@ -47,7 +50,8 @@ pub fn always(watched: &Watched) -> Figures {
         (Figure::FreeSpeed, free(0.0)),
         (Figure::FallSpeed, free(BRAKES)),
         (Figure::CausesLost, f64::from(causes_lost(watched))),
-        (Figure::TorqueUnasked, f64::from(unasked(&sent, &watched.moments))),
+        (Figure::TorqueUnasked, f64::from(unasked(&sent, &watched.moments, NOTICE))),
+        (Figure::TorqueUnheard, f64::from(unasked(&sent, &watched.moments, UNHEARD))),
         (Figure::HandSpeed, speeds.iter().map(|(_, speed)| *speed).fold(0.0, f64::max)),
     ])
 }
@@ -155,14 +159,14 @@ fn causes_lost(watched: &Watched) -> u32 {
     changes.count() as u32
 }
 
-/// Torques that are not zero although the safety module has not been ACTIVE for a while.
-fn unasked(sent: &[Sent], moments: &[Moment]) -> u32 {
+/// Torques that are not zero although the safety module has not been ACTIVE for this while.
+fn unasked(sent: &[Sent], moments: &[Moment], notice: Ticks) -> u32 {
     let mut since = None;
     let mut count = 0;
     let mut pairs = sent.iter().peekable();
     for moment in moments {
         while let Some(pair) = pairs.next_if(|pair| pair.at <= moment.ticks) {
-            count += u32::from(!pair.is_zero && since.is_some_and(|since| pair.at > since + NOTICE));
+            count += u32::from(!pair.is_zero && since.is_some_and(|since| pair.at > since + notice));
         }
         since = if moment.safety == SafetyMode::Active { None } else { since.or(Some(moment.ticks)) };
     }

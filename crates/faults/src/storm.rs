@@ -91,8 +91,23 @@ fn bars(inject: &[Injection]) -> std::collections::BTreeMap<Figure, f64> {
         FaultKind::CountJump { .. } | FaultKind::Restart { .. } => true,
         _ => false,
     };
-    let belief = if inject.iter().any(blinds) { f64::INFINITY } else { 20.0 };
-    [(Figure::Belief, belief), (Figure::FreeSpeed, f64::INFINITY), (Figure::FallSpeed, 0.25)].into()
+    // The word of the safety module can be lost: then its silence has to end the torque.
+    let deafens = |fault: &Injection| match &fault.what {
+        FaultKind::Drop(frames) | FaultKind::Flip(frames) | FaultKind::Freeze(frames) => {
+            matches!(frames.kind, FrameKind::Any | FrameKind::Property)
+        }
+        FaultKind::Delay { .. } | FaultKind::Refuse(_) | FaultKind::BusOff => true,
+        _ => false,
+    };
+    let bar = |is_free: bool, bar: f64| if is_free { f64::INFINITY } else { bar };
+    [
+        (Figure::Belief, bar(inject.iter().any(blinds), 20.0)),
+        (Figure::FreeSpeed, f64::INFINITY),
+        (Figure::FallSpeed, 0.25),
+        (Figure::TorqueUnasked, bar(inject.iter().any(deafens), 0.0)),
+        (Figure::TorqueUnheard, 0.0),
+    ]
+    .into()
 }
 
 /// Draws of one storm.

@@ -52,8 +52,8 @@ impl Brakes {
             self.request_in = REQUEST_SLOTS;
             return Some(set(Node::SAFETY_MODULE, PropertyId::MODE, SafetyMode::Idle.value()));
         }
-        // The module's word to the pucks may be lost, and with it the brakes.
-        let told = self.request_in == REQUEST_SLOTS - 1;
+        // The module's word to the pucks may be lost, and with it the brakes; so may this one.
+        let told = self.request_in % 2 == 1;
         let due = core::mem::take(&mut self.owed) || told;
         due.then(|| set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value()))
     }

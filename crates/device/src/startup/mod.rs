@@ -8,6 +8,7 @@
 //! verify, read, zero, tare, one position read, then the cyclic loop. Each step sends through an outlet that may refuse
 //! (a pause is not over); it then simply tries again in the next slot.
 
+mod continuity;
 mod hand;
 mod home;
 mod survey;
@@ -20,6 +21,7 @@ use puck::{Counts, Node, PropertyId, Reply, force_torque, set};
 use crate::bus::{Answer, Exchange, Outlet};
 use crate::command::Refusal;
 use crate::stage::{Stage, StartupError};
+use continuity::Continuity;
 use hand::HandSurvey;
 pub(crate) use survey::SafetyProperties;
 use survey::Survey;
@@ -32,6 +34,10 @@ const RETRY_US: u64 = 1_000_000;
 const IGNORED_AT_ZERO: i32 = 8;
 /// Velocity faults it shall ignore when polling begins: the length of its history.
 const IGNORED_AT_START: i32 = 5;
+/// Time for which a start-up after the cyclic loop repeats its stop frames, us: the first ones may have been lost.
+const STOPPING_US: u64 = 500_000;
+/// Between two of these frames, us.
+const STOP_PACE_US: u64 = 3_000;
 /// Transitions within one slot; more would mean a loop.
 const TRANSITIONS: usize = 8;
 /// First and last node that an enumeration asks.
@@ -97,6 +103,17 @@ enum Step {
     Blocked { until_us: u64 },
 }
 
+/// Stop frames that are repeated while the start-up goes on.
+#[derive(Clone, Copy, Debug, Default)]
+struct Stopping {
+    /// Time of the first, us.
+    since_us: Option<u64>,
+    /// Earliest time of the next, us.
+    next_us: u64,
+    /// Which one is next.
+    frame: u8,
+}
+
 /// Decision of a step.
 enum Next {
     /// Wait for an answer, a pause or a person.
@@ -109,6 +126,10 @@ enum Next {
 #[derive(Clone, Debug)]
 pub(crate) struct Startup {
     step: Step,
+    /// Begun after the cyclic loop: an arm that may have had torque a moment ago.
+    stopping: Option<Stopping>,
+    /// Begun after the cyclic loop: counts that a person has zeroed are not to change unseen.
+    continuity: Option<Continuity>,
     exchange: Exchange,
     survey: Survey,
     hand: HandSurvey,
@@ -118,6 +139,8 @@ pub(crate) struct Startup {
     targets: [Counts; 7],
     positions: [Option<Counts>; 7],
     zeroed: bool,
+    /// The sensor has been tared since it was woken. It is not tared again then: something may press on it.
+    tared: bool,
     /// Why the counts do not refer to the zero of the arm, whatever the safety module says, until a person zeroes.
     doubt: Option<StartupError>,
     /// True while the safety module has not been told so.
@@ -148,6 +171,8 @@ impl Startup {
     pub(crate) fn new() -> Startup {
         Startup {
             step: Step::ZeroTorques { frame: 0 },
+            stopping: None,
+            continuity: None,
             exchange: Exchange::default(),
             survey: Survey::new(),
             hand: HandSurvey::default(),
@@ -157,6 +182,7 @@ impl Startup {
             targets: [Counts(0); 7],
             positions: [None; 7],
             zeroed: false,
+            tared: false,
             doubt: None,
             owes_revocation: false,
             home: [0.0; 7],
@@ -168,7 +194,13 @@ impl Startup {
 
     /// Begins anew after the cyclic loop. A doubt about the zero stays.
     pub(crate) fn restart(&mut self) {
-        *self = Startup { doubt: self.doubt, ..Startup::new() };
+        *self = Startup {
+            doubt: self.doubt,
+            tared: self.tared,
+            stopping: Some(Stopping::default()),
+            continuity: Some(Continuity::default()),
+            ..Startup::new()
+        };
     }
 
     /// The counts of a motor have jumped in the cyclic loop.
@@ -270,12 +302,17 @@ impl Startup {
                     self.step,
                     Step::CheckPositions { until_us: Some(_) } | Step::FirstPositions { until_us: Some(_) }
                 );
-                match node.arm_index().and_then(|joint| self.positions.get_mut(joint)) {
+                let Some(joint) = node.arm_index() else { return false };
+                let continuity = self.continuity.as_mut();
+                if continuity.is_some_and(|continuity| continuity.has_jumped(joint, primary)) {
+                    self.lose_zero();
+                }
+                match self.positions.get_mut(joint) {
                     Some(place) if asked => {
                         *place = Some(primary);
                         true
                     }
-                    _ => false,
+                    _ => self.continuity.is_some(),
                 }
             }
             _ => false,
@@ -284,6 +321,9 @@ impl Startup {
 
     /// One slot. Returns whether the start-up has ended and the cyclic loop may take over.
     pub(crate) fn advance(&mut self, outlet: &mut impl Outlet) -> bool {
+        if self.repeats_stop(outlet) || self.looks(outlet) {
+            return false;
+        }
         for _ in 0..TRANSITIONS {
             match self.perform(outlet) {
                 Ok(Next::Stay) => break,
@@ -304,6 +344,20 @@ impl Startup {
             }
         }
         false
+    }
+
+    /// Looks at the counts if it is time to and the bus need not be quiet; true if the slot is used.
+    fn looks(&mut self, outlet: &mut impl Outlet) -> bool {
+        match self.step {
+            Step::ZeroTorques { .. } | Step::Wake { .. } | Step::Silence { .. } => false,
+            Step::CheckPositions { .. } | Step::FirstPositions { .. } => false,
+            Step::WritePosition { .. } => {
+                // From here on the counts are those that a person says.
+                self.continuity = None;
+                false
+            }
+            _ => self.continuity.as_mut().is_some_and(|continuity| continuity.look(outlet)),
+        }
     }
 
     /// Does what the present step asks.
@@ -354,12 +408,17 @@ impl Startup {
                 Some(_) => {
                     self.zeroed = true;
                     self.doubt = None;
+                    // A person stands beside it, and nothing presses.
+                    self.tared = false;
                     self.zeroed_at = Some(self.home);
                     Next::Go(Step::Tare)
                 }
             }),
-            Step::Tare if !self.has_sensor() => Ok(Next::Go(Step::IgnoreFirstFaults)),
-            Step::Tare => Ok(after(outlet.send(force_torque::tare()), Step::IgnoreFirstFaults)),
+            Step::Tare if !self.has_sensor() || self.tared => Ok(Next::Go(Step::IgnoreFirstFaults)),
+            Step::Tare => {
+                self.tared = outlet.send(force_torque::tare());
+                Ok(after(self.tared, Step::IgnoreFirstFaults))
+            }
             Step::IgnoreFirstFaults => {
                 let frame = set(Node::SAFETY_MODULE, self.safety()?.ignore_faults, IGNORED_AT_START);
                 Ok(after(outlet.send(frame), Step::FirstPositions { until_us: None }))
@@ -371,7 +430,8 @@ impl Startup {
             Step::Blocked { until_us } if outlet.now_us() < until_us => Ok(Next::Stay),
             Step::Blocked { .. } => {
                 let (error, doubt, hand) = (self.error, self.doubt, self.hand.again());
-                *self = Startup { error, doubt, hand, ..Startup::new() };
+                let (continuity, tared) = (self.continuity, self.tared);
+                *self = Startup { error, doubt, hand, continuity, tared, ..Startup::new() };
                 Ok(Next::Stay)
             }
         }

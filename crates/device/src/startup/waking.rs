@@ -3,7 +3,7 @@
 use puck::{Group, MotorMode, Node, PropertyId, SafetyMode, Status, get, set, stop_frames};
 
 use super::survey::{DRIVE_PROPERTIES, Survey};
-use super::{ENUMERATED, Next, POLL_US, Startup, Step, after};
+use super::{ENUMERATED, Next, POLL_US, STOP_PACE_US, STOPPING_US, Startup, Step, Stopping, after};
 use crate::bus::{Answer, Outlet};
 use crate::stage::StartupError;
 
@@ -20,6 +20,34 @@ impl Startup {
             Some(content) => after(outlet.send(*content), Step::ZeroTorques { frame: frame + 1 }),
             None => Next::Go(Step::Enumerate { node: *ENUMERATED.start(), powered: false }),
         }
+    }
+
+    /// Repeats a stop frame if one is due, for half a second after the cyclic loop: pucks keep the torque they have,
+    /// or the arm falls because nothing brakes it, and a frame can be lost. Ends before a puck is woken, for then
+    /// the bus has to be quiet. True if the slot is used.
+    pub(super) fn repeats_stop(&mut self, outlet: &mut impl Outlet) -> bool {
+        let (Step::Enumerate { powered: false, .. }
+        | Step::Listen { powered: false, .. }
+        | Step::IdentifySafety { .. }
+        | Step::LoadLimit { .. }
+        | Step::AwaitIdle { .. }) = self.step
+        else {
+            return false;
+        };
+        let now_us = outlet.now_us();
+        let Some(Stopping { since_us, next_us, frame }) = &mut self.stopping else { return false };
+        if now_us < *next_us || now_us > *since_us.get_or_insert(now_us) + STOPPING_US {
+            return false;
+        }
+        // The brakes hold whatever the torque is, so their frame goes more often.
+        let [arm, wrist, brake, brake_hand] = stop_frames();
+        let order = [brake, arm, brake, wrist, brake, brake_hand];
+        let sent = outlet.send(order.get(usize::from(*frame)).copied().unwrap_or(brake));
+        if sent {
+            *frame = (*frame + 1) % order.len() as u8;
+            *next_us = now_us + STOP_PACE_US;
+        }
+        sent
     }
 
     pub(super) fn enumerate(&mut self, number: u8, powered: bool, outlet: &mut impl Outlet) -> Next {
@@ -133,6 +161,8 @@ impl Startup {
             // Its counts began with its firmware.
             self.doubt.get_or_insert(StartupError::CountsAnew(node));
         }
+        // A sensor that slept has forgotten its tare.
+        self.tared &= node != Node::FORCE_TORQUE;
         let frame = set(node, PropertyId::STAT, Status::Ready.value());
         after(outlet.send(frame), Step::Wake { device: index + 1, woken: true })
     }
