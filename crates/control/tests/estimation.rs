@@ -41,6 +41,24 @@ fn the_transmission_of_the_bus_is_that_of_the_arm_model() {
 }
 
 #[test]
+fn a8_a_motor_that_turned_fast_and_stands_still_to_the_count_is_missing() {
+    let calibration = nominal::<f64>();
+    let at =
+        |cycle: i32| replies(&calibration, [0.0, 0.0, 0.0, 1.2, 0.0, 0.0, 0.0].map(|dq| dq * f64::from(cycle) / RATE));
+    let mut estimator = JointEstimator::new(&calibration);
+    for cycle in 0..100 {
+        let state = estimator.update(&at(cycle), true).expect("whole");
+        assert!(!state.stuck && state.missing == 0, "{cycle}");
+    }
+    let mut frozen = at(100);
+    frozen[3] = at(99)[3];
+    let state = estimator.update(&frozen, true).expect("known");
+    assert!(state.stuck && state.missing == 1, "{state:?}");
+    let state = estimator.update(&frozen, false).expect("known");
+    assert!(!state.stuck, "without torque nothing is concluded");
+}
+
+#[test]
 fn d8_a_clock_that_is_off_by_one_percent_scales_velocities_by_one_percent() {
     let calibration = nominal::<f64>();
     let speed = [0.8, -0.6, 0.9, -1.2, 1.5, -1.1, 2.0];

@@ -4,7 +4,7 @@ use control::act::TorqueLimiter;
 use control::act::hand::{HandLimiter, TORQUE_LIMIT};
 use control::act::limit::{LimitReport, MOTOR_COUNTS_LIMIT, STEP_LIMIT, WORST_GRAVITY};
 use control::model::{ArmModel, Frames};
-use control::units::{JointPositions, JointTorques};
+use control::units::{JointPositions, JointTorques, Vector7};
 use control::{Calibration, Payload, model};
 use proptest::prelude::*;
 
@@ -69,6 +69,34 @@ fn every_posture_can_be_held_with_room_for_control() {
     }
     assert_eq!(report, LimitReport::default());
     assert!((limiter.last().torques().0 - wanted.0).amax() < 1e-9);
+}
+
+#[test]
+fn a_limit_that_cut_is_told_and_a_reset_begins_from_nothing() {
+    for bits in 0..8 {
+        let report =
+            LimitReport { joint: bits & 1 != 0, motor: bits & 2 != 0, rate: bits & 4 != 0, ..LimitReport::default() };
+        assert_eq!(report.is_cut(), bits != 0, "{report:?}");
+    }
+    let mut limiter = limiter();
+    let wanted = JointTorques(Vector7::from(STEP_LIMIT));
+    limiter.limit(&wanted);
+    assert_ne!(*limiter.last().torques(), JointTorques::zero());
+    limiter.reset();
+    assert_eq!(*limiter.last().torques(), JointTorques::zero());
+    let (limited, report) = limiter.limit(&JointTorques(wanted.0 * 2.0));
+    assert!(report.rate && !report.joint);
+    assert!(limited.torques().0.iter().zip(STEP_LIMIT).all(|(torque, limit)| *torque <= limit + 1e-12));
+    let (_, report) = limiter.limit(&JointTorques(Vector7::repeat(1e3)));
+    assert!(report.joint && report.rate && report.is_cut());
+}
+
+#[test]
+fn a_step_is_the_full_scale_of_the_manufacturers_controllers_in_50_ms() {
+    let wanted = [5.0 / 3.0, 4.0 / 3.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0];
+    for (joint, (limit, wanted)) in STEP_LIMIT.iter().zip(wanted).enumerate() {
+        assert!((limit - wanted).abs() < 1e-12, "J{}: {limit}", joint + 1);
+    }
 }
 
 #[test]

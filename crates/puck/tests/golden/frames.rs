@@ -29,6 +29,36 @@ fn destination(number: u16) -> Destination {
 }
 
 #[test]
+fn a_frame_is_what_it_says_to_any_driver_and_to_a_person() {
+    use embedded_can::{Frame, Id};
+    let frame = CanFrame::from_slice(CanId::new(0x426).expect("eleven bits"), &[0x88, 0, 2, 0]).expect("short");
+    assert!(!Frame::is_extended(&frame) && !Frame::is_remote_frame(&frame));
+    assert_eq!((Frame::dlc(&frame), Frame::data(&frame)), (4, &[0x88, 0, 2, 0][..]));
+    assert!(matches!(Frame::id(&frame), Id::Standard(id) if id.as_raw() == 0x426));
+    assert_eq!(CanFrame::copy_of(&frame), Some(frame));
+    assert_eq!(frame.convert::<CanFrame>(), Some(frame));
+    assert_eq!(format!("{frame:?} {:?}", frame.can_id()), "0x426#88 00 02 00 0x426");
+}
+
+#[test]
+fn what_is_no_reply_is_refused_with_its_reason() {
+    let spread = node(14);
+    let reply = |sender: Node, to: Group, bytes: &[u8]| {
+        Reply::decode(&CanFrame::from_slice(CanId::encode(sender, to), bytes).expect("at most eight bytes"))
+    };
+    assert_eq!(reply(spread, Group::TACTILE_FULL_REPLIES, &[0; 7]), Err(ReplyError::Length));
+    assert_eq!(reply(spread, Group::TACTILE_FULL_REPLIES, &[0xF0; 8]), Err(ReplyError::Sequence));
+    assert_eq!(reply(spread, Group::TACTILE_TOP_REPLIES, &[0; 7]), Err(ReplyError::Length));
+    assert!(matches!(reply(spread, Group::TACTILE_TOP_REPLIES, &[0; 8]), Ok(Reply::TactileTop { .. })));
+    assert_eq!(reply(Node::SAFETY_MODULE, Group::ALL_MOTORS, &[0; 4]), Ok(Reply::SafetyBroadcast));
+    assert_eq!(reply(spread, Group::ALL_MOTORS, &[0; 4]), Err(ReplyError::UnknownGroup));
+    assert_eq!(reply(spread, Group::PROPERTY_REPLIES, &[0x80, 1, 0, 0]), Err(ReplyError::Header));
+    assert_eq!(reply(spread, Group::PROPERTY_REPLIES, &[0x00, 0, 0, 0]), Err(ReplyError::Header));
+    assert_eq!(reply(Node::HOST, Group::PROPERTY_REPLIES, &[0x80, 0, 0, 0]), Err(ReplyError::FromHost));
+    assert_eq!(ReplyError::Header.to_string(), "malformed header of an ordinary reply");
+}
+
+#[test]
 fn identifiers_equal_the_vectors_in_both_directions() {
     for row in rows("can_id") {
         let to: u16 = row.number("to");
