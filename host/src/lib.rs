@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod cmd;
+pub mod config;
 pub mod monitor;
 pub mod probe;
 pub mod schemas;

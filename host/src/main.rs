@@ -4,7 +4,6 @@ use std::io::Write;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use clap::Parser;
 use signal_hook::consts::signal::SIGXFSZ;
 
 fn main() -> ExitCode {
@@ -12,8 +11,8 @@ fn main() -> ExitCode {
     if let Err(cause) = signal_hook::flag::register(SIGXFSZ, Arc::default()) {
         let _ = writeln!(std::io::stderr(), "warning: a limit for files may end this program ({cause})");
     }
-    match tactus::cmd::Cli::try_parse() {
+    match tactus::cmd::parse() {
         Ok(cli) => tactus::cmd::run(cli),
-        Err(error) => tactus::cmd::usage(&error),
+        Err(code) => code,
     }
 }

@@ -6,12 +6,13 @@ use lab::failure::FailureData;
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 
-use crate::cmd::{delete, explain, export, get, hand, list, record, rename, sim, stop};
+use crate::cmd::{config, delete, explain, export, get, hand, list, manual, record, rename, sim, stop};
 
 /// Every schema by the name of its command; `error` is that of any command that fails.
 #[must_use]
 pub fn all() -> Vec<(&'static str, Schema)> {
     vec![
+        ("config", of::<config::Configured>()),
         ("delete", of::<delete::Deleted>()),
         ("error", of::<FailureData>()),
         ("explain", of::<explain::Explained>()),
@@ -19,6 +20,7 @@ pub fn all() -> Vec<(&'static str, Schema)> {
         ("get", of::<get::Gotten>()),
         ("hand", of::<hand::Moved>()),
         ("list", of::<list::Listed>()),
+        ("manual", of::<manual::Written>()),
         ("record", of::<record::Recorded>()),
         ("rename", of::<rename::Renamed>()),
         ("sim", of::<sim::Simulated>()),

@@ -13,7 +13,12 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 fn tactus(folder: &Path, arguments: &[&str]) -> Assert {
-    Command::new(env!("CARGO_BIN_EXE_tactus")).current_dir(folder).env_remove("TACTUS_DEVICE").args(arguments).assert()
+    Command::new(env!("CARGO_BIN_EXE_tactus"))
+        .current_dir(folder)
+        .env("XDG_CONFIG_HOME", folder)
+        .env_remove("TACTUS_DEVICE")
+        .args(arguments)
+        .assert()
 }
 
 fn stdout(assert: &Assert) -> String {

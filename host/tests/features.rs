@@ -74,7 +74,7 @@ const ROWS: [Feature; 20] = [
      tracking, limits and lost samples",
         "the preconditions are not listed with their values",
     ),
-    ("settings", "`config`", "read, written, compared and restored, with a report of differences", "not built"),
+    ("settings of the device", "-", "read, written, compared and restored, with a report of differences", "not built"),
     (
         "health of the line",
         "`status`, the end of each `run`",
@@ -97,8 +97,13 @@ const ROWS: [Feature; 20] = [
     ("calibration", "`calibrate`", "before and after, kept over a restart", "the report is not written to a file"),
     ("flashing and logs", "`flash`, `logs`", "the probe's command is shown; verified; stored primitives are kept", ""),
     ("doctor", "`doctor`", "permissions, versions, faults and settings in one file", "not built"),
-    ("completions and manual", "`completions`", "bash, zsh and fish know every command", "no manual pages"),
-    ("defaults", "`TACTUS_DEVICE`", "option before environment before file", "no configuration file"),
+    (
+        "completions and manual",
+        "`completions`, `manual`",
+        "bash, zsh and fish know every command; each has a page of the manual",
+        "",
+    ),
+    ("defaults", "`config`, `TACTUS_DEVICE`", "option before environment before file, and it is told which counts", ""),
     (
         "replay",
         "`can replay`",
@@ -174,7 +179,11 @@ fn the_table_of_features_is_what_the_tests_hold() {
 
 fn command(folder: &Path, line: &str) -> std::process::Command {
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env_remove("TACTUS_DEVICE").args(line.split_whitespace());
+    command
+        .current_dir(folder)
+        .env("XDG_CONFIG_HOME", folder)
+        .env_remove("TACTUS_DEVICE")
+        .args(line.split_whitespace());
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
 }
@@ -248,15 +257,73 @@ fn cli_10_a_run_that_lacks_something_names_it_and_another_tells_how_it_ended() {
     assert!(told["tracking"]["position_max_m"].is_number() && told["flags"]["limited"].is_number(), "{told}");
 }
 
-#[test]
-fn cli_19_an_option_counts_before_the_environment() {
+/// A folder with a configuration file of these words; the command sees no other.
+fn configured(words: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let refused = |line: &str| {
-        let output = command(folder.path(), line).env("TACTUS_DEVICE", "nonsense-of-the-environment").output().unwrap();
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    std::fs::create_dir(folder.path().join("tactus")).unwrap();
+    std::fs::write(folder.path().join("tactus/config.toml"), words).unwrap();
+    folder
+}
+
+#[test]
+fn cli_19_an_option_counts_before_the_environment_and_this_before_the_file() {
+    let folder = configured("device = \"nonsense-of-the-file\"\ntimeout = 7.5\n");
+    let said = |line: &str, environment: bool| {
+        let mut command = command(folder.path(), line);
+        command.env("XDG_CONFIG_HOME", folder.path());
+        if environment {
+            command.env("TACTUS_DEVICE", "nonsense-of-the-environment").env("TACTUS_TIMEOUT", "3");
+        }
+        let output = command.output().unwrap();
+        (output.status.code(), [output.stdout, output.stderr].map(|said| String::from_utf8(said).unwrap()).concat())
     };
-    let (code, said) = refused("list");
-    assert!(code == Some(2) && said.contains("nonsense-of-the-environment"), "{said}");
-    let (code, said) = refused("--device nonsense-of-the-option list");
-    assert!(code == Some(2) && said.contains("nonsense-of-the-option"), "{said}");
+    for (line, environment, device) in [
+        ("list", false, "nonsense-of-the-file"),
+        ("list", true, "nonsense-of-the-environment"),
+        ("--device nonsense-of-the-option list", true, "nonsense-of-the-option"),
+        ("list --device nonsense-of-the-option", true, "nonsense-of-the-option"),
+    ] {
+        let (code, said) = said(line, environment);
+        assert!(code == Some(2) && said.contains(device), "{line}: {said}");
+    }
+    let shown = |line: &str, environment: bool| {
+        let (code, said) = said(&format!("{line} --json"), environment);
+        assert_eq!(code, Some(0), "{said}");
+        let shown: serde_json::Value = serde_json::from_str(&said).unwrap();
+        ["device", "timeout"].map(|name| {
+            let setting = &shown["settings"][name];
+            (setting["value"].as_str().unwrap_or_default().to_owned(), setting["origin"].as_str().unwrap().to_owned())
+        })
+    };
+    let pair = |value: &str, origin: &str| (value.to_owned(), origin.to_owned());
+    assert_eq!(shown("config", false), [pair("nonsense-of-the-file", "file"), pair("7.5", "file")]);
+    assert_eq!(shown("config", true), [pair("nonsense-of-the-environment", "environment"), pair("3", "environment")]);
+    assert_eq!(
+        shown("config --device sil: --timeout 1", true),
+        [pair("sil:", "command line"), pair("1", "command line")]
+    );
+    let plain = tempfile::tempdir().unwrap();
+    let output = command(plain.path(), "config").env("XDG_CONFIG_HOME", plain.path()).output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.contains("timeout") && said.contains("default") && said.contains("does not exist"), "{said}");
+}
+
+#[test]
+fn cli_19_a_file_that_cannot_be_used_is_named_with_its_line_and_explain_goes_on() {
+    for (words, line, what) in [
+        ("timeout = 3\ndevise = \"sil:\"\n", "line 2", "devise"),
+        ("timeout = \"soon\"\n", "line 1", "timeout"),
+        ("timeout = -1\n", "timeout", "-1"),
+        ("device = \n", "line 1", "device"),
+        ("timeout = nan\n", "timeout", "NaN"),
+    ] {
+        let folder = configured(words);
+        let run = |line: &str| command(folder.path(), line).env("XDG_CONFIG_HOME", folder.path()).output().unwrap();
+        let output = run("--device sil:world=simple list");
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{words}: {said}");
+        assert!(said.contains("E250") && said.contains("config.toml"), "{words}: {said}");
+        assert!(said.contains(line) && said.contains(what), "{words}: {said}");
+        assert!(run("explain E250").status.success() && run("--help").status.success(), "{words}");
+    }
 }

@@ -13,13 +13,22 @@ use assert_cmd::assert::Assert;
 /// The program, in a folder, without a device of the environment.
 fn tactus(folder: &Path, line: &str) -> Assert {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env_remove("TACTUS_DEVICE").args(line.split_whitespace()).assert()
+    command
+        .current_dir(folder)
+        .env("XDG_CONFIG_HOME", folder)
+        .env_remove("TACTUS_DEVICE")
+        .args(line.split_whitespace())
+        .assert()
 }
 
 /// The program, started and left to itself.
 fn start(folder: &Path, line: &str) -> std::process::Child {
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env_remove("TACTUS_DEVICE").args(line.split_whitespace());
+    command
+        .current_dir(folder)
+        .env("XDG_CONFIG_HOME", folder)
+        .env_remove("TACTUS_DEVICE")
+        .args(line.split_whitespace());
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 

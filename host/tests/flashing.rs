@@ -45,6 +45,7 @@ fn calls(folder: &Path) -> Vec<String> {
 fn tactus(folder: &Path, arguments: &[&str]) -> Assert {
     Command::new(env!("CARGO_BIN_EXE_tactus"))
         .current_dir(folder)
+        .env("XDG_CONFIG_HOME", folder)
         .env_remove("TACTUS_DEVICE")
         .env("PATH", folder.join("bin"))
         .args(arguments)

@@ -9,7 +9,12 @@ use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 
 fn tactus(folder: &Path, arguments: &[&str]) -> Assert {
-    Command::new(env!("CARGO_BIN_EXE_tactus")).current_dir(folder).env_remove("TACTUS_DEVICE").args(arguments).assert()
+    Command::new(env!("CARGO_BIN_EXE_tactus"))
+        .current_dir(folder)
+        .env("XDG_CONFIG_HOME", folder)
+        .env_remove("TACTUS_DEVICE")
+        .args(arguments)
+        .assert()
 }
 
 fn stdout(assert: &Assert) -> String {
@@ -68,4 +73,31 @@ fn cli_18_shells_complete_every_command() {
 fn the_monitor_wants_a_terminal_or_json_before_it_looks_for_a_device() {
     let folder = tempfile::tempdir().unwrap();
     assert!(stderr(&tactus(folder.path(), &["monitor"]).code(2)).contains("E240"));
+}
+
+#[test]
+fn cli_18_every_command_has_a_page_of_the_manual() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = tactus(folder.path(), &["manual", "man1", "--json"]).success();
+    let told: serde_json::Value = serde_json::from_str(&stdout(&told)).unwrap();
+    let page = |name: &str| std::fs::read_to_string(folder.path().join("man1").join(name)).unwrap_or_default();
+    assert!(page("tactus.1").contains("tactus\\-run(1)"), "the first page leads to the others");
+    assert!(
+        page("tactus-run.1").contains("Play a primitive on the arm") && page("tactus-run.1").contains("\\-\\-speed")
+    );
+    // Commands of commands, too.
+    assert!(page("tactus-can-decode.1").contains("NAME"));
+    let pages = std::fs::read_dir(folder.path().join("man1")).unwrap().count();
+    assert_eq!(told["pages"].as_array().unwrap().len(), pages, "{told}");
+    let help = stdout(&tactus(folder.path(), &["--help-all"]).success());
+    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    for command in commands.filter_map(|line| line.strip_prefix("  ")?.split_whitespace().next()) {
+        assert!(command == "help" || !page(&format!("tactus-{command}.1")).is_empty(), "no page of {command}");
+    }
+
+    std::fs::write(folder.path().join("man1/tactus.1"), "mine").unwrap();
+    assert!(stderr(&tactus(folder.path(), &["manual", "man1"]).code(2)).contains("E230"));
+    assert_eq!(page("tactus.1"), "mine");
+    tactus(folder.path(), &["manual", "man1", "--force"]).success();
+    assert_ne!(page("tactus.1"), "mine");
 }

@@ -70,7 +70,11 @@ fn damage(bytes: &[u8], numbers: &mut Numbers) -> Vec<u8> {
 fn run(folder: &Path, line: &str) -> (Option<i32>, String, Duration) {
     let begun = Instant::now();
     let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env_remove("TACTUS_DEVICE").args(line.split_whitespace());
+    command
+        .current_dir(folder)
+        .env("XDG_CONFIG_HOME", folder)
+        .env_remove("TACTUS_DEVICE")
+        .args(line.split_whitespace());
     let said = std::fs::File::create(folder.join("said")).unwrap();
     let mut child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(said).spawn().unwrap();
     while begun.elapsed() < TIME_LIMIT {

@@ -11,7 +11,12 @@ use serde_json::Value;
 
 fn tactus(folder: &Path, line: &str) -> Assert {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env_remove("TACTUS_DEVICE").args(line.split_whitespace()).assert()
+    command
+        .current_dir(folder)
+        .env("XDG_CONFIG_HOME", folder)
+        .env_remove("TACTUS_DEVICE")
+        .args(line.split_whitespace())
+        .assert()
 }
 
 fn stderr(assert: &Assert) -> String {

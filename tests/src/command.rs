@@ -29,6 +29,7 @@ pub fn program() -> PathBuf {
 pub fn tactus(folder: &Path, arguments: &[&str]) -> Assert {
     Command::new(program())
         .current_dir(folder)
+        .env("XDG_CONFIG_HOME", folder)
         .env_remove("TACTUS_DEVICE")
         .env_remove("TACTUS_TIMEOUT")
         .args(arguments)
@@ -43,6 +44,7 @@ pub fn tactus(folder: &Path, arguments: &[&str]) -> Assert {
 pub fn start(folder: &Path, arguments: &[&str]) -> Running {
     let child = process::Command::new(program())
         .current_dir(folder)
+        .env("XDG_CONFIG_HOME", folder)
         .env_remove("TACTUS_DEVICE")
         .args(arguments)
         .stdin(process::Stdio::null())

@@ -133,7 +133,8 @@ fn hand_speeds(moments: &[Moment]) -> Vec<(&Moment, f64)> {
     speeds
 }
 
-/// Largest distance of the joint angles told from those that were true a moment before, rad.
+/// Largest distance of the joint angles told from those that were true a moment before, rad. Between two moments, which
+/// an order parts by as long as its answer takes, the truth is interpolated.
 fn belief(moments: &[Moment]) -> f64 {
     let mut worst = 0.0_f64;
     let mut from = 0;
@@ -142,8 +143,14 @@ fn belief(moments: &[Moment]) -> f64 {
             from += 1;
         }
         let Some((q, _)) = moment.told else { continue };
-        let off = |truth: &Moment| (0..7).map(|joint| (q[joint] - truth.q[joint]).abs()).fold(0.0, f64::max);
-        let nearest = moments[from..=index].iter().map(off).fold(f64::INFINITY, f64::min);
+        let off = |before: &Moment, behind: &Moment, share: f64| {
+            let truth = |joint: usize| before.q[joint] + share * (behind.q[joint] - before.q[joint]);
+            (0..7).map(|joint| (q[joint] - truth(joint)).abs()).fold(0.0, f64::max)
+        };
+        let seen = &moments[from.saturating_sub(1)..=index];
+        let pairs = seen.windows(2).flat_map(|pair| (0..8).map(move |step| (pair, f64::from(step) / 8.0)));
+        let nearest =
+            pairs.map(|(pair, share)| off(&pair[0], &pair[1], share)).fold(off(moment, moment, 0.0), f64::min);
         worst = worst.max(nearest);
     }
     worst

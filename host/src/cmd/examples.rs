@@ -4,13 +4,11 @@
 pub(super) const ALL: &str = "\
 Devices:
   sil:      the application in this process, on a simulated arm     sil:seed=7,world=simple
-  sim:      the firmware image under QEMU         board:  the emulated board with its image
-  hand:     a hand alone under QEMU
+  sim:      the firmware image under QEMU   board:  the emulated board with its image   hand:  a hand alone under QEMU
   serial:/dev/ttyACM0   can:can0   tcp:HOST:PORT   unix:tactus.sock
 Options of simulated devices, behind the colon and separated by commas:
-  seed=N               everything random          world=mujoco|simple   the physics
-  line=serial|can      the line to the host       bus=FILE              log of both buses
-  flash=FILE           keeps its primitives       faults=FILE[:N]       faults that befall the arm
+  seed=N    everything random     world=mujoco|simple  the physics        line=serial|can  the line to the host
+  bus=FILE  log of both buses     flash=FILE  keeps its primitives        faults=FILE[:N]  faults that befall the arm
 Examples:
   tactus --device sil: teach -o grasp.csv
   tactus learn grasp.csv -o grasp.toml
@@ -139,6 +137,18 @@ Example:
 pub(super) const COMPLETIONS: &str = "\
 Example:
   tactus completions bash";
+/// `manual`
+pub(super) const MANUAL: &str = "\
+Example:
+  tactus manual ~/.local/share/man/man1";
+/// `config`
+pub(super) const CONFIG: &str = "\
+The file is ~/.config/tactus/config.toml, for example:
+  device = \"serial:/dev/ttyACM0\"
+  timeout = 5
+An option counts before the environment, and the environment before the file.
+Example:
+  tactus config";
 /// `compare`
 pub(super) const COMPARE: &str = "\
 Example:

@@ -5,6 +5,7 @@ pub mod can;
 pub mod check;
 pub mod compare;
 pub mod completions;
+pub mod config;
 mod connection;
 pub mod delete;
 mod examples;
@@ -20,6 +21,7 @@ pub mod hand;
 pub mod learn;
 pub mod list;
 pub mod logs;
+pub mod manual;
 pub mod monitor;
 pub mod output;
 pub mod plot;
@@ -38,7 +40,7 @@ use std::io::{IsTerminal as _, Write};
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::{ArgAction, Args, Parser, Subcommand};
+use clap::{ArgAction, Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 pub use output::Output;
 
@@ -46,6 +48,8 @@ use lab::error_code::ErrorCode;
 use lab::failure::Failure;
 use lab::table::Table;
 use lab::transport::Address;
+
+use crate::config::{self as configuration, Config, Origins};
 
 /// Teach, learn, check, upload, run and watch movement primitives on a Barrett WAM.
 ///
@@ -90,6 +94,9 @@ pub struct Global {
     /// Longest wait for an answer of the device, s.
     #[arg(long, global = true, env = "TACTUS_TIMEOUT", default_value = "2", value_parser = seconds, value_name = "SECONDS")]
     pub timeout: Duration,
+    /// Where the values of these options come from.
+    #[arg(skip)]
+    pub origins: Origins,
 }
 
 impl Global {
@@ -189,12 +196,39 @@ pub enum Command {
     /// Write what a shell needs to complete command lines
     #[command(after_help = examples::COMPLETIONS)]
     Completions(completions::Cmd),
+    /// Write a page of the manual for each command
+    #[command(after_help = examples::MANUAL)]
+    Manual(manual::Cmd),
+    /// Show the settings that count, and where they come from
+    #[command(after_help = examples::CONFIG)]
+    Config(config::Cmd),
     /// Tell how two recordings of the same movement differ
     #[command(after_help = examples::COMPARE)]
     Compare(compare::Cmd),
     /// Read logs of the arm's CAN bus, or play them to the device's application
     #[command(after_help = examples::CAN)]
     Can(can::Cmd),
+}
+
+/// Reads the command line of this process, with the defaults of the configuration file.
+///
+/// # Errors
+/// The command line is wrong, or asks for help; or what was asked for cannot be done with the configuration file there
+/// is.
+pub fn parse() -> Result<Cli, ExitCode> {
+    let file = configuration::path();
+    let config = file.as_deref().map_or(Ok(Config::default()), Config::read);
+    let defaults = config.as_ref().ok().cloned().unwrap_or_default();
+    let mut command = defaults.defaults(Cli::command());
+    let matches = command.try_get_matches_from_mut(std::env::args_os()).map_err(|error| usage(&error))?;
+    let mut cli = Cli::from_arg_matches(&matches).map_err(|error| usage(&error.format(&mut command)))?;
+    cli.global.origins = defaults.origins(&matches, file);
+    // What explains the error is not to fail with it.
+    let needs_none = matches!(cli.command, Command::Explain(_) | Command::Completions(_) | Command::Manual(_));
+    match config {
+        Err(failure) if !needs_none => Err(tell(&failure, cli.global.json)),
+        _ => Ok(cli),
+    }
 }
 
 /// Runs what the command line asks for and reports failures; gives the exit code of the process.
@@ -228,20 +262,25 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Export(command) => export::run(&command, &global),
         Command::Explain(command) => explain::run(&command, &global),
         Command::Completions(command) => completions::run(&command),
+        Command::Manual(command) => manual::run(&command, &global),
+        Command::Config(command) => config::run(&command, &global),
         Command::Compare(command) => compare::run(&command, &global),
         Command::Can(command) => can::run(&command, &global),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            // Nobody may be there any more to read it; the exit code still tells.
-            if global.json {
-                let _ = writeln!(std::io::stdout(), "{}", failure.to_json());
-            }
-            let _ = writeln!(std::io::stderr(), "{failure}");
-            ExitCode::from(failure.code.exit() as u8)
-        }
+        Err(failure) => tell(&failure, global.json),
     }
+}
+
+/// Tells a failure; gives the exit code of the process.
+fn tell(failure: &Failure, json: bool) -> ExitCode {
+    // Nobody may be there any more to read it; the exit code still tells.
+    if json {
+        let _ = writeln!(std::io::stdout(), "{}", failure.to_json());
+    }
+    let _ = writeln!(std::io::stderr(), "{failure}");
+    ExitCode::from(failure.code.exit() as u8)
 }
 
 /// Says what is wrong with the command line, or shows the help or version that was asked for; gives the exit code of

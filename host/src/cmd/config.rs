@@ -1,0 +1,72 @@
+//! `tactus config`: the settings that count, and where each comes from.
+
+use clap::Args;
+use lab::table::Table;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{Failure, Global, files};
+use crate::config::Origin;
+
+/// Options of `config`.
+#[derive(Debug, Clone, Args)]
+pub struct Cmd {}
+
+/// A setting.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Setting {
+    /// Its value as it would stand on the command line; `null`: there is none.
+    pub value: Option<String>,
+    /// Where it comes from.
+    pub origin: Origin,
+}
+
+/// Every setting.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Settings {
+    /// `--device`.
+    pub device: Setting,
+    /// `--timeout`, s.
+    pub timeout: Setting,
+}
+
+/// The settings, and the file for them.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Configured {
+    /// The configuration file; `null` without a home.
+    pub file: Option<String>,
+    /// The file exists.
+    pub exists: bool,
+    /// Those that count.
+    pub settings: Settings,
+}
+
+/// Shows them.
+///
+/// # Errors
+/// Standard output was closed.
+pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
+    let origins = &global.origins;
+    let settings = Settings {
+        device: Setting { value: global.device.clone(), origin: origins.device },
+        timeout: Setting { value: Some(global.timeout.as_secs_f64().to_string()), origin: origins.timeout },
+    };
+    let exists = origins.file.as_ref().is_some_and(|file| file.exists());
+    let data = Configured { file: origins.file.as_deref().map(files::text), exists, settings };
+    let mut table = Table::new(["setting", "value", "from"]);
+    for (name, setting) in [("device", &data.settings.device), ("timeout", &data.settings.timeout)] {
+        let from = match setting.origin {
+            Origin::CommandLine => "command line",
+            Origin::Environment => "environment",
+            Origin::File => "file",
+            Origin::Default => "default",
+        };
+        table.row([name.to_owned(), setting.value.clone().unwrap_or_else(|| "-".to_owned()), from.to_owned()]);
+    }
+    let file = match &data.file {
+        Some(file) if exists => format!("file: {file}"),
+        Some(file) => format!("file: {file} (does not exist)"),
+        None => "no file: neither XDG_CONFIG_HOME nor HOME is set".to_owned(),
+    };
+    global.output().result(&data, format!("{table}{file}"))
+}

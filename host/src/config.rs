@@ -1,0 +1,108 @@
+//! The configuration file: defaults of options that every command has. An option counts before the environment, and the
+//! environment before the file.
+
+use std::path::{Path, PathBuf};
+
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Command};
+use lab::error_code::ErrorCode;
+use lab::failure::Failure;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Content of the file.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// `--device`.
+    pub device: Option<String>,
+    /// `--timeout`, s.
+    pub timeout: Option<f64>,
+}
+
+/// Where the value of a setting comes from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Origin {
+    /// The command line.
+    #[serde(rename = "command line")]
+    CommandLine,
+    /// An environment variable.
+    Environment,
+    /// The configuration file.
+    File,
+    /// The tool.
+    #[default]
+    Default,
+}
+
+/// Where the settings come from.
+#[derive(Debug, Clone, Default)]
+pub struct Origins {
+    /// The configuration file, whether or not it exists; `None` without a home.
+    pub file: Option<PathBuf>,
+    /// Of `--device`.
+    pub device: Origin,
+    /// Of `--timeout`.
+    pub timeout: Origin,
+}
+
+/// The place of the file: `$XDG_CONFIG_HOME/tactus/config.toml`, by default in `~/.config`.
+#[must_use]
+pub fn path() -> Option<PathBuf> {
+    let folder = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|folder| folder.is_absolute());
+    let base = folder("XDG_CONFIG_HOME").or_else(|| folder("HOME").map(|home| home.join(".config")))?;
+    Some(base.join("tactus/config.toml"))
+}
+
+impl Config {
+    /// Reads the file; one that does not exist says nothing.
+    ///
+    /// # Errors
+    /// It cannot be read, has a word that means nothing, or a value out of its range.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let failure = |cause: String| {
+            Failure::new(ErrorCode::Configuration, format!("reading {}", path.display()), cause.trim_end().to_owned())
+        };
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Self::default()),
+            Err(error) => return Err(failure(error.to_string())),
+        };
+        let config: Self = toml::from_str(&text).map_err(|error| failure(error.to_string()))?;
+        if let Some(timeout) = config.timeout.filter(|timeout| !(timeout.is_finite() && *timeout > 0.0)) {
+            return Err(failure(format!("timeout = {timeout}: a time in seconds, larger than 0, is wanted")));
+        }
+        Ok(config)
+    }
+
+    /// The command line with these defaults.
+    #[must_use]
+    pub fn defaults(&self, mut command: Command) -> Command {
+        let values = [("device", self.device.clone()), ("timeout", self.timeout.map(|timeout| timeout.to_string()))];
+        for (option, value) in values {
+            if let Some(value) = value {
+                // Read once a process, and clap keeps it as long as that lives.
+                command = command.mut_arg(option, |argument| argument.default_value(&*value.leak()));
+            }
+        }
+        command
+    }
+
+    /// Where the settings of a command line come from that was read with these defaults.
+    #[must_use]
+    pub fn origins(&self, matches: &ArgMatches, file: Option<PathBuf>) -> Origins {
+        let mut deepest = matches;
+        while let Some((_, inner)) = deepest.subcommand() {
+            deepest = inner;
+        }
+        let origin = |option: &str, is_in_file: bool| match deepest.value_source(option) {
+            Some(ValueSource::CommandLine) => Origin::CommandLine,
+            Some(ValueSource::EnvVariable) => Origin::Environment,
+            Some(_) if is_in_file => Origin::File,
+            _ => Origin::Default,
+        };
+        let device = origin("device", self.device.is_some());
+        Origins { file, device, timeout: origin("timeout", self.timeout.is_some()) }
+    }
+}
