@@ -67,6 +67,8 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("control::sense::joints::Motor::doubt", "a reply that does not fit the ones before"),
     ("control::cycle::Cycle<R,_>::actuate_without_torque", "no torque: no plan and no law is computed"),
     ("control::cycle::Cycle<R,_>::reset", "after a fault of the bus"),
+    ("control::cycle::Cycle<R,_>::not_sent", "the bus has refused a frame"),
+    ("device::controller::DeviceController::obey", "once, when a person commands"),
     ("device::controller::DeviceController::restart", "after a fault of the bus"),
     ("device::startup", "a person zeroes the arm again"),
     ("device::hand", "the hand is initialised or has failed"),

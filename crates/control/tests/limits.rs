@@ -92,6 +92,23 @@ fn a_limit_that_cut_is_told_and_a_reset_begins_from_nothing() {
 }
 
 #[test]
+fn a_pair_of_which_both_motors_are_beyond_their_caps_is_scaled_for_the_worse_one() {
+    // Pucks with so many counts for a newton metre that both motors reach their caps.
+    let calibration = Calibration::<f64>::new([4096; 7], [20_000; 7], Payload::SensorAndHand).expect("sound");
+    for wanted in [[0.0, 50.0, 8.0, 0.0, 4.0, 1.0, 0.0], [0.0, 50.0, -8.0, 0.0, 4.0, -1.0, 0.0]] {
+        let mut limiter = TorqueLimiter::new(&calibration);
+        for _ in 0..100 {
+            limiter.limit(&JointTorques(Vector7::from(wanted)));
+        }
+        let torques = limiter.last().torques().0;
+        let motors = calibration.transmission().motor_torques_from_joint(&torques.into());
+        for (motor, (torque, cap)) in motors.iter().zip(limiter.motor_limits()).enumerate() {
+            assert!(torque.abs() <= cap * (1.0 + 1e-9), "M{}: {torque} of {cap}", motor + 1);
+        }
+    }
+}
+
+#[test]
 fn a_step_is_the_full_scale_of_the_manufacturers_controllers_in_50_ms() {
     let wanted = [5.0 / 3.0, 4.0 / 3.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0];
     for (joint, (limit, wanted)) in STEP_LIMIT.iter().zip(wanted).enumerate() {

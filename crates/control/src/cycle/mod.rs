@@ -256,6 +256,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
 
     /// Frames of the last cycle did not leave: torques of M1 to M4, torques of M5 to M7, torques of the hand. The next
     /// step of a torque counts from what the motors still have.
+    #[cold]
+    #[inline(never)]
     pub fn not_sent(&mut self, arm: bool, wrist: bool, hand: bool) {
         self.limiter.not_sent(arm, wrist);
         if hand {

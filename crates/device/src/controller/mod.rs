@@ -287,6 +287,8 @@ impl DeviceController {
     }
 
     /// Leaves the cyclic loop.
+    #[cold]
+    #[inline(never)]
     fn restart(&mut self) {
         Counters::count(&mut self.counters.restarts);
         self.phase = BusPhase::StartUp;
@@ -340,12 +342,14 @@ impl DeviceController {
         };
         let output = self.cycle.step(&input);
         self.send_torques(output.actuation.frames(), now_us, io);
-        let [torques, position, gauge] = self.hand.frames(output.actuation.hand_frame());
-        if torques.is_some_and(|torques| !self.outlet(now_us, io).send(torques)) {
-            self.cycle.not_sent(false, false, true);
-        }
-        for frame in [position, gauge].into_iter().flatten() {
-            self.outlet(now_us, io).send(frame);
+        // Torques first, then questions.
+        let mut are_torques = true;
+        for frame in self.hand.frames(output.actuation.hand_frame()) {
+            let left = frame.is_none_or(|frame| self.outlet(now_us, io).send(frame));
+            if are_torques && !left {
+                self.cycle.not_sent(false, false, true);
+            }
+            are_torques = false;
         }
         self.brakes.want(output.actuation.requests_idle());
         if self.cycle.is_zero_lost() {
@@ -372,7 +376,14 @@ impl DeviceController {
 
     /// The command for the control cycle; those for the start-up are answered here.
     fn next_command(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) -> Option<control::Command> {
-        match io.command()? {
+        let command = io.command()?;
+        self.obey(command, now_us, io)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn obey(&mut self, command: Command, now_us: u64, io: &mut impl ControllerIo<Self>) -> Option<control::Command> {
+        match command {
             Command::Control(command) => {
                 if command == control::Command::Stop {
                     self.hand.stop();

@@ -193,6 +193,8 @@ impl Startup {
     }
 
     /// Begins anew after the cyclic loop. A doubt about the zero stays.
+    #[cold]
+    #[inline(never)]
     pub(crate) fn restart(&mut self) {
         *self = Startup {
             doubt: self.doubt,
@@ -204,6 +206,8 @@ impl Startup {
     }
 
     /// The counts of a motor have jumped in the cyclic loop.
+    #[cold]
+    #[inline(never)]
     pub(crate) fn lose_zero(&mut self) {
         self.owes_revocation |= self.doubt.is_none();
         self.doubt.get_or_insert(StartupError::CountsJumped);
