@@ -13,6 +13,7 @@
 //! it: the frames of a cycle come from [`control::Actuation`] or are zero.
 
 mod brakes;
+mod orders;
 mod outlet;
 
 use control::law::Gains;
@@ -337,7 +338,7 @@ impl DeviceController {
                 safety: self.safety_of_cycle(),
                 hand,
             },
-            command: self.next_command(now_us, io),
+            command: io.command().and_then(|command| self.obey(command, now_us, io)),
             external_fault: self.fault.take().or(self.standing_fault()),
         };
         let output = self.cycle.step(&input);
@@ -372,40 +373,6 @@ impl DeviceController {
     fn safety_of_cycle(&mut self) -> Option<SafetyMode> {
         let told = self.fresh_safety.take();
         if self.braking >= BRAKING_ANSWERS { Some(SafetyMode::Idle) } else { told }
-    }
-
-    /// The command for the control cycle; those for the start-up are answered here.
-    fn next_command(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) -> Option<control::Command> {
-        let command = io.command()?;
-        self.obey(command, now_us, io)
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn obey(&mut self, command: Command, now_us: u64, io: &mut impl ControllerIo<Self>) -> Option<control::Command> {
-        match command {
-            Command::Control(command) => {
-                if command == control::Command::Stop {
-                    self.hand.stop();
-                }
-                Some(command)
-            }
-            Command::InitialiseHand => {
-                let running = matches!(self.cycle.state(), State::Run | State::Coast);
-                let outcome = if running { Err(Refusal::HandBusy) } else { self.hand.initialise(now_us) };
-                self.tell(outcome.map_or_else(EventKind::Refused, |()| EventKind::Accepted), io);
-                None
-            }
-            Command::Zero { home } => {
-                // Under a latched fault too: what has lost its zero cannot be cleared before.
-                if !self.cycle.state().has_torque() && self.safety_mode == Some(SafetyMode::Idle) {
-                    self.startup.zero(&home);
-                } else {
-                    self.tell(EventKind::Refused(Refusal::ZeroNeedsIdle), io);
-                }
-                None
-            }
-        }
     }
 
     /// Both frames of the cycle, or zeros: pucks keep their last torque until they are told another.

@@ -48,6 +48,11 @@ impl Continuity {
         sent
     }
 
+    /// The start-up has asked for the counts itself.
+    pub(super) fn note_asked(&mut self, now_us: u64) {
+        self.asked_us = now_us;
+    }
+
     /// A motor has told its counts; true if it cannot have turned so far.
     pub(super) fn has_jumped(&mut self, joint: usize, told: Counts) -> bool {
         let (Some(seen), Some(fastest)) = (self.seen.get_mut(joint), COUNTS_PER_MILLISECOND.get(joint)) else {

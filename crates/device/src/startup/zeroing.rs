@@ -129,6 +129,9 @@ impl Startup {
         let Some(until_us) = until_us else {
             self.positions = [None; 7];
             let sent = outlet.send(get(Group::ARM, PropertyId::POSITION));
+            if let Some(continuity) = self.continuity.as_mut().filter(|_| sent) {
+                continuity.note_asked(outlet.now_us());
+            }
             return Ok(after(sent, waiting(Some(outlet.now_us() + POSITIONS_US))));
         };
         match Node::ARM.into_iter().zip(self.positions).find(|(_, position)| position.is_none()) {

@@ -145,3 +145,37 @@ fn g2_an_arm_whose_zero_is_lost_under_a_fault_is_zeroed_and_then_cleared() {
     assert_eq!(bus.events.last(), Some(&EventKind::Refused(Refusal::Control(control::Refusal::ZeroLost))));
     assert_zeroing_leads_on(&mut core, &mut bus);
 }
+
+/// G2: a joint that turns at `share` of its speed limit while the bus is started anew after an emergency stop; `jump`
+/// counts more as soon as the start-up prepares the loop. True if the arm is still zeroed.
+fn keeps_zero(joint: usize, share: f64, jump: i32) -> bool {
+    let (mut core, mut bus) = floating();
+    bus.safety_mode = SafetyMode::EStop;
+    let turns = share * control::model::VELOCITY_MAX[joint] * control::model::JOINT_TO_MOTOR[joint][joint].abs();
+    let (begin, from) = (bus.now_us, bus.pucks[joint].position.0);
+    let mut jumped = 0;
+    while bus.now_us < begin + 4_000_000 {
+        bus.run_slots(&mut core, 1);
+        if bus.now_us > begin + 200_000 && bus.safety_mode == SafetyMode::EStop {
+            bus.press_idle();
+        }
+        if core.stage() == Stage::Preparing {
+            jumped = jump;
+        }
+        let turned = turns * (bus.now_us - begin) as f64 * 1e-6 * 4096.0 / core::f64::consts::TAU;
+        bus.pucks[joint].position = Counts(from + turned as i32 + jumped);
+    }
+    let health = core.health();
+    assert_eq!(health.blocked, (!health.zeroed).then_some(StartupError::CountsJumped), "the reason is told");
+    health.zeroed
+}
+
+#[test]
+fn g2_an_arm_that_is_turned_by_hand_while_the_bus_is_started_anew_keeps_its_zero() {
+    for joint in [0, 3, 6] {
+        for share in [0.0, 0.5, 0.9] {
+            assert!(keeps_zero(joint, share, 0), "M{} at {share} of its limit", joint + 1);
+        }
+        assert!(!keeps_zero(joint, 0.0, 4_000), "M{} jumps", joint + 1);
+    }
+}

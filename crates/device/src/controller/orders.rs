@@ -1,0 +1,46 @@
+//! Commands of the host in the cyclic loop: for the control cycle, the start-up, or the hand.
+
+use control::State;
+
+use super::DeviceController;
+use crate::application::ControllerIo;
+use crate::command::{Command, Refusal};
+use crate::event::EventKind;
+use puck::SafetyMode;
+
+impl DeviceController {
+    /// The command for the control cycle; those for others are answered here. Not inlined: it is rare, and the
+    /// memory of the control slot is small.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn obey(
+        &mut self,
+        command: Command,
+        now_us: u64,
+        io: &mut impl ControllerIo<Self>,
+    ) -> Option<control::Command> {
+        match command {
+            Command::Control(command) => {
+                if command == control::Command::Stop {
+                    self.hand.stop();
+                }
+                Some(command)
+            }
+            Command::InitialiseHand => {
+                let running = matches!(self.cycle.state(), State::Run | State::Coast);
+                let outcome = if running { Err(Refusal::HandBusy) } else { self.hand.initialise(now_us) };
+                self.tell(outcome.map_or_else(EventKind::Refused, |()| EventKind::Accepted), io);
+                None
+            }
+            Command::Zero { home } => {
+                // Under a latched fault too: what has lost its zero cannot be cleared before.
+                if !self.cycle.state().has_torque() && self.safety_mode == Some(SafetyMode::Idle) {
+                    self.startup.zero(&home);
+                } else {
+                    self.tell(EventKind::Refused(Refusal::ZeroNeedsIdle), io);
+                }
+                None
+            }
+        }
+    }
+}
