@@ -8,6 +8,10 @@ use crate::bus::Outlet;
 /// Between two looks, us: a motor of the wrist at its speed limit turns 0.02 rad of its joint meanwhile.
 const PACE_US: u64 = 10_000;
 
+/// The same until the safety module has told IDLE, us: positions that flow are its heartbeat, and it would stay ACTIVE
+/// instead of noticing the loss.
+const SLOW_PACE_US: u64 = 250_000;
+
 /// Faster than so many times its speed limit no motor turns, not even of an arm that falls.
 const FASTEST: f64 = 3.0;
 
@@ -38,10 +42,11 @@ pub(super) struct Continuity {
 }
 
 impl Continuity {
-    /// Looks if it is time to; true if the slot is used.
-    pub(super) fn look(&mut self, outlet: &mut impl Outlet) -> bool {
+    /// Looks if it is time to; true if the slot is used. `is_idle`: the safety module has told IDLE.
+    pub(super) fn look(&mut self, is_idle: bool, outlet: &mut impl Outlet) -> bool {
         let now_us = outlet.now_us();
-        let sent = now_us >= self.asked_us + PACE_US && outlet.send(get(Group::ARM, PropertyId::POSITION));
+        let pace_us = if is_idle { PACE_US } else { SLOW_PACE_US };
+        let sent = now_us >= self.asked_us + pace_us && outlet.send(get(Group::ARM, PropertyId::POSITION));
         if sent {
             self.asked_us = now_us;
         }

@@ -361,7 +361,17 @@ impl Startup {
                 self.continuity = None;
                 false
             }
-            _ => self.continuity.as_mut().is_some_and(|continuity| continuity.look(outlet)),
+            step => {
+                let is_idle = !matches!(
+                    step,
+                    Step::Enumerate { powered: false, .. }
+                        | Step::Listen { powered: false, .. }
+                        | Step::IdentifySafety { .. }
+                        | Step::LoadLimit { .. }
+                        | Step::AwaitIdle { .. }
+                );
+                self.continuity.as_mut().is_some_and(|continuity| continuity.look(is_idle, outlet))
+            }
         }
     }
 
