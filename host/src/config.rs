@@ -2,6 +2,7 @@
 //! environment before the file.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Command};
@@ -70,8 +71,9 @@ impl Config {
             Err(error) => return Err(failure(error.to_string())),
         };
         let config: Self = toml::from_str(&text).map_err(|error| failure(error.to_string()))?;
-        if let Some(timeout) = config.timeout.filter(|timeout| !(timeout.is_finite() && *timeout > 0.0)) {
-            return Err(failure(format!("timeout = {timeout}: a time in seconds, larger than 0, is wanted")));
+        // The same rule as for the option: its default is checked by nobody else.
+        if let Some((timeout, Err(cause))) = config.timeout.map(|timeout| (timeout, seconds(&timeout.to_string()))) {
+            return Err(failure(format!("timeout = {timeout}: {cause}")));
         }
         Ok(config)
     }
@@ -104,5 +106,18 @@ impl Config {
         };
         let device = origin("device", self.device.is_some());
         Origins { file, device, timeout: origin("timeout", self.timeout.is_some()) }
+    }
+}
+
+/// A positive time in seconds, at most a day.
+///
+/// # Errors
+/// It is none.
+pub fn seconds(text: &str) -> Result<Duration, String> {
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
+    if value > 0.0 && value <= 86_400.0 {
+        Ok(Duration::from_secs_f64(value))
+    } else {
+        Err("a time between 0 and 86400 s is expected".to_owned())
     }
 }

@@ -316,6 +316,7 @@ fn cli_19_a_file_that_cannot_be_used_is_named_with_its_line_and_explain_goes_on(
         ("timeout = -1\n", "timeout", "-1"),
         ("device = \n", "line 1", "device"),
         ("timeout = nan\n", "timeout", "NaN"),
+        ("timeout = 86401\n", "timeout", "86401"),
     ] {
         let folder = configured(words);
         let run = |line: &str| command(folder.path(), line).env("XDG_CONFIG_HOME", folder.path()).output().unwrap();

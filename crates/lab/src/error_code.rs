@@ -178,7 +178,7 @@ error_codes! {
         "another folder was meant, or nothing was tried in it yet",
         "name the folder with `--out`, or leave out `--figures-only`";
     Configuration = 250: "the configuration file cannot be used", "a misspelt setting, or a value out of its range",
-        "the settings are `device` and `timeout`; `tactus config` names the file and shows what counts";
+        "the settings are `device` and `timeout`, for example `timeout = 5`";
     NoStudyOfWeights = 270: "the experiment with a weight knows neither demonstrations nor sweeps", "`experiment lift`",
         "leave out `--demonstrations` and `--sweep`";
     DeviceNotFound = 301: "there is no such device", "cable, power, or a misspelt port",

@@ -49,7 +49,7 @@ use lab::failure::Failure;
 use lab::table::Table;
 use lab::transport::Address;
 
-use crate::config::{self as configuration, Config, Origins};
+use crate::config::{self as configuration, Config, Origins, seconds};
 
 /// Teach, learn, check, upload, run and watch movement primitives on a Barrett WAM.
 ///
@@ -307,16 +307,6 @@ fn ask(global: &Global, question: &str) -> bool {
     let mut answer = String::new();
     let read = std::io::stdin().read_line(&mut answer);
     read.is_ok() && matches!(answer.trim(), "y" | "Y" | "yes")
-}
-
-/// A positive time in seconds.
-fn seconds(text: &str) -> Result<Duration, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
-    if value > 0.0 && value <= 86_400.0 {
-        Ok(Duration::from_secs_f64(value))
-    } else {
-        Err("a time between 0 and 86400 s is expected".to_owned())
-    }
 }
 
 #[cfg(test)]
