@@ -8,6 +8,16 @@ use crate::{budget, build, docs, emulated, fuzz, hand, house, package, shell, te
 
 /// Runs every check; the first failure ends it.
 pub(crate) fn run() -> Result<()> {
+    let before = shell::free_space();
+    checks()?;
+    if let (Some(before), Some(now)) = (before, shell::free_space()) {
+        let taken = before.saturating_sub(now) as f64 / 1e9;
+        shell::step(&format!("done; {taken:.1} GB of the disk taken, {:.0} GB left", now as f64 / 1e9));
+    }
+    Ok(())
+}
+
+fn checks() -> Result<()> {
     setup::lints()?;
     shell::step("format");
     shell::run(shell::cargo().args(["fmt", "--all", "--check"]))?;

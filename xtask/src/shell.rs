@@ -129,7 +129,28 @@ pub(crate) fn succeeds_within(command: &mut Command, limit: Duration) -> bool {
 
 fn check(command: &Command, status: ExitStatus) -> Result<()> {
     if !status.success() {
-        bail!("{status}\n  to repeat: {}", line(command));
+        bail!("{status}{}\n  to repeat: {}", full_disk(), line(command));
     }
     Ok(())
+}
+
+/// Space below which a failure is probably the disk's: one linked test takes 0.1 GB.
+const SCARCE: u64 = 500 << 20;
+
+/// Says that the disk of the build folder is full, with the command that frees it; empty while there is room.
+fn full_disk() -> String {
+    match free_space() {
+        Some(free) if free < SCARCE => {
+            format!("\n  only {} MB are free for the build folder; to make room: cargo clean", free >> 20)
+        }
+        _ => String::new(),
+    }
+}
+
+/// Free space for the build folder, bytes; nothing where `df` cannot tell.
+pub(crate) fn free_space() -> Option<u64> {
+    let output = Command::new("df").args(["-Pk"]).arg(root()).stdin(Stdio::null()).output().ok()?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    let kilobytes: u64 = text.lines().nth(1)?.split_whitespace().nth(3)?.parse().ok()?;
+    Some(kilobytes << 10)
 }
