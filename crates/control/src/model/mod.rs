@@ -13,4 +13,4 @@ pub use arm::ArmModel;
 pub use calibration::{Calibration, CalibrationError, Payload};
 pub use kinematics::{Frames, Jacobian};
 pub use wam7::*;
-pub use weight::{LinkWeight, WeightCorrection, WeightError, WeightFault};
+pub use weight::{LinkWeight, MASS_SHARE, MOMENT_SHIFT, WeightCorrection, WeightError, WeightFault};
