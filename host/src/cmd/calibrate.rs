@@ -1,10 +1,10 @@
-//! `tactus calibrate`: the home of the arm, where it stands when it is zeroed.
+//! `tactus calibrate`: the home of the arm, where it stands when it is zeroed, and the weight of its links.
 
 use clap::{ArgGroup, Args, Subcommand};
 use link::{Calibration, Refusal};
 use serde_json::{Value, json};
 
-use super::{ErrorCode, Failure, Global, Table, connection, learn};
+use super::{ErrorCode, Failure, Global, Table, connection, learn, weigh};
 use lab::client::Client;
 use lab::device::Device;
 use lab::error::{Capability, HostError};
@@ -18,7 +18,7 @@ pub struct Cmd {
     pub action: Action,
 }
 
-/// Actions on a home.
+/// Actions on home and weight.
 #[derive(Debug, Clone, Subcommand)]
 pub enum Action {
     /// Show where the arm is taken to stand when it is zeroed, and whose home that is
@@ -27,6 +27,8 @@ pub enum Action {
     Home(Home),
     /// Forget it: the robot model's home counts again
     Forget,
+    /// Weigh the links of this arm on a tour of slow moves, so that it carries itself; its hand must be empty and the way free
+    Gravity(weigh::Gravity),
 }
 
 /// The home to store.
@@ -61,6 +63,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut client = connection::open(global, DOING, |_| {})?;
     client.require(Capability::Arm).map_err(|error| error.into_failure(DOING))?;
     match &command.action {
+        Action::Gravity(command) => weigh::run(command, &mut client, global),
         Action::Show => show(&mut client, global),
         Action::Forget => {
             client.forget_calibration().map_err(|error| error.into_failure(DOING))?;

@@ -35,6 +35,7 @@ pub mod status;
 pub mod stop;
 pub mod teach;
 pub mod upload;
+mod weigh;
 
 use std::io::{IsTerminal as _, Write};
 use std::process::ExitCode;

@@ -6,7 +6,7 @@ use device::Stage;
 use link::{HandStage, HomeSource, Status};
 use serde_json::json;
 
-use super::{Failure, Global, Table, connection};
+use super::{Failure, Global, Table, connection, weigh};
 use lab::error::{HostError, explain_blocked};
 
 /// Options of `status`.
@@ -27,6 +27,11 @@ pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
         Err(HostError::Refused { .. }) => None,
         Err(error) => return Err(error.into_failure(DOING)),
     };
+    let weight = match client.weight() {
+        Ok(weight) => Some(weigh::weight_words(&weight)),
+        Err(HostError::Refused { .. }) => None,
+        Err(error) => return Err(error.into_failure(DOING)),
+    };
     let hello = client.hello();
     let board = format!("{} ({})", hello.board.as_str(), hello.firmware.as_str());
     let drives = hello.capabilities;
@@ -38,11 +43,12 @@ pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
             "board": hello.board.as_str(), "firmware": hello.firmware.as_str(), "cycle": status.cycle,
             "drives_arm": drives.arm, "drives_hand": drives.hand, "reads_wrench": drives.wrench,
             "startup": stage, "blocked": status.blocked.map(explain_blocked), "state": state, "fault": status.fault,
-            "zeroed": status.zeroed, "home": source.map(HomeSource::name), "safety_mode": status.safety_mode,
+            "zeroed": status.zeroed, "home": source.map(HomeSource::name), "weight": weight,
+            "safety_mode": status.safety_mode,
             "wrench_zeroed": status.wrench_zeroed, "hand": status.hand_stage.name(), "q_rad": status.q,
             "hand_rad": status.hand, "loaded": status.loaded.as_ref().map(|name| name.as_str()),
         }),
-        text(&status, &board, stage, state, fault, source),
+        text(&status, &board, stage, state, fault, (source, weight.as_deref())),
     )
 }
 
@@ -52,7 +58,7 @@ fn text(
     stage: &str,
     state: &str,
     fault: Option<Fault>,
-    source: Option<HomeSource>,
+    (source, weight): (Option<HomeSource>, Option<&str>),
 ) -> String {
     let blocked = status.blocked.map(|numbers| format!(": {}", explain_blocked(numbers))).unwrap_or_default();
     let mut table = Table::new(["device", board]);
@@ -63,6 +69,7 @@ fn text(
         .row(["safety module", safety_mode(status.safety_mode)])
         .row(["joint angles", if status.zeroed { "count from home" } else { "not zeroed" }])
         .row(["home", source.map_or("not known", HomeSource::name)])
+        .row(["weight of the links", weight.unwrap_or("not known")])
         .row(["force sensor", force_sensor(status.wrench_zeroed)])
         .row(["hand", status.hand_stage.name()])
         .row(["primitive in use", status.loaded.as_ref().map_or("none", |name| name.as_str())]);

@@ -11,6 +11,7 @@ mod run;
 mod teach;
 mod travel;
 mod wait;
+mod weigh;
 
 pub use calibrate::{HomeCorrection, correct_home};
 pub use hand::{HandReach, initialise_hand, move_hand};
@@ -22,6 +23,7 @@ pub use run::{CHANNELS, Change, ChangeKind, FlagCounts, RunOutcome, RunRequest, 
 pub use teach::{Demonstrated, record_demonstration, teacher};
 pub use travel::{go_to_start, travel};
 pub use wait::{Ends, after, pass, wait_for};
+pub use weigh::{Crossings, cross_postures, weight_in_use};
 
 use control::Fault;
 

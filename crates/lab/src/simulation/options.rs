@@ -120,6 +120,9 @@ pub struct SimulationOptions {
     /// Table and object.
     #[cfg(feature = "mujoco")]
     pub scene: Scene,
+    /// Number of an arm whose masses and friction are not the model's ([`FreeJoints::drawn`]); `None` is the model's.
+    /// [`WorldKind::Simple`] only, MuJoCo has imperfections.
+    pub arm: Option<u64>,
     /// Deviations of the arm from the controller's model.
     #[cfg(feature = "mujoco")]
     pub imperfections: Imperfections,
@@ -181,6 +184,9 @@ impl SimulationOptions {
             uptime: Duration::ZERO,
             flash: options.flash.clone().map_or(FlashSource::New, FlashSource::File),
             faults: options.faults.clone(),
+            arm: options.arm,
+            #[cfg(feature = "mujoco")]
+            imperfections: options.arm.map_or(Imperfections::NONE, Imperfections::drawn),
             ..Self::new(engine, options.seed.unwrap_or(DEFAULT_SEED), world)
         })
     }
@@ -215,6 +221,7 @@ impl SimulationOptions {
             plant: PlantConfig::default(),
             #[cfg(feature = "mujoco")]
             scene: Scene::default(),
+            arm: None,
             #[cfg(feature = "mujoco")]
             imperfections: Imperfections::NONE,
             #[cfg(feature = "mujoco")]
@@ -241,7 +248,13 @@ impl SimulationOptions {
             return Ok(Box::new(world));
         }
         match self.world {
-            WorldKind::Simple => Ok(Box::new(FreeJoints::new(self.posture))),
+            WorldKind::Simple => {
+                let nominal = FreeJoints::new(self.posture);
+                Ok(Box::new(match self.arm {
+                    Some(number) => nominal.drawn(number),
+                    None => nominal,
+                }))
+            }
             #[cfg(feature = "mujoco")]
             WorldKind::Mujoco => {
                 use sim::teacher::{GuidedWorld, Teacher, TeacherConfig};

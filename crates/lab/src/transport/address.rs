@@ -9,7 +9,7 @@
 //! unix:PATH              a Unix socket
 //! serial:PORT[@BAUD]     a serial port, 921600 baud unless said otherwise
 //! can:INTERFACE[/N]      device number N (0 unless said otherwise) on a CAN interface
-//! options: seed=7,world=simple|mujoco,line=serial|can,bus=FILE,flash=FILE,faults=FILE, separated by commas
+//! options: seed=7,arm=7,world=simple|mujoco,line=serial|can,bus=FILE,flash=FILE,faults=FILE, separated by commas
 //! of board: also report=FILE,cancellation=skipped|stuck,revision=0xNNNN,fault=KIND@MICROSECONDS[:ARGUMENT]
 //! ```
 
@@ -144,6 +144,7 @@ mod tests {
             "sim:",
             "sil:",
             "sim:seed=7,world=simple",
+            "sil:seed=7,arm=3,world=simple",
             "sil:world=mujoco",
             "hand:seed=3",
             "tcp:localhost:3333",

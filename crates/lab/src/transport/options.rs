@@ -20,6 +20,8 @@ pub enum LineKind {
 pub struct SimulatorOptions {
     /// Seed of all noise; `None` lets the simulator take its own, always the same.
     pub seed: Option<u64>,
+    /// Number of an arm whose masses and friction are not the model's; `None` is the model's.
+    pub arm: Option<u64>,
     /// Name of the world; `None` is the best one that was built in.
     pub world: Option<String>,
     /// The line of the host link.
@@ -89,6 +91,9 @@ impl SimulatorOptions {
                 Some(("seed", value)) => {
                     options.seed = Some(value.parse().map_err(|_| AddressError::Number(value.to_owned()))?);
                 }
+                Some(("arm", value)) => {
+                    options.arm = Some(value.parse().map_err(|_| AddressError::Number(value.to_owned()))?);
+                }
                 Some(("world", value)) => options.world = Some(value.to_owned()),
                 Some(("line", "serial")) => options.line = LineKind::Serial,
                 Some(("line", "can")) => options.line = LineKind::Can,
@@ -128,6 +133,7 @@ impl fmt::Display for SimulatorOptions {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let chip = &self.board.chip;
         let seed = self.seed.map(|seed| format!("seed={seed}"));
+        let arm = self.arm.map(|arm| format!("arm={arm}"));
         let world = self.world.as_ref().map(|world| format!("world={world}"));
         let line = (self.line == LineKind::Can).then(|| "line=can".to_owned());
         let bus = self.bus.as_ref().map(|path| format!("bus={}", path.display()));
@@ -137,7 +143,7 @@ impl fmt::Display for SimulatorOptions {
         let cancellation = chip.cancellation.map(|reading| format!("cancellation={}", reading.word()));
         let revision = chip.revision.map(|revision| format!("revision={revision:#06x}"));
         let faults = chip.faults.iter().map(|fault| format!("fault={fault}"));
-        let single = [seed, world, line, bus, flash, script, report, cancellation, revision];
+        let single = [seed, arm, world, line, bus, flash, script, report, cancellation, revision];
         let parts: Vec<String> = single.into_iter().flatten().chain(faults).collect();
         f.write_str(&parts.join(","))
     }

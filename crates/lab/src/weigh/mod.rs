@@ -12,7 +12,7 @@
 
 mod tour;
 
-pub use tour::{HALF_WAY, PASS_SECONDS, TOUR, Window, is_held_out};
+pub use tour::{HALF_WAY, PASS_SECONDS, TOUR, WINDOW, is_held_out};
 
 use control::Payload;
 use control::model::{ArmModel, Frames, LinkWeight, WeightCorrection, WeightError};

@@ -1,4 +1,4 @@
-//! The postures of the tour, and the part of a pass that counts.
+//! The postures of the tour, and how they are passed.
 //!
 //! In every posture the hand is above the table and in front of the base, and so it is on the straight ways between
 //! them (`the_tour_stays_above_the_table_and_away_from_the_arm_itself`). They were drawn at random within those bounds.
@@ -9,24 +9,9 @@ pub const HALF_WAY: f32 = 0.12;
 /// Duration of a pass, s. Twice [`HALF_WAY`] in this time is 0.15 rad/s in the middle, where all joints slide.
 pub const PASS_SECONDS: f32 = 3.0;
 
-/// The part of a pass that counts, by where the first joint is: around the posture, where the path is fastest and its
-/// acceleration passes zero.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Window {
-    /// Distance from the posture up to which a sample counts, rad.
-    pub half: f64,
-}
-
-impl Window {
-    /// Half of the way.
-    pub const MIDDLE: Self = Self { half: 0.5 * HALF_WAY as f64 };
-
-    /// True if a joint whose path should be at `q` (rad) is near `posture` (rad).
-    #[must_use]
-    pub fn contains(self, q: f64, posture: f64) -> bool {
-        (q - posture).abs() <= self.half
-    }
-}
+/// Distance of J1 from the posture up to which a moment of a pass counts, rad: around the posture, where the path is
+/// fastest and its acceleration passes zero.
+pub const WINDOW: f64 = 0.06;
 
 /// True for the postures by which the result is judged: every fourth, so that they lie among the others.
 #[must_use]

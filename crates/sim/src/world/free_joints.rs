@@ -11,7 +11,8 @@
 //! its sign, so that a joint at rest stays at rest whatever the step: `I` inertia, `b` viscous, `c` Coulomb friction,
 //! `h` step.
 
-use super::{HandState, HandTargets, Pose, World};
+use super::{ARM_STREAM, HandState, HandTargets, Pose, World};
+use crate::Noise;
 use crate::chain::{self, Frame, Vector, add, dot, subtract};
 use crate::rotation::cross;
 use crate::time::STEP_SECONDS;
@@ -124,6 +125,17 @@ impl FreeJoints {
     pub fn with_factors(self, links: [f64; 7], hand: f64, friction: [f64; 7]) -> Self {
         let coulomb = std::array::from_fn(|joint| self.coulomb[joint] * friction[joint]);
         Self { weights: (links, hand), coulomb, ..self }
+    }
+
+    /// The arm of this number: masses and friction as those of `Imperfections::drawn` in the MuJoCo world.
+    #[must_use]
+    pub fn drawn(self, number: u64) -> Self {
+        let mut noise = Noise::new(number, ARM_STREAM);
+        let mut around = |share: f64| noise.uniform(1.0 - share, 1.0 + share);
+        let links = std::array::from_fn(|_| around(0.1));
+        let hand = around(0.03);
+        let friction = std::array::from_fn(|_| around(0.3));
+        self.with_factors(links, hand, friction)
     }
 
     /// Torques that hold the arm still where it is, without friction, N m.

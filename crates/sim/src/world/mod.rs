@@ -13,6 +13,9 @@ mod object;
 pub use free_joints::{FingerObstacle, FreeJoints, HOME};
 pub use object::{ObjectKind, ObjectRow, UnknownObject};
 
+/// Stream of random numbers from which an arm other than the nominal one is drawn, and nothing else.
+const ARM_STREAM: u64 = 0x696d_7065_7266;
+
 /// A rigid pose in the world frame: origin where the axes of joints 1 and 2 meet, z up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {

@@ -2,10 +2,8 @@
 
 use super::error::WorldError;
 use crate::Noise;
+use crate::world::ARM_STREAM;
 use mujoco_rs::prelude::{MjModel, MjtObjBase};
-
-/// Stream of random numbers that no other part of the plant uses.
-const NOISE_STREAM: u64 = 0x696d_7065_7266;
 
 /// Deviations from the nominal arm; [`NONE`](Self::NONE) is the nominal arm itself, to the bit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +46,7 @@ impl Imperfections {
     /// cables within 20 % of [`Cables::WAM`]. The same seed, the same arm.
     #[must_use]
     pub fn drawn(seed: u64) -> Self {
-        let mut noise = Noise::new(seed, NOISE_STREAM);
+        let mut noise = Noise::new(seed, ARM_STREAM);
         let mut around = |share: f64| noise.uniform(1.0 - share, 1.0 + share);
         let links = std::array::from_fn(|_| around(0.1));
         let hand = around(0.03);

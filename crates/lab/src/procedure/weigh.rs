@@ -1,0 +1,104 @@
+//! The tour of `tactus calibrate gravity`: every posture is passed slowly, upwards and downwards.
+
+use std::time::Duration;
+
+use control::model::{LinkWeight, WeightCorrection};
+use control::{Payload, flags};
+use link::EventKind;
+
+use super::{ProcedureError, after, travel};
+use crate::client::{Client, Incoming};
+use crate::device::Device;
+use crate::weigh::{Crossing, HALF_WAY, PASS_SECONDS, Sample, WINDOW, is_held_out};
+
+/// Telemetry of every third cycle, 100 Hz.
+const EVERY: u8 = 3;
+
+/// Longest pass, s.
+const TIMEOUT: u64 = 30;
+
+/// What was measured, by postures.
+#[derive(Debug, Clone, Default)]
+pub struct Crossings {
+    /// Postures to regress from.
+    pub fitted: Vec<Crossing>,
+    /// Postures to judge by.
+    pub held_out: Vec<Crossing>,
+}
+
+/// The payload of the arm, and the weight that its device computes with now.
+///
+/// # Errors
+/// As [`Client::request`].
+pub fn weight_in_use(client: &mut Client<Device>) -> Result<WeightCorrection, ProcedureError> {
+    let payload = match client.status()?.wrench_zeroed {
+        Some(_) => Payload::SensorAndHand,
+        None => Payload::None,
+    };
+    let told = client.weight()?;
+    let links = told.links.map(|[share, x, y, z]| LinkWeight { share, shift: [x, y, z] });
+    let own = WeightCorrection::new(payload, links).ok().filter(|_| told.in_use);
+    Ok(own.unwrap_or(WeightCorrection::none(payload)))
+}
+
+/// Moves the arm through the postures (rad). It holds in the last one. `progress` hears which one is next.
+///
+/// # Errors
+/// As [`travel`].
+pub fn cross_postures(
+    client: &mut Client<Device>,
+    postures: &[[f32; 7]],
+    mut progress: impl FnMut(usize),
+) -> Result<Crossings, ProcedureError> {
+    let mut crossings = Crossings::default();
+    for (index, posture) in postures.iter().enumerate() {
+        progress(index);
+        let (below, above) = (posture.map(|q| q - HALF_WAY), posture.map(|q| q + HALF_WAY));
+        travel(client, below, |_| {})?;
+        let crossing =
+            Crossing { up: pass_posture(client, above, posture)?, down: pass_posture(client, below, posture)? };
+        if is_held_out(index) {
+            crossings.held_out.push(crossing);
+        } else {
+            crossings.fitted.push(crossing);
+        }
+    }
+    Ok(crossings)
+}
+
+/// Moves to `target` (rad) through the posture; what was measured near it.
+fn pass_posture(
+    client: &mut Client<Device>,
+    target: [f32; 7],
+    posture: &[f32; 7],
+) -> Result<Vec<Sample>, ProcedureError> {
+    client.take_events();
+    client.set_telemetry(EVERY)?;
+    client.approach(target, PASS_SECONDS)?;
+    let samples = watch(client, posture[0].into());
+    client.set_telemetry(0)?;
+    samples
+}
+
+fn watch(client: &mut Client<Device>, first: f64) -> Result<Vec<Sample>, ProcedureError> {
+    let started = client.now();
+    let mut samples = Vec::new();
+    loop {
+        if client.now().saturating_sub(started) > Duration::from_secs(TIMEOUT) {
+            client.stop()?;
+            return Err(ProcedureError::TooLong { what: "the pass through a posture", seconds: TIMEOUT });
+        }
+        match client.next(Duration::from_millis(100))? {
+            Some(Incoming::Telemetry(cycle)) => {
+                let sample = Sample { q: cycle.q.map(f64::from), torque: cycle.tau.map(f64::from) };
+                let measured = cycle.flags & flags::POSITIONS_KNOWN != 0 && cycle.lost_replies == 0;
+                if measured && (sample.q[0] - first).abs() <= WINDOW {
+                    samples.push(sample);
+                }
+            }
+            Some(Incoming::Event(event)) if event.kind == EventKind::Arrived => return Ok(samples),
+            Some(Incoming::Event(event)) if event.kind == EventKind::State => after(event.code, event.detail)?,
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! `tactus calibrate gravity`: the weight of the arm's links, measured, judged, and kept by its device.
+
+use clap::Args;
+use link::{HomeSource, Weight};
+use serde_json::{Value, json};
+
+use super::{ErrorCode, Failure, Global, Table, connection};
+use lab::client::Client;
+use lab::device::Device;
+use lab::procedure::{self, Crossings};
+use lab::weigh::{Residual, TOUR, WeighError, Weighing, weigh};
+
+/// Options of `calibrate gravity`.
+#[derive(Debug, Clone, Args)]
+pub struct Gravity {
+    /// Show the weight that counts; nothing moves
+    #[arg(long, conflicts_with_all = ["reset", "at_home"])]
+    pub show: bool,
+    /// Forget it: the robot model's weight counts again; nothing moves
+    #[arg(long, conflicts_with = "at_home")]
+    pub reset: bool,
+    /// I have brought the arm to its home pose: zero it there if need be
+    #[arg(long)]
+    pub at_home: bool,
+}
+
+const DOING: &str = "calibrate gravity";
+
+/// Shows, measures or forgets the weight of the links.
+///
+/// # Errors
+/// The device refuses, the arm stops, or what was measured is not accepted; the device then goes on as before.
+pub(super) fn run(command: &Gravity, client: &mut Client<Device>, global: &Global) -> Result<(), Failure> {
+    if command.reset {
+        client.forget_weight().map_err(|error| error.into_failure(DOING))?;
+    }
+    if command.show || command.reset {
+        let weight = client.weight().map_err(|error| error.into_failure(DOING))?;
+        return global.output().result(&weight_data(&weight), weight_text(&weight));
+    }
+    connection::ready(client, command.at_home, global.output(), DOING)?;
+    let present = procedure::weight_in_use(client).map_err(|error| connection::failure(error, DOING))?;
+    global.output().say(format!("the arm moves through {} postures, a few minutes; Ctrl-C stops it", TOUR.len()));
+    let spinner = global.output().spinner("weighing");
+    let measured = procedure::cross_postures(client, &TOUR, |posture| {
+        spinner.set_message(format!("posture {} of {}", posture + 1, TOUR.len()));
+    });
+    spinner.finish_and_clear();
+    let Crossings { fitted, held_out } = measured.map_err(|error| connection::failure(error, DOING))?;
+    let refused = |error: WeighError| Failure::new(ErrorCode::WeightNotAccepted, DOING, error);
+    let weighing = weigh(&present, present.payload(), &fitted, &held_out).map_err(refused)?;
+    weighing.judge().map_err(|error| refused(error).data(data(&weighing)))?;
+    client.keep_weight(&weighing.correction).map_err(|error| error.into_failure(DOING).data(data(&weighing)))?;
+    let text = format!("{}accepted, stored in the device; it counts when the arm has no torque next", table(&weighing));
+    global.output().result(&data(&weighing), text)
+}
+
+fn table(weighing: &Weighing) -> Table {
+    let [before, after] = weighing.held_out;
+    let [_, fitted] = weighing.fitted;
+    let mut table = Table::new(["joint", "before, N m", "after, N m", "worst", "fitted", "friction, N m"]);
+    for joint in 0..7 {
+        table.row([
+            format!("J{}", joint + 1),
+            format!("{:.3}", before.rms[joint]),
+            format!("{:.3}", after.rms[joint]),
+            format!("{:.3}", after.worst[joint]),
+            format!("{:.3}", fitted.rms[joint]),
+            format!("{:.2}", weighing.friction[joint]),
+        ]);
+    }
+    table
+}
+
+fn data(weighing: &Weighing) -> Value {
+    let residual = |residual: &Residual| json!({ "rms_nm": residual.rms, "worst_nm": residual.worst });
+    let links = weighing.correction.links().map(|link| json!({ "share": link.share, "shift_m": link.shift }));
+    json!({
+        "fitted": { "before": residual(&weighing.fitted[0]), "after": residual(&weighing.fitted[1]) },
+        "held_out": { "before": residual(&weighing.held_out[0]), "after": residual(&weighing.held_out[1]) },
+        "friction_nm": weighing.friction, "determined": weighing.determined, "links": links,
+    })
+}
+
+/// The words for whose weight counts.
+pub(super) fn weight_words(weight: &Weight) -> String {
+    match (weight.source, weight.in_use) {
+        (HomeSource::Stored, false) => "stored in the device, not in use: torque, or another payload".to_owned(),
+        (source, _) => source.name().to_owned(),
+    }
+}
+
+fn weight_data(weight: &Weight) -> Value {
+    let links = weight.links.map(|[share, x, y, z]| json!({ "share": share, "shift_m": [x, y, z] }));
+    json!({
+        "source": weight.source.name(), "stored": weight.source == HomeSource::Stored, "in_use": weight.in_use,
+        "with_hand": weight.hand, "links": links,
+    })
+}
+
+fn weight_text(weight: &Weight) -> String {
+    let mut table = Table::new(["link", "mass beyond the model's", "shift x, y, z, mm"]);
+    for (link, [share, shift @ ..]) in weight.links.iter().enumerate() {
+        let [x, y, z] = shift.map(|shift| shift * 1e3);
+        table.row([format!("{}", link + 1), format!("{:+.1} %", share * 100.0), format!("{x:+.1} {y:+.1} {z:+.1}")]);
+    }
+    format!("{table}weight: {}", weight_words(weight))
+}
