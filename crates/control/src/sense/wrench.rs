@@ -23,9 +23,9 @@ use crate::units::{Vector6, Wrench};
 /// Cut-off of the wrench filter (Hz).
 pub const WRENCH_CUT_OFF: f64 = 15.0;
 
-/// Largest change that is believed at once (N, N m), twelve times the noise of a difference of samples: a wild sample of
-/// that size stays in the dead band of Eq (8). A larger change is believed with the second sample that shows one, while
-/// every further one does: what truly changes fast is one cycle late, once.
+/// Largest change that is believed at once (N, N m), twelve times the noise of a difference of samples: a wild sample
+/// of that size stays in the dead band of Eq (8). A larger change is believed with the second sample that shows one,
+/// while every further one does: what truly changes fast is one cycle late, once.
 const LARGEST_STEP: [f64; 6] = [1.0, 1.0, 1.0, 0.05, 0.05, 0.05];
 
 /// Half of the time over which a resting wrench is averaged for the tare: 0.15 s, in control periods.

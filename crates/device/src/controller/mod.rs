@@ -290,11 +290,11 @@ impl DeviceController {
     /// Leaves the cyclic loop.
     #[cold]
     #[inline(never)]
-    fn restart(&mut self) {
+    fn restart(&mut self, now_us: u64) {
         Counters::count(&mut self.counters.restarts);
         self.phase = BusPhase::StartUp;
+        self.startup.restart(now_us, self.cycle.last_counts());
         self.cycle.reset();
-        self.startup.restart();
         self.hand.suspend();
         self.late = None;
         self.hand_temperatures = [None; 4];
@@ -360,7 +360,7 @@ impl DeviceController {
         if let Some(event) = output.event {
             self.tell(event.into(), io);
         }
-        self.leave_if_lost();
+        self.leave_if_lost(now_us);
     }
 
     /// A reason against torque that lasts.
@@ -396,7 +396,7 @@ impl DeviceController {
     }
 
     /// After a cycle: goes back to the start-up when the pucks have lost power, failed, or shall be zeroed again.
-    fn leave_if_lost(&mut self) {
+    fn leave_if_lost(&mut self, now_us: u64) {
         if !self.startup.is_done() {
             // A command has sent the start-up back to zeroing.
             self.phase = BusPhase::StartUp;
@@ -404,17 +404,17 @@ impl DeviceController {
             return;
         }
         if self.safety_mode == Some(SafetyMode::EStop) {
-            self.restart();
+            self.restart(now_us);
             return;
         }
         if let Some(node) = self.late.filter(|_| !self.cycle.state().has_torque()) {
             // What the arm carries decides its gravity: everything is asked anew.
-            self.restart();
+            self.restart(now_us);
             self.startup.note_late(node);
             return;
         }
         match &mut self.last_cycles {
-            Some(0) => self.restart(),
+            Some(0) => self.restart(now_us),
             Some(left) => *left -= 1,
             None => {}
         }
