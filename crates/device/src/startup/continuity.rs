@@ -1,4 +1,4 @@
-//! `Continuity`: compares the motors' counts, from the last that the cyclic loop knew on, while the bus is started anew.
+//! `Continuity`: compares the motors' counts while the bus is started anew, from the last of the cyclic loop on.
 
 use control::model;
 use puck::{Counts, Group, PropertyId, get};
@@ -21,8 +21,8 @@ const FASTEST: f64 = 3.0;
 /// Further than so many times the way between its stops no joint turns, however long nobody looks.
 const FARTHEST: f64 = 1.1;
 
-/// Counts by which each motor turns if every joint turns by as much as `joints` says (rad), whichever way, with the arm's
-/// usual encoders.
+/// Counts by which each motor turns if every joint turns by so many times `joints` (rad), whichever way, with the usual
+/// encoders.
 const fn counts_of(joints: [f64; 7], factor: f64) -> [i32; 7] {
     let mut counts = [0; 7];
     let mut motor = 0;

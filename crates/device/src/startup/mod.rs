@@ -192,8 +192,8 @@ impl Startup {
         }
     }
 
-    /// Begins anew after the cyclic loop. A doubt about the zero stays. `last`: the counts of the motors as the loop knew
-    /// them, and how many cycles ago.
+    /// Begins anew after the cyclic loop. A doubt about the zero stays. `last`: the counts of the motors as the loop
+    /// knew them, and how many cycles ago.
     #[cold]
     #[inline(never)]
     pub(crate) fn restart(&mut self, now_us: u64, last: Option<[(Counts, u8); 7]>) {
