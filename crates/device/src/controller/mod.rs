@@ -13,6 +13,7 @@
 //! it: the frames of a cycle come from [`control::Actuation`] or are zero.
 
 mod brakes;
+mod lateness;
 mod orders;
 mod outlet;
 
@@ -37,6 +38,7 @@ use crate::stage::{Stage, StartupError};
 use crate::startup::Startup;
 use crate::wire;
 use brakes::Brakes;
+use lateness::Lateness;
 use outlet::SlotOutlet;
 
 /// Time that a puck may be silent before the bus is started anew: 1 s, in control periods; long after the supervisor
@@ -52,12 +54,6 @@ const REFUSED_CYCLES: u8 = 6;
 /// Answers in a row of a braking puck 1 under an ACTIVE safety module that mean IDLE: one may be older than the
 /// activation.
 const BRAKING_ANSWERS: u8 = 2;
-
-/// Weight of an overrun against one cycle without.
-const OVERRUN_WEIGHT: u16 = 50;
-/// The sum at which the control cycle is too late too often: six overruns within a few cycles. One in fifty is
-/// tolerated.
-const OVERRUN_LIMIT: u16 = 300;
 
 /// Who has the bus.
 #[derive(Clone, Copy, Debug)]
@@ -94,8 +90,7 @@ pub struct DeviceController {
     last_cycles: Option<u8>,
     braking: u8,
     refused: u8,
-    /// Overruns of late: up by [`OVERRUN_WEIGHT`] with each, down by one with each cycle.
-    overruns: u16,
+    lateness: Lateness,
     brakes: Brakes,
 }
 
@@ -125,7 +120,7 @@ impl DeviceController {
             last_cycles: None,
             braking: 0,
             refused: 0,
-            overruns: 0,
+            lateness: Lateness::default(),
             brakes: Brakes::default(),
         })
     }
@@ -283,7 +278,7 @@ impl DeviceController {
         self.fresh_safety = None;
         self.braking = 0;
         self.refused = 0;
-        self.overruns = 0;
+        self.lateness = Lateness::default();
         self.brakes = Brakes::default();
     }
 
@@ -325,11 +320,9 @@ impl DeviceController {
         {
             self.fail();
         }
-        if self.overruns >= OVERRUN_LIMIT {
-            self.overruns = 0;
+        if self.lateness.take() {
             self.fault.get_or_insert(Fault::Overrun);
         }
-        self.overruns = self.overruns.saturating_sub(1);
         let input = CycleInput {
             cycle: self.number,
             sample: control::BusSample {
@@ -510,7 +503,7 @@ impl Controller for DeviceController {
 
     fn note_overrun(&mut self) {
         Counters::count(&mut self.counters.overruns);
-        self.overruns = self.overruns.saturating_add(OVERRUN_WEIGHT);
+        self.lateness.note(self.number);
     }
 
     fn note_bus_error(&mut self, bus_off: bool) {
