@@ -523,6 +523,7 @@ impl Controller for DeviceController {
             zeroed: self.startup.is_zeroed(),
             zeroed_at: self.startup.zeroed_at(),
             payload: self.cycle.payload(),
+            has_primitive: self.cycle.primitive().is_some(),
             wrench_zeroed: self.startup.has_sensor().then(|| self.cycle.is_wrench_zeroed()),
             safety_mode: self.safety_mode,
             pendant: self.pendant,
