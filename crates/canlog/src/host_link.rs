@@ -117,5 +117,6 @@ fn words(message: &Message) -> String {
         Message::Reply(Reply::Calibration { .. }) => "calibration".to_owned(),
         Message::Reply(Reply::FaultRecord { .. }) => "fault record".to_owned(),
         Message::Reply(Reply::FaultCycle { .. }) => "fault cycle".to_owned(),
+        Message::Reply(Reply::Weight { .. }) => "weight".to_owned(),
     }
 }

@@ -4,6 +4,7 @@
 //! other half is a [`crate::HostSession`] over an [`Application`]: the rules of the link are those of every device, the
 //! primitives and the requests that move something are those of the application.
 
+use control::model::WeightCorrection;
 use control::{CycleRecord, LoadRefusal, State};
 use link::{Capabilities, Listing, Name, Refusal, Reply, Request, Telemetry};
 use puck::CanFrame;
@@ -60,6 +61,10 @@ pub trait Controller: Sized + 'static {
     /// # Errors
     /// [`LoadRefusal`] while a run is in progress, or if it was checked for another arm than this. The old one stays.
     fn load(&mut self, primitive: Self::Primitive<'_>) -> Result<(), LoadRefusal>;
+
+    /// Takes the weight of the arm's links; `false` while the arm has torque, and where there is no arm. The old one
+    /// then stays.
+    fn weigh(&mut self, weight: &WeightCorrection) -> bool;
 
     /// The board began a control slot too late for its torque frames to leave in time.
     fn note_overrun(&mut self);
@@ -121,6 +126,9 @@ pub trait SessionPort<C: Controller> {
     /// # Errors
     /// As [`Controller::load`]. It must not be swallowed: the next run would be that of the old primitive.
     fn load(&mut self, primitive: C::Primitive<'_>) -> Result<(), LoadRefusal>;
+
+    /// Gives the control cycle the weight of the arm's links, as [`Controller::weigh`].
+    fn weigh(&mut self, weight: &WeightCorrection) -> bool;
 
     /// The next record of a control cycle, oldest first.
     fn record(&mut self) -> Option<TimedRecord<C::Record>>;

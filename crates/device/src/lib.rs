@@ -40,8 +40,10 @@ mod port;
 mod session;
 pub mod storage;
 mod store;
+pub mod weight;
 
 pub use port::{CheckedPrimitive, StoredPrimitive};
 pub use session::{ArmApplication, HostSession, Identity, Session};
 pub use store::{RamStore, STORE_SLOT_BYTES, STORE_SLOTS, Store, StoreError, stage_copy};
+pub use weight::StoredWeight;
 pub use wire::{PrimitiveTrouble, StartupTrouble};

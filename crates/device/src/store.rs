@@ -1,5 +1,5 @@
 //! Where primitives are kept: places for whole images, and a spare one in which an upload grows; and the home of the
-//! arm.
+//! arm and the weight of its links.
 //!
 //! Invariants every [`Store`] keeps: an image is either wholly there or not at all; until [`Store::finished`] tells of
 //! success, reading gives what it gave before the change was asked for; if power fails in between, the next start finds
@@ -7,9 +7,11 @@
 
 use core::fmt;
 
+use control::model::WeightCorrection;
 use link::frame::CRC;
 
 use crate::calibration::{Home, StoredHome};
+use crate::weight::StoredWeight;
 
 /// Places of the store of a device without flash of its own.
 pub const STORE_SLOTS: usize = 8;
@@ -127,6 +129,21 @@ pub trait Store {
     /// As [`Store::keep_home`].
     fn forget_home(&mut self) -> Result<(), StoreError>;
 
+    /// The weight of the arm's links that is kept beside the images.
+    fn weight(&self) -> StoredWeight;
+
+    /// Begins to keep this weight. It is kept when [`Store::finished`] says so.
+    ///
+    /// # Errors
+    /// As [`Store::keep_home`].
+    fn keep_weight(&mut self, weight: &WeightCorrection) -> Result<(), StoreError>;
+
+    /// Begins to forget it. It is forgotten when [`Store::finished`] says so.
+    ///
+    /// # Errors
+    /// As [`Store::keep_home`].
+    fn forget_weight(&mut self) -> Result<(), StoreError>;
+
     /// Returns the outcome of the change that was begun last, once, as soon as it is durable.
     fn finished(&mut self) -> Option<Result<(), StoreError>>;
 }
@@ -214,6 +231,18 @@ impl<S: Store + ?Sized> Store for &mut S {
     fn forget_home(&mut self) -> Result<(), StoreError> {
         (**self).forget_home()
     }
+
+    fn weight(&self) -> StoredWeight {
+        (**self).weight()
+    }
+
+    fn keep_weight(&mut self, weight: &WeightCorrection) -> Result<(), StoreError> {
+        (**self).keep_weight(weight)
+    }
+
+    fn forget_weight(&mut self) -> Result<(), StoreError> {
+        (**self).forget_weight()
+    }
 }
 
 /// One place in memory; empty while `length` is 0.
@@ -237,6 +266,7 @@ pub struct RamStore<const SLOTS: usize, const BYTES: usize> {
     areas: [Area<BYTES>; SLOTS],
     spare: Area<BYTES>,
     home: StoredHome,
+    weight: StoredWeight,
     changed: bool,
 }
 
@@ -244,7 +274,13 @@ impl<const SLOTS: usize, const BYTES: usize> RamStore<SLOTS, BYTES> {
     /// An empty store.
     #[must_use]
     pub const fn new() -> Self {
-        Self { areas: [Area::EMPTY; SLOTS], spare: Area::EMPTY, home: StoredHome::Nothing, changed: false }
+        Self {
+            areas: [Area::EMPTY; SLOTS],
+            spare: Area::EMPTY,
+            home: StoredHome::Nothing,
+            weight: StoredWeight::Nothing,
+            changed: false,
+        }
     }
 }
 
@@ -325,6 +361,22 @@ impl<const SLOTS: usize, const BYTES: usize> Store for RamStore<SLOTS, BYTES> {
 
     fn forget_home(&mut self) -> Result<(), StoreError> {
         self.home = StoredHome::Nothing;
+        self.changed = true;
+        Ok(())
+    }
+
+    fn weight(&self) -> StoredWeight {
+        self.weight
+    }
+
+    fn keep_weight(&mut self, weight: &WeightCorrection) -> Result<(), StoreError> {
+        self.weight = StoredWeight::Kept(*weight);
+        self.changed = true;
+        Ok(())
+    }
+
+    fn forget_weight(&mut self) -> Result<(), StoreError> {
+        self.weight = StoredWeight::Nothing;
         self.changed = true;
         Ok(())
     }

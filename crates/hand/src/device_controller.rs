@@ -10,6 +10,7 @@
 //! On a bus of its own the hand is answered within one slot: 1015 us at worst, stuffing and puck latency included, of
 //! 1111. The torque leaves in the cycle of its sample, one cycle earlier than behind an arm.
 
+use control::model::WeightCorrection;
 use control::{LoadRefusal, Payload};
 use device::bus::Outlet;
 use device::hand::{Drive, HandProperties, HandRound, HandTrouble, Initialisation, Outcome};
@@ -336,6 +337,11 @@ impl Controller for DeviceController {
 
     fn load(&mut self, primitive: &FingerPrimitive) -> Result<(), LoadRefusal> {
         if self.cycle.load(primitive) { Ok(()) } else { Err(LoadRefusal::Running) }
+    }
+
+    /// A hand alone has no arm to carry.
+    fn weigh(&mut self, _: &WeightCorrection) -> bool {
+        false
     }
 
     fn note_overrun(&mut self) {

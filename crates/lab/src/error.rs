@@ -3,6 +3,7 @@
 use std::fmt;
 use std::time::Duration;
 
+use control::model::WeightError;
 use device::{HomeError, PrimitiveTrouble, StartupTrouble};
 use link::{Capabilities, ImageError, Refusal};
 
@@ -154,6 +155,10 @@ fn explain(reason: Refusal, detail: [u32; 2]) -> String {
         Refusal::HomeImplausible => match HomeError::from_detail(detail) {
             Some(error) => format!("{reason}: {error}"),
             None => format!("{reason}: J{}", first.saturating_add(1)),
+        },
+        Refusal::WeightImplausible => match WeightError::from_detail(detail) {
+            Some(error) => format!("{reason}: {error}"),
+            None => format!("{reason}: link {}", first.saturating_add(1)),
         },
         _ => reason.to_string(),
     }

@@ -25,3 +25,4 @@ pub mod simulation;
 pub mod table;
 pub mod tracking;
 pub mod transport;
+pub mod weigh;

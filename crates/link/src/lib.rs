@@ -34,6 +34,6 @@ pub use name::{Name, NameError, Text};
 pub use refusal::Refusal;
 pub use report::{
     Calibration, Event, EventKind, FaultRecord, HandStage, HomeSource, LinkCounters, Listing, Statistics, Status,
-    Telemetry,
+    Telemetry, Weight,
 };
 pub use schema::{LINK_VERSION, SCHEMA_HASH};

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::name::{Name, Text};
 use crate::refusal::Refusal;
-use crate::report::{Calibration, Event, FaultRecord, Listing, Statistics, Status, Telemetry};
+use crate::report::{Calibration, Event, FaultRecord, Listing, Statistics, Status, Telemetry, Weight};
 
 /// Most bytes of an image in one [`Request::UploadChunk`] or [`Reply::Chunk`].
 ///
@@ -280,6 +280,18 @@ pub enum Request {
         /// Cycle of it, 0 for the oldest.
         index: u16,
     },
+    /// Asks for [`Reply::Weight`].
+    Weight,
+    /// Keeps the weight of this arm's links, for gravity compensation from the next moment without torque on. Answered
+    /// when it is durable.
+    KeepWeight {
+        /// It was measured with sensor and hand, otherwise with the bare arm.
+        hand: bool,
+        /// Share of mass beyond the model's, and shift of the first moment x, y, z (m), of links 1 to 7.
+        links: [[f32; 4]; 7],
+    },
+    /// Forgets that weight: the model's counts again. Answered when it is durable.
+    ForgetWeight,
 }
 
 impl Request {
@@ -322,7 +334,11 @@ impl Request {
             | Self::Observe(_)
             | Self::Rename { .. }
             | Self::FaultRecord
-            | Self::FaultCycle { .. } => false,
+            | Self::FaultCycle { .. }
+            // An arm that has torque goes on as it is.
+            | Self::Weight
+            | Self::KeepWeight { .. }
+            | Self::ForgetWeight => false,
         }
     }
 
@@ -363,6 +379,9 @@ impl Request {
             Self::Rename { .. } => "rename",
             Self::FaultRecord => "fault record",
             Self::FaultCycle { .. } => "fault cycle",
+            Self::Weight => "weight",
+            Self::KeepWeight { .. } => "keep weight",
+            Self::ForgetWeight => "forget weight",
         }
     }
 }
@@ -451,6 +470,13 @@ pub enum Reply {
         /// of this one, and if a reset has damaged it.
         cycle: Option<Telemetry>,
     },
+    /// Answer to [`Request::Weight`].
+    Weight {
+        /// Request answered.
+        of: u16,
+        /// The weight of the links.
+        weight: Weight,
+    },
 }
 
 impl Reply {
@@ -467,7 +493,8 @@ impl Reply {
             | Self::Chunk { of, .. }
             | Self::Calibration { of, .. }
             | Self::FaultRecord { of, .. }
-            | Self::FaultCycle { of, .. } => Some(*of),
+            | Self::FaultCycle { of, .. }
+            | Self::Weight { of, .. } => Some(*of),
             Self::Telemetry(_) | Self::Event(_) => None,
         }
     }

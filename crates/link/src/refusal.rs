@@ -109,11 +109,14 @@ pub enum Refusal {
     Observing,
     /// Another primitive in the store has this name.
     NameTaken,
+    /// A weight of the links cannot be that of an arm. `detail` = link (0 for the one that J1 turns), and what is wrong
+    /// with it: 0 not a number, 1 the mass, 2 the centre of mass.
+    WeightImplausible,
 }
 
 impl Refusal {
     /// Every refusal, in the order of its code.
-    pub const ALL: [Self; 49] = [
+    pub const ALL: [Self; 50] = [
         Self::LinkVersion,
         Self::Schema,
         Self::Model,
@@ -163,6 +166,7 @@ impl Refusal {
         Self::HasTorque,
         Self::Observing,
         Self::NameTaken,
+        Self::WeightImplausible,
     ];
 
     /// Number on the wire.
@@ -224,6 +228,7 @@ impl Refusal {
             Self::HasTorque => "the arm has torque",
             Self::Observing => "an observer may look and stop, nothing else",
             Self::NameTaken => "the device stores another primitive of that name",
+            Self::WeightImplausible => "the weight of the links cannot be that of an arm",
         }
     }
 
@@ -275,6 +280,7 @@ impl Refusal {
             Self::HasTorque => "support the arm, press Shift+Idle on the pendant, then try again",
             Self::Observing => "connect as the host that commands",
             Self::NameTaken => "choose another name, or delete that primitive first: `tactus delete NAME`",
+            Self::WeightImplausible => "empty the hand, free the arm, and calibrate again: `tactus calibrate gravity`",
         }
     }
 }

@@ -97,7 +97,7 @@ pub struct Status {
     pub wrench_zeroed: Option<bool>,
 }
 
-/// Whose home counts when the arm is zeroed. Append-only.
+/// Whose home counts when the arm is zeroed, and whose weight its links are taken to have. Append-only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 pub enum HomeSource {
     /// The robot model's: this arm has none of its own.
@@ -134,6 +134,20 @@ pub struct Calibration {
     /// Joint angles at which the last zeroing took the arm to stand, rad; `None` if the device has not zeroed it since
     /// its bus was started.
     pub zeroed_at: Option<[f32; 7]>,
+}
+
+/// The weight of the links that gravity compensation computes with.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Weight {
+    /// It was measured with sensor and hand, otherwise with the bare arm.
+    pub hand: bool,
+    /// Share of mass beyond the model's, and shift of the first moment x, y, z (m), of links 1 to 7; zero where the
+    /// model's counts.
+    pub links: [[f32; 4]; 7],
+    /// Whose it is.
+    pub source: HomeSource,
+    /// It counts now: it is stored, the arm has been without torque since, and carries what it was measured with.
+    pub in_use: bool,
 }
 
 /// Counters of the receiving end of a link. Every byte that arrived is accounted for in one of these.

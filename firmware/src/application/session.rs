@@ -1,6 +1,7 @@
 //! Talks with the host.
 
 use control::LoadRefusal;
+use control::model::WeightCorrection;
 use device::{Application, Controller, FaultMemory, Health, HostSession, QueueFull, SessionPort, TimedRecord, Timing};
 use heapless::spsc::{Consumer, Producer};
 use rtic_core::Mutex;
@@ -61,6 +62,10 @@ impl<P: LinkPort, C: Controller, M: Mutex<T = &'static mut C>> SessionPort<C> fo
 
     fn load(&mut self, primitive: C::Primitive<'_>) -> Result<(), LoadRefusal> {
         self.core.lock(|core| core.load(primitive))
+    }
+
+    fn weigh(&mut self, weight: &WeightCorrection) -> bool {
+        self.core.lock(|core| core.weigh(weight))
     }
 
     fn record(&mut self) -> Option<TimedRecord<C::Record>> {

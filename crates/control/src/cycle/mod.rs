@@ -31,6 +31,7 @@ use crate::law::gains::Gains;
 use crate::model::arm::ArmModel;
 use crate::model::calibration::{Calibration, Payload};
 use crate::model::kinematics::Frames;
+use crate::model::weight::WeightCorrection;
 use crate::plan::load::{CheckedPrimitive, LoadRefusal, Loaded};
 use crate::plan::primitive::Primitive;
 use crate::plan::run::{FADE, Run};
@@ -69,6 +70,7 @@ const STANDING: f64 = 0.05;
 /// The control code of one arm. `N` is the number of kernels per row that its primitive may have.
 pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     calibration: Calibration<R>,
+    weight: WeightCorrection,
     model: ArmModel<R>,
     gains: Gains<R>,
     supervisor: Supervisor,
@@ -143,6 +145,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             cut: LimitReport::default(),
             pending: None,
             caution: Caution::None,
+            weight: WeightCorrection::none(calibration.payload),
             calibration,
             model,
             gains,
@@ -210,9 +213,22 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             // It was checked for another tool.
             self.loaded.clear();
         }
-        self.model = ArmModel::new(calibration.payload);
+        self.model = ArmModel::corrected(calibration.payload, &self.weight);
         self.observer = MotionObserver::new();
         self.calibration = calibration;
+        Ok(())
+    }
+
+    /// Takes the weight of this arm's links. It counts while the arm carries the payload it was measured with.
+    ///
+    /// # Errors
+    /// [`Refusal::WrongState`] while torque is on: the torque would make a step.
+    pub fn weigh(&mut self, weight: &WeightCorrection) -> Result<(), Refusal> {
+        if self.supervisor.state().has_torque() {
+            return Err(Refusal::WrongState);
+        }
+        self.weight = *weight;
+        self.model = ArmModel::corrected(self.calibration.payload, weight);
         Ok(())
     }
 

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::model::calibration::Payload;
 use crate::model::wam7;
 use crate::model::wam7::{BodyTable, PayloadTable};
+use crate::model::weight::WeightCorrection;
 use crate::real::Real;
 use crate::units::{JOINTS, JointPositions};
 
@@ -47,16 +48,21 @@ pub struct ArmModel<R: Real> {
 impl<R: Real> ArmModel<R> {
     /// The arm of `model/wam7.toml` with this payload.
     pub fn new(payload: Payload) -> Self {
-        ArmModel::with(payload, 1.0, 0.0)
+        ArmModel::with(payload, 1.0, 0.0, None)
+    }
+
+    /// The same arm as a calibration of its weight found it; that of the model if it was found with another payload.
+    pub fn corrected(payload: Payload, correction: &WeightCorrection) -> Self {
+        ArmModel::with(payload, 1.0, 0.0, Some(correction).filter(|found| found.payload() == payload))
     }
 
     /// The same arm with every link mass and inertia scaled and extra mass at the tool: for tests of robustness against
     /// a model that is not the plant.
     pub fn disturbed(payload: Payload, inertia_scale: f64, extra_mass: f64) -> Self {
-        ArmModel::with(payload, inertia_scale, extra_mass)
+        ArmModel::with(payload, inertia_scale, extra_mass, None)
     }
 
-    fn with(payload: Payload, scale: f64, extra_mass: f64) -> Self {
+    fn with(payload: Payload, scale: f64, extra_mass: f64, correction: Option<&WeightCorrection>) -> Self {
         let mounted = match payload {
             Payload::None => wam7::PAYLOAD_NONE,
             Payload::SensorAndHand => wam7::PAYLOAD_HAND,
@@ -69,6 +75,10 @@ impl<R: Real> ArmModel<R> {
         let extra = BodyTable { mass: extra_mass, centre: [0.0, 0.0, mounted.tool_z], inertia: [0.0; 6] };
         let [first, second, third, fourth, fifth, sixth, last] = tables;
         let last = merged(merged(last, mounted.body), extra);
+        let mut bodies = [first, second, third, fourth, fifth, sixth, last];
+        if let Some(correction) = correction {
+            correction.apply(&mut bodies);
+        }
         let real = |values: [f64; JOINTS]| values.map(R::of);
         let PayloadTable { tool_z, tool_cosine, tool_sine, .. } = mounted;
         ArmModel {
@@ -76,7 +86,7 @@ impl<R: Real> ArmModel<R> {
             link_offset: real(wam7::DH_D),
             twist_cosine: real(wam7::DH_COSINE),
             twist_sine: real(wam7::DH_SINE),
-            bodies: [first, second, third, fourth, fifth, sixth, last].map(body),
+            bodies: bodies.map(body),
             reflected_inertia: real(wam7::REFLECTED_INERTIA),
             reflected_inertia_j5_j6: R::of(wam7::REFLECTED_INERTIA_J5_J6),
             tool_height: R::of(tool_z),

@@ -7,8 +7,10 @@ pub mod hand;
 pub mod kinematics;
 mod mass_matrix;
 pub mod wam7;
+pub mod weight;
 
 pub use arm::ArmModel;
 pub use calibration::{Calibration, CalibrationError, Payload};
 pub use kinematics::{Frames, Jacobian};
 pub use wam7::*;
+pub use weight::{LinkWeight, MASS_SHARE, MOMENT_SHIFT, WeightCorrection, WeightError, WeightFault};

@@ -15,3 +15,4 @@ mod primitives;
 mod rig;
 mod shoves;
 mod tracking;
+mod weight;

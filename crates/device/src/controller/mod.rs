@@ -18,6 +18,7 @@ mod orders;
 mod outlet;
 
 use control::law::Gains;
+use control::model::WeightCorrection;
 use control::time::periods;
 use control::{Calibration, Cycle, CycleInput, CycleRecord, Fault, LoadRefusal, Payload, State};
 use link::HandStage;
@@ -499,6 +500,10 @@ impl Controller for DeviceController {
 
     fn load(&mut self, fit: &CheckedPrimitive<'_>) -> Result<(), LoadRefusal> {
         self.cycle.load(fit)
+    }
+
+    fn weigh(&mut self, weight: &WeightCorrection) -> bool {
+        self.cycle.weigh(weight).is_ok()
     }
 
     fn note_overrun(&mut self) {

@@ -1,31 +1,37 @@
 //! The library in memory, and what is to be done about it on the flash.
 
+use control::model::WeightCorrection;
+
 use crate::calibration::{HOME_BYTES, Home, StoredHome};
-use crate::storage::{HOME_KEY, Opening};
+use crate::storage::{HOME_KEY, Opening, WEIGHT_KEY};
 use crate::store::{RamStore, Store, StoreError};
+use crate::weight::{StoredWeight, WEIGHT_BYTES};
+
+/// Bytes of the largest setting: home or weight.
+const SETTING_BYTES: usize = if HOME_BYTES > WEIGHT_BYTES { HOME_BYTES } else { WEIGHT_BYTES };
 
 /// A change under way: what the flash must hold before the memory may.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
-    /// Keep the image being written as that of a place, or the home.
+    /// Keep the image being written as that of a place, or a setting: the home or the weight.
     Save {
-        /// The place, or [`HOME_KEY`].
+        /// The place, or [`HOME_KEY`] or [`WEIGHT_KEY`].
         slot: u8,
         /// Bytes of it.
         length: usize,
     },
-    /// Forget the image of a place, or the home.
+    /// Forget the image of a place, or a setting.
     Delete {
-        /// The place, or [`HOME_KEY`].
+        /// The place, or [`HOME_KEY`] or [`WEIGHT_KEY`].
         slot: u8,
     },
 }
 
 impl Work {
-    /// True if it is about the home, and about no place.
-    fn is_of_home(self) -> bool {
+    /// True if it is about home or weight, and about no place.
+    fn is_of_setting(self) -> bool {
         let (Self::Save { slot, .. } | Self::Delete { slot }) = self;
-        slot == HOME_KEY
+        matches!(slot, HOME_KEY | WEIGHT_KEY)
     }
 }
 
@@ -48,8 +54,9 @@ enum Job {
 pub struct Library<const SLOTS: usize, const BYTES: usize> {
     memory: RamStore<SLOTS, BYTES>,
     home: StoredHome,
-    /// The home that is being kept.
-    staged_home: [u8; HOME_BYTES],
+    weight: StoredWeight,
+    /// The home or weight that is being kept.
+    staged: [u8; SETTING_BYTES],
     job: Job,
     is_open: bool,
     opening: Opening,
@@ -63,7 +70,8 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         Self {
             memory: RamStore::new(),
             home: StoredHome::Nothing,
-            staged_home: [0; HOME_BYTES],
+            weight: StoredWeight::Nothing,
+            staged: [0; SETTING_BYTES],
             job: Job::None,
             is_open: false,
             opening: Opening::NOTHING,
@@ -98,6 +106,7 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
             (0..self.memory.slots()).for_each(|slot| self.forget(slot));
         }
         self.home = opening.home;
+        self.weight = opening.weight;
         self.opening = opening;
         self.is_open = true;
     }
@@ -105,8 +114,8 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
     /// Hands a change to the keeper, with a copy of what is to be saved.
     pub fn take(&mut self, image: &mut [u8]) -> Option<Work> {
         let Job::Asked(work) = self.job else { return None };
-        if let Work::Save { slot, length } = work {
-            let staged = if slot == HOME_KEY { Some(self.staged_home.as_slice()) } else { self.memory.staged() };
+        if let Work::Save { length, .. } = work {
+            let staged = if work.is_of_setting() { self.staged.get(..length) } else { self.memory.staged() };
             let pair = staged.zip(image.get_mut(..length)).filter(|(from, to)| from.len() == to.len());
             let Some((from, to)) = pair else {
                 self.job = Job::Over(Err(StoreError::TooLarge));
@@ -122,16 +131,34 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
     pub fn settle(&mut self, outcome: Result<(), StoreError>) {
         let Job::Begun(work) = self.job else { return };
         let outcome = match work {
-            Work::Save { slot: HOME_KEY, .. } => outcome.map(|()| self.home = StoredHome::read(&self.staged_home)),
+            Work::Save { slot: HOME_KEY, length } => {
+                outcome.map(|()| self.home = StoredHome::read(self.setting(length)))
+            }
             Work::Delete { slot: HOME_KEY } => outcome.map(|()| self.home = StoredHome::Nothing),
+            Work::Save { slot: WEIGHT_KEY, length } => {
+                outcome.map(|()| self.weight = StoredWeight::read(self.setting(length)))
+            }
+            Work::Delete { slot: WEIGHT_KEY } => outcome.map(|()| self.weight = StoredWeight::Nothing),
             Work::Save { slot, .. } => outcome.and_then(|()| self.memory.commit(slot)),
             Work::Delete { slot } => outcome.and_then(|()| self.memory.delete(slot)),
         };
         let _ = self.memory.finished();
-        if outcome.is_err() && !work.is_of_home() {
+        if outcome.is_err() && !work.is_of_setting() {
             self.memory.abort();
         }
         self.job = Job::Over(outcome);
+    }
+
+    /// The setting that is being kept.
+    fn setting(&self, length: usize) -> &[u8] {
+        self.staged.get(..length).unwrap_or_default()
+    }
+
+    /// Begins to keep a setting.
+    fn keep(&mut self, key: u8, bytes: &[u8]) -> Result<(), StoreError> {
+        self.ask(Work::Save { slot: key, length: bytes.len() })?;
+        self.staged.iter_mut().zip(bytes).for_each(|(place, byte)| *place = *byte);
+        Ok(())
     }
 
     fn ask(&mut self, work: Work) -> Result<(), StoreError> {
@@ -145,7 +172,7 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
     /// True if the image being written is on its way to the flash.
     fn is_saving(&self) -> bool {
         match self.job {
-            Job::Asked(work) | Job::Begun(work) => matches!(work, Work::Save { .. }) && !work.is_of_home(),
+            Job::Asked(work) | Job::Begun(work) => matches!(work, Work::Save { .. }) && !work.is_of_setting(),
             Job::None | Job::Over(_) => false,
         }
     }
@@ -217,13 +244,23 @@ impl<const SLOTS: usize, const BYTES: usize> Store for Library<SLOTS, BYTES> {
     }
 
     fn keep_home(&mut self, home: &Home) -> Result<(), StoreError> {
-        self.ask(Work::Save { slot: HOME_KEY, length: HOME_BYTES })?;
-        self.staged_home = home.encode();
-        Ok(())
+        self.keep(HOME_KEY, &home.encode())
     }
 
     fn forget_home(&mut self) -> Result<(), StoreError> {
         self.ask(Work::Delete { slot: HOME_KEY })
+    }
+
+    fn weight(&self) -> StoredWeight {
+        self.weight
+    }
+
+    fn keep_weight(&mut self, weight: &WeightCorrection) -> Result<(), StoreError> {
+        self.keep(WEIGHT_KEY, &crate::weight::encode(weight))
+    }
+
+    fn forget_weight(&mut self) -> Result<(), StoreError> {
+        self.ask(Work::Delete { slot: WEIGHT_KEY })
     }
 
     fn finished(&mut self) -> Option<Result<(), StoreError>> {

@@ -1,4 +1,4 @@
-//! The library of primitives and the home of the arm on a NOR flash: what survives when the power goes.
+//! The library of primitives, the home of the arm and the weight of its links on a NOR flash: what survives when the power goes.
 //!
 //! ```text
 //! Session ── Store ──> Library <── LibraryAccess ── keep() ──> MapStorage ──> JournaledFlash ──> NorFlash
@@ -22,9 +22,13 @@ pub use library::{Library, Work};
 use core::fmt;
 
 use crate::calibration::StoredHome;
+use crate::weight::StoredWeight;
 
 /// The key of the arm's home in the log; those below it are the places of images.
 pub const HOME_KEY: u8 = 0xC0;
+
+/// The key of the weight of the arm's links.
+pub const WEIGHT_KEY: u8 = 0xC1;
 
 /// Content of the flash at start-up.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -41,12 +45,21 @@ pub struct Opening {
     pub failed: bool,
     /// The home of the arm.
     pub home: StoredHome,
+    /// The weight of the arm's links.
+    pub weight: StoredWeight,
 }
 
 impl Opening {
     /// A sound flash with nothing on it.
-    pub(crate) const NOTHING: Self =
-        Self { found: 0, formatted: false, resumed: false, cleaned: 0, failed: false, home: StoredHome::Nothing };
+    pub(crate) const NOTHING: Self = Self {
+        found: 0,
+        formatted: false,
+        resumed: false,
+        cleaned: 0,
+        failed: false,
+        home: StoredHome::Nothing,
+        weight: StoredWeight::Nothing,
+    };
 }
 
 impl fmt::Display for Opening {
@@ -54,7 +67,7 @@ impl fmt::Display for Opening {
         match self {
             Self { failed: true, .. } => f.write_str("the storage does not work: nothing is kept over a restart"),
             Self { formatted: true, .. } => f.write_str("the storage was blank or foreign; it is empty now"),
-            Self { found, resumed, cleaned, home, .. } => {
+            Self { found, resumed, cleaned, home, weight, .. } => {
                 write!(f, "{found} images in the storage")?;
                 match home {
                     StoredHome::Nothing => {}
@@ -62,6 +75,14 @@ impl fmt::Display for Opening {
                     StoredHome::Damaged => f.write_str("; the home of the arm is damaged, the model's counts")?,
                     StoredHome::Foreign => {
                         f.write_str("; the home of the arm is for another robot model or layout, this model's counts")?;
+                    }
+                }
+                match weight {
+                    StoredWeight::Nothing => {}
+                    StoredWeight::Kept(_) => f.write_str(", and its links' weight")?,
+                    StoredWeight::Damaged => f.write_str("; the weight of the links is damaged, the model's counts")?,
+                    StoredWeight::Foreign => {
+                        f.write_str("; the weight of the links is for another model or layout, this model's counts")?;
                     }
                 }
                 if *resumed {

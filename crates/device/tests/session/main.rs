@@ -11,3 +11,4 @@ mod rig;
 mod saving;
 mod strangers;
 mod uploads;
+mod weight;

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use control::model::{ArmModel, Frames};
+use control::model::{ArmModel, Frames, WeightCorrection};
 use control::units::JointPositions;
 use control::{CycleRecord, Fault, LoadRefusal, Payload, State};
 use device::{
@@ -54,6 +54,8 @@ pub(crate) struct Bench {
     pub(crate) payload: Payload,
     /// Where its arm was zeroed.
     pub(crate) zeroed_at: Option<[f32; 7]>,
+    /// The weights it was given, newest last; it takes none while the arm has torque.
+    pub(crate) weights: Vec<WeightCorrection>,
     /// Counters of the control half.
     pub(crate) counters: Counters,
     /// The last second before a fault.
@@ -84,6 +86,14 @@ impl SessionPort<DeviceController> for Bench {
         self.loaded.push(fit.primitive().movement().duration());
         self.primitive = Some(fit.primitive().clone());
         Ok(())
+    }
+
+    fn weigh(&mut self, weight: &WeightCorrection) -> bool {
+        let takes = !self.state.has_torque();
+        if takes {
+            self.weights.push(*weight);
+        }
+        takes
     }
 
     fn record(&mut self) -> Option<TimedRecord> {
@@ -180,6 +190,7 @@ impl<S: device::Store> Rig<S> {
             hand_moves: false,
             payload: Payload::SensorAndHand,
             zeroed_at: None,
+            weights: Vec::new(),
             counters: Counters::default(),
             faults: Box::new(FaultMemory::BLANK),
         };

@@ -4,7 +4,9 @@ use core::pin::pin;
 use core::task::{Context, Poll, Waker};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use device::storage::{HOME_KEY, Library, LibraryAccess, Opening, Scratch, Work, keep, value_bytes};
+use control::Payload;
+use control::model::{LinkWeight, WeightCorrection};
+use device::storage::{Library, LibraryAccess, Opening, Scratch, Work, keep, value_bytes};
 use device::{Home, Store, StoreError};
 use embedded_storage_async::nor_flash::NorFlash;
 use flash::{Flash, FlashChip, FlashPort, FlashTimes, VirtualClock};
@@ -54,9 +56,17 @@ pub(crate) enum Wish {
     Delete(u8),
     /// Let the image at a place begin with another number, as a rename does with its name.
     Rename(u8, u8),
+    /// Keep the weight of this number.
+    Weight(u8),
     /// Keep the home of this number.
     Home(u8),
     ForgetHome,
+}
+
+/// A weight made of its number.
+pub(crate) fn weight(number: u8) -> WeightCorrection {
+    let link = LinkWeight { share: f32::from(number) / 1000.0, shift: [0.01, -0.02, f32::from(number) / 10_000.0] };
+    WeightCorrection::new(Payload::SensorAndHand, [link; 7]).expect("an arm can weigh that")
 }
 
 /// A home made of its number.
@@ -101,6 +111,7 @@ pub(crate) fn run<const SLOTS: usize, F: NorFlash>(
             Wish::Tiny(slot) => save(&mut shared.library(), slot, &TINY),
             Wish::Delete(slot) => shared.library().delete(slot),
             Wish::Rename(slot, number) => rename(&mut shared.library(), slot, number),
+            Wish::Weight(number) => shared.library().keep_weight(&weight(number)),
             Wish::Home(number) => shared.library().keep_home(&home(number)),
             Wish::ForgetHome => shared.library().forget_home(),
         };
@@ -147,8 +158,8 @@ pub(crate) fn chip(content: &[u8]) -> FlashChip {
     FlashChip::new(Flash::with_content(content.to_vec(), FlashTimes::NONE))
 }
 
-/// A keeper's desk that has it store these bytes as the home, whatever they are.
-struct Forger<'a>(Option<&'a [u8]>);
+/// A keeper's desk that has it store these bytes as the home or the weight, whatever they are.
+struct Forger<'a>(Option<(u8, &'a [u8])>);
 
 impl LibraryAccess for Forger<'_> {
     fn restore(&mut self, _: u8, _: &[u8]) {}
@@ -158,9 +169,9 @@ impl LibraryAccess for Forger<'_> {
     fn open(&mut self, _: Opening) {}
 
     fn take(&mut self, room: &mut [u8]) -> Option<Work> {
-        let bytes = self.0.take()?;
+        let (slot, bytes) = self.0.take()?;
         room[..bytes.len()].copy_from_slice(bytes);
-        Some(Work::Save { slot: HOME_KEY, length: bytes.len() })
+        Some(Work::Save { slot, length: bytes.len() })
     }
 
     fn settle(&mut self, outcome: Result<(), StoreError>) {
@@ -168,10 +179,10 @@ impl LibraryAccess for Forger<'_> {
     }
 }
 
-/// Stores these bytes on the chip as the home.
-pub(crate) fn write_home(chip: &FlashChip, bytes: &[u8]) {
+/// Stores these bytes on the chip under the key of a setting.
+pub(crate) fn write_setting(chip: &FlashChip, key: u8, bytes: &[u8]) {
     let mut room = Box::new(Scratch::<IMAGE, VALUE>::new());
-    let mut forger = Forger(Some(bytes));
+    let mut forger = Forger(Some((key, bytes)));
     let port = FlashPort::new(chip.clone(), VirtualClock::default());
     let mut keeper = pin!(keep(port, &mut room, &mut forger));
     let mut context = Context::from_waker(Waker::noop());

@@ -1,9 +1,9 @@
 //! Power fails in the middle of every single word and sector, and every restart finds the old or the new.
 
-use device::{Store, StoredHome};
+use device::{Store, StoredHome, StoredWeight};
 use flash::FlashChip;
 
-use crate::bench::{TINY, Wish, chip, home, image, renamed, run_on};
+use crate::bench::{TINY, Wish, chip, home, image, renamed, run_on, weight};
 
 /// Places of the library here.
 const SLOTS: usize = 4;
@@ -22,9 +22,10 @@ const RENAMED: (u8, u8) = (41, 210);
 struct Content {
     images: [Option<u8>; SLOTS],
     home: Option<u8>,
+    weight: Option<u8>,
 }
 
-const EMPTY: Content = Content { images: [None; SLOTS], home: None };
+const EMPTY: Content = Content { images: [None; SLOTS], home: None, weight: None };
 
 /// The library on a chip after a start.
 fn found(chip: &FlashChip) -> Content {
@@ -43,7 +44,12 @@ fn found(chip: &FlashChip) -> Content {
         StoredHome::Kept(kept) => Some((0..=255).find(|number| home(*number) == kept).expect("one of ours")),
         other => panic!("the home is {other:?}"),
     };
-    Content { images, home }
+    let weight = match library.weight() {
+        StoredWeight::Nothing => None,
+        StoredWeight::Kept(kept) => Some((0..=255).find(|number| weight(*number) == kept).expect("one of ours")),
+        other => panic!("the weight is {other:?}"),
+    };
+    Content { images, home, weight }
 }
 
 fn content(chip: &FlashChip) -> Vec<u8> {
@@ -97,6 +103,10 @@ fn cut_everywhere(before: &[u8], wish: Wish) -> usize {
         Wish::Tiny(slot) => put(slot, Some(TINY[0])),
         Wish::Delete(slot) => put(slot, None),
         Wish::Rename(slot, number) => put(slot, Some(number)),
+        Wish::Weight(number) => {
+            new.weight = Some(number);
+            0
+        }
         Wish::Home(number) => {
             new.home = Some(number);
             0
@@ -134,6 +144,7 @@ fn cut_everywhere(before: &[u8], wish: Wish) -> usize {
                 let now = found(&self::chip(&again));
                 assert_eq!(now.images[usize::from(slot)], Some(200), "cut {operation}, draw {draw}: does not work on");
                 assert!([old.home, new.home].contains(&now.home), "cut {operation}, draw {draw}: {now:?} later");
+                assert!([old.weight, new.weight].contains(&now.weight), "cut {operation}, draw {draw}: {now:?} later");
             }
         }
     }
@@ -247,6 +258,14 @@ fn power_fails_at_every_word_of_a_calibration_and_the_old_home_or_the_new_is_the
 }
 
 #[test]
+fn power_fails_at_every_word_of_a_weighing_and_the_old_weight_or_the_new_is_there() {
+    let before = after(&vec![0xFF; flash::FLASH_BYTES], &[Wish::Save(0, 1), Wish::Home(3), Wish::Weight(6)]);
+    let cuts = cut_everywhere(&before, Wish::Weight(8));
+    // Head and 129 bytes in words of 32.
+    assert!(cuts >= 6, "{cuts} cuts");
+}
+
+#[test]
 fn power_fails_at_every_operation_of_a_calibration_that_needs_an_erase_and_the_old_home_or_the_new_is_there() {
     let cuts = cut_everywhere(&full_for(Wish::Home(9)), Wish::Home(9));
     assert!(cuts > 500, "{cuts} cuts: no sector was emptied");
@@ -281,7 +300,7 @@ fn a_deleted_image_stays_deleted_however_often_its_sector_is_emptied() {
     let mut now = after(&blank, &[Wish::Home(3), Wish::Save(0, 1), Wish::Save(1, 2), Wish::Delete(1)]);
     for number in 0..120 {
         now = after(&now, &[Wish::Save(2, number)]);
-        let expected = Content { images: [Some(1), None, Some(number), None], home: Some(3) };
+        let expected = Content { images: [Some(1), None, Some(number), None], home: Some(3), weight: None };
         assert_eq!(found(&chip(&now)), expected);
     }
 }

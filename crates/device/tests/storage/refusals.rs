@@ -1,9 +1,13 @@
 //! Refusals of the storage, and its treatment of a flash that is not its own.
 
-use device::{Store, StoreError, StoredHome};
+use control::Payload;
+use control::model::WeightCorrection;
+use device::storage::{HOME_KEY, WEIGHT_KEY};
+use device::weight::{WEIGHT_BYTES, encode};
+use device::{Store, StoreError, StoredHome, StoredWeight};
 use flash::{FLASH_BYTES, FlashPort, VirtualClock};
 
-use crate::bench::{Wish, chip, home, image, run, run_on, write_home};
+use crate::bench::{Wish, chip, home, image, run, run_on, weight, write_setting};
 
 fn noise(seed: u64) -> Vec<u8> {
     let mut state = seed;
@@ -77,7 +81,7 @@ fn a_home_that_is_damaged_or_foreign_on_the_flash_is_said_and_can_be_replaced() 
     for (bytes, expected) in [(damaged, StoredHome::Damaged), (foreign, StoredHome::Foreign)] {
         let chip = chip(&vec![0xFF; FLASH_BYTES]);
         run_on::<4>(&chip, &[Wish::Save(1, 7), Wish::Home(3)]);
-        write_home(&chip, &bytes);
+        write_setting(&chip, HOME_KEY, &bytes);
         let (shared, _) = run_on::<4>(&chip, &[]);
         let opening = shared.library().opening().expect("open");
         assert_eq!((opening.home, opening.found), (expected, 1));
@@ -88,6 +92,47 @@ fn a_home_that_is_damaged_or_foreign_on_the_flash_is_said_and_can_be_replaced() 
         let (shared, answers) = run_on::<4>(&chip, &[Wish::Home(4)]);
         assert_eq!((answers, shared.library().home()), (vec![Some(Ok(()))], StoredHome::Kept(home(4))));
         assert_eq!(run_on::<4>(&chip, &[]).0.library().home(), StoredHome::Kept(home(4)));
+    }
+}
+
+#[test]
+fn a_weight_is_kept_over_a_restart_and_one_that_is_forged_is_not_used() {
+    let sealed = |mut bytes: [u8; WEIGHT_BYTES]| {
+        let (body, sum) = bytes.split_last_chunk_mut::<4>().expect("longer than a check sum");
+        *sum = link::frame::CRC.checksum(body).to_le_bytes();
+        bytes
+    };
+    let changed = |at: usize, by: &[u8]| {
+        let mut bytes = encode(&weight(3));
+        bytes[at..at + by.len()].copy_from_slice(by);
+        bytes
+    };
+    let first = 12;
+    for (bytes, expected) in [
+        (encode(&weight(4)), StoredWeight::Kept(weight(4))),
+        (changed(20, &[0xAA]), StoredWeight::Damaged),
+        // Sound by their check sums: another model, layout and payload, no number, and links that cannot be.
+        (sealed(changed(8, &[1, 2, 3, 4])), StoredWeight::Foreign),
+        (sealed(changed(4, &[2])), StoredWeight::Foreign),
+        (sealed(changed(6, &[7])), StoredWeight::Foreign),
+        (sealed(changed(first, &f32::NAN.to_le_bytes())), StoredWeight::Foreign),
+        (sealed(changed(first + 4, &f32::INFINITY.to_le_bytes())), StoredWeight::Foreign),
+        (sealed(changed(first + 16, &(-0.6_f32).to_le_bytes())), StoredWeight::Foreign),
+        (sealed(changed(first + 20, &0.06_f32.to_le_bytes())), StoredWeight::Foreign),
+    ] {
+        let chip = chip(&vec![0xFF; FLASH_BYTES]);
+        run_on::<4>(&chip, &[Wish::Save(1, 7), Wish::Home(3), Wish::Weight(3)]);
+        assert_eq!(run_on::<4>(&chip, &[]).0.library().weight(), StoredWeight::Kept(weight(3)));
+        write_setting(&chip, WEIGHT_KEY, &bytes);
+        let (shared, _) = run_on::<4>(&chip, &[]);
+        let library = shared.library();
+        assert_eq!((library.weight(), library.home()), (expected, StoredHome::Kept(home(3))), "{bytes:?}");
+        let correction = library.weight().correction();
+        assert!(correction == weight(4) || correction == WeightCorrection::none(Payload::SensorAndHand));
+        drop(library);
+        // It can be replaced.
+        run_on::<4>(&chip, &[Wish::Weight(5)]);
+        assert_eq!(run_on::<4>(&chip, &[]).0.library().weight(), StoredWeight::Kept(weight(5)));
     }
 }
 

@@ -334,6 +334,9 @@ fn requests_for_an_arm_are_refused_with_that_reason() {
         Request::Calibration,
         Request::Calibrate { home: [0.0; 7] },
         Request::ForgetCalibration,
+        Request::Weight,
+        Request::KeepWeight { hand: false, links: [[0.0; 4]; 7] },
+        Request::ForgetWeight,
         Request::Rename { name: Name::new("grip").expect("a name"), to: Name::new("grasp").expect("a name") },
     ] {
         assert_eq!(rig.refusal(request), Refusal::NoArm);

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use control::LoadRefusal;
+use control::model::WeightCorrection;
 use device::time::{CYCLE_SLOTS, SLOT_HZ};
 use device::{
     Controller, ControllerIo, Health, HostSession, Identity, Message, QueueFull, SessionPort, Slot, TimedRecord, Timing,
@@ -71,6 +72,9 @@ impl SessionPort<DeviceController> for Port<'_> {
     }
     fn load(&mut self, primitive: &FingerPrimitive) -> Result<(), LoadRefusal> {
         self.core.load(primitive)
+    }
+    fn weigh(&mut self, weight: &WeightCorrection) -> bool {
+        self.core.weigh(weight)
     }
     fn record(&mut self) -> Option<TimedRecord<Record>> {
         self.queues.records.pop_front()

@@ -14,6 +14,7 @@ mod observe;
 mod telemetry;
 mod transfer;
 mod upload;
+mod weight;
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -293,7 +294,9 @@ impl<T: Transport> Client<T> {
             | Request::Delete { .. }
             | Request::Rename { .. }
             | Request::Calibrate { .. }
-            | Request::ForgetCalibration => self.timeout.max(STORE_TIMEOUT),
+            | Request::ForgetCalibration
+            | Request::KeepWeight { .. }
+            | Request::ForgetWeight => self.timeout.max(STORE_TIMEOUT),
             _ => self.timeout,
         };
         loop {

@@ -3,6 +3,7 @@
 
 use std::collections::VecDeque;
 
+use control::model::WeightCorrection;
 use control::{CycleRecord, LoadRefusal};
 use device::time::{CYCLE_SLOTS, SLOT_HZ};
 use device::{
@@ -114,6 +115,10 @@ impl SessionPort<DeviceController> for Port<'_> {
 
     fn load(&mut self, fit: &CheckedPrimitive<'_>) -> Result<(), LoadRefusal> {
         self.core.load(fit)
+    }
+
+    fn weigh(&mut self, weight: &WeightCorrection) -> bool {
+        self.core.weigh(weight)
     }
 
     fn record(&mut self) -> Option<TimedRecord> {

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use control::model::ArmModel;
+use control::model::{ArmModel, WeightCorrection};
 use control::{CycleRecord, LoadRefusal, Payload, State};
 use device::{
     CheckedPrimitive, Command, Counters, DeviceController, Event, EventKind, Health, Identity, QueueFull, RamStore,
@@ -49,6 +49,10 @@ impl SessionPort<DeviceController> for Half {
 
     fn load(&mut self, _fit: &CheckedPrimitive<'_>) -> Result<(), LoadRefusal> {
         Ok(())
+    }
+
+    fn weigh(&mut self, _: &WeightCorrection) -> bool {
+        true
     }
 
     fn record(&mut self) -> Option<TimedRecord> {

@@ -7,7 +7,7 @@ use link::image::{
 use link::message::{AccelerationSource, ChunkData, PoseFeedback};
 use link::{
     Calibration, Capabilities, DeviceHello, Event, EventKind, FaultRecord, Goal, HandStage, HomeSource, HostHello,
-    LinkCounters, Listing, Name, Refusal, Reply, Request, RunOptions, Statistics, Status, Telemetry, Text,
+    LinkCounters, Listing, Name, Refusal, Reply, Request, RunOptions, Statistics, Status, Telemetry, Text, Weight,
 };
 
 fn name() -> Name {
@@ -71,6 +71,9 @@ pub(crate) fn requests() -> Vec<Request> {
         Request::Rename { name: name(), to: Name::new("other.2").unwrap() },
         Request::FaultRecord,
         Request::FaultCycle { record: 300, index: 299 },
+        Request::Weight,
+        Request::KeepWeight { hand: true, links: core::array::from_fn(|link| ramp(link as f32)) },
+        Request::ForgetWeight,
     ]
 }
 
@@ -110,6 +113,9 @@ pub(crate) fn request_index(request: &Request) -> usize {
         Request::Rename { .. } => 30,
         Request::FaultRecord => 31,
         Request::FaultCycle { .. } => 32,
+        Request::Weight => 33,
+        Request::KeepWeight { .. } => 34,
+        Request::ForgetWeight => 35,
     }
 }
 
@@ -205,6 +211,15 @@ pub(crate) fn replies() -> Vec<Reply> {
         },
         Reply::FaultRecord { of: 10, record: Some(FaultRecord { number: 300, fault: 9, latched: true, cycles: 299 }) },
         Reply::FaultCycle { of: 11, cycle: Some(telemetry) },
+        Reply::Weight {
+            of: 12,
+            weight: Weight {
+                hand: true,
+                links: core::array::from_fn(|link| ramp(-(link as f32))),
+                source: HomeSource::Foreign,
+                in_use: true,
+            },
+        },
     ]
 }
 
@@ -223,6 +238,7 @@ pub(crate) fn reply_index(reply: &Reply) -> usize {
         Reply::Calibration { .. } => 9,
         Reply::FaultRecord { .. } => 10,
         Reply::FaultCycle { .. } => 11,
+        Reply::Weight { .. } => 12,
     }
 }
 

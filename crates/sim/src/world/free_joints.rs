@@ -90,6 +90,8 @@ pub struct FreeJoints {
     dq: [f64; 7],
     gravity: Vector,
     coulomb: [f64; 7],
+    /// Factors on the masses of links 1 to 7, and of the hand.
+    weights: ([f64; 7], f64),
     push_force: Vector,
     push_torque: Vector,
     hand: HandTargets,
@@ -107,12 +109,27 @@ impl FreeJoints {
             dq: [0.0; 7],
             gravity: GRAVITY,
             coulomb: COULOMB,
+            weights: ([1.0; 7], 1.0),
             push_force: [0.0; 3],
             push_torque: [0.0; 3],
             hand: HandTargets::default(),
             obstacles: [FingerObstacle::NOTHING; 3],
             spread_push: 0.0,
         }
+    }
+
+    /// The same arm with other masses and friction: factors on the masses of links 1 to 7 and of the hand, whose centres
+    /// stay, and on the Coulomb friction of the joints.
+    #[must_use]
+    pub fn with_factors(self, links: [f64; 7], hand: f64, friction: [f64; 7]) -> Self {
+        let coulomb = std::array::from_fn(|joint| self.coulomb[joint] * friction[joint]);
+        Self { weights: (links, hand), coulomb, ..self }
+    }
+
+    /// Torques that hold the arm still where it is, without friction, N m.
+    #[must_use]
+    pub fn holding_torques(&self) -> [f64; 7] {
+        self.external_torques(&chain::frames(&self.q)).map(|torque| -torque)
     }
 
     /// The same arm with the links of its hand here; the drives hold them.
@@ -143,10 +160,13 @@ impl FreeJoints {
     /// Torque of gravity and of the push on each joint, N m, by the principle of virtual work.
     fn external_torques(&self, frames: &[Frame; 8]) -> [f64; 7] {
         let weight = |mass: f64| self.gravity.map(|g| g * mass);
-        // Seven links, then sensor and hand, then the push: which link it acts on, where, and the force.
-        let forces: [(usize, Vector, Vector); 9] = std::array::from_fn(|part| match LINKS.get(part) {
-            Some((mass, centre)) => (part, frames[part + 1].point(*centre), weight(*mass)),
+        let (links, hand) = self.weights;
+        // Seven links, then sensor and hand, what the hand weighs more, and the push: which link it acts on, where, and
+        // the force.
+        let forces: [(usize, Vector, Vector); 10] = std::array::from_fn(|part| match LINKS.get(part) {
+            Some((mass, centre)) => (part, frames[part + 1].point(*centre), weight(*mass * links[part])),
             None if part == LINKS.len() => (6, frames[7].point(PAYLOAD.1), weight(PAYLOAD.0)),
+            None if part == LINKS.len() + 1 => (6, frames[7].point(HAND.1), weight(HAND.0 * (hand - 1.0))),
             None => (6, chain::grasp_frame(&frames[7]).origin, self.push_force),
         });
         std::array::from_fn(|joint| {
@@ -188,7 +208,7 @@ impl World for FreeJoints {
     fn wrist_wrench(&self) -> [f64; 6] {
         let plate = chain::frames(&self.q)[7];
         let sensor = plate.point(SENSOR_ORIGIN);
-        let weight = self.gravity.map(|g| g * HAND.0);
+        let weight = self.gravity.map(|g| g * HAND.0 * self.weights.1);
         let force = add(weight, self.push_force);
         let moments = [
             cross(subtract(plate.point(HAND.1), sensor), weight),

@@ -4,6 +4,7 @@ mod calibration;
 mod directory;
 mod primitive;
 mod saving;
+mod weight;
 
 use control::model::ArmModel;
 use control::plan::load;
@@ -56,6 +57,8 @@ pub struct ArmApplication<S> {
     /// The change of the store that is not durable yet.
     saving: Option<Change>,
     opened: bool,
+    /// The control half has not been given the weight that the store holds.
+    weight_waits: bool,
     loaded: Option<Entry>,
     weights: WeightBuffer,
     /// Where primitives are built, to be checked or handed to the control half.
@@ -73,6 +76,7 @@ impl<S: Store> ArmApplication<S> {
             directory,
             saving: None,
             opened,
+            weight_waits: true,
             loaded: None,
             weights <- zeroed::<WeightBuffer>(),
             primitive: StoredPrimitive::PLACEHOLDER,
@@ -290,6 +294,7 @@ impl<S: Store> Application for ArmApplication<S> {
     }
 
     fn saved(&mut self, calm: bool, port: &mut impl SessionPort<DeviceController>) -> Option<Saved> {
+        self.hand_over_weight(port);
         self.settle(calm, port)
     }
 
@@ -335,6 +340,9 @@ impl<S: Store> Application for ArmApplication<S> {
             Request::Calibration => return self.calibration(of, port).map(Action::Answer),
             Request::Calibrate { home } => return self.calibrate(home, port).map(|()| Action::Save),
             Request::ForgetCalibration => return self.forget_calibration(port).map(|()| Action::Save),
+            Request::Weight => return self.weight(of, port).map(Action::Answer),
+            Request::KeepWeight { hand, links } => return self.keep_weight(hand, &links).map(|()| Action::Save),
+            Request::ForgetWeight => return self.forget_weight().map(|()| Action::Save),
             // What every device does in the same way has not come here.
             Request::Hello(_)
             | Request::Goodbye

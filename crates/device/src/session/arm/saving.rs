@@ -25,6 +25,8 @@ pub(super) enum Change {
     },
     /// The home of the arm.
     Home,
+    /// The weight of its links.
+    Weight,
 }
 
 impl Change {
@@ -56,6 +58,10 @@ impl<S: Store> ArmApplication<S> {
     pub(super) fn settle(&mut self, calm: bool, port: &mut impl SessionPort<DeviceController>) -> Option<Saved> {
         let outcome = self.store.finished()?;
         let change = self.saving.take()?;
+        if outcome.is_ok() && matches!(change, Change::Weight) {
+            self.weight_waits = true;
+            self.hand_over_weight(port);
+        }
         let mut place = None;
         if let (Ok(()), Change::Place { slot, entry, built }) = (outcome, change) {
             self.replace(slot, entry);

@@ -184,9 +184,9 @@ impl<A: Application> HostSession<A> {
             Request::Statistics => return Ok(Reply::Statistics { of, statistics: self.statistics(port) }),
             Request::List { index } => return self.listing(of, index),
             Request::FaultRecord | Request::FaultCycle { .. } => return Ok(fault_record(of, &request, port)),
-            Request::Calibration => {
+            Request::Calibration | Request::Weight => {
                 let calm = self.pending.is_empty();
-                if let Action::Answer(reply) = self.application.act(of, Request::Calibration, calm, port)? {
+                if let Action::Answer(reply) = self.application.act(of, request, calm, port)? {
                     return Ok(reply);
                 }
             }
