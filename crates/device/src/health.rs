@@ -82,6 +82,8 @@ pub struct Health {
     pub zeroed_at: Option<[f32; 7]>,
     /// Payload mounted on the arm, as the last start-up found it; sensor and hand until one has.
     pub payload: Payload,
+    /// True if the control half holds a primitive. It forgets it when a start-up finds another payload.
+    pub has_primitive: bool,
     /// True if the wrench has a zero; `None` without a force/torque sensor.
     pub wrench_zeroed: Option<bool>,
     /// Latest mode of the safety module; `None` before it answered.

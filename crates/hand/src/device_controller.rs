@@ -376,6 +376,7 @@ impl Controller for DeviceController {
             zeroed: false,
             zeroed_at: None,
             payload: Payload::SensorAndHand,
+            has_primitive: false,
             wrench_zeroed: None,
             safety_mode: None,
             pendant: None,

@@ -40,7 +40,7 @@ use crate::sense::joints::{JointEstimator, JointState};
 use crate::sense::observer::MotionObserver;
 use crate::sense::wrench::WrenchEstimator;
 use crate::time::{few_periods, periods};
-use crate::units::{JointPositions, Pose, Wrench};
+use crate::units::{JOINTS, JointPositions, Pose, Wrench};
 
 /// Kernels per row that a stored primitive may have.
 pub const MAX_KERNELS: usize = 100;
@@ -185,6 +185,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// True if a motor began to count anew since the positions were learned.
     pub fn is_zero_lost(&self) -> bool {
         self.joints.is_displaced()
+    }
+
+    /// The counts of the motors as the loop knew them last; see [`JointEstimator::last_counts`].
+    pub fn last_counts(&self) -> Option<[(puck::Counts, u8); JOINTS]> {
+        self.joints.last_counts()
     }
 
     /// True if the wrench has a zero; see [`WrenchEstimator::is_tared`].

@@ -139,6 +139,13 @@ impl<R: Real> JointEstimator<R> {
         self.filter.settle(&Vector7::zeros());
     }
 
+    /// The last believed counts of each motor, as its puck told them, and the cycles since; `None` before all have
+    /// answered.
+    pub fn last_counts(&self) -> Option<[(Counts, u8); JOINTS]> {
+        let told = |motor: &Motor| (Counts(motor.counts.0.wrapping_sub(motor.offset)), motor.age);
+        self.motors.as_ref().map(|motors| motors.each_ref().map(told))
+    }
+
     /// True from a jump of a motor on until a reset: see [`JointState::displaced`].
     pub fn is_displaced(&self) -> bool {
         self.displaced

@@ -23,9 +23,10 @@ use crate::units::{Vector6, Wrench};
 /// Cut-off of the wrench filter (Hz).
 pub const WRENCH_CUT_OFF: f64 = 15.0;
 
-/// Largest believed change from one sample to the next (N, N m). A larger one is believed when the next sample confirms
-/// it: one corrupt sample must not bend the plan.
-const LARGEST_STEP: [f64; 6] = [20.0, 20.0, 20.0, 1.0, 1.0, 1.0];
+/// Largest change that is believed at once (N, N m), twelve times the noise of a difference of samples: a wild sample
+/// of that size stays in the dead band of Eq (8). A larger change is believed with the second sample that shows one,
+/// while every further one does: what truly changes fast is one cycle late, once.
+const LARGEST_STEP: [f64; 6] = [1.0, 1.0, 1.0, 0.05, 0.05, 0.05];
 
 /// Half of the time over which a resting wrench is averaged for the tare: 0.15 s, in control periods.
 const REST_HALF: u16 = periods(0.15);
@@ -83,7 +84,8 @@ impl<R: Real> RestMean<R> {
 /// Filters, tares and places the measured wrench.
 #[derive(Clone, Debug)]
 pub struct WrenchEstimator<R: Real> {
-    doubtful: bool,
+    /// True if the last sample was far from the last believed one.
+    jumped: bool,
     filter: LowPass<R, 6>,
     tare: Vector6<R>,
     /// The tare as it was taken, before anything was followed in a run.
@@ -105,7 +107,7 @@ impl<R: Real> WrenchEstimator<R> {
     /// An estimator that has not seen a wrench yet.
     pub fn new() -> Self {
         WrenchEstimator {
-            doubtful: false,
+            jumped: false,
             filter: LowPass::new(Butterworth::new(WRENCH_CUT_OFF, RATE)),
             tare: Vector6::zeros(),
             taken: Vector6::zeros(),
@@ -161,10 +163,10 @@ impl<R: Real> WrenchEstimator<R> {
         let beyond = |value: &R, limit: f64| *value > R::of(limit) || *value < R::of(-limit);
         let step = sample - self.last;
         let jumped = self.age.is_some() && step.iter().zip(&LARGEST_STEP).any(|(step, limit)| beyond(step, *limit));
-        self.doubtful = jumped && !self.doubtful;
-        if !self.doubtful {
+        if self.jumped || !jumped {
             self.last = sample;
         }
+        self.jumped = jumped;
         let at_end = |values: &[R], ranges: &[f64; 3]| {
             values.iter().zip(ranges).any(|(value, range)| beyond(value, FULL_SCALE * range.min(LARGEST_FORCE)))
         };

@@ -13,6 +13,7 @@
 //! it: the frames of a cycle come from [`control::Actuation`] or are zero.
 
 mod brakes;
+mod lateness;
 mod orders;
 mod outlet;
 
@@ -38,6 +39,7 @@ use crate::stage::{Stage, StartupError};
 use crate::startup::Startup;
 use crate::wire;
 use brakes::Brakes;
+use lateness::Lateness;
 use outlet::SlotOutlet;
 
 /// Time that a puck may be silent before the bus is started anew: 1 s, in control periods; long after the supervisor
@@ -53,12 +55,6 @@ const REFUSED_CYCLES: u8 = 6;
 /// Answers in a row of a braking puck 1 under an ACTIVE safety module that mean IDLE: one may be older than the
 /// activation.
 const BRAKING_ANSWERS: u8 = 2;
-
-/// Weight of an overrun against one cycle without.
-const OVERRUN_WEIGHT: u16 = 50;
-/// The sum at which the control cycle is too late too often: six overruns within a few cycles. One in fifty is
-/// tolerated.
-const OVERRUN_LIMIT: u16 = 300;
 
 /// Who has the bus.
 #[derive(Clone, Copy, Debug)]
@@ -95,8 +91,7 @@ pub struct DeviceController {
     last_cycles: Option<u8>,
     braking: u8,
     refused: u8,
-    /// Overruns of late: up by [`OVERRUN_WEIGHT`] with each, down by one with each cycle.
-    overruns: u16,
+    lateness: Lateness,
     brakes: Brakes,
 }
 
@@ -126,7 +121,7 @@ impl DeviceController {
             last_cycles: None,
             braking: 0,
             refused: 0,
-            overruns: 0,
+            lateness: Lateness::default(),
             brakes: Brakes::default(),
         })
     }
@@ -284,18 +279,18 @@ impl DeviceController {
         self.fresh_safety = None;
         self.braking = 0;
         self.refused = 0;
-        self.overruns = 0;
+        self.lateness = Lateness::default();
         self.brakes = Brakes::default();
     }
 
     /// Leaves the cyclic loop.
     #[cold]
     #[inline(never)]
-    fn restart(&mut self) {
+    fn restart(&mut self, now_us: u64) {
         Counters::count(&mut self.counters.restarts);
         self.phase = BusPhase::StartUp;
+        self.startup.restart(now_us, self.cycle.last_counts());
         self.cycle.reset();
-        self.startup.restart();
         self.hand.suspend();
         self.late = None;
         self.hand_temperatures = [None; 4];
@@ -326,11 +321,9 @@ impl DeviceController {
         {
             self.fail();
         }
-        if self.overruns >= OVERRUN_LIMIT {
-            self.overruns = 0;
+        if self.lateness.take() {
             self.fault.get_or_insert(Fault::Overrun);
         }
-        self.overruns = self.overruns.saturating_sub(1);
         let input = CycleInput {
             cycle: self.number,
             sample: control::BusSample {
@@ -361,7 +354,7 @@ impl DeviceController {
         if let Some(event) = output.event {
             self.tell(event.into(), io);
         }
-        self.leave_if_lost();
+        self.leave_if_lost(now_us);
     }
 
     /// A reason against torque that lasts.
@@ -397,7 +390,7 @@ impl DeviceController {
     }
 
     /// After a cycle: goes back to the start-up when the pucks have lost power, failed, or shall be zeroed again.
-    fn leave_if_lost(&mut self) {
+    fn leave_if_lost(&mut self, now_us: u64) {
         if !self.startup.is_done() {
             // A command has sent the start-up back to zeroing.
             self.phase = BusPhase::StartUp;
@@ -405,17 +398,17 @@ impl DeviceController {
             return;
         }
         if self.safety_mode == Some(SafetyMode::EStop) {
-            self.restart();
+            self.restart(now_us);
             return;
         }
         if let Some(node) = self.late.filter(|_| !self.cycle.state().has_torque()) {
             // What the arm carries decides its gravity: everything is asked anew.
-            self.restart();
+            self.restart(now_us);
             self.startup.note_late(node);
             return;
         }
         match &mut self.last_cycles {
-            Some(0) => self.restart(),
+            Some(0) => self.restart(now_us),
             Some(left) => *left -= 1,
             None => {}
         }
@@ -515,7 +508,7 @@ impl Controller for DeviceController {
 
     fn note_overrun(&mut self) {
         Counters::count(&mut self.counters.overruns);
-        self.overruns = self.overruns.saturating_add(OVERRUN_WEIGHT);
+        self.lateness.note(self.number);
     }
 
     fn note_bus_error(&mut self, bus_off: bool) {
@@ -535,6 +528,7 @@ impl Controller for DeviceController {
             zeroed: self.startup.is_zeroed(),
             zeroed_at: self.startup.zeroed_at(),
             payload: self.cycle.payload(),
+            has_primitive: self.cycle.primitive().is_some(),
             wrench_zeroed: self.startup.has_sensor().then(|| self.cycle.is_wrench_zeroed()),
             safety_mode: self.safety_mode,
             pendant: self.pendant,

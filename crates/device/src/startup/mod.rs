@@ -192,15 +192,16 @@ impl Startup {
         }
     }
 
-    /// Begins anew after the cyclic loop. A doubt about the zero stays.
+    /// Begins anew after the cyclic loop. A doubt about the zero stays. `last`: the counts of the motors as the loop
+    /// knew them, and how many cycles ago.
     #[cold]
     #[inline(never)]
-    pub(crate) fn restart(&mut self) {
+    pub(crate) fn restart(&mut self, now_us: u64, last: Option<[(Counts, u8); 7]>) {
         *self = Startup {
             doubt: self.doubt,
             tared: self.tared,
             stopping: Some(Stopping::default()),
-            continuity: Some(Continuity::default()),
+            continuity: Some(Continuity::since(now_us, last)),
             ..Startup::new()
         };
     }

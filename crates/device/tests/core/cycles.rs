@@ -300,19 +300,47 @@ fn a_silent_safety_module_is_a_fault_within_150_ms() {
     assert!(!core.health().state.has_torque(), "{:?}", core.health().state);
 }
 
-#[test]
-fn overruns_are_counted_and_too_many_stop_the_arm() {
+/// State and fault after so many late cycles, `apart` cycles from one to the next.
+fn after_late_cycles(number: usize, apart: usize) -> (State, Option<Fault>) {
     let (mut core, mut bus) = floating();
-    core.note_overrun();
-    bus.run(&mut core, 1.0);
-    assert_eq!(core.health().state, State::Gravity, "one overrun is survived");
-    for _ in 0..6 {
+    for _ in 0..number {
+        // Two slots of the cycle are late: one late cycle.
         core.note_overrun();
+        core.note_overrun();
+        bus.run_slots(&mut core, apart * CYCLE);
     }
-    bus.run_slots(&mut core, CYCLE);
-    assert_eq!(core.health().counters.overruns, 7);
+    assert_eq!(core.health().counters.overruns, 2 * number as u32);
+    (core.health().state, bus.records.last().map(|record| record.fault))
+}
+
+#[test]
+fn d2_three_late_cycles_in_a_row_or_ten_in_a_second_stop_the_arm_and_fewer_do_not() {
+    let (survived, stopped) = ((State::Gravity, Some(Fault::None)), (State::SoftStop, Some(Fault::Overrun)));
+    assert_eq!(after_late_cycles(2, 1), survived);
+    assert_eq!(after_late_cycles(3, 1), stopped);
+    assert_eq!(after_late_cycles(9, 2), survived);
+    assert_eq!(after_late_cycles(10, 2), stopped);
+    // Nine lengths of 33 cycles lie within a second of 300 cycles, nine of 34 do not.
+    assert_eq!(after_late_cycles(10, 33), stopped);
+    assert_eq!(after_late_cycles(30, 34), survived);
+}
+
+#[test]
+fn d2_after_a_stop_for_late_cycles_a_person_clears_and_the_count_begins_anew() {
+    let (mut core, mut bus) = floating();
+    for _ in 0..3 {
+        core.note_overrun();
+        bus.run_slots(&mut core, CYCLE);
+    }
     assert_eq!(core.health().state, State::SoftStop);
-    assert_eq!(bus.records.last().map(|record| record.fault), Some(Fault::Overrun));
+    bus.run(&mut core, 1.0);
+    bus.commands.push_back(Command::ClearFault.into());
+    bus.run_slots(&mut core, CYCLE);
+    bus.commands.push_back(Command::Gravity.into());
+    bus.run_slots(&mut core, CYCLE);
+    core.note_overrun();
+    bus.run(&mut core, 0.1);
+    assert_eq!(core.health().state, State::Gravity);
 }
 
 #[test]

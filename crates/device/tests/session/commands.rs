@@ -154,6 +154,18 @@ fn a_primitive_is_checked_for_the_arm_that_the_start_up_found() {
 }
 
 #[test]
+fn a_primitive_that_the_control_half_has_forgotten_unseen_is_given_again() {
+    let mut rig = Rig::greeted();
+    rig.store("reach", &image("reach", 3.0, 10));
+    let run = Request::Run { name: name("reach"), options: RunOptions::default() };
+    rig.commanded(run.clone());
+    // The start-up missed the sensor, began anew and found it: nobody asked in between.
+    rig.bench.primitive = None;
+    rig.commanded(run);
+    assert_eq!(rig.bench.loaded, [3.0, 3.0]);
+}
+
+#[test]
 fn a_primitive_that_is_not_there_is_not_run() {
     let mut rig = Rig::greeted();
     let run = Request::Run { name: name("reach"), options: RunOptions::default() };

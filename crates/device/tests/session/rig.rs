@@ -114,6 +114,7 @@ impl SessionPort<DeviceController> for Bench {
             zeroed: true,
             zeroed_at: self.zeroed_at,
             payload: self.payload,
+            has_primitive: self.primitive.is_some(),
             wrench_zeroed: Some(true),
             safety_mode: Some(SafetyMode::Active),
             pendant: Some(0x0F3F_1249),

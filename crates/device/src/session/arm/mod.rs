@@ -83,11 +83,15 @@ impl<S: Store> ArmApplication<S> {
         })
     }
 
-    /// Checks primitives against the arm that the control half has found. What was loaded for another it has forgotten.
-    fn follow_arm(&mut self, payload: Payload) {
-        if payload != self.payload {
-            self.payload = payload;
-            self.model = ArmModel::new(payload);
+    /// Checks primitives against the arm that the control half has found. What was loaded for another it has forgotten,
+    /// even if it has found this one again since.
+    fn follow_arm(&mut self, health: &Health) {
+        if health.payload != self.payload {
+            self.payload = health.payload;
+            self.model = ArmModel::new(health.payload);
+            self.loaded = None;
+        }
+        if !health.has_primitive {
             self.loaded = None;
         }
     }
@@ -101,7 +105,7 @@ impl<S: Store> ArmApplication<S> {
             return;
         }
         // Checked again: the arm may have been started anew with another tool while the flash was written.
-        self.follow_arm(health.payload);
+        self.follow_arm(&health);
         let fit = load::check(&self.model, &self.primitive);
         self.loaded = fit.is_ok_and(|fit| port.load(&fit).is_ok()).then_some(entry);
     }
@@ -114,8 +118,9 @@ impl<S: Store> ArmApplication<S> {
             return Err(StoreError::Busy.into());
         }
         let entry = entry.clone();
-        let Health { state, stage, payload, .. } = port.health();
-        self.follow_arm(payload);
+        let health = port.health();
+        let Health { state, stage, .. } = health;
+        self.follow_arm(&health);
         if self.loaded.as_ref().is_some_and(|loaded| loaded.is_same(&entry)) {
             return Ok(());
         }
@@ -264,7 +269,7 @@ impl<S: Store> Application for ArmApplication<S> {
     }
 
     fn commit(&mut self, name: &Name, crc: u32, port: &mut impl SessionPort<DeviceController>) -> Result<(), Refused> {
-        self.follow_arm(port.health().payload);
+        self.follow_arm(&port.health());
         let (slot, entry) = self.check_and_commit(name, crc)?;
         self.saving = Some(Change::Place { slot, built: true, entry: Some(entry) });
         Ok(())
