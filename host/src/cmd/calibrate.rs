@@ -27,7 +27,7 @@ pub enum Action {
     Home(Home),
     /// Forget it: the robot model's home counts again
     Forget,
-    /// Weigh the links of this arm on a tour of slow moves, so that it carries itself; its hand must be empty and the way free
+    /// Weigh the links of this arm on a tour of slow moves; its hand must be empty and the way free
     Gravity(weigh::Gravity),
 }
 

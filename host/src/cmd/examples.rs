@@ -82,8 +82,9 @@ Example:
   tactus --device unix:tactus.sock --json status";
 /// `calibrate`
 pub(super) const CALIBRATE: &str = "\
-Example:
-  tactus --device unix:tactus.sock calibrate show";
+Examples:
+  tactus --device unix:tactus.sock calibrate show
+  tactus --device sil:arm=9 calibrate gravity";
 /// `hand`
 pub(super) const HAND: &str = "\
 Examples:

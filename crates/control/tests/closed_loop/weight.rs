@@ -24,7 +24,7 @@ fn rig() -> Rig<f32> {
     rig
 }
 
-/// How far the tool sinks in half a second of gravity compensation (m).
+/// Returns how far the tool sinks in half a second of gravity compensation (m).
 fn sunk(rig: &mut Rig<f32>) -> f64 {
     rig.command(Command::Hold);
     rig.run_for(2.0);

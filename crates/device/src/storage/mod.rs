@@ -1,4 +1,5 @@
-//! The library of primitives, the home of the arm and the weight of its links on a NOR flash: what survives when the power goes.
+//! The library of primitives, the home of the arm and the weight of its links on a NOR flash: what survives when the
+//! power goes.
 //!
 //! ```text
 //! Session ── Store ──> Library <── LibraryAccess ── keep() ──> MapStorage ──> JournaledFlash ──> NorFlash

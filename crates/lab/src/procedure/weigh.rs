@@ -17,7 +17,7 @@ const EVERY: u8 = 3;
 /// Longest pass, s.
 const TIMEOUT: u64 = 30;
 
-/// What was measured, by postures.
+/// Measurements of a tour, by postures.
 #[derive(Debug, Clone, Default)]
 pub struct Crossings {
     /// Postures to regress from.

@@ -34,6 +34,10 @@ const NOISE: [f64; 7] = [0.1, 0.1, 0.1, 0.1, 0.03, 0.03, 0.02];
 /// Largest residual of any joint over the postures that were held out, N m RMS, of a correction that is accepted.
 pub const RESIDUAL_BOUND: f64 = 0.3;
 
+/// Least gain of a correction that is accepted: residual over the postures that were held out, N m RMS of all joints.
+/// Two measurements of the same arm differ by less.
+pub const LEAST_GAIN: f64 = 0.01;
+
 /// Fewest postures to regress from, and to judge by.
 pub const FEWEST: (usize, usize) = (8, 3);
 
@@ -113,7 +117,7 @@ pub enum WeighError {
     /// The correction cannot be that of an arm.
     #[error("the torques ask for an arm that cannot be: {0}")]
     Absurd(WeightError),
-    /// The correction explains the postures it has not seen no better than what counted before.
+    /// The correction explains the postures it has not seen no better than what counted before, by [`LEAST_GAIN`].
     #[error("no better than before: {after:.3} N m RMS over the postures held out, {before:.3} N m before")]
     NoBetter {
         /// Residual before, N m RMS.
@@ -143,7 +147,7 @@ impl Weighing {
             return Err(WeighError::TooLarge { joint, rms });
         }
         let (before, after) = (before.total(), after.total());
-        if after >= before {
+        if before - after < LEAST_GAIN {
             return Err(WeighError::NoBetter { before, after });
         }
         Ok(())
@@ -151,7 +155,7 @@ impl Weighing {
 }
 
 /// Torque and regressor of one posture, up and down in equal parts.
-struct Row {
+struct Balance {
     torque: [f64; 7],
     /// Gravity torque of the model, N m.
     model: [f64; 7],
@@ -198,11 +202,11 @@ impl Arms {
         (torque, model, regressor)
     }
 
-    fn row(&self, crossing: &Crossing) -> Row {
+    fn row(&self, crossing: &Crossing) -> Balance {
         let ((up, model_up, regressor_up), (down, model_down, regressor_down)) =
             (self.mean(&crossing.up), self.mean(&crossing.down));
         let middle = |a: [f64; 7], b: [f64; 7]| std::array::from_fn(|joint| 0.5 * (a[joint] + b[joint]));
-        Row {
+        Balance {
             torque: middle(up, down),
             model: middle(model_up, model_down),
             regressor: (regressor_up + regressor_down) * 0.5,
@@ -233,7 +237,7 @@ fn numbers(correction: &WeightCorrection) -> SVector<f64, NUMBERS> {
     })
 }
 
-fn residual(rows: &[Row], numbers: &SVector<f64, NUMBERS>) -> Residual {
+fn residual(rows: &[Balance], numbers: &SVector<f64, NUMBERS>) -> Residual {
     let left = rows.iter().map(|row| {
         let explained = row.regressor * numbers;
         std::array::from_fn(|joint| row.torque[joint] - row.model[joint] - explained[joint])

@@ -119,8 +119,8 @@ impl FreeJoints {
         }
     }
 
-    /// The same arm with other masses and friction: factors on the masses of links 1 to 7 and of the hand, whose centres
-    /// stay, and on the Coulomb friction of the joints.
+    /// The same arm with other masses and friction: factors on the masses of links 1 to 7 and of the hand, whose
+    /// centres stay, and on the Coulomb friction of the joints.
     #[must_use]
     pub fn with_factors(self, links: [f64; 7], hand: f64, friction: [f64; 7]) -> Self {
         let coulomb = std::array::from_fn(|joint| self.coulomb[joint] * friction[joint]);

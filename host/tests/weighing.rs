@@ -1,0 +1,59 @@
+//! An arm whose links weigh otherwise than the model says is weighed by command: accepted once, kept, and forgotten.
+
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+/// An arm that was not looked at while the regression was made, in a device with a flash of its own.
+const DEVICE: &str = "sil:world=simple,arm=7,flash=arm.flash";
+
+fn tactus(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    command.current_dir(folder).env("TACTUS_DEVICE", DEVICE).args(["--json", "-q"]).args(arguments);
+    command.stdin(Stdio::null()).output().unwrap()
+}
+
+#[track_caller]
+fn object(folder: &Path, arguments: &[&str]) -> Value {
+    let output = tactus(folder, arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn rms(weighing: &Value, when: &str) -> Vec<f64> {
+    let rms = weighing["held_out"][when]["rms_nm"].as_array().unwrap();
+    rms.iter().map(|joint| joint.as_f64().unwrap()).collect()
+}
+
+#[test]
+fn an_arm_is_weighed_once_and_its_device_keeps_the_weight_over_a_restart() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let before = object(folder, &["calibrate", "gravity", "--show"]);
+    assert_eq!((&before["stored"], &before["in_use"]), (&Value::Bool(false), &Value::Bool(false)));
+
+    let weighing = object(folder, &["calibrate", "gravity"]);
+    let [unknown, known] = ["before", "after"].map(|when| rms(&weighing, when));
+    assert!(unknown[1] > 0.1 && unknown[3] > 0.1, "{unknown:?}");
+    assert!(known.iter().all(|joint| *joint <= 0.05), "{known:?}");
+
+    // Another process, another start: what it computes with is the weight that was found.
+    let kept = object(folder, &["calibrate", "gravity", "--show"]);
+    assert_eq!((&kept["stored"], &kept["in_use"]), (&Value::Bool(true), &Value::Bool(true)));
+    assert_eq!(kept["links"], weighing["links"]);
+    assert_eq!(object(folder, &["status"])["weight"], "stored in the device");
+
+    // Weighed again, the arm carries itself already: nothing to gain, nothing changed.
+    let again = tactus(folder, &["calibrate", "gravity"]);
+    assert_eq!(again.status.code(), Some(6), "{}", String::from_utf8_lossy(&again.stdout));
+    let refused: Value = serde_json::from_slice(&again.stdout).unwrap();
+    assert_eq!(refused["error"]["code"], "E644");
+    assert_eq!(object(folder, &["calibrate", "gravity", "--show"]), kept);
+
+    let reset = object(folder, &["calibrate", "gravity", "--reset"]);
+    assert_eq!((&reset["stored"], &reset["in_use"]), (&Value::Bool(false), &Value::Bool(false)));
+    assert_eq!(object(folder, &["calibrate", "gravity", "--show"]), before);
+    let refused = tactus(folder, &["calibrate", "gravity", "--show", "--reset"]);
+    assert_eq!(refused.status.code(), Some(2));
+}
