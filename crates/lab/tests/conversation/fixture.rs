@@ -72,6 +72,7 @@ impl SessionPort<DeviceController> for Half {
             fault: control::Fault::None,
             zeroed: true,
             zeroed_at: None,
+            has_primitive: true,
             payload: Payload::SensorAndHand,
             wrench_zeroed: Some(true),
             safety_mode: None,
