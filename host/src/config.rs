@@ -42,6 +42,8 @@ pub enum Origin {
 pub struct Origins {
     /// The configuration file, whether or not it exists; `None` without a home.
     pub file: Option<PathBuf>,
+    /// Why the file cannot be used; nothing of it counts then.
+    pub problem: Option<String>,
     /// Of `--device`.
     pub device: Origin,
     /// Of `--timeout`.
@@ -105,19 +107,22 @@ impl Config {
             _ => Origin::Default,
         };
         let device = origin("device", self.device.is_some());
-        Origins { file, device, timeout: origin("timeout", self.timeout.is_some()) }
+        Origins { file, problem: None, device, timeout: origin("timeout", self.timeout.is_some()) }
     }
 }
 
-/// A positive time in seconds, at most a day.
+/// Shortest time that a setting may ask for: no line answers sooner.
+const SHORTEST: f64 = 0.001;
+
+/// A time in seconds: a millisecond to a day.
 ///
 /// # Errors
 /// It is none.
 pub fn seconds(text: &str) -> Result<Duration, String> {
     let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
-    if value > 0.0 && value <= 86_400.0 {
+    if (SHORTEST..=86_400.0).contains(&value) {
         Ok(Duration::from_secs_f64(value))
     } else {
-        Err("a time between 0 and 86400 s is expected".to_owned())
+        Err("a time of 0.001 to 86400 s is expected".to_owned())
     }
 }

@@ -317,6 +317,7 @@ fn cli_19_a_file_that_cannot_be_used_is_named_with_its_line_and_explain_goes_on(
         ("device = \n", "line 1", "device"),
         ("timeout = nan\n", "timeout", "NaN"),
         ("timeout = 86401\n", "timeout", "86401"),
+        ("timeout = 1e-30\n", "timeout", "0.001 to 86400 s"),
     ] {
         let folder = configured(words);
         let run = |line: &str| command(folder.path(), line).env("XDG_CONFIG_HOME", folder.path()).output().unwrap();
@@ -327,4 +328,40 @@ fn cli_19_a_file_that_cannot_be_used_is_named_with_its_line_and_explain_goes_on(
         assert!(said.contains(line) && said.contains(what), "{words}: {said}");
         assert!(run("explain E250").status.success() && run("--help").status.success(), "{words}");
     }
+}
+
+#[test]
+fn cli_19_a_device_that_means_nothing_is_told_with_the_place_it_comes_from() {
+    let folder = configured("device = \"nonsense\"\n");
+    let said = |line: &str, environment: Option<&str>| {
+        let mut command = command(folder.path(), line);
+        command.env("XDG_CONFIG_HOME", folder.path());
+        command.envs(environment.map(|device| ("TACTUS_DEVICE", device)));
+        let output = command.output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{line}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    for line in ["list", "hand --json init", "sim"] {
+        let said = said(line, None);
+        assert!(said.contains("E201") && said.contains("config.toml"), "{line}: {said}");
+    }
+    assert!(said("list", Some("rubbish")).contains("TACTUS_DEVICE"));
+    let said = said("list --device waste", Some("rubbish"));
+    assert!(!said.contains("TACTUS_DEVICE") && !said.contains("config.toml"), "{said}");
+}
+
+#[test]
+fn cli_19_the_settings_are_shown_beside_a_file_that_cannot_be_used() {
+    let folder = configured("timeout = \"soon\"\n");
+    let run = |line: &str| command(folder.path(), line).env("XDG_CONFIG_HOME", folder.path()).output().unwrap();
+    let shown = run("config --json");
+    assert!(shown.status.success());
+    let said = String::from_utf8(shown.stderr).unwrap();
+    assert!(said.contains("config.toml") && said.contains("line 1"), "{said}");
+    let shown: serde_json::Value = serde_json::from_slice(&shown.stdout).unwrap();
+    assert_eq!(shown["settings"]["timeout"]["origin"], "default");
+    assert!(shown["problem"].as_str().unwrap().contains("line 1"), "{shown}");
+    std::fs::write(folder.path().join("tactus/config.toml"), "timeout = 3\n").unwrap();
+    let shown: serde_json::Value = serde_json::from_slice(&run("config --json").stdout).unwrap();
+    assert!(shown["problem"].is_null(), "{shown}");
 }

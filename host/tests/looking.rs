@@ -101,3 +101,14 @@ fn cli_18_every_command_has_a_page_of_the_manual() {
     tactus(folder.path(), &["manual", "man1", "--force"]).success();
     assert_ne!(page("tactus.1"), "mine");
 }
+
+#[test]
+fn a_folder_of_the_manual_that_is_a_file_is_named_and_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("man1"), "mine").unwrap();
+    for name in ["man1", "man1/deeper"] {
+        let said = stderr(&tactus(folder.path(), &["manual", name]).code(2));
+        assert!(said.starts_with("error[E23") && said.contains(name), "{said}");
+    }
+    assert_eq!(std::fs::read_to_string(folder.path().join("man1")).unwrap(), "mine");
+}

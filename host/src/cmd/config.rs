@@ -37,6 +37,8 @@ pub struct Configured {
     pub file: Option<String>,
     /// The file exists.
     pub exists: bool,
+    /// Why the file cannot be used; `null`: it can. Nothing of it counts otherwise.
+    pub problem: Option<String>,
     /// Those that count.
     pub settings: Settings,
 }
@@ -52,7 +54,11 @@ pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
         timeout: Setting { value: Some(global.timeout.as_secs_f64().to_string()), origin: origins.timeout },
     };
     let exists = origins.file.as_ref().is_some_and(|file| file.exists());
-    let data = Configured { file: origins.file.as_deref().map(files::text), exists, settings };
+    let problem = origins.problem.clone();
+    if let Some(problem) = &problem {
+        global.output().warn(format!("nothing of the configuration file counts: {problem}"));
+    }
+    let data = Configured { file: origins.file.as_deref().map(files::text), exists, problem, settings };
     let mut table = Table::new(["setting", "value", "from"]);
     for (name, setting) in [("device", &data.settings.device), ("timeout", &data.settings.timeout)] {
         let from = match setting.origin {

@@ -69,10 +69,9 @@ fn reach(
     doing: &str,
     adjust: impl FnOnce(&mut SimulationOptions),
 ) -> Result<(Device, String), Failure> {
-    let Some(text) = &global.device else {
+    let Some(address) = global.address(doing)? else {
         return Err(Failure::new(ErrorCode::NoDeviceNamed, doing, "no device is named"));
     };
-    let address: Address = text.parse().map_err(|error| HostError::Address(error).into_failure(doing))?;
     let adjust = |options: &mut SimulationOptions| {
         options.replace_logs = global.force;
         adjust(options);

@@ -291,8 +291,10 @@ mod work {
 
     fn engine(global: &Global) -> Result<Engine, Failure> {
         let text = global.device.as_deref().unwrap_or(DEVICE);
-        let address: Address =
-            text.parse().map_err(|error| lab::error::HostError::Address(error).into_failure(DOING))?;
+        let address = match global.address(DOING)? {
+            Some(address) => address,
+            None => DEVICE.parse().map_err(|error| lab::error::HostError::Address(error).into_failure(DOING))?,
+        };
         let Address::Simulated(kind, options) = address else {
             return Err(Failure::new(ErrorCode::NotSimulated, DOING, format!("'{text}' is not a simulated device"))
                 .help("`--device sil:`, or `--device sim:` for the firmware under QEMU, or `--device board:` for it on the emulated board"));

@@ -1,5 +1,6 @@
 //! `tactus manual`: a page for `man` of each command.
 
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 use clap::{Args, Command, CommandFactory as _};
@@ -27,11 +28,19 @@ pub struct Written {
 /// Writes a page of each command and of each command's commands.
 ///
 /// # Errors
-/// A page cannot be written, or is there already and `--force` is not given. Nothing is replaced then.
+/// A page cannot be written, or is there already and `--force` is not given. Unless the disk fails while the pages are
+/// put at their places, none is replaced then.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let doing = "manual";
-    std::fs::create_dir_all(&command.folder)
-        .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, doing, cause))?;
+    std::fs::create_dir_all(&command.folder).map_err(|cause| {
+        let doing = format!("manual: making the folder {}", command.folder.display());
+        match cause.kind() {
+            ErrorKind::AlreadyExists | ErrorKind::NotADirectory => {
+                Failure::new(ErrorCode::OutputNotAFile, doing, "a file has that name, or the name of a folder above it")
+            }
+            _ => Failure::of_file(ErrorCode::FileFailed, doing, cause),
+        }
+    })?;
     let mut tool = Cli::command().disable_help_subcommand(true);
     tool.build();
     let mut pages = Vec::new();

@@ -45,12 +45,13 @@ use clap::{ArgAction, Args, CommandFactory as _, FromArgMatches as _, Parser, Su
 
 pub use output::Output;
 
+use lab::error::HostError;
 use lab::error_code::ErrorCode;
 use lab::failure::Failure;
 use lab::table::Table;
 use lab::transport::Address;
 
-use crate::config::{self as configuration, Config, Origins, seconds};
+use crate::config::{self as configuration, Config, Origin, Origins, seconds};
 
 /// Teach, learn, check, upload, run and watch movement primitives on a Barrett WAM.
 ///
@@ -105,6 +106,25 @@ impl Global {
     fn is_simulated_here(&self) -> bool {
         let address = self.device.as_deref().map(str::parse::<Address>);
         matches!(address, Some(Ok(Address::Simulated(..))))
+    }
+
+    /// The address that the options name, if any.
+    ///
+    /// # Errors
+    /// It is none. The help names the place to correct it.
+    fn address(&self, doing: &str) -> Result<Option<Address>, Failure> {
+        let Some(text) = &self.device else { return Ok(None) };
+        let address = text.parse().map_err(|error| {
+            let failure = HostError::Address(error).into_failure(doing);
+            match (self.origins.device, &self.origins.file) {
+                (Origin::File, Some(file)) => {
+                    failure.help(format!("correct `device` in {}, or give `--device`", file.display()))
+                }
+                (Origin::Environment, _) => failure.help("correct TACTUS_DEVICE, or give `--device`"),
+                _ => failure,
+            }
+        })?;
+        Ok(Some(address))
     }
 
     /// Where output goes.
@@ -225,9 +245,14 @@ pub fn parse() -> Result<Cli, ExitCode> {
     let mut cli = Cli::from_arg_matches(&matches).map_err(|error| usage(&error.format(&mut command)))?;
     cli.global.origins = defaults.origins(&matches, file);
     // What explains the error is not to fail with it.
-    let needs_none = matches!(cli.command, Command::Explain(_) | Command::Completions(_) | Command::Manual(_));
+    let needs_none =
+        matches!(cli.command, Command::Config(_) | Command::Explain(_) | Command::Completions(_) | Command::Manual(_));
     match config {
         Err(failure) if !needs_none => Err(tell(&failure, cli.global.json)),
+        Err(failure) => {
+            cli.global.origins.problem = Some(format!("{}: {}", failure.doing, failure.cause));
+            Ok(cli)
+        }
         _ => Ok(cli),
     }
 }

@@ -74,6 +74,8 @@ enum Listener {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "sim";
     let output = global.output();
+    // Options are added to the text below: a mistake in what was given is told before, with its place.
+    global.address(DOING)?;
     // Without co-controller there is no image to look for.
     let usual = if command.can_only { "sil:" } else { "sim:" };
     let mut device = global.device.clone().unwrap_or_else(|| usual.to_owned());

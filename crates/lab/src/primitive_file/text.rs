@@ -46,11 +46,21 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<(PrimitiveFile, u32), Pri
         message: error.to_string().trim_end().to_owned(),
     };
     let head: Head = toml::from_str(text).map_err(syntax)?;
+    if !is_schema(&head.schema) {
+        let message = format!("schema `{}` is none of a primitive: it should be `{SCHEMA}`", head.schema);
+        return Err(PrimitiveFileError::Syntax { file: file.to_owned(), message });
+    }
     if head.schema != SCHEMA {
         return Err(PrimitiveFileError::Schema { file: file.to_owned(), found: head.schema, expected: SCHEMA });
     }
     let primitive: PrimitiveFile = toml::from_str(text).map_err(syntax)?;
     Ok((PrimitiveFile { file: file.to_owned(), ..primitive }, head.content_crc32))
+}
+
+/// True for the name of a version, this one or another: anything else is damage.
+fn is_schema(name: &str) -> bool {
+    let version = |name: &str| name.split_once('/').map(|(kind, number)| (kind.to_owned(), number.parse::<u32>().ok()));
+    matches!((version(name), version(SCHEMA)), (Some((kind, Some(_))), Some((own, _))) if kind == own)
 }
 
 /// The text of the file. Every number is printed so that it reads back as the same f64.
