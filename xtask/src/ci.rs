@@ -8,11 +8,13 @@ use crate::{budget, build, docs, emulated, fuzz, hand, house, package, shell, te
 
 /// Runs every check; the first failure ends it.
 pub(crate) fn run() -> Result<()> {
-    let before = shell::free_space();
     checks()?;
-    if let (Some(before), Some(now)) = (before, shell::free_space()) {
-        let taken = before.saturating_sub(now) as f64 / 1e9;
-        shell::step(&format!("done; {taken:.1} GB of the disk taken, {:.0} GB left", now as f64 / 1e9));
+    if let (Some(taken), Some(free)) = (shell::size_of(&shell::target_dir()), shell::free_space()) {
+        shell::step(&format!(
+            "the build folder takes {:.1} GB; {:.0} GB are free",
+            taken as f64 / 1e9,
+            free as f64 / 1e9
+        ));
     }
     Ok(())
 }

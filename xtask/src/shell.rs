@@ -149,8 +149,18 @@ fn full_disk() -> String {
 
 /// Free space for the build folder, bytes; nothing where `df` cannot tell.
 pub(crate) fn free_space() -> Option<u64> {
-    let output = Command::new("df").args(["-Pk"]).arg(root()).stdin(Stdio::null()).output().ok()?;
+    kilobytes(Command::new("df").arg("-Pk").arg(root()), 1, 3)
+}
+
+/// Space that a folder takes, bytes; nothing where `du` cannot tell.
+pub(crate) fn size_of(folder: &Path) -> Option<u64> {
+    kilobytes(Command::new("du").arg("-sk").arg(folder), 0, 0)
+}
+
+/// A number of kilobytes that a command prints, in bytes.
+fn kilobytes(command: &mut Command, line: usize, column: usize) -> Option<u64> {
+    let output = command.stdin(Stdio::null()).output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?;
-    let kilobytes: u64 = text.lines().nth(1)?.split_whitespace().nth(3)?.parse().ok()?;
+    let kilobytes: u64 = text.lines().nth(line)?.split_whitespace().nth(column)?.parse().ok()?;
     Some(kilobytes << 10)
 }

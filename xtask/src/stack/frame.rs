@@ -364,11 +364,19 @@ impl Walk<'_> {
             }
             match self.index.get(&(counted + 2 * offset)) {
                 Some(to) if is_behind => self.reach((*to, None), state, instruction.address)?,
+                // A zero behind the last entry.
+                Some(to) if self.is_padding(*to) => {}
                 Some(to) => self.tables.push((*to, state)),
                 None => {}
             }
         }
         Ok(())
+    }
+
+    /// True for a NOP with no code behind it: it aligns constants.
+    fn is_padding(&self, index: usize) -> bool {
+        let instruction = self.all[index];
+        instruction.halves.0 == 0xBF00 && !self.index.contains_key(&(instruction.address + instruction.bytes))
     }
 
     /// The address near the code that a register holds, from the last instruction that can be read to set it.

@@ -1,6 +1,6 @@
 //! `Lateness`: which control cycles were late of late, and whether they are too many.
 
-use heapless::HistoryBuf;
+use heapless::Deque;
 
 /// Late cycles in a row that stop the arm.
 const IN_A_ROW: u8 = 3;
@@ -14,8 +14,8 @@ const WINDOW: u64 = control::time::RATE as u64;
 /// The late cycles of the last second.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lateness {
-    /// Numbers of the last late cycles.
-    late: HistoryBuf<u64, IN_A_SECOND>,
+    /// Numbers of the last late cycles, the oldest first.
+    late: Deque<u64, IN_A_SECOND>,
     /// Length of the row that the last one ends.
     row: u8,
     is_too_much: bool,
@@ -26,13 +26,17 @@ impl Lateness {
     #[cold]
     #[inline(never)]
     pub(super) fn note(&mut self, cycle: u64) {
-        let last = self.late.recent().copied();
+        let last = self.late.back().copied();
         if last == Some(cycle) {
             return;
         }
         self.row = if last.is_some_and(|last| last.wrapping_add(1) == cycle) { self.row.saturating_add(1) } else { 1 };
-        self.late.write(cycle);
-        let first = self.late.oldest().filter(|_| self.late.is_full());
+        if self.late.is_full() {
+            self.late.pop_front();
+        }
+        // There is room now.
+        let _ = self.late.push_back(cycle);
+        let first = self.late.front().filter(|_| self.late.is_full());
         let crowded = first.is_some_and(|first| cycle.saturating_sub(*first) < WINDOW);
         self.is_too_much |= self.row >= IN_A_ROW || crowded;
     }

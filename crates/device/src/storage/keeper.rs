@@ -14,7 +14,6 @@ use super::library::Work;
 use super::{HOME_KEY, Opening, WEIGHT_KEY};
 use crate::calibration::StoredHome;
 use crate::store::StoreError;
-use crate::weight::StoredWeight;
 
 /// Bytes of a value with an image of at most this many bytes: key, image, filling up to the largest word.
 #[must_use]
@@ -142,7 +141,7 @@ async fn open<F: NorFlash, D: LibraryAccess>(flash: F, value: &mut [u8], desk: &
         ..Opening::default()
     };
     match read_all(&mut log, value, desk).await {
-        Ok((found, home, weight)) => (opening.found, opening.home, opening.weight) = (found, home, weight),
+        Ok((found, home)) => (opening.found, opening.home) = (found, home),
         Err(Error::Storage { .. }) => return None,
         Err(_) => {
             log.flash().format().await.ok()?;
@@ -152,26 +151,22 @@ async fn open<F: NorFlash, D: LibraryAccess>(flash: F, value: &mut [u8], desk: &
     Some((log, opening))
 }
 
-/// Tells the library every image; the last one of a place counts. Returns the number of places that hold one,
-/// the home, and the weight.
+/// Tells the library every image, and the weight like one; the last one of a place counts. Returns the number of places
+/// that hold one, and the home.
 async fn read_all<F: NorFlash, D: LibraryAccess>(
     log: &mut Log<F>,
     value: &mut [u8],
     desk: &mut D,
-) -> Result<(u8, StoredHome, StoredWeight), Error<JournaledError<F::Error>>> {
+) -> Result<(u8, StoredHome), Error<JournaledError<F::Error>>> {
     let mut holding = [false; 256];
-    let (mut home, mut weight) = (StoredHome::Nothing, StoredWeight::Nothing);
+    let mut home = StoredHome::Nothing;
     let mut values = log.fetch_all_items(value).await?;
     while let Some((slot, image)) = values.next::<&[u8]>(value).await? {
         if slot == HOME_KEY {
             home = StoredHome::read(image);
             continue;
         }
-        if slot == WEIGHT_KEY {
-            weight = StoredWeight::read(image);
-            continue;
-        }
-        if let Some(holds) = holding.get_mut(usize::from(slot)) {
+        if let Some(holds) = holding.get_mut(usize::from(slot)).filter(|_| slot != WEIGHT_KEY) {
             *holds = !image.is_empty();
         }
         if image.is_empty() {
@@ -183,7 +178,7 @@ async fn read_all<F: NorFlash, D: LibraryAccess>(
         pause().await;
     }
     let found = u8::try_from(holding.iter().filter(|holds| **holds).count()).unwrap_or(u8::MAX);
-    Ok((found, home, weight))
+    Ok((found, home))
 }
 
 /// Appends the new value, and reads it back: it is durable when the flash says the same as the memory.

@@ -84,8 +84,12 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         self.is_open.then_some(self.opening)
     }
 
-    /// The keeper found an image.
+    /// The keeper found an image, or the weight.
     pub fn restore(&mut self, slot: u8, image: &[u8]) {
+        if slot == WEIGHT_KEY {
+            self.weight = StoredWeight::read(image);
+            return;
+        }
         let kept = self.memory.begin(image.len()).and_then(|()| self.memory.write(0, image));
         if kept.and_then(|()| self.memory.commit(slot)).is_err() {
             // What does not fit is as good as not there, but an older one must not stand for it.
@@ -94,8 +98,12 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         let _ = self.memory.finished();
     }
 
-    /// The keeper found an image that was deleted later.
+    /// The keeper found an image, or the weight, that was deleted later.
     pub fn forget(&mut self, slot: u8) {
+        if slot == WEIGHT_KEY {
+            self.weight = StoredWeight::Nothing;
+            return;
+        }
         let _ = self.memory.delete(slot);
         let _ = self.memory.finished();
     }
@@ -104,10 +112,10 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
     pub fn open(&mut self, opening: Opening) {
         if opening.formatted || opening.failed {
             (0..self.memory.slots()).for_each(|slot| self.forget(slot));
+            self.weight = StoredWeight::Nothing;
         }
         self.home = opening.home;
-        self.weight = opening.weight;
-        self.opening = opening;
+        self.opening = Opening { weight: self.weight.source(), ..opening };
         self.is_open = true;
     }
 

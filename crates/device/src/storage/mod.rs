@@ -22,8 +22,9 @@ pub use library::{Library, Work};
 
 use core::fmt;
 
+use link::HomeSource;
+
 use crate::calibration::StoredHome;
-use crate::weight::StoredWeight;
 
 /// The key of the arm's home in the log; those below it are the places of images.
 pub const HOME_KEY: u8 = 0xC0;
@@ -46,8 +47,8 @@ pub struct Opening {
     pub failed: bool,
     /// The home of the arm.
     pub home: StoredHome,
-    /// The weight of the arm's links.
-    pub weight: StoredWeight,
+    /// Whose weight the arm's links are taken to have. The keeper leaves it to the library.
+    pub weight: HomeSource,
 }
 
 impl Opening {
@@ -59,7 +60,7 @@ impl Opening {
         cleaned: 0,
         failed: false,
         home: StoredHome::Nothing,
-        weight: StoredWeight::Nothing,
+        weight: HomeSource::Model,
     };
 }
 
@@ -79,10 +80,10 @@ impl fmt::Display for Opening {
                     }
                 }
                 match weight {
-                    StoredWeight::Nothing => {}
-                    StoredWeight::Kept(_) => f.write_str(", and its links' weight")?,
-                    StoredWeight::Damaged => f.write_str("; the weight of the links is damaged, the model's counts")?,
-                    StoredWeight::Foreign => {
+                    HomeSource::Model => {}
+                    HomeSource::Stored => f.write_str(", and its links' weight")?,
+                    HomeSource::Damaged => f.write_str("; the weight of the links is damaged, the model's counts")?,
+                    HomeSource::Foreign => {
                         f.write_str("; the weight of the links is for another model or layout, this model's counts")?;
                     }
                 }

@@ -2,9 +2,9 @@
 
 use control::model::{LinkWeight, WeightCorrection};
 use control::{Payload, State};
+use device::StoreError;
 use device::storage::{Library, Opening, WEIGHT_KEY, Work};
 use device::weight::{WEIGHT_BYTES, encode};
-use device::{StoreError, StoredWeight};
 use link::{HomeSource, Refusal, Reply, Request, Weight};
 
 use crate::rig::{SLOT_BYTES, SLOTS};
@@ -13,9 +13,11 @@ type Rig = crate::rig::Rig<Library<SLOTS, SLOT_BYTES>>;
 
 const LINKS: [[f32; 4]; 7] = [[0.05, 0.001, -0.002, 0.003]; 7];
 
-fn rig_with(weight: StoredWeight) -> Rig {
+/// With these bytes of a weight on the flash; none of a weight that was never kept.
+fn rig_with(kept: &[u8]) -> Rig {
     let mut library = Library::new();
-    library.open(Opening { weight, ..Opening::default() });
+    library.restore(WEIGHT_KEY, kept);
+    library.open(Opening::default());
     let mut rig = Rig::over(library);
     rig.bench.state = State::Idle;
     rig.greet();
@@ -48,7 +50,7 @@ fn keep() -> Request {
 
 #[test]
 fn a_weight_is_kept_when_the_flash_has_it_and_used_then() {
-    let mut rig = rig_with(StoredWeight::Nothing);
+    let mut rig = rig_with(&[]);
     let model = Weight { hand: true, ..Weight::default() };
     assert_eq!(told(&mut rig), model);
     assert_eq!(rig.ask(keep()), None, "answered before anything was written");
@@ -71,7 +73,7 @@ fn a_weight_is_kept_when_the_flash_has_it_and_used_then() {
 
 #[test]
 fn a_weight_that_the_flash_did_not_take_is_not_used() {
-    let mut rig = rig_with(StoredWeight::Nothing);
+    let mut rig = rig_with(&[]);
     assert_eq!(rig.ask(keep()), None);
     settle(&mut rig, Err(StoreError::Medium));
     assert!(matches!(rig.answer(), Some(Reply::Refused { reason: Refusal::StoreFailed, .. })));
@@ -81,7 +83,7 @@ fn a_weight_that_the_flash_did_not_take_is_not_used() {
 
 #[test]
 fn a_weight_waits_until_the_arm_has_no_torque() {
-    let mut rig = rig_with(StoredWeight::Nothing);
+    let mut rig = rig_with(&[]);
     rig.bench.state = State::Hold;
     assert_eq!(rig.ask(keep()), None);
     settle(&mut rig, Ok(()));
@@ -97,12 +99,17 @@ fn a_weight_waits_until_the_arm_has_no_torque() {
 
 #[test]
 fn a_stored_weight_is_used_from_the_start_and_a_damaged_one_is_said() {
-    let mut rig = rig_with(StoredWeight::Kept(own()));
+    let mut rig = rig_with(&encode(&own()));
     assert_eq!(rig.bench.weights.last(), Some(&own()));
     assert!(told(&mut rig).in_use);
-    for (stored, source) in [(StoredWeight::Damaged, HomeSource::Damaged), (StoredWeight::Foreign, HomeSource::Foreign)]
-    {
-        let mut rig = rig_with(stored);
+    let mut damaged = encode(&own());
+    damaged[20] ^= 1;
+    let mut foreign = encode(&own());
+    foreign[4] += 1;
+    let (body, sum) = foreign.split_last_chunk_mut::<4>().expect("a check sum");
+    *sum = link::frame::CRC.checksum(body).to_le_bytes();
+    for (kept, source) in [(damaged, HomeSource::Damaged), (foreign, HomeSource::Foreign)] {
+        let mut rig = rig_with(&kept);
         assert_eq!(told(&mut rig), Weight { hand: true, source, ..Weight::default() });
         assert_eq!(rig.bench.weights.last(), Some(&WeightCorrection::none(Payload::SensorAndHand)));
     }
@@ -110,7 +117,7 @@ fn a_stored_weight_is_used_from_the_start_and_a_damaged_one_is_said() {
 
 #[test]
 fn a_weight_that_no_arm_has_is_refused_with_its_link() {
-    let mut rig = rig_with(StoredWeight::Nothing);
+    let mut rig = rig_with(&[]);
     for (link, number, value, fault) in
         [(0, 0, f32::NAN, 0), (2, 3, f32::INFINITY, 0), (4, 0, 0.51, 1), (5, 0, -0.51, 1), (6, 2, 0.051, 2)]
     {

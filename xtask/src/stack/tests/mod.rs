@@ -115,6 +115,27 @@ fn a_table_elsewhere_is_found_by_the_register_that_points_to_it() {
 }
 
 #[test]
+fn what_fills_up_a_table_leads_nowhere() {
+    let tiny = Tiny::default()
+        // push; adr r2, the table; tbb [r2, r0]; nop that aligns a constant; the constant; two entries and two bytes
+        // that are none; bl small; pop; bl inner; pop
+        .with(
+            "table",
+            vec![
+                code(&[PUSH, 0xA202, 0xE8D2, 0xF000, 0xBF00]),
+                Data(vec![0x1234, 0x0704, 0x0000]),
+                Call("small"),
+                code(&[POP]),
+                Call("inner"),
+                code(&[POP]),
+            ],
+        )
+        .with("inner", framed(200, &[]))
+        .with("small", framed(16, &[]));
+    assert_eq!(bytes(&tiny, "table"), 8 + 208);
+}
+
+#[test]
 fn large_frames_by_a_register_are_read() {
     // push; movw r12, #61440; movt r12, #1; sub.w sp, sp, r12; movw, movt, add sp, r12; pop
     let moved = |by: &[u16]| {

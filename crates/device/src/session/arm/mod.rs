@@ -119,8 +119,8 @@ impl<S: Store> ArmApplication<S> {
         }
         let entry = entry.clone();
         let health = port.health();
-        let Health { state, stage, .. } = health;
         self.follow_arm(&health);
+        let (state, stage) = (health.state, health.stage);
         if self.loaded.as_ref().is_some_and(|loaded| loaded.is_same(&entry)) {
             return Ok(());
         }

@@ -1,6 +1,7 @@
 //! The weight of the arm's links: told, kept, forgotten, and handed to the control half.
 //!
 //! It may be kept while the arm has torque, as a calibration leaves it; the control half takes it when there is none.
+//! Nothing here is inlined: its frames would lie on the stack below the check of a primitive, which goes deepest.
 
 use control::Payload;
 use control::model::{LinkWeight, WeightCorrection};
@@ -15,6 +16,7 @@ use crate::weight::StoredWeight;
 
 impl<S: Store> ArmApplication<S> {
     /// Returns the weight that counts, and whose it is.
+    #[inline(never)]
     pub(super) fn weight(&self, of: u16, port: &mut impl SessionPort<DeviceController>) -> Result<Reply, Refused> {
         self.need_open()?;
         let stored = self.store.weight();
@@ -30,6 +32,7 @@ impl<S: Store> ArmApplication<S> {
     }
 
     /// Has the store keep this weight.
+    #[inline(never)]
     pub(super) fn keep_weight(&mut self, hand: bool, links: &[[f32; 4]; 7]) -> Result<(), Refused> {
         self.need_open()?;
         let payload = if hand { Payload::SensorAndHand } else { Payload::None };
@@ -42,6 +45,7 @@ impl<S: Store> ArmApplication<S> {
     }
 
     /// Has the store forget it.
+    #[inline(never)]
     pub(super) fn forget_weight(&mut self) -> Result<(), Refused> {
         self.need_open()?;
         self.store.forget_weight()?;
@@ -50,6 +54,7 @@ impl<S: Store> ArmApplication<S> {
     }
 
     /// Gives the control half the weight that the store holds, as soon as the arm has no torque.
+    #[inline(never)]
     pub(super) fn hand_over_weight(&mut self, port: &mut impl SessionPort<DeviceController>) {
         if self.weight_waits && self.opened && !port.health().state.has_torque() {
             self.weight_waits = !port.weigh(&self.store.weight().correction());
