@@ -6,7 +6,7 @@ use lab::failure::FailureData;
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 
-use crate::cmd::{config, delete, explain, export, get, hand, list, manual, record, rename, sim, stop};
+use crate::cmd::{config, delete, doctor, explain, export, get, hand, list, manual, record, rename, sim, stop};
 
 /// Every schema by the name of its command; `error` is that of any command that fails.
 #[must_use]
@@ -14,6 +14,7 @@ pub fn all() -> Vec<(&'static str, Schema)> {
     vec![
         ("config", of::<config::Configured>()),
         ("delete", of::<delete::Deleted>()),
+        ("doctor", of::<doctor::Examined>()),
         ("error", of::<FailureData>()),
         ("explain", of::<explain::Explained>()),
         ("export", of::<export::Exported>()),

@@ -96,7 +96,7 @@ const ROWS: [Feature; 20] = [
     ),
     ("calibration", "`calibrate`", "before and after, kept over a restart", "the report is not written to a file"),
     ("flashing and logs", "`flash`, `logs`", "the probe's command is shown; verified; stored primitives are kept", ""),
-    ("doctor", "`doctor`", "permissions, versions, faults and settings in one file", "not built"),
+    ("doctor", "`doctor`", "permissions, versions, faults and settings in one file", ""),
     (
         "completions and manual",
         "`completions`, `manual`",
@@ -364,4 +364,41 @@ fn cli_19_the_settings_are_shown_beside_a_file_that_cannot_be_used() {
     std::fs::write(folder.path().join("tactus/config.toml"), "timeout = 3\n").unwrap();
     let shown: serde_json::Value = serde_json::from_slice(&run("config --json").stdout).unwrap();
     assert!(shown["problem"].is_null(), "{shown}");
+}
+
+#[test]
+fn cli_17_the_doctor_tells_versions_ports_programs_settings_and_the_device_and_fails_with_it() {
+    let folder = configured("timeout = 3\n");
+    let run = |line: &str| command(folder.path(), line).env("XDG_CONFIG_HOME", folder.path()).output().unwrap();
+    let verdict = |told: &serde_json::Value, subject: &str| {
+        let findings = told["findings"].as_array().unwrap().iter();
+        let mut found = findings.filter(|finding| finding["subject"] == subject);
+        let found = found.next().unwrap_or_else(|| panic!("{subject} is missing: {told}"));
+        (found["verdict"].as_str().unwrap().to_owned(), found["found"].as_str().unwrap().to_owned())
+    };
+    let well = run("doctor --device sil:world=simple --json --report doctor.json");
+    assert!(well.status.success(), "{}", String::from_utf8_lossy(&well.stderr));
+    let told: serde_json::Value = serde_json::from_slice(&well.stdout).unwrap();
+    let kept = std::fs::read(folder.path().join("doctor.json")).unwrap();
+    assert_eq!(serde_json::from_slice::<serde_json::Value>(&kept).unwrap(), told);
+    for subject in ["tactus", "device setting", "device", "arm", "fault"] {
+        assert_eq!(verdict(&told, subject).0, "ok", "{told}");
+    }
+    assert!(verdict(&told, "device setting").1.contains("sil:world=simple, from the command line"), "{told}");
+    assert!(verdict(&told, "timeout setting").1.contains("3 s, from the configuration file"), "{told}");
+    verdict(&told, "debug probe");
+    verdict(&told, "QEMU");
+    // What was written stays, and a report is no reason to ask the device.
+    assert_eq!(run("doctor --device sil:world=simple --report doctor.json").status.code(), Some(2));
+
+    let unreachable = run("doctor --device unix:nobody.sock --json --report ill.json");
+    assert_eq!(unreachable.status.code(), Some(3));
+    let told: serde_json::Value = serde_json::from_slice(&unreachable.stdout).unwrap();
+    assert_eq!(verdict(&told["result"], "device").0, "fail", "{told}");
+    assert!(folder.path().join("ill.json").is_file(), "a device that is not there is why one writes the report");
+
+    std::fs::write(folder.path().join("tactus/config.toml"), "devise = 1\n").unwrap();
+    let damaged = run("doctor");
+    let said = String::from_utf8(damaged.stdout).unwrap();
+    assert!(damaged.status.success() && said.contains("devise") && said.contains("no device is named"), "{said}");
 }

@@ -160,3 +160,9 @@ pub(super) const CAN: &str = "\
 Examples:
   tactus can decode bus.log --summary
   tactus can replay bus.log";
+/// `doctor`
+pub(super) const DOCTOR: &str = "\
+Nothing is changed, and no port is opened but that of the device that is named.
+Examples:
+  tactus doctor
+  tactus doctor --device sil: --report doctor.json";

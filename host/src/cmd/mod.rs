@@ -8,6 +8,7 @@ pub mod completions;
 pub mod config;
 mod connection;
 pub mod delete;
+pub mod doctor;
 mod examples;
 pub mod experience;
 pub mod experiment;
@@ -223,6 +224,9 @@ pub enum Command {
     /// Show the settings that count, and where they come from
     #[command(after_help = examples::CONFIG)]
     Config(config::Cmd),
+    /// Look at everything that a command needs, and say what is missing
+    #[command(after_help = examples::DOCTOR)]
+    Doctor(doctor::Cmd),
     /// Tell how two recordings of the same movement differ
     #[command(after_help = examples::COMPARE)]
     Compare(compare::Cmd),
@@ -245,8 +249,10 @@ pub fn parse() -> Result<Cli, ExitCode> {
     let mut cli = Cli::from_arg_matches(&matches).map_err(|error| usage(&error.format(&mut command)))?;
     cli.global.origins = defaults.origins(&matches, file);
     // What explains the error is not to fail with it.
-    let needs_none =
-        matches!(cli.command, Command::Config(_) | Command::Explain(_) | Command::Completions(_) | Command::Manual(_));
+    let needs_none = matches!(
+        cli.command,
+        Command::Config(_) | Command::Doctor(_) | Command::Explain(_) | Command::Completions(_) | Command::Manual(_)
+    );
     match config {
         Err(failure) if !needs_none => Err(tell(&failure, cli.global.json)),
         Err(failure) => {
@@ -290,6 +296,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Completions(command) => completions::run(&command),
         Command::Manual(command) => manual::run(&command, &global),
         Command::Config(command) => config::run(&command, &global),
+        Command::Doctor(command) => doctor::run(&command, &global),
         Command::Compare(command) => compare::run(&command, &global),
         Command::Can(command) => can::run(&command, &global),
     };
