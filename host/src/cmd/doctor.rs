@@ -170,7 +170,7 @@ fn from(origin: Origin) -> &'static str {
     }
 }
 
-/// The serial ports that boards and USB adapters get in the folder of devices. None is opened: that can restart a board.
+/// The serial ports of boards and USB adapters in the folder of devices. None is opened: that can restart a board.
 fn serial_ports(folder: &Path) -> Vec<Finding> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let is_port = |path: &PathBuf| {
