@@ -94,7 +94,7 @@ const ROWS: [Feature; 20] = [
         "code, cause and a command that helps; no input ends in a panic",
         "`report` and `get` are not tried with damaged files",
     ),
-    ("calibration", "`calibrate`", "before and after, kept over a restart", "the report is not written to a file"),
+    ("calibration", "`calibrate`", "before and after, kept over a restart, with a report that names arm and time", ""),
     ("flashing and logs", "`flash`, `logs`", "the probe's command is shown; verified; stored primitives are kept", ""),
     ("doctor", "`doctor`", "permissions, versions, faults and settings in one file", ""),
     (

@@ -27,13 +27,18 @@ fn rms(weighing: &Value, when: &str) -> Vec<f64> {
 }
 
 #[test]
-fn an_arm_is_weighed_once_and_its_device_keeps_the_weight_over_a_restart() {
+fn cli_15_an_arm_is_weighed_once_with_a_report_and_its_device_keeps_the_weight_over_a_restart() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let before = object(folder, &["calibrate", "gravity", "--show"]);
     assert_eq!((&before["stored"], &before["in_use"]), (&Value::Bool(false), &Value::Bool(false)));
 
-    let weighing = object(folder, &["calibrate", "gravity"]);
+    std::fs::create_dir(folder.join("reports")).unwrap();
+    let weighing = object(folder, &["calibrate", "gravity", "--report", "reports"]);
+    let report = std::fs::read(folder.join("reports/calibration-simulated.json")).unwrap();
+    let report: Value = serde_json::from_slice(&report).unwrap();
+    assert_eq!((&report["serial"], &report["kept"]), (&Value::from("simulated"), &Value::Bool(true)));
+    assert_eq!((&report["action"], &report["found"]), (&Value::from("gravity"), &weighing));
     let [unknown, known] = ["before", "after"].map(|when| rms(&weighing, when));
     assert!(unknown[1] > 0.1 && unknown[3] > 0.1, "{unknown:?}");
     assert!(known.iter().all(|joint| *joint <= 0.05), "{known:?}");
@@ -45,7 +50,10 @@ fn an_arm_is_weighed_once_and_its_device_keeps_the_weight_over_a_restart() {
     assert_eq!(object(folder, &["status"])["weight"], "stored in the device");
 
     // Weighed again, the arm carries itself already: nothing to gain, nothing changed.
-    let again = tactus(folder, &["calibrate", "gravity"]);
+    assert_eq!(tactus(folder, &["calibrate", "gravity", "--report", "reports"]).status.code(), Some(2));
+    let again = tactus(folder, &["calibrate", "gravity", "--report", "again.json"]);
+    let report: Value = serde_json::from_slice(&std::fs::read(folder.join("again.json")).unwrap()).unwrap();
+    assert_eq!(report["kept"], Value::Bool(false), "what was refused is told as well");
     assert_eq!(again.status.code(), Some(6), "{}", String::from_utf8_lossy(&again.stdout));
     let refused: Value = serde_json::from_slice(&again.stdout).unwrap();
     assert_eq!(refused["error"]["code"], "E644");

@@ -1,9 +1,12 @@
 //! `tactus calibrate`: the home of the arm, where it stands when it is zeroed, and the weight of its links.
 
+use std::path::PathBuf;
+
 use clap::{ArgGroup, Args, Subcommand};
 use link::{Calibration, Refusal};
 use serde_json::{Value, json};
 
+use super::calibration_report::CalibrationReport;
 use super::{ErrorCode, Failure, Global, Table, connection, learn, weigh};
 use lab::client::Client;
 use lab::device::Device;
@@ -44,6 +47,9 @@ pub struct Home {
     /// I have brought the arm to its home pose: zero it there if need be
     #[arg(long, conflicts_with = "set")]
     pub at_home: bool,
+    /// Write what was found into a file too, JSON; in a folder it is named with serial number and time
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
 }
 
 /// Joint angles from J1 to J7, rad.
@@ -69,15 +75,21 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             client.forget_calibration().map_err(|error| error.into_failure(DOING))?;
             show(&mut client, global)
         }
-        Action::Home(Home { set: Some(home), .. }) => {
-            store(&mut client, home.map(|angle| angle as f32), None, global)?;
+        Action::Home(Home { set: Some(home), report, .. }) => {
+            let report = CalibrationReport::open(report.as_deref(), &client, global, DOING)?;
+            let stored = store(&mut client, home.map(|angle| angle as f32), None, global);
+            report.write("home", stored.is_ok(), &json!({ "home_rad": home }), global)?;
+            stored?;
             show(&mut client, global)
         }
-        Action::Home(Home { here: Some(truth), at_home, .. }) => {
+        Action::Home(Home { here: Some(truth), at_home, report, .. }) => {
+            let report = CalibrationReport::open(report.as_deref(), &client, global, DOING)?;
             connection::joints_read(&mut client, *at_home, global.output(), DOING)?;
             let corrected = procedure::correct_home(&mut client, *truth);
             let correction = corrected.map_err(|error| connection::failure(error, DOING))?;
-            store(&mut client, correction.home, Some(&correction), global)?;
+            let stored = store(&mut client, correction.home, Some(&correction), global);
+            report.write("home", stored.is_ok(), &data(&correction), global)?;
+            stored?;
             global.output().result(&data(&correction), format!("{}stored in the device", table(&correction)))
         }
         Action::Home(Home { here: None, set: None, .. }) => {

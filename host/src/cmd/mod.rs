@@ -1,6 +1,7 @@
 //! The command line: one subcommand a file, each with a `Cmd` (its options) and a `run`.
 
 pub mod calibrate;
+mod calibration_report;
 pub mod can;
 pub mod check;
 pub mod compare;

@@ -1,9 +1,12 @@
 //! `tactus calibrate gravity`: the weight of the arm's links, measured, judged, and kept by its device.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use link::{HomeSource, Weight};
 use serde_json::{Value, json};
 
+use super::calibration_report::CalibrationReport;
 use super::{ErrorCode, Failure, Global, Table, connection};
 use lab::client::Client;
 use lab::device::Device;
@@ -22,6 +25,9 @@ pub struct Gravity {
     /// I have brought the arm to its home pose: zero it there if need be
     #[arg(long)]
     pub at_home: bool,
+    /// Write what was found into a file too, JSON; in a folder it is named with serial number and time
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["show", "reset"])]
+    pub report: Option<PathBuf>,
 }
 
 const DOING: &str = "calibrate gravity";
@@ -38,6 +44,7 @@ pub(super) fn run(command: &Gravity, client: &mut Client<Device>, global: &Globa
         let weight = client.weight().map_err(|error| error.into_failure(DOING))?;
         return global.output().result(&weight_data(&weight), weight_text(&weight));
     }
+    let report = CalibrationReport::open(command.report.as_deref(), client, global, DOING)?;
     connection::ready(client, command.at_home, global.output(), DOING)?;
     let present = procedure::weight_in_use(client).map_err(|error| connection::failure(error, DOING))?;
     global.output().say(format!("the arm moves through {} postures, a few minutes; Ctrl-C stops it", TOUR.len()));
@@ -49,8 +56,12 @@ pub(super) fn run(command: &Gravity, client: &mut Client<Device>, global: &Globa
     let Crossings { fitted, held_out } = measured.map_err(|error| connection::failure(error, DOING))?;
     let refused = |error: WeighError| Failure::new(ErrorCode::WeightNotAccepted, DOING, error);
     let weighing = weigh(&present, present.payload(), &fitted, &held_out).map_err(refused)?;
-    weighing.judge().map_err(|error| refused(error).data(data(&weighing)))?;
-    client.keep_weight(&weighing.correction).map_err(|error| error.into_failure(DOING).data(data(&weighing)))?;
+    let judged = weighing.judge().map_err(|error| refused(error).data(data(&weighing)));
+    let kept = judged.and_then(|()| {
+        client.keep_weight(&weighing.correction).map_err(|error| error.into_failure(DOING).data(data(&weighing)))
+    });
+    report.write("gravity", kept.is_ok(), &data(&weighing), global)?;
+    kept?;
     let text = format!("{}accepted, stored in the device; it counts when the arm has no torque next", table(&weighing));
     global.output().result(&data(&weighing), text)
 }
