@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
@@ -174,4 +175,42 @@ fn a_stored_primitive_runs_by_its_name_and_others_look_on_without_costing_it_a_c
     let both: Vec<_> = seen.iter().filter_map(|(cycle, row)| Some((row, run.get(cycle)?))).collect();
     assert!(both.len() > 500, "{} of {} cycles", both.len(), seen.len());
     assert!(both.iter().all(|(seen, run)| seen == run), "the observer saw another run");
+}
+
+/// Sends a signal to a process.
+#[track_caller]
+fn signal(process: u32, name: &str) {
+    assert!(Command::new("kill").args(["-s", name, &process.to_string()]).status().unwrap().success());
+}
+
+#[test]
+fn cli_3_a_second_interrupt_ends_a_run_whose_device_does_not_confirm_the_stop() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    common::demonstration(at, 20.0);
+    assert!(tactus(at, &["learn", "demo.csv", "-o", "reach.toml"]).status.success());
+    let device = served(at);
+    let patient = ["run", "reach.toml", "--record", "run.csv", "--non-interactive", "--timeout", "600"];
+    let mut run = command(at, &patient).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let begun = Instant::now();
+    let part = at.join("run.csv.part");
+    while !std::fs::metadata(&part).is_ok_and(|file| file.len() > 50_000) {
+        assert!(begun.elapsed() < Duration::from_secs(120), "nothing is recorded");
+        assert_eq!(run.try_wait().unwrap(), None, "it ended by itself");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    // The device hears nothing any more: nobody confirms the stop that the first interrupt asks for. One that follows at
+    // once is the same one, delivered twice.
+    signal(device.0.id(), "STOP");
+    let begun = Instant::now();
+    let ended = loop {
+        assert!(begun.elapsed() < Duration::from_secs(120), "it waits for the device");
+        match run.try_wait().unwrap() {
+            Some(ended) => break ended,
+            None => signal(run.id(), "INT"),
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    };
+    assert_eq!(ended.code(), Some(130));
+    assert!(part.is_file(), "what was recorded is kept");
 }

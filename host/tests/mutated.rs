@@ -115,6 +115,35 @@ fn cli_14_a_damaged_name_of_the_layout_is_a_damaged_file_and_another_version_is_
 }
 
 #[test]
+fn cli_14_a_device_with_a_damaged_memory_gives_a_sound_primitive_or_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    common::demonstration(at, 2.0);
+    for line in [
+        "learn demo.csv -o reach.toml",
+        "--device sil:world=simple,flash=arm.flash --non-interactive upload reach.toml",
+        "--device sil:world=simple,flash=arm.flash get reach -o good.toml",
+    ] {
+        assert_eq!(run(at, line).0, Some(0), "{line}: {}", run(at, line).1);
+    }
+    let (memory, good) = (std::fs::read(at.join("arm.flash")).unwrap(), std::fs::read(at.join("good.toml")).unwrap());
+    // Most of it is empty.
+    let written = memory.iter().rposition(|byte| *byte != 0xFF).unwrap() + 1;
+    for seed in 0..FEW {
+        let mut numbers = Numbers(seed);
+        let mut bad = damage(&memory[..written], &mut numbers);
+        bad.resize(memory.len(), 0xFF);
+        std::fs::write(at.join("bad.flash"), bad).unwrap();
+        let (code, said, took) = run(at, "--device sil:world=simple,flash=bad.flash get reach -o new.toml");
+        assert!(matches!(code, Some(0 | 2 | 5 | 6)) && !said.contains("panicked"), "seed {seed}: {code:?} {said}");
+        assert!(took < TIME_LIMIT, "seed {seed}: {took:?}");
+        let got = std::fs::read(at.join("new.toml")).ok();
+        assert!(got.is_none_or(|got| code == Some(0) && got == good), "seed {seed}: half a primitive, {said}");
+        let _ = std::fs::remove_file(at.join("new.toml"));
+    }
+}
+
+#[test]
 fn cli_14_damaged_files_are_refused_or_used_and_nothing_is_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

@@ -296,11 +296,11 @@ error_codes! {
         "something was in the way, or the goal is out of the arm's reach", "`tactus plot --run FILE` shows where it went";
     NotRemembered = 640: "nothing could be remembered from the recordings",
         "they are of another movement, or too few", "give recordings of this primitive, all at the same speed";
+    RecordingOfOthers = 641: "the recordings are not of the same movement", "another file was meant",
+        "give recordings of this primitive; their first lines name it";
     WeightNotAccepted = 644: "the weight of the arm was measured and not accepted",
         "the hand holds something, something touches the arm, or its weight is right already",
         "empty the hand and free the arm, then `tactus calibrate gravity` again; the device goes on as before";
-    RecordingOfOthers = 641: "the recordings are not of the same movement", "another file was meant",
-        "give recordings of this primitive; their first lines name it";
     ImageInvalid = 651: "the image to be uploaded is not sound", "a defect of the tool",
         "make the primitive again with `tactus learn`";
     ReadBackDiffers = 652: "reading the primitive back gave other bytes", "the device's storage, or the line",
