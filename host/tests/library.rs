@@ -199,8 +199,8 @@ fn cli_3_a_second_interrupt_ends_a_run_whose_device_does_not_confirm_the_stop() 
         assert_eq!(run.try_wait().unwrap(), None, "it ended by itself");
         std::thread::sleep(Duration::from_millis(5));
     }
-    // The device hears nothing any more: nobody confirms the stop that the first interrupt asks for. One that follows at
-    // once is the same one, delivered twice.
+    // The device hears nothing any more: nobody confirms the stop that the first interrupt asks for. One that follows
+    // at once is the same one, delivered twice.
     signal(device.0.id(), "STOP");
     let begun = Instant::now();
     let ended = loop {

@@ -7,8 +7,7 @@ Devices:
   sim:      the firmware image under QEMU   board:  the emulated board with its image   hand:  a hand alone under QEMU
   serial:/dev/ttyACM0   can:can0   tcp:HOST:PORT   unix:tactus.sock
 Options of simulated devices, behind the colon and separated by commas:
-  arm=N     an arm whose masses and friction are not the model's
-  seed=N    everything random     world=mujoco|simple  the physics        line=serial|can  the line to the host
+  arm=N     other masses, friction  seed=N  everything random     world=mujoco|simple  the physics        line=serial|can  the line to the host
   bus=FILE  log of both buses     flash=FILE  keeps its primitives        faults=FILE[:N]  faults that befall the arm
 Examples:
   tactus --device sil: teach -o grasp.csv
