@@ -6,9 +6,9 @@ Devices:
   sil:      the application in this process, on a simulated arm     sil:seed=7,world=simple
   sim:      the firmware image under QEMU   board:  the emulated board with its image   hand:  a hand alone under QEMU
   serial:/dev/ttyACM0   can:can0   tcp:HOST:PORT   unix:tactus.sock
-Options of simulated devices, behind the colon and separated by commas:
-  arm=N     other masses, friction  seed=N  everything random     world=mujoco|simple  the physics        line=serial|can  the line to the host
-  bus=FILE  log of both buses     flash=FILE  keeps its primitives        faults=FILE[:N]  faults that befall the arm
+Options of simulated devices, behind the colon and separated by commas; world=mujoco|simple is the physics:
+  seed=N    everything random     arm=N       masses and friction     line=serial|can  the line to the host
+  bus=FILE  log of both buses     flash=FILE  keeps its primitives    faults=FILE[:N]  faults that befall the arm
 Examples:
   tactus --device sil: teach -o grasp.csv
   tactus learn grasp.csv -o grasp.toml
