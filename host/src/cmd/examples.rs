@@ -3,8 +3,8 @@
 /// The whole tool.
 pub(super) const ALL: &str = "\
 Devices:
-  sil:   the application in this process, on a simulated arm   board:   the firmware image on the emulated board
-  sim:   it under QEMU   hand:   a hand under QEMU   serial:/dev/ttyACM0  can:can0  tcp:HOST:PORT  unix:tactus.sock
+  sil:   the application in this process, on a simulated arm   sim:   the firmware image under QEMU
+  board: the emulated board   hand: a hand under QEMU   serial:/dev/ttyACM0  can:can0  tcp:HOST:PORT  unix:tactus.sock
 Options of simulated devices, behind the colon and separated by commas; world=mujoco|simple is the physics:
   seed=N    everything random     arm=N       masses and friction     line=serial|can  the line to the host
   bus=FILE  log of both buses     flash=FILE  keeps its primitives    faults=FILE[:N]  faults that befall the arm
