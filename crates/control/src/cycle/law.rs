@@ -1,17 +1,26 @@
 //! `Law`: what acts in the present state, with all that the state remembers. Leaving a state drops what it remembered.
 
+use puck::Transmission;
+
+use crate::guard::disagreement::Effort;
+use crate::law::breakaway::Breakaway;
 use crate::law::integral::PostureIntegral;
 use crate::law::joint::JointController;
 use crate::law::operational::OperationalController;
+use crate::model::friction;
 use crate::plan::approach::Approach;
 use crate::plan::reference::JointReference;
 use crate::real::{Real, at_least, at_most, within};
 use crate::sense::drift::Drift;
+use crate::sense::joints::JointState;
 use crate::time::{PERIOD, periods};
-use crate::units::{JointPositions, Vector7};
+use crate::units::{JointPositions, JointVelocities, Vector7};
 
 /// Speed at which a held posture returns after somebody pushed the arm away from it (rad/s).
 const RETURN_SPEED: f64 = 0.2;
+
+/// Speeds of a joint on its way back to a posture that has given way, between which the spring is let go of (rad/s).
+const LET_GO: (f64, f64) = (0.15, 0.35);
 
 /// The law of a state.
 #[allow(
@@ -44,18 +53,63 @@ pub(super) struct Posture<R: Real> {
     pub(super) approach: Option<Approach<R>>,
     pub(super) integral: PostureIntegral<R>,
     pub(super) controller: JointController<R>,
+    /// How the approach begins.
+    breakaway: Breakaway<R>,
+    /// Torque that it added in the last good cycle (N m).
+    extra: Vector7<R>,
 }
 
 impl<R: Real> Posture<R> {
     /// To hold `q`.
     pub(super) fn at(q: JointPositions<R>) -> Self {
-        Posture { q, held: q, approach: None, integral: PostureIntegral::new(), controller: JointController::new() }
+        Posture {
+            q,
+            held: q,
+            approach: None,
+            integral: PostureIntegral::new(),
+            controller: JointController::new(),
+            breakaway: Breakaway::none(),
+            extra: Vector7::zeros(),
+        }
     }
 
     /// Moves from here on, or stays. The integral goes on.
-    pub(super) fn follow(&mut self, approach: Option<Approach<R>>) {
+    pub(super) fn follow(&mut self, approach: Option<Approach<R>>, transmission: &Transmission<R>) {
+        self.breakaway = match &approach {
+            Some(approach) => Breakaway::along(&transmission.motor_from_joint(&(*approach.way()).into())),
+            None => Breakaway::none(),
+        };
         self.approach = approach;
         self.controller.reset();
+    }
+
+    /// Returns the torque that makes motors break away (N m). `state` is complete.
+    pub(super) fn break_away(&mut self, state: &JointState<R>, transmission: &Transmission<R>) -> Vector7<R> {
+        if self.breakaway.is_active() {
+            let against = self.controller.feedback() + self.controller.friction();
+            let against = transmission.motor_torques_from_joint(&against.into());
+            let friction = friction::at_motors(transmission);
+            let extra = self.breakaway.step(&against, &friction, state.still);
+            self.extra = Vector7::from(transmission.joint_torques_from_motor(extra));
+        } else {
+            self.extra = Vector7::zeros();
+        }
+        self.extra
+    }
+
+    /// The torque that [`Posture::break_away`] returned last (N m).
+    pub(super) fn extra(&self) -> &Vector7<R> {
+        &self.extra
+    }
+
+    /// What is asked of the joints.
+    pub(super) fn effort(&self) -> Effort<'_, R> {
+        Effort {
+            feedback: self.controller.measured_feedback(),
+            sent: self.controller.feedback() + self.controller.friction() + self.extra,
+            desired: self.controller.desired(),
+            breaking_away: self.breakaway.due(),
+        }
     }
 
     /// Takes another posture to hold (rad).
@@ -64,7 +118,7 @@ impl<R: Real> Posture<R> {
     }
 
     /// Returns what the joints should do in this control period, at `q` (rad).
-    pub(super) fn reference(&mut self, q: &JointPositions<R>, clamp: &Vector7<R>) -> JointReference<R> {
+    pub(super) fn reference(&mut self, state: &JointState<R>, clamp: &Vector7<R>) -> JointReference<R> {
         match &mut self.approach {
             Some(approach) => {
                 let reference = approach.step();
@@ -72,18 +126,28 @@ impl<R: Real> Posture<R> {
                 reference
             }
             None => {
-                self.give_way(q, clamp);
+                self.give_way(&state.q, &state.dq, clamp);
                 JointReference::at_rest(self.held)
             }
         }
     }
 
     /// Gives way where the arm was pushed away by more than `clamp` (rad), and comes back slowly once it is let go. A
-    /// spring that is not bounded would throw it back.
-    fn give_way(&mut self, q: &JointPositions<R>, clamp: &Vector7<R>) {
+    /// spring that is not bounded would throw it back; so would one that is, and it gives way once more to a joint that
+    /// it has made fast.
+    fn give_way(&mut self, q: &JointPositions<R>, dq: &JointVelocities<R>, clamp: &Vector7<R>) {
         let step = R::of(RETURN_SPEED * PERIOD);
         let back = (self.q.0 - self.held.0).map(|way| within(way, step));
-        let held = q.0 + (self.held.0 + back - q.0).zip_map(clamp, within);
+        let mut offset = (self.held.0 + back - q.0).zip_map(clamp, within);
+        for (joint, offset) in offset.iter_mut().enumerate() {
+            let (speed, zero) = (dq.0[joint], R::of(0.0));
+            let along = if *offset < zero { -speed } else { speed };
+            if along > R::of(LET_GO.0) {
+                let share = at_least((R::of(LET_GO.1) - along) * R::of(1.0 / (LET_GO.1 - LET_GO.0)), zero);
+                *offset = within(*offset, share * clamp[joint]);
+            }
+        }
+        let held = q.0 + offset;
         // Exactly, where nobody pushes: a sum of differences is not.
         self.held = JointPositions(held.zip_map(&self.q.0, |held, wanted| {
             let rest = held - wanted;

@@ -115,22 +115,32 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     #[inline(never)]
     fn hold_to(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
         let Law::Posture(posture) = &mut self.law else { return self.float(measured) };
-        let reference = posture.reference(&measured.state.q, &self.gains.stiff.clamp);
+        let reference = posture.reference(measured.state, &self.gains.holding.clamp);
         let frozen = measured.state.missing > 0;
         if !frozen && !self.cut.is_cut() {
-            posture.integral.step(&self.gains, &reference.q, &measured.state.q);
+            let error = reference.q.0 - measured.state.q.0;
+            let before = *posture.integral.shift();
+            posture.integral.step(&self.gains, &error, &(measured.state.dq.0 - reference.dq.0));
+            // What the integral adds is there for friction, and moves nothing.
+            let added = self.gains.holding.stiffness.component_mul(&(posture.integral.shift() - before));
+            self.observer.hold_back(&added);
         }
         let shifted = JointReference { q: JointPositions(reference.q.0 + posture.integral.shift()), ..reference };
-        let torque = posture.controller.torque(
+        let velocity = self.observer.velocity_in_hold(measured.state);
+        let mut torque = posture.controller.torque(
             &self.model,
-            &self.gains.stiff,
+            &self.gains.holding,
             measured.frames,
             measured.state,
-            (!frozen).then_some(&measured.state.dq.0),
+            (!frozen).then_some(&velocity),
             &shifted,
         );
         let pose_d = Frames::new(&self.model, &reference.q).tool_pose();
         let explained = (torque.0 - posture.controller.feedback(), reference.ddq.0);
+        torque.0 += match frozen {
+            true => *posture.extra(),
+            false => posture.break_away(measured.state, &self.calibration.transmission),
+        };
         Demand { torque, q_d: reference.q, pose_d, explained, ..self.plain(measured, Vector7::zeros()) }
     }
 

@@ -22,6 +22,7 @@ use crate::command::Refusal;
 use crate::cycle::hand::HandDrive;
 use crate::cycle::law::{Lag, Law, Posture, Running};
 use crate::cycle::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
+use crate::guard::disagreement::Effort;
 use crate::guard::fault::Fault;
 use crate::guard::joint_limits::JointBounds;
 use crate::guard::monitor::{Monitor, Observation};
@@ -63,6 +64,9 @@ const STOP_RAMP: u16 = periods(0.1);
 /// Length of the ramp that takes away what a compliant run inherits from the stiff hold before it: 1 s, in control
 /// periods.
 const HANDOVER: u16 = periods(1.0);
+
+/// Time in which the torque of gravity builds up after arming: 100 ms, in control periods.
+const BUILDING_UP: u16 = periods(0.1);
 
 /// Below this joint speed (rad/s) the arm counts as standing, for leaving a stop.
 const STANDING: f64 = 0.05;
@@ -332,8 +336,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                     wrench: self.wrench.wrench(&frames),
                     outside_fault: input.external_fault.is_some(),
                 };
-                if self.supervisor.state().has_torque() {
-                    self.observer.update(&state);
+                // A model lets an arm fall that friction or brakes hold while the torque of gravity builds up.
+                if self.supervisor.state().has_torque() && self.armed_for >= BUILDING_UP {
+                    self.observer.update(&state, matches!(self.law, Law::Posture(_)));
                 } else {
                     self.observer.settle(&state);
                 }
@@ -388,10 +393,14 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             (Law::Run(Running { lag, .. }), Some(run)) => (run.options.feedback || run.options.force_control, *lag),
             _ => (false, Lag::none()),
         };
-        let feedback = match &self.law {
-            Law::Posture(Posture { controller, .. }) | Law::Run(Running { controller, .. }) => {
-                Some((controller.feedback(), controller.desired()))
-            }
+        let effort = match &self.law {
+            Law::Posture(posture) => Some(posture.effort()),
+            Law::Run(Running { controller, .. }) => Some(Effort {
+                feedback: controller.feedback(),
+                sent: *controller.feedback(),
+                desired: controller.desired(),
+                breaking_away: 0,
+            }),
             _ => None,
         };
         let seen = Observation {
@@ -402,7 +411,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             // The feedback fades in the meantime.
             wrench_lost: self.is_blind(u16::from(WRENCH_AGE) + FADE),
             blind: self.is_blind(WRENCH_AGE.into()),
-            feedback,
+            effort,
             full_scale: self.wrench.full_scale().force > 0 || (depends && self.wrench.full_scale().torque > 0),
         };
         if let Some((trigger, fault)) = self.monitor.check(law, measured.state, &seen) {

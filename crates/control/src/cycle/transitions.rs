@@ -53,7 +53,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             self.armed_for = 0;
         }
         match (state, &mut self.law) {
-            (State::Hold, Law::Posture(posture)) => posture.follow(None),
+            (State::Hold, Law::Posture(posture)) => posture.follow(None, &self.calibration.transmission),
             (State::Hold, Law::Run(_)) => self.law = Law::Posture(self.after_run(measured)),
             (State::Hold, _) => self.law = Law::Posture(Posture::at(measured.state.q)),
             (State::SoftStop | State::Lower, _) => {
@@ -80,7 +80,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             self.law = Law::Posture(Posture::at(measured.state.q));
         }
         if let Law::Posture(posture) = &mut self.law {
-            posture.follow(Some(approach));
+            posture.follow(Some(approach), &self.calibration.transmission);
         }
     }
 
@@ -90,7 +90,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.hand.begin_run();
         // From what the feedback is drawn to while holding, so that the torque against friction stays.
         let start = match &self.law {
-            Law::Posture(posture) if !options.compliant => JointPositions(posture.q.0 + posture.integral.shift()),
+            Law::Posture(posture) if !options.compliant => {
+                let drawn = posture.q.0 + posture.integral.shift() - measured.state.q.0;
+                let gains = &self.gains;
+                let ratio = gains.holding.stiffness.component_div(&gains.stiff.stiffness);
+                JointPositions(measured.state.q.0 + drawn.component_mul(&ratio))
+            }
             _ => measured.state.q,
         };
         self.force.restart(self.gains.tracking(options.compliant).force_window);
@@ -111,9 +116,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
 
     /// The posture to hold after a run: what Eq (11) has put between q_d and q against friction becomes the integral's.
     fn after_run(&self, measured: &Measured<'_, R>) -> Posture<R> {
-        let stiff = &self.gains.stiff;
-        let torque = self.torque_beyond_model(measured) + stiff.damping.component_mul(&measured.state.dq.0);
-        let offset = torque.component_div(&stiff.stiffness).zip_map(&stiff.clamp, within);
+        let holding = &self.gains.holding;
+        let velocity = self.observer.velocity_in_hold(measured.state);
+        let torque = self.torque_beyond_model(measured) + holding.damping.component_mul(&velocity);
+        let offset = torque.component_div(&holding.stiffness).zip_map(&holding.clamp, within);
         let mut posture = Posture::at(measured.state.q);
         let held = posture.integral.take_over(&self.gains, &offset, &measured.state.q);
         posture.shift_to(held);

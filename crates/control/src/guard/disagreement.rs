@@ -6,18 +6,19 @@
 
 use puck::Transmission;
 
+use crate::model::friction::{self, SWING};
 use crate::model::wam7;
 use crate::real::{Real, at_least};
 use crate::time::few_periods;
 use crate::units::{JOINTS, Vector7};
 
-/// Swing of a motor's feedback torque without a count, in parts of the model's friction. Friction that is 30 % more
-/// holds 2.6 of it, from one direction to the other.
-const SWING: f64 = 3.0;
-
 /// Desired speed of a motor from which on it has to turn (rad/s): 0.02 to 0.06 rad/s of the joint. A motor that is to
 /// stand may be held by contact, whatever its torque does: closing fingers and a table swing it by more than friction.
 const MOVING: f64 = 1.0;
+
+/// Time for which the swing of a motor that breaks away has to be too large: friction lets go of it a moment before it
+/// has turned by a count. 25 ms, in control periods.
+const LETTING_GO: u8 = few_periods(0.025);
 
 /// Force (N) that explains why a motor does not turn.
 const CONTACT: f64 = 10.0;
@@ -31,6 +32,18 @@ const PUSH: f64 = 3.5;
 /// Time for which it has to push: 10 ms, in control periods.
 const PUSHING: u8 = few_periods(0.01);
 
+/// What a law asks of the joints.
+pub(crate) struct Effort<'a, R: Real> {
+    /// Torque of the joint feedback as measured motion alone asks for it (N m).
+    pub(crate) feedback: &'a Vector7<R>,
+    /// Torque that was sent against friction (N m): what was fed back, fed forward, and added for a motor to break away.
+    pub(crate) sent: Vector7<R>,
+    /// Desired velocity (rad/s).
+    pub(crate) desired: &'a Vector7<R>,
+    /// Motors that are made to break away, one bit each, M1 lowest.
+    pub(crate) breaking_away: u8,
+}
+
 /// Compares the feedback torque with the motion.
 #[derive(Clone, Debug)]
 pub(crate) struct Disagreement<R: Real> {
@@ -41,6 +54,8 @@ pub(crate) struct Disagreement<R: Real> {
     anchor: [R; JOINTS],
     /// Control periods since.
     still: [u8; JOINTS],
+    /// Control periods for which the swing of each motor has been too large.
+    beyond: [u8; JOINTS],
     pushing: u8,
 }
 
@@ -48,14 +63,15 @@ impl<R: Real> Disagreement<R> {
     /// Nothing seen yet, on an arm with this transmission.
     pub(crate) fn new(transmission: Transmission<R>) -> Self {
         let zero = R::of(0.0);
-        let mut swing = [zero; JOINTS];
-        for (joint, friction) in wam7::FRICTION_COULOMB.into_iter().enumerate() {
-            let torque = core::array::from_fn(|of| if of == joint { R::of(SWING * friction) } else { zero });
-            for (swing, part) in swing.iter_mut().zip(transmission.motor_torques_from_joint(&torque)) {
-                *swing += at_least(part, -part);
-            }
+        let swing = friction::at_motors(&transmission).map(|friction| friction * R::of(SWING));
+        Disagreement {
+            transmission,
+            swing,
+            anchor: [zero; JOINTS],
+            still: [0; JOINTS],
+            beyond: [0; JOINTS],
+            pushing: 0,
         }
-        Disagreement { transmission, swing, anchor: [zero; JOINTS], still: [0; JOINTS], pushing: 0 }
     }
 
     /// Forgets what was seen: no feedback acts.
@@ -69,36 +85,37 @@ impl<R: Real> Disagreement<R> {
         self.still = [0; JOINTS];
     }
 
-    /// Takes the feedback torque (N m), the desired velocities (rad/s), the measured force (N) and the motors whose
-    /// counts have not changed, one bit each; true if an encoder stands still while its motor cannot.
+    /// Takes what the law asks of the joints, the measured force (N) and the motors whose counts have not changed, one
+    /// bit each; true if an encoder stands still while its motor cannot.
     ///
     /// Not inlined: it is asked where a motor stands.
     #[inline(never)]
-    pub(crate) fn encoder_stands_still(
-        &mut self,
-        (feedback, desired): (&Vector7<R>, &Vector7<R>),
-        force: R,
-        unchanged: u8,
-    ) -> bool {
+    pub(crate) fn encoder_stands_still(&mut self, effort: &Effort<'_, R>, force: R, unchanged: u8) -> bool {
         if force > R::of(CONTACT) {
             self.still = [0; JOINTS];
             return false;
         }
-        let torques = self.transmission.motor_torques_from_joint(&(*feedback).into());
-        let speeds = self.transmission.motor_from_joint(&(*desired).into());
+        let asked = self.transmission.motor_torques_from_joint(&(*effort.feedback).into());
+        let sent = self.transmission.motor_torques_from_joint(&effort.sent.into());
+        let speeds = self.transmission.motor_from_joint(&(*effort.desired).into());
         let mut stuck = false;
-        let motors = self.still.iter_mut().zip(&mut self.anchor).zip(&self.swing).zip(torques).zip(speeds).enumerate();
-        for (motor, ((((still, anchor), limit), torque), speed)) in motors {
-            if unchanged >> motor & 1 == 0 || at_least(speed, -speed) < R::of(MOVING) {
-                *still = 0;
+        let state = self.still.iter_mut().zip(&mut self.beyond).zip(&mut self.anchor);
+        let torques = self.swing.iter().zip(asked.into_iter().zip(sent)).zip(speeds);
+        for (motor, (((still, beyond), anchor), ((limit, (asked, sent)), speed))) in state.zip(torques).enumerate() {
+            let breaks_away = effort.breaking_away >> motor & 1 != 0;
+            let is_to_turn = breaks_away || at_least(speed, -speed) >= R::of(MOVING);
+            if unchanged >> motor & 1 == 0 || !is_to_turn {
+                (*still, *beyond) = (0, 0);
                 continue;
             }
+            let torque = if breaks_away { sent } else { asked };
             if *still == 0 {
                 *anchor = torque;
             }
             *still = still.saturating_add(1);
             let swing = torque - *anchor;
-            stuck |= *still > STILL && at_least(swing, -swing) > *limit;
+            *beyond = if at_least(swing, -swing) > *limit { beyond.saturating_add(1) } else { 0 };
+            stuck |= *still > STILL && *beyond > if breaks_away { LETTING_GO } else { 0 };
         }
         stuck
     }

@@ -1,6 +1,6 @@
 //! Guards: faults, the monitor of limits, the state machine, the watch for unusual runs.
 
-mod disagreement;
+pub(crate) mod disagreement;
 pub mod fault;
 pub mod joint_limits;
 pub mod monitor;

@@ -2,7 +2,7 @@
 
 use puck::Transmission;
 
-use crate::guard::disagreement::Disagreement;
+use crate::guard::disagreement::{Disagreement, Effort};
 use crate::guard::fault::Fault;
 use crate::guard::joint_limits::JointBounds;
 use crate::guard::supervisor::{State, Trigger};
@@ -11,7 +11,7 @@ use crate::model::wam7;
 use crate::real::Real;
 use crate::sense::joints::{COAST_CYCLES, JointState};
 use crate::time::few_periods;
-use crate::units::{JOINTS, Vector7};
+use crate::units::JOINTS;
 
 /// Largest speed of elbow and forearm in any state with torque (m/s); the safety module faults at 1.0.
 pub const TIP_SPEED_LIMIT: f64 = 0.8;
@@ -59,8 +59,8 @@ pub(crate) struct Observation<'a, R: Real> {
     pub(crate) wrench_lost: bool,
     /// True if no fresh force tells of a contact, on an arm that has a sensor.
     pub(crate) blind: bool,
-    /// Torque of the joint feedback (N m) and desired velocity (rad/s), where there are such.
-    pub(crate) feedback: Option<(&'a Vector7<R>, &'a Vector7<R>)>,
+    /// What the law asks of the joints, where it feeds anything back.
+    pub(crate) effort: Option<Effort<'a, R>>,
     /// True if the sensor has been at full scale: in a force, or in a torque that the run depends on.
     pub(crate) full_scale: bool,
 }
@@ -128,15 +128,15 @@ impl<R: Real> Monitor<R> {
 
     /// True if an encoder stands still; true if something pushes that the sensor does not see.
     fn disagrees(&mut self, state: &JointState<R>, seen: &Observation<'_, R>) -> (bool, bool) {
-        match seen.feedback {
-            Some((feedback, desired)) if state.missing == 0 => {
+        match &seen.effort {
+            Some(effort) if state.missing == 0 => {
                 let stuck = if state.still == 0 {
                     self.disagreement.all_turn();
                     false
                 } else {
-                    self.disagreement.encoder_stands_still((feedback, desired), seen.force, state.still)
+                    self.disagreement.encoder_stands_still(effort, seen.force, state.still)
                 };
-                (stuck, seen.blind && self.disagreement.is_pushed(feedback))
+                (stuck, seen.blind && self.disagreement.is_pushed(effort.feedback))
             }
             Some(_) => (false, false),
             None => {

@@ -36,6 +36,14 @@ const STIFF: Numbers = Numbers {
     force_limit: (10.0, 1.0),
 };
 
+/// For an arm that holds or approaches a posture. Softer than [`STIFF`] on J2 and J3: with the delay of the loop a stiffer
+/// joint and the elastic cables leave no margin where there is no friction.
+const HOLDING: Numbers = Numbers {
+    stiffness: [250.0, 300.0, 105.0, 130.0, 10.0, 16.0, 2.5],
+    damping: [18.0, 22.0, 4.5, 5.0, 0.3, 0.5, 0.07],
+    ..STIFF
+};
+
 /// Soft in contact.
 const COMPLIANT: Numbers = Numbers {
     stiffness: [40.0, 55.0, 20.0, 20.0, 6.0, 5.0, 1.5],
@@ -133,8 +141,10 @@ pub struct HandGains<R: Real> {
 /// Every gain of the controllers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains<R: Real> {
-    /// For `Hold`, `Approach` and runs that are to be exact.
+    /// For runs that are to be exact.
     pub stiff: Tracking<R>,
+    /// For `Hold` and `Approach`.
+    pub holding: Tracking<R>,
     /// For runs that are to be soft in contact.
     pub compliant: Tracking<R>,
     /// Largest shift of a held posture by the integral (rad); times `K_p` the most it adds against an obstacle.
@@ -150,9 +160,10 @@ impl<R: Real> Gains<R> {
     pub fn tuned() -> Self {
         Gains {
             stiff: Tracking::from_numbers(&STIFF),
+            holding: Tracking::from_numbers(&HOLDING),
             compliant: Tracking::from_numbers(&COMPLIANT),
             settling: (vector(wam7::FRICTION_COULOMB) * R::of(SETTLING_FRACTION))
-                .component_div(&vector(STIFF.stiffness)),
+                .component_div(&vector(HOLDING.stiffness)),
             stop_damping: vector(STOP_DAMPING),
             hand: HandGains {
                 stiffness: HAND_STIFFNESS.map(R::of),

@@ -61,15 +61,17 @@ impl<R: Real> PostureIntegral<R> {
 
     /// One control period towards the posture `q_d`, measured at `q`; the caller leaves it out where a torque could not
     /// be given in full or a position is not measured.
-    pub fn step(&mut self, gains: &Gains<R>, q_d: &JointPositions<R>, q: &JointPositions<R>) {
-        let errors = q_d.0 - q.0;
-        let joints = self.shift.iter_mut().zip(&mut self.seeking).zip(errors.iter()).zip(gains.settling.iter());
-        for ((((shift, seeking), error), clamp), tolerance) in joints.zip(TOLERANCE) {
+    ///
+    /// A joint that already closes its error (rad) at the rate of the integral, `closing` (rad/s), is left alone: more
+    /// torque would only carry it past.
+    pub fn step(&mut self, gains: &Gains<R>, error: &Vector7<R>, closing: &Vector7<R>) {
+        let joints = self.shift.iter_mut().zip(&mut self.seeking).zip(error.iter()).zip(gains.settling.iter());
+        for (((((shift, seeking), error), clamp), tolerance), closing) in joints.zip(TOLERANCE).zip(closing.iter()) {
             let zero = R::of(0.0);
             let (sign, magnitude) = if *error < zero { (R::of(-1.0), -*error) } else { (R::of(1.0), *error) };
             let bound = if *seeking { BAND.1 } else { BAND.0 };
             *seeking = magnitude > R::of(bound * tolerance);
-            if *seeking {
+            if *seeking && *closing * sign < *clamp * R::of(1.0 / RISE) {
                 *shift = within(*shift + sign * *clamp * R::of(PERIOD / RISE), *clamp);
             }
         }

@@ -24,12 +24,16 @@ pub struct JointController<R: Real> {
     feedback: Vector7<R>,
     /// Desired velocity of the same cycle (rad/s).
     desired: Vector7<R>,
+    /// Feedback torque as measured motion alone asks for it, of the same cycle (N m).
+    measured: Vector7<R>,
+    /// Friction fed forward in the same cycle (N m).
+    friction: Vector7<R>,
 }
 
 impl<R: Real> JointController<R> {
     /// A controller without history.
     pub fn new() -> Self {
-        JointController { feedback: Vector7::zeros(), desired: Vector7::zeros() }
+        JointController { feedback: Vector7::zeros(), desired: Vector7::zeros(), measured: Vector7::zeros(), friction: Vector7::zeros() }
     }
 
     /// The feedback torque of the last good cycle (N m).
@@ -40,6 +44,16 @@ impl<R: Real> JointController<R> {
     /// The desired velocity of the last good cycle (rad/s).
     pub fn desired(&self) -> &Vector7<R> {
         &self.desired
+    }
+
+    /// The feedback torque of the last good cycle as measured motion alone asks for it (N m), whatever was fed back.
+    pub fn measured_feedback(&self) -> &Vector7<R> {
+        &self.measured
+    }
+
+    /// The friction that was fed forward in the last good cycle (N m).
+    pub fn friction(&self) -> &Vector7<R> {
+        &self.friction
     }
 
     /// Forgets the feedback of the last cycle.
@@ -59,14 +73,17 @@ impl<R: Real> JointController<R> {
         velocity: Option<&Vector7<R>>,
         reference: &JointReference<R>,
     ) -> JointTorques<R> {
+        let friction = friction(gains, &reference.planned);
         if let Some(velocity) = velocity {
             self.desired = reference.dq.0;
-            self.feedback = gains.stiffness.component_mul(&(reference.q.0 - state.q.0))
-                + gains.damping.component_mul(&(reference.dq.0 - velocity));
+            let spring = gains.stiffness.component_mul(&(reference.q.0 - state.q.0));
+            self.feedback = spring + gains.damping.component_mul(&(reference.dq.0 - velocity));
+            self.measured = spring + gains.damping.component_mul(&(reference.dq.0 - state.dq.0));
+            self.friction = friction;
         }
         let inertial = model.inverse_dynamics(frames, &state.dq, &reference.ddq).0;
         let rotors = model.rotor_torque(&reference.ddq).0;
-        JointTorques(inertial + rotors + friction(gains, &reference.planned) + self.feedback)
+        JointTorques(inertial + rotors + friction + self.feedback)
     }
 }
 

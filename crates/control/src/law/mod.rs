@@ -1,6 +1,7 @@
 //! The controllers: Eq (11) in [`operational`], Eq (10) in [`joint`], Eq (12) in [`force`]; their sum is Eq (13).
 //! Beside them [`integral`], for the postures that are held, and Eq (14) in [`hand`].
 
+pub(crate) mod breakaway;
 pub mod force;
 pub mod gains;
 pub mod hand;

@@ -3,6 +3,7 @@
 pub mod arm;
 pub mod calibration;
 pub mod dynamics;
+pub(crate) mod friction;
 pub mod hand;
 pub mod kinematics;
 mod mass_matrix;

@@ -73,6 +73,11 @@ impl<R: Real> Approach<R> {
         Approach { start: start.0, way, length, passed: 0, settled: 0, rate: R::of(RATE) / R::from_counts(length) }
     }
 
+    /// Way of each joint (rad).
+    pub fn way(&self) -> &Vector7<R> {
+        &self.way
+    }
+
     /// Duration of the move (s).
     pub fn duration(&self) -> R {
         R::from_counts(self.length) * R::of(PERIOD)

@@ -34,6 +34,10 @@ pub const VELOCITY_CUT_OFF: f64 = 50.0;
 /// counts as motion.
 const PLAUSIBLE_CHANGE: f64 = 1.5;
 
+/// Largest change of a motor's speed that is believed once the next reply confirms it, in parts of
+/// [`PLAUSIBLE_CHANGE`]: a joint of the wrist that hits its stop sets its neighbour turning within a cycle.
+const HARDEST_BLOW: u32 = 4;
+
 /// Part of the largest change of speed from which on a motor of the arm turns too fast to stand still, to the count, in
 /// the next cycle: nothing but an encoder stops so dead.
 const TURNING: i32 = 8;
@@ -267,7 +271,17 @@ impl Motor {
     fn doubt<R: Real>(&mut self, counts: Counts, carried: i32, gate: i32, torque_on: bool) -> Option<Believed<R>> {
         let elapsed = self.age.saturating_add(1);
         let moved = counts.0.wrapping_sub(self.counts.0);
-        let since = self.doubtful.replace(counts).map(|doubtful| counts.0.wrapping_sub(doubtful.0));
+        let doubtful = self.doubtful.replace(counts);
+        let since = doubtful.map(|doubtful| counts.0.wrapping_sub(doubtful.0));
+        if let (2, Some(doubtful), Some(step)) = (elapsed, doubtful, since) {
+            let first = doubtful.0.wrapping_sub(self.counts.0);
+            let same = step.wrapping_sub(first).unsigned_abs() <= gate.unsigned_abs();
+            if same && first.unsigned_abs() <= gate.unsigned_abs().saturating_mul(HARDEST_BLOW) {
+                // A jump is over after one reply; what goes on as it began is motion.
+                *self = Motor { counts, step, age: 0, doubtful: None, ..*self };
+                return Some(Believed { rate: R::from_counts(step), jumped: false });
+            }
+        }
         let step = since.filter(|step| is_within(*step, self.step, gate))?;
         let can_have_turned = moved.unsigned_abs() <= gate.unsigned_abs().saturating_mul(u32::from(elapsed));
         let counts = if torque_on && !can_have_turned { Counts(self.counts.0.wrapping_add(carried)) } else { counts };

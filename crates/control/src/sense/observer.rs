@@ -10,7 +10,7 @@ use nalgebra::SMatrix;
 
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
-use crate::real::{Real, within};
+use crate::real::{Real, at_least, within};
 use crate::sense::joints::JointState;
 use crate::time::PERIOD;
 use crate::units::{JOINTS, Vector7};
@@ -25,11 +25,18 @@ const POLES: [f64; JOINTS] = [4.0, 4.0, 4.0, 6.0, 15.0, 15.0, 15.0];
 /// Pole with which the unexplained acceleration is followed (Hz).
 const DISTURBANCE_POLE: f64 = 2.0;
 
+/// Poles of the correction and of the unexplained acceleration (Hz) for an arm that holds or approaches a posture: its
+/// joints are stiffer than those of a compliant run.
+const HOLDING_POLES: ([f64; JOINTS], f64) = ([3.5, 3.0, 3.5, 5.0, 12.0, 12.0, 12.0], 1.5);
+
 /// Control periods after which the mass matrix is renewed: 27 ms.
 const RENEWAL: u8 = 8;
 
 /// Largest difference from the measured velocity (rad/s): a person who shoves the arm is in no model.
 const FARTHEST: f64 = 0.5;
+
+/// The same for a fast joint of an arm that holds a posture, and the measured speed from which it is one (rad/s).
+const FARTHEST_AT_SPEED: (f64, f64) = (0.1, 0.9);
 
 /// Gains of the correction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +69,8 @@ impl<R: Real> Correction<R> {
 /// Motion of the joints, as the model tells it.
 #[derive(Clone, Debug)]
 pub struct MotionObserver<R: Real> {
-    correction: Correction<R>,
+    /// For compliant runs, and for an arm that holds or approaches a posture.
+    correction: [Correction<R>; 2],
     q: Vector7<R>,
     dq: Vector7<R>,
     /// Acceleration that the torque does not explain (rad/s^2).
@@ -81,7 +89,10 @@ impl<R: Real> MotionObserver<R> {
     /// Nothing is known yet.
     pub fn new() -> Self {
         MotionObserver {
-            correction: Correction::with_poles(&POLES, DISTURBANCE_POLE),
+            correction: [
+                Correction::with_poles(&POLES, DISTURBANCE_POLE),
+                Correction::with_poles(&HOLDING_POLES.0, HOLDING_POLES.1),
+            ],
             q: Vector7::zeros(),
             dq: Vector7::zeros(),
             disturbance: Vector7::zeros(),
@@ -107,17 +118,30 @@ impl<R: Real> MotionObserver<R> {
         ahead.zip_map(&state.dq.0, |observed, measured| measured + within(observed - measured, R::of(FARTHEST)))
     }
 
-    /// One control period on, corrected by what is measured.
+    /// As [`MotionObserver::velocity`], for an arm that holds or approaches a posture: nearer to the measured velocities
+    /// where they are high.
     #[inline(never)]
-    pub fn update(&mut self, state: &JointState<R>) {
+    pub fn velocity_in_hold(&self, state: &JointState<R>) -> Vector7<R> {
+        let (least, speed) = FARTHEST_AT_SPEED;
+        self.velocity(state).zip_map(&state.dq.0, |observed, measured| {
+            let fast = if measured < R::of(0.0) { -measured } else { measured };
+            let farthest = at_least(R::of(FARTHEST) - fast * R::of((FARTHEST - least) / speed), R::of(least));
+            measured + within(observed - measured, farthest)
+        })
+    }
+
+    /// One control period on, corrected by what is measured, for an arm that holds a posture or not.
+    #[inline(never)]
+    pub fn update(&mut self, state: &JointState<R>, holds: bool) {
+        let correction = &self.correction[usize::from(holds)];
         let acceleration = self.sent[1] * R::of(LATENCY) + self.sent[0] * R::of(1.0 - LATENCY) + self.disturbance;
         self.q += (self.dq + acceleration * R::of(0.5 * PERIOD)) * R::of(PERIOD);
         self.dq += acceleration * R::of(PERIOD);
         if state.missing == 0 {
             let error = state.q.0 - self.q;
-            self.q += error.component_mul(&self.correction.position);
-            self.dq += error.component_mul(&self.correction.velocity);
-            self.disturbance += error.component_mul(&self.correction.acceleration);
+            self.q += error.component_mul(&correction.position);
+            self.dq += error.component_mul(&correction.velocity);
+            self.disturbance += error.component_mul(&correction.acceleration);
         }
     }
 
@@ -141,6 +165,14 @@ impl<R: Real> MotionObserver<R> {
         // What is not a number would stay for good.
         let known = next.iter().all(|value| value.is_finite_number());
         self.sent = [if known { next } else { Vector7::zeros() }, self.sent[0]];
+    }
+
+    /// Takes a torque (N m) that will be sent from now on and that friction holds.
+    #[inline(never)]
+    pub fn hold_back(&mut self, torque: &Vector7<R>) {
+        if self.ready && *torque != Vector7::zeros() {
+            self.disturbance -= self.accelerated(torque);
+        }
     }
 
     /// `L D L^T` of the mass matrix: `L` below the diagonal, `1/D` on it.

@@ -1,0 +1,99 @@
+//! `Breakaway`: the torque against friction with which an approach begins, so that a motor turns soon, or its encoder
+//! stands still.
+//!
+//! The spring of Eq (10) builds up slowly where a plan begins slowly. A motor whose encoder stands still then runs
+//! away: nothing damps it, and friction that is smaller than the largest thinkable one hides it. Here the torque of
+//! every motor that the approach is to turn rises to what no friction holds, in a short time. A sound motor breaks away
+//! at its own friction, and what was added fades.
+
+use crate::model::friction::SWING;
+use crate::real::{Real, at_least, at_most};
+use crate::time::{PERIOD, periods};
+use crate::units::JOINTS;
+
+/// Torque to which it rises, in parts of [`SWING`]: beyond what is believed of a sound motor.
+const BEYOND: f64 = 1.1;
+
+/// Time in which the torque rises to [`SWING`] times the friction (s). Shorter, and a joint without friction is jerked;
+/// longer, and a joint that nobody sees goes farther.
+const RISE: f64 = 0.11;
+
+/// Time constant with which it fades once the motor turns (s).
+const FADE: f64 = 0.06;
+
+/// Cycles with another count after which a motor turns: one may be a count that flickers.
+const TURNS: u8 = 2;
+
+/// Way of a motor (rad) below which it is not asked to turn: 7 mrad of J1.
+const LEAST_WAY: f64 = 0.3;
+
+/// Longest time for which it is asked: 0.5 s, in control periods.
+const LONGEST: u16 = periods(0.5);
+
+/// The torque with which an approach begins.
+#[derive(Clone, Debug)]
+pub(crate) struct Breakaway<R: Real> {
+    /// Direction of each motor's way, 1 or -1; 0: not asked to turn.
+    direction: [R; JOINTS],
+    /// Torque against friction when it began (N m at the motor).
+    begin: Option<[R; JOINTS]>,
+    /// Cycles in which the count of each motor changed.
+    turned: [u8; JOINTS],
+    /// Torque that is added (N m at the motor).
+    extra: [R; JOINTS],
+    passed: u16,
+}
+
+impl<R: Real> Breakaway<R> {
+    /// No motor is asked to turn.
+    pub(crate) fn none() -> Self {
+        let zero = [R::of(0.0); JOINTS];
+        Breakaway { direction: zero, begin: None, turned: [0; JOINTS], extra: zero, passed: 2 * LONGEST }
+    }
+
+    /// For motors that are to go these ways (rad).
+    pub(crate) fn along(ways: &[R; JOINTS]) -> Self {
+        let direction = ways.map(|way| {
+            let least = R::of(LEAST_WAY);
+            R::of(if way > least { 1.0 } else if way < -least { -1.0 } else { 0.0 })
+        });
+        Breakaway { direction, passed: 0, ..Breakaway::none() }
+    }
+
+    /// True while torque is added, or will be.
+    pub(crate) fn is_active(&self) -> bool {
+        self.passed < 2 * LONGEST
+    }
+
+    /// Motors that have been asked to turn and have not, one bit each, M1 lowest.
+    pub(crate) fn due(&self) -> u8 {
+        if self.passed >= LONGEST {
+            return 0;
+        }
+        let motors = self.direction.iter().zip(&self.turned).enumerate();
+        motors.fold(0, |due, (motor, (direction, turned))| {
+            due | u8::from(*direction != R::of(0.0) && *turned < TURNS) << motor
+        })
+    }
+
+    /// One control period: takes the torque against friction that acts without it and the largest friction (N m at the
+    /// motor), and the motors whose count did not change, one bit each. Returns what is to be added (N m at the motor).
+    #[inline(never)]
+    pub(crate) fn step(&mut self, against: &[R; JOINTS], friction: &[R; JOINTS], still: u8) -> &[R; JOINTS] {
+        let begin = *self.begin.get_or_insert(*against);
+        self.passed = self.passed.saturating_add(1);
+        let level = at_most(R::from_counts(i32::from(self.passed)) * R::of(PERIOD / RISE), R::of(BEYOND)) * R::of(SWING);
+        let motors = self.direction.iter().zip(&mut self.turned).zip(&mut self.extra);
+        let torques = begin.iter().zip(against).zip(friction);
+        for (motor, (((direction, turned), extra), ((begin, against), friction))) in motors.zip(torques).enumerate() {
+            *turned = turned.saturating_add(u8::from(still >> motor & 1 == 0));
+            if *turned >= TURNS || self.passed >= LONGEST {
+                *extra *= R::of(1.0 - PERIOD / FADE);
+            } else {
+                let missing = *direction * (*begin - *against) + level * *friction;
+                *extra = *direction * at_least(missing, R::of(0.0));
+            }
+        }
+        &self.extra
+    }
+}
