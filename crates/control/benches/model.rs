@@ -61,7 +61,7 @@ fn observer<R: Real>(bencher: Bencher<'_, '_>) {
             still: 0,
             displaced: false,
         };
-        observer.update(&state);
+        observer.update(&state, false);
         let velocity = observer.velocity(&state);
         observer.send(model, frames, &velocity, &q.0);
         velocity

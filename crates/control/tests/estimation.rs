@@ -314,6 +314,23 @@ fn g1_a_joint_that_runs_into_its_stop_at_any_speed_is_believed() {
 }
 
 #[test]
+fn g1_a_wrist_that_a_blow_sets_turning_within_a_cycle_is_believed_by_its_second_reply() {
+    // J5 hits its stop, and J7, whose axis is nearly the same, turns by 10 rad/s faster from one cycle to the next.
+    let calibration = nominal::<f64>();
+    for speed in [10.0, -10.0] {
+        let mut estimator = JointEstimator::<f64>::new(&nominal());
+        let mut q = [0.1; 7];
+        for cycle in 0..60 {
+            q[6] += if cycle < 30 { 0.0 } else { speed / RATE };
+            let state = estimator.update(&replies(&calibration, q), true).expect("known");
+            assert_eq!((state.missing, state.displaced), (u8::from(cycle == 30), false), "cycle {cycle}");
+            assert!((state.q.0[6] - q[6]).abs() < 2e-3 || cycle == 30, "cycle {cycle}: {state:?}");
+            assert!((state.dq.0[6] - speed).abs() < 0.1 || cycle < 40, "cycle {cycle}: {state:?}");
+        }
+    }
+}
+
+#[test]
 fn the_filter_has_unit_gain_at_rest_and_half_power_at_its_cut_off() {
     let gain = |frequency: f64| {
         let mut filter = LowPass::<f64, 1>::new(Butterworth::new(50.0, 300.0));

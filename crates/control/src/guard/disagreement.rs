@@ -82,7 +82,7 @@ impl<R: Real> Disagreement<R> {
 
     /// Every motor has turned.
     pub(crate) fn all_turn(&mut self) {
-        self.still = [0; JOINTS];
+        (self.still, self.beyond) = ([0; JOINTS], [0; JOINTS]);
     }
 
     /// Takes what the law asks of the joints, the measured force (N) and the motors whose counts have not changed, one
@@ -92,7 +92,7 @@ impl<R: Real> Disagreement<R> {
     #[inline(never)]
     pub(crate) fn encoder_stands_still(&mut self, effort: &Effort<'_, R>, force: R, unchanged: u8) -> bool {
         if force > R::of(CONTACT) {
-            self.still = [0; JOINTS];
+            self.all_turn();
             return false;
         }
         let asked = self.transmission.motor_torques_from_joint(&(*effort.feedback).into());

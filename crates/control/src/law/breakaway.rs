@@ -55,7 +55,13 @@ impl<R: Real> Breakaway<R> {
     pub(crate) fn along(ways: &[R; JOINTS]) -> Self {
         let direction = ways.map(|way| {
             let least = R::of(LEAST_WAY);
-            R::of(if way > least { 1.0 } else if way < -least { -1.0 } else { 0.0 })
+            R::of(if way > least {
+                1.0
+            } else if way < -least {
+                -1.0
+            } else {
+                0.0
+            })
         });
         Breakaway { direction, passed: 0, ..Breakaway::none() }
     }
@@ -82,7 +88,8 @@ impl<R: Real> Breakaway<R> {
     pub(crate) fn step(&mut self, against: &[R; JOINTS], friction: &[R; JOINTS], still: u8) -> &[R; JOINTS] {
         let begin = *self.begin.get_or_insert(*against);
         self.passed = self.passed.saturating_add(1);
-        let level = at_most(R::from_counts(i32::from(self.passed)) * R::of(PERIOD / RISE), R::of(BEYOND)) * R::of(SWING);
+        let level =
+            at_most(R::from_counts(i32::from(self.passed)) * R::of(PERIOD / RISE), R::of(BEYOND)) * R::of(SWING);
         let motors = self.direction.iter().zip(&mut self.turned).zip(&mut self.extra);
         let torques = begin.iter().zip(against).zip(friction);
         for (motor, (((direction, turned), extra), ((begin, against), friction))) in motors.zip(torques).enumerate() {

@@ -33,7 +33,12 @@ pub struct JointController<R: Real> {
 impl<R: Real> JointController<R> {
     /// A controller without history.
     pub fn new() -> Self {
-        JointController { feedback: Vector7::zeros(), desired: Vector7::zeros(), measured: Vector7::zeros(), friction: Vector7::zeros() }
+        JointController {
+            feedback: Vector7::zeros(),
+            desired: Vector7::zeros(),
+            measured: Vector7::zeros(),
+            friction: Vector7::zeros(),
+        }
     }
 
     /// The feedback torque of the last good cycle (N m).

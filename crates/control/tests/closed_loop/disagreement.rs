@@ -96,6 +96,51 @@ fn a8_an_encoder_of_the_arm_that_stands_still_before_a_movement_stops_it() {
 }
 
 #[test]
+fn a8_every_encoder_that_stands_still_is_found_as_an_approach_begins_whatever_the_friction() {
+    let mut farthest = 0.0f64;
+    for friction in [0.0, 0.3, 0.7, 1.3] {
+        for target in [TARGET, OUT, [-0.9, 0.3, -0.6, 2.2, -0.8, 0.6, -0.7]] {
+            for motor in 0..4 {
+                let mut rig = Rig::<f32>::new(START, 1);
+                rig.plant.coulomb *= friction;
+                rig.command(Command::Hold);
+                rig.run_for(2.0);
+                freeze(&mut rig, motor);
+                rig.command(Command::Approach { q: target.map(|q| q as f32), duration: 0.0 });
+                let (seconds, way, _) = stop(&mut rig);
+                let what = format!("friction {friction}, M{}: {seconds:.3} s, {way:.3} rad", motor + 1);
+                println!("{what}");
+                assert_eq!(rig.cycle.fault(), Fault::EncoderStuck, "{what}");
+                assert!(seconds < 0.25, "{what}");
+                farthest = farthest.max(way);
+            }
+        }
+    }
+    println!("farthest {farthest:.3} rad");
+    assert!(farthest < 0.1, "{farthest}");
+}
+
+#[test]
+fn a8_no_sound_encoder_is_called_stuck_as_an_approach_begins_whatever_the_friction() {
+    // A joint that friction holds the other way than it is to go takes 2.6 times the friction of the model to turn.
+    for friction in [0.0, 0.5, 1.3] {
+        for payload in [0.0, 1.0] {
+            let mut rig = Rig::<f32>::new(START, 1);
+            rig.plant.coulomb *= friction;
+            rig.plant.push[2] = -9.81 * payload;
+            rig.command(Command::Hold);
+            rig.run_for(2.0);
+            for target in [TARGET, START, GOAL, OUT, TARGET, GOAL] {
+                rig.command(Command::Approach { q: target.map(|q| q as f32), duration: 0.0 });
+                rig.until(State::Hold, 60.0);
+                assert_eq!(rig.cycle.fault(), Fault::None, "friction {friction}, {payload} kg");
+                rig.run_for(1.0);
+            }
+        }
+    }
+}
+
+#[test]
 fn a8_a_stuck_encoder_is_not_cleared_while_its_joint_may_be_elsewhere() {
     let mut rig = moving(false, 1.0, None);
     freeze(&mut rig, 0);
