@@ -76,19 +76,26 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
+    /// Torque of gravity (N m) where the model sees the arm: with the swing of the cables in it, and late, it would drive
+    /// them.
+    fn steady_gravity(&self, measured: &Measured<'_, R>) -> Vector7<R> {
+        let q = self.observer.position(measured.state);
+        self.model.gravity_torque(&Frames::new(&self.model, &q)).0
+    }
+
     /// Gravity compensation; damped while it builds up after arming, and while the hand is faster than a person
     /// teaches.
     fn float(&self, measured: &Measured<'_, R>) -> Demand<R> {
-        let gravity = self.model.gravity_torque(measured.frames).0;
+        let gravity = self.steady_gravity(measured);
         let mut torque = gravity;
         let mut share = (hand_speed(measured) - R::of(TAUGHT_SPEED)) * R::of(1.0 / (BRAKED_SPEED - TAUGHT_SPEED));
         if self.armed_for < ARMING {
             let arming = R::from_counts(i32::from(ARMING - self.armed_for)) / R::from_counts(i32::from(ARMING));
             share = at_least(share, arming);
         }
-        if share > R::of(0.0) {
-            torque -= self.gains.stop_damping.component_mul(&measured.state.dq.0) * at_most(share, R::of(1.0));
-        }
+        let (light, full) = (&self.gains.lead_damping, &self.gains.stop_damping);
+        let share = at_most(at_least(share, R::of(0.0)), R::of(1.0));
+        torque -= (light + (full - light) * share).component_mul(&self.observer.velocity_in_hold(measured.state));
         Demand { explained: (gravity, Vector7::zeros()), ..self.plain(measured, torque) }
     }
 
@@ -104,8 +111,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             }
             _ => return self.float(measured),
         };
-        let gravity = self.model.gravity_torque(measured.frames).0;
-        let damping = self.gains.stop_damping.component_mul(&measured.state.dq.0);
+        let gravity = self.steady_gravity(measured);
+        let velocity = self.observer.velocity_in_hold(measured.state);
+        let damping = self.gains.stop_damping.component_mul(&velocity);
         let demand = self.plain(measured, gravity * share + rest - damping);
         Demand { explained: (gravity, Vector7::zeros()), ..demand }
     }

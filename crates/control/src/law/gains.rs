@@ -64,6 +64,10 @@ const FRICTION_FRACTION: f64 = 0.8;
 /// friction that is 30 % more, with 20 % to spare.
 const SETTLING_FRACTION: f64 = 1.5;
 
+/// Damping of an arm that is led by hand (N m s/rad): little beside its friction, and enough for its cables where there
+/// is none.
+const LEAD_DAMPING: [f64; 7] = [2.0, 3.5, 0.45, 0.5, 0.07, 0.18, 0.02];
+
 /// Damping of a soft stop (N m s/rad).
 const STOP_DAMPING: [f64; 7] = [22.0, 40.0, 4.5, 5.0, 0.22, 0.6, 0.06];
 
@@ -149,6 +153,8 @@ pub struct Gains<R: Real> {
     pub compliant: Tracking<R>,
     /// Largest shift of a held posture by the integral (rad); times `K_p` the most it adds against an obstacle.
     pub settling: Vector7<R>,
+    /// Damping of an arm that is led by hand (N m s/rad).
+    pub lead_damping: Vector7<R>,
     /// Damping of a soft stop (N m s/rad).
     pub stop_damping: Vector7<R>,
     /// The hand.
@@ -164,6 +170,7 @@ impl<R: Real> Gains<R> {
             compliant: Tracking::from_numbers(&COMPLIANT),
             settling: (vector(wam7::FRICTION_COULOMB) * R::of(SETTLING_FRACTION))
                 .component_div(&vector(HOLDING.stiffness)),
+            lead_damping: vector(LEAD_DAMPING),
             stop_damping: vector(STOP_DAMPING),
             hand: HandGains {
                 stiffness: HAND_STIFFNESS.map(R::of),

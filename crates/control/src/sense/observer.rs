@@ -13,7 +13,7 @@ use crate::model::kinematics::Frames;
 use crate::real::{Real, at_least, within};
 use crate::sense::joints::JointState;
 use crate::time::PERIOD;
-use crate::units::{JOINTS, Vector7};
+use crate::units::{JOINTS, JointPositions, Vector7};
 
 /// Time from the latch of the positions to the torque that answers them, in control periods: 1.35 ms.
 const LATENCY: f64 = 0.4;
@@ -34,6 +34,9 @@ const RENEWAL: u8 = 8;
 
 /// Largest difference from the measured velocity (rad/s): a person who shoves the arm is in no model.
 const FARTHEST: f64 = 0.5;
+
+/// Largest difference from the measured position (rad).
+const ASTRAY: f64 = 0.02;
 
 /// The same for a fast joint of an arm that holds a posture, and the measured speed from which it is one (rad/s).
 const FARTHEST_AT_SPEED: (f64, f64) = (0.1, 0.9);
@@ -116,6 +119,13 @@ impl<R: Real> MotionObserver<R> {
     pub fn velocity(&self, state: &JointState<R>) -> Vector7<R> {
         let ahead = self.dq + (self.sent[0] + self.disturbance) * R::of(LATENCY * PERIOD);
         ahead.zip_map(&state.dq.0, |observed, measured| measured + within(observed - measured, R::of(FARTHEST)))
+    }
+
+    /// Positions (rad), kept near the measured ones.
+    #[inline(never)]
+    pub fn position(&self, state: &JointState<R>) -> JointPositions<R> {
+        let near = |observed, measured| measured + within(observed - measured, R::of(ASTRAY));
+        JointPositions(self.q.zip_map(&state.q.0, near))
     }
 
     /// As [`MotionObserver::velocity`], for an arm that holds or approaches a posture: nearer to the measured velocities
