@@ -95,7 +95,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         let (light, full) = (&self.gains.lead_damping, &self.gains.stop_damping);
         let share = at_most(at_least(share, R::of(0.0)), R::of(1.0));
-        torque -= (light + (full - light) * share).component_mul(&self.observer.velocity_in_hold(measured.state));
+        torque -= (light + (full - light) * share).component_mul(&self.observer.velocity_when_stiff(measured.state));
         Demand { explained: (gravity, Vector7::zeros()), ..self.plain(measured, torque) }
     }
 
@@ -112,7 +112,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             _ => return self.float(measured),
         };
         let gravity = self.steady_gravity(measured);
-        let velocity = self.observer.velocity_in_hold(measured.state);
+        let velocity = self.observer.velocity_when_stiff(measured.state);
         let damping = self.gains.stop_damping.component_mul(&velocity);
         let demand = self.plain(measured, gravity * share + rest - damping);
         Demand { explained: (gravity, Vector7::zeros()), ..demand }
@@ -123,21 +123,21 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     #[inline(never)]
     fn hold_to(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
         let Law::Posture(posture) = &mut self.law else { return self.float(measured) };
-        let reference = posture.reference(measured.state, &self.gains.holding.clamp);
+        let reference = posture.reference(measured.state, &self.gains.stiff.clamp);
         let frozen = measured.state.missing > 0;
         if !frozen && !self.cut.is_cut() {
             let error = reference.q.0 - measured.state.q.0;
             let before = *posture.integral.shift();
             posture.integral.step(&self.gains, &error, &(measured.state.dq.0 - reference.dq.0));
             // What the integral adds is there for friction, and moves nothing.
-            let added = self.gains.holding.stiffness.component_mul(&(posture.integral.shift() - before));
+            let added = self.gains.stiff.stiffness.component_mul(&(posture.integral.shift() - before));
             self.observer.hold_back(&added);
         }
         let shifted = JointReference { q: JointPositions(reference.q.0 + posture.integral.shift()), ..reference };
-        let velocity = self.observer.velocity_in_hold(measured.state);
+        let velocity = self.observer.velocity_when_stiff(measured.state);
         let mut torque = posture.controller.torque(
             &self.model,
-            &self.gains.holding,
+            &self.gains.stiff,
             measured.frames,
             measured.state,
             (!frozen).then_some(&velocity),
@@ -199,7 +199,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             let behind = lag.distance * R::of(1.0 / TRACKING_LIMIT);
             run.crowd(at_least(speed_load(measured.frames, &reference.dq), behind));
         }
-        let velocity = if options.compliant { self.observer.velocity(measured.state) } else { measured.state.dq.0 };
+        let velocity = if options.compliant {
+            self.observer.velocity(measured.state)
+        } else {
+            self.observer.velocity_when_stiff(measured.state)
+        };
         let velocity = (!frozen).then_some(&velocity);
         let mut torque =
             controller.torque(&self.model, tracking, measured.frames, measured.state, velocity, &reference);

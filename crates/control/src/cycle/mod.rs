@@ -338,7 +338,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 };
                 // A model lets an arm fall that friction or brakes hold while the torque of gravity builds up.
                 if self.supervisor.state().has_torque() && self.armed_for >= BUILDING_UP {
-                    self.observer.update(&state, matches!(self.law, Law::Posture(_)));
+                    let compliant = self.run.as_ref().is_some_and(|run| run.options.compliant);
+                    self.observer.update(&state, !(matches!(self.law, Law::Run(_)) && compliant));
                 } else {
                     self.observer.settle(&state);
                 }

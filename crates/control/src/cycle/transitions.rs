@@ -90,12 +90,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.hand.begin_run();
         // From what the feedback is drawn to while holding, so that the torque against friction stays.
         let start = match &self.law {
-            Law::Posture(posture) if !options.compliant => {
-                let drawn = posture.q.0 + posture.integral.shift() - measured.state.q.0;
-                let gains = &self.gains;
-                let ratio = gains.holding.stiffness.component_div(&gains.stiff.stiffness);
-                JointPositions(measured.state.q.0 + drawn.component_mul(&ratio))
-            }
+            Law::Posture(posture) if !options.compliant => JointPositions(posture.q.0 + posture.integral.shift()),
             _ => measured.state.q,
         };
         self.force.restart(self.gains.tracking(options.compliant).force_window);
@@ -116,10 +111,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
 
     /// The posture to hold after a run: what Eq (11) has put between q_d and q against friction becomes the integral's.
     fn after_run(&self, measured: &Measured<'_, R>) -> Posture<R> {
-        let holding = &self.gains.holding;
-        let velocity = self.observer.velocity_in_hold(measured.state);
-        let torque = self.torque_beyond_model(measured) + holding.damping.component_mul(&velocity);
-        let offset = torque.component_div(&holding.stiffness).zip_map(&holding.clamp, within);
+        let stiff = &self.gains.stiff;
+        let velocity = self.observer.velocity_when_stiff(measured.state);
+        let torque = self.torque_beyond_model(measured) + stiff.damping.component_mul(&velocity);
+        let offset = torque.component_div(&stiff.stiffness).zip_map(&stiff.clamp, within);
         let mut posture = Posture::at(measured.state.q);
         let held = posture.integral.take_over(&self.gains, &offset, &measured.state.q);
         posture.shift_to(held);

@@ -22,11 +22,12 @@ struct Numbers {
     force_limit: (f64, f64),
 }
 
-/// Exact. Damping: too high for the delay of the loop, the wrist sings; too low, it rings. Clamp times stiffness is the
-/// most a blocked joint pushes with, and that has to be more than its friction.
+/// Exact. With a stiffer J2 or J3 the delay of the loop and the elastic cables leave no margin where there is no friction
+/// (decision 0093). Clamp times stiffness is the most a blocked joint pushes with, and that has to be more than its
+/// friction.
 const STIFF: Numbers = Numbers {
-    stiffness: [300.0, 700.0, 150.0, 160.0, 10.0, 20.0, 2.5],
-    damping: [22.0, 40.0, 4.5, 5.0, 0.22, 0.6, 0.06],
+    stiffness: [250.0, 300.0, 105.0, 130.0, 10.0, 16.0, 2.5],
+    damping: [18.0, 22.0, 4.5, 5.0, 0.3, 0.5, 0.07],
     clamp: [0.10, 0.10, 0.10, 0.10, 0.20, 0.15, 0.20],
     pose: 3.0,
     posture: 1.0,
@@ -34,14 +35,6 @@ const STIFF: Numbers = Numbers {
     moment_share: 1.0,
     force_window: periods(0.2) as usize,
     force_limit: (10.0, 1.0),
-};
-
-/// For an arm that holds or approaches a posture. Softer than [`STIFF`] on J2 and J3: with the delay of the loop a stiffer
-/// joint and the elastic cables leave no margin where there is no friction.
-const HOLDING: Numbers = Numbers {
-    stiffness: [250.0, 300.0, 105.0, 130.0, 10.0, 16.0, 2.5],
-    damping: [18.0, 22.0, 4.5, 5.0, 0.3, 0.5, 0.07],
-    ..STIFF
 };
 
 /// Soft in contact.
@@ -145,10 +138,8 @@ pub struct HandGains<R: Real> {
 /// Every gain of the controllers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains<R: Real> {
-    /// For runs that are to be exact.
+    /// For `Hold`, `Approach` and runs that are to be exact.
     pub stiff: Tracking<R>,
-    /// For `Hold` and `Approach`.
-    pub holding: Tracking<R>,
     /// For runs that are to be soft in contact.
     pub compliant: Tracking<R>,
     /// Largest shift of a held posture by the integral (rad); times `K_p` the most it adds against an obstacle.
@@ -166,10 +157,9 @@ impl<R: Real> Gains<R> {
     pub fn tuned() -> Self {
         Gains {
             stiff: Tracking::from_numbers(&STIFF),
-            holding: Tracking::from_numbers(&HOLDING),
             compliant: Tracking::from_numbers(&COMPLIANT),
             settling: (vector(wam7::FRICTION_COULOMB) * R::of(SETTLING_FRACTION))
-                .component_div(&vector(HOLDING.stiffness)),
+                .component_div(&vector(STIFF.stiffness)),
             lead_damping: vector(LEAD_DAMPING),
             stop_damping: vector(STOP_DAMPING),
             hand: HandGains {

@@ -25,9 +25,9 @@ const POLES: [f64; JOINTS] = [4.0, 4.0, 4.0, 6.0, 15.0, 15.0, 15.0];
 /// Pole with which the unexplained acceleration is followed (Hz).
 const DISTURBANCE_POLE: f64 = 2.0;
 
-/// Poles of the correction and of the unexplained acceleration (Hz) for an arm that holds or approaches a posture: its
-/// joints are stiffer than those of a compliant run.
-const HOLDING_POLES: ([f64; JOINTS], f64) = ([3.5, 3.0, 3.5, 5.0, 12.0, 12.0, 12.0], 1.5);
+/// Poles of the correction and of the unexplained acceleration (Hz) in every other state than a compliant run: where the
+/// joints are stiffer, the shoulder's lie lower.
+const STIFF_POLES: ([f64; JOINTS], f64) = ([3.5, 3.0, 3.5, 5.0, 12.0, 12.0, 12.0], 1.5);
 
 /// Control periods after which the mass matrix is renewed: 27 ms.
 const RENEWAL: u8 = 8;
@@ -38,7 +38,8 @@ const FARTHEST: f64 = 0.5;
 /// Largest difference from the measured position (rad).
 const ASTRAY: f64 = 0.02;
 
-/// The same for a fast joint of an arm that holds a posture, and the measured speed from which it is one (rad/s).
+/// The same for a fast joint in every other state than a compliant run, and the measured speed from which it is fast
+/// (rad/s).
 const FARTHEST_AT_SPEED: (f64, f64) = (0.1, 0.9);
 
 /// Gains of the correction.
@@ -72,7 +73,7 @@ impl<R: Real> Correction<R> {
 /// Motion of the joints, as the model tells it.
 #[derive(Clone, Debug)]
 pub struct MotionObserver<R: Real> {
-    /// For compliant runs, and for an arm that holds or approaches a posture.
+    /// For compliant runs, and for every other state.
     correction: [Correction<R>; 2],
     q: Vector7<R>,
     dq: Vector7<R>,
@@ -94,7 +95,7 @@ impl<R: Real> MotionObserver<R> {
         MotionObserver {
             correction: [
                 Correction::with_poles(&POLES, DISTURBANCE_POLE),
-                Correction::with_poles(&HOLDING_POLES.0, HOLDING_POLES.1),
+                Correction::with_poles(&STIFF_POLES.0, STIFF_POLES.1),
             ],
             q: Vector7::zeros(),
             dq: Vector7::zeros(),
@@ -128,10 +129,10 @@ impl<R: Real> MotionObserver<R> {
         JointPositions(self.q.zip_map(&state.q.0, near))
     }
 
-    /// As [`MotionObserver::velocity`], for an arm that holds or approaches a posture: nearer to the measured velocities
-    /// where they are high.
+    /// As [`MotionObserver::velocity`], for every other state than a compliant run: nearer to the measured velocities where
+    /// they are high.
     #[inline(never)]
-    pub fn velocity_in_hold(&self, state: &JointState<R>) -> Vector7<R> {
+    pub fn velocity_when_stiff(&self, state: &JointState<R>) -> Vector7<R> {
         let (least, speed) = FARTHEST_AT_SPEED;
         self.velocity(state).zip_map(&state.dq.0, |observed, measured| {
             let fast = if measured < R::of(0.0) { -measured } else { measured };
@@ -140,10 +141,10 @@ impl<R: Real> MotionObserver<R> {
         })
     }
 
-    /// One control period on, corrected by what is measured, for an arm that holds a posture or not.
+    /// One control period on, corrected by what is measured; `stiff` in every state but a compliant run.
     #[inline(never)]
-    pub fn update(&mut self, state: &JointState<R>, holds: bool) {
-        let correction = &self.correction[usize::from(holds)];
+    pub fn update(&mut self, state: &JointState<R>, stiff: bool) {
+        let correction = &self.correction[usize::from(stiff)];
         let acceleration = self.sent[1] * R::of(LATENCY) + self.sent[0] * R::of(1.0 - LATENCY) + self.disturbance;
         self.q += (self.dq + acceleration * R::of(0.5 * PERIOD)) * R::of(PERIOD);
         self.dq += acceleration * R::of(PERIOD);

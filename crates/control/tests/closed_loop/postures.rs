@@ -128,7 +128,7 @@ fn a_frictionless_arm_is_held_steadily_as_well() {
 fn an_obstacle_feels_no_more_than_one_and_a_half_times_the_friction_in_addition() {
     let mut rig = holding(GOAL, 1, 1.0);
     rig.plant.push[1] = 25.0;
-    let stiffness = f64::from(Gains::<f32>::tuned().holding.stiffness[0]);
+    let stiffness = f64::from(Gains::<f32>::tuned().stiff.stiffness[0]);
     let (mut most, mut stands) = (0.0f64, 0);
     for _ in 0..periods(10.0) {
         let record = rig.tick(None).record;
@@ -196,7 +196,7 @@ fn while_a_torque_is_cut_the_integral_waits() {
         record = rig.tick(None).record;
         cycles += 1;
     }
-    let stiff = Gains::<f32>::tuned().holding;
+    let stiff = Gains::<f32>::tuned().stiff;
     let spring = stiff.stiffness[0] * (record.q_d[0] - record.q[0]) - stiff.damping[0] * record.dq[0];
     assert!(cycles > 20, "{cycles} cycles");
     assert!(spring.abs() > 3.0 && (record.tau[0] - spring).abs() < 0.02, "{} of {spring} N m", record.tau[0]);
