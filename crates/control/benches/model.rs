@@ -55,6 +55,7 @@ fn observer<R: Real>(bencher: Bencher<'_, '_>) {
             q: *q,
             dq: JointVelocities(q.0),
             missing: 0,
+            extrapolated: 0,
             age: 0,
             implausible: false,
             stuck: false,

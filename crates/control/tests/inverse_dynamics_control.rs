@@ -15,6 +15,7 @@ fn the_torque_is_inertia_bias_feedback_and_friction() {
         q: JointPositions::from_array([-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75]),
         dq: JointVelocities::from_array([0.2, -0.1, 0.3, 0.4, -0.5, 0.6, -0.2]),
         missing: 0,
+        extrapolated: 0,
         age: 0,
         implausible: false,
         stuck: false,
@@ -29,7 +30,7 @@ fn the_torque_is_inertia_bias_feedback_and_friction() {
     };
     let frames = Frames::new(&arm, &state.q);
     let mut controller = JointController::new();
-    let torque = controller.torque(&arm, &gains, &frames, &state, Some(&state.dq.0), &reference).0;
+    let torque = controller.torque(&arm, &gains, &frames, &state, &state.dq.0, &reference).0;
 
     let friction = Vector7::from_fn(|joint, _| {
         let rate = reference.planned.0[joint];
@@ -46,7 +47,13 @@ fn the_torque_is_inertia_bias_feedback_and_friction() {
     assert!((torque - expected).amax() < 1e-10, "{torque} {expected}");
 
     // Frozen, the feedback of the last good cycle stays, whatever the extrapolated state is.
-    let elsewhere = JointState { q: JointPositions(state.q.0 * 1.1), ..state };
-    let frozen = controller.torque(&arm, &gains, &frames, &elsewhere, None, &reference).0;
+    let elsewhere = JointState { q: JointPositions(state.q.0 * 1.1), extrapolated: 0b111_1111, ..state };
+    let frozen = controller.torque(&arm, &gains, &frames, &elsewhere, &state.dq.0, &reference).0;
     assert!((frozen - torque).amax() < 1e-10);
+    // So it does for the joints of a motor that is missing; those of the others go on.
+    let elsewhere = JointState { extrapolated: 0b110, ..elsewhere };
+    let partly = controller.torque(&arm, &gains, &frames, &elsewhere, &state.dq.0, &reference).0;
+    for joint in 0..7 {
+        assert_eq!((partly[joint] - torque[joint]).abs() < 1e-10, [1, 2].contains(&joint), "J{}", joint + 1);
+    }
 }

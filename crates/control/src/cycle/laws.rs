@@ -140,7 +140,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             &self.gains.stiff,
             measured.frames,
             measured.state,
-            (!frozen).then_some(&velocity),
+            &velocity,
             &shifted,
         );
         let pose_d = Frames::new(&self.model, &reference.q).tool_pose();
@@ -204,9 +204,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         } else {
             self.observer.velocity_when_stiff(measured.state)
         };
-        let velocity = (!frozen).then_some(&velocity);
         let mut torque =
-            controller.torque(&self.model, tracking, measured.frames, measured.state, velocity, &reference);
+            controller.torque(&self.model, tracking, measured.frames, measured.state, &velocity, &reference);
         let explained = (torque.0 - controller.feedback(), reference.ddq.0);
         let mut set = if run.bends(primitive) { flags::FEEDBACK } else { 0 };
         if let Some(deviation) = deviation {

@@ -66,8 +66,8 @@ impl<R: Real> JointController<R> {
         *self = JointController::new();
     }
 
-    /// The torque of one tick. `velocity` is fed back (rad/s), measured or observed. Without it (a reply is missing,
-    /// `state` is extrapolated) the feedback torque of the last good tick is kept, while the feed-forward follows the
+    /// The torque of one tick. `velocity` is fed back (rad/s), measured or observed. A joint that `state` extrapolates,
+    /// because a reply is missing, keeps the feedback torque of its last good tick, while the feed-forward follows the
     /// extrapolated posture.
     pub fn torque(
         &mut self,
@@ -75,20 +75,33 @@ impl<R: Real> JointController<R> {
         gains: &Tracking<R>,
         frames: &Frames<R>,
         state: &JointState<R>,
-        velocity: Option<&Vector7<R>>,
+        velocity: &Vector7<R>,
         reference: &JointReference<R>,
     ) -> JointTorques<R> {
         let friction = friction(gains, &reference.planned);
-        if let Some(velocity) = velocity {
-            self.desired = reference.dq.0;
-            let spring = gains.stiffness.component_mul(&(reference.q.0 - state.q.0));
-            self.feedback = spring + gains.damping.component_mul(&(reference.dq.0 - velocity));
-            self.measured = spring + gains.damping.component_mul(&(reference.dq.0 - state.dq.0));
-            self.friction = friction;
+        let spring = gains.stiffness.component_mul(&(reference.q.0 - state.q.0));
+        let before = self.feedback;
+        self.desired = reference.dq.0;
+        self.feedback = spring + gains.damping.component_mul(&(reference.dq.0 - velocity));
+        self.measured = spring + gains.damping.component_mul(&(reference.dq.0 - state.dq.0));
+        self.friction = friction;
+        if state.extrapolated != 0 {
+            self.keep(&before, state.extrapolated);
         }
         let inertial = model.inverse_dynamics(frames, &state.dq, &reference.ddq).0;
         let rotors = model.rotor_torque(&reference.ddq).0;
         JointTorques(inertial + rotors + friction + self.feedback)
+    }
+
+    /// Puts the feedback torque back to what it was (N m) for these joints, one bit each, J1 lowest.
+    #[cold]
+    #[inline(never)]
+    fn keep(&mut self, before: &Vector7<R>, joints: u8) {
+        for (joint, (feedback, before)) in self.feedback.iter_mut().zip(before.iter()).enumerate() {
+            if joints >> joint & 1 != 0 {
+                *feedback = *before;
+            }
+        }
     }
 }
 

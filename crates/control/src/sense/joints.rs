@@ -45,6 +45,9 @@ const TURNING: i32 = 8;
 /// Motors of the arm. A blow can stop those of the wrist dead, they have little to carry.
 const ARM_MOTORS: usize = 4;
 
+/// Joints that each motor turns, one bit each, J1 lowest.
+const TURNED: [u8; JOINTS] = [0b1, 0b110, 0b110, 0b1000, 0b11_0000, 0b11_0000, 0b100_0000];
+
 /// State of one motor.
 #[derive(Clone, Copy, Debug)]
 struct Motor {
@@ -77,6 +80,8 @@ pub struct JointState<R: Real> {
     pub dq: JointVelocities<R>,
     /// Motors without a believed reply in this cycle.
     pub missing: u8,
+    /// Joints that such a motor turns, one bit each, J1 lowest.
+    pub extrapolated: u8,
     /// Largest number of cycles since a believed reply.
     pub age: u8,
     /// True if a reply of this cycle was implausible.
@@ -164,7 +169,7 @@ impl<R: Real> JointEstimator<R> {
         let Some(motors) = &mut self.motors else {
             return self.begin(replies);
         };
-        let mut missing = 0;
+        let (mut missing, mut extrapolated) = (0, 0);
         let mut age = 0;
         let mut implausible = false;
         let (mut stuck, mut still) = (false, 0);
@@ -186,6 +191,7 @@ impl<R: Real> JointEstimator<R> {
                 None => {
                     motor.age = motor.age.saturating_add(1);
                     missing += 1;
+                    extrapolated |= TURNED[index];
                     let bridged = motor.age.min(COAST_CYCLES);
                     rates[index] = if motor.age > COAST_CYCLES { R::of(0.0) } else { self.rates[index] };
                     self.rates[index] * R::from_counts(i32::from(bridged))
@@ -206,6 +212,7 @@ impl<R: Real> JointEstimator<R> {
             q: JointPositions::from_array(q),
             dq: JointVelocities(dq),
             missing,
+            extrapolated,
             age,
             implausible,
             stuck,
@@ -228,6 +235,7 @@ impl<R: Real> JointEstimator<R> {
             q: JointPositions::from_array(q),
             dq: JointVelocities::zero(),
             missing: 0,
+            extrapolated: 0,
             age: 0,
             implausible: false,
             stuck: false,

@@ -148,12 +148,13 @@ impl<R: Real> MotionObserver<R> {
         let acceleration = self.sent[1] * R::of(LATENCY) + self.sent[0] * R::of(1.0 - LATENCY) + self.disturbance;
         self.q += (self.dq + acceleration * R::of(0.5 * PERIOD)) * R::of(PERIOD);
         self.dq += acceleration * R::of(PERIOD);
-        if state.missing == 0 {
-            let error = state.q.0 - self.q;
-            self.q += error.component_mul(&correction.position);
-            self.dq += error.component_mul(&correction.velocity);
-            self.disturbance += error.component_mul(&correction.acceleration);
+        let mut error = state.q.0 - self.q;
+        if state.extrapolated != 0 {
+            forget(&mut error, state.extrapolated);
         }
+        self.q += error.component_mul(&correction.position);
+        self.dq += error.component_mul(&correction.velocity);
+        self.disturbance += error.component_mul(&correction.acceleration);
     }
 
     /// Takes what was sent: the acceleration that was wanted, and the torque (N m) beyond the one that the model needs
@@ -229,6 +230,17 @@ impl<R: Real> MotionObserver<R> {
             }
         }
         x
+    }
+}
+
+/// Nothing corrects these joints, one bit each, J1 lowest: they are not measured.
+#[cold]
+#[inline(never)]
+fn forget<R: Real>(error: &mut Vector7<R>, joints: u8) {
+    for (joint, error) in error.iter_mut().enumerate() {
+        if joints >> joint & 1 != 0 {
+            *error = R::of(0.0);
+        }
     }
 }
 
