@@ -57,6 +57,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "control::sense::wrench::WrenchEstimator<R>::follow",
         "the memory is full; a few dozen instructions without a loop over time",
     ),
+    ("control::law::joint::JointController<R>::keep", "a reply is missing: a few dozen instructions"),
     ("control::sense::observer", "the memory is full; a few loops that the cache keeps from one cycle to the next"),
     (
         "control::model::mass_matrix",

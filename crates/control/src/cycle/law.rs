@@ -53,7 +53,7 @@ pub(super) struct Posture<R: Real> {
     pub(super) approach: Option<Approach<R>>,
     pub(super) integral: PostureIntegral<R>,
     pub(super) controller: JointController<R>,
-    /// How the approach begins.
+    /// Trial of the motors with which the approach begins.
     breakaway: Breakaway<R>,
     /// Torque that it added in the last good cycle (N m).
     extra: Vector7<R>,
@@ -102,7 +102,7 @@ impl<R: Real> Posture<R> {
         &self.extra
     }
 
-    /// What is asked of the joints.
+    /// Returns what is asked of the joints.
     pub(super) fn effort(&self) -> Effort<'_, R> {
         Effort {
             feedback: self.controller.measured_feedback(),

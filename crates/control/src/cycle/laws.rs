@@ -76,8 +76,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
-    /// Torque of gravity (N m) where the model sees the arm: with the swing of the cables in it, and late, it would drive
-    /// them.
+    /// Torque of gravity (N m) where the model sees the arm: with the swing of the cables in it, and late, it would
+    /// drive them.
     fn steady_gravity(&self, measured: &Measured<'_, R>) -> Vector7<R> {
         let q = self.observer.position(measured.state);
         self.model.gravity_torque(&Frames::new(&self.model, &q)).0
@@ -95,7 +95,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         let (light, full) = (&self.gains.lead_damping, &self.gains.stop_damping);
         let share = at_most(at_least(share, R::of(0.0)), R::of(1.0));
-        torque -= (light + (full - light) * share).component_mul(&self.observer.velocity_when_stiff(measured.state));
+        torque -= (light + (full - light) * share).component_mul(&self.observer.velocity(measured.state, true));
         Demand { explained: (gravity, Vector7::zeros()), ..self.plain(measured, torque) }
     }
 
@@ -112,7 +112,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             _ => return self.float(measured),
         };
         let gravity = self.steady_gravity(measured);
-        let velocity = self.observer.velocity_when_stiff(measured.state);
+        let velocity = self.observer.velocity(measured.state, true);
         let damping = self.gains.stop_damping.component_mul(&velocity);
         let demand = self.plain(measured, gravity * share + rest - damping);
         Demand { explained: (gravity, Vector7::zeros()), ..demand }
@@ -134,7 +134,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             self.observer.hold_back(&added);
         }
         let shifted = JointReference { q: JointPositions(reference.q.0 + posture.integral.shift()), ..reference };
-        let velocity = self.observer.velocity_when_stiff(measured.state);
+        let velocity = self.observer.velocity(measured.state, true);
         let mut torque = posture.controller.torque(
             &self.model,
             &self.gains.stiff,
@@ -199,11 +199,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             let behind = lag.distance * R::of(1.0 / TRACKING_LIMIT);
             run.crowd(at_least(speed_load(measured.frames, &reference.dq), behind));
         }
-        let velocity = if options.compliant {
-            self.observer.velocity(measured.state)
-        } else {
-            self.observer.velocity_when_stiff(measured.state)
-        };
+        let velocity = self.observer.velocity(measured.state, !options.compliant);
         let mut torque =
             controller.torque(&self.model, tracking, measured.frames, measured.state, &velocity, &reference);
         let explained = (torque.0 - controller.feedback(), reference.ddq.0);

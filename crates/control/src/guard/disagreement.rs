@@ -32,11 +32,11 @@ const PUSH: f64 = 3.5;
 /// Time for which it has to push: 10 ms, in control periods.
 const PUSHING: u8 = few_periods(0.01);
 
-/// What a law asks of the joints.
+/// Torques and motion that a law asks of the joints.
 pub(crate) struct Effort<'a, R: Real> {
     /// Torque of the joint feedback as measured motion alone asks for it (N m).
     pub(crate) feedback: &'a Vector7<R>,
-    /// Torque that was sent against friction (N m): what was fed back, fed forward, and added for a motor to break away.
+    /// Torque that was sent against friction (N m): fed back, fed forward, and added for a motor to break away.
     pub(crate) sent: Vector7<R>,
     /// Desired velocity (rad/s).
     pub(crate) desired: &'a Vector7<R>,

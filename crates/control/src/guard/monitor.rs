@@ -59,7 +59,7 @@ pub(crate) struct Observation<'a, R: Real> {
     pub(crate) wrench_lost: bool,
     /// True if no fresh force tells of a contact, on an arm that has a sensor.
     pub(crate) blind: bool,
-    /// What the law asks of the joints, where it feeds anything back.
+    /// Torques and motion that the law asks of the joints, where it feeds anything back.
     pub(crate) effort: Option<Effort<'a, R>>,
     /// True if the sensor has been at full scale: in a force, or in a torque that the run depends on.
     pub(crate) full_scale: bool,

@@ -27,8 +27,8 @@ const TURNS: u8 = 2;
 /// Way of a motor (rad) below which it is not asked to turn: 7 mrad of J1.
 const LEAST_WAY: f64 = 0.3;
 
-/// Longest time for which it is asked: 0.5 s, in control periods.
-const LONGEST: u16 = periods(0.5);
+/// Time for which it is asked: 0.5 s, in control periods.
+const TRIAL: u16 = periods(0.5);
 
 /// The torque with which an approach begins.
 #[derive(Clone, Debug)]
@@ -48,7 +48,7 @@ impl<R: Real> Breakaway<R> {
     /// No motor is asked to turn.
     pub(crate) fn none() -> Self {
         let zero = [R::of(0.0); JOINTS];
-        Breakaway { direction: zero, begin: None, turned: [0; JOINTS], extra: zero, passed: 2 * LONGEST }
+        Breakaway { direction: zero, begin: None, turned: [0; JOINTS], extra: zero, passed: 2 * TRIAL }
     }
 
     /// For motors that are to go these ways (rad).
@@ -68,12 +68,12 @@ impl<R: Real> Breakaway<R> {
 
     /// True while torque is added, or will be.
     pub(crate) fn is_active(&self) -> bool {
-        self.passed < 2 * LONGEST
+        self.passed < 2 * TRIAL
     }
 
     /// Motors that have been asked to turn and have not, one bit each, M1 lowest.
     pub(crate) fn due(&self) -> u8 {
-        if self.passed >= LONGEST {
+        if self.passed >= TRIAL {
             return 0;
         }
         let motors = self.direction.iter().zip(&self.turned).enumerate();
@@ -94,7 +94,7 @@ impl<R: Real> Breakaway<R> {
         let torques = begin.iter().zip(against).zip(friction);
         for (motor, (((direction, turned), extra), ((begin, against), friction))) in motors.zip(torques).enumerate() {
             *turned = turned.saturating_add(u8::from(still >> motor & 1 == 0));
-            if *turned >= TURNS || self.passed >= LONGEST {
+            if *turned >= TURNS || self.passed >= TRIAL {
                 *extra *= R::of(1.0 - PERIOD / FADE);
             } else {
                 let missing = *direction * (*begin - *against) + level * *friction;

@@ -22,9 +22,9 @@ struct Numbers {
     force_limit: (f64, f64),
 }
 
-/// Exact. With a stiffer J2 or J3 the delay of the loop and the elastic cables leave no margin where there is no friction
-/// (decision 0093). Clamp times stiffness is the most a blocked joint pushes with, and that has to be more than its
-/// friction.
+/// Exact. With a stiffer J2 or J3 the delay of the loop and the elastic cables leave no margin where there is no
+/// friction (decision 0093). Clamp times stiffness is the most a blocked joint pushes with, and that has to be more
+/// than its friction.
 const STIFF: Numbers = Numbers {
     stiffness: [250.0, 300.0, 105.0, 130.0, 10.0, 16.0, 2.5],
     damping: [18.0, 22.0, 4.5, 5.0, 0.3, 0.5, 0.07],

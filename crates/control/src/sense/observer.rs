@@ -25,8 +25,8 @@ const POLES: [f64; JOINTS] = [4.0, 4.0, 4.0, 6.0, 15.0, 15.0, 15.0];
 /// Pole with which the unexplained acceleration is followed (Hz).
 const DISTURBANCE_POLE: f64 = 2.0;
 
-/// Poles of the correction and of the unexplained acceleration (Hz) in every other state than a compliant run: where the
-/// joints are stiffer, the shoulder's lie lower.
+/// Poles of the correction and of the unexplained acceleration (Hz) in every other state than a compliant run: where
+/// the joints are stiffer, the shoulder's lie lower.
 const STIFF_POLES: ([f64; JOINTS], f64) = ([3.5, 3.0, 3.5, 5.0, 12.0, 12.0, 12.0], 1.5);
 
 /// Control periods after which the mass matrix is renewed: 27 ms.
@@ -115,11 +115,18 @@ impl<R: Real> MotionObserver<R> {
         self.sent = [Vector7::zeros(); 2];
     }
 
-    /// Velocities where the next torque acts (rad/s), kept near the measured ones.
+    /// Velocities where the next torque acts (rad/s), kept near the measured ones; where `stiff`, in every state but a
+    /// compliant run, the nearer the faster a joint is.
     #[inline(never)]
-    pub fn velocity(&self, state: &JointState<R>) -> Vector7<R> {
+    pub fn velocity(&self, state: &JointState<R>, stiff: bool) -> Vector7<R> {
         let ahead = self.dq + (self.sent[0] + self.disturbance) * R::of(LATENCY * PERIOD);
-        ahead.zip_map(&state.dq.0, |observed, measured| measured + within(observed - measured, R::of(FARTHEST)))
+        let (least, speed) = FARTHEST_AT_SPEED;
+        let nearer = R::of(if stiff { (FARTHEST - least) / speed } else { 0.0 });
+        ahead.zip_map(&state.dq.0, |observed, measured| {
+            let fast = if measured < R::of(0.0) { -measured } else { measured };
+            let farthest = at_least(R::of(FARTHEST) - fast * nearer, R::of(least));
+            measured + within(observed - measured, farthest)
+        })
     }
 
     /// Positions (rad), kept near the measured ones.
@@ -127,18 +134,6 @@ impl<R: Real> MotionObserver<R> {
     pub fn position(&self, state: &JointState<R>) -> JointPositions<R> {
         let near = |observed, measured| measured + within(observed - measured, R::of(ASTRAY));
         JointPositions(self.q.zip_map(&state.q.0, near))
-    }
-
-    /// As [`MotionObserver::velocity`], for every other state than a compliant run: nearer to the measured velocities where
-    /// they are high.
-    #[inline(never)]
-    pub fn velocity_when_stiff(&self, state: &JointState<R>) -> Vector7<R> {
-        let (least, speed) = FARTHEST_AT_SPEED;
-        self.velocity(state).zip_map(&state.dq.0, |observed, measured| {
-            let fast = if measured < R::of(0.0) { -measured } else { measured };
-            let farthest = at_least(R::of(FARTHEST) - fast * R::of((FARTHEST - least) / speed), R::of(least));
-            measured + within(observed - measured, farthest)
-        })
     }
 
     /// One control period on, corrected by what is measured; `stiff` in every state but a compliant run.
