@@ -303,6 +303,9 @@ impl DeviceController {
         if let Some(wrench) = wrench {
             outlet.send(wrench);
         }
+        if let Some(word) = self.brakes.second_word() {
+            self.outlet(now_us, io).send(word);
+        }
     }
 
     /// The slot that computes and sends torques.
@@ -424,7 +427,9 @@ impl DeviceController {
             if !self.outlet(now_us, io).send(frame) {
                 self.brakes.ask_again();
             }
-            return;
+            if !self.brakes.leaves_room() {
+                return;
+            }
         }
         let BusPhase::Cyclic(poll) = &mut self.phase else {
             return;
@@ -438,7 +443,7 @@ impl DeviceController {
             (Some(safety), _) => Some(safety),
             (None, Some(node)) => Some(poll.suspect(node)),
             (None, None) if self.hand.act(&mut outlet) => None,
-            (None, None) if self.brakes.look() => Some(poll.first_mode()),
+            (None, None) if self.brakes.look(self.safety_mode) => Some(poll.first_mode()),
             (None, None) => poll.other(self.hand.answers_questions(), self.startup.absent()),
         };
         if let Some(frame) = question {
