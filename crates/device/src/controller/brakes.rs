@@ -9,8 +9,8 @@ const REQUEST_SLOTS: u16 = periods(0.02);
 /// Time for which puck 1 is asked in every second cycle if it brakes, after the safety module has said so: 0.5 s, in
 /// slow slots.
 const LOOK_SLOTS: u16 = periods(0.5);
-/// Cycles with two words to the pucks after torque has ended: 100 ms. No longer, because a bus without room has to carry
-/// positions again.
+/// Cycles with two words to the pucks after torque has ended: 100 ms. No longer, because a bus without room has to
+/// carry positions again.
 const SECOND_WORDS: u16 = periods(0.1);
 
 /// The requests to brake.
@@ -78,7 +78,7 @@ impl Brakes {
     }
 
     /// True from the end of the torque on until puck 1 has told that it brakes, at most for the time of the looks.
-    fn is_open(&self) -> bool {
+    pub(super) fn is_open(&self) -> bool {
         self.look_slots > 0 && !self.braked
     }
 
