@@ -49,6 +49,8 @@ pub enum Figure {
     BusErrors,
     /// Cycles in which only one torque frame left, as the device counts.
     TorqueMismatches,
+    /// Cycles told in which the limiter cut a joint, a motor or a step, percent.
+    Limited,
     /// Torque frames on the bus that are not zero while they must not be: bus off, or the safety module not ACTIVE.
     TorqueUnasked,
     /// The same, if the device may not have been told: its patience with a silent safety module is granted.
@@ -96,6 +98,7 @@ impl Figure {
             Self::OddFrames => ("odd frames", ""),
             Self::BusErrors => ("bus errors", ""),
             Self::TorqueMismatches => ("torque mismatches", ""),
+            Self::Limited => ("limiter acts", "% of cycles"),
             Self::TorqueUnasked => ("torque unasked for", ""),
             Self::TorqueUnheard => ("torque unasked for, unheard", ""),
         }

@@ -61,6 +61,7 @@ pub fn always(watched: &Watched) -> Figures {
 pub fn all(scenario: &Scenario, watched: &Watched, nominal: Option<&Watched>) -> Figures {
     let moments = &watched.moments;
     let mut figures = always(watched);
+    figures.insert(Figure::Limited, limited(moments));
     let (first, last) = span(scenario);
     let stopped = moments.iter().find(|moment| moment.time >= first && !is_moving(moment.state));
     if let Some(stop) = stopped {
@@ -88,6 +89,13 @@ pub fn all(scenario: &Scenario, watched: &Watched, nominal: Option<&Watched>) ->
         figures.extend(against(moments, &nominal.moments));
     }
     figures
+}
+
+/// Share of the cycles told in which the limiter cut the torque, percent.
+fn limited(moments: &[Moment]) -> f64 {
+    let told = moments.iter().filter(|moment| moment.told.is_some());
+    let (cut, all) = told.fold((0_u32, 0_u32), |(cut, all), moment| (cut + u32::from(moment.is_limited), all + 1));
+    100.0 * f64::from(cut) / f64::from(all.max(1))
 }
 
 /// Last moment at which a joint moved, s.

@@ -74,7 +74,7 @@ impl Verdict {
     }
 }
 
-/// Runs one scenario of an entry, and the same without the faults if a bar compares the two.
+/// Runs one scenario of an entry, and the same without the faults, with the same orders, if a bar compares the two.
 #[must_use]
 pub fn run(entry: &Entry, scenario: &Scenario, kind: SimulatorKind) -> Verdict {
     let mut verdict = Verdict::open(&entry.id, scenario);
@@ -141,7 +141,7 @@ fn recovered(arm: &mut bench::Arm, scenario: &Scenario, verdict: &mut Verdict) -
 
 fn watched_without(scenario: &Scenario, kind: SimulatorKind) -> Result<Watched, Failure> {
     let mut arm = bench::arm(scenario, false, kind)?;
-    watch::watch(&mut arm, scenario.watch, &[])
+    watch::watch(&mut arm, scenario.watch, &scenario.order)
 }
 
 fn judge(figures: &Figures, figure: Figure, bar: f64, is_least: bool) -> Judged {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use control::{Fault, MODEL_HASH, State};
+use control::{Fault, MODEL_HASH, State, flags};
 use lab::client::Incoming;
 use lab::error::HostError;
 use lab::simulation::CYCLE_TICKS;
@@ -32,6 +32,8 @@ pub struct Moment {
     pub fault: Fault,
     /// Joint angles and planned position of the hand, if they were told just now, rad and m.
     pub told: Option<([f64; 7], [f64; 3])>,
+    /// True if the limiter cut the torque of the cycle told just now.
+    pub is_limited: bool,
     /// True joint angles, rad.
     pub q: [f64; 7],
     /// True joint velocities, rad/s.
@@ -206,6 +208,8 @@ impl Observer {
             self.heard = time;
         }
         let (state, fault) = (self.state, self.fault);
+        let cuts = flags::JOINT_LIMITED | flags::MOTOR_LIMITED | flags::RATE_LIMITED;
+        let is_limited = told.as_ref().is_some_and(|cycle| cycle.flags & cuts != 0);
         let told = told.map(|cycle| {
             let plan = [cycle.pose_d[0], cycle.pose_d[1], cycle.pose_d[2]];
             (cycle.q.map(f64::from), plan.map(f64::from))
@@ -214,7 +218,7 @@ impl Observer {
         let (ticks, safety, is_free) = (plant.now(), plant.safety_mode(), plant.is_free());
         let world = plant.world();
         let (q, dq, hand) = (world.joint_positions(), world.joint_velocities(), world.grasp_pose().position);
-        self.moments.push(Moment { time, ticks, state, fault, told, q, dq, hand, safety, is_free });
+        self.moments.push(Moment { time, ticks, state, fault, told, is_limited, q, dq, hand, safety, is_free });
         Ok(())
     }
 }

@@ -9,6 +9,9 @@ const REQUEST_SLOTS: u16 = periods(0.02);
 /// Time for which puck 1 is asked in every second cycle if it brakes, after the safety module has said so: 0.5 s, in
 /// slow slots.
 const LOOK_SLOTS: u16 = periods(0.5);
+/// Cycles with two words to the pucks after torque has ended: 100 ms. No longer, because a bus without room has to
+/// carry positions again.
+const SECOND_WORDS: u16 = periods(0.1);
 
 /// The requests to brake.
 #[derive(Clone, Copy, Debug, Default)]
@@ -20,17 +23,26 @@ pub(super) struct Brakes {
     pulling: bool,
     /// The pucks did not brake, and afterwards the safety module said that it is IDLE: its frame to them was lost.
     owed: bool,
+    /// Puck 1 has told that it brakes since torque ended.
+    braked: bool,
+    /// Words left for the request slots.
+    second_words: u16,
 }
 
 impl Brakes {
     /// The control cycle wants the safety module to go to IDLE, or no longer does.
     pub(super) fn want(&mut self, wanted: bool) {
+        if wanted && !self.wanted {
+            self.braked = false;
+            self.second_words = SECOND_WORDS;
+        }
         self.wanted = wanted;
     }
 
     /// Puck 1 has told if it brakes.
     pub(super) fn hear_puck(&mut self, braking: bool) {
         self.pulling = !braking;
+        self.braked |= braking;
     }
 
     /// The safety module has told its mode.
@@ -52,10 +64,28 @@ impl Brakes {
             self.request_in = REQUEST_SLOTS;
             return Some(set(Node::SAFETY_MODULE, PropertyId::MODE, SafetyMode::Idle.value()));
         }
-        // The module's word to the pucks may be lost, and with it the brakes; so may this one.
-        let told = self.request_in % 2 == 1;
-        let due = core::mem::take(&mut self.owed) || told;
-        due.then(|| set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value()))
+        // The module's word to the pucks may be lost, and with it the brakes; so may this one. That the module is IDLE
+        // does not say that a puck brakes: the words go on until one has told so.
+        let due = core::mem::take(&mut self.owed) || self.is_open();
+        due.then(word)
+    }
+
+    /// The word to the pucks for the request slot: the torque of a puck ends with the first zero torque that reaches
+    /// it, so at least as many words to brake have to leave.
+    pub(super) fn second_word(&mut self) -> Option<CanFrame> {
+        self.second_words = self.second_words.checked_sub(1)?;
+        self.is_open().then(word)
+    }
+
+    /// True from the end of the torque on until puck 1 has told that it brakes, at most for the time of the looks.
+    pub(super) fn is_open(&self) -> bool {
+        self.look_slots > 0 && !self.braked
+    }
+
+    /// True if a question may leave in the same slot: beside the words to the pucks, not beside the request, because
+    /// the safety module has one SET to work on then.
+    pub(super) fn leaves_room(&self) -> bool {
+        self.request_in != REQUEST_SLOTS
     }
 
     /// The frame could not leave.
@@ -65,7 +95,12 @@ impl Brakes {
 
     /// True while puck 1 is to be asked more often if it brakes: not before the safety module is IDLE, because pucks
     /// that brake under an ACTIVE one would hide that.
-    pub(super) fn look(&self) -> bool {
-        self.look_slots > 0 && !self.wanted
+    pub(super) fn look(&self, mode: Option<SafetyMode>) -> bool {
+        self.look_slots > 0 && (!self.wanted || mode == Some(SafetyMode::Idle))
     }
+}
+
+/// The word to the pucks of the arm that they shall brake.
+fn word() -> CanFrame {
+    set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value())
 }

@@ -303,6 +303,18 @@ impl DeviceController {
         if let Some(wrench) = wrench {
             outlet.send(wrench);
         }
+        if self.brakes.is_open() {
+            self.tell_to_brake(now_us, io);
+        }
+    }
+
+    /// The word to brake of a request slot.
+    #[cold]
+    #[inline(never)]
+    fn tell_to_brake(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
+        if let Some(word) = self.brakes.second_word() {
+            self.outlet(now_us, io).send(word);
+        }
     }
 
     /// The slot that computes and sends torques.
@@ -420,10 +432,9 @@ impl DeviceController {
         let known = Iterator::chain(self.temperatures.iter(), &self.hand_temperatures).copied().flatten();
         self.cycle.set_caution(self.watch.look(known, self.pendant));
         let writable = self.startup.safety_properties().is_some_and(|safety| safety.mode_is_writable);
-        if let Some(frame) = self.brakes.frame(self.safety_mode, writable) {
-            if !self.outlet(now_us, io).send(frame) {
-                self.brakes.ask_again();
-            }
+        if let Some(frame) = self.brakes.frame(self.safety_mode, writable)
+            && !self.ask_for_brakes(frame, now_us, io)
+        {
             return;
         }
         let BusPhase::Cyclic(poll) = &mut self.phase else {
@@ -438,12 +449,22 @@ impl DeviceController {
             (Some(safety), _) => Some(safety),
             (None, Some(node)) => Some(poll.suspect(node)),
             (None, None) if self.hand.act(&mut outlet) => None,
-            (None, None) if self.brakes.look() => Some(poll.first_mode()),
+            (None, None) if self.brakes.look(self.safety_mode) => Some(poll.first_mode()),
             (None, None) => poll.other(self.hand.answers_questions(), self.startup.absent()),
         };
         if let Some(frame) = question {
             outlet.send(frame);
         }
+    }
+
+    /// Sends a request to brake, or a word to do so; true if a question may leave in the same slot.
+    #[cold]
+    #[inline(never)]
+    fn ask_for_brakes(&mut self, frame: CanFrame, now_us: u64, io: &mut impl ControllerIo<Self>) -> bool {
+        if !self.outlet(now_us, io).send(frame) {
+            self.brakes.ask_again();
+        }
+        self.brakes.leaves_room()
     }
 
     fn outlet<'a, I: ControllerIo<Self>>(&'a mut self, now_us: u64, io: &'a mut I) -> SlotOutlet<'a, I> {

@@ -234,6 +234,42 @@ fn g7_brakes_are_asked_for_every_20_ms_until_they_are_on_even_if_the_module_was_
     assert_eq!(core.health().state, State::Gravity, "{:?}", bus.events);
 }
 
+/// G7: the safety module is IDLE and says so, its frame to the pucks was lost, and so are for 0.1 s those of the device
+/// and every answer of puck 1 about its mode: the words to brake go on, two in a cycle, until it answers.
+#[test]
+fn g7_pucks_are_told_to_brake_until_one_has_told_that_it_does() {
+    let (mut core, mut bus) = floating();
+    bus.safety_mode = SafetyMode::Idle;
+    bus.pucks[0].lose_properties = u32::MAX;
+    let words = |bus: &Bus, since: usize| {
+        let requests = bus.log[since..].iter().filter_map(|(_, frame)| Request::decode(frame).ok());
+        let brakes = |action: &Action| matches!(action, Action::Set { property: PropertyId::MODE, value: 0 });
+        requests.filter(|request| brakes(&request.action)).count()
+    };
+    while core.health().state == State::Gravity {
+        bus.run_slots(&mut core, 1);
+    }
+    let begin = bus.log.len();
+    for _ in 0..30 {
+        bus.run_slots(&mut core, CYCLE);
+        for puck in &mut bus.pucks {
+            puck.mode = MotorMode::Torque;
+        }
+    }
+    assert!(words(&bus, begin) >= 50, "{} words in 0.1 s", words(&bus, begin));
+    bus.pucks[0].lose_properties = 0;
+    bus.run(&mut core, 0.02);
+    assert!(bus.pucks.iter().all(|puck| puck.mode == MotorMode::Idle), "nobody asked again");
+    let begin = bus.log.len();
+    bus.run(&mut core, 0.5);
+    assert_eq!(words(&bus, begin), 0, "they brake");
+    bus.press_activate();
+    bus.run(&mut core, 0.1);
+    bus.commands.push_back(Command::Gravity.into());
+    bus.run(&mut core, 0.1);
+    assert_eq!(core.health().state, State::Gravity, "{:?}", bus.events);
+}
+
 /// G7: the safety module is IDLE, but its frame to the pucks was lost, and so are those of the device for 0.1 s.
 #[test]
 fn g7_pucks_that_did_not_hear_the_safety_module_are_told_to_brake() {
