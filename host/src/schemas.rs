@@ -6,7 +6,9 @@ use lab::failure::FailureData;
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 
-use crate::cmd::{config, delete, doctor, explain, export, get, hand, list, manual, record, rename, sim, stop};
+use crate::cmd::{
+    config, delete, doctor, explain, export, get, hand, list, manual, record, rename, run_report, sim, stop,
+};
 
 /// Every schema by the name of its command; `error` is that of any command that fails.
 #[must_use]
@@ -24,6 +26,7 @@ pub fn all() -> Vec<(&'static str, Schema)> {
         ("manual", of::<manual::Written>()),
         ("record", of::<record::Recorded>()),
         ("rename", of::<rename::Renamed>()),
+        ("run", of::<run_report::Ran>()),
         ("sim", of::<sim::Simulated>()),
         ("stop", of::<stop::Stopped>()),
     ]

@@ -70,17 +70,17 @@ const ROWS: [Feature; 20] = [
     (
         "a run with preconditions",
         "`run`",
-        "what is missing is named, and nothing moves; the end tells duration, \
-     tracking, limits and lost samples",
-        "the preconditions are not listed with their values",
+        "each with its value before anything moves; what is missing is named with its remedy, and ends with 5; the \
+     end tells duration, force error, limits and lost samples",
+        "",
     ),
     ("settings of the device", "-", "read, written, compared and restored, with a report of differences", "not built"),
     (
         "health of the line",
-        "`status`, the end of each `run`",
-        "success rate, longest gap, times of answers, bus errors, \
-     and which side was late",
-        "no command measures the line alone",
+        "`status --line`, the end of each `run`",
+        "complete cycles of the newest 100, longest gap, answers (half, 99 %, slowest), bus errors, bus frames, \
+     who was late; TEC and REC are null: the device does not tell them",
+        "",
     ),
     (
         "output for scripts",
@@ -101,10 +101,10 @@ const ROWS: [Feature; 20] = [
     ("defaults", "`config`, `TACTUS_DEVICE`", "option before environment before file, and it is told which counts", ""),
     (
         "replay",
-        "`can replay`",
-        "the device's application, given the recorded frames, sends the same torque frames to the \
-     bit",
-        "from logs of the bus; recordings of telemetry cannot be replayed",
+        "`run --bus-log`, `can replay`",
+        "the device's application, given what the pucks and the host said in the log of a run, sends the same torque \
+     frames to the bit (decision 0100)",
+        "",
     ),
 ];
 
@@ -250,6 +250,111 @@ fn cli_10_a_run_that_lacks_something_names_it_and_another_tells_how_it_ended() {
     let told = succeeds(folder.path(), &format!("{device} run reach.toml")).stdout;
     let told: serde_json::Value = serde_json::from_slice(&told).unwrap();
     assert!(told["tracking"]["position_max_m"].is_number() && told["flags"]["limited"].is_number(), "{told}");
+    assert!(told["force_error_max_n"].is_null(), "nothing is expected: {told}");
+}
+
+/// Preconditions of a result by their names: value, and whether it is met.
+fn preconditions(told: &serde_json::Value) -> BTreeMap<String, (String, bool)> {
+    let list = told["preconditions"].as_array().unwrap_or_else(|| panic!("no list: {told}")).iter();
+    let entry = |item: &serde_json::Value| {
+        assert_eq!(item["met"].as_bool(), Some(item["remedy"].is_null()), "{item}");
+        (item["value"].as_str().unwrap().to_owned(), item["met"].as_bool().unwrap())
+    };
+    list.map(|item| (item["item"].as_str().unwrap().to_owned(), entry(item))).collect()
+}
+
+#[test]
+fn cli_10_the_preconditions_are_listed_with_their_values_before_anything_moves() {
+    let folder = learned(3.0);
+    let device = "--device sil:world=simple --non-interactive --json";
+    let output = succeeds(folder.path(), &format!("{device} run reach.toml --speed 0.5"));
+    let list = preconditions(&serde_json::from_slice(&output.stdout).unwrap());
+    assert!(list.values().all(|(_, met)| *met), "{list:?}");
+    for (item, value) in [
+        ("speed", "0.50 of the taught one: 6."),
+        ("fault", "none"),
+        ("joint angles", "count from home"),
+        ("pendant", "active"),
+        ("force sensor", "has its zero"),
+        ("start posture", "rad away"),
+        ("primitive", "reach, checksum 0x"),
+        ("nearest limit", "of"),
+    ] {
+        assert!(list[item].0.contains(value), "{item}: {list:?}");
+    }
+    let said = String::from_utf8(output.stderr).unwrap();
+    let (listed, moved) = (said.find("count from home"), said.find("running 'reach'"));
+    assert!(listed.is_some() && listed < moved, "{said}");
+    let dry = succeeds(folder.path(), &format!("{device} run reach.toml --dry-run")).stdout;
+    let list = preconditions(&serde_json::from_slice(&dry).unwrap());
+    assert_eq!(list["start-up"].1, false, "a dry run starts nothing up: {list:?}");
+}
+
+#[test]
+fn cli_10_a_run_without_its_force_sensor_is_refused_before_the_arm_moves() {
+    let folder = learned(3.0);
+    let script = "[[scenario]]\nname = \"a silent sensor\"\nfrom = \"power-up\"\n\
+        inject = [{ at = 0.0, lasts = 1e6, what.drop = { kind = \"sensor-request\" } }]\n";
+    std::fs::write(folder.path().join("silent.toml"), script).unwrap();
+    succeeds(folder.path(), "--device sil:world=simple --non-interactive rehearse reach.toml");
+    let line = "--device sil:world=simple,faults=silent.toml --non-interactive --json run reach.toml --mode adapt";
+    let refused = command(folder.path(), line).output().unwrap();
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert_eq!(refused.status.code(), Some(5), "{said}");
+    assert!(said.contains("run refused: force sensor: ") && !said.contains("running 'reach'"), "{said}");
+    let told: serde_json::Value = serde_json::from_slice(&refused.stdout).unwrap();
+    let list = preconditions(&told["result"]);
+    assert_eq!(list.iter().filter(|(_, (_, met))| !met).map(|(item, _)| &**item).collect::<Vec<_>>(), ["force sensor"]);
+}
+
+#[test]
+fn cli_12_the_line_is_measured_alone_and_in_the_summary_of_each_run() {
+    let folder = learned(3.0);
+    let device = "--device sil:world=simple --non-interactive";
+    let told: serde_json::Value =
+        serde_json::from_slice(&succeeds(folder.path(), &format!("{device} --json status --line 2")).stdout).unwrap();
+    let line = &told["line"];
+    assert_eq!(line["success_rate_newest_100"], 1.0, "{line}");
+    assert!(line["answer_p50_ms"].as_f64().unwrap() <= line["answer_p99_ms"].as_f64().unwrap(), "{line}");
+    assert!(line["answer_p99_ms"].as_f64().unwrap() <= line["answer_max_ms"].as_f64().unwrap(), "{line}");
+    // Two seconds of cycles; the device does not tell the error counters of its bus controller.
+    assert!((590..=640).contains(&line["cycles"].as_u64().unwrap()), "{line}");
+    assert!(line["transmit_error_counter"].is_null() && line["receive_error_counter"].is_null(), "{line}");
+    let said = String::from_utf8(succeeds(folder.path(), &format!("{device} status --line 2")).stdout).unwrap();
+    assert!(said.contains("who was late") && said.contains("not told by the device"), "{said}");
+    let said = String::from_utf8(succeeds(folder.path(), &format!("{device} run reach.toml")).stdout).unwrap();
+    assert!(said.contains("100.0 % complete, longest gap 3.3 ms; late: nobody"), "{said}");
+}
+
+#[test]
+fn cli_12_a_run_whose_pucks_leave_out_replies_says_so() {
+    let folder = learned(3.0);
+    let script = "[[scenario]]\nname = \"lost replies\"\nfrom = \"run\"\n\
+        inject = [{ at = 3.0, every = 0.2, times = 60, lasts = 0.01, \
+        what.drop = { kind = \"position\", from = [1], most = 1 } }]\n";
+    std::fs::write(folder.path().join("lost.toml"), script).unwrap();
+    let line = "--device sil:world=simple,faults=lost.toml --non-interactive --json run reach.toml";
+    let told: serde_json::Value = serde_json::from_slice(&succeeds(folder.path(), line).stdout).unwrap();
+    let line = &told["line"];
+    assert!(line["lost_replies"].as_u64().unwrap() > 0, "{line}");
+    assert!(line["success_rate"].as_f64().unwrap() < 1.0, "{line}");
+    assert!(line["late"][0].as_str().unwrap().starts_with("the arm's bus"), "{line}");
+}
+
+#[test]
+fn cli_20_the_log_that_a_run_wrote_replays_to_the_bit() {
+    let folder = learned(3.0);
+    let device = "--device sil:world=simple,line=can --non-interactive";
+    succeeds(folder.path(), &format!("{device} run reach.toml --record run.csv --bus-log run.log"));
+    let told = succeeds(folder.path(), "--json can replay run.log").stdout;
+    let told: serde_json::Value = serde_json::from_slice(&told).unwrap();
+    assert_eq!((&told["different"], &told["has_host"]), (&0.into(), &true.into()), "{told}");
+    assert_eq!(told["same"], told["logged"], "{told}");
+    assert_eq!(told["telemetry"][0], told["telemetry"][1], "{told}");
+    let text = std::fs::read_to_string(folder.path().join("run.csv")).unwrap();
+    let recorded = text.lines().filter(|line| line.starts_with(|first: char| first.is_ascii_digit())).count() as u64;
+    // Every cycle of the recording is one of those that were compared.
+    assert!(recorded > 900 && told["telemetry"][0].as_u64().unwrap() >= recorded, "{recorded}: {told}");
 }
 
 /// A folder with a configuration file of these words; the command sees no other.

@@ -127,7 +127,7 @@ impl Error for Failure {}
 pub struct FailureData {
     /// The failure.
     pub error: ErrorData,
-    /// Findings of a command that failed with a result: the same object as after a success.
+    /// Findings of a command that failed with a result: the same object as after a success, or the part that is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub result: Option<serde_json::Value>,
 }

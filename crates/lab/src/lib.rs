@@ -14,6 +14,7 @@ pub mod failure;
 pub mod fault_guide;
 pub mod image_file;
 pub mod learn;
+pub mod line_health;
 pub mod output_file;
 pub mod plan;
 pub mod plot;

@@ -1,12 +1,13 @@
 //! Tracking of the plan by an execution: the figures that the run's report, the figure and the demo's table show.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use thiserror::Error;
 
 use crate::demonstration::{Recording, angle_between};
 
 /// Tracking of one run: measured against desired pose, cycle by cycle.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Tracking {
     /// Samples compared.
     pub samples: usize,
@@ -25,7 +26,7 @@ pub struct Tracking {
 }
 
 /// Tracking of the hand's plan in one run: measured against desired digits, in the order spread, F1, F2, F3.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct HandTracking {
     /// Samples compared.
     pub samples: usize,

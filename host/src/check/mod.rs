@@ -90,6 +90,14 @@ pub struct Margin {
 }
 
 impl Margin {
+    /// The limit, what is left of it, and when, in words.
+    pub fn words(&self) -> String {
+        let ((name, unit), part) = (self.limit.name(), self.part());
+        let blank = if part.is_empty() { "" } else { " " };
+        let Margin { value, bound, time_s, .. } = self;
+        format!("{part}{blank}{name} {value:.3} of {bound:.3} {unit}, at {time_s:.2} s")
+    }
+
     /// The joint or digit it concerns, as a word; empty for none.
     fn part(&self) -> String {
         match (self.limit, self.joint) {

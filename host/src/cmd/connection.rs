@@ -83,12 +83,29 @@ fn reach(
     Ok((device, owner(matches!(address, Address::Simulated(..)))))
 }
 
-/// Makes the arm ready and says what happens and what a person must do.
+/// Makes the arm ready, its hand too, and says what happens and what a person must do.
 ///
 /// # Errors
 /// The start-up does not get to its end.
 pub(super) fn ready(client: &mut Client<Device>, at_home: bool, output: Output, doing: &str) -> Result<(), Failure> {
-    let readiness = watch(client, output, doing, |client, tell| procedure::make_ready(client, at_home, tell))?;
+    started(client, output, doing, |client, tell| procedure::make_ready(client, at_home, tell))
+}
+
+/// As [`ready`], but nothing is commanded: the hand is left as it is.
+///
+/// # Errors
+/// As [`ready`].
+pub(super) fn unmoved(client: &mut Client<Device>, at_home: bool, output: Output, doing: &str) -> Result<(), Failure> {
+    started(client, output, doing, |client, tell| procedure::start_up(client, at_home, Stage::Ready, tell))
+}
+
+fn started(
+    client: &mut Client<Device>,
+    output: Output,
+    doing: &str,
+    start: impl FnOnce(&mut Client<Device>, &mut dyn FnMut(Stage)) -> Result<Readiness, ProcedureError>,
+) -> Result<(), Failure> {
+    let readiness = watch(client, output, doing, start)?;
     if readiness.wrench_zeroed == Some(false) {
         output.warn(
             "the force sensor has no zero: the arm has not rested since its bus was started, or the sensor is silent; \

@@ -76,8 +76,9 @@ Example:
   tactus --device unix:tactus.sock delete grasp-old";
 /// `status`
 pub(super) const STATUS: &str = "\
-Example:
-  tactus --device unix:tactus.sock --json status";
+Examples:
+  tactus --device unix:tactus.sock --json status
+  tactus --device sil:world=simple status --line 10";
 /// `calibrate`
 pub(super) const CALIBRATE: &str = "\
 Examples:

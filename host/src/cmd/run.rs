@@ -6,21 +6,25 @@ use std::time::Instant;
 
 use clap::Args;
 use control::State;
-use link::{Goal, Name, RunOptions, Statistics};
-use serde::Serialize;
+use link::{Goal, Name, RunOptions};
+use serde_json::json;
 
 use super::files::{self, RecordingFile};
-use super::{ErrorCode, Failure, Global, Output, Table, connection, get, upload};
+use super::preflight::{self, Asked, Precondition};
+use super::run_report::{DryRun, Report, report};
+use super::{ErrorCode, Failure, Global, Output, connection, get, upload};
 use crate::check::Course;
 use lab::client::Client;
-use lab::demonstration::{Origin, RATE, Recording};
+use lab::demonstration::{Origin, RATE};
 use lab::device::Device;
+use lab::line_health::{LineHealth, Snapshot};
 use lab::primitive_file::PrimitiveFile;
 use lab::procedure::{
-    self, Change, ChangeKind, CycleWriter, FlagCounts, Mode, ProcedureError, RunOutcome, RunRequest, Surprise,
-    recording_text,
+    self, Change, ChangeKind, CycleWriter, FlagCounts, Mode, ProcedureError, RunOutcome, RunRequest, recording_text,
 };
-use lab::tracking::{HandTracking, Tracking};
+use lab::tracking::Tracking;
+
+const DOING: &str = "run";
 
 /// Rest that is recorded at the goal, s.
 const POST_ROLL: f64 = 1.0;
@@ -70,74 +74,11 @@ pub struct Cmd {
     pub bus_log: Option<PathBuf>,
 }
 
-/// The result of a run.
-#[derive(Debug, Clone, Serialize)]
-pub struct Report {
-    /// Name of the primitive.
-    pub name: String,
-    /// Use of the measured force in the run.
-    pub mode: &'static str,
-    /// Duration of the movement, s.
-    pub duration_s: f64,
-    /// Tracking of the plan by the tool; none where a hand alone is driven.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tracking: Option<Tracking>,
-    /// Tracking of the plan by the digits, where a hand alone is driven.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub hand_tracking: Option<HandTracking>,
-    /// Samples in the recording, and how many the link lost.
-    pub samples: usize,
-    /// Telemetry messages lost.
-    pub gaps: u32,
-    /// Samples in which the torque limiter was at work.
-    pub limited_samples: usize,
-    /// Samples in which something was out of the ordinary.
-    pub flags: FlagCounts,
-    /// Where the run did not go as the successful ones did.
-    pub surprises: Vec<Surprise>,
-    /// Virtual time from power-up to an arm that could be commanded, s; none where time is real.
-    pub ready_s: Option<f64>,
-    /// Control cycles since the device was switched on.
-    pub cycles: u32,
-    /// Cycles whose torque frames were not queued in time.
-    pub missed_deadlines: u32,
-    /// Replies of pucks or sensor that did not come in their cycle.
-    pub lost_replies: u32,
-    /// Worst control computation, instructions; none where the board cannot tell.
-    pub worst_instructions: Option<u32>,
-    /// Mean control computation, instructions; likewise.
-    pub mean_instructions: Option<u32>,
-    /// Worst control computation by the board's own clock, us; none in this process, where nobody measures.
-    pub worst_computation_us: Option<f64>,
-    /// Worst delay from timer to control task, us; likewise.
-    pub worst_latency_us: Option<f64>,
-    /// Stack used at the most, bytes; likewise.
-    pub stack_used: Option<u32>,
-    /// Telemetry left out because the line was full.
-    pub telemetry_dropped: u32,
-    /// Counters of the simulated bus.
-    pub bus: Option<BusReport>,
-}
-
-/// Traffic on the simulated bus since the device was switched on.
-#[derive(Debug, Clone, Serialize)]
-pub struct BusReport {
-    /// Frames.
-    pub frames: u64,
-    /// Frames that the device side of the protocol could not read.
-    pub invalid_frames: u64,
-    /// Share of the time the bus was busy.
-    pub load: f64,
-    /// Hash over every frame with its time: equal seeds give equal hashes.
-    pub hash: String,
-}
-
 /// Runs a primitive.
 ///
 /// # Errors
 /// The primitive is wrong, the device refuses, or the arm stops before the end.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
-    const DOING: &str = "run";
     let output = global.output();
     let stored = stored_name(&command.primitive);
     let mut opened = stored.is_some().then(|| open(command, global)).transpose()?;
@@ -148,7 +89,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     check_expectation(&file, command, output)?;
     let changes = changes(&file, command)?;
     let course = Course { speed: command.speed, goal: super::check::goal(command.goal), changes };
-    upload::precheck(&file, &course, output, DOING)?;
+    let check = upload::precheck(&file, &course, output, DOING)?;
     let record = command.record.as_ref().filter(|_| !command.dry_run);
     let mut record =
         record.map(|path| RecordingFile::create(path, global, &[&command.primitive], DOING)).transpose()?;
@@ -166,11 +107,12 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     upload::send(&mut client, &file, output, DOING)?;
     output.say(format!("'{}' is in the device", file.name));
+    let Cmd { speed, goal, mode, .. } = *command;
+    let asked = Asked { file: &file, speed, goal, mode, check: &check };
     if command.dry_run {
-        return output
-            .result(&serde_json::json!({ "name": file.name, "dry_run": true }), "ready to run; nothing moved");
+        return tell_unmoved(&mut client, &asked, output);
     }
-    connection::ready(&mut client, command.at_home, output, DOING)?;
+    let preconditions = meet(&mut client, &asked, command.at_home, output)?;
     let ready_s = client.is_virtual().then(|| client.now().as_secs_f64());
     let played = play(command, &mut client, &file, record.as_mut(), output);
     connection::tell_speed(&client, started, output);
@@ -179,7 +121,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Some(record) => record.end(played, output)?,
         None => played?,
     };
-    let report = Report { ready_s, ..report };
+    let report = Report { ready_s, preconditions, ..report };
     if !client.is_simulated() {
         output.say("the arm holds its goal; `tactus stop` makes it soft");
     }
@@ -194,6 +136,43 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Ok(data) => failure.data(data),
         Err(_) => failure,
     })
+}
+
+/// Brings the device as far as it gets without moving, tells the preconditions, and refuses what lacks one.
+fn meet(
+    client: &mut Client<Device>,
+    asked: &Asked<'_>,
+    at_home: bool,
+    output: Output,
+) -> Result<Vec<Precondition>, Failure> {
+    let started = connection::unmoved(client, at_home, output, DOING);
+    let found = preflight::look(client, asked, DOING);
+    if let Ok(list) = &found {
+        preflight::tell(list, output);
+    }
+    match (started, found) {
+        (Err(failure), Ok(list)) => Err(failure.data(json!({ "preconditions": list }))),
+        (Err(failure), Err(_)) | (Ok(()), Err(failure)) => Err(failure),
+        (Ok(()), Ok(list)) => {
+            preflight::require(&list)?;
+            procedure::initialise_hand(client).map_err(|error| connection::failure(error, DOING))?;
+            Ok(list)
+        }
+    }
+}
+
+/// Ends a dry run: the preconditions as they are now, and those that a run would wait for.
+fn tell_unmoved(client: &mut Client<Device>, asked: &Asked<'_>, output: Output) -> Result<(), Failure> {
+    let list = preflight::look(client, asked, DOING)?;
+    preflight::tell(&list, output);
+    let missing = preflight::missing(&list);
+    let words = if missing.is_empty() {
+        "ready to run; nothing moved".to_owned()
+    } else {
+        format!("nothing moved; a run needs first: {}", missing.join(", "))
+    };
+    let data = DryRun { name: asked.file.name.clone(), dry_run: true, preconditions: list };
+    output.result(&data, words)
 }
 
 /// The changes on the way; one that would come after the run is refused.
@@ -251,6 +230,8 @@ fn play(
     let mut writer = record.map(|record| start(record, &notes)).transpose()?;
     let bar = output.bar((file.movement.duration / command.speed * RATE) as u64, "running");
     let (mut cycles, mut written, mut is_running) = (Vec::new(), Ok(()), false);
+    let before = Snapshot::of(client)?;
+    client.take_answer_times();
     let outcome = procedure::play(client, &request, &mut |cycle| {
         if !is_running && State::from_code(cycle.state) == Some(State::Run) {
             is_running = true;
@@ -271,8 +252,11 @@ fn play(
     }
     let bytes = recording_text(&cycles, &notes)?;
     tell(&outcome, output);
-    let statistics = client.statistics()?;
-    report(client, file, command.mode, &bytes, outcome, &statistics)
+    let answers = client.take_answer_times();
+    let after = Snapshot::of(client)?;
+    let line = Some(LineHealth::between(&before, &after, &cycles, &answers));
+    let report = report(client, file, command.mode, &bytes, outcome, &after.statistics)?;
+    Ok(Report { line, ..report })
 }
 
 /// Says what a person should know about how the run went.
@@ -355,112 +339,6 @@ fn notes(client: &Client<Device>, file: &PrimitiveFile, command: &Cmd) -> String
 fn start<'a>(record: &'a mut RecordingFile, notes: &str) -> std::io::Result<CycleWriter<impl Write + use<'a>>> {
     record.expect_notes(notes);
     CycleWriter::new(&mut record.file, notes)
-}
-
-fn report(
-    client: &mut Client<Device>,
-    file: &PrimitiveFile,
-    mode: Mode,
-    bytes: &[u8],
-    outcome: RunOutcome,
-    statistics: &Statistics,
-) -> Result<Report, ProcedureError> {
-    let unreadable = |error: &dyn std::fmt::Display| std::io::Error::other(format!("it reads back wrong: {error}"));
-    let recording = Recording::parse(Path::new("run"), bytes).map_err(|error| unreadable(&error))?;
-    let ticks_per_second = client.hello().ticks_per_second;
-    let per_tick = u32::from(client.hello().instructions_per_tick);
-    let instructions = |ticks: u32| ticks.saturating_mul(per_tick);
-    let microseconds = |ticks: u32| f64::from(ticks) * 1e6 / f64::from(ticks_per_second.max(1));
-    let measures = statistics.cost_worst_ticks > 0;
-    let counts = measures && per_tick > 0;
-    let gaps = client.gaps().telemetry;
-    let bus = client.transport().simulation().map(|simulation| {
-        let elapsed = simulation.ticks();
-        let trace = simulation.plant().trace();
-        BusReport {
-            frames: trace.total(),
-            invalid_frames: trace.invalid,
-            load: trace.load(elapsed),
-            hash: format!("{:016x}", trace.hash),
-        }
-    });
-    // Asked last: the bus goes on meanwhile, and its figures are those at the end of the run.
-    let (tracking, hand_tracking) = if client.hello().capabilities.arm {
-        (Some(Tracking::of_run(&recording).map_err(|error| unreadable(&error))?), None)
-    } else {
-        (None, Some(HandTracking::of_run(&recording).map_err(|error| unreadable(&error))?))
-    };
-    Ok(Report {
-        name: file.name.clone(),
-        mode: mode.name(),
-        duration_s: recording.running().len() as f64 / RATE,
-        tracking,
-        hand_tracking,
-        samples: outcome.samples,
-        gaps,
-        limited_samples: outcome.flags.limited,
-        flags: outcome.flags,
-        surprises: outcome.surprises,
-        ready_s: None,
-        cycles: statistics.cycles,
-        missed_deadlines: statistics.missed_deadlines,
-        lost_replies: statistics.lost_replies,
-        worst_instructions: counts.then(|| instructions(statistics.cost_worst_ticks)),
-        mean_instructions: counts.then(|| instructions(statistics.cost_mean_ticks)),
-        worst_computation_us: measures.then(|| microseconds(statistics.cost_worst_ticks)),
-        worst_latency_us: measures.then(|| microseconds(statistics.latency_worst_ticks)),
-        stack_used: measures.then(|| statistics.stack_size.saturating_sub(statistics.stack_free)),
-        telemetry_dropped: statistics.telemetry_dropped,
-        bus,
-    })
-}
-
-impl Report {
-    /// The report as a table for people.
-    pub fn to_text(&self) -> String {
-        let mut table = Table::new(["run", &self.name]);
-        let mut row = |name: &str, value: String| {
-            table.row([name.to_owned(), value]);
-        };
-        row("mode", self.mode.to_owned());
-        row("duration", format!("{:.2} s", self.duration_s));
-        if let Some(tracking) = &self.tracking {
-            let pose = |metres: f64, radians: f64| format!("{:.2} mm  {:.2} deg", metres * 1e3, radians.to_degrees());
-            row("tracking, RMS", pose(tracking.position_rms_m, tracking.orientation_rms_rad));
-            row("tracking, worst", pose(tracking.position_max_m, tracking.orientation_max_rad));
-            row("error at the goal", pose(tracking.position_end_m, tracking.orientation_end_rad));
-        }
-        if let Some(tracking) = &self.hand_tracking {
-            let digits = |[spread, first, second, third]: [f64; 4]| {
-                format!("spread {spread:.3}, fingers {first:.3}, {second:.3}, {third:.3} rad")
-            };
-            row("tracking, RMS", digits(tracking.rms_rad));
-            row("tracking, worst", digits(tracking.max_rad));
-            row("error at the goal", digits(tracking.end_rad));
-        }
-        row("cycles since power-up", self.cycles.to_string());
-        row("missed deadlines", self.missed_deadlines.to_string());
-        row("lost replies", self.lost_replies.to_string());
-        row("samples, lost on the link", format!("{}, {}", self.samples, self.gaps));
-        row("samples with limited torque", self.limited_samples.to_string());
-        row("surprises", self.surprises.len().to_string());
-        if let (Some(worst), Some(mean)) = (self.worst_instructions, self.mean_instructions) {
-            row("control cycle, worst", format!("{worst} instructions"));
-            row("control cycle, mean", format!("{mean} instructions"));
-        } else if let Some(worst) = self.worst_computation_us {
-            row("control cycle, worst", format!("{worst:.1} us"));
-        }
-        if let (Some(latency), Some(stack)) = (self.worst_latency_us, self.stack_used) {
-            row("timer latency, worst", format!("{latency:.1} us"));
-            row("stack used", format!("{stack} bytes"));
-        }
-        if let Some(bus) = &self.bus {
-            row("bus load", format!("{:.1} %", bus.load * 100.0));
-            row("bus frames, invalid", format!("{}, {}", bus.frames, bus.invalid_frames));
-            row("bus hash", bus.hash.clone());
-        }
-        table.to_string()
-    }
 }
 
 /// Words for an arm that rests elsewhere than its plan ends; `None` where it is at its goal.

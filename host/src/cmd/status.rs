@@ -1,5 +1,7 @@
 //! `tactus status`: what the device says of itself and its arm. Nothing is asked to move, nothing is started.
 
+use std::time::Duration;
+
 use clap::Args;
 use control::{Fault, State};
 use device::Stage;
@@ -8,18 +10,30 @@ use serde_json::json;
 
 use super::{Failure, Global, Table, connection, weigh};
 use lab::error::{HostError, explain_blocked};
+use lab::line_health::{self, LineHealth};
 
 /// Options of `status`.
 #[derive(Debug, Clone, Args)]
-pub struct Cmd {}
+pub struct Cmd {
+    /// Look at the bus and the line for so many seconds: complete cycles, gaps, times of answers, who was late
+    #[arg(long, value_name = "SECONDS", value_parser = crate::config::seconds)]
+    pub line: Option<Duration>,
+}
 
 /// Shows the state of the device.
 ///
 /// # Errors
 /// The device cannot be reached.
-pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "status";
-    let mut client = connection::observe(global, DOING)?;
+    let mut client = if command.line.is_some() && global.is_simulated_here() {
+        // It has just been switched on: before its start-up there are no control cycles to look at.
+        let mut client = connection::open(global, DOING, |_| {})?;
+        connection::unmoved(&mut client, false, global.output(), DOING)?;
+        client
+    } else {
+        connection::observe(global, DOING)?
+    };
     let status = client.status().map_err(|error| error.into_failure(DOING))?;
     let source = match client.calibration() {
         Ok(calibration) => Some(calibration.source),
@@ -32,6 +46,8 @@ pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
         Err(HostError::Refused { .. }) => None,
         Err(error) => return Err(error.into_failure(DOING)),
     };
+    let line = command.line.map(|time| line_health::measure(&mut client, time)).transpose();
+    let line = line.map_err(|error| error.into_failure(DOING))?;
     let hello = client.hello();
     let board = format!("{} ({})", hello.board.as_str(), hello.firmware.as_str());
     let drives = hello.capabilities;
@@ -46,9 +62,9 @@ pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
             "zeroed": status.zeroed, "home": source.map(HomeSource::name), "weight": weight,
             "safety_mode": status.safety_mode,
             "wrench_zeroed": status.wrench_zeroed, "hand": status.hand_stage.name(), "q_rad": status.q,
-            "hand_rad": status.hand, "loaded": status.loaded.as_ref().map(|name| name.as_str()),
+            "line": line, "hand_rad": status.hand, "loaded": status.loaded.as_ref().map(|name| name.as_str()),
         }),
-        text(&status, &board, stage, state, fault, (source, weight.as_deref())),
+        text(&status, &board, stage, state, fault, (source, weight.as_deref())) + &words(line.as_ref()),
     )
 }
 
@@ -82,7 +98,17 @@ fn text(
     table.to_string()
 }
 
-fn safety_mode(mode: Option<u8>) -> &'static str {
+/// The health of the line as a table of its own; empty where it was not asked for.
+fn words(line: Option<&LineHealth>) -> String {
+    let Some(line) = line else { return String::new() };
+    let mut table = Table::new(["line", &format!("{} cycles", line.cycles)]);
+    for (name, value) in line.rows() {
+        table.row([name, &value]);
+    }
+    format!("\n{table}")
+}
+
+pub(super) fn safety_mode(mode: Option<u8>) -> &'static str {
     match mode {
         Some(0) => "emergency stop",
         Some(1) => "idle",
@@ -92,7 +118,7 @@ fn safety_mode(mode: Option<u8>) -> &'static str {
     }
 }
 
-fn force_sensor(zeroed: Option<bool>) -> &'static str {
+pub(super) fn force_sensor(zeroed: Option<bool>) -> &'static str {
     match zeroed {
         Some(true) => "has its zero",
         Some(false) => "no zero yet: the arm has not rested",

@@ -8,7 +8,7 @@ use link::{Listing, Name};
 use serde_json::json;
 
 use super::{ErrorCode, Failure, Global, Output, connection};
-use crate::check::{self, Course};
+use crate::check::{self, CheckReport, Course};
 use lab::client::{Client, UploadOutcome, UploadPhase};
 use lab::device::Device;
 use lab::primitive_file::PrimitiveFile;
@@ -91,13 +91,18 @@ pub(super) fn read(path: &Path, doing: &str) -> Result<PrimitiveFile, Failure> {
 }
 
 /// Plays the primitive on the host first, and refuses what would break a limit of the arm.
-pub(super) fn precheck(file: &PrimitiveFile, course: &Course, output: Output, doing: &str) -> Result<(), Failure> {
+pub(super) fn precheck(
+    file: &PrimitiveFile,
+    course: &Course,
+    output: Output,
+    doing: &str,
+) -> Result<CheckReport, Failure> {
     let bar = output.bar(100, "checking");
     let report = check::check(file, course, |fraction| bar.set_position((fraction * 100.0) as u64))
         .map_err(|cause| super::check::failure(cause, &file.file, doing))?;
     bar.finish_and_clear();
     match report.violations.first() {
-        None => Ok(()),
+        None => Ok(report),
         Some(first) => {
             Err(Failure::new(ErrorCode::CheckFailed, format!("{doing} refused: the check failed"), first.to_string())
                 .help(format!("tactus check {}", file.file.display())))

@@ -66,6 +66,9 @@ pub enum Incoming {
     Event(Event),
 }
 
+/// Times of answers that are kept, the newest.
+const ANSWERS_KEPT: usize = 4096;
+
 /// Round trips of requests, in the device's time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RoundTrips {
@@ -93,6 +96,7 @@ pub struct Client<T: Transport> {
     answers: VecDeque<Reply>,
     gaps: Gaps,
     round_trips: RoundTrips,
+    took: VecDeque<Duration>,
     moving: bool,
     observing: bool,
     open: bool,
@@ -138,6 +142,7 @@ impl<T: Transport> Client<T> {
             answers: VecDeque::new(),
             gaps: Gaps::default(),
             round_trips: RoundTrips::default(),
+            took: VecDeque::new(),
             moving: false,
             observing: false,
             open: false,
@@ -256,6 +261,12 @@ impl<T: Transport> Client<T> {
         self.round_trips
     }
 
+    /// Times that the newest answers took, oldest first, since this was last asked. Answers to a change of the store
+    /// are not among them: these wait for the flash.
+    pub fn take_answer_times(&mut self) -> Vec<Duration> {
+        self.took.drain(..).collect()
+    }
+
     /// Sends a request and waits for its answer.
     ///
     /// # Errors
@@ -305,6 +316,12 @@ impl<T: Transport> Client<T> {
                 self.round_trips.count += 1;
                 self.round_trips.worst = self.round_trips.worst.max(took);
                 self.round_trips.total += took;
+                if timeout == self.timeout {
+                    if self.took.len() >= ANSWERS_KEPT {
+                        self.took.pop_front();
+                    }
+                    self.took.push_back(took);
+                }
                 return match reply {
                     Reply::Refused { reason, detail, .. } => {
                         Err(HostError::Refused { request: request.word(), reason, detail })

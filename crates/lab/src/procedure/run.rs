@@ -104,7 +104,7 @@ pub fn planned(duration: f64, speed: f64, changes: &[Change]) -> f64 {
 }
 
 /// The device told that a run does not go as the successful ones did.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, schemars::JsonSchema)]
 pub struct Surprise {
     /// Control cycle.
     pub cycle: u32,
@@ -133,7 +133,7 @@ pub const CHANNELS: [&str; control::plan::primitive::STATISTICS_CHANNELS] = [
 ];
 
 /// Samples of a run in which something out of the ordinary was going on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, schemars::JsonSchema)]
 pub struct FlagCounts {
     /// The torque limiter was at work.
     pub limited: usize,
