@@ -177,10 +177,10 @@ fn force_error(file: &PrimitiveFile, recording: &Recording) -> Option<f64> {
     let primitive = file.to_primitive().ok()?;
     let (expected, run) = (primitive.expected()?, recording.running());
     let samples = run.phase.as_ref()?.iter().zip(run.wrench.as_ref()?).filter(|(phase, _)| **phase > 0.0);
-    let errors = samples.map(|(phase, felt)| {
+    let errors = samples.map(|(phase, measured)| {
         let passed = (-phase.ln() / file.movement.alpha).clamp(0.0, 1.0);
         let expects = expected.at(passed);
-        (0..3).map(|axis| (felt[axis] - expects[axis]).powi(2)).sum::<f64>().sqrt()
+        (0..3).map(|axis| (measured[axis] - expects[axis]).powi(2)).sum::<f64>().sqrt()
     });
     errors.reduce(f64::max)
 }
