@@ -19,12 +19,12 @@ const NEWEST: u32 = 100;
 /// Period of the requests in a measurement.
 const ASK_EVERY: Duration = Duration::from_millis(100);
 
-/// Counters at one moment: the device's counters and those of this host.
+/// The counters of one moment: the device's counters and those of this host.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Snapshot {
     /// Counters of the device.
     pub statistics: Statistics,
-    /// Records that this host has missed.
+    /// Messages that this host has missed.
     pub gaps: Gaps,
     /// Requests that this host sent again.
     pub repeated: u32,

@@ -21,19 +21,19 @@ const AT_START: f64 = 0.02;
 /// One precondition.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Precondition {
-    /// Name of the condition.
+    /// Name of the item.
     pub item: &'static str,
     /// Value that was found.
     pub value: String,
     /// A run may begin, as far as this goes.
     pub met: bool,
-    /// Remedy for a person; none where it is met.
+    /// Remedy, in words for a person; none where it is met.
     pub remedy: Option<&'static str>,
     #[serde(skip)]
     refusal: Option<Refusal>,
 }
 
-/// Run that is asked for, and findings without the device.
+/// The run that is asked for, and the findings without the device.
 pub(super) struct Asked<'a> {
     /// The primitive.
     pub file: &'a PrimitiveFile,
