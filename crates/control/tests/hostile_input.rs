@@ -238,17 +238,8 @@ fn any_state() -> impl Strategy<Value = State> {
     prop::sample::select(vec![State::Idle, State::Gravity, State::Hold, State::Approach, State::Run, State::SoftStop])
 }
 
-/// Number of random cases: that of the environment variable, which `cargo xtask fuzz` sets, or `usual`.
-fn cases(variable: &str, usual: u32) -> u32 {
-    std::env::var(variable).ok().and_then(|number| number.parse().ok()).unwrap_or(usual)
-}
-
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: cases("TACTUS_FUZZ_CASES", 4_000),
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(ProptestConfig { cases: 4_000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn b1_any_input_in_any_state_gives_finite_torques_within_limits(
