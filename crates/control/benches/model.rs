@@ -63,7 +63,7 @@ fn observer<R: Real>(bencher: Bencher<'_, '_>) {
             displaced: false,
         };
         observer.update(&state, false);
-        let velocity = observer.velocity(&state, false);
+        let velocity = observer.velocity(&state, control::sense::observer::Trust::Compliant);
         observer.send(model, frames, &velocity, &q.0);
         velocity
     });

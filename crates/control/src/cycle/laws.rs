@@ -13,6 +13,7 @@ use crate::plan::reference::{HandReference, JointReference, TaskReference};
 use crate::plan::run::Senses;
 use crate::real::{Real, at_least, at_most, sqrt};
 use crate::sense::hand::HandState;
+use crate::sense::observer::Trust;
 use crate::time::{PERIOD, periods};
 use crate::units::{JointPositions, JointTorques, JointVelocities, Pose, Vector6, Vector7, Wrench};
 
@@ -95,7 +96,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         let (light, full) = (&self.gains.lead_damping, &self.gains.stop_damping);
         let share = at_most(at_least(share, R::of(0.0)), R::of(1.0));
-        torque -= (light + (full - light) * share).component_mul(&self.observer.velocity(measured.state, true));
+        torque -= (light + (full - light) * share).component_mul(&self.observer.velocity(measured.state, Trust::Stiff));
         Demand { explained: (gravity, Vector7::zeros()), ..self.plain(measured, torque) }
     }
 
@@ -112,7 +113,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             _ => return self.float(measured),
         };
         let gravity = self.steady_gravity(measured);
-        let velocity = self.observer.velocity(measured.state, true);
+        let velocity = self.observer.velocity(measured.state, Trust::Stiff);
         let damping = self.gains.stop_damping.component_mul(&velocity);
         let demand = self.plain(measured, gravity * share + rest - damping);
         Demand { explained: (gravity, Vector7::zeros()), ..demand }
@@ -134,7 +135,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             self.observer.hold_back(&added);
         }
         let shifted = JointReference { q: JointPositions(reference.q.0 + posture.integral.shift()), ..reference };
-        let velocity = self.observer.velocity(measured.state, true);
+        let trust = if posture.approach.is_some() { Trust::Approach } else { Trust::Stiff };
+        let velocity = self.observer.velocity(measured.state, trust);
         let mut torque = posture.controller.torque(
             &self.model,
             &self.gains.stiff,
@@ -199,7 +201,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             let behind = lag.distance * R::of(1.0 / TRACKING_LIMIT);
             run.crowd(at_least(speed_load(measured.frames, &reference.dq), behind));
         }
-        let velocity = self.observer.velocity(measured.state, !options.compliant);
+        let trust = if options.compliant { Trust::Compliant } else { Trust::Stiff };
+        let velocity = self.observer.velocity(measured.state, trust);
         let mut torque =
             controller.torque(&self.model, tracking, measured.frames, measured.state, &velocity, &reference);
         let explained = (torque.0 - controller.feedback(), reference.ddq.0);

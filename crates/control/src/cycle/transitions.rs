@@ -15,6 +15,7 @@ use crate::plan::primitive::Primitive;
 use crate::real::{Real, within};
 use crate::sense::deviation::Deviation;
 use crate::sense::drift::Drift;
+use crate::sense::observer::Trust;
 use crate::units::{JointAccelerations, JointPositions, Vector7, Wrench};
 
 impl<R: Real, const N: usize> Cycle<R, N> {
@@ -112,7 +113,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// The posture to hold after a run: what Eq (11) has put between q_d and q against friction becomes the integral's.
     fn after_run(&self, measured: &Measured<'_, R>) -> Posture<R> {
         let stiff = &self.gains.stiff;
-        let velocity = self.observer.velocity(measured.state, true);
+        let velocity = self.observer.velocity(measured.state, Trust::Stiff);
         let torque = self.torque_beyond_model(measured) + stiff.damping.component_mul(&velocity);
         let offset = torque.component_div(&stiff.stiffness).zip_map(&stiff.clamp, within);
         let mut posture = Posture::at(measured.state.q);

@@ -16,13 +16,13 @@ const BEYOND: f64 = 1.1;
 
 /// Time in which the torque rises to [`SWING`] times the friction (s). Shorter, and a joint without friction is jerked;
 /// longer, and a joint that nobody sees goes farther.
-const RISE: f64 = 0.11;
+const RISE: f64 = 0.12;
 
 /// Time constant with which it fades once the motor turns (s).
 const FADE: f64 = 0.06;
 
-/// Cycles with another count after which a motor turns: one may be a count that flickers.
-const TURNS: u8 = 2;
+/// Cycles in a row with another count after which a motor turns: one may be a count that flickers.
+const TURNS: u8 = 3;
 
 /// Way of a motor (rad) below which it is not asked to turn: 7 mrad of J1.
 const LEAST_WAY: f64 = 0.3;
@@ -37,7 +37,7 @@ pub(crate) struct Breakaway<R: Real> {
     direction: [R; JOINTS],
     /// Torque against friction when it began (N m at the motor).
     begin: Option<[R; JOINTS]>,
-    /// Cycles in which the count of each motor changed.
+    /// Cycles in a row in which the count of each motor changed; [`TURNS`] of them are not forgotten.
     turned: [u8; JOINTS],
     /// Torque that is added (N m at the motor).
     extra: [R; JOINTS],
@@ -93,7 +93,9 @@ impl<R: Real> Breakaway<R> {
         let motors = self.direction.iter().zip(&mut self.turned).zip(&mut self.extra);
         let torques = begin.iter().zip(against).zip(friction);
         for (motor, (((direction, turned), extra), ((begin, against), friction))) in motors.zip(torques).enumerate() {
-            *turned = turned.saturating_add(u8::from(still >> motor & 1 == 0));
+            if *turned < TURNS {
+                *turned = if still >> motor & 1 == 0 { *turned + 1 } else { 0 };
+            }
             if *turned >= TURNS || self.passed >= TRIAL {
                 *extra *= R::of(1.0 - PERIOD / FADE);
             } else {

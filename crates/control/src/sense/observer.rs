@@ -12,7 +12,7 @@ use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
 use crate::real::{Real, at_least, within};
 use crate::sense::joints::JointState;
-use crate::time::PERIOD;
+use crate::time::{PERIOD, few_periods};
 use crate::units::{JOINTS, JointPositions, Vector7};
 
 /// Time from the latch of the positions to the torque that answers them, in control periods: 1.35 ms.
@@ -35,12 +35,33 @@ const RENEWAL: u8 = 8;
 /// Largest difference from the measured velocity (rad/s): a person who shoves the arm is in no model.
 const FARTHEST: f64 = 0.5;
 
+/// The same for a joint that has stood still to the count for [`STANDS`] cycles (rad/s), on the way to which it falls
+/// steadily: friction holds the joint, of which the model knows nothing.
+const FARTHEST_AT_REST: f64 = 0.05;
+
+/// Time after which such a joint stands: 100 ms, in control periods. Shorter, and the torque makes steps.
+const STANDS: u8 = few_periods(0.1);
+
+/// Motors that turn each joint, one bit each, M1 lowest.
+const TURNED_BY: [u8; JOINTS] = [0b1, 0b110, 0b110, 0b1000, 0b11_0000, 0b11_0000, 0b100_0000];
+
 /// Largest difference from the measured position (rad).
 const ASTRAY: f64 = 0.02;
 
 /// The same for a fast joint in every other state than a compliant run, and the measured speed from which it is fast
 /// (rad/s).
 const FARTHEST_AT_SPEED: (f64, f64) = (0.1, 0.9);
+
+/// Nearness of the observed velocities to the measured ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trust {
+    /// In compliant runs: within a fixed distance.
+    Compliant,
+    /// In every other state: the nearer the faster a joint is measured.
+    Stiff,
+    /// In an approach, besides: the nearer the longer a joint has stood still that is to move.
+    Approach,
+}
 
 /// Gains of the correction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +100,8 @@ pub struct MotionObserver<R: Real> {
     dq: Vector7<R>,
     /// Acceleration that the torque does not explain (rad/s^2).
     disturbance: Vector7<R>,
+    /// Control periods for which the motors of each joint have stood, less those in which one turned: 0 to [`STANDS`].
+    still: [u8; JOINTS],
     /// Accelerations by the torques sent last and before.
     sent: [Vector7<R>; 2],
     mass: SMatrix<R, JOINTS, JOINTS>,
@@ -100,6 +123,7 @@ impl<R: Real> MotionObserver<R> {
             q: Vector7::zeros(),
             dq: Vector7::zeros(),
             disturbance: Vector7::zeros(),
+            still: [0; JOINTS],
             sent: [Vector7::zeros(); 2],
             mass: SMatrix::zeros(),
             factor: SMatrix::zeros(),
@@ -115,18 +139,22 @@ impl<R: Real> MotionObserver<R> {
         self.sent = [Vector7::zeros(); 2];
     }
 
-    /// Velocities where the next torque acts (rad/s), kept near the measured ones; where `stiff`, in every state but a
-    /// compliant run, the nearer the faster a joint is.
+    /// Velocities where the next torque acts (rad/s), kept near the measured ones.
     #[inline(never)]
-    pub fn velocity(&self, state: &JointState<R>, stiff: bool) -> Vector7<R> {
+    pub fn velocity(&self, state: &JointState<R>, trust: Trust) -> Vector7<R> {
         let ahead = self.dq + (self.sent[0] + self.disturbance) * R::of(LATENCY * PERIOD);
         let (least, speed) = FARTHEST_AT_SPEED;
-        let nearer = R::of(if stiff { (FARTHEST - least) / speed } else { 0.0 });
-        ahead.zip_map(&state.dq.0, |observed, measured| {
-            let fast = if measured < R::of(0.0) { -measured } else { measured };
+        let nearer = R::of(if trust != Trust::Compliant { (FARTHEST - least) / speed } else { 0.0 });
+        let stands = R::of(if trust == Trust::Approach { (FARTHEST - FARTHEST_AT_REST) / STANDS as f64 } else { 0.0 });
+        let mut velocity = state.dq.0;
+        for ((velocity, observed), still) in velocity.iter_mut().zip(ahead.iter()).zip(self.still) {
+            let fast = if *velocity < R::of(0.0) { -*velocity } else { *velocity };
+            let stands = R::from_counts(i32::from(still)) * stands;
             let farthest = at_least(R::of(FARTHEST) - fast * nearer, R::of(least));
-            measured + within(observed - measured, farthest)
-        })
+            let farthest = at_least(farthest - stands, R::of(FARTHEST_AT_REST));
+            *velocity += within(*observed - *velocity, farthest);
+        }
+        velocity
     }
 
     /// Positions (rad), kept near the measured ones.
@@ -143,6 +171,9 @@ impl<R: Real> MotionObserver<R> {
         let acceleration = self.sent[1] * R::of(LATENCY) + self.sent[0] * R::of(1.0 - LATENCY) + self.disturbance;
         self.q += (self.dq + acceleration * R::of(0.5 * PERIOD)) * R::of(PERIOD);
         self.dq += acceleration * R::of(PERIOD);
+        for (still, by) in self.still.iter_mut().zip(TURNED_BY) {
+            *still = if state.still & by == by { (*still + 1).min(STANDS) } else { still.saturating_sub(1) };
+        }
         let mut error = state.q.0 - self.q;
         if state.extrapolated != 0 {
             forget(&mut error, state.extrapolated);
