@@ -55,7 +55,7 @@ pub(super) struct Posture<R: Real> {
     pub(super) controller: JointController<R>,
     /// Trial of the motors with which the approach begins.
     breakaway: Breakaway<R>,
-    /// Torque that it added in the last good cycle (N m).
+    /// Torque that it added in the last cycle (N m).
     extra: Vector7<R>,
 }
 
@@ -83,23 +83,18 @@ impl<R: Real> Posture<R> {
         self.controller.reset();
     }
 
-    /// Returns the torque that makes motors break away (N m). `state` is complete.
+    /// Returns the torque that makes motors break away (N m).
     pub(super) fn break_away(&mut self, state: &JointState<R>, transmission: &Transmission<R>) -> Vector7<R> {
         if self.breakaway.is_active() {
             let against = self.controller.feedback() + self.controller.friction();
             let against = transmission.motor_torques_from_joint(&against.into());
             let friction = friction::at_motors(transmission);
-            let extra = self.breakaway.step(&against, &friction, state.still);
+            let extra = self.breakaway.step(&against, &friction, (state.still, state.extrapolated));
             self.extra = Vector7::from(transmission.joint_torques_from_motor(extra));
         } else {
             self.extra = Vector7::zeros();
         }
         self.extra
-    }
-
-    /// The torque that [`Posture::break_away`] returned last (N m).
-    pub(super) fn extra(&self) -> &Vector7<R> {
-        &self.extra
     }
 
     /// Returns what is asked of the joints.

@@ -147,10 +147,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         );
         let pose_d = Frames::new(&self.model, &reference.q).tool_pose();
         let explained = (torque.0 - posture.controller.feedback(), reference.ddq.0);
-        torque.0 += match frozen {
-            true => *posture.extra(),
-            false => posture.break_away(measured.state, &self.calibration.transmission),
-        };
+        torque.0 += posture.break_away(measured.state, &self.calibration.transmission);
         Demand { torque, q_d: reference.q, pose_d, explained, ..self.plain(measured, Vector7::zeros()) }
     }
 

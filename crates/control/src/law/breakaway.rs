@@ -22,7 +22,10 @@ const RISE: f64 = 0.12;
 const FADE: f64 = 0.06;
 
 /// Cycles in a row with another count after which a motor turns: one may be a count that flickers.
-const TURNS: u8 = 3;
+const TURNS: u8 = 2;
+
+/// Motors of the arm. Those of the wrist are not asked: what breaks their friction turns their light joints by degrees.
+const ARM_MOTORS: usize = 4;
 
 /// Way of a motor (rad) below which it is not asked to turn: 7 mrad of J1.
 const LEAST_WAY: f64 = 0.3;
@@ -53,16 +56,15 @@ impl<R: Real> Breakaway<R> {
 
     /// For motors that are to go these ways (rad).
     pub(crate) fn along(ways: &[R; JOINTS]) -> Self {
-        let direction = ways.map(|way| {
+        let mut direction = [R::of(0.0); JOINTS];
+        for (direction, way) in direction.iter_mut().zip(ways).take(ARM_MOTORS) {
             let least = R::of(LEAST_WAY);
-            R::of(if way > least {
-                1.0
-            } else if way < -least {
-                -1.0
-            } else {
-                0.0
-            })
-        });
+            if *way > least {
+                *direction = R::of(1.0);
+            } else if *way < -least {
+                *direction = R::of(-1.0);
+            }
+        }
         Breakaway { direction, passed: 0, ..Breakaway::none() }
     }
 
@@ -83,9 +85,15 @@ impl<R: Real> Breakaway<R> {
     }
 
     /// One control period: takes the torque against friction that acts without it and the largest friction (N m at the
-    /// motor), and the motors whose count did not change, one bit each. Returns what is to be added (N m at the motor).
+    /// motor), the motors whose count did not change, and those that are not known, one bit each. Returns what is to be
+    /// added (N m at the motor).
     #[inline(never)]
-    pub(crate) fn step(&mut self, against: &[R; JOINTS], friction: &[R; JOINTS], still: u8) -> &[R; JOINTS] {
+    pub(crate) fn step(
+        &mut self,
+        against: &[R; JOINTS],
+        friction: &[R; JOINTS],
+        (still, unknown): (u8, u8),
+    ) -> &[R; JOINTS] {
         let begin = *self.begin.get_or_insert(*against);
         self.passed = self.passed.saturating_add(1);
         let level =
@@ -93,7 +101,7 @@ impl<R: Real> Breakaway<R> {
         let motors = self.direction.iter().zip(&mut self.turned).zip(&mut self.extra);
         let torques = begin.iter().zip(against).zip(friction);
         for (motor, (((direction, turned), extra), ((begin, against), friction))) in motors.zip(torques).enumerate() {
-            if *turned < TURNS {
+            if *turned < TURNS && unknown >> motor & 1 == 0 {
                 *turned = if still >> motor & 1 == 0 { *turned + 1 } else { 0 };
             }
             if *turned >= TURNS || self.passed >= TRIAL {

@@ -171,8 +171,10 @@ impl<R: Real> MotionObserver<R> {
         let acceleration = self.sent[1] * R::of(LATENCY) + self.sent[0] * R::of(1.0 - LATENCY) + self.disturbance;
         self.q += (self.dq + acceleration * R::of(0.5 * PERIOD)) * R::of(PERIOD);
         self.dq += acceleration * R::of(PERIOD);
-        for (still, by) in self.still.iter_mut().zip(TURNED_BY) {
-            *still = if state.still & by == by { (*still + 1).min(STANDS) } else { still.saturating_sub(1) };
+        for (joint, (still, by)) in self.still.iter_mut().zip(TURNED_BY).enumerate() {
+            if state.extrapolated >> joint & 1 == 0 {
+                *still = if state.still & by == by { (*still + 1).min(STANDS) } else { still.saturating_sub(1) };
+            }
         }
         let mut error = state.q.0 - self.q;
         if state.extrapolated != 0 {
