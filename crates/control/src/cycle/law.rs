@@ -83,7 +83,8 @@ impl<R: Real> Posture<R> {
         self.controller.reset();
     }
 
-    /// Returns the torque that makes motors break away (N m).
+    /// Returns the torque that makes motors break away (N m). Not inlined: it is asked in an approach.
+    #[inline(never)]
     pub(super) fn break_away(&mut self, state: &JointState<R>, transmission: &Transmission<R>) -> Vector7<R> {
         if self.breakaway.is_active() {
             let against = self.controller.feedback() + self.controller.friction();
