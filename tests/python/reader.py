@@ -26,10 +26,10 @@ assert run.notes["primitive"].startswith("reach 0x") and run.notes["primitive"] 
 assert (run.notes["speed"], fast.notes["speed"]) == ("1", "1.5"), run.notes
 ratio = np.ptp(run.time[run.progress() <= 1]) / np.ptp(fast.time[fast.progress() <= 1])
 assert abs(ratio - 1.5) < 0.05, ratio
-progress, (a, b) = tr.align([run, fast], "position", alpha=movement["alpha"])
+progress, (a, b) = tr.align([run, fast], "position_d", alpha=movement["alpha"])
 assert a.shape == (101, 3)
-# By phase the two speeds are the same path; by time they are not.
-assert np.abs(a - b).max() < 0.01, np.abs(a - b).max()
+# By phase the two speeds are the same plan; by time they are not. Where the arm is, is another matter: it lags.
+assert np.abs(a - b).max() < 0.005, np.abs(a - b).max()
 count = min(len(run), len(fast))
 assert np.abs(run.position[:count] - fast.position[:count]).max() > 0.05
 
