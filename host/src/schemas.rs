@@ -7,7 +7,7 @@ use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 
 use crate::cmd::{
-    config, delete, doctor, explain, export, get, hand, list, manual, record, rename, run_report, sim, stop,
+    config, delete, doctor, explain, export, get, hand, list, manual, record, rename, run_report, settings, sim, stop,
 };
 
 /// Every schema by the name of its command; `error` is that of any command that fails.
@@ -15,6 +15,8 @@ use crate::cmd::{
 pub fn all() -> Vec<(&'static str, Schema)> {
     vec![
         ("config", of::<config::Configured>()),
+        ("config-diff", of::<settings::Compared>()),
+        ("config-get", of::<settings::Kept>()),
         ("delete", of::<delete::Deleted>()),
         ("doctor", of::<doctor::Examined>()),
         ("error", of::<FailureData>()),

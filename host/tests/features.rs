@@ -74,7 +74,13 @@ const ROWS: [Feature; 20] = [
      end tells duration, force error, limits and lost samples",
         "",
     ),
-    ("settings of the device", "-", "read, written, compared and restored, with a report of differences", "not built"),
+    (
+        "settings of the device",
+        "`config get`, `set`, `dump`, `diff`, `restore`",
+        "TOML, sorted, units in the names, comments kept; restored settings are read back and every difference told; \
+     unknown and missing names are listed; those of another serial number need `--force`",
+        "",
+    ),
     (
         "health of the line",
         "`status --line`, the end of each `run`",

@@ -170,6 +170,8 @@ error_codes! {
         "read the cause; name another file";
     ChangeTooLate = 237: "a change comes after the end of the run", "the time of `--goal-at` or `--speed-at`",
         "give a time within the run";
+    UnknownSetting = 238: "there is no such setting, or it cannot have that value", "a misspelt name or value",
+        "`tactus config get` lists every setting with its value";
     NoTerminal = 240: "there is no terminal to draw on", "standard output is a file or a pipe",
         "run it in a terminal, or with `--json` for a line ten times a second";
     UnknownCode = 241: "there is no error or fault of that name", "a misspelt code",
@@ -230,6 +232,8 @@ error_codes! {
         "learn the primitive again with this version";
     PrimitiveSchema = 431: "the primitive's file has another layout", "it was written by another version",
         "learn the primitive again with this version";
+    SettingsModel = 432: "the settings are for another model of the robot", "they were read by another version",
+        "calibrate the arm again with this version";
     NotReady = 590: "the arm does not get ready",
         "a puck, the safety module or the pendant does not let the start-up go on",
         "check the pendant and the cables, then try again";
@@ -301,6 +305,15 @@ error_codes! {
     WeightNotAccepted = 644: "the weight of the arm was measured and not accepted",
         "the hand holds something, something touches the arm, or its weight is right already",
         "empty the hand and free the arm, then `tactus calibrate gravity` again; the device goes on as before";
+    SettingsInvalid = 645: "the file of settings cannot be used", "a misspelt key, or a value that no arm can have",
+        "`tactus config dump` writes a sound one to compare with";
+    SettingsOfOthers = 646: "the settings are those of another arm", "another file was meant, or the board was changed",
+        "calibrate this arm; if it is the same arm with another board: `tactus config restore --force`";
+    SettingsDiffer = 647: "the device keeps other settings than the file has",
+        "it was calibrated since, or another device was meant",
+        "`tactus config restore FILE` has the device keep the file's, `tactus config dump -o FILE --force` the reverse";
+    SettingsNotKept = 648: "reading the settings back gave other values", "the device's storage, or the line",
+        "restore them again; if it persists the device's storage is worn out";
     ImageInvalid = 651: "the image to be uploaded is not sound", "a defect of the tool",
         "make the primitive again with `tactus learn`";
     ReadBackDiffers = 652: "reading the primitive back gave other bytes", "the device's storage, or the line",

@@ -22,6 +22,7 @@ pub mod primitive_file;
 pub mod procedure;
 pub mod replay;
 pub mod report;
+pub mod settings;
 pub mod simulation;
 pub mod table;
 pub mod tracking;

@@ -1,4 +1,4 @@
-//! `tactus config`: the settings that count, and where each comes from.
+//! `tactus config`: the tool's settings that count, and where each comes from; its actions are on the device's.
 
 use clap::Args;
 use lab::table::Table;
@@ -10,7 +10,11 @@ use crate::config::Origin;
 
 /// Options of `config`.
 #[derive(Debug, Clone, Args)]
-pub struct Cmd {}
+pub struct Cmd {
+    /// Action on the settings of the device; the tool's own are shown without one.
+    #[command(subcommand)]
+    pub action: Option<super::settings::Action>,
+}
 
 /// A setting.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -43,11 +47,14 @@ pub struct Configured {
     pub settings: Settings,
 }
 
-/// Shows them.
+/// Shows them, or does what the action says.
 ///
 /// # Errors
-/// Standard output was closed.
-pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
+/// Standard output was closed, or the action failed.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
+    if let Some(action) = &command.action {
+        return super::settings::run(action, global);
+    }
     let origins = &global.origins;
     let settings = Settings {
         device: Setting { value: global.device.clone(), origin: origins.device },

@@ -148,8 +148,13 @@ The file is ~/.config/tactus/config.toml, for example:
   device = \"serial:/dev/ttyACM0\"
   timeout = 5
 An option counts before the environment, and the environment before the file.
-Example:
-  tactus config";
+The settings of the device are the home of the arm and the weight of its links (`tactus calibrate`).
+Examples:
+  tactus config
+  tactus config dump -o arm.toml
+  tactus config diff arm.toml
+  tactus config restore arm.toml
+  tactus config set home.joint_4_rad=3.1";
 /// `compare`
 pub(super) const COMPARE: &str = "\
 Example:

@@ -34,6 +34,7 @@ pub mod rename;
 pub mod report;
 pub mod run;
 pub mod run_report;
+pub mod settings;
 pub mod sim;
 pub mod status;
 pub mod stop;
@@ -224,7 +225,7 @@ pub enum Command {
     /// Write a page of the manual for each command
     #[command(after_help = examples::MANUAL)]
     Manual(manual::Cmd),
-    /// Show the settings that count, and where they come from
+    /// Show the tool's settings, or read, change, compare and restore the device's
     #[command(after_help = examples::CONFIG)]
     Config(config::Cmd),
     /// Look at everything that a command needs, and say what is missing
@@ -254,7 +255,11 @@ pub fn parse() -> Result<Cli, ExitCode> {
     // What explains the error is not to fail with it.
     let needs_none = matches!(
         cli.command,
-        Command::Config(_) | Command::Doctor(_) | Command::Explain(_) | Command::Completions(_) | Command::Manual(_)
+        Command::Config(config::Cmd { action: None })
+            | Command::Doctor(_)
+            | Command::Explain(_)
+            | Command::Completions(_)
+            | Command::Manual(_)
     );
     match config {
         Err(failure) if !needs_none => Err(tell(&failure, cli.global.json)),

@@ -8,6 +8,7 @@ use lab::client::Client;
 use lab::device::Device;
 use lab::error::HostError;
 use lab::procedure;
+use lab::settings::{KeptWeight, Settings, WriteError};
 use lab::simulation::FlashSource;
 use link::{HomeSource, Refusal};
 use system_tests::{Arm, command, expect, simulation};
@@ -102,6 +103,15 @@ fn a_home_is_not_changed_under_torque_nor_to_one_the_arm_cannot_have() {
     assert_eq!(refused(arm.calibrate(home)), (Refusal::HasTorque, [State::Hold.code().into(), 0]));
     assert_eq!(refused(arm.forget_calibration()).0, Refusal::HasTorque);
     assert_eq!(expect(arm.calibration()).source, HomeSource::Model);
+    // Of settings that are half refused the other half is not written.
+    let weight = Some(KeptWeight { hand: true, links: [[0.01, 0.0, 0.0, 0.0]; 7] });
+    let written = Settings { home: Some(home), weight }.write(&mut arm);
+    let reason = match written {
+        Err(WriteError::Device(HostError::Refused { reason, .. })) => Some(reason),
+        _ => None,
+    };
+    assert_eq!(reason, Some(Refusal::HasTorque), "{written:?}");
+    assert_eq!(expect(Settings::of_device(&mut arm)), Settings::default());
 }
 
 #[test]

@@ -92,6 +92,10 @@ fn real_outputs_and_failures_are_valid_by_their_schemas() {
     ask("hand", "hand --at-home init", &device);
     ask("record", "record --duration 1 -o some.csv", &device);
     ask("stop", "stop", &device);
+    ask("config", "config", &device);
+    ask("config-get", "config get", &device);
+    ask("config-get", "config dump -o arm.toml", &device);
+    ask("config-diff", "config diff arm.toml", &device);
     ask("export", "export run.csv", &["--json"]);
     ask("explain", "explain E504", &["--json"]);
     ask("explain", "explain TrackingError", &["--json"]);
@@ -103,5 +107,5 @@ fn real_outputs_and_failures_are_valid_by_their_schemas() {
     expect(std::fs::write(at.join("outputs.txt"), outputs.concat()));
     let schemas = python::root().join("docs/schemas");
     let printed = python::run("validate.py", &[schemas.as_os_str(), at.join("outputs.txt").as_os_str()]);
-    assert_eq!(printed, "15 outputs are valid\n");
+    assert_eq!(printed, "19 outputs are valid\n");
 }
