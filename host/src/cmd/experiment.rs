@@ -1,5 +1,6 @@
 //! `tactus experiment`: the same movement on objects that are not where it expects them.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -29,15 +30,15 @@ pub struct Cmd {
     /// [default: a,b,c; lift c; fingers c,d]
     #[arg(long, value_delimiter = ',', value_parser = str::parse::<Mode>)]
     pub modes: Vec<Mode>,
-    /// Try every cell with the seeds 1 to N; a seed is an arm
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000), conflicts_with = "seed")]
-    pub seeds: Option<u64>,
+    /// Try every cell with the seeds 1 to N, or FROM to TO; a seed is an arm
+    #[arg(long, value_name = "N|FROM:TO", value_parser = numbers, conflicts_with = "seed")]
+    pub seeds: Option<RangeInclusive<u64>>,
     /// Try every cell with this seed only
     #[arg(long)]
     pub seed: Option<u64>,
-    /// Teach N times, each time by another person, and try every demonstration on every arm
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100), conflicts_with = "primitive")]
-    pub demonstrations: Option<u64>,
+    /// Teach N times, each time by another person, and try every demonstration on every arm; FROM:TO names the persons
+    #[arg(long, value_name = "N|FROM:TO", value_parser = numbers, conflicts_with = "primitive")]
+    pub demonstrations: Option<RangeInclusive<u64>>,
     /// Repeat with a factor of `--vary` over a range, until less than half is held: `joint-friction=1:0`,
     /// `bias=0:2:4` (steps)
     #[arg(long, value_name = "NAME=FROM:TO[:STEPS]")]
@@ -79,6 +80,22 @@ pub struct Cmd {
 fn object_kinds() -> impl TypedValueParser<Value = ObjectKind> {
     let value = |kind: ObjectKind| PossibleValue::new(kind.name()).help(kind.row().description);
     PossibleValuesParser::new(ObjectKind::ALL.map(value)).try_map(|name| name.parse::<ObjectKind>())
+}
+
+/// Largest number of an arm or a person; those that gather experience have numbers above.
+const LARGEST_NUMBER: u64 = 1000;
+
+/// Numbers of arms or persons: `N` for 1 to N, or `FROM:TO`.
+fn numbers(text: &str) -> Result<RangeInclusive<u64>, String> {
+    let number = |text: &str| text.parse::<u64>().map_err(|error| format!("'{text}': {error}"));
+    let (first, last) = match text.split_once(':') {
+        Some((first, last)) => (number(first)?, number(last)?),
+        None => (1, number(text)?),
+    };
+    if first < 1 || last < first || last > LARGEST_NUMBER {
+        return Err(format!("numbers are from 1 to {LARGEST_NUMBER}, the smaller one first"));
+    }
+    Ok(first..=last)
 }
 
 /// Carries an experiment through.
@@ -155,7 +172,7 @@ mod work {
             object: command.object.unwrap_or(usual.object),
             grid: grid.moved(command.rotate, command.shift.map(|value| value * 0.01)),
             modes: modes(command).unwrap_or(usual.modes),
-            seeds: command.seed.map_or_else(|| (1..=command.seeds.unwrap_or(1)).collect(), |seed| vec![seed]),
+            seeds: seeds(command),
             engine,
             plant: command.plant,
             variation: command.vary,
@@ -169,16 +186,30 @@ mod work {
         })
     }
 
+    /// The arms that are asked for.
+    fn seeds(command: &Cmd) -> Vec<u64> {
+        match (command.seed, &command.seeds) {
+            (Some(seed), _) => vec![seed],
+            (None, Some(seeds)) => seeds.clone().collect(),
+            (None, None) => vec![1],
+        }
+    }
+
     /// Several demonstrations, or several plants, or both: one experiment for each, and what they say together.
     fn study(command: &Cmd, global: &Global, out: &Path, interrupt: &Interrupt, output: Output) -> Result<(), Failure> {
         if command.scenario == Scenario::Lift {
             let cause = "the experiment with a weight has three cases of its own";
             return Err(Failure::new(ErrorCode::NoStudyOfWeights, DOING, cause));
         }
-        let demonstrations = command.demonstrations.unwrap_or(1);
+        let numbers = command.demonstrations.clone().unwrap_or(1..=1);
+        let demonstrations = numbers.clone().count();
         let mut configs = Vec::new();
-        for number in 1..=demonstrations {
-            let folder = if demonstrations > 1 { out.join(format!("demonstration-{number}")) } else { out.to_owned() };
+        for number in numbers {
+            let folder = if demonstrations > 1 || number > 1 {
+                out.join(format!("demonstration-{number}"))
+            } else {
+                out.to_owned()
+            };
             configs.push(configuration(command, global, &folder, number, interrupt, output)?);
         }
         let name = command.sweep.as_ref().map(|sweep| sweep.name.as_str());
@@ -446,6 +477,19 @@ mod work {
         match error {
             PreparationError::Trial(error) => trial_failure(error),
             error => Failure::new(ErrorCode::NotTaught, "experiment: no primitive was made", error),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::numbers;
+
+    #[test]
+    fn numbers_are_counted_from_one_or_from_where_they_begin() {
+        assert_eq!((numbers("5"), numbers("11:20"), numbers("7:7")), (Ok(1..=5), Ok(11..=20), Ok(7..=7)));
+        for wrong in ["0", "0:3", "5:4", "1001", "a", "1:", ":3", "-2", "1:2:3", ""] {
+            assert!(numbers(wrong).is_err(), "{wrong}");
         }
     }
 }
