@@ -48,6 +48,7 @@ Examples:
 pub(super) const RUN: &str = "\
 Examples:
   tactus --device sil: run grasp.toml --record run.csv
+  tactus --device sil: run grasp.toml --keep
   tactus --device sil: run grasp.toml --mode adapt --speed 0.5 --goal 0.6,0.1,0.2
   tactus --device serial:/dev/ttyACM0 run grasp";
 /// `upload`

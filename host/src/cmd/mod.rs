@@ -33,6 +33,7 @@ pub mod rehearse;
 pub mod rename;
 pub mod report;
 pub mod run;
+mod run_folder;
 pub mod run_report;
 pub mod settings;
 pub mod sim;

@@ -11,6 +11,7 @@ use serde_json::json;
 
 use super::files::{self, RecordingFile};
 use super::preflight::{self, Asked, Precondition};
+use super::run_folder::RunFolder;
 use super::run_report::{DryRun, Report, report};
 use super::{ErrorCode, Failure, Global, Output, connection, get, upload};
 use crate::check::Course;
@@ -42,6 +43,9 @@ pub struct Cmd {
     /// Where the recording goes, CSV (see docs/recording-format.md)
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
+    /// Keep all about the run in FOLDER/DATE-NAME: primitive, recording, result and report; FOLDER is `runs` if not given
+    #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "runs", conflicts_with = "record")]
+    pub keep: Option<PathBuf>,
     /// Speed relative to the taught one, 0.1 to 2
     #[arg(long, default_value_t = 1.0, value_parser = super::check::factor)]
     pub speed: f64,
@@ -91,48 +95,83 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let course = Course { speed: command.speed, goal: super::check::goal(command.goal), changes };
     let check = upload::precheck(&file, &course, output, DOING)?;
     let record = command.record.as_ref().filter(|_| !command.dry_run);
-    let mut record =
-        record.map(|path| RecordingFile::create(path, global, &[&command.primitive], DOING)).transpose()?;
+    let create = |path: &Path| RecordingFile::create(path, global, &[&command.primitive], DOING);
+    let record = record.map(|path| create(path)).transpose()?;
     let started = Instant::now();
     let mut client = match opened {
         Some(client) => client,
         None => open(command, global)?,
     };
-    if command.bus_log.is_some() && client.transport().simulation().is_none() {
-        let cause = std::io::Error::other("only a simulated bus can be written down");
-        return Err(connection::failure(ProcedureError::Recording(cause), DOING));
-    }
-    if let Some(old) = upload::other_version(&mut client, &file, DOING)? {
-        output.say(format!("replaces another version of '{}' in the device (checksum 0x{:08x})", file.name, old.crc));
-    }
-    upload::send(&mut client, &file, output, DOING)?;
-    output.say(format!("'{}' is in the device", file.name));
+    put(command, &mut client, &file, output)?;
     let Cmd { speed, goal, mode, .. } = *command;
     let asked = Asked { file: &file, speed, goal, mode, check: &check };
     if command.dry_run {
         return tell_unmoved(&mut client, &asked, output);
     }
-    let preconditions = meet(&mut client, &asked, command.at_home, output)?;
+    let folder = command.keep.as_ref().map(|base| RunFolder::create(base, &file)).transpose()?;
+    let record = match &folder {
+        Some(folder) => Some(create(&folder.recording())?),
+        None => record,
+    };
+    let mut ended = carry_out(command, &mut client, &asked, record, started, output);
+    if let Some(lost) = ended.as_ref().ok().and_then(|report| missed(report.tracking.as_ref()?)) {
+        ended = ended.and_then(|report| Err(short_of_goal(&report, lost, global)?));
+    }
+    if let Some(folder) = folder {
+        let kept = folder.finish(&mut ended, client.hello());
+        output.say(format!("everything about this run is in {}", folder.path().display()));
+        let name = Some(files::text(folder.path()));
+        ended = ended.and_then(|report| kept.map(|()| Report { folder: name, ..report }));
+    }
+    let report = ended?;
+    output.result(&report, report.to_text())
+}
+
+/// Puts the primitive into the device, unless it is there already.
+fn put(command: &Cmd, client: &mut Client<Device>, file: &PrimitiveFile, output: Output) -> Result<(), Failure> {
+    if command.bus_log.is_some() && client.transport().simulation().is_none() {
+        let cause = std::io::Error::other("only a simulated bus can be written down");
+        return Err(connection::failure(ProcedureError::Recording(cause), DOING));
+    }
+    if let Some(old) = upload::other_version(client, file, DOING)? {
+        output.say(format!("replaces another version of '{}' in the device (checksum 0x{:08x})", file.name, old.crc));
+    }
+    upload::send(client, file, output, DOING)?;
+    output.say(format!("'{}' is in the device", file.name));
+    Ok(())
+}
+
+/// Meets the preconditions and plays the primitive.
+fn carry_out(
+    command: &Cmd,
+    client: &mut Client<Device>,
+    asked: &Asked<'_>,
+    mut record: Option<RecordingFile>,
+    started: Instant,
+    output: Output,
+) -> Result<Report, Failure> {
+    let preconditions = meet(client, asked, command.at_home, output)?;
     let ready_s = client.is_virtual().then(|| client.now().as_secs_f64());
-    let played = play(command, &mut client, &file, record.as_mut(), output);
-    connection::tell_speed(&client, started, output);
+    let played = play(command, client, asked.file, record.as_mut(), output);
+    connection::tell_speed(client, started, output);
     let played = played.map_err(|error| connection::failure(error, DOING));
     let report = match record {
         Some(record) => record.end(played, output)?,
         None => played?,
     };
-    let report = Report { ready_s, preconditions, ..report };
     if !client.is_simulated() {
         output.say("the arm holds its goal; `tactus stop` makes it soft");
     }
-    let Some(missed) = report.tracking.as_ref().and_then(missed) else {
-        return output.result(&report, report.to_text());
-    };
+    Ok(Report { ready_s, preconditions, ..report })
+}
+
+/// The failure of a run that ended elsewhere than at its goal; its report is told all the same.
+fn short_of_goal(report: &Report, missed: String, global: &Global) -> Result<Failure, Failure> {
     if !global.json {
-        output.result(&report, report.to_text())?;
+        global.output().result(report, report.to_text())?;
     }
     let failure = Failure::new(ErrorCode::GoalMissed, DOING, missed);
-    Err(match serde_json::to_value(&report) {
+    Ok(match serde_json::to_value(report) {
         Ok(data) => failure.data(data),
         Err(_) => failure,
     })

@@ -45,6 +45,8 @@ pub struct Report {
     pub name: String,
     /// Use of the measured force in the run.
     pub mode: &'static str,
+    /// Folder with everything about this run; `null`: none was asked for.
+    pub folder: Option<String>,
     /// The preconditions before anything moved.
     pub preconditions: Vec<Precondition>,
     /// Duration of the movement, s.
@@ -147,6 +149,7 @@ pub(super) fn report(
     Ok(Report {
         name: file.name.clone(),
         mode: mode.name(),
+        folder: None,
         preconditions: Vec::new(),
         duration_s: recording.running().len() as f64 / RATE,
         tracking,

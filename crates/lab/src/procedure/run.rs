@@ -23,6 +23,9 @@ const SILENCE: Duration = Duration::from_secs(1);
 /// more.
 const SETTLING_ALLOWANCE: f64 = 5.0;
 
+/// Time for which an arm that has stopped is watched on: its recording shows the fault, and how it came to rest.
+const AFTERMATH: Duration = Duration::from_millis(500);
+
 /// Longest time that a goal takes to a new place, s.
 const GOAL_ALLOWANCE: f64 = 30.0;
 
@@ -188,6 +191,9 @@ pub fn play(
 ) -> Result<RunOutcome, ProcedureError> {
     client.set_telemetry(1)?;
     let outcome = follow(client, request, on_cycle);
+    if matches!(outcome, Err(ProcedureError::Stopped(_) | ProcedureError::Diverted(_))) {
+        watch_on(client, on_cycle);
+    }
     // The stream must not run on into the next procedure, and the first error is the one to tell.
     let silenced = client.set_telemetry(0);
     let outcome = outcome?;
@@ -249,6 +255,18 @@ fn follow(
                     _ => {}
                 }
             }
+        }
+    }
+}
+
+/// Hands on the cycles after an arm has stopped. What ends the stream now is no news: the stop is what is told.
+fn watch_on(client: &mut Client<Device>, on_cycle: &mut dyn FnMut(&Telemetry)) {
+    let end = client.now() + AFTERMATH;
+    while client.now() < end {
+        match client.next(end.saturating_sub(client.now())) {
+            Ok(Some(Incoming::Telemetry(telemetry))) => on_cycle(&telemetry),
+            Ok(Some(_)) => {}
+            Ok(None) | Err(_) => return,
         }
     }
 }
