@@ -43,7 +43,7 @@ pub struct Cmd {
     /// Where the recording goes, CSV (see docs/recording-format.md)
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
-    /// Keep all about the run in FOLDER/DATE-NAME: primitive, recording, result and report; FOLDER is `runs` if not given
+    /// Keep all about the run in FOLDER/DATE-NAME: primitive, recording, result, report; FOLDER is `runs` if not given
     #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "runs", conflicts_with = "record")]
     pub keep: Option<PathBuf>,
     /// Speed relative to the taught one, 0.1 to 2

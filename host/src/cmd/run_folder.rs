@@ -1,4 +1,4 @@
-//! `RunFolder`: everything about one run in a folder of its own, whatever its end: primitive, recording, result, report.
+//! `RunFolder`: a folder with all about one run, whatever its end: primitive, recording, result, report.
 
 use std::fs;
 use std::io;
