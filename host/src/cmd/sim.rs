@@ -1,6 +1,7 @@
 //! `tactus sim`: a simulated arm that stays, for other terminals to connect to.
 
 mod bus;
+mod pace;
 mod party;
 
 use std::io::ErrorKind;
@@ -21,6 +22,7 @@ use lab::client::Interrupt;
 use lab::device::Device;
 use lab::simulation::Engine;
 use lab::transport::{Address, Transport, TransportError};
+use pace::Pace;
 use party::{Party, Peer};
 
 /// Virtual time simulated between two looks at the socket: a human does not notice, a link time-out neither.
@@ -179,7 +181,7 @@ fn serve(
     mut bus: Option<&mut BusServer>,
     interrupt: &Interrupt,
 ) -> Result<(), TransportError> {
-    let started = Instant::now();
+    let (started, mut pace) = (Instant::now(), Pace::default());
     let mut party = Party::default();
     let mut bytes = Vec::new();
     while !interrupt.is_raised() {
@@ -208,7 +210,7 @@ fn serve(
                 bus.serve(simulation).map_err(TransportError::Io)?;
             }
             if !command.fast {
-                std::thread::sleep(device.now().saturating_sub(started.elapsed()));
+                std::thread::sleep(pace.wait(device.now(), started.elapsed()));
             }
         }
     }
