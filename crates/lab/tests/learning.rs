@@ -365,6 +365,43 @@ fn a_dwell_makes_the_movement_longer_by_exactly_that_and_rests_at_the_goal() {
     }
 }
 
+/// The taught movement of an arm that stands still for half a second and then creeps away for another half: nobody holds
+/// it any more, and it weighs otherwise than its model. `speed` is that of its J7 at the end, rad/s.
+fn let_go(speed: f64) -> Recording {
+    let mut rows = common::rows(4.0);
+    let at_rest = rows.last().unwrap().clone();
+    let mut last = at_rest.telemetry.q;
+    for k in 1..=150_u32 {
+        let time = f64::from(k) / control::RATE;
+        last[6] = at_rest.telemetry.q[6] + (speed * time * time) as f32;
+        let (position, orientation) = lab::arm::tool_pose(&last.map(f64::from));
+        let mut row = at_rest.clone();
+        row.time += time;
+        row.telemetry.cycle += k;
+        row.telemetry.q = last;
+        row.pose[..3].copy_from_slice(&position);
+        row.pose[3..].copy_from_slice(&orientation);
+        rows.push(row);
+    }
+    Recording::parse(Path::new("demo.csv"), common::text(&rows).as_bytes()).unwrap()
+}
+
+#[test]
+fn an_arm_that_creeps_away_once_it_is_let_go_is_cut_off_there_and_that_is_said() {
+    let options = LearnOptions { dwell: 2.5, ..LearnOptions::named("grasp") };
+    let plain = learned(&taught(4.0), &options).unwrap();
+    let crept = learned(&let_go(0.3), &options).unwrap();
+    let away = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+    let (goal, taught) = (crept.primitive.goal.position, plain.primitive.goal.position);
+    assert!(away(&goal, &taught) < 1e-3, "{goal:?} instead of {taught:?}");
+    let words = crept.report.warnings.join("\n");
+    assert!(words.contains("crept away by") && words.contains("let go"), "{words}");
+    assert!(!plain.report.warnings.iter().any(|warning| warning.contains("crept")));
+    // Half a metre per second is no creeping: who ends in motion is told so, as before.
+    let fast = learned(&let_go(5.0), &options).unwrap_err();
+    assert!(matches!(fast, LearnError::Option { option: "--dwell", .. }), "{fast}");
+}
+
 #[test]
 fn gains_that_the_user_gives_are_taken_and_explained_and_a_heavy_plan_is_warned_of() {
     let feedback = |k1: [f64; 10], stiffness: f64| LearnOptions {

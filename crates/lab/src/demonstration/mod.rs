@@ -54,6 +54,13 @@ const REST: usize = 90;
 /// Samples on either side over which the speed is averaged: encoder steps and tremor of one sample are not movement.
 const SPEED_HALF_WINDOW: usize = 15;
 
+/// Longest time for which an arm creeps away at the end of a recording, samples (1.5 s), and how far (m, turning counts
+/// with [`TURN_RADIUS`]). What lasts longer or goes farther is movement.
+const CREEPING: (usize, f64) = (450, 0.03);
+
+/// Rest before that, samples (0.1 s): one that only turns back stands still for less.
+const REST_BEFORE_CREEPING: usize = 30;
+
 /// A movement on a uniform grid of [`RATE`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Demonstration {
@@ -69,6 +76,8 @@ pub struct Demonstration {
     pub wrench: Option<Vec<[f64; 6]>>,
     /// Time that was cut off at the beginning and at the end, s.
     pub trimmed: (f64, f64),
+    /// Distance by which the arm crept away at the end, once it was let go, m; that is cut off.
+    pub crept: Option<f64>,
     /// Where the pose comes from.
     pub pose_source: PoseSource,
 }
@@ -151,6 +160,7 @@ impl Demonstration {
             q,
             wrench,
             trimmed: (0.0, 0.0),
+            crept: None,
             pose_source,
         };
         whole.trim(recording, preparation)
@@ -161,8 +171,12 @@ impl Demonstration {
             return Ok(self);
         };
         let speed = self.speed();
+        let (end, crept) = match self.let_go(&speed, threshold) {
+            Some((end, crept)) => (end, Some(crept)),
+            None => (speed.len() - 1, None),
+        };
         let first = speed.iter().position(|speed| *speed > threshold);
-        let last = speed.iter().rposition(|speed| *speed > threshold);
+        let last = speed[..=end].iter().rposition(|speed| *speed > threshold);
         let (first, last) = match (first, last) {
             (Some(first), Some(last)) => (first, last),
             _ => (0, 0),
@@ -177,7 +191,7 @@ impl Demonstration {
                 threshold,
             });
         }
-        let (first, last) = (first.saturating_sub(REST), (last + REST).min(speed.len() - 1));
+        let (first, last) = (first.saturating_sub(REST), (last + REST).min(end));
         let trimmed = (self.time[first], self.time[self.time.len() - 1] - self.time[last]);
         let range = first..=last;
         Ok(Demonstration {
@@ -187,8 +201,28 @@ impl Demonstration {
             q: self.q.map(|values| values[range.clone()].to_vec()),
             wrench: self.wrench.map(|values| values[range.clone()].to_vec()),
             trimmed,
+            crept,
             pose_source: self.pose_source,
         })
+    }
+
+    /// The last sample at which the arm stood still, and how far it crept away from there until the end (m): an arm
+    /// that nobody holds any more and that weighs otherwise than its model. `None` where it did not.
+    fn let_go(&self, speed: &[f64], threshold: f64) -> Option<(usize, f64)> {
+        let end = speed.len() - 1;
+        let still = speed.iter().rposition(|speed| *speed <= threshold)?;
+        let rested = speed[..=still].iter().rev().take_while(|speed| **speed <= threshold).count();
+        let crept = self.distance(still, end);
+        let (longest, farthest) = CREEPING;
+        let is_creeping = (1..=longest).contains(&(end - still)) && rested >= REST_BEFORE_CREEPING && crept <= farthest;
+        is_creeping.then_some((still, crept))
+    }
+
+    /// Distance of the tool frame between two samples, m, turning included at [`TURN_RADIUS`].
+    fn distance(&self, from: usize, to: usize) -> f64 {
+        let moved =
+            (0..3).map(|axis| (self.position[to][axis] - self.position[from][axis]).powi(2)).sum::<f64>().sqrt();
+        moved + TURN_RADIUS * angle_between(&self.orientation[from], &self.orientation[to])
     }
 
     /// Speed of the tool frame at each sample, m/s, turning included at [`TURN_RADIUS`].
@@ -198,13 +232,7 @@ impl Demonstration {
             .map(|index| {
                 let before = index.saturating_sub(SPEED_HALF_WINDOW);
                 let after = (index + SPEED_HALF_WINDOW).min(last);
-                let period = self.time[after] - self.time[before];
-                let moved: f64 = (0..3)
-                    .map(|axis| (self.position[after][axis] - self.position[before][axis]).powi(2))
-                    .sum::<f64>()
-                    .sqrt();
-                let turned = angle_between(&self.orientation[before], &self.orientation[after]);
-                (moved + TURN_RADIUS * turned) / period
+                self.distance(before, after) / (self.time[after] - self.time[before])
             })
             .collect()
     }

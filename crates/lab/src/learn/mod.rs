@@ -168,6 +168,12 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
     }
     demonstration.rest(options.dwell);
     let mut warnings = Vec::new();
+    if let Some(crept) = demonstration.crept {
+        warnings.push(format!(
+            "the arm crept away by {:.0} mm once it was let go, which is left out; `tactus calibrate gravity` weighs it",
+            crept * 1e3
+        ));
+    }
     let largest_angle = check_angle(recording, &demonstration, options, &mut warnings)?;
     let posture = match &demonstration.q {
         Some(q) => q.clone(),
