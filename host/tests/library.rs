@@ -147,7 +147,7 @@ fn a_stored_primitive_runs_by_its_name_and_others_look_on_without_costing_it_a_c
     assert_eq!(object(folder, &["list"])["primitives"][0]["loaded"], true);
     let seen = object(folder, &["record", "--duration", "2", "-o", "seen.csv"]);
     assert_eq!(seen["samples"], 600);
-    refused(folder, &["delete", "reach"], "E504", "another program");
+    refused(folder, &["delete", "reach"], "E504", "has been using the arm for");
     let watched = tactus(folder, &["--json", "monitor", "--primitive", "reach.toml", "--duration", "0.5"]);
     let lines = String::from_utf8(watched.stdout).unwrap();
     let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();

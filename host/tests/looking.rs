@@ -51,7 +51,9 @@ fn a_report_is_written_once_and_replaced_only_when_told_to() {
 fn cli_2_codes_and_faults_are_explained_without_a_device() {
     let folder = tempfile::tempdir().unwrap();
     let explained = |code: &str| stdout(&tactus(folder.path(), &["explain", code]).success());
-    assert!(explained("E504").starts_with("E504: another host is connected to the device\n  help: end the other"));
+    assert!(
+        explained("E504").starts_with("E504: another host is connected to the device\n  help: end the program there")
+    );
     assert_eq!(explained("504"), explained("e504"));
     assert!(explained("E702").contains("usual cause: no power"));
     assert!(explained("contactforce").starts_with("ContactForce: the contact force"));

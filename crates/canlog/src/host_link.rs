@@ -118,5 +118,6 @@ fn words(message: &Message) -> String {
         Message::Reply(Reply::FaultRecord { .. }) => "fault record".to_owned(),
         Message::Reply(Reply::FaultCycle { .. }) => "fault cycle".to_owned(),
         Message::Reply(Reply::Weight { .. }) => "weight".to_owned(),
+        Message::Reply(Reply::Owner { .. }) => "owner".to_owned(),
     }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use control::model::WeightError;
 use device::{HomeError, PrimitiveTrouble, StartupTrouble};
-use link::{Capabilities, ImageError, Refusal};
+use link::{Capabilities, ImageError, Refusal, SessionOwner};
 
 use crate::error_code::ErrorCode;
 use crate::failure::Failure;
@@ -83,6 +83,14 @@ pub enum HostError {
         /// Numbers that belong to the reason.
         detail: [u32; 2],
     },
+    /// Another host has the device.
+    #[error("{}", in_use(.owner.as_ref(), *.wait_ms))]
+    InUse {
+        /// The host, if the device tells.
+        owner: Option<SessionOwner>,
+        /// Time after which the device can be had if that host has fallen silent, ms.
+        wait_ms: u32,
+    },
     /// The device answered with something that is no answer to what was asked.
     #[error("the device answered '{request}' with another message")]
     WrongAnswer {
@@ -109,13 +117,33 @@ pub enum HostError {
     Interrupted,
 }
 
+/// Words for a device that another host has.
+fn in_use(owner: Option<&SessionOwner>, wait_ms: u32) -> String {
+    let who = match owner {
+        Some(SessionOwner { name, since_ms }) if !name.as_str().is_empty() => {
+            // A name is what another program says: nothing of it may command this terminal.
+            let name: String = name.as_str().chars().filter(|letter| !letter.is_control()).collect();
+            format!("{name} has been using the arm for {}", age(*since_ms))
+        }
+        _ => "another program is using the arm".to_owned(),
+    };
+    format!("{who}; if it has fallen silent it gives way in {wait_ms} ms")
+}
+
+/// A time in words: two units at most.
+fn age(ms: u32) -> String {
+    match ms / 1000 {
+        seconds @ 0..60 => format!("{seconds} s"),
+        seconds @ 60..3600 => format!("{} min {} s", seconds / 60, seconds % 60),
+        seconds => format!("{} h {} min", seconds / 3600, seconds / 60 % 60),
+    }
+}
+
 /// The refusal with its numbers put into words.
 fn explain(reason: Refusal, detail: [u32; 2]) -> String {
     let [first, second] = detail;
     match reason {
-        Refusal::Busy => format!(
-            "another program is using the arm: stop it there, or `tactus stop`; if it has fallen silent it gives way in {second} ms"
-        ),
+        Refusal::Busy => format!("{reason} for another {second} ms"),
         Refusal::Stale => format!("{reason} ({first} ms, at most {second} ms are allowed)"),
         Refusal::Faulted => match u8::try_from(first).ok().and_then(control::Fault::from_code) {
             Some(fault) => format!("{reason}: {fault}"),
@@ -186,6 +214,7 @@ impl HostError {
             Self::Incompatible { .. } => ErrorCode::LinkVersion,
             Self::Lacks(_) => ErrorCode::CapabilityMissing,
             Self::Refused { reason, .. } => ErrorCode::Refused(*reason),
+            Self::InUse { .. } => ErrorCode::Refused(Refusal::Busy),
             Self::Image(_) => ErrorCode::ImageInvalid,
             Self::ReadBack { .. } => ErrorCode::ReadBackDiffers,
             Self::Transport(TransportError::Closed | TransportError::Io(_)) => ErrorCode::LineClosed,

@@ -33,7 +33,7 @@ pub use metadata::ImageMetadata;
 pub use name::{Name, NameError, Text};
 pub use refusal::Refusal;
 pub use report::{
-    Calibration, Event, EventKind, FaultRecord, HandStage, HomeSource, LinkCounters, Listing, Statistics, Status,
-    Telemetry, Weight,
+    Calibration, Event, EventKind, FaultRecord, HandStage, HomeSource, LinkCounters, Listing, SessionOwner, Statistics,
+    Status, Telemetry, Weight,
 };
 pub use schema::{LINK_VERSION, SCHEMA_HASH};

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::name::{Name, Text};
 use crate::refusal::Refusal;
-use crate::report::{Calibration, Event, FaultRecord, Listing, Statistics, Status, Telemetry, Weight};
+use crate::report::{Calibration, Event, FaultRecord, Listing, SessionOwner, Statistics, Status, Telemetry, Weight};
 
 /// Most bytes of an image in one [`Request::UploadChunk`] or [`Reply::Chunk`].
 ///
@@ -292,6 +292,8 @@ pub enum Request {
     },
     /// Forgets that weight: the model's counts again. Answered when it is durable.
     ForgetWeight,
+    /// Asks for [`Reply::Owner`].
+    Owner,
 }
 
 impl Request {
@@ -338,7 +340,8 @@ impl Request {
             // An arm that has torque goes on as it is.
             | Self::Weight
             | Self::KeepWeight { .. }
-            | Self::ForgetWeight => false,
+            | Self::ForgetWeight
+            | Self::Owner => false,
         }
     }
 
@@ -382,6 +385,7 @@ impl Request {
             Self::Weight => "weight",
             Self::KeepWeight { .. } => "keep weight",
             Self::ForgetWeight => "forget weight",
+            Self::Owner => "owner",
         }
     }
 }
@@ -477,6 +481,13 @@ pub enum Reply {
         /// The weight of the links.
         weight: Weight,
     },
+    /// Answer to [`Request::Owner`].
+    Owner {
+        /// Request answered.
+        of: u16,
+        /// The host that has the session; `None`: nobody has.
+        owner: Option<SessionOwner>,
+    },
 }
 
 impl Reply {
@@ -494,7 +505,8 @@ impl Reply {
             | Self::Calibration { of, .. }
             | Self::FaultRecord { of, .. }
             | Self::FaultCycle { of, .. }
-            | Self::Weight { of, .. } => Some(*of),
+            | Self::Weight { of, .. }
+            | Self::Owner { of, .. } => Some(*of),
             Self::Telemetry(_) | Self::Event(_) => None,
         }
     }

@@ -241,7 +241,7 @@ impl Refusal {
             }
             Self::Model => "build tool and firmware from the same model file",
             Self::NoSession => "connect again",
-            Self::Busy => "end the other program, or wait until it has been silent for half a second",
+            Self::Busy => "end the program there; `tactus stop` stops the arm from here, `tactus monitor` looks on",
             Self::Stale => "send the request again",
             Self::BadValue => "correct the value",
             Self::NotZeroed => "put the arm into its home pose and zero it",

@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::name::Name;
+use crate::name::{Name, Text};
 
 /// Stage of the hand's start-up. Append-only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -148,6 +148,15 @@ pub struct Weight {
     pub source: HomeSource,
     /// It counts now: it is stored, the arm has been without torque since, and carries what it was measured with.
     pub in_use: bool,
+}
+
+/// The host that has the session.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SessionOwner {
+    /// What it called itself in its hello, for example "anna@lab3".
+    pub name: Text,
+    /// Time since that hello, ms.
+    pub since_ms: u32,
 }
 
 /// Counters of the receiving end of a link. Every byte that arrived is accounted for in one of these.

@@ -224,7 +224,10 @@ fn owner(simulated: bool) -> String {
         return "tactus".to_owned();
     }
     let user = std::env::var("USER").unwrap_or_else(|_| "somebody".to_owned());
-    format!("{user} (process {})", std::process::id())
+    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let host = host.trim();
+    let at = if host.is_empty() { "" } else { "@" };
+    format!("{user}{at}{host} (process {})", std::process::id())
 }
 
 /// Raised by the first Ctrl-C, by a terminal that is closed, and by `kill`. A second one ends the process at once,

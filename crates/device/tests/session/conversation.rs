@@ -45,7 +45,11 @@ fn a_matching_hello_is_answered_with_who_the_device_is() {
 #[test]
 fn c7_another_version_is_refused_with_both_named_and_nothing_else_is_answered() {
     let others = [
-        (HostHello { link_version: 9, ..hello() }, Refusal::LinkVersion, [9, u32::from(LINK_VERSION)]),
+        (
+            HostHello { link_version: LINK_VERSION + 1, ..hello() },
+            Refusal::LinkVersion,
+            [u32::from(LINK_VERSION) + 1, u32::from(LINK_VERSION)],
+        ),
         (HostHello { schema_hash: 5, ..hello() }, Refusal::Schema, [5, SCHEMA_HASH]),
         (HostHello { model_hash: 6, ..hello() }, Refusal::Model, [6, control::MODEL_HASH]),
     ];

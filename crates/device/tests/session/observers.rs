@@ -177,3 +177,23 @@ fn an_observer_of_another_version_is_told_so() {
     let old = HostHello { link_version: 5, ..hello() };
     assert_eq!(rig.refused(Request::Observe(old)).0, Refusal::LinkVersion);
 }
+
+#[test]
+fn who_finds_the_device_busy_is_told_whose_it_is_and_since_when_but_not_the_number_of_the_session() {
+    let owned = |rig: &mut Rig| match rig.ask(Request::Owner) {
+        Some(Reply::Owner { owner, .. }) => owner,
+        other => panic!("{other:?}"),
+    };
+    let mut rig = watched();
+    let before = owned(&mut rig).expect("somebody has it");
+    assert_eq!(before.name, hello().owner);
+    rig.wait(300);
+    assert_eq!(owned(&mut rig).map(|owner| owner.since_ms - before.since_ms), Some(300));
+    speak_as(&mut rig, OWNER);
+    assert!(owned(&mut rig).is_some(), "the owner may ask as well");
+    rig.done(Request::Goodbye);
+    speak_as(&mut rig, OBSERVER);
+    assert_eq!(owned(&mut rig), None);
+    speak_as(&mut rig, 77);
+    assert_eq!(rig.refused(Request::Owner).0, Refusal::NoSession, "a stranger looks on first");
+}

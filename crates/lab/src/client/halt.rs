@@ -32,7 +32,7 @@ impl<T: Transport> Client<T> {
         };
         match client.open(owner, LINK_VERSION, SCHEMA_HASH, Duration::ZERO) {
             Ok(()) => Ok(Halted::Ours(Box::new(client))),
-            Err(error @ HostError::Refused { reason: Refusal::Busy, .. }) if stopped => Ok(Halted::Others(error)),
+            Err(error @ HostError::InUse { .. }) if stopped => Ok(Halted::Others(error)),
             Err(error) => Err(error),
         }
     }

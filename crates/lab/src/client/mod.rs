@@ -111,7 +111,7 @@ impl<T: Transport> Client<T> {
     ///
     /// # Errors
     /// [`HostError::Incompatible`] with both versions, [`HostError::NoAnswer`] within two seconds,
-    /// [`HostError::Refused`] with [`Refusal::Busy`] if another host is using the device.
+    /// [`HostError::InUse`] if another host is using the device.
     pub fn connect(transport: T, owner: &str) -> Result<Self, HostError> {
         Self::connect_as(transport, owner, LINK_VERSION, SCHEMA_HASH)
     }
@@ -159,7 +159,11 @@ impl<T: Transport> Client<T> {
     /// Says hello; waits for so long until another host is gone.
     fn open(&mut self, owner: &str, link_version: u16, schema_hash: u32, patience: Duration) -> Result<(), HostError> {
         let hello = HostHello { link_version, schema_hash, model_hash: control::MODEL_HASH, owner: Text::new(owner) };
-        self.hello = self.greet(&Request::Hello(hello.clone()), &hello, patience)?;
+        let greeted = self.greet(&Request::Hello(hello.clone()), &hello, patience);
+        if let Err(HostError::Refused { reason: Refusal::Busy, detail: [_, wait], .. }) = greeted {
+            return Err(self.in_use(hello, wait));
+        }
+        self.hello = greeted?;
         self.open = true;
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! Looking on beside the host that commands the arm.
 
 use link::message::HostHello;
-use link::{LINK_VERSION, Request, SCHEMA_HASH, Text};
+use link::{LINK_VERSION, Reply, Request, SCHEMA_HASH, Text};
 
 use super::{BUSY_TIMEOUT, Client};
 use crate::error::HostError;
@@ -33,6 +33,21 @@ impl<T: Transport> Client<T> {
         }
         (client.open, client.observing) = (true, true);
         Ok(client)
+    }
+
+    /// The error for a device that another host has: with the name of that host, if the device tells an observer.
+    pub(super) fn in_use(&mut self, hello: HostHello, wait_ms: u32) -> HostError {
+        let mut ask = || {
+            self.exchange(&Request::Observe(hello)).ok()?;
+            let reply = self.exchange(&Request::Owner).ok()?;
+            // Its place is free for others again; whether that is heard changes nothing.
+            let _ = self.exchange(&Request::Goodbye);
+            match reply {
+                Reply::Owner { owner, .. } => owner,
+                _ => None,
+            }
+        };
+        HostError::InUse { owner: ask(), wait_ms }
     }
 
     /// Stops the arm, whoever commands it. Returns when the device has taken the stop.

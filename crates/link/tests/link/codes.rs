@@ -43,7 +43,8 @@ fn can_move(request: &Request) -> bool {
         | Request::FaultCycle { .. }
         | Request::Weight
         | Request::KeepWeight { .. }
-        | Request::ForgetWeight => false,
+        | Request::ForgetWeight
+        | Request::Owner => false,
     }
 }
 
@@ -67,7 +68,7 @@ fn every_request_has_a_word_of_its_own() {
 #[test]
 fn every_reply_names_the_request_it_answers_and_the_unasked_ones_name_none() {
     let answers: Vec<Option<u16>> = replies().iter().map(|reply| reply.answers()).collect();
-    let numbers = [1, 300, 3, 4, 5, 6, 7, 0, 0, 9, 10, 11, 12];
+    let numbers = [1, 300, 3, 4, 5, 6, 7, 0, 0, 9, 10, 11, 12, 13];
     assert_eq!(answers, numbers.map(|number| (number != 0).then_some(number)));
 }
 

@@ -7,7 +7,8 @@ use link::image::{
 use link::message::{AccelerationSource, ChunkData, PoseFeedback};
 use link::{
     Calibration, Capabilities, DeviceHello, Event, EventKind, FaultRecord, Goal, HandStage, HomeSource, HostHello,
-    LinkCounters, Listing, Name, Refusal, Reply, Request, RunOptions, Statistics, Status, Telemetry, Text, Weight,
+    LinkCounters, Listing, Name, Refusal, Reply, Request, RunOptions, SessionOwner, Statistics, Status, Telemetry,
+    Text, Weight,
 };
 
 fn name() -> Name {
@@ -74,6 +75,7 @@ pub(crate) fn requests() -> Vec<Request> {
         Request::Weight,
         Request::KeepWeight { hand: true, links: core::array::from_fn(|link| ramp(link as f32)) },
         Request::ForgetWeight,
+        Request::Owner,
     ]
 }
 
@@ -116,6 +118,7 @@ pub(crate) fn request_index(request: &Request) -> usize {
         Request::Weight => 33,
         Request::KeepWeight { .. } => 34,
         Request::ForgetWeight => 35,
+        Request::Owner => 36,
     }
 }
 
@@ -220,6 +223,7 @@ pub(crate) fn replies() -> Vec<Reply> {
                 in_use: true,
             },
         },
+        Reply::Owner { of: 13, owner: Some(SessionOwner { name: Text::new("eve@lab4"), since_ms: 95_000 }) },
     ]
 }
 
@@ -239,6 +243,7 @@ pub(crate) fn reply_index(reply: &Reply) -> usize {
         Reply::FaultRecord { .. } => 10,
         Reply::FaultCycle { .. } => 11,
         Reply::Weight { .. } => 12,
+        Reply::Owner { .. } => 13,
     }
 }
 

@@ -360,7 +360,8 @@ impl<S: Store> Application for ArmApplication<S> {
             | Request::Observe(_)
             | Request::Rename { .. }
             | Request::FaultRecord
-            | Request::FaultCycle { .. } => return Ok(Action::Answer(Reply::Accepted { of })),
+            | Request::FaultCycle { .. }
+            | Request::Owner => return Ok(Action::Answer(Reply::Accepted { of })),
         };
         Ok(Action::Command(command.into()))
     }

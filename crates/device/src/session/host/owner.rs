@@ -1,7 +1,7 @@
 //! The host that has the session, and the numbers of its requests.
 
-use link::Reply;
 use link::frame::LINK_TIMEOUT_MS;
+use link::{Reply, SessionOwner, Text};
 
 /// Treatment of a request, by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,15 +18,22 @@ pub(super) enum RequestOrder {
 #[derive(Debug)]
 pub(super) struct Owner {
     session: u16,
+    name: Text,
+    since_ms: u32,
     heard_ms: u32,
     newest: u16,
     answer: Option<Reply>,
 }
 
 impl Owner {
-    /// A host whose hello had this number.
-    pub(super) fn new(session: u16, sequence: u16, now_ms: u32) -> Self {
-        Self { session, heard_ms: now_ms, newest: sequence, answer: None }
+    /// A host whose hello had this number, and this name in it.
+    pub(super) fn new(session: u16, sequence: u16, name: Text, now_ms: u32) -> Self {
+        Self { session, name, since_ms: now_ms, heard_ms: now_ms, newest: sequence, answer: None }
+    }
+
+    /// Its name, and for how long it has had the session: for others, so without the number.
+    pub(super) fn report(&self, now_ms: u32) -> SessionOwner {
+        SessionOwner { name: self.name.clone(), since_ms: now_ms.wrapping_sub(self.since_ms) }
     }
 
     /// Its session number.

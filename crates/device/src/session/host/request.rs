@@ -27,7 +27,7 @@ impl<A: Application> HostSession<A> {
             return self.send_to(envelope.session, now_ms, &reply, port);
         }
         if !matches!(message, Request::Hello(_)) && self.observers.hear(envelope.session, now_ms) {
-            let reply = self.show(envelope.session, of, message, port);
+            let reply = self.show(now_ms, envelope.session, of, message, port);
             let reply = reply.unwrap_or_else(|(reason, detail)| Reply::Refused { of, reason, detail });
             return self.send_to(envelope.session, now_ms, &reply, port);
         }
@@ -99,8 +99,14 @@ impl<A: Application> HostSession<A> {
         }
         self.close();
         self.observers.leave(session);
-        self.owner = Some(Owner::new(session, of, now_ms));
+        self.welcome(session, of, hello, now_ms);
         Ok(())
+    }
+
+    /// Gives the session to a host. A function of its own: its copies of the name take no stack while others work.
+    #[inline(never)]
+    fn welcome(&mut self, session: u16, of: u16, hello: &HostHello, now_ms: u32) {
+        self.owner = Some(Owner::new(session, of, hello.owner.clone(), now_ms));
     }
 
     /// Does what is asked. `None`: the answer comes when the control half has given it, or the change is saved.
@@ -148,6 +154,7 @@ impl<A: Application> HostSession<A> {
                 return self.save(of);
             }
             Request::FaultRecord | Request::FaultCycle { .. } => return Ok(Some(fault_record(of, &request, port))),
+            Request::Owner => return Ok(Some(self.owner_report(now_ms, of))),
             request => {
                 return match self.application.act(of, request, self.pending.is_empty(), port)? {
                     Action::Command(command) => self.command(now_ms, of, command, port),
@@ -171,6 +178,7 @@ impl<A: Application> HostSession<A> {
     /// Answers an observer. Nothing of this changes anything but what it is sent.
     fn show(
         &mut self,
+        now_ms: u32,
         session: u16,
         of: u16,
         request: Request,
@@ -184,6 +192,7 @@ impl<A: Application> HostSession<A> {
             Request::Statistics => return Ok(Reply::Statistics { of, statistics: self.statistics(port) }),
             Request::List { index } => return self.listing(of, index),
             Request::FaultRecord | Request::FaultCycle { .. } => return Ok(fault_record(of, &request, port)),
+            Request::Owner => return Ok(self.owner_report(now_ms, of)),
             Request::Calibration | Request::Weight => {
                 let calm = self.pending.is_empty();
                 if let Action::Answer(reply) = self.application.act(of, request, calm, port)? {
@@ -193,6 +202,12 @@ impl<A: Application> HostSession<A> {
             _ => return Err((Refusal::Observing, [0, 0])),
         }
         Ok(Reply::Accepted { of })
+    }
+
+    /// Who has the session. A function of its own for the same reason.
+    #[inline(never)]
+    fn owner_report(&self, now_ms: u32, of: u16) -> Reply {
+        Reply::Owner { of, owner: self.owner.as_ref().map(|owner| owner.report(now_ms)) }
     }
 
     fn listing(&self, of: u16, index: u8) -> Result<Reply, Refused> {
