@@ -149,10 +149,10 @@ pub enum Command {
     /// Make a primitive from a demonstration
     #[command(after_help = examples::LEARN)]
     Learn(learn::Cmd),
-    /// Play a primitive without feedback and remember what it feels like
+    /// Run a primitive without feedback and record the forces that it should expect
     #[command(after_help = examples::REHEARSE)]
     Rehearse(rehearse::Cmd),
-    /// Remember successful runs, so that the device notices when one goes wrong
+    /// Learn the usual forces of successful runs, so that the device notices an unusual one
     #[command(name = "experience", after_help = examples::EXPERIENCE)]
     Statistics(experience::Cmd),
     /// Validate a primitive before it moves an arm
@@ -185,7 +185,7 @@ pub enum Command {
     /// Initialise, open, close or move the hand
     #[command(after_help = examples::HAND)]
     Hand(hand::Cmd),
-    /// Tell the last fault, what to do about it, and the second before it
+    /// Show the present and the last fault, what to do, and the second before it
     #[command(after_help = examples::FAULTS)]
     Faults(faults::Cmd),
     /// Bring the arm to rest
@@ -194,7 +194,7 @@ pub enum Command {
     /// Watch the arm on one screen, beside whoever commands it
     #[command(after_help = examples::MONITOR)]
     Monitor(monitor::Cmd),
-    /// Write down what the arm does
+    /// Record what the arm does, as CSV
     #[command(after_help = examples::RECORD)]
     Record(record::Cmd),
     /// Write the firmware image to a board
@@ -203,7 +203,7 @@ pub enum Command {
     /// Show what a device logs
     #[command(after_help = examples::LOGS)]
     Logs(logs::Cmd),
-    /// Try a movement on objects that are not where it expects them
+    /// Grasp simulated objects that stand elsewhere than taught
     #[command(after_help = examples::EXPERIMENT)]
     Experiment(experiment::Cmd),
     /// Draw demonstration, plan and execution
@@ -212,7 +212,7 @@ pub enum Command {
     /// Write a page of HTML about one run or several
     #[command(after_help = examples::REPORT)]
     Report(report::Cmd),
-    /// Write a recording for the viewers of others, as MCAP
+    /// Convert a recording to MCAP, for robotics viewers
     #[command(after_help = examples::EXPORT)]
     Export(export::Cmd),
     /// Explain an error or a fault
@@ -224,16 +224,16 @@ pub enum Command {
     /// Write a page of the manual for each command
     #[command(after_help = examples::MANUAL)]
     Manual(manual::Cmd),
-    /// Show the settings that count, and where they come from
+    /// Show the settings in use, and where they come from
     #[command(after_help = examples::CONFIG)]
     Config(config::Cmd),
-    /// Look at everything that a command needs, and say what is missing
+    /// Check everything that a command needs, and say what is missing
     #[command(after_help = examples::DOCTOR)]
     Doctor(doctor::Cmd),
-    /// Tell how two recordings of the same movement differ
+    /// Compare two recordings of the same movement
     #[command(after_help = examples::COMPARE)]
     Compare(compare::Cmd),
-    /// Read logs of the arm's CAN bus, or play them to the device's application
+    /// Decode logs of the arm's CAN bus, or replay them to the control code
     #[command(after_help = examples::CAN)]
     Can(can::Cmd),
 }

@@ -99,7 +99,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         None => open(command, global)?,
     };
     if command.bus_log.is_some() && client.transport().simulation().is_none() {
-        let cause = std::io::Error::other("only a simulated bus can be written down");
+        let cause = std::io::Error::other("only a simulated bus can be logged");
         return Err(connection::failure(ProcedureError::Recording(cause), DOING));
     }
     if let Some(old) = upload::other_version(&mut client, &file, DOING)? {
@@ -123,7 +123,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     };
     let report = Report { ready_s, preconditions, ..report };
     if !client.is_simulated() {
-        output.say("the arm holds its goal; `tactus stop` makes it soft");
+        output.say("the arm holds its goal; `tactus stop` ends that");
     }
     let Some(missed) = report.tracking.as_ref().and_then(missed) else {
         return output.result(&report, report.to_text());
@@ -263,7 +263,7 @@ fn play(
 fn tell(outcome: &RunOutcome, output: Output) {
     for surprise in &outcome.surprises {
         output.warn(format!(
-            "not as the successful runs: {} stands out {:.2} s into the run, at phase {:.3}",
+            "unlike the successful runs: {} is unusual {:.2} s into the run, at phase {:.3}",
             surprise.channel, surprise.time_s, surprise.phase
         ));
     }
@@ -272,9 +272,9 @@ fn tell(outcome: &RunOutcome, output: Output) {
     for (samples, words) in [
         (clamped, "the adaptation was at its limits"),
         (faded, "the adaptation was derated or fading"),
-        (saturated, "the force sensor was saturated; force control stood still"),
+        (saturated, "the force sensor was saturated; force control was paused"),
         (stale, "the force sensor was silent"),
-        (hand_lost, "the hand did not answer and was left alone"),
+        (hand_lost, "the hand did not answer and got no commands"),
     ] {
         if samples > 0 {
             output.say(format!("for {:.2} s {words}", seconds(samples)));
@@ -293,7 +293,7 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
         return Err(Failure::new(
             ErrorCode::NoExpectation,
             doing,
-            format!("{}: the primitive does not know what it should feel", file.file.display()),
+            format!("{}: the primitive has no expected forces", file.file.display()),
         )
         .help(help));
     };

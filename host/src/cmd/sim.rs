@@ -48,14 +48,14 @@ pub struct Cmd {
     /// Keep the device's flash in this file, so that its primitives are there again after a restart
     #[arg(long, value_name = "FILE")]
     pub flash: Option<PathBuf>,
-    /// Let the faults of this script befall the arm: a file such as those of `tests/faults`, `FILE:2` for the second of
+    /// Inject the faults of this script: a file such as those of `tests/faults`, `FILE:2` for the second of
     /// its scenarios
     #[arg(long, value_name = "FILE")]
     pub faults: Option<String>,
     /// Serve the arm's CAN bus to programs that speak socketcand, such as python-can, in real time
     #[arg(long, value_name = "HOST:PORT", conflicts_with = "fast")]
     pub can: Option<String>,
-    /// Leave the co-controller out: the bus with its pucks, safety module, sensor and hand is all there is
+    /// Leave the co-controller out: the bus has only pucks, safety module, sensor and hand
     #[arg(long, requires = "can", conflicts_with_all = ["listen", "flash"])]
     pub can_only: bool,
 }
