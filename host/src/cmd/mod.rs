@@ -94,7 +94,7 @@ pub struct Global {
     /// Show the help with every explanation.
     #[arg(long, global = true, action = ArgAction::HelpLong, hide_short_help = true)]
     pub help_all: Option<bool>,
-    /// The device: `sim:`, `sil:`, `board:`, `serial:PATH`, `can:INTERFACE`, `tcp:HOST:PORT` or `unix:PATH`.
+    /// The device, such as `sil:` or `serial:PATH`; `tactus --help` lists them.
     #[arg(long, global = true, env = "TACTUS_DEVICE", value_name = "DEVICE")]
     pub device: Option<String>,
     /// Longest wait for an answer of the device, s.
