@@ -114,7 +114,7 @@ fn summary_agrees_with_what_the_simulator_counted() {
     let load = arm["load"].as_f64().unwrap();
     assert!((0.4..0.7).contains(&load), "{load}");
     let told = stdout(&tactus(folder.path(), &["can", "decode", "bus.log", "--summary"]).success());
-    assert!(told.contains("every frame named") && told.contains("control cycle: "), "{told}");
+    assert!(told.contains("every frame is known") && told.contains("control cycle: "), "{told}");
 }
 
 #[test]
@@ -174,12 +174,15 @@ fn garbage_is_reported_with_line_numbers_and_the_rest_is_decoded() {
         assert!(words.contains(&format!("line {number}: ")), "{words}");
     }
     assert_eq!(words.lines().filter(|line| line.starts_with("line ")).count(), 3, "{words}");
-    assert!(words.contains("error[E671]: can decode: 3 lines are none of candump's, the first is line 2"), "{words}");
+    assert!(
+        words.contains("error[E671]: can decode: 3 lines are not in candump's format, the first is line 2"),
+        "{words}"
+    );
     assert!(out.contains("GET P"), "{out}");
     assert!(out.contains("unknown: wrong length for this reply"), "{out}");
     assert!(out.contains("unknown: 29-bit identifier") && out.contains("unknown: remote frame"), "{out}");
     assert!(out.contains("error frame: bus-off"), "{out}");
-    assert!(out.contains("3 frames without a name"), "{out}");
+    assert!(out.contains("3 unknown frames"), "{out}");
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! The lab guide cannot rot: every `tactus` command line in it is one that this tool takes.
 
-use clap::Parser;
 use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
 use tactus::cmd::Cli;
 
 const GUIDE: &str = include_str!("../../docs/lab-guide.md");
+const ERRORS: &str = include_str!("../../docs/errors.md");
 
 /// Command lines of the guide with their line numbers: in code blocks the lines that begin with `tactus` (after a
 /// prompt or a variable), in prose what stands between backticks and begins with it.
@@ -50,6 +51,52 @@ fn the_guide_names_every_thing_a_person_must_do_at_the_pendant_in_the_words_of_t
     use device::Stage;
     for stage in [Stage::WaitingForIdle, Stage::WaitingForZero, Stage::WaitingForActive] {
         assert!(GUIDE.contains(stage.explanation()), "docs/lab-guide.md does not say '{}'", stage.explanation());
+    }
+}
+
+/// Options of the tool and of all its commands, each with the values that it takes; none: any.
+fn options(command: &clap::Command) -> Vec<(String, Vec<String>)> {
+    let values =
+        |argument: &clap::Arg| argument.get_possible_values().iter().map(|value| value.get_name().to_owned()).collect();
+    let own = command.get_arguments().flat_map(|argument| {
+        let names = argument.get_long_and_visible_aliases().unwrap_or_default();
+        names.into_iter().map(|name| (name.to_owned(), values(argument))).collect::<Vec<_>>()
+    });
+    own.chain(command.get_subcommands().flat_map(options)).collect()
+}
+
+/// The options in the code spans of a document that are not about other programs, each with its value, if there is one.
+fn options_named(document: &str) -> Vec<(usize, String, Option<String>)> {
+    let spans = document.lines().enumerate().flat_map(|(index, line)| {
+        line.split('`').skip(1).step_by(2).map(move |span| (index + 1, span)).collect::<Vec<_>>()
+    });
+    let ours =
+        spans.filter(|(_, span)| span.starts_with("--") || span.starts_with("tactus ") || span.starts_with("run "));
+    let named = |(line, span): (usize, &str)| {
+        let words: Vec<String> = span.split_whitespace().map(str::to_owned).collect();
+        let option = |at: usize| {
+            let value = words.get(at + 1).filter(|value| !value.starts_with('-')).cloned();
+            Some((line, words[at].strip_prefix("--")?.to_owned(), value))
+        };
+        (0..words.len()).filter_map(option).collect::<Vec<_>>()
+    };
+    ours.flat_map(named).collect()
+}
+
+#[test]
+fn every_option_that_an_error_advises_is_one_of_the_tool_with_a_value_it_takes() {
+    let known = options(&Cli::command());
+    let named = options_named(ERRORS);
+    assert!(named.len() >= 30, "only {} options were found: the errors or this test have changed", named.len());
+    for (line, option, value) in named {
+        let takes = |values: &[String]| value.as_ref().is_none_or(|value| values.is_empty() || values.contains(value));
+        // A switch takes none of what follows it.
+        let is_taken = |values: &[String]| takes(values) || values == ["true", "false"];
+        assert!(
+            option == "help" || known.iter().any(|(name, values)| *name == option && is_taken(values)),
+            "docs/errors.md:{line}: --{option} {}",
+            value.unwrap_or_default()
+        );
     }
 }
 

@@ -55,7 +55,7 @@ cargo xtask <verb>
   run-image IMAGE   run an image where it belongs: QEMU, or a board through probe-rs (cargo's runner)
   doc      documentation of all crates
   docs     dead links, paths, test names and fault identifiers in any file
-  package  packages for strangers: packed, unpacked outside the repository, tested there
+  package  packages for strangers: packed, unpacked outside the repository, tested there, their examples run
   mutants  wrong changes of the code that named tests must catch; cargo xtask mutants WORDS: those whose name has WORDS
   faults [--all] [--json] [ID...]   the fault catalogue: every script of tests/faults against the simulated arm
            --device sim: | board: the scenarios marked for it, with the image under QEMU or on the emulated board

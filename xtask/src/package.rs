@@ -1,6 +1,7 @@
-//! Packages for strangers: packed, unpacked outside the repository, and tested there.
+//! Packages for strangers: packed with their licences, unpacked outside the repository, tested and tried there.
 
 use std::fs;
+use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
@@ -10,7 +11,8 @@ use crate::shell;
 /// Packs and tests every package that may be published.
 ///
 /// # Errors
-/// If a package does not build or fails its tests without the repository around it.
+/// If a package lacks the text of a licence, or does not build, fails its tests or has an example that fails, without
+/// the repository around it.
 pub(crate) fn run() -> Result<()> {
     let mut metadata = shell::cargo();
     metadata.args(["metadata", "--no-deps", "--format-version", "1"]);
@@ -27,12 +29,34 @@ pub(crate) fn run() -> Result<()> {
         shell::run(shell::cargo().args(["package", "--quiet", "--allow-dirty", "--no-verify", "--package", name]))?;
         let file = shell::target_dir().join("package").join(format!("{name}-{version}.crate"));
         shell::run(std::process::Command::new("tar").arg("-xzf").arg(&file).arg("-C").arg(&folder))?;
-        let mut test = shell::cargo();
-        test.current_dir(folder.join(format!("{name}-{version}")));
-        // In the folder that is removed: a build that is kept names its sources where they were unpacked the last time.
-        test.env("CARGO_TARGET_DIR", folder.join("target"));
-        shell::run(test.args(["test", "--quiet", "--all-features"]))?;
+        let package = folder.join(format!("{name}-{version}"));
+        for licence in ["LICENSE-APACHE", "LICENSE-MIT"] {
+            ensure!(package.join(licence).is_file(), "the package {name} lacks {licence}");
+        }
+        let there = || {
+            let mut cargo = shell::cargo();
+            // In the folder that is removed: a build that is kept names its sources where they were unpacked last time.
+            cargo.current_dir(&package).env("CARGO_TARGET_DIR", folder.join("target"));
+            cargo
+        };
+        shell::run(there().args(["test", "--quiet", "--all-features"]))?;
+        for example in examples(&package)? {
+            shell::run(there().args(["run", "--quiet", "--all-features", "--example", &example]))?;
+        }
     }
     fs::remove_dir_all(&folder)?;
     Ok(())
+}
+
+/// Names of a package's examples.
+fn examples(package: &Path) -> Result<Vec<String>> {
+    let folder = package.join("examples");
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let name = |path: &Path| Some(path.file_name()?.to_str()?.strip_suffix(".rs")?.to_owned());
+    let paths: Vec<_> = fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>()?;
+    let mut names: Vec<String> = paths.iter().filter_map(|path| name(path)).collect();
+    names.sort();
+    Ok(names)
 }

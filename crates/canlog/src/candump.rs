@@ -106,7 +106,7 @@ impl fmt::Display for LogLine {
     }
 }
 
-/// Why a line is none of candump's.
+/// Why a line is not in candump's format.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LineError {
     /// Not `(time) interface id#data`.

@@ -1,4 +1,4 @@
-//! CAN buses seen from outside: logs, what their frames mean, and replaying them to the device's application.
+//! CAN buses seen from outside: logs, and what their frames mean. `lab::replay` plays a log to the control code.
 
 mod candump;
 mod decoder;

@@ -3,6 +3,7 @@
 use control::sense::JointEstimator;
 use control::sense::filter::{Butterworth, LowPass};
 use control::sense::joints::COAST_CYCLES;
+use control::time::periods;
 use control::units::{JointPositions, Vector7};
 use control::{Calibration, Payload, RATE, Real, model};
 use nalgebra::SVector;
@@ -316,6 +317,8 @@ fn g1_a_joint_that_runs_into_its_stop_at_any_speed_is_believed() {
 #[test]
 fn g1_a_wrist_that_a_blow_sets_turning_within_a_cycle_is_believed_by_its_second_reply() {
     // J5 hits its stop, and J7, whose axis is nearly the same, turns by 10 rad/s faster from one cycle to the next.
+    // Its speed has come through the velocity filter a thirtieth of a second later.
+    let believed = 30 + periods(1.0 / 30.0);
     let calibration = nominal::<f64>();
     for speed in [10.0, -10.0] {
         let mut estimator = JointEstimator::<f64>::new(&nominal());
@@ -325,7 +328,7 @@ fn g1_a_wrist_that_a_blow_sets_turning_within_a_cycle_is_believed_by_its_second_
             let state = estimator.update(&replies(&calibration, q), true).expect("known");
             assert_eq!((state.missing, state.displaced), (u8::from(cycle == 30), false), "cycle {cycle}");
             assert!((state.q.0[6] - q[6]).abs() < 2e-3 || cycle == 30, "cycle {cycle}: {state:?}");
-            assert!((state.dq.0[6] - speed).abs() < 0.1 || cycle < 40, "cycle {cycle}: {state:?}");
+            assert!((state.dq.0[6] - speed).abs() < 0.1 || cycle < believed, "cycle {cycle}: {state:?}");
         }
     }
 }

@@ -5,7 +5,7 @@ use control::act::hand::{HandLimiter, TORQUE_LIMIT};
 use control::act::limit::{LimitReport, MOTOR_COUNTS_LIMIT, STEP_LIMIT, WORST_GRAVITY};
 use control::model::{ArmModel, Frames};
 use control::units::{JointPositions, JointTorques, Vector7};
-use control::{Calibration, Payload, model};
+use control::{Calibration, PERIOD, Payload, model};
 use proptest::prelude::*;
 
 /// Largest gravity torque per joint over a grid of postures within the mechanical stops (J1 does not matter).
@@ -110,8 +110,9 @@ fn a_pair_of_which_both_motors_are_beyond_their_caps_is_scaled_for_the_worse_one
 
 #[test]
 fn a_step_is_the_full_scale_of_the_manufacturers_controllers_in_50_ms() {
-    let wanted = [5.0 / 3.0, 4.0 / 3.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0];
-    for (joint, (limit, wanted)) in STEP_LIMIT.iter().zip(wanted).enumerate() {
+    let full_scale = [25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0];
+    for (joint, (limit, full_scale)) in STEP_LIMIT.iter().zip(full_scale).enumerate() {
+        let wanted = full_scale * PERIOD / 0.05;
         assert!((limit - wanted).abs() < 1e-12, "J{}: {limit}", joint + 1);
     }
 }

@@ -1,7 +1,11 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![allow(clippy::neg_cmp_op_on_partial_ord, reason = "`!(x > 0)` also refuses NaN, which `x <= 0` would let through")]
-#![doc = include_str!("../README.md")]
+#![cfg_attr(feature = "std", doc = include_str!("../README.md"))]
+#![cfg_attr(
+    not(feature = "std"),
+    doc = "Dynamic movement primitives for any robot, without the fitting: see the README."
+)]
 
 #[cfg(feature = "std")]
 extern crate std;

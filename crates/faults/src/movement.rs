@@ -20,7 +20,7 @@ const DURATION: f64 = 3.0;
 /// Rest before and behind it, s.
 const REST: f64 = 0.5;
 
-/// The movement, with the expectation that nothing is felt.
+/// The movement, with the expectation of no force.
 ///
 /// # Panics
 /// It cannot be learned: a defect of `lab`.

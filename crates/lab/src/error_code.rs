@@ -122,7 +122,7 @@ error_codes! {
         "for example `--device sim:world=mujoco`";
     NotSimulated = 204: "the command needs a simulated device", "`--device` names a real one",
         "`--device sim:`, `--device sil:` or `--device board:`";
-    NobodyToAsk = 205: "nobody may be asked to press Enter when the movement is shown",
+    NobodyToAsk = 205: "nobody can be asked to press Enter at the end of the movement",
         "`--non-interactive` or no terminal, with an arm that a person moves",
         "say how long to record with `--duration SECONDS`";
     StartIsFixed = 206: "the simulated teacher knows one movement, and where it begins",
@@ -292,8 +292,8 @@ error_codes! {
         "learn the primitive again, see `tactus learn --help`";
     ExpectationStale = 634: "the expected force is for another model or duration",
         "the primitive was changed after its rehearsal", "record it again with `tactus rehearse`";
-    NoExpectation = 635: "the primitive does not know what it should feel", "it was never rehearsed",
-        "record it with `tactus rehearse`, or run with `--mode open-loop`";
+    NoExpectation = 635: "the primitive has no expected forces", "it was never rehearsed",
+        "record it with `tactus rehearse`, or run with `--mode open`";
     ExpectationSpeed = 636: "the expected force was recorded at a speed too different", "`--speed`",
         "run at the speed of the rehearsal, or rehearse at this one";
     GoalMissed = 637: "the arm did not reach its goal",
@@ -326,7 +326,7 @@ error_codes! {
         "make one with `tactus teach`, `learn` and `rehearse`, and give it with `--primitive`";
     LogUnreadable = 670: "the log of the bus cannot be read", "the file does not exist",
         "`candump -L can0 > bus.log` makes such a file, and `--device sil:bus=bus.log` of a simulated arm";
-    LogLines = 671: "lines of the log are none of candump's", "another format", "make logs with `candump -L`";
+    LogLines = 671: "lines of the log are not in candump's format", "another format", "make logs with `candump -L`";
     ReplayDiffers = 672: "the device's application sends other frames than are in the log",
         "another version or other parameters",
         "the log is of another version or of other parameters, or something could not be reproduced";

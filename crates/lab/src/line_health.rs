@@ -226,7 +226,8 @@ mod tests {
         assert!((health.longest_gap_ms.unwrap() - 21.0 * 1e3 / RATE).abs() < 1e-9);
         let answers = (health.answer_p50_ms, health.answer_p99_ms, health.answer_max_ms);
         assert_eq!(answers, (Some(100.0), Some(198.0), Some(200.0)));
-        assert_eq!(health.bus_frames_per_s, Some(1500.0));
+        // 1500 frames in 300 cycles.
+        assert_eq!(health.bus_frames_per_s, Some(5.0 * RATE));
     }
 
     #[test]

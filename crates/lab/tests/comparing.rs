@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lab::demonstration::Recording;
+use lab::demonstration::{RATE, Recording};
 use lab::difference::Difference;
 use lab::tracking::Lack;
 
@@ -35,7 +35,7 @@ fn a_run_does_not_differ_from_itself() {
     let difference = Difference::between(&run, &run, 1.0).expect("comparable");
     assert_eq!(difference.whole.joint_rad, 0.0);
     assert_eq!((difference.before_contact.samples, difference.whole.samples), (100, 200));
-    assert!((difference.contact_s.expect("a contact") - 100.0 / 300.0).abs() < 1e-9);
+    assert!((difference.contact_s.expect("a contact") - 100.0 / RATE).abs() < 1e-9);
 }
 
 #[test]

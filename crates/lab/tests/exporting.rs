@@ -34,7 +34,8 @@ fn every_quantity_of_a_recording_has_its_channel_and_reads_back_as_it_was() {
     let names: Vec<&str> = topics.keys().map(String::as_str).collect();
     assert_eq!(names, ["/hand", "/joint_states", "/movement", "/tool_pose", "/tool_pose_desired", "/wrench"]);
     assert!(topics.values().all(|messages| messages.len() == recording.time.len()));
-    let row = 400;
+    // 1.33 s after the start.
+    let row = usize::from(control::time::periods(4.0 / 3.0));
     let at = |topic: &str| &topics[topic][row].1;
     let (time, pose) = &topics["/tool_pose"][row];
     assert_eq!(*time, (recording.time[row] * 1e9).round() as u64);

@@ -365,8 +365,8 @@ fn a_dwell_makes_the_movement_longer_by_exactly_that_and_rests_at_the_goal() {
     }
 }
 
-/// The taught movement of an arm that stands still for half a second and then creeps away for another half: nobody holds
-/// it any more, and it weighs otherwise than its model. `speed` is that of its J7 at the end, rad/s.
+/// The taught movement of an arm that stands still for half a second and then creeps away for another half: nobody
+/// holds it any more, and it weighs otherwise than its model. J7 accelerates by twice `speed`, rad/s^2.
 fn let_go(speed: f64) -> Recording {
     let mut rows = common::rows(4.0);
     let at_rest = rows.last().unwrap().clone();

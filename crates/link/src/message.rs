@@ -118,7 +118,7 @@ pub struct RunOptions {
     pub goal: Goal,
     /// Speed relative to the taught one: 1 as taught, 0.5 takes twice as long.
     pub speed: f32,
-    /// The difference between felt and expected wrench bends the plan (Eqs 8, 9).
+    /// The difference between measured and expected wrench bends the plan (Eqs 8, 9).
     pub feedback: bool,
     /// The force controller of Eq (12) adds its torque.
     pub force_control: bool,

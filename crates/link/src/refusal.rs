@@ -219,7 +219,7 @@ impl Refusal {
             Self::HandNotReady => "the hand is not initialised, so its finger angles are unknown",
             Self::HandOutOfRange => "the target lies outside the hand's range",
             Self::ImageFilter => "the expectation was recorded through another filter than the device has",
-            Self::NoExpectation => "the primitive does not know what it should feel",
+            Self::NoExpectation => "the primitive has no expected forces",
             Self::HandFarFromStart => "the hand is not near where the primitive starts",
             Self::ForceAtRest => "the force at rest is not the weight of the hand",
             Self::HandBusy => "the hand is being moved or initialised",

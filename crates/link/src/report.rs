@@ -153,7 +153,7 @@ pub struct Weight {
 /// The host that has the session.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SessionOwner {
-    /// What it called itself in its hello, for example "anna@lab3".
+    /// Its name in its hello, for example "anna@lab3".
     pub name: Text,
     /// Time since that hello, ms.
     pub since_ms: u32,

@@ -26,9 +26,9 @@ pub struct Cmd {
 pub enum Action {
     /// Show where the arm is taken to stand when it is zeroed, and whose home that is
     Show,
-    /// Store a home of this arm's own; it counts from the next zeroing on
+    /// Store a home of this arm's own; it takes effect at the next zeroing
     Home(Home),
-    /// Forget it: the robot model's home counts again
+    /// Forget it: the robot model's home is used again
     Forget,
     /// Weigh the links of this arm on a tour of slow moves; its hand must be empty and the way free
     Gravity(weigh::Gravity),

@@ -63,7 +63,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let exists = origins.file.as_ref().is_some_and(|file| file.exists());
     let problem = origins.problem.clone();
     if let Some(problem) = &problem {
-        global.output().warn(format!("nothing of the configuration file counts: {problem}"));
+        global.output().warn(format!("the configuration file is ignored: {problem}"));
     }
     let data = Configured { file: origins.file.as_deref().map(files::text), exists, problem, settings };
     let mut table = Table::new(["setting", "value", "from"]);

@@ -45,7 +45,7 @@ pub(super) fn observe(global: &Global, doing: &str) -> Result<Client<Device>, Fa
     Ok(set_up(client, global))
 }
 
-/// Stops the arm of the device that the options name, whoever has it in his hands, and says hello then.
+/// Stops the arm of the device that the options name, whoever commands it, and says hello then.
 ///
 /// # Errors
 /// As [`open`], except that a busy device is none.

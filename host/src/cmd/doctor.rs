@@ -137,16 +137,19 @@ fn tool() -> Finding {
 /// The configuration file, and the settings with the place each comes from.
 fn settings(global: &Global) -> [Finding; 3] {
     let origins = &global.origins;
-    let place = origins.file.as_deref().map_or_else(|| "no home, no file".to_owned(), files::text);
+    let place =
+        origins.file.as_deref().map_or_else(|| "neither XDG_CONFIG_HOME nor HOME is set".to_owned(), files::text);
     let file = match &origins.problem {
         Some(problem) => {
             let help = ErrorCode::Configuration.remedy().to_owned();
-            finding("configuration file", Verdict::Warn, format!("nothing of it counts: {problem}"), Some(help))
+            finding("configuration file", Verdict::Warn, format!("it is ignored: {problem}"), Some(help))
         }
         None if origins.file.as_ref().is_some_and(|file| file.exists()) => {
             finding("configuration file", Verdict::Ok, place, None)
         }
-        None => finding("configuration file", Verdict::Ok, format!("{place} (does not exist: defaults count)"), None),
+        None => {
+            finding("configuration file", Verdict::Ok, format!("{place} (does not exist: defaults are used)"), None)
+        }
     };
     let named = match &global.device {
         Some(device) => {

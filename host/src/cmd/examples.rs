@@ -7,7 +7,7 @@ Devices:
   board: the emulated board   hand: a hand under QEMU   serial:/dev/ttyACM0  can:can0  tcp:HOST:PORT  unix:tactus.sock
 Options of simulated devices, behind the colon and separated by commas; world=mujoco|simple is the physics:
   seed=N    everything random     arm=N       masses and friction     line=serial|can  the line to the host
-  bus=FILE  log of both buses     flash=FILE  keeps its primitives    faults=FILE[:N]  faults that befall the arm
+  bus=FILE  log of both buses     flash=FILE  keeps its primitives    faults=FILE[:N]  injected faults
 Examples:
   tactus --device sil: teach -o grasp.csv
   tactus learn grasp.csv -o grasp.toml

@@ -371,10 +371,10 @@ mod work {
         .and_then(|mut primitive| {
             // Whatever becomes of the experience, the primitive is worth keeping.
             primitive.write(&file)?;
-            spinner.set_message("gathering experience");
+            spinner.set_message("recording successful runs");
             let config = Config { plant: command.plant, ..Config::new(command.scenario, primitive.clone()) };
             let (held, of) = preparation::experience(&config, interrupt, &mut primitive)?;
-            output.say(format!("{held} of {of} runs succeeded and became experience"));
+            output.say(format!("{held} of {of} runs succeeded; what is usual was learned from them"));
             primitive.write(&file)?;
             Ok(primitive)
         });

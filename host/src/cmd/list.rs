@@ -78,7 +78,7 @@ pub struct Stored {
     pub bytes: u32,
     /// Check sum of its image, hexadecimal.
     pub crc: String,
-    /// True if it knows what it should feel.
+    /// True if it has expected forces.
     pub expectation: bool,
     /// True if the control cycle has it.
     pub loaded: bool,

@@ -96,7 +96,7 @@ pub struct Global {
     /// Show the help with every explanation.
     #[arg(long, global = true, action = ArgAction::HelpLong, hide_short_help = true)]
     pub help_all: Option<bool>,
-    /// The device: `sim:`, `sil:`, `board:`, `serial:PATH`, `can:INTERFACE`, `tcp:HOST:PORT` or `unix:PATH`.
+    /// The device, such as `sil:` or `serial:PATH`; `tactus --help` lists them.
     #[arg(long, global = true, env = "TACTUS_DEVICE", value_name = "DEVICE")]
     pub device: Option<String>,
     /// Longest wait for an answer of the device, s.
@@ -151,10 +151,10 @@ pub enum Command {
     /// Make a primitive from a demonstration
     #[command(after_help = examples::LEARN)]
     Learn(learn::Cmd),
-    /// Play a primitive without feedback and remember what it feels like
+    /// Run a primitive without feedback and record the forces that it should expect
     #[command(after_help = examples::REHEARSE)]
     Rehearse(rehearse::Cmd),
-    /// Remember successful runs, so that the device notices when one goes wrong
+    /// Learn the usual forces of successful runs, so that the device notices an unusual one
     #[command(name = "experience", after_help = examples::EXPERIENCE)]
     Statistics(experience::Cmd),
     /// Validate a primitive before it moves an arm
@@ -187,7 +187,7 @@ pub enum Command {
     /// Initialise, open, close or move the hand
     #[command(after_help = examples::HAND)]
     Hand(hand::Cmd),
-    /// Tell the last fault, what to do about it, and the second before it
+    /// Show the present and the last fault, what to do, and the second before it
     #[command(after_help = examples::FAULTS)]
     Faults(faults::Cmd),
     /// Bring the arm to rest
@@ -196,7 +196,7 @@ pub enum Command {
     /// Watch the arm on one screen, beside whoever commands it
     #[command(after_help = examples::MONITOR)]
     Monitor(monitor::Cmd),
-    /// Write down what the arm does
+    /// Record what the arm does, as CSV
     #[command(after_help = examples::RECORD)]
     Record(record::Cmd),
     /// Write the firmware image to a board
@@ -205,7 +205,7 @@ pub enum Command {
     /// Show what a device logs
     #[command(after_help = examples::LOGS)]
     Logs(logs::Cmd),
-    /// Try a movement on objects that are not where it expects them
+    /// Grasp simulated objects that stand elsewhere than taught
     #[command(after_help = examples::EXPERIMENT)]
     Experiment(experiment::Cmd),
     /// Draw demonstration, plan and execution
@@ -214,7 +214,7 @@ pub enum Command {
     /// Write a page of HTML about one run or several
     #[command(after_help = examples::REPORT)]
     Report(report::Cmd),
-    /// Write a recording for the viewers of others, as MCAP
+    /// Convert a recording to MCAP, for robotics viewers
     #[command(after_help = examples::EXPORT)]
     Export(export::Cmd),
     /// Explain an error or a fault
@@ -229,13 +229,13 @@ pub enum Command {
     /// Show the tool's settings, or read, change, compare and restore the device's
     #[command(after_help = examples::CONFIG)]
     Config(config::Cmd),
-    /// Look at everything that a command needs, and say what is missing
+    /// Check everything that a command needs, and say what is missing
     #[command(after_help = examples::DOCTOR)]
     Doctor(doctor::Cmd),
-    /// Tell how two recordings of the same movement differ
+    /// Compare two recordings of the same movement
     #[command(after_help = examples::COMPARE)]
     Compare(compare::Cmd),
-    /// Read logs of the arm's CAN bus, or play them to the device's application
+    /// Decode logs of the arm's CAN bus, or replay them to the control code
     #[command(after_help = examples::CAN)]
     Can(can::Cmd),
 }

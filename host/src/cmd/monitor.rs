@@ -44,7 +44,7 @@ pub struct Cmd {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "monitor";
     if !global.json && !std::io::stdout().is_terminal() {
-        return Err(Failure::new(ErrorCode::NoTerminal, DOING, "standard output is no terminal"));
+        return Err(Failure::new(ErrorCode::NoTerminal, DOING, "standard output is not a terminal"));
     }
     let mut watch = Watch::default();
     if let Some(path) = &command.primitive {

@@ -139,11 +139,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         command.payload.unwrap_or_default(),
         !command.equal_weights,
     )
-    .map_err(|cause| memory_failure(cause, "rehearse: nothing was remembered"))?;
+    .map_err(|cause| memory_failure(cause, "rehearse: no expectation was stored"))?;
     write(&file, output_file, &target, DOING)?;
     output.say(format!("wrote {}", target.display()));
     if flags.iter().any(|flags| flags.limited > 0) {
-        output.warn("the torque limiter was at work: the arm did not follow its plan everywhere");
+        output.warn("the torque limiter was active: the arm did not follow its plan everywhere");
     }
     if file.feedback.is_none() {
         output.warn("the primitive has no gains for feedback: learn it again, then rehearse it");

@@ -130,7 +130,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 /// Puts the primitive into the device, unless it is there already.
 fn put(command: &Cmd, client: &mut Client<Device>, file: &PrimitiveFile, output: Output) -> Result<(), Failure> {
     if command.bus_log.is_some() && client.transport().simulation().is_none() {
-        let cause = std::io::Error::other("only a simulated bus can be written down");
+        let cause = std::io::Error::other("only a simulated bus can be logged");
         return Err(connection::failure(ProcedureError::Recording(cause), DOING));
     }
     if let Some(old) = upload::other_version(client, file, DOING)? {
@@ -160,7 +160,7 @@ fn carry_out(
         None => played?,
     };
     if !client.is_simulated() {
-        output.say("the arm holds its goal; `tactus stop` makes it soft");
+        output.say("the arm holds its goal; `tactus stop` ends that");
     }
     Ok(Report { ready_s, preconditions, ..report })
 }
@@ -302,7 +302,7 @@ fn play(
 fn tell(outcome: &RunOutcome, output: Output) {
     for surprise in &outcome.surprises {
         output.warn(format!(
-            "not as the successful runs: {} stands out {:.2} s into the run, at phase {:.3}",
+            "unlike the successful runs: {} is unusual {:.2} s into the run, at phase {:.3}",
             surprise.channel, surprise.time_s, surprise.phase
         ));
     }
@@ -311,9 +311,9 @@ fn tell(outcome: &RunOutcome, output: Output) {
     for (samples, words) in [
         (clamped, "the adaptation was at its limits"),
         (faded, "the adaptation was derated or fading"),
-        (saturated, "the force sensor was saturated; force control stood still"),
+        (saturated, "the force sensor was saturated; force control was paused"),
         (stale, "the force sensor was silent"),
-        (hand_lost, "the hand did not answer and was left alone"),
+        (hand_lost, "the hand did not answer and got no commands"),
     ] {
         if samples > 0 {
             output.say(format!("for {:.2} s {words}", seconds(samples)));
@@ -332,7 +332,7 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
         return Err(Failure::new(
             ErrorCode::NoExpectation,
             doing,
-            format!("{}: the primitive does not know what it should feel", file.file.display()),
+            format!("{}: the primitive has no expected forces", file.file.display()),
         )
         .help(help));
     };

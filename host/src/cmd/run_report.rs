@@ -212,7 +212,7 @@ impl Report {
             row("error at the goal", digits(tracking.end_rad));
         }
         if let Some(error) = self.force_error_max_n {
-            row("force off the expected one, worst", format!("{error:.2} N"));
+            row("largest force error", format!("{error:.2} N"));
         }
         if let Some(line) = &self.line {
             row("newest 100 cycles", line.summary());

@@ -1,8 +1,8 @@
 //! `tactus sim`: a simulated arm that stays, for other terminals to connect to.
 
 mod bus;
-mod pace;
 mod party;
+mod real_time;
 
 use std::io::ErrorKind;
 use std::net::TcpListener;
@@ -22,8 +22,8 @@ use lab::client::Interrupt;
 use lab::device::Device;
 use lab::simulation::Engine;
 use lab::transport::{Address, Transport, TransportError};
-use pace::Pace;
 use party::{Party, Peer};
+use real_time::RealTime;
 
 /// Virtual time simulated between two looks at the socket: a human does not notice, a link time-out neither.
 const STRIDE: Duration = Duration::from_millis(5);
@@ -50,14 +50,14 @@ pub struct Cmd {
     /// Keep the device's flash in this file, so that its primitives are there again after a restart
     #[arg(long, value_name = "FILE")]
     pub flash: Option<PathBuf>,
-    /// Let the faults of this script befall the arm: a file such as those of `tests/faults`, `FILE:2` for the second of
+    /// Inject the faults of this script: a file such as those of `tests/faults`, `FILE:2` for the second of
     /// its scenarios
     #[arg(long, value_name = "FILE")]
     pub faults: Option<String>,
     /// Serve the arm's CAN bus to programs that speak socketcand, such as python-can, in real time
     #[arg(long, value_name = "HOST:PORT", conflicts_with = "fast")]
     pub can: Option<String>,
-    /// Leave the co-controller out: the bus with its pucks, safety module, sensor and hand is all there is
+    /// Leave the co-controller out: the bus has only pucks, safety module, sensor and hand
     #[arg(long, requires = "can", conflicts_with_all = ["listen", "flash"])]
     pub can_only: bool,
 }
@@ -181,7 +181,7 @@ fn serve(
     mut bus: Option<&mut BusServer>,
     interrupt: &Interrupt,
 ) -> Result<(), TransportError> {
-    let (started, mut pace) = (Instant::now(), Pace::default());
+    let (started, mut real_time) = (Instant::now(), RealTime::default());
     let mut party = Party::default();
     let mut bytes = Vec::new();
     while !interrupt.is_raised() {
@@ -210,7 +210,7 @@ fn serve(
                 bus.serve(simulation).map_err(TransportError::Io)?;
             }
             if !command.fast {
-                std::thread::sleep(pace.wait(device.now(), started.elapsed()));
+                std::thread::sleep(real_time.wait(device.now(), started.elapsed()));
             }
         }
     }

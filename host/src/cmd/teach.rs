@@ -96,7 +96,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         return Err(Failure::new(
             ErrorCode::NobodyToAsk,
             DOING,
-            "nobody may be asked to press Enter when the movement is shown",
+            "nobody can be asked to press Enter at the end of the movement",
         ));
     }
     if command.from.is_some() && default_posture(&mut client, command.movement).is_some() {

@@ -46,7 +46,7 @@ fn unmodified_python_can_drives_the_simulated_pucks_and_can_decode_reads_what_it
     assert!(arm.finish().status.success());
     let decoded = command::tactus(folder.path(), &["can", "decode", "bus.log"]).success();
     let decoded = command::stdout(&decoded);
-    assert!(decoded.contains("SET CMD = HI: initialise (13)") && decoded.contains("every frame named"), "{decoded}");
+    assert!(decoded.contains("SET CMD = HI: initialise (13)") && decoded.contains("every frame is known"), "{decoded}");
 }
 
 #[test]

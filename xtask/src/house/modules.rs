@@ -131,9 +131,30 @@ impl Modules {
 struct Reader {
     module: Module,
     children: Vec<String>,
+    /// Number of inline modules around the present place.
+    depth: usize,
 }
 
 impl Reader {
+    /// A path as the file would write it: `super` in an inline module leads to the file. `None` for a path that stays
+    /// in the inline modules.
+    fn outside(&self, path: &[String]) -> Option<Path> {
+        let up = path.iter().take_while(|name| *name == "super").count();
+        let rest = path.get(up..)?;
+        match (path.first()?.as_str(), up.checked_sub(self.depth)) {
+            ("self", _) if self.depth > 0 => None,
+            ("super", None) => None,
+            ("super", Some(0)) => Some([&["self".to_owned()], rest].concat()),
+            ("super", Some(up)) => Some([&vec!["super".to_owned(); up], rest].concat()),
+            _ => Some(path.to_vec()),
+        }
+    }
+
+    fn note(&mut self, path: &[String], line: usize) {
+        let path = self.outside(path);
+        self.module.paths.extend(path.map(|path| (path, line)));
+    }
+
     fn import(&mut self, before: &Path, tree: &syn::UseTree) {
         let with = |name: &syn::Ident| [before.clone(), vec![name.to_string()]].concat();
         match tree {
@@ -145,15 +166,15 @@ impl Reader {
             }
             syn::UseTree::Rename(name) => self.name(name.rename.to_string(), with(&name.ident), name.ident.span()),
             syn::UseTree::Glob(glob) => {
-                self.module.paths.push((before.clone(), glob.star_token.spans[0].start().line));
-                self.module.globs.push(before.clone());
+                self.note(before, glob.star_token.spans[0].start().line);
+                self.module.globs.extend(self.outside(before));
             }
         }
     }
 
     fn name(&mut self, name: String, path: Path, span: proc_macro2::Span) {
-        self.module.paths.push((path.clone(), span.start().line));
-        self.module.imports.insert(name, path);
+        self.note(&path, span.start().line);
+        self.module.imports.extend(self.outside(&path).map(|path| (name, path)));
     }
 
     /// Paths in the arguments of a macro, which `syn` leaves as words.
@@ -169,7 +190,7 @@ impl Reader {
                     path.push(ident.to_string());
                     colons = 0;
                     if path.len() > 1 {
-                        self.module.paths.push((path.clone(), ident.span().start().line));
+                        self.note(&path, ident.span().start().line);
                     }
                 }
                 TokenTree::Punct(mark) if mark.as_char() == ':' => colons += 1,
@@ -221,7 +242,10 @@ impl<'ast> Visit<'ast> for Reader {
             syn::Item::Mod(module) if module.content.is_none() => self.children.push(module.ident.to_string()),
             _ => {
                 self.module.items.extend(name.map(ToString::to_string));
+                let inner = usize::from(matches!(item, syn::Item::Mod(_)));
+                self.depth += inner;
                 syn::visit::visit_item(self, item);
+                self.depth -= inner;
             }
         }
     }
@@ -240,7 +264,7 @@ impl<'ast> Visit<'ast> for Reader {
         let names: Path = path.segments.iter().map(|segment| segment.ident.to_string()).collect();
         // A single name is an item of this file or came by a `use`, which is a reference of its own.
         if let Some(first) = path.segments.first().filter(|_| names.len() > 1 && path.leading_colon.is_none()) {
-            self.module.paths.push((names, first.ident.span().start().line));
+            self.note(&names, first.ident.span().start().line);
         }
         syn::visit::visit_path(self, path);
     }

@@ -1,5 +1,6 @@
 //! No Rust file over 600 lines, no function over 80, no comment beyond column 120.
 
+use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use syn::spanned::Spanned as _;
 use syn::visit::Visit;
 
@@ -52,9 +53,36 @@ struct Functions<'a> {
 
 impl Functions<'_> {
     fn measure(&mut self, signature: &syn::Signature, block: &syn::Block) {
-        let first = signature.span().start().line;
-        let lines = block.span().end().line + 1 - first;
-        let name = signature.ident.to_string();
+        self.judge(&signature.ident.to_string(), signature.span().start().line, block.span().end().line);
+    }
+
+    /// Functions in the arguments of a macro, as `proptest!` has them, which `syn` leaves as words.
+    fn tokens(&mut self, tokens: TokenStream) {
+        let mut begun: Option<(usize, Option<String>)> = None;
+        for token in tokens {
+            match token {
+                TokenTree::Ident(word) if word == "fn" => begun = Some((word.span().start().line, None)),
+                TokenTree::Ident(word) => {
+                    if let Some((_, name @ None)) = &mut begun {
+                        *name = Some(word.to_string());
+                    }
+                }
+                TokenTree::Group(group) => {
+                    if group.delimiter() == Delimiter::Brace
+                        && let Some((first, Some(name))) = begun.take()
+                    {
+                        self.judge(&name, first, group.span_close().end().line);
+                    }
+                    self.tokens(group.stream());
+                }
+                TokenTree::Punct(mark) if mark.as_char() == ';' => begun = None,
+                _ => {}
+            }
+        }
+    }
+
+    fn judge(&mut self, name: &str, first: usize, last: usize) {
+        let lines = last + 1 - first;
         let is_listed = LONG_FUNCTIONS.iter().any(|(file, known, _)| *file == self.path && *known == name);
         if lines > FUNCTION_LINES && !is_listed {
             let text = format!("function '{name}' of {lines} lines; at most {FUNCTION_LINES}");
@@ -67,6 +95,10 @@ impl<'ast> Visit<'ast> for Functions<'_> {
     fn visit_item_fn(&mut self, function: &'ast syn::ItemFn) {
         self.measure(&function.sig, &function.block);
         syn::visit::visit_item_fn(self, function);
+    }
+
+    fn visit_macro(&mut self, call: &'ast syn::Macro) {
+        self.tokens(call.tokens.clone());
     }
 
     fn visit_impl_item_fn(&mut self, function: &'ast syn::ImplItemFn) {

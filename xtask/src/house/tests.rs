@@ -47,6 +47,23 @@ fn a_circle_through_a_re_export_a_glob_an_alias_or_a_macro_is_found() {
 }
 
 #[test]
+fn a_circle_through_an_inline_module_is_found() {
+    let lib = ("lib", "mod a; mod b;");
+    let b = ("b", "pub struct B; use crate::a::A;");
+    for a in [
+        "mod inner { use super::super::b::B; }",
+        "mod inner { mod innermost { fn f(_: super::super::super::b::B) {} } }",
+        "mod inner { use crate::b::B; }",
+    ] {
+        assert_eq!(circles_in(&[lib, ("a", a), b]).len(), 1, "{a}");
+    }
+    // What is above an inline module is its own file.
+    let a =
+        ("a", "pub struct A; mod inner { use super::A; use super::*; pub(super) use self::other::C; mod other {} }");
+    assert_eq!(circles_in(&[lib, a, ("b", "use crate::a::A;")]), [""; 0]);
+}
+
+#[test]
 fn tests_do_not_make_a_circle() {
     let lib = ("lib", "mod a; mod b;");
     let a = ("a", "#[cfg(test)] mod tests { use crate::b::B; }\n#[cfg(all(test, unix))] fn f(_: crate::b::B) {}");
@@ -79,6 +96,9 @@ fn files_functions_and_comments_have_a_largest_size() {
     let function = |lines: usize| format!("/// Long.\nimpl A {{ fn f() {{{}}} }}", "\n".repeat(lines - 1));
     assert_eq!(check(&function(80)), [""; 0]);
     assert_eq!(check(&function(81)), ["a.rs:2: function 'f' of 81 lines; at most 80"]);
+    let in_a_macro = |lines: usize| format!("proptest! {{ fn f(x in 0..9) {{{}}} }}", "\n".repeat(lines - 1));
+    assert_eq!(check(&in_a_macro(80)), [""; 0]);
+    assert_eq!(check(&in_a_macro(81)), ["a.rs:1: function 'f' of 81 lines; at most 80"]);
     assert_eq!(check(&format!("// {}", "é".repeat(117))), [""; 0]);
     assert_eq!(check(&format!("\n// {}", "é".repeat(118))), ["a.rs:2: comment of 121 columns; at most 120"]);
 }

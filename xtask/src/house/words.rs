@@ -88,7 +88,7 @@ const OLD: &[Old] = &[
     (Name, "felt", "expected or measured", PRIMITIVE),
     // The simulator.
     (Name, "Lesson", "TaughtMovement", SIMULATOR),
-    (Phrase, "lesson", "demonstration", SIMULATOR),
+    (Phrase, "lesson", "demonstration", &[]),
     (Name, "Person", "Teacher", &["crates/sim"]),
     (Phrase, "sim::person", "sim::teacher", &[]),
     (Phrase, "simulated person", "simulated teacher", &[]),

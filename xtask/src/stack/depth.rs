@@ -311,8 +311,9 @@ impl<'a> Search<'a> {
             Target::Pointer => {
                 let behind = self.behind.called_by(self.calls.names(function));
                 if behind.is_empty() {
-                    let (name, address) = (self.calls.name(function), call.address);
-                    bail!("{name} calls at {address:#010x} through a pointer that nothing before it can have made");
+                    let way: Vec<String> = self.open.iter().map(|open| self.calls.name(open.0)).collect();
+                    let (way, address) = (way.join(" -> "), call.address);
+                    bail!("{way} calls at {address:#010x} through a pointer that nothing before it can have made");
                 }
                 let nested = |kind: usize| KINDS.get(kind).and_then(|kind| kind.nested);
                 let next = behind.into_iter().filter_map(|(kind, to)| {

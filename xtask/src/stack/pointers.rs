@@ -222,7 +222,9 @@ struct Data<'a> {
 impl<'a> Data<'a> {
     fn of(code: &Code, memory: &'a Memory, made: impl Iterator<Item = u32>) -> Self {
         let is_data = |address: &u32| memory.word(*address & !3).is_some() && !code.is_inside(*address);
-        let words = memory.words().map(|(_, word)| word);
+        // Instructions may look like an address: `ldrb.w r0, [r9, r5]` is 0x5f819. A piece that ended there would hide
+        // what follows.
+        let words = memory.words().filter(|(address, _)| !code.is_inside(*address)).map(|(_, word)| word);
         Self { memory, begins: made.chain(words).filter(is_data).collect() }
     }
 

@@ -1,6 +1,7 @@
 //! Heat, warnings and overruns (faults A15, E8, G12, G14): what they do, what they leave behind, and the way back.
 
 use control::command::{Command, Refusal, RunOptions};
+use control::time::periods;
 use control::units::JointPositions;
 use control::{Caution, CycleOutput, Event, Fault, Goal, PERIOD, State, flags};
 use puck::SafetyMode;
@@ -188,7 +189,7 @@ fn a15_what_an_integral_had_gathered_is_gone_after_a_drop_of_the_safety_module()
     let frames = control::model::Frames::new(rig.cycle.model(), &JointPositions::from_f32(q.map(|q| q as f32).into()));
     let gravity = rig.cycle.model().gravity_torque(&frames).0;
     let mut output = rig.command(Command::Hold);
-    for _ in 0..30 {
+    for _ in 0..periods(0.1) {
         (rig.plant.q, rig.plant.dq) = (q, q * 0.0);
         output = rig.tick(None);
     }

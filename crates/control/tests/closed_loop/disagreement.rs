@@ -212,8 +212,8 @@ fn g8_a_silent_sensor_is_told_at_once_and_nothing_moves_by_itself_without_it() {
         let mut rig = moving(run, 0.5, None);
         rig.plant.deaf = true;
         let begin = rig.number;
-        let told = (0..60).position(|_| rig.tick(None).record.flags & flags::CONTACT_UNSEEN != 0);
-        assert!(told.is_some_and(|cycles| cycles <= 6), "{told:?}");
+        let told = (0..periods(0.2)).position(|_| rig.tick(None).record.flags & flags::CONTACT_UNSEEN != 0);
+        assert!(told.is_some_and(|cycles| cycles <= usize::from(periods(0.02))), "{told:?}");
         rig.until(State::SoftStop, 0.2);
         assert_eq!(rig.cycle.fault(), Fault::WrenchLost);
         assert!(rig.number - begin <= u64::from(periods(0.13)));

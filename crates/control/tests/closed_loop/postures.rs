@@ -23,7 +23,7 @@ fn holding(q: [f64; 7], delay: usize, scale: f64) -> Rig<f32> {
 }
 
 /// Cycles in which a stuck joint is pulled aside.
-const PULL: u16 = 14;
+const PULL: u16 = periods(0.047);
 
 /// Moves J1 of an arm that is stuck by so much (rad), slowly enough for a joint.
 fn pull_aside(rig: &mut Rig<f32>, way: f64) -> CycleRecord {

@@ -19,7 +19,8 @@ use crate::plant::{Plant, Variation};
 
 const KERNELS: usize = 10;
 
-/// Duration of the movement that stays where it is (s): that of the lesson, for which the gains of Eq (8) were chosen.
+/// Duration of the movement that stays where it is (s): that of the demonstration for which the gains of Eq (8) were
+/// chosen.
 const DURATION: f64 = 12.0;
 
 /// Speed of each motor after the kick (rad/s).
@@ -176,7 +177,7 @@ fn rest(seen: &[Vector7<f64>]) -> Rest {
     Rest { share: swing(joint) / KICK, frequency: turns as f64 / 2.0 / (seen.len() as f64 * PERIOD), joint: joint + 1 }
 }
 
-/// A movement that stays at `q`, with the feedback gains that a lesson of this duration gets.
+/// A movement that stays at `q`, with the feedback gains that a demonstration of this duration gets.
 fn staying(q: [f64; 7]) -> Primitive<f64, KERNELS> {
     let model = ArmModel::new(Payload::SensorAndHand);
     let frames = Frames::new(&model, &JointPositions::from_array(q));

@@ -356,9 +356,10 @@ fn d2_three_late_cycles_in_a_row_or_ten_in_a_second_stop_the_arm_and_fewer_do_no
     assert_eq!(after_late_cycles(3, 1), stopped);
     assert_eq!(after_late_cycles(9, 2), survived);
     assert_eq!(after_late_cycles(10, 2), stopped);
-    // Nine lengths of 33 cycles lie within a second of 300 cycles, nine of 34 do not.
-    assert_eq!(after_late_cycles(10, 33), stopped);
-    assert_eq!(after_late_cycles(30, 34), survived);
+    // Nine of the first lengths lie within a second (at 300 Hz: 33 cycles), nine of the other do not.
+    let ninth = control::RATE_HZ as usize / 9;
+    assert_eq!(after_late_cycles(10, ninth), stopped);
+    assert_eq!(after_late_cycles(30, ninth + 1), survived);
 }
 
 #[test]

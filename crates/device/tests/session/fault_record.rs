@@ -21,6 +21,9 @@ fn cycle(rig: &mut Rig, record: u16, index: u16) -> Option<Telemetry> {
     }
 }
 
+/// Cycles of a record that is full.
+const SECOND: u16 = FAULT_CYCLES as u16;
+
 /// Numbers of the cycles in a record.
 fn cycles(rig: &mut Rig, of: FaultRecord) -> Vec<u32> {
     (0..of.cycles).map(|index| cycle(rig, of.number, index).expect("a whole cycle").cycle).collect()
@@ -33,28 +36,31 @@ fn run(rig: &mut Rig, numbers: std::ops::Range<u64>, fault: Fault) {
 #[test]
 fn a_record_ends_with_the_cycle_of_the_fault_and_stays_until_the_next_one() {
     let mut rig = Rig::greeted();
-    run(&mut rig, 0..700, Fault::None);
+    let stop = 2 * u32::from(SECOND) + 100;
+    let at = |later: u32| u64::from(stop + later);
+    run(&mut rig, 0..at(0), Fault::None);
     assert_eq!(record(&mut rig), None);
-    run(&mut rig, 700..900, Fault::ContactForce);
-    let first = FaultRecord { number: 1, fault: Fault::ContactForce.code(), latched: true, cycles: 300 };
+    run(&mut rig, at(0)..at(200), Fault::ContactForce);
+    let first = FaultRecord { number: 1, fault: Fault::ContactForce.code(), latched: true, cycles: SECOND };
     assert_eq!(record(&mut rig), Some(first));
-    assert_eq!(cycles(&mut rig, first), Vec::from_iter(401..=700));
-    let last = cycle(&mut rig, 1, 299).expect("the cycle of the fault");
+    let second_before = Vec::from_iter(stop + 1 - u32::from(SECOND)..=stop);
+    assert_eq!(cycles(&mut rig, first), second_before);
+    let last = cycle(&mut rig, 1, SECOND - 1).expect("the cycle of the fault");
     assert_eq!((last.fault, last.cost_ticks), (Fault::ContactForce.code(), 99));
-    assert_eq!(cycle(&mut rig, 1, 298).map(|cycle| cycle.fault), Some(0));
-    assert_eq!((cycle(&mut rig, 1, 300), cycle(&mut rig, 2, 0)), (None, None));
+    assert_eq!(cycle(&mut rig, 1, SECOND - 2).map(|cycle| cycle.fault), Some(0));
+    assert_eq!((cycle(&mut rig, 1, SECOND), cycle(&mut rig, 2, 0)), (None, None));
     // Cleared: it can still be read, however long the arm goes on.
-    run(&mut rig, 900..2000, Fault::None);
+    run(&mut rig, at(200)..at(2000), Fault::None);
     let cleared = FaultRecord { latched: false, ..first };
     assert_eq!(record(&mut rig), Some(cleared));
-    assert_eq!(cycles(&mut rig, cleared), Vec::from_iter(401..=700));
+    assert_eq!(cycles(&mut rig, cleared), second_before);
     // The next fault, 50 cycles after a clear: it holds these, and nothing from before.
-    run(&mut rig, 2000..2001, Fault::JointSpeed);
-    run(&mut rig, 2001..2051, Fault::None);
-    run(&mut rig, 2051..2052, Fault::TipSpeed);
+    run(&mut rig, at(2000)..at(2001), Fault::JointSpeed);
+    run(&mut rig, at(2001)..at(2051), Fault::None);
+    run(&mut rig, at(2051)..at(2052), Fault::TipSpeed);
     let third = FaultRecord { number: 3, fault: Fault::TipSpeed.code(), latched: true, cycles: 51 };
     assert_eq!(record(&mut rig), Some(third));
-    assert_eq!(cycles(&mut rig, third), Vec::from_iter(2001..=2051));
+    assert_eq!(cycles(&mut rig, third), Vec::from_iter(stop + 2001..=stop + 2051));
     assert_eq!(cycle(&mut rig, 1, 0), None, "the old record is gone, and is not mistaken for the new one");
 }
 
@@ -118,12 +124,15 @@ fn values_are_kept_to_their_step_and_what_is_no_number_is_told() {
     assert!(near(&[kept.dq[0], kept.wrench[2]], &[32.767, -655.34], 1e-3), "{:?}", kept.wrench);
 }
 
+/// Number of the cycle with the fault: there are more before it than a record holds.
+const FAULTY: u32 = SECOND as u32 + 100;
+
 /// A device that has run for so many cycles since a fault that a person has cleared.
 fn cleared(after: u32) -> Box<FaultMemory> {
     let mut memory = Box::new(FaultMemory::BLANK);
     memory.resume();
-    (0..400).for_each(|number| memory.take(&full(number)));
-    memory.take(&Telemetry { fault: 9, ..full(400) });
+    (0..FAULTY).for_each(|number| memory.take(&full(number)));
+    memory.take(&Telemetry { fault: 9, ..full(FAULTY) });
     (0..after).for_each(|number| memory.take(&full(1000 + number)));
     memory
 }
@@ -133,19 +142,19 @@ fn a_restart_keeps_a_fault_that_nobody_cleared_and_otherwise_the_last_second() {
     // Latched when the device restarted.
     let mut memory = cleared(0);
     memory.resume();
-    let kept = FaultRecord { number: 1, fault: 9, latched: false, cycles: 300 };
+    let kept = FaultRecord { number: 1, fault: 9, latched: false, cycles: SECOND };
     assert_eq!(memory.record(), Some(kept));
-    assert_eq!(memory.cycle(1, 299).map(|cycle| cycle.cycle), Some(400));
+    assert_eq!(memory.cycle(1, SECOND - 1).map(|cycle| cycle.cycle), Some(FAULTY));
     // Restarted again before anything ran: still there. The next fault replaces it.
     memory.resume();
     assert_eq!(memory.record(), Some(kept));
     memory.take(&Telemetry { fault: 4, ..full(7) });
     assert_eq!(memory.record(), Some(FaultRecord { number: 2, fault: 4, latched: true, cycles: 1 }));
     // Cleared, and 20 cycles later the device restarted: these are what there is to look at.
-    for after in [20, 300, 777] {
+    for after in [20, SECOND.into(), 777] {
         let mut memory = cleared(after);
         memory.resume();
-        let cycles = after.min(300) as u16;
+        let cycles = after.min(SECOND.into()) as u16;
         assert_eq!(memory.record(), Some(FaultRecord { number: 2, fault: 0, latched: false, cycles }));
         assert_eq!(memory.cycle(2, cycles - 1).map(|cycle| cycle.cycle), Some(999 + after));
         assert_eq!(memory.cycle(2, 0).map(|cycle| cycle.cycle), Some(1000 + after - u32::from(cycles)));
@@ -185,7 +194,7 @@ proptest! {
             for index in 0..record.cycles {
                 let Some(cycle) = memory.cycle(record.number, index) else { lost += 1; continue };
                 let whole = full(cycle.cycle);
-                prop_assert!(cycle.cycle < 400 || cycle.cycle >= 1000 || cycle.fault == 9, "{:?}", cycle);
+                prop_assert!(cycle.cycle < FAULTY || cycle.cycle >= 1000 || cycle.fault == 9, "{:?}", cycle);
                 prop_assert!((cycle.flags, cycle.cost_ticks) == (whole.flags, whole.cost_ticks));
                 prop_assert!((cycle.q[4] - whole.q[4]).abs() < 1e-3);
             }

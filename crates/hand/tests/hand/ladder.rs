@@ -150,7 +150,8 @@ fn a_stop_ends_the_torque_and_the_worms_hold() {
 
 #[test]
 fn lost_replies_are_bridged_for_five_cycles_and_end_the_torque_in_the_sixth() {
-    for (cycles, survives) in [(1, true), (5, true), (7, false)] {
+    let bridged = u64::from(hand::LOST_CYCLES);
+    for (cycles, survives) in [(1, true), (bridged, true), (bridged + 2, false)] {
         let mut rig = gripping(adapt());
         rig.run(1.0);
         let from = rig.health().cycle as u32;
@@ -181,7 +182,7 @@ fn lost_replies_are_bridged_for_five_cycles_and_end_the_torque_in_the_sixth() {
         } else {
             assert_eq!((health.state, health.fault), (State::SoftStop, Fault::RepliesLost), "{cycles} cycles");
             let coasting = states.iter().filter(|state| **state == State::Coast).count();
-            assert_eq!(coasting, 5, "torque ends in the sixth cycle");
+            assert_eq!(coasting as u64, bridged, "torque ends in the cycle after");
             assert_eq!(rig.refusal(run(adapt())), Refusal::Faulted);
         }
     }

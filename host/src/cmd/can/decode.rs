@@ -49,7 +49,7 @@ struct Data<'a> {
 /// Reads a log or a bus.
 ///
 /// # Errors
-/// It cannot be opened, or holds lines that are none of candump's.
+/// It cannot be opened, or holds lines that are not in candump's format.
 pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "can decode";
     let source = Source::open(command.log.as_deref(), command.interface.as_deref(), command.follow, DOING)?;
@@ -79,7 +79,7 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     match garbage.first {
         None => Ok(()),
         Some(first) => {
-            let cause = format!("{} lines are none of candump's, the first is line {first}", garbage.lines);
+            let cause = format!("{} lines are not in candump's format, the first is line {first}", garbage.lines);
             Err(Failure::new(ErrorCode::LogLines, DOING, cause))
         }
     }
@@ -178,8 +178,8 @@ fn summary_text(summary: &Summary) -> String {
         percent(summary.load),
         percent(summary.load_busiest),
         match summary.unnamed {
-            0 => "every frame named".to_owned(),
-            count => format!("{count} frames without a name"),
+            0 => "every frame is known".to_owned(),
+            count => format!("{count} unknown frames"),
         }
     );
     let mut table = Table::new(["kind", "frames", "per second", "load"]);

@@ -19,9 +19,9 @@ pub struct Cmd {
 /// Actions on a bus.
 #[derive(Debug, Clone, Subcommand)]
 pub enum Action {
-    /// Say what every frame means, and what they come to
+    /// Say what every frame means, and sum up the bus
     Decode(decode::Cmd),
-    /// Play a log to the device's application and compare what it does
+    /// Replay a log to the control code and compare the frames it sends
     Replay(replay::Cmd),
 }
 

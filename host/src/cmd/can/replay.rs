@@ -47,7 +47,7 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     output.result(&outcome, text(&outcome))?;
     if let Some(first) = garbage.first {
-        let cause = format!("{} lines are none of candump's, the first is line {first}", garbage.lines);
+        let cause = format!("{} lines are not in candump's format, the first is line {first}", garbage.lines);
         return Err(Failure::new(ErrorCode::LogLines, DOING, cause));
     }
     match outcome.differences.first() {

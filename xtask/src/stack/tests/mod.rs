@@ -256,6 +256,21 @@ fn functions_in_data_whose_address_is_made_may_be_behind_a_pointer() {
 }
 
 #[test]
+fn instructions_that_look_like_an_address_end_no_piece_of_data() {
+    let tiny = Tiny::default()
+        .with("lookalike", vec![code(&[0, 0, BACK])])
+        .with("outer", vec![code(&[PUSH]), Call("maker"), Call("caller"), code(&[POP])])
+        .with("caller", through_pointer())
+        .with("taken", framed(80, &[]))
+        .with("maker", vec![]);
+    let taken = tiny.address("taken") | 1;
+    let (tiny, begin) = tiny.with_data(&[u32::MAX, taken]);
+    let address = begin + 4;
+    let tiny = tiny.with("lookalike", vec![code(&[address as u16, (address >> 16) as u16, BACK])]);
+    assert_eq!(bytes(&tiny.with("maker", making_number(begin)), "outer"), 16 + 88);
+}
+
+#[test]
 fn a_call_of_one_kind_leads_to_that_kind_alone_and_as_deep_as_is_listed() {
     let text = "<x as core::fmt::Debug>::fmt";
     let tiny = Tiny::default()

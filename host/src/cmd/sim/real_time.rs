@@ -1,4 +1,4 @@
-//! `Pace`: virtual time that passes as wall time does, and never makes up for much that the machine was late.
+//! `RealTime`: virtual time that passes as wall time does, and never makes up for much that the machine was late.
 
 use std::time::Duration;
 
@@ -6,13 +6,13 @@ use std::time::Duration;
 /// up for half a second at once would take each of them for silent (500 ms).
 const MOST: Duration = Duration::from_millis(20);
 
-/// How far virtual time is behind wall time for good.
+/// Delay of virtual time behind wall time that is never caught up.
 #[derive(Debug, Default)]
-pub(super) struct Pace {
+pub(super) struct RealTime {
     lost: Duration,
 }
 
-impl Pace {
+impl RealTime {
     /// Time to wait now so that virtual time does not run ahead; both times are since the beginning.
     pub(super) fn wait(&mut self, virtual_time: Duration, wall_time: Duration) -> Duration {
         self.lost = self.lost.max(wall_time.saturating_sub(virtual_time).saturating_sub(MOST));
@@ -28,11 +28,11 @@ mod tests {
 
     /// Virtual time that passes in the second after the machine stood still for so long.
     fn after(delay: Duration) -> Duration {
-        let (mut pace, mut virtual_time, mut wall_time) = (Pace::default(), Duration::ZERO, delay);
+        let (mut real_time, mut virtual_time, mut wall_time) = (RealTime::default(), Duration::ZERO, delay);
         while wall_time < delay + Duration::from_secs(1) {
             virtual_time += STRIDE;
             // A computed stride takes an instant.
-            wall_time += pace.wait(virtual_time, wall_time).max(Duration::from_micros(50));
+            wall_time += real_time.wait(virtual_time, wall_time).max(Duration::from_micros(50));
         }
         virtual_time
     }
@@ -40,9 +40,9 @@ mod tests {
     #[test]
     fn a_machine_that_was_late_makes_up_for_a_moment_and_no_more() {
         let second = Duration::from_secs(1);
-        for (delay, made_up) in [(0, 0), (10, 10), (20, 20), (500, 20), (60_000, 20)] {
+        for (delay, caught_up) in [(0, 0), (10, 10), (20, 20), (500, 20), (60_000, 20)] {
             let passed = after(Duration::from_millis(delay));
-            let expected = second + Duration::from_millis(made_up);
+            let expected = second + Duration::from_millis(caught_up);
             let error = passed.abs_diff(expected);
             assert!(error <= 2 * STRIDE, "after {delay} ms: {passed:?} instead of {expected:?}");
         }
@@ -50,8 +50,8 @@ mod tests {
 
     #[test]
     fn two_delays_lose_no_more_than_both() {
-        let mut pace = Pace::default();
-        assert_eq!(pace.wait(Duration::from_secs(1), Duration::from_secs(2)), Duration::ZERO);
-        assert_eq!(pace.wait(Duration::from_secs(2), Duration::from_secs(2)), Duration::from_millis(980));
+        let mut real_time = RealTime::default();
+        assert_eq!(real_time.wait(Duration::from_secs(1), Duration::from_secs(2)), Duration::ZERO);
+        assert_eq!(real_time.wait(Duration::from_secs(2), Duration::from_secs(2)), Duration::from_millis(980));
     }
 }
