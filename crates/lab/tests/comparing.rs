@@ -16,7 +16,7 @@ fn recording(change: impl Fn(usize, &mut Sample) -> bool) -> Recording {
         let mut row = Sample { q: [0.1; 7], x: 0.001 * cycle as f64, force };
         if change(cycle, &mut row) {
             let q = row.q.map(|q| q.to_string()).join(",");
-            let (time, x, force) = (cycle as f64 / 300.0, row.x, row.force);
+            let (time, x, force) = (cycle as f64 / RATE, row.x, row.force);
             text += &format!("{time},run,{q},{x},0.2,0.3,1,0,0,0,{force},0,0,0,0,0\n");
         }
     }
