@@ -5,6 +5,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
+use lab::output_file;
 use serde::{Deserialize, Serialize};
 
 use super::grid::Cell;
@@ -302,13 +303,13 @@ impl Results {
     /// # Errors
     /// The file cannot be written.
     pub fn write_csv(&self, file: &Path) -> Result<(), csv::Error> {
-        let mut writer = csv::Writer::from_path(file)?;
+        let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(COLUMNS.map(|(name, _)| name))?;
         for report in &self.reports {
             writer.write_record(COLUMNS.map(|(_, value)| value(report)))?;
         }
-        writer.flush()?;
-        Ok(())
+        let text = writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))?;
+        output_file::replace(file, &text).map_err(|error| io::Error::from(error).into())
     }
 }
 
@@ -426,6 +427,19 @@ mod tests {
         let mut reversed = ordered.reports.clone();
         reversed.reverse();
         assert_eq!(Results::new(reversed), ordered);
+    }
+
+    #[test]
+    fn a_table_that_existed_is_replaced_whole_never_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, other_name) = (folder.path().join("results.csv"), folder.path().join("old.csv"));
+        std::fs::write(&file, "precious").unwrap();
+        // A second name of the old file shows whether its bytes were touched.
+        std::fs::hard_link(&file, &other_name).unwrap();
+        fixtures::results(&[1]).write_csv(&file).unwrap();
+        assert_eq!(std::fs::read(&other_name).unwrap(), b"precious");
+        assert!(std::fs::read(&file).unwrap().starts_with(b"cell,"));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "no part is left");
     }
 
     #[test]

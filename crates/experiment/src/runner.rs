@@ -248,5 +248,5 @@ fn record(folder: &Path, trial: &Trial) -> Result<(), ExperimentError> {
         key.cell, key.mode, key.seed, trial.report.outcome
     );
     let text = recording_text(&trial.telemetry, &notes).map_err(failed)?;
-    std::fs::write(&file, text).map_err(failed)
+    lab::output_file::replace(&file, text.as_ref()).map_err(|error| failed(error.into()))
 }

@@ -59,6 +59,15 @@ impl OutputError {
     }
 }
 
+impl From<OutputError> for io::Error {
+    fn from(error: OutputError) -> Self {
+        match error {
+            OutputError::System { cause, .. } => cause,
+            other => Self::other(other),
+        }
+    }
+}
+
 /// A file being written. Until [`commit`](Self::commit) its bytes are in a file of the same name with `.part` behind
 /// it, and what was at its place before is untouched. Dropped without [`keep`](Self::keep) it leaves nothing; a process
 /// that is killed leaves the part.

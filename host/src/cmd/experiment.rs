@@ -130,6 +130,7 @@ mod work {
     use experiment::trial::TrialError;
     use experiment::{Comparison, Config, Experiment, ExperimentError, Progress, Scenario, figures, map};
     use lab::client::Interrupt;
+    use lab::output_file;
     use lab::primitive_file::PrimitiveFile;
     use lab::simulation::{Engine, SimulationOptions};
     use lab::transport::Address;
@@ -240,9 +241,7 @@ mod work {
             "experiment": command.scenario, "folder": out, "demonstrations": demonstrations, "sweep": name, "points": points,
         });
         let file = out.join("study.json");
-        let json = serde_json::to_string_pretty(&data)
-            .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
-        std::fs::write(&file, json).map_err(|cause| unwritable(&file, cause))?;
+        save(&file, &data)?;
         if let (Some(name), Some(config)) = (name, configs.first()) {
             let title = format!("{}: held along {name}", config.object.row().title);
             figures::curve::draw(&points, name, &title).write(out, "sweep").map_err(|cause| {
@@ -306,9 +305,7 @@ mod work {
         output.say(format!("wrote {}", file.join("sag.png").display()));
         let data = serde_json::json!({ "experiment": config.scenario, "folder": out, "cases": rows });
         let file = out.join("results.json");
-        let json = serde_json::to_string_pretty(&data)
-            .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
-        std::fs::write(&file, json).map_err(|cause| unwritable(&file, cause))?;
+        save(&file, &data)?;
         output.result(&data, lift::table(&rows))
     }
 
@@ -401,9 +398,7 @@ mod work {
             "modes": summaries, "comparison": comparison, "trials": results.reports,
         });
         let file = out.join("results.json");
-        let text = serde_json::to_string_pretty(&data)
-            .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
-        std::fs::write(&file, text).map_err(|cause| unwritable(&file, cause))?;
+        save(&file, &data)?;
         let file = out.join("results.csv");
         results.write_csv(&file).map_err(|cause| unwritable(&file, cause))?;
         let figures = figures::write(config, experiment, &out.join("figures"), render)
@@ -429,6 +424,13 @@ mod work {
     fn mean(values: impl Iterator<Item = f64>) -> f64 {
         let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
         sum / f64::from(count.max(1))
+    }
+
+    /// Writes data as JSON: what was there before is whole until the new file is.
+    fn save(file: &Path, data: &serde_json::Value) -> Result<(), Failure> {
+        let text = serde_json::to_string_pretty(data)
+            .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
+        output_file::replace(file, text.as_bytes()).map_err(|cause| unwritable(file, cause))
     }
 
     fn unwritable(file: &Path, cause: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Failure {
