@@ -2,6 +2,7 @@
 
 mod bus;
 mod party;
+mod pendant;
 mod real_time;
 
 use std::io::ErrorKind;
@@ -16,13 +17,14 @@ use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{ErrorCode, Failure, Global, connection};
+use super::{ErrorCode, Failure, Global, Output, connection};
 use bus::BusServer;
 use lab::client::Interrupt;
 use lab::device::Device;
 use lab::simulation::Engine;
 use lab::transport::{Address, Transport, TransportError};
 use party::{Party, Peer};
+use pendant::Pendant;
 use real_time::RealTime;
 
 /// Virtual time simulated between two looks at the socket: a human does not notice, a link time-out neither.
@@ -111,7 +113,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         listener = Some(listen(&command.listen).map_err(|cause| refused(&command.listen, cause))?);
         output.say(format!("a simulated arm listens; in another terminal: `tactus --device {} list`", command.listen));
     }
-    let served = serve(command, &mut device, listener.as_ref(), bus.as_mut(), &interrupt);
+    output.say(format!("the pendant's buttons, typed here: {}", pendant::WORDS));
+    let served = serve(command, &mut device, listener.as_ref(), bus.as_mut(), &interrupt, output);
     if let Some(Listener::Unix(_, path)) = &listener {
         // Left behind it would only confuse the next one.
         let _ = std::fs::remove_file(path);
@@ -180,9 +183,11 @@ fn serve(
     listener: Option<&Listener>,
     mut bus: Option<&mut BusServer>,
     interrupt: &Interrupt,
+    output: Output,
 ) -> Result<(), TransportError> {
     let (started, mut real_time) = (Instant::now(), RealTime::default());
     let mut party = Party::default();
+    let mut pendant = Pendant::listen();
     let mut bytes = Vec::new();
     while !interrupt.is_raised() {
         if command.duration.is_some_and(|limit| device.now().as_secs_f64() >= limit) {
@@ -197,6 +202,13 @@ fn serve(
         let said = party.hear(STRIDE_BYTES);
         if !said.is_empty() {
             device.send(&said)?;
+        }
+        while let Some(pressed) = pendant.pressed() {
+            match (pressed, device.simulation()) {
+                (Ok(action), Some(simulation)) => simulation.plant().press(action),
+                (Ok(_), None) => {}
+                (Err(word), _) => output.warn(format!("the pendant has no '{word}'; it has {}", pendant::WORDS)),
+            }
         }
         let target = device.now() + STRIDE;
         while device.now() < target {

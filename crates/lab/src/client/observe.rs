@@ -37,7 +37,7 @@ impl<T: Transport> Client<T> {
 
     /// The error for a device that another host has: with the name of that host, if the device tells an observer.
     pub(super) fn in_use(&mut self, hello: HostHello, wait_ms: u32) -> HostError {
-        let mut ask = || {
+        let ask = || {
             self.exchange(&Request::Observe(hello)).ok()?;
             let reply = self.exchange(&Request::Owner).ok()?;
             // Its place is free for others again; whether that is heard changes nothing.

@@ -1,0 +1,99 @@
+//! The stand-in: an arm served by `tactus sim`, whose pendant is the standard input of that command.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, Command, Output, Stdio};
+
+use serde_json::Value;
+
+struct StandIn {
+    program: Child,
+    pendant: ChildStdin,
+}
+
+impl StandIn {
+    /// Serves an arm in a folder; it listens when this returns.
+    fn start(folder: &Path) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+        command.current_dir(folder).args(["--device", "sil:world=simple", "sim"]);
+        command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+        let mut program = command.spawn().unwrap();
+        let said = BufReader::new(program.stderr.take().unwrap());
+        let mut lines = said.lines();
+        assert!(lines.by_ref().any(|line| line.unwrap().contains("the pendant's buttons")), "it never listened");
+        std::thread::spawn(move || lines.for_each(drop));
+        let pendant = program.stdin.take().unwrap();
+        Self { program, pendant }
+    }
+
+    fn press(&mut self, button: &str) {
+        writeln!(self.pendant, "{button}").unwrap();
+    }
+}
+
+impl Drop for StandIn {
+    fn drop(&mut self) {
+        let _ = self.program.kill();
+        let _ = self.program.wait();
+    }
+}
+
+fn tactus(folder: &Path, line: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    command.current_dir(folder).env("TACTUS_DEVICE", "unix:tactus.sock").args(["--json", "--non-interactive"]);
+    command.args(line.split(' ')).stdin(Stdio::null()).output().unwrap()
+}
+
+/// The state of the arm once it is one of these; each question is a turn of the device's time as well.
+fn until(folder: &Path, states: &[&str]) -> String {
+    for _ in 0..500 {
+        let status = tactus(folder, "status");
+        let told: Value = serde_json::from_slice(&status.stdout).unwrap();
+        let state = told["state"].as_str().unwrap_or_default().to_owned();
+        if states.contains(&&*state) {
+            return state;
+        }
+    }
+    panic!("never in {states:?}");
+}
+
+#[test]
+fn the_guides_stand_in_can_be_calibrated_after_its_hand_was_initialised() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut arm = StandIn::start(at);
+    let initialised = tactus(at, "hand --at-home init");
+    assert!(initialised.status.success(), "{}", String::from_utf8_lossy(&initialised.stderr));
+    let calibrate = "calibrate home --set 0.02,-1.97,0.01,3.1,0,0.03,-0.05";
+    let refused = tactus(at, calibrate);
+    let told: Value = serde_json::from_slice(&refused.stdout).unwrap();
+    // It has torque, as an arm in the laboratory would; what the help says can be done here too.
+    assert_eq!(told["error"]["code"], "E546", "{told}");
+    assert!(told["error"]["help"].as_str().unwrap().contains("Shift+Idle"), "{told}");
+    arm.press("nonsense");
+    arm.press("idle");
+    until(at, &["idle"]);
+    let calibrated = tactus(at, calibrate);
+    assert!(calibrated.status.success(), "{}", String::from_utf8_lossy(&calibrated.stderr));
+    let shown: Value = serde_json::from_slice(&tactus(at, "calibrate show").stdout).unwrap();
+    assert_eq!(shown["stored"], true, "{shown}");
+}
+
+#[test]
+fn the_stand_in_is_stopped_by_its_emergency_stop_and_comes_back_by_its_pendant() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut arm = StandIn::start(at);
+    assert!(tactus(at, "hand --at-home init").status.success());
+    arm.press("estop");
+    until(at, &["idle", "fault"]);
+    let safety = |at: &Path| -> Value {
+        let status: Value = serde_json::from_slice(&tactus(at, "status").stdout).unwrap();
+        status["safety_mode"].clone()
+    };
+    let pressed = safety(at);
+    arm.press("release");
+    arm.press("idle");
+    let released = (0..500).map(|_| safety(at)).find(|mode| *mode != pressed);
+    assert!(released.is_some(), "still {pressed}");
+}
