@@ -1,6 +1,7 @@
 //! Set-up and chores of Tactus: `cargo xtask <verb>`. Says what it does, asks nothing.
 
 mod board;
+mod book;
 mod budget;
 mod build;
 mod ci;
@@ -55,6 +56,7 @@ cargo xtask <verb>
   run-image IMAGE   run an image where it belongs: QEMU, or a board through probe-rs (cargo's runner)
   doc      documentation of all crates
   docs     dead links, paths, test names and fault identifiers in any file
+  book     the documents as a book, read without a network: target/book/html (mdBook, installed if it is not there)
   package  packages for strangers: packed, unpacked outside the repository, tested there
   mutants  wrong changes of the code that named tests must catch; cargo xtask mutants WORDS: those whose name has WORDS
   faults [--all] [--json] [ID...]   the fault catalogue: every script of tests/faults against the simulated arm
@@ -141,6 +143,7 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["qemu", rest @ ..] => qemu::run(rest)?,
         ["doc"] => build::documentation()?,
         ["docs"] => docs::run()?,
+        ["book"] => book::run()?,
         ["faults", rest @ ..] => faults(rest)?,
         ["fuzz"] => fuzz::run(fuzz::USUAL)?,
         ["fuzz", count] => fuzz::run(count.parse().with_context(|| format!("no number: {count}"))?)?,
