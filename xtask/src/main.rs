@@ -54,9 +54,9 @@ cargo xtask <verb>
   size     flash and RAM of the image by section
   qemu     run an image by itself: cargo xtask qemu [IMAGE]
   run-image IMAGE   run an image where it belongs: QEMU, or a board through probe-rs (cargo's runner)
+  book     the documents as a book, read without a network: target/book/html (mdBook, installed if it is not there)
   doc      documentation of all crates
   docs     dead links, paths, test names and fault identifiers in any file
-  book     the documents as a book, read without a network: target/book/html (mdBook, installed if it is not there)
   package  packages for strangers: packed, unpacked outside the repository, tested there
   mutants  wrong changes of the code that named tests must catch; cargo xtask mutants WORDS: those whose name has WORDS
   faults [--all] [--json] [ID...]   the fault catalogue: every script of tests/faults against the simulated arm
