@@ -73,6 +73,21 @@ fn check(files: &[(String, String)]) -> Vec<Dead> {
     dead
 }
 
+/// Targets of the links of a Markdown text, without those in blocks and code spans.
+pub(crate) fn link_targets(text: &str) -> Vec<String> {
+    let mut fenced = false;
+    let mut targets = Vec::new();
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            fenced = !fenced;
+        } else if !fenced {
+            let (prose, _) = scan::code_spans(line);
+            targets.extend(scan::links(&prose).into_iter().map(str::to_owned));
+        }
+    }
+    targets
+}
+
 /// Documents that the index does not link to.
 fn unlisted(files: &[(String, String)]) -> Vec<Dead> {
     let index = files.iter().find(|(path, _)| path == INDEX).map_or("", |(_, text)| text);

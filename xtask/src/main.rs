@@ -1,6 +1,7 @@
 //! Set-up and chores of Tactus: `cargo xtask <verb>`. Says what it does, asks nothing.
 
 mod board;
+mod book;
 mod budget;
 mod build;
 mod ci;
@@ -53,6 +54,7 @@ cargo xtask <verb>
   size     flash and RAM of the image by section
   qemu     run an image by itself: cargo xtask qemu [IMAGE]
   run-image IMAGE   run an image where it belongs: QEMU, or a board through probe-rs (cargo's runner)
+  book     the documents as a book, read without a network: target/book/html (mdBook, installed if it is not there)
   doc      documentation of all crates
   docs     dead links, paths, test names and fault identifiers in any file
   package  packages for strangers: packed, unpacked outside the repository, tested there, their examples run
@@ -141,6 +143,7 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["qemu", rest @ ..] => qemu::run(rest)?,
         ["doc"] => build::documentation()?,
         ["docs"] => docs::run()?,
+        ["book"] => book::run()?,
         ["faults", rest @ ..] => faults(rest)?,
         ["fuzz"] => fuzz::run(fuzz::USUAL)?,
         ["fuzz", count] => fuzz::run(count.parse().with_context(|| format!("no number: {count}"))?)?,
