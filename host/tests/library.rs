@@ -177,6 +177,24 @@ fn a_stored_primitive_runs_by_its_name_and_others_look_on_without_costing_it_a_c
     assert!(both.iter().all(|(seen, run)| seen == run), "the observer saw another run");
 }
 
+#[test]
+fn a_run_by_its_name_in_the_device_is_a_run_of_the_file_that_was_uploaded() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    common::demonstration(folder, 3.0);
+    object(folder, &["learn", "demo.csv", "--name", "reach", "-o", "reach.toml"]);
+    let device = "sil:world=simple,flash=arm.flash";
+    object(folder, &["--device", device, "upload", "reach.toml"]);
+    object(folder, &["--device", device, "run", "reach", "--record", "stored.csv"]);
+    object(folder, &["--device", device, "run", "reach.toml", "--record", "file.csv"]);
+    // The device holds 32 bits of each number: that is no other movement.
+    object(folder, &["report", "stored.csv", "file.csv", "--primitive", "reach.toml", "-o", "report.html"]);
+    object(folder, &["plot", "-r", "stored.csv", "-p", "reach.toml", "-o", "figure.svg"]);
+    object(folder, &["compare", "stored.csv", "file.csv"]);
+    object(folder, &["learn", "demo.csv", "--name", "reach", "--kernels", "30", "-o", "other.toml"]);
+    refused(folder, &["report", "stored.csv", "--primitive", "other.toml", "-o", "other.html"], "E641", "other.toml");
+}
+
 /// Sends a signal to a process.
 #[track_caller]
 fn signal(process: u32, name: &str) {

@@ -319,9 +319,11 @@ impl PrimitiveFile {
     }
 
     /// Check sum of the movement alone: what is remembered of it, and the weights that follow from that, do not change
-    /// it.
+    /// it. It is that of the numbers as a device holds them, in 32 bits: a primitive that was read back from one is the
+    /// same movement.
     pub fn movement_checksum(&self) -> u32 {
-        PrimitiveFile { feedback: None, ..self.without_memory() }.checksum()
+        let movement = PrimitiveFile { feedback: None, ..self.without_memory() };
+        movement.checksum_of(|value| f64::from(value as f32))
     }
 
     /// Number of kernels of each row.
@@ -331,6 +333,10 @@ impl PrimitiveFile {
 
     /// CRC-32/ISCSI of everything that determines the movement.
     pub fn checksum(&self) -> u32 {
+        self.checksum_of(|value| value)
+    }
+
+    fn checksum_of(&self, number: impl Fn(f64) -> f64) -> u32 {
         let mut bytes = self.name.as_bytes().to_vec();
         bytes.push(0);
         bytes.extend(self.model_hash.to_le_bytes());
@@ -340,7 +346,7 @@ impl PrimitiveFile {
             bytes.extend(key.as_bytes());
             bytes.extend((values.len() as u32).to_le_bytes());
             for value in values {
-                bytes.extend(value.to_le_bytes());
+                bytes.extend(number(value).to_le_bytes());
             }
         }
         checksum(&bytes)
