@@ -232,3 +232,20 @@ fn figures_only_draws_results_that_are_there_and_teaches_nothing() {
     assert!(stderr(&empty.failure().code(2)).contains("there are no results in none"));
     assert!(!folder.path().join("none").join("results.jsonl").exists());
 }
+
+#[test]
+fn a_demonstration_that_nobody_ends_is_no_success_and_what_was_recorded_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |input: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+        command.current_dir(folder.path()).env("XDG_CONFIG_HOME", folder.path());
+        let line = "--device sil:world=simple --force teach --output demo.csv";
+        command.args(line.split(' ')).write_stdin(input).assert()
+    };
+    let refused = run("").failure().code(2);
+    let said = stderr(&refused);
+    assert!(said.contains("error[E205]") && said.contains("standard input has ended"), "{said}");
+    assert!(!folder.path().join("demo.csv").exists(), "it is no demonstration");
+    run("\n").success();
+    assert!(folder.path().join("demo.csv").exists());
+}

@@ -91,13 +91,10 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         clear_the_table(options);
     })?;
     client.require(Capability::Arm).map_err(|error| error.into_failure(DOING))?;
+    let nobody = |when: &str| Failure::new(ErrorCode::NobodyToAsk, DOING, format!("nobody can press Enter {when}"));
     let alone = global.non_interactive && command.duration.is_none();
     if alone && default_posture(&mut client, command.movement).is_none() {
-        return Err(Failure::new(
-            ErrorCode::NobodyToAsk,
-            DOING,
-            "nobody can be asked to press Enter at the end of the movement",
-        ));
+        return Err(nobody("at the end of the movement"));
     }
     if command.from.is_some() && default_posture(&mut client, command.movement).is_some() {
         return Err(Failure::new(
@@ -131,7 +128,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let held = client.hold();
     let recorded = recorded.and_then(|recorded| Ok(held.map(|()| recorded)?));
     connection::tell_speed(&client, started, output);
-    let (rows, gaps) = file.end(recorded.map_err(failed), output)?;
+    let recorded = recorded.map_err(failed).and_then(|(rows, gaps, is_shown)| match is_shown {
+        true => Ok((rows, gaps)),
+        false => Err(nobody("any more: standard input has ended")),
+    });
+    let (rows, gaps) = file.end(recorded, output)?;
     output.result(
         &json!({
             "file": files::text(&command.output),
@@ -143,13 +144,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     )
 }
 
-/// Records until the person is done; gives the number of samples and of those lost on the link.
+/// Records until the person is done; gives the number of samples, of those lost on the link, and whether anybody said
+/// that the movement is shown.
 fn record(
     command: &Cmd,
     global: &Global,
     client: &mut Client<Device>,
     recorder: Recorder<&mut Counted>,
-) -> Result<(usize, u32), ProcedureError> {
+) -> Result<(usize, u32, bool), ProcedureError> {
     let output = global.output();
     let guided = teacher::begin(client);
     let enter = (!guided && command.duration.is_none()).then(wait_for_enter);
@@ -166,16 +168,14 @@ fn record(
         (guided && teacher::has_finished(client)) || enter.as_ref().is_some_and(|enter| enter.is_finished())
     });
     spinner.finish_and_clear();
-    Ok((shown?.samples, client.gaps().telemetry))
+    let samples = shown?.samples;
+    let ended_unsaid = enter.filter(|enter| enter.is_finished()).is_some_and(|enter| !enter.join().unwrap_or(false));
+    Ok((samples, client.gaps().telemetry, !ended_unsaid))
 }
 
-/// A thread that ends when Enter is pressed.
-fn wait_for_enter() -> std::thread::JoinHandle<()> {
-    std::thread::spawn(|| {
-        let mut line = String::new();
-        // End of input counts as Enter: nobody is there to press it.
-        let _ = std::io::stdin().read_line(&mut line);
-    })
+/// A thread that ends when Enter is pressed; false if standard input has ended, and nobody can press it any more.
+fn wait_for_enter() -> std::thread::JoinHandle<bool> {
+    std::thread::spawn(|| std::io::stdin().read_line(&mut String::new()).is_ok_and(|bytes| bytes > 0))
 }
 
 /// Takes the object off the table: what is shown is the way, and a hand that is guided would push it over. The first
