@@ -13,9 +13,9 @@ use tactus::cmd::Cli;
 
 /// A command that writes a file: subcommand, the option that names it, the whole line, and the file. It begins with
 /// `reach.toml`, `run.csv` and a device whose flash holds `reach`, and takes the place of a file that is there already.
-type Row = (&'static str, &'static str, &'static str, &'static str);
+type Disturbed = (&'static str, &'static str, &'static str, &'static str);
 
-const ROWS: &[Row] = &[
+const ROWS: &[Disturbed] = &[
     ("learn", "output", "learn demo.csv --name a -o there.toml", "there.toml"),
     ("plot", "output", "plot -d demo.csv -p reach.toml -o there.svg", "there.svg"),
     ("plot", "output", "plot -d demo.csv -o there.png", "there.png"),
@@ -42,7 +42,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ("sim", "flash", "a flash, whose power may fail in any word: tests/tests/system/storage.rs"),
 ];
 
-/// What stands for an old file where the bytes do not matter; a TOML file of settings keeps its comments.
+/// Bytes of the old file; a TOML file of settings keeps its comments.
 fn precious(line: &str, settings: &[u8]) -> Vec<u8> {
     if line.starts_with("config") { settings.to_vec() } else { b"precious".to_vec() }
 }
@@ -99,7 +99,7 @@ fn judge(folder: &Path, line: &str, file: &str, disturbed: &str, ended: &Output,
 }
 
 /// Plays one row undisturbed, with disks that are full at some sizes, and with signals at some moments.
-fn disturb(row: &Row) {
+fn disturb(row: &Disturbed) {
     let (_, _, line, file) = *row;
     let folder = prepared();
     let at = folder.path();
