@@ -30,7 +30,7 @@ pub struct Cmd {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let file = PrimitiveFile::read(&command.primitive).map_err(|cause| failure(cause, &command.primitive, "check"))?;
-    let bar = output.bar(100, "playing the plan");
+    let bar = output.bar(100, "%", "playing the plan");
     let course = Course { goal: goal(command.goal), ..Course::stored(command.speed) };
     let report = check::check(&file, &course, |fraction| bar.set_position((fraction * 100.0) as u64))
         .map_err(|cause| failure(cause, &command.primitive, "check"))?;

@@ -46,7 +46,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             format!("{}: without experience; content {checksum}", file.name),
         );
     }
-    let bar = output.bar(command.recordings.len() as u64, "reading");
+    let bar = output.bar(command.recordings.len() as u64, "files", "reading");
     let mut recordings = Vec::new();
     for path in &command.recordings {
         let recording = Recording::read(path)

@@ -255,7 +255,7 @@ mod work {
     /// Carries all trials through with a progress bar; gives the time it took as well, s.
     fn carry(config: &Config, interrupt: &Interrupt, output: Output) -> Result<(Experiment, f64), Failure> {
         let started = Instant::now();
-        let bar = output.bar(config.keys().len() as u64, "trials");
+        let bar = output.bar(config.keys().len() as u64, "trials", "trials");
         let carried = experiment::run(config, interrupt, &mut |progress| match progress {
             Progress::Begin { all, done } => {
                 bar.set_length(all as u64);

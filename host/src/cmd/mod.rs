@@ -28,6 +28,7 @@ pub mod monitor;
 pub mod output;
 pub mod plot;
 pub mod preflight;
+mod progress;
 pub mod record;
 pub mod rehearse;
 pub mod rename;

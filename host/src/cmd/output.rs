@@ -2,12 +2,11 @@
 
 use std::borrow::Cow;
 use std::io::{ErrorKind, Write};
-use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use serde::Serialize;
 
-use super::{ErrorCode, Failure};
+use super::{ErrorCode, Failure, progress};
 
 /// The action that fails when standard output does.
 const WRITING: &str = "writing the result to standard output";
@@ -56,24 +55,13 @@ impl Output {
         }
     }
 
-    /// A bar for work of `steps` steps; it hides itself when stderr is no terminal.
-    pub fn bar(&self, steps: u64, doing: impl Into<Cow<'static, str>>) -> ProgressBar {
-        if self.quiet {
-            return ProgressBar::hidden();
-        }
-        let style = ProgressStyle::with_template("{msg:24} [{bar:32}] {pos}/{len} {elapsed} (about {eta} left)")
-            .unwrap_or_else(|_| ProgressStyle::default_bar())
-            .progress_chars("=> ");
-        ProgressBar::new(steps).with_style(style).with_message(doing)
+    /// A bar for work of `steps` steps of a unit; off a terminal it is a line every ten seconds.
+    pub fn bar(&self, steps: u64, unit: &str, doing: impl Into<Cow<'static, str>>) -> ProgressBar {
+        if self.quiet { ProgressBar::hidden() } else { progress::bar(steps, unit, doing) }
     }
 
-    /// A sign of life for work of unknown length.
+    /// A sign of life for work of unknown length; off a terminal it is a line every ten seconds.
     pub fn spinner(&self, doing: impl Into<Cow<'static, str>>) -> ProgressBar {
-        if self.quiet {
-            return ProgressBar::hidden();
-        }
-        let spinner = ProgressBar::new_spinner().with_message(doing);
-        spinner.enable_steady_tick(Duration::from_millis(120));
-        spinner
+        if self.quiet { ProgressBar::hidden() } else { progress::spinner(doing) }
     }
 }

@@ -40,14 +40,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         connection::observe(global, DOING)?
     };
     let wanted = (command.duration * lab::demonstration::RATE).round() as usize;
-    let bar = output.bar(wanted as u64, "recording");
+    let bar = output.bar(command.duration.ceil() as u64, "s", "recording");
     let notes = format!("Tactus recording, {} Hz\n{}", control::RATE_HZ, files::origin(&client, None));
     file.expect_notes(&notes);
     let mut record = || -> Result<usize, ProcedureError> {
         let mut recorder = Recorder::start(&mut client, &mut file.file, &notes)?;
         while recorder.rows() < wanted {
             recorder.take(&mut client)?;
-            bar.set_position(recorder.rows() as u64);
+            bar.set_position((recorder.rows() as f64 / lab::demonstration::RATE) as u64);
         }
         let rows = recorder.rows();
         recorder.finish(&mut client)?;

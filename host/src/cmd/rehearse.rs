@@ -111,10 +111,10 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut recordings = Vec::new();
     let mut flags = Vec::new();
     for trial in 1..=command.trials {
-        let bar = output.bar((file.movement.duration / command.speed * RATE) as u64, "to the start");
+        let bar = output.bar((file.movement.duration / command.speed).ceil() as u64, "s", "to the start");
         let played = procedure::play_once(&mut client, &movement, options, &notes, &mut |samples| {
             bar.set_message(format!("rehearsal {trial} of {}", command.trials));
-            bar.set_position(samples as u64);
+            bar.set_position((samples as f64 / RATE) as u64);
         });
         bar.finish_and_clear();
         let (bytes, outcome) = played.map_err(|error| connection::failure(error, DOING))?;

@@ -267,7 +267,7 @@ fn play(
 
     let notes = notes(client, file, command);
     let mut writer = record.map(|record| start(record, &notes)).transpose()?;
-    let bar = output.bar((file.movement.duration / command.speed * RATE) as u64, "running");
+    let bar = output.bar((file.movement.duration / command.speed).ceil() as u64, "s", "running");
     let (mut cycles, mut written, mut is_running) = (Vec::new(), Ok(()), false);
     let before = Snapshot::of(client)?;
     client.take_answer_times();
@@ -277,7 +277,7 @@ fn play(
             bar.suspend(|| output.say(format!("running '{}' ({})", file.name, command.mode.name())));
         }
         cycles.push(*cycle);
-        bar.set_position(cycles.len() as u64);
+        bar.set_position((cycles.len() as f64 / RATE) as u64);
         // A disk that is full is no reason to stop an arm: the run goes on, and is told of at its end.
         if let (Some(writer), Ok(())) = (&mut writer, &written) {
             written = writer.write(cycle);

@@ -97,7 +97,7 @@ pub(super) fn precheck(
     output: Output,
     doing: &str,
 ) -> Result<CheckReport, Failure> {
-    let bar = output.bar(100, "checking");
+    let bar = output.bar(100, "%", "checking");
     let report = check::check(file, course, |fraction| bar.set_position((fraction * 100.0) as u64))
         .map_err(|cause| super::check::failure(cause, &file.file, doing))?;
     bar.finish_and_clear();
@@ -118,7 +118,7 @@ pub(super) fn send(
     doing: &str,
 ) -> Result<UploadOutcome, Failure> {
     let image = file.to_image().map_err(|cause| super::check::failure(cause, &file.file, doing))?;
-    let bar = output.bar(image.len() as u64, "sending");
+    let bar = output.bar(image.len() as u64, "bytes", "sending");
     let outcome = client.upload(&image, |phase, done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
