@@ -293,3 +293,26 @@ fn a_log_that_begins_in_the_middle_is_refused() {
     let words = stderr(&tactus(folder.path(), &["can", "replay", "bus.log"]).code(6));
     assert!(words.contains("the log holds no frame that a co-controller has sent"), "{words}");
 }
+
+#[test]
+fn a_replay_that_is_interrupted_says_that_nothing_can_be_said() {
+    use std::io::Write;
+    use std::process::{Command, Stdio};
+    let (_, log) = recorded();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    command.args(["can", "replay", "-"]).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut replay = command.spawn().unwrap();
+    let mut input = replay.stdin.take().unwrap();
+    // More than a pipe holds: it has read the beginning, and hears signals.
+    let (first, rest) = log.as_bytes().split_at(log.len() / 2);
+    assert!(first.len() > 200_000, "{}", first.len());
+    input.write_all(first).unwrap();
+    assert!(Command::new("kill").args(["-s", "INT", &replay.id().to_string()]).status().unwrap().success());
+    // It may be gone already.
+    let _ = input.write_all(rest);
+    drop(input);
+    let ended = replay.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(130), "{said}");
+    assert!(said.contains("nothing can be said") && ended.stdout.is_empty(), "{said}");
+}

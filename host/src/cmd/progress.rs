@@ -73,7 +73,7 @@ impl Due {
         self.line.push_str(text);
     }
 
-    /// The drawing is complete, so long after the beginning: the line, if it is time for one.
+    /// The drawing is complete, this long after the beginning: the line, if it is time for one.
     fn complete(&mut self, elapsed: Duration) -> Option<String> {
         let line = std::mem::take(&mut self.line);
         let line = line.trim();
