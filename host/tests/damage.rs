@@ -1,4 +1,4 @@
-//! A full disk, an interrupt and a kill at every stage of every command that writes a file: what existed is whole.
+//! A full disk, a closed pipe, an interrupt and a kill at every stage of every command that writes a file.
 
 #[path = "../../crates/lab/tests/common/mod.rs"]
 mod common;
@@ -134,6 +134,24 @@ fn disturb(row: &Disturbed) {
             judge(at, line, file, "full disk", &ended, &old, &new);
         }
     }
+    for closed in [">&-", "2>&-", ">&- 2>&-", "| true", "2>&1 | true"] {
+        renew();
+        let ended = Command::new("bash")
+            .current_dir(at)
+            .env("XDG_CONFIG_HOME", at)
+            .env("TACTUS_DEVICE", "sil:world=simple,flash=arm.flash")
+            .args(["-c", &format!("set -o pipefail; \"$0\" --non-interactive --force {line} {closed}")])
+            .arg(env!("CARGO_BIN_EXE_tactus"))
+            .stdin(Stdio::null())
+            .output()
+            .unwrap();
+        judge(at, line, file, closed, &ended, &old, &new);
+    }
+    // A place where nobody may write, not even root.
+    let elsewhere = line.replace(file, &format!("/proc/{file}"));
+    let refused = command(at, &elsewhere).output().unwrap();
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert!(refused.status.code() == Some(2) && said.contains("error[E23"), "{elsewhere}: {said}");
     for signal in ["INT", "KILL"] {
         for moment in 0..6_u32 {
             renew();

@@ -165,3 +165,35 @@ fn recordings_that_tell_nothing_are_refused_and_nothing_is_changed() {
     let still = Recording { phase: None, ..whole };
     assert!(refused(&[still]).to_string().contains("phase"));
 }
+
+#[test]
+fn the_report_of_a_grasp_on_nothing_says_which_finger_nothing_stopped_and_is_not_called_good() {
+    let mut file = primitive();
+    let runs: Vec<_> =
+        [-0.6, 0.0, 0.6].map(|offset| recording(&rows(file.movement.alpha, |u| 2.0 * u + offset))).to_vec();
+    remember_successes(&mut file, &runs).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let report = |name: &str, rows: &[RecordingRow]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, common::text(rows)).unwrap();
+        lab::report::ReportedRun::read(&path, Some(&file)).unwrap()
+    };
+    let usual = rows(file.movement.alpha, |u| 2.0 * u);
+    let good = report("good.csv", &usual);
+    assert!(good.outcome.is_good() && !good.happenings.iter().any(|event| event.words.contains("successful")));
+
+    let mut empty = usual;
+    for row in &mut empty {
+        let u = (row.time - 0.5) / DURATION;
+        if (0.6..=1.0).contains(&u) {
+            row.telemetry.hand[1] += 1.0;
+            row.telemetry.flags |= flags::SURPRISE;
+        }
+    }
+    let missed = report("missed.csv", &empty);
+    assert!(!missed.outcome.is_good(), "{}", missed.outcome.words());
+    let said: Vec<_> =
+        missed.happenings.iter().filter(|event| event.words.contains("finger F1 closed farther")).collect();
+    assert_eq!(said.len(), 1, "{:?}", missed.happenings);
+    assert!((said[0].progress - 0.6).abs() < 0.05 && (said[0].time - 3.0).abs() < 0.25, "{:?}", said[0]);
+}

@@ -56,7 +56,7 @@ fn primitive(folder: &Path) -> PrimitiveFile {
 fn the_end_of_a_run_is_told_as_it_was() {
     let folder = tempfile::tempdir().unwrap();
     let outcome = |name, end| ReportedRun::read(&recorded(folder.path(), name, end), None).unwrap().outcome;
-    assert_eq!(outcome("a.csv", None), Outcome::Arrived);
+    assert_eq!(outcome("a.csv", None), Outcome::ArrivedUnlike);
     assert_eq!(outcome("b.csv", Some((State::SoftStop, Fault::ContactForce))), Outcome::Faulted(Fault::ContactForce));
     assert_eq!(outcome("c.csv", Some((State::SoftStop, Fault::None))), Outcome::Stopped);
     assert_eq!(outcome("d.csv", Some((State::Run, Fault::None))), Outcome::Unfinished);

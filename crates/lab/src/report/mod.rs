@@ -4,6 +4,7 @@
 mod events;
 mod figures;
 mod html;
+mod watched;
 
 use std::path::Path;
 
@@ -47,6 +48,8 @@ pub enum Outcome {
     NeverBegan,
     /// The arm came to the end of the movement and held.
     Arrived,
+    /// The same, but what was measured on the way was not as in the successful runs.
+    ArrivedUnlike,
     /// A fault stopped it.
     Faulted(Fault),
     /// It was stopped, by a person or another program.
@@ -68,6 +71,10 @@ impl Outcome {
         match self {
             Self::NeverBegan => "no movement was played".to_owned(),
             Self::Arrived => "arrived, and held the goal".to_owned(),
+            Self::ArrivedUnlike => {
+                "arrived, and held the goal, but not as the successful runs: what was to be done may have failed"
+                    .to_owned()
+            }
             Self::Faulted(fault) => format!("stopped by a fault ({fault:?}): {fault}"),
             Self::Stopped => "stopped by a person or by another program".to_owned(),
             Self::Unfinished => {
@@ -91,12 +98,28 @@ impl ReportedRun {
         let running = recording.running();
         let mut flags = FlagCounts::default();
         running.flags.iter().flatten().for_each(|sample| flags.add(*sample));
+        let progress: Vec<f64> = running.phase.iter().flatten().map(|phase| progress(*phase, alpha)).collect();
+        let mut happenings = events::of(&recording, alpha);
+        let departures = primitive.map(|primitive| watched::departures(&running, &progress, primitive));
+        for departure in departures.into_iter().flatten() {
+            let time = |sample: usize| running.time.get(sample).copied().unwrap_or(0.0);
+            happenings.push(Happening {
+                time: time(departure.sample) - time(0),
+                progress: progress.get(departure.sample).copied().unwrap_or(0.0),
+                words: departure.words(),
+            });
+        }
+        happenings.sort_by(|a, b| a.time.total_cmp(&b.time));
+        let is_unlike = running.flags.iter().flatten().any(|sample| sample & control::flags::SURPRISE != 0);
         Ok(ReportedRun {
             name: file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
             notes,
-            progress: running.phase.iter().flatten().map(|phase| progress(*phase, alpha)).collect(),
-            outcome: outcome(&recording, &running),
-            happenings: events::of(&recording, alpha),
+            progress,
+            outcome: match outcome(&recording, &running) {
+                Outcome::Arrived if is_unlike => Outcome::ArrivedUnlike,
+                outcome => outcome,
+            },
+            happenings,
             flags,
             missing: running.missing_samples,
             tracking: Tracking::of_run(&recording).ok(),
