@@ -7,30 +7,41 @@ use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 
 use crate::cmd::{
-    config, delete, doctor, explain, export, get, hand, list, manual, record, rename, run_report, settings, sim, stop,
+    config, delete, doctor, experience, explain, export, get, hand, learn, list, manual, plot, record, rehearse,
+    rename, report, run_report, settings, sim, stop, teach, upload,
 };
 
 /// Every schema by the name of its command; `error` is that of any command that fails.
 #[must_use]
 pub fn all() -> Vec<(&'static str, Schema)> {
     vec![
+        ("can-replay", of::<lab::replay::Outcome>()),
+        ("check", of::<crate::check::CheckReport>()),
+        ("compare", of::<lab::difference::Difference>()),
         ("config", of::<config::Configured>()),
         ("config-diff", of::<settings::Compared>()),
         ("config-get", of::<settings::Kept>()),
         ("delete", of::<delete::Deleted>()),
         ("doctor", of::<doctor::Examined>()),
         ("error", of::<FailureData>()),
+        ("experience", of::<experience::Known<'_>>()),
         ("explain", of::<explain::Explained>()),
         ("export", of::<export::Exported>()),
         ("get", of::<get::Gotten>()),
         ("hand", of::<hand::Moved>()),
+        ("learn", of::<learn::Fitted<'_>>()),
         ("list", of::<list::Listed>()),
         ("manual", of::<manual::Written>()),
+        ("plot", of::<plot::Drawn>()),
         ("record", of::<record::Recorded>()),
+        ("rehearse", of::<rehearse::Report>()),
         ("rename", of::<rename::Renamed>()),
+        ("report", of::<report::Reported>()),
         ("run", of::<run_report::Ran>()),
         ("sim", of::<sim::Simulated>()),
         ("stop", of::<stop::Stopped>()),
+        ("teach", of::<teach::Taught>()),
+        ("upload", of::<upload::Uploaded>()),
     ]
 }
 

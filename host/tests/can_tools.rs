@@ -250,6 +250,10 @@ fn a_changed_torque_is_found_at_its_line() {
     assert!(stdout(&run).contains("1 different"), "{}", stdout(&run));
     assert!(stderr(&run).contains(&format!("first: line {}, ", number + 1)), "{}", stderr(&run));
     assert!(stderr(&run).contains("error[E672]"));
+    // A script gets one object: the failure with the outcome in it.
+    let told = stdout(&tactus(folder.path(), &["--json", "can", "replay", "bus.log"]).code(6));
+    let told: Value = serde_json::from_str(&told).unwrap();
+    assert_eq!((&told["error"]["code"], &told["result"]["different"]), (&"E672".into(), &1.into()));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::demonstration::{RATE, Recording, angle_between};
 use crate::tracking::{ComparisonError, Lack};
 
 /// Largest differences over a part of two runs.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, schemars::JsonSchema)]
 pub struct Largest {
     /// Cycles compared.
     pub samples: usize,
@@ -28,7 +28,7 @@ pub struct Largest {
 }
 
 /// Differences of two runs.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Difference {
     /// In the first cycle of the run.
     pub start: Largest,

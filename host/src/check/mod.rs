@@ -35,7 +35,7 @@ pub const DIGITS: [(&str, [f64; 2]); 4] =
 const HAND_SLACK: f64 = 0.05;
 
 /// Which limit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Limit {
     /// Distance of a joint to its nearer soft limit, rad.
@@ -73,7 +73,7 @@ impl Limit {
 }
 
 /// The worst moment with respect to one limit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Margin {
     /// The limit.
     pub limit: Limit,
@@ -111,7 +111,7 @@ impl Margin {
 }
 
 /// The result of a check.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct CheckReport {
     /// Name of the primitive.
     pub name: String,

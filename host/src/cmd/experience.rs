@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, files, rehearse, upload};
 use lab::demonstration::Recording;
@@ -42,7 +43,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         rehearse::write(&file, output_file, &target, DOING)?;
         let checksum = format!("0x{:08x}", file.checksum());
         return output.result(
-            &json!({ "name": file.name, "file": files::text(&target), "checksum": checksum, "experience": null }),
+            &Known { name: &file.name, file: files::text(&target), checksum: &checksum, experience: None },
             format!("{}: without experience; content {checksum}", file.name),
         );
     }
@@ -70,7 +71,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     let checksum = format!("0x{:08x}", file.checksum());
     output.result(
-        &json!({ "name": file.name, "file": files::text(&target), "checksum": checksum, "experience": summary }),
+        &Known { name: &file.name, file: files::text(&target), checksum: &checksum, experience: Some(&summary) },
         format!(
             "{}: {} run(s) of {:.2} s, {} points; content {checksum}\n\n{}",
             file.name,
@@ -80,4 +81,17 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             rehearse::memory_table(&summary)
         ),
     )
+}
+
+/// Data of `tactus --json experience`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Known<'a> {
+    /// Name of the primitive.
+    pub name: &'a str,
+    /// The file that was written.
+    pub file: String,
+    /// Check sum of its content, hexadecimal.
+    pub checksum: &'a str,
+    /// Summary of the successful runs; `null`: forgotten.
+    pub experience: Option<&'a lab::learn::memory::MemorySummary>,
 }

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, files};
 use lab::demonstration::{Preparation, Recording};
@@ -116,9 +117,24 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     output.say(format!("wrote {}", file.display()));
     output.result(
-        &json!({ "file": files::text(&file), "checksum": format!("0x{:08x}", learned.primitive.checksum()), "fit": learned.report }),
+        &Fitted {
+            file: files::text(&file),
+            checksum: format!("0x{:08x}", learned.primitive.checksum()),
+            fit: &learned.report,
+        },
         learned.report.to_text(),
     )
+}
+
+/// Data of `tactus --json learn`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Fitted<'a> {
+    /// The file that was written.
+    pub file: String,
+    /// Check sum of its content, hexadecimal.
+    pub checksum: String,
+    /// How well the primitive fits the demonstration.
+    pub fit: &'a lab::learn::report::FitReport,
 }
 
 fn failure(error: LearnError, command: &Cmd) -> Failure {

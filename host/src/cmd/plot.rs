@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, Output, files};
 use lab::demonstration::{Demonstration, Preparation, Recording};
@@ -118,13 +119,24 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let files = command.output.iter().chain(&command.picture);
     let text: Vec<String> = files.map(|file| file.display().to_string()).collect();
     output.result(
-        &json!({
-            "figures": command.output.iter().map(|file| files::text(file)).collect::<Vec<_>>(),
-            "picture": command.picture.as_deref().map(files::text),
-            "tracking": tracking,
-        }),
+        &Drawn {
+            figures: command.output.iter().map(|file| files::text(file)).collect(),
+            picture: command.picture.as_deref().map(files::text),
+            tracking,
+        },
         text.join("\n"),
     )
+}
+
+/// Data of `tactus --json plot`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Drawn {
+    /// The figures that were written.
+    pub figures: Vec<String>,
+    /// The picture that was written; `null`: none was asked for.
+    pub picture: Option<String>,
+    /// How far the arm was from its plan; `null`: no run was given, or it has no poses.
+    pub tracking: Option<Tracking>,
 }
 
 /// Fills the files of the figure.

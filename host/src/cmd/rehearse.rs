@@ -60,7 +60,7 @@ pub enum Surroundings {
 }
 
 /// The result of a rehearsal.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct Report {
     /// Name of the primitive.
     pub name: String,

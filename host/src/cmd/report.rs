@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, files, plot};
 use lab::primitive_file::PrimitiveFile;
@@ -48,10 +49,29 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let title = command.title.clone().or(name).or_else(|| Some(runs.first()?.name.clone())).unwrap_or_default();
     let html = page(&title, &runs, primitive.as_ref());
     files::fill(output_file, html.as_bytes(), DOING)?;
-    let outcomes: Vec<_> = runs.iter().map(|run| json!({ "run": run.name, "outcome": run.outcome.words() })).collect();
+    let outcome = |run: &ReportedRun| ReportedOutcome { run: run.name.clone(), outcome: run.outcome.words() };
+    let outcomes: Vec<_> = runs.iter().map(outcome).collect();
     let lines: Vec<String> = runs.iter().map(|run| format!("{}: {}", run.name, run.outcome.words())).collect();
     global.output().result(
-        &json!({ "file": files::text(&command.output), "runs": outcomes }),
+        &Reported { file: files::text(&command.output), runs: outcomes },
         format!("{}\nwrote {}", lines.join("\n"), command.output.display()),
     )
+}
+
+/// Data of `tactus --json report`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Reported {
+    /// The page that was written.
+    pub file: String,
+    /// The runs in it.
+    pub runs: Vec<ReportedOutcome>,
+}
+
+/// The end of one run.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ReportedOutcome {
+    /// Its recording.
+    pub run: String,
+    /// How it ended, in words.
+    pub outcome: String,
 }

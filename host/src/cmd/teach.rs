@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 use sim::teacher::TaughtMovement;
 
 use super::files::{Counted, RecordingFile};
@@ -134,14 +135,22 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     });
     let (rows, gaps) = file.end(recorded, output)?;
     output.result(
-        &json!({
-            "file": files::text(&command.output),
-            "samples": rows,
-            "duration_s": rows as f64 / RATE,
-            "gaps": gaps,
-        }),
+        &Taught { file: files::text(&command.output), samples: rows, duration_s: rows as f64 / RATE, gaps },
         format!("{rows} samples, {:.1} s, {gaps} lost", rows as f64 / RATE),
     )
+}
+
+/// Data of `tactus --json teach`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Taught {
+    /// The demonstration that was written.
+    pub file: String,
+    /// Its samples.
+    pub samples: usize,
+    /// Its duration, s.
+    pub duration_s: f64,
+    /// Samples lost on the link.
+    pub gaps: u32,
 }
 
 /// Records until the person is done; gives the number of samples, of those lost on the link, and whether anybody said

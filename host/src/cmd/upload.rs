@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use link::image::stored_crc;
 use link::{Listing, Name};
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, Output, connection};
 use crate::check::{self, CheckReport, Course};
@@ -46,15 +47,39 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     if client.is_simulated() && client.transport().simulation().is_some() {
         output.say("this simulated device ends with the command; one that stays: `tactus sim`");
     }
-    let data = json!({
-        "name": listing.name.as_str(), "sent": sent, "bytes": listing.length, "crc": format!("0x{:08x}", listing.crc),
-        "place": listing.index, "kernels": listing.kernels, "duration_s": listing.duration,
-    });
+    let data = Uploaded {
+        name: listing.name.as_str().to_owned(),
+        sent,
+        bytes: listing.length,
+        crc: format!("0x{:08x}", listing.crc),
+        place: listing.index,
+        kernels: listing.kernels,
+        duration_s: listing.duration,
+    };
     let word = if sent { "stored" } else { "already there, nothing sent" };
     output.result(
         &data,
         format!("{}: {word} ({} bytes, CRC 0x{:08x})", listing.name.as_str(), listing.length, listing.crc),
     )
+}
+
+/// Data of `tactus --json upload`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Uploaded {
+    /// Name of the primitive.
+    pub name: String,
+    /// It was sent; otherwise the device had it already.
+    pub sent: bool,
+    /// Size of its image.
+    pub bytes: u32,
+    /// Check sum of its image, hexadecimal.
+    pub crc: String,
+    /// Place in the device, from 0.
+    pub place: u8,
+    /// Kernels of each row.
+    pub kernels: u16,
+    /// Duration of the movement, s.
+    pub duration_s: f32,
 }
 
 /// Makes sure that a person wants another version of the same name replaced.

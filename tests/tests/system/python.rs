@@ -97,6 +97,19 @@ fn real_outputs_and_failures_are_valid_by_their_schemas() {
     ask("config-get", "config dump -o arm.toml", &device);
     ask("config-diff", "config diff arm.toml", &device);
     ask("export", "export run.csv", &["--json"]);
+    ask("upload", "upload reach.toml", &device);
+    ask("check", "check reach.toml", &["--json"]);
+    ask("compare", "compare run.csv run.csv", &["--json"]);
+    ask("plot", "plot -r run.csv -p reach.toml -o figure.svg", &["--json"]);
+    ask("report", "report run.csv -p reach.toml -o page.html", &["--json"]);
+    ask("learn", "learn demo.csv --name a -o a.toml", &["--json"]);
+    ask("experience", "experience reach.toml --forget -o forgotten.toml", &["--json"]);
+    let alone = ["--json", "--device", "sil:world=simple", "--non-interactive"];
+    ask("rehearse", "rehearse reach.toml --trials 2 -o rehearsed.toml", &alone);
+    ask("teach", "teach --duration 1 -o still.csv", &alone);
+    let with_host_bus = ["--json", "--device", "sil:world=simple,line=can", "--non-interactive"];
+    ask("run", "run reach.toml --bus-log bus.log", &with_host_bus);
+    ask("can-replay", "can replay bus.log", &["--json"]);
     ask("explain", "explain E504", &["--json"]);
     ask("explain", "explain TrackingError", &["--json"]);
     ask("error", "explain E999", &["--json"]);
@@ -107,5 +120,5 @@ fn real_outputs_and_failures_are_valid_by_their_schemas() {
     expect(std::fs::write(at.join("outputs.txt"), outputs.concat()));
     let schemas = python::root().join("docs/schemas");
     let printed = python::run("validate.py", &[schemas.as_os_str(), at.join("outputs.txt").as_os_str()]);
-    assert_eq!(printed, "19 outputs are valid\n");
+    assert_eq!(printed, "30 outputs are valid\n");
 }

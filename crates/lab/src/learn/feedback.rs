@@ -97,7 +97,7 @@ fn vertical_axis(orientation: &[f64; 4]) -> Option<usize> {
 }
 
 /// Physical meaning of the gains of one row.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct RowFeedback {
     /// Name of the row.
     pub row: &'static str,
@@ -112,7 +112,7 @@ pub struct RowFeedback {
 }
 
 /// Physical meaning of the feedback.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct FeedbackReport {
     /// Largest displacement, m.
     pub displacement_m: f64,

@@ -124,7 +124,7 @@ pub struct Payload {
 }
 
 /// Summary of an expectation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct MemorySummary {
     /// Runs that were averaged.
     pub trials: u32,

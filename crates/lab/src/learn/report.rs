@@ -37,7 +37,7 @@ pub const WRENCH_NAMES: [(&str, &str); 6] = [
 ];
 
 /// Reproduction error of one row.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct RowError {
     /// Name of the row.
     pub row: &'static str,
@@ -52,7 +52,7 @@ pub struct RowError {
 }
 
 /// Statistics of one axis of the recorded wrench.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct WrenchStatistics {
     /// Name of the axis.
     pub axis: &'static str,
@@ -69,7 +69,7 @@ pub struct WrenchStatistics {
 }
 
 /// Everything `learn` reports.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct FitReport {
     /// Name of the primitive.
     pub name: String,

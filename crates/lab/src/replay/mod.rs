@@ -35,7 +35,7 @@ const LOOK_AHEAD: usize = 16;
 const KEPT: usize = 16;
 
 /// Difference of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DifferenceKind {
     /// The device sent another one instead.
@@ -47,7 +47,7 @@ pub enum DifferenceKind {
 }
 
 /// A frame of the device that is not as in the log.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Difference {
     /// How.
     pub kind: DifferenceKind,
@@ -66,7 +66,7 @@ pub struct Difference {
 }
 
 /// Result of a replay.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, schemars::JsonSchema)]
 pub struct Outcome {
     /// Time of the log, s.
     pub seconds: f64,

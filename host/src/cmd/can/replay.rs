@@ -45,20 +45,26 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     if !outcome.has_host {
         output.warn("the log does not hold the host's bus: orders are missing, and what they caused will differ");
     }
-    output.result(&outcome, text(&outcome))?;
-    if let Some(first) = garbage.first {
-        let cause = format!("{} lines are not in candump's format, the first is line {first}", garbage.lines);
-        return Err(Failure::new(ErrorCode::LogLines, DOING, cause));
-    }
-    match outcome.differences.first() {
-        None => Ok(()),
-        Some(first) => {
+    let failure = match (garbage.first, outcome.differences.first()) {
+        (None, None) => return output.result(&outcome, text(&outcome)),
+        (Some(first), _) => {
+            let cause = format!("{} lines are not in candump's format, the first is line {first}", garbage.lines);
+            Failure::new(ErrorCode::LogLines, DOING, cause)
+        }
+        (None, Some(first)) => {
             let frames =
                 if outcome.different == 1 { "frame of the device differs" } else { "frames of the device differ" };
             let cause = format!("{} {frames}, first: {}", outcome.different, told(first));
-            Err(Failure::new(ErrorCode::ReplayDiffers, DOING, cause))
+            Failure::new(ErrorCode::ReplayDiffers, DOING, cause)
         }
+    };
+    if !global.json {
+        output.result(&outcome, text(&outcome))?;
     }
+    Err(match serde_json::to_value(&outcome) {
+        Ok(data) => failure.data(data),
+        Err(_) => failure,
+    })
 }
 
 fn text(outcome: &Outcome) -> String {
