@@ -133,7 +133,7 @@ pub struct Fitted<'a> {
     pub file: String,
     /// Check sum of its content, hexadecimal.
     pub checksum: String,
-    /// How well the primitive fits the demonstration.
+    /// Errors of the primitive against the demonstration.
     pub fit: &'a lab::learn::report::FitReport,
 }
 

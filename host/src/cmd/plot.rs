@@ -135,7 +135,7 @@ pub struct Drawn {
     pub figures: Vec<String>,
     /// The picture that was written; `null`: none was asked for.
     pub picture: Option<String>,
-    /// How far the arm was from its plan; `null`: no run was given, or it has no poses.
+    /// Distances of the arm from its plan; `null`: no run was given, or it has no poses.
     pub tracking: Option<Tracking>,
 }
 

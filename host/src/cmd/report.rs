@@ -72,6 +72,6 @@ pub struct Reported {
 pub struct ReportedOutcome {
     /// Its recording.
     pub run: String,
-    /// How it ended, in words.
+    /// Its end, in words.
     pub outcome: String,
 }
