@@ -182,6 +182,20 @@ fn a_full_disk_an_interrupt_and_a_kill_leave_what_existed_whole() {
 }
 
 #[test]
+fn a_bus_log_on_a_full_disk_is_told_as_such_and_not_as_a_broken_cable() {
+    let folder = tempfile::tempdir().unwrap();
+    common::demonstration(folder.path(), 3.0);
+    succeeds(folder.path(), "learn demo.csv --name reach -o reach.toml");
+    let limit = "ulimit -f 20; exec \"$0\" --device sil:world=simple run reach.toml --bus-log there.log";
+    let mut limited = Command::new("bash");
+    limited.current_dir(folder.path()).args(["-c", limit, env!("CARGO_BIN_EXE_tactus")]).stdin(Stdio::null());
+    let ended = limited.output().unwrap();
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(2), "{said}");
+    assert!(said.contains("error[E235]") && said.contains("there.log") && !said.contains("cable"), "{said}");
+}
+
+#[test]
 fn every_option_that_names_a_file_to_be_written_has_a_row_or_a_reason() {
     fn collect(command: &clap::Command, found: &mut BTreeSet<(String, String)>) {
         for option in command.get_arguments().filter(|option| !option.is_global_set()) {

@@ -9,6 +9,7 @@ use link::{Capabilities, ImageError, Refusal, SessionOwner};
 
 use crate::error_code::ErrorCode;
 use crate::failure::Failure;
+use crate::output_file::OutputError;
 use crate::transport::{AddressError, TransportError};
 
 /// A part that a device can drive or read, as its hello says.
@@ -205,7 +206,10 @@ impl HostError {
         match self {
             Self::WrongAnswer { .. } => ErrorCode::WrongAnswer,
             Self::Transport(TransportError::Can(problem)) => problem.code(),
-            Self::Transport(TransportError::Other(_)) => ErrorCode::LineFailed,
+            // The line of a simulated device is sound where the log of its bus cannot be written.
+            Self::Transport(TransportError::Other(cause)) => {
+                cause.downcast_ref().map_or(ErrorCode::LineFailed, OutputError::code)
+            }
             Self::Address(_) => ErrorCode::AddressInvalid,
             Self::Transport(TransportError::NotFound { .. }) => ErrorCode::DeviceNotFound,
             Self::Transport(TransportError::Permission { .. }) => ErrorCode::PermissionDenied,

@@ -5,16 +5,17 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use sim::{Passage, TICKS_PER_MICROSECOND, Ticks};
 
 use super::SimulationError;
-use crate::output_file::create_log;
+use crate::output_file::{OutputError, create_log};
 use canlog::{ARM_INTERFACE, AnyFrame, HOST_INTERFACE, LogLine};
 
 /// The file, and the frames whose time has not come: both buses go into it in order of time.
 pub(super) struct BusLog {
+    path: PathBuf,
     file: BufWriter<File>,
     waiting: Vec<(Ticks, LogLine)>,
 }
@@ -23,7 +24,7 @@ impl BusLog {
     /// Begins a file.
     pub(super) fn create(path: &Path, replace: bool) -> Result<Self, SimulationError> {
         let file = create_log(path, replace)?;
-        Ok(Self { file: BufWriter::new(file), waiting: Vec::new() })
+        Ok(Self { path: path.to_owned(), file: BufWriter::new(file), waiting: Vec::new() })
     }
 
     /// Frames of the arm's bus.
@@ -44,7 +45,11 @@ impl BusLog {
     }
 
     /// Writes everything that both buses have carried by `now`.
-    pub(super) fn write_until(&mut self, now: Ticks) -> std::io::Result<()> {
+    pub(super) fn write_until(&mut self, now: Ticks) -> Result<(), OutputError> {
+        self.write(now).map_err(|cause| OutputError::System { file: self.path.clone(), cause })
+    }
+
+    fn write(&mut self, now: Ticks) -> std::io::Result<()> {
         // Stable: frames that end at the same moment stay in the order of the calls.
         self.waiting.sort_by_key(|(end, _)| *end);
         let due = self.waiting.partition_point(|(end, _)| *end <= now);

@@ -187,7 +187,7 @@ impl Simulation {
         }
         if let Some(log) = &mut self.log {
             log.host(host);
-            log.write_until(self.now).map_err(TransportError::Io)?;
+            log.write_until(self.now).map_err(TransportError::other)?;
         }
         Ok(())
     }
