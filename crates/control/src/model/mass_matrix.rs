@@ -2,53 +2,94 @@
 //!
 //! Less than half the price of a column of inverse dynamics per joint (method of Walker and Orin).
 
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{SMatrix, Vector3};
 
 use crate::model::arm::{ArmModel, Body};
 use crate::model::kinematics::Frames;
 use crate::real::Real;
 use crate::units::JOINTS;
 
+/// The six numbers of a symmetric 3x3 matrix: an inertia (kg m^2).
+struct Inertia<R: Real> {
+    xx: R,
+    yy: R,
+    zz: R,
+    xy: R,
+    xz: R,
+    yz: R,
+}
+
+impl<R: Real> Inertia<R> {
+    /// Adds what moves the reference point: `r` from the new point to the old one (m), `old` and `new` the first
+    /// moment (kg m) about each, `new - old` along `r`.
+    fn shift(&mut self, r: &Vector3<R>, old: &Vector3<R>, new: &Vector3<R>) {
+        // m (r^2 1 - r r') about the centre and the mixed terms, written with both moments: no mass, no division.
+        let (x, y, z) = (r.x * (old.x + new.x), r.y * (old.y + new.y), r.z * (old.z + new.z));
+        self.xx += y + z;
+        self.yy += x + z;
+        self.zz += x + y;
+        self.xy -= r.x * old.y + new.x * r.y;
+        self.xz -= r.x * old.z + new.x * r.z;
+        self.yz -= r.y * old.z + new.y * r.z;
+    }
+
+    /// In the axes of frame j-1, given in those of frame j.
+    fn inward(&self, model: &ArmModel<R>, frames: &Frames<R>, joint: usize) -> Self {
+        let (ts, tc) = (model.twist_sine[joint], model.twist_cosine[joint]);
+        let (s, c) = (frames.sine[joint], frames.cosine[joint]);
+        // About x by the twist, then about z by the joint.
+        let (yy, zz, yz) = turned(self.yy, self.zz, self.yz, ts, tc);
+        let (xy, xz) = (self.xy * tc - self.xz * ts, self.xy * ts + self.xz * tc);
+        let (xx, yy, xy) = turned(self.xx, yy, xy, s, c);
+        Inertia { xx, yy, zz, xy, xz: xz * c - yz * s, yz: xz * s + yz * c }
+    }
+}
+
+/// The symmetric 2x2 block `a, b` with `ab` off its diagonal, in axes turned back by the angle of sine `s`, cosine `c`.
+#[inline]
+fn turned<R: Real>(a: R, b: R, ab: R, s: R, c: R) -> (R, R, R) {
+    let across = s * (a - b) + c * (ab + ab);
+    let first = a - s * across;
+    (first, a + b - first, c * across - ab)
+}
+
 /// Links beyond a joint, as one rigid body in the axes of some frame, about its origin.
 struct Composite<R: Real> {
     mass: R,
     /// Mass times centre of mass (kg m).
     moment: Vector3<R>,
-    /// Inertia about the origin (kg m^2).
-    inertia: Matrix3<R>,
+    inertia: Inertia<R>,
 }
 
 impl<R: Real> Composite<R> {
     fn nothing() -> Self {
-        Self { mass: R::of(0.0), moment: Vector3::zeros(), inertia: Matrix3::zeros() }
+        let zero = R::of(0.0);
+        let inertia = Inertia { xx: zero, yy: zero, zz: zero, xy: zero, xz: zero, yz: zero };
+        Self { mass: zero, moment: Vector3::zeros(), inertia }
     }
 
     /// With a link, whose frame this is in.
     fn add(&mut self, body: &Body<R>) {
         let moment = body.centre * body.mass;
-        self.inertia += body.inertia + parallel_axes(&moment, &body.centre);
+        let (sum, own) = (&mut self.inertia, &body.inertia);
+        sum.xx += own.m11;
+        sum.yy += own.m22;
+        sum.zz += own.m33;
+        sum.xy += own.m12;
+        sum.xz += own.m13;
+        sum.yz += own.m23;
+        // About its own centre its first moment is nothing.
+        sum.shift(&body.centre, &Vector3::zeros(), &moment);
         self.moment += moment;
         self.mass += body.mass;
     }
 
     /// About a point that lies at `-arm`.
     fn shift(&mut self, arm: &Vector3<R>) {
-        // I + m (r^2 1 - r r') about the new point, written with what is already known about the old one.
-        let once = parallel_axes(&self.moment, arm);
-        self.moment += arm * self.mass;
-        self.inertia += once + parallel_axes(arm, &self.moment);
+        let moment = self.moment + arm * self.mass;
+        self.inertia.shift(arm, &self.moment, &moment);
+        self.moment = moment;
     }
-}
-
-/// `(a . b) 1 - b a'`: what a first moment `a` at the arm `b` adds to an inertia.
-#[inline]
-fn parallel_axes<R: Real>(a: &Vector3<R>, b: &Vector3<R>) -> Matrix3<R> {
-    let dot = a.dot(b);
-    let mut matrix = -b * a.transpose();
-    matrix.m11 += dot;
-    matrix.m22 += dot;
-    matrix.m33 += dot;
-    matrix
 }
 
 impl<R: Real> ArmModel<R> {
@@ -60,11 +101,12 @@ impl<R: Real> ArmModel<R> {
             composite.add(&self.bodies[joint]);
             composite.shift(&self.link_vector(joint));
             composite.moment = self.inward(frames, joint, &composite.moment);
-            composite.inertia = self.inward_inertia(frames, joint, &composite.inertia);
+            composite.inertia = composite.inertia.inward(self, frames, joint);
 
             // The joint turns it about z with 1 rad/s^2: force and moment that this takes, at the origin of frame j-1.
             let mut force = Vector3::new(-composite.moment.y, composite.moment.x, R::of(0.0));
-            let mut moment: Vector3<R> = composite.inertia.column(2).into_owned();
+            let Inertia { xz, yz, zz, .. } = composite.inertia;
+            let mut moment = Vector3::new(xz, yz, zz);
             matrix[(joint, joint)] = moment.z;
             for before in (0..joint).rev() {
                 moment += self.link_vector(before).cross(&force);
@@ -86,14 +128,5 @@ impl<R: Real> ArmModel<R> {
         matrix[(4, 5)] += self.reflected_inertia_j5_j6;
         matrix[(5, 4)] += self.reflected_inertia_j5_j6;
         matrix
-    }
-
-    /// An inertia given in the axes of frame j, in those of frame j-1.
-    fn inward_inertia(&self, frames: &Frames<R>, joint: usize, inertia: &Matrix3<R>) -> Matrix3<R> {
-        let turn = |m: &Matrix3<R>| {
-            let column = |i: usize| self.inward(frames, joint, &m.column(i).into_owned());
-            Matrix3::from_columns(&[column(0), column(1), column(2)])
-        };
-        turn(&turn(inertia).transpose())
     }
 }
