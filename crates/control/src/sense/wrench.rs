@@ -334,13 +334,15 @@ mod tests {
     #[test]
     fn an_error_of_the_sensor_is_followed_in_its_own_axes_and_holds_when_the_hand_turns() {
         let (mut estimator, mut drift) = (tared(), Drift::new());
-        let raw = sample([0.3, -0.2, 0.1], [0.01, 0.02, -0.01]);
+        let error = |share: f64| {
+            sample([0.3, -0.2, 0.1].map(|force| force * share), [0.01, 0.02, -0.01].map(|torque| torque * share))
+        };
         let before = frames([-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75]);
-        for _ in 0..1500 {
-            follow(&mut estimator, &mut drift, &raw, &before);
+        for tick in 0..1500_u32 {
+            follow(&mut estimator, &mut drift, &error(f64::min(f64::from(tick) / RATE, 1.0)), &before);
         }
         let turned = frames([0.3, 0.9, -0.4, 1.6, -1.5, 0.9, -1.0]);
-        let left = follow(&mut estimator, &mut drift, &raw, &turned);
+        let left = follow(&mut estimator, &mut drift, &error(1.0), &turned);
         assert!(left.force.norm() < 0.01 && left.torque.norm() < 0.002, "{left:?}");
     }
 
