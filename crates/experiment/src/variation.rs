@@ -1,12 +1,13 @@
-//! Variations of the usual plant: one factor at a time shows the robustness of a result.
+//! Variations of the usual plant and run: one factor at a time shows the robustness of a result.
 
 use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-/// Factors and additions to the plant of an experiment. The default changes nothing.
+/// Factors and additions to the plant and the run of an experiment. The default changes nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Variation {
     /// Factor on the object's mass.
     pub mass: f64,
@@ -25,6 +26,8 @@ pub struct Variation {
     /// Error that the force sensor comes to within 2 s after the run has started and been tared, N; its direction is
     /// drawn from the seed. An error from before would be tared away.
     pub bias: f64,
+    /// Speed of the run, relative to the taught one; the primitive and what it expects are those of the taught speed.
+    pub speed: f64,
 }
 
 impl Default for Variation {
@@ -38,12 +41,13 @@ impl Default for Variation {
             noise: 1.0,
             delay: 0,
             bias: 0.0,
+            speed: 1.0,
         }
     }
 }
 
 /// Names of the parts of a variation with what they may be.
-const PARTS: [(&str, f64, f64); 8] = [
+const PARTS: [(&str, f64, f64); 9] = [
     ("mass", 0.1, 5.0),
     ("table-friction", 0.1, 3.0),
     ("finger-friction", 0.1, 3.0),
@@ -52,10 +56,11 @@ const PARTS: [(&str, f64, f64); 8] = [
     ("noise", 0.0, 20.0),
     ("delay", 0.0, 3.0),
     ("bias", 0.0, 2.0),
+    ("speed", 0.1, 2.0),
 ];
 
 impl Variation {
-    fn values(&self) -> [f64; 8] {
+    fn values(&self) -> [f64; 9] {
         [
             self.mass,
             self.table_friction,
@@ -65,6 +70,7 @@ impl Variation {
             self.noise,
             f64::from(self.delay),
             self.bias,
+            self.speed,
         ]
     }
 
@@ -83,7 +89,8 @@ impl Variation {
             4 => self.link_mass = value,
             5 => self.noise = value,
             6 => self.delay = value as u8,
-            _ => self.bias = value,
+            7 => self.bias = value,
+            _ => self.speed = value,
         }
     }
 }
@@ -131,9 +138,14 @@ mod tests {
 
     #[test]
     fn a_variation_reads_as_it_is_written() {
-        for text in
-            ["", "mass=1.3", "table-friction=0.7,delay=1", "noise=3,bias=0.2", "joint-friction=1.3,link-mass=0.9"]
-        {
+        for text in [
+            "",
+            "mass=1.3",
+            "table-friction=0.7,delay=1",
+            "noise=3,bias=0.2",
+            "joint-friction=1.3,link-mass=0.9",
+            "speed=1.8",
+        ] {
             assert_eq!(text.parse::<Variation>().unwrap().to_string(), text);
         }
     }
@@ -145,5 +157,15 @@ mod tests {
         assert!("mass".parse::<Variation>().unwrap_err().contains("lacks its value"));
         assert!("delay=1.5".parse::<Variation>().unwrap_err().contains("whole number"));
         assert!("bias=NaN".parse::<Variation>().is_err());
+        assert!(
+            "speed=2.1".parse::<Variation>().unwrap_err().contains("between 0.1 and 2"),
+            "more than a device takes"
+        );
+    }
+
+    #[test]
+    fn results_from_before_a_part_existed_are_read_with_its_usual_value() {
+        let old = r#"{"mass":1.3,"table_friction":1.0,"finger_friction":1.0,"joint_friction":1.0,"link_mass":1.0,"noise":1.0,"delay":0,"bias":0.0}"#;
+        assert_eq!(serde_json::from_str::<Variation>(old).unwrap(), "mass=1.3".parse().unwrap());
     }
 }

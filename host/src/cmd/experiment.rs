@@ -50,7 +50,7 @@ pub struct Cmd {
     #[arg(long, value_enum, default_value = "perturbed")]
     pub plant: PlantKind,
     /// Factors that differ from that arm: mass, table-friction, finger-friction, joint-friction, link-mass, noise
-    /// (factors), delay (cycles), bias (N, comes up after the run's tare)
+    /// (factors), delay (cycles), bias (N, comes up after the run's tare), speed (of the run, of the taught one)
     #[arg(long, value_name = "NAME=VALUE,...", default_value = "")]
     pub vary: Variation,
     /// Object on the table instead of the usual object

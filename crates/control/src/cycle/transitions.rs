@@ -89,6 +89,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     #[inline(never)]
     pub(super) fn begin_run(&mut self, options: RunOptions, measured: &Measured<'_, R>) {
         self.hand.begin_run();
+        self.observer.postpone();
         // From what the feedback is drawn to while holding, so that the torque against friction stays.
         let start = match &self.law {
             Law::Posture(posture) if !options.compliant => JointPositions(posture.q.0 + posture.integral.shift()),

@@ -207,6 +207,14 @@ impl<R: Real> MotionObserver<R> {
         self.sent = [if known { next } else { Vector7::zeros() }, self.sent[0]];
     }
 
+    /// This control period has a change of state to compute: a renewal of the mass matrix that is due waits for the
+    /// next one. Without this the longest cycle of a run depends on the moment at which a person begins it.
+    pub fn postpone(&mut self) {
+        if self.ready && self.cycle <= 1 {
+            self.cycle = RENEWAL - 1;
+        }
+    }
+
     /// Takes a torque (N m) that will be sent from now on and that friction holds.
     #[inline(never)]
     pub fn hold_back(&mut self, torque: &Vector7<R>) {
@@ -312,6 +320,30 @@ mod tests {
             observer.send(&model, &now, &Vector7::zeros(), &torque);
         }
         assert!((observer.sent[0] - wanted).amax() < 1e-9, "{}", observer.sent[0]);
+    }
+
+    /// The change that makes it fail: `postpone` does nothing, or postpones for longer than a cycle.
+    #[test]
+    fn a_postponed_renewal_comes_in_the_cycle_after() {
+        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
+        let [before, now] = [[0.0; JOINTS], POSTURE].map(|q| Frames::new(&model, &JointPositions::from_array(q)));
+        for phase in 0..RENEWAL {
+            let mut observer = MotionObserver::new();
+            let send = |observer: &mut MotionObserver<f64>, frames: &Frames<f64>| {
+                let known = (observer.mass, observer.factor);
+                observer.send(&model, frames, &Vector7::zeros(), &Vector7::zeros());
+                (observer.mass, observer.factor) != known
+            };
+            for _ in 0..RENEWAL + phase {
+                send(&mut observer, &before);
+            }
+            observer.postpone();
+            assert!(!send(&mut observer, &now), "renewed in phase {phase}");
+            for _ in 0..RENEWAL {
+                send(&mut observer, &now);
+            }
+            assert_eq!(observer.mass, model.mass_matrix(&now), "phase {phase}");
+        }
     }
 
     #[test]
