@@ -206,11 +206,11 @@ impl ForceTorque {
     fn sample(&mut self, now: Ticks, wrench: &[f64; 6]) -> [Option<CanFrame>; 2] {
         let overloaded = gauges_beyond_range(wrench);
         self.saturated |= overloaded;
-        let felt = self.felt(wrench);
+        let measured = self.measured(wrench);
         let age = seconds(now - self.tared_at);
         let creep = self.creep.map_or([0.0; 6], |creep| creep.error.map(|error| error * creep.share(now)));
         let [fx, fy, fz, tx, ty, tz] = std::array::from_fn(|axis| {
-            felt[axis] - self.tare[axis] + self.config.bias[axis] + self.config.drift[axis] * age + creep[axis]
+            measured[axis] - self.tare[axis] + self.config.bias[axis] + self.config.drift[axis] * age + creep[axis]
         });
         let status = (self.saturated != 0).then(|| {
             let bad = if overloaded != 0 { 0x40 } else { 0 };
@@ -223,13 +223,13 @@ impl ForceTorque {
     }
 
     fn tare(&mut self, now: Ticks, wrench: &[f64; 6]) {
-        self.tare = self.felt(wrench);
+        self.tare = self.measured(wrench);
         self.tared_at = now;
         self.saturated = gauges_beyond_range(wrench);
     }
 
     /// Output of the gauges, with this sample's noise.
-    fn felt(&mut self, wrench: &[f64; 6]) -> [f64; 6] {
+    fn measured(&mut self, wrench: &[f64; 6]) -> [f64; 6] {
         self.follow(wrench);
         let strained = self.strained.unwrap_or(*wrench);
         let sigma = per_axis(self.config.force_noise, self.config.torque_noise);

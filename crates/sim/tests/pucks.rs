@@ -310,9 +310,9 @@ fn a_pull_on_the_hand_is_felt_with_the_sign_of_the_environment_on_the_robot() {
         let [Reply::Force { counts, .. }, _] = master.ask(force_torque::get_wrench())[..] else { panic!() };
         let [x, y, z] = counts.map(|counts| f64::from(counts) / 256.0);
         // The grasp frame is the sensor frame turned by pi about z.
-        let felt = rotate(master.plant.world().grasp_pose().quaternion, [-x, -y, z]);
-        for (component, expected) in felt.iter().zip(pull) {
-            assert!((component - expected).abs() < 0.5, "{felt:?} for {pull:?}");
+        let measured = rotate(master.plant.world().grasp_pose().quaternion, [-x, -y, z]);
+        for (component, expected) in measured.iter().zip(pull) {
+            assert!((component - expected).abs() < 0.5, "{measured:?} for {pull:?}");
         }
     }
 }

@@ -17,7 +17,7 @@ fn noiseless() -> ForceTorqueConfig {
 }
 
 /// Force and torque, N and N m; `None` if the sensor is silent.
-fn felt(master: &mut Master) -> Option<[f64; 6]> {
+fn measured(master: &mut Master) -> Option<[f64; 6]> {
     match master.ask(force_torque::get_wrench())[..] {
         [] => None,
         [Reply::Force { counts: force, .. }, Reply::Torque { counts: torque, .. }] => {
@@ -41,7 +41,7 @@ fn pushed_through(master: &mut Master, forces: impl Iterator<Item = f64>) -> Vec
         .map(|force| {
             master.plant.world().push([0.0, 0.0, force], [0.0; 3]);
             master.wait_ms(2);
-            (force, felt(master).expect("the sensor answers")[2])
+            (force, measured(master).expect("the sensor answers")[2])
         })
         .collect()
 }
@@ -54,17 +54,17 @@ fn hysteresis_is_a_loop_of_the_width_that_was_asked_for() {
     let down = pushed_through(&mut master, (0..=40).map(|step| 20.0 - f64::from(step)));
     let again = pushed_through(&mut master, (0..=40).map(|step| -20.0 + f64::from(step)));
     // After half a newton of the way the output follows at the half-width behind the input, whichever way it goes.
-    for (force, felt) in &up[2..] {
-        assert!((felt - (force - 0.25)).abs() < 0.005, "up {force}: {felt}");
+    for (force, measured) in &up[2..] {
+        assert!((measured - (force - 0.25)).abs() < 0.005, "up {force}: {measured}");
     }
-    for (force, felt) in &down[2..] {
-        assert!((felt - (force + 0.25)).abs() < 0.005, "down {force}: {felt}");
+    for (force, measured) in &down[2..] {
+        assert!((measured - (force + 0.25)).abs() < 0.005, "down {force}: {measured}");
     }
-    for (force, felt) in &again[2..] {
-        assert!((felt - (force - 0.25)).abs() < 0.005, "again {force}: {felt}");
+    for (force, measured) in &again[2..] {
+        assert!((measured - (force - 0.25)).abs() < 0.005, "again {force}: {measured}");
     }
     let turn = pushed_through(&mut master, [20.0, 19.8, 19.6].into_iter());
-    assert!(turn.iter().all(|(_, felt)| (felt - 19.75).abs() < 0.005), "the output waits at a turn: {turn:?}");
+    assert!(turn.iter().all(|(_, measured)| (measured - 19.75).abs() < 0.005), "the output waits at a turn: {turn:?}");
 }
 
 #[test]
@@ -75,8 +75,8 @@ fn hysteresis_remembers_what_happens_between_two_samples() {
     master.wait_ms(5);
     master.plant.world().push([0.0; 3], [0.0; 3]);
     master.wait_ms(5);
-    let felt = felt(&mut master).expect("the sensor answers");
-    assert!((felt[2] - 0.25).abs() < 0.005, "it came from above: {felt:?}");
+    let measured = measured(&mut master).expect("the sensor answers");
+    assert!((measured[2] - 0.25).abs() < 0.005, "it came from above: {measured:?}");
 }
 
 #[test]
@@ -84,9 +84,9 @@ fn bias_is_what_the_tare_leaves() {
     let bias = [0.1, -0.2, 0.3, 0.01, 0.0, -0.02];
     let mut master = master(ForceTorqueConfig { bias, ..noiseless() });
     for _ in 0..2 {
-        let felt = felt(&mut master).expect("the sensor answers");
-        for (value, bias) in felt.iter().zip(bias) {
-            assert!((value - bias).abs() < 1.0 / 256.0, "one count: {felt:?}");
+        let measured = measured(&mut master).expect("the sensor answers");
+        for (value, bias) in measured.iter().zip(bias) {
+            assert!((value - bias).abs() < 1.0 / 256.0, "one count: {measured:?}");
         }
         tare(&mut master);
     }
@@ -97,17 +97,17 @@ fn drift_grows_from_the_last_tare() {
     let mut master = master(ForceTorqueConfig { drift: [0.5, 0.0, 0.0, 0.0, 0.0, 0.0], ..noiseless() });
     tare(&mut master);
     master.wait_ms(2000);
-    let before = felt(&mut master).expect("the sensor answers")[0];
+    let before = measured(&mut master).expect("the sensor answers")[0];
     assert!((before - 1.0).abs() < 0.01, "{before}");
     tare(&mut master);
-    assert!(felt(&mut master).expect("the sensor answers")[0] < 0.01);
+    assert!(measured(&mut master).expect("the sensor answers")[0] < 0.01);
 }
 
 #[test]
 fn noise_scales_with_its_factor() {
     let sigma = |noise_scale: f64| {
         let mut master = master(ForceTorqueConfig { noise_scale, ..ForceTorqueConfig::default() });
-        let samples: Vec<f64> = (0..400).map(|_| felt(&mut master).expect("the sensor answers")[0]).collect();
+        let samples: Vec<f64> = (0..400).map(|_| measured(&mut master).expect("the sensor answers")[0]).collect();
         let mean = samples.iter().sum::<f64>() / samples.len() as f64;
         (samples.iter().map(|sample| (sample - mean).powi(2)).sum::<f64>() / samples.len() as f64).sqrt()
     };
@@ -120,9 +120,9 @@ fn a_sensor_that_falls_silent_answers_nothing_more() {
     let silent_from = Some(100 * TICKS_PER_MILLISECOND);
     let mut master = master(ForceTorqueConfig { silent_from, ..noiseless() });
     master.wait_ms(90);
-    assert!(felt(&mut master).is_some());
+    assert!(measured(&mut master).is_some());
     master.wait_ms(10);
-    assert!(felt(&mut master).is_none());
+    assert!(measured(&mut master).is_none());
     assert_eq!(master.value(Node::FORCE_TORQUE, PropertyId::STAT), None);
 }
 
@@ -132,14 +132,14 @@ fn an_error_that_creeps_in_after_the_tare_is_all_there_in_the_end_and_stays() {
     master.wait_ms(100);
     tare(&mut master);
     master.plant.creep_force_torque([0.2, 0.0, -0.1, 0.0, 0.05, 0.0], 200 * TICKS_PER_MILLISECOND);
-    let at_first = felt(&mut master).expect("the sensor answers");
+    let at_first = measured(&mut master).expect("the sensor answers");
     assert!(at_first.iter().all(|value| value.abs() < 0.01), "{at_first:?}");
     master.wait_ms(100);
-    let half = felt(&mut master).expect("the sensor answers");
+    let half = measured(&mut master).expect("the sensor answers");
     assert!((half[0] - 0.1).abs() < 0.02 && (half[4] - 0.025).abs() < 0.005, "{half:?}");
     for _ in 0..2 {
         master.wait_ms(200);
-        let whole = felt(&mut master).expect("the sensor answers");
+        let whole = measured(&mut master).expect("the sensor answers");
         assert!((whole[0] - 0.2).abs() < 0.005 && (whole[2] + 0.1).abs() < 0.005, "{whole:?}");
     }
 }

@@ -259,7 +259,7 @@ fn the_teacher_pulls_harder_at_what_stays_wrong_but_only_after_their_reaction_ti
             pulls.push(force[2]);
         }
     }
-    // 0.05 s to forget the jump of 5 mm in the felt speed; the reaction time is 0.2 s.
+    // 0.05 s to forget the jump of 5 mm in the filtered speed; the reaction time is 0.2 s.
     let at = |seconds: f64| pulls[(seconds / STEP_SECONDS) as usize];
     assert!((at(0.1) - spring).abs() < 0.05 && (at(0.19) - spring).abs() < 0.05, "{} {}", at(0.1), at(0.19));
     assert!(at(1.5) > 1.5 * spring, "{} N after 1.5 s", at(1.5));

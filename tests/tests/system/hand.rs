@@ -131,7 +131,7 @@ fn adapt() -> RunOptions {
     RunOptions { feedback: true, force_control: true, ..RunOptions::default() }
 }
 
-/// Largest difference of felt and expected gauge torque over the last half second, N m.
+/// Largest difference of measured and expected gauge torque over the last half second, N m.
 fn force_error(account: &Account) -> f32 {
     let last = &account.telemetry[account.telemetry.len() - 150..];
     let errors =
@@ -167,9 +167,9 @@ fn hand_image_grips_with_the_expected_force_within_half_of_a_72_mhz_cycle() {
     assert_eq!((missed_deadlines, account.statistics.hand_lost_replies), (0, 0));
     assert_eq!(account.trace.invalid, 0, "{:?}", account.trace.invalid_examples);
     let blind = grip("hand:seed=31", RunOptions::default());
-    let (felt, unfelt) = (force_error(&account), force_error(&blind));
-    println!("force error at the end    {felt:>8.3} N m with feedback and force control, {unfelt:.3} without");
-    assert!(felt < 0.05 && felt < 0.5 * unfelt, "the force is not tracked: {felt} N m, {unfelt} without");
+    let (adapting, without) = (force_error(&account), force_error(&blind));
+    println!("force error at the end    {adapting:>8.3} N m with feedback and force control, {without:.3} without");
+    assert!(adapting < 0.05 && adapting < 0.5 * without, "the force is not tracked: {adapting} N m, {without} without");
 }
 
 /// Instructions as a share of a control cycle of a 72 MHz part, percent.

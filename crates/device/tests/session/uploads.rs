@@ -228,14 +228,14 @@ fn a_primitive_beyond_all_bounds_is_refused_with_the_value_that_is() {
         words(|content| (content.k1, content.k2) = (&ENDLESS, &NINE)),
         "the sensitivity at point 0, column 0 (from 0) is larger than anything real"
     );
-    static FELT: [f32; 18] = {
+    static EXPECTED: [f32; 18] = {
         let mut statistics = [1.0; 18];
         statistics[16] = 1e30;
         statistics
     };
     assert_eq!(
         words(|content| {
-            content.expected_mean = &FELT;
+            content.expected_mean = &EXPECTED;
             (content.marks.recorded_duration, content.marks.filter_cutoff) = (3.0, 15.0);
         }),
         "the expected value at point 1, column 7 (from 0) is larger than anything real"

@@ -53,7 +53,7 @@ pub struct MujocoWorld {
 #[derive(Clone, Copy, Debug, Default)]
 struct Crush {
     /// Force of the finger that presses hardest, N, smoothed over some 10 ms.
-    felt: f64,
+    squeeze: f64,
     crushed: bool,
 }
 
@@ -193,8 +193,8 @@ impl MujocoWorld {
         self.contacts.push_back(forces);
         if let Some(limit) = self.scene.object.and_then(|object| object.crush_force) {
             let hardest = forces.fingers_on_object.into_iter().fold(0.0, f64::max);
-            self.crush.felt += (hardest - self.crush.felt) / MEAN_STEPS as f64;
-            self.crush.crushed |= self.crush.felt > limit;
+            self.crush.squeeze += (hardest - self.crush.squeeze) / MEAN_STEPS as f64;
+            self.crush.crushed |= self.crush.squeeze > limit;
         }
     }
 
