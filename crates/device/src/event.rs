@@ -5,7 +5,7 @@ use link::HandStage;
 use puck::{Node, SafetyMode};
 
 use crate::command::Refusal;
-use crate::hand::HandTrouble;
+use crate::hand::HandFailure;
 use crate::stage::{Stage, StartupError};
 
 /// Something happened.
@@ -46,7 +46,7 @@ pub enum EventKind {
         /// The stage.
         stage: HandStage,
         /// The puck that caused it and why, where something went wrong.
-        cause: Option<(Node, HandTrouble)>,
+        cause: Option<(Node, HandFailure)>,
     },
 }
 

@@ -32,7 +32,7 @@ pub use command::{Command, Refusal};
 pub use controller::DeviceController;
 pub use event::{Event, EventKind};
 pub use fault_memory::{FAULT_CYCLES, FaultMemory};
-pub use hand::HandTrouble;
+pub use hand::HandFailure;
 pub use health::{Counters, Health, Timing};
 pub use stage::{Stage, StartupError};
 
@@ -46,4 +46,4 @@ pub use port::{CheckedPrimitive, StoredPrimitive};
 pub use session::{ArmApplication, HostSession, Identity, Session};
 pub use store::{RamStore, STORE_SLOT_BYTES, STORE_SLOTS, Store, StoreError, stage_copy};
 pub use weight::StoredWeight;
-pub use wire::{PrimitiveTrouble, StartupTrouble};
+pub use wire::{PrimitiveDefect, StartupFailure};

@@ -72,12 +72,12 @@ pub(crate) fn event(event: Event) -> Option<LinkEvent> {
         EventKind::Arrived => (LinkKind::Arrived, 0, 0),
         EventKind::Startup(stage) => (LinkKind::Startup, stage.code().into(), 0),
         EventKind::Blocked(error) => {
-            let StartupTrouble([code, detail]) = StartupTrouble::from(error);
+            let StartupFailure([code, detail]) = StartupFailure::from(error);
             (LinkKind::Blocked, u16::try_from(code).unwrap_or(u16::MAX), detail)
         }
         EventKind::Surprised { phase, channel } => (LinkKind::Surprise, channel.into(), thousandths(phase)),
         EventKind::Hand { stage, cause } => {
-            (LinkKind::Hand, stage.code().into(), cause.map_or(0, |(node, trouble)| trouble.number(node)))
+            (LinkKind::Hand, stage.code().into(), cause.map_or(0, |(node, failure)| failure.number(node)))
         }
         EventKind::Safety(mode) => (LinkKind::SafetyMode, u16::try_from(mode.value()).unwrap_or(u16::MAX), 0),
     };
@@ -115,9 +115,9 @@ pub(crate) fn telemetry(record: &CycleRecord) -> Telemetry {
 ///
 /// The second number is the node, and from bit 8 on the value that was wrong, cut to 24 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct StartupTrouble(pub [u32; 2]);
+pub struct StartupFailure(pub [u32; 2]);
 
-impl From<StartupError> for StartupTrouble {
+impl From<StartupError> for StartupFailure {
     fn from(error: StartupError) -> Self {
         let at =
             |code: u32, node: Node, value: i32| Self([code, u32::from(node.number()) | value.cast_unsigned() << 8]);
@@ -145,7 +145,7 @@ impl From<StartupError> for StartupTrouble {
     }
 }
 
-impl StartupTrouble {
+impl StartupFailure {
     /// The reason these numbers stand for, where they carry it wholly.
     fn error(self) -> Option<StartupError> {
         let Self([code, detail]) = self;
@@ -176,7 +176,7 @@ impl StartupTrouble {
     }
 }
 
-impl fmt::Display for StartupTrouble {
+impl fmt::Display for StartupFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.error(), self.0) {
             (Some(error), _) => error.fmt(f),
@@ -189,7 +189,7 @@ impl fmt::Display for StartupTrouble {
 
 /// Why the device found a primitive outside what the controller accepts, as the two numbers of the refusal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PrimitiveTrouble(pub [u32; 2]);
+pub struct PrimitiveDefect(pub [u32; 2]);
 
 /// Errors in the order of their numbers.
 const GAINS: [GainError; 2] = [GainError::Stiffness, GainError::Damping];
@@ -212,27 +212,27 @@ const PLAIN: [PrimitiveError; 13] = [
 const PARTS: [Part; 3] = [Part::Start, Part::Goal, Part::StartVelocity];
 
 /// Codes of the tables beside the primitive itself.
-const TROUBLE_FEEDBACK: PrimitiveTrouble = PrimitiveTrouble::FEEDBACK;
-const TROUBLE_EXPECTATION: PrimitiveTrouble = PrimitiveTrouble::EXPECTATION;
-const TROUBLE_EXPERIENCE: PrimitiveTrouble = PrimitiveTrouble([10, 0]);
+const DEFECT_FEEDBACK: PrimitiveDefect = PrimitiveDefect::FEEDBACK;
+const DEFECT_EXPECTATION: PrimitiveDefect = PrimitiveDefect::EXPECTATION;
+const DEFECT_EXPERIENCE: PrimitiveDefect = PrimitiveDefect([10, 0]);
 
 /// Code of a value that is larger than anything real; its place is in the detail.
 const TABLE_VALUE: u32 = 13;
 
-impl PrimitiveTrouble {
+impl PrimitiveDefect {
     /// The error of the feedback's table as two numbers.
     pub(crate) fn feedback(error: TableError) -> Self {
-        Self::value(error).unwrap_or(TROUBLE_FEEDBACK)
+        Self::value(error).unwrap_or(DEFECT_FEEDBACK)
     }
 
     /// The error of the expectation's table as two numbers.
     pub(crate) fn expectation(error: TableError) -> Self {
-        Self::value(error).unwrap_or(TROUBLE_EXPECTATION)
+        Self::value(error).unwrap_or(DEFECT_EXPECTATION)
     }
 
     /// The error of the table of earlier runs as two numbers.
     pub(crate) fn experience(error: TableError) -> Self {
-        Self::value(error).unwrap_or(TROUBLE_EXPERIENCE)
+        Self::value(error).unwrap_or(DEFECT_EXPERIENCE)
     }
 
     fn value(error: TableError) -> Option<Self> {
@@ -273,9 +273,9 @@ impl PrimitiveTrouble {
     }
 
     /// The gains of the feedback.
-    pub const FEEDBACK: PrimitiveTrouble = PrimitiveTrouble([8, 0]);
+    pub const FEEDBACK: PrimitiveDefect = PrimitiveDefect([8, 0]);
     /// The expectation.
-    pub const EXPECTATION: PrimitiveTrouble = PrimitiveTrouble([9, 0]);
+    pub const EXPECTATION: PrimitiveDefect = PrimitiveDefect([9, 0]);
 }
 
 fn place<T: PartialEq>(list: &[T], item: &T) -> u32 {
@@ -286,7 +286,7 @@ fn item<T: Copy>(list: &[T], index: u32) -> Option<T> {
     list.get(usize::try_from(index).ok()?).copied()
 }
 
-impl From<LoadError> for PrimitiveTrouble {
+impl From<LoadError> for PrimitiveDefect {
     fn from(error: LoadError) -> Self {
         let number = |group: RowGroup| place(&RowGroup::ALL, &group);
         let end = |end: End| match end {
@@ -335,7 +335,7 @@ impl From<LoadError> for PrimitiveTrouble {
     }
 }
 
-impl PrimitiveTrouble {
+impl PrimitiveDefect {
     fn error(self) -> Option<LoadError> {
         let Self([code, detail]) = self;
         let end = |bit: u32| if bit == 0 { End::Start } else { End::Goal };
@@ -384,18 +384,18 @@ impl PrimitiveTrouble {
     }
 }
 
-impl fmt::Display for PrimitiveTrouble {
+impl fmt::Display for PrimitiveDefect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(entry) = self.entry() {
             return TableError::TooLarge(entry).fmt(f);
         }
         match (self.error(), *self) {
             (Some(error), _) => error.fmt(f),
-            (None, TROUBLE_FEEDBACK) => f.write_str("a gain or clamp of the feedback is negative or too large"),
-            (None, TROUBLE_EXPERIENCE) => {
+            (None, DEFECT_FEEDBACK) => f.write_str("a gain or clamp of the feedback is negative or too large"),
+            (None, DEFECT_EXPERIENCE) => {
                 f.write_str("a spread of the experience is below 1e-6, or no run is behind it")
             }
-            (None, TROUBLE_EXPECTATION) => {
+            (None, DEFECT_EXPECTATION) => {
                 f.write_str("the recorded duration of the expectation is not positive or too long")
             }
             (None, Self([code, detail])) => write!(f, "unknown reason {code} ({detail:#x})"),

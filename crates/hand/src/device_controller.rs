@@ -13,7 +13,7 @@
 use control::model::WeightCorrection;
 use control::{LoadRefusal, Payload};
 use device::bus::Outlet;
-use device::hand::{Drive, HandProperties, HandRound, HandTrouble, Initialisation, Outcome};
+use device::hand::{Drive, HandFailure, HandProperties, HandRound, Initialisation, Outcome};
 use device::{Controller, ControllerIo, Counters, Health, Message, Refused, Slot, Stage};
 use link::{Event as LinkEvent, EventKind, HandStage, Refusal};
 use puck::{CanFrame, Node, PropertyId, Reply, Status, get};
@@ -43,8 +43,8 @@ pub struct DeviceController {
     cycles: u32,
     startup: Startup,
     stage: HandStage,
-    told: (HandStage, Option<(Node, HandTrouble)>),
-    cause: Option<(Node, HandTrouble)>,
+    told: (HandStage, Option<(Node, HandFailure)>),
+    cause: Option<(Node, HandFailure)>,
     told_phase: Option<Phase>,
     properties: Option<HandProperties>,
     initialisation: Option<Initialisation>,
@@ -117,7 +117,7 @@ impl DeviceController {
         let sample = self.round.close(&mut self.counters);
         let silent = self.round.silent_for(SILENT_CYCLES).filter(|_| self.stage == HandStage::Ready);
         if let Some(node) = silent {
-            self.fail(node, HandTrouble::Silent);
+            self.fail(node, HandFailure::Silent);
         }
         let sample = sample.filter(|_| self.stage == HandStage::Ready);
         let command = io.command();
@@ -166,7 +166,7 @@ impl DeviceController {
                     self.properties = Some(properties);
                     self.enter(HandStage::NotInitialised, None);
                 }
-                Progress::Unfit(node, trouble) => self.cause = Some((node, trouble)),
+                Progress::Unfit(node, failure) => self.cause = Some((node, failure)),
             }
             return;
         };
@@ -174,7 +174,7 @@ impl DeviceController {
             match initialisation.advance(&properties, &mut outlet) {
                 Outcome::Busy => {}
                 Outcome::Done => self.enter(HandStage::Ready, None),
-                Outcome::Failed(node, trouble) => self.fail(node, trouble),
+                Outcome::Failed(node, failure) => self.fail(node, failure),
             }
             return;
         }
@@ -240,7 +240,7 @@ impl DeviceController {
         if property == PropertyId::STAT && self.asked == Some(node) {
             self.asked = None;
             if Status::from_value(value) != Some(Status::Ready) {
-                self.fail(node, HandTrouble::Reset);
+                self.fail(node, HandFailure::Reset);
             }
             return true;
         }
@@ -272,10 +272,10 @@ impl DeviceController {
         self.initialisation = Some(Initialisation::new(driven, now_us));
     }
 
-    fn fail(&mut self, node: Node, trouble: HandTrouble) {
+    fn fail(&mut self, node: Node, failure: HandFailure) {
         self.cycle.hand_failed();
-        self.enter(HandStage::Failed, Some((node, trouble)));
-        if matches!(trouble, HandTrouble::Reset | HandTrouble::Silent) {
+        self.enter(HandStage::Failed, Some((node, failure)));
+        if matches!(failure, HandFailure::Reset | HandFailure::Silent) {
             // Whatever was known of it may be gone: it is looked for again. What counts as known to people is that it
             // failed.
             self.properties = None;
@@ -284,7 +284,7 @@ impl DeviceController {
     }
 
     /// Enters a stage with drives at rest: whatever the pucks did before, they are told to stop.
-    fn enter(&mut self, stage: HandStage, cause: Option<(Node, HandTrouble)>) {
+    fn enter(&mut self, stage: HandStage, cause: Option<(Node, HandFailure)>) {
         self.stage = stage;
         self.cause = cause;
         self.initialisation = None;
@@ -305,7 +305,7 @@ impl DeviceController {
         }
         let now = (self.stage, self.cause);
         if now != core::mem::replace(&mut self.told, now) {
-            let detail = self.cause.map_or(0, |(node, trouble)| trouble.number(node));
+            let detail = self.cause.map_or(0, |(node, failure)| failure.number(node));
             self.news(io, EventKind::Hand, self.stage.code().into(), detail);
         }
     }

@@ -7,7 +7,7 @@ use control::model::FINGER_TORQUE_MAX;
 use control::plan::bounds::{self as arm, Quantity};
 use control::plan::load::{LONGEST_MOVEMENT, LoadError, SHORTEST_MOVEMENT};
 use control::plan::primitive::RowGroup;
-use device::PrimitiveTrouble;
+use device::PrimitiveDefect;
 use device::recorded_filter::{self, OtherFilter};
 use dmp::{
     Configuration, Coupling, CouplingGains, DisplacementLimits, ExpectedSensors, Gain, Gains, Group, Hemisphere,
@@ -208,9 +208,9 @@ impl From<PrimitiveError> for Unfit {
 impl From<Unfit> for (Refusal, [u32; 2]) {
     fn from(unfit: Unfit) -> Self {
         match unfit {
-            Unfit::Movement(error) => (Refusal::PrimitiveInvalid, PrimitiveTrouble::from(error).0),
-            Unfit::Feedback => (Refusal::PrimitiveInvalid, PrimitiveTrouble::FEEDBACK.0),
-            Unfit::Expectation => (Refusal::PrimitiveInvalid, PrimitiveTrouble::EXPECTATION.0),
+            Unfit::Movement(error) => (Refusal::PrimitiveInvalid, PrimitiveDefect::from(error).0),
+            Unfit::Feedback => (Refusal::PrimitiveInvalid, PrimitiveDefect::FEEDBACK.0),
+            Unfit::Expectation => (Refusal::PrimitiveInvalid, PrimitiveDefect::EXPECTATION.0),
             Unfit::Filter(other) => other.into(),
         }
     }

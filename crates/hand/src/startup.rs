@@ -4,7 +4,7 @@
 //! anew.
 
 use device::bus::{Answer, Exchange, Outlet};
-use device::hand::{HandProperties, HandTrouble};
+use device::hand::{HandFailure, HandProperties};
 use puck::hand::{COUNTS_PER_REVOLUTION, HandCommander};
 use puck::{Group, Node, Property, PropertyId, PropertyTable, Role, Status, get, hand_stop_frames, set};
 
@@ -99,7 +99,7 @@ pub enum Progress {
     /// A hand.
     Found(FoundHand),
     /// None that works, because of this puck; it is looked for again.
-    Unfit(Node, HandTrouble),
+    Unfit(Node, HandFailure),
 }
 
 /// The start-up.
@@ -160,22 +160,22 @@ impl Startup {
                 self.step = Step::Done;
                 Progress::Found(found)
             }
-            Err((node, trouble)) => {
+            Err((node, failure)) => {
                 *self = Startup { step: Step::Rest { until_us: now_us + REST_US }, ..Startup::new() };
-                Progress::Unfit(node, trouble)
+                Progress::Unfit(node, failure)
             }
         }
     }
 
     /// All who are there have answered the enumeration.
-    fn listened(&mut self, now_us: u64) -> Result<(), (Node, HandTrouble)> {
+    fn listened(&mut self, now_us: u64) -> Result<(), (Node, HandFailure)> {
         self.enumerations += 1;
         let present = self.status.iter().flatten().count();
         let missing = Node::HAND.into_iter().zip(self.status).find(|(_, status)| status.is_none());
         match missing {
             None => self.step = Step::Role { digit: 0 },
             Some((node, _)) if present > 0 && self.enumerations >= ENUMERATIONS => {
-                return Err((node, HandTrouble::Missing));
+                return Err((node, HandFailure::Missing));
             }
             // Nobody there yet is nothing to tell: the hand may be switched on later.
             Some(_) => {
@@ -187,7 +187,7 @@ impl Startup {
         Ok(())
     }
 
-    fn attempt(&mut self, now_us: u64, outlet: &mut impl Outlet) -> Result<Option<FoundHand>, (Node, HandTrouble)> {
+    fn attempt(&mut self, now_us: u64, outlet: &mut impl Outlet) -> Result<Option<FoundHand>, (Node, HandFailure)> {
         match self.step {
             Step::ZeroTorques { frame } => match hand_stop_frames().get(frame) {
                 Some(content) => {
@@ -212,7 +212,7 @@ impl Startup {
                 Some(node) => {
                     if let Some(role) = self.ask(*node, PropertyId::ROLE, outlet)? {
                         if Role::from_value(role).kind() != Role::HAND {
-                            return Err((*node, HandTrouble::WrongRole));
+                            return Err((*node, HandFailure::WrongRole));
                         }
                         self.step = Step::Role { digit: digit + 1 };
                     }
@@ -238,7 +238,7 @@ impl Startup {
                 Some(node) => {
                     if let Some(status) = self.ask(*node, PropertyId::STAT, outlet)? {
                         if status != Status::Ready.value() {
-                            return Err((*node, HandTrouble::DidNotWake));
+                            return Err((*node, HandFailure::DidNotWake));
                         }
                         self.step = Step::Status { digit: digit + 1 };
                     }
@@ -272,7 +272,7 @@ impl Startup {
         digit: usize,
         item: usize,
         outlet: &mut impl Outlet,
-    ) -> Result<Option<FoundHand>, (Node, HandTrouble)> {
+    ) -> Result<Option<FoundHand>, (Node, HandFailure)> {
         let Some(node) = Node::HAND.get(digit).copied() else {
             return self.judge().map(Some);
         };
@@ -281,7 +281,7 @@ impl Startup {
             return Ok(None);
         };
         let id = self.table(digit).and_then(|table| table.id(*property));
-        let id = id.ok_or((node, HandTrouble::UnknownFirmware))?;
+        let id = id.ok_or((node, HandFailure::UnknownFirmware))?;
         if let Some(value) = self.ask(node, id, outlet)? {
             if let Some(place) = self.values.get_mut(digit).and_then(|values| values.get_mut(item)) {
                 *place = value;
@@ -296,11 +296,11 @@ impl Startup {
         node: Node,
         property: PropertyId,
         outlet: &mut impl Outlet,
-    ) -> Result<Option<i32>, (Node, HandTrouble)> {
+    ) -> Result<Option<i32>, (Node, HandFailure)> {
         match self.exchange.ask(node, property, outlet) {
             Answer::Pending => Ok(None),
             Answer::Value(value) => Ok(Some(value)),
-            Answer::Silent => Err((node, HandTrouble::NoAnswer)),
+            Answer::Silent => Err((node, HandFailure::NoAnswer)),
         }
     }
 
@@ -309,7 +309,7 @@ impl Startup {
     }
 
     /// Everything is read: is it a hand that can be driven?
-    fn judge(&self) -> Result<FoundHand, (Node, HandTrouble)> {
+    fn judge(&self) -> Result<FoundHand, (Node, HandFailure)> {
         let mut common: Option<HandProperties> = None;
         let places = Node::HAND.into_iter().enumerate().zip(self.values).zip(1..);
         for (((digit, node), values), place) in places {
@@ -317,21 +317,21 @@ impl Startup {
             let hand_group = i32::from(Group::HAND.number());
             // A puck in the wrong group, or at the wrong place of the frame, would apply the torque of another one.
             if !groups.contains(&hand_group) || groups.iter().any(|group| ARM_GROUPS.contains(group)) {
-                return Err((node, HandTrouble::WrongGroups));
+                return Err((node, HandFailure::WrongGroups));
             }
             if index != place {
-                return Err((node, HandTrouble::WrongPlace));
+                return Err((node, HandFailure::WrongPlace));
             }
             if counts != COUNTS_PER_REVOLUTION as i32 || !UNITS_RANGE.contains(&units) {
-                return Err((node, HandTrouble::WrongScale));
+                return Err((node, HandFailure::WrongScale));
             }
-            let properties = self.properties(digit).ok_or((node, HandTrouble::UnknownFirmware))?;
+            let properties = self.properties(digit).ok_or((node, HandFailure::UnknownFirmware))?;
             if *common.get_or_insert(properties) != properties {
-                return Err((node, HandTrouble::UnknownFirmware));
+                return Err((node, HandFailure::UnknownFirmware));
             }
         }
         let [first, ..] = Node::HAND;
-        let properties = common.ok_or((first, HandTrouble::Missing))?;
+        let properties = common.ok_or((first, HandFailure::Missing))?;
         Ok(FoundHand { properties, units_per_newton_metre: self.values.map(|[_, units, ..]| units) })
     }
 

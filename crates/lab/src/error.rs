@@ -4,7 +4,7 @@ use std::fmt;
 use std::time::Duration;
 
 use control::model::WeightError;
-use device::{HomeError, PrimitiveTrouble, StartupTrouble};
+use device::{HomeError, PrimitiveDefect, StartupFailure};
 use link::{Capabilities, ImageError, Refusal, SessionOwner};
 
 use crate::error_code::ErrorCode;
@@ -175,7 +175,7 @@ fn explain(reason: Refusal, detail: [u32; 2]) -> String {
         }
         Refusal::ImageModel => format!("{reason}: {first:#010x}, the device has {second:#010x}"),
         Refusal::ImageInvalid => format!("{reason} (reason {first}, {second})"),
-        Refusal::PrimitiveInvalid => format!("{reason}: {}", PrimitiveTrouble(detail)),
+        Refusal::PrimitiveInvalid => format!("{reason}: {}", PrimitiveDefect(detail)),
         Refusal::NoAnswer => format!("{reason} within {first} ms"),
         Refusal::HasTorque => match u8::try_from(first).ok().and_then(control::State::from_code) {
             Some(state) => format!("{reason}: {state}"),
@@ -196,7 +196,7 @@ fn explain(reason: Refusal, detail: [u32; 2]) -> String {
 /// The reason for which a bus start-up is blocked, in words, from the numbers in a status or event.
 #[must_use]
 pub fn explain_blocked(numbers: [u32; 2]) -> String {
-    StartupTrouble(numbers).to_string()
+    StartupFailure(numbers).to_string()
 }
 
 impl HostError {

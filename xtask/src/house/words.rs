@@ -77,7 +77,10 @@ const OLD: &[Old] = &[
     (Name, "Handling", "GraspTuning", HOST),
     (Name, "halves", "a name that says of what", HOST),
     (Name, "seat", "a name that says what is shared", HOST),
-    (Name, "trouble", "a name that says which failure", HOST),
+    (Phrase, "trouble", "failure, defect or fault", &[]),
+    (Name, "HandTrouble", "HandFailure", &[]),
+    (Name, "StartupTrouble", "StartupFailure", &[]),
+    (Name, "PrimitiveTrouble", "PrimitiveDefect", &[]),
     // The primitive.
     (Name, "Experience", "SensorStatistics", PRIMITIVE),
     (Name, "Chart", "log-map coordinates", PRIMITIVE),
@@ -85,7 +88,7 @@ const OLD: &[Old] = &[
     (Name, "Marks", "Metadata", &[]),
     (Name, "square_root", "sqrt", &[]),
     (Name, "whole_below", "floor", &[]),
-    (Name, "felt", "expected or measured", PRIMITIVE),
+    (Phrase, "felt", "expected or measured", &[]),
     // The simulator.
     (Name, "Lesson", "TaughtMovement", SIMULATOR),
     (Phrase, "lesson", "demonstration", &[]),

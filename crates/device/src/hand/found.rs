@@ -3,7 +3,7 @@
 use puck::hand::HandCommander;
 use puck::{Node, PropertyId};
 
-use super::trouble::HandTrouble;
+use super::failure::HandFailure;
 
 /// The numbers of the hand's properties that the device uses, the same on all four pucks, and how its digits rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub struct HandProperties {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Found {
     /// No hand, or one that is unfit because of this puck.
-    Nothing(Option<(Node, HandTrouble)>),
+    Nothing(Option<(Node, HandFailure)>),
     /// Four pucks of one kind, awake.
     Hand {
         properties: HandProperties,

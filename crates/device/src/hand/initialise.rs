@@ -7,8 +7,8 @@
 use puck::hand::HandCommand;
 use puck::{Counts, Group, MotorMode, Node, PropertyId, get, set};
 
+use super::failure::HandFailure;
 use super::found::HandProperties;
-use super::trouble::HandTrouble;
 use crate::bus::{Answer, Exchange, Outlet};
 
 /// Between two looks at the modes, us.
@@ -70,7 +70,7 @@ pub enum Outcome {
     /// The hand counts from its open stops.
     Done,
     /// It did not work, because of this puck.
-    Failed(Node, HandTrouble),
+    Failed(Node, HandFailure),
 }
 
 /// An initialisation under way.
@@ -172,11 +172,11 @@ impl Initialisation {
                 let away =
                     |position: Option<Counts>| position.is_some_and(|Counts(count)| count.abs() > ZERO_TOLERANCE);
                 if let Some((node, _)) = digits.clone().find(|(_, position)| away(*position)) {
-                    return Outcome::Failed(node, HandTrouble::NotZeroed);
+                    return Outcome::Failed(node, HandFailure::NotZeroed);
                 }
                 match digits.find(|(_, position)| position.is_none()) {
                     None => self.step = Step::Write { digit: 0, attempt: 0 },
-                    Some((node, _)) if attempt + 1 >= ATTEMPTS => return Outcome::Failed(node, HandTrouble::NoAnswer),
+                    Some((node, _)) if attempt + 1 >= ATTEMPTS => return Outcome::Failed(node, HandFailure::NoAnswer),
                     Some(_) => self.step = Step::Measure { attempt: attempt + 1 },
                 }
             }
@@ -194,10 +194,10 @@ impl Initialisation {
                 };
                 match self.exchange.ask(*node, properties.stall, outlet) {
                     Answer::Pending => {}
-                    Answer::Silent => return Outcome::Failed(*node, HandTrouble::NoAnswer),
+                    Answer::Silent => return Outcome::Failed(*node, HandFailure::NoAnswer),
                     Answer::Value(0) => self.step = Step::Write { digit: digit + 1, attempt: 0 },
                     Answer::Value(_) if attempt + 1 >= ATTEMPTS => {
-                        return Outcome::Failed(*node, HandTrouble::NotTaken);
+                        return Outcome::Failed(*node, HandFailure::NotTaken);
                     }
                     Answer::Value(_) => self.step = Step::Write { digit, attempt: attempt + 1 },
                 }
@@ -219,7 +219,7 @@ impl Initialisation {
             let Some(mode) = mode else {
                 *silent += 1;
                 if *silent >= SILENT_POLLS {
-                    return Outcome::Failed(node, HandTrouble::Silent);
+                    return Outcome::Failed(node, HandFailure::Silent);
                 }
                 laggard = laggard.or(Some(node));
                 continue;
@@ -237,7 +237,7 @@ impl Initialisation {
         }
         if let Some(node) = laggard {
             if now_us >= self.limit_us {
-                return Outcome::Failed(node, HandTrouble::TimedOut);
+                return Outcome::Failed(node, HandFailure::TimedOut);
             }
             self.step = Step::Poll { next_us: now_us + POLL_US - LISTEN_US };
             return Outcome::Busy;

@@ -12,10 +12,10 @@
 //! | failed | MODE IDLE once |
 
 mod drive;
+mod failure;
 mod found;
 mod initialise;
 mod round;
-mod trouble;
 
 use control::HandSample;
 use link::HandStage;
@@ -25,11 +25,11 @@ use crate::bus::Outlet;
 use crate::command::Refusal;
 use crate::health::Counters;
 pub use drive::Drive;
+pub use failure::HandFailure;
 pub(crate) use found::Found;
 pub use found::HandProperties;
 pub use initialise::{Initialisation, Outcome};
 pub use round::HandRound;
-pub use trouble::HandTrouble;
 
 /// Time that a puck may be silent before the hand is given up: 0.2 s, in rounds, one a control period.
 const SILENT_ROUNDS: u16 = control::time::periods(0.2);
@@ -38,9 +38,9 @@ const SILENT_ROUNDS: u16 = control::time::periods(0.2);
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hand {
     stage: HandStage,
-    cause: Option<(Node, HandTrouble)>,
+    cause: Option<(Node, HandFailure)>,
     /// Stage and cause that were told last.
-    told: (HandStage, Option<(Node, HandTrouble)>),
+    told: (HandStage, Option<(Node, HandFailure)>),
     properties: Option<HandProperties>,
     /// It was ready when the bus was started anew.
     was_ready: bool,
@@ -96,7 +96,7 @@ impl Hand {
     }
 
     /// Stage and cause, if either has changed since the last call.
-    pub(crate) fn news(&mut self) -> Option<(HandStage, Option<(Node, HandTrouble)>)> {
+    pub(crate) fn news(&mut self) -> Option<(HandStage, Option<(Node, HandFailure)>)> {
         let now = (self.stage, self.cause);
         (now != core::mem::replace(&mut self.told, now)).then_some(now)
     }
@@ -157,7 +157,7 @@ impl Hand {
                 if property == PropertyId::STAT && self.asked == Some(node) {
                     self.asked = None;
                     if Status::from_value(value) != Some(Status::Ready) {
-                        self.fail(node, HandTrouble::Reset);
+                        self.fail(node, HandFailure::Reset);
                     }
                     return true;
                 }
@@ -176,7 +176,7 @@ impl Hand {
     pub(crate) fn sample(&mut self, counters: &mut Counters) -> Option<HandSample> {
         let sample = self.round.close(counters);
         if let Some(node) = self.round.silent_for(SILENT_ROUNDS).filter(|_| self.stage == HandStage::Ready) {
-            self.fail(node, HandTrouble::Silent);
+            self.fail(node, HandFailure::Silent);
         }
         sample.filter(|_| self.stage == HandStage::Ready)
     }
@@ -201,7 +201,7 @@ impl Hand {
             match initialisation.advance(&properties, outlet) {
                 Outcome::Busy => {}
                 Outcome::Done => self.enter(HandStage::Ready, None),
-                Outcome::Failed(node, trouble) => self.fail(node, trouble),
+                Outcome::Failed(node, failure) => self.fail(node, failure),
             }
             return true;
         }
@@ -218,12 +218,12 @@ impl Hand {
         })
     }
 
-    fn fail(&mut self, node: Node, trouble: HandTrouble) {
-        self.enter(HandStage::Failed, Some((node, trouble)));
+    fn fail(&mut self, node: Node, failure: HandFailure) {
+        self.enter(HandStage::Failed, Some((node, failure)));
     }
 
     /// Enters a stage with drives at rest: whatever the pucks did before, they are told to stop.
-    fn enter(&mut self, stage: HandStage, cause: Option<(Node, HandTrouble)>) {
+    fn enter(&mut self, stage: HandStage, cause: Option<(Node, HandFailure)>) {
         // A digit that holds after its initialisation may go on holding.
         let brake = stage != HandStage::Ready;
         *self = Hand {

@@ -6,7 +6,7 @@ use puck::{Node, Property, PropertyId, PropertyTable, Role, Status};
 use super::survey::Survey;
 use super::{Next, Startup, Step};
 use crate::bus::{Answer, Outlet};
-use crate::hand::{Found, HandProperties, HandTrouble};
+use crate::hand::{Found, HandFailure, HandProperties};
 
 /// Properties that are read of each hand puck, in this order.
 pub(super) const DIGIT_PROPERTIES: [Property; 7] =
@@ -22,7 +22,7 @@ const ARM_GROUPS: core::ops::RangeInclusive<i32> = 1..=4;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct HandSurvey {
     /// A puck that made it unfit, and why.
-    trouble: Option<(Node, HandTrouble)>,
+    failure: Option<(Node, HandFailure)>,
     digits: [[i32; DIGIT_PROPERTIES.len()]; 4],
     /// A puck of it has not been awake at some time since the cyclic loop: it may have lost its position.
     pub(super) slept: bool,
@@ -61,12 +61,12 @@ impl Startup {
     }
 
     fn hand_is_fit(&self) -> bool {
-        self.hand.trouble.is_none() && self.survey.digits() == Node::HAND.len()
+        self.hand.failure.is_none() && self.survey.digits() == Node::HAND.len()
     }
 
     /// A puck of the hand makes it unfit. The first reason is kept.
-    pub(super) fn drop_hand(&mut self, node: Node, trouble: HandTrouble) {
-        self.hand.trouble.get_or_insert((node, trouble));
+    pub(super) fn drop_hand(&mut self, node: Node, failure: HandFailure) {
+        self.hand.failure.get_or_insert((node, failure));
     }
 
     /// The enumeration is over.
@@ -76,7 +76,7 @@ impl Startup {
         if self.survey.hand_is_partial()
             && let Some(node) = Node::HAND.into_iter().find(|node| !self.survey.is_present(*node))
         {
-            self.drop_hand(node, HandTrouble::Missing);
+            self.drop_hand(node, HandFailure::Missing);
         }
     }
 
@@ -91,7 +91,7 @@ impl Startup {
             Answer::Pending => None,
             Answer::Value(value) => Some(Ok(value)),
             Answer::Silent => {
-                self.drop_hand(node, HandTrouble::NoAnswer);
+                self.drop_hand(node, HandFailure::NoAnswer);
                 Some(Err(()))
             }
         }
@@ -102,7 +102,7 @@ impl Startup {
         match self.ask_digit(node, PropertyId::ROLE, outlet) {
             None => return Next::Stay,
             Some(Ok(role)) if Role::from_value(role).kind() != Role::HAND => {
-                self.drop_hand(node, HandTrouble::WrongRole);
+                self.drop_hand(node, HandFailure::WrongRole);
             }
             Some(_) => {}
         }
@@ -119,7 +119,7 @@ impl Startup {
                     Next::Go(Step::Verify { device: index, item: 1 })
                 }
                 Some(_) => {
-                    self.drop_hand(node, HandTrouble::DidNotWake);
+                    self.drop_hand(node, HandFailure::DidNotWake);
                     next
                 }
             };
@@ -144,7 +144,7 @@ impl Startup {
         };
         let table = self.survey.seen(node).version.and_then(|version| PropertyTable::motor(version).ok());
         let Some(id) = table.and_then(|table| table.id(*property)) else {
-            self.drop_hand(node, HandTrouble::UnknownFirmware);
+            self.drop_hand(node, HandFailure::UnknownFirmware);
             return Next::Stay;
         };
         if let Some(Ok(value)) = self.ask_digit(node, id, outlet) {
@@ -159,34 +159,34 @@ impl Startup {
     /// Checks everything read of the hand and joins its scales to those of the arm.
     fn judge_hand(&mut self) -> Found {
         if !self.hand_is_fit() {
-            return Found::Nothing(self.hand.trouble);
+            return Found::Nothing(self.hand.failure);
         }
         match self.fit_hand() {
             Ok(properties) => Found::Hand { properties, was_awake: !self.hand.slept },
-            Err((node, trouble)) => {
-                self.drop_hand(node, trouble);
-                Found::Nothing(self.hand.trouble)
+            Err((node, failure)) => {
+                self.drop_hand(node, failure);
+                Found::Nothing(self.hand.failure)
             }
         }
     }
 
-    fn fit_hand(&mut self) -> Result<HandProperties, (Node, HandTrouble)> {
+    fn fit_hand(&mut self) -> Result<HandProperties, (Node, HandFailure)> {
         let mut common: Option<HandProperties> = None;
         for (place, (node, digit)) in (1..).zip(Node::HAND.into_iter().zip(self.hand.digits)) {
             let [counts, _, index, groups @ .., _] = digit;
             // A puck in the wrong group, or at the wrong place of the frame, would apply the torque of another one.
             if !groups.contains(&HAND_GROUP) || groups.iter().any(|group| ARM_GROUPS.contains(group)) {
-                return Err((node, HandTrouble::WrongGroups));
+                return Err((node, HandFailure::WrongGroups));
             }
             if index != place {
-                return Err((node, HandTrouble::WrongPlace));
+                return Err((node, HandFailure::WrongPlace));
             }
             if counts != COUNTS_PER_REVOLUTION {
-                return Err((node, HandTrouble::WrongScale));
+                return Err((node, HandFailure::WrongScale));
             }
-            let properties = self.digit_properties(node).ok_or((node, HandTrouble::UnknownFirmware))?;
+            let properties = self.digit_properties(node).ok_or((node, HandFailure::UnknownFirmware))?;
             if *common.get_or_insert(properties) != properties {
-                return Err((node, HandTrouble::UnknownFirmware));
+                return Err((node, HandFailure::UnknownFirmware));
             }
         }
         let [first, ..] = Node::HAND;
@@ -199,9 +199,9 @@ impl Startup {
             }
             (_, Some(Err(control::CalibrationError::HandTorqueCounts(digit)))) => {
                 let node = Node::HAND.get(usize::from(digit)).copied().unwrap_or(first);
-                Err((node, HandTrouble::WrongScale))
+                Err((node, HandFailure::WrongScale))
             }
-            _ => Err((first, HandTrouble::WrongScale)),
+            _ => Err((first, HandFailure::WrongScale)),
         }
     }
 

@@ -1,7 +1,7 @@
 //! The hand: found, woken, initialised by a person alone, read and driven in every cycle, and lost without the arm.
 
 use control::{Command as Control, State, flags};
-use device::{Command, Controller, EventKind, HandTrouble, Refusal, Slot, Stage};
+use device::{Command, Controller, EventKind, HandFailure, Refusal, Slot, Stage};
 use link::HandStage;
 use puck::hand::angles;
 use puck::{
@@ -41,7 +41,7 @@ fn sets(bus: &Bus, begin: usize) -> Vec<(Destination, PropertyId, i32)> {
     to_hand(bus, begin).into_iter().filter_map(set).collect()
 }
 
-fn news(bus: &Bus) -> Vec<(HandStage, Option<(Node, HandTrouble)>)> {
+fn news(bus: &Bus) -> Vec<(HandStage, Option<(Node, HandFailure)>)> {
     let hand = |event: &EventKind| match event {
         EventKind::Hand { stage, cause } => Some((*stage, *cause)),
         _ => None,
@@ -160,12 +160,12 @@ fn an_initialisation_that_was_broken_off_is_noticed() {
     // As the safety module's broadcast of MODE may do: the puck is at rest, but not where it counts from.
     bus.digits[1].break_off();
     bus.run(&mut core, 6.0);
-    assert_eq!(news(&bus).last(), Some(&(HandStage::Failed, Some((Node::FINGERS[1], HandTrouble::NotZeroed)))));
+    assert_eq!(news(&bus).last(), Some(&(HandStage::Failed, Some((Node::FINGERS[1], HandFailure::NotZeroed)))));
     let (mut core, mut bus) = holding_with_hand();
     bus.digits[3].lose_commands = 2;
     bus.commands.push_back(Command::InitialiseHand);
     bus.run(&mut core, 7.0);
-    let cause = Some((Node::SPREAD, HandTrouble::NotZeroed));
+    let cause = Some((Node::SPREAD, HandFailure::NotZeroed));
     assert_eq!(news(&bus).last(), Some(&(HandStage::Failed, cause)), "both commands were lost");
 }
 
@@ -175,7 +175,7 @@ fn an_initialisation_that_does_not_end_fails_and_is_braked() {
     bus.digits[2].work_us = 60_000_000;
     bus.commands.push_back(Command::InitialiseHand);
     bus.run(&mut core, 12.0);
-    let cause = Some((Node::FINGERS[2], HandTrouble::TimedOut));
+    let cause = Some((Node::FINGERS[2], HandFailure::TimedOut));
     assert_eq!(news(&bus).last(), Some(&(HandStage::Failed, cause)));
     assert_eq!(bus.digits[2].mode, MotorMode::Idle, "a finger that still drives is stopped");
     let begin = bus.log.len();
@@ -235,7 +235,7 @@ fn a_digit_that_falls_silent_in_the_initialisation_is_named() {
     bus.run(&mut core, 1.0);
     bus.digits[0].lose_power();
     bus.run(&mut core, 1.0);
-    assert_eq!(news(&bus).last(), Some(&(HandStage::Failed, Some((Node::FINGERS[0], HandTrouble::Silent)))));
+    assert_eq!(news(&bus).last(), Some(&(HandStage::Failed, Some((Node::FINGERS[0], HandFailure::Silent)))));
 }
 
 #[test]
@@ -348,7 +348,7 @@ fn a_hand_puck_that_resets_costs_the_hand_and_not_the_arm() {
         bus.run_slots(&mut core, 1);
         assert!(bus.now_us - now < 30_000, "not found in time");
     }
-    assert_eq!(news(&bus).last(), Some(&(HandStage::Failed, Some((Node::FINGERS[2], HandTrouble::Reset)))));
+    assert_eq!(news(&bus).last(), Some(&(HandStage::Failed, Some((Node::FINGERS[2], HandFailure::Reset)))));
     bus.run(&mut core, 0.02);
     let begin = bus.log.len();
     bus.run(&mut core, 1.0);
@@ -368,12 +368,12 @@ fn a_hand_that_falls_silent_altogether_is_given_up_after_a_fifth_of_a_second() {
     bus.run(&mut core, 0.15);
     assert_eq!(core.health().hand, HandStage::Ready);
     bus.run(&mut core, 0.1);
-    assert_eq!(news(&bus).last(), Some(&(HandStage::Failed, Some((Node::FINGERS[0], HandTrouble::Silent)))));
+    assert_eq!(news(&bus).last(), Some(&(HandStage::Failed, Some((Node::FINGERS[0], HandFailure::Silent)))));
     assert_eq!(core.health().state, State::Hold);
 }
 
 /// The arm starts with this hand; what is told of it.
-fn verdict(break_something: impl FnOnce(&mut Bus)) -> (HandStage, Option<(Node, HandTrouble)>) {
+fn verdict(break_something: impl FnOnce(&mut Bus)) -> (HandStage, Option<(Node, HandFailure)>) {
     let (mut core, mut bus) = (silent_device(), Bus::idle().with_hand());
     break_something(&mut bus);
     bus.run_until(&mut core, Stage::WaitingForZero);
@@ -390,16 +390,16 @@ fn verdict(break_something: impl FnOnce(&mut Bus)) -> (HandStage, Option<(Node, 
 #[test]
 fn whatever_is_wrong_with_a_hand_is_named_and_the_arm_starts_without_it() {
     let [f1, f2, f3, spread] = Node::HAND;
-    let absent = |node, trouble| (HandStage::Absent, Some((node, trouble)));
+    let absent = |node, failure| (HandStage::Absent, Some((node, failure)));
     assert_eq!(verdict(|_| {}), (HandStage::NotInitialised, None));
-    assert_eq!(verdict(|bus| bus.digits[2].present = false), absent(f3, HandTrouble::Missing));
-    assert_eq!(verdict(|bus| bus.digits[1].never_wakes = true), absent(f2, HandTrouble::DidNotWake));
-    assert_eq!(verdict(|bus| bus.digits[0].role = 0), absent(f1, HandTrouble::WrongRole));
-    assert_eq!(verdict(|bus| bus.digits[3].version = 115), absent(spread, HandTrouble::UnknownFirmware));
-    assert_eq!(verdict(|bus| bus.digits[0].groups = [0, 5, 1]), absent(f1, HandTrouble::WrongGroups));
-    assert_eq!(verdict(|bus| bus.digits[1].place = 3), absent(f2, HandTrouble::WrongPlace));
-    assert_eq!(verdict(|bus| bus.digits[3].counts = 40_960), absent(spread, HandTrouble::WrongScale));
-    assert_eq!(verdict(|bus| bus.digits[2].torque_counts = 0), absent(f3, HandTrouble::WrongScale));
+    assert_eq!(verdict(|bus| bus.digits[2].present = false), absent(f3, HandFailure::Missing));
+    assert_eq!(verdict(|bus| bus.digits[1].never_wakes = true), absent(f2, HandFailure::DidNotWake));
+    assert_eq!(verdict(|bus| bus.digits[0].role = 0), absent(f1, HandFailure::WrongRole));
+    assert_eq!(verdict(|bus| bus.digits[3].version = 115), absent(spread, HandFailure::UnknownFirmware));
+    assert_eq!(verdict(|bus| bus.digits[0].groups = [0, 5, 1]), absent(f1, HandFailure::WrongGroups));
+    assert_eq!(verdict(|bus| bus.digits[1].place = 3), absent(f2, HandFailure::WrongPlace));
+    assert_eq!(verdict(|bus| bus.digits[3].counts = 40_960), absent(spread, HandFailure::WrongScale));
+    assert_eq!(verdict(|bus| bus.digits[2].torque_counts = 0), absent(f3, HandFailure::WrongScale));
     assert_eq!(
         verdict(|bus| bus.digits[2].groups = [0, 5, 5]),
         (HandStage::NotInitialised, None),

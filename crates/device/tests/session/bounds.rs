@@ -3,7 +3,7 @@
 use control::LoadError;
 use control::plan::bounds::Quantity;
 use control::plan::primitive::RowGroup;
-use device::PrimitiveTrouble;
+use device::PrimitiveDefect;
 use link::image::ExpectationMarks;
 use link::{Refusal, Reply, Request, RunOptions};
 
@@ -82,9 +82,9 @@ fn h5_what_no_arm_has_is_refused_with_its_name() {
     let mut rig = Rig::greeted();
     for (change, quantity) in cases {
         let answer = refusal(&mut rig, &image_with("forged", 3.0, 10, change));
-        let trouble = PrimitiveTrouble::from(LoadError::Bound(quantity));
-        assert_eq!(answer, Some((Refusal::PrimitiveInvalid, trouble.0)), "{quantity:?}");
-        assert_eq!(trouble.to_string(), quantity.to_string(), "the words arrive");
+        let defect = PrimitiveDefect::from(LoadError::Bound(quantity));
+        assert_eq!(answer, Some((Refusal::PrimitiveInvalid, defect.0)), "{quantity:?}");
+        assert_eq!(defect.to_string(), quantity.to_string(), "the words arrive");
     }
     // What comes after: a sound image is taken, and runs.
     rig.store("forged", &image("forged", 3.0, 10));

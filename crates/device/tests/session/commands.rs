@@ -1,7 +1,7 @@
 //! Requests for the control half, and what it tells.
 
 use control::{Fault, State};
-use device::{Command, Counters, EventKind, HandTrouble, Refusal as ControlRefusal, Stage};
+use device::{Command, Counters, EventKind, HandFailure, Refusal as ControlRefusal, Stage};
 use link::message::{AccelerationSource, PoseFeedback};
 use link::{Event, EventKind as LinkKind, Goal, HandStage, Name, Refusal, Reply, Request, RunOptions, Telemetry};
 use proptest::prelude::*;
@@ -229,12 +229,12 @@ fn every_refusal_of_the_control_half_reaches_the_host() {
 fn a_surprise_and_the_stages_of_the_hand_are_told() {
     let mut rig = Rig::greeted();
     rig.event(EventKind::Surprised { phase: 0.625, channel: 7 });
-    let cause = Some((puck::Node::FINGERS[1], HandTrouble::Silent));
+    let cause = Some((puck::Node::FINGERS[1], HandFailure::Silent));
     rig.event(EventKind::Hand { stage: HandStage::Failed, cause });
     let told: Vec<_> = events(&mut rig).iter().map(|event| (event.kind, event.code, event.detail)).collect();
     let failed = (LinkKind::Hand, u16::from(HandStage::Failed.code()), 11 << 8 | 12);
     assert_eq!(told, [(LinkKind::Surprise, 7, 625), failed]);
-    assert_eq!(HandTrouble::from_number(told[1].2), cause, "a host can say it in words");
+    assert_eq!(HandFailure::from_number(told[1].2), cause, "a host can say it in words");
 }
 
 #[test]
@@ -336,7 +336,7 @@ fn events_reach_the_host() {
     let node = puck::Node::new(3).unwrap();
     rig.event(EventKind::Blocked(device::StartupError::MissingPuck(node)));
     let told = events(&mut rig)[0];
-    let words = device::StartupTrouble([told.code.into(), told.detail]).to_string();
+    let words = device::StartupFailure([told.code.into(), told.detail]).to_string();
     assert_eq!(words, device::StartupError::MissingPuck(node).to_string());
 }
 

@@ -298,7 +298,7 @@ impl<S: device::Store> Rig<S> {
         match self.upload(name, image) {
             Some(Reply::Accepted { .. }) => {}
             Some(Reply::Refused { reason: Refusal::PrimitiveInvalid, detail, .. }) => {
-                panic!("not taken: {}", device::PrimitiveTrouble(detail))
+                panic!("not taken: {}", device::PrimitiveDefect(detail))
             }
             other => panic!("not taken but {other:?}"),
         }

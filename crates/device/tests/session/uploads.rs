@@ -1,7 +1,7 @@
 //! Uploads: only what is whole, sound and fit replaces what is there; and the store itself.
 
 use control::State;
-use device::{PrimitiveTrouble, RamStore, Store, StoreError};
+use device::{PrimitiveDefect, RamStore, Store, StoreError};
 use link::message::ChunkData;
 use link::{EventKind, Listing, Name, Refusal, Reply, Request, RunOptions};
 
@@ -167,7 +167,7 @@ fn a_primitive_outside_the_limits_of_the_arm_is_refused_in_words() {
     let mut words = |change: fn(&mut link::image::ImageContent<&[f32]>)| {
         let (reason, detail) = refused(&mut rig, "reach", &image_with("reach", 3.0, 10, change));
         assert_eq!(reason, Refusal::PrimitiveInvalid);
-        PrimitiveTrouble(detail).to_string()
+        PrimitiveDefect(detail).to_string()
     };
     assert!(words(|content| content.start.posture[3] = 9.0).contains("J4"));
     assert!(words(|content| content.goal.position = [3.0, 0.0, 0.0]).contains("out of reach"));
@@ -198,7 +198,7 @@ fn a_primitive_beyond_all_bounds_is_refused_with_the_value_that_is() {
     let mut words = |change: fn(&mut link::image::ImageContent<&[f32]>)| {
         let (reason, detail) = refused(&mut rig, "reach", &image_with("reach", 3.0, 10, change));
         assert_eq!(reason, Refusal::PrimitiveInvalid);
-        PrimitiveTrouble(detail).to_string()
+        PrimitiveDefect(detail).to_string()
     };
     static HUGE: [f32; 170] = [1e30; 170];
     static LARGE: [f32; 170] = [1e6; 170];
@@ -263,14 +263,14 @@ fn every_place_of_a_value_survives_its_two_numbers() {
         for kernel in [0, 1, 99] {
             let (group, index) = Group::of_weights(row, 1);
             let error = LoadError::Primitive(PrimitiveError::WeightTooLarge { group, index: index as u8, kernel });
-            assert_eq!(PrimitiveTrouble::from(error).to_string(), error.to_string());
+            assert_eq!(PrimitiveDefect::from(error).to_string(), error.to_string());
         }
     }
     for part in [Part::Start, Part::Goal, Part::StartVelocity] {
         for (part_of_arm, last) in RowGroup::ALL.into_iter().zip([2, 2, 6, 3]) {
             let (group, index) = part_of_arm.row(last);
             let error = LoadError::Primitive(PrimitiveError::TooLarge { part, group, index });
-            assert_eq!(PrimitiveTrouble::from(error).to_string(), error.to_string());
+            assert_eq!(PrimitiveDefect::from(error).to_string(), error.to_string());
         }
     }
 }

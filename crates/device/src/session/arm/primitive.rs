@@ -14,7 +14,7 @@ use link::image::{
 use crate::application::Refused;
 use crate::port::{CheckedPrimitive, StoredPrimitive};
 use crate::recorded_filter::{self, OtherFilter};
-use crate::wire::PrimitiveTrouble;
+use crate::wire::PrimitiveDefect;
 
 // The image's limits must not exceed what the control half can hold; a table that does not fit would be refused
 // only after its upload.
@@ -31,21 +31,21 @@ pub(crate) type WeightBuffer = [f32; WEIGHT_ROWS * KERNEL_LIMIT];
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Unfit {
     /// Its content is outside what the controller accepts.
-    Content(PrimitiveTrouble),
+    Content(PrimitiveDefect),
     /// Its expectation was recorded through another filter.
     Filter(OtherFilter),
 }
 
-impl From<PrimitiveTrouble> for Unfit {
-    fn from(trouble: PrimitiveTrouble) -> Self {
-        Self::Content(trouble)
+impl From<PrimitiveDefect> for Unfit {
+    fn from(defect: PrimitiveDefect) -> Self {
+        Self::Content(defect)
     }
 }
 
 impl From<Unfit> for Refused {
     fn from(unfit: Unfit) -> Self {
         match unfit {
-            Unfit::Content(trouble) => (Refusal::PrimitiveInvalid, trouble.0),
+            Unfit::Content(defect) => (Refusal::PrimitiveInvalid, defect.0),
             Unfit::Filter(other) => other.into(),
         }
     }
@@ -68,7 +68,7 @@ pub(crate) fn build<'a>(
     }
     let marks = &content.marks;
     bounds::check_marks(marks.payload_mass, &marks.payload_centre, marks.trials, marks.spread_floor)
-        .map_err(|quantity| PrimitiveTrouble::from(LoadError::Bound(quantity)))?;
+        .map_err(|quantity| PrimitiveDefect::from(LoadError::Bound(quantity)))?;
     let weights = content.weights.copy_to(weights_buffer).unwrap_or_default();
     let start_velocity = &content.start_velocity;
     let tables = MovementTables {
@@ -90,22 +90,22 @@ pub(crate) fn build<'a>(
             start_velocity.hand,
         ),
     };
-    primitive.assign(&tables).map_err(|error| PrimitiveTrouble::from(LoadError::Primitive(error)))?;
+    primitive.assign(&tables).map_err(|error| PrimitiveDefect::from(LoadError::Primitive(error)))?;
     if !content.k1.is_empty() {
         let clamps = &content.clamps;
         let limits = limits(clamps.position, clamps.orientation, clamps.hand);
-        primitive.assign_feedback(content.k1.iter(), content.k2.iter(), limits).map_err(PrimitiveTrouble::feedback)?;
+        primitive.assign_feedback(content.k1.iter(), content.k2.iter(), limits).map_err(PrimitiveDefect::feedback)?;
     }
     if !content.expected_mean.is_empty() {
         primitive
             .assign_expected(content.expected_mean.iter(), content.marks.recorded_duration)
-            .map_err(PrimitiveTrouble::expectation)?;
+            .map_err(PrimitiveDefect::expectation)?;
     }
     if !content.experience_mean.is_empty() {
         let (mean, spread) = (content.experience_mean.iter(), content.experience_spread.iter());
-        primitive.assign_statistics(mean, spread, content.experience_trials).map_err(PrimitiveTrouble::experience)?;
+        primitive.assign_statistics(mean, spread, content.experience_trials).map_err(PrimitiveDefect::experience)?;
     }
-    load::check(model, primitive).map_err(|error| PrimitiveTrouble::from(error).into())
+    load::check(model, primitive).map_err(|error| PrimitiveDefect::from(error).into())
 }
 
 fn waypoint(waypoint: &Waypoint) -> Configuration<f32> {

@@ -8,7 +8,7 @@ use crate::session::host::HostSession;
 use crate::session::host::owner::{Owner, RequestOrder};
 use crate::session::host::pending::Requester;
 use crate::session::host::upload::Upload;
-use crate::wire::StartupTrouble;
+use crate::wire::StartupFailure;
 
 impl<A: Application> HostSession<A> {
     /// Takes one request: greets, refuses other hosts, repeats answers, acts.
@@ -281,7 +281,7 @@ impl<A: Application> HostSession<A> {
             state: health.state.code(),
             fault: health.fault.code(),
             startup_stage: health.stage.code(),
-            blocked: health.blocked.map(|error| StartupTrouble::from(error).0),
+            blocked: health.blocked.map(|error| StartupFailure::from(error).0),
             zeroed: health.zeroed,
             safety_mode: health.safety_mode.and_then(|mode| u8::try_from(mode.value()).ok()),
             pendant: health.pendant.map(i32::cast_unsigned),
