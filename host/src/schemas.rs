@@ -7,8 +7,8 @@ use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 
 use crate::cmd::{
-    config, delete, doctor, experience, explain, export, get, hand, learn, list, manual, plot, record, rehearse,
-    rename, report, run_report, settings, sim, stop, teach, upload,
+    config, delete, doctor, explain, export, get, hand, learn, list, manual, plot, record, rehearse, rename, report,
+    run_report, settings, sim, statistics, stop, teach, upload,
 };
 
 /// Every schema by the name of its command; `error` is that of any command that fails.
@@ -24,7 +24,7 @@ pub fn all() -> Vec<(&'static str, Schema)> {
         ("delete", of::<delete::Deleted>()),
         ("doctor", of::<doctor::Examined>()),
         ("error", of::<FailureData>()),
-        ("experience", of::<experience::Known<'_>>()),
+        ("statistics", of::<statistics::Known<'_>>()),
         ("explain", of::<explain::Explained>()),
         ("export", of::<export::Exported>()),
         ("get", of::<get::Gotten>()),

@@ -119,7 +119,7 @@ fn a_missing_file_is_a_wrong_command_line_and_the_reason_is_told() {
         &["plot", "-d", "nothing.csv", "-o", "a.png"],
         &["compare", "nothing.csv", "nothing.csv"],
         &["can", "decode", "nothing.csv"],
-        &["experience", "nothing.csv", "nothing.csv"],
+        &["statistics", "nothing.csv", "nothing.csv"],
     ] {
         let failed = tactus(folder.path(), line).failure().code(2);
         let said = stderr(&failed);
@@ -221,8 +221,8 @@ fn a_rehearsed_primitive_adapts_and_one_that_was_not_is_refused() {
     assert!(run["tracking"]["position_max_m"].as_f64().unwrap() < 0.05, "{run}");
 
     let kept = ["kept/grasp-1.csv", "kept/grasp-2.csv", "kept/grasp-3.csv"];
-    let gathered = json(&tactus(at, &[&["--json", "experience", "grasp.toml"][..], &kept].concat()).success());
-    assert_eq!(gathered["experience"]["trials"], 3);
-    // A run whose speed was changed on the way is no run of the same duration.
+    let gathered = json(&tactus(at, &[&["--json", "statistics", "grasp.toml"][..], &kept].concat()).success());
+    assert_eq!(gathered["statistics"]["trials"], 3);
+    // A run whose speed was changed on the way is no run of the same duration. The command's former name still works.
     tactus(at, &["experience", "grasp.toml", kept[0], "run.csv"]).failure().code(6);
 }

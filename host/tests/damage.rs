@@ -21,7 +21,7 @@ const ROWS: &[Disturbed] = &[
     ("plot", "output", "plot -d demo.csv -o there.png", "there.png"),
     ("export", "output", "export run.csv -o there.mcap", "there.mcap"),
     ("report", "output", "report run.csv -p reach.toml -o there.html", "there.html"),
-    ("experience", "output", "experience known.toml run.csv run2.csv -o there.toml", "there.toml"),
+    ("statistics", "output", "statistics known.toml run.csv run2.csv -o there.toml", "there.toml"),
     ("record", "output", "record --duration 4 -o there.csv", "there.csv"),
     ("teach", "output", "teach --duration 2 -o there.csv", "there.csv"),
     ("rehearse", "output", "rehearse reach.toml --trials 2 -o there.toml", "there.toml"),

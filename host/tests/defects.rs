@@ -31,7 +31,7 @@ const DEFECTS: &[(&str, &[&str])] = &[
         ],
     ),
     (
-        "`experience`, `plot` and `compare` mix movements; recordings do not say where they come from",
+        "`statistics`, `plot` and `compare` mix movements; recordings do not say where they come from",
         &[
             "recordings_say_where_they_come_from_and_no_command_mixes_movements",
             "a_run_by_its_name_in_the_device_is_a_run_of_the_file_that_was_uploaded",

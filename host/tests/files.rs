@@ -87,7 +87,7 @@ fn h14_an_output_that_is_an_input_a_device_or_a_folder_is_refused_even_when_forc
     for (line, code) in [
         ("learn demo.csv --name a -o demo.csv --force".to_owned(), "E232"),
         ("learn demo.csv --name a -o ./demo.csv --force".to_owned(), "E232"),
-        ("experience reach.toml demo.csv -o demo.csv --force".to_owned(), "E232"),
+        ("statistics reach.toml demo.csv -o demo.csv --force".to_owned(), "E232"),
         (format!("{DEVICE} run reach.toml --record reach.toml --force"), "E232"),
         (format!("{DEVICE} record --duration 0.1 -o /dev/null --force"), "E231"),
         (format!("{DEVICE} run reach.toml --bus-log /dev/null --force"), "E231"),
@@ -248,7 +248,7 @@ fn names_that_are_no_unicode_are_written_and_reported() {
     run(&[word("check"), name]).success();
     let figure = OsStr::from_bytes(b"f\xff.svg");
     run(&[word("plot"), word("-p"), name, word("-o"), figure]).success();
-    run(&[word("experience"), name, word("--forget")]).success();
+    run(&[word("statistics"), name, word("--forget")]).success();
     run(&[word("check"), OsStr::from_bytes(b"no\xff")]).failure().code(2);
     run(&[OsStr::from_bytes(b"no\xff")]).failure().code(2);
 }

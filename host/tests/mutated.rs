@@ -169,12 +169,12 @@ fn cli_14_damaged_files_are_refused_or_used_and_nothing_is_replaced() {
         (
             &primitive,
             "bad.toml",
-            &["check bad.toml", "plot -p bad.toml -o new.svg", "experience bad.toml run.csv -o new.toml"],
+            &["check bad.toml", "plot -p bad.toml -o new.svg", "statistics bad.toml run.csv -o new.toml"],
         ),
         (
             &recording,
             "bad.csv",
-            &["compare run.csv bad.csv", "experience reach.toml bad.csv -o new.toml", "plot -r bad.csv -o new.svg"],
+            &["compare run.csv bad.csv", "statistics reach.toml bad.csv -o new.toml", "plot -r bad.csv -o new.svg"],
         ),
         (&primitive, "bad.toml", &["report run.csv -p bad.toml -o new.html"]),
         (&recording, "bad.csv", &["report bad.csv -o new.html", "report run.csv bad.csv -o new.html"]),

@@ -139,8 +139,8 @@ fn recordings_say_where_they_come_from_and_no_command_mixes_movements() {
     assert!(origin.device.is_some_and(|device| device.contains("in-process")) && origin.firmware.is_some());
     let before = std::fs::read(at.join("reach.toml")).unwrap();
     for line in [
-        "experience reach.toml other.csv",
-        "experience reach.toml reach.csv other.csv",
+        "statistics reach.toml other.csv",
+        "statistics reach.toml reach.csv other.csv",
         "compare reach.csv other.csv",
         "plot -p reach.toml -r other.csv -o figure.svg",
     ] {
@@ -155,13 +155,13 @@ fn recordings_say_where_they_come_from_and_no_command_mixes_movements() {
 }
 
 #[test]
-fn experience_leaves_the_movement_what_it_was() {
+fn statistics_leave_the_movement_what_it_was() {
     let folder = learned(3.0, "");
     let at = folder.path();
     tactus(at, &format!("{DEVICE} rehearse reach.toml --trials 3 --record-dir kept")).success();
-    let gather = "experience reach.toml kept/reach-1.csv kept/reach-2.csv kept/reach-3.csv";
+    let gather = "statistics reach.toml kept/reach-1.csv kept/reach-2.csv kept/reach-3.csv";
     tactus(at, gather).success();
-    // The primitive has K2, an expectation and an experience now, and is still the movement of those runs.
+    // The primitive has K2, an expectation and statistics now, and is still the movement of those runs.
     tactus(at, gather).success();
     tactus(at, "plot -p reach.toml -r kept/reach-1.csv -o figure.svg").success();
 }

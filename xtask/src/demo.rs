@@ -76,8 +76,8 @@ const REHEARSE_LARGEST: Step = Step {
 
 /// Records the spread of successful runs, so that the device watches the run.
 const REMEMBER_LARGEST: Step = Step {
-    sentence: "experience: by what the device watches its runs",
-    words: &["experience", LARGEST, "rehearsals/largest-1.csv", "rehearsals/largest-2.csv", "rehearsals/largest-3.csv"],
+    sentence: "statistics: by what the device watches its runs",
+    words: &["statistics", LARGEST, "rehearsals/largest-1.csv", "rehearsals/largest-2.csv", "rehearsals/largest-3.csv"],
 };
 
 /// Prepares the machine, builds, and runs every step; takes no further words.

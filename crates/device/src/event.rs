@@ -38,7 +38,7 @@ pub enum EventKind {
     Surprised {
         /// Progress of the movement, 0 to 1.
         phase: f32,
-        /// The channel of the experience that stands out most.
+        /// The channel of the statistics that stands out most.
         channel: u8,
     },
     /// The hand reached a stage, or was found unfit at the start.

@@ -214,7 +214,7 @@ const PARTS: [Part; 3] = [Part::Start, Part::Goal, Part::StartVelocity];
 /// Codes of the tables beside the primitive itself.
 const DEFECT_FEEDBACK: PrimitiveDefect = PrimitiveDefect::FEEDBACK;
 const DEFECT_EXPECTATION: PrimitiveDefect = PrimitiveDefect::EXPECTATION;
-const DEFECT_EXPERIENCE: PrimitiveDefect = PrimitiveDefect([10, 0]);
+const DEFECT_STATISTICS: PrimitiveDefect = PrimitiveDefect([10, 0]);
 
 /// Code of a value that is larger than anything real; its place is in the detail.
 const TABLE_VALUE: u32 = 13;
@@ -231,8 +231,8 @@ impl PrimitiveDefect {
     }
 
     /// The error of the table of earlier runs as two numbers.
-    pub(crate) fn experience(error: TableError) -> Self {
-        Self::value(error).unwrap_or(DEFECT_EXPERIENCE)
+    pub(crate) fn statistics(error: TableError) -> Self {
+        Self::value(error).unwrap_or(DEFECT_STATISTICS)
     }
 
     fn value(error: TableError) -> Option<Self> {
@@ -392,8 +392,8 @@ impl fmt::Display for PrimitiveDefect {
         match (self.error(), *self) {
             (Some(error), _) => error.fmt(f),
             (None, DEFECT_FEEDBACK) => f.write_str("a gain or clamp of the feedback is negative or too large"),
-            (None, DEFECT_EXPERIENCE) => {
-                f.write_str("a spread of the experience is below 1e-6, or no run is behind it")
+            (None, DEFECT_STATISTICS) => {
+                f.write_str("a spread of the sensor statistics is below 1e-6, or no run is behind it")
             }
             (None, DEFECT_EXPECTATION) => {
                 f.write_str("the recorded duration of the expectation is not positive or too long")

@@ -1,6 +1,6 @@
 //! The primitive of an experiment, made on the spot: taught by the simulated teacher, learned, rehearsed, and with the
-//! experience of runs that succeeded; the same library calls as in `tactus teach`, `learn`, `rehearse` and
-//! `experience`.
+//! statistics of runs that succeeded; the same library calls as in `tactus teach`, `learn`, `rehearse` and
+//! `statistics`.
 
 use std::path::Path;
 
@@ -314,8 +314,8 @@ fn parse(cycles: &[link::Telemetry], name: &str) -> Result<Recording, Preparatio
 /// them: each mode where it has a chance. Arms and places are none of an experiment's trials.
 ///
 /// # Errors
-/// [`PreparationError`]; too few successes leave the primitive without experience, which is no error.
-pub fn experience(
+/// [`PreparationError`]; too few successes leave the primitive without statistics, which is no error.
+pub fn statistics(
     config: &Config,
     interrupt: &Interrupt,
     primitive: &mut PrimitiveFile,
@@ -339,7 +339,7 @@ pub fn experience(
     Ok((recordings.len(), keys.len()))
 }
 
-/// Where and how experience is gathered: `(mode, runs, part of the grid about the goal)`. The less a mode answers to
+/// Where and how statistics are gathered: `(mode, runs, part of the grid about the goal)`. The less a mode answers to
 /// what it feels, the nearer the object must be.
 const PRACTICE: [(Mode, usize, f64); 4] = [
     (Mode::OpenLoop, 20, 0.5),
@@ -347,10 +347,10 @@ const PRACTICE: [(Mode, usize, f64); 4] = [
     (Mode::Adaptive, 20, 1.0),
     (Mode::RigidFingers, 12, 1.0),
 ];
-/// First of the seeds of arms that gather experience; experiments count from 1 to at most 1000.
+/// First of the seeds of arms that gather statistics; experiments count from 1 to at most 1000.
 const PRACTICE_SEED: u64 = 1_000_000;
 
-/// The runs that gather experience: places spread evenly over the extent of a grid (the points of Halton), each with
+/// The runs that gather statistics: places spread evenly over the extent of a grid (the points of Halton), each with
 /// another arm.
 fn practice(grid: &Grid, modes: &[Mode]) -> Vec<Key> {
     let extent = |values: &[i32]| {
@@ -396,7 +396,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn experience_is_gathered_by_arms_of_its_own_all_over_the_grid_and_near_the_goal_without_feedback() {
+    fn statistics_are_gathered_by_arms_of_its_own_all_over_the_grid_and_near_the_goal_without_feedback() {
         let keys = practice(&Grid::paper(), &Mode::PAPER);
         assert_eq!(keys.iter().map(|key| key.seed).collect::<BTreeSet<_>>().len(), keys.len());
         assert!(keys.iter().all(|key| key.seed > 1000));

@@ -7,8 +7,8 @@
 
 use dmp::Scalar;
 use link::image::{
-    COUPLED_ROWS, EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT, EXPERIENCE_ROWS, GAIN_POINTS_LIMIT, IMAGE_SCHEMA,
-    ImageError, KERNEL_LIMIT, MAGIC, SENSOR_ROWS, WEIGHT_ROWS, image_bytes,
+    COUPLED_ROWS, EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_SCHEMA, ImageError, KERNEL_LIMIT, MAGIC,
+    SENSOR_ROWS, STATISTICS_POINTS_LIMIT, STATISTICS_ROWS, WEIGHT_ROWS, image_bytes,
 };
 use link::name::NAME_BYTES;
 use link::{Name, Refusal};
@@ -198,7 +198,7 @@ impl ImageReader {
         if announced != given {
             return Err(ImageError::Length { expected: announced, found: given });
         }
-        let [kernels, k1, k2, expected, experience] = [48, 50, 52, 54, 56].map(|at| usize::from(half(at)));
+        let [kernels, k1, k2, expected, statistics] = [48, 50, 52, 54, 56].map(|at| usize::from(half(at)));
         if !(2..=KERNEL_LIMIT).contains(&kernels) {
             return Err(ImageError::Kernels { found: clip(kernels) });
         }
@@ -208,10 +208,10 @@ impl ImageReader {
         if expected > EXPECTATION_POINTS_LIMIT {
             return Err(ImageError::ExpectationPoints { found: clip(expected) });
         }
-        if experience > EXPERIENCE_POINTS_LIMIT {
-            return Err(ImageError::ExperiencePoints { found: clip(experience) });
+        if statistics > STATISTICS_POINTS_LIMIT {
+            return Err(ImageError::StatisticsPoints { found: clip(statistics) });
         }
-        let whole = image_bytes(kernels, k1, k2, expected, experience);
+        let whole = image_bytes(kernels, k1, k2, expected, statistics);
         if whole != self.length {
             return Err(ImageError::Length { expected: clip(whole), found: given });
         }
@@ -224,8 +224,8 @@ impl ImageReader {
             end += reals;
             end
         });
-        // What follows, spreads and experience, concerns the arm's watch alone.
-        let _ = EXPERIENCE_ROWS;
+        // What follows, spreads and statistics, concern the arm's watch alone.
+        let _ = STATISTICS_ROWS;
         Ok(Header { model: u32::from_le_bytes(word(12)), name, kernels, ends })
     }
 

@@ -8,7 +8,7 @@ use lab::demonstration::{Preparation, Recording};
 use lab::learn::feedback::FeedbackOptions;
 use lab::learn::{LearnError, LearnOptions, Learned, hand::HandMotion, learn};
 use lab::primitive_file::{
-    ExpectationTable, ExperienceTable, FeedbackTables, OrientationError, PrimitiveFile, PrimitiveFileError,
+    ExpectationTable, FeedbackTables, OrientationError, PrimitiveFile, PrimitiveFileError, StatisticsTable,
 };
 
 /// The plan has to end this near to its goal, m: the bound of `tactus check`.
@@ -178,7 +178,7 @@ fn full() -> PrimitiveFile {
         mean: (0..50).map(|point| row(point, 9)).collect(),
         spread: (0..50).map(|point| row(point + 7, 9).iter().map(|value| value.abs()).collect()).collect(),
     });
-    primitive.experience = Some(ExperienceTable {
+    primitive.statistics = Some(StatisticsTable {
         trials: 5,
         mean: (0..64).map(|point| row(point, 12)).collect(),
         spread: (0..64).map(|point| row(point, 12).iter().map(|value| value.abs() + 0.01).collect()).collect(),
@@ -282,18 +282,26 @@ fn the_image_holds_the_same_primitive_in_single_precision() {
     }
     assert_eq!(content.expected_mean.len(), 50 * 9);
     assert_eq!(content.clamps.position, 0.23);
-    assert_eq!((content.experience_trials, content.experience_mean.len()), (5, 64 * 12));
-    let experience = primitive.experience.unwrap();
-    for (index, value) in experience.spread.concat().iter().enumerate() {
-        assert_eq!(content.experience_spread.get(index), Some(*value as f32));
+    assert_eq!((content.statistics_trials, content.statistics_mean.len()), (5, 64 * 12));
+    let statistics = primitive.statistics.unwrap();
+    for (index, value) in statistics.spread.concat().iter().enumerate() {
+        assert_eq!(content.statistics_spread.get(index), Some(*value as f32));
     }
 }
 
 #[test]
-fn an_experience_that_is_changed_cut_or_impossible_is_refused() {
+fn statistics_under_the_name_of_earlier_versions_are_read() {
+    let old = full().to_text().replace("[statistics]", "[experience]");
+    let read = PrimitiveFile::parse(Path::new("reach.toml"), &old).unwrap();
+    assert!(read.statistics.is_some());
+    assert_eq!(read.to_text(), full().to_text());
+}
+
+#[test]
+fn statistics_that_are_changed_cut_or_impossible_are_refused() {
     let text = full().to_text();
     let parse = |text: &str| PrimitiveFile::parse(Path::new("reach.toml"), text);
-    let section = text.find("[experience]").unwrap();
+    let section = text.find("[statistics]").unwrap();
     let (head, tail) = text.split_at(section);
     let changed = format!("{head}{}", tail.replacen("trials = 5", "trials = 6", 1));
     assert!(matches!(parse(&changed).unwrap_err(), PrimitiveFileError::Checksum { .. }));
@@ -302,15 +310,15 @@ fn an_experience_that_is_changed_cut_or_impossible_is_refused() {
     assert!(error.contains("line ") && error.contains("runs"), "{error}");
 
     let mut short = full();
-    short.experience.as_mut().unwrap().spread.pop();
+    short.statistics.as_mut().unwrap().spread.pop();
     let error = PrimitiveFile::parse(Path::new("reach.toml"), &short.to_text()).unwrap_err();
-    assert!(error.to_string().contains("experience.spread"), "{error}");
+    assert!(error.to_string().contains("statistics.spread"), "{error}");
     let mut narrow = full();
-    narrow.experience.as_mut().unwrap().mean[3].pop();
+    narrow.statistics.as_mut().unwrap().mean[3].pop();
     let error = PrimitiveFile::parse(Path::new("reach.toml"), &narrow.to_text()).unwrap_err();
-    assert!(error.to_string().contains("experience.mean"), "{error}");
+    assert!(error.to_string().contains("statistics.mean"), "{error}");
     let mut certain = full();
-    certain.experience.as_mut().unwrap().spread[10][2] = 0.0;
+    certain.statistics.as_mut().unwrap().spread[10][2] = 0.0;
     let error = certain.to_primitive().unwrap_err();
     assert!(error.to_string().contains("a spread is not at least 1e-6"), "{error}");
 }

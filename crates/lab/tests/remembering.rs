@@ -1,4 +1,4 @@
-//! Remembering: recordings of rehearsals become an expectation and weights, recordings of successes an experience.
+//! Remembering: recordings of rehearsals become an expectation and weights, recordings of successes become statistics.
 
 mod common;
 
@@ -79,25 +79,25 @@ fn rehearsals_become_an_expectation_by_phase_with_its_marks() {
 }
 
 #[test]
-fn successes_become_an_experience_that_ends_with_the_next_rehearsal() {
+fn successes_become_statistics_that_end_with_the_next_rehearsal() {
     let mut file = primitive();
     let runs: Vec<_> =
         [-0.6, 0.0, 0.6].map(|offset| recording(&rows(file.movement.alpha, |u| 2.0 * u + offset))).to_vec();
     let summary = remember_successes(&mut file, &runs).unwrap();
     assert!((summary.duration_s - DURATION).abs() < 0.01, "{}", summary.duration_s);
-    let experience = file.experience.as_ref().unwrap();
-    assert_eq!((experience.trials, experience.mean.len()), (3, 64));
+    let statistics = file.statistics.as_ref().unwrap();
+    assert_eq!((statistics.trials, statistics.mean.len()), (3, 64));
     // A third of the others' band is what each outer run is beyond it: that fits in the room that is left.
-    assert!((experience.mean[30][0] - 2.0 * 30.0 / 63.0).abs() < 0.02, "{:?}", experience.mean[30]);
-    assert_eq!((experience.spread[30][0], experience.spread[30][4]), (0.5, 0.06));
-    let finger = experience.mean[32][9];
+    assert!((statistics.mean[30][0] - 2.0 * 30.0 / 63.0).abs() < 0.02, "{:?}", statistics.mean[30]);
+    assert_eq!((statistics.spread[30][0], statistics.spread[30][4]), (0.5, 0.06));
+    let finger = statistics.mean[32][9];
     assert!((finger - 32.0 / 63.0).abs() < 0.01, "{finger}");
     assert!(file.to_image().is_ok());
     remember_rehearsals(&mut file, &runs, DURATION, Payload::default(), true).unwrap();
-    assert!(file.experience.is_none());
+    assert!(file.statistics.is_none());
 }
 
-/// The largest statistic of the device's watch over a recording, judged by the experience of a primitive.
+/// The largest statistic of the device's watch over a recording, judged by the statistics of a primitive.
 fn watched(file: &PrimitiveFile, recording: &Recording) -> f64 {
     let primitive = file.to_primitive().unwrap();
     let mut watch = control::guard::Watch::<f64>::new();

@@ -317,7 +317,7 @@ pub enum EventKind {
     CommandRefused,
     /// The bus start-up cannot go on: `code` and `detail` as `Status::blocked`.
     Blocked,
-    /// The run no longer goes as the successful ones before it: `code` is the channel of the experience, `detail` how
+    /// The run no longer goes as the successful ones before it: `code` is the channel of the statistics, `detail` how
     /// far the movement has come, 0 to 1000.
     Surprise,
     /// The hand reached a stage: `code` is [`HandStage`]. `detail`: the CAN node that caused it in the low 8 bits and

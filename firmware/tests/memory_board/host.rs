@@ -337,9 +337,9 @@ pub(crate) fn image(name: &str) -> Vec<u8> {
         k2: &[],
         weights: &weights,
         expected_mean: &[],
-        experience_trials: 0,
-        experience_mean: &[],
-        experience_spread: &[],
+        statistics_trials: 0,
+        statistics_mean: &[],
+        statistics_spread: &[],
     };
     // The same rotation has two signs; a demonstration would have kept the one of its start.
     let dot: f32 = content.start.orientation.iter().zip(content.goal.orientation).map(|(a, b)| a * b).sum();

@@ -34,11 +34,11 @@ pub(super) const REHEARSE: &str = "\
 Examples:
   tactus --device sil: rehearse grasp.toml
   tactus --device sil: rehearse grasp.toml --trials 5 --record-dir rehearsals --output rehearsed.toml";
-/// `experience`
-pub(super) const EXPERIENCE: &str = "\
+/// `statistics`
+pub(super) const STATISTICS: &str = "\
 Examples:
-  tactus experience grasp.toml run-1.csv run-2.csv run-3.csv
-  tactus experience grasp.toml --forget";
+  tactus statistics grasp.toml run-1.csv run-2.csv run-3.csv
+  tactus statistics grasp.toml --forget";
 /// `check`
 pub(super) const CHECK: &str = "\
 Examples:

@@ -82,7 +82,7 @@ fn object_kinds() -> impl TypedValueParser<Value = ObjectKind> {
     PossibleValuesParser::new(ObjectKind::ALL.map(value)).try_map(|name| name.parse::<ObjectKind>())
 }
 
-/// Largest number of an arm or a person; those that gather experience have numbers above.
+/// Largest number of an arm or a person; those that gather statistics have numbers above.
 const LARGEST_NUMBER: u64 = 1000;
 
 /// Numbers of arms or persons: `N` for 1 to N, or `FROM:TO`.
@@ -366,11 +366,11 @@ mod work {
             spinner.set_message(doing.to_owned());
         })
         .and_then(|mut primitive| {
-            // Whatever becomes of the experience, the primitive is worth keeping.
+            // Whatever becomes of the statistics, the primitive is worth keeping.
             primitive.write(&file)?;
             spinner.set_message("recording successful runs");
             let config = Config { plant: command.plant, ..Config::new(command.scenario, primitive.clone()) };
-            let (held, of) = preparation::experience(&config, interrupt, &mut primitive)?;
+            let (held, of) = preparation::statistics(&config, interrupt, &mut primitive)?;
             output.say(format!("{held} of {of} runs succeeded; what is usual was learned from them"));
             primitive.write(&file)?;
             Ok(primitive)

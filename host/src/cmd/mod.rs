@@ -11,7 +11,6 @@ mod connection;
 pub mod delete;
 pub mod doctor;
 mod examples;
-pub mod experience;
 pub mod experiment;
 pub mod explain;
 pub mod export;
@@ -38,6 +37,7 @@ mod run_folder;
 pub mod run_report;
 pub mod settings;
 pub mod sim;
+pub mod statistics;
 pub mod status;
 pub mod stop;
 pub mod teach;
@@ -156,8 +156,8 @@ pub enum Command {
     #[command(after_help = examples::REHEARSE)]
     Rehearse(rehearse::Cmd),
     /// Learn the usual forces of successful runs, so that the device notices an unusual one
-    #[command(name = "experience", after_help = examples::EXPERIENCE)]
-    Statistics(experience::Cmd),
+    #[command(alias = "experience", after_help = examples::STATISTICS)]
+    Statistics(statistics::Cmd),
     /// Validate a primitive before it moves an arm
     #[command(after_help = examples::CHECK)]
     Check(check::Cmd),
@@ -294,7 +294,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Learn(command) => learn::run(&command, &global),
         Command::Check(command) => check::run(&command, &global),
         Command::Rehearse(command) => rehearse::run(&command, &global),
-        Command::Statistics(command) => experience::run(&command, &global),
+        Command::Statistics(command) => statistics::run(&command, &global),
         Command::Hand(command) => hand::run(&command, &global),
         Command::Flash(command) => flash::run(&command, &global),
         Command::Logs(command) => logs::run(&command, &global),

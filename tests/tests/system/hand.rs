@@ -76,14 +76,14 @@ fn image() -> Vec<u8> {
             trials: 5.0,
             ..ExpectationMarks::default()
         },
-        experience_trials: 0,
+        statistics_trials: 0,
         kernels: KERNELS,
         k1: &k1[..],
         k2: &k2[..],
         weights: &weights[..],
         expected_mean: &expected[..],
-        experience_mean: &[][..],
-        experience_spread: &[][..],
+        statistics_mean: &[][..],
+        statistics_spread: &[][..],
     };
     let mut bytes = vec![0; 30_000];
     let length = expect(content.encode(&name(), &mut bytes));

@@ -103,7 +103,7 @@ fn real_outputs_and_failures_are_valid_by_their_schemas() {
     ask("plot", "plot -r run.csv -p reach.toml -o figure.svg", &["--json"]);
     ask("report", "report run.csv -p reach.toml -o page.html", &["--json"]);
     ask("learn", "learn demo.csv --name a -o a.toml", &["--json"]);
-    ask("experience", "experience reach.toml --forget -o forgotten.toml", &["--json"]);
+    ask("statistics", "statistics reach.toml --forget -o forgotten.toml", &["--json"]);
     let alone = ["--json", "--device", "sil:world=simple", "--non-interactive"];
     ask("rehearse", "rehearse reach.toml --trials 2 -o rehearsed.toml", &alone);
     ask("teach", "teach --duration 1 -o still.csv", &alone);

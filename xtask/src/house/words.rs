@@ -83,6 +83,10 @@ const OLD: &[Old] = &[
     (Name, "PrimitiveTrouble", "PrimitiveDefect", &[]),
     // The primitive.
     (Name, "Experience", "SensorStatistics", PRIMITIVE),
+    (Name, "ExperienceTable", "StatisticsTable", &[]),
+    (Phrase, "an experience", "statistics", &[]),
+    (Phrase, "the experience", "the statistics", &[]),
+    (Phrase, "tactus experience", "tactus statistics", &[]),
     (Name, "Chart", "log-map coordinates", PRIMITIVE),
     (Name, "Row", "Group", PRIMITIVE),
     (Name, "Marks", "Metadata", &[]),

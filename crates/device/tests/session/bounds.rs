@@ -33,7 +33,7 @@ fn full() -> Vec<u8> {
             spread_floor: 0.05,
         };
         (content.k1, content.k2, content.expected_mean) = (&[4.0; 10], &[1.0; 9], &[0.0; 2 * 9]);
-        (content.experience_trials, content.experience_mean, content.experience_spread) =
+        (content.statistics_trials, content.statistics_mean, content.statistics_spread) =
             (3, &[0.1; 2 * 12], &[0.5; 2 * 12]);
     })
 }

@@ -184,11 +184,11 @@ fn a_primitive_outside_the_limits_of_the_arm_is_refused_in_words() {
         content.marks.filter_cutoff = 15.0;
     };
     assert!(words(expectation).contains("expectation"), "recorded in no time");
-    let experience = |content: &mut link::image::ImageContent<&[f32]>| {
-        (content.experience_mean, content.experience_spread, content.experience_trials) = (&TWELVE, &TWELVE, 0);
+    let statistics = |content: &mut link::image::ImageContent<&[f32]>| {
+        (content.statistics_mean, content.statistics_spread, content.statistics_trials) = (&TWELVE, &TWELVE, 0);
         content.marks.filter_cutoff = 15.0;
     };
-    assert!(words(experience).contains("experience"), "no run behind it");
+    assert!(words(statistics).contains("statistics"), "no run behind it");
 }
 
 /// Values that no robot needs, each told by its place.
@@ -247,7 +247,7 @@ fn a_primitive_beyond_all_bounds_is_refused_with_the_value_that_is() {
     };
     assert_eq!(
         words(|content| {
-            (content.experience_mean, content.experience_spread, content.experience_trials) = (&KNOWN, &TWELVE, 3);
+            (content.statistics_mean, content.statistics_spread, content.statistics_trials) = (&KNOWN, &TWELVE, 3);
             content.marks.filter_cutoff = 15.0;
         }),
         "the mean of the statistics at point 0, column 11 (from 0) is larger than anything real"
@@ -300,11 +300,11 @@ fn an_expectation_recorded_through_another_filter_is_refused_with_both() {
 }
 
 #[test]
-fn expectation_and_experience_reach_the_control_half() {
+fn expectation_and_statistics_reach_the_control_half() {
     let mut rig = Rig::greeted();
     let whole = |content: &mut link::image::ImageContent<&[f32]>| {
         content.expected_mean = &NINE;
-        (content.experience_mean, content.experience_spread, content.experience_trials) = (&TWELVE, &TWELVE, 5);
+        (content.statistics_mean, content.statistics_spread, content.statistics_trials) = (&TWELVE, &TWELVE, 5);
         content.marks.recorded_duration = 3.0;
         content.marks.filter_cutoff = control::sense::wrench::WRENCH_CUT_OFF as f32;
     };

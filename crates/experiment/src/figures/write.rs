@@ -140,9 +140,9 @@ pub fn write_lift(rows: &[Carried], trials: usize, folder: &Path) -> Result<(), 
     Ok(())
 }
 
-/// The primitive's expectation over time: the experience of successful runs if there is one, else the rehearsals.
+/// The primitive's expectation over time: the statistics of successful runs if there are any, else the rehearsals.
 fn expected(primitive: &PrimitiveFile) -> Option<Expected> {
-    let (mean, spread) = match (&primitive.expectation, &primitive.experience) {
+    let (mean, spread) = match (&primitive.expectation, &primitive.statistics) {
         (Some(table), _) => (&table.mean, &table.spread),
         (None, Some(table)) => (&table.mean, &table.spread),
         (None, None) => return None,

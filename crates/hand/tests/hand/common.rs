@@ -111,14 +111,14 @@ impl Movement {
                 trials: 5.0,
                 ..ExpectationMarks::default()
             },
-            experience_trials: 0,
+            statistics_trials: 0,
             kernels: self.kernels,
             k1: k1.as_slice(),
             k2: k2.as_slice(),
             weights: weights.as_slice(),
             expected_mean: expected_mean.as_slice(),
-            experience_mean: &[][..],
-            experience_spread: &[][..],
+            statistics_mean: &[][..],
+            statistics_spread: &[][..],
         };
         let mut bytes = vec![0; 30_000];
         let length = content.encode(&Name::new(name).expect("a name"), &mut bytes).expect("an image");

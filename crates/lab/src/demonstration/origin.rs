@@ -8,7 +8,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 pub struct Played {
     /// Name of the primitive.
     pub name: String,
-    /// Check sum of its movement alone: an expectation or experience that is added later does not change it.
+    /// Check sum of its movement alone: an expectation or statistics added later do not change it.
     pub movement: u32,
 }
 

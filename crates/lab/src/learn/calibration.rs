@@ -1,4 +1,4 @@
-//! The width of an experience's band: the device's own watch goes over the runs that it was made from.
+//! The width of the statistics' band: the device's own watch goes over the runs that it was made from.
 
 use control::guard::Watch;
 use control::guard::watch::{FIRST_FINGER, LIMIT};
@@ -11,11 +11,11 @@ use dmp::fit::{FEWEST_TRIALS, sensor_statistics};
 use crate::plan;
 use crate::primitive_file::PrimitiveFile;
 
-/// Share of the limit of the watch that a success may use, judged by the experience of the others. Half, because twenty
+/// Share of the limit of the watch that a success may use, judged by the statistics of the others. Half, because twenty
 /// or thirty runs do not hold the most unusual success.
 const ROOM: f64 = 0.5;
 
-/// Parts into which the runs are divided; each is judged by an experience of the others.
+/// Parts into which the runs are divided; each is judged by statistics of the others.
 const PARTS: usize = 6;
 
 /// An empty hand counts as told from a success by a finger if it goes this many times as far as the farthest success.
@@ -27,18 +27,18 @@ const CLOSED: usize = 90;
 /// The samples of a run: progress and channels.
 pub(super) type Run = Vec<(f64, [f64; STATISTICS_CHANNELS])>;
 
-/// An experience whose spreads leave successful runs room, and what it is worth.
+/// Statistics whose spreads leave successful runs room, and what they are worth.
 #[derive(Debug, Clone)]
 pub(super) struct Calibrated {
-    /// The experience.
-    pub(super) experience: SensorStatistics<f64>,
+    /// The statistics.
+    pub(super) statistics: SensorStatistics<f64>,
     /// Statistic of a hand that closes on nothing, as a share of the watch's limit: above 1 it is reported.
     pub(super) empty_hand: f64,
 }
 
-/// The experience of `runs`, with the spread of each channel multiplied by one factor:
+/// The statistics of `runs`, with the spread of each channel multiplied by one factor:
 ///
-/// - the farthest success, judged by the experience of the others, comes to half the limit ([`ROOM`]);
+/// - the farthest success, judged by the statistics of the others, comes to half the limit ([`ROOM`]);
 /// - where a finger that closes on nothing goes clearly farther than that, the limit lies halfway (geometrically)
 ///   between the two. How an empty hand closes is known without trying it: as planned.
 ///
@@ -80,12 +80,12 @@ pub(super) fn calibrated(
         .iter()
         .map(|point| std::array::from_fn(|channel| point[channel] * factors[channel]))
         .collect();
-    let experience = SensorStatistics::new(gathered.mean(), &spread, gathered.trials())?;
-    let empty_hand = reach(&experience, &empty).into_iter().fold(0.0, f64::max) / LIMIT;
-    Ok(Calibrated { experience, empty_hand })
+    let statistics = SensorStatistics::new(gathered.mean(), &spread, gathered.trials())?;
+    let empty_hand = reach(&statistics, &empty).into_iter().fold(0.0, f64::max) / LIMIT;
+    Ok(Calibrated { statistics, empty_hand })
 }
 
-/// The farthest that the watch finds a run away from an experience, channel by channel (spreads).
+/// The farthest that the watch finds a run away from the statistics, channel by channel (spreads).
 fn reach(known: &SensorStatistics<f64>, run: &[(f64, [f64; STATISTICS_CHANNELS])]) -> [f64; STATISTICS_CHANNELS] {
     let mut watch = Watch::new();
     let mut farthest = [0.0; STATISTICS_CHANNELS];

@@ -69,7 +69,7 @@ pub(super) fn fit(
         },
         feedback: None,
         expectation: None,
-        experience: None,
+        statistics: None,
         provenance: None,
     })
 }

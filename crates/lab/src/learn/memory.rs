@@ -1,5 +1,5 @@
 //! From recordings of runs to what a primitive remembers of them: the expectation (and the weights K2) from rehearsals,
-//! the experience from runs that succeeded.
+//! the statistics from runs that succeeded.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use thiserror::Error;
 
 use super::calibration::calibrated;
 use crate::demonstration::{Played, Recording};
-use crate::primitive_file::{ExpectationTable, ExperienceTable, PrimitiveFile};
+use crate::primitive_file::{ExpectationTable, PrimitiveFile, StatisticsTable};
 
 /// Points of the weights K2: coarse, because the spread of a few runs is itself uncertain.
 const WEIGHT_POINTS: usize = 16;
@@ -29,10 +29,10 @@ const RESOLUTION: [f64; SENSORS] = {
     [f, f, f, n, n, n, 0.05, 0.05, 0.05]
 };
 
-/// Smallest spread of the channels of an experience: what objects and grasps that are all good differ by, however alike
+/// Smallest spread of each channel: what objects and grasps that are all good differ by, however alike
 /// the gathered runs were. Force 0.5 N, torque 0.06 N m (that force at the distance of the fingers), gauges 0.15 N m (a
 /// finger that happens to carry the object alone), fingers 0.025 rad.
-const EXPERIENCE_FLOOR: [f64; STATISTICS_CHANNELS] =
+const STATISTICS_FLOOR: [f64; STATISTICS_CHANNELS] =
     [0.5, 0.5, 0.5, 0.06, 0.06, 0.06, 0.15, 0.15, 0.15, 0.025, 0.025, 0.025];
 
 /// A recording must cover the movement from this progress at the latest to one minus this at the earliest.
@@ -136,14 +136,14 @@ pub struct MemorySummary {
     pub extremes: Vec<f64>,
     /// Root mean square spread of each channel over the phase.
     pub spread: Vec<f64>,
-    /// Of an experience: how far a hand that closes on nothing goes, as a share of the watch's limit; above 1 it is
+    /// Of the statistics: how far a hand that closes on nothing goes, as a share of the watch's limit; above 1 it is
     /// told.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub empty_hand: Option<f64>,
 }
 
 /// Puts the expectation of these rehearsals into a primitive, and K2 if there are enough of them and `weigh`. The
-/// experience of earlier runs is dropped: it was gathered with another expectation.
+/// statistics of earlier runs are dropped: they were gathered with another expectation.
 ///
 /// `duration` is that of the runs, s.
 ///
@@ -182,11 +182,11 @@ pub fn remember_rehearsals(
         mean: rows(&statistics.mean),
         spread: rows(&statistics.spread),
     });
-    primitive.experience = None;
+    primitive.statistics = None;
     Ok(summary(trials, duration, &statistics.mean, &statistics.spread))
 }
 
-/// Puts the experience of these successful runs into a primitive; they must have been made at one speed. The more they
+/// Puts the statistics of these successful runs into a primitive; they must have been made at one speed. The more they
 /// differ (in place of the object, arm and mode), the less will be told of a run that is only unusual.
 ///
 /// # Errors
@@ -198,11 +198,11 @@ pub fn remember_successes(
     let first = recordings.first().ok_or(MemoryError::None)?;
     let (_, duration) = progress(first, primitive.movement.alpha)?;
     let runs = runs::<STATISTICS_CHANNELS>(primitive, recordings, duration, channels)?;
-    let calibrated = calibrated(primitive, &runs, &EXPERIENCE_FLOOR)?;
-    let gathered = &calibrated.experience;
+    let calibrated = calibrated(primitive, &runs, &STATISTICS_FLOOR)?;
+    let gathered = &calibrated.statistics;
     let trials = u32::from(gathered.trials());
-    primitive.experience =
-        Some(ExperienceTable { trials, mean: rows(gathered.mean()), spread: rows(gathered.spread()) });
+    primitive.statistics =
+        Some(StatisticsTable { trials, mean: rows(gathered.mean()), spread: rows(gathered.spread()) });
     let empty_hand = Some(calibrated.empty_hand);
     Ok(MemorySummary { empty_hand, ..summary(trials, duration, gathered.mean(), gathered.spread()) })
 }
@@ -278,7 +278,7 @@ fn sensors(recording: &Recording) -> Result<Vec<[f64; SENSORS]>, MemoryError> {
         .collect())
 }
 
-/// The channels of an experience: the sensors, then the fingers.
+/// The channels of the statistics: the sensors, then the fingers.
 fn channels(recording: &Recording) -> Result<Vec<[f64; STATISTICS_CHANNELS]>, MemoryError> {
     let hand = recording.hand.as_ref().ok_or_else(|| columns(recording, "spread_rad to finger3_rad"))?;
     let sensors = sensors(recording)?;

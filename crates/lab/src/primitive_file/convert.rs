@@ -50,15 +50,15 @@ impl PrimitiveFile {
             bounds::check_marks(mass, &centre, table.trials as f32, table.spread_floor as f32)
                 .map_err(|quantity| refused(quantity.to_string()))?;
         }
-        let experience = self
-            .experience
+        let statistics = self
+            .statistics
             .as_ref()
             .map(|table| {
                 let trials = u16::try_from(table.trials).unwrap_or(u16::MAX);
                 SensorStatistics::new(&points(&table.mean), &points(&table.spread), trials)
             })
             .transpose()
-            .map_err(|error| refused(format!("experience: {error}")))?;
+            .map_err(|error| refused(format!("statistics: {error}")))?;
         let tables = MovementTables {
             control_period: control::PERIOD,
             duration: movement.duration,
@@ -80,7 +80,7 @@ impl PrimitiveFile {
             Primitive::new(&tables).map_err(|error| refused(LoadError::Primitive(error).to_string()))?;
         primitive.set_feedback(feedback.as_ref());
         primitive.set_expected(expected.as_ref());
-        primitive.set_statistics(experience.as_ref());
+        primitive.set_statistics(statistics.as_ref());
         Ok(primitive)
     }
 
@@ -95,7 +95,7 @@ impl PrimitiveFile {
             rows.into_iter().flatten().map(|value| *value as f32).collect()
         }
         let (movement, feedback) = (&self.movement, self.feedback.as_ref());
-        let (expectation, experience) = (self.expectation.as_ref(), self.experience.as_ref());
+        let (expectation, statistics) = (self.expectation.as_ref(), self.statistics.as_ref());
         let content = ImageContent::<&[f32]> {
             model_hash: self.model_hash,
             duration: movement.duration as f32,
@@ -126,9 +126,9 @@ impl PrimitiveFile {
             k2: &single(feedback.iter().flat_map(|tables| &tables.k2)),
             weights: &single(self.weights.rows()),
             expected_mean: &single(expectation.iter().flat_map(|table| &table.mean)),
-            experience_trials: experience.map_or(0, |table| u16::try_from(table.trials).unwrap_or(u16::MAX)),
-            experience_mean: &single(experience.iter().flat_map(|table| &table.mean)),
-            experience_spread: &single(experience.iter().flat_map(|table| &table.spread)),
+            statistics_trials: statistics.map_or(0, |table| u16::try_from(table.trials).unwrap_or(u16::MAX)),
+            statistics_mean: &single(statistics.iter().flat_map(|table| &table.mean)),
+            statistics_spread: &single(statistics.iter().flat_map(|table| &table.spread)),
         };
         let name = link::Name::new(&self.name).map_err(|_| refused(link::ImageError::Name))?;
         let mut bytes = vec![0; IMAGE_BYTES_LIMIT];

@@ -144,7 +144,7 @@ pub struct ExpectationTable {
 /// Sensor values and finger angles of successful runs, by phase: the device watches a run by them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ExperienceTable {
+pub struct StatisticsTable {
     /// Successful runs it was made from.
     pub trials: u32,
     /// Mean by phase, 12 channels a point: the 9 sensor rows of the expectation, then fingers F1 to F3, rad.
@@ -217,8 +217,9 @@ pub struct PrimitiveFile {
     pub feedback: Option<FeedbackTables>,
     /// Expected sensor values, if they were recorded.
     pub expectation: Option<ExpectationTable>,
-    /// Sensor values of successful runs, if any were gathered.
-    pub experience: Option<ExperienceTable>,
+    /// Sensor values of successful runs, if any were gathered; `experience` in files of earlier versions.
+    #[serde(alias = "experience")]
+    pub statistics: Option<StatisticsTable>,
     /// Where it comes from.
     pub provenance: Option<Provenance>,
 }
@@ -313,9 +314,9 @@ impl PrimitiveFile {
         Ok(())
     }
 
-    /// The movement alone, as it can be rehearsed: without expectation and experience.
+    /// The movement alone, as it can be rehearsed: without expectation and statistics.
     pub fn without_memory(&self) -> PrimitiveFile {
-        PrimitiveFile { expectation: None, experience: None, ..self.clone() }
+        PrimitiveFile { expectation: None, statistics: None, ..self.clone() }
     }
 
     /// Check sum of the movement alone: what is remembered of it, and the weights that follow from that, do not change
@@ -389,10 +390,10 @@ impl PrimitiveFile {
             tables.push(("expectation.mean".into(), expectation.mean.concat()));
             tables.push(("expectation.spread".into(), expectation.spread.concat()));
         }
-        if let Some(experience) = &self.experience {
-            tables.push(("experience".into(), vec![f64::from(experience.trials)]));
-            tables.push(("experience.mean".into(), experience.mean.concat()));
-            tables.push(("experience.spread".into(), experience.spread.concat()));
+        if let Some(statistics) = &self.statistics {
+            tables.push(("statistics".into(), vec![f64::from(statistics.trials)]));
+            tables.push(("statistics.mean".into(), statistics.mean.concat()));
+            tables.push(("statistics.spread".into(), statistics.spread.concat()));
         }
         tables
     }
@@ -430,10 +431,10 @@ impl PrimitiveFile {
             columns("expectation.mean", &expectation.mean, link::image::SENSOR_ROWS)?;
             columns("expectation.spread", &expectation.spread, link::image::SENSOR_ROWS)?;
         }
-        if let Some(experience) = &self.experience {
-            shape("experience.spread", experience.spread.len(), experience.mean.len())?;
-            columns("experience.mean", &experience.mean, link::image::EXPERIENCE_ROWS)?;
-            columns("experience.spread", &experience.spread, link::image::EXPERIENCE_ROWS)?;
+        if let Some(statistics) = &self.statistics {
+            shape("statistics.spread", statistics.spread.len(), statistics.mean.len())?;
+            columns("statistics.mean", &statistics.mean, link::image::STATISTICS_ROWS)?;
+            columns("statistics.spread", &statistics.spread, link::image::STATISTICS_ROWS)?;
         }
         Ok(())
     }

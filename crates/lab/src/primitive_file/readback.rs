@@ -4,11 +4,11 @@ use std::path::Path;
 
 use dmp::Gain;
 use link::PrimitiveImage;
-use link::image::{COUPLED_ROWS, EXPERIENCE_ROWS, Reals, SENSOR_ROWS};
+use link::image::{COUPLED_ROWS, Reals, SENSOR_ROWS, STATISTICS_ROWS};
 use serde::de::IgnoredAny;
 
 use super::{
-    ExpectationTable, ExperienceTable, FeedbackTables, GROUPS, Groups, MovementSection, PrimitiveFile, Waypoint,
+    ExpectationTable, FeedbackTables, GROUPS, Groups, MovementSection, PrimitiveFile, StatisticsTable, Waypoint,
     WaypointVelocity,
 };
 
@@ -74,10 +74,10 @@ impl PrimitiveFile {
                 mean: table(&content.expected_mean, SENSOR_ROWS),
                 spread: Vec::new(),
             }),
-            experience: image.has_experience().then(|| ExperienceTable {
-                trials: content.experience_trials.into(),
-                mean: table(&content.experience_mean, EXPERIENCE_ROWS),
-                spread: table(&content.experience_spread, EXPERIENCE_ROWS),
+            statistics: image.has_statistics().then(|| StatisticsTable {
+                trials: content.statistics_trials.into(),
+                mean: table(&content.statistics_mean, STATISTICS_ROWS),
+                spread: table(&content.statistics_spread, STATISTICS_ROWS),
             }),
             provenance: None,
         }

@@ -26,7 +26,7 @@ const COMMENTS: [(&str, &str); 12] = [
     ("[weights]", "theta of Eq (2), one row a degree of freedom: position m, orientation (body) and joints rad"),
     ("[feedback]", "Eq (8), by phase: first point at the start, last at the end of the movement"),
     ("[expectation]", "wrench of the environment on the robot by phase: force N (world), torque N m, gauges N m"),
-    ("[experience]", "of successful runs, by phase: the rows of the expectation, then fingers F1 to F3 rad"),
+    ("[statistics]", "of successful runs, by phase: the rows of the expectation, then fingers F1 to F3 rad"),
     ("[provenance]", "where it comes from; errors are [maximum, RMS] of the reproduction"),
     ("spread_floor = ", "relative spread below which no sensor is trusted more"),
 ];

@@ -119,7 +119,7 @@ pub struct Surprise {
     pub channel: &'static str,
 }
 
-/// Names of the channels that an experience compares.
+/// Names of the channels that the statistics compare.
 pub const CHANNELS: [&str; control::plan::primitive::STATISTICS_CHANNELS] = [
     "force x",
     "force y",

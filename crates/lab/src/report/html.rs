@@ -50,8 +50,8 @@ fn asked(runs: &[ReportedRun], primitive: Option<&PrimitiveFile>) -> String {
                 .as_ref()
                 .map(|table| format!("{} run(s) of {:.2} s", table.trials, table.recorded_duration));
             rows.push(("expectation", rehearsed.unwrap_or_else(|| "none: never rehearsed".to_owned())));
-            let experience = file.experience.as_ref().map(|table| format!("{} successful run(s)", table.trials));
-            rows.push(("experience", experience.unwrap_or_else(|| "none".to_owned())));
+            let statistics = file.statistics.as_ref().map(|table| format!("{} successful run(s)", table.trials));
+            rows.push(("statistics", statistics.unwrap_or_else(|| "none".to_owned())));
         }
     }
     for run in runs {

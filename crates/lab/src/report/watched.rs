@@ -27,7 +27,7 @@ impl Departure {
     }
 }
 
-/// The channels that leave their band, in their order. None where the primitive has no experience, or the recording
+/// The channels that leave their band, in their order. None where the primitive has no statistics, or the recording
 /// lacks what is compared.
 pub(super) fn departures(running: &Recording, progress: &[f64], primitive: &PrimitiveFile) -> Vec<Departure> {
     let known = primitive.to_primitive().ok();

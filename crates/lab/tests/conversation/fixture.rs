@@ -237,9 +237,9 @@ pub(crate) fn image(name: &str, duration: f32) -> Vec<u8> {
         k2: &[],
         weights: &[0.0; 17 * 20],
         expected_mean: &[],
-        experience_trials: 0,
-        experience_mean: &[],
-        experience_spread: &[],
+        statistics_trials: 0,
+        statistics_mean: &[],
+        statistics_spread: &[],
     };
     let mut bytes = vec![0; 4096];
     let length = content.encode(&Name::new(name).unwrap(), &mut bytes).unwrap();

@@ -123,8 +123,8 @@ pub struct ImageContent<F> {
     pub clamps: FeedbackClamps,
     /// Circumstances in which the expectation was recorded; all zero without one.
     pub marks: ExpectationMarks,
-    /// Successful runs behind the experience; 0 without one.
-    pub experience_trials: u16,
+    /// Successful runs behind the statistics; 0 without one.
+    pub statistics_trials: u16,
     /// Kernels of each row.
     pub kernels: usize,
     /// K1 of Eq (8) by phase: points x [`COUPLED_ROWS`](super::COUPLED_ROWS), point after point, first at the start.
@@ -137,9 +137,9 @@ pub struct ImageContent<F> {
     /// Expected sensor values by phase: points x [`SENSOR_ROWS`](super::SENSOR_ROWS), environment on robot. Force N in
     /// world axes, torque N m in hand axes at the grasp point, fingers N m. May be empty.
     pub expected_mean: F,
-    /// Sensor statistics of successful runs, by phase: points x [`EXPERIENCE_ROWS`](super::EXPERIENCE_ROWS): the sensor
+    /// Sensor statistics of successful runs, by phase: points x [`STATISTICS_ROWS`](super::STATISTICS_ROWS): the sensor
     /// values as in `expected_mean`, then the angles of fingers F1 to F3, rad. May be empty.
-    pub experience_mean: F,
+    pub statistics_mean: F,
     /// Their standard deviations, same shape.
-    pub experience_spread: F,
+    pub statistics_spread: F,
 }

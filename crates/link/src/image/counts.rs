@@ -1,7 +1,7 @@
 //! The numbers that fix the length of an image, and their limits.
 
 use super::error::ImageError;
-use super::layout::{EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT, GAIN_POINTS_LIMIT, KERNEL_LIMIT, image_bytes};
+use super::layout::{EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, KERNEL_LIMIT, STATISTICS_POINTS_LIMIT, image_bytes};
 
 /// The five numbers that fix the length of an image.
 #[derive(Clone, Copy)]
@@ -10,7 +10,7 @@ pub(super) struct Counts {
     pub(super) k1_points: usize,
     pub(super) k2_points: usize,
     pub(super) expectation_points: usize,
-    pub(super) experience_points: usize,
+    pub(super) statistics_points: usize,
 }
 
 impl Counts {
@@ -25,14 +25,14 @@ impl Counts {
         if self.expectation_points > EXPECTATION_POINTS_LIMIT {
             return Err(ImageError::ExpectationPoints { found: clip(self.expectation_points) });
         }
-        if self.experience_points > EXPERIENCE_POINTS_LIMIT {
-            return Err(ImageError::ExperiencePoints { found: clip(self.experience_points) });
+        if self.statistics_points > STATISTICS_POINTS_LIMIT {
+            return Err(ImageError::StatisticsPoints { found: clip(self.statistics_points) });
         }
         Ok(())
     }
 
     pub(super) const fn bytes(self) -> usize {
-        image_bytes(self.kernels, self.k1_points, self.k2_points, self.expectation_points, self.experience_points)
+        image_bytes(self.kernels, self.k1_points, self.k2_points, self.expectation_points, self.statistics_points)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::layout::{EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_SCHEMA, KERNEL_LIMIT};
+use super::layout::{EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_SCHEMA, KERNEL_LIMIT, STATISTICS_POINTS_LIMIT};
 
 /// Why bytes are not an image, or a content cannot become one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,8 +62,8 @@ pub enum ImageError {
     },
     /// A table to be written does not have the shape its counts ask for, or the buffer is too small.
     Shape,
-    /// More than [`EXPERIENCE_POINTS_LIMIT`] points.
-    ExperiencePoints {
+    /// More than [`STATISTICS_POINTS_LIMIT`] points.
+    StatisticsPoints {
         /// Their number.
         found: u32,
     },
@@ -86,7 +86,7 @@ impl ImageError {
             Self::ExpectationPoints { .. } => 10,
             Self::NotFinite { .. } => 11,
             Self::Shape => 12,
-            Self::ExperiencePoints { .. } => 13,
+            Self::StatisticsPoints { .. } => 13,
         }
     }
 
@@ -100,7 +100,7 @@ impl ImageError {
             | Self::Kernels { found }
             | Self::GainPoints { found }
             | Self::ExpectationPoints { found }
-            | Self::ExperiencePoints { found } => found,
+            | Self::StatisticsPoints { found } => found,
             Self::Crc { computed, .. } => computed,
             Self::NotFinite { real } => real,
             Self::Magic | Self::Name | Self::Shape => 0,
@@ -134,8 +134,8 @@ impl fmt::Display for ImageError {
             Self::ExpectationPoints { found } => {
                 write!(f, "the expectation has {found} points; at most {EXPECTATION_POINTS_LIMIT} are possible")
             }
-            Self::ExperiencePoints { found } => {
-                write!(f, "the experience has {found} points; at most {EXPERIENCE_POINTS_LIMIT} are possible")
+            Self::StatisticsPoints { found } => {
+                write!(f, "the sensor statistics have {found} points; at most {STATISTICS_POINTS_LIMIT} are possible")
             }
             Self::NotFinite { real } => write!(f, "real number {real} of the image is not finite"),
             Self::Shape => {

@@ -24,11 +24,11 @@ pub const GAIN_POINTS_LIMIT: usize = 32;
 /// Most points of the expectation.
 pub const EXPECTATION_POINTS_LIMIT: usize = 128;
 
-/// Channels of an experience: what the sensor rows are, then the angles of the three fingers.
-pub const EXPERIENCE_ROWS: usize = 12;
+/// Channels of the statistics: what the sensor rows are, then the angles of the three fingers.
+pub const STATISTICS_ROWS: usize = 12;
 
-/// Most points of the experience.
-pub const EXPERIENCE_POINTS_LIMIT: usize = 64;
+/// Most points of the statistics.
+pub const STATISTICS_POINTS_LIMIT: usize = 64;
 
 pub(super) const HEADER_BYTES: usize = 60;
 pub(super) const CRC_BYTES: usize = 4;
@@ -53,17 +53,17 @@ pub const fn image_bytes(
     k1_points: usize,
     k2_points: usize,
     expectation_points: usize,
-    experience_points: usize,
+    statistics_points: usize,
 ) -> usize {
     let reals = FIXED_REALS
         + COUPLED_ROWS * k1_points
         + SENSOR_ROWS * k2_points
         + WEIGHT_ROWS * kernels
         + SENSOR_ROWS * expectation_points
-        + 2 * EXPERIENCE_ROWS * experience_points;
+        + 2 * STATISTICS_ROWS * statistics_points;
     HEADER_BYTES + REAL_BYTES * reals + CRC_BYTES
 }
 
 /// Bytes of the largest image there can be.
 pub const IMAGE_BYTES_LIMIT: usize =
-    image_bytes(KERNEL_LIMIT, GAIN_POINTS_LIMIT, GAIN_POINTS_LIMIT, EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT);
+    image_bytes(KERNEL_LIMIT, GAIN_POINTS_LIMIT, GAIN_POINTS_LIMIT, EXPECTATION_POINTS_LIMIT, STATISTICS_POINTS_LIMIT);

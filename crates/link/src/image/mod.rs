@@ -1,7 +1,7 @@
 //! A movement primitive as one block of bytes: what is uploaded and what is stored.
 //!
 //! ```text
-//! header 60 bytes | fixed part 75 f32 | K1 table | K2 table | weights | expectation | experience | CRC-32
+//! header 60 bytes | fixed part 75 f32 | K1 table | K2 table | weights | expectation | statistics | CRC-32
 //! ```
 //! All numbers little endian, all reals IEEE-754 single precision, SI units. `docs/image-format.md` gives
 //! every offset. There is no padding: the header's counts fix the total length.
@@ -22,8 +22,8 @@ pub use content::{
 };
 pub use error::ImageError;
 pub use layout::{
-    COUPLED_ROWS, EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT, EXPERIENCE_ROWS, GAIN_POINTS_LIMIT,
-    IMAGE_BYTES_LIMIT, IMAGE_SCHEMA, KERNEL_LIMIT, MAGIC, SENSOR_ROWS, WEIGHT_ROWS, image_bytes,
+    COUPLED_ROWS, EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_BYTES_LIMIT, IMAGE_SCHEMA, KERNEL_LIMIT, MAGIC,
+    SENSOR_ROWS, STATISTICS_POINTS_LIMIT, STATISTICS_ROWS, WEIGHT_ROWS, image_bytes,
 };
 pub use read::{PrimitiveImage, Reals, stored_crc};
 pub use write::{NAMED_HEAD_BYTES, renamed_head};

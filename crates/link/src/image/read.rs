@@ -6,8 +6,8 @@ use super::content::{
 use super::counts::{Counts, clip};
 use super::error::ImageError;
 use super::layout::{
-    COUPLED_ROWS, CRC_BYTES, EXPERIENCE_ROWS, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES,
-    IMAGE_SCHEMA, KNOWN_FLAGS, MAGIC, REAL_BYTES, SENSOR_ROWS, WEIGHT_ROWS,
+    COUPLED_ROWS, CRC_BYTES, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES, IMAGE_SCHEMA, KNOWN_FLAGS,
+    MAGIC, REAL_BYTES, SENSOR_ROWS, STATISTICS_ROWS, WEIGHT_ROWS,
 };
 use crate::frame::CRC;
 use crate::name::{NAME_BYTES, Name};
@@ -96,9 +96,9 @@ impl<'a> PrimitiveImage<'a> {
             k1_points: usize::from(header.u16().ok_or(short)?),
             k2_points: usize::from(header.u16().ok_or(short)?),
             expectation_points: usize::from(header.u16().ok_or(short)?),
-            experience_points: usize::from(header.u16().ok_or(short)?),
+            statistics_points: usize::from(header.u16().ok_or(short)?),
         };
-        let experience_trials = header.u16().ok_or(short)?;
+        let statistics_trials = header.u16().ok_or(short)?;
         counts.check()?;
         if counts.bytes() != bytes.len() {
             return Err(ImageError::Length { expected: clip(counts.bytes()), found: clip(bytes.len()) });
@@ -111,7 +111,7 @@ impl<'a> PrimitiveImage<'a> {
         if let Some(real) = Reals(body).iter().position(|value| !value.is_finite()) {
             return Err(ImageError::NotFinite { real: clip(real) });
         }
-        let content = read_content(Cursor(body), model_hash, flags, counts, experience_trials).ok_or(short)?;
+        let content = read_content(Cursor(body), model_hash, flags, counts, statistics_trials).ok_or(short)?;
         Ok(Self { bytes, name, crc: computed, content })
     }
 
@@ -148,8 +148,8 @@ impl<'a> PrimitiveImage<'a> {
 
     /// True if it has sensor statistics of successful runs.
     #[must_use]
-    pub fn has_experience(&self) -> bool {
-        !self.content.experience_mean.is_empty()
+    pub fn has_statistics(&self) -> bool {
+        !self.content.statistics_mean.is_empty()
     }
 }
 
@@ -177,7 +177,7 @@ fn read_content<'a>(
     model_hash: u32,
     flags: u16,
     counts: Counts,
-    experience_trials: u16,
+    statistics_trials: u16,
 ) -> Option<ImageContent<Reals<'a>>> {
     let [duration, alpha, activation] = body.reals()?;
     let stiffness = body.reals()?;
@@ -220,14 +220,14 @@ fn read_content<'a>(
             trials,
             spread_floor,
         },
-        experience_trials,
+        statistics_trials,
         kernels: counts.kernels,
         k1: body.table(COUPLED_ROWS * counts.k1_points)?,
         k2: body.table(SENSOR_ROWS * counts.k2_points)?,
         weights: body.table(WEIGHT_ROWS * counts.kernels)?,
         expected_mean: body.table(SENSOR_ROWS * counts.expectation_points)?,
-        experience_mean: body.table(EXPERIENCE_ROWS * counts.experience_points)?,
-        experience_spread: body.table(EXPERIENCE_ROWS * counts.experience_points)?,
+        statistics_mean: body.table(STATISTICS_ROWS * counts.statistics_points)?,
+        statistics_spread: body.table(STATISTICS_ROWS * counts.statistics_points)?,
     })
 }
 

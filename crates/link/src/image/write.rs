@@ -4,8 +4,8 @@ use super::content::{Hemisphere, ImageContent, OrientationError, Waypoint};
 use super::counts::{Counts, clip};
 use super::error::ImageError;
 use super::layout::{
-    COUPLED_ROWS, EXPERIENCE_ROWS, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES, IMAGE_SCHEMA, MAGIC,
-    REAL_BYTES, SENSOR_ROWS, WEIGHT_ROWS,
+    COUPLED_ROWS, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES, IMAGE_SCHEMA, MAGIC, REAL_BYTES,
+    SENSOR_ROWS, STATISTICS_ROWS, WEIGHT_ROWS,
 };
 use crate::frame::CRC;
 use crate::name::{NAME_BYTES, Name};
@@ -43,11 +43,11 @@ impl ImageContent<&[f32]> {
             k1_points: points(self.k1, COUPLED_ROWS)?,
             k2_points: points(self.k2, SENSOR_ROWS)?,
             expectation_points: points(self.expected_mean, SENSOR_ROWS)?,
-            experience_points: points(self.experience_mean, EXPERIENCE_ROWS)?,
+            statistics_points: points(self.statistics_mean, STATISTICS_ROWS)?,
         };
         counts.check()?;
         if self.weights.len() != WEIGHT_ROWS * self.kernels
-            || self.experience_spread.len() != self.experience_mean.len()
+            || self.statistics_spread.len() != self.statistics_mean.len()
         {
             return Err(ImageError::Shape);
         }
@@ -68,11 +68,11 @@ impl ImageContent<&[f32]> {
         writer.bytes(&self.model_hash.to_le_bytes())?;
         writer.bytes(&padded(name))?;
         for count in
-            [counts.kernels, counts.k1_points, counts.k2_points, counts.expectation_points, counts.experience_points]
+            [counts.kernels, counts.k1_points, counts.k2_points, counts.expectation_points, counts.statistics_points]
         {
             writer.bytes(&u16::try_from(count).map_err(|_| ImageError::Shape)?.to_le_bytes())?;
         }
-        writer.bytes(&self.experience_trials.to_le_bytes())?;
+        writer.bytes(&self.statistics_trials.to_le_bytes())?;
         writer.reals(&[self.duration, self.alpha, self.activation])?;
         writer.reals(&self.stiffness)?;
         writer.reals(&self.damping)?;
@@ -88,7 +88,7 @@ impl ImageContent<&[f32]> {
         writer.reals(&[marks.recorded_duration, marks.payload_mass])?;
         writer.reals(&marks.payload_centre)?;
         writer.reals(&[marks.filter_cutoff, marks.trials, marks.spread_floor])?;
-        for table in [self.k1, self.k2, self.weights, self.expected_mean, self.experience_mean, self.experience_spread]
+        for table in [self.k1, self.k2, self.weights, self.expected_mean, self.statistics_mean, self.statistics_spread]
         {
             writer.reals(table)?;
         }

@@ -87,7 +87,7 @@ fn the_code_of_an_image_error_is_never_given_to_another() {
         (ImageError::ExpectationPoints { found: 110 }, 110),
         (ImageError::NotFinite { real: 111 }, 111),
         (ImageError::Shape, 0),
-        (ImageError::ExperiencePoints { found: 113 }, 113),
+        (ImageError::StatisticsPoints { found: 113 }, 113),
     ];
     for (code, (error, number)) in (1..).zip(errors) {
         assert_eq!((error.code(), error.number()), (code, number), "{error:?}");
@@ -105,7 +105,7 @@ fn the_code_of_an_image_error_is_never_given_to_another() {
             ImageError::ExpectationPoints { .. } => 9,
             ImageError::NotFinite { .. } => 10,
             ImageError::Shape => 11,
-            ImageError::ExperiencePoints { .. } => 12,
+            ImageError::StatisticsPoints { .. } => 12,
         };
         assert_eq!(errors[at].0, error);
     }

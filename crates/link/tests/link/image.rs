@@ -2,7 +2,7 @@
 
 use crate::samples::Tables;
 use link::image::{
-    EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_BYTES_LIMIT, KERNEL_LIMIT, Waypoint,
+    EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_BYTES_LIMIT, KERNEL_LIMIT, STATISTICS_POINTS_LIMIT, Waypoint,
     image_bytes, stored_crc,
 };
 use link::{ImageError, Name, PrimitiveImage};
@@ -36,7 +36,7 @@ fn what_was_written_is_what_is_read() {
     assert_eq!(image.name(), &Name::new("side-grasp").unwrap());
     assert_eq!(image.crc().to_le_bytes(), bytes[bytes.len() - 4..]);
     assert_eq!(image.bytes(), bytes);
-    assert!(image.has_expectation() && image.has_experience());
+    assert!(image.has_expectation() && image.has_statistics());
     assert_eq!(read.model_hash, written.model_hash);
     assert_eq!(
         (read.duration, read.alpha, read.activation, read.kernels),
@@ -46,16 +46,16 @@ fn what_was_written_is_what_is_read() {
     assert_eq!((read.orientation_error, read.hemisphere), (written.orientation_error, written.hemisphere));
     assert_eq!((read.start, read.start_velocity, read.goal), (written.start, written.start_velocity, written.goal));
     assert_eq!(
-        (read.clamps, read.marks, read.experience_trials),
-        (written.clamps, written.marks, written.experience_trials)
+        (read.clamps, read.marks, read.statistics_trials),
+        (written.clamps, written.marks, written.statistics_trials)
     );
     for (read, written) in [
         (read.k1, written.k1),
         (read.k2, written.k2),
         (read.weights, written.weights),
         (read.expected_mean, written.expected_mean),
-        (read.experience_mean, written.experience_mean),
-        (read.experience_spread, written.experience_spread),
+        (read.statistics_mean, written.statistics_mean),
+        (read.statistics_spread, written.statistics_spread),
     ] {
         assert_eq!(read.iter().collect::<Vec<_>>(), written);
         assert_eq!(read.get(1), written.get(1).copied());
@@ -67,7 +67,7 @@ fn what_was_written_is_what_is_read() {
 
 #[test]
 fn the_largest_image_has_the_stated_size() {
-    let image = Tables::new(KERNEL_LIMIT, GAIN_POINTS_LIMIT, EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT).image();
+    let image = Tables::new(KERNEL_LIMIT, GAIN_POINTS_LIMIT, EXPECTATION_POINTS_LIMIT, STATISTICS_POINTS_LIMIT).image();
     assert_eq!(image.len(), IMAGE_BYTES_LIMIT);
     assert!(PrimitiveImage::parse(&image).is_ok());
     assert_eq!(image_bytes(50, 1, 1, 0, 0), 60 + 4 * (75 + 19 + 850) + 4);
@@ -77,7 +77,7 @@ fn the_largest_image_has_the_stated_size() {
 fn a_primitive_without_feedback_and_expectation_is_an_image() {
     let bytes = Tables::new(2, 0, 0, 0).image();
     let image = PrimitiveImage::parse(&bytes).unwrap();
-    assert!(!image.has_expectation() && !image.has_experience() && image.content().k1.is_empty());
+    assert!(!image.has_expectation() && !image.has_statistics() && image.content().k1.is_empty());
 }
 
 #[test]
@@ -124,12 +124,12 @@ fn a_not_finite_real_is_refused_wherever_it_is() {
 
 #[test]
 fn counts_beyond_the_limits_are_refused() {
-    let with_counts = |kernels: u16, k1: u16, k2: u16, expectation: u16, experience: u16| {
-        let length = image_bytes(kernels.into(), k1.into(), k2.into(), expectation.into(), experience.into());
+    let with_counts = |kernels: u16, k1: u16, k2: u16, expectation: u16, statistics: u16| {
+        let length = image_bytes(kernels.into(), k1.into(), k2.into(), expectation.into(), statistics.into());
         let mut image = Tables::new(2, 0, 0, 0).image();
         image.resize(length, 0);
         image[8..12].copy_from_slice(&(length as u32).to_le_bytes());
-        for (index, count) in [kernels, k1, k2, expectation, experience].into_iter().enumerate() {
+        for (index, count) in [kernels, k1, k2, expectation, statistics].into_iter().enumerate() {
             image[KERNELS + 2 * index..][..2].copy_from_slice(&count.to_le_bytes());
         }
         sealed(image)
@@ -140,7 +140,7 @@ fn counts_beyond_the_limits_are_refused() {
     assert_eq!(refusal(&with_counts(2, 33, 1, 0, 0)), ImageError::GainPoints { found: 33 });
     assert_eq!(refusal(&with_counts(2, 1, 0, 0, 0)), ImageError::GainPoints { found: 1 });
     assert_eq!(refusal(&with_counts(2, 0, 0, 129, 0)), ImageError::ExpectationPoints { found: 129 });
-    assert_eq!(refusal(&with_counts(2, 0, 0, 0, 65)), ImageError::ExperiencePoints { found: 65 });
+    assert_eq!(refusal(&with_counts(2, 0, 0, 0, 65)), ImageError::StatisticsPoints { found: 65 });
     assert_eq!(refusal(&with_counts(u16::MAX, 0, 0, 0, 0)), ImageError::Kernels { found: 65_535 });
 
     let mut lying = Tables::new(2, 0, 0, 0).image();
@@ -181,7 +181,7 @@ fn what_could_not_be_read_back_is_not_written() {
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
     let bad = link::image::ImageContent { k1: &good.k1[1..], ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
-    let bad = link::image::ImageContent { experience_spread: &good.k1[..0], ..good };
+    let bad = link::image::ImageContent { statistics_spread: &good.k1[..0], ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
     let bad = link::image::ImageContent { k2: &good.k2[..0], ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::GainPoints { found: 1 }));
@@ -205,12 +205,12 @@ proptest! {
     }
 
     #[test]
-    fn every_shape_within_the_limits_survives(kernels in 2_usize..=100, gains in 0_usize..=32, expectation in 0_usize..=128, experience in 0_usize..=64) {
-        let tables = Tables::new(kernels, gains, expectation, experience);
+    fn every_shape_within_the_limits_survives(kernels in 2_usize..=100, gains in 0_usize..=32, expectation in 0_usize..=128, statistics in 0_usize..=64) {
+        let tables = Tables::new(kernels, gains, expectation, statistics);
         let bytes = tables.image();
         let image = PrimitiveImage::parse(&bytes).unwrap();
         prop_assert!(image.content().weights.iter().eq(tables.content().weights.iter().copied()));
         prop_assert!(image.content().expected_mean.iter().eq(tables.content().expected_mean.iter().copied()));
-        prop_assert!(image.content().experience_spread.iter().eq(tables.content().experience_spread.iter().copied()));
+        prop_assert!(image.content().statistics_spread.iter().eq(tables.content().statistics_spread.iter().copied()));
     }
 }

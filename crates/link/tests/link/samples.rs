@@ -283,22 +283,22 @@ pub(crate) struct Tables {
     k2: Vec<f32>,
     weights: Vec<f32>,
     mean: Vec<f32>,
-    experience_mean: Vec<f32>,
-    experience_spread: Vec<f32>,
+    statistics_mean: Vec<f32>,
+    statistics_spread: Vec<f32>,
     kernels: usize,
 }
 
 impl Tables {
     /// Tables with so many kernels and points.
-    pub(crate) fn new(kernels: usize, gain_points: usize, expectation_points: usize, experience_points: usize) -> Self {
+    pub(crate) fn new(kernels: usize, gain_points: usize, expectation_points: usize, statistics_points: usize) -> Self {
         let series = |count: usize, step: f32| (0..count).map(|index| step * index as f32 - 1.0).collect();
         Self {
             k1: series(10 * gain_points, 0.5),
             k2: series(9 * gain_points, 0.25),
             weights: series(17 * kernels, 0.125),
             mean: series(9 * expectation_points, 2.0),
-            experience_mean: series(12 * experience_points, 3.0),
-            experience_spread: series(12 * experience_points, 5.0),
+            statistics_mean: series(12 * statistics_points, 3.0),
+            statistics_spread: series(12 * statistics_points, 5.0),
             kernels,
         }
     }
@@ -337,14 +337,14 @@ impl Tables {
                 trials: 3.0,
                 spread_floor: 0.1,
             },
-            experience_trials: 7,
+            statistics_trials: 7,
             kernels: self.kernels,
             k1: &self.k1,
             k2: &self.k2,
             weights: &self.weights,
             expected_mean: &self.mean,
-            experience_mean: &self.experience_mean,
-            experience_spread: &self.experience_spread,
+            statistics_mean: &self.statistics_mean,
+            statistics_spread: &self.statistics_spread,
         }
     }
 

@@ -7,8 +7,8 @@ use control::plan::load::LoadError;
 use control::plan::primitive::{self, Configuration, MovementTables, configuration, gains, limits, velocity};
 use link::Refusal;
 use link::image::{
-    EXPECTATION_POINTS_LIMIT, EXPERIENCE_POINTS_LIMIT, EXPERIENCE_ROWS, GAIN_POINTS_LIMIT, ImageContent, KERNEL_LIMIT,
-    Reals, WEIGHT_ROWS, Waypoint,
+    EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, ImageContent, KERNEL_LIMIT, Reals, STATISTICS_POINTS_LIMIT,
+    STATISTICS_ROWS, WEIGHT_ROWS, Waypoint,
 };
 
 use crate::application::Refused;
@@ -21,8 +21,8 @@ use crate::wire::PrimitiveDefect;
 const _: () = assert!(KERNEL_LIMIT <= control::MAX_KERNELS);
 const _: () = assert!(GAIN_POINTS_LIMIT <= primitive::GAIN_CAPACITY);
 const _: () = assert!(EXPECTATION_POINTS_LIMIT <= primitive::EXPECTED_CAPACITY);
-const _: () = assert!(EXPERIENCE_POINTS_LIMIT <= primitive::STATISTICS_CAPACITY);
-const _: () = assert!(EXPERIENCE_ROWS == primitive::STATISTICS_CHANNELS);
+const _: () = assert!(STATISTICS_POINTS_LIMIT <= primitive::STATISTICS_CAPACITY);
+const _: () = assert!(STATISTICS_ROWS == primitive::STATISTICS_CHANNELS);
 
 /// Buffer to copy the weights into, because those of an image are not aligned.
 pub(crate) type WeightBuffer = [f32; WEIGHT_ROWS * KERNEL_LIMIT];
@@ -62,7 +62,7 @@ pub(crate) fn build<'a>(
     weights_buffer: &mut WeightBuffer,
     primitive: &'a mut StoredPrimitive,
 ) -> Result<CheckedPrimitive<'a>, Unfit> {
-    let recorded = !content.expected_mean.is_empty() || !content.experience_mean.is_empty();
+    let recorded = !content.expected_mean.is_empty() || !content.statistics_mean.is_empty();
     if recorded {
         recorded_filter::check(content.marks.filter_cutoff).map_err(Unfit::Filter)?;
     }
@@ -101,9 +101,9 @@ pub(crate) fn build<'a>(
             .assign_expected(content.expected_mean.iter(), content.marks.recorded_duration)
             .map_err(PrimitiveDefect::expectation)?;
     }
-    if !content.experience_mean.is_empty() {
-        let (mean, spread) = (content.experience_mean.iter(), content.experience_spread.iter());
-        primitive.assign_statistics(mean, spread, content.experience_trials).map_err(PrimitiveDefect::experience)?;
+    if !content.statistics_mean.is_empty() {
+        let (mean, spread) = (content.statistics_mean.iter(), content.statistics_spread.iter());
+        primitive.assign_statistics(mean, spread, content.statistics_trials).map_err(PrimitiveDefect::statistics)?;
     }
     load::check(model, primitive).map_err(|error| PrimitiveDefect::from(error).into())
 }

@@ -1,4 +1,4 @@
-//! `tactus experience`: makes the statistics of successful runs, by which the device watches the next runs.
+//! `tactus statistics`: makes the statistics of successful runs, by which the device watches the next runs.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use super::{ErrorCode, Failure, Global, files, rehearse, upload};
 use lab::demonstration::Recording;
 use lab::learn::memory::remember_successes;
 
-/// Options of `experience`.
+/// Options of `statistics`.
 #[derive(Debug, Clone, Args)]
 pub struct Cmd {
     /// The primitive, TOML
@@ -19,39 +19,39 @@ pub struct Cmd {
     /// Recordings of runs that succeeded, all at the same speed, CSV
     #[arg(value_name = "RECORDING", required_unless_present = "forget")]
     pub recordings: Vec<PathBuf>,
-    /// Where the primitive with the experience goes [default: back into PRIMITIVE]
+    /// Where the primitive with the statistics goes [default: back into PRIMITIVE]
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// Take the experience out: runs are then not watched
+    /// Take the statistics out: runs are then not watched
     #[arg(long, conflicts_with = "recordings")]
     pub forget: bool,
 }
 
-/// Gathers experience.
+/// Gathers statistics.
 ///
 /// # Errors
 /// A file is wrong, or the recordings do not fit the primitive.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
-    const DOING: &str = "experience";
+    const DOING: &str = "statistics";
     let output = global.output();
     let mut file = upload::read(&command.primitive, DOING)?;
     let target = command.output.clone().unwrap_or_else(|| command.primitive.clone());
     let inputs: Vec<&Path> = command.recordings.iter().map(PathBuf::as_path).collect();
     let output_file = rehearse::memory_target(&target, &command.primitive, &inputs, global, DOING)?;
     if command.forget {
-        file.experience = None;
+        file.statistics = None;
         rehearse::write(&file, output_file, &target, DOING)?;
         let checksum = format!("0x{:08x}", file.checksum());
         return output.result(
-            &Known { name: &file.name, file: files::text(&target), checksum: &checksum, experience: None },
-            format!("{}: without experience; content {checksum}", file.name),
+            &Known { name: &file.name, file: files::text(&target), checksum: &checksum, statistics: None },
+            format!("{}: without statistics; content {checksum}", file.name),
         );
     }
     let bar = output.bar(command.recordings.len() as u64, "files", "reading");
     let mut recordings = Vec::new();
     for path in &command.recordings {
         let recording = Recording::read(path)
-            .map_err(|cause| Failure::of_file(ErrorCode::RecordingInvalid, "experience refused", cause))?;
+            .map_err(|cause| Failure::of_file(ErrorCode::RecordingInvalid, "statistics refused", cause))?;
         recordings.push(recording);
         bar.inc(1);
     }
@@ -60,7 +60,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         output.warn(format!("{} does not name its movement", recording.file.display()));
     }
     let summary = remember_successes(&mut file, &recordings)
-        .map_err(|cause| rehearse::memory_failure(cause, "experience: nothing was remembered"))?;
+        .map_err(|cause| rehearse::memory_failure(cause, "statistics: nothing was remembered"))?;
     rehearse::write(&file, output_file, &target, DOING)?;
     output.say(format!("wrote {}", target.display()));
     if recordings.len() < dmp::fit::FEWEST_TRIALS {
@@ -71,7 +71,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     let checksum = format!("0x{:08x}", file.checksum());
     output.result(
-        &Known { name: &file.name, file: files::text(&target), checksum: &checksum, experience: Some(&summary) },
+        &Known { name: &file.name, file: files::text(&target), checksum: &checksum, statistics: Some(&summary) },
         format!(
             "{}: {} run(s) of {:.2} s, {} points; content {checksum}\n\n{}",
             file.name,
@@ -83,7 +83,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     )
 }
 
-/// Data of `tactus --json experience`.
+/// Data of `tactus --json statistics`.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Known<'a> {
     /// Name of the primitive.
@@ -93,5 +93,5 @@ pub struct Known<'a> {
     /// Check sum of its content, hexadecimal.
     pub checksum: &'a str,
     /// Summary of the successful runs; `null`: forgotten.
-    pub experience: Option<&'a lab::learn::memory::MemorySummary>,
+    pub statistics: Option<&'a lab::learn::memory::MemorySummary>,
 }
