@@ -59,8 +59,8 @@ impl Board {
     /// Every board.
     pub(crate) const ALL: [Self; 2] = [Self::Mps2, Self::Stm32h743];
 
-    /// Word for `--board`.
-    pub(crate) const fn word(self) -> &'static str {
+    /// Name for `--board`.
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Mps2 => "mps2",
             Self::Stm32h743 => "stm32h743",
@@ -68,8 +68,8 @@ impl Board {
     }
 
     /// The board of a word.
-    pub(crate) fn from_word(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|board| board.word() == word)
+    pub(crate) fn from_name(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|board| board.name() == word)
     }
 
     /// Features of the package `firmware`, without the default ones.
@@ -183,8 +183,8 @@ mod tests {
     #[test]
     fn every_board_is_found_by_its_word() {
         for board in Board::ALL {
-            assert_eq!(Board::from_word(board.word()), Some(board));
+            assert_eq!(Board::from_name(board.name()), Some(board));
         }
-        assert_eq!(Board::from_word("arduino"), None);
+        assert_eq!(Board::from_name("arduino"), None);
     }
 }

@@ -114,8 +114,8 @@ fn dispatch(words: &[&str]) -> Result<()> {
             build::image(&machine)?;
         }
         ["build", "--board", word] => {
-            let board = Board::from_word(word)
-                .with_context(|| format!("no board '{word}'; there are: {}", Board::ALL.map(Board::word).join(", ")))?;
+            let board = Board::from_name(word)
+                .with_context(|| format!("no board '{word}'; there are: {}", Board::ALL.map(Board::name).join(", ")))?;
             if board == Board::Mps2 {
                 build::image(&setup::all()?)?;
             } else {

@@ -70,9 +70,9 @@ impl Kind {
         Self::Unknown,
     ];
 
-    /// The word for people.
+    /// The name for people.
     #[must_use]
-    pub const fn word(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Get => "GET",
             Self::Set => "SET",
@@ -143,7 +143,7 @@ impl Meaning {
             Kind::Set => format!("SET {property} = {values}"),
             Kind::Property => format!("{property} = {values}"),
             Kind::Link | Kind::Error | Kind::Unknown => String::new(),
-            kind => format!("{} {values}", kind.word()),
+            kind => format!("{} {values}", kind.name()),
         };
         match (&self.remark, self.kind) {
             (Some(remark), Kind::Unknown) => format!("unknown: {remark}"),

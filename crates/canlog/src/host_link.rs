@@ -104,7 +104,7 @@ fn words(message: &Message) -> String {
             format!("'upload chunk' ({} bytes at {offset})", data.len())
         }
         Message::Request(Request::Run { name, .. }) => format!("'run' {}", name.as_str()),
-        Message::Request(request) => format!("'{}'", request.word()),
+        Message::Request(request) => format!("'{}'", request.name()),
         Message::Reply(Reply::Hello { .. }) => "hello".to_owned(),
         Message::Reply(Reply::Accepted { of }) => format!("'accepted' (request {of})"),
         Message::Reply(Reply::Refused { of, reason, .. }) => format!("'refused' (request {of}: {reason})"),

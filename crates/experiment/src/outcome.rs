@@ -76,7 +76,7 @@ impl Outcome {
     }
 
     /// Its kind without particulars: a column of a table.
-    pub fn word(&self) -> &'static str {
+    pub fn name(&self) -> &'static str {
         match self {
             Outcome::Held => "held",
             Outcome::KnockedOver => "knocked over",
@@ -95,7 +95,7 @@ impl fmt::Display for Outcome {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Outcome::Stopped(fault) => write!(formatter, "stopped ({fault})"),
-            other => formatter.write_str(other.word()),
+            other => formatter.write_str(other.name()),
         }
     }
 }
@@ -330,7 +330,7 @@ mod tests {
         let mut observation = good();
         observation.crushed = true;
         let (outcome, measures) = judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default());
-        assert_eq!((outcome.is_success(), outcome.word(), measures.finger_peak_n), (false, "crushed", 8.0));
+        assert_eq!((outcome.is_success(), outcome.name(), measures.finger_peak_n), (false, "crushed", 8.0));
     }
 
     #[test]

@@ -323,7 +323,7 @@ const COLUMNS: [Column; 33] = [
     ("sideways_m", |r| number(r.key.cell.sideways())),
     ("mode", |r| r.key.mode.to_string()),
     ("seed", |r| r.key.seed.to_string()),
-    ("outcome", |r| r.outcome.word().to_owned()),
+    ("outcome", |r| r.outcome.name().to_owned()),
     ("fault", |r| if let Outcome::Stopped(fault) = &r.outcome { fault.clone() } else { String::new() }),
     ("object_x_m", |r| number(r.object[0])),
     ("object_y_m", |r| number(r.object[1])),

@@ -174,7 +174,7 @@ impl Summary {
         cells.sort_unstable();
         cells.dedup();
         let count = |test: &dyn Fn(&Report) -> bool| reports.iter().filter(|report| test(report)).count();
-        let mean = |word: &str| count(&|report| report.outcome.word() == word) as f64 / seeds.len().max(1) as f64;
+        let mean = |word: &str| count(&|report| report.outcome.name() == word) as f64 / seeds.len().max(1) as f64;
         let spread =
             |value: fn(&Report) -> f64| Spread::of(&reports.iter().map(|report| value(report)).collect::<Vec<_>>());
         let successes = || reports.iter().filter(|report| report.outcome.is_success());

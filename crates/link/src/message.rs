@@ -345,9 +345,9 @@ impl Request {
         }
     }
 
-    /// The word for the request in messages to people.
+    /// The name of the request in messages to people.
     #[must_use]
-    pub fn word(&self) -> &'static str {
+    pub fn name(&self) -> &'static str {
         match self {
             Self::Hello(_) => "hello",
             Self::Goodbye => "goodbye",

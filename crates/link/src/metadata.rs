@@ -163,20 +163,20 @@ impl<'a> ImageMetadata<'a> {
         if layout != LAYOUT {
             return Err(MetadataError::Layout(layout));
         }
-        if CRC.checksum(block.get(..CRC_AT).unwrap_or(&[])) != word(block, CRC_AT) {
+        if CRC.checksum(block.get(..CRC_AT).unwrap_or(&[])) != word_at(block, CRC_AT) {
             return Err(MetadataError::Crc);
         }
         let flags = half(block, 10);
         if flags & !KNOWN_FLAGS != 0 {
             return Err(MetadataError::Flags(flags));
         }
-        let store = MemoryRegion { start: word(block, 28), length: word(block, 32) };
+        let store = MemoryRegion { start: word_at(block, 28), length: word_at(block, 32) };
         Ok(Self {
             link_version: half(block, 8),
             simulated: flags & SIMULATED != 0,
-            schema_hash: word(block, 12),
-            model_hash: word(block, 16),
-            image: MemoryRegion { start: word(block, 20), length: word(block, 24) },
+            schema_hash: word_at(block, 12),
+            model_hash: word_at(block, 16),
+            image: MemoryRegion { start: word_at(block, 20), length: word_at(block, 24) },
             store: (store.length > 0).then_some(store),
             firmware: text(block, FIRMWARE_AT, FIRMWARE_BYTES)?,
             board: text(block, BOARD_AT, BOARD_BYTES)?,
@@ -198,7 +198,7 @@ fn half(block: &[u8], at: usize) -> u16 {
     u16::from_le_bytes(*bytes.unwrap_or(&[0; 2]))
 }
 
-fn word(block: &[u8], at: usize) -> u32 {
+fn word_at(block: &[u8], at: usize) -> u32 {
     let bytes = block.get(at..).and_then(|rest| rest.first_chunk());
     u32::from_le_bytes(*bytes.unwrap_or(&[0; 4]))
 }

@@ -29,7 +29,7 @@ pub enum Grade {
 impl Grade {
     /// For people and for the report.
     #[must_use]
-    pub const fn word(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Unmodelled => "unmodelled",
             Self::Refused => "refused",
@@ -63,7 +63,7 @@ impl Finding {
     pub fn line(&self) -> String {
         let address = self.address.map(|address| format!(" ({address:#010x})")).unwrap_or_default();
         let function = self.function.as_ref().map(|name| format!(", by {name}")).unwrap_or_default();
-        let (grade, us) = (self.grade.word(), self.at / 1000);
+        let (grade, us) = (self.grade.name(), self.at / 1000);
         format!("{grade}: {}{address}{function}, at {us} us: {}", self.register, self.text)
     }
 
@@ -252,7 +252,7 @@ impl Findings {
             .into_iter()
             .map(|grade| {
                 let entries: Vec<Value> = self.of(grade).map(Finding::json).collect();
-                (grade.word(), json!({ "count": entries.len(), "entries": entries }))
+                (grade.name(), json!({ "count": entries.len(), "entries": entries }))
             })
             .collect()
     }

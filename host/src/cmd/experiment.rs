@@ -265,7 +265,7 @@ mod work {
             Progress::Done(report) => {
                 bar.inc(1);
                 let key = &report.key;
-                bar.set_message(format!("{} ({}) {}", key.cell, key.mode, report.outcome.word()));
+                bar.set_message(format!("{} ({}) {}", key.cell, key.mode, report.outcome.name()));
             }
         });
         bar.finish_and_clear();

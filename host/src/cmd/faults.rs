@@ -65,7 +65,7 @@ pub(super) fn data(status: &Status, last: Option<&LastSecond>) -> Value {
             "cycles": last.cycles.iter().map(cycle_data).collect::<Vec<_>>(),
         })),
         "pendant": pendant(status).map(|state| json!({
-            "supervised": SUPERVISED.iter().zip(state.health()).map(|(name, health)| (*name, word(health)))
+            "supervised": SUPERVISED.iter().zip(state.health()).map(|(name, health)| (*name, health_name(health)))
                 .collect::<std::collections::BTreeMap<_, _>>(),
             "display": state.display(), "idle_light": state.idle_light, "activate_light": state.activate_light,
             "button": format!("{:?}", state.button),
@@ -131,7 +131,7 @@ fn pendant_text(status: &Status) -> String {
             None => "pendant: not read yet\n".to_owned(),
         };
     };
-    let judged = SUPERVISED.iter().zip(state.health()).map(|(name, health)| format!("{name} {}", word(health)));
+    let judged = SUPERVISED.iter().zip(state.health()).map(|(name, health)| format!("{name} {}", health_name(health)));
     let display = state.display().map_or("?".to_owned(), String::from);
     let light = |on| if on { "on" } else { "off" };
     let (idle, activate) = (light(state.idle_light), light(state.activate_light));
@@ -139,7 +139,7 @@ fn pendant_text(status: &Status) -> String {
     format!("pendant: {judged}; display {display}; idle light {idle}, activate light {activate}\n")
 }
 
-const fn word(health: Health) -> &'static str {
+const fn health_name(health: Health) -> &'static str {
     match health {
         Health::Safe => "ok",
         Health::Warning => "warning",

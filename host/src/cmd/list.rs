@@ -26,8 +26,8 @@ pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
             listing.kernels.to_string(),
             listing.length.to_string(),
             format!("0x{:08x}", listing.crc),
-            word(listing.expectation).to_owned(),
-            word(listing.loaded).to_owned(),
+            yes_or_no(listing.expectation).to_owned(),
+            yes_or_no(listing.loaded).to_owned(),
         ]);
     }
     let primitives: Vec<_> = stored
@@ -84,6 +84,6 @@ pub struct Stored {
     pub loaded: bool,
 }
 
-fn word(yes: bool) -> &'static str {
+fn yes_or_no(yes: bool) -> &'static str {
     if yes { "yes" } else { "no" }
 }

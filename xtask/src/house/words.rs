@@ -90,6 +90,7 @@ const OLD: &[Old] = &[
     (Name, "Chart", "log-map coordinates", PRIMITIVE),
     (Name, "Row", "Group", PRIMITIVE),
     (Name, "Marks", "Metadata", &[]),
+    (Phrase, "fn word", "fn name", &["crates", "host", "firmware", "emulator", "tests"]),
     (Name, "square_root", "sqrt", &[]),
     (Name, "whole_below", "floor", &[]),
     (Phrase, "felt", "expected or measured", &[]),

@@ -67,14 +67,14 @@ impl Brakes {
         // The module's word to the pucks may be lost, and with it the brakes; so may this one. That the module is IDLE
         // does not say that a puck brakes: the words go on until one has told so.
         let due = core::mem::take(&mut self.owed) || self.is_open();
-        due.then(word)
+        due.then(brake_frame)
     }
 
     /// The word to the pucks for the request slot: the torque of a puck ends with the first zero torque that reaches
     /// it, so at least as many words to brake have to leave.
     pub(super) fn second_word(&mut self) -> Option<CanFrame> {
         self.second_words = self.second_words.checked_sub(1)?;
-        self.is_open().then(word)
+        self.is_open().then(brake_frame)
     }
 
     /// True from the end of the torque on until puck 1 has told that it brakes, at most for the time of the looks.
@@ -101,6 +101,6 @@ impl Brakes {
 }
 
 /// The word to the pucks of the arm that they shall brake.
-fn word() -> CanFrame {
+fn brake_frame() -> CanFrame {
     set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value())
 }

@@ -83,7 +83,7 @@ fn an_observer_changes_nothing_but_may_stop() {
         Request::Calibrate { home: [0.0; 7] },
         Request::ForgetCalibration,
     ] {
-        let word = request.word();
+        let word = request.name();
         // As fast as others may ask beside an owner.
         rig.wait(10);
         assert_eq!(rig.refused(request).0, Refusal::Observing, "{word}");

@@ -285,7 +285,7 @@ impl Rig {
                 return reply.clone();
             }
         }
-        panic!("no answer to {}", request.word());
+        panic!("no answer to {}", request.name());
     }
 
     /// A request that must be accepted.

@@ -292,7 +292,7 @@ impl<T: Transport> Client<T> {
     fn order(&mut self, request: &Request) -> Result<(), HostError> {
         match self.request(request)? {
             Reply::Accepted { .. } => Ok(()),
-            _ => Err(HostError::WrongAnswer { request: request.word() }),
+            _ => Err(HostError::WrongAnswer { request: request.name() }),
         }
     }
 
@@ -328,7 +328,7 @@ impl<T: Transport> Client<T> {
                 }
                 return match reply {
                     Reply::Refused { reason, detail, .. } => {
-                        Err(HostError::Refused { request: request.word(), reason, detail })
+                        Err(HostError::Refused { request: request.name(), reason, detail })
                     }
                     reply => Ok(reply),
                 };
@@ -336,7 +336,7 @@ impl<T: Transport> Client<T> {
             let now = self.transport.now();
             let deadline = started + timeout;
             if now >= deadline {
-                return Err(HostError::NoAnswer { request: request.word(), after: timeout });
+                return Err(HostError::NoAnswer { request: request.name(), after: timeout });
             }
             if now >= repeat_at {
                 self.round_trips.repeated += 1;

@@ -47,7 +47,7 @@ fn command(engine: &BoardEngine, options: &SimulationOptions) -> Result<Command,
         }
     }
     if let Some(reading) = engine.chip.cancellation {
-        command.args(["--cancellation", reading.word()]);
+        command.args(["--cancellation", reading.name()]);
     }
     if let Some(revision) = engine.chip.revision {
         command.args(["--revision", &format!("{revision:#06x}")]);

@@ -69,9 +69,9 @@ impl Cancellation {
     /// Both readings.
     pub const ALL: [Self; 2] = [Self::Skipped, Self::Stuck];
 
-    /// Its word in an address and for the emulator.
+    /// Its name in an address and for the emulator.
     #[must_use]
-    pub const fn word(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Skipped => "skipped",
             Self::Stuck => "stuck",
@@ -120,7 +120,7 @@ impl BoardOptions {
                 self.chip.revision = Some(u16::from_str_radix(digits, 16).map_err(|_| unknown())?);
             }
             "cancellation" => {
-                let known = Cancellation::ALL.into_iter().find(|reading| reading.word() == value);
+                let known = Cancellation::ALL.into_iter().find(|reading| reading.name() == value);
                 self.chip.cancellation = Some(known.ok_or_else(unknown)?);
             }
             _ => return Err(unknown()),
@@ -140,7 +140,7 @@ impl fmt::Display for SimulatorOptions {
         let flash = self.flash.as_ref().map(|path| format!("flash={}", path.display()));
         let script = self.faults.as_ref().map(|name| format!("faults={name}"));
         let report = self.board.report.as_ref().map(|path| format!("report={}", path.display()));
-        let cancellation = chip.cancellation.map(|reading| format!("cancellation={}", reading.word()));
+        let cancellation = chip.cancellation.map(|reading| format!("cancellation={}", reading.name()));
         let revision = chip.revision.map(|revision| format!("revision={revision:#06x}"));
         let faults = chip.faults.iter().map(|fault| format!("fault={fault}"));
         let single = [seed, arm, world, line, bus, flash, script, report, cancellation, revision];

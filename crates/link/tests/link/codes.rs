@@ -59,10 +59,10 @@ fn every_request_that_can_move_the_arm_is_known_as_such() {
 
 #[test]
 fn every_request_has_a_word_of_its_own() {
-    let words: std::collections::BTreeSet<&str> = requests().iter().map(Request::word).collect();
+    let words: std::collections::BTreeSet<&str> = requests().iter().map(Request::name).collect();
     assert_eq!(words.len(), requests().len());
-    assert_eq!(Request::Stop.word(), "stop");
-    assert_eq!(Request::SetSpeed { factor: 1.0 }.word(), "set speed");
+    assert_eq!(Request::Stop.name(), "stop");
+    assert_eq!(Request::SetSpeed { factor: 1.0 }.name(), "set speed");
 }
 
 #[test]

@@ -185,7 +185,7 @@ fn summary_text(summary: &Summary) -> String {
     let mut table = Table::new(["kind", "frames", "per second", "load"]);
     for kind in &summary.kinds {
         let rate = format!("{:.1}", kind.per_second);
-        table.row([kind.kind.word().to_owned(), kind.frames.to_string(), rate, percent(kind.load)]);
+        table.row([kind.kind.name().to_owned(), kind.frames.to_string(), rate, percent(kind.load)]);
     }
     text += &format!("\n{table}");
     if !summary.nodes.is_empty() {
