@@ -14,7 +14,7 @@ const POSTURES: usize = 64;
 
 /// Postures all over the workspace: each benchmark goes through all of them, so that none is answered from memory.
 fn postures<R: Real>() -> Vec<JointPositions<R>> {
-    let wave = |n: usize, joint: usize| R::of(f64::sin(1.7 * n as f64 + 0.9 * joint as f64));
+    let wave = |n: usize, joint: usize| R::constant(f64::sin(1.7 * n as f64 + 0.9 * joint as f64));
     (0..POSTURES).map(|n| JointPositions::from_array(core::array::from_fn(|joint| wave(n, joint)))).collect()
 }
 

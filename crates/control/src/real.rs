@@ -8,40 +8,37 @@ use nalgebra::RealField;
 /// measured cheap one: `f32` uses its own sine and cosine (7.6e-8 on one turn) and the FPU's square root.
 pub trait Real: RealField + Copy + dmp::Scalar<Weight = Self> + puck::Real {
     /// The nearest value to `value`. For constants; not meant for inner loops on the board.
-    fn of(value: f64) -> Self;
+    #[inline]
+    fn constant(value: f64) -> Self {
+        <Self as dmp::Scalar>::from_f64(value)
+    }
 
     /// As `f32`, for records.
-    fn single(self) -> f32;
+    #[inline]
+    fn single(self) -> f32 {
+        dmp::Scalar::to_f64(self) as f32
+    }
 
     /// From a whole number of counts; exact for |counts| < 2^24.
-    fn from_counts(counts: i32) -> Self;
+    #[inline]
+    fn from_counts(counts: i32) -> Self {
+        <Self as puck::Real>::from_i32(counts)
+    }
+
+    /// Neither infinite nor a NaN.
+    #[inline]
+    fn is_finite_number(self) -> bool {
+        dmp::Scalar::is_finite(self)
+    }
 
     /// Sine and cosine.
     fn sine_cosine(self) -> (Self, Self);
 
     /// The largest whole number not above it, saturating; zero for a NaN.
     fn to_whole(self) -> i32;
-
-    /// Neither infinite nor a NaN.
-    fn is_finite_number(self) -> bool;
 }
 
 impl Real for f32 {
-    #[inline]
-    fn of(value: f64) -> Self {
-        value as f32
-    }
-
-    #[inline]
-    fn single(self) -> f32 {
-        self
-    }
-
-    #[inline]
-    fn from_counts(counts: i32) -> Self {
-        counts as f32
-    }
-
     /// Two-step reduction by quarter turns, then polynomials; 7.6e-8 on [-pi, pi]. `libm` costs fifty times as much on
     /// a Cortex-M4F because it computes in f64.
     #[inline]
@@ -66,29 +63,9 @@ impl Real for f32 {
     fn to_whole(self) -> i32 {
         micromath::F32Ext::floor(self) as i32
     }
-
-    #[inline]
-    fn is_finite_number(self) -> bool {
-        f32::is_finite(self)
-    }
 }
 
 impl Real for f64 {
-    #[inline]
-    fn of(value: f64) -> Self {
-        value
-    }
-
-    #[inline]
-    fn single(self) -> f32 {
-        self as f32
-    }
-
-    #[inline]
-    fn from_counts(counts: i32) -> Self {
-        f64::from(counts)
-    }
-
     #[inline]
     fn sine_cosine(self) -> (Self, Self) {
         libm::sincos(self)
@@ -97,11 +74,6 @@ impl Real for f64 {
     #[inline]
     fn to_whole(self) -> i32 {
         libm::floor(self) as i32
-    }
-
-    #[inline]
-    fn is_finite_number(self) -> bool {
-        f64::is_finite(self)
     }
 }
 

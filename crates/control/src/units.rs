@@ -36,7 +36,7 @@ macro_rules! joint_quantity {
 
             /// From plain `f32` in the same unit.
             pub fn from_f32(values: [f32; JOINTS]) -> Self {
-                $name(Vector7::from(values.map(|value| R::of(f64::from(value)))))
+                $name(Vector7::from(values.map(|value| R::constant(f64::from(value)))))
             }
 
             /// As plain `f32` in the same unit.
@@ -103,14 +103,14 @@ pub struct Orientation<R: Real>(pub [R; 4]);
 impl<R: Real> Orientation<R> {
     /// No rotation.
     pub fn identity() -> Self {
-        Orientation([R::of(1.0), R::of(0.0), R::of(0.0), R::of(0.0)])
+        Orientation([R::constant(1.0), R::constant(0.0), R::constant(0.0), R::constant(0.0)])
     }
 
     /// The quaternion of a rotation matrix (body to world), with `w >= 0`.
     ///
     /// The largest of the four squared components is computed first, so that no division is by a small number.
     pub fn from_matrix(rotation: &Matrix3<R>) -> Self {
-        let one = R::of(1.0);
+        let one = R::constant(1.0);
         let (m00, m11, m22) = (rotation[(0, 0)], rotation[(1, 1)], rotation[(2, 2)]);
         // Four times the squares of w, x, y, z.
         let squares = [one + m00 + m11 + m22, one + m00 - m11 - m22, one - m00 + m11 - m22, one - m00 - m11 + m22];
@@ -131,16 +131,16 @@ impl<R: Real> Orientation<R> {
         } else {
             (zz, [wz, xz, yz, zz])
         };
-        let scale = R::of(0.5) / sqrt(square);
-        let scale = if row[0] < R::of(0.0) { -scale } else { scale };
+        let scale = R::constant(0.5) / sqrt(square);
+        let scale = if row[0] < R::constant(0.0) { -scale } else { scale };
         Orientation(row.map(|component| component * scale))
     }
 
     /// The rotation matrix, body to world.
     pub fn to_matrix(&self) -> Matrix3<R> {
         let [w, x, y, z] = self.0;
-        let one = R::of(1.0);
-        let two = R::of(2.0);
+        let one = R::constant(1.0);
+        let two = R::constant(2.0);
         Matrix3::new(
             one - two * (y * y + z * z),
             two * (x * y - w * z),
@@ -159,9 +159,9 @@ impl<R: Real> Orientation<R> {
     pub fn error_to(&self, desired: &Orientation<R>) -> Vector3<R> {
         let [w, x, y, z] = self.0;
         let [dw, dx, dy, dz] = desired.0;
-        let two = R::of(2.0);
+        let two = R::constant(2.0);
         let dot = w * dw + x * dx + y * dy + z * dz;
-        let scale = if dot < R::of(0.0) { -two } else { two };
+        let scale = if dot < R::constant(0.0) { -two } else { two };
         let measured = Vector3::new(x, y, z);
         let wanted = Vector3::new(dx, dy, dz);
         (wanted * w - measured * dw - wanted.cross(&measured)) * scale

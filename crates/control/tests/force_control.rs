@@ -31,7 +31,7 @@ where
     // J[a][b] = c_a sin(0.7 a + 1.3 b + 0.2), as the file's header gives it.
     let jacobian = control::model::Jacobian(nalgebra::SMatrix::<R, 6, 7>::from_fn(|a, b| {
         let scale = if a < 3 { 0.6 } else { 1.0 };
-        R::of(scale * (0.7 * a as f64 + 1.3 * b as f64 + 0.2).sin())
+        R::constant(scale * (0.7 * a as f64 + 1.3 * b as f64 + 0.2).sin())
     }));
     let mut controller = controller::<R>();
     let (mut worst, mut peak) = ([0.0f64; 2], [0.0f64; 2]);
@@ -39,8 +39,9 @@ where
     for record in reader.records() {
         let record = record.expect("a row");
         let number = |index: usize| record[index].parse::<f64>().expect("a number");
-        let error = Vector6::from_fn(|axis, _| R::of(number(expected[axis])) - R::of(number(measured[axis])));
-        let u = controller.command(&error, R::of(1.0), R::of(2.0), R::of(PERIOD), false);
+        let error =
+            Vector6::from_fn(|axis, _| R::constant(number(expected[axis])) - R::constant(number(measured[axis])));
+        let u = controller.command(&error, R::constant(1.0), R::constant(2.0), R::constant(PERIOD), false);
         let tau = ForceController::torque(&jacobian, &u);
         let mut compare = |which: usize, computed: f64, golden: f64| {
             worst[which] = worst[which].max((computed - golden).abs());

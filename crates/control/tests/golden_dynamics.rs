@@ -64,7 +64,7 @@ where
     let model = ArmModel::<R>::new(payload);
     let mut worst = Worst::default();
     for row in rows(file) {
-        let convert = |start| row.joints(start).map(R::of);
+        let convert = |start| row.joints(start).map(R::constant);
         let q = JointPositions::from_array(convert(1));
         let dq = JointVelocities::from_array(convert(8));
         let ddq = JointAccelerations::from_array(convert(15));

@@ -50,7 +50,7 @@ impl Actuation {
         for ((units, torque), ((efficiency, ratio), ipnm)) in
             units.iter_mut().zip(to_pucks(*torques.torques())).zip(scales)
         {
-            let scale = R::of(1.0 / (efficiency * ratio)) * R::from_counts(*ipnm);
+            let scale = R::constant(1.0 / (efficiency * ratio)) * R::from_counts(*ipnm);
             // As for the arm: zero, should a torque ever not be finite.
             *units = PuckTorque::from_units(torque * scale).unwrap_or(PuckTorque::ZERO);
         }

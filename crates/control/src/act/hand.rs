@@ -33,7 +33,7 @@ pub struct HandLimiter<R: Real> {
 impl<R: Real> HandLimiter<R> {
     /// A limiter at zero torque.
     pub fn new() -> Self {
-        HandLimiter { last: [R::of(0.0); DIGITS], before: [R::of(0.0); DIGITS] }
+        HandLimiter { last: [R::constant(0.0); DIGITS], before: [R::constant(0.0); DIGITS] }
     }
 
     /// Back to zero torque at once: nothing is being sent.
@@ -56,9 +56,9 @@ impl<R: Real> HandLimiter<R> {
     pub fn limit(&mut self, wanted: &[R; DIGITS]) -> LimitedHandTorques<R> {
         self.before = self.last;
         for ((last, wanted), limit) in self.last.iter_mut().zip(wanted).zip(TORQUE_LIMIT) {
-            let finite = if wanted.is_finite_number() { *wanted } else { R::of(0.0) };
-            let step = within(finite, R::of(limit)) - *last;
-            *last = within(*last + within(step, R::of(limit / FULL_SCALE_CYCLES)), R::of(limit));
+            let finite = if wanted.is_finite_number() { *wanted } else { R::constant(0.0) };
+            let step = within(finite, R::constant(limit)) - *last;
+            *last = within(*last + within(step, R::constant(limit / FULL_SCALE_CYCLES)), R::constant(limit));
         }
         LimitedHandTorques(self.last)
     }

@@ -87,19 +87,19 @@ pub struct TorqueLimiter<R: Real> {
 impl<R: Real> TorqueLimiter<R> {
     /// A limiter for this arm, at zero torque.
     pub fn new(calibration: &Calibration<R>) -> Self {
-        let mut joint_limit = [R::of(0.0); JOINTS];
-        let mut motor_limit = [R::of(0.0); JOINTS];
+        let mut joint_limit = [R::constant(0.0); JOINTS];
+        let mut motor_limit = [R::constant(0.0); JOINTS];
         for joint in 0..JOINTS {
             let wanted = WORST_GRAVITY[joint] + wam7::CONTROL_SIGNAL_LIMIT[joint];
-            joint_limit[joint] = R::of(wanted.min(wam7::TORQUE_MAX[joint]));
+            joint_limit[joint] = R::constant(wanted.min(wam7::TORQUE_MAX[joint]));
             let units = f64::from(calibration.drives.units_per_newton_metre()[joint]);
-            motor_limit[joint] = R::of(wam7::MOTOR_TORQUE_MAX[joint].min(MOTOR_COUNTS_LIMIT / units));
+            motor_limit[joint] = R::constant(wam7::MOTOR_TORQUE_MAX[joint].min(MOTOR_COUNTS_LIMIT / units));
         }
         TorqueLimiter {
             transmission: calibration.transmission,
             joint_limit,
             motor_limit,
-            step_limit: STEP_LIMIT.map(R::of),
+            step_limit: STEP_LIMIT.map(R::constant),
             last: JointTorques::zero(),
             before: JointTorques::zero(),
         }
@@ -161,7 +161,7 @@ impl<R: Real> TorqueLimiter<R> {
         let motors = self.transmission.motor_torques_from_joint(&(*torques).into());
         let mut scaled = false;
         for group in GROUPS {
-            let mut factor = R::of(1.0);
+            let mut factor = R::constant(1.0);
             // Motors have the numbers of the joints they drive: M2, M3 drive J2, J3, and M5, M6 drive J5, J6.
             for &motor in group {
                 let magnitude = magnitude(motors[motor]);
@@ -181,7 +181,7 @@ impl<R: Real> TorqueLimiter<R> {
     fn cut_steps(&self, torques: &mut Vector7<R>) -> bool {
         let mut cut = false;
         for group in GROUPS {
-            let mut fraction = R::of(1.0);
+            let mut fraction = R::constant(1.0);
             for &joint in group {
                 let step = magnitude(torques[joint] - self.last.0[joint]);
                 if step * fraction > self.step_limit[joint] {
@@ -189,7 +189,7 @@ impl<R: Real> TorqueLimiter<R> {
                     cut = true;
                 }
             }
-            if fraction < R::of(1.0) {
+            if fraction < R::constant(1.0) {
                 for &joint in group {
                     let from = self.last.0[joint];
                     torques[joint] = from + (torques[joint] - from) * fraction;
@@ -201,5 +201,5 @@ impl<R: Real> TorqueLimiter<R> {
 }
 
 fn magnitude<R: Real>(value: R) -> R {
-    if value < R::of(0.0) { -value } else { value }
+    if value < R::constant(0.0) { -value } else { value }
 }

@@ -53,7 +53,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Command::ClearFault => {
                 self.may_trust_zero(measured)?;
                 let waits = matches!(self.supervisor.state(), State::SoftStop | State::Fault);
-                let moving = waits && self.fastest(measured) > R::of(STANDING);
+                let moving = waits && self.fastest(measured) > R::constant(STANDING);
                 let remains = measured.outside_fault || measured.state.missing > 0 || moving;
                 if (waits || self.needs_clear()) && remains {
                     return Err(Refusal::CauseRemains);
@@ -85,7 +85,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.may_move(measured)?;
                 // From the posture that is held, so that the torque against friction stays.
                 let from = if let Law::Posture(posture) = &self.law { posture.q } else { *q };
-                let approach = Approach::new(&self.model, &from, &target, R::of(f64::from(duration)));
+                let approach = Approach::new(&self.model, &from, &target, R::constant(f64::from(duration)));
                 self.supervisor.take(Trigger::Approach, Fault::None)?;
                 self.begin_approach(approach, measured);
                 Ok(())
@@ -125,9 +125,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             return Err(Refusal::WrenchMissing);
         }
         let expected = primitive.expected().ok_or(Refusal::NoExpectation)?;
-        let [fx, fy, fz, ..] = expected.at(R::of(0.0));
+        let [fx, fy, fz, ..] = expected.at(R::constant(0.0));
         let at_rest = measured.frames.sensor_to_world() * self.wrench.rest_force();
-        let limit = R::of(REST_FORCE * REST_FORCE);
+        let limit = R::constant(REST_FORCE * REST_FORCE);
         let within = |force: Vector3<R>| force.dot(&force) <= limit;
         if within(at_rest) || within(at_rest - Vector3::new(fx, fy, fz)) { Ok(()) } else { Err(Refusal::ForceAtRest) }
     }
@@ -144,7 +144,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if !timely || !hand::within_range(q) {
             return Err(Refusal::OutOfRange);
         }
-        self.hand.move_to(&q.map(|q| R::of(f64::from(q))), R::of(f64::from(duration)));
+        self.hand.move_to(&q.map(|q| R::constant(f64::from(q))), R::constant(f64::from(duration)));
         Ok(())
     }
 
@@ -163,7 +163,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if self.needs_clear() {
             return Err(Refusal::FaultLatched);
         }
-        if self.supervisor.state() == State::SoftStop && self.fastest(measured) > R::of(STANDING) {
+        if self.supervisor.state() == State::SoftStop && self.fastest(measured) > R::constant(STANDING) {
             return Err(Refusal::Moving);
         }
         Ok(())
@@ -184,7 +184,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if self.is_blind(WRENCH_AGE.into()) {
             return Err(Refusal::WrenchMissing);
         }
-        if self.fastest(measured) > R::of(CALM) { Err(Refusal::Moving) } else { Ok(()) }
+        if self.fastest(measured) > R::constant(CALM) { Err(Refusal::Moving) } else { Ok(()) }
     }
 
     pub(super) fn fastest(&self, measured: &Measured<'_, R>) -> R {

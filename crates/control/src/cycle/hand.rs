@@ -123,10 +123,10 @@ impl<R: Real> HandDrive<R> {
     pub fn follow(&mut self, reference: &HandReference<R>, expected: Option<[R; FINGERS]>) {
         let mut reference = *reference;
         for ((q, dq), [min, max]) in reference.q.iter_mut().zip(&mut reference.dq).zip(ranges()) {
-            let kept = crate::real::at_least(crate::real::at_most(*q, R::of(max)), R::of(min));
+            let kept = crate::real::at_least(crate::real::at_most(*q, R::constant(max)), R::constant(min));
             if kept != *q {
                 *q = kept;
-                *dq = R::of(0.0);
+                *dq = R::constant(0.0);
             }
         }
         self.aim = Aim::Follow(reference);
@@ -146,7 +146,7 @@ impl<R: Real> HandDrive<R> {
             (Aim::Follow(reference), _) => reference.q,
             (Aim::Move(motion, _), _) => motion.now().q,
             (Aim::None, Some(state)) => state.q,
-            (Aim::None, None) => [R::of(0.0); DIGITS],
+            (Aim::None, None) => [R::constant(0.0); DIGITS],
         }
     }
 
@@ -177,7 +177,7 @@ impl<R: Real> HandDrive<R> {
         let limited = self.limiter.limit(&wanted);
         self.saturated = wanted.iter().zip(TORQUE_LIMIT).skip(1).any(|(torque, limit)| {
             // A NaN counts as saturated.
-            !(*torque <= R::of(limit) && *torque >= R::of(-limit))
+            !(*torque <= R::constant(limit) && *torque >= R::constant(-limit))
         });
         Some(limited)
     }

@@ -132,14 +132,14 @@ impl<R: Real> Posture<R> {
     /// spring that is not bounded would throw it back; so would one that is, and it gives way once more to a joint that
     /// it has made fast.
     fn give_way(&mut self, q: &JointPositions<R>, dq: &JointVelocities<R>, clamp: &Vector7<R>) {
-        let step = R::of(RETURN_SPEED * PERIOD);
+        let step = R::constant(RETURN_SPEED * PERIOD);
         let back = (self.q.0 - self.held.0).map(|way| within(way, step));
         let mut offset = (self.held.0 + back - q.0).zip_map(clamp, within);
         for (joint, offset) in offset.iter_mut().enumerate() {
-            let (speed, zero) = (dq.0[joint], R::of(0.0));
+            let (speed, zero) = (dq.0[joint], R::constant(0.0));
             let along = if *offset < zero { -speed } else { speed };
-            if along > R::of(LET_GO.0) {
-                let share = at_least((R::of(LET_GO.1) - along) * R::of(1.0 / (LET_GO.1 - LET_GO.0)), zero);
+            if along > R::constant(LET_GO.0) {
+                let share = at_least((R::constant(LET_GO.1) - along) * R::constant(1.0 / (LET_GO.1 - LET_GO.0)), zero);
                 *offset = within(*offset, share * clamp[joint]);
             }
         }
@@ -176,7 +176,7 @@ pub(super) struct Lag<R: Real> {
 impl<R: Real> Lag<R> {
     /// The tool is where the plan is.
     pub(super) fn none() -> Self {
-        Lag { distance: R::of(0.0), speed: R::of(0.0) }
+        Lag { distance: R::constant(0.0), speed: R::constant(0.0) }
     }
 }
 
@@ -193,12 +193,12 @@ pub(super) struct Ramp<R: Real> {
 impl<R: Real> Ramp<R> {
     /// A ramp of so many control periods.
     pub(super) fn new(torque: Vector7<R>, periods: u16) -> Self {
-        Ramp { torque, left: periods, slope: R::of(1.0 / f64::from(periods)) }
+        Ramp { torque, left: periods, slope: R::constant(1.0 / f64::from(periods)) }
     }
 
     /// Nothing to take away.
     pub(super) fn none() -> Self {
-        Ramp { torque: Vector7::zeros(), left: 0, slope: R::of(0.0) }
+        Ramp { torque: Vector7::zeros(), left: 0, slope: R::constant(0.0) }
     }
 
     /// Returns the torque of this control period (N m).
@@ -238,15 +238,15 @@ pub(super) struct Lowering<R: Real> {
 impl<R: Real> Lowering<R> {
     /// Begins with all of gravity.
     pub(super) fn new(rest: Ramp<R>) -> Self {
-        Lowering { rest, share: R::of(1.0), rested: 0, left: LOWERING }
+        Lowering { rest, share: R::constant(1.0), rested: 0, left: LOWERING }
     }
 
     /// Takes the speed of the hand (m/s) and of the fastest joint (rad/s).
     pub(super) fn step(&mut self, hand: R, joint: R) {
-        let zero = R::of(0.0);
-        let change = (hand - R::of(SINKING_SPEED)) * R::of(SINKING_GAIN * PERIOD);
-        self.share = at_most(at_least(self.share + change, zero), R::of(1.0));
-        let rests = self.share == zero && joint < R::of(RESTING);
+        let zero = R::constant(0.0);
+        let change = (hand - R::constant(SINKING_SPEED)) * R::constant(SINKING_GAIN * PERIOD);
+        self.share = at_most(at_least(self.share + change, zero), R::constant(1.0));
+        let rests = self.share == zero && joint < R::constant(RESTING);
         self.rested = if rests { self.rested.saturating_add(1) } else { 0 };
         self.left = self.left.saturating_sub(1);
     }

@@ -48,7 +48,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// The law of the present state; `None` where no torque is sent.
     pub(super) fn demand(&mut self, measured: &Measured<'_, R>) -> Option<Demand<R>> {
         let mut repulsion = self.bounds.repulsion(&measured.state.q, &measured.state.dq);
-        let near = if repulsion.0.amax() > R::of(0.0) { flags::NEAR_LIMIT } else { 0 };
+        let near = if repulsion.0.amax() > R::constant(0.0) { flags::NEAR_LIMIT } else { 0 };
         let mut demand = match &self.law {
             Law::Off { .. } => return None,
             Law::Gravity => self.float(measured),
@@ -70,8 +70,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             torque: JointTorques(torque),
             q_d: measured.state.q,
             pose_d: measured.pose,
-            phase: R::of(0.0),
-            surprise: R::of(0.0),
+            phase: R::constant(0.0),
+            surprise: R::constant(0.0),
             flags: 0,
             explained: (torque, Vector7::zeros()),
         }
@@ -89,13 +89,14 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     fn float(&self, measured: &Measured<'_, R>) -> Demand<R> {
         let gravity = self.steady_gravity(measured);
         let mut torque = gravity;
-        let mut share = (hand_speed(measured) - R::of(TAUGHT_SPEED)) * R::of(1.0 / (BRAKED_SPEED - TAUGHT_SPEED));
+        let mut share =
+            (hand_speed(measured) - R::constant(TAUGHT_SPEED)) * R::constant(1.0 / (BRAKED_SPEED - TAUGHT_SPEED));
         if self.armed_for < ARMING {
             let arming = R::from_counts(i32::from(ARMING - self.armed_for)) / R::from_counts(i32::from(ARMING));
             share = at_least(share, arming);
         }
         let (light, full) = (&self.gains.lead_damping, &self.gains.stop_damping);
-        let share = at_most(at_least(share, R::of(0.0)), R::of(1.0));
+        let share = at_most(at_least(share, R::constant(0.0)), R::constant(1.0));
         torque -= (light + (full - light) * share).component_mul(&self.observer.velocity(measured.state, Trust::Stiff));
         Demand { explained: (gravity, Vector7::zeros()), ..self.plain(measured, torque) }
     }
@@ -105,7 +106,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     #[inline(never)]
     fn stop(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
         let (rest, share) = match &mut self.law {
-            Law::SoftStop(ramp) => (ramp.step(), R::of(1.0)),
+            Law::SoftStop(ramp) => (ramp.step(), R::constant(1.0)),
             Law::Lower(lowering) => {
                 lowering.step(hand_speed(measured), measured.state.dq.0.amax());
                 (lowering.rest.step(), lowering.share)
@@ -195,7 +196,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         );
         if run.goal_moves() {
             // A goal that the joints cannot follow is not led away from the tool.
-            let behind = lag.distance * R::of(1.0 / TRACKING_LIMIT);
+            let behind = lag.distance * R::constant(1.0 / TRACKING_LIMIT);
             run.crowd(at_least(speed_load(measured.frames, &reference.dq), behind));
         }
         let trust = if options.compliant { Trust::Compliant } else { Trust::Stiff };
@@ -211,7 +212,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 &-error.in_world(to_world),
                 tracking.force_proportional,
                 tracking.force_integral,
-                R::of(PERIOD),
+                R::constant(PERIOD),
                 self.cut.joint || self.cut.motor || senses != Senses::Fresh,
             );
             // The expected wrench is fed forward, because the gain of the integral is finite.
@@ -221,7 +222,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             set |= flags::FORCE_CONTROL;
         }
         let surprise = run.surprise();
-        if surprise > R::of(1.0) {
+        if surprise > R::constant(1.0) {
             set |= flags::SURPRISE;
         }
         if run.is_faded(primitive) {
@@ -241,11 +242,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
 /// forearm, and of the hand.
 #[inline(never)]
 fn speed_load<R: Real>(frames: &Frames<R>, dq: &JointVelocities<R>) -> R {
-    let [elbow, tip] = frames.elbow_speeds(dq, R::of(TIP_REACH));
+    let [elbow, tip] = frames.elbow_speeds(dq, R::constant(TIP_REACH));
     let hand = sqrt(frames.jacobian().twist(&dq.0).fixed_rows::<3>(0).norm_squared());
-    let load = at_least(at_least(elbow, tip) * R::of(1.0 / TIP_SPEED_LIMIT), hand * R::of(1.0 / HAND_SPEED));
+    let load =
+        at_least(at_least(elbow, tip) * R::constant(1.0 / TIP_SPEED_LIMIT), hand * R::constant(1.0 / HAND_SPEED));
     dq.0.iter().zip(&wam7::VELOCITY_MAX).fold(load, |load, (dq, limit)| {
-        at_least(load, (if *dq < R::of(0.0) { -*dq } else { *dq }) * R::of(1.0 / limit))
+        at_least(load, (if *dq < R::constant(0.0) { -*dq } else { *dq }) * R::constant(1.0 / limit))
     })
 }
 

@@ -323,7 +323,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             }
             Some(state) => {
                 let frames = Frames::new(&self.model, &state.q);
-                let at_rest = state.missing == 0 && state.dq.0.amax() < R::of(STANDING);
+                let at_rest = state.missing == 0 && state.dq.0.amax() < R::constant(STANDING);
                 let weight = self.model.hanging_weight(&frames);
                 self.wrench.update(input.sample.wrench.as_ref(), Some(&weight), at_rest);
                 if self.supervisor.state() == State::Idle && !self.wrench.is_tared() {
@@ -498,7 +498,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         match &self.law {
             Law::Run(_) => self.run.as_ref().is_none_or(Run::is_over),
             Law::Posture(Posture { approach: Some(approach), integral, .. }) => {
-                let rests = integral.is_settled() && self.fastest(measured) < R::of(STANDING);
+                let rests = integral.is_settled() && self.fastest(measured) < R::constant(STANDING);
                 approach.is_overdue() || (approach.is_finished() && rests)
             }
             _ => false,

@@ -134,7 +134,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     fn load_expected_first(&mut self, measured: &Measured<'_, R>) -> Vector7<R> {
         match self.loaded.get().and_then(Primitive::expected) {
             Some(expected) => {
-                let expected = Deviation::new(&expected.at(R::of(0.0)), &Wrench::zero(), None).expected;
+                let expected = Deviation::new(&expected.at(R::constant(0.0)), &Wrench::zero(), None).expected;
                 let to_world = measured.frames.tool_to_world();
                 let load = self.force.confirmed(&-expected.in_world(to_world), &measured.wrench.in_world(to_world));
                 ForceController::torque(&measured.frames.jacobian(), &load).0

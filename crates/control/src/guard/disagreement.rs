@@ -62,8 +62,8 @@ pub(crate) struct Disagreement<R: Real> {
 impl<R: Real> Disagreement<R> {
     /// Nothing seen yet, on an arm with this transmission.
     pub(crate) fn new(transmission: Transmission<R>) -> Self {
-        let zero = R::of(0.0);
-        let swing = friction::at_motors(&transmission).map(|friction| friction * R::of(SWING));
+        let zero = R::constant(0.0);
+        let swing = friction::at_motors(&transmission).map(|friction| friction * R::constant(SWING));
         Disagreement {
             transmission,
             swing,
@@ -91,7 +91,7 @@ impl<R: Real> Disagreement<R> {
     /// Not inlined: it is asked where a motor stands.
     #[inline(never)]
     pub(crate) fn encoder_stands_still(&mut self, effort: &Effort<'_, R>, force: R, unchanged: u8) -> bool {
-        if force > R::of(CONTACT) {
+        if force > R::constant(CONTACT) {
             self.all_turn();
             return false;
         }
@@ -103,7 +103,7 @@ impl<R: Real> Disagreement<R> {
         let torques = self.swing.iter().zip(asked.into_iter().zip(sent)).zip(speeds);
         for (motor, (((still, beyond), anchor), ((limit, (asked, sent)), speed))) in state.zip(torques).enumerate() {
             let breaks_away = effort.breaking_away >> motor & 1 != 0;
-            let is_to_turn = breaks_away || at_least(speed, -speed) >= R::of(MOVING);
+            let is_to_turn = breaks_away || at_least(speed, -speed) >= R::constant(MOVING);
             if unchanged >> motor & 1 == 0 || !is_to_turn {
                 (*still, *beyond) = (0, 0);
                 continue;
@@ -125,7 +125,7 @@ impl<R: Real> Disagreement<R> {
     #[inline(never)]
     pub(crate) fn is_pushed(&mut self, feedback: &Vector7<R>) -> bool {
         let beyond = feedback.iter().zip(wam7::FRICTION_COULOMB).any(|(torque, friction)| {
-            let bar = R::of(PUSH * friction);
+            let bar = R::constant(PUSH * friction);
             *torque > bar || *torque < -bar
         });
         self.pushing = if beyond { self.pushing.saturating_add(1) } else { 0 };

@@ -35,8 +35,8 @@ impl<R: Real> JointBounds<R> {
     pub fn around(model: &ArmModel<R>, q: &JointPositions<R>) -> Self {
         let mut bounds = JointBounds { min: model.soft_min, max: model.soft_max };
         for joint in 0..JOINTS {
-            bounds.min[joint] = at_most(q.0[joint] - R::of(SLACK), bounds.min[joint]);
-            bounds.max[joint] = at_least(q.0[joint] + R::of(SLACK), bounds.max[joint]);
+            bounds.min[joint] = at_most(q.0[joint] - R::constant(SLACK), bounds.min[joint]);
+            bounds.max[joint] = at_least(q.0[joint] + R::constant(SLACK), bounds.max[joint]);
         }
         bounds
     }
@@ -52,13 +52,13 @@ impl<R: Real> JointBounds<R> {
 
     /// True if a joint is beyond its bound by more than `STOP_DISTANCE`.
     pub fn violated(&self, q: &JointPositions<R>) -> bool {
-        let distance = R::of(STOP_DISTANCE);
+        let distance = R::constant(STOP_DISTANCE);
         (0..JOINTS).any(|joint| q.0[joint] > self.max[joint] + distance || q.0[joint] < self.min[joint] - distance)
     }
 
     /// Torque that pushes joints back inside; zero within the bounds.
     pub fn repulsion(&self, q: &JointPositions<R>, dq: &JointVelocities<R>) -> JointTorques<R> {
-        let zero = R::of(0.0);
+        let zero = R::constant(0.0);
         let mut torque = Vector7::zeros();
         for joint in 0..JOINTS {
             let above = at_least(q.0[joint] - self.max[joint], zero);
@@ -75,7 +75,7 @@ impl<R: Real> JointBounds<R> {
 
 /// Torque towards the inside (N m) on a joint that is this far out (rad) and moves further out at this speed (rad/s).
 fn push_back<R: Real>(joint: usize, distance: R, outward: R) -> R {
-    let zero = R::of(0.0);
-    let share = at_most(at_least(R::of(1.0) + outward * R::of(1.0 / RETURN_SPEED), zero), R::of(1.0));
-    distance * R::of(STIFFNESS[joint]) * share + at_least(outward, zero) * R::of(DAMPING[joint])
+    let zero = R::constant(0.0);
+    let share = at_most(at_least(R::constant(1.0) + outward * R::constant(1.0 / RETURN_SPEED), zero), R::constant(1.0));
+    distance * R::constant(STIFFNESS[joint]) * share + at_least(outward, zero) * R::constant(DAMPING[joint])
 }

@@ -68,7 +68,7 @@ pub(crate) struct Observation<'a, R: Real> {
 impl<R: Real> Monitor<R> {
     pub(crate) fn new(transmission: Transmission<R>) -> Self {
         Monitor {
-            speed_limit: wam7::VELOCITY_MAX.map(|limit| R::of(limit * SPEED_MARGIN)),
+            speed_limit: wam7::VELOCITY_MAX.map(|limit| R::constant(limit * SPEED_MARGIN)),
             pressed: 0,
             disagreement: Disagreement::new(transmission),
         }
@@ -97,7 +97,7 @@ impl<R: Real> Monitor<R> {
         }
         let (stuck, pushed) = self.disagrees(state, seen);
         // A value that was measured long ago says nothing of now.
-        let pressed = !seen.blind && (seen.force > R::of(FORCE_LIMIT) || seen.full_scale);
+        let pressed = !seen.blind && (seen.force > R::constant(FORCE_LIMIT) || seen.full_scale);
         self.pressed = if pressed { self.pressed.saturating_add(1) } else { 0 };
         let moving_by_itself = matches!(law, State::Hold | State::Approach | State::Run);
         let finding = if moving_by_itself && self.pressed >= FORCE_CYCLES {
@@ -110,13 +110,14 @@ impl<R: Real> Monitor<R> {
             Some(Fault::JointLimit)
         } else if matches!(law, State::Approach | State::Run) && seen.wrench_lost {
             Some(Fault::WrenchLost)
-        } else if law == State::Run && (seen.lag.0 > R::of(TRACKING_LIMIT) || seen.lag.1 > R::of(LAG_LIMIT)) {
+        } else if law == State::Run && (seen.lag.0 > R::constant(TRACKING_LIMIT) || seen.lag.1 > R::constant(LAG_LIMIT))
+        {
             Some(Fault::TrackingError)
         } else if state.dq.0.iter().zip(&self.speed_limit).any(|(dq, limit)| *dq > *limit || *dq < -*limit) {
             Some(Fault::JointSpeed)
         } else {
-            let [elbow, tip] = seen.frames.elbow_speeds(&state.dq, R::of(TIP_REACH));
-            let limit = R::of(TIP_SPEED_LIMIT);
+            let [elbow, tip] = seen.frames.elbow_speeds(&state.dq, R::constant(TIP_REACH));
+            let limit = R::constant(TIP_SPEED_LIMIT);
             (elbow > limit || tip > limit).then_some(Fault::TipSpeed)
         };
         if let Some(fault) = finding {

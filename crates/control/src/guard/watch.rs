@@ -78,7 +78,7 @@ impl<R: Real> Watch<R> {
     /// Before the first sample.
     pub fn new() -> Self {
         Watch {
-            averages: [R::of(0.0); STATISTICS_CHANNELS],
+            averages: [R::constant(0.0); STATISTICS_CHANNELS],
             told: [false; STATISTICS_CHANNELS],
             contact: Contact::new(),
         }
@@ -102,9 +102,9 @@ impl<R: Real> Watch<R> {
             if channel >= WRIST_CHANNELS && !has_hand {
                 continue;
             }
-            *average += (clamp(deviation) - *average) * R::of(PERIOD / MEMORY);
+            *average += (clamp(deviation) - *average) * R::constant(PERIOD / MEMORY);
             let size = size(channel, *average);
-            if size > R::of(LIMIT) && !*told {
+            if size > R::constant(LIMIT) && !*told {
                 *told = true;
                 if worst.is_none_or(|(_, other)| size > other) {
                     worst = Some((channel, size));
@@ -119,9 +119,9 @@ impl<R: Real> Watch<R> {
     /// The largest averaged deviation, as a share of [`LIMIT`]: above 1 is a surprise. At least 2 once contact was
     /// lost.
     pub fn statistic(&self) -> R {
-        let begin = if self.contact.lost { R::of(LOST) } else { R::of(0.0) };
+        let begin = if self.contact.lost { R::constant(LOST) } else { R::constant(0.0) };
         self.averages.iter().enumerate().fold(begin, |largest, (channel, average)| {
-            let share = size(channel, *average) * R::of(1.0 / LIMIT);
+            let share = size(channel, *average) * R::constant(1.0 / LIMIT);
             if share > largest { share } else { largest }
         })
     }
@@ -129,7 +129,9 @@ impl<R: Real> Watch<R> {
     /// Distance of each channel towards a surprise (spreads, never negative): the averaged deviation, of fingers only
     /// that of closing too far.
     pub fn sizes(&self) -> [R; STATISTICS_CHANNELS] {
-        core::array::from_fn(|channel| self.averages.get(channel).map_or(R::of(0.0), |average| size(channel, *average)))
+        core::array::from_fn(|channel| {
+            self.averages.get(channel).map_or(R::constant(0.0), |average| size(channel, *average))
+        })
     }
 
     /// True if contact was lost before the fingers closed.
@@ -165,7 +167,7 @@ struct Contact<R: Real> {
 
 impl<R: Real> Contact<R> {
     fn new() -> Self {
-        let zero = R::of(0.0);
+        let zero = R::constant(0.0);
         Contact { force: [zero; 3], largest: zero, axis: 0, fingers: None, closing: false, lost: false }
     }
 
@@ -174,18 +176,18 @@ impl<R: Real> Contact<R> {
         let [fx, fy, fz, .., q1, q2, q3] = *values;
         if has_hand {
             let start = *self.fingers.get_or_insert([q1, q2, q3]);
-            let moved = |(q, start): (R, R)| magnitude(q - start) > R::of(CLOSING);
+            let moved = |(q, start): (R, R)| magnitude(q - start) > R::constant(CLOSING);
             self.closing = self.closing || [q1, q2, q3].into_iter().zip(start).any(moved);
         }
         // The force of a grasp has other reasons, and after the movement nothing is known of it.
-        if self.closing || self.lost || progress > R::of(1.0) {
+        if self.closing || self.lost || progress > R::constant(1.0) {
             return None;
         }
-        let mut square = R::of(0.0);
-        let mut strongest = (0, R::of(0.0));
+        let mut square = R::constant(0.0);
+        let mut strongest = (0, R::constant(0.0));
         for (axis, (average, force)) in self.force.iter_mut().zip([fx, fy, fz]).enumerate() {
-            if magnitude(force) < R::of(STRONGEST) {
-                *average += (force - *average) * R::of(PERIOD / CONTACT_MEMORY);
+            if magnitude(force) < R::constant(STRONGEST) {
+                *average += (force - *average) * R::constant(PERIOD / CONTACT_MEMORY);
             }
             square += *average * *average;
             if magnitude(*average) > strongest.1 {
@@ -195,7 +197,7 @@ impl<R: Real> Contact<R> {
         if square > self.largest {
             (self.largest, self.axis) = (square, strongest.0);
         }
-        self.lost = self.largest > R::of(CONTACT * CONTACT) && square < self.largest * R::of(KEPT * KEPT);
+        self.lost = self.largest > R::constant(CONTACT * CONTACT) && square < self.largest * R::constant(KEPT * KEPT);
         self.lost.then_some(self.axis)
     }
 }
@@ -204,16 +206,16 @@ impl<R: Real> Contact<R> {
 fn size<R: Real>(channel: usize, average: R) -> R {
     if channel < FIRST_FINGER {
         magnitude(average)
-    } else if average > R::of(0.0) {
+    } else if average > R::constant(0.0) {
         average
     } else {
-        R::of(0.0)
+        R::constant(0.0)
     }
 }
 
 /// Within [`WILDEST`]; what is not a number counts as nothing, which the limiter and the gates before it make known.
 fn clamp<R: Real>(deviation: R) -> R {
-    let wildest = R::of(WILDEST);
+    let wildest = R::constant(WILDEST);
     if deviation > wildest {
         wildest
     } else if deviation < -wildest {
@@ -221,12 +223,12 @@ fn clamp<R: Real>(deviation: R) -> R {
     } else if deviation <= wildest {
         deviation
     } else {
-        R::of(0.0)
+        R::constant(0.0)
     }
 }
 
 fn magnitude<R: Real>(value: R) -> R {
-    if value < R::of(0.0) { -value } else { value }
+    if value < R::constant(0.0) { -value } else { value }
 }
 
 #[cfg(test)]

@@ -50,19 +50,19 @@ pub(crate) struct Breakaway<R: Real> {
 impl<R: Real> Breakaway<R> {
     /// No motor is asked to turn.
     pub(crate) fn none() -> Self {
-        let zero = [R::of(0.0); JOINTS];
+        let zero = [R::constant(0.0); JOINTS];
         Breakaway { direction: zero, begin: None, turned: [0; JOINTS], extra: zero, passed: 2 * TRIAL }
     }
 
     /// For motors that are to go these ways (rad).
     pub(crate) fn along(ways: &[R; JOINTS]) -> Self {
-        let mut direction = [R::of(0.0); JOINTS];
+        let mut direction = [R::constant(0.0); JOINTS];
         for (direction, way) in direction.iter_mut().zip(ways).take(ARM_MOTORS) {
-            let least = R::of(LEAST_WAY);
+            let least = R::constant(LEAST_WAY);
             if *way > least {
-                *direction = R::of(1.0);
+                *direction = R::constant(1.0);
             } else if *way < -least {
-                *direction = R::of(-1.0);
+                *direction = R::constant(-1.0);
             }
         }
         Breakaway { direction, passed: 0, ..Breakaway::none() }
@@ -80,7 +80,7 @@ impl<R: Real> Breakaway<R> {
         }
         let motors = self.direction.iter().zip(&self.turned).enumerate();
         motors.fold(0, |due, (motor, (direction, turned))| {
-            due | u8::from(*direction != R::of(0.0) && *turned < TURNS) << motor
+            due | u8::from(*direction != R::constant(0.0) && *turned < TURNS) << motor
         })
     }
 
@@ -96,8 +96,8 @@ impl<R: Real> Breakaway<R> {
     ) -> &[R; JOINTS] {
         let begin = *self.begin.get_or_insert(*against);
         self.passed = self.passed.saturating_add(1);
-        let level =
-            at_most(R::from_counts(i32::from(self.passed)) * R::of(PERIOD / RISE), R::of(BEYOND)) * R::of(SWING);
+        let level = at_most(R::from_counts(i32::from(self.passed)) * R::constant(PERIOD / RISE), R::constant(BEYOND))
+            * R::constant(SWING);
         let motors = self.direction.iter().zip(&mut self.turned).zip(&mut self.extra);
         let torques = begin.iter().zip(against).zip(friction);
         for (motor, (((direction, turned), extra), ((begin, against), friction))) in motors.zip(torques).enumerate() {
@@ -105,10 +105,10 @@ impl<R: Real> Breakaway<R> {
                 *turned = if still >> motor & 1 == 0 { *turned + 1 } else { 0 };
             }
             if *turned >= TURNS || self.passed >= TRIAL {
-                *extra *= R::of(1.0 - PERIOD / FADE);
+                *extra *= R::constant(1.0 - PERIOD / FADE);
             } else {
                 let missing = *direction * (*begin - *against) + level * *friction;
-                *extra = *direction * at_least(missing, R::of(0.0));
+                *extra = *direction * at_least(missing, R::constant(0.0));
             }
         }
         &self.extra

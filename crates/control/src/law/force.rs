@@ -61,16 +61,16 @@ impl<R: Real> ForceController<R> {
     /// The wrench that is to be applied (world axes), its force and its torque cut to what the environment presses back
     /// along them, as the sensor measures it, and `UNCONFIRMED` beyond that; their directions are kept.
     pub fn confirmed(&mut self, wanted: &Vector6<R>, measured: &Vector6<R>) -> Vector6<R> {
-        let (mut confirmed, zero) = (*wanted, R::of(0.0));
+        let (mut confirmed, zero) = (*wanted, R::constant(0.0));
         let before = self.pressing.map_or([None; 2], |before| before.map(Some));
         let rows =
             self.pressing.insert([zero; 2]).iter_mut().zip(before).zip(UNCONFIRMED).zip(CONFIRMATION).zip([0, 3]);
         for ((((pressing, before), unconfirmed), rise), first) in rows {
             let mut part = confirmed.fixed_rows_mut::<3>(first);
-            let (length, unconfirmed) = (sqrt(part.dot(&part)), R::of(unconfirmed));
+            let (length, unconfirmed) = (sqrt(part.dot(&part)), R::constant(unconfirmed));
             if length > unconfirmed {
                 let reaction = at_least(-part.dot(&measured.fixed_rows::<3>(first)) / length, zero);
-                *pressing = before.map_or(reaction, |before| at_most(reaction, before + R::of(rise * PERIOD)));
+                *pressing = before.map_or(reaction, |before| at_most(reaction, before + R::constant(rise * PERIOD)));
                 let most = *pressing + unconfirmed;
                 if length > most {
                     part *= most / length;

@@ -158,17 +158,17 @@ impl<R: Real> Gains<R> {
         Gains {
             stiff: Tracking::from_numbers(&STIFF),
             compliant: Tracking::from_numbers(&COMPLIANT),
-            settling: (vector(wam7::FRICTION_COULOMB) * R::of(SETTLING_FRACTION))
+            settling: (vector(wam7::FRICTION_COULOMB) * R::constant(SETTLING_FRACTION))
                 .component_div(&vector(STIFF.stiffness)),
             lead_damping: vector(LEAD_DAMPING),
             stop_damping: vector(STOP_DAMPING),
             hand: HandGains {
-                stiffness: HAND_STIFFNESS.map(R::of),
-                damping: HAND_DAMPING.map(R::of),
-                viscous: HAND_VISCOUS.map(R::of),
-                coulomb: HAND_COULOMB.map(R::of),
-                force_proportional: R::of(HAND_FORCE.0),
-                force_integral: R::of(HAND_FORCE.1),
+                stiffness: HAND_STIFFNESS.map(R::constant),
+                damping: HAND_DAMPING.map(R::constant),
+                viscous: HAND_VISCOUS.map(R::constant),
+                coulomb: HAND_COULOMB.map(R::constant),
+                force_proportional: R::constant(HAND_FORCE.0),
+                force_integral: R::constant(HAND_FORCE.1),
                 force_window: HAND_FORCE.2,
             },
         }
@@ -185,24 +185,24 @@ impl<R: Real> Tracking<R> {
         Tracking {
             stiffness: vector(numbers.stiffness),
             damping: vector(numbers.damping),
-            coulomb: vector(wam7::FRICTION_COULOMB) * R::of(FRICTION_FRACTION),
+            coulomb: vector(wam7::FRICTION_COULOMB) * R::constant(FRICTION_FRACTION),
             viscous: vector(wam7::FRICTION_VISCOUS),
             clamp: vector(numbers.clamp),
-            position: R::of(numbers.pose),
-            orientation: R::of(numbers.pose),
-            posture: R::of(numbers.posture),
-            inverse_damping: R::of(4e-4),
-            force_proportional: R::of(numbers.force.0),
-            force_integral: R::of(numbers.force.1),
-            moment_share: R::of(numbers.moment_share),
+            position: R::constant(numbers.pose),
+            orientation: R::constant(numbers.pose),
+            posture: R::constant(numbers.posture),
+            inverse_damping: R::constant(4e-4),
+            force_proportional: R::constant(numbers.force.0),
+            force_integral: R::constant(numbers.force.1),
+            moment_share: R::constant(numbers.moment_share),
             force_window: numbers.force_window,
-            force_limit: (R::of(numbers.force_limit.0), R::of(numbers.force_limit.1)),
+            force_limit: (R::constant(numbers.force_limit.0), R::constant(numbers.force_limit.1)),
         }
     }
 }
 
 fn vector<R: Real>(values: [f64; 7]) -> Vector7<R> {
-    Vector7::from(values.map(R::of))
+    Vector7::from(values.map(R::constant))
 }
 
 impl<R: Real> Default for Gains<R> {

@@ -35,13 +35,13 @@ impl<R: Real> HandController<R> {
     /// Makes a controller without history in its place.
     pub fn init(gains: &HandGains<R>) -> impl Init<Self> + use<R> {
         let length = gains.force_window;
-        init!(HandController { window <- Window::init(length), feedback: [R::of(0.0); DIGITS] })
+        init!(HandController { window <- Window::init(length), feedback: [R::constant(0.0); DIGITS] })
     }
 
     /// Forgets everything.
     pub fn reset(&mut self) {
         self.window.reset();
-        self.feedback = [R::of(0.0); DIGITS];
+        self.feedback = [R::constant(0.0); DIGITS];
     }
 
     /// The torques of one tick (N m, spread first).
@@ -60,11 +60,11 @@ impl<R: Real> HandController<R> {
         for digit in 0..DIGITS {
             if state.age[digit] == 0 {
                 let rate = reference.dq[digit];
-                let magnitude = if rate < R::of(0.0) { -rate } else { rate };
+                let magnitude = if rate < R::constant(0.0) { -rate } else { rate };
                 self.feedback[digit] = gains.stiffness[digit] * (reference.q[digit] - state.q[digit])
                     + gains.damping[digit] * (reference.dq[digit] - state.dq[digit])
                     + gains.viscous[digit] * rate
-                    + gains.coulomb[digit] * rate / (magnitude + R::of(FRICTION_SPEED));
+                    + gains.coulomb[digit] * rate / (magnitude + R::constant(FRICTION_SPEED));
             }
         }
         let [spread, f1, f2, f3] = self.feedback;
@@ -75,7 +75,7 @@ impl<R: Real> HandController<R> {
         if !frozen && state.gauge_age == 0 {
             self.window.push(&error);
         }
-        let force = error * gains.force_proportional + self.window.sum() * (gains.force_integral * R::of(PERIOD));
+        let force = error * gains.force_proportional + self.window.sum() * (gains.force_integral * R::constant(PERIOD));
         [spread, f1 - force[0], f2 - force[1], f3 - force[2]]
     }
 }

@@ -67,12 +67,13 @@ impl<R: Real> PostureIntegral<R> {
     pub fn step(&mut self, gains: &Gains<R>, error: &Vector7<R>, closing: &Vector7<R>) {
         let joints = self.shift.iter_mut().zip(&mut self.seeking).zip(error.iter()).zip(gains.settling.iter());
         for (((((shift, seeking), error), clamp), tolerance), closing) in joints.zip(TOLERANCE).zip(closing.iter()) {
-            let zero = R::of(0.0);
-            let (sign, magnitude) = if *error < zero { (R::of(-1.0), -*error) } else { (R::of(1.0), *error) };
+            let zero = R::constant(0.0);
+            let (sign, magnitude) =
+                if *error < zero { (R::constant(-1.0), -*error) } else { (R::constant(1.0), *error) };
             let bound = if *seeking { BAND.1 } else { BAND.0 };
-            *seeking = magnitude > R::of(bound * tolerance);
-            if *seeking && *closing * sign < *clamp * R::of(1.0 / RISE) {
-                *shift = within(*shift + sign * *clamp * R::of(PERIOD / RISE), *clamp);
+            *seeking = magnitude > R::constant(bound * tolerance);
+            if *seeking && *closing * sign < *clamp * R::constant(1.0 / RISE) {
+                *shift = within(*shift + sign * *clamp * R::constant(PERIOD / RISE), *clamp);
             }
         }
     }

@@ -115,8 +115,8 @@ impl<R: Real> Default for JointController<R> {
 fn friction<R: Real>(gains: &Tracking<R>, dq_d: &JointVelocities<R>) -> Vector7<R> {
     let mut torque = gains.viscous.component_mul(&dq_d.0);
     for ((torque, coulomb), rate) in torque.iter_mut().zip(gains.coulomb.iter()).zip(dq_d.0.iter()) {
-        let magnitude = if *rate < R::of(0.0) { -*rate } else { *rate };
-        *torque += *coulomb * *rate / (magnitude + R::of(FRICTION_SPEED));
+        let magnitude = if *rate < R::constant(0.0) { -*rate } else { *rate };
+        *torque += *coulomb * *rate / (magnitude + R::constant(FRICTION_SPEED));
     }
     torque
 }

@@ -44,7 +44,7 @@ impl<R: Real> OperationalController<R> {
             dq_d: JointVelocities::zero(),
             derivative: LowPass::new(Butterworth::new(ACCELERATION_CUT_OFF, RATE)),
             clamped: false,
-            lag: R::of(0.0),
+            lag: R::constant(0.0),
         }
     }
 
@@ -91,8 +91,8 @@ impl<R: Real> OperationalController<R> {
 
         let (offset, turn) = (task.pose.position - pose.position, pose.orientation.error_to(&task.pose.orientation));
         let correction = gain(
-            within_length(offset, R::of(CORRECTION_SPEED.0) / gains.position),
-            within_length(turn, R::of(CORRECTION_SPEED.1) / gains.orientation),
+            within_length(offset, R::constant(CORRECTION_SPEED.0) / gains.position),
+            within_length(turn, R::constant(CORRECTION_SPEED.1) / gains.orientation),
         );
         // The posture term uses the measured q in either case, so that the null space does not integrate blindly.
         let preferred = (task.posture - state.q.0) * gains.posture;
@@ -113,12 +113,12 @@ impl<R: Real> OperationalController<R> {
                 let wanted = task.acceleration + damping - frames.velocity_product(dq).to_vector();
                 inverse.resolve(&wanted, &((task.posture_velocity - state.dq.0) * gains.posture))
             }
-            AccelerationSource::Differentiated => self.derivative.step(&((dq_d - self.dq_d.0) * R::of(RATE))),
+            AccelerationSource::Differentiated => self.derivative.step(&((dq_d - self.dq_d.0) * R::constant(RATE))),
         };
 
         self.dq_d = JointVelocities(dq_d);
         self.clamped = false;
-        let mut q_d = self.q_d.0 + dq_d * R::of(PERIOD);
+        let mut q_d = self.q_d.0 + dq_d * R::constant(PERIOD);
         for ((desired, measured), clamp) in q_d.iter_mut().zip(state.q.0.iter()).zip(gains.clamp.iter()) {
             let kept = at_most(at_least(*desired, *measured - *clamp), *measured + *clamp);
             self.clamped |= kept != *desired;
@@ -130,7 +130,7 @@ impl<R: Real> OperationalController<R> {
         for ((desired, rate), (min, max)) in q_d.iter_mut().zip(self.dq_d.0.iter_mut()).zip(limits) {
             let kept = at_most(at_least(*desired, *min), *max);
             if kept != *desired {
-                (*desired, *rate) = (kept, R::of(0.0));
+                (*desired, *rate) = (kept, R::constant(0.0));
                 self.clamped = true;
             }
         }

@@ -79,7 +79,7 @@ impl<R: Real> ArmModel<R> {
         if let Some(correction) = correction {
             correction.apply(&mut bodies);
         }
-        let real = |values: [f64; JOINTS]| values.map(R::of);
+        let real = |values: [f64; JOINTS]| values.map(R::constant);
         let PayloadTable { tool_z, tool_cosine, tool_sine, .. } = mounted;
         ArmModel {
             link_length: real(wam7::DH_A),
@@ -88,17 +88,17 @@ impl<R: Real> ArmModel<R> {
             twist_sine: real(wam7::DH_SINE),
             bodies: bodies.map(body),
             reflected_inertia: real(wam7::REFLECTED_INERTIA),
-            reflected_inertia_j5_j6: R::of(wam7::REFLECTED_INERTIA_J5_J6),
-            tool_height: R::of(tool_z),
-            tool_cosine: R::of(tool_cosine),
-            tool_sine: R::of(tool_sine),
-            sensor_origin: Vector3::from(wam7::SENSOR_ORIGIN.map(R::of)),
-            hanging_mass: R::of(match payload {
+            reflected_inertia_j5_j6: R::constant(wam7::REFLECTED_INERTIA_J5_J6),
+            tool_height: R::constant(tool_z),
+            tool_cosine: R::constant(tool_cosine),
+            tool_sine: R::constant(tool_sine),
+            sensor_origin: Vector3::from(wam7::SENSOR_ORIGIN.map(R::constant)),
+            hanging_mass: R::constant(match payload {
                 Payload::None => 0.0,
                 Payload::SensorAndHand => wam7::HAND_MASS,
             }),
-            hanging_centre: Vector3::from(wam7::HAND_CENTRE.map(R::of)),
-            base_acceleration: -Vector3::from(wam7::GRAVITY.map(R::of)),
+            hanging_centre: Vector3::from(wam7::HAND_CENTRE.map(R::constant)),
+            base_acceleration: -Vector3::from(wam7::GRAVITY.map(R::constant)),
             soft_min: real(wam7::SOFT_MIN),
             soft_max: real(wam7::SOFT_MAX),
         }
@@ -134,10 +134,10 @@ fn merged(one: BodyTable, other: BodyTable) -> BodyTable {
 }
 
 fn body<R: Real>(table: BodyTable) -> Body<R> {
-    let [xx, yy, zz, xy, xz, yz] = table.inertia.map(R::of);
+    let [xx, yy, zz, xy, xz, yz] = table.inertia.map(R::constant);
     Body {
-        mass: R::of(table.mass),
-        centre: Vector3::from(table.centre.map(R::of)),
+        mass: R::constant(table.mass),
+        centre: Vector3::from(table.centre.map(R::constant)),
         inertia: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
     }
 }

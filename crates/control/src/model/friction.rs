@@ -12,10 +12,10 @@ pub(crate) const SWING: f64 = 3.0;
 
 /// Coulomb friction of the model at each motor (N m), were that of every joint it turns to act against it.
 pub(crate) fn at_motors<R: Real>(transmission: &Transmission<R>) -> [R; JOINTS] {
-    let zero = R::of(0.0);
+    let zero = R::constant(0.0);
     let mut most = [zero; JOINTS];
     for (joint, friction) in wam7::FRICTION_COULOMB.into_iter().enumerate() {
-        let torque = core::array::from_fn(|of| if of == joint { R::of(friction) } else { zero });
+        let torque = core::array::from_fn(|of| if of == joint { R::constant(friction) } else { zero });
         for (most, part) in most.iter_mut().zip(transmission.motor_torques_from_joint(&torque)) {
             *most += at_least(part, -part);
         }

@@ -40,7 +40,7 @@ impl<R: Real> Jacobian<R> {
 
     /// Factorises `J J^T + damping I`. A positive `damping` (m^2, rad^2) keeps the inverse bounded at a singularity.
     pub fn damped(&self, damping: R) -> DampedInverse<'_, R> {
-        let zero = R::of(0.0);
+        let zero = R::constant(0.0);
         let factor = Factor { lower: [[zero; 6]; 6], pivot_inverse: [zero; 6] };
         let mut inverse = DampedInverse { jacobian: self, factor };
         let gram = &mut inverse.factor.lower;
@@ -72,7 +72,7 @@ impl<R: Real> Factor<R> {
     fn factorise(&mut self, floor: R) {
         let matrix = &mut self.lower;
         for column in 0..6 {
-            let inverse = R::of(1.0) / at_least(matrix[column][column], floor);
+            let inverse = R::constant(1.0) / at_least(matrix[column][column], floor);
             self.pivot_inverse[column] = inverse;
             // From below, so that the upper rows of this column are still undivided.
             for row in (column + 1..6).rev() {
@@ -143,7 +143,7 @@ pub struct Frames<R: Real> {
 impl<R: Real> Frames<R> {
     /// The frames at posture `q`.
     pub fn new(model: &ArmModel<R>, q: &JointPositions<R>) -> Self {
-        let (zero, one) = (R::of(0.0), R::of(1.0));
+        let (zero, one) = (R::constant(0.0), R::constant(1.0));
         // Filled in its place: a copy of its arrays costs as much as their contents.
         let mut frames = Frames {
             sine: [zero; JOINTS],

@@ -63,7 +63,7 @@ struct Composite<R: Real> {
 
 impl<R: Real> Composite<R> {
     fn nothing() -> Self {
-        let zero = R::of(0.0);
+        let zero = R::constant(0.0);
         let inertia = Inertia { xx: zero, yy: zero, zz: zero, xy: zero, xz: zero, yz: zero };
         Self { mass: zero, moment: Vector3::zeros(), inertia }
     }
@@ -104,7 +104,7 @@ impl<R: Real> ArmModel<R> {
             composite.inertia = composite.inertia.inward(self, frames, joint);
 
             // The joint turns it about z with 1 rad/s^2: force and moment that this takes, at the origin of frame j-1.
-            let mut force = Vector3::new(-composite.moment.y, composite.moment.x, R::of(0.0));
+            let mut force = Vector3::new(-composite.moment.y, composite.moment.x, R::constant(0.0));
             let Inertia { xz, yz, zz, .. } = composite.inertia;
             let mut moment = Vector3::new(xz, yz, zz);
             matrix[(joint, joint)] = moment.z;

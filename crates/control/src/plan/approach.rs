@@ -53,24 +53,31 @@ impl<R: Real> Approach<R> {
     /// A move from `start` to `goal` in `duration` (s) or, where the speed limits ask for it, longer.
     pub fn new(model: &ArmModel<R>, start: &JointPositions<R>, goal: &JointPositions<R>, duration: R) -> Self {
         let way = goal.0 - start.0;
-        let mut needed = crate::real::at_least(duration, R::of(SHORTEST));
+        let mut needed = crate::real::at_least(duration, R::constant(SHORTEST));
         for (way, limit) in way.iter().zip(&wam7::VELOCITY_MAX) {
             // The peak speed of a minimum jerk is 1.875 times the mean.
-            let magnitude = if *way < R::of(0.0) { -*way } else { *way };
-            needed = crate::real::at_least(needed, magnitude * R::of(1.875 / (SPEED_FRACTION * limit)));
+            let magnitude = if *way < R::constant(0.0) { -*way } else { *way };
+            needed = crate::real::at_least(needed, magnitude * R::constant(1.875 / (SPEED_FRACTION * limit)));
         }
         for sample in 0..SAMPLES {
             let u = (sample as f64 + 0.5) / SAMPLES as f64;
-            let (position, speed, _) = minimum_jerk(R::of(u));
+            let (position, speed, _) = minimum_jerk(R::constant(u));
             let frames = Frames::new(model, &JointPositions(start.0 + way * position));
-            let [elbow, tip] = frames.elbow_speeds(&JointVelocities(way * speed), R::of(TIP_REACH));
-            let scale = R::of(SAMPLE_MARGIN / TIP_SPEED);
+            let [elbow, tip] = frames.elbow_speeds(&JointVelocities(way * speed), R::constant(TIP_REACH));
+            let scale = R::constant(SAMPLE_MARGIN / TIP_SPEED);
             needed = crate::real::at_least(needed, crate::real::at_least(elbow, tip) * scale);
         }
-        let longest = R::of(LONGEST_APPROACH);
+        let longest = R::constant(LONGEST_APPROACH);
         let needed = crate::real::at_most(needed, longest);
-        let length = (needed * R::of(RATE)).to_whole() + 1;
-        Approach { start: start.0, way, length, passed: 0, settled: 0, rate: R::of(RATE) / R::from_counts(length) }
+        let length = (needed * R::constant(RATE)).to_whole() + 1;
+        Approach {
+            start: start.0,
+            way,
+            length,
+            passed: 0,
+            settled: 0,
+            rate: R::constant(RATE) / R::from_counts(length),
+        }
     }
 
     /// Way of each joint (rad).
@@ -80,7 +87,7 @@ impl<R: Real> Approach<R> {
 
     /// Duration of the move (s).
     pub fn duration(&self) -> R {
-        R::from_counts(self.length) * R::of(PERIOD)
+        R::from_counts(self.length) * R::constant(PERIOD)
     }
 
     /// Fraction of the time passed, 0 to 1.
@@ -118,7 +125,7 @@ impl<R: Real> Approach<R> {
 
 /// Minimum-jerk path over unit time: position and its first two derivatives.
 pub(crate) fn minimum_jerk<R: Real>(u: R) -> (R, R, R) {
-    let n = R::of;
+    let n = R::constant;
     let rest = n(1.0) - u;
     let position = u * u * u * (n(10.0) - u * (n(15.0) - u * n(6.0)));
     let speed = n(30.0) * u * u * rest * rest;

@@ -133,7 +133,7 @@ pub(crate) fn check<R: Real, const N: usize>(primitive: &Primitive<R, N>) -> Res
     let springs =
         [(Group::Position, position), (Group::Orientation, orientation)].map(|(group, system)| (group, 0, system));
     let points = (0u8..).zip(movement.point_systems()).map(|(row, system)| (Group::Points, row, system));
-    let mut stiffest = R::of(0.0);
+    let mut stiffest = R::constant(0.0);
     for (group, row, system) in springs.into_iter().chain(points) {
         if !within(&[system.stiffness(), system.damping()], GAIN) {
             return Err(Quantity::Gain(RowGroup::of(group, row).0));
@@ -185,13 +185,14 @@ fn check_plan<R: Real, const N: usize>(primitive: &Primitive<R, N>, stiffest: R)
         return Err(Quantity::Speed(RowGroup::Orientation));
     };
     let period = movement.control_period();
-    let step = crate::real::at_most(R::of(1.0 / STEPS), R::of(STEP_OF_SPRING) / crate::real::sqrt(stiffest));
-    let fastest = R::of(0.9) * movement.duration() / movement.minimum_duration();
+    let step =
+        crate::real::at_most(R::constant(1.0 / STEPS), R::constant(STEP_OF_SPRING) / crate::real::sqrt(stiffest));
+    let fastest = R::constant(0.9) * movement.duration() / movement.minimum_duration();
     let speed = crate::real::at_most(step * movement.duration() / period, fastest);
-    let speed = crate::real::at_least(speed, R::of(1.0));
+    let speed = crate::real::at_least(speed, R::constant(1.0));
     let taken = rollout.set_speed_slew(None).and_then(|()| rollout.set_speed(movement, speed));
-    let back = R::of(1.0) / speed;
-    while taken.is_ok() && rollout.progress() < R::of(LOOKED_AT) {
+    let back = R::constant(1.0) / speed;
+    while taken.is_ok() && rollout.progress() < R::constant(LOOKED_AT) {
         let Ok(plan) = rollout.step(movement, period, &crate::plan::primitive::Coupling::NONE) else { break };
         let ([pose], points) = (&plan.poses, &plan.points);
         let slow = |value: R| value * back;

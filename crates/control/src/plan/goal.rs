@@ -61,21 +61,21 @@ impl<R: Real> GoalFilter<R> {
     /// Moves for one control period at the phase `s`, while the plan uses the part `load` of the speed limits; returns
     /// the goal, `None` where it stays as it was.
     pub(crate) fn step(&mut self, s: R, load: R) -> Option<Pose<R>> {
-        let part = R::of(1.0) - s;
-        if self.left == 0 || part < R::of(NO_EFFECT) {
+        let part = R::constant(1.0) - s;
+        if self.left == 0 || part < R::constant(NO_EFFECT) {
             return None;
         }
         self.left -= 1;
-        let free = (R::of(CROWDED.1) - load) * R::of(1.0 / (CROWDED.1 - CROWDED.0));
+        let free = (R::constant(CROWDED.1) - load) * R::constant(1.0 / (CROWDED.1 - CROWDED.0));
         // Of a NaN neither holds, and the goal waits.
-        let share = if free >= R::of(1.0) {
-            R::of(1.0)
-        } else if free > R::of(0.0) {
+        let share = if free >= R::constant(1.0) {
+            R::constant(1.0)
+        } else if free > R::constant(0.0) {
             free
         } else {
-            R::of(0.0)
+            R::constant(0.0)
         };
-        let step = (share * R::of(GOAL_SPEED.0 * PERIOD), share * R::of(GOAL_SPEED.1 * PERIOD));
+        let step = (share * R::constant(GOAL_SPEED.0 * PERIOD), share * R::constant(GOAL_SPEED.1 * PERIOD));
         let turn =
             self.base.orientation.conjugate().product(&self.commanded.orientation.aligned_with(&self.base.orientation));
         let way = Vector3::from(self.commanded.position) - Vector3::from(self.base.position);
@@ -85,7 +85,7 @@ impl<R: Real> GoalFilter<R> {
             self.left = 0;
             return Some(self.commanded);
         }
-        let scale = R::of(1.0) / part;
+        let scale = R::constant(1.0) / part;
         let position = Vector3::from(self.base.position) + self.shift.0 * scale;
         let turn = Quaternion::from_rotation_vector(&(self.shift.1 * scale).into());
         Some(Pose { position: position.into(), orientation: self.base.orientation.product(&turn).renormalised() })
@@ -100,7 +100,7 @@ fn approach<R: Real>(from: &mut Vector3<R>, to: Vector3<R>, longest: R) -> bool 
         *from = to;
         return true;
     }
-    if longest > R::of(0.0) {
+    if longest > R::constant(0.0) {
         *from += way * (longest / sqrt(squared));
     }
     false

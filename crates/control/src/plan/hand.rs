@@ -33,14 +33,14 @@ impl<R: Real> HandMotion<R> {
     /// A move from `start` to `goal` (rad) in `duration` (s) or, where the speed limits ask for it, longer.
     pub fn new(start: &[R; DIGITS], goal: &[R; DIGITS], duration: R) -> Self {
         let mut way = *goal;
-        let mut needed = at_least(duration, R::of(SHORTEST));
+        let mut needed = at_least(duration, R::constant(SHORTEST));
         for ((way, start), limit) in way.iter_mut().zip(start).zip(SPEED_LIMIT) {
             *way -= *start;
-            let magnitude = if *way < R::of(0.0) { -*way } else { *way };
-            needed = at_least(needed, magnitude * R::of(PEAK / limit));
+            let magnitude = if *way < R::constant(0.0) { -*way } else { *way };
+            needed = at_least(needed, magnitude * R::constant(PEAK / limit));
         }
-        let needed = at_most(needed, R::of(LONGEST_MOVE));
-        HandMotion { start: *start, way, length: (needed * R::of(RATE)).to_whole() + 1, passed: 0 }
+        let needed = at_most(needed, R::constant(LONGEST_MOVE));
+        HandMotion { start: *start, way, length: (needed * R::constant(RATE)).to_whole() + 1, passed: 0 }
     }
 
     /// Returns the goal (rad).
@@ -66,7 +66,7 @@ impl<R: Real> HandMotion<R> {
     pub fn now(&self) -> HandReference<R> {
         let length = R::from_counts(self.length);
         let (position, speed, _) = minimum_jerk(R::from_counts(self.passed) / length);
-        let rate = R::of(RATE) / length;
+        let rate = R::constant(RATE) / length;
         HandReference {
             q: core::array::from_fn(|digit| self.start[digit] + self.way[digit] * position),
             dq: core::array::from_fn(|digit| self.way[digit] * (speed * rate)),

@@ -179,7 +179,7 @@ pub fn check<'a, R: Real, const N: usize>(
     primitive: &'a Primitive<R, N>,
 ) -> Result<CheckedPrimitive<'a, R, N>, LoadError> {
     let duration = primitive.movement().duration();
-    if !(duration >= R::of(SHORTEST_MOVEMENT) && duration <= R::of(LONGEST_MOVEMENT)) {
+    if !(duration >= R::constant(SHORTEST_MOVEMENT) && duration <= R::constant(LONGEST_MOVEMENT)) {
         return Err(LoadError::Duration);
     }
     check_end(model, End::Start, primitive.movement().start())?;
@@ -193,7 +193,7 @@ pub fn check<'a, R: Real, const N: usize>(
 fn check_expected<R: Real, const N: usize>(primitive: &Primitive<R, N>) -> Result<(), LoadError> {
     let [n1, n2, n3] = wam7::SENSOR_TORQUE_RANGE;
     let finger = wam7::FINGER_TORQUE_MAX;
-    let limits = [EXPECTED_FORCE, EXPECTED_FORCE, EXPECTED_FORCE, n1, n2, n3, finger, finger, finger].map(R::of);
+    let limits = [EXPECTED_FORCE, EXPECTED_FORCE, EXPECTED_FORCE, n1, n2, n3, finger, finger, finger].map(R::constant);
     for sample in primitive.expected().into_iter().flat_map(|expected| expected.samples()) {
         for (sensor, (value, limit)) in (0u8..).zip(sample.iter().zip(&limits)) {
             // Of a NaN neither holds.
@@ -203,7 +203,7 @@ fn check_expected<R: Real, const N: usize>(primitive: &Primitive<R, N>) -> Resul
             }
         }
         let [x, y, z, ..] = *sample;
-        let within = x * x + y * y + z * z <= R::of(EXPECTED_FORCE * EXPECTED_FORCE);
+        let within = x * x + y * y + z * z <= R::constant(EXPECTED_FORCE * EXPECTED_FORCE);
         if !within {
             return Err(LoadError::Expected(0));
         }
@@ -226,14 +226,14 @@ fn check_end<R: Real>(model: &ArmModel<R>, end: End, configuration: &Configurati
     let pose = Frames::new(model, &JointPositions::from_array(posture)).tool_pose();
     let orientation = Orientation(taught.orientation.to_array());
     let (offset, turn) = (pose.position - position, pose.orientation.error_to(&orientation));
-    let near = offset.dot(&offset) <= R::of(POSE_MISMATCH * POSE_MISMATCH);
-    let aligned = turn.dot(&turn) <= R::of(TURN_MISMATCH * TURN_MISMATCH);
+    let near = offset.dot(&offset) <= R::constant(POSE_MISMATCH * POSE_MISMATCH);
+    let aligned = turn.dot(&turn) <= R::constant(TURN_MISMATCH * TURN_MISMATCH);
     if near && aligned { Ok(()) } else { Err(LoadError::Inconsistent(end)) }
 }
 
 /// True if a tool position can be reached at all. False for a NaN.
 pub fn within_reach<R: Real>(position: &nalgebra::Vector3<R>) -> bool {
-    position.dot(position) <= R::of(REACH * REACH)
+    position.dot(position) <= R::constant(REACH * REACH)
 }
 
 /// Why a primitive was not taken.

@@ -81,6 +81,6 @@ pub struct HandReference<R: Real> {
 impl<R: Real> HandReference<R> {
     /// To stand still at `q`.
     pub fn at_rest(q: [R; DIGITS]) -> Self {
-        HandReference { q, dq: [R::of(0.0); DIGITS] }
+        HandReference { q, dq: [R::constant(0.0); DIGITS] }
     }
 }

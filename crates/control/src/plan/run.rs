@@ -102,7 +102,7 @@ impl<R: Real, const N: usize> Run<R, N> {
         let (taught_posture, taught_hand) = posture_and_hand(&primitive.movement().start().points);
         let far = |(q, start): (&R, &R)| {
             let distance = *q - *start;
-            !(distance <= R::of(START_DISTANCE) && distance >= R::of(-START_DISTANCE))
+            !(distance <= R::constant(START_DISTANCE) && distance >= R::constant(-START_DISTANCE))
         };
         if q.0.iter().zip(&taught_posture).any(far) {
             return Err(Refusal::StartTooFar);
@@ -111,7 +111,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             Some(state) => {
                 let far = |(q, start): (&R, &R)| {
                     let distance = *q - *start;
-                    !(distance <= R::of(HAND_DISTANCE) && distance >= R::of(-HAND_DISTANCE))
+                    !(distance <= R::constant(HAND_DISTANCE) && distance >= R::constant(-HAND_DISTANCE))
                 };
                 if state.q.iter().zip(&taught_hand).any(far) {
                     return Err(Refusal::HandTooFar);
@@ -132,15 +132,15 @@ impl<R: Real, const N: usize> Run<R, N> {
             settled: false,
             rested: 0,
             goal: GoalFilter::at(primitive.movement().goal().poses[0]),
-            end: R::of(1.0),
-            load: R::of(0.0),
+            end: R::constant(1.0),
+            load: R::constant(0.0),
             speed: (options.speed, false),
         };
         let rollout = &mut run.rollout;
         // The first speed acts at once; later ones are approached at the rollout's slew rate.
         rollout.set_speed_slew(None).map_err(reason)?;
         set_speed(rollout, primitive, options.speed)?;
-        rollout.set_speed_slew(Some(R::of(Rollout::<R, N>::DEFAULT_SLEW))).map_err(reason)?;
+        rollout.set_speed_slew(Some(R::constant(Rollout::<R, N>::DEFAULT_SLEW))).map_err(reason)?;
         run.set_goal(primitive, &options.goal)?;
         *place = Some(run);
         Ok(())
@@ -184,7 +184,7 @@ impl<R: Real, const N: usize> Run<R, N> {
                 let _ = self.rollout.set_goal_orientation(primitive.movement(), 0, goal.orientation);
             }
         }
-        self.end = at_least(self.end, self.rollout.progress() + R::of(FOLLOWING));
+        self.end = at_least(self.end, self.rollout.progress() + R::constant(FOLLOWING));
     }
 
     fn is_finished(&self) -> bool {
@@ -237,7 +237,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             // What swings is an arm that follows softly; a stiff one meets hard things, where each millisecond counts.
             let mut seen = if self.options.compliant { deviation.smoothed(&self.smoothed) } else { deviation };
             if !self.options.finger_feedback {
-                seen.gauges = [R::of(0.0); 3];
+                seen.gauges = [R::constant(0.0); 3];
             }
             self.coupling = primitive.coupling(&self.rollout, &seen.error())?;
         }
@@ -251,14 +251,15 @@ impl<R: Real, const N: usize> Run<R, N> {
         }
         let kept = self.kept();
         let coupling = self.coupling.map(|value| value * kept);
-        let plan = self.rollout.step(primitive.movement(), R::of(PERIOD), &coupling)?;
+        let plan = self.rollout.step(primitive.movement(), R::constant(PERIOD), &coupling)?;
         if settles {
             let [PoseReference { position, orientation }] = &plan.poses;
             self.goal = GoalFilter::at(Place { position: position.x, orientation: orientation.quaternion });
         }
         let (posture, hand) = posture_and_hand(&plan.points.v);
-        let slow =
-            |speeds: &[R], limit: f64| speeds.iter().all(|speed| *speed < R::of(limit) && *speed > R::of(-limit));
+        let slow = |speeds: &[R], limit: f64| {
+            speeds.iter().all(|speed| *speed < R::constant(limit) && *speed > R::constant(-limit))
+        };
         let resting = self.is_finished()
             && plan.poses.iter().all(|pose| slow(&pose.position.v, REST.0) && slow(&pose.orientation.omega, REST.1))
             && slow(&posture, REST.1)
@@ -277,7 +278,7 @@ impl<R: Real, const N: usize> Run<R, N> {
     ) -> Option<Surprise> {
         let statistics = primitive.statistics()?;
         let (f, n) = (&wrench.force, &wrench.torque);
-        let zero = [R::of(0.0); 3];
+        let zero = [R::constant(0.0); 3];
         let [g1, g2, g3] = hand.map_or(zero, |hand| hand.gauges);
         let [q1, q2, q3] = hand.map_or(zero, |hand| {
             let [_spread, fingers @ ..] = hand.q;
@@ -294,21 +295,21 @@ impl<R: Real, const N: usize> Run<R, N> {
 
     /// Share of the feedback that has not faded: 1 unless the sensor is silent.
     pub(crate) fn kept(&self) -> R {
-        R::from_counts(i32::from(self.kept)) * R::of(1.0 / FADE as f64)
+        R::from_counts(i32::from(self.kept)) * R::constant(1.0 / FADE as f64)
     }
 
     /// True if the feedback or the force controller acts with less than it would: the sensor is silent, or the run
     /// takes another time than the recording of the expectation.
     pub(crate) fn is_faded(&self, primitive: &Primitive<R, N>) -> bool {
         let uses_force = self.options.feedback || self.options.force_control;
-        let derated = self.options.feedback && primitive.trust(&self.rollout) < R::of(1.0);
+        let derated = self.options.feedback && primitive.trust(&self.rollout) < R::constant(1.0);
         (uses_force && self.kept < FADE) || derated
     }
 
     /// True if the movement is over.
     pub(crate) fn is_over(&self) -> bool {
         let overtime = if self.options.feedback { OVERTIME_WITH_FEEDBACK } else { OVERTIME };
-        self.rested >= SETTLING || self.rollout.progress() > self.end + R::of(overtime)
+        self.rested >= SETTLING || self.rollout.progress() > self.end + R::constant(overtime)
     }
 
     /// The expected sensor values and the deviation from them, as of the last complete tick; `None` without an
@@ -331,7 +332,7 @@ fn checked_goal<R: Real, const N: usize>(
         if wanted.iter().any(|value| !value.is_finite()) {
             return Err(Refusal::OutOfRange);
         }
-        let wanted = wanted.map(|value| R::of(f64::from(value)));
+        let wanted = wanted.map(|value| R::constant(f64::from(value)));
         if !within_reach(&Vector3::from(wanted)) {
             return Err(Refusal::OutsideWorkspace);
         }
@@ -340,7 +341,7 @@ fn checked_goal<R: Real, const N: usize>(
     }
     let mut orientation = None;
     if let Some(wanted) = goal.orientation {
-        let [w, x, y, z] = wanted.map(|value| R::of(f64::from(value)));
+        let [w, x, y, z] = wanted.map(|value| R::constant(f64::from(value)));
         let wanted = Quaternion::new(w, x, y, z);
         next.set_goal_orientation(primitive.movement(), 0, wanted).map_err(reason)?;
         orientation = Some(wanted.renormalised());
@@ -357,7 +358,7 @@ fn set_speed<R: Real, const N: usize>(
     if !(factor >= SPEEDS.0 && factor <= SPEEDS.1) {
         return Err(Refusal::OutOfRange);
     }
-    rollout.set_speed(primitive.movement(), R::of(f64::from(factor))).map_err(reason)
+    rollout.set_speed(primitive.movement(), R::constant(f64::from(factor))).map_err(reason)
 }
 
 /// Every reason a rollout gives is a number out of range.

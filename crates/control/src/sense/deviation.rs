@@ -50,12 +50,12 @@ impl<R: Real> Deviation<R> {
         let [fx, fy, fz, nx, ny, nz, expected_gauges @ ..] = *expected;
         let expected = Wrench { force: Vector3::new(fx, fy, fz), torque: Vector3::new(nx, ny, nz) };
         let wrench = Wrench {
-            force: shrunk(measured.force - expected.force, R::of(FORCE_DEAD_BAND)),
-            torque: shrunk(measured.torque - expected.torque, R::of(TORQUE_DEAD_BAND)),
+            force: shrunk(measured.force - expected.force, R::constant(FORCE_DEAD_BAND)),
+            torque: shrunk(measured.torque - expected.torque, R::constant(TORQUE_DEAD_BAND)),
         };
         let gauges = match measured_gauges {
             Some(measured) => core::array::from_fn(|finger| measured[finger] - expected_gauges[finger]),
-            None => [R::of(0.0); 3],
+            None => [R::constant(0.0); 3],
         };
         Deviation { expected, expected_gauges, wrench, gauges }
     }
@@ -88,7 +88,7 @@ impl<R: Real> SmoothedWrench<R> {
     pub fn step(&mut self, measured: &Wrench<R>, expected: &Wrench<R>) {
         let (force, torque) = (measured.force - expected.force, measured.torque - expected.torque);
         let now = Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
-        self.value += (now - self.value) * R::of(FEEDBACK_SHARE);
+        self.value += (now - self.value) * R::constant(FEEDBACK_SHARE);
     }
 
     /// The part of the filtered deviation beyond the dead bands.
@@ -96,7 +96,10 @@ impl<R: Real> SmoothedWrench<R> {
         let smoothed = &self.value;
         let force = Vector3::new(smoothed[0], smoothed[1], smoothed[2]);
         let torque = Vector3::new(smoothed[3], smoothed[4], smoothed[5]);
-        Wrench { force: shrunk(force, R::of(FORCE_DEAD_BAND)), torque: shrunk(torque, R::of(TORQUE_DEAD_BAND)) }
+        Wrench {
+            force: shrunk(force, R::constant(FORCE_DEAD_BAND)),
+            torque: shrunk(torque, R::constant(TORQUE_DEAD_BAND)),
+        }
     }
 }
 

@@ -64,7 +64,7 @@ impl<R: Real> Drift<R> {
         // What deviates when the run begins has not come fast.
         let mean = self.mean.get_or_insert(*deviation);
         let change = deviation - *mean;
-        *mean += change * R::of(PERIOD / TOUCH);
+        *mean += change * R::constant(PERIOD / TOUCH);
         let touches = !is_within(&change, TOUCH_FORCE, TOUCH_TORQUE);
         self.touched |= touches;
         let (force, torque) = if self.touched { (GONE_FORCE, GONE_TORQUE) } else { (FREE_FORCE, FREE_TORQUE) };
@@ -78,7 +78,7 @@ impl<R: Real> Drift<R> {
         for (((change, deviation), followed), largest) in
             change.iter_mut().zip(deviation.iter()).zip(self.followed.iter_mut()).zip(&LARGEST)
         {
-            let next = within(*followed + *deviation * R::of(PERIOD / FOLLOWING), R::of(*largest));
+            let next = within(*followed + *deviation * R::constant(PERIOD / FOLLOWING), R::constant(*largest));
             *change = next - *followed;
             *followed = next;
         }
@@ -90,7 +90,7 @@ impl<R: Real> Drift<R> {
 fn is_within<R: Real>(wrench: &Vector6<R>, force: f64, torque: f64) -> bool {
     let [fx, fy, fz, nx, ny, nz] = (*wrench).into();
     let size = |a: R, b: R, c: R| sqrt(a * a + b * b + c * c);
-    size(fx, fy, fz) <= R::of(force) && size(nx, ny, nz) <= R::of(torque)
+    size(fx, fy, fz) <= R::constant(force) && size(nx, ny, nz) <= R::constant(torque)
 }
 
 impl<R: Real> Default for Drift<R> {

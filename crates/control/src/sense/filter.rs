@@ -24,9 +24,9 @@ impl<R: Real> Butterworth<R> {
         let squared = warped * warped;
         let norm = 1.0 / (1.0 + core::f64::consts::SQRT_2 * warped + squared);
         Butterworth {
-            gain: R::of(squared * norm),
-            a1: R::of(2.0 * (squared - 1.0) * norm),
-            a2: R::of((1.0 - core::f64::consts::SQRT_2 * warped + squared) * norm),
+            gain: R::constant(squared * norm),
+            a1: R::constant(2.0 * (squared - 1.0) * norm),
+            a2: R::constant((1.0 - core::f64::consts::SQRT_2 * warped + squared) * norm),
         }
     }
 }
@@ -51,7 +51,7 @@ impl<R: Real, const D: usize> LowPass<R, D> {
         let Butterworth { gain, a1, a2 } = self.filter;
         let scaled = input * gain;
         let output = scaled + self.first;
-        self.first = scaled * R::of(2.0) - output * a1 + self.second;
+        self.first = scaled * R::constant(2.0) - output * a1 + self.second;
         self.second = scaled - output * a2;
         self.output = output;
         output
@@ -66,7 +66,7 @@ impl<R: Real, const D: usize> LowPass<R, D> {
     pub fn settle(&mut self, value: &SVector<R, D>) {
         let Butterworth { gain, a2, .. } = self.filter;
         self.second = value * (gain - a2);
-        self.first = value * (R::of(1.0) - gain);
+        self.first = value * (R::constant(1.0) - gain);
         self.output = *value;
     }
 }

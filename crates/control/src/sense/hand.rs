@@ -130,7 +130,7 @@ impl<R: Real> HandEstimator<R> {
             encoders: None,
             velocity: LowPass::new(Butterworth::new(VELOCITY_CUT_OFF, RATE)),
             gauge: LowPass::new(Butterworth::new(WRENCH_CUT_OFF, RATE)),
-            torques: [R::of(0.0); FINGERS],
+            torques: [R::constant(0.0); FINGERS],
             doubtful: [false; FINGERS],
             zero: [-gauge::torque(R::from_counts(i32::from(gauge::UNLOADED))); FINGERS],
             tared: false,
@@ -191,7 +191,7 @@ impl<R: Real> HandEstimator<R> {
         }
         for (zero, now) in self.zero.iter_mut().zip(self.gauge.output().iter()) {
             let offset = *now - *zero;
-            if offset <= R::of(GAUGE_DRIFT) && offset >= R::of(-GAUGE_DRIFT) {
+            if offset <= R::constant(GAUGE_DRIFT) && offset >= R::constant(-GAUGE_DRIFT) {
                 *zero = *now;
             }
         }
@@ -210,7 +210,7 @@ impl<R: Real> HandEstimator<R> {
             };
             let torque = -gauge::torque(R::from_counts(i32::from(*counts)));
             let step = torque - *last;
-            let jumped = !first && (step > R::of(GAUGE_STEP) || step < R::of(-GAUGE_STEP));
+            let jumped = !first && (step > R::constant(GAUGE_STEP) || step < R::constant(-GAUGE_STEP));
             *doubtful = jumped && !*doubtful;
             if !*doubtful {
                 *last = torque;
@@ -239,7 +239,7 @@ impl<R: Real> Encoders<R> {
         let mut encoders = Encoders {
             motors: [f1, f2, f3, spread].map(Encoder::new),
             worms: sample.secondary.map(|worm| worm.map(Encoder::new)),
-            q: [R::of(0.0); DIGITS],
+            q: [R::constant(0.0); DIGITS],
         };
         encoders.q = encoders.inner_and_spread();
         Some(encoders)
@@ -273,7 +273,7 @@ impl<R: Real> Encoders<R> {
         for digit in 0..DIGITS {
             if heard[digit] && !jumped[digit] {
                 let elapsed = R::from_counts(i32::from(before[digit].saturating_add(1)));
-                rates[digit] = (now[digit] - self.q[digit]) * R::of(RATE) / elapsed;
+                rates[digit] = (now[digit] - self.q[digit]) * R::constant(RATE) / elapsed;
             }
             if heard[digit] {
                 self.q[digit] = now[digit];

@@ -117,8 +117,8 @@ impl<R: Real> JointEstimator<R> {
         let mut gate = [0; JOINTS];
         for motor in 0..JOINTS {
             let counts = f64::from(calibration.drives.counts_per_revolution()[motor]);
-            radians_per_count[motor] = R::of(core::f64::consts::TAU / counts);
-            counts_per_radian[motor] = R::of(counts / core::f64::consts::TAU);
+            radians_per_count[motor] = R::constant(core::f64::consts::TAU / counts);
+            counts_per_radian[motor] = R::constant(counts / core::f64::consts::TAU);
             // Joint limits through the absolute values of the transmission: the fastest this motor can be asked to
             // turn.
             let fastest: f64 = wam7::JOINT_TO_MOTOR[motor]
@@ -186,14 +186,14 @@ impl<R: Real> JointEstimator<R> {
                 Some(believed) => {
                     self.displaced |= believed.jumped;
                     rates[index] = believed.rate;
-                    R::of(0.0)
+                    R::constant(0.0)
                 }
                 None => {
                     motor.age = motor.age.saturating_add(1);
                     missing += 1;
                     extrapolated |= TURNED[index];
                     let bridged = motor.age.min(COAST_CYCLES);
-                    rates[index] = if motor.age > COAST_CYCLES { R::of(0.0) } else { self.rates[index] };
+                    rates[index] = if motor.age > COAST_CYCLES { R::constant(0.0) } else { self.rates[index] };
                     self.rates[index] * R::from_counts(i32::from(bridged))
                 }
             };
@@ -201,11 +201,11 @@ impl<R: Real> JointEstimator<R> {
             angles[index] = (R::from_counts(motor.counts.0) + carried) * self.radians_per_count[index];
         }
         let q = self.transmission.joint_from_motor(&angles.into());
-        let speeds = rates.component_mul(&self.radians_per_count) * R::of(RATE);
+        let speeds = rates.component_mul(&self.radians_per_count) * R::constant(RATE);
         let dq = self.filter.step(&Vector7::from(self.transmission.joint_from_motor(&speeds.into())));
         if missing == 0 {
             let motor_speeds = Vector7::from(self.transmission.motor_from_joint(&dq.into()));
-            self.rates = motor_speeds.component_mul(&self.counts_per_radian) * R::of(PERIOD);
+            self.rates = motor_speeds.component_mul(&self.counts_per_radian) * R::constant(PERIOD);
         }
         let displaced = self.displaced;
         Some(JointState {

@@ -83,9 +83,9 @@ impl<R: Real> Correction<R> {
             let third = fast * fast * slow;
             let second = fast * fast + 2.0 * fast * slow - 1.5 * third;
             let first = 2.0 * fast + slow - second - 0.5 * third;
-            correction.position[joint] = R::of(first);
-            correction.velocity[joint] = R::of(second / PERIOD);
-            correction.acceleration[joint] = R::of(third / (PERIOD * PERIOD));
+            correction.position[joint] = R::constant(first);
+            correction.velocity[joint] = R::constant(second / PERIOD);
+            correction.acceleration[joint] = R::constant(third / (PERIOD * PERIOD));
         }
         correction
     }
@@ -142,16 +142,17 @@ impl<R: Real> MotionObserver<R> {
     /// Velocities where the next torque acts (rad/s), kept near the measured ones.
     #[inline(never)]
     pub fn velocity(&self, state: &JointState<R>, trust: Trust) -> Vector7<R> {
-        let ahead = self.dq + (self.sent[0] + self.disturbance) * R::of(LATENCY * PERIOD);
+        let ahead = self.dq + (self.sent[0] + self.disturbance) * R::constant(LATENCY * PERIOD);
         let (least, speed) = FARTHEST_AT_SPEED;
-        let nearer = R::of(if trust != Trust::Compliant { (FARTHEST - least) / speed } else { 0.0 });
-        let stands = R::of(if trust == Trust::Approach { (FARTHEST - FARTHEST_AT_REST) / STANDS as f64 } else { 0.0 });
+        let nearer = R::constant(if trust != Trust::Compliant { (FARTHEST - least) / speed } else { 0.0 });
+        let stands =
+            R::constant(if trust == Trust::Approach { (FARTHEST - FARTHEST_AT_REST) / STANDS as f64 } else { 0.0 });
         let mut velocity = state.dq.0;
         for ((velocity, observed), still) in velocity.iter_mut().zip(ahead.iter()).zip(self.still) {
-            let fast = if *velocity < R::of(0.0) { -*velocity } else { *velocity };
+            let fast = if *velocity < R::constant(0.0) { -*velocity } else { *velocity };
             let stands = R::from_counts(i32::from(still)) * stands;
-            let farthest = at_least(R::of(FARTHEST) - fast * nearer, R::of(least));
-            let farthest = at_least(farthest - stands, R::of(FARTHEST_AT_REST));
+            let farthest = at_least(R::constant(FARTHEST) - fast * nearer, R::constant(least));
+            let farthest = at_least(farthest - stands, R::constant(FARTHEST_AT_REST));
             *velocity += within(*observed - *velocity, farthest);
         }
         velocity
@@ -160,7 +161,7 @@ impl<R: Real> MotionObserver<R> {
     /// Positions (rad), kept near the measured ones.
     #[inline(never)]
     pub fn position(&self, state: &JointState<R>) -> JointPositions<R> {
-        let near = |observed, measured| measured + within(observed - measured, R::of(ASTRAY));
+        let near = |observed, measured| measured + within(observed - measured, R::constant(ASTRAY));
         JointPositions(self.q.zip_map(&state.q.0, near))
     }
 
@@ -168,9 +169,10 @@ impl<R: Real> MotionObserver<R> {
     #[inline(never)]
     pub fn update(&mut self, state: &JointState<R>, stiff: bool) {
         let correction = &self.correction[usize::from(stiff)];
-        let acceleration = self.sent[1] * R::of(LATENCY) + self.sent[0] * R::of(1.0 - LATENCY) + self.disturbance;
-        self.q += (self.dq + acceleration * R::of(0.5 * PERIOD)) * R::of(PERIOD);
-        self.dq += acceleration * R::of(PERIOD);
+        let acceleration =
+            self.sent[1] * R::constant(LATENCY) + self.sent[0] * R::constant(1.0 - LATENCY) + self.disturbance;
+        self.q += (self.dq + acceleration * R::constant(0.5 * PERIOD)) * R::constant(PERIOD);
+        self.dq += acceleration * R::constant(PERIOD);
         for (joint, (still, by)) in self.still.iter_mut().zip(TURNED_BY).enumerate() {
             if state.extrapolated >> joint & 1 == 0 {
                 *still = if state.still & by == by { (*still + 1).min(STANDS) } else { still.saturating_sub(1) };
@@ -236,7 +238,7 @@ impl<R: Real> MotionObserver<R> {
                 }
                 factor[(i, j)] = sum;
             }
-            self.factor[(j, j)] = R::of(1.0) / factor[(j, j)];
+            self.factor[(j, j)] = R::constant(1.0) / factor[(j, j)];
         }
         for j in 0..JOINTS {
             let inverse = self.factor[(j, j)];
@@ -275,7 +277,7 @@ impl<R: Real> MotionObserver<R> {
 fn forget<R: Real>(error: &mut Vector7<R>, joints: u8) {
     for (joint, error) in error.iter_mut().enumerate() {
         if joints >> joint & 1 != 0 {
-            *error = R::of(0.0);
+            *error = R::constant(0.0);
         }
     }
 }

@@ -160,7 +160,7 @@ impl<R: Real> WrenchEstimator<R> {
         let [fx, fy, fz] = raw.newtons::<R>();
         let [nx, ny, nz] = raw.newton_metres::<R>();
         let sample = Vector6::new(fx, fy, fz, nx, ny, nz);
-        let beyond = |value: &R, limit: f64| *value > R::of(limit) || *value < R::of(-limit);
+        let beyond = |value: &R, limit: f64| *value > R::constant(limit) || *value < R::constant(-limit);
         let step = sample - self.last;
         let jumped = self.age.is_some() && step.iter().zip(&LARGEST_STEP).any(|(step, limit)| beyond(step, *limit));
         if self.jumped || !jumped {
@@ -208,7 +208,7 @@ impl<R: Real> WrenchEstimator<R> {
         // What was followed in a run may have been a slow touch: the tare before it counts as well.
         let near = |tare: &Vector6<R>| {
             let drift = (self.offset() - tare).fixed_rows::<3>(0).into_owned();
-            drift.dot(&drift) <= R::of(DRIFT * DRIFT)
+            drift.dot(&drift) <= R::constant(DRIFT * DRIFT)
         };
         if !self.tared || near(&self.tare) || near(&self.taken) {
             self.tare();
@@ -245,7 +245,7 @@ impl<R: Real> WrenchEstimator<R> {
     /// threshold, which cannot wait for a filter.
     pub fn raw_force(&self) -> R {
         if !self.placed {
-            return R::of(0.0);
+            return R::constant(0.0);
         }
         let force = self.unloaded.fixed_rows::<3>(0) - self.tare.fixed_rows::<3>(0);
         sqrt(force.dot(&force))

@@ -25,8 +25,8 @@ pub(crate) const ROTATION: f64 = 0.4;
 pub(crate) fn configuration<R: Real>(q: [f64; 7], hand: [f64; 4]) -> Configuration<R> {
     let model = ArmModel::<f64>::new(Payload::SensorAndHand);
     let pose = Frames::new(&model, &JointPositions::from_array(q)).tool_pose();
-    let position = [0, 1, 2].map(|axis| R::of(pose.position[axis]));
-    rows(position, pose.orientation.0.map(R::of), q.map(R::of), hand.map(R::of))
+    let position = [0, 1, 2].map(|axis| R::constant(pose.position[axis]));
+    rows(position, pose.orientation.0.map(R::constant), q.map(R::constant), hand.map(R::constant))
 }
 
 /// Weights that bend the position path by a few centimetres and the orientation by some degrees.
@@ -41,7 +41,7 @@ fn weights<R: Real>() -> Vec<R> {
                     3..6 => 0.2,
                     _ => 0.0,
                 };
-                R::of(amplitude * bump * (0.25 * kernel as f64 + row as f64).sin())
+                R::constant(amplitude * bump * (0.25 * kernel as f64 + row as f64).sin())
             })
         })
         .collect()
@@ -83,34 +83,35 @@ impl Default for Design {
 
 /// The primitive, checked as the device checks it.
 pub(crate) fn primitive<R: Real>(design: &Design) -> Primitive<R, KERNELS> {
-    let zero = R::of(0.0);
-    let stiffness = R::of(200.0);
-    let critical = R::of(2.0 * 200f64.sqrt());
+    let zero = R::constant(0.0);
+    let stiffness = R::constant(200.0);
+    let critical = R::constant(2.0 * 200f64.sqrt());
     let weights = if design.bent { weights() } else { vec![zero; ROWS * KERNELS] };
     let [p, o, h] = design.sensitivity;
     let feedback = design.expected.map(|_| {
         Feedback::new(
-            GainSchedule::constant([p, p, p, o, o, o, 0.0, h, h, h].map(R::of)).expect("gains"),
-            GainSchedule::constant([R::of(1.0); SENSORS]).expect("gains"),
-            limits(R::of(DISPLACEMENT), R::of(ROTATION), R::of(0.8)),
+            GainSchedule::constant([p, p, p, o, o, o, 0.0, h, h, h].map(R::constant)).expect("gains"),
+            GainSchedule::constant([R::constant(1.0); SENSORS]).expect("gains"),
+            limits(R::constant(DISPLACEMENT), R::constant(ROTATION), R::constant(0.8)),
         )
         .expect("gains")
     });
     let expected = design.expected.map(|wrench| {
         let mut row = [zero; SENSORS];
         for (entry, value) in row.iter_mut().zip(wrench.into_iter().chain(design.expected_gauges)) {
-            *entry = R::of(value);
+            *entry = R::constant(value);
         }
-        ExpectedWrench::new(&[row, row], R::of(design.recorded.unwrap_or(design.duration))).expect("an expectation")
+        ExpectedWrench::new(&[row, row], R::constant(design.recorded.unwrap_or(design.duration)))
+            .expect("an expectation")
     });
     let tables = MovementTables {
-        control_period: R::of(control::PERIOD),
-        duration: R::of(design.duration),
-        alpha: R::of(-(0.01f64).ln()),
-        activation: R::of(0.7),
+        control_period: R::constant(control::PERIOD),
+        duration: R::constant(design.duration),
+        alpha: R::constant(-(0.01f64).ln()),
+        activation: R::constant(0.7),
         kernel_count: KERNELS,
         weights: &weights,
-        gains: gains([stiffness; 4], [critical, R::of(20.0), critical, critical]),
+        gains: gains([stiffness; 4], [critical, R::constant(20.0), critical, critical]),
         orientation_error: OrientationError::Quaternion,
         hemisphere: Hemisphere::Nearest,
         start: configuration(design.start, [0.0, 0.25, 0.25, 0.25]),
