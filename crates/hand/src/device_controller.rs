@@ -7,8 +7,9 @@
 //! | control | the replies of this very cycle, [`Cycle::step`], the torque frame |
 //! | slow | one of: initialisation, MODE where it is due, STAT of a silent puck, MODE and TEMP in turn |
 //!
-//! On a bus of its own the hand is answered within one slot: 1015 us at worst, stuffing and puck latency included, of
-//! 1111. The torque leaves in the cycle of its sample, one cycle earlier than behind an arm.
+//! On a bus of its own the hand is answered within one slot of 300 Hz: 1015 us at worst, stuffing and puck latency
+//! included, of 1111. At a rate with shorter slots the slow one comes between ([`Slot::next`]). The torque leaves in
+//! the cycle of its sample, one cycle earlier than behind an arm.
 
 use control::model::WeightCorrection;
 use control::{LoadRefusal, Payload};
@@ -69,7 +70,8 @@ impl<I: ControllerIo<DeviceController>> Outlet for SlotOutlet<'_, I> {
         self.now_us
     }
 
-    /// Slots are 1.1 ms apart and all but the request slot send one frame: the pauses pucks need come by themselves.
+    /// Slots are a third of a cycle apart and all but the request slot send one frame: the pauses pucks need come by
+    /// themselves.
     fn send(&mut self, frame: CanFrame) -> bool {
         let sent = self.io.transmit(frame);
         Counters::count(if sent { &mut self.counters.frames_sent } else { &mut self.counters.frames_refused });

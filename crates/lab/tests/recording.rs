@@ -4,6 +4,7 @@ mod common;
 
 use std::path::Path;
 
+use control::time::periods;
 use lab::demonstration::{Demonstration, DemonstrationError, Preparation, Recording, RecordingError, layout};
 
 const FILE: &str = "folder/demo.csv";
@@ -63,8 +64,8 @@ fn text_in_a_number_is_refused_with_its_place() {
 
 #[test]
 fn time_that_runs_backwards_or_stands_still_is_refused_with_its_place() {
-    for time in ["0.01", "0.16"] {
-        // Line 52 is sample 49 at 0.1633 s; line 51 is at 0.16 s.
+    let before = good()[50].split(',').nth(column("t_s")).expect("a time").to_owned();
+    for time in ["0.01", &before] {
         let error = parse(&with_field(52, "t_s", time)).unwrap_err();
         assert!(matches!(error, RecordingError::TimeRunsBackwards { .. }), "{error}");
         names(&error, 52, column("t_s") + 1);
@@ -245,11 +246,12 @@ fn cli_8_lost_samples_are_counted_by_the_cycle_counter_and_by_time() {
 #[test]
 fn a_gap_that_hides_movement_is_refused_with_its_place() {
     let mut rows = common::rows(2.0);
-    rows.drain(100..140);
+    let begin = usize::from(periods(1.0 / 3.0));
+    rows.drain(begin..begin + usize::from(periods(0.133)));
     let recording = parse(&common::text(&rows)).unwrap();
     let error = Demonstration::prepare(&recording, &Preparation::default()).unwrap_err();
     assert!(matches!(error, DemonstrationError::Recording(RecordingError::GapTooLong { .. })), "{error}");
-    names(&error, 103, column("t_s") + 1);
+    names(&error, begin as u64 + 3, column("t_s") + 1);
 }
 
 #[test]
@@ -288,7 +290,7 @@ fn the_pose_comes_from_the_joint_angles_where_there_are_any() {
 }
 
 #[test]
-fn other_rates_are_resampled_to_300_hz() {
+fn other_rates_are_resampled_to_the_control_rate() {
     let text = common::foreign(1.0);
     // Every third sample: 100 Hz.
     let (head, samples): (Vec<_>, Vec<_>) = text.lines().enumerate().partition(|(index, _)| *index < 2);
@@ -299,7 +301,8 @@ fn other_rates_are_resampled_to_300_hz() {
     let preparation = Preparation { still_speed: None };
     let a = Demonstration::prepare(&full, &preparation).unwrap();
     let b = Demonstration::prepare(&recording, &preparation).unwrap();
-    assert_eq!((a.len(), b.len()), (1201, 1201));
+    let samples = usize::from(periods(4.0)) + 1;
+    assert_eq!((a.len(), b.len()), (samples, samples));
     for (a, b) in a.position.iter().zip(&b.position) {
         for axis in 0..3 {
             assert!((a[axis] - b[axis]).abs() < 2e-5, "{a:?} {b:?}");

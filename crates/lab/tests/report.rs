@@ -15,7 +15,7 @@ fn recorded(folder: &Path, name: &str, end: Option<(State, Fault)>) -> PathBuf {
     let mut rows = common::rows(4.0);
     let alpha = 4.605_170_185_988_091;
     for (at, row) in rows.iter_mut().enumerate() {
-        let progress = (at as f64 - 150.0) / 1200.0;
+        let progress = (at as f64 / control::RATE - 0.5) / 4.0;
         let (state, fault) = match (progress, end) {
             (..0.0, _) => (State::Hold, Fault::None),
             (0.6.., Some(end)) => end,

@@ -12,11 +12,11 @@ use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
 use crate::real::{Real, at_least, within};
 use crate::sense::joints::JointState;
-use crate::time::{PERIOD, few_periods};
+use crate::time::{PERIOD, RATE, few_periods};
 use crate::units::{JOINTS, JointPositions, Vector7};
 
-/// Time from the latch of the positions to the torque that answers them, in control periods: 1.35 ms.
-const LATENCY: f64 = 0.4;
+/// Time from the latch of the positions to the torque that answers them: 1.33 ms, in control periods.
+const LATENCY: f64 = 0.4 * RATE / 300.0;
 
 /// Poles of the correction (Hz). The shoulder's lie well below the first swing of its cables (24 Hz), the wrist's are
 /// fast enough to damp it against a wall (8 to 10 Hz).
@@ -29,8 +29,8 @@ const DISTURBANCE_POLE: f64 = 2.0;
 /// the joints are stiffer, the shoulder's lie lower.
 const STIFF_POLES: ([f64; JOINTS], f64) = ([3.5, 3.0, 3.5, 5.0, 12.0, 12.0, 12.0], 1.5);
 
-/// Control periods after which the mass matrix is renewed: 27 ms.
-const RENEWAL: u8 = 8;
+/// Time after which the mass matrix is renewed: 27 ms, in control periods.
+const RENEWAL: u8 = few_periods(0.027);
 
 /// Largest difference from the measured velocity (rad/s): a person who shoves the arm is in no model.
 const FARTHEST: f64 = 0.5;

@@ -57,6 +57,10 @@ const OPEN: [(&str, &[&str]); 4] = [
     ("run, compliant, Eqs 8, 12", &["all"]),
 ];
 
+/// Loops that do not pass either at 500 Hz: the gains are those of 300 Hz, nobody tuned them for another rate. The
+/// swing of 3 Hz is the integral's (decision 0099).
+const OPEN_AT_500: [(&str, &[&str]); 1] = [("hold", &["gain x0.5"])];
+
 fn variations() -> Vec<(String, Variation)> {
     let nominal = Variation::NONE;
     let mut all = vec![
@@ -102,8 +106,10 @@ fn worst(law: Law, variation: Variation) -> (f64, String) {
 
 #[test]
 fn every_loop_that_is_not_listed_is_stable_without_friction_and_every_listed_one_is_not() {
+    let at_500 = OPEN_AT_500.iter().filter(|_| control::RATE_HZ == 500);
     let open: BTreeSet<(String, String)> = OPEN
         .iter()
+        .chain(at_500)
         .flat_map(|(law, variations)| variations.iter().map(|variation| ((*law).to_owned(), (*variation).to_owned())))
         .collect();
     let rows = std::thread::scope(|scope| {

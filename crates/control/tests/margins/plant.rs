@@ -8,15 +8,15 @@ use std::collections::VecDeque;
 
 use control::model::{self, ArmModel, Frames};
 use control::units::{JointPositions, JointVelocities, Vector7};
-use control::{Calibration, PERIOD, Payload};
+use control::{Calibration, PERIOD, Payload, RATE};
 use nalgebra::{SMatrix, Vector3, Vector6};
 use puck::{Counts, RawWrench};
 
 /// Steps of time in a control period.
 pub(crate) const SUBSTEPS: usize = 8;
 
-/// Steps of time from the latch of the positions to the torque that answers them: 1.25 ms.
-const LATENCY: usize = 3;
+/// Time from the latch of the positions to the torque that answers them: 1.25 ms, in steps of time.
+const LATENCY: usize = (1.25e-3 * RATE * SUBSTEPS as f64 + 0.5) as usize;
 
 /// Stiffness between motor and joint, at the joint (N m/rad), and share of critical damping; as in `crates/sim`.
 const CABLES: [f64; 7] = [4000.0, 4000.0, 2500.0, 2000.0, 350.0, 350.0, 120.0];

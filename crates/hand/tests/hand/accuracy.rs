@@ -9,12 +9,15 @@ use crate::common::{Movement, demonstrated, step};
 /// The bound of the issue, rad.
 const BOUND: f64 = 5e-4;
 
+/// Control rate of the golden vectors (Hz), whatever that of the device is.
+const GOLDEN_RATE: f64 = 300.0;
+
 /// Largest difference of position (rad) and velocity (rad/s) over the movement and half as long again.
 fn error(movement: &Movement, speed: f64, gauges: impl Fn(f64) -> [f64; 3]) -> [f64; 2] {
     let (fixed, sensed) = (movement.fixed(), movement.exact());
     let exact = sensed.movement();
     let mut reference = dmp::Rollout::start(exact, &StartState::demonstrated(exact)).expect("a start");
-    let mut rollout = demonstrated(&fixed);
+    let mut rollout = demonstrated(fixed.movement());
     reference.set_speed(exact, speed).expect("a speed");
     rollout.set_speed(fixed.movement(), Number::from_f64(speed)).expect("a speed");
     let mut worst = [0.0_f64; 2];
@@ -96,7 +99,7 @@ fn golden<const D: usize>(name: &str, columns: [&str; D]) -> Vec<(usize, [f64; D
         .map(|record| {
             let record = record.expect("a row");
             let number = |at: usize| record[at].parse::<f64>().unwrap_or(f64::NAN);
-            ((number(time) * 300.0).round() as usize, places.map(number))
+            ((number(time) * GOLDEN_RATE).round() as usize, places.map(number))
         })
         .collect()
 }
@@ -116,11 +119,12 @@ fn golden_finger_rows_are_followed() {
     movement.weights = std::array::from_fn(|row| rows[row].clone());
     movement.start = [0.0; 4];
     movement.goal = [0.3, 2.1, 2.1, 2.1];
-    let primitive = movement.fixed();
+    let period = Number::constant(1.0 / GOLDEN_RATE);
+    let movement = movement.fixed_at(period);
     let forces = golden("dmp_coupling_force", ["z7", "z8", "z9"]);
     for (name, coupled) in [("dmp_nocoupling", false), ("dmp_coupling", true)] {
         let wanted = golden(name, ["f1_e", "f2_e", "f3_e"]);
-        let mut rollout = demonstrated(&primitive);
+        let mut rollout = demonstrated(&movement);
         let (mut tick, mut worst) = (0, 0.0_f64);
         for (at, angles) in wanted {
             loop {
@@ -129,8 +133,7 @@ fn golden_finger_rows_are_followed() {
                     None => [ZERO; 4],
                 };
                 let coupling = dmp::Coupling { poses: [], points: zeta };
-                let period = Number::constant(control::PERIOD);
-                let plan = rollout.step(primitive.movement(), period, &coupling).expect("its own").points;
+                let plan = rollout.step(&movement, period, &coupling).expect("its own").points;
                 tick += 1;
                 if tick > at {
                     for (q, angle) in plan.x.iter().skip(1).zip(angles) {
@@ -151,7 +154,7 @@ fn a_flipped_sign_of_the_feedback_is_seen() {
     let movement = Movement::closing(50, 4.0, 0.4).feeling();
     let primitive = movement.fixed();
     let run = |sign: f64| {
-        let mut rollout = demonstrated(&primitive);
+        let mut rollout = demonstrated(primitive.movement());
         for _ in 0..900 {
             step(&primitive, &mut rollout, &[Number::from_f64(sign * 0.2); 3]);
         }

@@ -1,9 +1,9 @@
 //! Helpers of the tests: primitives as images, in fixed point and in f64.
 
 use control::plan::primitive::{MovementTables, Primitive, ROWS, configuration as rows, gains, limits, velocity};
-
+use dmp::{Configuration, Gain, Gains, PrimitiveTables};
 use hand::image::ImageReader;
-use hand::number::Number;
+use hand::number::{Number, from_real};
 use hand::{FingerPrimitive, FingerTables, Rollout};
 use link::Name;
 use link::image::{
@@ -128,14 +128,40 @@ impl Movement {
 
     /// In fixed point, by way of the image.
     pub(crate) fn fixed(&self) -> Box<FingerPrimitive> {
+        let mut primitive = Box::new(FingerPrimitive::EMPTY);
+        primitive.assign(&self.tables()).expect("a movement of the hand");
+        primitive
+    }
+
+    /// The movement alone in fixed point, by way of the image, for another control period than the device's.
+    pub(crate) fn fixed_at(&self, control_period: Number) -> Box<hand::primitive::Movement> {
+        let tables = self.tables();
+        let gain = Gain { stiffness: from_real(tables.stiffness), damping: from_real(tables.damping) };
+        let at = |points: [f32; 4]| Configuration { poses: [], points: points.map(from_real) };
+        let movement = hand::primitive::Movement::new(&PrimitiveTables {
+            control_period,
+            duration: from_real(tables.duration),
+            alpha: from_real(tables.alpha),
+            activation: from_real(tables.activation),
+            kernel_count: tables.kernels,
+            weights: &tables.weights,
+            gains: Gains { poses: [], points: [gain; 4] },
+            orientation_error: OrientationError::Quaternion,
+            hemisphere: Hemisphere::Demonstrated,
+            start: at(tables.start),
+            goal: at(tables.goal),
+            start_velocity: dmp::Velocity { poses: [], points: tables.start_velocity.map(from_real) },
+        });
+        Box::new(movement.expect("a movement of the hand"))
+    }
+
+    fn tables(&self) -> Box<FingerTables> {
         let image = self.image("movement");
         let mut tables = Box::new(FingerTables::EMPTY);
         let mut reader = ImageReader::new(image.len() as u32);
         image.chunks(192).for_each(|chunk| reader.take(chunk, &mut tables));
         reader.finish(&tables, link::image::stored_crc(&image)).expect("a sound image");
-        let mut primitive = Box::new(FingerPrimitive::EMPTY);
-        primitive.assign(&tables).expect("a movement of the hand");
-        primitive
+        tables
     }
 
     /// In f64: the same numbers on the arm's path.
@@ -178,8 +204,7 @@ impl Movement {
 }
 
 /// A run as the demonstration started, with its initial velocity.
-pub(crate) fn demonstrated(primitive: &FingerPrimitive) -> Rollout {
-    let movement = primitive.movement();
+pub(crate) fn demonstrated(movement: &hand::primitive::Movement) -> Rollout {
     Rollout::start(movement, &dmp::StartState::demonstrated(movement)).expect("a start")
 }
 

@@ -1,11 +1,12 @@
 //! The whole application against the simulated hand: start-up, grip, and every rung of the ladder.
 
 use control::{Fault, State};
+use device::Slot;
 use dmp::Scalar;
 use hand::number::real;
 use link::{EventKind, HandStage, Name, Refusal, Reply, Request, RunOptions};
 use puck::device::reply32;
-use puck::{Action, Group, MotorMode, Node, PropertyId, Status};
+use puck::{Action, Group, MotorMode, Node, Property, PropertyId, PropertyTable, Status};
 use sim::FingerObstacle;
 
 use crate::common::Movement;
@@ -389,6 +390,10 @@ fn replies_are_in_before_the_control_slot_and_the_bus_has_room() {
     let mut rig = gripping(adapt());
     rig.plant.record_bus();
     rig.run(2.0);
+    let gauge =
+        PropertyTable::motor(200).ok().and_then(|table| table.id(Property::Sg)).expect("a property of the hand");
+    // At a higher rate the slow slot passes before the control slot; its question and the answer take 160 us.
+    let (time, between) = if Slot::Request.next() == Slot::Control { (SLOT_TICKS, 0) } else { (2 * SLOT_TICKS, 160) };
     let (mut begin, mut longest, mut busy, mut cycles) = (0, 0, 0, 0);
     for passage in rig.plant.recorded() {
         let to_hand = puck::Request::decode(&passage.frame);
@@ -396,8 +401,12 @@ fn replies_are_in_before_the_control_slot_and_the_bus_has_room() {
             begin = passage.start;
             cycles += 1;
         }
-        let from_digit = passage.sender.hand_index().is_some();
-        if cycles > 0 && from_digit && passage.end - begin < CYCLE_TICKS / 2 {
+        let answers = match puck::Reply::decode(&passage.frame) {
+            Ok(puck::Reply::Position { .. }) => true,
+            Ok(puck::Reply::Property { property, .. }) => property == gauge,
+            _ => false,
+        };
+        if cycles > 0 && answers {
             longest = longest.max(passage.end - begin);
         }
         busy += passage.end - passage.start;
@@ -405,9 +414,9 @@ fn replies_are_in_before_the_control_slot_and_the_bus_has_room() {
     let microseconds = |ticks: u64| ticks as f64 / sim::TICKS_PER_MICROSECOND as f64;
     let load = busy as f64 / (cycles * CYCLE_TICKS) as f64;
     println!("all replies in after {:.0} us, bus load {:.1} %", microseconds(longest), 100.0 * load);
-    assert!(longest < SLOT_TICKS, "{} us", microseconds(longest));
+    assert!(longest < time, "{} us", microseconds(longest));
     // By the bit counts, worst stuffing: two requests, three positions of 6 bytes and one of 3, four gauges, and 75 us.
-    let worst = 2 * 65 + 3 * 115 + 85 + 4 * 95 + 75;
-    assert!(worst * sim::TICKS_PER_MICROSECOND < SLOT_TICKS, "{worst} us");
-    assert!(load < 0.45);
+    let worst = 2 * 65 + 3 * 115 + 85 + 4 * 95 + 75 + between;
+    assert!(worst * sim::TICKS_PER_MICROSECOND < time, "{worst} us");
+    assert!(busy < cycles * 1500 * sim::TICKS_PER_MICROSECOND, "45 % of a cycle of 300 Hz");
 }

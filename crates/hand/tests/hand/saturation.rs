@@ -113,7 +113,7 @@ fn a_rollout_under_random_feedback_never_turns_its_torque_round() {
     let movement = Movement::closing(50, 2.0, 0.4).feeling();
     let primitive = movement.fixed();
     let bound = movement.limit * movement.stiffness;
-    let mut rollout = demonstrated(&primitive);
+    let mut rollout = demonstrated(primitive.movement());
     for case in 0..CASES {
         if case % 5000 == 0 {
             let start = core::array::from_fn(|_| within(any(&mut random), Number::ONE));
