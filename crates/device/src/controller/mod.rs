@@ -545,6 +545,7 @@ impl Controller for DeviceController {
             stage: self.stage(),
             blocked: self.startup.error(),
             state: self.cycle.state(),
+            law: self.cycle.law(),
             fault: self.cycle.fault(),
             zeroed: self.startup.is_zeroed(),
             zeroed_at: self.startup.zeroed_at(),
