@@ -395,8 +395,8 @@ impl DeviceController {
             Counters::count(&mut self.counters.torque_mismatches);
         }
         self.refused = self.refused.saturating_add(1);
-        if self.refused == REFUSED_CYCLES {
-            // The bus may recover by itself; motion does not.
+        if self.refused >= REFUSED_CYCLES {
+            // The bus may recover by itself; motion does not. Told as long as it goes on, so that nobody arms the arm.
             self.fault = Some(Fault::BusFault);
         }
     }
