@@ -72,6 +72,8 @@ pub struct Health {
     pub blocked: Option<StartupError>,
     /// State of the supervisor.
     pub state: State,
+    /// The state whose law acts: while lost replies are bridged, the one before.
+    pub law: State,
     /// The latched fault.
     pub fault: Fault,
     /// The encoders count from a known pose, as the safety module says. False for a hand alone, as for all that is only

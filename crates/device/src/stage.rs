@@ -145,6 +145,8 @@ pub enum StartupError {
     CountsJumped,
     /// The sensor or the hand answers now and did not at the start-up.
     AnswersLate(Node),
+    /// The zeroing of an arm was broken off.
+    ZeroUnfinished,
 }
 
 impl fmt::Display for StartupError {
@@ -187,6 +189,7 @@ impl fmt::Display for StartupError {
                 write!(formatter, "puck {} has restarted and counts anew: zero the arm", node.number())
             }
             StartupError::CountsJumped => formatter.write_str("the counts of a motor jumped: zero the arm"),
+            StartupError::ZeroUnfinished => formatter.write_str("zeroing was broken off: zero the arm"),
             StartupError::AnswersLate(node) => {
                 write!(
                     formatter,

@@ -141,6 +141,7 @@ impl From<StartupError> for StartupFailure {
             StartupError::CountsAnew(node) => at(17, node, 0),
             StartupError::CountsJumped => Self([18, 0]),
             StartupError::AnswersLate(node) => at(19, node, 0),
+            StartupError::ZeroUnfinished => Self([20, 0]),
         }
     }
 }
@@ -171,6 +172,7 @@ impl StartupFailure {
             17 => StartupError::CountsAnew(node),
             18 => StartupError::CountsJumped,
             19 => StartupError::AnswersLate(node),
+            20 => StartupError::ZeroUnfinished,
             _ => return None,
         })
     }

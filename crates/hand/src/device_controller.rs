@@ -368,6 +368,7 @@ impl Controller for DeviceController {
                 Phase::Done => Stage::Ready,
             },
             state: self.cycle.state(),
+            law: self.cycle.state(),
             fault: self.cycle.fault(),
             hand: self.stage,
             // A move is a state of the cycle.

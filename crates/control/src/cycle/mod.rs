@@ -161,6 +161,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.supervisor.state()
     }
 
+    /// The state whose law acts: while lost replies are bridged, the one before.
+    pub fn law(&self) -> State {
+        self.supervisor.law()
+    }
+
     /// The latched fault.
     pub fn fault(&self) -> Fault {
         self.supervisor.fault()

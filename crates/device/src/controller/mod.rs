@@ -395,8 +395,8 @@ impl DeviceController {
             Counters::count(&mut self.counters.torque_mismatches);
         }
         self.refused = self.refused.saturating_add(1);
-        if self.refused == REFUSED_CYCLES {
-            // The bus may recover by itself; motion does not.
+        if self.refused >= REFUSED_CYCLES {
+            // The bus may recover by itself; motion does not. Told as long as it goes on, so that nobody arms the arm.
             self.fault = Some(Fault::BusFault);
         }
     }
@@ -545,6 +545,7 @@ impl Controller for DeviceController {
             stage: self.stage(),
             blocked: self.startup.error(),
             state: self.cycle.state(),
+            law: self.cycle.law(),
             fault: self.cycle.fault(),
             zeroed: self.startup.is_zeroed(),
             zeroed_at: self.startup.zeroed_at(),

@@ -55,6 +55,10 @@ impl Startup {
         };
         if SafetyMode::from_value(mode) == Some(SafetyMode::Idle) {
             self.zero_request = ZeroRequest::Answered(Ok(()));
+            // Broken off, it leaves a mixture of two zeros. Not even a board that restarts meanwhile may believe the
+            // word of the safety module for it.
+            self.owes_revocation = self.zeroed;
+            self.doubt.get_or_insert(StartupError::ZeroUnfinished);
             self.zeroed = false;
             self.zeroed_at = None;
             return Ok(Next::Go(Step::IgnoreFaults));
@@ -90,6 +94,9 @@ impl Startup {
     }
 
     pub(super) fn write_position(&mut self, joint: u8, outlet: &mut impl Outlet) -> Next {
+        if self.revoke_zero(outlet) {
+            return Next::Stay;
+        }
         let index = usize::from(joint);
         match (Node::ARM.get(index), self.targets.get(index)) {
             (Some(node), Some(target)) => {

@@ -417,3 +417,25 @@ fn the_first_wrench_after_the_tare_is_thrown_away() {
     let first = bus.records.first().expect("a record");
     assert!(first.flags & control::flags::WRENCH_STALE != 0);
 }
+
+/// A12: what goes on is no cause that a Clear ends. An arm that holds by torques that do not leave would fall.
+#[test]
+fn a12_while_torque_frames_cannot_leave_nothing_is_cleared_or_armed() {
+    let (mut core, mut bus) = floating();
+    bus.refuse_torques = true;
+    // Long enough for the count of refused cycles to reach the end of its byte.
+    bus.run(&mut core, 1.5);
+    assert_eq!(core.health().state, State::Fault);
+    for command in [Command::ClearFault, Command::Hold, Command::Gravity] {
+        bus.press_activate();
+        bus.run_slots(&mut core, 2 * CYCLE);
+        bus.commands.push_back(command.into());
+        bus.run(&mut core, 0.1);
+        assert_eq!(core.health().state, State::Fault, "{command:?}");
+    }
+    bus.refuse_torques = false;
+    bus.run(&mut core, 0.1);
+    bus.commands.push_back(Command::ClearFault.into());
+    bus.run(&mut core, 0.1);
+    assert_eq!(core.health().state, State::Idle, "{:?}", bus.events);
+}

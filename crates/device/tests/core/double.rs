@@ -122,6 +122,8 @@ pub(crate) struct Bus {
     pub(crate) sensor: RawWrench,
     /// The controller has no room for this many more frames.
     pub(crate) refuse: u32,
+    /// The controller takes no torque frames.
+    pub(crate) refuse_torques: bool,
     /// Writes to the safety module that are lost from now on.
     pub(crate) lose_safety_writes: u32,
     /// The mode that the safety module tells next, once, instead of its own.
@@ -156,6 +158,7 @@ impl Bus {
             sensor_awake_at: None,
             sensor: RawWrench { force: [256, 0, 0], torque: [0, 0, 0], status: None },
             refuse: 0,
+            refuse_torques: false,
             lose_safety_writes: 0,
             wrong_safety_mode: None,
             pressed_us: 0,
@@ -465,6 +468,11 @@ impl ControllerIo<DeviceController> for Bus {
     fn transmit(&mut self, frame: CanFrame) -> bool {
         if self.refuse > 0 {
             self.refuse -= 1;
+            return false;
+        }
+        let is_torque =
+            || matches!(Request::decode(&frame), Ok(request) if matches!(request.action, Action::PackedTorques { .. }));
+        if self.refuse_torques && is_torque() {
             return false;
         }
         self.log.push((self.now_us, frame));

@@ -179,3 +179,28 @@ fn g2_an_arm_that_is_turned_by_hand_while_the_bus_is_started_anew_keeps_its_zero
         assert!(!keeps_zero(joint, 0.0, 4_000), "M{} jumps", joint + 1);
     }
 }
+
+/// G2: a zeroing that breaks off has told some motors where they stand and others not. The safety module had an older
+/// zero, and nobody may take its word for the mixture: neither the device nor one that restarts meanwhile.
+#[test]
+fn g2_a_zeroing_that_breaks_off_leaves_no_zero_that_anybody_believes() {
+    for (restarts, lost_words) in [(false, 0), (false, 2), (true, 0)] {
+        let (mut core, mut bus) = started();
+        bus.run(&mut core, 0.2);
+        bus.pucks[3].ignores_position_writes = true;
+        bus.lose_safety_writes = lost_words;
+        let home = [0.5, -2.0, 0.0, 2.8, 0.0, 0.0, 0.0];
+        bus.commands.push_back(Command::Zero { home });
+        bus.run_until(&mut core, Stage::Blocked);
+        assert_eq!(core.health().blocked, Some(StartupError::ZeroNotTaken(Node::ARM[3])));
+        if restarts {
+            core = silent_device();
+        }
+        bus.run(&mut core, 4.0);
+        assert_eq!((core.stage(), core.health().zeroed), (Stage::WaitingForZero, false), "{:?}", bus.events);
+        assert_nothing_leads_on(&mut core, &mut bus);
+        assert!(!bus.safety_zero);
+        bus.pucks[3].ignores_position_writes = false;
+        assert_zeroing_leads_on(&mut core, &mut bus);
+    }
+}

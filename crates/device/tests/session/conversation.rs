@@ -105,6 +105,21 @@ fn c9_a_second_host_is_refused_until_the_first_has_been_silent() {
     assert_eq!(rig.refused(Request::Status).0, Refusal::NoSession, "the first has lost the session");
 }
 
+/// C9: the time of the link is 32 bits of milliseconds, half of which are "before" the other half.
+#[test]
+fn c9_a_second_host_takes_over_from_a_silent_one_however_long_the_device_has_run() {
+    for days in [0, 24, 25, 30, 49, 50, 75, 100] {
+        let mut rig = Rig::new();
+        rig.now_ms += days * 24 * 3_600_000;
+        rig.greet();
+        rig.wait(100);
+        (rig.number, rig.sequence) = (88, 0);
+        assert_eq!(rig.refused(Request::Hello(hello())), (Refusal::Busy, [0, 400]), "after {days} days");
+        rig.wait(400);
+        rig.greet();
+    }
+}
+
 /// A host of another number sends a request; what the device says to it.
 fn from_another(rig: &mut Rig, number: u16, request: Request) -> Vec<Reply> {
     let (own, sequence) = (std::mem::replace(&mut rig.number, number), rig.sequence);
@@ -170,7 +185,7 @@ fn a_stop_of_a_stranger_that_the_control_half_never_answers_is_refused_to_the_st
     rig.number = 500;
     rig.put(9000, 0, &Request::Stop);
     rig.number = 77;
-    rig.wait(150);
+    rig.wait(250);
     let said: Vec<_> = rig.sent().into_iter().filter(|frame| frame.envelope.session == 500).collect();
     assert!(matches!(said[0].message, Reply::Refused { of: 9000, reason: Refusal::NoAnswer, .. }), "{said:?}");
 }
@@ -200,6 +215,37 @@ fn c10_a_moving_arm_is_stopped_when_its_host_falls_silent_for_half_a_second() {
         assert_eq!(event.map(|event| (event.kind, event.detail)), Some((LinkKind::LinkTimeout, 500)));
         assert_eq!(rig.refused(Request::Gravity).0, Refusal::NoSession, "the session is over");
     }
+}
+
+/// A1: an arm that holds does so without its host. A lost reply is bridged, and the host is no reason to stop then.
+#[test]
+fn a1_a_lost_reply_does_not_stop_an_arm_that_holds_without_its_host() {
+    for leaves in [false, true] {
+        let mut rig = Rig::greeted();
+        if leaves {
+            rig.done(Request::Goodbye);
+        }
+        rig.wait(600);
+        (rig.bench.state, rig.bench.bridged) = (State::Coast, State::Hold);
+        rig.wait(4);
+        assert!(rig.bench.commands.is_empty(), "the host has left: {leaves}");
+        rig.bench.bridged = State::Run;
+        rig.wait(1);
+        assert_eq!(rig.bench.commands, [Command::Control(control::Command::Stop)]);
+    }
+}
+
+/// G2: zeroing first asks the safety module, three times if its answers are lost: 150 ms.
+#[test]
+fn g2_the_late_answer_to_zeroing_is_not_taken_for_that_to_the_next_command() {
+    let mut rig = Rig::greeted();
+    assert_eq!(rig.ask(Request::Zero { home: [0.0; 7] }), None);
+    let of = rig.sequence;
+    rig.wait(160);
+    assert_eq!(rig.ask(Request::Hold), None);
+    rig.event(EventKind::Accepted);
+    let said: Vec<_> = rig.sent().into_iter().map(|frame| frame.message).collect();
+    assert_eq!(said, [Reply::Accepted { of }]);
 }
 
 #[test]

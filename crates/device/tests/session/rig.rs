@@ -46,6 +46,8 @@ pub(crate) struct Bench {
     pub(crate) load: Result<(), LoadRefusal>,
     /// The state of the control half.
     pub(crate) state: State,
+    /// The state that it bridges while it coasts.
+    pub(crate) bridged: State,
     /// Its latched fault.
     pub(crate) fault: Fault,
     /// The hand moves by itself.
@@ -110,6 +112,7 @@ impl SessionPort<DeviceController> for Bench {
             stage: Stage::Ready,
             blocked: None,
             state: self.state,
+            law: if self.state == State::Coast { self.bridged } else { self.state },
             fault: self.fault,
             zeroed: true,
             zeroed_at: self.zeroed_at,
@@ -186,6 +189,7 @@ impl<S: device::Store> Rig<S> {
             primitive: None,
             load: Ok(()),
             state: State::Hold,
+            bridged: State::Run,
             fault: Fault::None,
             hand_moves: false,
             payload: Payload::SensorAndHand,

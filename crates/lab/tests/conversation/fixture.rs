@@ -69,6 +69,7 @@ impl SessionPort<DeviceController> for Half {
             stage: Stage::Ready,
             blocked: None,
             state: self.state,
+            law: self.state,
             fault: control::Fault::None,
             zeroed: true,
             zeroed_at: None,

@@ -40,8 +40,9 @@ impl Inbox {
         }
         let next = self.others.front()?;
         if !(is_free || next.message == Request::Stop || is_owner(next.envelope.session)) {
-            // Signed: the time that is paid for may lie behind or before now, and the clock wraps.
-            let debt = self.paid_until_ms.wrapping_sub(now_ms).cast_signed().max(0).unsigned_abs();
+            // The clock wraps. More than the largest debt lies behind now: long ago.
+            let ahead = self.paid_until_ms.wrapping_sub(now_ms);
+            let debt = if ahead > OTHER_CREDIT_MS + OTHER_COST_MS { 0 } else { ahead };
             if debt > OTHER_CREDIT_MS {
                 return None;
             }

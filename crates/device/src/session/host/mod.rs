@@ -234,7 +234,8 @@ impl<A: Application> HostSession<A> {
             return true;
         }
         let health = port.health();
-        let active = matches!(health.state, State::Gravity | State::Approach | State::Run | State::Coast);
+        // By the law: a lost reply that is bridged while the arm holds is no motion.
+        let active = matches!(health.law, State::Gravity | State::Approach | State::Run);
         let moving = active || health.hand_moves;
         // Without a host the stop may be on its way already.
         if !moving || (silence.is_none() && !self.pending.is_empty()) {

@@ -8,8 +8,9 @@ use heapless::Deque;
 const PENDING: usize = 8;
 
 /// A command that the control half does not answer within this time is given up, ms. It answers within two
-/// cycles, 7 ms; longer means that it does not run.
-const ANSWER_TIMEOUT_MS: u32 = 100;
+/// cycles, 7 ms, and to zeroing after its last question to the safety module, 150 ms; longer means that it does not run.
+/// An answer that came later would be taken for that to the next command.
+const ANSWER_TIMEOUT_MS: u32 = 200;
 
 /// Who waits for an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
