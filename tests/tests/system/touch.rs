@@ -158,7 +158,8 @@ fn request(primitive: &PrimitiveFile) -> RunRequest {
 
 #[test]
 fn a_sensor_error_within_the_dead_band_neither_moves_the_plan_nor_makes_the_hand_swing() {
-    // The sensor measures the hand's inertia, what it measures accelerates the plan, and the plan's acceleration is fed forward.
+    // The sensor measures the hand's inertia, what it measures accelerates the plan, and the plan's acceleration is fed
+    // forward.
     // Without the filter between them an arm whose cables give way swings at 20 Hz as soon as the sensor's error comes
     // near the dead band, and the peaks carry the plan away by centimetres.
     let mut primitive = primitive().clone();
