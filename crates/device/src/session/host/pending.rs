@@ -8,7 +8,8 @@ use heapless::Deque;
 const PENDING: usize = 8;
 
 /// A command that the control half does not answer within this time is given up, ms. It answers within two
-/// cycles, 7 ms, and to zeroing after its last question to the safety module, 150 ms; longer means that it does not run.
+/// cycles, 7 ms, and to zeroing after its last question to the safety module, 150 ms; longer means that it is not
+/// running.
 /// An answer that came later would be taken for that to the next command.
 const ANSWER_TIMEOUT_MS: u32 = 200;
 
