@@ -286,3 +286,41 @@ fn codes_are_stable_and_unique() {
     }
     assert_eq!((State::from_code(9), Fault::from_code(u8::MAX), Refusal::from_code(0)), (None, None, None));
 }
+
+#[test]
+fn a1_each_bridge_leads_back_to_the_state_that_it_began_in() {
+    let mut supervisor = in_state(State::Hold);
+    for command in [None, Some(Trigger::Run), Some(Trigger::Hold), Some(Trigger::Gravity)] {
+        if let Some(command) = command {
+            supervisor.take(command, Fault::None).expect("allowed");
+        }
+        let before = supervisor.state();
+        supervisor.take(Trigger::RepliesMissing, Fault::None).expect("no command");
+        assert_eq!((supervisor.state(), supervisor.law()), (State::Coast, before));
+        supervisor.take(Trigger::RepliesBack, Fault::None).expect("no command");
+        assert_eq!(supervisor.state(), before);
+    }
+}
+
+#[test]
+fn a15_whichever_command_arms_the_arm_again_clears_the_drop_of_the_safety_module() {
+    for arming in [Trigger::Gravity, Trigger::Hold] {
+        let mut supervisor = in_state(State::Hold);
+        supervisor.take(Trigger::SafetyDropped, Fault::SafetyDropped).expect("no command");
+        assert_eq!((supervisor.state(), supervisor.fault()), (State::Idle, Fault::SafetyDropped));
+        supervisor.take(arming, Fault::None).expect("allowed");
+        assert_eq!(supervisor.fault(), Fault::None, "{arming:?}");
+    }
+}
+
+#[test]
+fn g6_a_loss_of_replies_that_goes_on_is_told_as_such_and_never_the_other_way_round() {
+    for (first, then) in
+        [(Fault::RepliesLost, Fault::RepliesLostForLong), (Fault::RepliesLostForLong, Fault::RepliesLost)]
+    {
+        let mut supervisor = in_state(State::Hold);
+        supervisor.latch(first);
+        supervisor.latch(then);
+        assert_eq!(supervisor.fault(), Fault::RepliesLostForLong);
+    }
+}

@@ -396,7 +396,7 @@ impl DeviceController {
         }
         self.refused = self.refused.saturating_add(1);
         if self.refused >= REFUSED_CYCLES {
-            // The bus may recover by itself; motion does not. A fault as long as it goes on: nobody arms the arm.
+            // The bus may recover by itself; motion does not. A fault as long as it goes on, so that nobody arms.
             self.fault = Some(Fault::BusFault);
         }
     }

@@ -107,7 +107,8 @@ impl Hand {
             (HandStage::Initialising, _) => Err(Refusal::HandBusy),
             (HandStage::Absent, _) | (_, None) => Err(Refusal::NoHand),
             (stage, Some(_)) => {
-                let driven = stage == HandStage::Ready;
+                // Braking after a stop: that word may not have left.
+                let driven = stage == HandStage::Ready || self.drive.mode_frame().is_some();
                 self.enter(HandStage::Initialising, None);
                 self.drive = Drive::resting(false);
                 self.initialisation = Some(Initialisation::new(driven, now_us));

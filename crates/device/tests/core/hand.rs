@@ -228,6 +228,20 @@ fn a_stop_ends_the_initialisation() {
     assert!(bus.digits.iter().all(|digit| digit.mode == MotorMode::Idle && !digit.initialised));
 }
 
+/// G11: a stop and a new order in one breath. The double fails if a digit under way hears anything but the word to brake.
+#[test]
+fn g11_a_hand_that_is_initialised_right_after_a_stop_is_braked_first() {
+    for slots in 0..12 {
+        let (mut core, mut bus) = holding_with_hand();
+        bus.commands.push_back(Command::InitialiseHand);
+        bus.run(&mut core, 0.5);
+        bus.run_slots(&mut core, slots);
+        bus.commands.extend([Control::Stop.into(), Command::InitialiseHand]);
+        bus.run(&mut core, 0.1);
+        assert_eq!(core.health().hand, HandStage::Initialising, "{:?}", bus.events);
+    }
+}
+
 #[test]
 fn a_digit_that_falls_silent_in_the_initialisation_is_named() {
     let (mut core, mut bus) = holding_with_hand();

@@ -277,6 +277,28 @@ fn an_answer_to_a_host_that_is_gone_is_not_given_to_the_next_one() {
 }
 
 #[test]
+fn nothing_is_said_to_the_next_host_about_a_command_of_the_one_that_is_gone() {
+    let mut rig = Rig::greeted();
+    assert_eq!(rig.ask(Request::Hold), None);
+    rig.done(Request::Goodbye);
+    rig.number = 88;
+    rig.greet();
+    rig.event(EventKind::Accepted);
+    assert!(rig.sent().is_empty(), "numbers of two hosts may be equal");
+}
+
+#[test]
+fn the_next_host_gets_no_telemetry_that_it_has_not_asked_for() {
+    let mut rig = Rig::greeted();
+    rig.done(Request::Telemetry { every: 1 });
+    rig.done(Request::Goodbye);
+    rig.number = 88;
+    rig.greet();
+    rig.cycle(1, Fault::None);
+    assert!(telemetry(&mut rig).is_empty());
+}
+
+#[test]
 fn a_full_queue_refuses_but_keeps_a_place_for_a_stop() {
     let mut rig = Rig::greeted();
     rig.bench.stuck = true;

@@ -162,3 +162,19 @@ fn a_hello_waits_for_the_library_a_second_and_is_then_answered_without_it() {
     rig.poll();
     assert!(matches!(rig.ask(Request::List { index: 2 }), Some(Reply::Listing { listing: Some(_), .. })));
 }
+
+#[test]
+fn the_next_host_is_told_nothing_of_the_commit_of_the_one_that_is_gone() {
+    let mut rig = rig();
+    rig.send_parts("reach", &image("reach", 2.0, 10));
+    assert_eq!(rig.ask(Request::UploadCommit), None);
+    let mut copy = [0; SLOT_BYTES];
+    assert!(rig.session.store_mut().take(&mut copy).is_some());
+    let commit = rig.sequence;
+    rig.done(Request::Goodbye);
+    rig.number = 88;
+    rig.greet();
+    rig.session.store_mut().settle(Ok(()));
+    let replies = said(&mut rig);
+    assert!(replies.iter().all(|reply| reply.answers() != Some(commit)), "{replies:?}");
+}

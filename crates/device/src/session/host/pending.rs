@@ -7,9 +7,10 @@ use heapless::Deque;
 /// Commands that may be on their way at a time, the last place of them kept for a stop.
 const PENDING: usize = 8;
 
-/// A command that the control half does not answer within this time is given up, ms. It answers within two cycles,
-/// 7 ms, and to zeroing after its last question to the safety module, 150 ms; longer means that it does not run. An
-/// answer that came later would be taken for that to the next command.
+/// A command that the control half does not answer within this time is given up, ms. It answers within two
+/// cycles, 7 ms, and to zeroing after its last question to the safety module, 150 ms; longer means that it is not
+/// running.
+/// An answer that came later would be taken for that to the next command.
 const ANSWER_TIMEOUT_MS: u32 = 200;
 
 /// Who waits for an answer.
