@@ -228,7 +228,8 @@ fn a_stop_ends_the_initialisation() {
     assert!(bus.digits.iter().all(|digit| digit.mode == MotorMode::Idle && !digit.initialised));
 }
 
-/// G11: a stop and a new order in one breath. The double fails if a digit under way hears anything but the word to brake.
+/// G11: a stop and a new order in one breath. The double fails if a digit under way hears anything but the word to
+/// brake.
 #[test]
 fn g11_a_hand_that_is_initialised_right_after_a_stop_is_braked_first() {
     for slots in 0..12 {
