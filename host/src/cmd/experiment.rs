@@ -78,7 +78,7 @@ pub struct Cmd {
 
 /// Names of the objects, each with its description in the help.
 fn object_kinds() -> impl TypedValueParser<Value = ObjectKind> {
-    let value = |kind: ObjectKind| PossibleValue::new(kind.name()).help(kind.row().description);
+    let value = |kind: ObjectKind| PossibleValue::new(kind.name()).help(kind.row().description.as_str());
     PossibleValuesParser::new(ObjectKind::ALL.map(value)).try_map(|name| name.parse::<ObjectKind>())
 }
 

@@ -50,7 +50,7 @@ pub fn write(
 ) -> Result<Vec<PathBuf>, FigureError> {
     std::fs::create_dir_all(folder).map_err(|cause| FigureError::Folder { folder: folder.to_owned(), cause })?;
     let results = &experiment.results;
-    let title = config.object.row().title;
+    let title = &config.object.row().title;
     let radius = config.object_at(&experiment.prepared.frame, Default::default()).foot_radius();
     let mut written = Vec::new();
     let mut put = |drawing: lab::plot::drawing::Drawing, name: &str| -> Result<(), FigureError> {

@@ -9,9 +9,11 @@ mod free_joints;
 #[cfg(feature = "mujoco")]
 pub mod mujoco;
 mod object;
+mod object_file;
 
 pub use free_joints::{FingerObstacle, FreeJoints, HOME};
-pub use object::{ObjectKind, ObjectRow, UnknownObject};
+pub use object::{ObjectKind, UnknownObject};
+pub use object_file::{Head, Material, ObjectFileError, ObjectRow, Ring};
 
 /// Stream of random numbers from which an arm other than the nominal one is drawn, and nothing else.
 const ARM_STREAM: u64 = 0x696d_7065_7266;

@@ -71,7 +71,7 @@ impl ObjectSpec {
     /// Radius of its foot, m: about its rim it topples.
     #[must_use]
     pub fn foot_radius(&self) -> f64 {
-        self.kind.row().head.map_or(self.radius, |(ratio, _)| ratio * self.radius)
+        self.kind.row().head.map_or(self.radius, |head| head.radius * self.radius)
     }
 
     /// Horizontal force at a height above the table that topples it, N: `m g r / h`. It slides instead where that
@@ -134,8 +134,9 @@ impl ObjectSpec {
         }
         // Rings of material; heights over the foot, where the body's frame is in the middle of the axis.
         let half = 0.5 * self.height();
-        for (share, bottom, top, material) in self.kind.row().rings {
-            let (radius, bottom, top) = (share * self.radius, bottom - half, top - half);
+        for ring in &self.kind.row().rings {
+            let (radius, bottom, top) = (ring.radius * self.radius, ring.bottom - half, ring.top - half);
+            let material = ring.material.name();
             let _ = writeln!(
                 text,
                 r#"      <geom class="look" type="cylinder" size="{radius}" fromto="0 0 {bottom} 0 0 {top}" material="{material}"/>"#
@@ -150,9 +151,9 @@ impl ObjectSpec {
         let half = 0.5 * self.height();
         let mut parts = Vec::new();
         let mut bottom = -half;
-        if let Some((_, height)) = self.kind.row().head {
-            parts.push(Part { radius: self.foot_radius(), bottom, top: height - half, mass: 0.0 });
-            bottom = height - half;
+        if let Some(head) = self.kind.row().head {
+            parts.push(Part { radius: self.foot_radius(), bottom, top: head.height - half, mass: 0.0 });
+            bottom = head.height - half;
         }
         parts.push(Part { radius: self.radius, bottom, top: half, mass: 0.0 });
         // The common factor pi drops out.
