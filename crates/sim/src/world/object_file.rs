@@ -55,7 +55,7 @@ pub struct Ring {
     pub bottom: f64,
     /// Top, height over the foot, m.
     pub top: f64,
-    /// What it is made of.
+    /// Its material.
     pub material: Material,
 }
 
@@ -124,7 +124,7 @@ pub enum ObjectFileError {
     Ring(usize),
 }
 
-/// What the figures that are checked may be.
+/// Ranges of the figures.
 const RANGES: [(&str, fn(&ObjectRow) -> Option<f64>, f64, f64); 10] = [
     ("position x", |row| Some(row.position[0]), -1.5, 1.5),
     ("position y", |row| Some(row.position[1]), -1.5, 1.5),
