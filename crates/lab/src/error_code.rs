@@ -183,6 +183,8 @@ error_codes! {
         "the settings are `device` and `timeout`, for example `timeout = 5`";
     NoStudyOfWeights = 270: "the experiment with a weight knows neither demonstrations nor sweeps", "`experiment lift`",
         "leave out `--demonstrations` and `--sweep`";
+    UnknownObject = 271: "there is no object of that name", "a misspelt name",
+        "`tactus experiment --help` lists them; a file of your own ends in `.toml`";
     DeviceNotFound = 301: "there is no such device", "cable, power, or a misspelt port",
         "check cable and name of the device; for a simulated arm use `--device sim:`";
     PermissionDenied = 302: "no permission to use the device",
@@ -324,6 +326,8 @@ error_codes! {
         "choose another folder with `--out`";
     NotTaught = 662: "no primitive was made for the experiment", "the simulated teacher's grasp did not hold",
         "make one with `tactus teach`, `learn` and `rehearse`, and give it with `--primitive`";
+    ObjectInvalid = 663: "the file of the object cannot be used", "a misspelt key, or a figure out of its range",
+        "write it as crates/sim/objects/cup.toml is written, under a name of its own";
     LogUnreadable = 670: "the log of the bus cannot be read", "the file does not exist",
         "`candump -L can0 > bus.log` makes such a file, and `--device sil:bus=bus.log` of a simulated arm";
     LogLines = 671: "lines of the log are not in candump's format", "another format", "make logs with `candump -L`";

@@ -4,8 +4,6 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use sim::world::ObjectKind;
 
 use super::{ErrorCode, Failure, Global};
 use experiment::{Grid, Mode, PlantKind, Scenario, Sweep, Variation};
@@ -53,9 +51,10 @@ pub struct Cmd {
     /// (factors), delay (cycles), bias (N, comes up after the run's tare), speed (of the run, of the taught one)
     #[arg(long, value_name = "NAME=VALUE,...", default_value = "")]
     pub vary: Variation,
-    /// Object on the table instead of the usual object
-    #[arg(long, value_parser = object_kinds())]
-    pub object: Option<ObjectKind>,
+    /// Object on the table instead of the usual one: small-torch, flashlight, cup, bottle, weight, paper-cup, or a file
+    /// of your own such as `mug.toml`
+    #[arg(long, value_name = "NAME|FILE")]
+    pub object: Option<PathBuf>,
     /// Simulations at a time [default: one for each processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=512))]
     pub jobs: Option<u16>,
@@ -74,12 +73,6 @@ pub struct Cmd {
     /// Write the telemetry of every trial into the folder `recordings`
     #[arg(long)]
     pub keep_recordings: bool,
-}
-
-/// Names of the objects, each with its description in the help.
-fn object_kinds() -> impl TypedValueParser<Value = ObjectKind> {
-    let value = |kind: ObjectKind| PossibleValue::new(kind.name()).help(kind.row().description.as_str());
-    PossibleValuesParser::new(ObjectKind::ALL.map(value)).try_map(|name| name.parse::<ObjectKind>())
 }
 
 /// Largest number of an arm or a person; those that gather statistics have numbers above.
@@ -134,6 +127,7 @@ mod work {
     use lab::primitive_file::PrimitiveFile;
     use lab::simulation::{Engine, SimulationOptions};
     use lab::transport::Address;
+    use sim::world::ObjectKind;
 
     const DOING: &str = "experiment";
     /// Where the device is simulated unless said otherwise.
@@ -165,12 +159,13 @@ mod work {
         output: Output,
     ) -> Result<Config, Failure> {
         let engine = engine(global)?;
+        let object = command.object.as_deref().map(object).transpose()?;
         std::fs::create_dir_all(out).map_err(|cause| unwritable(out, cause))?;
         let primitive = primitive(command, out, number, interrupt, output)?;
         let usual = Config::new(command.scenario, primitive);
         let grid = command.grid.clone().unwrap_or_else(|| usual.grid.clone());
         Ok(Config {
-            object: command.object.unwrap_or(usual.object),
+            object: object.unwrap_or(usual.object),
             grid: grid.moved(command.rotate, command.shift.map(|value| value * 0.01)),
             modes: modes(command).unwrap_or(usual.modes),
             seeds: seeds(command),
@@ -184,6 +179,23 @@ mod work {
             keep_traces: true,
             keep_recordings: command.keep_recordings,
             ..usual
+        })
+    }
+
+    /// The object that is compiled in under this name, or that of the user's file.
+    fn object(given: &Path) -> Result<ObjectKind, Failure> {
+        if let Some(Ok(kind)) = given.to_str().map(str::parse) {
+            return Ok(kind);
+        }
+        if given.extension().is_none_or(|extension| extension != "toml") {
+            let known = ObjectKind::ALL.map(ObjectKind::name).join(", ");
+            let cause = format!("there is no object '{}'; there are {known}, and files NAME.toml", given.display());
+            return Err(Failure::new(ErrorCode::UnknownObject, DOING, cause));
+        }
+        let text = std::fs::read_to_string(given)
+            .map_err(|cause| Failure::of_file(ErrorCode::FileFailed, format!("{DOING}: {}", given.display()), cause))?;
+        ObjectKind::from_toml(&text).map_err(|cause| {
+            Failure::new(ErrorCode::ObjectInvalid, format!("{DOING} refused {}", given.display()), cause)
         })
     }
 

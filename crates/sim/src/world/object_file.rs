@@ -124,8 +124,11 @@ pub enum ObjectFileError {
     Ring(usize),
 }
 
-/// Ranges of the figures.
-const RANGES: [(&str, fn(&ObjectRow) -> Option<f64>, f64, f64); 10] = [
+/// A figure of an object; `None` where it has none of this kind.
+type Figure = fn(&ObjectRow) -> Option<f64>;
+
+/// Ranges of the figures: name, figure, smallest, largest.
+const RANGES: [(&str, Figure, f64, f64); 10] = [
     ("position x", |row| Some(row.position[0]), -1.5, 1.5),
     ("position y", |row| Some(row.position[1]), -1.5, 1.5),
     ("mass", |row| Some(row.mass), 0.005, 20.0),
