@@ -28,6 +28,7 @@ fn checks() -> Result<()> {
     let machine = setup::all()?;
     lint_host()?;
     lint_firmware(&machine)?;
+    emulated::lint()?;
     libraries_without_std(&machine)?;
     plain_root()?;
     crate::faults(&[])?;
@@ -35,7 +36,6 @@ fn checks() -> Result<()> {
     crate::faults(&["endurance"])?;
     fuzz::run(fuzz::USUAL)?;
     package::run()?;
-    emulated::lint()?;
     emulated::run(None)?;
     test::run(&machine)?;
     crate::faults(&["--device", "sim:"])?;
