@@ -46,12 +46,16 @@ fn hash(arm: &mut Arm) -> u64 {
     simulation(arm.transport()).plant().trace().hash
 }
 
-/// Asserts that two accounts are the same, without printing a megabyte when they are not.
+/// Asserts that two accounts are the same, and prints the first lines that differ when they are not.
 #[track_caller]
 fn assert_same(one: &Account, other: &Account, what: &str) {
     println!("{what}: {:016x} and {:016x}", one.0, other.0);
     assert_eq!(one.0, other.0, "{what}: other frames, or other times of frames");
-    assert!(one.1 == other.1, "{what}: another recording");
+    let lines = |account: &Account| String::from_utf8_lossy(&account.1).lines().map(str::to_owned).collect::<Vec<_>>();
+    let (one, other) = (lines(one), lines(other));
+    let differ = one.iter().zip(&other).find(|(one, other)| one != other);
+    assert!(differ.is_none(), "{what}: another recording, first in these lines: {differ:#?}");
+    assert_eq!(one.len(), other.len(), "{what}: one recording is longer");
 }
 
 #[track_caller]
