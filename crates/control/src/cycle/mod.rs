@@ -41,7 +41,7 @@ use crate::sense::joints::{JointEstimator, JointState};
 use crate::sense::observer::MotionObserver;
 use crate::sense::wrench::WrenchEstimator;
 use crate::time::{few_periods, periods};
-use crate::units::{JOINTS, JointPositions, Pose, Wrench};
+use crate::units::{JOINTS, JointPositions, Pose, Vector7, Wrench};
 
 /// Kernels per row that a stored primitive may have.
 pub const MAX_KERNELS: usize = 100;
@@ -96,6 +96,8 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     armed_for: u16,
     /// Limits that cut the last torque.
     cut: LimitReport,
+    /// The part of the last torque that the model does not explain (N m): feedback, contact, and what it does not know.
+    beyond: Vector7<R>,
     pending: Option<Event>,
     caution: Caution,
 }
@@ -147,6 +149,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             safety: None,
             armed_for: 0,
             cut: LimitReport::default(),
+            beyond: Vector7::zeros(),
             pending: None,
             caution: Caution::None,
             weight: WeightCorrection::none(calibration.payload),
@@ -454,7 +457,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         };
         let (torques, report) = self.limiter.limit(&demand.torque);
         let (model, wanted) = &demand.explained;
-        self.observer.send(&self.model, measured.frames, wanted, &(torques.torques().0 - model));
+        self.beyond = torques.torques().0 - model;
+        self.observer.send(&self.model, measured.frames, wanted, &self.beyond);
         self.cut = report;
         self.armed_for = self.armed_for.saturating_add(1);
         record.q_d = demand.q_d.to_f32();

@@ -16,7 +16,7 @@ use crate::real::{Real, within};
 use crate::sense::deviation::Deviation;
 use crate::sense::drift::Drift;
 use crate::sense::observer::Trust;
-use crate::units::{JointAccelerations, JointPositions, Vector7, Wrench};
+use crate::units::{JointPositions, Vector7, Wrench};
 
 impl<R: Real, const N: usize> Cycle<R, N> {
     /// Takes a trigger that no person caused.
@@ -98,7 +98,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.force.restart(self.gains.tracking(options.compliant).force_window);
         let handover = if options.compliant {
             let load = if options.force_control { self.load_expected_first(measured) } else { Vector7::zeros() };
-            Ramp::new(self.torque_beyond_model(measured) - load, HANDOVER)
+            Ramp::new(self.beyond - load, HANDOVER)
         } else {
             Ramp::none()
         };
@@ -115,19 +115,16 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     fn after_run(&self, measured: &Measured<'_, R>) -> Posture<R> {
         let stiff = &self.gains.stiff;
         let velocity = self.observer.velocity(measured.state, Trust::Stiff);
-        let torque = self.torque_beyond_model(measured) + stiff.damping.component_mul(&velocity);
+        let friction = match &self.law {
+            Law::Run(Running { controller, .. }) => *controller.friction(),
+            _ => Vector7::zeros(),
+        };
+        let torque = self.beyond + friction + stiff.damping.component_mul(&velocity);
         let offset = torque.component_div(&stiff.stiffness).zip_map(&stiff.clamp, within);
         let mut posture = Posture::at(measured.state.q);
         let held = posture.integral.take_over(&self.gains, &offset, &measured.state.q);
         posture.shift_to(held);
         posture
-    }
-
-    /// Returns the part of the last torque that the motion of the arm itself does not explain (N m): friction, contact,
-    /// and what the model does not know.
-    fn torque_beyond_model(&self, measured: &Measured<'_, R>) -> Vector7<R> {
-        let own = self.model.inverse_dynamics(measured.frames, &measured.state.dq, &JointAccelerations::zero());
-        self.limiter.last().torques().0 - own.0
     }
 
     /// Torque that the force controller will feed forward for what the primitive expects at its start (N m).
@@ -152,6 +149,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         };
         self.law = Law::Off { zero_cycles: ZERO_CYCLES, brakes };
         self.limiter.reset();
+        self.beyond = Vector7::zeros();
         self.hand.release();
         self.cut = LimitReport::default();
     }
