@@ -6,6 +6,7 @@ mod board;
 mod boot;
 mod calibration;
 mod command_line;
+mod cost;
 mod determinism;
 mod firmware_ends;
 mod hand;

@@ -1,0 +1,165 @@
+//! Instructions of the control cycles in which something begins, ends or goes wrong: the nominal run is not the worst.
+
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use control::{RATE_HZ, State};
+use lab::client::Incoming;
+use lab::primitive_file::PrimitiveFile;
+use lab::procedure;
+use link::{Goal, Name, RunOptions, Telemetry};
+use system_tests::execution::prepare;
+use system_tests::{Arm, command, expect, ready, simulation};
+
+/// Instructions of a control cycle at its worst; the same bound as in `cargo xtask budget`.
+const BOUND: u32 = 28_500;
+
+/// Instructions per tick of the image's clock under `-icount shift=3`.
+const PER_TICK: u32 = 5;
+
+/// Control cycles after an order that count as its own.
+const AFTER: u32 = 5;
+
+/// Control cycles after which the mass matrix of the observer is renewed: a run is begun at each of their phases.
+const RENEWAL: u32 = 8;
+
+/// A movement with the most kernels that a device holds, with all that its sensors are to feel and by what it is
+/// watched.
+fn largest() -> &'static PrimitiveFile {
+    static LARGEST: OnceLock<PrimitiveFile> = OnceLock::new();
+    LARGEST.get_or_init(|| {
+        let folder = expect(tempfile::tempdir());
+        for words in [
+            "--device sil: teach -o demo.csv",
+            "learn demo.csv --kernels 100 -o largest.toml",
+            "--device sil: rehearse largest.toml --trials 3 --record-dir runs",
+            "statistics largest.toml runs/largest-1.csv runs/largest-2.csv runs/largest-3.csv",
+        ] {
+            command::tactus(folder.path(), &words.split(' ').collect::<Vec<_>>()).success();
+        }
+        expect(PrimitiveFile::read(&folder.path().join("largest.toml")))
+    })
+}
+
+/// Everything that a run can have switched on.
+fn all_on(compliant: bool) -> RunOptions {
+    RunOptions { feedback: true, force_control: true, compliant, ..RunOptions::default() }
+}
+
+/// Costs by what happened.
+struct Costs {
+    arm: Arm,
+    worst: BTreeMap<&'static str, u32>,
+    states: Vec<u8>,
+}
+
+impl Costs {
+    /// The next control cycle, whose cost counts as that of `what`.
+    fn cycle(&mut self, what: &'static str) -> Telemetry {
+        loop {
+            if let Incoming::Telemetry(cycle) =
+                expect(self.arm.next(Duration::from_secs(1))).expect("telemetry for ever")
+            {
+                let worst = self.worst.entry(what).or_default();
+                *worst = cycle.cost_ticks.max(*worst);
+                if self.states.last() != Some(&cycle.state) {
+                    self.states.push(cycle.state);
+                }
+                return cycle;
+            }
+        }
+    }
+
+    fn cycles(&mut self, what: &'static str, count: u32) {
+        for _ in 0..count {
+            self.cycle(what);
+        }
+    }
+
+    /// Gives an order, and counts the cycles after it as its own.
+    fn order(&mut self, what: &'static str, order: impl FnOnce(&mut Arm)) {
+        order(&mut self.arm);
+        self.cycles(what, AFTER);
+    }
+
+    /// Brings the arm to where the movement starts; it holds there.
+    fn to_the_start(&mut self) {
+        expect(procedure::travel(&mut self.arm, largest().start.posture.map(|angle| angle as f32), |_| {}));
+        expect(self.arm.set_telemetry(1));
+        self.cycles("approached", RATE_HZ / 10);
+    }
+
+    fn begin(&mut self, compliant: bool) {
+        let name = expect(Name::new(&largest().name));
+        let what = if compliant { "a compliant run begins" } else { "a run begins" };
+        self.order(what, |arm| expect(arm.run(&name, all_on(compliant))));
+        self.cycles("run", RATE_HZ / 10);
+    }
+
+    fn state(&mut self) -> Option<State> {
+        State::from_code(self.cycle("state").state)
+    }
+
+    /// Waits until the arm stands still, and clears the fault that stopped it, if one did.
+    fn clear(&mut self) {
+        self.cycles("stopped", RATE_HZ);
+        self.order("cleared", |arm| expect(arm.clear_fault()));
+        self.order("held", |arm| expect(arm.hold()));
+    }
+}
+
+/// The change that makes it fail: `MotionObserver::postpone` does nothing, so that a run may begin in the cycle in which
+/// the mass matrix is renewed.
+#[test]
+fn no_order_and_no_stop_makes_a_control_cycle_longer_than_28_500_instructions() {
+    let mut costs = Costs { arm: ready("sim:seed=51"), worst: BTreeMap::new(), states: Vec::new() };
+    prepare(&mut costs.arm, largest());
+    costs.to_the_start();
+    let goal = |lift: f32| {
+        let [x, y, z] = largest().goal.position.map(|value| value as f32);
+        Goal { position: Some([x, y, z + lift]), orientation: None }
+    };
+    for phase in 0..RENEWAL {
+        for compliant in [true, false] {
+            costs.cycles("held", phase);
+            costs.begin(compliant);
+            costs.order("goal moved", |arm| expect(arm.set_goal(goal(0.01))));
+            costs.order("speed changed", |arm| expect(arm.set_speed(0.8)));
+            costs.order("run held", |arm| expect(arm.hold()));
+            costs.to_the_start();
+        }
+    }
+    for phase in 0..RENEWAL {
+        costs.begin(true);
+        costs.cycles("run", phase);
+        simulation(costs.arm.transport()).world().push([0.0, 80.0, 0.0], [0.0; 3]);
+        while State::from_code(costs.cycle("pushed").state) == Some(State::Run) {}
+        costs.cycles("pushed", AFTER);
+        simulation(costs.arm.transport()).world().push([0.0; 3], [0.0; 3]);
+        assert_eq!(costs.state(), Some(State::SoftStop), "a push of 80 N stops a run");
+        costs.clear();
+        costs.to_the_start();
+    }
+    for compliant in [true, false] {
+        costs.begin(compliant);
+        while State::from_code(costs.cycle("run to its end").state) == Some(State::Run) {}
+        costs.to_the_start();
+    }
+    costs.begin(true);
+    costs.order("run stopped", |arm| expect(arm.stop()));
+    costs.cycles("stopped", RATE_HZ);
+    costs.order("held", |arm| expect(arm.hold()));
+    costs.order("led", |arm| expect(arm.gravity()));
+    costs.order("held", |arm| expect(arm.hold()));
+    costs.order("released", |arm| expect(arm.release()));
+    costs.cycles("lowered", RATE_HZ);
+    for (what, ticks) in &costs.worst {
+        println!("{:>8} instructions  {what}", ticks * PER_TICK);
+    }
+    let statistics = expect(costs.arm.statistics());
+    println!("{:>8} instructions  since the start", statistics.cost_worst_ticks * PER_TICK);
+    assert_eq!(statistics.missed_deadlines, 0);
+    assert!(costs.worst.values().all(|ticks| *ticks > 1000 / PER_TICK), "a cycle was not measured: {:?}", costs.worst);
+    assert!(statistics.cost_worst_ticks * PER_TICK <= BOUND, "{} instructions", statistics.cost_worst_ticks * PER_TICK);
+}
