@@ -20,6 +20,14 @@ const MOVING: f64 = 1.0;
 /// has turned by a count. 25 ms, in control periods.
 const LETTING_GO: u8 = few_periods(0.025);
 
+/// Swing of the torque that was sent in which friction may hold a motor, in parts of [`SWING`]: friction that is 30 %
+/// larger than the model's, from one direction to the other, is 2.6 times the model's.
+const HELD: f64 = 2.6 / SWING;
+
+/// Swing of the torque that measured motion asks for beyond which the torque that was sent is not looked at, in parts of
+/// [`SWING`]: a motor that runs away unseen is damped by what the observer believes, and time presses.
+const UNDENIABLE: f64 = 4.0 / SWING;
+
 /// Force (N) that explains why a motor does not turn.
 const CONTACT: f64 = 10.0;
 
@@ -50,8 +58,8 @@ pub(crate) struct Disagreement<R: Real> {
     transmission: Transmission<R>,
     /// Largest swing of each motor (N m at the motor).
     swing: [R; JOINTS],
-    /// Feedback torque of each motor at its last count (N m).
-    anchor: [R; JOINTS],
+    /// Torques of each motor at its last count, as asked for and as sent (N m).
+    anchor: [(R, R); JOINTS],
     /// Control periods since.
     still: [u8; JOINTS],
     /// Control periods for which the swing of each motor has been too large.
@@ -67,7 +75,7 @@ impl<R: Real> Disagreement<R> {
         Disagreement {
             transmission,
             swing,
-            anchor: [zero; JOINTS],
+            anchor: [(zero, zero); JOINTS],
             still: [0; JOINTS],
             beyond: [0; JOINTS],
             pushing: 0,
@@ -108,13 +116,19 @@ impl<R: Real> Disagreement<R> {
                 (*still, *beyond) = (0, 0);
                 continue;
             }
-            let torque = if breaks_away { sent } else { asked };
             if *still == 0 {
-                *anchor = torque;
+                *anchor = (asked, sent);
             }
             *still = still.saturating_add(1);
-            let swing = torque - *anchor;
-            *beyond = if at_least(swing, -swing) > *limit { beyond.saturating_add(1) } else { 0 };
+            let swings = |now: R, then: R, share: f64| at_least(now - then, then - now) > *limit * R::constant(share);
+            let (asked, sent) = ((asked, anchor.0), (sent, anchor.1));
+            // What the observer believes, and friction that was fed forward, may have made up for what was asked for.
+            let too_far = if breaks_away {
+                swings(sent.0, sent.1, 1.0)
+            } else {
+                swings(asked.0, asked.1, 1.0) && swings(sent.0, sent.1, HELD) || swings(asked.0, asked.1, UNDENIABLE)
+            };
+            *beyond = if too_far { beyond.saturating_add(1) } else { 0 };
             stuck |= *still > STILL && *beyond > if breaks_away { LETTING_GO } else { 0 };
         }
         stuck
