@@ -2,7 +2,7 @@
 
 use puck::Transmission;
 
-use crate::guard::disagreement::Effort;
+use crate::guard::disagreement::{Effort, Plan};
 use crate::law::breakaway::Breakaway;
 use crate::law::integral::PostureIntegral;
 use crate::law::joint::JointController;
@@ -105,6 +105,7 @@ impl<R: Real> Posture<R> {
             sent: self.controller.feedback() + self.controller.friction() + self.extra,
             desired: self.controller.desired(),
             breaking_away: self.breakaway.due(),
+            plan: Plan::Approach,
         }
     }
 

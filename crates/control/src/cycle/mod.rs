@@ -22,7 +22,7 @@ use crate::command::Refusal;
 use crate::cycle::hand::HandDrive;
 use crate::cycle::law::{Lag, Law, Posture, Running};
 use crate::cycle::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
-use crate::guard::disagreement::Effort;
+use crate::guard::disagreement::{Effort, Plan};
 use crate::guard::fault::Fault;
 use crate::guard::joint_limits::JointBounds;
 use crate::guard::monitor::{Monitor, Observation};
@@ -409,6 +409,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 sent: *controller.feedback(),
                 desired: controller.desired(),
                 breaking_away: 0,
+                plan: Plan::Run,
             }),
             _ => None,
         };

@@ -20,9 +20,9 @@ const MOVING: f64 = 1.0;
 /// has turned by a count. 25 ms, in control periods.
 const LETTING_GO: u8 = few_periods(0.025);
 
-/// Swing of the torque that was sent in which friction may hold a motor, in parts of [`SWING`]: friction that is 30 %
-/// larger than the model's, from one direction to the other, is 2.6 times the model's.
-const HELD: f64 = 2.6 / SWING;
+/// Largest swing of a motor in an approach, in parts of [`SWING`]: all joints move at once, up to half of their limits,
+/// and what the model does not know of the dynamics swings with them.
+const IN_APPROACH: f64 = 3.5 / SWING;
 
 /// Swing of the torque that measured motion asks for beyond which the torque that was sent is not looked at, in parts of
 /// [`SWING`]: a motor that runs away unseen is damped by what the observer believes, and time presses.
@@ -40,6 +40,15 @@ const PUSH: f64 = 3.5;
 /// Time for which it has to push: 10 ms, in control periods.
 const PUSHING: u8 = few_periods(0.01);
 
+/// Source of the motion that is asked of the joints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Plan {
+    /// A posture that is held, or approached.
+    Approach,
+    /// A primitive.
+    Run,
+}
+
 /// Torques and motion that a law asks of the joints.
 pub(crate) struct Effort<'a, R: Real> {
     /// Torque of the joint feedback as measured motion alone asks for it (N m).
@@ -50,6 +59,8 @@ pub(crate) struct Effort<'a, R: Real> {
     pub(crate) desired: &'a Vector7<R>,
     /// Motors that are made to break away, one bit each, M1 lowest.
     pub(crate) breaking_away: u8,
+    /// Where the motion comes from.
+    pub(crate) plan: Plan,
 }
 
 /// Compares the feedback torque with the motion.
@@ -123,10 +134,13 @@ impl<R: Real> Disagreement<R> {
             let swings = |now: R, then: R, share: f64| at_least(now - then, then - now) > *limit * R::constant(share);
             let (asked, sent) = ((asked, anchor.0), (sent, anchor.1));
             // What the observer believes, and friction that was fed forward, may have made up for what was asked for.
-            let too_far = if breaks_away {
-                swings(sent.0, sent.1, 1.0)
-            } else {
-                swings(asked.0, asked.1, 1.0) && swings(sent.0, sent.1, HELD) || swings(asked.0, asked.1, UNDENIABLE)
+            let too_far = match effort.plan {
+                _ if breaks_away => swings(sent.0, sent.1, 1.0),
+                Plan::Run => swings(asked.0, asked.1, 1.0),
+                Plan::Approach => {
+                    swings(asked.0, asked.1, IN_APPROACH) && swings(sent.0, sent.1, IN_APPROACH)
+                        || swings(asked.0, asked.1, UNDENIABLE)
+                }
             };
             *beyond = if too_far { beyond.saturating_add(1) } else { 0 };
             stuck |= *still > STILL && *beyond > if breaks_away { LETTING_GO } else { 0 };
