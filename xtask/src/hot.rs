@@ -57,6 +57,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "control::sense::wrench::WrenchEstimator<R>::follow",
         "the memory is full; a few dozen instructions without a loop over time",
     ),
+    ("control::cycle::law::Posture<R>::effort", "the arm stands: no plan and no feedback is computed"),
     ("control::law::joint::JointController<R>::keep", "a reply is missing: a few dozen instructions"),
     ("control::sense::observer", "the memory is full; a few loops that the cache keeps from one cycle to the next"),
     (

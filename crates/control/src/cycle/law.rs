@@ -98,7 +98,8 @@ impl<R: Real> Posture<R> {
         self.extra
     }
 
-    /// Returns what is asked of the joints.
+    /// Returns what is asked of the joints. Not inlined: it is asked while a posture is held or approached.
+    #[inline(never)]
     pub(super) fn effort(&self) -> Effort<'_, R> {
         Effort {
             feedback: self.controller.measured_feedback(),
