@@ -147,6 +147,16 @@ pub enum StartupError {
     AnswersLate(Node),
     /// The zeroing of an arm was broken off.
     ZeroUnfinished,
+    /// The safety module stops no fast arm, or one only that is faster than it may be.
+    SafetyVelocity {
+        /// Its VL2, in counts of 1/4096 m/s; 0: none.
+        limit: i32,
+    },
+    /// The safety module would stop the arm for a torque that this device may send, or never for its torque.
+    SafetyTorque {
+        /// Its TL2, in counts of a puck's torque.
+        limit: i32,
+    },
 }
 
 impl fmt::Display for StartupError {
@@ -189,6 +199,12 @@ impl fmt::Display for StartupError {
                 write!(formatter, "puck {} has restarted and counts anew: zero the arm", node.number())
             }
             StartupError::CountsJumped => formatter.write_str("the counts of a motor jumped: zero the arm"),
+            StartupError::SafetyVelocity { limit } => {
+                write!(formatter, "the safety module has a velocity limit VL2 of {limit}: it must be 1 to 4096 (1 m/s)")
+            }
+            StartupError::SafetyTorque { limit } => {
+                write!(formatter, "the safety module has a torque limit TL2 of {limit}: it must be 4601 to 8191 (5204)")
+            }
             StartupError::ZeroUnfinished => formatter.write_str("zeroing was broken off: zero the arm"),
             StartupError::AnswersLate(node) => {
                 write!(

@@ -142,6 +142,8 @@ impl From<StartupError> for StartupFailure {
             StartupError::CountsJumped => Self([18, 0]),
             StartupError::AnswersLate(node) => at(19, node, 0),
             StartupError::ZeroUnfinished => Self([20, 0]),
+            StartupError::SafetyVelocity { limit } => at(21, Node::SAFETY_MODULE, limit),
+            StartupError::SafetyTorque { limit } => at(22, Node::SAFETY_MODULE, limit),
         }
     }
 }
@@ -173,6 +175,8 @@ impl StartupFailure {
             18 => StartupError::CountsJumped,
             19 => StartupError::AnswersLate(node),
             20 => StartupError::ZeroUnfinished,
+            21 => StartupError::SafetyVelocity { limit: value },
+            22 => StartupError::SafetyTorque { limit: value },
             _ => return None,
         })
     }

@@ -55,7 +55,7 @@ enum Step {
     Listen { until_us: u64, powered: bool },
     /// ROLE (0) and VERS (1) of the safety module.
     IdentifySafety { item: u8 },
-    /// DEF (0), LOAD (1) and GET STAT (2) of a limit.
+    /// DEF (0), LOAD (1) and GET STAT (2) of a limit, then its value (3).
     LoadLimit { limit: u8, part: u8 },
     /// Ask for the safety module's mode from this time on.
     AwaitIdle { next_us: u64 },

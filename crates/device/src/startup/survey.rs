@@ -33,7 +33,7 @@ pub(crate) const DRIVE_PROPERTIES: [Property; 8] = [
 /// Poles of the wrist motor M7. Gimbals have 8 on that puck, and another kinematics.
 const WRIST_POLES: i32 = 6;
 /// Largest torque a packed frame can carry; an MT beyond it is a misread value.
-const PACKING_LIMIT: i32 = 8191;
+pub(super) const PACKING_LIMIT: i32 = 8191;
 
 /// The numbers of the safety module's properties that the device uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

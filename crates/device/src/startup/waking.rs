@@ -1,8 +1,9 @@
 //! The first half of the start-up: from an unknown bus to pucks that are awake, checked and read.
 
+use control::act::limit::MOTOR_COUNTS_LIMIT;
 use puck::{Group, MotorMode, Node, PropertyId, SafetyMode, Status, get, set, stop_frames};
 
-use super::survey::{DRIVE_PROPERTIES, Survey};
+use super::survey::{DRIVE_PROPERTIES, PACKING_LIMIT, Survey};
 use super::{ENUMERATED, Next, POLL_US, STOP_PACE_US, STOPPING_US, Startup, Step, Stopping, after};
 use crate::bus::{Answer, Outlet};
 use crate::stage::StartupError;
@@ -13,6 +14,12 @@ const LISTEN_US: u64 = 50_000;
 const ENUMERATIONS: u8 = 6;
 /// Silence after the last wake, us: whoever talks while transceivers come up may be put off the bus.
 const WAKE_SILENCE_US: u64 = 1_000_000;
+
+/// Places of the limits that end in a fault.
+const VL2: u8 = 1;
+const TL2: u8 = 3;
+/// Largest velocity fault limit of the safety module (counts): 1 m/s, above the 0.8 m/s at which the control code stops.
+const VL2_COUNTS: i32 = 4096;
 
 impl Startup {
     pub(super) fn take_torque_off(&self, frame: u8, outlet: &mut impl Outlet) -> Next {
@@ -102,9 +109,14 @@ impl Startup {
             0 => safety.default,
             1 => safety.load,
             // The question after the two SETs gives the module time and proves that it still listens.
-            _ => {
+            2 => {
                 let answered = self.ask_safety(PropertyId::STAT, outlet)?.is_some();
-                return Ok(after(answered, Step::LoadLimit { limit: limit + 1, part: 0 }));
+                return Ok(after(answered, Step::LoadLimit { limit, part: 3 }));
+            }
+            _ => {
+                let Some(value) = self.ask_safety(*property, outlet)? else { return Ok(Next::Stay) };
+                check_limit(limit, value)?;
+                return Ok(Next::Go(Step::LoadLimit { limit: limit + 1, part: 0 }));
             }
         };
         let frame = set(Node::SAFETY_MODULE, command, i32::from(property.number()));
@@ -224,5 +236,17 @@ impl Startup {
         };
         self.survey.note_drive(usize::from(joint), usize::from(item), value);
         Ok(Next::Go(Step::Read { joint, item: item + 1 }))
+    }
+}
+
+/// Checks a limit of the safety module that was read back, by its place in
+/// [`SafetyProperties::limits`](super::SafetyProperties). Those that only warn may have any value.
+fn check_limit(limit: u8, value: i32) -> Result<(), StartupError> {
+    match limit {
+        VL2 if !(1..=VL2_COUNTS).contains(&value) => Err(StartupError::SafetyVelocity { limit: value }),
+        TL2 if value <= MOTOR_COUNTS_LIMIT as i32 || value > PACKING_LIMIT => {
+            Err(StartupError::SafetyTorque { limit: value })
+        }
+        _ => Ok(()),
     }
 }

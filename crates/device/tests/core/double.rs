@@ -117,6 +117,8 @@ pub(crate) struct Bus {
     pub(crate) safety_mode: SafetyMode,
     pub(crate) safety_version: i32,
     pub(crate) safety_zero: bool,
+    /// VL1, VL2, TL1, TL2 of the safety module.
+    pub(crate) safety_limits: [i32; 4],
     pub(crate) sensor_present: bool,
     pub(crate) sensor_awake_at: Option<u64>,
     pub(crate) sensor: RawWrench,
@@ -154,6 +156,7 @@ impl Bus {
             safety_mode: SafetyMode::EStop,
             safety_version: 197,
             safety_zero: false,
+            safety_limits: [2048, 4096, 4731, 5204],
             sensor_present: true,
             sensor_awake_at: None,
             sensor: RawWrench { force: [256, 0, 0], torque: [0, 0, 0], status: None },
@@ -344,6 +347,10 @@ impl Bus {
                     Some(Property::Mode) => self.wrong_safety_mode.take().unwrap_or(self.safety_mode).value(),
                     Some(Property::Zero) => i32::from(self.safety_zero),
                     Some(Property::Pen) => 0x0F3F_1249,
+                    Some(Property::Vl1) => self.safety_limits[0],
+                    Some(Property::Vl2) => self.safety_limits[1],
+                    Some(Property::Tl1) => self.safety_limits[2],
+                    Some(Property::Tl2) => self.safety_limits[3],
                     other => panic!("the core asked the safety module for {other:?}"),
                 };
                 self.answer_value(node, property, value, table.property(property) == Some(Property::Pen));

@@ -226,6 +226,40 @@ fn whatever_is_wrong_with_a_device_is_named() {
     assert_eq!(refusal(|bus| bus.pucks[2].torque_counts = 0), Some(expected));
 }
 
+/// The change that makes it fail: `check_limit` accepts whatever it reads, or looks at another limit.
+#[test]
+fn e3_a_safety_module_that_would_not_stop_the_arm_is_named_and_nothing_is_armed() {
+    for limit in [0, -1, 4097, 32_767] {
+        let expected = StartupError::SafetyVelocity { limit };
+        assert_eq!(refusal(|bus| bus.safety_limits[1] = limit), Some(expected), "VL2 {limit}");
+    }
+    // A torque that the device may send must not end in IDLE; one that no frame carries never does.
+    for limit in [0, 4600, 8192, 32_767] {
+        let expected = StartupError::SafetyTorque { limit };
+        assert_eq!(refusal(|bus| bus.safety_limits[3] = limit), Some(expected), "TL2 {limit}");
+    }
+    // Slower, or warned of at another value, is for the lab to decide.
+    for limits in [[0, 1, 0, 4601], [4096, 4096, 8191, 8191]] {
+        let (mut core, mut bus) = (silent_device(), Bus::idle());
+        bus.safety_limits = limits;
+        bus.run_until(&mut core, Stage::WaitingForZero);
+        assert_eq!(core.health().blocked, None, "{limits:?}");
+    }
+}
+
+/// The module is mended while the device tries again: a person loads the right limits.
+#[test]
+fn e3_the_start_up_goes_on_once_the_safety_module_has_its_limits() {
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
+    bus.safety_limits[1] = 0;
+    bus.run_until(&mut core, Stage::Blocked);
+    bus.safety_limits[1] = 4096;
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    assert_eq!(core.health().blocked, None);
+}
+
 #[test]
 fn a_position_that_was_not_taken_is_noticed_before_the_safety_module_is_told() {
     let (mut core, mut bus) = (silent_device(), Bus::idle());
