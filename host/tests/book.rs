@@ -173,6 +173,8 @@ fn page(name: &str) {
     }
 }
 
+/// At 300 Hz: the pages show figures of that rate.
+///
 /// One test a page, so that they run side by side, and a test that no page is forgotten.
 macro_rules! pages {
     ($($test:ident $name:literal)*) => {

@@ -78,6 +78,7 @@ fn upload_and_run(address: &str, file: &PrimitiveFile) -> (Client<Device>, Vec<T
     (client, cycles)
 }
 
+/// At 300 Hz: the lines carry the telemetry of every cycle, which they do not at 500 Hz (decision 0017).
 #[test]
 fn a_run_over_can_is_the_run_over_the_serial_line_to_the_last_bit() {
     let folder = tempfile::tempdir().unwrap();
@@ -128,6 +129,7 @@ fn one_at_a_time(client: &mut Client<Device>, image: &[u8]) -> f64 {
     rate
 }
 
+/// At 300 Hz: at 500 Hz the line waits for shorter slots, and parts on their way gain less.
 #[test]
 fn an_upload_fills_the_line() {
     let folder = tempfile::tempdir().unwrap();
@@ -157,6 +159,7 @@ fn an_upload_fills_the_line() {
     }
 }
 
+/// At 300 Hz: the lines carry the telemetry of every cycle, which they do not at 500 Hz (decision 0017).
 #[test]
 fn full_telemetry_fits_on_the_bus_and_an_order_still_gets_through() {
     let mut client = arm("sil:world=simple,line=can");

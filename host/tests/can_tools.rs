@@ -94,6 +94,7 @@ fn every_frame_of_a_whole_start_up_and_run_has_a_name() {
     }
 }
 
+/// At 300 Hz: a cycle with a driven hand fits into its period, which it does not at 500 Hz (decision 0017).
 #[test]
 fn summary_agrees_with_what_the_simulator_counted() {
     let (folder, _) = recorded();
@@ -117,6 +118,7 @@ fn summary_agrees_with_what_the_simulator_counted() {
     assert!(told.contains("every frame is known") && told.contains("control cycle: "), "{told}");
 }
 
+/// At 300 Hz: a cycle with a driven hand fits into its period, which it does not at 500 Hz (decision 0017).
 #[test]
 fn a_lost_reply_is_counted_where_it_was_owed() {
     let (_, log) = recorded();
@@ -208,6 +210,7 @@ fn a_log_that_is_not_there_and_no_log_at_all_are_told_apart() {
     assert!(live.starts_with("error[E303]: "), "{live}");
 }
 
+/// At 300 Hz: the lines carry the telemetry of every cycle, which they do not at 500 Hz (decision 0017).
 #[test]
 fn cli_20_a_whole_start_up_and_run_replays_without_a_difference() {
     let (folder, log) = recorded();

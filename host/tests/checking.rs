@@ -133,7 +133,7 @@ fn a_primitive_of_another_arm_is_refused() {
 #[test]
 fn a_duration_that_the_integration_cannot_follow_is_refused() {
     let mut primitive = reach(3.0);
-    primitive.movement.duration = 0.05;
+    primitive.movement.duration = 15.0 * control::PERIOD;
     let error = check(&primitive, &Course::stored(1.0), |_| {}).unwrap_err();
     assert!(matches!(error, PrimitiveFileError::Invalid { .. }), "{error}");
 }

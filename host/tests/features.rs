@@ -313,6 +313,7 @@ fn cli_10_a_run_without_its_force_sensor_is_refused_before_the_arm_moves() {
     assert_eq!(list.iter().filter(|(_, (_, met))| !met).map(|(item, _)| &**item).collect::<Vec<_>>(), ["force sensor"]);
 }
 
+/// At 300 Hz: the lines carry the telemetry of every cycle, which they do not at 500 Hz (decision 0017).
 #[test]
 fn cli_12_the_line_is_measured_alone_and_in_the_summary_of_each_run() {
     let folder = learned(3.0);
@@ -347,6 +348,7 @@ fn cli_12_a_run_whose_pucks_leave_out_replies_says_so() {
     assert!(line["late"][0].as_str().unwrap().starts_with("the arm's bus"), "{line}");
 }
 
+/// At 300 Hz: the lines carry the telemetry of every cycle, which they do not at 500 Hz (decision 0017).
 #[test]
 fn cli_20_the_log_that_a_run_wrote_replays_to_the_bit() {
     let folder = learned(3.0);

@@ -9,6 +9,7 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use control::RATE_HZ;
 use serde_json::Value;
 
 fn command(folder: &Path, arguments: &[&str]) -> Command {
@@ -146,7 +147,7 @@ fn a_stored_primitive_runs_by_its_name_and_others_look_on_without_costing_it_a_c
     assert_eq!(state["loaded"], "reach");
     assert_eq!(object(folder, &["list"])["primitives"][0]["loaded"], true);
     let seen = object(folder, &["record", "--duration", "2", "-o", "seen.csv"]);
-    assert_eq!(seen["samples"], 600);
+    assert_eq!(seen["samples"], 2 * RATE_HZ);
     refused(folder, &["delete", "reach"], "E504", "has been using the arm for");
     let watched = tactus(folder, &["--json", "monitor", "--primitive", "reach.toml", "--duration", "0.5"]);
     let lines = String::from_utf8(watched.stdout).unwrap();
