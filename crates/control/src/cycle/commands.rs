@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::command::{Command, Refusal};
 use crate::cycle::law::Law;
-use crate::cycle::{Cycle, Measured, STANDING, WRENCH_AGE};
+use crate::cycle::{Caution, Cycle, Measured, STANDING, WRENCH_AGE};
 use crate::guard::fault::Fault;
 use crate::guard::supervisor::{State, Trigger};
 use crate::model::hand;
@@ -85,7 +85,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.may_move(measured)?;
                 // From the posture that is held, so that the torque against friction stays.
                 let from = if let Law::Posture(posture) = &self.law { posture.q } else { *q };
-                let approach = Approach::new(&self.model, &from, &target, R::constant(f64::from(duration)));
+                let mut approach = Approach::new(&self.model, &from, &target, R::constant(f64::from(duration)));
+                if self.caution == Caution::Slowed {
+                    approach = approach.slowed();
+                }
                 self.supervisor.take(Trigger::Approach, Fault::None)?;
                 self.begin_approach(approach, measured);
                 Ok(())

@@ -80,6 +80,14 @@ impl<R: Real> Approach<R> {
         }
     }
 
+    /// The same move in twice the time, or in [`LONGEST_APPROACH`].
+    #[must_use]
+    pub fn slowed(self) -> Self {
+        let longest = (LONGEST_APPROACH * RATE) as i32 + 1;
+        let length = (2 * self.length).min(longest);
+        Approach { length, rate: R::constant(RATE) / R::from_counts(length), ..self }
+    }
+
     /// Way of each joint (rad).
     pub fn way(&self) -> &Vector7<R> {
         &self.way

@@ -83,6 +83,24 @@ fn g14_a_warning_is_told_and_a_derated_run_goes_on_at_half_speed() {
     assert!((free / held - 3.6).abs() < 0.1, "{free} against {held}");
 }
 
+/// The change that makes it fail: an approach begins as if nothing had been found.
+#[test]
+fn g14_an_approach_that_begins_derated_takes_twice_the_time() {
+    let time = |caution: Caution| {
+        let mut rig = holding();
+        rig.cycle.set_caution(caution);
+        rig.command(Command::Approach { q: GOAL.map(|q| q as f32), duration: 0.0 });
+        let begin = rig.number;
+        rig.until(State::Hold, 40.0);
+        let off = (0..7).map(|joint| (rig.plant.q[joint] - GOAL[joint]).abs()).fold(0.0, f64::max);
+        assert!(off < 0.03, "{off} rad beside the target");
+        (rig.number - begin) as f64 * PERIOD
+    };
+    let [free, warned, slow] = [Caution::None, Caution::Warned, Caution::Slowed].map(time);
+    println!("{free} {warned} {slow} s");
+    assert!((warned - free).abs() < 0.05 && (1.5..2.2).contains(&(slow / free)), "{free} {warned} {slow}");
+}
+
 #[test]
 fn g14_a_motor_that_is_too_hot_stops_the_arm_and_lets_it_be_lowered() {
     for command in [Command::Gravity, Command::Hold, Command::Run(RunOptions::default())] {
