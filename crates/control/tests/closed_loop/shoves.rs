@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use control::command::{Command, PoseFeedback, Refusal, RunOptions};
 use control::time::periods;
-use control::{Event, Fault, State};
+use control::{Event, Fault, PERIOD, State};
 
 use crate::primitives::{Design, GOAL, START, primitive};
 use crate::rig::Rig;
@@ -24,7 +24,7 @@ struct Outcome {
     /// Work of the push, and the largest kinetic energy afterwards (J).
     work: f64,
     energy: f64,
-    /// Speed of the hand 0.3 s after the push (m/s).
+    /// Speed of the hand 0.3 s after the push beyond that of its plan, if it still runs (m/s).
     braked: f64,
     /// Largest distance of a reported joint speed from those that the joint had in the last 30 ms, in parts of the
     /// fastest (1 rad/s at least).
@@ -52,6 +52,7 @@ fn shove(rig: &mut Rig<f32>, direction: [f64; 3], force: f64, seconds: f64) -> O
         fault: Fault::None,
     };
     let mut recent = VecDeque::from([rig.plant.dq]);
+    let mut planned = rig.last.expect("ran").record.pose_d;
     let push = usize::from(periods(seconds));
     for cycle in 0..push + usize::from(periods(0.8)) {
         let pushing = cycle < push;
@@ -69,8 +70,12 @@ fn shove(rig: &mut Rig<f32>, direction: [f64; 3], force: f64, seconds: f64) -> O
         let speed = hand_speed(rig);
         let part = if pushing { &mut outcome.pushed } else { &mut outcome.after };
         *part = part.max(speed);
+        let now = output.record.pose_d;
+        let way = |axis: usize| f64::from(now[axis] - planned[axis]);
+        let plan = (0..3).map(|axis| way(axis).powi(2)).sum::<f64>().sqrt() / PERIOD;
+        planned = now;
         if cycle == push + usize::from(periods(0.3)) {
-            outcome.braked = speed;
+            outcome.braked = if output.record.state == State::Run { (speed - plan).max(0.0) } else { speed };
         }
         recent.push_back(rig.plant.dq);
         if recent.len() > FILTER_CYCLES {
@@ -156,8 +161,11 @@ fn shoves(from: usize) -> (usize, usize, f64) {
 
 #[test]
 fn g1_a_shove_of_up_to_10_n_s_in_teach_hold_and_run_is_braked_with_torque_and_seen() {
-    let (late, zeros, worst) = shoves(0);
-    assert!(late <= 5 && zeros == 0 && worst < 0.4, "{late}, {zeros}, {worst}");
+    // One of them, 10 N s in 0.13 s, throws the hand at 4.7 m/s: all the torque there is leaves 0.28 m/s.
+    for (from, too_fast) in [(0, 1), (1005, 0)] {
+        let (late, zeros, worst) = shoves(from);
+        assert!(late <= too_fast && zeros == 0 && worst < 0.3, "{late}, {zeros}, {worst}");
+    }
 }
 
 #[test]
@@ -180,6 +188,6 @@ fn g1_a_shove_in_a_compliant_run_gets_no_more_energy_than_it_brought() {
 
 #[test]
 fn g1_shoves_that_no_limit_was_chosen_on_are_braked_as_well() {
-    let (late, zeros, worst) = shoves(1005);
-    assert!(late <= 5 && zeros == 0 && worst < 0.4, "{late}, {zeros}, {worst}");
+    let (late, zeros, worst) = shoves(2010);
+    assert!(late == 0 && zeros == 0, "{late}, {zeros}, {worst}");
 }
