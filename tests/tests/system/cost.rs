@@ -84,7 +84,7 @@ impl Costs {
     }
 
     /// Brings the arm to where the movement starts; it holds there.
-    fn to_the_start(&mut self) {
+    fn go_to_the_start(&mut self) {
         expect(procedure::travel(&mut self.arm, largest().start.posture.map(|angle| angle as f32), |_| {}));
         expect(self.arm.set_telemetry(1));
         self.cycles("approached", RATE_HZ / 10);
@@ -109,13 +109,13 @@ impl Costs {
     }
 }
 
-/// The change that makes it fail: `MotionObserver::postpone` does nothing, so that a run may begin in the cycle in which
-/// the mass matrix is renewed.
+/// The change that makes it fail: `MotionObserver::postpone` does nothing, so that a run may begin in the cycle in
+/// which the mass matrix is renewed.
 #[test]
 fn no_order_and_no_stop_makes_a_control_cycle_longer_than_28_500_instructions() {
     let mut costs = Costs { arm: ready("sim:seed=51"), worst: BTreeMap::new(), states: Vec::new() };
     prepare(&mut costs.arm, largest());
-    costs.to_the_start();
+    costs.go_to_the_start();
     let goal = |lift: f32| {
         let [x, y, z] = largest().goal.position.map(|value| value as f32);
         Goal { position: Some([x, y, z + lift]), orientation: None }
@@ -127,7 +127,7 @@ fn no_order_and_no_stop_makes_a_control_cycle_longer_than_28_500_instructions() 
             costs.order("goal moved", |arm| expect(arm.set_goal(goal(0.01))));
             costs.order("speed changed", |arm| expect(arm.set_speed(0.8)));
             costs.order("run held", |arm| expect(arm.hold()));
-            costs.to_the_start();
+            costs.go_to_the_start();
         }
     }
     for phase in 0..RENEWAL {
@@ -139,12 +139,12 @@ fn no_order_and_no_stop_makes_a_control_cycle_longer_than_28_500_instructions() 
         simulation(costs.arm.transport()).world().push([0.0; 3], [0.0; 3]);
         assert_eq!(costs.state(), Some(State::SoftStop), "a push of 80 N stops a run");
         costs.clear();
-        costs.to_the_start();
+        costs.go_to_the_start();
     }
     for compliant in [true, false] {
         costs.begin(compliant);
         while State::from_code(costs.cycle("run to its end").state) == Some(State::Run) {}
-        costs.to_the_start();
+        costs.go_to_the_start();
     }
     costs.begin(true);
     costs.order("run stopped", |arm| expect(arm.stop()));

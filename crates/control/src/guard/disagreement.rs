@@ -24,8 +24,8 @@ const LETTING_GO: u8 = few_periods(0.025);
 /// and what the model does not know of the dynamics swings with them.
 const IN_APPROACH: f64 = 3.5 / SWING;
 
-/// Swing of the torque that measured motion asks for beyond which the torque that was sent is not looked at, in parts of
-/// [`SWING`]: a motor that runs away unseen is damped by what the observer believes, and time presses.
+/// Swing of the torque that measured motion asks for beyond which the torque that was sent is not looked at, in parts
+/// of [`SWING`]: a motor that runs away unseen is damped by what the observer believes, and time presses.
 const UNDENIABLE: f64 = 4.0 / SWING;
 
 /// Force (N) that explains why a motor does not turn.

@@ -55,8 +55,8 @@ fn stop(rig: &mut Rig<f32>) -> (f64, f64, f64) {
     (seconds, way, unseen(rig))
 }
 
-/// Speed of a motor from which on it is asked to stop within 100 ms and 100 mrad (rad/s). M2 at 5.2 rad/s, 0.12 rad/s of
-/// its joint, was seen to take 170 ms and 46 mrad.
+/// Speed of a motor from which on it is asked to stop within 100 ms and 100 mrad (rad/s). M2 at 5.2 rad/s, 0.12 rad/s
+/// of its joint, was seen to take 170 ms and 46 mrad.
 const FAST: f64 = 5.5;
 
 #[test]

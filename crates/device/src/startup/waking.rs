@@ -18,7 +18,7 @@ const WAKE_SILENCE_US: u64 = 1_000_000;
 /// Places of the limits that end in a fault.
 const VL2: u8 = 1;
 const TL2: u8 = 3;
-/// Largest velocity fault limit of the safety module (counts): 1 m/s, above the 0.8 m/s at which the control code stops.
+/// Largest velocity fault limit of the safety module (counts): 1 m/s. The control code stops at 0.8 m/s.
 const VL2_COUNTS: i32 = 4096;
 
 impl Startup {
