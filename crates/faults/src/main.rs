@@ -139,11 +139,7 @@ impl Wanted {
 fn go(wanted: &Wanted) -> Result<bool, Box<dyn std::error::Error>> {
     let &Wanted { ref ids, json, all, kind } = wanted;
     let entries = Entry::all(Path::new(FOLDER))?;
-    let mut is_good = true;
-    for difference in catalogue::differences(&entries, &std::fs::read_to_string(CATALOGUE)?) {
-        eprintln!("{difference}");
-        is_good = false;
-    }
+    let differences = catalogue::differences(&entries, &std::fs::read_to_string(CATALOGUE)?);
     if let Some(id) = ids.iter().find(|id| entries.iter().all(|entry| entry.id != **id)) {
         return Err(format!("there is no entry {id}").into());
     }
@@ -172,7 +168,9 @@ fn go(wanted: &Wanted) -> Result<bool, Box<dyn std::error::Error>> {
         verdicts.len(),
         verdicts.iter().filter(|verdict| verdict.holds()).count(),
     );
-    Ok(is_good && failed == 0)
+    // Last, because hundreds of lines are above it.
+    differences.iter().for_each(|difference| eprintln!("{CATALOGUE} and the scripts differ: {difference}"));
+    Ok(differences.is_empty() && failed == 0)
 }
 
 /// Runs the scenarios; the verdicts in the order of the scenarios.
