@@ -129,7 +129,7 @@ fn one_at_a_time(client: &mut Client<Device>, image: &[u8]) -> f64 {
     rate
 }
 
-/// At 300 Hz: at 500 Hz the line waits for shorter slots, and parts on their way gain less.
+/// At 300 Hz: at 500 Hz parts on their way gain 13 % on a CAN line, not 20.
 #[test]
 fn an_upload_fills_the_line() {
     let folder = tempfile::tempdir().unwrap();

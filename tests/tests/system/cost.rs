@@ -12,7 +12,8 @@ use link::{Goal, Name, RunOptions, Telemetry};
 use system_tests::execution::prepare;
 use system_tests::{Arm, command, expect, ready, simulation};
 
-/// Instructions of a control cycle at its worst; the same bound as in `cargo xtask budget`.
+/// Instructions of a control cycle at its worst: a little more than is measured (27 315). `cargo xtask budget` allows
+/// 30 000.
 const BOUND: u32 = 28_500;
 
 /// Instructions per tick of the image's clock under `-icount shift=3`.
@@ -51,7 +52,6 @@ fn all_on(compliant: bool) -> RunOptions {
 struct Costs {
     arm: Arm,
     worst: BTreeMap<&'static str, u32>,
-    states: Vec<u8>,
 }
 
 impl Costs {
@@ -63,9 +63,6 @@ impl Costs {
             {
                 let worst = self.worst.entry(what).or_default();
                 *worst = cycle.cost_ticks.max(*worst);
-                if self.states.last() != Some(&cycle.state) {
-                    self.states.push(cycle.state);
-                }
                 return cycle;
             }
         }
@@ -113,7 +110,7 @@ impl Costs {
 /// which the mass matrix is renewed.
 #[test]
 fn no_order_and_no_stop_makes_a_control_cycle_longer_than_28_500_instructions() {
-    let mut costs = Costs { arm: ready("sim:seed=51"), worst: BTreeMap::new(), states: Vec::new() };
+    let mut costs = Costs { arm: ready("sim:seed=51"), worst: BTreeMap::new() };
     prepare(&mut costs.arm, largest());
     costs.go_to_the_start();
     let goal = |lift: f32| {
