@@ -87,6 +87,15 @@ impl Costs {
         self.cycles("approached", RATE_HZ / 10);
     }
 
+    /// Moves by a little, from a hold that is this many cycles older than the last one.
+    fn approach(&mut self, later: u32) {
+        self.cycles("held", later);
+        let mut target = largest().start.posture.map(|angle| angle as f32);
+        target[0] += 0.05;
+        self.order("an approach begins", |arm| expect(arm.approach(target, 0.0)));
+        while State::from_code(self.cycle("approaching").state) == Some(State::Approach) {}
+    }
+
     fn begin(&mut self, compliant: bool) {
         let name = expect(Name::new(&largest().name));
         let what = if compliant { "a compliant run begins" } else { "a run begins" };
@@ -124,6 +133,7 @@ fn no_order_and_no_stop_makes_a_control_cycle_longer_than_28_500_instructions() 
             costs.order("goal moved", |arm| expect(arm.set_goal(goal(0.01))));
             costs.order("speed changed", |arm| expect(arm.set_speed(0.8)));
             costs.order("run held", |arm| expect(arm.hold()));
+            costs.approach(phase);
             costs.go_to_the_start();
         }
     }

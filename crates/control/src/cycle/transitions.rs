@@ -77,6 +77,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// Begins a move in joint space, after the supervisor has allowed it.
     pub(super) fn begin_approach(&mut self, approach: Approach<R>, measured: &Measured<'_, R>) {
         self.hand.stay();
+        self.observer.postpone();
         if !matches!(self.law, Law::Posture(_)) {
             self.law = Law::Posture(Posture::at(measured.state.q));
         }
