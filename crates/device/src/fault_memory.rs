@@ -8,38 +8,17 @@
 //! [`FaultMemory::resume`] then finds what is whole. A cycle carries its running number and a check sum, so that one
 //! whose writing was cut by a reset is left out, and the place of the newest follows from the cycles alone.
 
-use link::{FaultRecord, Telemetry};
+use link::{FaultRecord, ShortTelemetry, Telemetry};
 
 /// Cycles of a record: one second.
 pub const FAULT_CYCLES: usize = control::RATE_HZ as usize;
 
-/// Words of a cycle: running number (two), cycle, flags with lost replies, codes, cost; the values; the check sum.
-const CYCLE_WORDS: usize = 6 + VALUES.div_ceil(2) + 1;
-/// Values of a cycle, 16 bits each.
-const VALUES: usize = 47;
+/// Words of a cycle: running number (two), the cycle in its short form, the check sum.
+const CYCLE_WORDS: usize = 2 + size_of::<ShortTelemetry>() / 4 + 1;
 /// Magic number, content, check sum.
 const HEAD_WORDS: usize = 10;
-/// "TaF" and the version of the layout.
-const MAGIC: u32 = u32::from_le_bytes(*b"TaF1");
-
-/// Steps per unit, in the order of [`values`], each with its count. A value outside of 32767 steps becomes the largest.
-const STEPS: [(usize, f32); 12] = [
-    (1, 30_000.0), // phase
-    (7, 8000.0),   // q: 0.125 mrad
-    (7, 1000.0),   // dq: 1 mrad/s
-    (7, 250.0),    // tau: 4 mN m
-    (3, 10_000.0), // pose_d: 0.1 mm
-    (4, 32_000.0), // its quaternion
-    (3, 50.0),     // force: 20 mN
-    (3, 500.0),    // torque: 2 mN m
-    (4, 8000.0),   // hand
-    (4, 8000.0),   // hand_d
-    (3, 4000.0),   // gauges: 0.25 mN m
-    (1, 100.0),    // surprise
-];
-
-/// The number that stands for one that is not a number.
-const NOT_A_NUMBER: i16 = i16::MIN;
+/// "TaF1" and the schema of the link: a program with another telemetry does not read the cycles of this one.
+const MAGIC: u32 = u32::from_le_bytes(*b"TaF1") ^ link::SCHEMA_HASH;
 
 type Cycle = [u32; CYCLE_WORDS];
 
@@ -220,44 +199,10 @@ fn sum(words: &[u32]) -> u32 {
     words.iter().fold(0x811C_9DC5, |sum, word| (sum ^ word).wrapping_mul(0x0100_0193))
 }
 
-/// The values of a cycle in the order of [`STEPS`].
-fn values(cycle: &mut Telemetry) -> impl Iterator<Item = &mut f32> {
-    core::iter::once(&mut cycle.phase)
-        .chain(&mut cycle.q)
-        .chain(&mut cycle.dq)
-        .chain(&mut cycle.tau)
-        .chain(&mut cycle.pose_d)
-        .chain(&mut cycle.wrench)
-        .chain(&mut cycle.hand)
-        .chain(&mut cycle.hand_d)
-        .chain(&mut cycle.gauges)
-        .chain(core::iter::once(&mut cycle.surprise))
-}
-
-fn steps() -> impl Iterator<Item = f32> {
-    STEPS.into_iter().flat_map(|(count, steps)| core::iter::repeat_n(steps, count))
-}
-
 fn encode(number: u64, cycle: &Telemetry) -> Cycle {
-    let mut source = *cycle;
     let mut words = [0; CYCLE_WORDS];
-    let mut halves = values(&mut source).zip(steps()).map(|(value, steps)| {
-        let scaled = *value * steps;
-        let rounded = (scaled + if scaled < 0.0 { -0.5 } else { 0.5 }) as i16;
-        let short = if scaled.is_nan() { NOT_A_NUMBER } else { rounded.max(-i16::MAX) };
-        u32::from(short.cast_unsigned())
-    });
-    let [low, high] = split(number);
-    let head = [
-        low,
-        high,
-        cycle.cycle,
-        cycle.flags & 0x00FF_FFFF | u32::from(cycle.lost_replies) << 24,
-        u32::from(cycle.state) | u32::from(cycle.fault) << 8,
-        cycle.cost_ticks,
-    ];
-    let packed = core::iter::from_fn(|| halves.next().map(|low| low | halves.next().unwrap_or(0) << 16));
-    for (word, value) in words.iter_mut().zip(head.into_iter().chain(packed)) {
+    let content = split(number).into_iter().chain(cycle.shortened());
+    for (word, value) in words.iter_mut().zip(content) {
         *word = value;
     }
     if let Some((check, content)) = words.split_last_mut() {
@@ -267,32 +212,6 @@ fn encode(number: u64, cycle: &Telemetry) -> Cycle {
 }
 
 fn decode(words: &Cycle) -> Telemetry {
-    let [_, _, number, flags, codes, cost_ticks, packed @ ..] = words;
-    let [state, fault, ..] = codes.to_le_bytes();
-    let mut cycle = Telemetry {
-        cycle: *number,
-        state,
-        fault,
-        flags: flags & 0x00FF_FFFF,
-        lost_replies: (flags >> 24) as u8,
-        cost_ticks: *cost_ticks,
-        ..Telemetry::default()
-    };
-    let halves = packed.iter().flat_map(|word| [*word as u16, (word >> 16) as u16]);
-    for ((value, steps), half) in values(&mut cycle).zip(steps()).zip(halves) {
-        let short = half.cast_signed();
-        *value = if short == NOT_A_NUMBER { f32::NAN } else { f32::from(short) / steps };
-    }
-    cycle
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn steps_are_as_many_as_values() {
-        assert_eq!(values(&mut Telemetry::default()).count(), VALUES);
-        assert_eq!(steps().count(), VALUES);
-    }
+    let [_, _, short @ .., _] = words;
+    Telemetry::from_short(short)
 }

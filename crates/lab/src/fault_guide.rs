@@ -5,6 +5,8 @@ use control::Fault;
 /// Advice on a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FaultGuide {
+    /// Reaction of the arm, with the state it goes to.
+    pub reaction: &'static str,
     /// The usual cause.
     pub cause: &'static str,
     /// The places to look at before going on.
@@ -95,7 +97,30 @@ impl FaultGuide {
                 "what hangs on the arm, and that all of it has power",
             ),
         };
-        FaultGuide { cause, check, clear: way_on(fault) }
+        FaultGuide { reaction: reaction(fault), cause, check, clear: way_on(fault) }
+    }
+}
+
+/// Reaction of the arm, with the state it goes to.
+const fn reaction(fault: Fault) -> &'static str {
+    match fault {
+        Fault::None => "nothing",
+        Fault::RepliesLost
+        | Fault::JointLimit
+        | Fault::JointSpeed
+        | Fault::TipSpeed
+        | Fault::ImplausiblePosition
+        | Fault::TrackingError
+        | Fault::ContactForce
+        | Fault::WrenchLost
+        | Fault::Overrun
+        | Fault::UnseenContact => "SoftStop: it brakes and gives way",
+        Fault::NotFinite => "SoftStop; Fault, without torque, if it goes on",
+        Fault::EncoderStuck => "SoftStop, and the safety module is asked for IDLE: its brakes",
+        Fault::MotorHot | Fault::OtherPayload => "SoftStop, unless it is being lowered",
+        Fault::RepliesLostForLong => "Fault: no torque",
+        Fault::SafetyDropped => "Idle: no torque",
+        Fault::BusFault => "Fault: no torque; then a new start-up of the bus",
     }
 }
 

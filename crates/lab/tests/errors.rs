@@ -36,12 +36,12 @@ fn document() -> String {
     text += "\n## Refusals of the device\n\n";
     text += &table(Refusal::ALL.into_iter().map(ErrorCode::Refused));
     text += "\n## Faults\n\nA fault stops the arm and stays until `tactus stop --clear-fault`; `tactus faults` tells the last one. [faults.md](faults.md) says how each is found.\n\n";
-    text +=
-        "| fault | name | meaning and what to do | usual cause | check | how to go on |\n|---|---|---|---|---|---|\n";
+    text += "| fault | name | meaning and what to do | the arm | usual cause | check | how to go on |\n|---|---|---|---|---|---|---|\n";
     for fault in Fault::ALL.into_iter().filter(|fault| *fault != Fault::None) {
-        let FaultGuide { cause, check, clear } = FaultGuide::of(fault);
+        let FaultGuide { reaction, cause, check, clear } = FaultGuide::of(fault);
         let (code, meaning) = (fault.code(), fault.explanation());
-        writeln!(text, "| {code} | `{fault:?}` | {meaning} | {cause} | {check} | {clear} |").expect("a text");
+        writeln!(text, "| {code} | `{fault:?}` | {meaning} | {reaction} | {cause} | {check} | {clear} |")
+            .expect("a text");
     }
     text
 }

@@ -26,6 +26,7 @@ pub mod name;
 pub mod refusal;
 pub mod report;
 mod schema;
+pub mod telemetry;
 
 pub use image::{ImageError, PrimitiveImage};
 pub use message::{Capabilities, DeviceHello, Goal, HostHello, Reply, Request, RunOptions};
@@ -34,6 +35,7 @@ pub use name::{Name, NameError, Text};
 pub use refusal::Refusal;
 pub use report::{
     Calibration, Event, EventKind, FaultRecord, HandStage, HomeSource, LinkCounters, Listing, SessionOwner, Statistics,
-    Status, Telemetry, Weight,
+    Status, Weight,
 };
 pub use schema::{LINK_VERSION, SCHEMA_HASH};
+pub use telemetry::{ShortTelemetry, Telemetry};

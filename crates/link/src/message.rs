@@ -12,7 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::name::{Name, Text};
 use crate::refusal::Refusal;
-use crate::report::{Calibration, Event, FaultRecord, Listing, SessionOwner, Statistics, Status, Telemetry, Weight};
+use crate::report::{Calibration, Event, FaultRecord, Listing, SessionOwner, Statistics, Status, Weight};
+use crate::telemetry::Telemetry;
 
 /// Most bytes of an image in one [`Request::UploadChunk`] or [`Reply::Chunk`].
 ///

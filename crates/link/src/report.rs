@@ -1,4 +1,4 @@
-//! Reports of the device: status, statistics, listing, telemetry, events.
+//! Reports of the device: status, statistics, listing, events.
 //!
 //! Codes (`state`, `fault`, start-up stage) are numbers of `control` and `device`, which name and explain
 //! them; this crate only carries them.
@@ -244,45 +244,6 @@ pub struct Listing {
     pub expectation: bool,
     /// It is the one in the control cycle.
     pub loaded: bool,
-}
-
-/// One control cycle as the device saw it.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Telemetry {
-    /// Control cycle, 300 a second. A step of more than the asked decimation is a gap.
-    pub cycle: u32,
-    /// Code of the supervisor's state.
-    pub state: u8,
-    /// Code of the latched fault, 0 for none.
-    pub fault: u8,
-    /// Flag bits of the cycle record (`control`).
-    pub flags: u32,
-    /// Phase s of the primitive.
-    pub phase: f32,
-    /// Measured joint angles, rad.
-    pub q: [f32; 7],
-    /// Estimated joint velocities, rad/s.
-    pub dq: [f32; 7],
-    /// Joint torques sent, after the limiter, N m.
-    pub tau: [f32; 7],
-    /// Desired pose of the grasp point in the world: x, y, z (m), quaternion w, x, y, z.
-    pub pose_d: [f32; 7],
-    /// Wrench of the environment on the robot at the grasp point: force in world axes (N), torque in
-    /// hand axes (N m).
-    pub wrench: [f32; 6],
-    /// Replies missing in this cycle.
-    pub lost_replies: u8,
-    /// Control computation of this cycle, ticks.
-    pub cost_ticks: u32,
-    /// Spread and fingers F1 to F3 (inner links) as measured, rad.
-    pub hand: [f32; 4],
-    /// The same as desired, rad.
-    pub hand_d: [f32; 4],
-    /// Torque of the environment on fingers F1 to F3 about their outer joints, by the strain gauges, N m: negative when
-    /// they close on an object.
-    pub gauges: [f32; 3],
-    /// Difference between this run and the successful ones before it (z-score); 0 when nothing is compared.
-    pub surprise: f32,
 }
 
 /// The last second before a fault, as far as the device has kept it.

@@ -1,7 +1,7 @@
 //! The numbers by which host and device recognise that they fit together.
 
-/// Version of the link. Raised whenever a message is added, or a field at the end of one; nothing else of them changes.
-pub const LINK_VERSION: u16 = 9;
+/// Version of the link, from the schema text. It rises whenever a message is added, or a field at the end of one.
+pub const LINK_VERSION: u16 = version(SCHEMA.as_bytes());
 
 /// Every message with its encoding, and the image with its layout, as text.
 ///
@@ -23,4 +23,19 @@ const fn fnv1a(bytes: &[u8]) -> u32 {
         index += 1;
     }
     hash
+}
+
+/// The number behind "link" in the second line of the schema text.
+const fn version(text: &[u8]) -> u16 {
+    let mut index = 0;
+    while text[index] != b'\n' {
+        index += 1;
+    }
+    let (mut version, mut place) = (0, index + 1 + "link ".len());
+    while text[place].is_ascii_digit() {
+        version = 10 * version + (text[place] - b'0') as u16;
+        place += 1;
+    }
+    assert!(version > 0, "the second line of the schema text begins with \"link \" and the version");
+    version
 }

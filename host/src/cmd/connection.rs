@@ -172,7 +172,7 @@ pub(super) fn tell_speed(client: &Client<Device>, started: Instant, output: Outp
 pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
     let code = match error {
         ProcedureError::Stopped(fault) if fault != Fault::None => {
-            let FaultGuide { cause, check, clear } = FaultGuide::of(fault);
+            let FaultGuide { cause, check, clear, .. } = FaultGuide::of(fault);
             let help = format!("usually {cause}; check {check}; then {clear}. `tactus faults` shows the second before");
             return Failure::new(ErrorCode::ArmStopped, doing, error).help(help);
         }

@@ -25,11 +25,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let text = command.code.as_str();
     let mut faults = Fault::ALL.into_iter().filter(|fault| *fault != Fault::None);
     let fault = faults.find(|fault| format!("{fault:?}").eq_ignore_ascii_case(text));
-    let (code, meaning, cause, remedy) = match (error(text), fault) {
-        (Some(code), _) => (code.to_string(), code.meaning(), code.cause(), code.remedy()),
+    let (code, meaning, reaction, cause, remedy) = match (error(text), fault) {
+        (Some(code), _) => (code.to_string(), code.meaning(), "", code.cause(), code.remedy()),
         (None, Some(fault)) => {
-            let FaultGuide { cause, clear, .. } = FaultGuide::of(fault);
-            (format!("{fault:?}"), fault.explanation(), cause, clear)
+            let FaultGuide { reaction, cause, clear, .. } = FaultGuide::of(fault);
+            (format!("{fault:?}"), fault.explanation(), reaction, cause, clear)
         }
         (None, None) => {
             let cause = format!("'{text}' is neither the code of an error nor the name of a fault");
@@ -38,7 +38,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     };
     let exit = error(text).map(|code| code.exit() as u8);
     let mut words = format!("{code}: {meaning}");
-    for (name, text) in [("usual cause", cause), ("help", remedy)] {
+    for (name, text) in [("the arm", reaction), ("usual cause", cause), ("help", remedy)] {
         if !text.is_empty() {
             words += &format!("\n  {name}: {text}");
         }

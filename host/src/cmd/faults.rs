@@ -76,7 +76,7 @@ pub(super) fn data(status: &Status, last: Option<&LastSecond>) -> Value {
 
 fn fault_data(code: u8) -> Option<Value> {
     let fault = Fault::from_code(code).filter(|fault| *fault != Fault::None)?;
-    let FaultGuide { cause, check, clear } = FaultGuide::of(fault);
+    let FaultGuide { cause, check, clear, .. } = FaultGuide::of(fault);
     Some(json!({
         "code": code, "name": format!("{fault:?}"), "meaning": fault.explanation(),
         "cause": cause, "check": check, "clear": clear,
@@ -112,11 +112,13 @@ fn text(status: &Status, last: Option<&LastSecond>) -> String {
     text + &table(&last.cycles)
 }
 
-/// Name, meaning, cause, what to check, how to go on; `None` for no fault.
+/// Name, meaning, reaction, cause, what to check, how to go on; `None` for no fault.
 fn fault_text(code: u8) -> Option<String> {
     let fault = Fault::from_code(code)?;
-    let FaultGuide { cause, check, clear } = FaultGuide::of(fault);
-    let words = format!("{fault:?}: {fault}\n  usual cause: {cause}\n  check: {check}\n  to go on: {clear}\n");
+    let FaultGuide { reaction, cause, check, clear } = FaultGuide::of(fault);
+    let words = format!(
+        "{fault:?}: {fault}\n  the arm: {reaction}\n  usual cause: {cause}\n  check: {check}\n  to go on: {clear}\n"
+    );
     (fault != Fault::None).then_some(words)
 }
 

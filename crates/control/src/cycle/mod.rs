@@ -23,7 +23,7 @@ use crate::cycle::hand::HandDrive;
 use crate::cycle::law::{Lag, Law, Posture, Running};
 use crate::cycle::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
 use crate::guard::disagreement::{Effort, Plan};
-use crate::guard::fault::Fault;
+use crate::guard::fault::{Fault, ReactionOutside};
 use crate::guard::joint_limits::JointBounds;
 use crate::guard::monitor::{Monitor, Observation};
 use crate::guard::supervisor::{State, Supervisor, Trigger};
@@ -304,11 +304,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let before = (self.supervisor.law(), self.supervisor.fault());
         self.watch_safety(input.sample.safety);
         if let Some(fault) = input.external_fault {
-            let lasts = matches!(fault, Fault::MotorHot | Fault::OtherPayload);
-            let soft = lasts || fault == Fault::Overrun;
-            // An arm that is let down is on the way to where both end.
-            if !lasts || self.supervisor.law() != State::Lower {
-                self.trigger(if soft { Trigger::SoftFault } else { Trigger::HardFault }, fault, None);
+            match fault.reaction_outside() {
+                ReactionOutside::SoftUnlessLowering if self.supervisor.law() == State::Lower => {}
+                ReactionOutside::TorqueOff => self.trigger(Trigger::HardFault, fault, None),
+                _ => self.trigger(Trigger::SoftFault, fault, None),
             }
         }
         let torque_on = self.supervisor.state().has_torque();

@@ -16,7 +16,7 @@ pub struct CycleInput {
     /// A person's command, if one is waiting.
     pub command: Option<Command>,
     /// A fault that the caller found outside the cycle (bus-off, puck reset, overrun); `None` otherwise. It takes all
-    /// torque off at once, but for an overrun, which stops softly.
+    /// torque off at once, or stops softly, as [`Fault`] says of each.
     pub external_fault: Option<Fault>,
 }
 

@@ -48,6 +48,17 @@ pub enum Fault {
     OtherPayload = 17,
 }
 
+/// The reaction to a fault that the caller of the control cycle reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ReactionOutside {
+    /// All torque is taken off.
+    TorqueOff,
+    /// A soft stop.
+    Soft,
+    /// A soft stop; nothing if the arm is being lowered, which is the way to where that ends.
+    SoftUnlessLowering,
+}
+
 impl Fault {
     /// Every fault, in the order of the codes.
     pub const ALL: [Fault; 18] = [
@@ -79,6 +90,15 @@ impl Fault {
     /// The fault with this number, if there is one.
     pub fn from_code(code: u8) -> Option<Fault> {
         Fault::ALL.into_iter().find(|fault| fault.code() == code)
+    }
+
+    /// The reaction to this fault where the device found it, outside the control cycle.
+    pub(crate) const fn reaction_outside(self) -> ReactionOutside {
+        match self {
+            Fault::MotorHot | Fault::OtherPayload => ReactionOutside::SoftUnlessLowering,
+            Fault::Overrun => ReactionOutside::Soft,
+            _ => ReactionOutside::TorqueOff,
+        }
     }
 
     /// Returns cause and remedy in one sentence for a person.

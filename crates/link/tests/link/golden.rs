@@ -1,6 +1,7 @@
 //! The bytes of every message and of an image, pinned in `src/schema.txt`, and thereby the schema hash.
 //!
-//! After a change of the layouts: `UPDATE_DOCUMENTS=1 cargo test -p link --test link` writes text and hash anew.
+//! After a change of the layouts: `UPDATE_DOCUMENTS=1 cargo test -p link --test link` writes text, version, hash and
+//! the lines of the documents anew.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -29,15 +30,15 @@ fn variant(value: &impl std::fmt::Debug) -> String {
     text.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default().to_owned()
 }
 
-/// The text that `src/schema.txt` must be.
-fn schema() -> String {
+/// The text that `src/schema.txt` must be, of a version of the link.
+fn schema(version: u16) -> String {
     let mut text = String::new();
     let mut line = |words: String| {
         text.push_str(&words);
         text.push('\n');
     };
     line("# Every layout of the link with its bytes. Written by tests/golden.rs, hashed into SCHEMA_HASH.".into());
-    line(format!("link {LINK_VERSION}"));
+    line(format!("link {version}"));
     line("payload session:u16 sequence:u16 time_ms:u32 message:postcard crc32_iscsi:u32 in COBS, 00".into());
     for request in requests() {
         line(format!("request {:2} {} {}", request_index(&request), variant(&request), encoded(&request)));
@@ -81,7 +82,7 @@ fn hash_of(text: &str) -> u32 {
 
 /// Names and types of the telemetry, as its struct says, for the table of `docs/protocol.md`.
 fn telemetry_fields() -> String {
-    let source = include_str!("../../src/report.rs").replace('\r', "");
+    let source = include_str!("../../src/telemetry.rs").replace('\r', "");
     let (_, after) = source.split_once("pub struct Telemetry {\n").expect("the struct");
     let (fields, _) = after.split_once("\n}").expect("its end");
     let field = |line: &str| {
@@ -97,42 +98,80 @@ fn telemetry_line() -> String {
     format!("| 7 | Telemetry | {} |", telemetry_fields())
 }
 
-/// Writes the schema text, and its hash into the documents in place of the old one.
-fn update(root: &Path, expected: &str) {
-    std::fs::write(root.join("crates/link/src/schema.txt"), expected).unwrap();
-    for document in WITH_HASH {
-        let text = std::fs::read_to_string(root.join(document)).unwrap();
-        let (old, new) = (format!("{SCHEMA_HASH:#010x}"), format!("{:#010x}", hash_of(expected)));
-        let text: Vec<String> = text
-            .replace(&old, &new)
-            .split_inclusive('\n')
-            .map(|line| if line.starts_with("| 7 | Telemetry |") { telemetry_line() + "\n" } else { line.to_owned() })
-            .collect();
-        std::fs::write(root.join(document), text.concat()).unwrap();
-    }
+/// Bytes of a telemetry message whose integers are as long as they get: postcard writes 7 bits a byte.
+pub(crate) fn longest_telemetry_frame() -> usize {
+    let bytes = |kind: &str| match kind {
+        "u8" | "bool" => 1,
+        "u16" => 3,
+        "u32" => 5,
+        "f32" => 4,
+        other => panic!("the length of {other} is not known here"),
+    };
+    let field = |field: &str| match field.split(' ').collect::<Vec<_>>()[..] {
+        [_, count, kind] => count.parse::<usize>().expect("a count") * bytes(kind),
+        [_, kind] => bytes(kind),
+        _ => panic!("{field:?} is no field"),
+    };
+    let fields: usize = telemetry_fields().split(", ").map(field).sum();
+    // Envelope and number of the message before them, check sum, stuffing and zero behind them.
+    8 + 1 + fields + 4 + 2
+}
+
+/// The sentence of `docs/protocol.md` about the length of a telemetry message and its share of the serial line.
+fn telemetry_load() -> String {
+    let bytes = longest_telemetry_frame();
+    let (rate, line) = (f64::from(u32::try_from(bytes).unwrap()) * 300.0, 921_600.0 / 10.0);
+    format!("at most {bytes} bytes a message, {:.0} kB/s, {:.0} % of the serial line", rate / 1e3, 100.0 * rate / line)
+}
+
+/// The document with version and hash of a schema text, and what the struct of the telemetry says.
+fn brought_up_to_date(document: &str, schema: &str, version: u16) -> String {
+    let text = document
+        .replace(&format!("version **{LINK_VERSION}**"), &format!("version **{version}**"))
+        .replace(&format!("{SCHEMA_HASH:#010x}"), &format!("{:#010x}", hash_of(schema)));
+    let line = |line: &str| {
+        if line.starts_with("| 7 | Telemetry |") {
+            return telemetry_line() + "\n";
+        }
+        match (line.split_once("at most "), line.split_once("of the serial line")) {
+            (Some((before, _)), Some((_, after))) => before.to_owned() + &telemetry_load() + after,
+            _ => line.to_owned(),
+        }
+    };
+    text.split_inclusive('\n').map(line).collect()
 }
 
 #[test]
 fn every_layout_is_the_one_in_the_schema_text_and_its_hash_in_the_documents() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let expected = schema();
-    if std::env::var_os("UPDATE_DOCUMENTS").is_some() {
-        update(&root, &expected);
-    }
     let read = |path: &str| std::fs::read_to_string(root.join(path)).unwrap().replace('\r', "");
+    let same = schema(LINK_VERSION) == include_str!("../../src/schema.txt").replace('\r', "");
+    let version = if same { LINK_VERSION } else { LINK_VERSION + 1 };
+    let expected = schema(version);
+    let document = |path: &str| brought_up_to_date(&read(path), &expected, version);
+    if std::env::var_os("UPDATE_DOCUMENTS").is_some() {
+        for path in WITH_HASH {
+            std::fs::write(root.join(path), document(path)).unwrap();
+        }
+        std::fs::write(root.join("crates/link/src/schema.txt"), &expected).unwrap();
+    }
     let written = read("crates/link/src/schema.txt");
-    let difference = expected.lines().zip(written.lines()).find(|(new, old)| new != old);
+    let difference = expected.lines().zip(written.lines()).skip(2).find(|(new, old)| new != old);
     assert!(
         expected == written,
-        "a layout changed: {difference:?}\nIf that is meant: raise LINK_VERSION or IMAGE_SCHEMA, then \
-         UPDATE_DOCUMENTS=1 cargo test -p link --test link"
+        "a layout changed: {difference:?}\nIf that is meant: UPDATE_DOCUMENTS=1 cargo test -p link --test link. It \
+         raises the version of the link; raise IMAGE_SCHEMA by hand if the image changed"
     );
-    let hash = format!("{:#010x}", hash_of(&expected));
-    for document in WITH_HASH {
-        assert!(read(document).contains(&hash), "{document} should show {hash}");
+    for path in WITH_HASH {
+        let (hash, found) = (format!("{:#010x}", hash_of(&expected)), read(path));
+        assert!(
+            found.contains(&hash) && found == document(path),
+            "{path}: UPDATE_DOCUMENTS=1 cargo test -p link --test link"
+        );
     }
-    let line = telemetry_line();
-    assert!(read("docs/protocol.md").contains(&line), "docs/protocol.md should show: {line}");
+    let protocol = read("docs/protocol.md");
+    let told = [telemetry_line(), telemetry_load(), format!("version **{version}**")];
+    told.iter().for_each(|told| assert!(protocol.contains(told), "docs/protocol.md should show: {told}"));
 }
 
 #[test]
