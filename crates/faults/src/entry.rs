@@ -59,6 +59,9 @@ pub struct Scenario {
     /// Faults; their times count from time 0.
     #[serde(default)]
     pub inject: Vec<Injection>,
+    /// The scenario is gone through so many times, each time with its faults later.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sweep: Option<Sweep>,
     /// Orders of the host.
     #[serde(default)]
     pub order: Vec<Order>,
@@ -77,6 +80,26 @@ impl Scenario {
         let is = |kind: &FaultKind| matches!(kind, FaultKind::BusOff | FaultKind::Refuse(_) | FaultKind::Clock(_));
         self.inject.iter().any(|injection| is(&injection.what))
     }
+
+    /// The scenario for each arm of the sweep; itself where there is none.
+    pub(crate) fn each(&self) -> impl Iterator<Item = Self> {
+        let Sweep { count, by } = self.sweep.unwrap_or(Sweep { count: 1, by: 0.0 });
+        (0..count).map(move |number| {
+            let mut shifted = self.clone();
+            shifted.inject.iter_mut().for_each(|injection| injection.at += f64::from(number) * by);
+            shifted
+        })
+    }
+}
+
+/// One fault at each of many moments, each on an arm of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sweep {
+    /// Number of arms.
+    pub count: u32,
+    /// Time from the faults of one arm to those of the next, s.
+    pub by: f64,
 }
 
 /// States in which a scenario begins.
@@ -247,6 +270,9 @@ impl Entry {
             let unknown_fault = faults.iter().find(|name| Fault::ALL.iter().all(|fault| fault_name(*fault) != **name));
             if let Some(name) = unknown_state.or(unknown_fault) {
                 return Err(format!("{}: no state or fault '{name}'", scenario.name));
+            }
+            if scenario.sweep.is_some_and(|sweep| sweep.count == 0 || !(sweep.by > 0.0)) {
+                return Err(format!("{}: a sweep of no arms, or of no time", scenario.name));
             }
             if scenario.known.is_some() && self.today == "held" {
                 return Err(format!("{}: a known defect in an entry that is held", scenario.name));

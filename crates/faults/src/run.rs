@@ -61,6 +61,19 @@ impl Verdict {
         }
     }
 
+    /// Takes in the verdict on one more arm: its end, and the worse of each figure.
+    fn join(&mut self, one: Verdict) {
+        let before = std::mem::take(&mut self.figures);
+        *self = one;
+        for old in before {
+            let now = self.figures.iter_mut().find(|now| (now.figure, now.is_least) == (old.figure, old.is_least));
+            // The end of the last arm is told, and of the figures the worst.
+            if let Some(now) = now.filter(|now| now.is_within && worse(&old, now)) {
+                *now = old;
+            }
+        }
+    }
+
     /// True if everything is as it must be.
     #[must_use]
     pub fn holds(&self) -> bool {
@@ -88,7 +101,20 @@ fn go_through(scenario: &Scenario, kind: SimulatorKind, verdict: &mut Verdict) -
     let compares = |figure: &Figure| matches!(figure, Figure::Deviation | Figure::Tracking | Figure::Plan);
     let (most, least) = (&scenario.expect.most, &scenario.expect.least);
     let nominal = most.keys().chain(least.keys()).any(compares).then(|| watched_without(scenario, kind)).transpose()?;
-    judged(&mut bench::arm(scenario, true, kind)?, scenario, nominal.as_ref(), verdict)
+    for arm in scenario.each() {
+        let mut one = Verdict::open(&verdict.id, scenario);
+        let failure = judged(&mut bench::arm(&arm, true, kind)?, &arm, nominal.as_ref(), &mut one).err();
+        one.failures.extend(failure.map(|failure| failure.to_string()));
+        if scenario.sweep.is_some() && !one.holds() {
+            let first = arm.inject.first().map_or(0.0, |injection| injection.at);
+            one.failures.push(format!("with the first fault at {first:.4} s"));
+        }
+        verdict.join(one);
+        if !verdict.holds() {
+            break;
+        }
+    }
+    Ok(())
 }
 
 /// Watches an arm in the state where the scenario begins, judges what comes of it, and goes the way back.
@@ -142,6 +168,10 @@ fn recovered(arm: &mut bench::Arm, scenario: &Scenario, verdict: &mut Verdict) -
 fn watched_without(scenario: &Scenario, kind: SimulatorKind) -> Result<Watched, Failure> {
     let mut arm = bench::arm(scenario, false, kind)?;
     watch::watch(&mut arm, scenario.watch, &scenario.order)
+}
+
+fn worse(a: &Judged, b: &Judged) -> bool {
+    if a.is_least { a.value < b.value } else { a.value > b.value }
 }
 
 fn judge(figures: &Figures, figure: Figure, bar: f64, is_least: bool) -> Judged {

@@ -74,6 +74,7 @@ pub fn draw(seed: u64) -> Scenario {
         firmware: false,
         known: None,
         inject,
+        sweep: None,
         order,
         expect,
         recover: Recover::Either,

@@ -71,3 +71,23 @@ fn a_scenario_is_judged_by_its_bars_and_a_known_defect_has_to_fail() {
     assert_eq!(judged(&known), (true, false), "a defect that is gone must not stay in the list");
     assert_eq!(judged(&known.replace("stop = 60", "stop = 1")), (false, true));
 }
+
+#[test]
+fn a_sweep_is_as_good_as_the_worst_of_its_arms() {
+    // The fault comes 0.2 s later on each arm: on a third, too late for the watch.
+    let text = SCRIPT.replace("watch = 0.5", "watch = 0.45\nsweep = { count = 2, by = 0.2 }");
+    let judged = |text: &str| {
+        let entry = read(text).expect("sound");
+        run(&entry, &entry.scenario[0], SimulatorKind::InProcess)
+    };
+    let both = judged(&text);
+    assert!(both.holds(), "{both:?}");
+    let alone = judged(&SCRIPT.replace("watch = 0.5", "watch = 0.45"));
+    let stop = |verdict: &faults::run::Verdict| verdict.figures.last().and_then(|judged| judged.value);
+    assert!(stop(&both) >= stop(&alone), "{both:?} {alone:?}");
+    let third = judged(&text.replace("count = 2", "count = 3"));
+    assert!(!third.holds() && third.failures.iter().any(|words| words.contains("0.5000 s")), "{third:?}");
+    let refused = |to: &str| read(&text.replace("{ count = 2, by = 0.2 }", to)).expect_err("it means nothing");
+    assert!(refused("{ count = 0, by = 0.2 }").contains("a sweep of no arms"));
+    assert!(refused("{ count = 2, by = 0 }").contains("of no time"));
+}
