@@ -143,6 +143,11 @@ pub enum StartupError {
     CountsAnew(Node),
     /// The counts of a motor jumped since the arm was zeroed.
     CountsJumped,
+    /// By its counts a joint, 1 to 7, is where its stops do not let it go.
+    BeyondStops {
+        /// Number of the joint.
+        joint: u8,
+    },
     /// The sensor or the hand answers now and did not at the start-up.
     AnswersLate(Node),
     /// The zeroing of an arm was broken off.
@@ -199,6 +204,9 @@ impl fmt::Display for StartupError {
                 write!(formatter, "puck {} has restarted and counts anew: zero the arm", node.number())
             }
             StartupError::CountsJumped => formatter.write_str("the counts of a motor jumped: zero the arm"),
+            StartupError::BeyondStops { joint } => {
+                write!(formatter, "J{joint} is told to be beyond its stops: zero the arm")
+            }
             StartupError::SafetyVelocity { limit } => {
                 write!(formatter, "the safety module has a velocity limit VL2 of {limit}: it must be 1 to 4096 (1 m/s)")
             }

@@ -144,6 +144,7 @@ impl From<StartupError> for StartupFailure {
             StartupError::ZeroUnfinished => Self([20, 0]),
             StartupError::SafetyVelocity { limit } => at(21, Node::SAFETY_MODULE, limit),
             StartupError::SafetyTorque { limit } => at(22, Node::SAFETY_MODULE, limit),
+            StartupError::BeyondStops { joint } => Self([23, joint.into()]),
         }
     }
 }
@@ -177,6 +178,7 @@ impl StartupFailure {
             20 => StartupError::ZeroUnfinished,
             21 => StartupError::SafetyVelocity { limit: value },
             22 => StartupError::SafetyTorque { limit: value },
+            23 => StartupError::BeyondStops { joint: byte },
             _ => return None,
         })
     }

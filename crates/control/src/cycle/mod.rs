@@ -199,6 +199,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.joints.is_displaced()
     }
 
+    /// The caller knows that the zero is lost: as if a motor had begun to count anew.
+    #[cold]
+    pub fn lose_zero(&mut self) {
+        self.joints.displace();
+    }
+
     /// The counts of the motors as the loop knew them last; see [`JointEstimator::last_counts`].
     pub fn last_counts(&self) -> Option<[(puck::Counts, u8); JOINTS]> {
         self.joints.last_counts()

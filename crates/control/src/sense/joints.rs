@@ -160,6 +160,11 @@ impl<R: Real> JointEstimator<R> {
         self.displaced
     }
 
+    /// The positions do not refer to the zero of the arm, as after a jump: until a reset.
+    pub fn displace(&mut self) {
+        self.displaced = true;
+    }
+
     /// Takes the replies of one cycle. `None` until all seven motors have answered once in the same cycle.
     ///
     /// A jump is carried over where `torque_on` is true, because a step of the position would be a step of the torque.

@@ -268,6 +268,9 @@ impl DeviceController {
         if self.cycle.calibrate(*calibration).is_err() {
             return;
         }
+        if !self.startup.is_zeroed() {
+            self.cycle.lose_zero();
+        }
         self.phase = BusPhase::Cyclic(BackgroundPoll::new(safety));
         self.round = Round::new(self.startup.has_sensor());
         match self.startup.take_hand() {
@@ -436,6 +439,10 @@ impl DeviceController {
             && !self.ask_for_brakes(frame, now_us, io)
         {
             return;
+        }
+        let counts = self.cycle.last_counts().map(|motors| motors.map(|(counts, _)| counts));
+        if counts.is_some_and(|counts| self.startup.doubts_posture(&counts)) {
+            self.cycle.lose_zero();
         }
         let BusPhase::Cyclic(poll) = &mut self.phase else {
             return;

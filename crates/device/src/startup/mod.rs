@@ -210,8 +210,27 @@ impl Startup {
     #[cold]
     #[inline(never)]
     pub(crate) fn lose_zero(&mut self) {
+        self.lose_zero_by(StartupError::CountsJumped);
+    }
+
+    /// A zero by which a joint stands where its stops do not let it go is none: counts may jump while nobody looks, by
+    /// less than the arm could have turned. True if that has cost the zero now.
+    pub(crate) fn doubts_posture(&mut self, counts: &[Counts; 7]) -> bool {
+        let calibration = self.calibration.as_ref().filter(|_| self.zeroed);
+        let beyond = calibration.and_then(|calibration| home::beyond_stops(calibration, counts));
+        if let Some(joint) = beyond {
+            self.lose_zero_by(StartupError::BeyondStops { joint });
+        }
+        beyond.is_some()
+    }
+
+    #[cold]
+    fn lose_zero_by(&mut self, reason: StartupError) {
         self.owes_revocation |= self.doubt.is_none();
-        self.doubt.get_or_insert(StartupError::CountsJumped);
+        let doubt = *self.doubt.get_or_insert(reason);
+        if self.is_done() {
+            self.error = Some(doubt);
+        }
         self.zeroed = false;
         self.zeroed_at = None;
     }
@@ -440,7 +459,12 @@ impl Startup {
                 Ok(after(outlet.send(frame), Step::FirstPositions { until_us: None }))
             }
             Step::FirstPositions { until_us } => {
-                self.read_positions(until_us, Step::Done, outlet, |until_us| Step::FirstPositions { until_us })
+                let next =
+                    self.read_positions(until_us, Step::Done, outlet, |until_us| Step::FirstPositions { until_us })?;
+                if matches!(next, Next::Go(Step::Done)) {
+                    self.doubts_posture(&self.positions.map(Option::unwrap_or_default));
+                }
+                Ok(next)
             }
             Step::Done => Ok(Next::Stay),
             Step::Blocked { until_us } if outlet.now_us() < until_us => Ok(Next::Stay),

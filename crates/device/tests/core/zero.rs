@@ -11,6 +11,11 @@ fn restart_puck_4(bus: &mut Bus) {
     bus.pucks[3].position = Counts(bus.pucks[3].position.0 - 8_000);
 }
 
+/// Counts of motor 4, which turns 18 times as far as J4, the other way. J4 goes from -0.9 to 3.1 rad.
+fn counts_of_j4(angle: f64) -> Counts {
+    Counts((angle * -18.0 * 4096.0 / core::f64::consts::TAU) as i32)
+}
+
 /// Neither clearing nor arming leads on.
 fn assert_nothing_leads_on(core: &mut DeviceController, bus: &mut Bus) {
     for command in [Control::ClearFault, Control::Hold, Control::Gravity] {
@@ -59,6 +64,49 @@ fn g2_a_puck_that_had_to_be_woken_is_not_believed_whatever_the_safety_module_say
     assert!(!bus.safety_zero, "the safety module no longer says so either");
     assert_nothing_leads_on(&mut core, &mut bus);
     assert_zeroing_leads_on(&mut core, &mut bus);
+}
+
+#[test]
+fn g2_a_posture_beyond_the_stops_is_not_believed_whatever_the_safety_module_says() {
+    for (joint, is_believed) in [(-1.05, true), (3.25, true), (-1.2, false), (3.4, false)] {
+        let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
+        bus.pucks[3].position = counts_of_j4(joint);
+        bus.run(&mut core, 3.0);
+        assert_eq!(core.health().zeroed, is_believed, "{joint}");
+        if is_believed {
+            assert_eq!((core.stage(), core.health().blocked), (Stage::WaitingForActive, None), "{joint}");
+            continue;
+        }
+        assert_eq!(core.health().blocked, Some(StartupError::BeyondStops { joint: 4 }));
+        assert!(!bus.safety_zero, "the safety module no longer says so either");
+        bus.press_activate();
+        bus.run(&mut core, 0.2);
+        assert_nothing_leads_on(&mut core, &mut bus);
+        assert_zeroing_leads_on(&mut core, &mut bus);
+    }
+}
+
+#[test]
+fn g2_a_posture_that_comes_to_be_beyond_the_stops_is_not_believed_any_longer() {
+    for torque in [false, true] {
+        let (mut core, mut bus) = if torque { floating() } else { started() };
+        bus.press_activate();
+        bus.run(&mut core, 0.2);
+        // J4, led by a person as slowly as motors turn, to 3.4 rad.
+        while bus.pucks[3].position.0 > counts_of_j4(3.4).0 && core.health().blocked.is_none() {
+            bus.pucks[3].position.0 -= 40;
+            bus.run_slots(&mut core, 3);
+        }
+        let told = f64::from(bus.pucks[3].position.0) / f64::from(counts_of_j4(1.0).0);
+        assert!(told > 3.3, "{told}: stops are where cables stretch");
+        bus.run(&mut core, 0.1);
+        assert_eq!(core.health().blocked, Some(StartupError::BeyondStops { joint: 4 }), "torque: {torque}");
+        assert_eq!(core.health().fault, Fault::ImplausiblePosition);
+        if !torque {
+            assert_nothing_leads_on(&mut core, &mut bus);
+        }
+        assert_zeroing_leads_on(&mut core, &mut bus);
+    }
 }
 
 #[test]
@@ -154,8 +202,14 @@ fn keeps_zero(joint: usize, share: f64, jump: i32) -> bool {
     let turns = share * control::model::VELOCITY_MAX[joint] * control::model::JOINT_TO_MOTOR[joint][joint].abs();
     let (begin, from) = (bus.now_us, bus.pucks[joint].position.0);
     let mut jumped = 0;
-    while bus.now_us < begin + 4_000_000 {
+    let mut last_cycles = 300;
+    while bus.now_us < begin + 4_000_000 && last_cycles > 0 {
         bus.run_slots(&mut core, 1);
+        if [Stage::WaitingForActive, Stage::WaitingForZero].contains(&core.stage()) {
+            // No joint turns beyond its stops.
+            last_cycles -= 1;
+            continue;
+        }
         if bus.now_us > begin + 200_000 && bus.safety_mode == SafetyMode::EStop {
             bus.press_idle();
         }
@@ -167,6 +221,11 @@ fn keeps_zero(joint: usize, share: f64, jump: i32) -> bool {
     }
     let health = core.health();
     assert_eq!(health.blocked, (!health.zeroed).then_some(StartupError::CountsJumped), "the reason is told");
+    if !health.zeroed {
+        bus.press_activate();
+        bus.run(&mut core, 0.2);
+        assert_nothing_leads_on(&mut core, &mut bus);
+    }
     health.zeroed
 }
 
