@@ -30,6 +30,14 @@ fn zero_torques_reach_all_seven_motors_once() {
 }
 
 #[test]
+fn a_hand_alone_is_stopped_by_zero_torque_to_its_four_pucks_and_then_by_idle() {
+    let [zero, idle] = puck::hand_stop_frames().map(|frame| raw(&frame));
+    // Group 5; T is property 42 (0x2A), MODE is 8, and 0 is IDLE; 0x80 says SET.
+    assert_eq!(zero, (0x405, vec![0xAA, 0, 0, 0, 0, 0, 0, 0]));
+    assert_eq!((idle.0, &idle.1[..2], idle.1[2]), (0x405, &[0x88, 0][..], 0));
+}
+
+#[test]
 fn the_force_sensor_is_asked_and_tared_by_its_own_properties() {
     assert_eq!(raw(&get_wrench()), (0x008, vec![54]));
     assert_eq!(raw(&get_acceleration()), (0x008, vec![64]));
