@@ -8,6 +8,7 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, Command};
 use lab::error_code::ErrorCode;
 use lab::failure::Failure;
+use lab::input_file;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -67,7 +68,7 @@ impl Config {
         let failure = |cause: String| {
             Failure::new(ErrorCode::Configuration, format!("reading {}", path.display()), cause.trim_end().to_owned())
         };
-        let text = match std::fs::read_to_string(path) {
+        let text = match input_file::read_text(path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Self::default()),
             Err(error) => return Err(failure(error.to_string())),

@@ -253,3 +253,13 @@ fn names_that_are_no_unicode_are_written_and_reported() {
     run(&[word("check"), OsStr::from_bytes(b"no\xff")]).failure().code(2);
     run(&[OsStr::from_bytes(b"no\xff")]).failure().code(2);
 }
+
+/// A device that never ends would fill the memory of the machine.
+#[test]
+fn an_input_that_never_ends_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for line in ["check /dev/zero", "--device sil:faults=/dev/zero status", "--device sil: config restore /dev/zero"] {
+        let assert = tactus(folder.path(), line).failure();
+        assert!(stderr(&assert).contains("more than the 16 MiB"), "{line}: {}", stderr(&assert));
+    }
+}

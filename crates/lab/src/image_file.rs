@@ -4,8 +4,9 @@
 //! hello. An image is only taken for flashing if all it would write lies where it says images belong: never where the
 //! device keeps its primitives.
 
-use std::fs;
 use std::path::{Path, PathBuf};
+
+use crate::input_file;
 
 use link::ImageMetadata;
 use link::metadata::{METADATA_SECTION, MemoryRegion, MetadataError, chip};
@@ -115,7 +116,8 @@ impl ImageFile {
     /// It is not there, is no image, or says nothing about itself.
     pub fn read(path: &Path) -> Result<Self, ImageFileError> {
         let owned = || path.to_path_buf();
-        let bytes = fs::read(path).map_err(|source| ImageFileError::Unreadable { path: owned(), source })?;
+        let bytes = input_file::read(path, input_file::LONGEST_IMAGE)
+            .map_err(|source| ImageFileError::Unreadable { path: owned(), source })?;
         let no_image = |source| ImageFileError::NotAnImage { path: owned(), source };
         let file = object::read::elf::ElfFile32::<Endianness>::parse(&*bytes).map_err(no_image)?;
         let section = file.section_by_name(METADATA_SECTION).ok_or_else(|| ImageFileError::Silent { path: owned() })?;

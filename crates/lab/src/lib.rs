@@ -13,6 +13,7 @@ pub mod export;
 pub mod failure;
 pub mod fault_guide;
 pub mod image_file;
+pub mod input_file;
 pub mod learn;
 pub mod line_health;
 pub mod output_file;

@@ -192,7 +192,7 @@ mod work {
             let cause = format!("there is no object '{}'; there are {known}, and files NAME.toml", given.display());
             return Err(Failure::new(ErrorCode::UnknownObject, DOING, cause));
         }
-        let text = std::fs::read_to_string(given)
+        let text = lab::input_file::read_text(given)
             .map_err(|cause| Failure::of_file(ErrorCode::FileFailed, format!("{DOING}: {}", given.display()), cause))?;
         ObjectKind::from_toml(&text).map_err(|cause| {
             Failure::new(ErrorCode::ObjectInvalid, format!("{DOING} refused {}", given.display()), cause)

@@ -11,6 +11,7 @@ use super::{ErrorCode, Failure, Global, Table, connection, files};
 use lab::client::Client;
 use lab::device::Device;
 use lab::error::Capability;
+use lab::input_file;
 use lab::settings::{self, Change, Key, Setting, Settings, SettingsFile, WriteError};
 
 /// Actions on the settings that the device keeps.
@@ -288,7 +289,7 @@ fn compared(client: &Client<Device>, changes: &[Change], missing: Vec<Key>) -> C
 }
 
 fn read_text(path: &Path, doing: &str) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|cause| {
+    input_file::read_text(path).map_err(|cause| {
         if cause.kind() == std::io::ErrorKind::InvalidData {
             return invalid("it is not text", path, doing);
         }

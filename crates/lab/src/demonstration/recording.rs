@@ -5,6 +5,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::input_file;
+
 use super::error::{Place, RecordingError};
 use super::layout;
 use super::origin::Origin;
@@ -85,7 +87,8 @@ impl Recording {
     /// # Errors
     /// The first thing that is wrong, with its line and column.
     pub fn read(file: &Path) -> Result<Recording, RecordingError> {
-        let bytes = std::fs::read(file).map_err(|cause| RecordingError::Unreadable { file: file.to_owned(), cause })?;
+        let bytes = input_file::read(file, input_file::LONGEST_RECORDING)
+            .map_err(|cause| RecordingError::Unreadable { file: file.to_owned(), cause })?;
         Recording::parse(file, &bytes)
     }
 

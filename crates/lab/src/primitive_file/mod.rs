@@ -22,7 +22,7 @@ pub use dmp::{Hemisphere, OrientationError};
 pub use error::PrimitiveFileError;
 
 use crate::demonstration::recording::checksum;
-use crate::output_file;
+use crate::{input_file, output_file};
 
 /// Version of the layout. A file that names another one is refused.
 pub const SCHEMA: &str = "tactus-primitive/1";
@@ -232,7 +232,7 @@ impl PrimitiveFile {
     /// The first thing that is wrong.
     pub fn read(file: &Path) -> Result<PrimitiveFile, PrimitiveFileError> {
         let text =
-            std::fs::read_to_string(file).map_err(|cause| PrimitiveFileError::Io { file: file.to_owned(), cause })?;
+            input_file::read_text(file).map_err(|cause| PrimitiveFileError::Io { file: file.to_owned(), cause })?;
         PrimitiveFile::parse(file, &text)
     }
 

@@ -12,6 +12,7 @@ use control::{Fault, State};
 use dmp::CanonicalSystem;
 
 use crate::demonstration::{Recording, RecordingError};
+use crate::input_file;
 use crate::primitive_file::PrimitiveFile;
 use crate::procedure::FlagCounts;
 use crate::tracking::Tracking;
@@ -90,7 +91,8 @@ impl ReportedRun {
     /// # Errors
     /// [`RecordingError`].
     pub fn read(file: &Path, primitive: Option<&PrimitiveFile>) -> Result<ReportedRun, RecordingError> {
-        let bytes = std::fs::read(file).map_err(|cause| RecordingError::Unreadable { file: file.to_owned(), cause })?;
+        let bytes = input_file::read(file, input_file::LONGEST_RECORDING)
+            .map_err(|cause| RecordingError::Unreadable { file: file.to_owned(), cause })?;
         let recording = Recording::parse(file, &bytes)?;
         let text = String::from_utf8_lossy(&bytes);
         let notes = text.lines().map_while(|line| line.strip_prefix('#')).map(|note| note.trim().to_owned()).collect();

@@ -4,7 +4,9 @@
 //! orders, figures and bars are for `cargo xtask faults`. Times count from the first torque on the bus that is not
 //! zero, in a scenario that begins at the power-up from there.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use crate::input_file;
 
 use serde::Deserialize;
 use sim::Plant;
@@ -40,7 +42,7 @@ impl FaultScript {
         let numbered = name.rsplit_once(':').and_then(|(path, number)| Some((path, number.parse().ok()?)));
         let (path, number): (&str, usize) = numbered.unwrap_or((name, 1));
         let failed = |cause: String| SimulationError::Faults(PathBuf::from(path), cause);
-        let text = std::fs::read_to_string(path).map_err(|cause| failed(cause.to_string()))?;
+        let text = input_file::read_text(Path::new(path)).map_err(|cause| failed(cause.to_string()))?;
         let file: File = toml::from_str(&text).map_err(|cause| failed(cause.to_string()))?;
         let scenario = number.checked_sub(1).and_then(|index| file.scenario.into_iter().nth(index));
         let scenario = scenario.ok_or_else(|| failed(format!("there is no scenario {number}")))?;

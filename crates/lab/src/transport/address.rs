@@ -188,6 +188,6 @@ mod tests {
         for part in ["speed=2", "fault=", "report", "cancellation=maybe", "revision=2003", "revision=0x12345"] {
             assert_eq!(parse(&format!("board:seed=1,{part}")), Err(AddressError::BoardOption(part.into())));
         }
-        assert_eq!(parse("sim:seed=-1"), Err(AddressError::Number("-1".into())));
+        assert_eq!(parse("sim:seed=-1"), Err(AddressError::Number("seed=-1".into())));
     }
 }

@@ -22,7 +22,7 @@ pub enum AddressError {
     )]
     BoardOption(String),
     /// A value that is no number.
-    #[error("'{0}' is not a whole number")]
+    #[error("'{0}': a whole number is expected, without a sign")]
     Number(String),
     /// A device number that there is not.
     #[error("devices on a CAN bus have the numbers 0 to 15, not '{0}'")]

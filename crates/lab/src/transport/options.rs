@@ -89,10 +89,10 @@ impl SimulatorOptions {
         for part in text.split(',').filter(|part| !part.is_empty()) {
             match part.split_once('=').filter(|(_, value)| !value.is_empty()) {
                 Some(("seed", value)) => {
-                    options.seed = Some(value.parse().map_err(|_| AddressError::Number(value.to_owned()))?);
+                    options.seed = Some(value.parse().map_err(|_| AddressError::Number(format!("seed={value}")))?);
                 }
                 Some(("arm", value)) => {
-                    options.arm = Some(value.parse().map_err(|_| AddressError::Number(value.to_owned()))?);
+                    options.arm = Some(value.parse().map_err(|_| AddressError::Number(format!("arm={value}")))?);
                 }
                 Some(("world", value)) => options.world = Some(value.to_owned()),
                 Some(("line", "serial")) => options.line = LineKind::Serial,
