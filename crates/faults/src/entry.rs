@@ -271,7 +271,7 @@ impl Entry {
             if let Some(name) = unknown_state.or(unknown_fault) {
                 return Err(format!("{}: no state or fault '{name}'", scenario.name));
             }
-            if scenario.sweep.is_some_and(|sweep| sweep.count == 0 || !(sweep.by > 0.0)) {
+            if scenario.sweep.is_some_and(|sweep| sweep.count == 0 || sweep.by.is_nan() || sweep.by <= 0.0) {
                 return Err(format!("{}: a sweep of no arms, or of no time", scenario.name));
             }
             if scenario.known.is_some() && self.today == "held" {
