@@ -8,7 +8,7 @@ use std::path::Path;
 pub const LONGEST_RECORDING: u64 = 1 << 30;
 /// Longest image of a firmware (bytes).
 pub const LONGEST_IMAGE: u64 = 64 << 20;
-/// Longest primitive, configuration or script (bytes). The largest primitive has 1 MB.
+/// Longest primitive, configuration or script (bytes). A primitive of 50 kernels has 0.1 MB.
 pub const LONGEST_TEXT: u64 = 16 << 20;
 
 /// Reads a file of at most so many bytes. A device that never ends, such as `/dev/zero`, would fill the memory.
