@@ -157,6 +157,18 @@ fn empty_files_and_folders_are_refused() {
 }
 
 #[test]
+fn a_file_in_utf_16_or_packed_is_called_so_and_not_a_wrong_count_of_columns() {
+    let text = "# a note\nt_s,q1_rad\n0,1\n";
+    let wide: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let mut packed = text.as_bytes().to_vec();
+    packed.insert(14, 0);
+    for (bytes, line) in [(wide, 1), (packed, 2)] {
+        let error = Recording::parse(Path::new("a.csv"), &bytes).unwrap_err();
+        assert!(matches!(error, RecordingError::NotText { line: found, .. } if found == line), "{error}");
+    }
+}
+
+#[test]
 fn bytes_that_are_no_text_are_refused_and_never_panic() {
     let mut state = 1_u32;
     for length in [10, 1000, 20_000] {

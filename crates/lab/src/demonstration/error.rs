@@ -42,6 +42,14 @@ pub enum RecordingError {
         /// The file.
         file: PathBuf,
     },
+    /// The file has bytes of zero: it is packed, or in UTF-16, or no text at all.
+    #[error("{file}: line {line}: this is no text in UTF-8, but a packed or binary file, or UTF-16", file = file.display())]
+    NotText {
+        /// The file.
+        file: PathBuf,
+        /// Line of the first such byte.
+        line: u64,
+    },
     /// The header names the same column twice.
     #[error("{place}: the column appears a second time")]
     DuplicateColumn {

@@ -290,6 +290,10 @@ struct Table<'a> {
 
 impl<'a> Table<'a> {
     fn parse(file: &'a Path, bytes: &[u8]) -> Result<Table<'a>, RecordingError> {
+        if let Some(zero) = bytes.iter().position(|byte| *byte == 0) {
+            let before = bytes.iter().take(zero).filter(|byte| **byte == b'\n').count();
+            return Err(RecordingError::NotText { file: file.to_owned(), line: before as u64 + 1 });
+        }
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .flexible(true)
