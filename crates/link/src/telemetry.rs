@@ -1,6 +1,6 @@
 //! `Telemetry`: one control cycle for the host, and in short form for the fault memory.
 //!
-//! A new field stands at the end of the struct. A real one is also named in [`Telemetry::values`] and has its steps in
+//! A new field stands at the end of the struct. A real one is also named in `Telemetry::values` and has its steps in
 //! `STEPS`; another one has its place in the words at the beginning of the short form.
 
 use serde::{Deserialize, Serialize};
@@ -44,7 +44,7 @@ pub struct Telemetry {
     pub surprise: f32,
 }
 
-/// Steps per unit of each run of [`Telemetry::values`], with its length. More than 32767 steps become as many.
+/// Steps per unit of each run of `Telemetry::values`, with its length. More than 32767 steps become as many.
 const STEPS: [(usize, f32); 12] = [
     (1, 30_000.0), // phase
     (7, 8000.0),   // q: 0.125 mrad
