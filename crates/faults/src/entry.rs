@@ -83,10 +83,10 @@ impl Scenario {
 
     /// The scenario for each arm of the sweep; itself where there is none.
     pub(crate) fn each(&self) -> impl Iterator<Item = Self> {
-        let Sweep { count, by } = self.sweep.unwrap_or(Sweep { count: 1, by: 0.0 });
+        let Sweep { count, by, keep } = self.sweep.unwrap_or(Sweep { count: 1, by: 0.0, keep: 0 });
         (0..count).map(move |number| {
             let mut shifted = self.clone();
-            shifted.inject.iter_mut().for_each(|injection| injection.at += f64::from(number) * by);
+            shifted.inject.iter_mut().skip(keep).for_each(|injection| injection.at += f64::from(number) * by);
             shifted
         })
     }
@@ -100,6 +100,9 @@ pub struct Sweep {
     pub count: u32,
     /// Time from the faults of one arm to those of the next, s.
     pub by: f64,
+    /// So many faults, the first ones, befall every arm at the same time.
+    #[serde(default)]
+    pub keep: usize,
 }
 
 /// States in which a scenario begins.

@@ -106,8 +106,8 @@ fn go_through(scenario: &Scenario, kind: SimulatorKind, verdict: &mut Verdict) -
         let failure = judged(&mut bench::arm(&arm, true, kind)?, &arm, nominal.as_ref(), &mut one).err();
         one.failures.extend(failure.map(|failure| failure.to_string()));
         if scenario.sweep.is_some() && !one.holds() {
-            let first = arm.inject.first().map_or(0.0, |injection| injection.at);
-            one.failures.push(format!("with the first fault at {first:.4} s"));
+            let last = arm.inject.last().map_or(0.0, |injection| injection.at);
+            one.failures.push(format!("with the last fault at {last:.4} s"));
         }
         verdict.join(one);
         if !verdict.holds() {

@@ -88,6 +88,8 @@ impl Role {
     pub const HAND: u16 = 5;
     /// Kind of a force/torque sensor.
     pub const FORCE_TORQUE: u16 = 6;
+    /// Option of a motor puck with a magnetic encoder on its serial input: from VERS 118 on MECH is an absolute angle.
+    pub const ABSOLUTE_ANGLE: u16 = 0x0100;
 
     /// From the value of ROLE: the low 16 bits.
     #[must_use]
@@ -105,6 +107,12 @@ impl Role {
     #[must_use]
     pub const fn has_magnetic_encoder(self) -> bool {
         self.0 & 0x0700 != 0
+    }
+
+    /// [`Role::ABSOLUTE_ANGLE`].
+    #[must_use]
+    pub const fn has_absolute_angle(self) -> bool {
+        self.0 & Self::ABSOLUTE_ANGLE != 0
     }
 
     /// 0x0800: strain gauge.

@@ -75,7 +75,7 @@ impl Puck {
         let torque_group = if index < 4 { Group::ARM_TORQUES } else { Group::WRIST_TORQUES };
         let factory = [
             (Property::Vers, i32::from(config.version)),
-            (Property::Role, i32::from(Role::MOTOR)),
+            (Property::Role, i32::from(Role::MOTOR | Role::ABSOLUTE_ANGLE)),
             (Property::Sn, 1000 + i32::from(node.number())),
             (Property::Id, i32::from(node.number())),
             (Property::Error, 0),

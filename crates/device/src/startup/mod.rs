@@ -8,6 +8,7 @@
 //! verify, read, zero, tare, one position read, then the cyclic loop. Each step sends through an outlet that may refuse
 //! (a pause is not over); it then simply tries again in the next slot.
 
+mod angles;
 mod continuity;
 mod hand;
 mod home;
@@ -21,6 +22,7 @@ use puck::{Counts, Node, PropertyId, Reply, force_torque, set};
 use crate::bus::{Answer, Exchange, Outlet};
 use crate::command::Refusal;
 use crate::stage::{Stage, StartupError};
+use angles::MotorAngles;
 use continuity::Continuity;
 use hand::HandSurvey;
 pub(crate) use survey::SafetyProperties;
@@ -95,8 +97,12 @@ enum Step {
     Tare,
     /// IFAULT before polling begins.
     IgnoreFirstFaults,
-    /// One position read before the loop.
+    /// The positions before the angles are read.
     FirstPositions { until_us: Option<u64> },
+    /// MECH of each motor that has an absolute angle.
+    ReadAngle { joint: u8 },
+    /// The positions after that.
+    LastPositions { until_us: Option<u64> },
     /// Done: the cyclic loop has the bus.
     Done,
     /// Failed; rest, then begin anew.
@@ -130,6 +136,7 @@ pub(crate) struct Startup {
     stopping: Option<Stopping>,
     /// Begun after the cyclic loop: counts that a person has zeroed are not to change unseen.
     continuity: Option<Continuity>,
+    angles: MotorAngles,
     exchange: Exchange,
     survey: Survey,
     hand: HandSurvey,
@@ -173,6 +180,7 @@ impl Startup {
             step: Step::ZeroTorques { frame: 0 },
             stopping: None,
             continuity: None,
+            angles: MotorAngles::default(),
             exchange: Exchange::default(),
             survey: Survey::new(),
             hand: HandSurvey::default(),
@@ -200,6 +208,7 @@ impl Startup {
         *self = Startup {
             doubt: self.doubt,
             tared: self.tared,
+            angles: self.angles,
             stopping: Some(Stopping::default()),
             continuity: Some(Continuity::since(now_us, last)),
             ..Startup::new()
@@ -257,7 +266,11 @@ impl Startup {
             | Step::CheckPositions { .. }
             | Step::TellZero
             | Step::ConfirmZero => Stage::Zeroing,
-            Step::Tare | Step::IgnoreFirstFaults | Step::FirstPositions { .. } => Stage::Preparing,
+            Step::Tare
+            | Step::IgnoreFirstFaults
+            | Step::FirstPositions { .. }
+            | Step::ReadAngle { .. }
+            | Step::LastPositions { .. } => Stage::Preparing,
             Step::Done if !self.zeroed => Stage::WaitingForZero,
             Step::Done => Stage::WaitingForActive,
             Step::Blocked { .. } => Stage::Blocked,
@@ -324,7 +337,9 @@ impl Startup {
             Reply::Position { node, primary, .. } => {
                 let asked = matches!(
                     self.step,
-                    Step::CheckPositions { until_us: Some(_) } | Step::FirstPositions { until_us: Some(_) }
+                    Step::CheckPositions { until_us: Some(_) }
+                        | Step::FirstPositions { until_us: Some(_) }
+                        | Step::LastPositions { until_us: Some(_) }
                 );
                 let Some(joint) = node.arm_index() else { return false };
                 let continuity = self.continuity.as_mut();
@@ -375,10 +390,11 @@ impl Startup {
     fn looks(&mut self, outlet: &mut impl Outlet) -> bool {
         match self.step {
             Step::ZeroTorques { .. } | Step::Wake { .. } | Step::Silence { .. } => false,
-            Step::CheckPositions { .. } | Step::FirstPositions { .. } => false,
+            Step::CheckPositions { .. } | Step::FirstPositions { .. } | Step::LastPositions { .. } => false,
             Step::WritePosition { .. } => {
                 // From here on the counts are those that a person says.
                 self.continuity = None;
+                self.angles.forget();
                 false
             }
             step => {
@@ -437,18 +453,7 @@ impl Startup {
                 let frame = set(Node::SAFETY_MODULE, self.safety()?.zero, 1);
                 Ok(after(outlet.send(frame), Step::ConfirmZero))
             }
-            Step::ConfirmZero => Ok(match self.ask_safety(self.safety()?.zero, outlet)? {
-                None => Next::Stay,
-                Some(0) => return Err(StartupError::SafetyNotZeroed),
-                Some(_) => {
-                    self.zeroed = true;
-                    self.doubt = None;
-                    // A person stands beside it, and nothing presses.
-                    self.tared = false;
-                    self.zeroed_at = Some(self.home);
-                    Next::Go(Step::Tare)
-                }
-            }),
+            Step::ConfirmZero => self.confirm_zero(outlet),
             Step::Tare if !self.has_sensor() || self.tared => Ok(Next::Go(Step::IgnoreFirstFaults)),
             Step::Tare => {
                 self.tared = outlet.send(force_torque::tare());
@@ -459,19 +464,21 @@ impl Startup {
                 Ok(after(outlet.send(frame), Step::FirstPositions { until_us: None }))
             }
             Step::FirstPositions { until_us } => {
+                let next = Step::ReadAngle { joint: 0 };
+                self.read_positions(until_us, next, outlet, |until_us| Step::FirstPositions { until_us })
+            }
+            Step::ReadAngle { joint } => self.read_angle(joint, outlet),
+            Step::LastPositions { until_us } => {
                 let next =
-                    self.read_positions(until_us, Step::Done, outlet, |until_us| Step::FirstPositions { until_us })?;
-                if matches!(next, Next::Go(Step::Done)) {
-                    self.doubts_posture(&self.positions.map(Option::unwrap_or_default));
-                }
-                Ok(next)
+                    self.read_positions(until_us, Step::Done, outlet, |until_us| Step::LastPositions { until_us })?;
+                Ok(if matches!(next, Next::Go(Step::Done)) { self.compare_angles() } else { next })
             }
             Step::Done => Ok(Next::Stay),
             Step::Blocked { until_us } if outlet.now_us() < until_us => Ok(Next::Stay),
             Step::Blocked { .. } => {
                 let (error, doubt, hand) = (self.error, self.doubt, self.hand.again());
-                let (continuity, tared) = (self.continuity, self.tared);
-                *self = Startup { error, doubt, hand, continuity, tared, ..Startup::new() };
+                let (continuity, tared, angles) = (self.continuity, self.tared, self.angles);
+                *self = Startup { error, doubt, hand, continuity, tared, angles, ..Startup::new() };
                 Ok(Next::Stay)
             }
         }

@@ -16,6 +16,8 @@ pub(crate) struct Seen {
     pub(crate) status: Option<i32>,
     /// VERS, as last read: of the monitor while STAT is 0.
     pub(crate) version: Option<i32>,
+    /// ROLE of a puck of the arm.
+    pub(crate) role: Option<Role>,
 }
 
 /// Properties that are read of each arm puck, in this order.
@@ -91,7 +93,10 @@ pub(crate) struct Survey {
 impl Survey {
     /// Nothing known.
     pub(crate) const fn new() -> Survey {
-        Survey { nodes: [Seen { status: None, version: None }; NODES], drives: [[0; DRIVE_PROPERTIES.len()]; 7] }
+        Survey {
+            nodes: [Seen { status: None, version: None, role: None }; NODES],
+            drives: [[0; DRIVE_PROPERTIES.len()]; 7],
+        }
     }
 
     /// Answers of a node so far.
@@ -118,6 +123,16 @@ impl Survey {
     /// True if the node answered in the latest enumeration.
     pub(crate) fn is_present(&self, node: Node) -> bool {
         self.seen(node).status.is_some()
+    }
+
+    /// The puck of the arm answered with this ROLE.
+    pub(crate) fn note_role(&mut self, node: Node, role: i32) {
+        self.entry(node).role = Some(Role::from_value(role));
+    }
+
+    /// Counts of a motor's revolution (CTS), as read; 0 before that.
+    pub(crate) fn counts_per_revolution(&self, joint: usize) -> i32 {
+        self.drives.get(joint).map_or(0, |[counts, ..]| *counts)
     }
 
     /// The first puck of the arm that is missing.

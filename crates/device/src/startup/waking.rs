@@ -153,6 +153,7 @@ impl Startup {
                     return Ok(Next::Stay);
                 };
                 self.survey.check_role(node, role)?;
+                self.survey.note_role(node, role);
                 Ok(Next::Go(next))
             }
         }

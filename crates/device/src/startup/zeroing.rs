@@ -125,6 +125,22 @@ impl Startup {
         Ok(next)
     }
 
+    /// The safety module is asked if it has taken the zero.
+    pub(super) fn confirm_zero(&mut self, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
+        Ok(match self.ask_safety(self.safety()?.zero, outlet)? {
+            None => Next::Stay,
+            Some(0) => return Err(StartupError::SafetyNotZeroed),
+            Some(_) => {
+                self.zeroed = true;
+                self.doubt = None;
+                // A person stands beside it, and nothing presses.
+                self.tared = false;
+                self.zeroed_at = Some(self.home);
+                Next::Go(Step::Tare)
+            }
+        })
+    }
+
     /// One position request to the arm; goes on to `done` when all seven have answered.
     pub(super) fn read_positions(
         &mut self,

@@ -15,7 +15,7 @@ use pinned_init::InPlaceWrite;
 use puck::device::{force_frame, position_frame, reply16, reply32, safety_broadcast, torque_frame};
 use puck::{
     Action, CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId, PropertyTable, PuckTorque,
-    RawWrench, Request, SafetyMode, Status,
+    RawWrench, Request, Role, SafetyMode, Status,
 };
 
 /// From the last bit of a request to the first of its answer, us.
@@ -34,6 +34,8 @@ pub(crate) struct Puck {
     pub(crate) awake_at: Option<u64>,
     pub(crate) version: i32,
     pub(crate) position: Counts,
+    /// Counts less the absolute angle of the motor; `None`: this puck has no such encoder.
+    pub(crate) beyond_angle: Option<i32>,
     pub(crate) mode: MotorMode,
     pub(crate) torque: PuckTorque,
     pub(crate) groups: [i32; 3],
@@ -59,6 +61,7 @@ impl Puck {
             awake_at: None,
             version: 200,
             position: Counts(100 + joint as i32),
+            beyond_angle: Some(-1234 * joint as i32),
             mode: MotorMode::Idle,
             torque: PuckTorque::ZERO,
             groups: [0, if wrist { 2 } else { 1 }, 4],
@@ -76,7 +79,8 @@ impl Puck {
     fn value(&self, property: Property, awake: bool, joint: usize) -> Option<i32> {
         Some(match property {
             Property::Stat => if awake { Status::Ready } else { Status::Reset }.value(),
-            Property::Role => 0,
+            Property::Role => self.beyond_angle.map_or(0, |_| Role::ABSOLUTE_ANGLE.into()),
+            Property::Mech => (self.position.0 - self.beyond_angle?).rem_euclid(4096),
             Property::Vers => {
                 if awake {
                     self.version
@@ -423,6 +427,7 @@ impl Bus {
                 let active = puck.mode != MotorMode::Idle && now_us > self.pressed_us + 100_000;
                 assert!(!active, "zeroed under torque");
                 if !puck.ignores_position_writes {
+                    puck.beyond_angle = puck.beyond_angle.map(|counts| counts + value - puck.position.0);
                     puck.position = Counts(value);
                 }
             }

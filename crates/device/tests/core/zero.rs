@@ -4,7 +4,7 @@ use control::{Command as Control, Fault, State};
 use device::{Command, Controller, DeviceController, EventKind, Refusal, Stage, StartupError};
 use puck::{Counts, Node, SafetyMode};
 
-use crate::double::{Bus, HOME, floating, silent_device, started};
+use crate::double::{Bus, HOME, Puck, floating, silent_device, started};
 
 /// Puck 4 begins to count anew, by so much that its joint seems 0.7 rad away.
 fn restart_puck_4(bus: &mut Bus) {
@@ -237,6 +237,70 @@ fn g2_an_arm_that_is_turned_by_hand_while_the_bus_is_started_anew_keeps_its_zero
         }
         assert!(!keeps_zero(joint, 0.0, 4_000), "M{} jumps", joint + 1);
     }
+}
+
+/// G2: under the emergency stop the counts of a motor jump by less than it could have turned since they were looked at.
+/// True if the arm is still zeroed when the bus has been started anew.
+fn believes_jump(joint: usize, jump: i32, puck: fn(&mut Puck)) -> bool {
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
+    bus.pucks.iter_mut().for_each(puck);
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    bus.press_activate();
+    bus.run_until(&mut core, Stage::Ready);
+    bus.safety_mode = SafetyMode::EStop;
+    bus.run(&mut core, 0.1);
+    // The counter jumps, the motor does not turn.
+    let puck = &mut bus.pucks[joint];
+    puck.position = Counts(puck.position.0 + jump);
+    puck.beyond_angle = puck.beyond_angle.map(|counts| counts + jump);
+    bus.run(&mut core, 0.2);
+    bus.press_idle();
+    bus.run(&mut core, 4.0);
+    let health = core.health();
+    assert_eq!(health.blocked, (!health.zeroed).then_some(StartupError::CountsJumped), "the reason is told");
+    if !health.zeroed {
+        bus.press_activate();
+        bus.run(&mut core, 0.2);
+        assert_nothing_leads_on(&mut core, &mut bus);
+        assert_zeroing_leads_on(&mut core, &mut bus);
+    }
+    health.zeroed
+}
+
+#[test]
+fn g2_a_jump_that_could_have_been_a_motion_is_told_by_the_absolute_angle_of_the_motor() {
+    for joint in 0..7 {
+        assert!(believes_jump(joint, 0, |_| {}), "M{} stands", joint + 1);
+        for jump in [500, -2_000] {
+            assert!(!believes_jump(joint, jump, |_| {}), "M{} by {jump}", joint + 1);
+        }
+    }
+    assert!(!believes_jump(0, 500, |puck| puck.version = 118), "the first firmware that tells it");
+    // What nothing tells: decision 0107.
+    assert!(believes_jump(0, 500, |puck| puck.version = 117), "firmware that does not");
+    assert!(believes_jump(0, 500, |puck| puck.beyond_angle = None), "no such encoder");
+    assert!(believes_jump(0, 4096, |_| {}), "by a whole revolution");
+}
+
+/// G2: the counts of a second zero differ from those of the first, and the motors have not turned.
+#[test]
+fn g2_a_second_zero_is_not_compared_with_the_angles_of_the_first() {
+    let (mut core, mut bus) = started();
+    bus.press_idle();
+    bus.run(&mut core, 0.2);
+    let home = [0.5, -1.9, 0.1, 2.8, 0.1, 0.1, 0.1];
+    bus.commands.push_back(Command::Zero { home });
+    bus.run(&mut core, 0.05);
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    assert!(core.health().zeroed);
+    // It is the one that later start-ups compare with.
+    bus.safety_mode = SafetyMode::EStop;
+    bus.run(&mut core, 0.3);
+    bus.press_idle();
+    bus.run(&mut core, 4.0);
+    assert!(core.health().zeroed && core.health().blocked.is_none());
 }
 
 /// G2: a zeroing that breaks off has told some motors where they stand and others not. The safety module had an older

@@ -95,6 +95,7 @@ fn every_bit_of_a_role_means_one_thing() {
         assert_eq!(role, Role(expected));
         assert_eq!(role.kind(), if bit < 5 { 1 << bit } else { 0 }, "bit {bit}");
         assert_eq!(role.has_magnetic_encoder(), (8..11).contains(&bit), "bit {bit}");
+        assert_eq!(role.has_absolute_angle(), bit == 8, "bit {bit}");
         assert_eq!(role.has_strain_gauge(), bit == 11, "bit {bit}");
         assert_eq!(role.has_tactile_array(), bit == 12, "bit {bit}");
         assert_eq!(role.has_joint_encoder(), bit == 14, "bit {bit}");
