@@ -84,7 +84,8 @@ Examples:
 pub(super) const CALIBRATE: &str = "\
 Examples:
   tactus --device unix:tactus.sock calibrate show
-  tactus --device sil:arm=9 calibrate gravity";
+  tactus --device sil:arm=9 calibrate gravity
+  tactus --device unix:tactus.sock calibrate payload hand";
 /// `hand`
 pub(super) const HAND: &str = "\
 Examples:

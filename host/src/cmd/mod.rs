@@ -25,6 +25,7 @@ pub mod logs;
 pub mod manual;
 pub mod monitor;
 pub mod output;
+mod payload;
 pub mod plot;
 pub mod preflight;
 mod progress;
