@@ -21,7 +21,7 @@ use crate::units::{JointPositions, JointTorques, JointVelocities, Pose, Vector6,
 pub(super) const ARMING: u16 = periods(0.5);
 
 /// Speed of the hand up to which the arm floats freely (m/s).
-const TAUGHT_SPEED: f64 = 0.18;
+pub(super) const TAUGHT_SPEED: f64 = 0.18;
 
 /// Speed of the hand from which it is damped as in a soft stop (m/s); in between the damping rises. 0.25 m/s, the
 /// reduced speed of the standards for work beside a person, lies in between: an arm that was shoved falls below it by
@@ -253,7 +253,7 @@ fn speed_load<R: Real>(frames: &Frames<R>, dq: &JointVelocities<R>) -> R {
 }
 
 /// Speed of the hand (m/s).
-fn hand_speed<R: Real>(measured: &Measured<'_, R>) -> R {
+pub(super) fn hand_speed<R: Real>(measured: &Measured<'_, R>) -> R {
     sqrt(measured.frames.jacobian().twist(&measured.state.dq.0).fixed_rows::<3>(0).norm_squared())
 }
 

@@ -400,6 +400,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             self.supervisor.latch(Fault::ImplausiblePosition);
         }
         if !law.has_torque() {
+            self.catch(measured);
             return;
         }
         self.bounds.tighten(&self.model, &measured.state.q);
@@ -433,6 +434,15 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         };
         if let Some((trigger, fault)) = self.monitor.check(law, measured.state, &seen) {
             self.trigger(trigger, fault, Some(measured));
+        }
+    }
+
+    /// Asks for brakes where an arm that is activated falls before anybody has commanded it.
+    fn catch(&mut self, measured: &Measured<'_, R>) {
+        let active = self.is_active();
+        let Law::Off { brakes, .. } = &mut self.law else { return };
+        if active && *brakes == 0 && laws::hand_speed(measured) > R::constant(laws::TAUGHT_SPEED) {
+            *brakes = BRAKE_WORDS;
         }
     }
 

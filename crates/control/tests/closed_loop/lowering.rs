@@ -61,6 +61,23 @@ fn g7_a_released_arm_sinks_slowly_until_it_rests_and_can_be_armed_again() {
 }
 
 #[test]
+fn g7_an_activated_arm_that_falls_before_anybody_commands_it_is_braked() {
+    for (posture, friction) in [(OUT, 1.3), (OUT, 0.3), (START, 0.3), (GOAL, 0.0)] {
+        let mut rig = Rig::<f32>::new(posture, 1);
+        rig.plant.coulomb *= friction;
+        let mut speed = 0.0;
+        while !rig.tick(None).actuation.requests_idle() {
+            speed = hand_speed(&rig);
+            assert!(speed < 0.4, "{posture:?}, friction {friction}: {speed} m/s");
+        }
+        println!("{posture:?}, friction {friction}: {speed:.2} m/s after {} cycles", rig.number);
+        rig.plant.dq.fill(0.0);
+        brakes_are_asked_for_until_they_are_on(&mut rig);
+        assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None));
+    }
+}
+
+#[test]
 fn h3_an_arm_that_is_released_while_it_moves_is_braked_and_lowered() {
     for seconds in [0.3, 1.0, 2.0] {
         for run in [false, true] {

@@ -238,7 +238,12 @@ impl<R: Real> Rig<R> {
             hand.receive(output.actuation.hand_frame());
             hand.advance();
         }
-        self.plant.advance();
+        if self.safety == SafetyMode::Active {
+            self.plant.advance();
+        } else {
+            // The pucks brake.
+            self.plant.dq.fill(0.0);
+        }
         self.number += 1;
         self.last = Some(output);
         output
