@@ -170,7 +170,7 @@ mod tests {
     const J4: usize = 3;
     const M4: u8 = 1 << J4;
 
-    /// What a law asks of J4: torques in parts of the model's friction.
+    /// Torques of a law at J4, in parts of the model's friction, and the motion it asks for (rad/s).
     #[derive(Clone, Copy)]
     struct Asked {
         feedback: f64,
