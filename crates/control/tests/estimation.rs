@@ -59,6 +59,139 @@ fn a8_a_motor_that_turned_fast_and_stands_still_to_the_count_is_missing() {
     assert!(!state.stuck, "without torque nothing is concluded");
 }
 
+/// Largest change of the speed of a motor that is believed at once (counts a cycle).
+fn gate(motor: usize) -> i32 {
+    let limits = model::JOINT_TO_MOTOR[motor].iter().zip(model::VELOCITY_MAX);
+    let fastest: f64 = limits.map(|(ratio, limit)| ratio.abs() * limit).sum();
+    (1.5 * fastest * 4096.0 / std::f64::consts::TAU / RATE) as i32 + 1
+}
+
+/// An estimator of an arm of which one motor turns by so many counts a cycle, and its last replies.
+fn turning(motor: usize, step: i32) -> (JointEstimator<f64>, Replies) {
+    let mut estimator = JointEstimator::<f64>::new(&nominal());
+    let mut sample: Replies = [Some(Counts(0)); 7];
+    let mut counts = 0;
+    for cycle in 0..50 {
+        counts += step.min(cycle * gate(motor) / 2);
+        sample[motor] = Some(Counts(counts).wrapped());
+        let state = estimator.update(&sample, true).expect("known");
+        assert!(!state.stuck && state.missing == 0, "M{}: {step} counts, cycle {cycle}", motor + 1);
+    }
+    (estimator, sample)
+}
+
+#[test]
+fn a8_a_motor_of_the_arm_between_an_eighth_and_the_whole_of_its_gate_does_not_stop_dead_and_one_of_the_wrist_may() {
+    for motor in 0..7 {
+        let gate = gate(motor);
+        for (step, is_fast) in [(gate / 8, false), (gate / 8 + 1, true), (gate, true), (gate + 1, false)] {
+            let (mut estimator, sample) = turning(motor, step);
+            let state = estimator.update(&sample, true).expect("known");
+            let stuck = is_fast && motor < 4;
+            assert_eq!((state.stuck, state.missing), (stuck, u8::from(stuck)), "M{}: {step} of {gate}", motor + 1);
+        }
+    }
+}
+
+#[test]
+fn after_a_silence_a_motor_may_be_as_far_as_it_can_have_turned_while_it_was_bridged_and_one_cycle_more() {
+    for motor in 0..7 {
+        for (silent, cycles) in [(0, 1), (1, 2), (COAST_CYCLES, COAST_CYCLES + 1), (COAST_CYCLES + 9, COAST_CYCLES + 1)]
+        {
+            for sign in [1, -1] {
+                let believed = |counts: i32| {
+                    let (mut estimator, mut sample) = turning(motor, 0);
+                    sample[motor] = None;
+                    for _ in 0..silent {
+                        estimator.update(&sample, true);
+                    }
+                    sample[motor] = Some(Counts(sign * counts).wrapped());
+                    estimator.update(&sample, true).expect("known").missing == 0
+                };
+                let farthest = gate(motor) * i32::from(cycles);
+                assert!(believed(farthest) && !believed(farthest + 1), "M{} after {silent} cycles", motor + 1);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_reply_after_a_lost_one_tells_the_speed_per_cycle_and_a_single_count_is_a_motion() {
+    for motor in 0..4 {
+        let step = gate(motor) / 8;
+        let (mut estimator, mut sample) = turning(motor, step);
+        let counts = sample[motor].expect("whole").0;
+        sample[motor] = None;
+        estimator.update(&sample, true);
+        sample[motor] = Some(Counts(counts + 2 * step).wrapped());
+        assert_eq!(estimator.update(&sample, true).expect("known").missing, 0);
+        assert!(!estimator.update(&sample, true).expect("known").stuck, "too slow to be called stuck");
+        sample[motor] = None;
+        estimator.update(&sample, true);
+        sample[motor] = Some(Counts(counts + 2 * step + 1).wrapped());
+        assert_eq!(estimator.update(&sample, true).expect("known").still, 0x7F & !(1 << motor));
+    }
+}
+
+#[test]
+fn g1_a_blow_goes_on_as_it_began_and_is_four_gates_hard_at_most_and_everything_else_is_a_jump_or_unknown() {
+    for motor in 0..7 {
+        let gate = gate(motor);
+        for (first, then, known, jumped) in [
+            (4 * gate, 4 * gate, true, false),
+            (3 * gate, 4 * gate, true, false),
+            (3 * gate, 4 * gate + 1, false, false),
+            (4 * gate + 1, 4 * gate + 1, false, false),
+            (3 * gate, 0, true, true),
+        ] {
+            let (mut estimator, mut sample) = turning(motor, 0);
+            let mut counts = 0;
+            let mut state = None;
+            for step in [first, then] {
+                counts += step;
+                sample[motor] = Some(Counts(counts).wrapped());
+                state = estimator.update(&sample, true);
+            }
+            let state = state.expect("known");
+            let what = format!("M{}: {first}, then {then}, gate {gate}: {state:?}", motor + 1);
+            assert_eq!((state.missing == 0, state.displaced), (known, jumped), "{what}");
+            if known && !jumped {
+                assert_eq!((state.age, state.implausible), (0, false), "{what}");
+                sample[motor] = Some(Counts(counts + then).wrapped());
+                let after = estimator.update(&sample, true).expect("known");
+                assert_eq!((after.age, after.implausible, after.displaced), (0, false, false), "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn g1_a_motor_may_be_thrown_back_at_half_its_speed_or_go_on_each_changed_by_one_gate_and_no_more() {
+    for motor in 0..7 {
+        let gate = gate(motor);
+        for sign in [1, -1] {
+            for (moved, expected) in
+                [(2 * gate, true), (2 * gate + 1, false), (-(gate / 2) - gate, true), (-(gate / 2) - gate - 1, false)]
+            {
+                let (mut estimator, mut sample) = turning(motor, sign * gate);
+                sample[motor] = sample[motor].map(|counts| Counts(counts.0 + sign * moved).wrapped());
+                let believed = estimator.update(&sample, true).expect("known").missing == 0;
+                assert_eq!(believed, expected, "M{}: {sign} times {gate}, then {moved}", motor + 1);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_single_wild_reply_is_implausible_once() {
+    let (mut estimator, sample) = turning(0, 3);
+    let mut wild = sample;
+    wild[0] = Some(Counts(50_000));
+    assert!(estimator.update(&wild, true).expect("known").implausible);
+    let state = estimator.update(&sample, true).expect("known");
+    assert_eq!((state.implausible, state.missing, state.displaced), (false, 0, false));
+}
+
 #[test]
 fn d8_a_clock_that_is_off_by_one_percent_scales_velocities_by_one_percent() {
     let calibration = nominal::<f64>();
@@ -220,6 +353,74 @@ fn a7_a_jump_of_counts_moves_no_position_and_hides_no_speed_and_is_told_for_good
                 }
             }
         }
+    }
+}
+
+#[test]
+fn the_last_counts_are_those_the_pucks_told_even_after_a_jump_and_as_old_as_the_last_reply() {
+    let calibration = nominal::<f64>();
+    assert_eq!(JointEstimator::<f64>::new(&nominal()).last_counts(), None);
+    let (mut estimator, at) = moving(&calibration, 0.0);
+    let mut sample = replies(&calibration, at(0));
+    sample[1] = sample[1].map(|counts| Counts(counts.0 + 100_000).wrapped());
+    let told = sample.map(|counts| counts.expect("whole"));
+    for silent in 0..4 {
+        assert_eq!(estimator.update(&sample, true).expect("known").displaced, silent > 0);
+        let last = estimator.last_counts().expect("known");
+        if silent > 0 {
+            assert_eq!(last.map(|(counts, _)| counts), told);
+        }
+        assert_eq!(last.map(|(_, age)| age), [0, u8::from(silent == 0), 0, 0, silent, 0, 0]);
+        sample[4] = None;
+    }
+}
+
+#[test]
+fn who_knows_that_the_zero_is_lost_says_so_and_it_counts_until_everything_is_forgotten() {
+    let calibration = nominal::<f64>();
+    let (mut estimator, at) = moving(&calibration, 0.0);
+    assert!(!estimator.is_displaced());
+    estimator.displace();
+    assert!(estimator.is_displaced());
+    assert!(estimator.update(&replies(&calibration, at(0)), true).expect("known").displaced);
+    estimator.reset();
+    assert!(!estimator.is_displaced());
+}
+
+#[test]
+fn the_motors_that_did_not_turn_by_a_count_are_told_one_by_one() {
+    let calibration = nominal::<f64>();
+    for turning in 0..=0x7F_u8 {
+        for step in [1, -1] {
+            let (mut estimator, at) = moving(&calibration, 0.0);
+            let mut sample = replies(&calibration, at(0));
+            for motor in (0..7).filter(|motor| turning >> motor & 1 != 0) {
+                sample[motor] = sample[motor].map(|counts| Counts(counts.0 + step).wrapped());
+            }
+            assert_eq!(estimator.update(&sample, true).expect("known").still, !turning & 0x7F);
+            let lost = usize::from(turning % 7);
+            sample[lost] = None;
+            let state = estimator.update(&sample, true).expect("known");
+            assert_eq!(state.still, 0x7F & !(1 << lost), "who is not heard is not known to stand");
+        }
+    }
+}
+
+#[test]
+fn the_joints_that_a_silent_motor_turns_are_told_as_extrapolated() {
+    let calibration = nominal::<f64>();
+    for lost in 0..=0x7F_u8 {
+        let (mut estimator, at) = moving(&calibration, 0.0);
+        let mut sample = replies(&calibration, at(0));
+        let mut joints = 0;
+        for motor in (0..7).filter(|motor| lost >> motor & 1 != 0) {
+            sample[motor] = None;
+            for joint in (0..7).filter(|joint| model::JOINT_TO_MOTOR[motor][*joint] != 0.0) {
+                joints |= 1 << joint;
+            }
+        }
+        let state = estimator.update(&sample, true).expect("known");
+        assert_eq!((state.extrapolated, u32::from(state.missing)), (joints, lost.count_ones()), "{lost:07b}");
     }
 }
 

@@ -324,3 +324,35 @@ fn g6_a_loss_of_replies_that_goes_on_is_told_as_such_and_never_the_other_way_rou
         assert_eq!(supervisor.fault(), Fault::RepliesLostForLong);
     }
 }
+
+#[test]
+fn torque_is_sent_in_every_state_but_idle_and_fault() {
+    for state in State::ALL {
+        assert_eq!(state.has_torque(), !matches!(state, State::Idle | State::Fault), "{state}");
+    }
+}
+
+#[test]
+fn every_state_is_shown_to_a_person_by_the_name_that_documents_and_scripts_use() {
+    let names = ["idle", "gravity", "hold", "approach", "run", "coast", "soft stop", "fault", "lowering"];
+    assert_eq!(State::ALL.map(State::name), names);
+    assert_eq!(State::ALL.map(|state| state.to_string()), names);
+}
+
+#[test]
+fn e1_a_command_is_allowed_exactly_where_the_table_does_not_refuse_it() {
+    for state in State::ALL {
+        for trigger in Trigger::ALL {
+            let refused = transition(state, trigger) == Transition::Refuse;
+            let expected = if refused { Err(Refusal::WrongState) } else { Ok(()) };
+            assert_eq!(in_state(state).allows(trigger), expected, "{state} {trigger:?}");
+        }
+    }
+}
+
+#[test]
+fn a_limit_that_is_passed_without_torque_latches_nothing() {
+    let mut supervisor = Supervisor::new();
+    assert_eq!(supervisor.take(Trigger::SoftFault, Fault::JointLimit), Ok(false));
+    assert_eq!((supervisor.state(), supervisor.fault()), (State::Idle, Fault::None));
+}

@@ -108,7 +108,7 @@ impl<R: Real> Posture<R> {
         Effort {
             feedback: self.controller.measured_feedback(),
             sent: self.controller.feedback() + self.controller.friction() + self.extra,
-            pressing: Vector7::zeros(),
+            pressing: None,
             desired: self.controller.desired(),
             breaking_away: self.breakaway.due(),
             plan: Plan::Approach,

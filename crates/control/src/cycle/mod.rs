@@ -413,7 +413,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Law::Run(Running { controller, pressing, .. }) => Some(Effort {
                 feedback: controller.feedback(),
                 sent: *controller.feedback(),
-                pressing: *pressing,
+                pressing: Some(pressing),
                 desired: controller.desired(),
                 breaking_away: 0,
                 plan: Plan::Run,
@@ -437,7 +437,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
-    /// Asks for brakes where an arm that is activated falls before anybody has commanded it.
+    /// Asks for brakes where an arm that is activated falls before anybody has commanded it. Not inlined: an arm with
+    /// torque has no use for it.
+    #[inline(never)]
     fn catch(&mut self, measured: &Measured<'_, R>) {
         let active = self.is_active();
         let Law::Off { brakes, .. } = &mut self.law else { return };

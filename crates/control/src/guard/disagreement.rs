@@ -7,10 +7,11 @@
 use puck::Transmission;
 
 use crate::model::friction::{self, SWING};
+use crate::model::kinematics::Frames;
 use crate::model::wam7;
 use crate::real::{Real, at_least};
 use crate::time::few_periods;
-use crate::units::{JOINTS, Vector7};
+use crate::units::{JOINTS, Vector6, Vector7, Wrench};
 
 /// Desired speed of a motor from which on it has to turn (rad/s): 0.02 to 0.06 rad/s of the joint. A motor that is to
 /// stand may be held by contact, whatever its torque does: closing fingers and a table swing it by more than friction.
@@ -62,14 +63,21 @@ pub(crate) struct Effort<'a, R: Real> {
     pub(crate) feedback: &'a Vector7<R>,
     /// Torque that was sent against friction (N m): fed back, fed forward, and added for a motor to break away.
     pub(crate) sent: Vector7<R>,
-    /// Torque of the force control (N m): it presses on the environment.
-    pub(crate) pressing: Vector7<R>,
+    /// Torque of the force control (N m), if there is one: it presses on the environment.
+    pub(crate) pressing: Option<&'a Vector7<R>>,
     /// Desired velocity (rad/s).
     pub(crate) desired: &'a Vector7<R>,
     /// Motors that are made to break away, one bit each, M1 lowest.
     pub(crate) breaking_away: u8,
     /// Where the motion comes from.
     pub(crate) plan: Plan,
+}
+
+/// Joint torques (N m) of the wrench of the environment at the grasp point. Not inlined, as what asks for them.
+#[inline(never)]
+pub(crate) fn torques_of<R: Real>(wrench: &Wrench<R>, frames: &Frames<R>) -> Vector7<R> {
+    let (force, torque) = (wrench.force, frames.tool_to_world() * wrench.torque);
+    frames.jacobian().transpose_times(&Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z))
 }
 
 /// Compares the feedback torque with the motion.
@@ -135,7 +143,8 @@ impl<R: Real> Disagreement<R> {
         }
         let asked = self.transmission.motor_torques_from_joint(&(*effort.feedback).into());
         let sent = self.transmission.motor_torques_from_joint(&effort.sent.into());
-        let environment = self.transmission.motor_torques_from_joint(&(*environment + effort.pressing).into());
+        let outside = effort.pressing.map_or(*environment, |pressing| environment + pressing);
+        let environment = self.transmission.motor_torques_from_joint(&outside.into());
         let speeds = self.transmission.motor_from_joint(&(*effort.desired).into());
         let mut stuck = false;
         let state = self.still.iter_mut().zip(&mut self.beyond).zip(&mut self.anchor);
@@ -188,5 +197,219 @@ impl<R: Real> Disagreement<R> {
         });
         self.pushing = if beyond { self.pushing.saturating_add(1) } else { 0 };
         self.pushing >= PUSHING
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::calibration::{Calibration, Payload};
+
+    /// Everything here happens at J4, which M4 turns alone.
+    const J4: usize = 3;
+    const M4: u8 = 1 << J4;
+
+    /// Torques of a law at J4, in parts of the model's friction, and the motion it asks for (rad/s).
+    #[derive(Clone, Copy)]
+    struct Asked {
+        feedback: f64,
+        sent: f64,
+        speed: f64,
+        breaking_away: u8,
+        plan: Plan,
+    }
+
+    const RUN: Asked = Asked { feedback: 0.0, sent: 0.0, speed: 0.3, breaking_away: 0, plan: Plan::Run };
+    const APPROACH: Asked = Asked { plan: Plan::Approach, ..RUN };
+    const BREAKING_AWAY: Asked = Asked { speed: 0.0, breaking_away: M4, ..APPROACH };
+
+    /// The torque swings by this much of the friction, in what is asked for and in what is sent.
+    fn swung(by: f64, from: Asked) -> Asked {
+        Asked { feedback: from.feedback + by, sent: from.sent + by, ..from }
+    }
+
+    fn new() -> Disagreement<f64> {
+        Disagreement::new(Calibration::nominal(Payload::SensorAndHand).transmission)
+    }
+
+    fn at_j4(value: f64) -> Vector7<f64> {
+        let mut joints = Vector7::zeros();
+        joints[J4] = value;
+        joints
+    }
+
+    /// One cycle in which nothing is touched; true if an encoder stands still.
+    fn take(seen: &mut Disagreement<f64>, asked: &Asked, force: f64, unchanged: u8) -> bool {
+        take_touching(seen, asked, (0.0, 0.0), force, unchanged)
+    }
+
+    /// The same with torques of the environment and of the force control at J4, in parts of its friction.
+    fn take_touching(
+        seen: &mut Disagreement<f64>,
+        asked: &Asked,
+        (environment, pressing): (f64, f64),
+        force: f64,
+        unchanged: u8,
+    ) -> bool {
+        let friction = wam7::FRICTION_COULOMB[J4];
+        let (feedback, desired) = (at_j4(asked.feedback * friction), at_j4(asked.speed));
+        let pressing = at_j4(pressing * friction);
+        let effort = Effort {
+            feedback: &feedback,
+            sent: at_j4(asked.sent * friction),
+            pressing: Some(&pressing),
+            desired: &desired,
+            breaking_away: asked.breaking_away,
+            plan: asked.plan,
+        };
+        seen.encoder_stands_still(&effort, &at_j4(environment * friction), force, unchanged)
+    }
+
+    /// Number of the cycle in which M4 is found after `first`, once `then` is asked for; `None` within a second.
+    fn found(first: &Asked, then: &Asked) -> Option<u8> {
+        let mut seen = new();
+        assert!(!take(&mut seen, first, 0.0, M4));
+        (2..=few_periods(0.5)).find(|_| take(&mut seen, then, 0.0, M4))
+    }
+
+    #[test]
+    fn a_torque_of_a_run_that_swings_by_more_than_three_times_the_friction_finds_a_motor_that_stands() {
+        for sign in [1.0, -1.0] {
+            let from = Asked { feedback: -sign, ..RUN };
+            assert_eq!(found(&from, &Asked { feedback: 2.1 * sign, ..RUN }), Some(STILL + 1));
+            // To the last bit: friction that is three times that of the model may hold it.
+            assert_eq!(found(&from, &Asked { feedback: 2.0 * sign, ..RUN }), None);
+            // A large torque that stays is no swing.
+            let steady = Asked { feedback: 9.0 * sign, sent: 9.0 * sign, ..RUN };
+            assert_eq!(found(&steady, &steady), None);
+        }
+        assert_eq!(found(&RUN, &Asked { sent: 9.0, ..RUN }), None, "what is fed forward is not looked at");
+    }
+
+    #[test]
+    fn in_an_approach_both_torques_have_to_swing_unless_one_is_undeniable() {
+        for sign in [1.0, -1.0] {
+            for (feedback, sent, is_found) in [
+                (3.6, 3.6, true),
+                (3.4, 3.4, false),
+                (3.6, 3.4, false),
+                (3.4, 3.6, false),
+                (3.9, 0.0, false),
+                (4.1, 0.0, true),
+            ] {
+                let then = Asked { feedback: feedback * sign, sent: sent * sign, ..APPROACH };
+                assert_eq!(found(&APPROACH, &then).is_some(), is_found, "{feedback} {sent} {sign}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_motor_that_breaks_away_is_judged_by_what_was_sent_for_long_enough() {
+        assert_eq!(found(&BREAKING_AWAY, &Asked { sent: 3.1, ..BREAKING_AWAY }), Some(STILL + 1));
+        assert_eq!(found(&BREAKING_AWAY, &Asked { sent: 2.9, ..BREAKING_AWAY }), None);
+        assert_eq!(found(&BREAKING_AWAY, &Asked { feedback: 9.0, ..BREAKING_AWAY }), None);
+        let others = Asked { breaking_away: !M4, ..BREAKING_AWAY };
+        assert_eq!(found(&others, &swung(9.0, others)), None, "another motor breaks away");
+        // A swing that comes late has to last.
+        let mut seen = new();
+        for _ in 0..2 * STILL {
+            assert!(!take(&mut seen, &BREAKING_AWAY, 0.0, M4));
+        }
+        for _ in 0..LETTING_GO {
+            assert!(!take(&mut seen, &swung(3.1, BREAKING_AWAY), 0.0, M4));
+        }
+        assert!(take(&mut seen, &swung(3.1, BREAKING_AWAY), 0.0, M4));
+    }
+
+    #[test]
+    fn a_motor_that_is_to_stand_or_has_turned_is_not_looked_at() {
+        for (speed, is_found) in [(0.3, true), (-0.3, true), (0.0, false), (0.03, false), (-0.03, false)] {
+            let from = Asked { speed, ..RUN };
+            assert_eq!(found(&from, &swung(9.0, from)).is_some(), is_found, "{speed} rad/s");
+        }
+        let mut seen = new();
+        take(&mut seen, &RUN, 0.0, M4);
+        for cycle in 0..=2 * STILL {
+            // Every other motor stands; M4 turns once in a while.
+            let unchanged = if cycle % STILL == 0 { !M4 } else { M4 };
+            assert!(!take(&mut seen, &swung(9.0, RUN), 0.0, unchanged), "{cycle}");
+        }
+    }
+
+    #[test]
+    fn a_contact_explains_a_motor_that_stands_and_the_time_begins_anew_after_it() {
+        for (force, expected) in [(CONTACT, true), (1.001 * CONTACT, false)] {
+            let mut seen = new();
+            take(&mut seen, &RUN, force, M4);
+            let found = (0..2 * STILL).any(|_| take(&mut seen, &swung(9.0, RUN), force, M4));
+            assert_eq!(found, expected, "{force} N");
+        }
+        let mut seen = new();
+        take(&mut seen, &RUN, 0.0, M4);
+        take(&mut seen, &swung(9.0, RUN), 2.0 * CONTACT, M4);
+        take(&mut seen, &RUN, 0.0, M4);
+        for _ in 1..STILL {
+            assert!(!take(&mut seen, &swung(9.0, RUN), 0.0, M4));
+        }
+        assert!(take(&mut seen, &swung(9.0, RUN), 0.0, M4));
+    }
+
+    #[test]
+    fn what_the_environment_takes_of_a_torque_and_what_presses_on_it_is_no_friction() {
+        // Swing of the feedback, of the environment and of the force control, in parts of the friction.
+        for (swing, environment, pressing, is_found) in [
+            (3.1, 0.0, 0.0, true),
+            (3.1, -0.7, 0.0, false),
+            (3.1, 0.7, 0.0, true),
+            // Something is met: half as much again, with it and without it.
+            (4.4, 0.8, 0.0, false),
+            (4.6, 0.8, 0.0, true),
+            (5.2, -0.8, 0.0, false),
+            (5.4, -0.8, 0.0, true),
+            (9.0, -5.0, 0.0, false),
+            (9.0, 0.0, -5.0, false),
+            (9.0, -5.0, 5.0, true),
+        ] {
+            for sign in [1.0, -1.0] {
+                let mut seen = new();
+                take_touching(&mut seen, &RUN, (1.0, -2.0), 0.0, M4);
+                let outside = (1.0 + sign * environment, -2.0 + sign * pressing);
+                let then = swung(sign * swing, RUN);
+                let found = (0..2 * STILL).any(|_| take_touching(&mut seen, &then, outside, 0.0, M4));
+                assert_eq!(found, is_found, "{swing} {environment} {pressing} {sign}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_torque_of_three_and_a_half_times_the_friction_of_a_joint_for_10_ms_is_a_push() {
+        for (joint, friction) in wam7::FRICTION_COULOMB.into_iter().enumerate() {
+            let bar = PUSH * friction;
+            for (torque, expected) in
+                [(bar, None), (-bar, None), (1.001 * bar, Some(PUSHING)), (-1.001 * bar, Some(PUSHING))]
+            {
+                let mut feedback = Vector7::zeros();
+                feedback[joint] = torque;
+                let mut seen = new();
+                let found = (1..=3 * PUSHING).find(|_| seen.is_pushed(&feedback));
+                assert_eq!(found, expected, "J{}: {torque} N m", joint + 1);
+            }
+        }
+    }
+
+    #[test]
+    fn what_was_seen_is_forgotten_where_no_feedback_acts_and_where_the_push_ends() {
+        let large = Vector7::repeat(100.0);
+        let ends: [fn(&mut Disagreement<f64>); 2] =
+            [Disagreement::reset, |seen| assert!(!seen.is_pushed(&Vector7::zeros()))];
+        for end in ends {
+            let mut seen = new();
+            for _ in 0..2 {
+                for _ in 1..PUSHING {
+                    assert!(!seen.is_pushed(&large));
+                }
+                end(&mut seen);
+            }
+        }
     }
 }

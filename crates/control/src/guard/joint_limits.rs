@@ -79,3 +79,100 @@ fn push_back<R: Real>(joint: usize, distance: R, outward: R) -> R {
     let share = at_most(at_least(R::constant(1.0) + outward * R::constant(1.0 / RETURN_SPEED), zero), R::constant(1.0));
     distance * R::constant(STIFFNESS[joint]) * share + at_least(outward, zero) * R::constant(DAMPING[joint])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::calibration::Payload;
+
+    fn model() -> ArmModel<f64> {
+        ArmModel::new(Payload::SensorAndHand)
+    }
+
+    /// The middle of the soft limits, but for one joint.
+    fn posture(model: &ArmModel<f64>, joint: usize, angle: f64) -> JointPositions<f64> {
+        let mut q = Vector7::from_fn(|joint, _| 0.5 * (model.soft_min[joint] + model.soft_max[joint]));
+        q[joint] = angle;
+        JointPositions(q)
+    }
+
+    /// The middle of the soft limits.
+    fn middle(model: &ArmModel<f64>) -> JointPositions<f64> {
+        posture(model, 0, 0.5 * (model.soft_min[0] + model.soft_max[0]))
+    }
+
+    #[test]
+    fn bounds_are_the_soft_limits_and_reach_a_little_beyond_the_posture_the_arm_is_armed_in() {
+        let model = model();
+        for joint in 0..JOINTS {
+            let (min, max) = (model.soft_min[joint], model.soft_max[joint]);
+            let around = |angle| {
+                let bounds = JointBounds::around(&model, &posture(&model, joint, angle));
+                (bounds.min[joint], bounds.max[joint])
+            };
+            assert_eq!(around(min + 0.1), (min, max));
+            assert_eq!(around(min - 0.1), (min - 0.1 - SLACK, max));
+            assert_eq!(around(max + 0.1), (min, max + 0.1 + SLACK));
+        }
+    }
+
+    #[test]
+    fn bounds_tighten_as_the_arm_comes_in_and_never_widen() {
+        let model = model();
+        for joint in 0..JOINTS {
+            for (limit, outward) in [(model.soft_min[joint], -1.0), (model.soft_max[joint], 1.0)] {
+                let mut bounds = JointBounds::around(&model, &posture(&model, joint, limit + 0.2 * outward));
+                let mut bound = |out: f64| {
+                    bounds.tighten(&model, &posture(&model, joint, limit + out * outward));
+                    if outward < 0.0 { bounds.min[joint] } else { bounds.max[joint] }
+                };
+                assert_eq!(bound(0.1), limit + 0.1 * outward + SLACK * outward);
+                assert_eq!(bound(0.15), limit + 0.1 * outward + SLACK * outward);
+                assert_eq!(bound(-0.1), limit);
+                assert_eq!(bound(0.1), limit);
+            }
+        }
+    }
+
+    #[test]
+    fn a_bound_is_violated_beyond_the_stop_distance_and_not_at_it() {
+        let model = model();
+        let bounds = JointBounds::around(&model, &middle(&model));
+        for joint in 0..JOINTS {
+            let violated = |angle| bounds.violated(&posture(&model, joint, angle));
+            assert!(!violated(bounds.max[joint] + STOP_DISTANCE) && violated(bounds.max[joint] + 1.1 * STOP_DISTANCE));
+            assert!(!violated(bounds.min[joint] - STOP_DISTANCE) && violated(bounds.min[joint] - 1.1 * STOP_DISTANCE));
+        }
+    }
+
+    #[test]
+    fn a_joint_beyond_its_bound_is_pushed_back_and_damped_outwards_and_let_go_on_its_return() {
+        let model = model();
+        let bounds = JointBounds::around(&model, &middle(&model));
+        for joint in 0..JOINTS {
+            for (bound, outward) in [(bounds.min[joint], -1.0), (bounds.max[joint], 1.0)] {
+                let inwards = |out: f64, speed: f64| {
+                    let mut dq = JointVelocities::zero();
+                    dq.0[joint] = speed * outward;
+                    let torque = bounds.repulsion(&posture(&model, joint, bound + out * outward), &dq).0;
+                    for other in (0..JOINTS).filter(|other| *other != joint) {
+                        assert_eq!(torque[other], 0.0, "J{}", other + 1);
+                    }
+                    -outward * torque[joint]
+                };
+                let spring = 0.04 * STIFFNESS[joint];
+                for (out, speed, expected) in [
+                    (0.04, 0.0, spring),
+                    (0.04, 0.3, spring + 0.3 * DAMPING[joint]),
+                    (0.04, -0.5 * RETURN_SPEED, 0.5 * spring),
+                    (0.04, -RETURN_SPEED, 0.0),
+                    (0.04, -2.0 * RETURN_SPEED, 0.0),
+                    (-0.04, 0.3, 0.0),
+                ] {
+                    let torque = inwards(out, speed);
+                    assert!((torque - expected).abs() < 1e-9, "J{}: {torque}, {expected}", joint + 1);
+                }
+            }
+        }
+    }
+}

@@ -2,7 +2,7 @@
 
 use puck::Transmission;
 
-use crate::guard::disagreement::{Disagreement, Effort};
+use crate::guard::disagreement::{self, Disagreement, Effort};
 use crate::guard::fault::Fault;
 use crate::guard::joint_limits::JointBounds;
 use crate::guard::supervisor::{State, Trigger};
@@ -137,7 +137,7 @@ impl<R: Real> Monitor<R> {
                     self.disagreement.all_turn();
                     false
                 } else {
-                    let environment = seen.frames.torques_of(seen.wrench);
+                    let environment = disagreement::torques_of(seen.wrench, seen.frames);
                     self.disagreement.encoder_stands_still(effort, &environment, seen.force, state.still)
                 };
                 (stuck, seen.blind && self.disagreement.is_pushed(effort.feedback))
@@ -148,5 +148,273 @@ impl<R: Real> Monitor<R> {
                 (false, false)
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::guard::disagreement::Plan;
+    use crate::model::arm::ArmModel;
+    use crate::model::calibration::{Calibration, Payload};
+    use crate::units::{JointPositions, JointVelocities, Vector7};
+
+    const POSTURE: [f64; JOINTS] = [-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75];
+
+    const WITH_TORQUE: [State; 6] =
+        [State::Gravity, State::Hold, State::Approach, State::Run, State::SoftStop, State::Lower];
+
+    /// Laws in which the arm moves by itself.
+    const MOVING: [State; 3] = [State::Hold, State::Approach, State::Run];
+
+    /// An arm and what is seen of it.
+    struct Scene {
+        model: ArmModel<f64>,
+        monitor: Monitor<f64>,
+        bounds: JointBounds<f64>,
+        state: JointState<f64>,
+        force: f64,
+        lag: (f64, f64),
+        wrench_lost: bool,
+        blind: bool,
+        full_scale: bool,
+        /// Feedback torque and desired velocity.
+        effort: Option<(Vector7<f64>, Vector7<f64>)>,
+    }
+
+    impl Scene {
+        /// An arm that rests in free air, its replies whole.
+        fn calm() -> Self {
+            let model = ArmModel::new(Payload::SensorAndHand);
+            let q = JointPositions::from_array(POSTURE);
+            let state = JointState {
+                q,
+                dq: JointVelocities::zero(),
+                missing: 0,
+                extrapolated: 0,
+                age: 0,
+                implausible: false,
+                stuck: false,
+                still: 0,
+                displaced: false,
+            };
+            let transmission = Calibration::nominal(Payload::SensorAndHand).transmission;
+            Scene {
+                bounds: JointBounds::around(&model, &q),
+                monitor: Monitor::new(transmission),
+                model,
+                state,
+                force: 0.0,
+                lag: (0.0, 0.0),
+                wrench_lost: false,
+                blind: false,
+                full_scale: false,
+                effort: None,
+            }
+        }
+
+        fn with(change: impl FnOnce(&mut Scene)) -> Self {
+            let mut scene = Scene::calm();
+            change(&mut scene);
+            scene
+        }
+
+        /// The finding of one more cycle.
+        fn check(&mut self, law: State) -> (Trigger, Fault) {
+            let frames = Frames::new(&self.model, &self.state.q);
+            let effort = self.effort.as_ref().map(|(feedback, desired)| Effort {
+                feedback,
+                pressing: None,
+                sent: *feedback,
+                desired,
+                breaking_away: 0,
+                plan: Plan::Run,
+            });
+            let seen = Observation {
+                frames: &frames,
+                bounds: &self.bounds,
+                force: self.force,
+                wrench: &Wrench::zero(),
+                lag: self.lag,
+                wrench_lost: self.wrench_lost,
+                blind: self.blind,
+                effort,
+                full_scale: self.full_scale,
+            };
+            self.monitor.check(law, &self.state, &seen).expect("a finding in every state with torque")
+        }
+    }
+
+    const NOTHING: (Trigger, Fault) = (Trigger::RepliesBack, Fault::None);
+
+    fn stop(fault: Fault) -> (Trigger, Fault) {
+        (Trigger::SoftFault, fault)
+    }
+
+    #[test]
+    fn an_arm_that_rests_in_free_air_is_stopped_in_no_state() {
+        for law in WITH_TORQUE {
+            assert_eq!(Scene::calm().check(law), NOTHING, "{law}");
+        }
+    }
+
+    #[test]
+    fn lost_replies_are_bridged_then_stop_the_arm_by_their_cause_and_then_take_torque_off() {
+        let silent = |age, stuck, implausible| {
+            Scene::with(|scene| {
+                scene.state = JointState { age, missing: 1, stuck, implausible, ..scene.state };
+            })
+            .check(State::Run)
+        };
+        assert_eq!(silent(COAST_CYCLES, true, true), (Trigger::RepliesMissing, Fault::None));
+        for age in [COAST_CYCLES + 1, COAST_CYCLES + 2, SILENCE_CYCLES] {
+            assert_eq!(silent(age, false, false), stop(Fault::RepliesLost), "{age}");
+            assert_eq!(silent(age, false, true), stop(Fault::ImplausiblePosition), "{age}");
+            assert_eq!(silent(age, true, true), stop(Fault::EncoderStuck), "{age}");
+        }
+        for age in [SILENCE_CYCLES + 1, SILENCE_CYCLES + 2] {
+            assert_eq!(silent(age, true, true), (Trigger::HardFault, Fault::RepliesLostForLong), "{age}");
+        }
+    }
+
+    #[test]
+    fn a_lost_zero_stops_every_state_but_lowering() {
+        for law in WITH_TORQUE {
+            let expected = if law == State::Lower { NOTHING } else { stop(Fault::ImplausiblePosition) };
+            assert_eq!(Scene::with(|scene| scene.state.displaced = true).check(law), expected, "{law}");
+        }
+    }
+
+    #[test]
+    fn the_second_sample_beyond_the_force_limit_or_at_full_scale_stops_what_moves_by_itself() {
+        for law in WITH_TORQUE {
+            let expected = if MOVING.contains(&law) { stop(Fault::ContactForce) } else { NOTHING };
+            for (force, full_scale) in [(1.001 * FORCE_LIMIT, false), (0.0, true)] {
+                let mut scene = Scene::with(|scene| (scene.force, scene.full_scale) = (force, full_scale));
+                assert_eq!(scene.check(law), NOTHING, "{law}: one sample may be corrupt");
+                assert_eq!(scene.check(law), expected, "{law}");
+                assert_eq!(scene.check(law), expected, "{law}");
+                (scene.force, scene.full_scale) = (FORCE_LIMIT, false);
+                assert_eq!(scene.check(law), NOTHING, "{law}: the limit itself is allowed");
+            }
+        }
+    }
+
+    #[test]
+    fn a_force_measured_before_the_sensor_fell_silent_stops_nothing() {
+        let mut scene = Scene::with(|scene| {
+            (scene.blind, scene.force, scene.full_scale) = (true, 2.0 * FORCE_LIMIT, true);
+        });
+        for _ in 0..5 {
+            assert_eq!(scene.check(State::Run), NOTHING);
+        }
+    }
+
+    #[test]
+    fn a_joint_beyond_its_bound_stops_what_moves_by_itself_and_nothing_else() {
+        for law in WITH_TORQUE {
+            let expected = if MOVING.contains(&law) { stop(Fault::JointLimit) } else { NOTHING };
+            let mut beyond = Scene::with(|scene| scene.state.q.0[6] = scene.model.soft_max[6] + 0.03);
+            assert_eq!(beyond.check(law), expected, "{law}");
+        }
+    }
+
+    #[test]
+    fn a_lost_wrench_stops_an_approach_and_a_run_alone() {
+        for law in WITH_TORQUE {
+            let moves = matches!(law, State::Approach | State::Run);
+            let expected = if moves { stop(Fault::WrenchLost) } else { NOTHING };
+            assert_eq!(Scene::with(|scene| scene.wrench_lost = true).check(law), expected, "{law}");
+        }
+    }
+
+    #[test]
+    fn a_run_ends_where_its_plan_is_too_far_or_too_fast_for_the_tool() {
+        for law in WITH_TORQUE {
+            let run = if law == State::Run { stop(Fault::TrackingError) } else { NOTHING };
+            for (lag, expected) in [
+                ((TRACKING_LIMIT, LAG_LIMIT), NOTHING),
+                ((1.001 * TRACKING_LIMIT, 0.0), run),
+                ((0.0, 1.001 * LAG_LIMIT), run),
+            ] {
+                assert_eq!(Scene::with(|scene| scene.lag = lag).check(law), expected, "{law} {lag:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_joint_of_the_wrist_may_turn_by_a_fifth_beyond_its_speed_limit_either_way_and_no_faster() {
+        for joint in 4..JOINTS {
+            let limit = wam7::VELOCITY_MAX[joint] * SPEED_MARGIN;
+            for (speed, expected) in [
+                (limit, NOTHING),
+                (-limit, NOTHING),
+                (1.001 * limit, stop(Fault::JointSpeed)),
+                (-1.001 * limit, stop(Fault::JointSpeed)),
+            ] {
+                let mut scene = Scene::with(|scene| scene.state.dq.0[joint] = speed);
+                assert_eq!(scene.check(State::Gravity), expected, "J{} at {speed}", joint + 1);
+            }
+        }
+    }
+
+    #[test]
+    fn neither_the_elbow_nor_the_forearm_may_be_fast_whichever_is_the_faster() {
+        // Folded, the elbow is farther from the shoulder than the forearm; stretched, the forearm is.
+        for (elbow, is_elbow) in [(2.9, true), (0.0, false)] {
+            let mut scene = Scene::with(|scene| scene.state.q.0[3] = elbow);
+            scene.state.dq.0[1] = 1.0;
+            let frames = Frames::new(&scene.model, &scene.state.q);
+            let [of_elbow, of_forearm] = frames.elbow_speeds(&scene.state.dq, TIP_REACH);
+            assert_eq!(of_elbow > of_forearm, is_elbow, "{of_elbow} {of_forearm}");
+            let allowed = TIP_SPEED_LIMIT / f64::max(of_elbow, of_forearm);
+            for (share, expected) in [(0.999, NOTHING), (1.001, stop(Fault::TipSpeed))] {
+                scene.state.dq.0[1] = share * allowed;
+                assert!(scene.state.dq.0[1] < wam7::VELOCITY_MAX[1] * SPEED_MARGIN);
+                assert_eq!(scene.check(State::Gravity), expected, "{share}");
+            }
+        }
+    }
+
+    /// The finding after a while in which the encoder of M4 does not change: its feedback has swung by ten times the
+    /// friction. `missing` replies in each cycle.
+    fn standing(missing: u8, still: u8) -> (Trigger, Fault) {
+        let mut desired = Vector7::zeros();
+        desired[3] = 0.5;
+        let mut scene = Scene::with(|scene| {
+            (scene.state.missing, scene.state.still) = (missing, still);
+            scene.effort = Some((Vector7::zeros(), desired));
+        });
+        assert_ne!(scene.check(State::Run).1, Fault::EncoderStuck);
+        let mut swung = Vector7::zeros();
+        swung[3] = 10.0 * wam7::FRICTION_COULOMB[3];
+        scene.effort = Some((swung, desired));
+        for _ in 0..few_periods(0.1) {
+            scene.check(State::Run);
+        }
+        scene.check(State::Run)
+    }
+
+    #[test]
+    fn a_motor_that_stands_against_its_torque_stops_the_arm_unless_a_reply_is_missing() {
+        assert_eq!(standing(0, 0b1000), stop(Fault::EncoderStuck));
+        assert_eq!(standing(0, 0), NOTHING, "it turns");
+        assert_eq!(standing(1, 0b1000), (Trigger::RepliesMissing, Fault::None));
+    }
+
+    #[test]
+    fn a_push_is_looked_for_in_the_torque_only_while_the_sensor_is_silent() {
+        let pushed = |blind| {
+            let mut scene = Scene::with(|scene| {
+                scene.blind = blind;
+                scene.effort = Some((Vector7::repeat(100.0), Vector7::zeros()));
+            });
+            for _ in 0..few_periods(0.1) {
+                scene.check(State::Hold);
+            }
+            scene.check(State::Hold)
+        };
+        assert_eq!(pushed(true), stop(Fault::UnseenContact));
+        assert_eq!(pushed(false), NOTHING);
     }
 }

@@ -150,4 +150,38 @@ mod tests {
         let (end, _) = left(20.0, |t| 0.2 * t);
         assert!(end > 1.9, "{end}");
     }
+
+    #[test]
+    fn an_error_that_comes_within_a_third_of_a_second_is_no_touch() {
+        let (end, _) = left(6.0, |t| f64::clamp(1.5 * (t - 2.0), 0.0, 0.45));
+        assert!(end.abs() < 0.02, "{end}");
+    }
+
+    /// Number of the cycle in which a deviation that is there from the beginning is first followed.
+    fn followed_in(deviation: [f64; 6]) -> Option<u16> {
+        let mut drift = Drift::<f64>::new();
+        (1..=2 * QUIET).find(|_| drift.step(&Vector6::from(deviation)) != Vector6::zeros())
+    }
+
+    #[test]
+    fn a_deviation_is_followed_once_it_has_been_small_for_the_whole_quiet_time() {
+        assert_eq!(followed_in([0.3, 0.0, 0.0, 0.0, 0.0, 0.0]), Some(QUIET));
+    }
+
+    #[test]
+    fn a_deviation_is_as_large_as_its_force_or_its_torque_is_long() {
+        for (first, size) in [(0, FREE_FORCE), (3, FREE_TORQUE)] {
+            for axis in 0..3 {
+                let along = |parts: [f64; 3]| {
+                    let mut deviation = [0.0; 6];
+                    for (other, part) in parts.into_iter().enumerate() {
+                        deviation[first + (axis + other) % 3] = part * size;
+                    }
+                    followed_in(deviation).is_some()
+                };
+                assert!(along([0.9, 0.0, 0.0]) && !along([1.1, 0.0, 0.0]), "{first} {axis}");
+                assert!(along([0.6, 0.6, 0.0]) && !along([0.8, 0.8, 0.0]), "{first} {axis}");
+            }
+        }
+    }
 }

@@ -185,7 +185,8 @@ impl<R: Real> JointEstimator<R> {
                 torque_on && index < ARM_MOTORS && reply.is_some_and(|raw| motor.is_frozen(raw, self.gate[index]));
             stuck |= frozen;
             let believed = reply.filter(|_| !frozen).and_then(|raw| motor.judge::<R>(raw, self.gate[index], torque_on));
-            still |= u8::from(believed.is_some() && motor.step == 0) << index;
+            // By the way since the last reply, not by the whole counts per cycle: one count in two cycles is a motion.
+            still |= u8::from(believed.as_ref().is_some_and(|believed| believed.rate == R::constant(0.0))) << index;
             implausible |= motor.doubtful.is_some() || believed.as_ref().is_some_and(|believed| believed.jumped);
             let carried = match believed {
                 Some(believed) => {

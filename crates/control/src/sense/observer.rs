@@ -356,4 +356,155 @@ mod tests {
         observer.send(&model, &frames, &Vector7::zeros(), &Vector7::repeat(f64::NAN));
         assert_eq!(observer.sent[0], Vector7::zeros());
     }
+
+    /// A measured motion of all joints, in which so many motors stand and no joint is extrapolated.
+    fn measured(q: f64, dq: f64, still: u8) -> JointState<f64> {
+        JointState {
+            q: JointPositions(Vector7::repeat(q)),
+            dq: crate::units::JointVelocities(Vector7::repeat(dq)),
+            missing: 0,
+            extrapolated: 0,
+            age: 0,
+            implausible: false,
+            stuck: false,
+            still,
+            displaced: false,
+        }
+    }
+
+    /// An observer of a motion with this velocity.
+    fn observing(dq: f64) -> MotionObserver<f64> {
+        let mut observer = MotionObserver::new();
+        observer.settle(&measured(0.0, dq, 0));
+        observer
+    }
+
+    fn near(is: &Vector7<f64>, expected: f64, what: &str) {
+        assert!(is.iter().all(|value| (value - expected).abs() < 1e-9), "{what}: {is} for {expected}");
+    }
+
+    #[test]
+    fn a_velocity_is_kept_the_nearer_to_the_measured_one_the_faster_that_is_but_in_a_compliant_run() {
+        for sign in [1.0, -1.0] {
+            for (observed, speed, compliant, stiff) in [
+                (0.3, 0.0, 0.3, 0.3),
+                (0.7, 0.0, FARTHEST, FARTHEST),
+                (0.0, 0.45, 0.0, 0.15),
+                (1.0, 0.45, 0.95, 0.75),
+                (0.0, 3.0, 2.5, 2.9),
+                (9.0, 3.0, 3.5, 3.1),
+            ] {
+                let (observer, state) = (observing(sign * observed), measured(0.0, sign * speed, 0));
+                near(&observer.velocity(&state, Trust::Compliant), sign * compliant, "compliant");
+                near(&observer.velocity(&state, Trust::Stiff), sign * stiff, "stiff");
+                near(&observer.velocity(&state, Trust::Approach), sign * stiff, "approach");
+            }
+        }
+    }
+
+    #[test]
+    fn in_an_approach_a_joint_that_stands_is_believed_the_more_the_longer_it_stands() {
+        let mut observer = observing(1.0);
+        let mut cycle = 0.0;
+        let mut believed = |cycles: u8, still: u8, extrapolated: u8, trust: Trust| {
+            for _ in 0..cycles {
+                cycle += 1.0;
+                let state = JointState { extrapolated, ..measured(cycle * PERIOD, 1.0, still) };
+                observer.update(&state, true);
+            }
+            observer.velocity(&measured(cycle * PERIOD, 0.0, still), trust)
+        };
+        let after = |cycles: u8| FARTHEST - f64::from(cycles) / f64::from(STANDS) * (FARTHEST - FARTHEST_AT_REST);
+        near(&believed(STANDS / 3, 0x7F, 0, Trust::Approach), after(STANDS / 3), "it begins to stand");
+        near(&believed(0, 0x7F, 0, Trust::Stiff), FARTHEST, "in an approach alone");
+        near(&believed(2, 0x7F, 0x7F, Trust::Approach), after(STANDS / 3), "nothing is known of who is silent");
+        near(&believed(2, 0, 0, Trust::Approach), after(STANDS / 3 - 2), "it turns");
+        near(&believed(2 * STANDS, 0x7F, 0, Trust::Approach), FARTHEST_AT_REST, "it stands");
+        near(&believed(2 * STANDS, 0, 0, Trust::Approach), FARTHEST, "it turns again");
+        // M2 and M3 turn J2 and J3 together.
+        let one_of_two = believed(STANDS, 0b101_0101, 0, Trust::Approach);
+        for (joint, velocity) in one_of_two.iter().enumerate() {
+            let expected = if [0, 6].contains(&joint) { FARTHEST_AT_REST } else { FARTHEST };
+            assert!((velocity - expected).abs() < 1e-9, "J{}: {velocity}", joint + 1);
+        }
+    }
+
+    #[test]
+    fn a_position_is_kept_within_20_mrad_of_the_measured_one() {
+        let observer = observing(0.0);
+        for (q, expected) in [(0.01, 0.0), (-0.01, 0.0), (0.05, 0.05 - ASTRAY), (-0.05, ASTRAY - 0.05)] {
+            near(&observer.position(&measured(q, 0.0, 0)).0, expected, "position");
+        }
+    }
+
+    #[test]
+    fn what_was_sent_moves_the_model_from_the_moment_on_at_which_it_acts() {
+        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
+        let frames = Frames::new(&model, &JointPositions::from_array(POSTURE));
+        let mut observer = observing(0.0);
+        let acceleration = 30.0;
+        let (mut q, mut dq) = (0.0, 0.0);
+        for cycle in 0..10 {
+            observer.send(&model, &frames, &Vector7::repeat(acceleration), &Vector7::zeros());
+            // Nothing is measured: the model is alone.
+            observer.update(&JointState { extrapolated: 0x7F, ..measured(9.0, 0.0, 0) }, false);
+            let acts = if cycle == 0 { acceleration * (1.0 - LATENCY) } else { acceleration };
+            q += (dq + 0.5 * acts * PERIOD) * PERIOD;
+            dq += acts * PERIOD;
+            near(&observer.q, q, "position");
+            near(&observer.dq, dq, "velocity");
+            let ahead = dq + acceleration * LATENCY * PERIOD;
+            near(&observer.velocity(&measured(0.0, ahead - 0.1, 0), Trust::Compliant), ahead, "where the torque acts");
+        }
+        observer.settle(&measured(0.1, 0.2, 0));
+        near(&observer.velocity(&measured(0.1, 0.2, 0), Trust::Compliant), 0.2, "nothing is predicted any more");
+    }
+
+    /// An error of the model dies away with two poles of the joint and one of the disturbance: each value follows from
+    /// the three before it.
+    #[test]
+    fn an_error_dies_away_with_the_poles_of_each_joint() {
+        for (stiff, (poles, slowest)) in [(false, (POLES, DISTURBANCE_POLE)), (true, STIFF_POLES)] {
+            let mut observer = MotionObserver::<f64>::new();
+            observer.settle(&measured(0.01, 0.0, 0));
+            let mut last = [Vector7::zeros(); 20];
+            for q in &mut last {
+                *q = observer.q;
+                observer.update(&measured(0.0, 0.0, 0), stiff);
+            }
+            for (joint, pole) in poles.into_iter().enumerate() {
+                let [p, s] = [pole, slowest].map(|hertz| f64::exp(-core::f64::consts::TAU * hertz * PERIOD));
+                for k in 3..last.len() {
+                    let [a, b, c] = [k - 1, k - 2, k - 3].map(|k| last[k][joint]);
+                    let expected = (2.0 * p + s) * a - (p * p + 2.0 * p * s) * b + p * p * s * c;
+                    assert!((last[k][joint] - expected).abs() < 1e-12, "J{}, cycle {k}, {stiff}", joint + 1);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_joint_that_is_not_measured_is_not_corrected_and_every_other_one_is() {
+        for extrapolated in [0b1, 0b110, 0b100_0000] {
+            let mut observer = MotionObserver::<f64>::new();
+            observer.settle(&measured(0.01, 0.0, 0));
+            observer.update(&JointState { extrapolated, ..measured(0.0, 0.0, 0) }, false);
+            for (joint, q) in observer.q.iter().enumerate() {
+                assert_eq!(*q == 0.01, extrapolated >> joint & 1 != 0, "J{}", joint + 1);
+            }
+        }
+    }
+
+    #[test]
+    fn a_torque_that_friction_holds_back_is_no_acceleration() {
+        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
+        let frames = Frames::new(&model, &JointPositions::from_array(POSTURE));
+        let mut observer = observing(0.0);
+        let torque = Vector7::from([0.5, -1.0, 2.0, 0.3, -0.4, 0.5, 0.1]);
+        observer.hold_back(&torque);
+        assert_eq!(observer.disturbance, Vector7::zeros(), "of which arm?");
+        observer.send(&model, &frames, &Vector7::zeros(), &torque);
+        observer.hold_back(&torque);
+        assert!((observer.disturbance + observer.sent[0]).amax() < 1e-9, "{}", observer.disturbance);
+    }
 }
