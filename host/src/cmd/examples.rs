@@ -84,7 +84,9 @@ Examples:
 pub(super) const CALIBRATE: &str = "\
 Examples:
   tactus --device unix:tactus.sock calibrate show
-  tactus --device sil:arm=9 calibrate gravity";
+  tactus --device sil:arm=9 calibrate gravity
+  tactus --device sil:world=simple,arm=9 calibrate friction
+  tactus --device sil:world=simple,arm=9 calibrate load";
 /// `hand`
 pub(super) const HAND: &str = "\
 Examples:
