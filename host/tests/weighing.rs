@@ -111,3 +111,47 @@ fn the_hand_of_the_model_is_what_hangs_on_the_arm_of_the_model() {
     let report: Value = serde_json::from_slice(&std::fs::read(folder.join("load.json")).unwrap()).unwrap();
     assert_eq!((&report["action"], &report["found"]), (&Value::from("load"), &found));
 }
+
+#[test]
+fn g4_a_declared_payload_is_kept_and_a_start_up_that_contradicts_it_is_blocked_with_the_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let payload = |words: &[&str]| object(folder, &[&["calibrate", "payload"], words].concat());
+    let declared = |shown: &Value| shown["declared"].as_str().unwrap().to_owned();
+    assert_eq!(declared(&payload(&[])), "undeclared");
+    let shown = payload(&["hand"]);
+    assert_eq!((shown["declared"].as_str(), shown["weight"].as_str()), (Some("hand"), Some("the model's")));
+    assert_eq!(payload(&["hand"]), shown, "declared twice");
+    // Another process, another start: kept, and nothing is in its way.
+    assert_eq!(payload(&[]), shown);
+    let teach = ["teach", "--duration", "0.5", "--output", "taught.csv", "--force"];
+    object(folder, &teach);
+
+    assert_eq!(declared(&payload(&["nothing"])), "nothing");
+    let refused = tactus(folder, &teach);
+    assert_eq!(refused.status.code(), Some(5));
+    let words = String::from_utf8_lossy(&refused.stdout).into_owned();
+    assert!(words.contains("the bare arm is declared, and a sensor answers"), "{words}");
+
+    assert_eq!(declared(&payload(&["undeclared"])), "undeclared");
+    object(folder, &teach);
+}
+
+#[test]
+fn g4_a_measured_weight_is_not_lost_to_a_declaration() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let share = || object(folder, &["config", "get", "weight.link_3_mass_share"]);
+    object(folder, &["config", "set", "weight.link_3_mass_share=0.05"]);
+    let kept = share();
+    assert_eq!(object(folder, &["calibrate", "payload"])["weight"], "measured");
+    for other in ["nothing", "undeclared"] {
+        let refused = tactus(folder, &["calibrate", "payload", other]);
+        assert_eq!(refused.status.code(), Some(6), "{}", String::from_utf8_lossy(&refused.stdout));
+        let refused: Value = serde_json::from_slice(&refused.stdout).unwrap();
+        assert_eq!(refused["error"]["code"], "E642");
+    }
+    // It was measured with the hand, which is thereby declared.
+    assert_eq!(object(folder, &["calibrate", "payload", "hand"])["declared"], "hand");
+    assert_eq!(share(), kept);
+}

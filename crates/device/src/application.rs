@@ -4,7 +4,6 @@
 //! other half is a [`crate::HostSession`] over an [`Application`]: the rules of the link are those of every device, the
 //! primitives and the requests that move something are those of the application.
 
-use control::model::WeightCorrection;
 use control::{CycleRecord, LoadRefusal, State};
 use link::{Capabilities, Listing, Name, Refusal, Reply, Request, Telemetry};
 use puck::CanFrame;
@@ -12,6 +11,7 @@ use puck::CanFrame;
 use crate::fault_memory::FaultMemory;
 use crate::health::{Health, Timing};
 use crate::time::{ANSWERS_US, SLOT_HZ};
+use crate::weight::StoredWeight;
 
 /// A refusal with its detail.
 pub type Refused = (Refusal, [u32; 2]);
@@ -62,9 +62,9 @@ pub trait Controller: Sized + 'static {
     /// [`LoadRefusal`] while a run is in progress, or if it was checked for another arm than this. The old one stays.
     fn load(&mut self, primitive: Self::Primitive<'_>) -> Result<(), LoadRefusal>;
 
-    /// Takes the weight of the arm's links; `false` while the arm has torque, and where there is no arm. The old one
-    /// then stays.
-    fn weigh(&mut self, weight: &WeightCorrection) -> bool;
+    /// Takes the weight of the arm's links and the payload that it declares; `false` while the arm has torque, and where
+    /// there is no arm. The old one then stays.
+    fn weigh(&mut self, weight: &StoredWeight) -> bool;
 
     /// The board began a control slot too late for its torque frames to leave in time.
     fn note_overrun(&mut self);
@@ -128,7 +128,7 @@ pub trait SessionPort<C: Controller> {
     fn load(&mut self, primitive: C::Primitive<'_>) -> Result<(), LoadRefusal>;
 
     /// Gives the control cycle the weight of the arm's links, as [`Controller::weigh`].
-    fn weigh(&mut self, weight: &WeightCorrection) -> bool;
+    fn weigh(&mut self, weight: &StoredWeight) -> bool;
 
     /// The next record of a control cycle, oldest first.
     fn record(&mut self) -> Option<TimedRecord<C::Record>>;

@@ -152,6 +152,11 @@ pub enum StartupError {
     AnswersLate(Node),
     /// The zeroing of an arm was broken off.
     ZeroUnfinished,
+    /// What a person has declared that the arm carries is contradicted by who answers.
+    PayloadContradicted {
+        /// True if sensor and hand are declared, and no sensor answers; false if the bare arm is, and one does.
+        hand: bool,
+    },
     /// The safety module stops no fast arm, or one only that is faster than it may be.
     SafetyVelocity {
         /// Its VL2, in counts of 1/4096 m/s; 0: none.
@@ -212,6 +217,12 @@ impl fmt::Display for StartupError {
             }
             StartupError::SafetyTorque { limit } => {
                 write!(formatter, "the safety module has a torque limit TL2 of {limit}: it must be 4601 to 8191 (5204)")
+            }
+            StartupError::PayloadContradicted { hand: true } => formatter.write_str(
+                "sensor and hand are declared, and no sensor answers: check its cable, or declare what the arm carries",
+            ),
+            StartupError::PayloadContradicted { hand: false } => {
+                formatter.write_str("the bare arm is declared, and a sensor answers: declare what the arm carries")
             }
             StartupError::ZeroUnfinished => formatter.write_str("zeroing was broken off: zero the arm"),
             StartupError::AnswersLate(node) => {

@@ -104,6 +104,15 @@ impl StoredWeight {
         }
     }
 
+    /// What a person has declared that the arm carries: a weight counts with one payload only. `None`: nothing.
+    #[must_use]
+    pub fn declared(&self) -> Option<Payload> {
+        match self {
+            Self::Kept(weight) => Some(weight.payload()),
+            Self::Nothing | Self::Damaged | Self::Foreign => None,
+        }
+    }
+
     /// Whose that is.
     #[must_use]
     pub fn source(&self) -> HomeSource {

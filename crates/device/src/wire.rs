@@ -145,6 +145,7 @@ impl From<StartupError> for StartupFailure {
             StartupError::SafetyVelocity { limit } => at(21, Node::SAFETY_MODULE, limit),
             StartupError::SafetyTorque { limit } => at(22, Node::SAFETY_MODULE, limit),
             StartupError::BeyondStops { joint } => Self([23, joint.into()]),
+            StartupError::PayloadContradicted { hand } => Self([24, hand.into()]),
         }
     }
 }
@@ -179,6 +180,7 @@ impl StartupFailure {
             21 => StartupError::SafetyVelocity { limit: value },
             22 => StartupError::SafetyTorque { limit: value },
             23 => StartupError::BeyondStops { joint: byte },
+            24 => StartupError::PayloadContradicted { hand: byte != 0 },
             _ => return None,
         })
     }

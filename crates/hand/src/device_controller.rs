@@ -11,11 +11,10 @@
 //! included, of 1111. At a rate with shorter slots the slow one comes between ([`Slot::next`]). The torque leaves in
 //! the cycle of its sample, one cycle earlier than behind an arm.
 
-use control::model::WeightCorrection;
 use control::{LoadRefusal, Payload};
 use device::bus::Outlet;
 use device::hand::{Drive, HandFailure, HandProperties, HandRound, Initialisation, Outcome};
-use device::{Controller, ControllerIo, Counters, Health, Message, Refused, Slot, Stage};
+use device::{Controller, ControllerIo, Counters, Health, Message, Refused, Slot, Stage, StoredWeight};
 use link::{Event as LinkEvent, EventKind, HandStage, Refusal};
 use puck::{CanFrame, Node, PropertyId, Reply, Status, get};
 
@@ -342,7 +341,7 @@ impl Controller for DeviceController {
     }
 
     /// A hand alone has no arm to carry.
-    fn weigh(&mut self, _: &WeightCorrection) -> bool {
+    fn weigh(&mut self, _: &StoredWeight) -> bool {
         false
     }
 

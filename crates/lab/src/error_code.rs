@@ -304,6 +304,9 @@ error_codes! {
         "they are of another movement, or too few", "give recordings of this primitive, all at the same speed";
     RecordingOfOthers = 641: "the recordings are not of the same movement", "another file was meant",
         "give recordings of this primitive; their first lines name it";
+    WeightOfOtherPayload = 642: "the device keeps a weight that was measured with another payload",
+        "a weight counts with one payload only",
+        "`tactus calibrate gravity --reset` forgets it; then declare what the arm carries, and weigh it again";
     WeightNotAccepted = 644: "the weight of the arm was measured and not accepted",
         "the hand holds something, something touches the arm, or its weight is right already",
         "empty the hand and free the arm, then `tactus calibrate gravity` again; the device goes on as before";

@@ -85,8 +85,8 @@ impl FaultGuide {
                 "the joint that stands still in the record although it was moved",
             ),
             Fault::UnseenContact => (
-                "the arm was pushed while the force sensor was silent",
-                "obstacles, and the plug of the sensor at the wrist",
+                "the arm was pushed while the force sensor was silent, or carries a hand whose sensor never answered",
+                "obstacles, the plug of the sensor at the wrist, and `tactus calibrate payload`",
             ),
             Fault::MotorHot => (
                 "long work against gravity or against an obstacle, or a warm room",

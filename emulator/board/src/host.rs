@@ -14,6 +14,8 @@ use crate::world::Host;
 const WAITING_FOR_ZERO: u8 = 6;
 /// The arm can be commanded.
 pub const READY: u8 = 10;
+/// State of an arm without torque.
+const IDLE: u8 = 0;
 
 /// Time between two questions.
 const PACE: Ticks = 20 * TICKS_PER_MILLISECOND;
@@ -73,6 +75,7 @@ pub struct Inquirer {
     asked_at: Ticks,
     waiting: bool,
     turn: u32,
+    holds: bool,
 }
 
 impl Inquirer {
@@ -87,7 +90,14 @@ impl Inquirer {
             asked_at: 0,
             waiting: false,
             turn: 0,
+            holds: false,
         }
+    }
+
+    /// The same, which orders an arm to hold that is ready and idle.
+    #[must_use]
+    pub fn holding(self) -> Self {
+        Self { holds: true, ..self }
     }
 
     /// The next question.
@@ -103,8 +113,10 @@ impl Inquirer {
             });
         }
         let stage = learned.status.as_ref().map(|status| status.startup_stage);
+        let is_idle = learned.status.as_ref().is_some_and(|status| status.state == IDLE);
         self.turn += 1;
         match self.turn % 4 {
+            0 if self.holds && is_idle && stage == Some(READY) => Request::Hold,
             0 if stage == Some(WAITING_FOR_ZERO) => Request::Zero { home: HOME.map(|angle| angle as f32) },
             1 => Request::Statistics,
             2 => match learned.fault_record {

@@ -2,10 +2,10 @@
 
 mod common;
 
-use common::{Story, safe_frames, tell, tell_with};
+use common::{Story, safe_frames, tell, tell_holding, tell_with};
 use emulated_board::setup::Setup;
 use fdcan_model::Cancellation;
-use puck::CanFrame;
+use puck::{Action, CanFrame, PuckTorque, Request};
 use sim::HOME;
 
 /// In service: the arm is ready long before.
@@ -56,7 +56,7 @@ fn both_readings(seconds: f64, faults: &[&str], judge: impl Fn(&Story)) {
 }
 
 #[test]
-fn a_panic_with_frames_queued_sends_the_last_frames_and_the_next_start_tells_the_words() {
+fn d4_a_panic_with_frames_queued_sends_the_last_frames_and_the_next_start_tells_the_words() {
     // Instants across a whole control cycle, so that the queue is full in some of them.
     for step in 0..3 {
         let us = SERVICE_US + 1_300 * step;
@@ -67,37 +67,70 @@ fn a_panic_with_frames_queued_sends_the_last_frames_and_the_next_start_tells_the
 }
 
 #[test]
-fn a_hard_fault_sends_the_last_frames_and_records_its_cause() {
+fn d4_a_hard_fault_sends_the_last_frames_and_records_its_cause() {
     let story = tell_with(2.2, &["hard-fault@2100000"]);
     ended_in_order(&story, SERVICE_US, "hard fault");
     assert!(story.log_says("0x00010000"), "CFSR: undefined instruction; {:#?}", story.log());
 }
 
 #[test]
-fn a_stack_at_its_guard_sends_the_last_frames() {
+fn d5_a_stack_at_its_guard_sends_the_last_frames() {
     let story = tell_with(2.2, &["guard@2100000"]);
     ended_in_order(&story, SERVICE_US, "memory fault");
 }
 
 #[test]
-fn a_non_maskable_interrupt_sends_the_last_frames() {
+fn d4_a_non_maskable_interrupt_sends_the_last_frames() {
     let story = tell_with(2.2, &["nmi@2100000"]);
     ended_in_order(&story, SERVICE_US, "non-maskable interrupt");
 }
 
+/// True if the frame gives a motor torque.
+fn is_torque(frame: &CanFrame) -> bool {
+    let Ok(Request { action: Action::PackedTorques { torques, .. }, .. }) = Request::decode(frame) else { return false };
+    torques.iter().any(|torque| *torque != PuckTorque::ZERO)
+}
+
 #[test]
-fn a_hang_ends_by_the_watchdog() {
+fn d4_an_image_that_ends_under_torque_gives_none_any_more_even_if_it_fails_twice() {
+    // The arm holds; a second fault befalls the first while its last frames leave.
+    const UNDER_TORQUE_US: u64 = 3_000_000;
+    let at = |kind: &str, after: u64| format!("{kind}@{}", UNDER_TORQUE_US + after);
+    for (faults, words) in [
+        (vec![at("panic", 0)], "called `Option::unwrap()` on a `None` value"),
+        (vec![at("hard-fault", 700)], "hard fault"),
+        (vec![at("guard", 1_500)], "memory fault"),
+        (vec![at("panic", 0), at("panic", 150)], ""),
+        (vec![at("panic", 0), at("hard-fault", 150)], ""),
+        (vec![at("hard-fault", 0), at("below-guard", 150)], ""),
+    ] {
+        let story = tell_holding(4.5, &faults);
+        let first = UNDER_TORQUE_US + if faults.len() == 1 { 0 } else { 150 };
+        let before = story.sent_since(UNDER_TORQUE_US - 5_000);
+        assert!(before.iter().any(|(at, frame)| *at < UNDER_TORQUE_US && is_torque(frame)), "{faults:?}: no torque");
+        let (reset_us, _) = *story.resets().first().unwrap_or_else(|| panic!("{faults:?}: it goes on"));
+        assert!((first..first + 12_000).contains(&reset_us), "{faults:?}: {:?}", story.resets());
+        begins_safely(&story, reset_us);
+        // What was in the queue of the bus may still leave; nothing else.
+        let stale: Vec<_> = story.sent_since(first + 2_000).into_iter().filter(|(_, frame)| is_torque(frame)).collect();
+        assert!(stale.is_empty(), "{faults:?}: {stale:?}");
+        assert!(story.log_says(words), "{faults:?}: {:#?}", story.log());
+    }
+}
+
+#[test]
+fn d3_a_hang_ends_by_the_watchdog() {
     ended_by_watchdog(&tell_with(2.2, &["hang@2100000"]), SERVICE_US);
 }
 
 #[test]
-fn a_hang_before_the_first_slot_ends_by_the_watchdog_as_fast() {
+fn d3_a_hang_before_the_first_slot_ends_by_the_watchdog_as_fast() {
     // After the clocks are set up, before the first slot.
     ended_by_watchdog(&tell_with(0.2, &["hang@4600"]), 4_600);
 }
 
 #[test]
-fn a_core_that_stands_still_is_reset_by_the_watchdog() {
+fn d3_a_core_that_stands_still_is_reset_by_the_watchdog() {
     ended_by_watchdog(&tell_with(2.2, &["stall@2100000:20000"]), SERVICE_US);
 }
 
@@ -130,7 +163,7 @@ fn a_bus_held_dominant_is_borne_until_it_is_free() {
 }
 
 #[test]
-fn every_kind_of_reset_is_told_by_its_name() {
+fn d7_every_kind_of_reset_is_told_by_its_name() {
     for (kind, words) in [("pin", "button"), ("power", "power"), ("brown-out", "power"), ("probe", "debug")] {
         let story = tell_with(1.2, &[&format!("reset@1000000:{kind}")]);
         assert_eq!(story.resets().len(), 1, "{kind}");

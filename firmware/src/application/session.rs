@@ -1,8 +1,10 @@
 //! Talks with the host.
 
 use control::LoadRefusal;
-use control::model::WeightCorrection;
-use device::{Application, Controller, FaultMemory, Health, HostSession, QueueFull, SessionPort, TimedRecord, Timing};
+use device::{
+    Application, Controller, FaultMemory, Health, HostSession, QueueFull, SessionPort, StoredWeight, TimedRecord,
+    Timing,
+};
 use heapless::spsc::{Consumer, Producer};
 use rtic_core::Mutex;
 
@@ -64,7 +66,7 @@ impl<P: LinkPort, C: Controller, M: Mutex<T = &'static mut C>> SessionPort<C> fo
         self.core.lock(|core| core.load(primitive))
     }
 
-    fn weigh(&mut self, weight: &WeightCorrection) -> bool {
+    fn weigh(&mut self, weight: &StoredWeight) -> bool {
         self.core.lock(|core| core.weigh(weight))
     }
 

@@ -1,4 +1,4 @@
-//! `tactus calibrate`: the home of the arm, where it stands when it is zeroed, the weight of its links, its friction.
+//! `tactus calibrate`: the home of the arm, where it stands when it is zeroed, weight and friction, and its payload.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use link::{Calibration, Refusal};
 use serde_json::{Value, json};
 
 use super::calibration_report::CalibrationReport;
-use super::{ErrorCode, Failure, Global, Table, connection, friction, learn, load, weigh};
+use super::{ErrorCode, Failure, Global, Table, connection, friction, learn, load, payload, weigh};
 use lab::client::Client;
 use lab::device::Device;
 use lab::error::{Capability, HostError};
@@ -21,7 +21,7 @@ pub struct Cmd {
     pub action: Action,
 }
 
-/// Actions on home and weight.
+/// Actions on home, weight and payload.
 #[derive(Debug, Clone, Subcommand)]
 pub enum Action {
     /// Show where the arm is taken to stand when it is zeroed, and whose home that is
@@ -36,6 +36,8 @@ pub enum Action {
     Friction(friction::Friction),
     /// Measure mass and centre of what hangs on the wrist, mounted or held, by sensor and joints; the way must be free
     Load(load::Load),
+    /// Declare what the arm carries: a start-up that finds something else is blocked
+    Payload(payload::Payload),
 }
 
 /// The home to store.
@@ -76,6 +78,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Action::Gravity(command) => weigh::run(command, &mut client, global),
         Action::Friction(command) => friction::run(command, &mut client, global),
         Action::Load(command) => load::run(command, &mut client, global),
+        Action::Payload(command) => payload::run(command, &mut client, global),
         Action::Show => show(&mut client, global),
         Action::Forget => {
             client.forget_calibration().map_err(|error| error.into_failure(DOING))?;

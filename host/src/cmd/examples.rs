@@ -86,7 +86,8 @@ Examples:
   tactus --device unix:tactus.sock calibrate show
   tactus --device sil:arm=9 calibrate gravity
   tactus --device sil:world=simple,arm=9 calibrate friction
-  tactus --device sil:world=simple,arm=9 calibrate load";
+  tactus --device sil:world=simple,arm=9 calibrate load
+  tactus --device unix:tactus.sock calibrate payload hand";
 /// `hand`
 pub(super) const HAND: &str = "\
 Examples:

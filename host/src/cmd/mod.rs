@@ -27,6 +27,7 @@ pub mod logs;
 pub mod manual;
 pub mod monitor;
 pub mod output;
+mod payload;
 pub mod plot;
 pub mod preflight;
 mod progress;

@@ -96,7 +96,9 @@ fn data(weighing: &Weighing) -> Value {
 
 /// The words for whose weight counts.
 pub(super) fn weight_words(weight: &Weight) -> String {
+    let is_models = weight.links.iter().flatten().all(|number| *number == 0.0);
     match (weight.source, weight.in_use) {
+        (HomeSource::Stored, _) if is_models => "the robot model's, for the declared payload".to_owned(),
         (HomeSource::Stored, false) => "stored in the device, not in use: torque, or another payload".to_owned(),
         (source, _) => source.name().to_owned(),
     }

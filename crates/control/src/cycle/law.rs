@@ -108,6 +108,7 @@ impl<R: Real> Posture<R> {
         Effort {
             feedback: self.controller.measured_feedback(),
             sent: self.controller.feedback() + self.controller.friction() + self.extra,
+            pressing: Vector7::zeros(),
             desired: self.controller.desired(),
             breaking_away: self.breakaway.due(),
             plan: Plan::Approach,
@@ -168,6 +169,8 @@ pub(super) struct Running<R: Real> {
     pub(super) lag: Lag<R>,
     /// Error of the force sensor in free motion.
     pub(super) drift: Drift<R>,
+    /// Torque of Eq (12) in the last cycle (N m).
+    pub(super) pressing: Vector7<R>,
 }
 
 /// The tool against the plan in the last cycle.

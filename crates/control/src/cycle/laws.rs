@@ -18,7 +18,7 @@ use crate::time::{PERIOD, periods};
 use crate::units::{JointPositions, JointTorques, JointVelocities, Pose, Vector6, Vector7, Wrench};
 
 /// Length of the damping that carries the arm while gravity torque builds up after arming: 0.5 s, in control periods.
-const ARMING: u16 = periods(0.5);
+pub(super) const ARMING: u16 = periods(0.5);
 
 /// Speed of the hand up to which the arm floats freely (m/s).
 const TAUGHT_SPEED: f64 = 0.18;
@@ -161,7 +161,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             // A run begins with a primitive, and no other is loaded meanwhile; else the arm floats.
             return self.float(measured);
         };
-        let Running { operational, controller, handover, lag, drift } = running;
+        let Running { operational, controller, handover, lag, drift, pressing } = running;
         let frozen = measured.state.missing > 0;
         let senses = match self.wrench.age() {
             Some(0) if !frozen => Senses::Fresh,
@@ -218,7 +218,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             // The expected wrench is fed forward, because the gain of the integral is finite.
             let wanted = bounded(&command, tracking.force_limit) * run.kept() - deviation.expected.in_world(to_world);
             let wanted = self.force.confirmed(&wanted, &measured.wrench.in_world(to_world));
-            torque.0 += ForceController::torque(&measured.frames.jacobian(), &wanted).0;
+            *pressing = ForceController::torque(&measured.frames.jacobian(), &wanted).0;
+            torque.0 += *pressing;
             set |= flags::FORCE_CONTROL;
         }
         let surprise = run.surprise();

@@ -409,9 +409,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         };
         let effort = match &self.law {
             Law::Posture(posture) => Some(posture.effort()),
-            Law::Run(Running { controller, .. }) => Some(Effort {
+            Law::Run(Running { controller, pressing, .. }) => Some(Effort {
                 feedback: controller.feedback(),
                 sent: *controller.feedback(),
+                pressing: *pressing,
                 desired: controller.desired(),
                 breaking_away: 0,
                 plan: Plan::Run,
@@ -422,10 +423,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             frames: measured.frames,
             bounds: &self.bounds,
             force: self.wrench.raw_force(),
+            wrench: &measured.wrench,
             lag: (lag.distance, lag.speed),
             // The feedback fades in the meantime.
             wrench_lost: self.is_blind(u16::from(WRENCH_AGE) + FADE),
-            blind: self.is_blind(WRENCH_AGE.into()),
+            blind: self.is_blind(WRENCH_AGE.into()) || self.is_bare() && self.armed_for >= laws::ARMING,
             effort,
             full_scale: self.wrench.full_scale().force > 0 || (depends && self.wrench.full_scale().torque > 0),
         };
@@ -434,10 +436,14 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
+    /// True if the arm carries nothing, as far as anybody knows: no sensor answers.
+    fn is_bare(&self) -> bool {
+        self.calibration.payload == Payload::None
+    }
+
     /// True if an arm that has a sensor has had no wrench for so many control periods.
     fn is_blind(&self, periods: u16) -> bool {
-        self.calibration.payload == Payload::SensorAndHand
-            && self.wrench.age().is_none_or(|age| u16::from(age) > periods)
+        !self.is_bare() && self.wrench.age().is_none_or(|age| u16::from(age) > periods)
     }
 
     /// The first rest after start-up is the zero of the sensors; the arm is braked then, and nobody uses the hand.
@@ -492,8 +498,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             self.pending = Some(Event::Arrived);
         }
         let mut actuation = Actuation::torque(&torques, &self.calibration);
-        if self.supervisor.fault() == Fault::EncoderStuck {
-            // Torque cannot damp a joint that nobody sees: brakes, as soon as the safety module has them on.
+        let fault = self.supervisor.fault();
+        if fault == Fault::EncoderStuck || fault == Fault::UnseenContact && self.is_bare() {
+            // Torque cannot damp a joint that nobody sees, nor carry what nobody knows of: brakes, as soon as the safety
+            // module has them on.
             actuation = actuation.requesting_idle();
         }
         let keeps = self.supervisor.law() != State::Gravity;

@@ -109,6 +109,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             handover,
             lag: Lag::none(),
             drift: Drift::new(),
+            pressing: Vector7::zeros(),
         });
     }
 

@@ -28,7 +28,14 @@ const IN_APPROACH: f64 = 3.5 / SWING;
 /// of [`SWING`]: a motor that runs away unseen is damped by what the observer believes, and time presses.
 const UNDENIABLE: f64 = 4.0 / SWING;
 
-/// Force (N) that explains why a motor does not turn.
+/// Swing of the torque of the environment from which on a motor meets something, in parts of the largest swing.
+const TOUCHED: f64 = 0.25;
+
+/// Largest swing of a motor that meets something, in parts of [`SWING`]: the arm is slowed down within some cycles, and
+/// the wrench is filtered.
+const IN_CONTACT: f64 = 1.5;
+
+/// Force (N) that explains why a motor does not turn, whatever its torque does.
 const CONTACT: f64 = 10.0;
 
 /// Time without a count, before a swing means anything: 50 ms, in control periods.
@@ -55,6 +62,8 @@ pub(crate) struct Effort<'a, R: Real> {
     pub(crate) feedback: &'a Vector7<R>,
     /// Torque that was sent against friction (N m): fed back, fed forward, and added for a motor to break away.
     pub(crate) sent: Vector7<R>,
+    /// Torque of the force control (N m): it presses on the environment.
+    pub(crate) pressing: Vector7<R>,
     /// Desired velocity (rad/s).
     pub(crate) desired: &'a Vector7<R>,
     /// Motors that are made to break away, one bit each, M1 lowest.
@@ -69,8 +78,8 @@ pub(crate) struct Disagreement<R: Real> {
     transmission: Transmission<R>,
     /// Largest swing of each motor (N m at the motor).
     swing: [R; JOINTS],
-    /// Torques of each motor at its last count, as asked for and as sent (N m).
-    anchor: [(R, R); JOINTS],
+    /// Torques of each motor at its last count, as asked for, as sent, and of the environment as measured (N m).
+    anchor: [(R, R, R); JOINTS],
     /// Control periods since.
     still: [u8; JOINTS],
     /// Control periods for which the swing of each motor has been too large.
@@ -86,7 +95,7 @@ impl<R: Real> Disagreement<R> {
         Disagreement {
             transmission,
             swing,
-            anchor: [(zero, zero); JOINTS],
+            anchor: [(zero, zero, zero); JOINTS],
             still: [0; JOINTS],
             beyond: [0; JOINTS],
             pushing: 0,
@@ -104,23 +113,36 @@ impl<R: Real> Disagreement<R> {
         (self.still, self.beyond) = ([0; JOINTS], [0; JOINTS]);
     }
 
-    /// Takes what the law asks of the joints, the measured force (N) and the motors whose counts have not changed, one
-    /// bit each; true if an encoder stands still while its motor cannot.
+    /// Takes what the law asks of the joints, the torque (N m) and the magnitude of the force (N) that the environment
+    /// is measured to apply, and the motors whose counts have not changed, one bit each; true if an encoder stands still
+    /// while its motor cannot.
+    ///
+    /// What the environment takes of the torque swings with it, and is no friction: an arm that runs into something
+    /// stands still as well.
     ///
     /// Not inlined: it is asked where a motor stands.
     #[inline(never)]
-    pub(crate) fn encoder_stands_still(&mut self, effort: &Effort<'_, R>, force: R, unchanged: u8) -> bool {
+    pub(crate) fn encoder_stands_still(
+        &mut self,
+        effort: &Effort<'_, R>,
+        environment: &Vector7<R>,
+        force: R,
+        unchanged: u8,
+    ) -> bool {
         if force > R::constant(CONTACT) {
             self.all_turn();
             return false;
         }
         let asked = self.transmission.motor_torques_from_joint(&(*effort.feedback).into());
         let sent = self.transmission.motor_torques_from_joint(&effort.sent.into());
+        let environment = self.transmission.motor_torques_from_joint(&(*environment + effort.pressing).into());
         let speeds = self.transmission.motor_from_joint(&(*effort.desired).into());
         let mut stuck = false;
         let state = self.still.iter_mut().zip(&mut self.beyond).zip(&mut self.anchor);
-        let torques = self.swing.iter().zip(asked.into_iter().zip(sent)).zip(speeds);
-        for (motor, (((still, beyond), anchor), ((limit, (asked, sent)), speed))) in state.zip(torques).enumerate() {
+        let torques = self.swing.iter().zip(asked.into_iter().zip(sent).zip(environment)).zip(speeds);
+        for (motor, (((still, beyond), anchor), ((limit, ((asked, sent), outside)), speed))) in
+            state.zip(torques).enumerate()
+        {
             let breaks_away = effort.breaking_away >> motor & 1 != 0;
             let is_to_turn = breaks_away || at_least(speed, -speed) >= R::constant(MOVING);
             if unchanged >> motor & 1 == 0 || !is_to_turn {
@@ -128,10 +150,18 @@ impl<R: Real> Disagreement<R> {
                 continue;
             }
             if *still == 0 {
-                *anchor = (asked, sent);
+                *anchor = (asked, sent, outside);
             }
             *still = still.saturating_add(1);
-            let swings = |now: R, then: R, share: f64| at_least(now - then, then - now) > *limit * R::constant(share);
+            // What the environment takes of a torque is no friction; the joints that it slows down swing as well.
+            let outside = outside - anchor.2;
+            let touched = at_least(outside, -outside) > *limit * R::constant(TOUCHED);
+            let limit = if touched { *limit * R::constant(IN_CONTACT) } else { *limit };
+            let swings = |now: R, then: R, share: f64| {
+                let (swing, limit) = (now - then, limit * R::constant(share));
+                let rest = swing + outside;
+                at_least(swing, -swing) > limit && at_least(rest, -rest) > limit
+            };
             let (asked, sent) = ((asked, anchor.0), (sent, anchor.1));
             // What the observer believes, and friction that was fed forward, may have made up for what was asked for.
             let too_far = match effort.plan {

@@ -40,7 +40,7 @@ pub enum Fault {
     Overrun = 13,
     /// The counts of a motor do not change although it turns.
     EncoderStuck = 14,
-    /// Something pushed the arm while the wrench sensor was silent.
+    /// Something pushed the arm, or hung on it, while the wrench sensor was silent, or where there is none.
     UnseenContact = 15,
     /// A motor is too hot to go on.
     MotorHot = 16,
@@ -130,7 +130,7 @@ impl Fault {
                 "the counts of a motor stood still while it turned; check the encoder cable, then zero the arm again"
             }
             Fault::UnseenContact => {
-                "something pushed the arm while the force sensor was silent; look for an obstacle, check its cable"
+                "something pushes the arm, or hangs on it, and no force sensor tells; look for an obstacle, check what it carries"
             }
             Fault::OtherPayload => {
                 "the sensor or the hand answers now and did not at the start-up; support and release the arm, the bus is then started anew"

@@ -11,7 +11,7 @@ use crate::model::wam7;
 use crate::real::Real;
 use crate::sense::joints::{COAST_CYCLES, JointState};
 use crate::time::few_periods;
-use crate::units::JOINTS;
+use crate::units::{JOINTS, Wrench};
 
 /// Largest speed of elbow and forearm in any state with torque (m/s); the safety module faults at 1.0.
 pub const TIP_SPEED_LIMIT: f64 = 0.8;
@@ -53,11 +53,13 @@ pub(crate) struct Observation<'a, R: Real> {
     pub(crate) bounds: &'a JointBounds<R>,
     /// Magnitude of the unfiltered, tared force (N).
     pub(crate) force: R,
+    /// Wrench of the environment on the robot at the grasp point.
+    pub(crate) wrench: &'a Wrench<R>,
     /// Distance (m) and speed (m/s) of the tool against the plan in the last cycle.
     pub(crate) lag: (R, R),
     /// True if the wrench is gone for so long that nothing moves by itself any more.
     pub(crate) wrench_lost: bool,
-    /// True if no fresh force tells of a contact, on an arm that has a sensor.
+    /// True if no fresh force tells of a contact: the sensor is silent, or there is none.
     pub(crate) blind: bool,
     /// Torques and motion that the law asks of the joints, where it feeds anything back.
     pub(crate) effort: Option<Effort<'a, R>>,
@@ -135,7 +137,8 @@ impl<R: Real> Monitor<R> {
                     self.disagreement.all_turn();
                     false
                 } else {
-                    self.disagreement.encoder_stands_still(effort, seen.force, state.still)
+                    let environment = seen.frames.torques_of(seen.wrench);
+                    self.disagreement.encoder_stands_still(effort, &environment, seen.force, state.still)
                 };
                 (stuck, seen.blind && self.disagreement.is_pushed(effort.feedback))
             }

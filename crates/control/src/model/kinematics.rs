@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use crate::model::arm::ArmModel;
 use crate::real::{Real, at_least, sqrt};
-use crate::units::{JOINTS, JointPositions, JointVelocities, Orientation, Pose, Twist, Vector6, Vector7};
+use crate::units::{JOINTS, JointPositions, JointVelocities, Orientation, Pose, Twist, Vector6, Vector7, Wrench};
 
 /// The geometric Jacobian: 6 rows (linear, angular; world axes), one column per joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -206,6 +206,12 @@ impl<R: Real> Frames<R> {
     /// Geometric Jacobian of the tool.
     pub fn jacobian(&self) -> Jacobian<R> {
         self.jacobian_at(&self.tool)
+    }
+
+    /// Joint torques (N m) of a wrench on the robot at the grasp point.
+    pub(crate) fn torques_of(&self, wrench: &Wrench<R>) -> Vector7<R> {
+        let (force, torque) = (wrench.force, self.tool_to_world() * wrench.torque);
+        self.jacobian().transpose_times(&Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z))
     }
 
     fn jacobian_at(&self, point: &Vector3<R>) -> Jacobian<R> {

@@ -2,7 +2,7 @@
 
 use control::model::{ArmModel, Frames, LinkWeight, MASS_SHARE, MOMENT_SHIFT, WeightCorrection};
 use control::units::JointPositions;
-use control::{Calibration, Command, Payload, Refusal};
+use control::{Calibration, Command, Fault, Payload, Refusal, State};
 
 use crate::rig::Rig;
 
@@ -93,5 +93,52 @@ fn every_weight_within_the_bounds_is_one_that_a_body_can_have() {
         }
         let beyond = LinkWeight { share: link.share * 1.01, ..link };
         assert!(WeightCorrection::new(Payload::None, [beyond; 7]).is_err());
+    }
+}
+
+/// An arm on whose bus no sensor answers, so that it is taken for a bare one.
+fn bare(carries: Payload, posture: [f64; 7]) -> Rig<f32> {
+    let mut rig = Rig::<f32>::new(posture, 1);
+    rig.cycle.calibrate(Calibration::nominal(Payload::None)).expect("idle");
+    rig.plant.model = ArmModel::new(carries);
+    rig.plant.deaf = true;
+    rig
+}
+
+#[test]
+fn g4_a_hand_that_nobody_knows_of_stops_the_hold_by_its_weight() {
+    for posture in [[0.0, 1.2, 0.0, 0.6, 0.0, 0.2, 0.0], [0.8, -1.0, 0.3, 0.5, 0.2, -0.3, 0.0], POSTURE] {
+        for friction in [0.3, 1.0, 1.3] {
+            let mut rig = bare(Payload::SensorAndHand, posture);
+            rig.plant.coulomb *= friction;
+            let hand = |rig: &Rig<f32>| rig.plant.frames().tool_pose().position;
+            let before = hand(&rig);
+            rig.command(Command::Hold);
+            rig.until(State::SoftStop, 2.0);
+            let output = rig.last.expect("ran");
+            println!("{posture:?} x{friction}: cycle {}, {:.3} m", rig.number, (hand(&rig) - before).norm());
+            assert_eq!(output.record.fault, Fault::UnseenContact);
+            assert!(output.actuation.requests_idle(), "a soft stop does not carry what nobody knows of");
+            assert!((hand(&rig) - before).norm() < 0.15);
+        }
+    }
+}
+
+#[test]
+fn g4_a_bare_arm_holds_and_moves_as_ever() {
+    for posture in [[0.0, 1.2, 0.0, 0.6, 0.0, 0.2, 0.0], [0.8, -1.0, 0.3, 0.5, 0.2, -0.3, 0.0], POSTURE] {
+        for (friction, heavier) in [(0.0, 0.0), (0.7, 0.2), (1.3, -0.2)] {
+            let mut rig = bare(Payload::None, posture);
+            rig.plant.coulomb *= friction;
+            rig.plant.model = ArmModel::disturbed(Payload::None, 1.0, heavier);
+            rig.command(Command::Hold);
+            rig.run_for(3.0);
+            let record = rig.last.unwrap().record;
+            assert_eq!(
+                (record.state, record.fault),
+                (State::Hold, Fault::None),
+                "{posture:?} x{friction} {heavier} kg"
+            );
+        }
     }
 }

@@ -18,7 +18,6 @@ mod orders;
 mod outlet;
 
 use control::law::Gains;
-use control::model::WeightCorrection;
 use control::time::periods;
 use control::{Calibration, Cycle, CycleInput, CycleRecord, Fault, LoadRefusal, Payload, State};
 use link::HandStage;
@@ -37,6 +36,7 @@ use crate::port::CheckedPrimitive;
 use crate::round::Round;
 use crate::stage::{Stage, StartupError};
 use crate::startup::Startup;
+use crate::weight::StoredWeight;
 use crate::wire;
 use brakes::Brakes;
 use lateness::Lateness;
@@ -416,10 +416,11 @@ impl DeviceController {
             self.restart(now_us);
             return;
         }
-        if let Some(node) = self.late.filter(|_| !self.cycle.state().has_torque()) {
+        let late = self.late.map(StartupError::AnswersLate).or(self.startup.contradiction());
+        if let Some(error) = late.filter(|_| !self.cycle.state().has_torque()) {
             // What the arm carries decides its gravity: everything is asked anew.
             self.restart(now_us);
-            self.startup.note_late(node);
+            self.startup.note(error);
             return;
         }
         match &mut self.last_cycles {
@@ -530,8 +531,12 @@ impl Controller for DeviceController {
         self.cycle.load(fit)
     }
 
-    fn weigh(&mut self, weight: &WeightCorrection) -> bool {
-        self.cycle.weigh(weight).is_ok()
+    fn weigh(&mut self, weight: &StoredWeight) -> bool {
+        let is_taken = self.cycle.weigh(&weight.correction()).is_ok();
+        if is_taken {
+            self.startup.declare(weight.declared());
+        }
+        is_taken
     }
 
     fn note_overrun(&mut self) {

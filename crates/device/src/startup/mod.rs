@@ -16,7 +16,7 @@ mod survey;
 mod waking;
 mod zeroing;
 
-use control::Calibration;
+use control::{Calibration, Payload};
 use puck::{Counts, Node, PropertyId, Reply, force_torque, set};
 
 use crate::bus::{Answer, Exchange, Outlet};
@@ -152,6 +152,8 @@ pub(crate) struct Startup {
     doubt: Option<StartupError>,
     /// True while the safety module has not been told so.
     owes_revocation: bool,
+    /// What the arm carries, if a person has declared it.
+    declared: Option<Payload>,
     /// The posture that `targets` are the counts of (rad).
     home: [f32; 7],
     /// The same once the arm has been zeroed there.
@@ -193,6 +195,7 @@ impl Startup {
             tared: false,
             doubt: None,
             owes_revocation: false,
+            declared: None,
             home: [0.0; 7],
             zeroed_at: None,
             zero_request: ZeroRequest::None,
@@ -209,6 +212,7 @@ impl Startup {
             doubt: self.doubt,
             tared: self.tared,
             angles: self.angles,
+            declared: self.declared,
             stopping: Some(Stopping::default()),
             continuity: Some(Continuity::since(now_us, last)),
             ..Startup::new()
@@ -318,9 +322,21 @@ impl Startup {
         (!self.has_sensor(), !hand)
     }
 
-    /// A device that had not answered does now: the reason for which the start-up begins anew.
-    pub(crate) fn note_late(&mut self, node: Node) {
-        self.error = Some(StartupError::AnswersLate(node));
+    /// The reason for which the start-up begins anew.
+    pub(crate) fn note(&mut self, error: StartupError) {
+        self.error = Some(error);
+    }
+
+    /// A person has declared what the arm carries, or takes that back.
+    pub(crate) fn declare(&mut self, payload: Option<Payload>) {
+        self.declared = payload;
+    }
+
+    /// What is declared, where another payload was found.
+    pub(crate) fn contradiction(&self) -> Option<StartupError> {
+        let found = self.calibration.as_ref()?.payload();
+        let declared = self.declared.filter(|declared| *declared != found)?;
+        Some(StartupError::PayloadContradicted { hand: declared == Payload::SensorAndHand })
     }
 
     /// A reply has come in; whether it was expected.
@@ -477,8 +493,8 @@ impl Startup {
             Step::Blocked { until_us } if outlet.now_us() < until_us => Ok(Next::Stay),
             Step::Blocked { .. } => {
                 let (error, doubt, hand) = (self.error, self.doubt, self.hand.again());
-                let (continuity, tared, angles) = (self.continuity, self.tared, self.angles);
-                *self = Startup { error, doubt, hand, continuity, tared, angles, ..Startup::new() };
+                let (continuity, tared, angles, declared) = (self.continuity, self.tared, self.angles, self.declared);
+                *self = Startup { error, doubt, hand, continuity, tared, angles, declared, ..Startup::new() };
                 Ok(Next::Stay)
             }
         }

@@ -224,6 +224,9 @@ impl Startup {
     pub(super) fn read(&mut self, joint: u8, item: u8, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
         let Some(node) = Node::ARM.get(usize::from(joint)).copied() else {
             self.calibration = Some(self.survey.calibration()?);
+            if let Some(contradiction) = self.contradiction() {
+                return Err(contradiction);
+            }
             return Ok(Next::Go(Step::ReadHand { digit: 0, item: 0 }));
         };
         let Some(property) = DRIVE_PROPERTIES.get(usize::from(item)).copied() else {

@@ -89,8 +89,8 @@ impl Startup {
 
     /// The pucks have lost power, and with it everything read and written.
     fn power_is_off(&mut self) {
-        let (hand, zero_request) = (self.hand.again(), self.zero_request);
-        *self = Startup { hand, zero_request, ..Startup::new() };
+        let (hand, zero_request, declared) = (self.hand.again(), self.zero_request, self.declared);
+        *self = Startup { hand, zero_request, declared, ..Startup::new() };
     }
 
     pub(super) fn write_position(&mut self, joint: u8, outlet: &mut impl Outlet) -> Next {

@@ -1,7 +1,8 @@
 //! A sensor that misses the questions of the start-up (fault G4): what hangs on the arm is not "nothing".
 
+use control::model::WeightCorrection;
 use control::{Command as Control, Fault, Payload, State};
-use device::{Controller, EventKind, Stage, StartupError};
+use device::{Controller, EventKind, Stage, StartupError, StoredWeight};
 use puck::{Node, PropertyId, get};
 
 use crate::double::{Bus, silent_device};
@@ -58,4 +59,61 @@ fn g4_one_lost_question_to_the_sensor_does_not_decide_what_the_arm_carries() {
         assert!(bus.now_us < 10_000_000, "stuck in {:?}", core.stage());
     }
     assert_eq!(core.health().payload, Payload::SensorAndHand, "{:?}", bus.events);
+}
+
+/// Declares what the arm carries, as a weight that the device keeps.
+fn declared(payload: Payload) -> StoredWeight {
+    StoredWeight::Kept(WeightCorrection::none(payload))
+}
+
+#[test]
+fn g4_a_declared_payload_that_who_answers_contradicts_blocks_until_one_of_them_changes() {
+    for (hand, payload, other) in
+        [(true, Payload::SensorAndHand, Payload::None), (false, Payload::None, Payload::SensorAndHand)]
+    {
+        for mends_cable in [true, false] {
+            let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
+            assert!(core.weigh(&declared(payload)));
+            bus.sensor_present = !hand;
+            bus.run_until(&mut core, Stage::Blocked);
+            assert_eq!(core.health().blocked, Some(StartupError::PayloadContradicted { hand }));
+            // It is tried again each second, and the reason stays.
+            bus.run(&mut core, 2.5);
+            assert_eq!(core.health().blocked, Some(StartupError::PayloadContradicted { hand }));
+            assert_eq!(core.health().state, State::Idle);
+            if mends_cable {
+                bus.sensor_present = hand;
+            } else {
+                assert!(core.weigh(&declared(other)));
+            }
+            bus.run_until(&mut core, Stage::WaitingForActive);
+            assert_eq!(core.health().payload, if mends_cable { payload } else { other });
+            assert_eq!(core.health().blocked, None);
+        }
+    }
+}
+
+#[test]
+fn g4_a_declaration_in_the_loop_is_compared_at_once_and_the_arm_is_not_armed_with_what_it_contradicts() {
+    let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    assert_eq!(core.health().payload, Payload::SensorAndHand);
+    assert!(core.weigh(&declared(Payload::SensorAndHand)));
+    bus.run(&mut core, 0.2);
+    assert_eq!((core.stage(), core.health().blocked), (Stage::WaitingForActive, None));
+    assert!(core.weigh(&declared(Payload::None)));
+    bus.run_until(&mut core, Stage::Blocked);
+    assert_eq!(core.health().blocked, Some(StartupError::PayloadContradicted { hand: false }));
+    // Nothing is declared any more: the start-up believes who answers.
+    assert!(core.weigh(&StoredWeight::Nothing));
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    bus.press_activate();
+    bus.run_until(&mut core, Stage::Ready);
+    bus.commands.push_back(Control::Hold.into());
+    bus.run(&mut core, 0.3);
+    assert_eq!(core.health().state, State::Hold, "{:?}", bus.events);
+    // With torque it is not taken; the session gives it again later.
+    assert!(!core.weigh(&declared(Payload::None)));
+    bus.run(&mut core, 0.5);
+    assert_eq!(core.health().state, State::Hold, "{:?}", bus.events);
 }

@@ -7,7 +7,7 @@ use control::units::JointPositions;
 use control::{CycleRecord, Fault, LoadRefusal, Payload, State};
 use device::{
     CheckedPrimitive, Command, Counters, DeviceController, Event, EventKind, FaultMemory, Health, Identity, QueueFull,
-    RamStore, Session, SessionPort, Stage, StoredPrimitive, TimedRecord, Timing,
+    RamStore, Session, SessionPort, Stage, StoredPrimitive, StoredWeight, TimedRecord, Timing,
 };
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, Frame};
 use link::image::{FeedbackClamps, Hemisphere, ImageContent, OrientationError, Waypoint, WaypointVelocity};
@@ -90,10 +90,10 @@ impl SessionPort<DeviceController> for Bench {
         Ok(())
     }
 
-    fn weigh(&mut self, weight: &WeightCorrection) -> bool {
+    fn weigh(&mut self, weight: &StoredWeight) -> bool {
         let takes = !self.state.has_torque();
         if takes {
-            self.weights.push(*weight);
+            self.weights.push(weight.correction());
         }
         takes
     }

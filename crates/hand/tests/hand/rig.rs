@@ -3,10 +3,11 @@
 use std::collections::VecDeque;
 
 use control::LoadRefusal;
-use control::model::WeightCorrection;
+
 use device::time::{CYCLE_SLOTS, SLOT_HZ};
 use device::{
-    Controller, ControllerIo, Health, HostSession, Identity, Message, QueueFull, SessionPort, Slot, TimedRecord, Timing,
+    Controller, ControllerIo, Health, HostSession, Identity, Message, QueueFull, SessionPort, Slot, StoredWeight,
+    TimedRecord, Timing,
 };
 use hand::{Command, DeviceController, FingerPrimitive, HandApplication, Library, Record, Session};
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES, LINK_TIMEOUT_MS};
@@ -73,7 +74,7 @@ impl SessionPort<DeviceController> for Port<'_> {
     fn load(&mut self, primitive: &FingerPrimitive) -> Result<(), LoadRefusal> {
         self.core.load(primitive)
     }
-    fn weigh(&mut self, weight: &WeightCorrection) -> bool {
+    fn weigh(&mut self, weight: &StoredWeight) -> bool {
         self.core.weigh(weight)
     }
     fn record(&mut self) -> Option<TimedRecord<Record>> {

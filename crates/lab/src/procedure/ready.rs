@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use control::State;
 use device::{Stage, StoreError};
-use link::{EventKind, HomeSource, Refusal};
+use link::{HomeSource, Refusal};
 
 use super::{ProcedureError, initialise_hand};
-use crate::client::{Client, Incoming};
+use crate::client::Client;
 use crate::device::Device;
 use crate::error::{HostError, explain_blocked};
 
@@ -68,7 +68,6 @@ pub fn start_up(
     let deadline = client.now() + Duration::from_secs(seconds);
     let mut readiness = Readiness::default();
     let mut told = None;
-    let mut blocked = None;
     let mut ready_since = None;
     loop {
         let status = client.status()?;
@@ -97,14 +96,10 @@ pub fn start_up(
         }
         if client.now() > deadline {
             let stage = told.map_or("unknown stage", Stage::explanation);
+            let blocked = status.blocked.map(explain_blocked);
             return Err(ProcedureError::NotReady(blocked.unwrap_or_else(|| stage.to_owned())));
         }
-        if let Some(Incoming::Event(event)) = client.next(LOOK)?
-            && event.kind == EventKind::Startup
-            && event.code == u16::from(Stage::Blocked.code())
-        {
-            blocked = Some(explain_blocked([event.detail, 0]));
-        }
+        client.next(LOOK)?;
     }
 }
 

@@ -3,12 +3,11 @@
 
 use std::collections::VecDeque;
 
-use control::model::WeightCorrection;
 use control::{CycleRecord, LoadRefusal};
 use device::time::{CYCLE_SLOTS, SLOT_HZ};
 use device::{
     CheckedPrimitive, Command, Controller, ControllerIo, DeviceController, Event, FaultMemory, Health, QueueFull,
-    SessionPort, TimedRecord, Timing,
+    SessionPort, StoredWeight, TimedRecord, Timing,
 };
 use puck::CanFrame;
 use sim::Ticks;
@@ -117,7 +116,7 @@ impl SessionPort<DeviceController> for Port<'_> {
         self.core.load(fit)
     }
 
-    fn weigh(&mut self, weight: &WeightCorrection) -> bool {
+    fn weigh(&mut self, weight: &StoredWeight) -> bool {
         self.core.weigh(weight)
     }
 

@@ -3,11 +3,11 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use control::model::{ArmModel, WeightCorrection};
+use control::model::ArmModel;
 use control::{CycleRecord, LoadRefusal, Payload, State};
 use device::{
     CheckedPrimitive, Command, Counters, DeviceController, Event, EventKind, Health, Identity, QueueFull, RamStore,
-    Session, SessionPort, Stage, TimedRecord, Timing,
+    Session, SessionPort, Stage, StoredWeight, TimedRecord, Timing,
 };
 use lab::client::Client;
 use lab::transport::{Transport, TransportError};
@@ -51,7 +51,7 @@ impl SessionPort<DeviceController> for Half {
         Ok(())
     }
 
-    fn weigh(&mut self, _: &WeightCorrection) -> bool {
+    fn weigh(&mut self, _: &StoredWeight) -> bool {
         true
     }
 

@@ -2,8 +2,8 @@
 
 use crate::samples::Tables;
 use link::image::{
-    EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_BYTES_LIMIT, KERNEL_LIMIT, STATISTICS_POINTS_LIMIT, Waypoint,
-    image_bytes, stored_crc,
+    EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_BYTES_LIMIT, IMAGE_SCHEMA, KERNEL_LIMIT,
+    STATISTICS_POINTS_LIMIT, Waypoint, image_bytes, stored_crc,
 };
 use link::{ImageError, Name, PrimitiveImage};
 use proptest::prelude::*;
@@ -107,6 +107,26 @@ fn c7_another_schema_is_named_even_when_all_else_differs() {
     assert_eq!(refusal(&image[..6]), ImageError::Schema { found: 9 });
     image[0] = b'X';
     assert_eq!(refusal(&image), ImageError::Magic);
+}
+
+/// Images of every layout there was, by its number: `images/layout-N.bin`. They are added to, never changed.
+#[test]
+fn c7_the_image_kept_of_each_layout_is_read_to_the_byte_or_refused_by_its_number() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/link/images");
+    let of = |layout: u16| folder.join(format!("layout-{layout}.bin"));
+    let today = Tables::new(5, 3, 4, 6).image();
+    if std::env::var_os("UPDATE_DOCUMENTS").is_some() && !of(IMAGE_SCHEMA).exists() {
+        std::fs::write(of(IMAGE_SCHEMA), &today).expect("a folder of this crate");
+    }
+    let kept =
+        std::fs::read(of(IMAGE_SCHEMA)).expect("UPDATE_DOCUMENTS=1 cargo test -p link writes that of a new layout");
+    assert_eq!(kept, today, "the layout has changed and its number has not");
+    assert_eq!(PrimitiveImage::parse(&kept).map(|image| image.bytes()), Ok(&kept[..]));
+    for layout in 1..IMAGE_SCHEMA {
+        // Of layouts 1 and 2, which no release had, the head is kept.
+        let older = std::fs::read(of(layout)).expect("an older one is kept");
+        assert_eq!(refusal(&older), ImageError::Schema { found: layout });
+    }
 }
 
 #[test]

@@ -94,10 +94,21 @@ const WAITING_FOR_ACTIVE: u8 = 9;
 
 /// Runs the image for these seconds.
 pub(crate) fn tell(seconds: f64, setup: Setup) -> Story {
+    tell_to(seconds, setup, |inquirer| inquirer)
+}
+
+/// The same with faults, and with a host that has the arm hold as soon as it can.
+pub(crate) fn tell_holding(seconds: f64, faults: &[String]) -> Story {
+    let faults = faults.iter().map(|text| text.parse().expect("a fault")).collect();
+    tell_to(seconds, Setup { faults, ..Setup::default() }, Inquirer::holding)
+}
+
+/// The same for any host.
+fn tell_to(seconds: f64, setup: Setup, host: impl Fn(Inquirer) -> Inquirer) -> Story {
     let image = image();
     let learned = SharedLearned::default();
     let passages = Arc::new(Mutex::new(Vec::new()));
-    let inquirer = Inquirer::new(image.model_hash, learned.clone());
+    let inquirer = host(Inquirer::new(image.model_hash, learned.clone()));
     let world = InProcess::new(plant(), Box::new(Recorder { inquirer, passages: passages.clone() }));
     let setup = Setup { until: Some((seconds * 1e9) as u64), ..setup };
     let outcome = run(&image, &setup, Box::new(world)).expect("the emulation runs");

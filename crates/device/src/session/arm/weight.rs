@@ -57,7 +57,7 @@ impl<S: Store> ArmApplication<S> {
     #[inline(never)]
     pub(super) fn hand_over_weight(&mut self, port: &mut impl SessionPort<DeviceController>) {
         if self.weight_waits && self.opened && !port.health().state.has_torque() {
-            self.weight_waits = !port.weigh(&self.store.weight().correction());
+            self.weight_waits = !port.weigh(&self.store.weight());
         }
     }
 }

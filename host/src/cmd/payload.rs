@@ -1,0 +1,105 @@
+//! `tactus calibrate payload`: what the arm carries, declared by a person and compared with who answers on its bus.
+
+use clap::{Args, ValueEnum};
+use control::model::WeightCorrection;
+use device::Stage;
+use link::{HomeSource, Weight};
+use serde_json::json;
+
+use super::{ErrorCode, Failure, Global};
+use lab::client::Client;
+use lab::device::Device;
+use lab::error::explain_blocked;
+
+/// Options of `calibrate payload`.
+#[derive(Debug, Clone, Args)]
+pub struct Payload {
+    /// Declare that the arm carries this; without it, what is declared is shown
+    #[arg(value_enum)]
+    pub carries: Option<Carries>,
+}
+
+/// What an arm may carry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Carries {
+    /// Force/torque sensor and hand: a start-up in which no sensor answers is blocked
+    Hand,
+    /// Nothing: a start-up in which a sensor answers is blocked
+    Nothing,
+    /// Whatever answers; nothing is declared
+    Undeclared,
+}
+
+impl Carries {
+    /// As the model has it.
+    const fn payload(self) -> Option<control::Payload> {
+        match self {
+            Self::Hand => Some(control::Payload::SensorAndHand),
+            Self::Nothing => Some(control::Payload::None),
+            Self::Undeclared => None,
+        }
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Hand => "hand",
+            Self::Nothing => "nothing",
+            Self::Undeclared => "undeclared",
+        }
+    }
+}
+
+const DOING: &str = "calibrate payload";
+
+/// Shows, declares or takes back what the arm carries. A declaration is kept as a weight without corrections.
+///
+/// # Errors
+/// The device refuses, or it keeps a weight that was measured with something else.
+pub(super) fn run(command: &Payload, client: &mut Client<Device>, global: &Global) -> Result<(), Failure> {
+    let failed = |error: lab::error::HostError| error.into_failure(DOING);
+    let kept = client.weight().map_err(failed)?;
+    if let Some(carries) = command.carries.filter(|carries| *carries != declared(&kept)) {
+        if is_measured(&kept) {
+            return Err(Failure::new(ErrorCode::WeightOfOtherPayload, DOING, "a measured weight would be lost"));
+        }
+        match carries.payload() {
+            Some(payload) => client.keep_weight(&WeightCorrection::none(payload)),
+            None => client.forget_weight(),
+        }
+        .map_err(failed)?;
+    }
+    show(client, global)
+}
+
+fn declared(weight: &Weight) -> Carries {
+    match (weight.source, weight.hand) {
+        (HomeSource::Stored, true) => Carries::Hand,
+        (HomeSource::Stored, false) => Carries::Nothing,
+        _ => Carries::Undeclared,
+    }
+}
+
+fn is_measured(weight: &Weight) -> bool {
+    weight.source == HomeSource::Stored && weight.links.iter().flatten().any(|number| *number != 0.0)
+}
+
+fn show(client: &mut Client<Device>, global: &Global) -> Result<(), Failure> {
+    let failed = |error: lab::error::HostError| error.into_failure(DOING);
+    let (kept, status) = (client.weight().map_err(failed)?, client.status().map_err(failed)?);
+    let is_known = matches!(
+        Stage::from_code(status.startup_stage),
+        Some(Stage::WaitingForZero | Stage::Zeroing | Stage::Preparing | Stage::WaitingForActive | Stage::Ready)
+    );
+    let answers = is_known.then(|| status.wrench_zeroed.map_or("no sensor", |_| "sensor"));
+    let (declared, blocked) = (declared(&kept), status.blocked.map(explain_blocked));
+    let weight = if is_measured(&kept) { "measured" } else { "the model's" };
+    let blocked_words = blocked.as_ref().map(|reason| format!("\nstart-up: {reason}")).unwrap_or_default();
+    global.output().result(
+        &json!({ "declared": declared.name(), "answers": answers, "weight": weight, "blocked": blocked }),
+        format!(
+            "declared: {}\nanswers: {}\nweight: {weight}{blocked_words}",
+            declared.name(),
+            answers.unwrap_or("not known before the pucks were asked")
+        ),
+    )
+}
