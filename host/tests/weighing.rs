@@ -8,6 +8,9 @@ use serde_json::Value;
 /// An arm that was not looked at while the regression was made, in a device with a flash of its own.
 const DEVICE: &str = "sil:world=simple,arm=7,flash=arm.flash";
 
+/// The arm of the model itself.
+const NOMINAL: &str = "sil:world=simple";
+
 fn tactus(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
     command.current_dir(folder).env("TACTUS_DEVICE", DEVICE).args(["--json", "-q"]).args(arguments);
@@ -66,6 +69,47 @@ fn cli_15_an_arm_is_weighed_once_with_a_report_and_its_device_keeps_the_weight_o
     assert_eq!(object(folder, &["calibrate", "gravity", "--show"]), before);
     let refused = tactus(folder, &["calibrate", "gravity", "--show", "--reset"]);
     assert_eq!(refused.status.code(), Some(2));
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+#[test]
+fn the_friction_of_the_model_is_measured_on_the_arm_of_the_model_and_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let found = object(folder, &["--device", NOMINAL, "calibrate", "friction", "--report", "friction.json"]);
+    let joints = found["joints"].as_array().unwrap();
+    assert_eq!(joints.len(), 7);
+    for joint in joints {
+        let (coulomb, model) = (number(&joint["coulomb_nm"]["value"]), number(&joint["model"]["coulomb_nm"]));
+        assert!((coulomb - model).abs() < 0.15 * model, "{joint}");
+        // At the fastest pass the line and the model mean the same friction.
+        let fastest = number(&joint["speeds_rad_s"][1]);
+        let at = |coulomb: f64, viscous: &Value| coulomb + number(viscous) * fastest;
+        let line = at(coulomb, &joint["viscous_nms_per_rad"]["value"]);
+        let truth = at(model, &joint["model"]["viscous_nms_per_rad"]);
+        assert!((line - truth).abs() < 0.1 * truth, "{joint}");
+    }
+    let report: Value = serde_json::from_slice(&std::fs::read(folder.join("friction.json")).unwrap()).unwrap();
+    assert_eq!((&report["action"], &report["kept"]), (&Value::from("friction"), &Value::Bool(false)));
+    assert_eq!(report["found"], found);
+}
+
+#[test]
+fn the_hand_of_the_model_is_what_hangs_on_the_arm_of_the_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let found = object(folder, &["--device", NOMINAL, "calibrate", "load", "--report", "load.json"]);
+    for told in ["sensor", "joints"] {
+        let mass = number(&found[told]["beyond_hand"]["mass_kg"]);
+        // Two per cent of the hand.
+        assert!(mass.abs() < 0.024 && found[told]["held"].is_null(), "{told}: {found}");
+    }
+    assert!(number(&found["difference"]["centre_m"]) < 0.004, "{found}");
+    let report: Value = serde_json::from_slice(&std::fs::read(folder.join("load.json")).unwrap()).unwrap();
+    assert_eq!((&report["action"], &report["found"]), (&Value::from("load"), &found));
 }
 
 #[test]

@@ -11,6 +11,7 @@ use super::results::{Header, Key};
 use super::scenario::{PlantKind, Scenario};
 use super::seed;
 use super::variation::Variation;
+use control::model::WeightCorrection;
 use lab::demonstration::recording::checksum;
 use lab::plan;
 use lab::primitive_file::PrimitiveFile;
@@ -50,6 +51,8 @@ pub struct Config {
     pub resume: bool,
     /// Take the results that are there for all: no trials.
     pub as_it_is: bool,
+    /// The weight that the devices of these arms were given, by seed; others compute with the model's.
+    pub weights: BTreeMap<u64, WeightCorrection>,
     /// Keep what pictures and time series need of the first seed's trials.
     pub keep_traces: bool,
     /// Write every trial's telemetry into the folder.
@@ -74,6 +77,7 @@ impl Config {
             out: None,
             resume: false,
             as_it_is: false,
+            weights: BTreeMap::new(),
             keep_traces: false,
             keep_recordings: false,
         }
@@ -165,7 +169,7 @@ impl Config {
             }
         };
         let variation = self.variation.to_string();
-        let described: BTreeMap<String, String> = [
+        let mut described: BTreeMap<String, String> = [
             ("object", described(self.object)),
             ("cells", cells.join(" ")),
             ("engine", engine),
@@ -179,6 +183,10 @@ impl Config {
         .into_iter()
         .map(|(name, value)| (name.to_owned(), value))
         .collect();
+        if !self.weights.is_empty() {
+            // An arm's weight follows from the arm: more seeds may be added later.
+            described.insert("arms".to_owned(), "weighed".to_owned());
+        }
         let text = described.iter().map(|(name, value)| format!("{name}={value}\n")).collect::<String>();
         Header {
             experiment: self.scenario.name().to_owned(),

@@ -70,6 +70,7 @@ pub fn results(seeds: &[u64]) -> Results {
                     adaptation_m: share * cell.distance(),
                     adaptation_deg: share * 80.0 * cell.distance(),
                     sag_m: 0.002,
+                    free_sag_m: Some(0.003),
                     surprise: (!held && chance < 0.95).then_some(Surprise {
                         phase: 0.4,
                         channel: 0,

@@ -7,6 +7,8 @@
 //!                  '- Trace, Observation, Snapshot (first seed)           '-> Results -> Summary, map, figures
 //! ```
 
+#[cfg(feature = "mujoco")]
+pub mod calibrated;
 pub mod comparison;
 #[cfg(feature = "mujoco")]
 pub mod config;

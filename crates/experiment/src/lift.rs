@@ -98,6 +98,10 @@ pub struct Carried {
     pub sag_median_m: f64,
     /// The same, the worst trial.
     pub sag_max_m: f64,
+    /// Distance of the free hand below or above its plan before it touches the weight, m: median over the trials.
+    pub free_sag_median_m: f64,
+    /// The same, the worst trial.
+    pub free_sag_max_m: f64,
 }
 
 /// The figures of a case, mode by mode.
@@ -106,6 +110,7 @@ pub fn carried(case: Case, results: &Results) -> Vec<Carried> {
     let [remembered_kg, carried_kg] = case.factors().map(|factor| factor * usual);
     let of_mode = |mode| {
         let sags: Vec<f64> = results.of(mode).map(|report| report.sag_m).collect();
+        let free: Vec<f64> = results.of(mode).filter_map(|report| report.free_sag_m).map(f64::abs).collect();
         Carried {
             case: case.name(),
             remembered_kg,
@@ -115,6 +120,8 @@ pub fn carried(case: Case, results: &Results) -> Vec<Carried> {
             held: results.of(mode).filter(|report| report.outcome.is_success()).count(),
             sag_median_m: quantile(&sags, 0.5).unwrap_or(0.0),
             sag_max_m: quantile(&sags, 1.0).unwrap_or(0.0),
+            free_sag_median_m: quantile(&free, 0.5).unwrap_or(0.0),
+            free_sag_max_m: quantile(&free, 1.0).unwrap_or(0.0),
         }
     };
     results.modes().into_iter().map(of_mode).collect()
@@ -122,7 +129,9 @@ pub fn carried(case: Case, results: &Results) -> Vec<Carried> {
 
 /// As a table.
 pub fn table(rows: &[Carried]) -> String {
-    let mut table = Table::new(["mode", "remembered", "carried", "held", "sag, median", "sag, largest"]);
+    let heads =
+        ["mode", "remembered", "carried", "held", "sag, median", "sag, largest", "off before a touch", "largest"];
+    let mut table = Table::new(heads);
     for row in rows {
         table.row([
             row.mode.to_string(),
@@ -131,6 +140,8 @@ pub fn table(rows: &[Carried]) -> String {
             format!("{} of {}", row.held, row.trials),
             format!("{:.1} mm", row.sag_median_m * 1e3),
             format!("{:.1} mm", row.sag_max_m * 1e3),
+            format!("{:.1} mm", row.free_sag_median_m * 1e3),
+            format!("{:.1} mm", row.free_sag_max_m * 1e3),
         ]);
     }
     table.to_string()

@@ -118,6 +118,9 @@ pub fn table(summaries: &[Summary]) -> String {
     row("finger on object, median, max", &|s| format!("{:.1} N  {:.1} N", s.finger_peak_n.median, s.finger_peak_n.max));
     row("hand on table, max", &|s| format!("{:.1} N", s.table_peak_n.max));
     row("sag when lifted, median, max", &|s| format!("{:.1} mm  {:.1} mm", s.sag_m.median * 1e3, s.sag_m.max * 1e3));
+    row("off its height before a touch, median, max", &|s| {
+        format!("{:.1} mm  {:.1} mm", s.free_sag_m.median * 1e3, s.free_sag_m.max * 1e3)
+    });
     row("shaking above 15 Hz, median, max", &|s| {
         format!("{:.2}  {:.2} rad/s", s.shaking_rad_s.median, s.shaking_rad_s.max)
     });

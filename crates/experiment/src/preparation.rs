@@ -197,7 +197,11 @@ pub fn rehearsed(config: &Config, interrupt: &Interrupt) -> Result<PrimitiveFile
 }
 
 /// Does something with every item, some at a time; the results are in the order of the items.
-fn in_parallel<Item: Sync, Done: Send>(jobs: usize, items: &[Item], work: impl Fn(&Item) -> Done + Sync) -> Vec<Done> {
+pub(super) fn in_parallel<Item: Sync, Done: Send>(
+    jobs: usize,
+    items: &[Item],
+    work: impl Fn(&Item) -> Done + Sync,
+) -> Vec<Done> {
     let mut done = Vec::with_capacity(items.len());
     for some in items.chunks(jobs.max(1)) {
         std::thread::scope(|scope| {

@@ -71,6 +71,10 @@ pub struct Report {
     pub adaptation_deg: f64,
     /// Distance of the hand below its plan when it has lifted, mean over 1 s, m.
     pub sag_m: f64,
+    /// Distance of the free hand below its plan, mean over the last second before it touches anything, m; `None` where
+    /// it was not free for so long.
+    #[serde(default)]
+    pub free_sag_m: Option<f64>,
     /// First surprise that the device reported.
     pub surprise: Option<Surprise>,
     /// Paths.
@@ -317,7 +321,7 @@ impl Results {
 type Column = (&'static str, fn(&Report) -> String);
 
 /// All columns of `results.csv`.
-const COLUMNS: [Column; 33] = [
+const COLUMNS: [Column; 34] = [
     ("cell", |r| r.key.index.to_string()),
     ("along_m", |r| number(r.key.cell.along())),
     ("sideways_m", |r| number(r.key.cell.sideways())),
@@ -342,6 +346,7 @@ const COLUMNS: [Column; 33] = [
     ("table_peak_n", |r| number(r.measures.table_peak_n)),
     ("finger_peak_n", |r| number(r.measures.finger_peak_n)),
     ("sag_m", |r| number(r.sag_m)),
+    ("free_sag_m", |r| optional(r.free_sag_m)),
     ("shaking_rad_s", |r| number(r.measures.shaking_rad_s)),
     ("touch_s", |r| optional(r.measures.touch_s)),
     ("closing_s", |r| number(r.measures.closing_s)),

@@ -159,6 +159,8 @@ pub struct Summary {
     pub table_peak_n: Spread,
     /// Distance of the hand below its plan when it has lifted, m.
     pub sag_m: Spread,
+    /// Distance of the free hand below or above its plan, just before it touches anything, m.
+    pub free_sag_m: Spread,
     /// Amplitude of the fast part of the joint speeds, rad/s.
     pub shaking_rad_s: Spread,
     /// Failure detection.
@@ -210,6 +212,7 @@ impl Summary {
             finger_peak_n: spread(|report| report.measures.finger_peak_n),
             table_peak_n: spread(|report| report.measures.table_peak_n),
             sag_m: spread(|report| report.sag_m),
+            free_sag_m: Spread::of(&reports.iter().filter_map(|r| r.free_sag_m).map(f64::abs).collect::<Vec<_>>()),
             shaking_rad_s: spread(|report| report.measures.shaking_rad_s),
             detection: Detection::of(reports.iter().copied()),
         }

@@ -5,6 +5,9 @@ use lab::demonstration::RATE;
 /// Sensor channels of an expectation: force (world axes), torque (tool axes), gauges of F1 to F3.
 pub const CHANNELS: usize = 9;
 
+/// Time in free air over which the height of the hand is averaged, s.
+const FREE_SECONDS: f64 = 1.0;
+
 /// One control cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cycle {
@@ -61,6 +64,12 @@ impl Trace {
         let (sum, count) =
             cycles.fold((0.0, 0.0), |(sum, count), cycle| (sum + cycle.position_d[2] - cycle.position[2], count + 1.0));
         sum / f64::max(count, 1.0)
+    }
+
+    /// The same over the last second before something is touched (s after the start): what a free hand sags. `None`
+    /// where the hand was not free for so long.
+    pub fn free_sag(&self, touched: f64) -> Option<f64> {
+        (touched >= FREE_SECONDS).then(|| self.sag(touched - FREE_SECONDS, touched))
     }
 }
 
@@ -135,5 +144,14 @@ pub(crate) mod tests {
         trace.cycles[2].position[2] = 0.02;
         assert!((trace.sag(1.5, 2.5) - 0.004).abs() < 1e-12);
         assert!((trace.sag(1.5, 3.5) + 0.008).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_free_hand_sags_over_the_last_second_before_it_touches_something() {
+        let mut trace = Trace { cycles: (0..900).map(|k| cycle(f64::from(k) / RATE)).collect() };
+        trace.cycles.iter_mut().filter(|cycle| cycle.time > 1.45).for_each(|cycle| cycle.position_d[2] += 0.01);
+        trace.cycles.iter_mut().filter(|cycle| cycle.time > 2.55).for_each(|cycle| cycle.position_d[2] += 1.0);
+        assert!((trace.free_sag(2.5).unwrap() - 0.01).abs() < 1e-12);
+        assert_eq!(trace.free_sag(0.9), None, "it was not free for a second");
     }
 }

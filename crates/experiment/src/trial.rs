@@ -156,7 +156,7 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
     };
     let options = plant::options(&arm, config.trial_seed(&key), config.primitive.start.posture, scene);
     let mut client = connect(&options, interrupt)?;
-    client.upload(&prepared.image, |_, _, _| {})?;
+    furnish(&mut client, config, prepared, key)?;
     let ready = wait_for_beat(&mut client, BEAT_OF_UPLOAD)
         .and_then(|()| procedure::make_ready(&mut client, true, |_| {}))
         .and_then(|_| procedure::go_to_start(&mut client, &config.primitive.start, |_| {}))
@@ -211,6 +211,7 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
             (None, true) => trace.sag(arrived - run - SETTLED_SECONDS, arrived - run),
             (None, false) => trace.sag(end - run - SETTLED_SECONDS, end - run),
         },
+        free_sag_m: trace.free_sag(measures.touch_s.map_or(measures.closing_s, |touch| touch.min(measures.closing_s))),
         surprise: surprises.first().map(|surprise| Surprise {
             phase: surprise.phase,
             channel: CHANNELS.iter().position(|name| *name == surprise.channel).map_or(u8::MAX, |index| index as u8),
@@ -221,6 +222,12 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
         wall_s: Some(started.elapsed().as_secs_f64()),
     };
     Ok(Trial { report, trace, telemetry, observation, snapshots, scene, marks })
+}
+
+/// Gives the device the weight of its arm, if that was measured, and the primitive.
+fn furnish(client: &mut Client<Device>, config: &Config, prepared: &Prepared, key: Key) -> Result<(), HostError> {
+    config.weights.get(&key.seed).map_or(Ok(()), |weight| client.keep_weight(weight))?;
+    client.upload(&prepared.image, |_, _, _| {}).map(|_| ())
 }
 
 /// Starts a simulated device and says hello.

@@ -41,7 +41,11 @@ impl Arm {
         for _ in 0..5 {
             torque = self.gravity(std::array::from_fn(|joint| q[joint] - torque[joint] / self.stiffness[joint]));
         }
-        Sample { q, torque: std::array::from_fn(|joint| torque[joint] + direction * self.friction[joint]) }
+        Sample {
+            q,
+            torque: std::array::from_fn(|joint| torque[joint] + direction * self.friction[joint]),
+            ..Sample::default()
+        }
     }
 
     fn cross(&self, posture: [f32; 7]) -> Crossing {

@@ -1,4 +1,4 @@
-//! `tactus calibrate`: the home of the arm, where it stands when it is zeroed, the weight of its links, its payload.
+//! `tactus calibrate`: the home of the arm, where it stands when it is zeroed, weight and friction, and its payload.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use link::{Calibration, Refusal};
 use serde_json::{Value, json};
 
 use super::calibration_report::CalibrationReport;
-use super::{ErrorCode, Failure, Global, Table, connection, learn, payload, weigh};
+use super::{ErrorCode, Failure, Global, Table, connection, friction, learn, load, payload, weigh};
 use lab::client::Client;
 use lab::device::Device;
 use lab::error::{Capability, HostError};
@@ -32,6 +32,10 @@ pub enum Action {
     Forget,
     /// Weigh the links of this arm on a tour of slow moves; its hand must be empty and the way free
     Gravity(weigh::Gravity),
+    /// Measure the friction of each joint on slow and faster moves and show it beside the model's; the way must be free
+    Friction(friction::Friction),
+    /// Measure mass and centre of what hangs on the wrist, mounted or held, by sensor and joints; the way must be free
+    Load(load::Load),
     /// Declare what the arm carries: a start-up that finds something else is blocked
     Payload(payload::Payload),
 }
@@ -72,6 +76,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     client.require(Capability::Arm).map_err(|error| error.into_failure(DOING))?;
     match &command.action {
         Action::Gravity(command) => weigh::run(command, &mut client, global),
+        Action::Friction(command) => friction::run(command, &mut client, global),
+        Action::Load(command) => load::run(command, &mut client, global),
         Action::Payload(command) => payload::run(command, &mut client, global),
         Action::Show => show(&mut client, global),
         Action::Forget => {

@@ -85,6 +85,8 @@ pub(super) const CALIBRATE: &str = "\
 Examples:
   tactus --device unix:tactus.sock calibrate show
   tactus --device sil:arm=9 calibrate gravity
+  tactus --device sil:world=simple,arm=9 calibrate friction
+  tactus --device sil:world=simple,arm=9 calibrate load
   tactus --device unix:tactus.sock calibrate payload hand";
 /// `hand`
 pub(super) const HAND: &str = "\

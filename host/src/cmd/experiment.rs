@@ -51,6 +51,10 @@ pub struct Cmd {
     /// (factors), delay (cycles), bias (N, comes up after the run's tare), speed (of the run, of the taught one)
     #[arg(long, value_name = "NAME=VALUE,...", default_value = "")]
     pub vary: Variation,
+    /// Weigh every arm first, as `calibrate gravity` does, and give its device the result; what was found is kept in
+    /// the folder
+    #[arg(long, conflicts_with_all = ["demonstrations", "sweep"])]
+    pub calibrated: bool,
     /// Object on the table instead of the usual one: small-torch, flashlight, cup, bottle, weight, paper-cup, or a file
     /// of your own such as `mug.toml`
     #[arg(long, value_name = "NAME|FILE")]
@@ -112,11 +116,14 @@ pub fn run(_command: &Cmd, _global: &Global) -> Result<(), Failure> {
 
 #[cfg(feature = "mujoco")]
 mod work {
+    use std::collections::BTreeMap;
     use std::path::Path;
     use std::time::Instant;
 
     use super::{Cmd, ErrorCode, Failure, Global};
     use crate::cmd::{Output, connection, upload};
+    use control::model::WeightCorrection;
+    use experiment::calibrated::{Calibrated, CalibrationError};
     use experiment::lift::{self, Case};
     use experiment::preparation::{self, PreparationError, Teaching};
     use experiment::sweep::{self, Point};
@@ -140,7 +147,10 @@ mod work {
         if command.demonstrations.is_some() || command.sweep.is_some() {
             return study(command, global, &out, &interrupt, output);
         }
-        let config = configuration(command, global, &out, 1, &interrupt, output)?;
+        let mut config = configuration(command, global, &out, 1, &interrupt, output)?;
+        if command.calibrated {
+            config.weights = calibrate(&config, &out, &interrupt, output)?;
+        }
         if config.scenario == Scenario::Lift {
             return lift(&config, command.render, &interrupt, output);
         }
@@ -180,6 +190,30 @@ mod work {
             keep_recordings: command.keep_recordings,
             ..usual
         })
+    }
+
+    /// Weighs the arms that were not weighed here before; their weights by seed.
+    fn calibrate(
+        config: &Config,
+        out: &Path,
+        interrupt: &Interrupt,
+        output: Output,
+    ) -> Result<BTreeMap<u64, WeightCorrection>, Failure> {
+        let file = out.join("calibrated.json");
+        let mut calibrated = Calibrated::read(&file, config);
+        let spinner = output.spinner("weighing the arms");
+        let completed = calibrated.complete(config, interrupt);
+        spinner.finish_and_clear();
+        // The arms that were weighed are worth keeping, whatever became of the others.
+        let data = serde_json::to_value(&calibrated)
+            .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
+        save(&file, &data)?;
+        completed.map_err(|error| match error {
+            CalibrationError::Tour { cause, .. } => trial_failure(cause),
+            CalibrationError::Regression { .. } => Failure::new(ErrorCode::WeightNotAccepted, DOING, error),
+        })?;
+        output.say(calibrated.table().to_string());
+        calibrated.weights().map_err(|error| Failure::new(ErrorCode::WeightNotAccepted, DOING, error))
     }
 
     /// The object that is compiled in under this name, or that of the user's file.

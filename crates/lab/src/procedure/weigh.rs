@@ -1,4 +1,4 @@
-//! The tour of `tactus calibrate gravity`: every posture is passed slowly, upwards and downwards.
+//! The tours of `tactus calibrate gravity` and `friction`: every posture is passed upwards and downwards.
 
 use std::time::Duration;
 
@@ -8,6 +8,7 @@ use link::EventKind;
 
 use super::{ProcedureError, after, travel};
 use crate::client::{Client, Incoming};
+use crate::demonstration::RATE;
 use crate::device::Device;
 use crate::weigh::{Crossing, HALF_WAY, PASS_SECONDS, Sample, WINDOW, is_held_out};
 
@@ -55,8 +56,8 @@ pub fn cross_postures(
         progress(index);
         let (below, above) = (posture.map(|q| q - HALF_WAY), posture.map(|q| q + HALF_WAY));
         travel(client, below, |_| {})?;
-        let crossing =
-            Crossing { up: pass_posture(client, above, posture)?, down: pass_posture(client, below, posture)? };
+        let mut pass = |target| pass_posture(client, target, posture, PASS_SECONDS);
+        let crossing = Crossing { up: pass(above)?, down: pass(below)? };
         if is_held_out(index) {
             crossings.held_out.push(crossing);
         } else {
@@ -66,15 +67,41 @@ pub fn cross_postures(
     Ok(crossings)
 }
 
-/// Moves to `target` (rad) through the posture; what was measured near it.
+/// Moves the arm through the postures (rad), each at every one of these durations of a pass (s). It holds in the last
+/// one. `progress` hears which posture is next.
+///
+/// # Errors
+/// As [`travel`].
+pub fn slide_postures(
+    client: &mut Client<Device>,
+    postures: &[[f32; 7]],
+    durations: &[f32],
+    mut progress: impl FnMut(usize),
+) -> Result<Vec<Crossing>, ProcedureError> {
+    let mut crossings = Vec::with_capacity(postures.len() * durations.len());
+    for (index, posture) in postures.iter().enumerate() {
+        progress(index);
+        let (below, above) = (posture.map(|q| q - HALF_WAY), posture.map(|q| q + HALF_WAY));
+        travel(client, below, |_| {})?;
+        for seconds in durations {
+            let mut pass = |target| pass_posture(client, target, posture, *seconds);
+            crossings.push(Crossing { up: pass(above)?, down: pass(below)? });
+        }
+    }
+    Ok(crossings)
+}
+
+/// Moves to `target` (rad) through the posture within `seconds`, or longer where the device asks for it; what was
+/// measured near it.
 fn pass_posture(
     client: &mut Client<Device>,
     target: [f32; 7],
     posture: &[f32; 7],
+    seconds: f32,
 ) -> Result<Vec<Sample>, ProcedureError> {
     client.take_events();
     client.set_telemetry(EVERY)?;
-    client.approach(target, PASS_SECONDS)?;
+    client.approach(target, seconds)?;
     let samples = watch(client, posture[0].into());
     client.set_telemetry(0)?;
     samples
@@ -82,7 +109,7 @@ fn pass_posture(
 
 fn watch(client: &mut Client<Device>, first: f64) -> Result<Vec<Sample>, ProcedureError> {
     let started = client.now();
-    let mut samples = Vec::new();
+    let (mut samples, mut first_cycle) = (Vec::new(), None);
     loop {
         if client.now().saturating_sub(started) > Duration::from_secs(TIMEOUT) {
             client.stop()?;
@@ -90,7 +117,9 @@ fn watch(client: &mut Client<Device>, first: f64) -> Result<Vec<Sample>, Procedu
         }
         match client.next(Duration::from_millis(100))? {
             Some(Incoming::Telemetry(cycle)) => {
-                let sample = Sample { q: cycle.q.map(f64::from), torque: cycle.tau.map(f64::from) };
+                let [q, torque, speed] = [cycle.q, cycle.tau, cycle.dq].map(|joints| joints.map(f64::from));
+                let time = f64::from(cycle.cycle.wrapping_sub(*first_cycle.get_or_insert(cycle.cycle))) / RATE;
+                let sample = Sample { time, q, torque, speed, wrench: cycle.wrench.map(f64::from) };
                 let measured = cycle.flags & flags::POSITIONS_KNOWN != 0 && cycle.lost_replies == 0;
                 if measured && (sample.q[0] - first).abs() <= WINDOW {
                     samples.push(sample);

@@ -41,13 +41,19 @@ pub const LEAST_GAIN: f64 = 0.01;
 /// Fewest postures to regress from, and to judge by.
 pub const FEWEST: (usize, usize) = (8, 3);
 
-/// One moment of a pass: joint angles (rad) and the torques that were sent (N m).
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// One moment of a pass.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sample {
+    /// Time, s, from a moment that samples of one pass share.
+    pub time: f64,
     /// Joint angles, rad.
     pub q: [f64; 7],
-    /// Joint torques, N m.
+    /// Joint torques that were sent, N m.
     pub torque: [f64; 7],
+    /// Joint velocities, rad/s. They do not count where links are weighed, nor does the wrench.
+    pub speed: [f64; 7],
+    /// Wrench at the grasp point as the device tells it: force in world axes (N), torque in tool axes (N m).
+    pub wrench: [f64; 6],
 }
 
 /// A posture that all joints passed upwards and then downwards.

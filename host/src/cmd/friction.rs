@@ -1,0 +1,82 @@
+//! `tactus calibrate friction`: the friction of the arm's joints, measured and shown beside the model's.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::calibration_report::CalibrationReport;
+use super::{ErrorCode, Failure, Global, Table, connection};
+use control::model::{FRICTION_COULOMB, FRICTION_VISCOUS};
+use lab::client::Client;
+use lab::device::Device;
+use lab::friction::{DURATIONS, Estimate, JointFriction, POSTURES, measure};
+use lab::procedure;
+
+/// Options of `calibrate friction`.
+#[derive(Debug, Clone, Args)]
+pub struct Friction {
+    /// I have brought the arm to its home pose: zero it there if need be
+    #[arg(long)]
+    pub at_home: bool,
+    /// Write what was found into a file too, JSON; in a folder it is named with serial number and time
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+}
+
+const DOING: &str = "calibrate friction";
+
+/// Measures friction and shows it; the device goes on with the model's.
+///
+/// # Errors
+/// The device refuses, the arm stops, or the passes tell no friction.
+pub(super) fn run(command: &Friction, client: &mut Client<Device>, global: &Global) -> Result<(), Failure> {
+    let report = CalibrationReport::open(command.report.as_deref(), client, global, DOING)?;
+    connection::ready(client, command.at_home, global.output(), DOING)?;
+    let weight = procedure::weight_in_use(client).map_err(|error| connection::failure(error, DOING))?;
+    let (postures, speeds) = (POSTURES.len(), DURATIONS.len());
+    global.output().say(format!(
+        "the arm moves through {postures} postures at {speeds} speeds, some two minutes; Ctrl-C stops it"
+    ));
+    let spinner = global.output().spinner("measuring friction");
+    let measured = procedure::slide_postures(client, POSTURES, &DURATIONS, |posture| {
+        spinner.set_message(format!("posture {} of {postures}", posture + 1));
+    });
+    spinner.finish_and_clear();
+    let crossings = measured.map_err(|error| connection::failure(error, DOING))?;
+    let joints =
+        measure(&weight, &crossings).map_err(|error| Failure::new(ErrorCode::FrictionNotTold, DOING, error))?;
+    report.write("friction", false, &data(&joints), global)?;
+    global.output().result(&data(&joints), format!("{}shown only: the device goes on with the model's", table(&joints)))
+}
+
+fn table(joints: &[JointFriction; 7]) -> Table {
+    let mut table =
+        Table::new(["joint", "Coulomb, N m", "model's", "viscous, N m s/rad", "model's", "left, N m", "speeds, rad/s"]);
+    let plain = |estimate: Estimate| format!("{:.3} +-{:.3}", estimate.value, estimate.error);
+    for (joint, friction) in joints.iter().enumerate() {
+        let [slowest, fastest] = friction.speeds;
+        table.row([
+            format!("J{}", joint + 1),
+            plain(friction.coulomb),
+            format!("{:.3}", FRICTION_COULOMB[joint]),
+            plain(friction.viscous),
+            format!("{:.3}", FRICTION_VISCOUS[joint]),
+            format!("{:.3}", friction.left),
+            format!("{slowest:.2} .. {fastest:.2}"),
+        ]);
+    }
+    table
+}
+
+fn data(joints: &[JointFriction; 7]) -> Value {
+    let estimate = |estimate: Estimate| json!({ "value": estimate.value, "standard_error": estimate.error });
+    let joints = joints.iter().enumerate().map(|(joint, friction)| {
+        json!({
+            "coulomb_nm": estimate(friction.coulomb), "viscous_nms_per_rad": estimate(friction.viscous),
+            "left_rms_nm": friction.left, "speeds_rad_s": friction.speeds,
+            "model": { "coulomb_nm": FRICTION_COULOMB[joint], "viscous_nms_per_rad": FRICTION_VISCOUS[joint] },
+        })
+    });
+    json!({ "joints": joints.collect::<Vec<_>>() })
+}
