@@ -284,7 +284,7 @@ fn a_wrench_at_the_grasp_point_is_measured_as_it_acts_in_every_posture() {
 #[test]
 fn what_is_expected_is_no_error_of_the_sensor_and_what_is_not_is_one() {
     let here = frames(POSTURE);
-    let (force, torque) = (Vector3::new(0.1, -0.1, 0.15), Vector3::new(0.01, 0.015, -0.01));
+    let (force, torque) = (Vector3::new(0.05, -0.05, 0.08), Vector3::new(0.01, 0.015, -0.01));
     let in_tool = here.tool_to_world().transpose() * torque;
     let expected = [force.x, force.y, force.z, in_tool.x, in_tool.y, in_tool.z, 0.0, 0.0, 0.0];
     for (expected, is_followed) in [(Some(expected), false), (Some([0.0; 9]), true), (None, false)] {
@@ -302,4 +302,21 @@ fn what_is_expected_is_no_error_of_the_sensor_and_what_is_not_is_one() {
         assert!((left.force - force).norm() < 0.01, "{left:?} {force}");
         assert!((left.torque - in_tool).norm() < 0.002, "{left:?} {in_tool}");
     }
+}
+
+#[test]
+fn an_error_of_the_force_alone_is_followed_as_such_and_takes_no_torque_along() {
+    let here = frames(POSTURE);
+    let mut estimator = rested(&sample([0.0; 3], [0.0; 3]), half());
+    assert!(estimator.tare());
+    let mut drift = Drift::new();
+    for _ in 0..(2.0 * RATE) as u32 {
+        take(&mut estimator, Some(sample([0.1, 0.1, -0.1], [0.0; 3])), false);
+        let measured = estimator.wrench(&here);
+        // A force at the sensor and nothing else.
+        let torque = here.tool_to_world().transpose() * here.tool_to_sensor().cross(&measured.force);
+        assert!((measured.torque - torque).norm() < 1e-9, "{measured:?} {torque}");
+        estimator.follow(&mut drift, &measured, Some(&Deviation::new(&[0.0; 9], &measured, None)), &here);
+    }
+    assert!(estimator.raw_force() < 0.02, "{}", estimator.raw_force());
 }

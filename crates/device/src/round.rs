@@ -195,4 +195,30 @@ mod tests {
         turn(&mut round, 0..7);
         assert_eq!((round.suspect(), round.longest_silence()), (None, 0));
     }
+
+    #[test]
+    fn a_round_asks_the_sensor_only_where_there_is_one_and_is_open_until_it_is_closed() {
+        for has_sensor in [true, false] {
+            let mut round = Round::new(has_sensor);
+            assert!(!round.is_open());
+            let sensor = has_sensor.then(force_torque::get_wrench);
+            assert_eq!(round.open(), (get(Group::ARM, PropertyId::POSITION), sensor));
+            assert!(round.is_open());
+            round.close(&mut Counters::default());
+            assert!(!round.is_open());
+        }
+    }
+
+    #[test]
+    fn a_reply_of_another_kind_or_node_belongs_to_no_round() {
+        let (mut round, mut counters) = (Round::new(true), Counters::default());
+        round.open();
+        let finger = Reply::Position { node: Node::FINGERS[0], primary: Counts(1), secondary: None };
+        let force = Reply::Force { node: Node::FINGERS[0], counts: [1, 0, 0], status: None };
+        let torque = Reply::Torque { node: Node::FINGERS[0], counts: [1, 0, 0], status: None };
+        for reply in [finger, force, torque] {
+            assert!(!round.take(&reply, &mut counters), "{reply:?}");
+        }
+        assert_eq!(counters.late_replies, 0);
+    }
 }

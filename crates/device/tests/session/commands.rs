@@ -1,7 +1,8 @@
 //! Requests for the control half, and what it tells.
 
-use control::{Fault, State};
-use device::{Command, Counters, EventKind, HandFailure, Refusal as ControlRefusal, Stage};
+use control::{CycleRecord, Fault, State};
+use device::{Command, Counters, EventKind, HandFailure, Refusal as ControlRefusal, Stage, TimedRecord};
+use link::frame::FRAME_BYTES;
 use link::message::{AccelerationSource, PoseFeedback};
 use link::{Event, EventKind as LinkKind, Goal, HandStage, Name, Refusal, Reply, Request, RunOptions, Telemetry};
 use proptest::prelude::*;
@@ -340,6 +341,37 @@ fn telemetry_gives_way_and_is_counted_when_the_line_is_full() {
     rig.bench.room = 4096;
     let Some(Reply::Statistics { statistics, .. }) = rig.ask(Request::Statistics) else { panic!() };
     assert_eq!(statistics.telemetry_dropped, 5);
+}
+
+#[test]
+fn telemetry_keeps_room_for_one_answer_and_no_more() {
+    for (room, sent) in [(2 * FRAME_BYTES, 1), (2 * FRAME_BYTES - 1, 0)] {
+        let mut rig = Rig::greeted();
+        rig.done(Request::Telemetry { every: 1 });
+        rig.bench.room = room;
+        rig.cycle(1, Fault::None);
+        assert_eq!(telemetry(&mut rig).len(), sent, "{room} bytes");
+    }
+}
+
+#[test]
+fn every_cycle_whose_torque_was_cut_is_counted_whatever_cut_it() {
+    use control::flags::{CONTACT_UNSEEN, JOINT_LIMITED, MOTOR_LIMITED, RATE_LIMITED};
+    for (flags, counted) in [
+        (JOINT_LIMITED, 1),
+        (MOTOR_LIMITED, 1),
+        (RATE_LIMITED, 1),
+        (JOINT_LIMITED | RATE_LIMITED, 1),
+        (CONTACT_UNSEEN, 0),
+        (0, 0),
+    ] {
+        let mut rig = Rig::greeted();
+        let record = CycleRecord { flags, ..CycleRecord::EMPTY };
+        rig.bench.records.push_back(TimedRecord { record, cost_ticks: 0 });
+        rig.poll();
+        let Some(Reply::Statistics { statistics, .. }) = rig.ask(Request::Statistics) else { panic!() };
+        assert_eq!(statistics.limited_cycles, counted, "{flags:#b}");
+    }
 }
 
 #[test]

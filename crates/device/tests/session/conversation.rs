@@ -191,6 +191,41 @@ fn a_stop_of_a_stranger_that_the_control_half_never_answers_is_refused_to_the_st
 }
 
 #[test]
+fn no_session_has_the_number_zero() {
+    let mut rig = Rig::new();
+    rig.number = 0;
+    for hello in [Request::Hello(hello()), Request::Observe(hello())] {
+        assert_eq!(rig.refused(hello), (Refusal::BadValue, [0, 0]));
+    }
+    assert_eq!(rig.refused(Request::Ping).0, Refusal::NoSession);
+}
+
+#[test]
+fn a_stranger_is_not_answered_where_the_line_has_no_room_for_a_frame() {
+    for (room, is_answered) in [(FRAME_BYTES, true), (FRAME_BYTES - 1, false)] {
+        let mut rig = Rig::greeted();
+        rig.number = 500;
+        rig.put(9000, 0, &Request::Stop);
+        rig.bench.room = room;
+        rig.event(EventKind::Accepted);
+        assert_eq!(rig.sent().len(), usize::from(is_answered), "{room} bytes");
+    }
+}
+
+#[test]
+fn an_event_that_finds_no_room_is_counted() {
+    let mut rig = Rig::greeted();
+    rig.bench.room = FRAME_BYTES - 1;
+    rig.event(EventKind::Arrived);
+    rig.bench.room = FRAME_BYTES;
+    rig.event(EventKind::Arrived);
+    assert_eq!(rig.sent().len(), 1);
+    rig.bench.room = 4096;
+    let Some(Reply::Statistics { statistics, .. }) = rig.ask(Request::Statistics) else { panic!() };
+    assert_eq!(statistics.events_dropped, 1);
+}
+
+#[test]
 fn goodbye_frees_the_device_at_once() {
     let mut rig = Rig::greeted();
     rig.done(Request::Goodbye);
@@ -342,6 +377,10 @@ fn a_motion_whose_host_said_goodbye_is_stopped() {
 fn c10_an_old_request_does_not_move_the_arm_but_an_old_stop_stops_it() {
     let mut rig = Rig::greeted();
     rig.sequence += 1;
+    rig.put(rig.sequence, 500, &Request::Hold);
+    assert_eq!(rig.bench.commands.pop(), Some(Command::Control(control::Command::Hold)), "just in time");
+    rig.event(EventKind::Accepted);
+    rig.sequence += 1;
     rig.put(rig.sequence, 501, &Request::Gravity);
     let answer = rig.answer();
     assert!(matches!(answer, Some(Reply::Refused { reason: Refusal::Stale, detail: [501, 500], .. })), "{answer:?}");
@@ -353,7 +392,8 @@ fn c10_an_old_request_does_not_move_the_arm_but_an_old_stop_stops_it() {
 #[test]
 fn answers_wait_for_room_on_the_line() {
     let mut rig = Rig::greeted();
-    rig.bench.room = FRAME_BYTES;
+    // An answer and an event may come of a request.
+    rig.bench.room = 2 * FRAME_BYTES - 1;
     assert_eq!(rig.ask(Request::Ping), None);
     rig.bench.room = 4096;
     rig.poll();

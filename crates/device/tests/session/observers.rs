@@ -48,6 +48,10 @@ fn an_observer_asks_for_state_counters_listing_and_calibration_beside_the_owner_
     assert!(matches!(rig.ask(Request::Statistics), Some(Reply::Statistics { .. })));
     assert!(matches!(rig.ask(Request::List { index: 0 }), Some(Reply::Listing { listing: Some(_), .. })));
     assert!(matches!(rig.ask(Request::Calibration), Some(Reply::Calibration { .. })));
+    assert!(matches!(rig.ask(Request::Weight), Some(Reply::Weight { .. })));
+    // As fast as others may ask beside an owner.
+    rig.wait(10);
+    assert!(matches!(rig.ask(Request::Owner), Some(Reply::Owner { owner: Some(_), .. })));
     rig.done(Request::Ping);
     rig.done(Request::Goodbye);
     assert_eq!(rig.refused(Request::Status).0, Refusal::NoSession);

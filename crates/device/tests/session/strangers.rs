@@ -37,6 +37,20 @@ fn h7_a_stop_that_is_repeated_by_its_owner_stops_again() {
 }
 
 #[test]
+fn a_stop_of_the_owner_is_a_sign_of_life_and_one_of_a_stranger_is_none() {
+    for (number, is_stopped_again) in [(77, false), (500, true)] {
+        let mut rig = Rig::greeted();
+        rig.bench.state = State::Run;
+        rig.wait(400);
+        let owner = std::mem::replace(&mut rig.number, number);
+        rig.commanded(Request::Stop);
+        rig.number = owner;
+        rig.wait(400);
+        assert_eq!(rig.bench.commands.len() > 1, is_stopped_again, "session {number}: its host has fallen silent");
+    }
+}
+
+#[test]
 fn h9_no_replay_keeps_the_run_of_a_dead_host_alive() {
     // The newest request again, an older one, and one that belongs to no session.
     for (session, behind) in [(77, 0), (77, 1), (77, 4), (0, 0), (500, 0)] {

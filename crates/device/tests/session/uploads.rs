@@ -56,6 +56,25 @@ fn an_upload_is_stored_listed_and_read_back_to_the_last_byte() {
 }
 
 #[test]
+fn an_image_may_fill_its_place_to_the_last_byte_and_the_status_tells_how_much_has_come() {
+    let mut rig = Rig::greeted();
+    let received = |rig: &mut Rig| match rig.ask(Request::Status) {
+        Some(Reply::Status { status, .. }) => status.upload_received,
+        other => panic!("no status but {other:?}"),
+    };
+    let begin = |length: usize| Request::UploadBegin { name: name("reach"), length: length as u32, crc: 0 };
+    assert_eq!(
+        rig.refused(begin(SLOT_BYTES + 1)),
+        (Refusal::ImageTooLarge, [SLOT_BYTES as u32 + 1, SLOT_BYTES as u32])
+    );
+    assert_eq!(received(&mut rig), None);
+    rig.done(begin(SLOT_BYTES));
+    assert_eq!(received(&mut rig), Some(0));
+    rig.done(Request::UploadChunk { offset: 0, data: ChunkData::from_slice(&[0; 100]).unwrap() });
+    assert_eq!(received(&mut rig), Some(100));
+}
+
+#[test]
 fn an_upload_tells_that_the_store_changed() {
     let mut rig = Rig::greeted();
     rig.send_parts("reach", &image("reach", 3.0, 10));

@@ -85,6 +85,52 @@ fn the_largest_messages_fit() {
     assert_eq!(FRAME_BYTES, PAYLOAD_BYTES + 2, "one byte of stuffing up to 254 bytes, and the zero");
 }
 
+/// A message of any length.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+struct Long(heapless::Vec<u8, { 2 * MESSAGE_BYTES }>);
+
+impl Long {
+    /// One of so many bytes, two of which are its length.
+    fn of(bytes: usize) -> Self {
+        Self((0..bytes - 2).map(|byte| byte as u8).collect())
+    }
+}
+
+impl Message for Long {
+    fn tolerates_more(&self) -> bool {
+        false
+    }
+
+    fn foreign_hello(_: &[u8]) -> Option<Self> {
+        None
+    }
+}
+
+#[test]
+fn a_message_of_the_stated_length_travels_and_one_byte_more_is_refused() {
+    let longest = Long::of(MESSAGE_BYTES);
+    let frame = frame_of(&longest);
+    assert_eq!(frame.len(), FRAME_BYTES);
+    let back = Decoder::<FRAME_BYTES>::new().next::<Long>(&mut frame.as_slice()).unwrap();
+    assert_eq!((back.envelope, back.message), (ENVELOPE, longest));
+    let refused = frame::encode(ENVELOPE, &Long::of(MESSAGE_BYTES + 1), &mut [0; 2 * FRAME_BYTES]);
+    assert_eq!(refused, Err(EncodeError::MessageTooLong));
+    let words = [EncodeError::MessageTooLong, EncodeError::BufferTooSmall].map(|error| error.to_string());
+    assert_eq!(words, ["the message is longer than a frame can carry", "the buffer is smaller than the frame"]);
+}
+
+#[test]
+fn a_connection_that_is_opened_anew_forgets_the_frame_that_had_begun() {
+    let frame = frame_of(&Request::Ping);
+    for begun in [&frame[..5], &[1; 2 * FRAME_BYTES]] {
+        let mut decoder = Decoder::new();
+        assert_eq!(read(&mut decoder, begun), []);
+        decoder.reset();
+        assert_eq!(read(&mut decoder, &frame), [Request::Ping]);
+        assert_eq!(decoder.counters(), LinkCounters { accepted: 1, ..LinkCounters::default() });
+    }
+}
+
 #[test]
 fn encoding_into_a_short_buffer_is_refused() {
     let request = &requests()[0];

@@ -54,6 +54,8 @@ fn identifiers_name_direction_device_and_place() {
     assert_eq!(heading.id(), 0x010);
     let device = DeviceNumber::new(15).unwrap();
     assert_eq!(Heading { direction: Direction::ToHost, device, sequence: 15 }.id(), 0x3FF);
+    assert_eq!((device.number(), device.to_string()), (15, "15".to_owned()));
+    assert_eq!((DEVICE.number(), DEVICE.to_string()), (0, "0".to_owned()));
     assert_eq!(DeviceNumber::new(16), None);
     let known = (0..=u16::MAX).filter_map(|id| Some((id, Heading::parse(id)?)));
     let mut count = 0;

@@ -65,3 +65,83 @@ fn push<const N: usize>(queue: &mut Deque<Frame<Request>, N>, frame: Frame<Reque
     }
     !is_full
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use link::frame::Envelope;
+
+    /// The session number of the owner.
+    const OWNER: u16 = 7;
+
+    fn frame(session: u16, message: Request) -> Frame<Request> {
+        Frame { envelope: Envelope { session, sequence: 0, time_ms: 0 }, message }
+    }
+
+    /// A request of another host arrives and is asked for at once; true if it is handled.
+    fn passes(inbox: &mut Inbox, now_ms: u32, session: u16, message: Request) -> bool {
+        assert!(inbox.push(frame(session, message), false));
+        let passed = inbox.pop(now_ms, false, |session| session == OWNER).is_some();
+        if !passed {
+            // Nobody has the session: it is not kept waiting.
+            assert!(inbox.pop(now_ms, true, |_| false).is_some());
+        }
+        passed
+    }
+
+    #[test]
+    fn others_may_ask_nine_times_at_once_and_then_every_two_milliseconds() {
+        // The clock wraps: from all of it, and from just before the wrap.
+        for start in [1000, u32::MAX - 5] {
+            let mut inbox = Inbox { paid_until_ms: start, ..Inbox::default() };
+            let at = |ms: u32| start.wrapping_add(ms);
+            let passed: [bool; 11] = core::array::from_fn(|_| passes(&mut inbox, at(0), 99, Request::Ping));
+            assert_eq!(passed.iter().filter(|passed| **passed).count(), 9);
+            assert!(passed[8] && !passed[9]);
+            assert!(!passes(&mut inbox, at(1), 99, Request::Ping));
+            assert!(passes(&mut inbox, at(2), 99, Request::Ping));
+            assert!(!passes(&mut inbox, at(2), 99, Request::Ping));
+            assert!(passes(&mut inbox, at(4), 99, Request::Ping));
+            // A stop costs nothing and owes nothing, and no more does what the owner said before it had the session.
+            assert!(passes(&mut inbox, at(4), 99, Request::Stop) && passes(&mut inbox, at(4), OWNER, Request::Ping));
+            assert!(!passes(&mut inbox, at(4), 99, Request::Ping));
+        }
+    }
+
+    #[test]
+    fn a_debt_of_long_ago_is_none_wherever_the_clock_has_wrapped_to() {
+        for ahead in (OTHER_CREDIT_MS + OTHER_COST_MS + 1..60).chain([1 << 31, u32::MAX]) {
+            let mut inbox = Inbox { paid_until_ms: 5000, ..Inbox::default() };
+            assert!(passes(&mut inbox, 5000_u32.wrapping_sub(ahead), 99, Request::Ping), "{ahead} ms");
+        }
+    }
+
+    #[test]
+    fn a_stop_goes_before_what_waits_and_takes_the_place_of_the_last_where_all_are_taken() {
+        for (is_owner, places) in [(true, OWNER_REQUESTS), (false, OTHER_REQUESTS)] {
+            let mut inbox = Inbox::default();
+            for _ in 0..places {
+                assert!(inbox.push(frame(OWNER, Request::Ping), is_owner));
+            }
+            assert!(!inbox.push(frame(OWNER, Request::Status), is_owner), "it is lost");
+            assert!(!inbox.push(frame(OWNER, Request::Stop), is_owner), "another is lost");
+            let mut next = || inbox.pop(0, true, |_| false).map(|frame| frame.message);
+            assert_eq!(next(), Some(Request::Stop));
+            for _ in 1..places {
+                assert_eq!(next(), Some(Request::Ping));
+            }
+            assert_eq!(next(), None);
+            let mut inbox = Inbox::default();
+            assert!(inbox.push(frame(OWNER, Request::Ping), is_owner));
+            assert!(inbox.push(frame(OWNER, Request::Stop), is_owner), "there was room for both");
+        }
+    }
+
+    #[test]
+    fn the_owner_s_requests_come_before_those_of_others() {
+        let mut inbox = Inbox::default();
+        assert!(inbox.push(frame(99, Request::Status), false) && inbox.push(frame(OWNER, Request::Ping), true));
+        let mut next = || inbox.pop(0, false, |session| session == OWNER).map(|frame| frame.message);
+        assert_eq!((next(), next(), next()), (Some(Request::Ping), Some(Request::Status), None));
+    }
+}
