@@ -62,8 +62,8 @@ pub trait Controller: Sized + 'static {
     /// [`LoadRefusal`] while a run is in progress, or if it was checked for another arm than this. The old one stays.
     fn load(&mut self, primitive: Self::Primitive<'_>) -> Result<(), LoadRefusal>;
 
-    /// Takes the weight of the arm's links and the payload that it declares; `false` while the arm has torque, and where
-    /// there is no arm. The old one then stays.
+    /// Takes the weight of the arm's links and the payload that it declares; `false` while the arm has torque, and
+    /// where there is no arm. The old one then stays.
     fn weigh(&mut self, weight: &StoredWeight) -> bool;
 
     /// The board began a control slot too late for its torque frames to leave in time.

@@ -152,7 +152,7 @@ pub enum StartupError {
     AnswersLate(Node),
     /// The zeroing of an arm was broken off.
     ZeroUnfinished,
-    /// What a person has declared that the arm carries is contradicted by who answers.
+    /// Another payload is declared than who answers tells of.
     PayloadContradicted {
         /// True if sensor and hand are declared, and no sensor answers; false if the bare arm is, and one does.
         hand: bool,

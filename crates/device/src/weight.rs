@@ -104,7 +104,7 @@ impl StoredWeight {
         }
     }
 
-    /// What a person has declared that the arm carries: a weight counts with one payload only. `None`: nothing.
+    /// Payload that a person has declared: a weight counts with one only. `None`: nothing is declared.
     #[must_use]
     pub fn declared(&self) -> Option<Payload> {
         match self {

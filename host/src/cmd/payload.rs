@@ -19,7 +19,7 @@ pub struct Payload {
     pub carries: Option<Carries>,
 }
 
-/// What an arm may carry.
+/// Payload of an arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Carries {
     /// Force/torque sensor and hand: a start-up in which no sensor answers is blocked

@@ -223,9 +223,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             set |= flags::FORCE_CONTROL;
         }
         let surprise = run.surprise();
-        if surprise > R::constant(1.0) {
-            set |= flags::SURPRISE;
-        }
+        set |= if surprise > R::constant(1.0) { flags::SURPRISE } else { 0 };
         if run.is_faded(primitive) {
             set |= flags::FEEDBACK_FADED;
         }

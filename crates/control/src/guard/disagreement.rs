@@ -122,10 +122,10 @@ impl<R: Real> Disagreement<R> {
     }
 
     /// Takes what the law asks of the joints, the torque (N m) and the magnitude of the force (N) that the environment
-    /// is measured to apply, and the motors whose counts have not changed, one bit each; true if an encoder stands still
-    /// while its motor cannot.
+    /// is measured to apply, and the motors whose counts have not changed, one bit each; true if an encoder stands
+    /// still while its motor cannot.
     ///
-    /// What the environment takes of the torque swings with it, and is no friction: an arm that runs into something
+    /// The torque of the environment swings with that of the law, and is no friction: an arm that runs into something
     /// stands still as well.
     ///
     /// Not inlined: it is asked where a motor stands.

@@ -143,7 +143,7 @@ fn b3_a_force_above_the_threshold_stops_the_movement_within_two_cycles() {
     assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::SoftStop, Fault::ContactForce));
 }
 
-/// What came of a movement into a wall.
+/// Outcome of a movement into a wall.
 #[derive(Debug)]
 struct Crash {
     /// Speed of the tool as it met the wall (m/s).

@@ -532,11 +532,8 @@ impl Controller for DeviceController {
     }
 
     fn weigh(&mut self, weight: &StoredWeight) -> bool {
-        let is_taken = self.cycle.weigh(&weight.correction()).is_ok();
-        if is_taken {
-            self.startup.declare(weight.declared());
-        }
-        is_taken
+        let taken = self.cycle.weigh(&weight.correction());
+        taken.map(|()| self.startup.declare(weight.declared())).is_ok()
     }
 
     fn note_overrun(&mut self) {

@@ -152,7 +152,7 @@ pub(crate) struct Startup {
     doubt: Option<StartupError>,
     /// True while the safety module has not been told so.
     owes_revocation: bool,
-    /// What the arm carries, if a person has declared it.
+    /// Payload that a person has declared.
     declared: Option<Payload>,
     /// The posture that `targets` are the counts of (rad).
     home: [f32; 7],
@@ -332,7 +332,7 @@ impl Startup {
         self.declared = payload;
     }
 
-    /// What is declared, where another payload was found.
+    /// The reason to stop where another payload is declared than was found.
     pub(crate) fn contradiction(&self) -> Option<StartupError> {
         let found = self.calibration.as_ref()?.payload();
         let declared = self.declared.filter(|declared| *declared != found)?;
