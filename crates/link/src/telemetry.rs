@@ -168,6 +168,11 @@ mod tests {
     }
 
     #[test]
+    fn no_word_of_the_short_form_is_spare() {
+        assert!(full().shortened().iter().all(|word| *word != 0));
+    }
+
+    #[test]
     fn what_is_no_number_stays_none_and_what_is_too_large_is_cut() {
         let mut broken = Telemetry { fault: 6, ..Telemetry::default() };
         (broken.tau[3], broken.dq[0], broken.wrench[2]) = (f32::NAN, f32::INFINITY, -1e9);

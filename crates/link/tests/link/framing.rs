@@ -212,6 +212,10 @@ fn a_hello_of_a_later_version_with_more_fields_is_still_understood() {
     let mut decoder = Decoder::new();
     assert_eq!(read(&mut decoder, &longer(&requests()[0])), &requests()[..1]);
     assert_eq!(read(&mut decoder, &longer(&Request::Ping)), [], "any other message must end where it ends");
+    let hello = replies().into_iter().find(|reply| matches!(reply, Reply::Hello { .. })).expect("a hello");
+    let frame = frame_with(&hello, |payload| payload.extend([1, 2, 3]));
+    let back = Decoder::<FRAME_BYTES>::new().next::<Reply>(&mut frame.as_slice());
+    assert_eq!(back.map(|frame| frame.message), Some(hello), "the device's as well");
 }
 
 /// Bytes of the envelope, the number of the message, the link version and the schema hash of the sample hello.
@@ -246,6 +250,18 @@ fn a_hello_of_another_version_with_fewer_fields_still_tells_its_version() {
         let found = Decoder::<FRAME_BYTES>::new().next::<Reply>(&mut frame.as_slice()).map(|frame| frame.message);
         let Some(Reply::Hello { of: answered, hello }) = found else { panic!("{kept} bytes: {found:?}") };
         assert_eq!((Some(answered), hello.link_version, hello.schema_hash), (of, 1, 0x1234_5678));
+    }
+}
+
+#[test]
+fn a_hello_that_is_cut_is_of_another_version_if_the_link_s_or_the_schema_s_differs() {
+    let Request::Hello(sample) = &requests()[0] else { panic!("no hello") };
+    for (link_version, schema_hash) in [(LINK_VERSION, SCHEMA_HASH ^ 1), (LINK_VERSION + 1, SCHEMA_HASH)] {
+        let hello = Request::Hello(HostHello { link_version, schema_hash, ..sample.clone() });
+        let frame = frame_with(&hello, |payload| payload.truncate(payload.len() - 1));
+        let messages = read(&mut Decoder::new(), &frame);
+        let [Request::Hello(told)] = messages.as_slice() else { panic!("{messages:?}") };
+        assert_eq!((told.link_version, told.schema_hash), (link_version, schema_hash));
     }
 }
 
