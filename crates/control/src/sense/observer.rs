@@ -349,6 +349,18 @@ mod tests {
     }
 
     #[test]
+    fn a_postponement_before_the_first_mass_matrix_changes_nothing() {
+        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
+        let frames = Frames::new(&model, &JointPositions::from_array(POSTURE));
+        let wanted = Vector7::from([0.5, -1.0, 2.0, 0.3, -4.0, 5.0, 6.0]);
+        let torque = model.mass_matrix(&frames) * wanted;
+        let mut observer = MotionObserver::new();
+        observer.postpone();
+        observer.send(&model, &frames, &Vector7::zeros(), &torque);
+        assert!((observer.sent[0] - wanted).amax() < 1e-9, "{}", observer.sent[0]);
+    }
+
+    #[test]
     fn a_torque_that_is_no_number_is_forgotten() {
         let model = ArmModel::<f64>::new(Payload::SensorAndHand);
         let frames = Frames::new(&model, &JointPositions::from_array(POSTURE));
@@ -441,6 +453,7 @@ mod tests {
     fn what_was_sent_moves_the_model_from_the_moment_on_at_which_it_acts() {
         let model = ArmModel::<f64>::new(Payload::SensorAndHand);
         let frames = Frames::new(&model, &JointPositions::from_array(POSTURE));
+        assert!((LATENCY * PERIOD - 0.004 / 3.0).abs() < 1e-9, "1.33 ms at any rate");
         let mut observer = observing(0.0);
         let acceleration = 30.0;
         let (mut q, mut dq) = (0.0, 0.0);
