@@ -171,7 +171,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let options = run.options;
         let tracking = self.gains.tracking(options.compliant);
         let hand = self.hand.answering().filter(HandState::feels);
-        let Ok(plan) = run.step(primitive, &measured.wrench, hand.as_ref().map(|hand| &hand.gauges), senses) else {
+        let gauges = hand.as_ref().map(|hand| &hand.gauges);
+        let Ok(plan) = run.step(primitive, &measured.wrench, gauges, self.hand.is_gripping(), senses) else {
             return self.float(measured);
         };
         if senses == Senses::Fresh {
