@@ -152,6 +152,18 @@ pub struct Measures {
 }
 
 impl Measures {
+    /// The measures of the fingers; everything else is zero.
+    fn of_fingers(samples: &[Sample]) -> Measures {
+        Measures {
+            finger_peak_n: samples.iter().flat_map(|sample| sample.contact.fingers).fold(0.0, f64::max),
+            finger_grip_n: std::array::from_fn(|finger| {
+                let forces: Vec<f64> = samples.iter().map(|sample| sample.contact.fingers[finger]).collect();
+                largest_mean(&forces, GRIP)
+            }),
+            ..Measures::default()
+        }
+    }
+
     /// Largest force of the finger that presses hardest, 50 ms average, N.
     pub fn hardest_finger(&self) -> f64 {
         self.finger_grip_n.into_iter().fold(0.0, f64::max)
@@ -250,14 +262,8 @@ pub fn judge(
         contact_mean_n: mean_since(forces.iter().skip_while(|force| **force <= TOUCH)),
         finger_n: last.contact.fingers,
         table_peak_n: whole.iter().map(|sample| sample.contact.table).fold(0.0, f64::max),
-        finger_peak_n: whole.iter().flat_map(|sample| sample.contact.fingers).fold(0.0, f64::max),
-        finger_grip_n: std::array::from_fn(|finger| {
-            let forces: Vec<f64> = whole.iter().map(|sample| sample.contact.fingers[finger]).collect();
-            largest_mean(&forces, GRIP)
-        }),
-        finger_asked_n: 0.0,
-        chatter_n: 0.0,
         shaking_rad_s: shaking,
+        ..Measures::of_fingers(whole)
     };
     (outcome, measures)
 }

@@ -195,8 +195,7 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
     let (observation, snapshots) = take_observation(&mut client);
     let conduct = ArmConduct { fault: fault.as_deref(), shaking: shaking::amplitude(&telemetry) };
     let (outcome, mut measures) = outcome::judge(&observation, &marks, config.rule(), conduct);
-    measures.finger_asked_n = asked(config);
-    measures.chatter_n = trace.chatter(measures.closing_s, measures.lift_s);
+    (measures.finger_asked_n, measures.chatter_n) = (asked(config), trace.chatter(measures.closing_s, measures.lift_s));
     let movement = config.primitive.movement.duration.min(measures.lift_s);
     let (adaptation_m, adaptation_deg) = trace.adaptation(&prepared.taught, movement);
     let report = Report {

@@ -98,7 +98,8 @@ impl HandController {
     /// The torques of one tick (N m, spread first).
     ///
     /// A digit whose reply is missing keeps the position part of its last one. With `expected` gauges (N m) the PI
-    /// acts, and no finger closes with more than is asked of it; `frozen` (a torque saturates) keeps its window as it is, and so do gauges that are not measured.
+    /// acts, and no finger closes with more than is asked of it; `frozen` (a torque saturates) keeps its window as it
+    /// is, and so do gauges that are not measured.
     pub fn torque(
         &mut self,
         state: &HandState,

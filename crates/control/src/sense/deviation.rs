@@ -24,8 +24,8 @@ pub const TORQUE_DEAD_BAND: f64 = 0.02;
 /// `cargo xtask margins`.
 pub const FEEDBACK_CUT_OFF: f64 = 4.0;
 
-/// The same of a hand that grips (Hz): what it holds swings with it and adds to the mass that the wrist sensor feels, so
-/// that at [`FEEDBACK_CUT_OFF`] the plan, the hand and an object of 0.9 kg swing at 12 Hz.
+/// The same of a hand that grips (Hz): what it holds swings with it and adds to the mass that the wrist sensor feels.
+/// At [`FEEDBACK_CUT_OFF`] the plan, the hand and an object of 0.9 kg swing at 12 Hz.
 pub const GRIPPING_CUT_OFF: f64 = 1.0;
 
 /// Share of a new value in the filtered one, from one control period to the next.
@@ -76,7 +76,8 @@ impl<R: Real> Deviation<R> {
     }
 }
 
-/// The deviation of the wrench through a low-pass of [`FEEDBACK_CUT_OFF`] or [`GRIPPING_CUT_OFF`], before its dead band.
+/// The deviation of the wrench through a low-pass of [`FEEDBACK_CUT_OFF`] or [`GRIPPING_CUT_OFF`], before its dead
+/// band.
 #[derive(Clone, Debug)]
 pub struct SmoothedWrench<R: Real> {
     value: Vector6<R>,

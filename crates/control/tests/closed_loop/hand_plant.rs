@@ -67,8 +67,8 @@ impl Hand {
             secondary: fingers.map(|angle| counts(angle, 50.0)),
             gauges: [0, 1, 2].map(|finger| {
                 let sign = if self.reversed_gauges { -1.0 } else { 1.0 };
-                let felt = if self.unfelt { 0.0 } else { self.pressing(finger) };
-                Some(gauge::counts(zero + sign * felt).round() as u16)
+                let measured = if self.unfelt { 0.0 } else { self.pressing(finger) };
+                Some(gauge::counts(zero + sign * measured).round() as u16)
             }),
         }
     }
