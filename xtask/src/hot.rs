@@ -67,6 +67,8 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("control::guard::disagreement::Disagreement<R>::is_pushed", "the force sensor is silent"),
     ("control::guard::disagreement::Disagreement<R>::encoder_stands_still", "a motor stands still"),
     ("control::guard::disagreement::torques_of", "a motor stands still"),
+    ("control::cycle::hand::HandDrive<R>::is_gripping", "the memory is full; three fingers, a dozen instructions"),
+    ("control::law::hand::bound_closing", "the memory is full; three fingers, a few dozen instructions"),
     ("control::cycle::Cycle<R,_>::catch", "no torque: no plan and no law is computed"),
     ("control::sense::joints::Motor::doubt", "a reply that does not fit the ones before"),
     ("control::cycle::Cycle<R,_>::actuate_without_torque", "no torque: no plan and no law is computed"),

@@ -116,6 +116,13 @@ pub fn table(summaries: &[Summary]) -> String {
         format!("{:.1} cm  {:.1} cm", s.push_m.median * 100.0, s.push_m.max * 100.0)
     });
     row("finger on object, median, max", &|s| format!("{:.1} N  {:.1} N", s.finger_peak_n.median, s.finger_peak_n.max));
+    row("finger over 50 ms, median, max; asked", &|s| {
+        format!("{:.1} N  {:.1} N; {:.1} N", s.finger_grip_n.median, s.finger_grip_n.max, s.finger_asked_n.max)
+    });
+    row("trials with at most 1.5 of what was asked", &|s| format!("{:.0} %", s.grip_as_asked * 100.0));
+    row("wrist above 3 Hz, closing to lift, median, max", &|s| {
+        format!("{:.2} N  {:.2} N", s.chatter_n.median, s.chatter_n.max)
+    });
     row("hand on table, max", &|s| format!("{:.1} N", s.table_peak_n.max));
     row("sag when lifted, median, max", &|s| format!("{:.1} mm  {:.1} mm", s.sag_m.median * 1e3, s.sag_m.max * 1e3));
     row("off its height before a touch, median, max", &|s| {

@@ -29,6 +29,8 @@ const IN_HAND: f64 = 0.25;
 const TOUCH: f64 = 0.05;
 /// Time over which a sustained force is averaged, s.
 const SUSTAINED: f64 = 0.1;
+/// Time over which the force of a finger is averaged, s.
+const GRIP: f64 = 0.05;
 
 /// The outcome of a trial.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -135,9 +137,37 @@ pub struct Measures {
     /// Largest force of one finger on the object, 10 ms average, N.
     #[serde(default)]
     pub finger_peak_n: f64,
+    /// Largest force of F1, F2, F3 on the object, 50 ms average, N.
+    #[serde(default)]
+    pub finger_grip_n: [f64; 3],
+    /// Force that a finger is asked for, N: the torque that the primitive asks for, over the middle of a link.
+    #[serde(default)]
+    pub finger_asked_n: f64,
+    /// Content of the wrist's force above 3 Hz from the closing of the fingers to the lift, RMS, N.
+    #[serde(default)]
+    pub chatter_n: f64,
     /// Largest [amplitude](crate::shaking::amplitude) of a joint's speed above 15 Hz, rad/s.
     #[serde(default)]
     pub shaking_rad_s: f64,
+}
+
+impl Measures {
+    /// The measures of the fingers; everything else is zero.
+    fn of_fingers(samples: &[Sample]) -> Measures {
+        Measures {
+            finger_peak_n: samples.iter().flat_map(|sample| sample.contact.fingers).fold(0.0, f64::max),
+            finger_grip_n: std::array::from_fn(|finger| {
+                let forces: Vec<f64> = samples.iter().map(|sample| sample.contact.fingers[finger]).collect();
+                largest_mean(&forces, GRIP)
+            }),
+            ..Measures::default()
+        }
+    }
+
+    /// Largest force of the finger that presses hardest, 50 ms average, N.
+    pub fn hardest_finger(&self) -> f64 {
+        self.finger_grip_n.into_iter().fold(0.0, f64::max)
+    }
 }
 
 /// The rule by which a trial is judged.
@@ -227,13 +257,13 @@ pub fn judge(
         lift_s: marks.lift - marks.run,
         failure_s,
         contact_peak_n: forces.iter().copied().fold(0.0, f64::max),
-        contact_sustained_n: sustained(&forces),
+        contact_sustained_n: largest_mean(&forces, SUSTAINED),
         contact_median_n: quantile(&touching, 0.5).unwrap_or(0.0),
         contact_mean_n: mean_since(forces.iter().skip_while(|force| **force <= TOUCH)),
         finger_n: last.contact.fingers,
         table_peak_n: whole.iter().map(|sample| sample.contact.table).fold(0.0, f64::max),
-        finger_peak_n: whole.iter().flat_map(|sample| sample.contact.fingers).fold(0.0, f64::max),
         shaking_rad_s: shaking,
+        ..Measures::of_fingers(whole)
     };
     (outcome, measures)
 }
@@ -255,9 +285,9 @@ fn mean_since<'a>(forces: impl Iterator<Item = &'a f64>) -> f64 {
     sum / f64::max(count, 1.0)
 }
 
-/// Largest mean over [`SUSTAINED`].
-fn sustained(forces: &[f64]) -> f64 {
-    let length = (SUSTAINED / SAMPLE_SECONDS).round() as usize;
+/// Largest mean over `seconds`.
+fn largest_mean(forces: &[f64], seconds: f64) -> f64 {
+    let length = (seconds / SAMPLE_SECONDS).round() as usize;
     let mean = |window: &[f64]| window.iter().sum::<f64>() / length as f64;
     if forces.len() < length {
         return mean(forces);
@@ -331,6 +361,16 @@ mod tests {
         observation.crushed = true;
         let (outcome, measures) = judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default());
         assert_eq!((outcome.is_success(), outcome.name(), measures.finger_peak_n), (false, "crushed", 8.0));
+    }
+
+    #[test]
+    fn a_finger_is_judged_by_fifty_milliseconds_and_not_by_a_knock() {
+        let mut observation = good();
+        observation.samples[1100].contact.fingers = [0.0, 50.0, 0.0];
+        observation.samples[1400..1405].iter_mut().for_each(|sample| sample.contact.fingers[2] = 20.0);
+        let (_, measures) = judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default());
+        assert!((measures.finger_grip_n[1] - 10.0).abs() < 1e-9 && measures.finger_peak_n == 50.0);
+        assert!((measures.hardest_finger() - 20.0).abs() < 1e-9, "{:?}", measures.finger_grip_n);
     }
 
     #[test]

@@ -321,7 +321,7 @@ impl Results {
 type Column = (&'static str, fn(&Report) -> String);
 
 /// All columns of `results.csv`.
-const COLUMNS: [Column; 34] = [
+const COLUMNS: [Column; 39] = [
     ("cell", |r| r.key.index.to_string()),
     ("along_m", |r| number(r.key.cell.along())),
     ("sideways_m", |r| number(r.key.cell.sideways())),
@@ -345,6 +345,11 @@ const COLUMNS: [Column; 34] = [
     ("finger3_n", |r| number(r.measures.finger_n[2])),
     ("table_peak_n", |r| number(r.measures.table_peak_n)),
     ("finger_peak_n", |r| number(r.measures.finger_peak_n)),
+    ("finger1_grip_n", |r| number(r.measures.finger_grip_n[0])),
+    ("finger2_grip_n", |r| number(r.measures.finger_grip_n[1])),
+    ("finger3_grip_n", |r| number(r.measures.finger_grip_n[2])),
+    ("finger_asked_n", |r| number(r.measures.finger_asked_n)),
+    ("chatter_n", |r| number(r.measures.chatter_n)),
     ("sag_m", |r| number(r.sag_m)),
     ("free_sag_m", |r| optional(r.free_sag_m)),
     ("shaking_rad_s", |r| number(r.measures.shaking_rad_s)),

@@ -21,15 +21,15 @@ pub fn amplitude(telemetry: &[Telemetry]) -> f64 {
 /// Largest amplitude over a window of what a second-order Butterworth high-pass leaves.
 fn fast_part(values: impl Iterator<Item = f64>) -> f64 {
     let window = (WINDOW * control::RATE).round() as usize;
-    let fast: Vec<f64> = high_pass(values).map(|value| value * value).collect();
+    let fast: Vec<f64> = high_pass(values, CORNER).map(|value| value * value).collect();
     // A sine of amplitude a has the mean square a^2/2.
     let largest = fast.windows(window).map(|squares| squares.iter().sum::<f64>() / window as f64).fold(0.0, f64::max);
     (2.0 * largest).sqrt()
 }
 
-/// Bilinear transform of the second-order Butterworth high-pass, at rest at the first value.
-fn high_pass(mut values: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
-    let warped = (std::f64::consts::PI * CORNER / control::RATE).tan();
+/// Bilinear transform of the second-order Butterworth high-pass of `corner` (Hz), at rest at the first value.
+pub(super) fn high_pass(mut values: impl Iterator<Item = f64>, corner: f64) -> impl Iterator<Item = f64> {
+    let warped = (std::f64::consts::PI * corner / control::RATE).tan();
     let norm = 1.0 / (1.0 + std::f64::consts::SQRT_2 * warped + warped * warped);
     let a1 = 2.0 * (warped * warped - 1.0) * norm;
     let a2 = (1.0 - std::f64::consts::SQRT_2 * warped + warped * warped) * norm;

@@ -8,6 +8,9 @@ use super::quantile::quantile;
 use super::results::{Report, Results};
 use lab::procedure::Mode;
 
+/// A finger presses as it was asked to up to this many times the force that it was asked for.
+const GRIP_BAR: f64 = 1.5;
+
 /// A quantity over trials.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Spread {
@@ -155,6 +158,14 @@ pub struct Summary {
     pub push_m: Spread,
     /// Peak force of one finger on the object, N.
     pub finger_peak_n: Spread,
+    /// Largest force of one finger on the object over 50 ms, N.
+    pub finger_grip_n: Spread,
+    /// Force that a finger is asked for, N.
+    pub finger_asked_n: Spread,
+    /// Share of the trials in which no finger presses with more than 1.5 times that.
+    pub grip_as_asked: f64,
+    /// Content of the wrist's force above 3 Hz from closing to lift, RMS, N.
+    pub chatter_n: Spread,
     /// Peak force of hand on table, N.
     pub table_peak_n: Spread,
     /// Distance of the hand below its plan when it has lifted, m.
@@ -210,6 +221,13 @@ impl Summary {
             }),
             push_m: spread(|report| report.measures.push_m),
             finger_peak_n: spread(|report| report.measures.finger_peak_n),
+            finger_grip_n: spread(|report| report.measures.hardest_finger()),
+            finger_asked_n: spread(|report| report.measures.finger_asked_n),
+            grip_as_asked: count(&|report| {
+                report.measures.hardest_finger() <= GRIP_BAR * report.measures.finger_asked_n
+            }) as f64
+                / reports.len().max(1) as f64,
+            chatter_n: spread(|report| report.measures.chatter_n),
             table_peak_n: spread(|report| report.measures.table_peak_n),
             sag_m: spread(|report| report.sag_m),
             free_sag_m: Spread::of(&reports.iter().filter_map(|r| r.free_sag_m).map(f64::abs).collect::<Vec<_>>()),

@@ -2,11 +2,16 @@
 
 use lab::demonstration::RATE;
 
+use super::shaking::high_pass;
+
 /// Sensor channels of an expectation: force (world axes), torque (tool axes), gauges of F1 to F3.
 pub const CHANNELS: usize = 9;
 
 /// Time in free air over which the height of the hand is averaged, s.
 const FREE_SECONDS: f64 = 1.0;
+
+/// Frequency above which the force at the wrist is chatter, Hz.
+const CHATTER: f64 = 3.0;
 
 /// One control cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,6 +76,18 @@ impl Trace {
     pub fn free_sag(&self, touched: f64) -> Option<f64> {
         (touched >= FREE_SECONDS).then(|| self.sag(touched - FREE_SECONDS, touched))
     }
+
+    /// Content above 3 Hz of the force at the wrist between two times, N: root mean square of the vector.
+    pub fn chatter(&self, from: f64, to: f64) -> f64 {
+        let before = self.cycles.partition_point(|cycle| cycle.time < from);
+        let within = self.cycles.partition_point(|cycle| cycle.time < to).saturating_sub(before);
+        // The filter is at rest at the first cycle and gives a value from the second on.
+        let squares = |axis: usize| {
+            let fast = high_pass(self.cycles.iter().map(|cycle| cycle.sensors[axis]), CHATTER);
+            fast.skip(before.saturating_sub(1)).take(within).map(|value| value * value).sum::<f64>()
+        };
+        ((0..3).map(squares).sum::<f64>() / within.max(1) as f64).sqrt()
+    }
 }
 
 impl Cycle {
@@ -134,6 +151,20 @@ pub(crate) mod tests {
         assert!((distance - 0.05).abs() < 1e-12 && (angle - 10.0).abs() < 1e-6);
         // After the movement the plan is another one: the lift is no adaptation.
         assert!(trace.adaptation(&taught, 1.0).1 < 1e-9);
+    }
+
+    #[test]
+    fn chatter_is_what_is_fast_in_all_axes_of_the_force_and_only_between_the_two_times() {
+        let mut trace = Trace { cycles: (0..1200).map(|k| cycle(f64::from(k) / RATE)).collect() };
+        for cycle in &mut trace.cycles {
+            let turn = |hertz: f64| (std::f64::consts::TAU * hertz * cycle.time).sin();
+            let fast = if cycle.time < 2.0 { turn(12.0) } else { 0.0 };
+            cycle.sensors = [fast, 9.0 * turn(0.1), 2.0 * fast, 0.0, 0.0, 0.0, 5.0 * fast, 0.0, 0.0];
+        }
+        let whole = (5.0_f64 / 2.0).sqrt();
+        assert!((trace.chatter(0.5, 1.9) - whole).abs() < 0.03, "{}", trace.chatter(0.5, 1.9));
+        assert!(trace.chatter(2.5, 3.9) < 0.03, "{}", trace.chatter(2.5, 3.9));
+        assert_eq!(trace.chatter(9.0, 10.0), 0.0);
     }
 
     #[test]

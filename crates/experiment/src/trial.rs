@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use control::law::gains::HAND_RADIUS;
 use control::time::periods;
 use lab::simulation::{CYCLE_TICKS, SLOT_TICKS};
 use link::EventKind;
@@ -193,7 +194,8 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
     let marks = Milestones { run, lift, hold };
     let (observation, snapshots) = take_observation(&mut client);
     let conduct = ArmConduct { fault: fault.as_deref(), shaking: shaking::amplitude(&telemetry) };
-    let (outcome, measures) = outcome::judge(&observation, &marks, config.rule(), conduct);
+    let (outcome, mut measures) = outcome::judge(&observation, &marks, config.rule(), conduct);
+    (measures.finger_asked_n, measures.chatter_n) = (asked(config), trace.chatter(measures.closing_s, measures.lift_s));
     let movement = config.primitive.movement.duration.min(measures.lift_s);
     let (adaptation_m, adaptation_deg) = trace.adaptation(&prepared.taught, movement);
     let report = Report {
@@ -356,6 +358,13 @@ impl Attempt<'_> {
         self.client.set_telemetry(0)?;
         Ok(arrived)
     }
+}
+
+/// Force that the primitive asks of a finger at the end of its movement, the largest of the three, N.
+fn asked(config: &Config) -> f64 {
+    let last = config.primitive.expectation.as_ref().and_then(|expectation| expectation.mean.last());
+    let gauges = last.and_then(|sensors| sensors.get(6..)).unwrap_or(&[0.0]);
+    gauges.iter().map(|gauge| control::law::hand::asked(*gauge)).fold(0.0, f64::max) / HAND_RADIUS
 }
 
 /// Time at which the plan of a movement that lifts by itself begins to rise from its lowest point, s after its start.

@@ -1,12 +1,13 @@
 //! `HandController`: Eq (14) in fixed point, the law of `control::law::HandController` with its gains.
 //!
 //! `tau_finger = PD(position) - (P e + K_i integral_{t-Dt}^{t} e dt)`, `e = F_expected - F`, `F` the torque of the
-//! environment on the finger. The window's sum is exact: integers are added and taken away, nothing drifts.
+//! environment on the finger, with the same bound of what a finger closes with. The window's sum is exact: integers are
+//! added and taken away, nothing drifts.
 
-use control::law::gains::{HAND_COULOMB, HAND_DAMPING, HAND_FORCE, HAND_STIFFNESS, HAND_VISCOUS};
+use control::law::gains::{HAND_COULOMB, HAND_DAMPING, HAND_FORCE, HAND_GRIP, HAND_STIFFNESS, HAND_TOLD, HAND_VISCOUS};
 
 use crate::estimate::HandState;
-use crate::number::{Number, ZERO, constant, constants, magnitude, share};
+use crate::number::{Number, ZERO, at_least, at_most, constant, constants, magnitude, share};
 use crate::{DIGITS, FINGERS};
 
 const STIFFNESS: [Number; DIGITS] = constants(HAND_STIFFNESS);
@@ -18,6 +19,9 @@ const FORCE_PROPORTIONAL: Number = constant(HAND_FORCE.0);
 const FORCE_INTEGRAL: Number = constant(HAND_FORCE.1 * control::PERIOD);
 /// Control periods of the window.
 const WINDOW: usize = HAND_FORCE.2;
+
+const GRIP: Number = constant(HAND_GRIP);
+const TOLD: Number = constant(HAND_TOLD);
 
 /// Desired speed at which half of the Coulomb friction is fed forward (rad/s).
 const FRICTION_SPEED: Number = constant(0.05);
@@ -94,7 +98,8 @@ impl HandController {
     /// The torques of one tick (N m, spread first).
     ///
     /// A digit whose reply is missing keeps the position part of its last one. With `expected` gauges (N m) the PI
-    /// acts; `frozen` (a torque saturates) keeps its window as it is, and so do gauges that are not measured.
+    /// acts, and no finger closes with more than is asked of it; `frozen` (a torque saturates) keeps its window as it
+    /// is, and so do gauges that are not measured.
     pub fn torque(
         &mut self,
         state: &HandState,
@@ -123,7 +128,14 @@ impl HandController {
         let force: [Number; FINGERS] = core::array::from_fn(|finger| {
             FORCE_PROPORTIONAL * error[finger] + FORCE_INTEGRAL * self.window.sum[finger]
         });
-        [spread, f1 - force[0], f2 - force[1], f3 - force[2]]
+        let mut torques = [spread, f1 - force[0], f2 - force[1], f3 - force[2]];
+        for (finger, expected) in expected.iter().enumerate() {
+            let digit = 1 + finger;
+            let asked = if -*expected > TOLD { -*expected } else { GRIP };
+            let friction = COULOMB[digit] + VISCOUS[digit] * at_least(state.dq[digit], ZERO);
+            torques[digit] = at_most(torques[digit], asked + at_least(-state.gauges[finger], ZERO) + friction);
+        }
+        torques
     }
 }
 

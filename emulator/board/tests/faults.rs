@@ -104,7 +104,7 @@ fn d4_an_image_that_ends_under_torque_gives_none_any_more_even_if_it_fails_twice
         (vec![at("panic", 0), at("hard-fault", 150)], ""),
         (vec![at("hard-fault", 0), at("below-guard", 150)], ""),
     ] {
-        let story = tell_holding(4.5, &faults);
+        let story = tell_holding(3.5, &faults);
         let first = UNDER_TORQUE_US + if faults.len() == 1 { 0 } else { 150 };
         let before = story.sent_since(UNDER_TORQUE_US - 5_000);
         assert!(before.iter().any(|(at, frame)| *at < UNDER_TORQUE_US && is_torque(frame)), "{faults:?}: no torque");

@@ -16,6 +16,10 @@ use crate::time::periods;
 /// Time for which the hand is still driven after a move that nothing follows: 0.5 s, in control periods.
 const SETTLING: u16 = periods(0.5);
 
+/// A finger that is this far behind its plan on the closing side stands on something (rad): in free motion it is 0.03
+/// behind.
+const HELD_UP: f64 = 0.1;
+
 /// Aim of the hand.
 #[derive(Clone, Copy, Debug)]
 enum Aim<R: Real> {
@@ -131,6 +135,15 @@ impl<R: Real> HandDrive<R> {
         }
         self.aim = Aim::Follow(reference);
         self.expected = expected;
+    }
+
+    /// True while two fingers or more stand on something on their way along a plan. Not inlined: the small fast memory
+    /// of a board is full.
+    #[inline(never)]
+    pub fn is_gripping(&self) -> bool {
+        let (Aim::Follow(reference), Some(state)) = (&self.aim, &self.state) else { return false };
+        let behind = reference.q.iter().zip(&state.q).skip(1).map(|(wanted, found)| *wanted - *found);
+        behind.filter(|behind| *behind > R::constant(HELD_UP)).count() > 1
     }
 
     /// Keeps the last reference, at rest: what is gripped stays gripped.

@@ -168,10 +168,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Some(age) if age <= WRENCH_AGE => Senses::Frozen,
             _ => Senses::Lost,
         };
-        let options = run.options;
-        let tracking = self.gains.tracking(options.compliant);
+        let (options, tracking) = (run.options, self.gains.tracking(run.options.compliant));
         let hand = self.hand.answering().filter(HandState::feels);
-        let Ok(plan) = run.step(primitive, &measured.wrench, hand.as_ref().map(|hand| &hand.gauges), senses) else {
+        let gauges = hand.as_ref().map(|hand| &hand.gauges);
+        let Ok(plan) = run.step(primitive, &measured.wrench, gauges, self.hand.is_gripping(), senses) else {
             return self.float(measured);
         };
         if senses == Senses::Fresh {

@@ -81,6 +81,14 @@ pub const HAND_COULOMB: [f64; 4] = [0.05, 0.08, 0.08, 0.08];
 /// its gauge: with the delay of filter and bus a proportional gain of 1 is close to ringing.
 pub const HAND_FORCE: (f64, f64, usize) = (0.5, 2.0, periods(0.2) as usize);
 
+/// Torque of a finger that a plan asks for which tells none (N m).
+pub const HAND_GRIP: f64 = 0.45;
+/// Expected torque of a gauge (N m) from which on a plan tells what it asks of that finger: what is less is drift.
+pub const HAND_TOLD: f64 = 0.1;
+/// Distance of a contact from the joint that presses there (m), in the middle of a link: the torque that is asked for
+/// over this distance is the force that is asked for.
+pub const HAND_RADIUS: f64 = 0.035;
+
 /// Gains with which the arm follows a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracking<R: Real> {

@@ -67,7 +67,7 @@ pub(crate) struct Run<R: Real, const N: usize> {
     /// Feedback as computed last, before it fades.
     coupling: Coupling<R>,
     deviation: Option<Deviation<R>>,
-    /// The filtered deviation, by which a compliant run bends.
+    /// The filtered deviation, by which a compliant run bends, and any run in which the hand grips.
     smoothed: SmoothedWrench<R>,
     watch: Watch<R>,
     /// Control periods of fading left: `FADE` in full, 0 gone.
@@ -209,7 +209,7 @@ impl<R: Real, const N: usize> Run<R, N> {
         let _ = self.set_speed(primitive, self.speed.0);
     }
 
-    /// The plan of this tick.
+    /// The plan of this tick; `gripping` tells that the hand holds something.
     ///
     /// # Errors
     /// [`RolloutError::OtherPrimitive`]: this is not the primitive that the run was started with.
@@ -218,6 +218,7 @@ impl<R: Real, const N: usize> Run<R, N> {
         primitive: &Primitive<R, N>,
         wrench: &Wrench<R>,
         gauges: Option<&[R; 3]>,
+        gripping: bool,
         senses: Senses,
     ) -> Result<Reference<R>, RolloutError> {
         self.kept = match senses {
@@ -228,14 +229,16 @@ impl<R: Real, const N: usize> Run<R, N> {
             let progress = self.rollout.progress();
             self.deviation =
                 primitive.expected().map(|expected| Deviation::new(&expected.at(progress), wrench, gauges));
-            if let Some(deviation) = self.deviation.as_ref().filter(|_| self.options.compliant) {
-                self.smoothed.step(wrench, &deviation.expected);
+            if let Some(deviation) = &self.deviation {
+                self.smoothed.step(wrench, &deviation.expected, gripping);
             }
         }
         let bends = self.options.feedback && !self.settled;
         if let Some(deviation) = self.deviation.filter(|_| bends && senses == Senses::Fresh) {
-            // What swings is an arm that follows softly; a stiff one meets hard things, where each millisecond counts.
-            let mut seen = if self.options.compliant { deviation.smoothed(&self.smoothed) } else { deviation };
+            // What swings is an arm that follows softly, or that holds something; a stiff one meets hard things, where
+            // each millisecond counts.
+            let mut seen =
+                if self.options.compliant || gripping { deviation.smoothed(&self.smoothed) } else { deviation };
             if !self.options.finger_feedback {
                 seen.gauges = [R::constant(0.0); 3];
             }

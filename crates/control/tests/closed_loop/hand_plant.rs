@@ -21,6 +21,8 @@ pub(crate) struct Hand {
     pub(crate) object: [Option<(f64, f64)>; 3],
     /// Reading of the gauges without load (counts).
     pub(crate) unloaded: f64,
+    /// Objects are met by the inner links, which no gauge feels.
+    pub(crate) unfelt: bool,
     /// Turns the sign of the gauges over.
     pub(crate) reversed_gauges: bool,
     /// Digits whose replies are lost.
@@ -38,6 +40,7 @@ impl Hand {
             dq: [0.0; 4],
             object: [None; 3],
             unloaded: 1990.0,
+            unfelt: false,
             reversed_gauges: false,
             silent: false,
             torque: [0.0; 4],
@@ -64,7 +67,8 @@ impl Hand {
             secondary: fingers.map(|angle| counts(angle, 50.0)),
             gauges: [0, 1, 2].map(|finger| {
                 let sign = if self.reversed_gauges { -1.0 } else { 1.0 };
-                Some(gauge::counts(zero + sign * self.pressing(finger)).round() as u16)
+                let measured = if self.unfelt { 0.0 } else { self.pressing(finger) };
+                Some(gauge::counts(zero + sign * measured).round() as u16)
             }),
         }
     }
