@@ -181,8 +181,7 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
         let mut attempt = Attempt { client: &mut client, telemetry: &mut telemetry };
         let lifted = on_time.and_then(|()| if config.scenario.lifts_itself() { Ok(()) } else { attempt.lift() });
         hold = attempt.client.now().as_secs_f64();
-        let held = lifted.and_then(|()| attempt.watch(HOLD_SECONDS));
-        if let Err(error) = held {
+        if let Err(error) = lifted.and_then(|()| attempt.watch(HOLD_SECONDS)) {
             fault = Some(self::fault(error)?);
         }
     }
