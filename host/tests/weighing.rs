@@ -133,6 +133,13 @@ fn g4_a_declared_payload_is_kept_and_a_start_up_that_contradicts_it_is_blocked_w
     let words = String::from_utf8_lossy(&refused.stdout).into_owned();
     assert!(words.contains("the bare arm is declared, and a sensor answers"), "{words}");
 
+    // Whoever waits is told at once, and once.
+    let mut aloud = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    aloud.current_dir(folder).env("TACTUS_DEVICE", DEVICE).args(teach).stdin(Stdio::null());
+    let said = String::from_utf8_lossy(&aloud.output().unwrap().stderr).into_owned();
+    let reason = "the start-up failed and is tried again: the bare arm is declared, and a sensor answers";
+    assert_eq!(said.matches(reason).count(), 1, "{said}");
+
     assert_eq!(declared(&payload(&["undeclared"])), "undeclared");
     object(folder, &teach);
 }

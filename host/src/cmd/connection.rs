@@ -14,7 +14,7 @@ use lab::client::{Client, Halted, Interrupt};
 use lab::device::{Device, OpenError};
 use lab::error::HostError;
 use lab::fault_guide::FaultGuide;
-use lab::procedure::{self, ProcedureError, Readiness};
+use lab::procedure::{self, ProcedureError, Readiness, StartupLook};
 use lab::simulation::{SimulationError, SimulationOptions};
 use lab::transport::Address;
 
@@ -103,7 +103,7 @@ fn started(
     client: &mut Client<Device>,
     output: Output,
     doing: &str,
-    start: impl FnOnce(&mut Client<Device>, &mut dyn FnMut(Stage)) -> Result<Readiness, ProcedureError>,
+    start: impl FnOnce(&mut Client<Device>, &mut dyn FnMut(&StartupLook)) -> Result<Readiness, ProcedureError>,
 ) -> Result<(), Failure> {
     let readiness = watch(client, output, doing, start)?;
     if readiness.wrench_zeroed == Some(false) {
@@ -138,12 +138,19 @@ fn watch(
     client: &mut Client<Device>,
     output: Output,
     doing: &str,
-    start: impl FnOnce(&mut Client<Device>, &mut dyn FnMut(Stage)) -> Result<Readiness, ProcedureError>,
+    start: impl FnOnce(&mut Client<Device>, &mut dyn FnMut(&StartupLook)) -> Result<Readiness, ProcedureError>,
 ) -> Result<Readiness, Failure> {
     let simulated = client.is_simulated();
     let spinner = output.spinner("starting up");
-    let result = start(client, &mut |stage| {
-        spinner.set_message(stage.explanation());
+    let mut blocked = None;
+    let result = start(client, &mut |look| {
+        let stage = look.stage;
+        spinner.set_message(look.explanation());
+        // It is tried again each second; the reason is said once.
+        if look.blocked.is_some() && look.blocked != blocked {
+            blocked.clone_from(&look.blocked);
+            spinner.suspend(|| output.say(look.explanation()));
+        }
         // People at a simulated pendant need no reminder; at a real one the words must stay on the screen.
         if !simulated && matches!(stage, Stage::WaitingForIdle | Stage::WaitingForZero | Stage::WaitingForActive) {
             spinner.suspend(|| output.say(stage.explanation()));

@@ -22,7 +22,7 @@ fn firmware_boots_from_the_emergency_stop_to_ready_through_every_stage() {
     assert_eq!(mode, Some(puck::SafetyMode::EStop), "the arm must start with the E-stop pressed");
     let mut arm = expect(Client::connect(device, "system test"));
     let stages = RefCell::new(Vec::new());
-    expect(procedure::make_ready(&mut arm, false, |stage| stages.borrow_mut().push(stage)));
+    expect(procedure::make_ready(&mut arm, false, |look| stages.borrow_mut().push(look.stage)));
     let stages = stages.into_inner();
     // Motor power changes what there is to be found on the bus: it is enumerated once more behind the E-stop.
     let powered = stages.iter().rposition(|stage| *stage == Stage::Enumerating).unwrap_or(0);

@@ -16,7 +16,7 @@ mod weigh;
 pub use calibrate::{HomeCorrection, correct_home};
 pub use hand::{HandReach, initialise_hand, move_hand};
 pub use mode::Mode;
-pub use ready::{Readiness, make_ready, start_up};
+pub use ready::{Readiness, StartupLook, make_ready, start_up};
 pub use recorder::{CycleWriter, Recorder, Take, recording_row, recording_text};
 pub use rehearse::play_once;
 pub use run::{CHANNELS, Change, ChangeKind, FlagCounts, RunOutcome, RunRequest, Surprise, planned, play};

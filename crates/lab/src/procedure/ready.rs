@@ -34,6 +34,24 @@ pub struct Readiness {
     pub zeroed_at: Option<HomeSource>,
 }
 
+/// One look at a start-up. It is told where it differs from the one before.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StartupLook {
+    /// How far the start-up has come.
+    pub stage: Stage,
+    /// Why it cannot go on, at [`Stage::Blocked`].
+    pub blocked: Option<String>,
+}
+
+impl StartupLook {
+    /// The look in words.
+    #[must_use]
+    pub fn explanation(&self) -> String {
+        let stage = self.stage.explanation();
+        self.blocked.as_ref().map_or_else(|| stage.to_owned(), |reason| format!("{stage}: {reason}"))
+    }
+}
+
 /// Waits until the arm can be commanded, tells every stage, and initialises the hand where there is one.
 ///
 /// A simulated arm stands at home, so it is zeroed there; which home that is the device knows. For a real one
@@ -45,7 +63,7 @@ pub struct Readiness {
 pub fn make_ready(
     client: &mut Client<Device>,
     at_home: bool,
-    tell: impl FnMut(Stage),
+    tell: impl FnMut(&StartupLook),
 ) -> Result<Readiness, ProcedureError> {
     let readiness = start_up(client, at_home, Stage::Ready, tell)?;
     initialise_hand(client)?;
@@ -61,20 +79,24 @@ pub fn start_up(
     client: &mut Client<Device>,
     at_home: bool,
     goal: Stage,
-    mut tell: impl FnMut(Stage),
+    mut tell: impl FnMut(&StartupLook),
 ) -> Result<Readiness, ProcedureError> {
     let simulated = client.is_simulated();
     let seconds = if simulated { SIMULATED_TIMEOUT } else { TIMEOUT };
     let deadline = client.now() + Duration::from_secs(seconds);
     let mut readiness = Readiness::default();
-    let mut told = None;
+    let mut told: Option<StartupLook> = None;
     let mut ready_since = None;
     loop {
         let status = client.status()?;
         let stage = Stage::from_code(status.startup_stage);
-        if let Some(stage) = stage.filter(|_| stage != told) {
-            tell(stage);
-            told = Some(stage);
+        if let Some(stage) = stage {
+            let blocked = status.blocked.filter(|_| stage == Stage::Blocked).map(explain_blocked);
+            let look = StartupLook { stage, blocked };
+            if told.as_ref() != Some(&look) {
+                tell(&look);
+                told = Some(look);
+            }
         }
         match stage {
             Some(Stage::Ready) => {
@@ -95,7 +117,7 @@ pub fn start_up(
             _ => {}
         }
         if client.now() > deadline {
-            let stage = told.map_or("unknown stage", Stage::explanation);
+            let stage = told.map_or("unknown stage", |look| look.stage.explanation());
             let blocked = status.blocked.map(explain_blocked);
             return Err(ProcedureError::NotReady(blocked.unwrap_or_else(|| stage.to_owned())));
         }
