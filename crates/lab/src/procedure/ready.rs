@@ -37,7 +37,7 @@ pub struct Readiness {
 /// One look at a start-up. It is told where it differs from the one before.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StartupLook {
-    /// How far the start-up has come.
+    /// Stage that the start-up has reached.
     pub stage: Stage,
     /// Why it cannot go on, at [`Stage::Blocked`].
     pub blocked: Option<String>,
