@@ -356,3 +356,114 @@ fn a_limit_that_is_passed_without_torque_latches_nothing() {
     assert_eq!(supervisor.take(Trigger::SoftFault, Fault::JointLimit), Ok(false));
     assert_eq!((supervisor.state(), supervisor.fault()), (State::Idle, Fault::None));
 }
+
+/// A supervisor in each state, with what led there.
+fn in_every_state() -> Vec<Supervisor> {
+    use Trigger::{Approach, Hold, RepliesMissing, Run};
+    let ways: [&[Trigger]; 12] = [
+        &[],
+        &[Trigger::Gravity],
+        &[Hold],
+        &[Hold, Approach],
+        &[Hold, Run],
+        &[Trigger::Gravity, RepliesMissing],
+        &[Hold, RepliesMissing],
+        &[Hold, Approach, RepliesMissing],
+        &[Hold, Run, RepliesMissing],
+        &[Hold, Trigger::SoftFault],
+        &[Hold, Trigger::HardFault],
+        &[Hold, Trigger::Release],
+    ];
+    let states: Vec<Supervisor> = ways
+        .iter()
+        .map(|way| {
+            let mut supervisor = Supervisor::new();
+            for trigger in *way {
+                supervisor.take(*trigger, cause(*trigger)).expect("a way there");
+            }
+            supervisor
+        })
+        .collect();
+    for state in State::ALL {
+        assert!(states.iter().any(|supervisor| supervisor.state() == state), "{state:?}");
+    }
+    states
+}
+
+/// The fault that a trigger comes with.
+fn cause(trigger: Trigger) -> Fault {
+    match trigger {
+        Trigger::SoftFault => Fault::ContactForce,
+        Trigger::HardFault => Fault::BusFault,
+        Trigger::SafetyDropped => Fault::SafetyDropped,
+        _ => Fault::None,
+    }
+}
+
+/// One step of a sequence: what must hold between the supervisor before and after it.
+fn step(before: Supervisor, trigger: Trigger, way: &[Trigger]) -> Supervisor {
+    let mut after = before;
+    let taken = after.take(trigger, cause(trigger));
+    let (was, is) = (before.state(), after.state());
+    if taken.is_err() {
+        assert!(trigger.is_command(), "{way:?}: {trigger:?} is refused");
+        assert_eq!((was, before.fault()), (is, after.fault()), "{way:?}: {trigger:?} was refused");
+    }
+    // Torque begins by a person's command to float or to hold, motion by one to move.
+    if is.has_torque() && !was.has_torque() {
+        assert!(matches!(trigger, Trigger::Gravity | Trigger::Hold), "{way:?}: {trigger:?} gives torque");
+    }
+    if authority(after.law()) > authority(before.law()) {
+        assert!(trigger.is_command(), "{way:?}: {trigger:?} raises {:?} to {:?}", before.law(), after.law());
+    }
+    if matches!(after.law(), State::Approach | State::Run) && after.law() != before.law() {
+        assert!(matches!(trigger, Trigger::Approach | Trigger::Run), "{way:?}: {trigger:?} moves the arm");
+    }
+    // What is bridged has torque, and is not a bridge.
+    if is == State::Coast {
+        assert!(!matches!(after.law(), State::Coast | State::Idle | State::Fault), "{way:?}: {trigger:?}");
+    }
+    // The first cause stays until a person clears it, or arms again after the safety module's drop.
+    if before.fault() != Fault::None && after.fault() != before.fault() {
+        let arms = matches!(trigger, Trigger::Gravity | Trigger::Hold) && before.fault() == Fault::SafetyDropped;
+        assert!(trigger == Trigger::Clear || arms, "{way:?}: {trigger:?} overwrites {:?}", before.fault());
+        assert_eq!(after.fault(), Fault::None, "{way:?}");
+    }
+    // Whatever takes torque away has a name.
+    if was.has_torque() && !is.has_torque() && trigger != Trigger::Arrived {
+        assert_ne!(after.fault(), Fault::None, "{way:?}: {trigger:?} without a cause");
+    }
+    after
+}
+
+/// From wherever a sequence has led, a stop ends motion and torque does not rise; clear and hold lead back.
+fn leads_back(mut supervisor: Supervisor, way: &[Trigger]) {
+    supervisor.take(Trigger::Stop, Fault::None).expect("a stop is never refused");
+    assert!(authority(supervisor.law()) < 2, "{way:?}: goes on after a stop as {:?}", supervisor.law());
+    supervisor.take(Trigger::Clear, Fault::None).expect("a stop or a fault is cleared");
+    assert_eq!(supervisor.fault(), Fault::None, "{way:?}");
+    supervisor.take(Trigger::Hold, Fault::None).expect("armed again");
+    assert_eq!((supervisor.state(), supervisor.fault()), (State::Hold, Fault::None), "{way:?}");
+}
+
+#[test]
+fn e1_every_sequence_of_four_triggers_from_every_state_keeps_the_rules_and_leads_back() {
+    let mut sequences = 0_u32;
+    for start in in_every_state() {
+        for first in Trigger::ALL {
+            let one = step(start, first, &[]);
+            for second in Trigger::ALL {
+                let two = step(one, second, &[first]);
+                for third in Trigger::ALL {
+                    let three = step(two, third, &[first, second]);
+                    for fourth in Trigger::ALL {
+                        let way = [first, second, third, fourth];
+                        leads_back(step(three, fourth, &way[..3]), &way);
+                        sequences += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert_eq!(sequences, 12 * 13_u32.pow(4));
+}

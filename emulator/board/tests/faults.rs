@@ -87,7 +87,9 @@ fn d4_a_non_maskable_interrupt_sends_the_last_frames() {
 
 /// True if the frame gives a motor torque.
 fn is_torque(frame: &CanFrame) -> bool {
-    let Ok(Request { action: Action::PackedTorques { torques, .. }, .. }) = Request::decode(frame) else { return false };
+    let Ok(Request { action: Action::PackedTorques { torques, .. }, .. }) = Request::decode(frame) else {
+        return false;
+    };
     torques.iter().any(|torque| *torque != PuckTorque::ZERO)
 }
 
