@@ -92,9 +92,9 @@ fn g2_a_posture_that_comes_to_be_beyond_the_stops_is_not_believed_any_longer() {
         let (mut core, mut bus) = if torque { floating() } else { started() };
         bus.press_activate();
         bus.run(&mut core, 0.2);
-        // J4, led by a person as slowly as motors turn, to 3.4 rad.
+        // J4, led by a person to 3.4 rad, more slowly than an arm that falls (G7).
         while bus.pucks[3].position.0 > counts_of_j4(3.4).0 && core.health().blocked.is_none() {
-            bus.pucks[3].position.0 -= 40;
+            bus.pucks[3].position.0 -= 8;
             bus.run_slots(&mut core, 3);
         }
         let told = f64::from(bus.pucks[3].position.0) / f64::from(counts_of_j4(1.0).0);
