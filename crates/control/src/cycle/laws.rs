@@ -21,7 +21,7 @@ use crate::units::{JointPositions, JointTorques, JointVelocities, Pose, Vector6,
 pub(super) const ARMING: u16 = periods(0.5);
 
 /// Speed of the hand up to which the arm floats freely (m/s).
-pub(super) const TAUGHT_SPEED: f64 = 0.18;
+const TAUGHT_SPEED: f64 = 0.18;
 
 /// Speed of the hand from which it is damped as in a soft stop (m/s); in between the damping rises. 0.25 m/s, the
 /// reduced speed of the standards for work beside a person, lies in between: an arm that was shoved falls below it by
