@@ -20,6 +20,10 @@ use crate::units::{JointPositions, JointTorques, JointVelocities, Pose, Vector6,
 /// Length of the damping that carries the arm while gravity torque builds up after arming: 0.5 s, in control periods.
 pub(super) const ARMING: u16 = periods(0.5);
 
+/// Speed of the hand from which on an arm without torque falls (m/s), as the safety module warns at its forearm. One
+/// that is let go of at its resting place settles more slowly.
+pub(super) const FALLING: f64 = 0.5;
+
 /// Speed of the hand up to which the arm floats freely (m/s).
 const TAUGHT_SPEED: f64 = 0.18;
 

@@ -65,10 +65,6 @@ const STOP_RAMP: u16 = periods(0.1);
 /// periods.
 const HANDOVER: u16 = periods(1.0);
 
-/// Speed of the hand from which on an arm without torque falls (m/s), as the safety module warns at its forearm. One
-/// that is let go of at its resting place settles more slowly.
-const FALLING: f64 = 0.5;
-
 /// Time in which the torque of gravity builds up after arming: 100 ms, in control periods.
 const BUILDING_UP: u16 = periods(0.1);
 
@@ -447,7 +443,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     fn catch(&mut self, measured: &Measured<'_, R>) {
         let active = self.is_active();
         let Law::Off { brakes, .. } = &mut self.law else { return };
-        if active && *brakes == 0 && laws::hand_speed(measured) > R::constant(FALLING) {
+        if active && *brakes == 0 && laws::hand_speed(measured) > R::constant(laws::FALLING) {
             *brakes = BRAKE_WORDS;
         }
     }
