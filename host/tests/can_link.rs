@@ -57,11 +57,10 @@ fn upload_and_run(address: &str, file: &PrimitiveFile) -> (Client<Device>, Vec<T
     assert!(matches!(outcome, UploadOutcome::Stored(_)));
     wait_until(&mut client, 5.0);
     client.zero(control::model::HOME.map(|angle| angle as f32)).unwrap();
-    // Activated some tenths of a second later, the arm has to be held: nothing else carries it.
-    wait_until(&mut client, 5.6);
-    client.hold().unwrap();
     wait_until(&mut client, 7.0);
     client.initialise_hand().unwrap();
+    wait_until(&mut client, 16.0);
+    client.hold().unwrap();
     wait_until(&mut client, 17.0);
     client.approach(file.start.posture.map(|angle| angle as f32), 4.0).unwrap();
     wait_until(&mut client, 30.0);

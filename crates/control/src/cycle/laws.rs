@@ -20,9 +20,9 @@ use crate::units::{JointPositions, JointTorques, JointVelocities, Pose, Vector6,
 /// Length of the damping that carries the arm while gravity torque builds up after arming: 0.5 s, in control periods.
 pub(super) const ARMING: u16 = periods(0.5);
 
-/// Speed of the hand from which on an arm without torque falls (m/s), as the safety module warns at its forearm. One
-/// that is let go of at its resting place settles more slowly.
-pub(super) const FALLING: f64 = 0.5;
+/// Speed of elbow or forearm from which on an arm without torque falls (m/s). A wrist that sinks onto its stop, as that
+/// of an arm at its resting place does, is no fall.
+const FALLING: f64 = 0.3;
 
 /// Speed of the hand up to which the arm floats freely (m/s).
 const TAUGHT_SPEED: f64 = 0.18;
@@ -254,8 +254,14 @@ fn speed_load<R: Real>(frames: &Frames<R>, dq: &JointVelocities<R>) -> R {
     })
 }
 
+/// True if the arm is faster than one that is led or at rest.
+pub(super) fn falls<R: Real>(measured: &Measured<'_, R>) -> bool {
+    let speeds = measured.frames.elbow_speeds(&measured.state.dq, R::constant(TIP_REACH));
+    speeds.iter().any(|speed| *speed > R::constant(FALLING))
+}
+
 /// Speed of the hand (m/s).
-pub(super) fn hand_speed<R: Real>(measured: &Measured<'_, R>) -> R {
+fn hand_speed<R: Real>(measured: &Measured<'_, R>) -> R {
     sqrt(measured.frames.jacobian().twist(&measured.state.dq.0).fixed_rows::<3>(0).norm_squared())
 }
 

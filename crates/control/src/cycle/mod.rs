@@ -443,7 +443,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     fn catch(&mut self, measured: &Measured<'_, R>) {
         let active = self.is_active();
         let Law::Off { brakes, .. } = &mut self.law else { return };
-        if active && *brakes == 0 && laws::hand_speed(measured) > R::constant(laws::FALLING) {
+        if active && *brakes == 0 && laws::falls(measured) {
             *brakes = BRAKE_WORDS;
         }
     }
