@@ -7,7 +7,7 @@
 //! one that misses what it should press on is driven shut. The spread is controlled in position alone.
 //!
 //! A gauge feels the outer link only. So the sum is bounded on the closing side, by what moves the finger, what is
-//! [asked](asked) of it, and what its gauge feels: an inner link that closes on something presses with what is asked,
+//! [asked] of it, and what its gauge feels: an inner link that closes on something presses with what is asked,
 //! and not with all that drive and clutch can give.
 
 use nalgebra::SVector;
