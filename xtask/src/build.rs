@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
@@ -16,10 +17,20 @@ pub(crate) const WORLD: &str = "tactus/mujoco,lab/mujoco,experiment/mujoco,sim/m
 /// File name of the hand's image beside the tools.
 pub(crate) const HAND: &str = "hand.elf";
 
+/// `cargo build` or `cargo test` of all host packages, optimised, with the MuJoCo world.
+///
+/// Every optimised build selects the same packages and features, whatever it then needs of them: the features of a
+/// dependency follow from the selection, so another selection would build half of the house once more.
+pub(crate) fn optimised(verb: &str) -> Command {
+    let mut cargo = shell::cargo();
+    cargo.args([verb, "--release", "--workspace", "--exclude", "firmware", "--features", WORLD]);
+    cargo
+}
+
 /// Builds the `tactus` command with the MuJoCo world, optimised; returns its path.
 pub(crate) fn host() -> Result<PathBuf> {
     shell::step("building the tactus command");
-    shell::run(shell::cargo().args(["build", "--release", "--package", "tactus", "--features", "tactus/mujoco"]))?;
+    shell::run(optimised("build").args(["--bin", "tactus"]))?;
     Ok(shell::target_dir().join("release").join("tactus"))
 }
 

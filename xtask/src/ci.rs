@@ -50,7 +50,7 @@ fn lint_host() -> Result<()> {
     let clippy = |features: &[&str]| {
         shell::run(
             shell::cargo()
-                .args(["clippy", "--release", "--workspace", "--exclude", "firmware", "--all-targets"])
+                .args(["clippy", "--workspace", "--exclude", "firmware", "--all-targets"])
                 .args(features)
                 .args(["--", "-D", "warnings"]),
         )

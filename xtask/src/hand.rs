@@ -88,12 +88,10 @@ pub(crate) fn run(machine: &Machine) -> Result<()> {
     // The tests run the command as well, in the build that all tests share.
     build::host()?;
     shell::step("the hand image under QEMU: start-up, grip, costs");
-    let mut system = shell::cargo();
-    system.args(["test", "--release", "--package", "system-tests", "--test", "system", "hand::"]);
-    system.args(["--features", "mujoco"]);
-    shell::run(system.args(["--", "--nocapture", "--test-threads", "1"]))?;
+    let printed = ["--", "--nocapture", "--test-threads", "1"];
+    shell::run(build::optimised("test").args(["--test", "system", "hand::"]).args(printed))?;
     shell::step("accuracy against f64, saturation, ladder (development profile: integers that wrap are errors)");
-    shell::run(shell::cargo().args(["test", "--package", "hand", "--", "--nocapture", "--test-threads", "1"]))
+    shell::run(shell::cargo().args(["test", "--test", "fixed"]).args(printed))
 }
 
 /// Which function calls which, by the branch instructions of an image.

@@ -2,7 +2,7 @@
 //!
 //! An image has up to 25 kB, of which the hand needs a tenth. So it is never held: header, numbers and check sum pass
 //! through, the hand's columns are kept. What a whole image is checked for by
-//! `link::PrimitiveImage` is checked here as well; `tests/hand/image.rs` holds the two against each other. Layout:
+//! `link::PrimitiveImage` is checked here as well; `tests/fixed/image.rs` holds the two against each other. Layout:
 //! `docs/image-format.md`.
 
 use dmp::Scalar;
