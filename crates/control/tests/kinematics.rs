@@ -111,23 +111,27 @@ fn quaternions_and_matrices_agree_for_every_branch() {
 }
 
 #[test]
-fn elbow_speeds_are_derivatives_of_points_on_the_arm() {
+fn watched_speeds_are_derivatives_of_points_on_the_arm() {
     let dq = JointVelocities::from_array([0.4, -0.3, 0.6, 0.5, 1.0, 1.0, 1.0]);
     for q in POSTURES {
-        // The elbow by forward kinematics of the bare geometry: 0.55 m up the upper arm, 0.045 m aside.
-        let elbow = |q: &Vector7<f64>| {
+        // By forward kinematics of the bare geometry: the elbow 0.55 m up the upper arm and 0.045 m aside, the point
+        // beyond it along the forearm, which J4 bends.
+        let points = |q: &Vector7<f64>| {
             let turn = |axis: Vector3<f64>, angle: f64| {
                 Rotation3::from_axis_angle(&nalgebra::Unit::new_unchecked(axis), angle)
             };
             let rotation = turn(Vector3::z(), q[0]) * turn(Vector3::y(), q[1]) * turn(Vector3::z(), q[2]);
-            rotation * Vector3::new(0.045, 0.0, 0.55)
+            let elbow = rotation * Vector3::new(0.045, 0.0, 0.55);
+            let tip = elbow + rotation * turn(Vector3::y(), q[3]) * Vector3::new(0.0, 0.0, 0.35);
+            [elbow, tip, frames((*q).into()).tool_pose().position]
         };
         let h = 1e-6;
         let q = Vector7::from(q);
-        let speed = ((elbow(&(q + dq.0 * h)) - elbow(&(q - dq.0 * h))) / (2.0 * h)).norm();
-        let [computed, tip] = frames(q.into()).elbow_speeds(&dq, 0.35);
-        assert!((computed - speed).abs() < 1e-6, "{computed} {speed}");
-        assert!(tip > 0.0);
+        let (before, after) = (points(&(q - dq.0 * h)), points(&(q + dq.0 * h)));
+        for (point, computed) in frames(q.into()).watched_speeds(&dq, 0.35).into_iter().enumerate() {
+            let speed = ((after[point] - before[point]) / (2.0 * h)).norm();
+            assert!((computed - speed).abs() < 1e-6, "{point}: {computed} {speed}");
+        }
     }
 }
 

@@ -45,7 +45,7 @@ impl FaultGuide {
                 "the speeds in the record, what hangs on the arm, and the duration of the primitive",
             ),
             Fault::TipSpeed => (
-                "the movement is too fast for elbow or forearm",
+                "the movement is too fast for elbow, forearm or hand, or the arm was pushed hard",
                 "the speeds in the record; run with a smaller `--speed`",
             ),
             Fault::NotFinite => (

@@ -39,10 +39,8 @@ pub(super) struct Sample {
     pub(super) q: [f64; 7],
     /// Joint velocities, rad/s.
     pub(super) dq: [f64; 7],
-    /// Speeds of elbow and forearm, as the safety module watches them, m/s.
-    pub(super) elbow_speeds: [f64; 2],
-    /// Speed of the tool frame, m/s.
-    pub(super) tool_speed: f64,
+    /// Speeds of elbow and forearm, as the safety module watches them, and of the tool frame, m/s.
+    pub(super) speeds: [f64; 3],
     /// Tool position, m.
     pub(super) position: [f64; 3],
     /// Tool orientation.
@@ -169,13 +167,11 @@ fn sample(plant: &Plant, time: f64, record: CycleRecord) -> Sample {
     let frames = plant.frames();
     let dq = JointVelocities(plant.dq);
     let pose = frames.tool_pose();
-    let twist = frames.jacobian().twist(&plant.dq);
     Sample {
         time,
         q: plant.q.into(),
         dq: plant.dq.into(),
-        elbow_speeds: frames.elbow_speeds(&dq, control::guard::monitor::TIP_REACH),
-        tool_speed: twist.fixed_rows::<3>(0).norm(),
+        speeds: frames.watched_speeds(&dq, control::guard::monitor::TIP_REACH),
         position: pose.position.into(),
         orientation: pose.orientation.0,
         record,

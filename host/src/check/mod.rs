@@ -7,7 +7,7 @@
 mod closed_loop;
 mod plant;
 
-use control::guard::monitor::TIP_SPEED_LIMIT;
+use control::guard::monitor::{HAND_SPEED_LIMIT, TIP_SPEED_LIMIT};
 use control::model::{FINGER_RANGE, SOFT_MAX, SOFT_MIN, SPREAD_RANGE, VELOCITY_MAX};
 use control::plan::load::{REACH, within_reach};
 use control::plan::primitive::posture_and_hand;
@@ -46,6 +46,8 @@ pub enum Limit {
     JointTorque,
     /// Speed of elbow and forearm, m/s.
     TipSpeed,
+    /// Speed of the hand, m/s.
+    HandSpeed,
     /// Distance of the planned tool position from the shoulder, m.
     Reach,
     /// Angle of a digit of the hand, rad.
@@ -64,6 +66,7 @@ impl Limit {
             Limit::JointVelocity => ("velocity", "rad/s"),
             Limit::JointTorque => ("torque", "N m"),
             Limit::TipSpeed => ("elbow/forearm speed", "m/s"),
+            Limit::HandSpeed => ("hand speed", "m/s"),
             Limit::Reach => ("reach", "m"),
             Limit::HandPosition => ("range", "rad"),
             Limit::GoalPosition => ("goal distance", "m"),
@@ -371,8 +374,12 @@ fn check_run(file: &PrimitiveFile, course: &Course, run: &ClosedLoop, report: &m
         }));
     }
     report.margins.push(worst(run, Limit::TipSpeed, None, |sample| {
-        let speed = sample.elbow_speeds[0].max(sample.elbow_speeds[1]);
+        let speed = sample.speeds[0].max(sample.speeds[1]);
         (speed, TIP_SPEED_LIMIT, TIP_SPEED_LIMIT - speed)
+    }));
+    report.margins.push(worst(run, Limit::HandSpeed, None, |sample| {
+        let [_, _, speed] = sample.speeds;
+        (speed, HAND_SPEED_LIMIT, HAND_SPEED_LIMIT - speed)
     }));
     report.limited_cycles = run.limited_cycles();
     if report.limited_cycles > 0 {
@@ -383,7 +390,7 @@ fn check_run(file: &PrimitiveFile, course: &Course, run: &ClosedLoop, report: &m
         ));
     }
     let maximum = |pick: &dyn Fn(&Sample) -> f64| run.samples.iter().map(pick).fold(0.0, f64::max);
-    report.tool_speed_max_m_s = maximum(&|sample| sample.tool_speed);
+    report.tool_speed_max_m_s = maximum(&|sample| sample.speeds[2]);
     report.tracking_max_m = maximum(&|sample| distance(&sample.position, &sample.record.pose_d));
     if run.ending == Ending::Arrived {
         let goal = course.last_goal();

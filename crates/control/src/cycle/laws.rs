@@ -245,8 +245,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
 /// forearm, and of the hand.
 #[inline(never)]
 fn speed_load<R: Real>(frames: &Frames<R>, dq: &JointVelocities<R>) -> R {
-    let [elbow, tip] = frames.elbow_speeds(dq, R::constant(TIP_REACH));
-    let hand = sqrt(frames.jacobian().twist(&dq.0).fixed_rows::<3>(0).norm_squared());
+    let [elbow, tip, hand] = frames.watched_speeds(dq, R::constant(TIP_REACH));
     let load =
         at_least(at_least(elbow, tip) * R::constant(1.0 / TIP_SPEED_LIMIT), hand * R::constant(1.0 / HAND_SPEED));
     dq.0.iter().zip(&wam7::VELOCITY_MAX).fold(load, |load, (dq, limit)| {
@@ -256,8 +255,8 @@ fn speed_load<R: Real>(frames: &Frames<R>, dq: &JointVelocities<R>) -> R {
 
 /// True if the arm is faster than one that is led or at rest.
 pub(super) fn falls<R: Real>(measured: &Measured<'_, R>) -> bool {
-    let speeds = measured.frames.elbow_speeds(&measured.state.dq, R::constant(TIP_REACH));
-    speeds.iter().any(|speed| *speed > R::constant(FALLING))
+    let [elbow, tip, _] = measured.frames.watched_speeds(&measured.state.dq, R::constant(TIP_REACH));
+    at_least(elbow, tip) > R::constant(FALLING)
 }
 
 /// Speed of the hand (m/s).

@@ -20,7 +20,7 @@ pub enum Fault {
     JointLimit = 3,
     /// A joint velocity exceeded its limit.
     JointSpeed = 4,
-    /// The elbow, or the point 0.35 m beyond it, moved faster than allowed.
+    /// The elbow, the point 0.35 m beyond it, or the hand moved faster than allowed.
     TipSpeed = 5,
     /// A torque, reference or state was not finite.
     NotFinite = 6,
@@ -114,7 +114,7 @@ impl Fault {
             Fault::JointLimit => "a joint left its soft limits; move it back by hand in gravity mode after clearing",
             Fault::JointSpeed => "a joint moved faster than its limit; check the primitive's duration and the payload",
             Fault::TipSpeed => {
-                "elbow or forearm moved faster than allowed; run the primitive more slowly or choose a longer approach"
+                "elbow, forearm or hand moved faster than allowed; run the primitive more slowly or choose a longer approach"
             }
             Fault::NotFinite => "a number in the control cycle was not finite; this is a defect, keep the record",
             Fault::ImplausiblePosition => {

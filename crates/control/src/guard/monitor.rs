@@ -16,6 +16,11 @@ use crate::units::{JOINTS, Wrench};
 /// Largest speed of elbow and forearm in any state with torque (m/s); the safety module faults at 1.0.
 pub const TIP_SPEED_LIMIT: f64 = 0.8;
 
+/// Largest speed of the hand in any state with torque (m/s). The safety module does not watch it; wrist and forearm can
+/// make it thrice as fast as the elbow. Above what a change of goal may lead to (0.8 m/s), below the speed at which a
+/// hand of this mass reaches the transient limits for a person (1.4 m/s).
+pub const HAND_SPEED_LIMIT: f64 = 1.0;
+
 /// Distance beyond the elbow at which the safety module watches the speed (m).
 pub const TIP_REACH: f64 = 0.35;
 
@@ -118,9 +123,9 @@ impl<R: Real> Monitor<R> {
         } else if state.dq.0.iter().zip(&self.speed_limit).any(|(dq, limit)| *dq > *limit || *dq < -*limit) {
             Some(Fault::JointSpeed)
         } else {
-            let [elbow, tip] = seen.frames.elbow_speeds(&state.dq, R::constant(TIP_REACH));
+            let [elbow, tip, hand] = seen.frames.watched_speeds(&state.dq, R::constant(TIP_REACH));
             let limit = R::constant(TIP_SPEED_LIMIT);
-            (elbow > limit || tip > limit).then_some(Fault::TipSpeed)
+            (elbow > limit || tip > limit || hand > R::constant(HAND_SPEED_LIMIT)).then_some(Fault::TipSpeed)
         };
         if let Some(fault) = finding {
             return Some((Trigger::SoftFault, fault));
@@ -365,13 +370,29 @@ mod tests {
             let mut scene = Scene::with(|scene| scene.state.q.0[3] = elbow);
             scene.state.dq.0[1] = 1.0;
             let frames = Frames::new(&scene.model, &scene.state.q);
-            let [of_elbow, of_forearm] = frames.elbow_speeds(&scene.state.dq, TIP_REACH);
+            let [of_elbow, of_forearm, _] = frames.watched_speeds(&scene.state.dq, TIP_REACH);
             assert_eq!(of_elbow > of_forearm, is_elbow, "{of_elbow} {of_forearm}");
             let allowed = TIP_SPEED_LIMIT / f64::max(of_elbow, of_forearm);
             for (share, expected) in [(0.999, NOTHING), (1.001, stop(Fault::TipSpeed))] {
                 scene.state.dq.0[1] = share * allowed;
                 assert!(scene.state.dq.0[1] < wam7::VELOCITY_MAX[1] * SPEED_MARGIN);
                 assert_eq!(scene.check(State::Gravity), expected, "{share}");
+            }
+        }
+    }
+
+    #[test]
+    fn g14_the_hand_may_not_be_fast_where_elbow_and_forearm_are_slow() {
+        for law in WITH_TORQUE {
+            // J4 and J6 turn the same way: neither is beyond its own limit, and the elbow stands still.
+            let mut scene = Scene::with(|scene| (scene.state.dq.0[3], scene.state.dq.0[5]) = (1.0, 1.0));
+            let frames = Frames::new(&scene.model, &scene.state.q);
+            let [elbow, tip, hand] = frames.watched_speeds(&scene.state.dq, TIP_REACH);
+            let allowed = HAND_SPEED_LIMIT / hand;
+            assert!(allowed * elbow.max(tip) < TIP_SPEED_LIMIT, "{elbow} {tip} {hand}");
+            for (share, expected) in [(0.999, NOTHING), (1.001, stop(Fault::TipSpeed))] {
+                (scene.state.dq.0[3], scene.state.dq.0[5]) = (share * allowed, share * allowed);
+                assert_eq!(scene.check(law), expected, "{law} {share}");
             }
         }
     }

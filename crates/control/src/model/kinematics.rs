@@ -234,19 +234,24 @@ impl<R: Real> Frames<R> {
         Twist { linear, angular }
     }
 
-    /// Speeds (m/s) of the elbow and of the point `reach` beyond it along the forearm: what the safety module watches.
-    pub fn elbow_speeds(&self, dq: &JointVelocities<R>, reach: R) -> [R; 2] {
+    /// Speeds (m/s) of the elbow and of the point `reach` beyond it along the forearm, which the safety module watches,
+    /// and of the grasp point, which it does not.
+    pub fn watched_speeds(&self, dq: &JointVelocities<R>, reach: R) -> [R; 3] {
         // The elbow is the axis of J4 (origin of frame 3); the forearm points along z of frame 4, the axis of J5.
-        let elbow = self.origins[3];
-        let tip = elbow + self.axes[4] * reach;
-        let speed = |point: Vector3<R>, joints: usize| {
-            let mut velocity = Vector3::zeros();
-            for joint in 0..joints {
-                velocity += self.axes[joint].cross(&(point - self.origins[joint])) * dq.0[joint];
+        const ELBOW: usize = 3;
+        let speed = |velocity: Vector3<R>| sqrt(velocity.dot(&velocity));
+        let (mut omega, mut velocity) = (Vector3::zeros(), Vector3::zeros());
+        let (mut elbow, mut tip) = (R::constant(0.0), R::constant(0.0));
+        for joint in 0..JOINTS {
+            omega += self.axes[joint] * dq.0[joint];
+            if joint == ELBOW {
+                elbow = speed(velocity);
+                tip = speed(velocity + omega.cross(&self.axes[4]) * reach);
             }
-            sqrt(velocity.dot(&velocity))
-        };
-        [speed(elbow, 3), speed(tip, 4)]
+            let end = if joint + 1 < JOINTS { self.origins[joint + 1] } else { self.tool };
+            velocity += omega.cross(&(end - self.origins[joint]));
+        }
+        [elbow, tip, speed(velocity)]
     }
 
     /// Origin of frame 7, the face of the tool plate (m).

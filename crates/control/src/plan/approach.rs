@@ -1,20 +1,23 @@
 //! `Approach`: a joint-space move along a minimum-jerk path.
 //!
 //! `q(u) = q_0 + (q_1 - q_0)(10 u^3 - 15 u^4 + 6 u^5)`, `u = t/T`. The duration is long enough that no joint exceeds
-//! half of its speed limit and neither the elbow nor the point 0.35 m beyond it exceeds 0.35 m/s; the safety module
-//! faults at 1.0 m/s.
+//! half of its speed limit, neither the elbow nor the point 0.35 m beyond it exceeds 0.35 m/s (the safety module faults
+//! at 1.0 m/s), and the hand does not exceed 0.5 m/s.
 
 use crate::guard::monitor::TIP_REACH;
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
 use crate::model::wam7;
 use crate::plan::reference::JointReference;
-use crate::real::Real;
+use crate::real::{Real, at_least};
 use crate::time::{PERIOD, RATE, periods};
 use crate::units::{JointAccelerations, JointPositions, JointVelocities, Vector7};
 
 /// Largest speed of the elbow and of the point beyond it during an approach (m/s).
 pub const TIP_SPEED: f64 = 0.35;
+
+/// Largest speed of the hand during an approach (m/s), which no plan of a person has checked.
+pub const HAND_SPEED: f64 = 0.5;
 
 /// Part of the joint speed limits that an approach uses.
 const SPEED_FRACTION: f64 = 0.5;
@@ -53,19 +56,20 @@ impl<R: Real> Approach<R> {
     /// A move from `start` to `goal` in `duration` (s) or, where the speed limits ask for it, longer.
     pub fn new(model: &ArmModel<R>, start: &JointPositions<R>, goal: &JointPositions<R>, duration: R) -> Self {
         let way = goal.0 - start.0;
-        let mut needed = crate::real::at_least(duration, R::constant(SHORTEST));
+        let mut needed = at_least(duration, R::constant(SHORTEST));
         for (way, limit) in way.iter().zip(&wam7::VELOCITY_MAX) {
             // The peak speed of a minimum jerk is 1.875 times the mean.
             let magnitude = if *way < R::constant(0.0) { -*way } else { *way };
-            needed = crate::real::at_least(needed, magnitude * R::constant(1.875 / (SPEED_FRACTION * limit)));
+            needed = at_least(needed, magnitude * R::constant(1.875 / (SPEED_FRACTION * limit)));
         }
         for sample in 0..SAMPLES {
             let u = (sample as f64 + 0.5) / SAMPLES as f64;
             let (position, speed, _) = minimum_jerk(R::constant(u));
             let frames = Frames::new(model, &JointPositions(start.0 + way * position));
-            let [elbow, tip] = frames.elbow_speeds(&JointVelocities(way * speed), R::constant(TIP_REACH));
-            let scale = R::constant(SAMPLE_MARGIN / TIP_SPEED);
-            needed = crate::real::at_least(needed, crate::real::at_least(elbow, tip) * scale);
+            let [elbow, tip, hand] = frames.watched_speeds(&JointVelocities(way * speed), R::constant(TIP_REACH));
+            let tips = at_least(elbow, tip) * R::constant(SAMPLE_MARGIN / TIP_SPEED);
+            let hand = hand * R::constant(SAMPLE_MARGIN / HAND_SPEED);
+            needed = at_least(needed, at_least(tips, hand));
         }
         let longest = R::constant(LONGEST_APPROACH);
         let needed = crate::real::at_most(needed, longest);

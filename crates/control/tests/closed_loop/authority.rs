@@ -244,7 +244,7 @@ fn an_arm_that_moves_too_fast_is_stopped() {
     rig.plant.push = [0.0, 60.0, 0.0, 0.0, 0.0, 0.0];
     rig.until(State::SoftStop, 3.0);
     assert!(matches!(rig.cycle.fault(), Fault::TipSpeed | Fault::JointSpeed), "{:?}", rig.cycle.fault());
-    let speeds = rig.plant.frames().elbow_speeds(&control::units::JointVelocities(rig.plant.dq), 0.35);
+    let speeds = rig.plant.frames().watched_speeds(&control::units::JointVelocities(rig.plant.dq), 0.35);
     assert!(speeds[0].max(speeds[1]) < 1.0, "before the safety module faults: {speeds:?}");
 }
 

@@ -65,8 +65,8 @@ impl Worst {
         let twist = frames.jacobian().twist(&dq);
         self.hand = self.hand.max(twist.fixed_rows::<3>(0).norm());
         self.turn = self.turn.max(twist.fixed_rows::<3>(3).norm());
-        let tips = frames.elbow_speeds(&JointVelocities(dq), TIP_REACH);
-        self.tip = tips.into_iter().fold(self.tip, f64::max);
+        let [elbow, tip, _] = frames.watched_speeds(&JointVelocities(dq), TIP_REACH);
+        self.tip = self.tip.max(elbow).max(tip);
     }
 }
 
