@@ -5,7 +5,7 @@ use control::sense::deviation::TORQUE_DEAD_BAND;
 use control::time::periods;
 use control::{Fault, Real, State, flags};
 
-use crate::primitives::{Design, GOAL, START, configuration, primitive};
+use crate::primitives::{DISPLACEMENT, Design, GOAL, START, configuration, primitive};
 use crate::rig::Rig;
 
 /// A rig that holds `q`, tared.
@@ -197,6 +197,53 @@ fn b3_a8_an_arm_that_runs_into_something_presses_little_and_is_not_called_stuck(
     }
     // One is left: force control chatters on a hard wall, and M4 stands while the force comes and goes.
     assert!(stuck <= 1, "{stuck} of 120");
+}
+
+/// Largest force of a wall of this stiffness (N/m) that stands 6 cm before the end of a movement whose sensor has the wrong
+/// sign (N), and how far the plan went beyond its goal (m), until the run ended or was stopped.
+fn reversed(options: RunOptions, stiffness: f64) -> (f64, f64) {
+    let far = Rig::<f32>::new(GOAL, 1).plant.frames().tool_pose().position.x;
+    let mut rig = holding::<f32>(START);
+    let design = Design { duration: 3.0, bent: false, expected: Some([0.0; 6]), ..Design::default() };
+    rig.load(&primitive(&design)).expect("loads");
+    rig.plant.wall = Some((far - 0.06, stiffness));
+    rig.plant.reversed = true;
+    rig.command(Command::Run(options));
+    let (mut peak, mut beyond) = (0.0f64, 0.0f64);
+    while rig.cycle.state() == State::Run {
+        let record = rig.tick(None).record;
+        peak = peak.max(-rig.plant.environment()[0]);
+        beyond = beyond.max(f64::from(record.pose_d[0]) - far);
+    }
+    // Whatever it ended in can be left, and nothing swings.
+    rig.plant.wall = None;
+    rig.run_for(1.0);
+    if rig.cycle.fault() != Fault::None {
+        rig.command(Command::ClearFault);
+        rig.command(Command::Hold);
+    }
+    rig.run_for(0.5);
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None));
+    assert!(rig.plant.dq.amax() < 0.05, "at rest: {}", rig.plant.dq);
+    (peak, beyond)
+}
+
+#[test]
+fn b7_a_sensor_with_the_wrong_sign_presses_little_and_leads_the_plan_no_farther_than_its_clamps() {
+    let mut worst = (0.0f64, 0.0f64);
+    for (feedback, force_control) in [(true, false), (true, true), (false, true)] {
+        for (compliant, stiffness) in
+            [(true, 300.0), (true, 3000.0), (false, 300.0), (false, 3000.0), (false, 10_000.0)]
+        {
+            let options = RunOptions { feedback, force_control, compliant, ..RunOptions::default() };
+            let (peak, beyond) = reversed(options, stiffness);
+            println!("{feedback} {force_control} {compliant} {stiffness} N/m: {peak:.1} N, {beyond:.3} m");
+            worst = (worst.0.max(peak), worst.1.max(beyond));
+        }
+    }
+    // The right sign presses with up to 25 N here. The clamps are what keeps it: without them the force has no end.
+    assert!(worst.0 < 32.0 && worst.1 < DISPLACEMENT, "{worst:?}");
+    assert!(worst.1 > 0.5 * DISPLACEMENT, "the plan was led away at all: {worst:?}");
 }
 
 /// Way (m) by which one wild sample of `outlier` (N) moves the plan of a run that `push` (N) bends already.

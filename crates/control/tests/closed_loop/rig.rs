@@ -41,6 +41,8 @@ pub(crate) struct Plant {
     pub(crate) glitch: f64,
     /// The one value that a stuck sensor reports.
     pub(crate) stuck: Option<RawWrench>,
+    /// True if what the sensor feels of the environment has the wrong sign.
+    pub(crate) reversed: bool,
     /// True while the sensor's replies are lost.
     pub(crate) deaf: bool,
     /// The hand, if it is on the bus.
@@ -63,6 +65,7 @@ impl Plant {
             hand_weight: model::HAND_MASS * 9.81,
             glitch: 0.0,
             stuck: None,
+            reversed: false,
             deaf: false,
             hand: None,
             queue: (0..delay).map(|_| Vector7::zeros()).collect(),
@@ -93,7 +96,8 @@ impl Plant {
     /// The wrist sensor: environment and weight of the hand, in sensor axes.
     pub(crate) fn wrench(&self) -> RawWrench {
         let frames = self.frames();
-        let [fx, fy, fz, nx, ny, nz] = self.environment();
+        let sign = if self.reversed { -1.0 } else { 1.0 };
+        let [fx, fy, fz, nx, ny, nz] = self.environment().map(|part| sign * part);
         let weight = Vector3::new(0.0, 0.0, -self.hand_weight);
         let to_sensor = frames.sensor_to_world().transpose();
         let centre = frames.sensor_to_world() * Vector3::from(model::HAND_CENTRE);
