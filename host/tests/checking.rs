@@ -27,7 +27,7 @@ fn cli_5_a_calm_movement_passes_with_every_margin_reported() {
     let mut heard = Vec::new();
     let report = check(&reach(5.0), &Course::stored(1.0), |fraction| heard.push(fraction)).unwrap();
     assert!(report.passed(), "{}", report.to_text());
-    assert_eq!(report.margins.len(), 4 + 1 + 7 + 7 + 7 + 1 + 2);
+    assert_eq!(report.margins.len(), 4 + 1 + 7 + 7 + 7 + 1 + 1 + 2);
     assert_eq!(report.limited_cycles, 0);
     assert!(report.tracking_max_m < 5e-3, "{}", report.tracking_max_m);
     for margin in &report.margins {

@@ -149,7 +149,7 @@ fn a_stored_primitive_runs_by_its_name_and_others_look_on_without_costing_it_a_c
     let seen = object(folder, &["record", "--duration", "2", "-o", "seen.csv"]);
     assert_eq!(seen["samples"], 2 * RATE_HZ);
     refused(folder, &["delete", "reach"], "E504", "has been using the arm for");
-    let watched = tactus(folder, &["--json", "monitor", "--primitive", "reach.toml", "--duration", "0.5"]);
+    let watched = tactus(folder, &["--json", "monitor", "--primitive", "reach.toml", "--duration", "1.5"]);
     let lines = String::from_utf8(watched.stdout).unwrap();
     let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert!(lines.len() >= 4 && lines.iter().all(|line| line["state"] == "run"), "{lines:?}");

@@ -44,6 +44,13 @@ fn tactus(folder: &Path, line: &str) -> Output {
     command.args(line.split(' ')).stdin(Stdio::null()).output().unwrap()
 }
 
+/// Learns the primitive of the documents' example: `reach.toml`.
+fn learn_reach(folder: &Path) {
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/examples/reach.csv");
+    std::fs::copy(example, folder.join("reach.csv")).unwrap();
+    assert!(tactus(folder, "learn reach.csv").status.success());
+}
+
 /// The state of the arm once it is one of these; each question is a turn of the device's time as well.
 fn until(folder: &Path, states: &[&str]) -> String {
     for _ in 0..500 {
@@ -96,4 +103,62 @@ fn the_stand_in_is_stopped_by_its_emergency_stop_and_comes_back_by_its_pendant()
     arm.press("idle");
     let released = (0..500).map(|_| safety(at)).find(|mode| *mode != pressed);
     assert!(released.is_some(), "still {pressed}");
+}
+
+#[test]
+fn an_arm_that_has_arrived_holds_when_its_program_ends_and_so_it_does_while_its_hand_closes() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut arm = StandIn::start(at);
+    learn_reach(at);
+    for order in ["run reach.toml --at-home --speed 2", "hand close", "hand open"] {
+        let done = tactus(at, order);
+        assert!(done.status.success(), "{order}: {}", String::from_utf8_lossy(&done.stderr));
+        // The program is gone; what its farewell began would have come by the fifth question.
+        for _ in 0..5 {
+            let status: Value = serde_json::from_slice(&tactus(at, "status").stdout).unwrap();
+            assert_eq!(status["state"], "hold", "after '{order}': {status}");
+        }
+    }
+    // An arm that has fallen is carried home before it is zeroed: else the next run would start from nowhere.
+    arm.press("estop");
+    until(at, &["idle", "fault"]);
+    arm.press("release");
+    arm.press("idle");
+    // The safety module took the torque, a person gave it back at the pendant: a command may follow.
+    for order in ["hand --at-home open", "run reach.toml --speed 2"] {
+        let done = tactus(at, order);
+        assert!(done.status.success(), "{order}: {}", String::from_utf8_lossy(&done.stderr));
+    }
+}
+
+#[test]
+fn an_interrupted_observer_does_not_say_that_the_arm_has_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let _arm = StandIn::start(at);
+    learn_reach(at);
+    let mut run = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    run.current_dir(at).env("TACTUS_DEVICE", "unix:tactus.sock").stdin(Stdio::null()).stdout(Stdio::null());
+    let run = run.args(["--non-interactive", "run", "reach.toml", "--at-home", "--speed", "0.3"]);
+    let mut run = run.stderr(Stdio::null()).spawn().unwrap();
+    until(at, &["approach"]);
+    for order in ["record --duration 100 -o z.csv", "status --line 100"] {
+        let mut observer = Command::new(env!("CARGO_BIN_EXE_tactus"));
+        observer.current_dir(at).env("TACTUS_DEVICE", "unix:tactus.sock").args(order.split(' '));
+        let mut observer = observer.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        // It is at work when the device knows of it: the file is there, or a second of the device's time has passed.
+        let begun = std::time::Instant::now();
+        while begun.elapsed() < std::time::Duration::from_secs(2) {
+            tactus(at, "list");
+        }
+        assert!(Command::new("kill").args(["-INT", &observer.id().to_string()]).status().unwrap().success());
+        let output = observer.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(130), "{order}: {said}");
+        assert!(said.contains("so nothing was stopped") && !said.contains("has stopped"), "{order}: {said}");
+    }
+    until(at, &["approach", "run"]);
+    let _ = run.kill();
+    let _ = run.wait();
 }

@@ -5,6 +5,8 @@ use sim::{Passage, Ticks};
 
 pub use lab::simulation::CYCLE_TICKS;
 
+use crate::{Arm, simulation};
+
 /// The starts of all position requests to the whole arm.
 #[must_use]
 pub fn position_requests(frames: &[Passage]) -> Vec<Ticks> {
@@ -29,4 +31,24 @@ pub fn torques(frames: &[Passage]) -> Vec<(Ticks, [i16; 4])> {
             _ => None,
         })
         .collect()
+}
+
+/// Spread of the starts of the torque frames of these cycles, ticks: latest minus earliest place in the cycle.
+#[must_use]
+pub fn torque_jitter(starts: &[u64]) -> u64 {
+    let places: Vec<u64> = starts.iter().map(|start| start % CYCLE_TICKS).collect();
+    places.iter().max().zip(places.iter().min()).map_or(0, |(most, least)| most - least)
+}
+
+/// Starts of the torque frames to the arm (the first of two) between two virtual times.
+///
+/// # Panics
+/// The device is not simulated.
+pub fn arm_torques(arm: &mut Arm, from: u64, until: u64) -> Vec<u64> {
+    let all = torques(simulation(arm.transport()).plant().recorded());
+    let mut starts: Vec<u64> =
+        all.into_iter().map(|(start, _)| start).filter(|at| (from..until).contains(at)).collect();
+    // Arm, wrist, perhaps hand: the first of each cycle counts.
+    starts.dedup_by_key(|start| *start / CYCLE_TICKS);
+    starts
 }

@@ -116,6 +116,9 @@ pub enum HostError {
     /// The user interrupted; the arm was stopped.
     #[error("interrupted; the arm has stopped")]
     Interrupted,
+    /// The user interrupted a program that had set nothing in motion, or whose motion had ended.
+    #[error("interrupted; this command moves nothing, so nothing was stopped: `tactus stop` stops the arm")]
+    Left,
 }
 
 /// Words for a device that another host has.
@@ -224,7 +227,7 @@ impl HostError {
             Self::Transport(TransportError::Closed | TransportError::Io(_)) => ErrorCode::LineClosed,
             Self::NoAnswer { .. } => ErrorCode::NoAnswer,
             Self::NotStopped { .. } => ErrorCode::NotStopped,
-            Self::Interrupted => ErrorCode::Interrupted,
+            Self::Interrupted | Self::Left => ErrorCode::Interrupted,
         }
     }
 

@@ -26,7 +26,7 @@ pub enum Exit {
     Invalid = 6,
     /// The link was lost or the device did not answer in time.
     LinkLost = 7,
-    /// Interrupted by the user after a confirmed stop.
+    /// Interrupted by the user, after a confirmed stop of what the command had set in motion.
     Interrupted = 130,
 }
 
@@ -111,7 +111,7 @@ error_codes! {
         "check the disk and the rights of the folder";
     ResultsNotWritten = 124: "results of an experiment cannot be written",
         "the folder does not exist, or the disk is full", "check the disk and the rights of the folder";
-    Interrupted = 130: "the user interrupted, and the arm has stopped", "Ctrl-C", "";
+    Interrupted = 130: "the user interrupted; what the command had set in motion has stopped", "Ctrl-C", "";
     CommandLine = 200: "the command line is wrong", "a misspelt option, or one that is missing",
         "`tactus COMMAND --help` shows what it takes";
     AddressInvalid = 201: "the address of the device cannot be read", "a misspelt `--device`",

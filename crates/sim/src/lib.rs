@@ -37,7 +37,7 @@ pub use link_wire::{BYTE_TICKS, CHUNK, LinkLine, PlainLine};
 pub use lockstep::{Lockstep, LockstepError, Served};
 pub use noise::Noise;
 pub use operator::{OperatorConfig, PendantAction};
-pub use plant::{Event, Plant, PlantConfig, STEPS_PER_SECOND};
+pub use plant::{Event, Plant, PlantConfig};
 pub use plant_error::PlantError;
 pub use puck_model::PuckConfig;
 pub use safety::SafetyConfig;

@@ -75,6 +75,11 @@ impl Motors {
         self.hand.see_active(now);
     }
 
+    /// The operator carries the arm home, from `now` on.
+    pub(crate) fn carry_home(&mut self, now: Ticks) {
+        self.hand.carry_home(now, self.q);
+    }
+
     /// The pucks drive the motors like this for the next `duration`.
     pub(crate) fn drive(&mut self, drives: &[Drive; 7], duration: Ticks) {
         for (motor, drive) in drives.iter().enumerate() {

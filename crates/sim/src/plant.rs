@@ -23,7 +23,7 @@ use crate::plant_error::PlantError;
 use crate::puck_model::{Drive, Puck, PuckConfig};
 use crate::safety::{SafetyConfig, SafetyModule};
 use crate::speed::SpeedMonitor;
-use crate::time::{STEP_TICKS, TICKS_PER_SECOND, Ticks};
+use crate::time::Ticks;
 use crate::trace::BusTrace;
 use crate::wire::Passage;
 use crate::world::World;
@@ -285,6 +285,11 @@ impl Plant {
         self.safety.press(self.now, action);
         self.settle_power();
         self.arbitrate();
+    }
+
+    /// The operator takes the arm where it lies and carries it home within a second, if there is one who holds it.
+    pub fn carry_home(&mut self) {
+        self.motors.carry_home(self.now);
     }
 
     /// Mode of the safety module.
@@ -593,6 +598,3 @@ impl Plant {
         }
     }
 }
-
-/// Steps of physics per second of virtual time, for those who report speed.
-pub const STEPS_PER_SECOND: f64 = TICKS_PER_SECOND as f64 / STEP_TICKS as f64;

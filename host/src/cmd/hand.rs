@@ -103,7 +103,7 @@ fn go(client: &mut Client<Device>, target: Posture) -> Result<HandReach, Procedu
     if !matches!(state, Some(control::State::Hold | control::State::Gravity)) {
         client.hold()?;
     }
-    procedure::move_hand(client, target)
+    procedure::move_hand_to_the_end(client, target)
 }
 
 /// Four angles separated by commas.

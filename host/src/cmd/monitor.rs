@@ -64,7 +64,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         ratatui::restore();
     }
     match watched {
-        Err(Ended::Host(HostError::Interrupted)) | Ok(()) => Ok(()),
+        Err(Ended::Host(HostError::Interrupted | HostError::Left)) | Ok(()) => Ok(()),
         Err(Ended::Host(error)) => Err(error.into_failure(DOING)),
         Err(Ended::View(failure)) => Err(failure),
     }

@@ -205,7 +205,15 @@ fn serve(
         }
         while let Some(pressed) = pendant.pressed() {
             match (pressed, device.simulation()) {
-                (Ok(action), Some(simulation)) => simulation.plant().press(action),
+                (Ok(action), Some(simulation)) => {
+                    simulation.plant().press(action);
+                    // It lies where it fell, and its pucks have forgotten where that is. In a laboratory a person
+                    // carries it home before it is zeroed again.
+                    if action == sim::PendantAction::ReleaseEStop {
+                        simulation.plant().carry_home();
+                        output.say("the simulated operator carries the arm home");
+                    }
+                }
                 (Ok(_), None) => {}
                 (Err(word), _) => output.warn(format!("the pendant has no '{word}'; it has {}", pendant::WORDS)),
             }

@@ -9,6 +9,7 @@ mod command_line;
 mod cost;
 mod determinism;
 mod firmware_ends;
+mod flood;
 mod hand;
 mod journey;
 mod metadata;

@@ -16,7 +16,7 @@ use link::image::{
 };
 use link::message::RunOptions;
 use link::{Name, Telemetry};
-use system_tests::bus::{CYCLE_TICKS, torques};
+use system_tests::bus::{arm_torques, torque_jitter};
 use system_tests::{Arm, command, expect, simulation};
 
 /// A straight movement of the forearm that takes `duration` seconds, in as many kernels as a device takes.
@@ -131,22 +131,6 @@ fn to_the_start(arm: &mut Arm) {
         assert!(arm.now() < deadline, "the arm does not arrive");
         expect(arm.next(Duration::from_millis(50)));
     }
-}
-
-/// Spread of the starts of the torque frames of these cycles, ticks: latest minus earliest place in the cycle.
-fn torque_jitter(starts: &[u64]) -> u64 {
-    let places: Vec<u64> = starts.iter().map(|start| start % CYCLE_TICKS).collect();
-    places.iter().max().zip(places.iter().min()).map_or(0, |(most, least)| most - least)
-}
-
-/// Starts of the torque frames to the arm (the first of two) between two virtual times.
-fn arm_torques(arm: &mut Arm, from: u64, until: u64) -> Vec<u64> {
-    let all = torques(simulation(arm.transport()).plant().recorded());
-    let mut starts: Vec<u64> =
-        all.into_iter().map(|(start, _)| start).filter(|at| (from..until).contains(at)).collect();
-    // Arm, wrist, perhaps hand: the first of each cycle counts.
-    starts.dedup_by_key(|start| *start / CYCLE_TICKS);
-    starts
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //!
 //! `q(u) = q_0 + (q_1 - q_0)(10 u^3 - 15 u^4 + 6 u^5)`, `u = t/T`. The duration is long enough that no joint exceeds
 //! half of its speed limit, neither the elbow nor the point 0.35 m beyond it exceeds 0.35 m/s (the safety module faults
-//! at 1.0 m/s), and the hand does not exceed 0.5 m/s.
+//! at 1.0 m/s), and the hand does not exceed 0.6 m/s.
 
 use crate::guard::monitor::TIP_REACH;
 use crate::model::arm::ArmModel;
@@ -17,7 +17,7 @@ use crate::units::{JointAccelerations, JointPositions, JointVelocities, Vector7}
 pub const TIP_SPEED: f64 = 0.35;
 
 /// Largest speed of the hand during an approach (m/s), which no plan of a person has checked.
-pub const HAND_SPEED: f64 = 0.5;
+pub const HAND_SPEED: f64 = 0.6;
 
 /// Part of the joint speed limits that an approach uses.
 const SPEED_FRACTION: f64 = 0.5;

@@ -199,8 +199,8 @@ fn b3_a8_an_arm_that_runs_into_something_presses_little_and_is_not_called_stuck(
     assert!(stuck <= 1, "{stuck} of 120");
 }
 
-/// Largest force of a wall of this stiffness (N/m) that stands 6 cm before the end of a movement whose sensor has the wrong
-/// sign (N), and how far the plan went beyond its goal (m), until the run ended or was stopped.
+/// Largest force of a wall of this stiffness (N/m) that stands 6 cm before the end of a movement whose sensor has the
+/// wrong sign (N), and how far the plan went beyond its goal (m), until the run ended or was stopped.
 fn reversed(options: RunOptions, stiffness: f64) -> (f64, f64) {
     let far = Rig::<f32>::new(GOAL, 1).plant.frames().tool_pose().position.x;
     let mut rig = holding::<f32>(START);

@@ -22,8 +22,8 @@ use std::time::Duration;
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
 use link::message::{DeviceHello, HostHello};
 use link::{
-    Event, LINK_VERSION, LinkCounters, Listing, Refusal, Reply, Request, SCHEMA_HASH, Statistics, Status, Telemetry,
-    Text,
+    Event, EventKind, LINK_VERSION, LinkCounters, Listing, Refusal, Reply, Request, SCHEMA_HASH, Statistics, Status,
+    Telemetry, Text,
 };
 
 use crate::error::{Capability, HostError};
@@ -97,7 +97,10 @@ pub struct Client<T: Transport> {
     gaps: Gaps,
     round_trips: RoundTrips,
     took: VecDeque<Duration>,
+    /// A motion of the arm that this host has ordered goes on.
     moving: bool,
+    /// This host has ordered a motion of the hand, which may go on.
+    hand_ordered: bool,
     observing: bool,
     open: bool,
     timeout: Duration,
@@ -144,6 +147,7 @@ impl<T: Transport> Client<T> {
             round_trips: RoundTrips::default(),
             took: VecDeque::new(),
             moving: false,
+            hand_ordered: false,
             observing: false,
             open: false,
             timeout: ANSWER_TIMEOUT,
@@ -282,7 +286,9 @@ impl<T: Transport> Client<T> {
         let reply = self.exchange(request)?;
         match request {
             Request::Gravity | Request::Approach { .. } | Request::Run { .. } => self.moving = true,
-            Request::Stop | Request::Hold | Request::Release => self.moving = false,
+            Request::MoveHand { .. } | Request::InitialiseHand => self.hand_ordered = true,
+            Request::Stop => (self.moving, self.hand_ordered) = (false, false),
+            Request::Hold | Request::Release => self.moving = false,
             _ => {}
         }
         Ok(reply)
@@ -404,7 +410,15 @@ impl<T: Transport> Client<T> {
                 self.gaps.telemetry(telemetry.cycle);
                 self.incoming.push_back(Incoming::Telemetry(telemetry));
             }
-            Reply::Event(event) => self.incoming.push_back(Incoming::Event(event)),
+            Reply::Event(event) => {
+                // A movement that has ended needs no stop: it ended in hold, which the arm shall keep.
+                self.moving &= match event.kind {
+                    EventKind::Arrived => false,
+                    EventKind::State => u8::try_from(event.code).is_ok_and(motion::is_moving),
+                    _ => true,
+                };
+                self.incoming.push_back(Incoming::Event(event));
+            }
             answer => self.answers.push_back(answer),
         }
     }

@@ -123,9 +123,12 @@ impl<T: Transport> Client<T> {
     }
 
     /// Stops the arm because the user asked to; the error to end with.
+    ///
+    /// Nothing is stopped where this host has set nothing in motion: what moves is another's, and `tactus stop` is
+    /// there for it.
     pub(super) fn interrupted(&mut self) -> HostError {
-        if !self.moving {
-            return HostError::Interrupted;
+        if !self.moving && !self.hand_ordered {
+            return HostError::Left;
         }
         // Stopping waits for answers, and must not be interrupted by the wish to stop.
         let interrupt = std::mem::take(&mut self.interrupt);
@@ -139,6 +142,6 @@ impl<T: Transport> Client<T> {
 }
 
 /// True for a state that the device would end when this host fell silent.
-fn is_moving(state: u8) -> bool {
+pub(super) fn is_moving(state: u8) -> bool {
     matches!(State::from_code(state), Some(State::Gravity | State::Approach | State::Run | State::Coast))
 }

@@ -29,6 +29,13 @@ const STANDING: f32 = 2e-3;
 /// A hand that stands so long has met something; a minimum jerk is slow at its beginning, but not for so long.
 const STILL: Duration = Duration::from_millis(800);
 
+/// Longest time that a plan of the hand goes on after every digit was seen [`NEAR`] its end: the last eighth of the
+/// longest one, which takes 3.05 s.
+const TAIL: Duration = Duration::from_millis(500);
+
+/// Longest plan of the hand, from stop to stop.
+const LONGEST_PLAN: Duration = Duration::from_millis(3200);
+
 /// Result of a move of the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum HandReach {
@@ -73,7 +80,8 @@ pub fn initialise_hand(client: &mut Client<Device>) -> Result<HandStage, Procedu
     }
 }
 
-/// Moves the hand to `q` (spread, F1, F2, F3; rad) and waits until it stands there or at something it has met.
+/// Moves the hand to `q` (spread, F1, F2, F3; rad) and waits until it stands there or at something it has met. The device
+/// may then have a little of its plan before it.
 ///
 /// # Errors
 /// The device refuses, for example without torque, or the hand does not come to rest.
@@ -97,4 +105,20 @@ pub fn move_hand(client: &mut Client<Device>, q: [f32; 4]) -> Result<HandReach, 
             return Err(ProcedureError::TooLong { what: "moving the hand", seconds: LONGEST_MOVE });
         }
     }
+}
+
+/// As [`move_hand`], and waits until the device has come to the end of its plan: a host that leaves before is taken for
+/// one that has died in a motion, and the arm is stopped.
+///
+/// # Errors
+/// As [`move_hand`].
+pub fn move_hand_to_the_end(client: &mut Client<Device>, q: [f32; 4]) -> Result<HandReach, ProcedureError> {
+    let started = client.now();
+    let reach = move_hand(client, q)?;
+    let rest = match reach {
+        HandReach::Reached => TAIL,
+        HandReach::Stopped(_) => (started + LONGEST_PLAN).saturating_sub(client.now()),
+    };
+    pass(client, rest, Ends::OnFault)?;
+    Ok(reach)
 }
