@@ -80,8 +80,8 @@ pub fn initialise_hand(client: &mut Client<Device>) -> Result<HandStage, Procedu
     }
 }
 
-/// Moves the hand to `q` (spread, F1, F2, F3; rad) and waits until it stands there or at something it has met. The device
-/// may then have a little of its plan before it.
+/// Moves the hand to `q` (spread, F1, F2, F3; rad) and waits until it stands there or at something it has met. The
+/// device may then have a little of its plan before it.
 ///
 /// # Errors
 /// The device refuses, for example without torque, or the hand does not come to rest.
