@@ -22,11 +22,11 @@ pub const HAND_SPEED: f64 = 0.6;
 /// Part of the joint speed limits that an approach uses.
 const SPEED_FRACTION: f64 = 0.5;
 
-/// Postures along the path at which the tip speed is computed.
-const SAMPLES: usize = 8;
+/// Postures along the path at which the speeds are computed. An odd number: the path is fastest in its middle.
+const SAMPLES: usize = 7;
 
 /// Allowance for peaks between the samples.
-const SAMPLE_MARGIN: f64 = 1.05;
+const SAMPLE_MARGIN: f64 = 1.02;
 
 /// Longest approach that may be asked for (s).
 pub const LONGEST_APPROACH: f64 = 120.0;
