@@ -156,8 +156,17 @@ impl Party {
 mod tests {
     use std::os::unix::net::UnixStream;
 
-    use link::frame::{Envelope, encode};
+    use std::time::Duration;
 
+    use control::State;
+    use lab::client::Client;
+    use lab::device::Device;
+    use lab::procedure;
+    use lab::transport::Transport;
+    use link::frame::{Decoder, Envelope, encode};
+    use link::{EventKind, Reply};
+
+    use super::super::{STRIDE, STRIDE_BYTES};
     use super::*;
 
     fn message(request: &Request) -> Vec<u8> {
@@ -216,6 +225,56 @@ mod tests {
             while flood.write(&garbage).is_ok_and(|count| count == garbage.len()) {}
             party.hear(MOST);
             assert!(party.guests[1].begun.len() <= LONGEST_MESSAGE);
+        }
+    }
+
+    /// Device time from a guest's stop to the word that the arm stops, while three others say all they can: `said` again
+    /// and again.
+    fn stopping(said: &[u8]) -> Duration {
+        let device = Device::open(&"sil:world=simple".parse().unwrap(), |_| {}).map_err(|_| "no device").unwrap();
+        let mut arm = Client::connect(device, "test").unwrap();
+        procedure::make_ready(&mut arm, true, |_| {}).unwrap();
+        arm.gravity().unwrap();
+        let device = arm.transport();
+        let mut party = Party::default();
+        let mut guests: [UnixStream; 4] = std::array::from_fn(|_| guest(&mut party));
+        let (mut bytes, mut decoder, mut asked) = (Vec::new(), Decoder::<FRAME_BYTES>::new(), None);
+        for turn in 0.. {
+            for flood in &mut guests[1..] {
+                while flood.write(said).is_ok_and(|count| count == said.len()) {}
+            }
+            if turn == 40 {
+                // Just too late for this turn: it is heard in the next.
+                device.send(&party.hear(STRIDE_BYTES)).unwrap();
+                guests[0].write_all(&message(&Request::Stop)).unwrap();
+                asked = Some(device.now());
+            } else {
+                device.send(&party.hear(STRIDE_BYTES)).unwrap();
+            }
+            let target = device.now() + STRIDE;
+            while device.now() < target {
+                bytes.clear();
+                device.receive(target.saturating_sub(device.now()), &mut bytes).unwrap();
+                let mut rest = bytes.as_slice();
+                while let Some(frame) = decoder.next::<Reply>(&mut rest) {
+                    if let (Reply::Event(event), Some(asked)) = (frame.message, asked)
+                        && (event.kind, event.code) == (EventKind::State, State::SoftStop.code().into())
+                    {
+                        return device.now() - asked;
+                    }
+                }
+            }
+            assert!(turn < 200, "the arm never stopped");
+        }
+        unreachable!("the turns do not end")
+    }
+
+    #[test]
+    fn h6_a_guest_s_stop_is_obeyed_within_20_ms_of_the_device_s_time_whatever_the_others_say() {
+        for said in [message(&Request::Status).repeat(100), message(&Request::Ping).repeat(100), vec![0xA5; 4096]] {
+            let took = stopping(&said);
+            println!("{took:?}");
+            assert!(took <= Duration::from_millis(20), "{took:?}");
         }
     }
 
