@@ -228,8 +228,8 @@ mod tests {
         }
     }
 
-    /// Device time from a guest's stop to the word that the arm stops, while three others say all they can: `said` again
-    /// and again.
+    /// Device time from a guest's stop to the word that the arm stops, while three others say all they can: `said`
+    /// again and again.
     fn stopping(said: &[u8]) -> Duration {
         let device = Device::open(&"sil:world=simple".parse().unwrap(), |_| {}).map_err(|_| "no device").unwrap();
         let mut arm = Client::connect(device, "test").unwrap();
