@@ -5,17 +5,18 @@ use std::time::{Duration, Instant};
 
 use control::Fault;
 use device::Stage;
-use link::HomeSource;
+use link::{HomeSource, Refusal, Status};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use super::{ErrorCode, Failure, Global, Output};
 use lab::client::{Client, Halted, Interrupt};
 use lab::device::{Device, OpenError};
-use lab::error::HostError;
+use lab::error::{HostError, explain_blocked};
 use lab::fault_guide::FaultGuide;
 use lab::procedure::{self, ProcedureError, Readiness, StartupLook};
 use lab::simulation::{SimulationError, SimulationOptions};
+use lab::startup_guide::blocked_remedy;
 use lab::transport::Address;
 
 /// Two signals within this time are one.
@@ -157,7 +158,7 @@ fn watch(
         }
     });
     spinner.finish_and_clear();
-    let readiness = result.map_err(|error| failure(error, doing))?;
+    let readiness = result.map_err(|error| explained(client, failure(error, doing)))?;
     if let Some(source @ (HomeSource::Damaged | HomeSource::Foreign)) = readiness.zeroed_at {
         output.warn(format!(
             "the arm was zeroed at another home than its own: {}; `tactus calibrate show`",
@@ -165,6 +166,24 @@ fn watch(
         ));
     }
     Ok(readiness)
+}
+
+/// The failure of a request that the device refused.
+pub(super) fn refused(client: &mut Client<Device>, error: HostError, doing: &str) -> Failure {
+    explained(client, error.into_failure(doing))
+}
+
+/// A failure of an arm that does not get ready helps with what blocks its start-up, if the device tells.
+fn explained(client: &mut Client<Device>, failure: Failure) -> Failure {
+    if !matches!(failure.code, ErrorCode::NotReady | ErrorCode::Refused(Refusal::NotReady)) {
+        return failure;
+    }
+    let Ok(Status { blocked: Some(reason), .. }) = client.status() else { return failure };
+    match blocked_remedy(reason) {
+        Some(remedy) if failure.cause.to_string().contains(&explain_blocked(reason)) => failure.help(remedy),
+        Some(remedy) => failure.help(format!("{}; {remedy}", explain_blocked(reason))),
+        None => failure,
+    }
 }
 
 /// Says how much faster than life a simulated device was. In words only: data must be the same in every run.

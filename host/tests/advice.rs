@@ -1,0 +1,89 @@
+//! Advice works: what a refusal advises shows or mends the same refusal, and what a command drops it says.
+
+use std::io::Write as _;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+fn tactus(folder: &Path, line: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    command.current_dir(folder).env("XDG_CONFIG_HOME", folder).env_remove("TACTUS_DEVICE");
+    command.args(line.split_whitespace()).stdin(Stdio::null()).output().unwrap()
+}
+
+#[track_caller]
+fn succeeds(folder: &Path, line: &str) -> Output {
+    let output = tactus(folder, line);
+    assert!(output.status.success(), "{line}: {}", said(&output));
+    output
+}
+
+/// Code and help of a command that fails.
+#[track_caller]
+fn refused(folder: &Path, line: &str) -> (String, String) {
+    let output = tactus(folder, &format!("--json {line}"));
+    assert!(!output.status.success(), "{line}");
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let word = |key: &str| told["error"][key].as_str().unwrap_or_default().to_owned();
+    (word("code"), word("help"))
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+const SERVED: &str = "--device unix:arm.sock";
+
+/// A simulated arm that stays, with its pendant; killed when the test is over.
+struct Served(Child);
+
+impl Served {
+    fn start(folder: &Path, options: &[&str]) -> Served {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+        command.current_dir(folder).args(["--device", "sil:world=simple", "sim", "--listen", "unix:arm.sock"]);
+        command.args(options);
+        let served = Served(command.stdin(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap());
+        wait_until("it listens", || folder.join("arm.sock").exists());
+        served
+    }
+
+    fn press(&mut self, word: &str) {
+        writeln!(self.0.stdin.as_mut().unwrap(), "{word}").unwrap();
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[track_caller]
+fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let begun = Instant::now();
+    while !is_so() {
+        assert!(begun.elapsed() < Duration::from_secs(60), "it does not come to it that {what}");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
+#[test]
+fn g4_a_fault_that_a_wrong_declaration_keeps_from_being_cleared_is_answered_with_the_declaration() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut arm = Served::start(at, &[]);
+    succeeds(at, &format!("{SERVED} hand init"));
+    let status =
+        || -> Value { serde_json::from_slice(&succeeds(at, &format!("{SERVED} --json status")).stdout).unwrap() };
+    arm.press("estop");
+    wait_until("the arm has no torque", || status()["state"] == "idle");
+    succeeds(at, &format!("{SERVED} calibrate payload nothing"));
+    arm.press("release");
+    arm.press("idle");
+    wait_until("the start-up is blocked", || status()["blocked"].is_string());
+    let (code, help) = refused(at, &format!("{SERVED} stop --clear-fault"));
+    assert!(code == "E508" && help.contains("`tactus calibrate payload hand`"), "{code}: {help}");
+}
