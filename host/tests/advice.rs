@@ -1,11 +1,16 @@
 //! Advice works: what a refusal advises shows or mends the same refusal, and what a command drops it says.
 
+#[path = "../../crates/lab/tests/common/mod.rs"]
+mod common;
+
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+
+const DEVICE: &str = "--device sil:world=simple,flash=arm.flash --non-interactive";
 
 fn tactus(folder: &Path, line: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
@@ -32,6 +37,39 @@ fn refused(folder: &Path, line: &str) -> (String, String) {
 
 fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn learned(duration: f64) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    common::demonstration(folder.path(), duration);
+    succeeds(folder.path(), "learn demo.csv -o reach.toml");
+    folder
+}
+
+#[test]
+fn a_rehearsal_says_that_it_drops_the_statistics() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    let rehearse = format!("{DEVICE} --json rehearse reach.toml --trials 2 --record-dir kept --force");
+    let first = succeeds(at, &rehearse);
+    let told: Value = serde_json::from_slice(&first.stdout).unwrap();
+    assert_eq!(told["statistics_dropped"], Value::Bool(false));
+    assert!(!said(&first).contains("statistics"), "{}", said(&first));
+    succeeds(at, "statistics reach.toml kept/reach-1.csv kept/reach-2.csv");
+    let again = succeeds(at, &rehearse);
+    let told: Value = serde_json::from_slice(&again.stdout).unwrap();
+    assert_eq!(told["statistics_dropped"], Value::Bool(true));
+    let words = said(&again);
+    assert!(words.contains("warning: its statistics were dropped") && words.contains("`tactus statistics reach.toml"));
+}
+
+#[test]
+fn a_primitive_is_not_renamed_to_its_own_name() {
+    let folder = tempfile::tempdir().unwrap();
+    // Nobody listens there: it ends before a device is asked.
+    let (code, help) = refused(folder.path(), "--device unix:nobody.sock rename reach reach");
+    assert_eq!(code, "E200");
+    assert!(help.contains("tactus rename reach NEW") && !help.contains("delete"), "{help}");
 }
 
 const SERVED: &str = "--device unix:arm.sock";
