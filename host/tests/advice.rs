@@ -72,6 +72,33 @@ fn a_primitive_is_not_renamed_to_its_own_name() {
     assert!(help.contains("tactus rename reach NEW") && !help.contains("delete"), "{help}");
 }
 
+#[test]
+fn a_folder_does_not_hide_a_primitive_in_the_device() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    succeeds(at, &format!("{DEVICE} upload reach.toml"));
+    std::fs::create_dir(at.join("reach")).unwrap();
+    succeeds(at, &format!("{DEVICE} run reach --dry-run"));
+}
+
+#[test]
+fn one_run_does_not_count_as_several() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    succeeds(at, &format!("{DEVICE} rehearse reach.toml --trials 2 --record-dir kept"));
+    let text = std::fs::read_to_string(at.join("kept/reach-1.csv")).unwrap();
+    std::fs::write(at.join("copy.csv"), &text).unwrap();
+    std::fs::write(at.join("noted.csv"), format!("# the best of them\n{text}")).unwrap();
+    let before = std::fs::read(at.join("reach.toml")).unwrap();
+    for again in ["kept/reach-1.csv", "./kept/../kept/reach-1.csv", "copy.csv", "noted.csv"] {
+        let line = format!("statistics reach.toml kept/reach-1.csv kept/reach-2.csv {again}");
+        let (code, help) = refused(at, &line);
+        assert!(code == "E640" && help.contains("different runs"), "{again}: {code} {help}");
+    }
+    assert_eq!(std::fs::read(at.join("reach.toml")).unwrap(), before);
+    succeeds(at, "statistics reach.toml kept/reach-1.csv kept/reach-2.csv");
+}
+
 const SERVED: &str = "--device unix:arm.sock";
 
 /// A simulated arm that stays, with its pendant; killed when the test is over.

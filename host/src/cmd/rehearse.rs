@@ -233,6 +233,10 @@ pub(super) fn memory_failure(cause: MemoryError, doing: &str) -> Failure {
         MemoryError::None | MemoryError::Incomplete { .. } => {
             "record whole runs with `tactus run PRIMITIVE --record FILE`"
         }
+        MemoryError::Twice { .. } => {
+            "give recordings of different runs; a simulated arm repeats itself unless its seed differs, for example \
+             `--device sil:seed=2`"
+        }
         MemoryError::Columns { .. } => "record with this version of tactus",
         MemoryError::Saturated { .. } | MemoryError::Stale { .. } => {
             "check the force sensor and its cable, and that the hand touches nothing"

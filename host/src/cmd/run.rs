@@ -227,9 +227,11 @@ fn changes(file: &PrimitiveFile, command: &Cmd) -> Result<Vec<Change>, Failure> 
     }
 }
 
-/// The name of a primitive in the device, where the argument is that and no file.
+/// The name of a primitive in the device, where the argument is that and no file. A folder is no primitive, whatever
+/// its name: it does not hide the one in the device.
 fn stored_name(primitive: &Path) -> Option<Name> {
-    let is_file = primitive.exists() || primitive.extension().is_some_and(|extension| extension == "toml");
+    let is_file =
+        primitive.exists() && !primitive.is_dir() || primitive.extension().is_some_and(|extension| extension == "toml");
     Name::new(primitive.to_str()?).ok().filter(|_| !is_file)
 }
 
