@@ -99,6 +99,62 @@ fn one_run_does_not_count_as_several() {
     succeeds(at, "statistics reach.toml kept/reach-1.csv kept/reach-2.csv");
 }
 
+/// The command line in the first pair of backquotes that begins with these words.
+fn advised(help: &str, begins: &str) -> String {
+    let found = help.split('`').find(|part| part.starts_with(begins));
+    found.unwrap_or_else(|| panic!("no `{begins}` in: {help}")).trim_start_matches("tactus ").to_owned()
+}
+
+#[test]
+fn a_refused_run_advises_a_check_that_shows_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/examples/reach.csv");
+    std::fs::copy(example, at.join("reach.csv")).unwrap();
+    succeeds(at, "learn reach.csv");
+    for options in ["--goal 0.6,0.1,0.5", "--goal 5,5,5 --speed 2", "--goal -5,0.1,-0.3 --speed 0.5"] {
+        let (code, help) = refused(at, &format!("{DEVICE} run reach.toml {options}"));
+        assert_eq!(code, "E631", "{options}");
+        let (again, help) = refused(at, &advised(&help, "tactus check"));
+        assert_eq!(again, "E631", "{options}: {help}");
+    }
+    // Of one in the device the file is fetched first.
+    succeeds(at, &format!("{DEVICE} upload reach.toml"));
+    std::fs::remove_file(at.join("reach.toml")).unwrap();
+    let (_, help) = refused(at, &format!("{DEVICE} run reach --goal 5,5,5"));
+    succeeds(at, &format!("{DEVICE} {}", advised(&help, "tactus get")));
+    assert_eq!(refused(at, &advised(&help, "tactus check")).0, "E631");
+}
+
+#[test]
+fn a_change_on_the_way_that_breaks_a_limit_is_named_with_its_time() {
+    let folder = learned(3.0);
+    let (code, help) =
+        refused(folder.path(), &format!("{DEVICE} run reach.toml --goal-at 0.5:0.6,0.1,0.2 --goal-at 1:5,5,5"));
+    assert!(code == "E631" && help.contains("`--goal-at 1:5,5,5`"), "{help}");
+}
+
+#[test]
+fn a_slower_run_is_advised_only_where_it_is_slower_and_can_help() {
+    let folder = learned(1.0);
+    let at = folder.path();
+    let mut speed = 2.0;
+    loop {
+        let output = tactus(at, &format!("--json check reach.toml --speed {speed}"));
+        if output.status.success() {
+            break;
+        }
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let help = told["error"]["help"].as_str().unwrap().to_owned();
+        let slower: f64 = advised(&help, "--speed ").trim_start_matches("--speed ").parse().unwrap();
+        assert!(slower < speed && slower >= 0.1, "{speed}: {help}");
+        speed = slower;
+    }
+    assert!(speed < 2.0);
+    let (_, help) = refused(at, "check reach.toml --speed 0.2 --goal 5,5,5");
+    assert!(!help.contains("--speed") && help.contains("another goal"), "{help}");
+}
+
 const SERVED: &str = "--device unix:arm.sock";
 
 /// A simulated arm that stays, with its pendant; killed when the test is over.
