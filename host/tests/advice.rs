@@ -124,6 +124,9 @@ fn a_refused_run_advises_a_check_that_shows_the_same() {
     let (_, help) = refused(at, &format!("{DEVICE} run reach --goal 5,5,5"));
     succeeds(at, &format!("{DEVICE} {}", advised(&help, "tactus get")));
     assert_eq!(refused(at, &advised(&help, "tactus check")).0, "E631");
+    std::fs::remove_file(at.join("reach.toml")).unwrap();
+    let (code, help) = refused(at, &format!("{DEVICE} run reach --mode adapt"));
+    assert!(code == "E635" && help.contains("`tactus get reach`, then tactus rehearse reach.toml"), "{help}");
 }
 
 #[test]
@@ -207,4 +210,69 @@ fn g4_a_fault_that_a_wrong_declaration_keeps_from_being_cleared_is_answered_with
     wait_until("the start-up is blocked", || status()["blocked"].is_string());
     let (code, help) = refused(at, &format!("{SERVED} stop --clear-fault"));
     assert!(code == "E508" && help.contains("`tactus calibrate payload hand`"), "{code}: {help}");
+}
+
+#[test]
+fn an_option_that_is_to_blame_is_named_and_not_the_movement() {
+    let folder = learned(3.0);
+    for (option, blamed) in [
+        ("--cutoff 1000", "--cutoff"),
+        ("--cutoff 0", "--cutoff"),
+        ("--cutoff nan", "--cutoff"),
+        ("--cutoff 0.001", "--cutoff"),
+        ("--still-speed 100", "--still-speed"),
+    ] {
+        let output = tactus(folder.path(), &format!("learn demo.csv -o other.toml {option}"));
+        let words = said(&output);
+        assert!(!output.status.success() && words.contains(blamed), "{option}: {words}");
+        assert!(!words.contains("show the movement again") && !words.contains("--kernels"), "{option}: {words}");
+    }
+}
+
+#[test]
+fn a_fault_of_an_arm_that_ended_with_its_command_is_not_to_be_cleared() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/faults/a3.toml");
+    std::fs::copy(script, at.join("a3.toml")).unwrap();
+    let run = "--non-interactive run reach.toml --keep --force";
+    let (code, help) = refused(at, &format!("--device sil:world=simple,faults=a3.toml {run}"));
+    assert_eq!(code, "E592");
+    assert!(!help.contains("clear-fault") && help.contains("`tactus sim`") && help.contains("usually "), "{help}");
+    let kept = at.join("runs").read_dir().unwrap().next().unwrap().unwrap().path().join("run.json");
+    let kept = std::fs::read_to_string(kept).unwrap();
+    assert!(!kept.contains("clear-fault") && kept.contains("`tactus sim`"), "{kept}");
+}
+
+#[test]
+fn a_flash_that_is_not_kept_is_told_of_once() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    succeeds(at, &format!("{DEVICE} list"));
+    // The limit stands for a full disk; the file of the flash is longer.
+    let line = format!("ulimit -f 1; exec \"$0\" {DEVICE} upload reach.toml");
+    let mut limited = Command::new("bash");
+    limited.current_dir(at).args(["-c", &line, env!("CARGO_BIN_EXE_tactus")]).stdin(Stdio::null());
+    let words = said(&limited.output().unwrap());
+    assert_eq!(words.matches("is not kept").count(), 1, "{words}");
+}
+
+#[test]
+fn advice_names_commands_and_options_that_there_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let explained = |code: &str| String::from_utf8(succeeds(folder.path(), &format!("explain {code}")).stdout).unwrap();
+    for (code, words) in [
+        ("E503", "enter the command again"),
+        ("E507", "`--at-home`"),
+        ("E526", "`tactus run` goes to the start"),
+        ("E537", "`tactus hand init`"),
+        ("E220", "`_` and `.`"),
+    ] {
+        assert!(explained(code).contains(words), "{code}: {}", explained(code));
+    }
+    // Every option that an address takes is in the list that a wrong one is answered with.
+    let output = tactus(folder.path(), "--device sil:aim=7 list");
+    for option in ["seed=", "arm=", "world=", "line=", "bus=", "flash=", "faults="] {
+        assert!(said(&output).contains(option), "{option}: {}", said(&output));
+    }
 }

@@ -216,6 +216,20 @@ pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
     Failure::new(code, doing, error)
 }
 
+/// A failure as it is told when the command has ended. A fault of a device that was simulated in this process is gone
+/// with it: nothing is left to be cleared, and nobody can be asked for the second before.
+pub(super) fn afterwards(failure: Failure, global: &Global) -> Failure {
+    let Some(ProcedureError::Stopped(fault)) = failure.cause.downcast_ref() else { return failure };
+    if *fault == Fault::None || !global.is_simulated_here() {
+        return failure;
+    }
+    let FaultGuide { cause, check, .. } = FaultGuide::of(*fault);
+    failure.help(format!(
+        "usually {cause}; check {check}. This simulated arm ended with the command, and its fault with it: `tactus \
+         sim` serves one that stays, and `tactus faults` shows its second before the fault"
+    ))
+}
+
 /// The failure of a simulated device.
 pub(super) fn simulation_failure(error: SimulationError, doing: &str) -> Failure {
     let code = match &error {

@@ -117,6 +117,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     if let Some(lost) = ended.as_ref().ok().and_then(|report| missed(report.tracking.as_ref()?)) {
         ended = ended.and_then(|report| Err(short_of_goal(&report, lost, global)?));
     }
+    ended = ended.map_err(|failure| connection::afterwards(failure, global));
     if let Some(folder) = folder {
         let kept = folder.finish(&mut ended, client.hello());
         output.say(format!("everything about this run is in {}", folder.path().display()));
@@ -329,7 +330,12 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
         return Ok(());
     }
     let doing = format!("run refused: mode `{}`", command.mode.name());
-    let help = format!("tactus rehearse {}", file.file.display());
+    let name = file.file.display();
+    // One that was read from the device has no file yet.
+    let help = match file.file.is_file() {
+        true => format!("tactus rehearse {name}"),
+        false => format!("`tactus get {name}`, then tactus rehearse {name}.toml"),
+    };
     let Some(expectation) = &file.expectation else {
         return Err(Failure::new(
             ErrorCode::NoExpectation,
