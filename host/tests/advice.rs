@@ -276,3 +276,20 @@ fn advice_names_commands_and_options_that_there_are() {
         assert!(said(&output).contains(option), "{option}: {}", said(&output));
     }
 }
+
+#[test]
+fn an_arm_that_is_served_fast_can_be_commanded() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    let _arm = Served::start(at, &["--fast"]);
+    let cycle = || {
+        let told = succeeds(at, &format!("{SERVED} --json status")).stdout;
+        serde_json::from_slice::<Value>(&told).unwrap()["cycle"].as_u64().unwrap()
+    };
+    succeeds(at, &format!("{SERVED} hand init"));
+    succeeds(at, &format!("{SERVED} run reach.toml"));
+    // Nobody is connected for a second: more than ten times as much passes on the arm.
+    let before = cycle();
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(cycle() - before > 10 * u64::from(control::RATE_HZ));
+}

@@ -168,6 +168,8 @@ const DEFECTS: &[(&str, &[&str])] = &[
         ],
     ),
     ("a flash that is not kept is told of 130 times", &["a_flash_that_is_not_kept_is_told_of_once"]),
+    ("the lab guide shows a fault that does not come", &["a_fault_looks_as_the_lab_guide_shows"]),
+    ("an arm that is served fast cannot be commanded", &["an_arm_that_is_served_fast_can_be_commanded"]),
 ];
 
 const HEAD: &str = "\
