@@ -191,6 +191,20 @@ pages! {
     reading_recordings_does_what_its_page_shows "how-to/read-recordings.md"
 }
 
+/// The rest of the lab guide needs an arm, or a second person; this section needs neither.
+#[test]
+fn a_fault_looks_as_the_lab_guide_shows() {
+    let guide = fs::read_to_string(repository().join("docs/lab-guide.md")).unwrap();
+    let (_, section) = guide.split_once("## 13. What faults look like").unwrap();
+    let (section, _) = section.split_once("`tactus stop` says which fault is latched").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let scripts = folder.path().join("tests/faults");
+    fs::create_dir_all(&scripts).unwrap();
+    fs::copy(repository().join("tests/faults/a3.toml"), scripts.join("a3.toml")).unwrap();
+    let before = "```\n$ cp ../../docs/examples/reach.csv .\n$ tactus learn reach.csv --output first.toml\n```\n";
+    assert_eq!(play(&format!("{before}{section}"), folder.path()), Ok(4));
+}
+
 #[test]
 fn every_how_to_page_is_played() {
     for entry in fs::read_dir(repository().join("docs/how-to")).unwrap() {

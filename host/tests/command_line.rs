@@ -166,7 +166,7 @@ fn a_violation_ends_with_6_and_the_report_is_still_given() {
     tactus(folder.path(), &["learn", "demo.csv"]).success();
     let failed = tactus(folder.path(), &["check", "demo.toml", "--speed", "2"]).failure().code(6);
     assert!(stdout(&failed).contains("violation"), "{}", stdout(&failed));
-    assert!(stderr(&failed).contains("error[E631]") && stderr(&failed).contains("--speed 0.5"), "{}", stderr(&failed));
+    assert!(stderr(&failed).contains("error[E631]") && stderr(&failed).contains("--speed 1`"), "{}", stderr(&failed));
     let failed = json(&tactus(folder.path(), &["check", "demo.toml", "--speed", "2", "--json"]).failure().code(6));
     assert!(!failed["result"]["violations"].as_array().unwrap().is_empty());
 }

@@ -130,6 +130,46 @@ const DEFECTS: &[(&str, &[&str])] = &[
         "a busy machine makes a served arm take its programs for silent",
         &["a_machine_that_was_late_makes_up_for_a_moment_and_no_more"],
     ),
+    (
+        "`calibrate gravity --reset` deletes the declared payload; the settings give a measured weight to another one",
+        &[
+            "g4_forgetting_a_weight_keeps_the_declared_payload_and_says_so",
+            "g4_the_settings_do_not_give_a_measured_weight_to_another_payload",
+        ],
+    ),
+    (
+        "a wrong declaration is answered with \"check the pendant and the cables\"",
+        &[
+            "g4_a_declared_payload_is_kept_and_a_start_up_that_contradicts_it_is_blocked_with_the_reason",
+            "g4_a_fault_that_a_wrong_declaration_keeps_from_being_cleared_is_answered_with_the_declaration",
+            "every_reason_that_blocks_a_start_up_has_a_remedy_of_its_own",
+        ],
+    ),
+    ("`rehearse` drops the statistics without a word", &["a_rehearsal_says_that_it_drops_the_statistics"]),
+    ("`rename X X` advises to delete the only copy", &["a_primitive_is_not_renamed_to_its_own_name"]),
+    ("`statistics` takes one recording three times for three runs", &["one_run_does_not_count_as_several"]),
+    ("a folder hides the primitive of its name in the device", &["a_folder_does_not_hide_a_primitive_in_the_device"]),
+    (
+        "a refused run advises a check that passes, or a speed that was tried",
+        &[
+            "a_refused_run_advises_a_check_that_shows_the_same",
+            "a_change_on_the_way_that_breaks_a_limit_is_named_with_its_time",
+            "a_slower_run_is_advised_only_where_it_is_slower_and_can_help",
+        ],
+    ),
+    (
+        "advice that cannot be followed: to calibrate without end, to clear a fault that is gone, to show the movement \
+         again where an option is to blame",
+        &[
+            "cli_15_an_arm_is_weighed_once_with_a_report_and_its_device_keeps_the_weight_over_a_restart",
+            "a_fault_of_an_arm_that_ended_with_its_command_is_not_to_be_cleared",
+            "an_option_that_is_to_blame_is_named_and_not_the_movement",
+            "advice_names_commands_and_options_that_there_are",
+        ],
+    ),
+    ("a flash that is not kept is told of 130 times", &["a_flash_that_is_not_kept_is_told_of_once"]),
+    ("the lab guide shows a fault that does not come", &["a_fault_looks_as_the_lab_guide_shows"]),
+    ("an arm that is served fast cannot be commanded", &["an_arm_that_is_served_fast_can_be_commanded"]),
 ];
 
 const HEAD: &str = "\

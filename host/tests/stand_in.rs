@@ -146,7 +146,7 @@ fn an_interrupted_observer_does_not_say_that_the_arm_has_stopped() {
     for order in ["record --duration 100 -o z.csv", "status --line 100"] {
         let mut observer = Command::new(env!("CARGO_BIN_EXE_tactus"));
         observer.current_dir(at).env("TACTUS_DEVICE", "unix:tactus.sock").args(order.split(' '));
-        let mut observer = observer.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        let observer = observer.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         // It is at work when the device knows of it: the file is there, or a second of the device's time has passed.
         let begun = std::time::Instant::now();
         while begun.elapsed() < std::time::Duration::from_secs(2) {

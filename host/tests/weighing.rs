@@ -62,10 +62,14 @@ fn cli_15_an_arm_is_weighed_once_with_a_report_and_its_device_keeps_the_weight_o
     assert_eq!(again.status.code(), Some(6), "{}", String::from_utf8_lossy(&again.stdout));
     let refused: Value = serde_json::from_slice(&again.stdout).unwrap();
     assert_eq!(refused["error"]["code"], "E644");
+    let help = refused["error"]["help"].as_str().unwrap();
+    assert!(help.contains("nothing is to be done") && !help.contains("again"), "{help}");
     assert_eq!(object(folder, &["calibrate", "gravity", "--show"]), kept);
 
+    // The weight is forgotten, not the hand that it was measured with: that is taken back by its own command.
     let reset = object(folder, &["calibrate", "gravity", "--reset"]);
-    assert_eq!((&reset["stored"], &reset["in_use"]), (&Value::Bool(false), &Value::Bool(false)));
+    assert_eq!((&reset["links"], &reset["with_hand"]), (&before["links"], &Value::Bool(true)));
+    assert_eq!(object(folder, &["calibrate", "payload", "undeclared"])["declared"], "undeclared");
     assert_eq!(object(folder, &["calibrate", "gravity", "--show"]), before);
     let refused = tactus(folder, &["calibrate", "gravity", "--show", "--reset"]);
     assert_eq!(refused.status.code(), Some(2));
@@ -133,6 +137,18 @@ fn g4_a_declared_payload_is_kept_and_a_start_up_that_contradicts_it_is_blocked_w
     let words = String::from_utf8_lossy(&refused.stdout).into_owned();
     assert!(words.contains("the bare arm is declared, and a sensor answers"), "{words}");
 
+    // What helps is another declaration, and each command says so: neither pendant nor cable is at fault.
+    let lines: [&[&str]; 4] = [&teach, &["hand", "open"], &["stop", "--clear-fault"], &["stop"]];
+    for line in lines {
+        let output = tactus(folder, line);
+        if output.status.success() {
+            continue;
+        }
+        let refused: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let help = refused["error"]["help"].as_str().unwrap();
+        assert!(help.contains("`tactus calibrate payload hand`"), "{line:?}: {refused}");
+    }
+
     // Whoever waits is told at once, and once.
     let mut aloud = Command::new(env!("CARGO_BIN_EXE_tactus"));
     aloud.current_dir(folder).env("TACTUS_DEVICE", DEVICE).args(teach).stdin(Stdio::null());
@@ -161,4 +177,60 @@ fn g4_a_measured_weight_is_not_lost_to_a_declaration() {
     // It was measured with the hand, which is thereby declared.
     assert_eq!(object(folder, &["calibrate", "payload", "hand"])["declared"], "hand");
     assert_eq!(share(), kept);
+}
+
+#[test]
+fn g4_forgetting_a_weight_keeps_the_declared_payload_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let payload = || object(folder, &["calibrate", "payload"]);
+    for (carries, told) in [("hand", "sensor and hand stay declared"), ("nothing", "the bare arm stays declared")] {
+        object(folder, &["calibrate", "payload", carries]);
+        for weight in [None, Some("weight.link_3_mass_share=0.05")] {
+            if let Some(weight) = weight {
+                object(folder, &["config", "set", weight]);
+                assert_eq!(payload()["weight"], "measured");
+            }
+            let mut aloud = Command::new(env!("CARGO_BIN_EXE_tactus"));
+            aloud.current_dir(folder).env("TACTUS_DEVICE", DEVICE).args(["calibrate", "gravity", "--reset"]);
+            let said = String::from_utf8_lossy(&aloud.output().unwrap().stderr).into_owned();
+            assert!(said.contains(told) && said.contains("tactus calibrate payload undeclared"), "{said}");
+            let kept = payload();
+            assert_eq!((&kept["declared"], &kept["weight"]), (&Value::from(carries), &Value::from("the model's")));
+        }
+        // Nothing is measured any more, so another payload can be declared.
+        object(folder, &["calibrate", "payload", "undeclared"]);
+    }
+    // Where nothing is declared nothing is kept.
+    let reset = object(folder, &["calibrate", "gravity", "--reset"]);
+    assert_eq!(reset["stored"], Value::Bool(false));
+    assert_eq!(payload()["declared"], "undeclared");
+}
+
+#[test]
+fn g4_the_settings_do_not_give_a_measured_weight_to_another_payload() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    object(folder, &["config", "set", "weight.link_3_mass_share=0.05"]);
+    object(folder, &["config", "dump", "-o", "arm.toml"]);
+    let kept = object(folder, &["config", "get"]);
+    let file = folder.join("arm.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let other = text.replace("with_hand = true", "with_hand = false");
+    assert_ne!(text, other);
+    std::fs::write(&file, other).unwrap();
+    let lines: [&[&str]; 2] = [&["config", "set", "weight.with_hand=false"], &["config", "restore", "arm.toml"]];
+    for line in lines {
+        let refused = tactus(folder, line);
+        assert_eq!(refused.status.code(), Some(6), "{line:?}: {}", String::from_utf8_lossy(&refused.stdout));
+        let refused: Value = serde_json::from_slice(&refused.stdout).unwrap();
+        assert_eq!(refused["error"]["code"], "E642");
+        assert!(refused["error"]["help"].as_str().unwrap().contains("tactus calibrate gravity --reset"), "{refused}");
+        assert_eq!(object(folder, &["config", "get"]), kept);
+    }
+    // Without a measured weight it is the declaration that changes, and with another weight the whole is another one.
+    object(folder, &["config", "set", "weight.with_hand=false", "weight.link_3_mass_share=0.02"]);
+    object(folder, &["calibrate", "gravity", "--reset"]);
+    object(folder, &["config", "set", "weight.with_hand=true"]);
+    assert_eq!(object(folder, &["calibrate", "payload"])["declared"], "hand");
 }

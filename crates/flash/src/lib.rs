@@ -96,6 +96,8 @@ pub struct Flash {
     cut: Option<(u64, u64)>,
     powered: bool,
     file: Option<File>,
+    /// The file did not take everything, and that has been said.
+    lost: bool,
 }
 
 impl Flash {
@@ -109,7 +111,8 @@ impl Flash {
     #[must_use]
     pub fn with_content(mut bytes: Vec<u8>, times: FlashTimes) -> Self {
         bytes.resize(FLASH_BYTES, BLANK);
-        Self { bytes, times, busy_until: 0, operations: 0, erases: [0; SECTORS], cut: None, powered: true, file: None }
+        let erases = [0; SECTORS];
+        Self { bytes, times, busy_until: 0, operations: 0, erases, cut: None, powered: true, file: None, lost: false }
     }
 
     /// A chip whose content is kept in a file, so that it outlives this program. The file is made if there is none.
@@ -243,8 +246,10 @@ impl Flash {
         self.operations += 1;
         if let (Some(file), Some(bytes)) = (&mut self.file, self.bytes.get(range.clone())) {
             let kept = file.seek(SeekFrom::Start(range.start as u64)).and_then(|_| file.write_all(bytes));
-            if let Err(error) = kept {
-                // Nobody waits for the file; a flash that is not kept must not go unnoticed.
+            if let Err(error) = kept
+                && !std::mem::replace(&mut self.lost, true)
+            {
+                // Nobody waits for the file; a flash that is not kept must not go unnoticed. It is said once.
                 eprintln!("warning: the content of the simulated flash is not kept: {error}");
             }
         }

@@ -4,12 +4,13 @@ use std::fmt;
 use std::time::Duration;
 
 use control::model::WeightError;
-use device::{HomeError, PrimitiveDefect, StartupFailure};
+use device::{HomeError, PrimitiveDefect, Stage, StartupFailure};
 use link::{Capabilities, ImageError, Refusal, SessionOwner};
 
 use crate::error_code::ErrorCode;
 use crate::failure::Failure;
 use crate::output_file::OutputError;
+use crate::startup_guide::stage_remedy;
 use crate::transport::{AddressError, TransportError};
 
 /// A part that a device can drive or read, as its hello says.
@@ -157,7 +158,7 @@ fn explain(reason: Refusal, detail: [u32; 2]) -> String {
             Some(state) => format!("{reason}: {state}"),
             None => format!("{reason}: number {first}"),
         },
-        Refusal::NotReady => match u8::try_from(first).ok().and_then(device::Stage::from_code) {
+        Refusal::NotReady => match u8::try_from(first).ok().and_then(Stage::from_code) {
             Some(stage) => format!("{reason}: {stage}"),
             None => format!("{reason}: stage {first}"),
         },
@@ -236,6 +237,10 @@ impl HostError {
     pub fn into_failure(self, doing: impl Into<String>) -> Failure {
         let help = match &self {
             Self::Transport(TransportError::Can(problem)) => problem.help(),
+            Self::Refused { reason: Refusal::NotReady, detail: [stage, _], .. } => {
+                let stage = u8::try_from(*stage).ok().and_then(Stage::from_code);
+                stage.and_then(stage_remedy).map(str::to_owned)
+            }
             _ => None,
         };
         let failure = Failure::new(self.code(), doing, self);

@@ -148,7 +148,8 @@ error_codes! {
         "`faults=` names a file that is missing, or none of `tests/faults`, or a fault in it is misspelt",
         "the faults are listed in docs/faults.md; for example `sil:faults=tests/faults/a3.toml:2`";
     NameInvalid = 220: "the name of the primitive is not valid",
-        "too long, empty, or other characters than letters, digits, `-` and `_`", "give a name with `--name NAME`";
+        "too long, empty, other characters than letters, digits, `-`, `_` and `.`, or `-` or `.` at its begin",
+        "give a name with `--name NAME`";
     LearnOption = 221: "an option of `learn` is out of its range", "a value on the command line", "";
     NoAngles = 222: "no angles are given", "`calibrate home` without `--here` and `--set`", "`--here` or `--set`";
     AttachMayReset = 223: "attaching the debug probe can restart the board", "`logs` on a live board without leave",
@@ -277,7 +278,8 @@ error_codes! {
     TurnsTooFar = 622: "the demonstration turns farther than can be learned",
         "the tool turns by half a turn between start and goal, or nearly",
         "show the movement with less turning, or learn it in two parts";
-    FitFailed = 623: "no weights fit the demonstration", "numbers out of range", "show the movement again";
+    FitFailed = 623: "no weights fit the demonstration", "numbers out of range, of the recording or of an option",
+        "show the movement again, with the usual options of `tactus learn`";
     LearnedInvalid = 624: "what was learned is no valid primitive",
         "a bound of the primitive is exceeded; the message names it",
         "show the movement again, or change the option that the message names";
@@ -309,7 +311,8 @@ error_codes! {
         "`tactus calibrate gravity --reset` forgets it; then declare what the arm carries, and weigh it again";
     WeightNotAccepted = 644: "the weight of the arm was measured and not accepted",
         "the hand holds something, something touches the arm, or its weight is right already",
-        "empty the hand and free the arm, then `tactus calibrate gravity` again; the device goes on as before";
+        "where its weight is right already nothing is to be done, `tactus calibrate gravity --show` tells whose it is; else \
+         empty the hand and free the arm, then `tactus calibrate gravity` again; the device goes on as before";
     SettingsInvalid = 645: "the file of settings cannot be used", "a misspelt key, or a value that no arm can have",
         "`tactus config dump` writes a sound one to compare with";
     SettingsOfOthers = 646: "the settings are those of another arm", "another file was meant, or the board was changed",

@@ -27,6 +27,7 @@ pub mod replay;
 pub mod report;
 pub mod settings;
 pub mod simulation;
+pub mod startup_guide;
 pub mod table;
 pub mod tracking;
 pub mod transport;

@@ -376,10 +376,15 @@ fn a_dwell_makes_the_movement_longer_by_exactly_that_and_rests_at_the_goal() {
 /// The taught movement of an arm that stands still for half a second and then creeps away for another half: nobody
 /// holds it any more, and it weighs otherwise than its model. J7 accelerates by twice `speed`, rad/s^2.
 fn let_go(speed: f64) -> Recording {
+    let_go_for(speed, 150)
+}
+
+/// The same, recorded for so many samples.
+fn let_go_for(speed: f64, samples: u32) -> Recording {
     let mut rows = common::rows(4.0);
     let at_rest = rows.last().unwrap().clone();
     let mut last = at_rest.telemetry.q;
-    for k in 1..=150_u32 {
+    for k in 1..=samples {
         let time = f64::from(k) / control::RATE;
         last[6] = at_rest.telemetry.q[6] + (speed * time * time) as f32;
         let (position, orientation) = lab::arm::tool_pose(&last.map(f64::from));
@@ -405,6 +410,11 @@ fn an_arm_that_creeps_away_once_it_is_let_go_is_cut_off_there_and_that_is_said()
     let words = crept.report.warnings.join("\n");
     assert!(words.contains("crept away by") && words.contains("let go"), "{words}");
     assert!(!plain.report.warnings.iter().any(|warning| warning.contains("crept")));
+    // A tenth of a millimetre is cut off as well, and nothing to warn of.
+    for samples in (10..50).step_by(4) {
+        let barely = learned(&let_go_for(0.3, samples), &options).unwrap().report.warnings;
+        assert!(!barely.iter().any(|warning| warning.contains("by 0 mm")), "{samples}: {barely:?}");
+    }
     // Half a metre per second is no creeping: who ends in motion is told so, as before.
     let fast = learned(&let_go(5.0), &options).unwrap_err();
     assert!(matches!(fast, LearnError::Option { option: "--dwell", .. }), "{fast}");

@@ -152,7 +152,9 @@ fn recordings_that_tell_nothing_are_refused_and_nothing_is_changed() {
     };
     assert!(matches!(refused(&[]), MemoryError::None));
     let cut = broken(&|rows| rows.truncate(1200));
-    assert!(matches!(refused(&[cut]), MemoryError::Incomplete { .. }));
+    let incomplete = refused(&[cut]);
+    assert!(matches!(incomplete, MemoryError::Incomplete { .. }));
+    assert!(incomplete.to_string().contains(" from 0 % to "), "{incomplete}");
     let saturated = broken(&|rows| rows[700].telemetry.flags = flags::SENSOR_SATURATED);
     assert!(matches!(refused(&[saturated]), MemoryError::Saturated { samples: 1, .. }));
     let stale = broken(&|rows| rows[400..500].iter_mut().for_each(|row| row.telemetry.flags = flags::WRENCH_STALE));

@@ -4,6 +4,7 @@
 //! runs on the device, in double precision, on an ideal arm with the model's friction. Every limit is reported with
 //! its worst margin and the time at which it occurs; a negative margin is a violation.
 
+mod advice;
 mod closed_loop;
 mod plant;
 

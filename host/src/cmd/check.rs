@@ -43,7 +43,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         output.result(&report, report.to_text())?;
     }
     let failure =
-        Failure::new(ErrorCode::CheckFailed, format!("check failed: {}", command.primitive.display()), reason);
+        Failure::new(ErrorCode::CheckFailed, format!("check failed: {}", command.primitive.display()), reason)
+            .help(report.advice());
     Err(match serde_json::to_value(&report) {
         Ok(data) => failure.data(data),
         Err(_) => failure,

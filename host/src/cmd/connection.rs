@@ -5,17 +5,18 @@ use std::time::{Duration, Instant};
 
 use control::Fault;
 use device::Stage;
-use link::HomeSource;
+use link::{HomeSource, Refusal, Status};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use super::{ErrorCode, Failure, Global, Output};
 use lab::client::{Client, Halted, Interrupt};
 use lab::device::{Device, OpenError};
-use lab::error::HostError;
+use lab::error::{HostError, explain_blocked};
 use lab::fault_guide::FaultGuide;
 use lab::procedure::{self, ProcedureError, Readiness, StartupLook};
 use lab::simulation::{SimulationError, SimulationOptions};
+use lab::startup_guide::blocked_remedy;
 use lab::transport::Address;
 
 /// Two signals within this time are one.
@@ -157,7 +158,7 @@ fn watch(
         }
     });
     spinner.finish_and_clear();
-    let readiness = result.map_err(|error| failure(error, doing))?;
+    let readiness = result.map_err(|error| explained(client, failure(error, doing)))?;
     if let Some(source @ (HomeSource::Damaged | HomeSource::Foreign)) = readiness.zeroed_at {
         output.warn(format!(
             "the arm was zeroed at another home than its own: {}; `tactus calibrate show`",
@@ -165,6 +166,24 @@ fn watch(
         ));
     }
     Ok(readiness)
+}
+
+/// The failure of a request that the device refused.
+pub(super) fn refused(client: &mut Client<Device>, error: HostError, doing: &str) -> Failure {
+    explained(client, error.into_failure(doing))
+}
+
+/// A failure of an arm that does not get ready helps with what blocks its start-up, if the device tells.
+fn explained(client: &mut Client<Device>, failure: Failure) -> Failure {
+    if !matches!(failure.code, ErrorCode::NotReady | ErrorCode::Refused(Refusal::NotReady)) {
+        return failure;
+    }
+    let Ok(Status { blocked: Some(reason), .. }) = client.status() else { return failure };
+    match blocked_remedy(reason) {
+        Some(remedy) if failure.cause.to_string().contains(&explain_blocked(reason)) => failure.help(remedy),
+        Some(remedy) => failure.help(format!("{}; {remedy}", explain_blocked(reason))),
+        None => failure,
+    }
 }
 
 /// Says how much faster than life a simulated device was. In words only: data must be the same in every run.
@@ -195,6 +214,20 @@ pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
         ProcedureError::Recording(_) => return Failure::of_file(ErrorCode::RecordingNotWritten, doing, error),
     };
     Failure::new(code, doing, error)
+}
+
+/// A failure as it is told when the command has ended. A fault of a device that was simulated in this process is gone
+/// with it: nothing is left to be cleared, and nobody can be asked for the second before.
+pub(super) fn afterwards(failure: Failure, global: &Global) -> Failure {
+    let Some(ProcedureError::Stopped(fault)) = failure.cause.downcast_ref() else { return failure };
+    if *fault == Fault::None || !global.is_simulated_here() {
+        return failure;
+    }
+    let FaultGuide { cause, check, .. } = FaultGuide::of(*fault);
+    failure.help(format!(
+        "usually {cause}; check {check}. This simulated arm ended with the command, and its fault with it: `tactus \
+         sim` serves one that stays, and `tactus faults` shows its second before the fault"
+    ))
 }
 
 /// The failure of a simulated device.

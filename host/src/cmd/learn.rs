@@ -7,11 +7,17 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, files};
-use lab::demonstration::{Preparation, Recording};
+use lab::demonstration::{DemonstrationError, Preparation, Recording};
 use lab::learn::feedback::FeedbackOptions;
 use lab::learn::hand::HandMotion;
 use lab::learn::{self, LearnError, LearnOptions};
 use lab::primitive_file::OrientationError;
+
+/// Usual cut-off of the filter, Hz.
+const CUTOFF: f64 = 7.5;
+
+/// Usual speed below which the arm counts as still, m/s.
+const STILL_SPEED: f64 = 0.005;
 
 /// Options of `learn`.
 #[derive(Debug, Clone, Args)]
@@ -29,13 +35,13 @@ pub struct Cmd {
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u16).range(2..=100))]
     pub kernels: u16,
     /// Cut-off of the zero-phase filter on the demonstration, Hz
-    #[arg(long, default_value_t = 7.5, value_name = "HZ")]
+    #[arg(long, default_value_t = CUTOFF, value_name = "HZ")]
     pub cutoff: f64,
     /// Use the rotation vector as orientation error: for movements that turn more than 150 degrees
     #[arg(long)]
     pub rotation_vector: bool,
     /// Speed below which the arm counts as still before and behind the movement, m/s
-    #[arg(long, default_value_t = 0.005, value_name = "M_PER_S")]
+    #[arg(long, default_value_t = STILL_SPEED, value_name = "M_PER_S")]
     pub still_speed: f64,
     /// Learn the whole recording, with the time in which the arm stands still
     #[arg(long)]
@@ -143,7 +149,13 @@ fn failure(error: LearnError, command: &Cmd) -> Failure {
         LearnError::TurnsTooFar { rotation_vector_helps: true, .. } => {
             Some(format!("tactus learn --rotation-vector {demonstration}"))
         }
-        LearnError::Demonstration(lab::demonstration::DemonstrationError::Still { .. }) => {
+        LearnError::Demonstration(DemonstrationError::Still { .. }) if command.still_speed > STILL_SPEED => {
+            Some(format!("a lower `--still-speed` ({STILL_SPEED} m/s is usual)"))
+        }
+        LearnError::Poor { .. } if command.cutoff < CUTOFF => {
+            Some(format!("a higher `--cutoff` ({CUTOFF} Hz is usual): the filter takes the movement away"))
+        }
+        LearnError::Demonstration(DemonstrationError::Still { .. }) => {
             Some(format!("tactus learn --no-trim {demonstration}"))
         }
         _ => None,

@@ -315,7 +315,7 @@ pub fn run(cli: Cli) -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => tell(&failure, global.json),
+        Err(failure) => tell(&connection::afterwards(failure, &global), global.json),
     }
 }
 

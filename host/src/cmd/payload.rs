@@ -32,7 +32,7 @@ pub enum Carries {
 
 impl Carries {
     /// As the model has it.
-    const fn payload(self) -> Option<control::Payload> {
+    pub(super) const fn payload(self) -> Option<control::Payload> {
         match self {
             Self::Hand => Some(control::Payload::SensorAndHand),
             Self::Nothing => Some(control::Payload::None),
@@ -71,7 +71,8 @@ pub(super) fn run(command: &Payload, client: &mut Client<Device>, global: &Globa
     show(client, global)
 }
 
-fn declared(weight: &Weight) -> Carries {
+/// The payload that a kept weight declares.
+pub(super) fn declared(weight: &Weight) -> Carries {
     match (weight.source, weight.hand) {
         (HomeSource::Stored, true) => Carries::Hand,
         (HomeSource::Stored, false) => Carries::Nothing,

@@ -7,6 +7,7 @@ use lab::device::Device;
 use lab::error::explain_blocked;
 use lab::primitive_file::{PrimitiveFile, Waypoint};
 use lab::procedure::Mode;
+use lab::startup_guide::{blocked_remedy, stage_remedy};
 use link::message::Capabilities;
 use link::{HandStage, Listing, Refusal, Status};
 use schemars::JsonSchema;
@@ -69,8 +70,9 @@ pub(super) fn look(client: &mut Client<Device>, asked: &Asked<'_>, doing: &str) 
 /// An item is not met.
 pub(super) fn require(list: &[Precondition]) -> Result<(), Failure> {
     let missing = list.iter().find_map(|item| Some((item, item.refusal?)));
-    missing.map_or(Ok(()), |(Precondition { item, value, .. }, refusal)| {
-        let failure = Failure::new(ErrorCode::Refused(refusal), "run refused", format!("{item}: {value}"));
+    missing.map_or(Ok(()), |(Precondition { item, value, remedy, .. }, refusal)| {
+        let failure = Failure::new(ErrorCode::Refused(refusal), "run refused", format!("{item}: {value}"))
+            .help(remedy.unwrap_or(refusal.remedy()));
         Err(failure.data(serde_json::json!({ "preconditions": list })))
     })
 }
@@ -131,10 +133,10 @@ fn of_device(status: &Status, drives: Capabilities, mode: Mode, start: &Waypoint
         starts += &format!(": {}", explain_blocked(numbers));
     }
     let words = fault.map_or("none".to_owned(), |fault| format!("{fault:?}: {fault}"));
-    let mut list = vec![
-        item("fault", words, fault.is_none(), Refusal::Faulted),
-        item("start-up", starts, stage == Some(Stage::Ready), Refusal::NotReady),
-    ];
+    let mut startup = item("start-up", starts, stage == Some(Stage::Ready), Refusal::NotReady);
+    let remedy = status.blocked.and_then(blocked_remedy).or_else(|| stage.and_then(stage_remedy));
+    startup.remedy = startup.remedy.map(|usual| remedy.unwrap_or(usual));
+    let mut list = vec![item("fault", words, fault.is_none(), Refusal::Faulted), startup];
     if drives.arm {
         let zeroed = if status.zeroed { "count from home" } else { "not zeroed" };
         let pendant = super::status::safety_mode(status.safety_mode);

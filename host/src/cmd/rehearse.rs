@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use link::RunOptions;
 use serde::Serialize;
 
-use super::{ErrorCode, Failure, Global, Table, connection, files, upload};
+use super::{ErrorCode, Failure, Global, Output, Table, connection, files, upload};
 use crate::check::Course;
 use lab::demonstration::{Origin, RATE, Recording};
 use lab::learn::memory::{MemoryError, MemorySummary, Payload, remember_rehearsals};
@@ -27,7 +27,7 @@ pub struct Cmd {
     /// Speed relative to the taught one, 0.1 to 2
     #[arg(long, default_value_t = 1.0, value_parser = super::check::factor)]
     pub speed: f64,
-    /// Where the primitive with its expectation goes [default: back into PRIMITIVE]
+    /// Where the primitive with its expectation goes, without statistics [default: back into PRIMITIVE]
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Keep the recordings in this folder, as NAME-1.csv and so on
@@ -72,6 +72,8 @@ pub struct Report {
     pub expectation: MemorySummary,
     /// True if K2 came from the spread.
     pub weighted: bool,
+    /// True if the primitive had statistics: they were gathered with another expectation, and were dropped.
+    pub statistics_dropped: bool,
     /// Irregularities, trial by trial.
     pub flags: Vec<FlagCounts>,
     /// Telemetry messages lost.
@@ -132,6 +134,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     connection::tell_speed(&client, started, output);
 
     let duration = file.movement.duration / command.speed;
+    let statistics_dropped = file.statistics.is_some();
     let summary = remember_rehearsals(
         &mut file,
         &recordings,
@@ -142,22 +145,36 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     .map_err(|cause| memory_failure(cause, "rehearse: no expectation was stored"))?;
     write(&file, output_file, &target, DOING)?;
     output.say(format!("wrote {}", target.display()));
-    if flags.iter().any(|flags| flags.limited > 0) {
-        output.warn("the torque limiter was active: the arm did not follow its plan everywhere");
-    }
-    if file.feedback.is_none() {
-        output.warn("the primitive has no gains for feedback: learn it again, then rehearse it");
-    }
+    caution(&file, &flags, statistics_dropped.then_some(&*target), output);
     let report = Report {
         name: file.name.clone(),
         file: files::text(&target),
         checksum: format!("0x{:08x}", file.checksum()),
         weighted: file.feedback.as_ref().is_some_and(|feedback| feedback.k2.len() > 1),
         expectation: summary,
+        statistics_dropped,
         flags,
         gaps,
     };
     output.result(&report, report.to_text())
+}
+
+/// Warns of what a person should know about the primitive that was written; `dropped` is its file, if it has lost its
+/// statistics.
+fn caution(file: &PrimitiveFile, flags: &[FlagCounts], dropped: Option<&Path>, output: Output) {
+    if flags.iter().any(|flags| flags.limited > 0) {
+        output.warn("the torque limiter was active: the arm did not follow its plan everywhere");
+    }
+    if let Some(target) = dropped {
+        output.warn(format!(
+            "its statistics were dropped: they were gathered with another expectation. No run is watched until \
+             `tactus statistics {} RECORDING...` has new ones",
+            target.display()
+        ));
+    }
+    if file.feedback.is_none() {
+        output.warn("the primitive has no gains for feedback: learn it again, then rehearse it");
+    }
 }
 
 /// Refuses a speed at which the expectation could not be kept.
@@ -215,6 +232,10 @@ pub(super) fn memory_failure(cause: MemoryError, doing: &str) -> Failure {
     let help = match &cause {
         MemoryError::None | MemoryError::Incomplete { .. } => {
             "record whole runs with `tactus run PRIMITIVE --record FILE`"
+        }
+        MemoryError::Twice { .. } => {
+            "give recordings of different runs; a simulated arm repeats itself unless its seed differs, for example \
+             `--device sil:seed=2`"
         }
         MemoryError::Columns { .. } => "record with this version of tactus",
         MemoryError::Saturated { .. } | MemoryError::Stale { .. } => {

@@ -22,13 +22,17 @@ pub struct Cmd {
 /// Renames a primitive.
 ///
 /// # Errors
-/// The device stores none of the old name, or one of the new; a run uses it.
+/// Both names are the same; the device stores none of the old name, or one of the new; a run uses it.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "rename";
     let (old, new) = (&command.old, &command.new);
+    if old == new {
+        let failure = Failure::new(ErrorCode::CommandLine, "rename refused", format!("'{old}' has that name already"));
+        return Err(failure.help(format!("give another name: `tactus rename {old} NEW`")));
+    }
     let mut client = connection::open(global, DOING, |_| {})?;
     let mut renamed = client.rename(old, new);
-    if old != new && matches!(renamed, Err(HostError::Refused { reason: Refusal::NameTaken, .. })) {
+    if matches!(renamed, Err(HostError::Refused { reason: Refusal::NameTaken, .. })) {
         let what = format!("the device stores another primitive '{new}'");
         if !global.force && !super::ask(global, &format!("{what}; delete it?")) {
             return Err(Failure::new(ErrorCode::WouldReplace, "rename refused", what));

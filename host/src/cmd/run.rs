@@ -117,6 +117,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     if let Some(lost) = ended.as_ref().ok().and_then(|report| missed(report.tracking.as_ref()?)) {
         ended = ended.and_then(|report| Err(short_of_goal(&report, lost, global)?));
     }
+    ended = ended.map_err(|failure| connection::afterwards(failure, global));
     if let Some(folder) = folder {
         let kept = folder.finish(&mut ended, client.hello());
         output.say(format!("everything about this run is in {}", folder.path().display()));
@@ -227,9 +228,11 @@ fn changes(file: &PrimitiveFile, command: &Cmd) -> Result<Vec<Change>, Failure> 
     }
 }
 
-/// The name of a primitive in the device, where the argument is that and no file.
+/// The name of a primitive in the device, where the argument is that and no file. A folder is no primitive, whatever
+/// its name: it does not hide the one in the device.
 fn stored_name(primitive: &Path) -> Option<Name> {
-    let is_file = primitive.exists() || primitive.extension().is_some_and(|extension| extension == "toml");
+    let is_file =
+        primitive.exists() && !primitive.is_dir() || primitive.extension().is_some_and(|extension| extension == "toml");
     Name::new(primitive.to_str()?).ok().filter(|_| !is_file)
 }
 
@@ -327,7 +330,12 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
         return Ok(());
     }
     let doing = format!("run refused: mode `{}`", command.mode.name());
-    let help = format!("tactus rehearse {}", file.file.display());
+    let name = file.file.display();
+    // One that was read from the device has no file yet.
+    let help = match file.file.is_file() {
+        true => format!("tactus rehearse {name}"),
+        false => format!("`tactus get {name}`, then tactus rehearse {name}.toml"),
+    };
     let Some(expectation) = &file.expectation else {
         return Err(Failure::new(
             ErrorCode::NoExpectation,

@@ -227,6 +227,7 @@ fn write(
         let failure = match error {
             WriteError::Impossible(error) => unknown(error, doing),
             WriteError::Device(error) => error.into_failure(doing),
+            WriteError::OtherPayload { .. } => Failure::new(ErrorCode::WeightOfOtherPayload, doing, error),
             WriteError::ReadBack(_) => Failure::new(ErrorCode::SettingsNotKept, doing, error),
         };
         // What was kept before the failure is told, if the device still answers.

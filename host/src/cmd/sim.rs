@@ -10,7 +10,7 @@ use std::net::TcpListener;
 use std::os::unix::fs::FileTypeExt;
 use std::os::unix::net::UnixListener;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use canlog::ARM_INTERFACE;
 use clap::Args;
@@ -46,7 +46,7 @@ pub struct Cmd {
     /// End after this much virtual time, s
     #[arg(long, value_name = "SECONDS", value_parser = super::teach::duration)]
     pub duration: Option<f64>,
-    /// Do not wait for the wall clock: run as fast as this machine can
+    /// While nobody is connected, do not wait for the wall clock: run as fast as this machine can
     #[arg(long)]
     pub fast: bool,
     /// Keep the device's flash in this file, so that its primitives are there again after a restart
@@ -185,7 +185,7 @@ fn serve(
     interrupt: &Interrupt,
     output: Output,
 ) -> Result<(), TransportError> {
-    let (started, mut real_time) = (Instant::now(), RealTime::default());
+    let mut real_time = RealTime::begin(device.now());
     let mut party = Party::default();
     let mut pendant = Pendant::listen();
     let mut bytes = Vec::new();
@@ -229,8 +229,11 @@ fn serve(
             if let (Some(bus), Some(simulation)) = (bus.as_deref_mut(), device.simulation()) {
                 bus.serve(simulation).map_err(TransportError::Io)?;
             }
-            if !command.fast {
-                std::thread::sleep(real_time.wait(device.now(), started.elapsed()));
+            // Who is connected lives by the wall clock: at another pace a device would take each of them for silent.
+            if command.fast && party.is_empty() {
+                real_time = RealTime::begin(device.now());
+            } else {
+                std::thread::sleep(real_time.wait(device.now()));
             }
         }
     }

@@ -39,13 +39,13 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 }
 
 fn report(mut client: Client<Device>, command: &Cmd, global: &Global) -> Result<(), Failure> {
-    client.stop().map_err(|error| error.into_failure(DOING))?;
+    client.stop().map_err(|error| connection::refused(&mut client, error, DOING))?;
     let status = client.status().map_err(|error| error.into_failure(DOING))?;
     let state = State::from_code(status.state).map_or("unknown", State::name);
     let latched = Fault::from_code(status.fault).filter(|fault| *fault != Fault::None);
     let cleared = command.clear_fault && latched.is_some();
     if cleared {
-        client.clear_fault().map_err(|error| error.into_failure(DOING))?;
+        client.clear_fault().map_err(|error| connection::refused(&mut client, error, DOING))?;
     }
     let mut text = format!("stopped; state: {state}");
     if let Some(fault) = latched {

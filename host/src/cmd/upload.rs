@@ -130,7 +130,7 @@ pub(super) fn precheck(
         None => Ok(report),
         Some(first) => {
             Err(Failure::new(ErrorCode::CheckFailed, format!("{doing} refused: the check failed"), first.to_string())
-                .help(format!("tactus check {}", file.file.display())))
+                .help(course.help(&file.file, &report)))
         }
     }
 }

@@ -3,13 +3,16 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use control::Payload;
+use control::model::WeightCorrection;
 use link::{HomeSource, Weight};
 use serde_json::{Value, json};
 
 use super::calibration_report::CalibrationReport;
-use super::{ErrorCode, Failure, Global, Table, connection};
+use super::{ErrorCode, Failure, Global, Table, connection, payload};
 use lab::client::Client;
 use lab::device::Device;
+use lab::error::HostError;
 use lab::procedure::{self, Crossings};
 use lab::weigh::{Residual, TOUR, WeighError, Weighing, weigh};
 
@@ -19,7 +22,7 @@ pub struct Gravity {
     /// Show the weight that counts; nothing moves
     #[arg(long, conflicts_with_all = ["reset", "at_home"])]
     pub show: bool,
-    /// Forget it: the robot model's weight counts again; nothing moves
+    /// Forget it: the robot model's weight counts again, for the declared payload; nothing moves
     #[arg(long, conflicts_with = "at_home")]
     pub reset: bool,
     /// I have brought the arm to its home pose: zero it there if need be
@@ -38,7 +41,7 @@ const DOING: &str = "calibrate gravity";
 /// The device refuses, the arm stops, or what was measured is not accepted; the device then goes on as before.
 pub(super) fn run(command: &Gravity, client: &mut Client<Device>, global: &Global) -> Result<(), Failure> {
     if command.reset {
-        client.forget_weight().map_err(|error| error.into_failure(DOING))?;
+        forget(client, global)?;
     }
     if command.show || command.reset {
         let weight = client.weight().map_err(|error| error.into_failure(DOING))?;
@@ -54,7 +57,6 @@ pub(super) fn run(command: &Gravity, client: &mut Client<Device>, global: &Globa
     });
     spinner.finish_and_clear();
     let Crossings { fitted, held_out } = measured.map_err(|error| connection::failure(error, DOING))?;
-    let refused = |error: WeighError| Failure::new(ErrorCode::WeightNotAccepted, DOING, error);
     let weighing = weigh(&present, present.payload(), &fitted, &held_out).map_err(refused)?;
     let judged = weighing.judge().map_err(|error| refused(error).data(data(&weighing)));
     let kept = judged.and_then(|()| {
@@ -65,6 +67,36 @@ pub(super) fn run(command: &Gravity, client: &mut Client<Device>, global: &Globa
     let text =
         format!("{}accepted, stored in the device; it takes effect when the arm next has no torque", table(&weighing));
     global.output().result(&data(&weighing), text)
+}
+
+/// The failure of a weight that is not accepted. One that is right already asks for nothing.
+fn refused(error: WeighError) -> Failure {
+    let help = match &error {
+        WeighError::NoBetter { .. } => {
+            "the weight in use explains what the arm carries as well as another would: nothing is to be done; \
+             `tactus calibrate gravity --show` tells whose it is"
+        }
+        WeighError::TooFew { .. } | WeighError::NotANumber => {
+            "messages were lost: `tactus status --line 10` tells how many, then `tactus calibrate gravity` again"
+        }
+        WeighError::Absurd(_) | WeighError::TooLarge { .. } => ErrorCode::WeightNotAccepted.remedy(),
+    };
+    Failure::new(ErrorCode::WeightNotAccepted, DOING, error).help(help)
+}
+
+/// Forgets the measured weight. The declared payload stays: its own command takes that back, and without it a sensor
+/// that falls silent would be no reason to stop a start-up.
+fn forget(client: &mut Client<Device>, global: &Global) -> Result<(), Failure> {
+    let failed = |error: HostError| error.into_failure(DOING);
+    let declared = payload::declared(&client.weight().map_err(failed)?);
+    let Some(carried) = declared.payload() else { return client.forget_weight().map_err(failed) };
+    client.keep_weight(&WeightCorrection::none(carried)).map_err(failed)?;
+    let words = match carried {
+        Payload::SensorAndHand => "sensor and hand stay declared",
+        Payload::None => "the bare arm stays declared",
+    };
+    global.output().say(format!("{words}; `tactus calibrate payload undeclared` takes that back"));
+    Ok(())
 }
 
 fn table(weighing: &Weighing) -> Table {

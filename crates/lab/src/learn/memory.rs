@@ -50,6 +50,14 @@ pub enum MemoryError {
     /// There are none.
     #[error("no recordings are given")]
     None,
+    /// Two recordings are of one run: it would count as two that are alike.
+    #[error("{again} holds the same run as {file}, sample by sample", again = again.display(), file = file.display())]
+    Twice {
+        /// The earlier recording.
+        file: PathBuf,
+        /// The later one.
+        again: PathBuf,
+    },
     /// A recording lacks columns.
     #[error("{file}: line {line}: the columns {columns} are needed", file = file.display())]
     Columns {
@@ -196,6 +204,11 @@ pub fn remember_successes(
     recordings: &[Recording],
 ) -> Result<MemorySummary, MemoryError> {
     let first = recordings.first().ok_or(MemoryError::None)?;
+    for (index, again) in recordings.iter().enumerate() {
+        if let Some(earlier) = recordings[..index].iter().find(|earlier| is_same_run(earlier, again)) {
+            return Err(MemoryError::Twice { file: earlier.file.clone(), again: again.file.clone() });
+        }
+    }
     let (_, duration) = progress(first, primitive.movement.alpha)?;
     let runs = runs::<STATISTICS_CHANNELS>(primitive, recordings, duration, channels)?;
     let calibrated = calibrated(primitive, &runs, &STATISTICS_FLOOR)?;
@@ -207,6 +220,19 @@ pub fn remember_successes(
     Ok(MemorySummary { empty_hand, ..summary(trials, duration, gathered.mean(), gathered.spread()) })
 }
 
+/// Two files hold one run: their bytes are the same, or their samples are and only the notes above them differ. Two
+/// runs never measure the same to the last digit.
+fn is_same_run(one: &Recording, other: &Recording) -> bool {
+    one.checksum == other.checksum
+        || (&one.time, &one.q, &one.wrench, &one.gauges, &one.hand)
+            == (&other.time, &other.q, &other.wrench, &other.gauges, &other.hand)
+}
+
+/// A progress in percent of the movement: neither below zero nor beyond its end, and zero has no sign.
+fn percent(progress: f64) -> f64 {
+    100.0 * progress.clamp(0.0, 1.0) + 0.0
+}
+
 /// Progress of every sample of the movement itself with its index, and the duration of the movement that follows from
 /// it, s.
 fn progress(recording: &Recording, alpha: f64) -> Result<(Vec<(usize, f64)>, f64), MemoryError> {
@@ -215,8 +241,8 @@ fn progress(recording: &Recording, alpha: f64) -> Result<(Vec<(usize, f64)>, f64
         phase.iter().enumerate().filter(|(_, s)| **s > 0.0).map(|(index, s)| (index, -s.ln() / alpha)).collect();
     let incomplete = |from: f64, to: f64| MemoryError::Incomplete {
         file: recording.file.clone(),
-        from: from * 100.0,
-        to: to.min(1.0) * 100.0,
+        from: percent(from),
+        to: percent(to),
     };
     let (Some(first), Some(last)) = (samples.first(), samples.iter().rev().find(|(_, u)| *u <= 1.0)) else {
         return Err(incomplete(0.0, 0.0));

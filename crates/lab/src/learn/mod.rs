@@ -19,13 +19,18 @@ use control::plan::primitive::Reference;
 use dmp::fit::{LARGEST_ANGLE, LARGEST_ROTATION_VECTOR, WARNING_ANGLE};
 use thiserror::Error;
 
-use crate::demonstration::{Demonstration, DemonstrationError, PoseSource, Preparation, Recording, angle_between};
+use crate::demonstration::{
+    Demonstration, DemonstrationError, PoseSource, Preparation, RATE, Recording, angle_between,
+};
 use crate::plan;
 use crate::plot::movement::rotation_vectors;
 use crate::primitive_file::{KERNEL_CAPACITY, OrientationError, PrimitiveFile, PrimitiveFileError, Provenance};
 use feedback::{FeedbackOptions, FeedbackReport};
 use hand::HandMotion;
 use report::{FitReport, RowError, row_error, wrench_statistics};
+
+/// Distance by which an arm must creep to be told of, m: less is no reason to weigh it.
+const LEAST_CREPT: f64 = 0.5e-3;
 
 /// Speed of the tool (turning counted, m/s) above which a demonstration does not begin or end at rest.
 const MOVING_END: f64 = 0.01;
@@ -168,7 +173,7 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
     }
     demonstration.rest(options.dwell);
     let mut warnings = Vec::new();
-    if let Some(crept) = demonstration.crept {
+    if let Some(crept) = demonstration.crept.filter(|crept| *crept >= LEAST_CREPT) {
         warnings.push(format!(
             "the arm crept away by {:.0} mm once it was let go, which is left out; `tactus calibrate gravity` weighs it",
             crept * 1e3
@@ -245,6 +250,10 @@ fn check_options(options: &LearnOptions) -> Result<(), LearnError> {
     }
     if !(0.0..=LONGEST_DWELL).contains(&options.dwell) {
         return wrong("--dwell", &format!("a time between 0 and {LONGEST_DWELL} s is expected"));
+    }
+    let highest = RATE / 2.0;
+    if !(options.cutoff > 0.0 && options.cutoff < highest) {
+        return wrong("--cutoff", &format!("a frequency between 0 and {highest} Hz is expected; 7.5 Hz is usual"));
     }
     let feedback = &options.feedback;
     let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value <= GAIN);

@@ -25,6 +25,14 @@ pub struct KeptWeight {
     pub links: [[f32; 4]; 7],
 }
 
+impl KeptWeight {
+    /// It differs from the robot model's: it was measured, or set by a person, and is no mere declaration.
+    #[must_use]
+    pub fn is_measured(&self) -> bool {
+        self.links.iter().flatten().any(|number| *number != 0.0)
+    }
+}
+
 /// Settings that a device keeps. `None`: nothing is kept, the robot model's counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Settings {
@@ -66,9 +74,20 @@ pub enum WriteError {
     /// The device refused, or the line failed.
     #[error(transparent)]
     Device(#[from] HostError),
+    /// A weight that was measured with one payload would count as measured with another; nothing was written.
+    #[error("the weight that the device keeps was measured {}, and this would call it measured {}", with(!.hand), with(*.hand))]
+    OtherPayload {
+        /// It would be called measured with sensor and hand.
+        hand: bool,
+    },
     /// The device keeps other values than were written.
     #[error("read back, {0} is another value than was written")]
     ReadBack(Key),
+}
+
+/// The payload of a weight, in words.
+fn with(hand: bool) -> &'static str {
+    if hand { "with sensor and hand" } else { "with the bare arm" }
 }
 
 /// One setting that two sets of settings differ in.
@@ -198,6 +217,13 @@ impl Settings {
     pub fn write<T: Transport>(&self, client: &mut Client<T>) -> Result<(), WriteError> {
         self.check()?;
         let before = Self::of_device(client)?;
+        if let (Some(kept), Some(wanted)) = (before.weight, self.weight)
+            && kept.is_measured()
+            && kept.links == wanted.links
+            && kept.hand != wanted.hand
+        {
+            return Err(WriteError::OtherPayload { hand: wanted.hand });
+        }
         match self.home {
             _ if self.home == before.home => {}
             Some(home) => client.calibrate(home)?,

@@ -86,6 +86,11 @@ pub(super) struct Party {
 }
 
 impl Party {
+    /// True if nobody is connected.
+    pub(super) fn is_empty(&self) -> bool {
+        self.guests.is_empty()
+    }
+
     /// True if one more can be welcomed: at the last place they take turns.
     pub(super) fn has_room(&self) -> bool {
         self.guests.len() < PLACES || self.guests.last().is_some_and(|last| last.came.elapsed() > STAY)

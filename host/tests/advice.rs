@@ -1,0 +1,295 @@
+//! Advice works: what a refusal advises shows or mends the same refusal, and what a command drops it says.
+
+#[path = "../../crates/lab/tests/common/mod.rs"]
+mod common;
+
+use std::io::Write as _;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+const DEVICE: &str = "--device sil:world=simple,flash=arm.flash --non-interactive";
+
+fn tactus(folder: &Path, line: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    command.current_dir(folder).env("XDG_CONFIG_HOME", folder).env_remove("TACTUS_DEVICE");
+    command.args(line.split_whitespace()).stdin(Stdio::null()).output().unwrap()
+}
+
+#[track_caller]
+fn succeeds(folder: &Path, line: &str) -> Output {
+    let output = tactus(folder, line);
+    assert!(output.status.success(), "{line}: {}", said(&output));
+    output
+}
+
+/// Code and help of a command that fails.
+#[track_caller]
+fn refused(folder: &Path, line: &str) -> (String, String) {
+    let output = tactus(folder, &format!("--json {line}"));
+    assert!(!output.status.success(), "{line}");
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let word = |key: &str| told["error"][key].as_str().unwrap_or_default().to_owned();
+    (word("code"), word("help"))
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn learned(duration: f64) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    common::demonstration(folder.path(), duration);
+    succeeds(folder.path(), "learn demo.csv -o reach.toml");
+    folder
+}
+
+#[test]
+fn a_rehearsal_says_that_it_drops_the_statistics() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    let rehearse = format!("{DEVICE} --json rehearse reach.toml --trials 2 --record-dir kept --force");
+    let first = succeeds(at, &rehearse);
+    let told: Value = serde_json::from_slice(&first.stdout).unwrap();
+    assert_eq!(told["statistics_dropped"], Value::Bool(false));
+    assert!(!said(&first).contains("statistics"), "{}", said(&first));
+    succeeds(at, "statistics reach.toml kept/reach-1.csv kept/reach-2.csv");
+    let again = succeeds(at, &rehearse);
+    let told: Value = serde_json::from_slice(&again.stdout).unwrap();
+    assert_eq!(told["statistics_dropped"], Value::Bool(true));
+    let words = said(&again);
+    assert!(words.contains("warning: its statistics were dropped") && words.contains("`tactus statistics reach.toml"));
+}
+
+#[test]
+fn a_primitive_is_not_renamed_to_its_own_name() {
+    let folder = tempfile::tempdir().unwrap();
+    // Nobody listens there: it ends before a device is asked.
+    let (code, help) = refused(folder.path(), "--device unix:nobody.sock rename reach reach");
+    assert_eq!(code, "E200");
+    assert!(help.contains("tactus rename reach NEW") && !help.contains("delete"), "{help}");
+}
+
+#[test]
+fn a_folder_does_not_hide_a_primitive_in_the_device() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    succeeds(at, &format!("{DEVICE} upload reach.toml"));
+    std::fs::create_dir(at.join("reach")).unwrap();
+    succeeds(at, &format!("{DEVICE} run reach --dry-run"));
+}
+
+#[test]
+fn one_run_does_not_count_as_several() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    succeeds(at, &format!("{DEVICE} rehearse reach.toml --trials 2 --record-dir kept"));
+    let text = std::fs::read_to_string(at.join("kept/reach-1.csv")).unwrap();
+    std::fs::write(at.join("copy.csv"), &text).unwrap();
+    std::fs::write(at.join("noted.csv"), format!("# the best of them\n{text}")).unwrap();
+    let before = std::fs::read(at.join("reach.toml")).unwrap();
+    for again in ["kept/reach-1.csv", "./kept/../kept/reach-1.csv", "copy.csv", "noted.csv"] {
+        let line = format!("statistics reach.toml kept/reach-1.csv kept/reach-2.csv {again}");
+        let (code, help) = refused(at, &line);
+        assert!(code == "E640" && help.contains("different runs"), "{again}: {code} {help}");
+    }
+    assert_eq!(std::fs::read(at.join("reach.toml")).unwrap(), before);
+    succeeds(at, "statistics reach.toml kept/reach-1.csv kept/reach-2.csv");
+}
+
+/// The command line in the first pair of backquotes that begins with these words.
+fn advised(help: &str, begins: &str) -> String {
+    let found = help.split('`').find(|part| part.starts_with(begins));
+    found.unwrap_or_else(|| panic!("no `{begins}` in: {help}")).trim_start_matches("tactus ").to_owned()
+}
+
+#[test]
+fn a_refused_run_advises_a_check_that_shows_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/examples/reach.csv");
+    std::fs::copy(example, at.join("reach.csv")).unwrap();
+    succeeds(at, "learn reach.csv");
+    for options in ["--goal 0.6,0.1,0.5", "--goal 5,5,5 --speed 2", "--goal -5,0.1,-0.3 --speed 0.5"] {
+        let (code, help) = refused(at, &format!("{DEVICE} run reach.toml {options}"));
+        assert_eq!(code, "E631", "{options}");
+        let (again, help) = refused(at, &advised(&help, "tactus check"));
+        assert_eq!(again, "E631", "{options}: {help}");
+    }
+    // Of one in the device the file is fetched first.
+    succeeds(at, &format!("{DEVICE} upload reach.toml"));
+    std::fs::remove_file(at.join("reach.toml")).unwrap();
+    let (_, help) = refused(at, &format!("{DEVICE} run reach --goal 5,5,5"));
+    succeeds(at, &format!("{DEVICE} {}", advised(&help, "tactus get")));
+    assert_eq!(refused(at, &advised(&help, "tactus check")).0, "E631");
+    std::fs::remove_file(at.join("reach.toml")).unwrap();
+    let (code, help) = refused(at, &format!("{DEVICE} run reach --mode adapt"));
+    assert!(code == "E635" && help.contains("`tactus get reach`, then tactus rehearse reach.toml"), "{help}");
+}
+
+#[test]
+fn a_change_on_the_way_that_breaks_a_limit_is_named_with_its_time() {
+    let folder = learned(3.0);
+    let (code, help) =
+        refused(folder.path(), &format!("{DEVICE} run reach.toml --goal-at 0.5:0.6,0.1,0.2 --goal-at 1:5,5,5"));
+    assert!(code == "E631" && help.contains("`--goal-at 1:5,5,5`"), "{help}");
+}
+
+#[test]
+fn a_slower_run_is_advised_only_where_it_is_slower_and_can_help() {
+    let folder = learned(1.0);
+    let at = folder.path();
+    let mut speed = 2.0;
+    loop {
+        let output = tactus(at, &format!("--json check reach.toml --speed {speed}"));
+        if output.status.success() {
+            break;
+        }
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let help = told["error"]["help"].as_str().unwrap().to_owned();
+        let slower: f64 = advised(&help, "--speed ").trim_start_matches("--speed ").parse().unwrap();
+        assert!(slower < speed && slower >= 0.1, "{speed}: {help}");
+        speed = slower;
+    }
+    assert!(speed < 2.0);
+    let (_, help) = refused(at, "check reach.toml --speed 0.2 --goal 5,5,5");
+    assert!(!help.contains("--speed") && help.contains("another goal"), "{help}");
+}
+
+const SERVED: &str = "--device unix:arm.sock";
+
+/// A simulated arm that stays, with its pendant; killed when the test is over.
+struct Served(Child);
+
+impl Served {
+    fn start(folder: &Path, options: &[&str]) -> Served {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+        command.current_dir(folder).args(["--device", "sil:world=simple", "sim", "--listen", "unix:arm.sock"]);
+        command.args(options);
+        let served = Served(command.stdin(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap());
+        wait_until("it listens", || folder.join("arm.sock").exists());
+        served
+    }
+
+    fn press(&mut self, word: &str) {
+        writeln!(self.0.stdin.as_mut().unwrap(), "{word}").unwrap();
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[track_caller]
+fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let begun = Instant::now();
+    while !is_so() {
+        assert!(begun.elapsed() < Duration::from_secs(60), "it does not come to it that {what}");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
+#[test]
+fn g4_a_fault_that_a_wrong_declaration_keeps_from_being_cleared_is_answered_with_the_declaration() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut arm = Served::start(at, &[]);
+    succeeds(at, &format!("{SERVED} hand init"));
+    let status =
+        || -> Value { serde_json::from_slice(&succeeds(at, &format!("{SERVED} --json status")).stdout).unwrap() };
+    arm.press("estop");
+    wait_until("the arm has no torque", || status()["state"] == "idle");
+    succeeds(at, &format!("{SERVED} calibrate payload nothing"));
+    arm.press("release");
+    arm.press("idle");
+    wait_until("the start-up is blocked", || status()["blocked"].is_string());
+    let (code, help) = refused(at, &format!("{SERVED} stop --clear-fault"));
+    assert!(code == "E508" && help.contains("`tactus calibrate payload hand`"), "{code}: {help}");
+}
+
+#[test]
+fn an_option_that_is_to_blame_is_named_and_not_the_movement() {
+    let folder = learned(3.0);
+    for (option, blamed) in [
+        ("--cutoff 1000", "--cutoff"),
+        ("--cutoff 0", "--cutoff"),
+        ("--cutoff nan", "--cutoff"),
+        ("--cutoff 0.001", "--cutoff"),
+        ("--still-speed 100", "--still-speed"),
+    ] {
+        let output = tactus(folder.path(), &format!("learn demo.csv -o other.toml {option}"));
+        let words = said(&output);
+        assert!(!output.status.success() && words.contains(blamed), "{option}: {words}");
+        assert!(!words.contains("show the movement again") && !words.contains("--kernels"), "{option}: {words}");
+    }
+}
+
+#[test]
+fn a_fault_of_an_arm_that_ended_with_its_command_is_not_to_be_cleared() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/faults/a3.toml");
+    std::fs::copy(script, at.join("a3.toml")).unwrap();
+    let run = "--non-interactive run reach.toml --keep --force";
+    let (code, help) = refused(at, &format!("--device sil:world=simple,faults=a3.toml {run}"));
+    assert_eq!(code, "E592");
+    assert!(!help.contains("clear-fault") && help.contains("`tactus sim`") && help.contains("usually "), "{help}");
+    let kept = at.join("runs").read_dir().unwrap().next().unwrap().unwrap().path().join("run.json");
+    let kept = std::fs::read_to_string(kept).unwrap();
+    assert!(!kept.contains("clear-fault") && kept.contains("`tactus sim`"), "{kept}");
+}
+
+#[test]
+fn a_flash_that_is_not_kept_is_told_of_once() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    succeeds(at, &format!("{DEVICE} list"));
+    // The limit stands for a full disk; the file of the flash is longer.
+    let line = format!("ulimit -f 1; exec \"$0\" {DEVICE} upload reach.toml");
+    let mut limited = Command::new("bash");
+    limited.current_dir(at).args(["-c", &line, env!("CARGO_BIN_EXE_tactus")]).stdin(Stdio::null());
+    let words = said(&limited.output().unwrap());
+    assert_eq!(words.matches("is not kept").count(), 1, "{words}");
+}
+
+#[test]
+fn advice_names_commands_and_options_that_there_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let explained = |code: &str| String::from_utf8(succeeds(folder.path(), &format!("explain {code}")).stdout).unwrap();
+    for (code, words) in [
+        ("E503", "enter the command again"),
+        ("E507", "`--at-home`"),
+        ("E526", "`tactus run` goes to the start"),
+        ("E537", "`tactus hand init`"),
+        ("E220", "`_` and `.`"),
+    ] {
+        assert!(explained(code).contains(words), "{code}: {}", explained(code));
+    }
+    // Every option that an address takes is in the list that a wrong one is answered with.
+    let output = tactus(folder.path(), "--device sil:aim=7 list");
+    for option in ["seed=", "arm=", "world=", "line=", "bus=", "flash=", "faults="] {
+        assert!(said(&output).contains(option), "{option}: {}", said(&output));
+    }
+}
+
+#[test]
+fn an_arm_that_is_served_fast_can_be_commanded() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    let _arm = Served::start(at, &["--fast"]);
+    let cycle = || {
+        let told = succeeds(at, &format!("{SERVED} --json status")).stdout;
+        serde_json::from_slice::<Value>(&told).unwrap()["cycle"].as_u64().unwrap()
+    };
+    succeeds(at, &format!("{SERVED} hand init"));
+    succeeds(at, &format!("{SERVED} run reach.toml"));
+    // Nobody is connected for a second: more than ten times as much passes on the arm.
+    let before = cycle();
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(cycle() - before > 10 * u64::from(control::RATE_HZ));
+}
