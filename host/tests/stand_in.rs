@@ -44,6 +44,12 @@ fn tactus(folder: &Path, line: &str) -> Output {
     command.args(line.split(' ')).stdin(Stdio::null()).output().unwrap()
 }
 
+/// The device's control cycle.
+fn cycle(folder: &Path) -> u64 {
+    let status: Value = serde_json::from_slice(&tactus(folder, "status").stdout).unwrap();
+    status["cycle"].as_u64().unwrap()
+}
+
 /// Learns the primitive of the documents' example: `reach.toml`.
 fn learn_reach(folder: &Path) {
     let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/examples/reach.csv");
@@ -147,11 +153,9 @@ fn an_interrupted_observer_does_not_say_that_the_arm_has_stopped() {
         let mut observer = Command::new(env!("CARGO_BIN_EXE_tactus"));
         observer.current_dir(at).env("TACTUS_DEVICE", "unix:tactus.sock").args(order.split(' '));
         let observer = observer.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-        // It is at work when the device knows of it: the file is there, or a second of the device's time has passed.
-        let begun = std::time::Instant::now();
-        while begun.elapsed() < std::time::Duration::from_secs(2) {
-            tactus(at, "list");
-        }
+        // Two seconds of the device's time: the observer has said hello.
+        let begun = cycle(at);
+        while cycle(at) < begun + 600 {}
         assert!(Command::new("kill").args(["-INT", &observer.id().to_string()]).status().unwrap().success());
         let output = observer.wait_with_output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr);
