@@ -208,6 +208,9 @@ fn g4_a_fault_that_a_wrong_declaration_keeps_from_being_cleared_is_answered_with
     arm.press("release");
     arm.press("idle");
     wait_until("the start-up is blocked", || status()["blocked"].is_string());
+    let told = succeeds(at, &format!("{SERVED} status"));
+    assert!(String::from_utf8_lossy(&told.stdout).contains("`tactus calibrate payload hand`"));
+    assert!(status()["help"].as_str().unwrap().contains("`tactus calibrate payload hand`"));
     let (code, help) = refused(at, &format!("{SERVED} stop --clear-fault"));
     assert!(code == "E508" && help.contains("`tactus calibrate payload hand`"), "{code}: {help}");
 }

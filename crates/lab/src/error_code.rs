@@ -239,7 +239,7 @@ error_codes! {
         "calibrate the arm again with this version";
     NotReady = 590: "the arm does not get ready",
         "a puck, the safety module or the pendant does not let the start-up go on",
-        "check the pendant and the cables, then try again";
+        "`tactus status` tells what is in its way: mostly the pendant or a cable";
     NotZeroed = 591: "the arm does not know where it stands", "its encoders lost their counts",
         "bring the arm to its home pose by hand and add `--at-home`";
     ArmStopped = 592: "the arm stopped because of a fault", "one of the faults below",

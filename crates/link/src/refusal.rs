@@ -247,7 +247,9 @@ impl Refusal {
             Self::Stale => "send the request again",
             Self::BadValue => "correct the value",
             Self::NotZeroed => "bring the arm to its home pose by hand and add `--at-home`",
-            Self::NotReady => "wait for the start-up to finish; if it does not, look at pendant and cables",
+            Self::NotReady => {
+                "wait for the start-up to finish; if it does not, `tactus status` tells what is in its way"
+            }
             Self::SafetyMode => "press Shift+Activate on the pendant",
             Self::Faulted => "remove the cause, then `tactus stop --clear-fault`",
             Self::State => "stop the present motion first: `tactus stop`",

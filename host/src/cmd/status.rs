@@ -11,6 +11,7 @@ use serde_json::json;
 use super::{Failure, Global, Table, connection, weigh};
 use lab::error::{HostError, explain_blocked};
 use lab::line_health::{self, LineHealth};
+use lab::startup_guide::blocked_remedy;
 
 /// Options of `status`.
 #[derive(Debug, Clone, Args)]
@@ -58,7 +59,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         &json!({
             "board": hello.board.as_str(), "firmware": hello.firmware.as_str(), "cycle": status.cycle,
             "drives_arm": drives.arm, "drives_hand": drives.hand, "reads_wrench": drives.wrench,
-            "startup": stage, "blocked": status.blocked.map(explain_blocked), "state": state, "fault": status.fault,
+            "startup": stage, "blocked": status.blocked.map(explain_blocked),
+            "help": status.blocked.and_then(blocked_remedy), "state": state, "fault": status.fault,
             "zeroed": status.zeroed, "home": source.map(HomeSource::name), "weight": weight,
             "safety_mode": status.safety_mode,
             "wrench_zeroed": status.wrench_zeroed, "hand": status.hand_stage.name(), "q_rad": status.q,
@@ -78,8 +80,11 @@ fn text(
 ) -> String {
     let blocked = status.blocked.map(|numbers| format!(": {}", explain_blocked(numbers))).unwrap_or_default();
     let mut table = Table::new(["device", board]);
+    table.row(["start-up", &format!("{stage}{blocked}")]);
+    if let Some(remedy) = status.blocked.and_then(blocked_remedy) {
+        table.row(["help", remedy]);
+    }
     table
-        .row(["start-up", &format!("{stage}{blocked}")])
         .row(["state", state])
         .row(["fault", &fault.map_or_else(|| "none".to_owned(), |fault| fault.to_string())])
         .row(["safety module", safety_mode(status.safety_mode)])
