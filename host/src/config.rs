@@ -20,6 +20,8 @@ pub struct Config {
     pub device: Option<String>,
     /// `--timeout`, s.
     pub timeout: Option<f64>,
+    /// `--secret-file`.
+    pub secret_file: Option<String>,
 }
 
 /// Where the value of a setting comes from.
@@ -49,6 +51,8 @@ pub struct Origins {
     pub device: Origin,
     /// Of `--timeout`.
     pub timeout: Origin,
+    /// Of `--secret-file`.
+    pub secret_file: Origin,
 }
 
 /// The place of the file: `$XDG_CONFIG_HOME/tactus/config.toml`, by default in `~/.config`.
@@ -84,7 +88,8 @@ impl Config {
     /// The command line with these defaults.
     #[must_use]
     pub fn defaults(&self, mut command: Command) -> Command {
-        let values = [("device", self.device.clone()), ("timeout", self.timeout.map(|timeout| timeout.to_string()))];
+        let timeout = self.timeout.map(|timeout| timeout.to_string());
+        let values = [("device", self.device.clone()), ("timeout", timeout), ("secret_file", self.secret_file.clone())];
         for (option, value) in values {
             if let Some(value) = value {
                 // Read once a process, and clap keeps it as long as that lives.
@@ -108,7 +113,8 @@ impl Config {
             _ => Origin::Default,
         };
         let device = origin("device", self.device.is_some());
-        Origins { file, problem: None, device, timeout: origin("timeout", self.timeout.is_some()) }
+        let timeout = origin("timeout", self.timeout.is_some());
+        Origins { file, problem: None, device, timeout, secret_file: origin("secret_file", self.secret_file.is_some()) }
     }
 }
 

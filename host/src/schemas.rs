@@ -8,7 +8,7 @@ use schemars::{JsonSchema, Schema};
 
 use crate::cmd::{
     config, delete, doctor, explain, export, get, hand, learn, list, manual, plot, record, rehearse, rename, report,
-    run_report, settings, sim, statistics, stop, teach, upload,
+    run_report, secret, settings, sim, statistics, stop, teach, upload,
 };
 
 /// Every schema by the name of its command; `error` is that of any command that fails.
@@ -38,6 +38,8 @@ pub fn all() -> Vec<(&'static str, Schema)> {
         ("rename", of::<rename::Renamed>()),
         ("report", of::<report::Reported>()),
         ("run", of::<run_report::Ran>()),
+        ("secret", of::<secret::Shown>()),
+        ("secret-new", of::<secret::Drawn>()),
         ("sim", of::<sim::Simulated>()),
         ("stop", of::<stop::Stopped>()),
         ("teach", of::<teach::Taught>()),

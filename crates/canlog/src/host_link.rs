@@ -119,5 +119,7 @@ fn words(message: &Message) -> String {
         Message::Reply(Reply::FaultCycle { .. }) => "fault cycle".to_owned(),
         Message::Reply(Reply::Weight { .. }) => "weight".to_owned(),
         Message::Reply(Reply::Owner { .. }) => "owner".to_owned(),
+        Message::Reply(Reply::Secret { .. }) => "secret".to_owned(),
+        Message::Reply(Reply::Challenge { .. }) => "challenge".to_owned(),
     }
 }

@@ -10,6 +10,7 @@ use puck::CanFrame;
 
 use crate::fault_memory::FaultMemory;
 use crate::health::{Health, Timing};
+use crate::secret::StoredSecret;
 use crate::time::{ANSWERS_US, SLOT_HZ};
 use crate::weight::StoredWeight;
 
@@ -212,6 +213,17 @@ pub trait Application {
 
     /// True once it is known what is stored. Until then, and not for long, requests wait.
     fn is_open(&mut self, now_ms: u32) -> bool;
+
+    /// It has a place to keep a secret.
+    const KEEPS_SECRET: bool = false;
+
+    /// The secret that is kept.
+    ///
+    /// # Errors
+    /// That is not known yet.
+    fn secret(&self) -> Result<StoredSecret, Refused> {
+        Ok(StoredSecret::Nothing)
+    }
 
     /// Number of places for primitives.
     fn places(&self) -> u8;

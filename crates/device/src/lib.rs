@@ -37,12 +37,14 @@ pub use health::{Counters, Health, Timing};
 pub use stage::{Stage, StartupError};
 
 mod port;
+pub mod secret;
 mod session;
 pub mod storage;
 mod store;
 pub mod weight;
 
 pub use port::{CheckedPrimitive, StoredPrimitive};
+pub use secret::StoredSecret;
 pub use session::{ArmApplication, HostSession, Identity, Session};
 pub use store::{RamStore, STORE_SLOT_BYTES, STORE_SLOTS, Store, StoreError, stage_copy};
 pub use weight::StoredWeight;

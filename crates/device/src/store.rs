@@ -1,5 +1,5 @@
 //! Where primitives are kept: places for whole images, and a spare one in which an upload grows; and the home of the
-//! arm and the weight of its links.
+//! arm, the weight of its links, and a secret.
 //!
 //! Invariants every [`Store`] keeps: an image is either wholly there or not at all; until [`Store::finished`] tells of
 //! success, reading gives what it gave before the change was asked for; if power fails in between, the next start finds
@@ -8,9 +8,11 @@
 use core::fmt;
 
 use control::model::WeightCorrection;
+use link::Secret;
 use link::frame::CRC;
 
 use crate::calibration::{Home, StoredHome};
+use crate::secret::StoredSecret;
 use crate::weight::StoredWeight;
 
 /// Places of the store of a device without flash of its own.
@@ -144,6 +146,21 @@ pub trait Store {
     /// As [`Store::keep_home`].
     fn forget_weight(&mut self) -> Result<(), StoreError>;
 
+    /// The secret that is kept beside the images.
+    fn secret(&self) -> StoredSecret;
+
+    /// Begins to keep this secret. It is kept when [`Store::finished`] says so.
+    ///
+    /// # Errors
+    /// As [`Store::keep_home`].
+    fn keep_secret(&mut self, secret: &Secret) -> Result<(), StoreError>;
+
+    /// Begins to forget it. It is forgotten when [`Store::finished`] says so.
+    ///
+    /// # Errors
+    /// As [`Store::keep_home`].
+    fn forget_secret(&mut self) -> Result<(), StoreError>;
+
     /// Returns the outcome of the change that was begun last, once, as soon as it is durable.
     fn finished(&mut self) -> Option<Result<(), StoreError>>;
 }
@@ -243,6 +260,18 @@ impl<S: Store + ?Sized> Store for &mut S {
     fn forget_weight(&mut self) -> Result<(), StoreError> {
         (**self).forget_weight()
     }
+
+    fn secret(&self) -> StoredSecret {
+        (**self).secret()
+    }
+
+    fn keep_secret(&mut self, secret: &Secret) -> Result<(), StoreError> {
+        (**self).keep_secret(secret)
+    }
+
+    fn forget_secret(&mut self) -> Result<(), StoreError> {
+        (**self).forget_secret()
+    }
 }
 
 /// One place in memory; empty while `length` is 0.
@@ -267,6 +296,7 @@ pub struct RamStore<const SLOTS: usize, const BYTES: usize> {
     spare: Area<BYTES>,
     home: StoredHome,
     weight: StoredWeight,
+    secret: StoredSecret,
     changed: bool,
 }
 
@@ -279,6 +309,7 @@ impl<const SLOTS: usize, const BYTES: usize> RamStore<SLOTS, BYTES> {
             spare: Area::EMPTY,
             home: StoredHome::Nothing,
             weight: StoredWeight::Nothing,
+            secret: StoredSecret::Nothing,
             changed: false,
         }
     }
@@ -377,6 +408,22 @@ impl<const SLOTS: usize, const BYTES: usize> Store for RamStore<SLOTS, BYTES> {
 
     fn forget_weight(&mut self) -> Result<(), StoreError> {
         self.weight = StoredWeight::Nothing;
+        self.changed = true;
+        Ok(())
+    }
+
+    fn secret(&self) -> StoredSecret {
+        self.secret
+    }
+
+    fn keep_secret(&mut self, secret: &Secret) -> Result<(), StoreError> {
+        self.secret = StoredSecret::Kept(*secret);
+        self.changed = true;
+        Ok(())
+    }
+
+    fn forget_secret(&mut self) -> Result<(), StoreError> {
+        self.secret = StoredSecret::Nothing;
         self.changed = true;
         Ok(())
     }

@@ -168,6 +168,7 @@ impl Application for HandApplication<'_> {
                 finite(&[duration])?;
                 Command::Move { q: q.map(from_real), duration: from_real(duration) }
             }
+            Request::KeepSecret { .. } | Request::ForgetSecret => return Err((Refusal::SecretNotOffered, [0, 0])),
             // Everything else needs an arm. Of an image only the hand's part was kept, and that in other numbers.
             _ => return Err(NO_ARM),
         }))

@@ -181,6 +181,7 @@ fn explain(reason: Refusal, detail: [u32; 2]) -> String {
         Refusal::ImageInvalid => format!("{reason} (reason {first}, {second})"),
         Refusal::PrimitiveInvalid => format!("{reason}: {}", PrimitiveDefect(detail)),
         Refusal::NoAnswer => format!("{reason} within {first} ms"),
+        Refusal::ProofTooSoon => format!("{reason}; it takes the next in {first} ms"),
         Refusal::HasTorque => match u8::try_from(first).ok().and_then(control::State::from_code) {
             Some(state) => format!("{reason}: {state}"),
             None => format!("{reason}: state {first}"),

@@ -173,6 +173,8 @@ error_codes! {
         "give a time within the run";
     UnknownSetting = 238: "there is no such setting, or it cannot have that value", "a misspelt name or value",
         "`tactus config get` lists every setting with its value";
+    NoSecretInFile = 239: "a file holds no secret of a device", "another file was named, or one with a passphrase",
+        "`tactus secret new FILE` writes one";
     NoTerminal = 240: "there is no terminal to draw on", "standard output is a file or a pipe",
         "run it in a terminal, or with `--json` for a line ten times a second";
     UnknownCode = 241: "there is no error or fault of that name", "a misspelt code",
@@ -181,7 +183,7 @@ error_codes! {
         "another folder was meant, or nothing was tried in it yet",
         "name the folder with `--out`, or leave out `--figures-only`";
     Configuration = 250: "the configuration file cannot be used", "a misspelt setting, or a value out of its range",
-        "the settings are `device` and `timeout`, for example `timeout = 5`";
+        "the settings are `device`, `timeout` and `secret_file`, for example `timeout = 5`";
     NoStudyOfWeights = 270: "the experiment with a weight knows neither demonstrations nor sweeps", "`experiment lift`",
         "leave out `--demonstrations` and `--sweep`";
     UnknownObject = 271: "there is no object of that name", "a misspelt name",

@@ -25,6 +25,7 @@ pub mod primitive_file;
 pub mod procedure;
 pub mod replay;
 pub mod report;
+pub mod secret_file;
 pub mod settings;
 pub mod simulation;
 pub mod startup_guide;

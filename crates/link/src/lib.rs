@@ -7,6 +7,7 @@
 //! - [`frame`]: one message to bytes and back: postcard, CRC-32, COBS, terminated by a zero byte.
 //! - [`can`]: the same bytes over classic CAN frames.
 //! - [`metadata`]: [`ImageMetadata`], what a firmware image says about itself to those who have its file.
+//! - [`secret`]: [`Secret`], what a host proves to know to a device that keeps one.
 //! - [`image`]: [`PrimitiveImage`], a movement primitive as it is uploaded and stored.
 //! - [`SCHEMA_HASH`]: a number that changes with every change of any of these layouts.
 //!
@@ -26,6 +27,7 @@ pub mod name;
 pub mod refusal;
 pub mod report;
 mod schema;
+pub mod secret;
 pub mod telemetry;
 
 pub use image::{ImageError, PrimitiveImage};
@@ -34,8 +36,9 @@ pub use metadata::ImageMetadata;
 pub use name::{Name, NameError, Text};
 pub use refusal::Refusal;
 pub use report::{
-    Calibration, Event, EventKind, FaultRecord, HandStage, HomeSource, LinkCounters, Listing, SessionOwner, Statistics,
-    Status, Weight,
+    Calibration, Event, EventKind, FaultRecord, HandStage, HomeSource, LinkCounters, Listing, SecretReport,
+    SecretState, SessionOwner, Statistics, Status, Weight,
 };
 pub use schema::{LINK_VERSION, SCHEMA_HASH};
+pub use secret::Secret;
 pub use telemetry::{ShortTelemetry, Telemetry};

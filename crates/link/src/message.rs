@@ -12,7 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::name::{Name, Text};
 use crate::refusal::Refusal;
-use crate::report::{Calibration, Event, FaultRecord, Listing, SessionOwner, Statistics, Status, Weight};
+use crate::report::{Calibration, Event, FaultRecord, Listing, SecretReport, SessionOwner, Statistics, Status, Weight};
+use crate::secret::Secret;
 use crate::telemetry::Telemetry;
 
 /// Most bytes of an image in one [`Request::UploadChunk`] or [`Reply::Chunk`].
@@ -295,6 +296,23 @@ pub enum Request {
     ForgetWeight,
     /// Asks for [`Reply::Owner`].
     Owner,
+    /// Asks for [`Reply::Secret`].
+    Secret,
+    /// Asks for [`Reply::Challenge`]; an earlier one counts no more.
+    Challenge,
+    /// Proves that the host knows the device's secret, for as long as its session lasts. A challenge is good for one
+    /// try.
+    Prove {
+        /// [`Secret::proof`] of the challenge and of this session.
+        proof: u64,
+    },
+    /// Keeps this secret; it crosses the line as it is. Answered when it is durable.
+    KeepSecret {
+        /// The secret that has to be proven from then on.
+        secret: Secret,
+    },
+    /// Forgets the secret: whoever has the session may do everything again. Answered when it is durable.
+    ForgetSecret,
 }
 
 impl Request {
@@ -342,7 +360,34 @@ impl Request {
             | Self::Weight
             | Self::KeepWeight { .. }
             | Self::ForgetWeight
-            | Self::Owner => false,
+            | Self::Owner
+            | Self::Secret
+            | Self::Challenge
+            | Self::Prove { .. }
+            | Self::KeepSecret { .. }
+            | Self::ForgetSecret => false,
+        }
+    }
+
+    /// True if the request moves the arm or its hand, or changes what the device keeps: a device that keeps a secret
+    /// does it only for a session that has proven to know it.
+    #[must_use]
+    pub fn is_guarded(&self) -> bool {
+        match self {
+            Self::UploadBegin { .. }
+            | Self::UploadChunk { .. }
+            | Self::UploadCommit
+            | Self::UploadAbort
+            | Self::Delete { .. }
+            | Self::Rename { .. }
+            | Self::Calibrate { .. }
+            | Self::ForgetCalibration
+            | Self::KeepWeight { .. }
+            | Self::ForgetWeight
+            | Self::KeepSecret { .. }
+            | Self::ForgetSecret => true,
+            // `Stop` is none of these that move.
+            request => request.moves(),
         }
     }
 
@@ -387,6 +432,11 @@ impl Request {
             Self::KeepWeight { .. } => "keep weight",
             Self::ForgetWeight => "forget weight",
             Self::Owner => "owner",
+            Self::Secret => "secret",
+            Self::Challenge => "challenge",
+            Self::Prove { .. } => "prove",
+            Self::KeepSecret { .. } => "keep secret",
+            Self::ForgetSecret => "forget secret",
         }
     }
 }
@@ -489,6 +539,20 @@ pub enum Reply {
         /// The host that has the session; `None`: nobody has.
         owner: Option<SessionOwner>,
     },
+    /// Answer to [`Request::Secret`].
+    Secret {
+        /// Request answered.
+        of: u16,
+        /// The secret without its bytes, and if this session has proven to know it.
+        secret: SecretReport,
+    },
+    /// Answer to [`Request::Challenge`].
+    Challenge {
+        /// Request answered.
+        of: u16,
+        /// A number that the device has given to nobody since it started.
+        nonce: u64,
+    },
 }
 
 impl Reply {
@@ -507,7 +571,9 @@ impl Reply {
             | Self::FaultRecord { of, .. }
             | Self::FaultCycle { of, .. }
             | Self::Weight { of, .. }
-            | Self::Owner { of, .. } => Some(*of),
+            | Self::Owner { of, .. }
+            | Self::Secret { of, .. }
+            | Self::Challenge { of, .. } => Some(*of),
             Self::Telemetry(_) | Self::Event(_) => None,
         }
     }

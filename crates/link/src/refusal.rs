@@ -112,11 +112,23 @@ pub enum Refusal {
     /// A weight of the links cannot be that of an arm. `detail` = link (0 for the one that J1 turns), and what is wrong
     /// with it: 0 not a number, 1 the mass, 2 the centre of mass.
     WeightImplausible,
+    /// The device keeps a secret, and this session has not proven to know it.
+    Locked,
+    /// The proof is wrong, or there was no challenge: each is good for one try.
+    WrongProof,
+    /// A wrong proof has just come. `detail` = time until the next challenge, ms.
+    ProofTooSoon,
+    /// The device keeps no secret, so there is nothing to prove.
+    NoSecret,
+    /// The device keeps a secret that it cannot read.
+    SecretUnreadable,
+    /// The device has no place to keep a secret.
+    SecretNotOffered,
 }
 
 impl Refusal {
     /// Every refusal, in the order of its code.
-    pub const ALL: [Self; 50] = [
+    pub const ALL: [Self; 56] = [
         Self::LinkVersion,
         Self::Schema,
         Self::Model,
@@ -167,6 +179,12 @@ impl Refusal {
         Self::Observing,
         Self::NameTaken,
         Self::WeightImplausible,
+        Self::Locked,
+        Self::WrongProof,
+        Self::ProofTooSoon,
+        Self::NoSecret,
+        Self::SecretUnreadable,
+        Self::SecretNotOffered,
     ];
 
     /// Number on the wire.
@@ -229,6 +247,12 @@ impl Refusal {
             Self::Observing => "an observer may look and stop, nothing else",
             Self::NameTaken => "the device stores another primitive of that name",
             Self::WeightImplausible => "the weight of the links cannot be that of an arm",
+            Self::Locked => "the device keeps a secret, and this session has not proven to know it",
+            Self::WrongProof => "the secret is not that of the device",
+            Self::ProofTooSoon => "somebody has just given the device a wrong secret",
+            Self::NoSecret => "the device keeps no secret",
+            Self::SecretUnreadable => "the device keeps a secret that it cannot read",
+            Self::SecretNotOffered => "the device has no place to keep a secret",
         }
     }
 
@@ -285,6 +309,14 @@ impl Refusal {
             Self::Observing => "connect as the host that commands",
             Self::NameTaken => "choose another name, or delete that primitive first: `tactus delete NAME`",
             Self::WeightImplausible => "empty the hand, free the arm, and calibrate again: `tactus calibrate gravity`",
+            Self::Locked => "name the file with its secret: `--secret-file FILE`, or set TACTUS_SECRET_FILE",
+            Self::WrongProof => {
+                "ask for the file of this device; without one its library has to be erased (docs/lab-guide.md)"
+            }
+            Self::ProofTooSoon => "try again in a second; `tactus secret status` counts the wrong ones",
+            Self::NoSecret => "nothing has to be proven; `tactus secret set FILE` has it keep one",
+            Self::SecretUnreadable => "`tactus secret set FILE` has it keep another one, `tactus secret clear` none",
+            Self::SecretNotOffered => "keep those off its line who shall not command it",
         }
     }
 }

@@ -159,6 +159,45 @@ pub struct SessionOwner {
     pub since_ms: u32,
 }
 
+/// The secret of a device, without its bytes. Append-only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+pub enum SecretState {
+    /// There is none: whoever has the session may do everything.
+    #[default]
+    Nothing,
+    /// One is kept: a session has to prove that it knows it.
+    Kept,
+    /// One is kept that cannot be read: damaged, or of another layout. Nothing is moved or changed until another one is
+    /// kept, or it is forgotten.
+    Unreadable,
+    /// The device has no place to keep one.
+    NotOffered,
+}
+
+impl SecretState {
+    /// The words for people.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Nothing => "none",
+            Self::Kept => "kept",
+            Self::Unreadable => "unreadable",
+            Self::NotOffered => "not offered",
+        }
+    }
+}
+
+/// A device's secret, and what was tried against it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct SecretReport {
+    /// There is one, or none.
+    pub state: SecretState,
+    /// The session that asks has proven that it knows it.
+    pub proven: bool,
+    /// Wrong proofs since start-up.
+    pub wrong_proofs: u32,
+}
+
 /// Counters of the receiving end of a link. Every byte that arrived is accounted for in one of these.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct LinkCounters {

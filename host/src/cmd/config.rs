@@ -32,6 +32,8 @@ pub struct Settings {
     pub device: Setting,
     /// `--timeout`, s.
     pub timeout: Setting,
+    /// `--secret-file`.
+    pub secret_file: Setting,
 }
 
 /// The settings, and the file for them.
@@ -59,6 +61,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let settings = Settings {
         device: Setting { value: global.device.clone(), origin: origins.device },
         timeout: Setting { value: Some(global.timeout.as_secs_f64().to_string()), origin: origins.timeout },
+        secret_file: Setting { value: global.secret_file.as_deref().map(files::text), origin: origins.secret_file },
     };
     let exists = origins.file.as_ref().is_some_and(|file| file.exists());
     let problem = origins.problem.clone();
@@ -67,7 +70,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     let data = Configured { file: origins.file.as_deref().map(files::text), exists, problem, settings };
     let mut table = Table::new(["setting", "value", "from"]);
-    for (name, setting) in [("device", &data.settings.device), ("timeout", &data.settings.timeout)] {
+    let Settings { device, timeout, secret_file } = &data.settings;
+    for (name, setting) in [("device", device), ("timeout", timeout), ("secret_file", secret_file)] {
         let from = match setting.origin {
             Origin::CommandLine => "command line",
             Origin::Environment => "environment",

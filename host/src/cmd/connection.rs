@@ -1,11 +1,12 @@
 //! From the options of the command line to a conversation with a device.
 
+use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use control::Fault;
 use device::Stage;
-use link::{HomeSource, Refusal, Status};
+use link::{HomeSource, Refusal, SecretState, Status};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
@@ -15,6 +16,7 @@ use lab::device::{Device, OpenError};
 use lab::error::{HostError, explain_blocked};
 use lab::fault_guide::FaultGuide;
 use lab::procedure::{self, ProcedureError, Readiness, StartupLook};
+use lab::secret_file::{self, SecretFileError};
 use lab::simulation::{SimulationError, SimulationOptions};
 use lab::startup_guide::blocked_remedy;
 use lab::transport::Address;
@@ -33,7 +35,59 @@ pub(super) fn open(
 ) -> Result<Client<Device>, Failure> {
     let (device, owner) = reach(global, doing, adjust)?;
     let client = Client::connect(device, &owner).map_err(|error| error.into_failure(doing))?;
-    Ok(set_up(client, global))
+    let mut client = set_up(client, global);
+    prove(&mut client, global, doing)?;
+    Ok(client)
+}
+
+/// As [`open`], for whoever is going to change the secret of the device: that there is none is no warning.
+///
+/// # Errors
+/// As [`open`]; the secret that is named is not that of the device, or its file cannot be read.
+pub(super) fn open_to_change_secret(global: &Global, doing: &str) -> Result<Client<Device>, Failure> {
+    let (device, owner) = reach(global, doing, |_| {})?;
+    let client = Client::connect(device, &owner).map_err(|error| error.into_failure(doing))?;
+    let mut client = set_up(client, global);
+    if let Some(file) = &global.secret_file {
+        let secret = secret_file::read(file).map_err(|error| secret_failure(file, error, doing))?;
+        client.unlock(&secret).map_err(|error| error.into_failure(doing))?;
+    }
+    Ok(client)
+}
+
+/// The failure of a file with a secret.
+pub(super) fn secret_failure(file: &Path, error: SecretFileError, doing: &str) -> Failure {
+    let code = error.code();
+    let failure = Failure::new(code, doing, format!("{}: {error}", file.display()));
+    match code {
+        ErrorCode::WouldReplace => failure.help("name another file: a device may keep the secret of this one"),
+        _ => failure,
+    }
+}
+
+/// Proves the secret, if a file with one is named and the device keeps one. What only looks goes on without: all that
+/// is wrong here is a warning, and the device refuses the rest.
+fn prove(client: &mut Client<Device>, global: &Global, doing: &str) -> Result<(), Failure> {
+    let Some(file) = &global.secret_file else { return Ok(()) };
+    let output = global.output();
+    let secret = match secret_file::read(file) {
+        Ok(secret) => secret,
+        Err(error) => {
+            output.warn(format!("the secret in {} cannot be read: {error}", file.display()));
+            return Ok(());
+        }
+    };
+    match client.unlock(&secret) {
+        Ok(SecretState::Kept) => {}
+        Ok(SecretState::Nothing) => {
+            output.warn("the device keeps no secret: whoever has its line may command it; `tactus secret set FILE`");
+        }
+        Ok(SecretState::Unreadable) => output.warn("the device keeps a secret that it cannot read"),
+        Ok(SecretState::NotOffered) => output.warn("the device has no place to keep a secret"),
+        Err(HostError::Refused { reason, .. }) => output.warn(format!("{}: {reason}", file.display())),
+        Err(error) => return Err(error.into_failure(doing)),
+    }
+    Ok(())
 }
 
 /// Opens the device that the options name to look on, whoever commands its arm. Nothing can be changed, but stopped.
@@ -53,7 +107,12 @@ pub(super) fn observe(global: &Global, doing: &str) -> Result<Client<Device>, Fa
 pub(super) fn halt(global: &Global, doing: &str) -> Result<Halted<Device>, Failure> {
     let (device, owner) = reach(global, doing, |_| {})?;
     Ok(match Client::halt(device, &owner).map_err(|error| error.into_failure(doing))? {
-        Halted::Ours(client) => Halted::Ours(Box::new(set_up(*client, global))),
+        Halted::Ours(client) => {
+            let mut client = set_up(*client, global);
+            // The arm has stopped; clearing a fault may need it.
+            prove(&mut client, global, doing)?;
+            Halted::Ours(Box::new(client))
+        }
         others => others,
     })
 }

@@ -151,6 +151,7 @@ pub(super) const CONFIG: &str = "\
 The file is ~/.config/tactus/config.toml, for example:
   device = \"serial:/dev/ttyACM0\"
   timeout = 5
+  secret_file = \"/home/anna/lab.secret\"
 An option counts before the environment, and the environment before the file.
 The settings of the device are the home of the arm and the weight of its links (`tactus calibrate`).
 Examples:
@@ -159,6 +160,15 @@ Examples:
   tactus config diff arm.toml
   tactus config restore arm.toml
   tactus config set home.joint_4_rad=3.1";
+/// `secret`
+pub(super) const SECRET: &str = "\
+Without one, as delivered, whoever has the line of a device may command it. Looking and stopping never need one.
+The file is named with `--secret-file FILE`, TACTUS_SECRET_FILE, or `secret_file` in ~/.config/tactus/config.toml.
+Examples:
+  tactus secret new lab.secret
+  tactus --device serial:/dev/ttyACM0 secret set lab.secret
+  tactus --device serial:/dev/ttyACM0 --secret-file lab.secret run grasp
+  tactus --device serial:/dev/ttyACM0 --secret-file lab.secret secret clear";
 /// `compare`
 pub(super) const COMPARE: &str = "\
 Example:

@@ -38,6 +38,7 @@ pub mod report;
 pub mod run;
 mod run_folder;
 pub mod run_report;
+pub mod secret;
 pub mod settings;
 pub mod sim;
 pub mod statistics;
@@ -48,6 +49,7 @@ pub mod upload;
 mod weigh;
 
 use std::io::{IsTerminal as _, Write};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -106,6 +108,9 @@ pub struct Global {
     /// Longest wait for an answer of the device, s.
     #[arg(long, global = true, env = "TACTUS_TIMEOUT", default_value = "2", value_parser = seconds, value_name = "SECONDS")]
     pub timeout: Duration,
+    /// File with the secret of a device that keeps one (`tactus secret`).
+    #[arg(long, global = true, env = "TACTUS_SECRET_FILE", value_name = "FILE", hide_short_help = true)]
+    pub secret_file: Option<PathBuf>,
     /// Where the values of these options come from.
     #[arg(skip)]
     pub origins: Origins,
@@ -233,6 +238,9 @@ pub enum Command {
     /// Show the tool's settings, or read, change, compare and restore the device's
     #[command(after_help = examples::CONFIG)]
     Config(config::Cmd),
+    /// Let nobody command the device who does not know a secret
+    #[command(after_help = examples::SECRET)]
+    Secret(secret::Cmd),
     /// Check everything that a command needs, and say what is missing
     #[command(after_help = examples::DOCTOR)]
     Doctor(doctor::Cmd),
@@ -309,6 +317,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Completions(command) => completions::run(&command),
         Command::Manual(command) => manual::run(&command, &global),
         Command::Config(command) => config::run(&command, &global),
+        Command::Secret(command) => secret::run(&command, &global),
         Command::Doctor(command) => doctor::run(&command, &global),
         Command::Compare(command) => compare::run(&command, &global),
         Command::Can(command) => can::run(&command, &global),

@@ -11,7 +11,7 @@ use sequential_storage::map::{MapConfig, MapStorage};
 
 use super::journaled::{Found, JournaledError, JournaledFlash};
 use super::library::Work;
-use super::{HOME_KEY, Opening, WEIGHT_KEY};
+use super::{HOME_KEY, Opening, SECRET_KEY, WEIGHT_KEY};
 use crate::calibration::StoredHome;
 use crate::store::StoreError;
 
@@ -151,8 +151,8 @@ async fn open<F: NorFlash, D: LibraryAccess>(flash: F, value: &mut [u8], desk: &
     Some((log, opening))
 }
 
-/// Tells the library every image, and the weight like one; the last one of a place counts. Returns the number of places
-/// that hold one, and the home.
+/// Tells the library every image, and weight and secret like one; the last one of a place counts. Returns the number of
+/// places that hold one, and the home.
 async fn read_all<F: NorFlash, D: LibraryAccess>(
     log: &mut Log<F>,
     value: &mut [u8],
@@ -166,7 +166,7 @@ async fn read_all<F: NorFlash, D: LibraryAccess>(
             home = StoredHome::read(image);
             continue;
         }
-        if let Some(holds) = holding.get_mut(usize::from(slot)).filter(|_| slot != WEIGHT_KEY) {
+        if let Some(holds) = holding.get_mut(usize::from(slot)).filter(|_| !matches!(slot, WEIGHT_KEY | SECRET_KEY)) {
             *holds = !image.is_empty();
         }
         if image.is_empty() {

@@ -1,37 +1,41 @@
 //! The library in memory, and what is to be done about it on the flash.
 
 use control::model::WeightCorrection;
+use link::Secret;
 
 use crate::calibration::{HOME_BYTES, Home, StoredHome};
-use crate::storage::{HOME_KEY, Opening, WEIGHT_KEY};
+use crate::secret::StoredSecret;
+use crate::storage::{HOME_KEY, Opening, SECRET_KEY, WEIGHT_KEY};
 use crate::store::{RamStore, Store, StoreError};
 use crate::weight::{StoredWeight, WEIGHT_BYTES};
 
-/// Bytes of the largest setting: home or weight.
-const SETTING_BYTES: usize = if HOME_BYTES > WEIGHT_BYTES { HOME_BYTES } else { WEIGHT_BYTES };
+/// Bytes of the largest setting: home, weight or secret.
+const SETTING_BYTES: usize = WEIGHT_BYTES;
+
+const _: () = assert!(HOME_BYTES <= SETTING_BYTES && crate::secret::STORED_BYTES <= SETTING_BYTES);
 
 /// A change under way: what the flash must hold before the memory may.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
-    /// Keep the image being written as that of a place, or a setting: the home or the weight.
+    /// Keep the image being written as that of a place, or a setting: home, weight or secret.
     Save {
-        /// The place, or [`HOME_KEY`] or [`WEIGHT_KEY`].
+        /// The place, or [`HOME_KEY`], [`WEIGHT_KEY`] or [`SECRET_KEY`].
         slot: u8,
         /// Bytes of it.
         length: usize,
     },
     /// Forget the image of a place, or a setting.
     Delete {
-        /// The place, or [`HOME_KEY`] or [`WEIGHT_KEY`].
+        /// The place, or [`HOME_KEY`], [`WEIGHT_KEY`] or [`SECRET_KEY`].
         slot: u8,
     },
 }
 
 impl Work {
-    /// True if it is about home or weight, and about no place.
+    /// True if it is about home, weight or secret, and about no place.
     fn is_of_setting(self) -> bool {
         let (Self::Save { slot, .. } | Self::Delete { slot }) = self;
-        matches!(slot, HOME_KEY | WEIGHT_KEY)
+        matches!(slot, HOME_KEY | WEIGHT_KEY | SECRET_KEY)
     }
 }
 
@@ -55,7 +59,8 @@ pub struct Library<const SLOTS: usize, const BYTES: usize> {
     memory: RamStore<SLOTS, BYTES>,
     home: StoredHome,
     weight: StoredWeight,
-    /// The home or weight that is being kept.
+    secret: StoredSecret,
+    /// The home, weight or secret that is being kept.
     staged: [u8; SETTING_BYTES],
     job: Job,
     is_open: bool,
@@ -71,6 +76,7 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
             memory: RamStore::new(),
             home: StoredHome::Nothing,
             weight: StoredWeight::Nothing,
+            secret: StoredSecret::Nothing,
             staged: [0; SETTING_BYTES],
             job: Job::None,
             is_open: false,
@@ -84,11 +90,12 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         self.is_open.then_some(self.opening)
     }
 
-    /// The keeper found an image, or the weight.
+    /// The keeper found an image, the weight or the secret.
     pub fn restore(&mut self, slot: u8, image: &[u8]) {
-        if slot == WEIGHT_KEY {
-            self.weight = StoredWeight::read(image);
-            return;
+        match slot {
+            WEIGHT_KEY => return self.weight = StoredWeight::read(image),
+            SECRET_KEY => return self.secret = StoredSecret::read(image),
+            _ => {}
         }
         let kept = self.memory.begin(image.len()).and_then(|()| self.memory.write(0, image));
         if kept.and_then(|()| self.memory.commit(slot)).is_err() {
@@ -98,11 +105,12 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         let _ = self.memory.finished();
     }
 
-    /// The keeper found an image, or the weight, that was deleted later.
+    /// The keeper found an image, the weight or the secret, and it was deleted later.
     pub fn forget(&mut self, slot: u8) {
-        if slot == WEIGHT_KEY {
-            self.weight = StoredWeight::Nothing;
-            return;
+        match slot {
+            WEIGHT_KEY => return self.weight = StoredWeight::Nothing,
+            SECRET_KEY => return self.secret = StoredSecret::Nothing,
+            _ => {}
         }
         let _ = self.memory.delete(slot);
         let _ = self.memory.finished();
@@ -113,9 +121,10 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         if opening.formatted || opening.failed {
             (0..self.memory.slots()).for_each(|slot| self.forget(slot));
             self.weight = StoredWeight::Nothing;
+            self.secret = StoredSecret::Nothing;
         }
         self.home = opening.home;
-        self.opening = Opening { weight: self.weight.source(), ..opening };
+        self.opening = Opening { weight: self.weight.source(), secret: self.secret.state(), ..opening };
         self.is_open = true;
     }
 
@@ -147,6 +156,10 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
                 outcome.map(|()| self.weight = StoredWeight::read(self.setting(length)))
             }
             Work::Delete { slot: WEIGHT_KEY } => outcome.map(|()| self.weight = StoredWeight::Nothing),
+            Work::Save { slot: SECRET_KEY, length } => {
+                outcome.map(|()| self.secret = StoredSecret::read(self.setting(length)))
+            }
+            Work::Delete { slot: SECRET_KEY } => outcome.map(|()| self.secret = StoredSecret::Nothing),
             Work::Save { slot, .. } => outcome.and_then(|()| self.memory.commit(slot)),
             Work::Delete { slot } => outcome.and_then(|()| self.memory.delete(slot)),
         };
@@ -269,6 +282,18 @@ impl<const SLOTS: usize, const BYTES: usize> Store for Library<SLOTS, BYTES> {
 
     fn forget_weight(&mut self) -> Result<(), StoreError> {
         self.ask(Work::Delete { slot: WEIGHT_KEY })
+    }
+
+    fn secret(&self) -> StoredSecret {
+        self.secret
+    }
+
+    fn keep_secret(&mut self, secret: &Secret) -> Result<(), StoreError> {
+        self.keep(SECRET_KEY, &crate::secret::encode(secret))
+    }
+
+    fn forget_secret(&mut self) -> Result<(), StoreError> {
+        self.ask(Work::Delete { slot: SECRET_KEY })
     }
 
     fn finished(&mut self) -> Option<Result<(), StoreError>> {

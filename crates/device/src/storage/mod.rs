@@ -1,5 +1,5 @@
-//! The library of primitives, the home of the arm and the weight of its links on a NOR flash: what survives when the
-//! power goes.
+//! The library of primitives, the home of the arm, the weight of its links and a secret on a NOR flash: what survives
+//! when the power goes.
 //!
 //! ```text
 //! Session ── Store ──> Library <── LibraryAccess ── keep() ──> MapStorage ──> JournaledFlash ──> NorFlash
@@ -22,7 +22,7 @@ pub use library::{Library, Work};
 
 use core::fmt;
 
-use link::HomeSource;
+use link::{HomeSource, SecretState};
 
 use crate::calibration::StoredHome;
 
@@ -31,6 +31,9 @@ pub const HOME_KEY: u8 = 0xC0;
 
 /// The key of the weight of the arm's links.
 pub const WEIGHT_KEY: u8 = 0xC1;
+
+/// The key of the secret.
+pub const SECRET_KEY: u8 = 0xC2;
 
 /// Content of the flash at start-up.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -49,6 +52,8 @@ pub struct Opening {
     pub home: StoredHome,
     /// Whose weight the arm's links are taken to have. The keeper leaves it to the library.
     pub weight: HomeSource,
+    /// The secret, without its bytes. The keeper leaves it to the library, too.
+    pub secret: SecretState,
 }
 
 impl Opening {
@@ -61,6 +66,7 @@ impl Opening {
         failed: false,
         home: StoredHome::Nothing,
         weight: HomeSource::Model,
+        secret: SecretState::Nothing,
     };
 }
 
@@ -69,7 +75,7 @@ impl fmt::Display for Opening {
         match self {
             Self { failed: true, .. } => f.write_str("the storage does not work: nothing is kept over a restart"),
             Self { formatted: true, .. } => f.write_str("the storage was blank or foreign; it is empty now"),
-            Self { found, resumed, cleaned, home, weight, .. } => {
+            Self { found, resumed, cleaned, home, weight, secret, .. } => {
                 write!(f, "{found} images in the storage")?;
                 match home {
                     StoredHome::Nothing => {}
@@ -85,6 +91,13 @@ impl fmt::Display for Opening {
                     HomeSource::Damaged => f.write_str("; the weight of the links is damaged, the model's counts")?,
                     HomeSource::Foreign => {
                         f.write_str("; the weight of the links is for another model or layout, this model's counts")?;
+                    }
+                }
+                match secret {
+                    SecretState::Nothing | SecretState::NotOffered => {}
+                    SecretState::Kept => f.write_str(", and a secret")?,
+                    SecretState::Unreadable => {
+                        f.write_str("; the secret cannot be read, nothing moves until another or none is kept")?;
                     }
                 }
                 if *resumed {

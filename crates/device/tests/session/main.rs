@@ -9,6 +9,7 @@ mod library;
 mod observers;
 mod rig;
 mod saving;
+mod secret;
 mod strangers;
 mod uploads;
 mod weight;

@@ -150,6 +150,8 @@ pub(crate) struct Rig<S: device::Store = Store> {
     pub(crate) number: u16,
     /// The host's last sequence number.
     pub(crate) sequence: u16,
+    /// Bytes that the hosts have sent, as whoever listens on the line records them.
+    pub(crate) said: Vec<u8>,
     decoder: Decoder<FRAME_BYTES>,
 }
 
@@ -200,7 +202,7 @@ impl<S: device::Store> Rig<S> {
         };
         bench.faults.resume();
         let Ok(session) = Box::new_uninit().write_init(Session::init(identity, store));
-        Self { session, bench, now_ms: 10_000, number: 77, sequence: 0, decoder: Decoder::new() }
+        Self { session, bench, now_ms: 10_000, number: 77, sequence: 0, said: Vec::new(), decoder: Decoder::new() }
     }
 
     /// Says hello as the present host.
@@ -217,6 +219,7 @@ impl<S: device::Store> Rig<S> {
         let time_ms = (self.now_ms as u32).wrapping_sub(age_ms);
         let envelope = Envelope { session: self.number, sequence, time_ms };
         let length = frame::encode(envelope, request, &mut buffer).unwrap();
+        self.said.extend_from_slice(&buffer[..length]);
         self.session.receive(&buffer[..length]);
         self.poll();
     }

@@ -10,6 +10,7 @@ use device::storage::{Library, LibraryAccess, Opening, Scratch, Work, keep, valu
 use device::{Home, Store, StoreError};
 use embedded_storage_async::nor_flash::NorFlash;
 use flash::{Flash, FlashChip, FlashPort, FlashTimes, VirtualClock};
+use link::Secret;
 
 /// Bytes of the images here: as large as the device's.
 pub(crate) const IMAGE: usize = 16_384;
@@ -61,6 +62,9 @@ pub(crate) enum Wish {
     /// Keep the home of this number.
     Home(u8),
     ForgetHome,
+    /// Keep the secret of this number.
+    Secret(u8),
+    ForgetSecret,
 }
 
 /// A weight made of its number.
@@ -73,6 +77,11 @@ pub(crate) fn weight(number: u8) -> WeightCorrection {
 pub(crate) fn home(number: u8) -> Home {
     let turn = f32::from(number) / 1000.0;
     Home::new([turn, turn - 1.95, -turn, 3.1 - turn, turn, -turn, 0.02]).expect("within the bounds")
+}
+
+/// A secret made of its number.
+pub(crate) fn secret(number: u8) -> Secret {
+    Secret::new([number; 16])
 }
 
 /// An image of a few bytes.
@@ -114,6 +123,8 @@ pub(crate) fn run<const SLOTS: usize, F: NorFlash>(
             Wish::Weight(number) => shared.library().keep_weight(&weight(number)),
             Wish::Home(number) => shared.library().keep_home(&home(number)),
             Wish::ForgetHome => shared.library().forget_home(),
+            Wish::Secret(number) => shared.library().keep_secret(&secret(number)),
+            Wish::ForgetSecret => shared.library().forget_secret(),
         };
         if let Err(error) = asked {
             answers.push(Some(Err(error)));
@@ -158,7 +169,7 @@ pub(crate) fn chip(content: &[u8]) -> FlashChip {
     FlashChip::new(Flash::with_content(content.to_vec(), FlashTimes::NONE))
 }
 
-/// A keeper's desk that has it store these bytes as the home or the weight, whatever they are.
+/// A keeper's desk that has it store these bytes as home, weight or secret, whatever they are.
 struct Forger<'a>(Option<(u8, &'a [u8])>);
 
 impl LibraryAccess for Forger<'_> {

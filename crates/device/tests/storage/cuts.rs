@@ -1,9 +1,9 @@
 //! Power fails in the middle of every single word and sector, and every restart finds the old or the new.
 
-use device::{Store, StoredHome, StoredWeight};
+use device::{Store, StoredHome, StoredSecret, StoredWeight};
 use flash::FlashChip;
 
-use crate::bench::{TINY, Wish, chip, home, image, renamed, run_on, weight};
+use crate::bench::{TINY, Wish, chip, home, image, renamed, run_on, secret, weight};
 
 /// Places of the library here.
 const SLOTS: usize = 4;
@@ -23,9 +23,10 @@ struct Content {
     images: [Option<u8>; SLOTS],
     home: Option<u8>,
     weight: Option<u8>,
+    secret: Option<u8>,
 }
 
-const EMPTY: Content = Content { images: [None; SLOTS], home: None, weight: None };
+const EMPTY: Content = Content { images: [None; SLOTS], home: None, weight: None, secret: None };
 
 /// The library on a chip after a start.
 fn found(chip: &FlashChip) -> Content {
@@ -49,7 +50,12 @@ fn found(chip: &FlashChip) -> Content {
         StoredWeight::Kept(kept) => Some((0..=255).find(|number| weight(*number) == kept).expect("one of ours")),
         other => panic!("the weight is {other:?}"),
     };
-    Content { images, home, weight }
+    let secret = match library.secret() {
+        StoredSecret::Nothing => None,
+        StoredSecret::Kept(kept) => Some((0..=255).find(|number| secret(*number) == kept).expect("one of ours")),
+        StoredSecret::Unreadable => panic!("the secret cannot be read"),
+    };
+    Content { images, home, weight, secret }
 }
 
 fn content(chip: &FlashChip) -> Vec<u8> {
@@ -115,6 +121,14 @@ fn cut_everywhere(before: &[u8], wish: Wish) -> usize {
             new.home = None;
             0
         }
+        Wish::Secret(number) => {
+            new.secret = Some(number);
+            0
+        }
+        Wish::ForgetSecret => {
+            new.secret = None;
+            0
+        }
     };
     let whole = chip(before);
     let (_, answers) = run_on::<SLOTS>(&whole, &[wish]);
@@ -145,6 +159,7 @@ fn cut_everywhere(before: &[u8], wish: Wish) -> usize {
                 assert_eq!(now.images[usize::from(slot)], Some(200), "cut {operation}, draw {draw}: does not work on");
                 assert!([old.home, new.home].contains(&now.home), "cut {operation}, draw {draw}: {now:?} later");
                 assert!([old.weight, new.weight].contains(&now.weight), "cut {operation}, draw {draw}: {now:?} later");
+                assert!([old.secret, new.secret].contains(&now.secret), "cut {operation}, draw {draw}: {now:?} later");
             }
         }
     }
@@ -266,6 +281,18 @@ fn power_fails_at_every_word_of_a_weighing_and_the_old_weight_or_the_new_is_ther
 }
 
 #[test]
+fn power_fails_at_every_word_of_a_change_of_the_secret_and_the_old_one_or_the_new_is_there() {
+    let blank = vec![0xFF; flash::FLASH_BYTES];
+    let others = [Wish::Save(0, 1), Wish::Home(3), Wish::Weight(6)];
+    let without = after(&blank, &others);
+    let with = after(&without, &[Wish::Secret(5)]);
+    for (before, wish) in [(&without, Wish::Secret(8)), (&with, Wish::Secret(8)), (&with, Wish::ForgetSecret)] {
+        let cuts = cut_everywhere(before, wish);
+        assert!(cuts >= 2, "{cuts} cuts");
+    }
+}
+
+#[test]
 fn power_fails_at_every_operation_of_a_calibration_that_needs_an_erase_and_the_old_home_or_the_new_is_there() {
     let cuts = cut_everywhere(&full_for(Wish::Home(9)), Wish::Home(9));
     assert!(cuts > 500, "{cuts} cuts: no sector was emptied");
@@ -300,7 +327,8 @@ fn a_deleted_image_stays_deleted_however_often_its_sector_is_emptied() {
     let mut now = after(&blank, &[Wish::Home(3), Wish::Save(0, 1), Wish::Save(1, 2), Wish::Delete(1)]);
     for number in 0..120 {
         now = after(&now, &[Wish::Save(2, number)]);
-        let expected = Content { images: [Some(1), None, Some(number), None], home: Some(3), weight: None };
+        let expected =
+            Content { images: [Some(1), None, Some(number), None], home: Some(3), weight: None, secret: None };
         assert_eq!(found(&chip(&now)), expected);
     }
 }

@@ -4,7 +4,7 @@ use control::{Fault, State};
 use device::Slot;
 use dmp::Scalar;
 use hand::number::real;
-use link::{EventKind, HandStage, Name, Refusal, Reply, Request, RunOptions};
+use link::{EventKind, HandStage, Name, Refusal, Reply, Request, RunOptions, SecretReport, SecretState};
 use puck::device::reply32;
 use puck::{Action, Group, MotorMode, Node, Property, PropertyId, PropertyTable, Status};
 use sim::FingerObstacle;
@@ -346,6 +346,18 @@ fn requests_for_an_arm_are_refused_with_that_reason() {
     rig.upload("grip", &grip().image("grip"));
     let options = RunOptions { goal: link::Goal { position: Some([0.4, 0.0, 0.2]), orientation: None }, ..adapt() };
     assert_eq!(rig.refusal(run(options)), Refusal::NoArm);
+}
+
+#[test]
+fn a_hand_alone_keeps_no_secret_says_so_and_asks_for_none() {
+    let mut rig = Rig::ready(OBJECT);
+    let secret = link::Secret::new([7; 16]);
+    assert_eq!(rig.refusal(Request::KeepSecret { secret }), Refusal::SecretNotOffered);
+    assert_eq!(rig.refusal(Request::ForgetSecret), Refusal::SecretNotOffered);
+    assert_eq!(rig.refusal(Request::Challenge), Refusal::NoSecret);
+    let Reply::Secret { secret, .. } = rig.ask(Request::Secret) else { panic!("no report") };
+    assert_eq!(secret, SecretReport { state: SecretState::NotOffered, proven: false, wrong_proofs: 0 });
+    rig.accept(Request::Hold);
 }
 
 #[test]

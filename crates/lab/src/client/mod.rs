@@ -11,6 +11,7 @@ mod halt;
 mod interrupt;
 mod motion;
 mod observe;
+mod secret;
 mod telemetry;
 mod transfer;
 mod upload;
@@ -317,7 +318,9 @@ impl<T: Transport> Client<T> {
             | Request::Calibrate { .. }
             | Request::ForgetCalibration
             | Request::KeepWeight { .. }
-            | Request::ForgetWeight => self.timeout.max(STORE_TIMEOUT),
+            | Request::ForgetWeight
+            | Request::KeepSecret { .. }
+            | Request::ForgetSecret => self.timeout.max(STORE_TIMEOUT),
             _ => self.timeout,
         };
         loop {

@@ -1,6 +1,7 @@
 //! The client against the device's own session: handshake, loss, silence, uploads, stopping.
 
 mod fixture;
+mod secret;
 
 use std::cell::RefCell;
 use std::io::Write as _;

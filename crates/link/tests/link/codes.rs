@@ -44,7 +44,12 @@ fn can_move(request: &Request) -> bool {
         | Request::Weight
         | Request::KeepWeight { .. }
         | Request::ForgetWeight
-        | Request::Owner => false,
+        | Request::Owner
+        | Request::Secret
+        | Request::Challenge
+        | Request::Prove { .. }
+        | Request::KeepSecret { .. }
+        | Request::ForgetSecret => false,
     }
 }
 
@@ -58,6 +63,18 @@ fn every_request_that_can_move_the_arm_is_known_as_such() {
 }
 
 #[test]
+fn a_device_that_keeps_a_secret_asks_for_its_proof_before_all_that_moves_or_changes_and_never_before_a_stop() {
+    let guarded: Vec<usize> = requests().iter().filter(|request| request.is_guarded()).map(request_index).collect();
+    let changing = [16, 17, 18, 19, 20, 27, 28, 30, 34, 35, 40, 41];
+    let mut expected: Vec<usize> = [6, 7, 8, 9, 10, 12, 13, 14, 22, 23, 24, 25].into_iter().chain(changing).collect();
+    expected.sort_unstable();
+    assert_eq!(guarded, expected);
+    assert!(!Request::Stop.is_guarded());
+    // Exhaustive by number: whoever adds a request decides here whether it is guarded.
+    assert_eq!(requests().len(), 42);
+}
+
+#[test]
 fn every_request_has_a_word_of_its_own() {
     let words: std::collections::BTreeSet<&str> = requests().iter().map(Request::name).collect();
     assert_eq!(words.len(), requests().len());
@@ -68,7 +85,7 @@ fn every_request_has_a_word_of_its_own() {
 #[test]
 fn every_reply_names_the_request_it_answers_and_the_unasked_ones_name_none() {
     let answers: Vec<Option<u16>> = replies().iter().map(|reply| reply.answers()).collect();
-    let numbers = [1, 300, 3, 4, 5, 6, 7, 0, 0, 9, 10, 11, 12, 13];
+    let numbers = [1, 300, 3, 4, 5, 6, 7, 0, 0, 9, 10, 11, 12, 13, 14, 15];
     assert_eq!(answers, numbers.map(|number| (number != 0).then_some(number)));
 }
 

@@ -10,7 +10,7 @@ use crate::samples::{EVENT_KINDS, Tables, event_index, replies, reply_index, req
 use link::frame::{self, Envelope, FRAME_BYTES};
 use link::image::{Hemisphere, IMAGE_SCHEMA, PrimitiveImage, image_bytes};
 use link::message::{AccelerationSource, PoseFeedback};
-use link::{HandStage, HomeSource, LINK_VERSION, Refusal, SCHEMA_HASH};
+use link::{HandStage, HomeSource, LINK_VERSION, Refusal, SCHEMA_HASH, SecretState};
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |mut text, byte| {
@@ -58,6 +58,9 @@ fn schema(version: u16) -> String {
     }
     for source in [HomeSource::Model, HomeSource::Stored, HomeSource::Damaged, HomeSource::Foreign] {
         line(format!("home_source {source:?} {}", encoded(&source)));
+    }
+    for state in [SecretState::Nothing, SecretState::Kept, SecretState::Unreadable, SecretState::NotOffered] {
+        line(format!("secret_state {state:?} {}", encoded(&state)));
     }
     for choice in [PoseFeedback::Measured, PoseFeedback::Planned] {
         line(format!("pose_feedback {choice:?} {}", encoded(&choice)));
@@ -183,8 +186,8 @@ fn hash_of_the_schema_is_fnv_1a_of_its_text() {
 
 #[test]
 fn samples_cover_every_variant_in_order() {
-    assert!(requests().iter().map(request_index).eq(0..37));
-    assert!(replies().iter().map(reply_index).eq(0..14));
+    assert!(requests().iter().map(request_index).eq(0..42));
+    assert!(replies().iter().map(reply_index).eq(0..16));
     assert!(EVENT_KINDS.iter().map(|kind| event_index(*kind)).eq(0..10));
     assert!(Refusal::ALL.iter().map(|refusal| usize::from(refusal.code())).eq(0..Refusal::ALL.len()));
 }

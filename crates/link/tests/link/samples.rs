@@ -7,8 +7,8 @@ use link::image::{
 use link::message::{AccelerationSource, ChunkData, PoseFeedback};
 use link::{
     Calibration, Capabilities, DeviceHello, Event, EventKind, FaultRecord, Goal, HandStage, HomeSource, HostHello,
-    LinkCounters, Listing, Name, Refusal, Reply, Request, RunOptions, SessionOwner, Statistics, Status, Telemetry,
-    Text, Weight,
+    LinkCounters, Listing, Name, Refusal, Reply, Request, RunOptions, Secret, SecretReport, SecretState, SessionOwner,
+    Statistics, Status, Telemetry, Text, Weight,
 };
 
 fn name() -> Name {
@@ -76,6 +76,11 @@ pub(crate) fn requests() -> Vec<Request> {
         Request::KeepWeight { hand: true, links: core::array::from_fn(|link| ramp(link as f32)) },
         Request::ForgetWeight,
         Request::Owner,
+        Request::Secret,
+        Request::Challenge,
+        Request::Prove { proof: 0xFEDC_BA98_7654_3210 },
+        Request::KeepSecret { secret: Secret::new(core::array::from_fn(|index| 0xF0 + index as u8)) },
+        Request::ForgetSecret,
     ]
 }
 
@@ -119,6 +124,11 @@ pub(crate) fn request_index(request: &Request) -> usize {
         Request::KeepWeight { .. } => 34,
         Request::ForgetWeight => 35,
         Request::Owner => 36,
+        Request::Secret => 37,
+        Request::Challenge => 38,
+        Request::Prove { .. } => 39,
+        Request::KeepSecret { .. } => 40,
+        Request::ForgetSecret => 41,
     }
 }
 
@@ -224,6 +234,8 @@ pub(crate) fn replies() -> Vec<Reply> {
             },
         },
         Reply::Owner { of: 13, owner: Some(SessionOwner { name: Text::new("eve@lab4"), since_ms: 95_000 }) },
+        Reply::Secret { of: 14, secret: SecretReport { state: SecretState::Kept, proven: true, wrong_proofs: 300 } },
+        Reply::Challenge { of: 15, nonce: 0x0123_4567_89AB_CDEF },
     ]
 }
 
@@ -244,6 +256,8 @@ pub(crate) fn reply_index(reply: &Reply) -> usize {
         Reply::FaultCycle { .. } => 11,
         Reply::Weight { .. } => 12,
         Reply::Owner { .. } => 13,
+        Reply::Secret { .. } => 14,
+        Reply::Challenge { .. } => 15,
     }
 }
 

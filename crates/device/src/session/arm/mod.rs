@@ -4,6 +4,7 @@ mod calibration;
 mod directory;
 mod primitive;
 mod saving;
+mod secret;
 mod weight;
 
 use control::model::ArmModel;
@@ -19,6 +20,7 @@ use crate::command::Command;
 use crate::controller::DeviceController;
 use crate::health::Health;
 use crate::port::StoredPrimitive;
+use crate::secret::StoredSecret;
 use crate::session::host::{HostSession, Identity};
 use crate::store::{Store, StoreError, stage_copy};
 use directory::{Directory, Entry};
@@ -228,8 +230,15 @@ impl<S: Store> Application for ArmApplication<S> {
 
     const CAPABILITIES: Capabilities = Capabilities { arm: true, hand: true, wrench: true };
 
+    const KEEPS_SECRET: bool = true;
+
     fn is_open(&mut self, now_ms: u32) -> bool {
         !self.is_opening(now_ms)
+    }
+
+    fn secret(&self) -> Result<StoredSecret, Refused> {
+        self.need_open()?;
+        Ok(self.store.secret())
     }
 
     fn places(&self) -> u8 {
@@ -343,6 +352,8 @@ impl<S: Store> Application for ArmApplication<S> {
             Request::Weight => return self.weight(of, port).map(Action::Answer),
             Request::KeepWeight { hand, links } => return self.keep_weight(hand, &links).map(|()| Action::Save),
             Request::ForgetWeight => return self.forget_weight().map(|()| Action::Save),
+            Request::KeepSecret { secret } => return self.keep_secret(&secret).map(|()| Action::Save),
+            Request::ForgetSecret => return self.forget_secret().map(|()| Action::Save),
             // What every device does in the same way has not come here.
             Request::Hello(_)
             | Request::Goodbye
@@ -361,7 +372,10 @@ impl<S: Store> Application for ArmApplication<S> {
             | Request::Rename { .. }
             | Request::FaultRecord
             | Request::FaultCycle { .. }
-            | Request::Owner => return Ok(Action::Answer(Reply::Accepted { of })),
+            | Request::Owner
+            | Request::Secret
+            | Request::Challenge
+            | Request::Prove { .. } => return Ok(Action::Answer(Reply::Accepted { of })),
         };
         Ok(Action::Command(command.into()))
     }

@@ -27,6 +27,8 @@ pub(super) enum Change {
     Home,
     /// The weight of its links.
     Weight,
+    /// The secret.
+    Secret,
 }
 
 impl Change {

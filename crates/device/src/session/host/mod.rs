@@ -10,9 +10,11 @@
 //! - a request for the control half is answered when that half has taken or refused it;
 //! - what moves is stopped when the host has been silent for half a second ([`LINK_TIMEOUT_MS`]), before anything else;
 //! - an image replaces another only when it is complete, undamaged and fit for this device;
-//! - a change of the store is answered when it is durable.
+//! - a change of the store is answered when it is durable;
+//! - a device that keeps a secret moves and changes nothing for a session that has not proven to know it.
 
 mod inbox;
+mod lock;
 mod observers;
 mod owner;
 mod pending;
@@ -26,6 +28,7 @@ use pinned_init::{Init, init};
 
 use crate::application::{Application, Controller, CycleReport, Message, Refused, SessionPort, TimedRecord};
 use inbox::Inbox;
+use lock::Lock;
 use observers::Observers;
 use owner::Owner;
 use pending::{Pending, Requester};
@@ -65,6 +68,7 @@ pub struct HostSession<A: Application> {
     sequence: u16,
     owner: Option<Owner>,
     observers: Observers,
+    lock: Lock,
     pending: Pending,
     upload: Option<Upload>,
     /// Session and number of the request whose change is being saved.
@@ -89,6 +93,7 @@ impl<A: Application> HostSession<A> {
             sequence: 0,
             owner: None,
             observers: Observers::default(),
+            lock: Lock::default(),
             pending: Pending::default(),
             upload: None,
             saving: None,
@@ -116,6 +121,7 @@ impl<A: Application> HostSession<A> {
     /// millisecond or two; `now_us` is the device's time.
     pub fn poll(&mut self, now_us: u64, port: &mut impl SessionPort<A::Controller>) {
         let now_ms = milliseconds(now_us);
+        self.lock.tick(now_us);
         self.observers.forget_silent(now_ms);
         self.forward_events(now_ms, port);
         self.drop_unanswered(now_ms, port);

@@ -1,7 +1,7 @@
 //! The host that has the session, and the numbers of its requests.
 
 use link::frame::LINK_TIMEOUT_MS;
-use link::{Reply, SessionOwner, Text};
+use link::{Reply, Secret, SessionOwner, Text};
 
 /// Treatment of a request, by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,12 +23,25 @@ pub(super) struct Owner {
     heard_ms: u32,
     newest: u16,
     answer: Option<Reply>,
+    /// The challenge that it has not answered yet.
+    nonce: Option<u64>,
+    /// The secret that it has proven to know.
+    proven: Option<Secret>,
 }
 
 impl Owner {
     /// A host whose hello had this number, and this name in it.
     pub(super) fn new(session: u16, sequence: u16, name: Text, now_ms: u32) -> Self {
-        Self { session, name, since_ms: now_ms, heard_ms: now_ms, newest: sequence, answer: None }
+        Self {
+            session,
+            name,
+            since_ms: now_ms,
+            heard_ms: now_ms,
+            newest: sequence,
+            answer: None,
+            nonce: None,
+            proven: None,
+        }
     }
 
     /// Its name, and for how long it has had the session: for others, so without the number.
@@ -39,6 +52,23 @@ impl Owner {
     /// Its session number.
     pub(super) fn session(&self) -> u16 {
         self.session
+    }
+
+    /// It is given a number to prove the secret with, in place of one that it has not used.
+    pub(super) fn challenge(&mut self, nonce: u64) {
+        self.nonce = Some(nonce);
+    }
+
+    /// True if the proof is right. The challenge is used up by it, and a wrong one takes what was proven before.
+    pub(super) fn prove(&mut self, secret: &Secret, proof: u64) -> bool {
+        let is_right = self.nonce.take().is_some_and(|nonce| secret.proof(nonce, self.session) == proof);
+        self.proven = is_right.then_some(*secret);
+        is_right
+    }
+
+    /// True if it has proven to know this secret, and no other one.
+    pub(super) fn knows(&self, secret: &Secret) -> bool {
+        self.proven.as_ref() == Some(secret)
     }
 
     /// For how long it has not been heard, ms.

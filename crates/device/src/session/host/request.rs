@@ -52,7 +52,7 @@ impl<A: Application> HostSession<A> {
         let outcome = if message.moves() && age > REQUEST_AGE_LIMIT_MS {
             Err((Refusal::Stale, [age, REQUEST_AGE_LIMIT_MS]))
         } else {
-            self.act(now_ms, of, message, port)
+            self.need_proof(&message).and_then(|()| self.act(now_ms, of, message, port))
         };
         match outcome {
             Ok(Some(reply)) => self.answer(now_ms, reply, port),
@@ -155,6 +155,9 @@ impl<A: Application> HostSession<A> {
             }
             Request::FaultRecord | Request::FaultCycle { .. } => return Ok(Some(fault_record(of, &request, port))),
             Request::Owner => return Ok(Some(self.owner_report(now_ms, of))),
+            Request::Secret => return self.secret_report(of, true).map(Some),
+            Request::Challenge => return self.challenge(now_ms, of).map(Some),
+            Request::Prove { proof } => self.prove(now_ms, proof)?,
             request => {
                 return match self.application.act(of, request, self.pending.is_empty(), port)? {
                     Action::Command(command) => self.command(now_ms, of, command, port),
@@ -193,6 +196,7 @@ impl<A: Application> HostSession<A> {
             Request::List { index } => return self.listing(of, index),
             Request::FaultRecord | Request::FaultCycle { .. } => return Ok(fault_record(of, &request, port)),
             Request::Owner => return Ok(self.owner_report(now_ms, of)),
+            Request::Secret => return self.secret_report(of, false),
             Request::Calibration | Request::Weight => {
                 let calm = self.pending.is_empty();
                 if let Action::Answer(reply) = self.application.act(of, request, calm, port)? {
