@@ -11,6 +11,7 @@ use crate::store::Store;
 
 impl<S: Store> ArmApplication<S> {
     /// Has the store keep this secret.
+    #[inline(never)]
     pub(super) fn keep_secret(&mut self, secret: &Secret) -> Result<(), Refused> {
         self.need_open()?;
         self.store.keep_secret(secret)?;
@@ -19,6 +20,7 @@ impl<S: Store> ArmApplication<S> {
     }
 
     /// Has the store forget it.
+    #[inline(never)]
     pub(super) fn forget_secret(&mut self) -> Result<(), Refused> {
         self.need_open()?;
         self.store.forget_secret()?;

@@ -61,8 +61,10 @@ impl Lock {
     }
 }
 
+/// Nothing here is inlined: its frames would lie on the stack below the check of a primitive, which goes deepest.
 impl<A: Application> HostSession<A> {
     /// Refuses what moves or changes something to a session that has not proven to know the secret, if there is one.
+    #[inline(never)]
     pub(super) fn need_proof(&self, request: &Request) -> Result<(), Refused> {
         if !A::KEEPS_SECRET || !request.is_guarded() {
             return Ok(());
@@ -77,6 +79,7 @@ impl<A: Application> HostSession<A> {
     }
 
     /// Tells if there is a secret. `is_owner`: the session that commands asks.
+    #[inline(never)]
     pub(super) fn secret_report(&self, of: u16, is_owner: bool) -> Result<Reply, Refused> {
         let stored = self.application.secret()?;
         let owner = self.owner.as_ref().filter(|_| is_owner);
@@ -85,8 +88,7 @@ impl<A: Application> HostSession<A> {
         Ok(Reply::Secret { of, secret: SecretReport { state, proven, wrong_proofs: self.lock.wrong_proofs } })
     }
 
-    /// Gives the session a number to prove the secret with. A function of its own: its telemetry takes no stack while
-    /// others work.
+    /// Gives the session a number to prove the secret with.
     #[inline(never)]
     pub(super) fn challenge(&mut self, now_ms: u32, of: u16) -> Result<Reply, Refused> {
         let secret = self.secret_to_prove()?;
@@ -103,6 +105,7 @@ impl<A: Application> HostSession<A> {
     }
 
     /// Compares a proof with the one that is right. Either way its challenge is used up.
+    #[inline(never)]
     pub(super) fn prove(&mut self, now_ms: u32, proof: u64) -> Result<(), Refused> {
         let secret = self.secret_to_prove()?;
         let is_right = self.owner.as_mut().is_some_and(|owner| owner.prove(&secret, proof));
