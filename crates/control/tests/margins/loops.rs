@@ -2,7 +2,7 @@
 
 use control::command::{Command, PoseFeedback, RunOptions};
 use control::law::Gains;
-use control::model::{ArmModel, Frames};
+use control::model::{self, ArmModel, Frames};
 use control::plan::load;
 use control::plan::primitive::{
     ExpectedWrench, Feedback, GainSchedule, MovementTables, Primitive, ROWS, SENSORS, Velocity, configuration, gains,
@@ -25,6 +25,11 @@ const DURATION: f64 = 12.0;
 
 /// Speed of each motor after the kick (rad/s).
 const KICK: f64 = 0.1;
+
+/// Distance from its soft limit at which a joint begins that is then pressed against it (rad), and the time it gets for
+/// that before the kick (s).
+const BEFORE_LIMIT: f64 = 0.001;
+const PRESS: f64 = 1.5;
 
 /// Time after the kick until its rest is measured, and for how long (s).
 const WAIT: f64 = 1.5;
@@ -112,6 +117,7 @@ fn course(
     bias: Vector3<f64>,
     kick: f64,
 ) -> Option<Vec<Vector7<f64>>> {
+    let q = at_limit(q, variation);
     // Rest comes first, with the nominal loop and time; then what varies is switched on.
     let plant = Plant::new(q, variation);
     let Ok(cycle) = Box::new_uninit().write_init(Cycle::init(plant.calibration(), *gains));
@@ -128,8 +134,10 @@ fn course(
         Law::Run { compliant, feedback, force } => {
             arm.command(Command::Tare);
             while arm.number < 3000 && arm.tick(None).record.dq.iter().any(|v| v.abs() > 0.02) {}
-            let there = arm.tick(None).record.q.map(f64::from);
-            let primitive = staying(there);
+            let there: [f64; 7] = arm.tick(None).record.q.map(f64::from);
+            // A joint that settled a little beyond its soft limit is taught at it: no movement may begin beyond.
+            let taught = core::array::from_fn(|at| there[at].clamp(model::SOFT_MIN[at], model::SOFT_MAX[at]));
+            let primitive = staying(taught);
             arm.cycle.load(&load::check(arm.cycle.model(), &primitive).expect("runs")).expect("loads");
             arm.command(Command::Run(RunOptions {
                 feedback,
@@ -146,6 +154,9 @@ fn course(
     }
     arm.run_for(0.2);
     arm.plant.settle();
+    if variation.pressed.is_some() {
+        arm.run_for(PRESS);
+    }
     for (joint, speed) in arm.plant.omega.iter_mut().enumerate() {
         *speed += if joint % 2 == 0 { kick } else { -kick };
     }
@@ -162,6 +173,15 @@ fn course(
         Law::Run { .. } => State::Run,
     };
     (arm.cycle.state() == wanted && arm.plant.omega.amax().is_finite()).then_some(seen)
+}
+
+/// The posture with the joint that is pressed just inside its soft limit.
+fn at_limit(mut q: [f64; 7], variation: Variation) -> [f64; 7] {
+    if let Some((joint, torque)) = variation.pressed {
+        let (min, max) = (model::SOFT_MIN[joint] + BEFORE_LIMIT, model::SOFT_MAX[joint] - BEFORE_LIMIT);
+        q[joint] = if torque > 0.0 { max } else { min };
+    }
+    q
 }
 
 fn rest(seen: &[Vector7<f64>]) -> Rest {

@@ -41,10 +41,13 @@ pub(crate) struct Variation {
     pub(crate) payload: f64,
     /// Stiffness of a wall that touches the hand (N/m), and the axis across it.
     pub(crate) wall: (f64, usize),
+    /// A joint (0 to 6) that stands at its soft limit and is pushed out by this torque (N m, signed).
+    pub(crate) pressed: Option<(usize, f64)>,
 }
 
 impl Variation {
-    pub(crate) const NONE: Self = Variation { gain: 1.0, delay: 0, cables: 1.0, payload: 0.0, wall: (0.0, 0) };
+    pub(crate) const NONE: Self =
+        Variation { gain: 1.0, delay: 0, cables: 1.0, payload: 0.0, wall: (0.0, 0), pressed: None };
 }
 
 /// The arm.
@@ -169,7 +172,10 @@ impl Plant {
             self.omega += (motor - cable).component_div(&self.rotors) * dt;
             self.theta += self.omega * dt;
             let touch = if self.variation.wall.0 > 0.0 { self.wall(&self.frames()) } else { Vector3::zeros() };
-            let external = jacobian.transpose_times(&Vector6::new(touch.x, touch.y, touch.z, 0.0, 0.0, 0.0));
+            let mut external = jacobian.transpose_times(&Vector6::new(touch.x, touch.y, touch.z, 0.0, 0.0, 0.0));
+            if let (Some((joint, torque)), true) = (self.variation.pressed, self.still.is_some()) {
+                external[joint] += torque;
+            }
             self.ddq = inverse * (cable - bias + external);
             self.dq += self.ddq * dt;
             self.q += self.dq * dt;
