@@ -54,6 +54,10 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "a soft stop: no plan and no feedback is computed",
     ),
     (
+        "control::cycle::laws::<impl control::cycle::Cycle<R,_>>::push_back",
+        "a joint is beyond its bound: a few dozen instructions",
+    ),
+    (
         "control::sense::wrench::WrenchEstimator<R>::follow",
         "the memory is full; a few dozen instructions without a loop over time",
     ),

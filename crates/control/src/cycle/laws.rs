@@ -52,7 +52,8 @@ pub(super) struct Demand<R: Real> {
 impl<R: Real, const N: usize> Cycle<R, N> {
     /// The law of the present state; `None` where no torque is sent.
     pub(super) fn demand(&mut self, measured: &Measured<'_, R>) -> Option<Demand<R>> {
-        let mut repulsion = self.push_back(measured);
+        let within = self.bounds.contain(&measured.state.q);
+        let mut repulsion = if within { JointTorques(Vector7::zeros()) } else { self.push_back(measured) };
         let near = if repulsion.0.amax() > R::constant(0.0) { flags::NEAR_LIMIT } else { 0 };
         let mut demand = match &self.law {
             Law::Off { .. } => return None,
@@ -72,18 +73,16 @@ impl<R: Real, const N: usize> Cycle<R, N> {
 
     /// Torque that keeps joints within their bounds (N m). It damps what the model sees, as everything else does: at a
     /// bound the swing of the cables would be driven too.
+    #[cold]
+    #[inline(never)]
     fn push_back(&self, measured: &Measured<'_, R>) -> JointTorques<R> {
-        let q = &measured.state.q;
-        if self.bounds.contain(q) {
-            return JointTorques(Vector7::zeros());
-        }
         let holds = |gains: &Tracking<R>| (gains.stiffness, gains.damping);
         let held = match &self.law {
             Law::Posture(_) => holds(&self.gains.stiff),
             Law::Run(_) => holds(self.gains.tracking(self.run.as_ref().is_some_and(|run| run.options.compliant))),
             _ => (Vector7::zeros(), Vector7::zeros()),
         };
-        self.bounds.repulsion(q, &self.observer.velocity(measured.state, Trust::Stiff), &held)
+        self.bounds.repulsion(&measured.state.q, &self.observer.velocity(measured.state, Trust::Stiff), &held)
     }
 
     fn plain(&self, measured: &Measured<'_, R>, torque: Vector7<R>) -> Demand<R> {

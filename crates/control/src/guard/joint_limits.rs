@@ -66,6 +66,7 @@ impl<R: Real> JointBounds<R> {
     /// Torque that pushes joints back inside; zero within the bounds. `held` is the stiffness (N m/rad) and damping
     /// (N m s/rad) with which the law of the state holds the joints already: only what is missing is added, because
     /// both together would shake. `dq` is the velocity to be damped (rad/s).
+    #[inline(always)]
     pub fn repulsion(
         &self,
         q: &JointPositions<R>,
