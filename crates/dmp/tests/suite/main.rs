@@ -6,6 +6,7 @@ mod common;
 mod fit;
 mod golden;
 mod groups;
+mod hostile;
 mod kernels;
 mod memory;
 mod robustness;
