@@ -9,6 +9,7 @@ mod groups;
 mod hostile;
 mod kernels;
 mod memory;
+mod mistakes;
 mod robustness;
 mod signs;
 mod whole;
