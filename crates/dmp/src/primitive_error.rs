@@ -168,7 +168,12 @@ impl fmt::Display for PrimitiveError {
                 "the weights of {group} row {index} at kernel {kernel} (both from 0) are larger than any movement needs"
             ),
             Self::TooLarge { part, group, index } => {
-                write!(f, "{group} value {index} (from 0) of the {part} is larger than any movement needs")
+                // As text: the routines that print an f64 are larger than this crate.
+                let largest = match part {
+                    Part::Start | Part::Goal => "20 m or rad",
+                    Part::StartVelocity => "50 m/s or rad/s",
+                };
+                write!(f, "{group} value {index} (from 0) of the {part} is larger than any movement needs: {largest}")
             }
         }
     }

@@ -12,4 +12,6 @@ mod memory;
 mod mistakes;
 mod robustness;
 mod signs;
+#[cfg(feature = "serde")]
+mod stored;
 mod whole;
