@@ -20,6 +20,10 @@ pub const LARGEST_ACCELERATION: f64 = 1000.0;
 /// Longest movement (s).
 pub const LONGEST_DURATION: f64 = 3600.0;
 
+/// Shortest control period (s): no controller runs at more than 1 MHz. A plan for 1e-22 s is stable, but its
+/// acceleration, some `1/dt^2`, is infinite in f32.
+pub const SHORTEST_CONTROL_PERIOD: f64 = 1e-6;
+
 /// Smallest stiffness and damping. At K = 0.1 a row needs twenty times the duration of its movement for one swing.
 pub const SMALLEST_GAIN: f64 = 0.1;
 

@@ -12,6 +12,9 @@
 use crate::vector::clamp;
 use crate::{Entry, PhaseTable, Scalar, TableError, bounds};
 
+/// Largest limit of a rotation (rad): pi as somebody else may have rounded it.
+pub(crate) const LARGEST_ROTATION: f64 = core::f64::consts::PI + 1e-6;
+
 /// `zeta` of one pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseCoupling<T> {
@@ -112,8 +115,7 @@ impl<T: Scalar, const D: usize, const P: usize> DisplacementLimits<T, D, P> {
         let poses = self.poses.iter().flat_map(|pose| {
             [
                 (pose.displacement, bounds::LARGEST_DISPLACEMENT, Entry::Displacement),
-                // Pi as somebody else may have rounded it.
-                (pose.rotation, core::f64::consts::PI + 1e-6, Entry::Rotation),
+                (pose.rotation, LARGEST_ROTATION, Entry::Rotation),
             ]
         });
         let points = self

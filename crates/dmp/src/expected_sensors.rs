@@ -93,13 +93,16 @@ impl<T: Scalar, const SENSORS: usize, const CAPACITY: usize> ExpectedSensors<T, 
     /// Returns how far the expectation can be believed at another speed, 1 to 0.
     ///
     /// The inertial part of the record scales with `1/tau^2`; how large that part is, the record does not tell. Up
-    /// to 10 % deviation of the duration it is used in full, from 50 % on not at all, linearly in between.
-    /// `relative_speed` = recorded duration / present duration.
+    /// to 10 % deviation of the duration it is used in full, from 50 % on not at all, linearly in between; a speed that
+    /// is no number is not believed. `relative_speed` = recorded duration / present duration.
     pub fn trust(&self, relative_speed: T) -> T {
         let (full, none) = (T::from_f64(Self::TRUSTED_DEVIATION), T::from_f64(Self::USELESS_DEVIATION));
         // Deviation of the duration, without dividing by a speed of 0: |1/r - 1| <= k is |1 - r| <= k r.
         let deviation = (T::ONE - relative_speed).abs();
-        if deviation <= full * relative_speed {
+        if !relative_speed.is_finite() {
+            // Of infinity the deviation is not larger than a tenth.
+            T::ZERO
+        } else if deviation <= full * relative_speed {
             T::ONE
         } else if deviation < none * relative_speed {
             (none - deviation / relative_speed) / (none - full)

@@ -8,7 +8,7 @@
 //!
 //! `omega = J_r(y) yd` (body frame), `J_r = 1 - b [y] + c [y]^2`, `b = (1 - cos n)/n^2`, `c = (n - sin n)/n^3`.
 
-use crate::vector::{cross, dot, scale};
+use crate::vector::{cross, dot, lifted_norm, scale};
 use crate::{Quaternion, Scalar};
 
 /// Rotation vectors about a centre.
@@ -81,11 +81,12 @@ impl<T: Scalar> LogMap<T> {
     /// about their axis) those nearest to `near`.
     pub fn vector(&self, q: &Quaternion<T>, near: &[T; 3]) -> [T; 3] {
         let y = self.centre.conjugate().product(q).rotation_vector();
-        let n = T::sqrt(dot(&y, &y));
+        let (lifted, lifted_n, factor) = lifted_norm(&y);
+        let n = lifted_n / factor;
         if n < T::from_f64(1e-6) {
             return y;
         }
-        let axis = scale(&y, T::ONE / n);
+        let axis = scale(&lifted, T::ONE / lifted_n);
         let turn = T::from_f64(2.0 * core::f64::consts::PI);
         // Of the points n + k turn on the line along the axis, the one nearest to the projection of `near`.
         let wanted = dot(&axis, near);

@@ -39,6 +39,10 @@ pub enum Hemisphere {
 /// Eq. (4), which is longest at 180 degrees and pulls ever less beyond.
 const FARTHEST_COSINE: f64 = 0.043_619_387_365_336;
 
+/// Cosine of half of 359.1 degrees: 359, and what the rounding of an f32 makes of it. Farther apart a run could start
+/// where its rotation vector is a full turn, and the velocity that belongs to it is infinite.
+const FARTHEST_VECTOR_COSINE: f64 = -0.999_969_157_644_79;
+
 /// True if Eq. (4) can pull from `from` to `goal`, whose signs tell which way round: they are at most 175 degrees
 /// apart.
 #[inline]
@@ -47,6 +51,14 @@ pub(crate) fn is_near_enough<T: Scalar>(from: &Quaternion<T>, goal: &Quaternion<
 }
 
 impl OrientationError {
+    /// True if a movement with this error can begin at `from` and end at `goal`, whose signs tell which way round.
+    pub(crate) fn can_turn<T: Scalar>(self, from: &Quaternion<T>, goal: &Quaternion<T>) -> bool {
+        match self {
+            Self::Quaternion => is_near_enough(from, goal),
+            Self::RotationVector => from.dot(goal) >= T::from_f64(FARTHEST_VECTOR_COSINE),
+        }
+    }
+
     /// Damping that makes the linearised system critical: `sqrt(2 K)` for the half-angle error of Eq. (4),
     /// `2 sqrt(K)` for the rotation vector.
     pub fn critical_damping<T: Scalar>(self, stiffness: T) -> T {

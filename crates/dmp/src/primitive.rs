@@ -3,9 +3,9 @@
 //! `P` poses and `D` point rows on one phase, learned together and run together. Of each pose the weights come first:
 //! three position rows, three orientation rows; the point rows follow.
 
+use crate::coupling::LARGEST_ROTATION;
 use crate::forcing::Weights;
 use crate::gains::Systems;
-use crate::orientation::is_near_enough;
 use crate::orientation_rows::Taught;
 use crate::vector::{clamp, clamp_norm};
 use crate::{
@@ -105,6 +105,13 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Clone for Primit
     }
 }
 
+/// # Errors
+/// [`PrimitiveError::ControlPeriod`].
+pub(crate) fn check_control_period<T: Scalar>(period: T) -> Result<(), PrimitiveError> {
+    let allowed = T::from_f64(bounds::SHORTEST_CONTROL_PERIOD)..=T::from_f64(bounds::LONGEST_DURATION);
+    if allowed.contains(&period) { Ok(()) } else { Err(PrimitiveError::ControlPeriod) }
+}
+
 /// Results of the check of tables, before anything is written.
 struct Checked<T: Scalar, const D: usize, const P: usize, const N: usize> {
     canonical: CanonicalSystem<T>,
@@ -193,9 +200,7 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Primitive<T, D, 
         if !(duration > T::ZERO && duration <= T::from_f64(bounds::LONGEST_DURATION)) {
             return Err(PrimitiveError::Duration);
         }
-        if !(tables.control_period > T::ZERO && tables.control_period <= T::from_f64(bounds::LONGEST_DURATION)) {
-            return Err(PrimitiveError::ControlPeriod);
-        }
+        check_control_period(tables.control_period)?;
         let canonical = CanonicalSystem::new(tables.alpha).ok_or(PrimitiveError::Alpha)?;
         if tables.kernel_count < 2 || tables.kernel_count > N {
             return Err(PrimitiveError::KernelCount);
@@ -333,25 +338,31 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Primitive<T, D, 
 
     /// `zeta` cut so that it displaces the plan by no more than `limits` in steady state: `|zeta_p| <= K dx_max`,
     /// `|zeta_o| <= K_o sin(theta_max/2)` (of [`OrientationError::RotationVector`] `K_o theta_max`), each point row to
-    /// its own. A value that is not a number counts as 0.
+    /// its own. A value that is not a number counts as 0, and so does a limit that is negative or no number; a rotation
+    /// limit above pi counts as pi. [`DisplacementLimits::check`] says so beforehand.
     #[must_use]
     pub fn limited_coupling(
         &self,
         zeta: &Coupling<T, D, P>,
         limits: &DisplacementLimits<T, D, P>,
     ) -> Coupling<T, D, P> {
+        // `!(limit > 0)` is also true of a NaN, which would limit nothing; a negative limit would turn the push round.
+        let bound = |limit: T| if limit > T::ZERO { limit } else { T::ZERO };
         let pose = |n: usize| {
             let (zeta, limits, [position, orientation]) = (&zeta.poses[n], &limits.poses[n], &self.systems.poses[n]);
+            let rotation = bound(limits.rotation);
+            let rotation =
+                if rotation > T::from_f64(LARGEST_ROTATION) { T::from_f64(core::f64::consts::PI) } else { rotation };
             let largest_rotation = match self.orientation_error {
-                OrientationError::Quaternion => T::sin_cos(limits.rotation * T::from_f64(0.5)).0,
-                OrientationError::RotationVector => limits.rotation,
+                OrientationError::Quaternion => T::sin_cos(rotation * T::from_f64(0.5)).0,
+                OrientationError::RotationVector => rotation,
             };
             PoseCoupling {
-                position: clamp_norm(&zeta.position, limits.displacement * position.stiffness()),
+                position: clamp_norm(&zeta.position, bound(limits.displacement) * position.stiffness()),
                 orientation: clamp_norm(&zeta.orientation, largest_rotation * orientation.stiffness()),
             }
         };
-        let point = |i: usize| clamp(zeta.points[i], limits.points[i] * self.systems.points[i].stiffness());
+        let point = |i: usize| clamp(zeta.points[i], bound(limits.points[i]) * self.systems.points[i].stiffness());
         Coupling { poses: core::array::from_fn(pose), points: core::array::from_fn(point) }
     }
 
@@ -449,7 +460,7 @@ impl<T: Scalar, const D: usize, const P: usize> PrimitiveTables<'_, T, D, P> {
                 Hemisphere::Demonstrated => to.orientation,
                 Hemisphere::Nearest => to.orientation.aligned_with(&from.orientation),
             };
-            if self.orientation_error == OrientationError::Quaternion && !is_near_enough(&from.orientation, &to) {
+            if !self.orientation_error.can_turn(&from.orientation, &to) {
                 return Err(PrimitiveError::TurnsTooFar);
             }
         }

@@ -81,7 +81,8 @@ pub enum PrimitiveError {
     Activation,
     /// Not exactly `kernel_count` weights for each row.
     WeightCount,
-    /// The control period is not a positive number.
+    /// The control period is not between [`bounds::SHORTEST_CONTROL_PERIOD`](crate::bounds::SHORTEST_CONTROL_PERIOD)
+    /// and 3600 s.
     ControlPeriod,
     /// A weight is NaN or infinite, or more than the number type keeps
     /// ([`Scalar::to_weight`](crate::Scalar::to_weight)).
@@ -113,7 +114,7 @@ pub enum PrimitiveError {
     /// The goal orientation is not a unit quaternion.
     GoalNotUnit,
     /// Start and goal are more than 175 degrees apart, where the error of Eq. (4) fails: use
-    /// [`OrientationError::RotationVector`](crate::OrientationError::RotationVector).
+    /// [`OrientationError::RotationVector`](crate::OrientationError::RotationVector). With that: more than 359 degrees.
     TurnsTooFar,
     /// The weights give a larger forcing term than any movement of this duration with these gains needs, see
     /// [`bounds`](crate::bounds).
@@ -145,7 +146,7 @@ impl fmt::Display for PrimitiveError {
             Self::Activation => f.write_str("the kernel activation is outside 0.05..0.95"),
             Self::WeightCount => f.write_str("the number of weights is not rows times kernels"),
             Self::Weight => f.write_str("a weight is not a number, or more than the number type keeps"),
-            Self::ControlPeriod => f.write_str("the control period is not a positive number"),
+            Self::ControlPeriod => f.write_str("the control period is not between 1e-6 and 3600 s"),
             Self::Gains { group, index, error } => write!(f, "{group} row {index} (from 0): {error}"),
             Self::Unstable { group, index } => {
                 write!(
@@ -158,15 +159,21 @@ impl fmt::Display for PrimitiveError {
             Self::Goal => f.write_str("a goal value is not a number"),
             Self::StartNotUnit => f.write_str("the start orientation is not a unit quaternion"),
             Self::GoalNotUnit => f.write_str("the goal orientation is not a unit quaternion"),
-            Self::TurnsTooFar => {
-                f.write_str("start and goal are more than 175 degrees apart; the rotation-vector error is needed")
-            }
+            Self::TurnsTooFar => f.write_str(
+                "start and goal are more than 175 degrees apart, where the rotation-vector error is needed, or more \
+                 than 359, where no error is left",
+            ),
             Self::WeightTooLarge { group, index, kernel } => write!(
                 f,
                 "the weights of {group} row {index} at kernel {kernel} (both from 0) are larger than any movement needs"
             ),
             Self::TooLarge { part, group, index } => {
-                write!(f, "{group} value {index} (from 0) of the {part} is larger than any movement needs")
+                // As text: the routines that print an f64 are larger than this crate.
+                let largest = match part {
+                    Part::Start | Part::Goal => "20 m or rad",
+                    Part::StartVelocity => "50 m/s or rad/s",
+                };
+                write!(f, "{group} value {index} (from 0) of the {part} is larger than any movement needs: {largest}")
             }
         }
     }

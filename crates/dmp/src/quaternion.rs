@@ -4,7 +4,7 @@
 //! `2 log` is its inverse, continuous over `w < 0` (angles up to 2 pi) because the sign of `q` is kept.
 
 use crate::Scalar;
-use crate::vector::{clamp_norm, cross, dot, scale};
+use crate::vector::{clamp_norm, cross, dot, lifted_norm, scale};
 
 /// Hamilton quaternion; `R(q)` maps body to world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -146,11 +146,12 @@ impl<T: Scalar> Quaternion<T> {
             // asin(n)/n = 1 + n^2/6
             return scale(&v, T::from_f64(2.0) + n2 * T::from_f64(1.0 / 3.0));
         }
-        let n = T::sqrt(n2);
+        // The error of the norm cancels where the angle is small, and not where it is almost a full turn.
+        let (v, n, factor) = if self.w < T::ZERO { lifted_norm(&v) } else { (v, T::sqrt(n2), T::ONE) };
         if n <= T::ZERO {
             return [T::ZERO; 3];
         }
-        let half = T::atan2(n, self.w);
+        let half = T::atan2(n / factor, self.w);
         scale(&v, (half + half) / n)
     }
 

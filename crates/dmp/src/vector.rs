@@ -25,6 +25,20 @@ pub(crate) fn scale<T: Scalar, const D: usize>(a: &[T; D], k: T) -> [T; D] {
     a.map(|a| a * k)
 }
 
+/// `a`, its norm and a factor: both are larger than they should be by this power of two, 1 unless `a` is short.
+///
+/// In fixed point the square of 1e-4 has two digits and that of 1e-5 has none, and with the norm every direction made
+/// from it would be wrong. A power of two changes nothing in a floating-point number.
+pub(crate) fn lifted_norm<T: Scalar>(a: &[T; 3]) -> ([T; 3], T, T) {
+    let (short, factor) = (T::from_f64(1e-4), T::from_f64(1_048_576.0));
+    let square = dot(a, a);
+    if square >= short {
+        return (*a, T::sqrt(square), T::ONE);
+    }
+    let lifted = scale(a, factor);
+    (lifted, T::sqrt(dot(&lifted, &lifted)), factor)
+}
+
 /// `a` shortened to the norm `limit` (not negative) if it is longer; 0 if it is not a number.
 pub(crate) fn clamp_norm<T: Scalar>(a: &[T; 3], limit: T) -> [T; 3] {
     // The largest component first: squares of large values would overflow in f32 and fixed point.

@@ -248,6 +248,8 @@ pub enum LimitError {
     NeverExceeded,
     /// The safety module's firmware has no such property.
     Property,
+    /// The IPNM is not positive.
+    UnitsPerNewtonMetre,
 }
 
 impl fmt::Display for LimitError {
@@ -259,6 +261,7 @@ impl fmt::Display for LimitError {
             LimitError::Range => "limit does not fit into 16 bits",
             LimitError::NeverExceeded => "no torque that can be commanded exceeds the fault limit: it would never trip",
             LimitError::Property => "the safety module has no such property",
+            LimitError::UnitsPerNewtonMetre => "the IPNM is not positive",
         })
     }
 }
@@ -293,6 +296,9 @@ pub fn torque_limits<R: Real>(
     warning: R,
     units_per_newton_metre: i32,
 ) -> Result<[CanFrame; 2], LimitError> {
+    if units_per_newton_metre <= 0 {
+        return Err(LimitError::UnitsPerNewtonMetre);
+    }
     let scale = R::from_i32(units_per_newton_metre);
     if fault.is_finite() && (fault * scale).to_i32() >= PACKED_TORQUE_LIMIT as i32 {
         return Err(LimitError::NeverExceeded);
@@ -311,11 +317,13 @@ fn limits<R: Real>(
     if !fault.is_finite() || !warning.is_finite() {
         return Err(LimitError::NotFinite);
     }
+    // Its sign is that of the value: what is below one unit is cut to 0.
+    let is_negative = warning < R::from_i32(0);
     let (fault, warning) = ((fault * scale).to_i32(), (warning * scale).to_i32());
     if fault <= 0 {
         return Err(LimitError::NotPositive);
     }
-    if warning < 0 || warning > fault {
+    if is_negative || warning > fault {
         return Err(LimitError::Order);
     }
     if fault > i16::MAX as i32 {

@@ -95,15 +95,16 @@ impl<R: Real> Transmission<R> {
     /// A transmission with these ratios.
     ///
     /// # Errors
-    /// [`TransmissionError::Ratio`] unless all are positive and finite.
+    /// [`TransmissionError::Ratio`] unless all, and their inverses, are positive and finite in `R`.
     pub fn new(ratios: &Ratios) -> Result<Transmission<R>, TransmissionError> {
-        if ratios.coefficients.iter().any(|ratio| !(ratio.is_finite() && *ratio > 0.0)) {
+        let inverse = ratios.coefficients.map(|ratio| R::from_f64(1.0 / ratio));
+        let ratios = ratios.coefficients.map(R::from_f64);
+        // In the number type: what f64 holds may be 0 or infinite in f32.
+        let unusable = |ratio: &R| !(ratio.is_finite() && *ratio > R::from_f64(0.0));
+        if ratios.iter().chain(&inverse).any(unusable) {
             return Err(TransmissionError::Ratio);
         }
-        Ok(Transmission {
-            ratios: ratios.coefficients.map(R::from_f64),
-            inverse: ratios.coefficients.map(|ratio| R::from_f64(1.0 / ratio)),
-        })
+        Ok(Transmission { ratios, inverse })
     }
 
     /// Motor angles (or velocities) from those of the joints, rad (rad/s).

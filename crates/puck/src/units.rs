@@ -31,7 +31,7 @@ impl Counts {
 
     /// The position nearest to `previous` whose 22 low bits equal those of `self`.
     ///
-    /// Exact as long as the motor turned by less than 256 revolutions (at 4096 counts) since `previous`.
+    /// Exact as long as the motor turned by less than 512 revolutions (at 4096 counts) since `previous`.
     #[must_use]
     pub const fn unwrapped_near(self, previous: Counts) -> Counts {
         let moved = Counts(self.0.wrapping_sub(previous.0)).wrapped();

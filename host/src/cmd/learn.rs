@@ -152,7 +152,7 @@ fn failure(error: LearnError, command: &Cmd) -> Failure {
         LearnError::Demonstration(DemonstrationError::Still { .. }) if command.still_speed > STILL_SPEED => {
             Some(format!("a lower `--still-speed` ({STILL_SPEED} m/s is usual)"))
         }
-        LearnError::Poor { .. } if command.cutoff < CUTOFF => {
+        LearnError::Poor { .. } | LearnError::Fit { .. } if command.cutoff < CUTOFF => {
             Some(format!("a higher `--cutoff` ({CUTOFF} Hz is usual): the filter takes the movement away"))
         }
         LearnError::Demonstration(DemonstrationError::Still { .. }) => {

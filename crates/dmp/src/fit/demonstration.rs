@@ -11,9 +11,12 @@ use crate::{Configuration, Pose, Quaternion};
 /// Fewest samples of a demonstration.
 const FEWEST_SAMPLES: usize = 30;
 
-/// A point row that moves no faster (1/s) rests, whatever its highest speed was: one that
+/// A point row (1/s) or orientation (rad/s) that moves no faster rests, whatever its highest speed was: one that
 /// never moves has only the noise of its sensor, of which no share is small. 2 mm/s at a lever of 0.1 m.
 const RESTING_SPEED: f64 = 0.02;
+
+/// The same of a position, m/s.
+const RESTING_LINEAR_SPEED: f64 = 0.002;
 
 /// Samples of one pose.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,6 +60,11 @@ pub enum DemonstrationError {
         /// Index of the sample.
         sample: usize,
     },
+    /// At this sample of their mean, orientations of several demonstrations are opposite to each other.
+    Opposite {
+        /// Index of the sample.
+        sample: usize,
+    },
 }
 
 impl fmt::Display for DemonstrationError {
@@ -74,6 +82,9 @@ impl fmt::Display for DemonstrationError {
             Self::NotUnit { sample } => {
                 write!(f, "the quaternion of sample {sample} is not of unit norm")
             }
+            Self::Opposite { sample } => {
+                write!(f, "the orientations of sample {sample} are too far apart to have a mean")
+            }
         }
     }
 }
@@ -81,13 +92,22 @@ impl fmt::Display for DemonstrationError {
 impl core::error::Error for DemonstrationError {}
 
 impl<const D: usize, const P: usize> Demonstration<D, P> {
-    /// From equally long lists of samples, `period` seconds apart.
+    /// From equally long lists of samples, `period` seconds apart. Poses alone need no list of empty point rows.
+    ///
+    /// There are no times: a recording with its own is to be interpolated to even ones first.
     ///
     /// # Errors
     /// [`DemonstrationError`].
-    pub fn new(period: f64, mut poses: [PoseSamples; P], points: Vec<[f64; D]>) -> Result<Self, DemonstrationError> {
+    pub fn new(
+        period: f64,
+        mut poses: [PoseSamples; P],
+        mut points: Vec<[f64; D]>,
+    ) -> Result<Self, DemonstrationError> {
         if !(period > 0.0 && period.is_finite()) {
             return Err(DemonstrationError::Period);
+        }
+        if D == 0 && points.is_empty() {
+            points.resize(poses.first().map_or(0, |pose| pose.position.len()), [0.0; D]);
         }
         let samples = points.len();
         if poses.iter().any(|pose| [pose.position.len(), pose.orientation.len()] != [samples; 2]) {
@@ -119,7 +139,7 @@ impl<const D: usize, const P: usize> Demonstration<D, P> {
     ///
     /// # Errors
     /// [`DemonstrationError::None`], [`DemonstrationError::Lengths`] for different sampling periods,
-    /// [`DemonstrationError::NotUnit`] where orientations are opposite to each other.
+    /// [`DemonstrationError::Opposite`] where orientations are opposite to each other.
     pub fn mean(all: &[Self]) -> Result<(Self, Vec<f64>), DemonstrationError> {
         let first = all.first().ok_or(DemonstrationError::None)?;
         if all.iter().any(|one| one.period != first.period) {
@@ -142,7 +162,7 @@ impl<const D: usize, const P: usize> Demonstration<D, P> {
                 let [w, x, y, z] =
                     core::array::from_fn(|i| share * resampled.iter().map(|one| at(one)[i]).sum::<f64>());
                 let q = Quaternion::new(w, x, y, z).checked_unit(0.5);
-                mean.poses[n].orientation[k] = q.ok_or(DemonstrationError::NotUnit { sample: k })?;
+                mean.poses[n].orientation[k] = q.ok_or(DemonstrationError::Opposite { sample: k })?;
             }
             let rows = resampled.iter().map(|one| one.distance(&mean, k));
             rows.for_each(|row| squares.iter_mut().zip(row).for_each(|(sum, x)| *sum += x * x));
@@ -242,6 +262,7 @@ impl<const D: usize, const P: usize> Demonstration<D, P> {
             let steps = (1..self.len()).map(step);
             (step(self.len() - 1), steps.fold(0.0, f64::max))
         };
+        let resting = RESTING_SPEED * self.period;
         let pose_rests = |pose: &PoseSamples| {
             let (last, highest) = speed(&|i| {
                 let square = |axis: usize| {
@@ -255,9 +276,9 @@ impl<const D: usize, const P: usize> Demonstration<D, P> {
                 let [x, y, z] = crate::orientation_error(&pose.orientation[i - 1], &pose.orientation[i]);
                 libm::sqrt(x * x + y * y + z * z)
             });
-            last <= share * highest && last_turn <= share * highest_turn
+            last <= (share * highest).max(RESTING_LINEAR_SPEED * self.period)
+                && last_turn <= (share * highest_turn).max(0.5 * resting)
         };
-        let resting = RESTING_SPEED * self.period;
         let point_rests = |row: usize| {
             let (last, highest) = speed(&|i| (self.points[i][row] - self.points[i - 1][row]).abs());
             last <= (share * highest).max(resting)

@@ -12,6 +12,9 @@ pub const FEWEST_TRIALS: usize = 3;
 /// and never trusted so much that a chance coincidence of three recordings becomes a gain.
 pub const WEIGHT_RANGE: f64 = 4.0;
 
+/// Square of a sensor value (N^2) beside which no spread counts: the reciprocal would be denormal, and its share 0/0.
+const LARGEST_SQUARE: f64 = 1e100;
+
 /// The expectation at `count` evenly spaced phases from samples at arbitrary progress `u`.
 ///
 /// `recorded_duration` is the duration tau of the recorded run, s. How samples become entries, see
@@ -70,12 +73,13 @@ pub fn weights_from_spread<const SENSORS: usize>(
     let mut weights = phase_statistics(&[squares.as_slice()], count)?.mean;
     for sensor in 0..SENSORS {
         let mean = squares.iter().map(|(_, squares)| squares[sensor]).sum::<f64>() / squares.len() as f64;
-        if !(floor * floor * mean > f64::MIN_POSITIVE) {
+        let (share, smallest) = (floor * floor * mean, resolution[sensor] * resolution[sensor]);
+        let smallest = share.max(smallest);
+        if !(share > f64::MIN_POSITIVE && smallest < LARGEST_SQUARE) {
             // Nothing to divide by, or equal weights that scaling would leave a rounding error beside 1.
             weights.iter_mut().for_each(|point| point[sensor] = 1.0);
             continue;
         }
-        let smallest = (floor * floor * mean).max(resolution[sensor] * resolution[sensor]);
         weights.iter_mut().for_each(|point| point[sensor] = 1.0 / (point[sensor] + smallest));
         let scale = count as f64 / weights.iter().map(|point| point[sensor]).sum::<f64>();
         for point in &mut weights {

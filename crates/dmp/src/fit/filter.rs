@@ -2,7 +2,8 @@
 //!
 //! Two passes cancel the delay and square the gain (-6 dB at the cut-off). Both ends are continued by point reflection
 //! and the filter starts in its steady state, so that the first and the last sample, which become start and goal of the
-//! movement, stay where they are.
+//! movement, stay where they are. That needs one period of the cut-off within the samples: with a third of it the ends
+//! move by 6 % of the movement, with a tenth by more than all of it.
 
 use std::vec::Vec;
 

@@ -398,11 +398,17 @@ fn starts_goals_and_velocities_out_of_this_world_are_refused_by_their_place() {
         assert_eq!(far(&|t| t.start_velocity.poses[0].angular[2] = fast), too_large(part, Group::Orientation, 2));
         assert_eq!(far(&|t| t.start_velocity.points[8] = fast), too_large(part, Group::Points, 8));
     }
-    let error = PrimitiveError::TooLarge { part: Part::StartVelocity, group: Group::Orientation, index: 2 };
-    assert_eq!(
-        error.to_string(),
-        "orientation value 2 (from 0) of the start velocity is larger than any movement needs"
-    );
+    for (part, name, largest, unit) in [
+        (Part::Start, "start", dmp::bounds::LARGEST_VALUE, "m or rad"),
+        (Part::Goal, "goal", dmp::bounds::LARGEST_VALUE, "m or rad"),
+        (Part::StartVelocity, "start velocity", dmp::bounds::LARGEST_SPEED, "m/s or rad/s"),
+    ] {
+        let error = PrimitiveError::TooLarge { part, group: Group::Orientation, index: 2 };
+        assert_eq!(
+            error.to_string(),
+            format!("orientation value 2 (from 0) of the {name} is larger than any movement needs: {largest} {unit}")
+        );
+    }
 
     // What comes in flight has the same bounds.
     let primitive = Plan::golden().build::<f32>();

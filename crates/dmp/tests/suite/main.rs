@@ -6,8 +6,12 @@ mod common;
 mod fit;
 mod golden;
 mod groups;
+mod hostile;
 mod kernels;
 mod memory;
+mod mistakes;
 mod robustness;
 mod signs;
+#[cfg(feature = "serde")]
+mod stored;
 mod whole;

@@ -69,6 +69,19 @@ fn unusable_ratios_and_drives_are_refused() {
     );
 }
 
+/// A ratio of f64 that the other number type does not hold, or whose inverse it does not.
+#[test]
+fn ratios_that_are_none_in_the_number_type_are_refused() {
+    for (ratio, single, double) in
+        [(1e-60, false, true), (1e39, false, true), (1e-310, false, false), (1e-30, true, true)]
+    {
+        let mut ratios = Ratios::WAM7;
+        ratios.coefficients[3] = ratio;
+        assert_eq!(Transmission::<f32>::new(&ratios).is_ok(), single, "{ratio:e}");
+        assert_eq!(Transmission::<f64>::new(&ratios).is_ok(), double, "{ratio:e}");
+    }
+}
+
 #[test]
 fn not_a_number_never_becomes_counts_or_torque() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {

@@ -315,3 +315,17 @@ fn safety_limits_equal_the_vectors_and_zero_is_refused() {
         assert_eq!(torque_limits(&table, never, 0.0, 1), Err(LimitError::NeverExceeded));
     }
 }
+
+/// Two signs cancel, and what is below one unit is cut to 0.
+#[test]
+fn a_negative_limit_is_refused_whatever_it_is_multiplied_with() {
+    let table = PropertyTable::safety(197).expect("a known firmware");
+    for ipnm in [-1000, -1, 0, i32::MIN] {
+        assert_eq!(torque_limits(&table, -3.0, -1.0, ipnm), Err(LimitError::UnitsPerNewtonMetre), "{ipnm}");
+        assert_eq!(torque_limits(&table, 3.0, 1.0, ipnm), Err(LimitError::UnitsPerNewtonMetre), "{ipnm}");
+    }
+    assert_eq!(torque_limits(&table, 3.0, -1e-5, 1000), Err(LimitError::Order));
+    assert_eq!(velocity_limits(&table, 0.5, -1e-5), Err(LimitError::Order));
+    assert_eq!(torque_limits(&table, -3.0, -4.0, 1000), Err(LimitError::NotPositive));
+    assert!(torque_limits(&table, 3.0, 0.0, 1000).is_ok() && torque_limits(&table, 3.0, -0.0, 1000).is_ok());
+}
