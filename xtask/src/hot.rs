@@ -63,6 +63,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ),
     ("control::cycle::law::Posture<R>::effort", "the arm stands: no plan and no feedback is computed"),
     ("control::law::joint::JointController<R>::keep", "a reply is missing: a few dozen instructions"),
+    ("control::sense::swing", "the memory is full; seven joints, a few dozen instructions each"),
     ("control::sense::observer", "the memory is full; a few loops that the cache keeps from one cycle to the next"),
     (
         "control::model::mass_matrix",

@@ -92,6 +92,10 @@ impl FaultGuide {
                 "long work against gravity or against an obstacle, or a warm room",
                 "the temperatures in `tactus --json monitor`; let the arm rest until all are below 75 degrees C",
             ),
+            Fault::Shaking => (
+                "a loop that is not stable on this arm: a payload that is not the declared one, loose cables, or less friction than the model's",
+                "which joint swings in the record, and how fast; `tactus calibrate payload`, the tension of the cables, `tactus calibrate friction`",
+            ),
             Fault::OtherPayload => (
                 "the sensor or the hand was plugged in, or got power, after the start-up",
                 "what hangs on the arm, and that all of it has power",
@@ -114,6 +118,7 @@ const fn reaction(fault: Fault) -> &'static str {
         | Fault::ContactForce
         | Fault::WrenchLost
         | Fault::Overrun
+        | Fault::Shaking
         | Fault::UnseenContact => "SoftStop: it brakes and gives way",
         Fault::NotFinite => "SoftStop; Fault, without torque, if it goes on",
         Fault::EncoderStuck => "SoftStop, and the safety module is asked for IDLE: its brakes",
@@ -137,6 +142,7 @@ const fn way_on(fault: Fault) -> &'static str {
         | Fault::ContactForce
         | Fault::WrenchLost
         | Fault::Overrun
+        | Fault::Shaking
         | Fault::UnseenContact
         | Fault::MotorHot => CLEAR,
         Fault::JointLimit => "`tactus stop --clear-fault`, then lead the joint back by hand with `tactus teach`",

@@ -365,10 +365,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         record.state = self.supervisor.state();
         record.fault = self.supervisor.fault();
         record.flags |= self.standing_flags();
-        let now = (self.supervisor.law(), record.fault);
         // A run's last transition is told as `Arrived` by `act`; every other change is told here.
-        if now != before && self.pending.is_none() {
-            self.pending = Some(Event::Entered(now.0, record.fault));
+        if (self.supervisor.law(), record.fault) != before && self.pending.is_none() {
+            self.pending = Some(Event::Entered(self.supervisor.law(), record.fault));
         }
         let event = match answer {
             Some(Ok(())) => Some(Event::Accepted),
@@ -430,6 +429,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             wrench_lost: self.is_blind(u16::from(WRENCH_AGE) + FADE),
             blind: self.is_blind(WRENCH_AGE.into()) || self.is_bare() && self.armed_for >= laws::ARMING,
             effort,
+            shakes: self.observer.shakes(),
             full_scale: self.wrench.full_scale().force > 0 || (depends && self.wrench.full_scale().torque > 0),
         };
         if let Some((trigger, fault)) = self.monitor.check(law, measured.state, &seen) {

@@ -46,6 +46,8 @@ pub enum Fault {
     MotorHot = 16,
     /// A device answers that the start-up had not found: what hangs on the arm is not what the model carries.
     OtherPayload = 17,
+    /// A joint swung back and forth for longer than a blow rings.
+    Shaking = 18,
 }
 
 /// The reaction to a fault that the caller of the control cycle reports.
@@ -61,7 +63,7 @@ pub(crate) enum ReactionOutside {
 
 impl Fault {
     /// Every fault, in the order of the codes.
-    pub const ALL: [Fault; 18] = [
+    pub const ALL: [Fault; 19] = [
         Fault::None,
         Fault::RepliesLost,
         Fault::RepliesLostForLong,
@@ -80,6 +82,7 @@ impl Fault {
         Fault::UnseenContact,
         Fault::MotorHot,
         Fault::OtherPayload,
+        Fault::Shaking,
     ];
 
     /// The stable number of this fault.
@@ -134,6 +137,9 @@ impl Fault {
             }
             Fault::OtherPayload => {
                 "the sensor or the hand answers now and did not at the start-up; support and release the arm, the bus is then started anew"
+            }
+            Fault::Shaking => {
+                "a joint swung back and forth; check what the arm carries and the tension of its cables, calibrate, then clear"
             }
             Fault::MotorHot => {
                 "a motor is hotter than 80 degrees C; release the arm and let it cool below 75, then clear"

@@ -70,6 +70,8 @@ pub(crate) struct Observation<'a, R: Real> {
     pub(crate) effort: Option<Effort<'a, R>>,
     /// True if the sensor has been at full scale: in a force, or in a torque that the run depends on.
     pub(crate) full_scale: bool,
+    /// True if a joint swings back and forth for longer than a blow rings.
+    pub(crate) shakes: bool,
 }
 
 impl<R: Real> Monitor<R> {
@@ -113,6 +115,8 @@ impl<R: Real> Monitor<R> {
             Some(Fault::EncoderStuck)
         } else if pushed {
             Some(Fault::UnseenContact)
+        } else if seen.shakes {
+            Some(Fault::Shaking)
         } else if moving_by_itself && seen.bounds.violated(&state.q) {
             Some(Fault::JointLimit)
         } else if matches!(law, State::Approach | State::Run) && seen.wrench_lost {
@@ -183,6 +187,7 @@ mod tests {
         wrench_lost: bool,
         blind: bool,
         full_scale: bool,
+        shakes: bool,
         /// Feedback torque and desired velocity.
         effort: Option<(Vector7<f64>, Vector7<f64>)>,
     }
@@ -214,6 +219,7 @@ mod tests {
                 wrench_lost: false,
                 blind: false,
                 full_scale: false,
+                shakes: false,
                 effort: None,
             }
         }
@@ -245,6 +251,7 @@ mod tests {
                 blind: self.blind,
                 effort,
                 full_scale: self.full_scale,
+                shakes: self.shakes,
             };
             self.monitor.check(law, &self.state, &seen).expect("a finding in every state with torque")
         }
@@ -260,6 +267,13 @@ mod tests {
     fn an_arm_that_rests_in_free_air_is_stopped_in_no_state() {
         for law in WITH_TORQUE {
             assert_eq!(Scene::calm().check(law), NOTHING, "{law}");
+        }
+    }
+
+    #[test]
+    fn g10_a_joint_that_shakes_stops_the_arm_in_every_state() {
+        for law in WITH_TORQUE {
+            assert_eq!(Scene::with(|scene| scene.shakes = true).check(law), stop(Fault::Shaking), "{law}");
         }
     }
 

@@ -7,6 +7,7 @@ pub mod hand;
 pub mod joints;
 pub mod observer;
 pub mod sample;
+pub mod swing;
 pub mod wrench;
 
 pub use deviation::Deviation;
@@ -15,4 +16,5 @@ pub use hand::{HandEstimator, HandState};
 pub use joints::{JointEstimator, JointState};
 pub use observer::MotionObserver;
 pub use sample::{BusSample, HandSample};
+pub use swing::Swings;
 pub use wrench::WrenchEstimator;

@@ -12,6 +12,7 @@ use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
 use crate::real::{Real, at_least, within};
 use crate::sense::joints::JointState;
+use crate::sense::swing::Swings;
 use crate::time::{PERIOD, RATE, few_periods};
 use crate::units::{JOINTS, JointPositions, Vector7};
 
@@ -102,6 +103,8 @@ pub struct MotionObserver<R: Real> {
     disturbance: Vector7<R>,
     /// Control periods for which the motors of each joint have stood, less those in which one turned: 0 to [`STANDS`].
     still: [u8; JOINTS],
+    /// Joints that swing.
+    swings: Swings<R>,
     /// Accelerations by the torques sent last and before.
     sent: [Vector7<R>; 2],
     mass: SMatrix<R, JOINTS, JOINTS>,
@@ -124,6 +127,7 @@ impl<R: Real> MotionObserver<R> {
             dq: Vector7::zeros(),
             disturbance: Vector7::zeros(),
             still: [0; JOINTS],
+            swings: Swings::new(),
             sent: [Vector7::zeros(); 2],
             mass: SMatrix::zeros(),
             factor: SMatrix::zeros(),
@@ -137,6 +141,12 @@ impl<R: Real> MotionObserver<R> {
         (self.q, self.dq) = (state.q.0, state.dq.0);
         self.disturbance = Vector7::zeros();
         self.sent = [Vector7::zeros(); 2];
+        self.swings = Swings::new();
+    }
+
+    /// True if a joint swings back and forth for longer than a blow rings.
+    pub fn shakes(&self) -> bool {
+        self.swings.shakes()
     }
 
     /// Velocities where the next torque acts (rad/s), kept near the measured ones.
@@ -148,7 +158,13 @@ impl<R: Real> MotionObserver<R> {
         let stands =
             R::constant(if trust == Trust::Approach { (FARTHEST - FARTHEST_AT_REST) / STANDS as f64 } else { 0.0 });
         let mut velocity = state.dq.0;
-        for ((velocity, observed), still) in velocity.iter_mut().zip(ahead.iter()).zip(self.still) {
+        for (joint, ((velocity, observed), still)) in velocity.iter_mut().zip(ahead.iter()).zip(self.still).enumerate()
+        {
+            if self.swings.swings(joint) {
+                // Nobody shoves a joint back and forth like that: near what is measured, its damping would drive it.
+                *velocity = *observed;
+                continue;
+            }
             let fast = if *velocity < R::constant(0.0) { -*velocity } else { *velocity };
             let stands = R::from_counts(i32::from(still)) * stands;
             let farthest = at_least(R::constant(FARTHEST) - fast * nearer, R::constant(least));
@@ -178,6 +194,7 @@ impl<R: Real> MotionObserver<R> {
                 *still = if state.still & by == by { (*still + 1).min(STANDS) } else { still.saturating_sub(1) };
             }
         }
+        self.swings.step(&state.dq.0, state.extrapolated);
         let mut error = state.q.0 - self.q;
         if state.extrapolated != 0 {
             forget(&mut error, state.extrapolated);

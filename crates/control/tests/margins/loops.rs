@@ -175,6 +175,42 @@ fn course(
     (arm.cycle.state() == wanted && arm.plant.omega.amax().is_finite()).then_some(seen)
 }
 
+/// End of an arm whose loop is not stable.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stopped {
+    pub(crate) fault: control::Fault,
+    /// Time from the first swing of a motor with this speed (rad/s) to the soft stop (s).
+    pub(crate) after: f64,
+    /// Fastest motor one second later (rad/s).
+    pub(crate) left: f64,
+}
+
+/// Holds `q` with gains that swing until the arm is stopped; `None` if it is not within 3 s. `strong` is the speed that
+/// counts as a swing (rad/s).
+pub(crate) fn shake(gains: &Gains<f64>, q: [f64; 7], strong: f64) -> Option<Stopped> {
+    let plant = Plant::new(q, Variation::NONE);
+    let Ok(cycle) = Box::new_uninit().write_init(Cycle::init(plant.calibration(), *gains));
+    let mut arm = Loop { cycle, plant, number: 0 };
+    arm.run_for(0.01);
+    arm.command(Command::Hold);
+    arm.run_for(1.0);
+    arm.plant.settle();
+    arm.plant.omega[3] += KICK;
+    let mut swinging = None;
+    for tick in 0..(3.0 * RATE) as u32 {
+        arm.tick(None);
+        if arm.plant.omega.amax() > strong {
+            swinging = swinging.or(Some(tick));
+        }
+        if arm.cycle.fault() != control::Fault::None {
+            let (fault, after) = (arm.cycle.fault(), f64::from(tick - swinging.unwrap_or(tick)) * PERIOD);
+            arm.run_for(1.0);
+            return Some(Stopped { fault, after, left: arm.plant.omega.amax() });
+        }
+    }
+    None
+}
+
 /// The posture with the joint that is pressed just inside its soft limit.
 fn at_limit(mut q: [f64; 7], variation: Variation) -> [f64; 7] {
     if let Some((joint, torque)) = variation.pressed {

@@ -57,7 +57,7 @@ fn a_period_or_stiffness_that_is_none_is_not_reported_as_a_weight() {
 
 #[test]
 fn a_cut_off_that_would_flatten_the_whole_movement_is_refused() {
-    // Slower than one period within the movement the ends do not stay in their places: at 0.3 Hz the goal of this
+    // Slower than one period within the movement the ends do not stay in their places: at 0.1 Hz the goal of this
     // demonstration of one second would come out at -0.15 instead of 1.
     for (duration, cutoff) in [(1.0, 0.3), (1.0, 0.9), (0.1, 7.5), (1.0, 1e-9)] {
         let options = FitOptions { cutoff: Some(cutoff), ..FitOptions::default() };
