@@ -7,14 +7,15 @@ use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 
 use crate::cmd::{
-    config, delete, doctor, explain, export, get, hand, learn, list, manual, plot, record, rehearse, rename, report,
-    run_report, secret, settings, sim, statistics, stop, teach, upload,
+    config, delete, doctor, explain, export, get, hand, learn, list, manual, payload, plot, record, rehearse, rename,
+    report, run_report, secret, settings, sim, statistics, stop, teach, upload,
 };
 
 /// Every schema by the name of its command; `error` is that of any command that fails.
 #[must_use]
 pub fn all() -> Vec<(&'static str, Schema)> {
     vec![
+        ("calibrate-payload", of::<payload::data::Measured>()),
         ("can-replay", of::<lab::replay::Outcome>()),
         ("check", of::<crate::check::CheckReport>()),
         ("compare", of::<lab::difference::Difference>()),

@@ -105,7 +105,7 @@ fn the_friction_of_the_model_is_measured_on_the_arm_of_the_model_and_reported() 
 fn the_hand_of_the_model_is_what_hangs_on_the_arm_of_the_model() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let found = object(folder, &["--device", NOMINAL, "calibrate", "load", "--report", "load.json"]);
+    let found = object(folder, &["--device", NOMINAL, "calibrate", "payload", "--measure", "--report", "load.json"]);
     for told in ["sensor", "joints"] {
         let mass = number(&found[told]["beyond_hand"]["mass_kg"]);
         // Two per cent of the hand.
@@ -113,7 +113,7 @@ fn the_hand_of_the_model_is_what_hangs_on_the_arm_of_the_model() {
     }
     assert!(number(&found["difference"]["centre_m"]) < 0.004, "{found}");
     let report: Value = serde_json::from_slice(&std::fs::read(folder.join("load.json")).unwrap()).unwrap();
-    assert_eq!((&report["action"], &report["found"]), (&Value::from("load"), &found));
+    assert_eq!((&report["action"], &report["found"]), (&Value::from("payload"), &found));
 }
 
 #[test]

@@ -330,6 +330,14 @@ error_codes! {
     LoadNotTold = 650: "what the wrist carries cannot be told",
         "there is no wrist sensor, messages were lost, or what is held moved in the hand",
         "hold it fast, keep it from touching anything, then again";
+    PayloadContradicted = 653: "what the arm carries was measured and is not believed",
+        "the wrist sensor and the joints tell different loads: one of them is wrong, something touches the arm or what it \
+         carries, or something hangs on the arm before the sensor",
+        "free arm and load, let nothing touch them, then `tactus calibrate payload --measure` again; if it stays the same, \
+         `tactus calibrate gravity --show` tells whose weight counts, and the sensor has to be checked with a known weight";
+    EmptyHandInvalid = 654: "the report of the empty hand cannot be used",
+        "it is of another arm or of another calibration, or was not believed",
+        "empty the hand, then `tactus calibrate payload --measure --report FILE` makes one";
     ImageInvalid = 651: "the image to be uploaded is not sound", "a defect of the tool",
         "make the primitive again with `tactus learn`";
     ReadBackDiffers = 652: "reading the primitive back gave other bytes", "the device's storage, or the line",

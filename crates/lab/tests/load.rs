@@ -3,7 +3,7 @@
 use control::Payload;
 use control::model::{ArmModel, Frames, GRAVITY, HAND_CENTRE, HAND_MASS, WeightCorrection};
 use control::units::JointPositions;
-use lab::load::{Body, Load, LoadError, POSTURES, measure};
+use lab::load::{Body, Contradiction, Finding, Load, LoadError, POSTURES, measure};
 use lab::weigh::{Crossing, HALF_WAY, Sample, TOUR, is_held_out, weigh};
 use nalgebra::Vector3;
 use sim::{FreeJoints, Noise};
@@ -177,7 +177,7 @@ fn ten_arms_tell_what_hangs_on_them_within_two_per_cent_and_four_millimetres() {
         let (mass, apart) = load.sensor.hanging().beside(&truth);
         let (mass, apart) = (100.0 * mass / truth.mass, apart * 1e3);
         // The joints know what was taken up since the arm was weighed, with its own hand.
-        let (joints, joints_apart) = load.joints.held().unwrap().beside(&arm.held);
+        let (joints, joints_apart) = load.since_weighed.unwrap().held().unwrap().beside(&arm.held);
         let joints = 100.0 * joints / arm.held.mass;
         println!(
             "arm {seed}: {:.3} kg, sensor {mass:+.2} % {apart:.2} mm; held {:.3} kg, joints {joints:+.2} % {:.1} mm",
@@ -187,6 +187,7 @@ fn ten_arms_tell_what_hangs_on_them_within_two_per_cent_and_four_millimetres() {
         );
         assert!(mass.abs() <= 2.0 && apart <= 4.0, "arm {seed}: {mass} %, {apart} mm");
         assert!(joints.abs() <= 10.0, "arm {seed}: {joints} %");
+        load.judge().unwrap();
     }
 }
 
@@ -201,4 +202,83 @@ fn what_does_not_tell_a_load_is_refused() {
     assert_eq!(measure(&none(), &wrong), Err(LoadError::NotANumber));
     // The same posture over and over: the weight cannot be told from the tare.
     assert_eq!(measure(&none(), &vec![passes[0].clone(); 8]), Err(LoadError::Undetermined));
+}
+
+#[test]
+fn ten_arms_that_were_never_weighed_tell_what_they_took_up_and_how_little_their_joints_know_of_the_rest() {
+    for seed in 1..=10 {
+        let mut arm = Arm::drawn(seed);
+        let full = arm.measured(&none()).unwrap();
+        full.judge().unwrap();
+        let (mass, apart) = full.joints.hanging().beside(&arm.hanging());
+        assert!(mass.abs() < 3.0 * full.joints.mass_error, "arm {seed}: {mass} kg, {apart} m");
+        let (held, hanging) = (arm.held, arm.hanging());
+        arm.held = NOTHING;
+        let empty = arm.measured(&none()).unwrap();
+        for (name, full, empty, bar) in
+            [("sensor", full.sensor, empty.sensor, (2.0, 4.0)), ("joints", full.joints, empty.joints, (5.0, 10.0))]
+        {
+            let told = full.beyond(&empty);
+            let (mass, apart) = told.held().unwrap().beside(&held);
+            let (mass, apart) = (100.0 * mass / held.mass, 1e3 * apart);
+            println!("arm {seed}: {:.3} of {:.3} kg, {name} {mass:+.2} % {apart:.2} mm", held.mass, hanging.mass);
+            assert!(mass.abs() <= bar.0 && apart <= bar.1, "arm {seed}, {name}: {mass} %, {apart} mm");
+        }
+        full.sensor.beyond(&empty.sensor).agree(&full.joints.beyond(&empty.joints)).unwrap();
+    }
+}
+
+#[test]
+fn what_contradicts_itself_is_named() {
+    let mut arm = Arm::drawn(3);
+    let (weight, passes) = (arm.weighed(), arm.passes());
+    let judged = |spoil: &dyn Fn(&mut Sample)| {
+        let mut passes = passes.clone();
+        let all = passes.iter_mut().flat_map(|crossing| crossing.up.iter_mut().chain(&mut crossing.down));
+        all.for_each(spoil);
+        measure(&weight, &passes).unwrap().judge()
+    };
+    assert_eq!(judged(&|_| ()), Ok(()));
+    // The device has taken the hand off already: this is the gain of what is held.
+    let gain = judged(&|sample| sample.wrench[..3].iter_mut().for_each(|force| *force *= 3.0));
+    assert!(matches!(gain, Err(Contradiction::Mass { .. })), "{gain:?}");
+    let turned = judged(&|sample| sample.wrench.swap(3, 4));
+    assert!(matches!(turned, Err(Contradiction::Sensor { .. })), "{turned:?}");
+    let pulled = judged(&|sample| sample.torque[1] += 3.0 * sample.q[0]);
+    assert!(matches!(pulled, Err(Contradiction::Joints { joint: 1, .. })), "{pulled:?}");
+    let mut off = measure(&weight, &passes).unwrap();
+    off.sensor.moment[2] += 0.05;
+    let off = off.judge();
+    assert!(matches!(off, Err(Contradiction::Moment { axis: 'z', .. })), "{off:?}");
+    let nothing = judged(&|sample| sample.torque[6] += f64::MAX);
+    assert!(nothing.is_err(), "what is not a number agrees with nothing: {nothing:?}");
+}
+
+#[test]
+fn what_hangs_there_is_named_beside_the_hand_of_the_model() {
+    let found = |hand: f64, held: Body| Arm { hand, ..Arm::model(held) }.measured(&none()).unwrap().finding();
+    assert_eq!(found(1.02, NOTHING), Finding::Hand);
+    assert!(matches!(found(1.0, TORCH), Finding::More(body) if (body.mass - 0.4).abs() < 1e-6));
+    assert!(matches!(found(0.9, NOTHING), Finding::Less(mass) if (mass - 0.1 * HAND_MASS).abs() < 1e-6));
+    let aside = Body { mass: 0.05, centre: [0.4, 0.0, 0.1] };
+    assert!(matches!(found(1.0, aside), Finding::Elsewhere(distance) if distance > 0.015));
+}
+
+#[test]
+fn what_was_mounted_when_the_arm_was_weighed_is_no_contradiction() {
+    let mut arm = Arm::model(TORCH);
+    let mut parts = [Vec::new(), Vec::new()];
+    for (index, posture) in TOUR.into_iter().enumerate() {
+        parts[usize::from(is_held_out(index))].push(arm.cross(posture, true));
+    }
+    let weight = weigh(&none(), PAYLOAD, &parts[0], &parts[1]).unwrap().correction;
+    let load = arm.measured(&weight).unwrap();
+    let since = load.since_weighed.unwrap();
+    assert!(load.sensor.mass > 0.39 && since.mass.abs() < 0.03, "{load:?}");
+    assert!(
+        (load.joints.mass - 0.4).abs() < 0.03,
+        "what the links may weigh is beside the model's, not beside that: {load:?}"
+    );
+    load.judge().unwrap();
+    assert!(load.is_carried());
 }

@@ -44,4 +44,4 @@ pub use safety::SafetyConfig;
 pub use time::*;
 pub use trace::{BusTrace, FrameClass};
 pub use wire::Passage;
-pub use world::{FingerObstacle, FreeJoints, HOME, HandState, HandTargets, Pose, World};
+pub use world::{FingerObstacle, FreeJoints, HOME, HandState, HandTargets, Held, NotHeld, Pose, World};

@@ -7,7 +7,7 @@ use link::{Calibration, Refusal};
 use serde_json::{Value, json};
 
 use super::calibration_report::CalibrationReport;
-use super::{ErrorCode, Failure, Global, Table, connection, friction, learn, load, payload, weigh};
+use super::{ErrorCode, Failure, Global, Table, connection, friction, learn, payload, weigh};
 use lab::client::Client;
 use lab::device::Device;
 use lab::error::{Capability, HostError};
@@ -34,9 +34,7 @@ pub enum Action {
     Gravity(weigh::Gravity),
     /// Measure the friction of each joint on slow and faster moves and show it beside the model's; the way must be free
     Friction(friction::Friction),
-    /// Measure mass and centre of what hangs on the wrist, mounted or held, by sensor and joints; the way must be free
-    Load(load::Load),
-    /// Declare what the arm carries: a start-up that finds something else is blocked
+    /// Declare what the arm carries, or measure its mass and centre by sensor and joints; the way must be free then
     Payload(payload::Payload),
 }
 
@@ -77,7 +75,6 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     match &command.action {
         Action::Gravity(command) => weigh::run(command, &mut client, global),
         Action::Friction(command) => friction::run(command, &mut client, global),
-        Action::Load(command) => load::run(command, &mut client, global),
         Action::Payload(command) => payload::run(command, &mut client, global),
         Action::Show => show(&mut client, global),
         Action::Forget => {

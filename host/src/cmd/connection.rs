@@ -293,6 +293,10 @@ pub(super) fn afterwards(failure: Failure, global: &Global) -> Failure {
 pub(super) fn simulation_failure(error: SimulationError, doing: &str) -> Failure {
     let code = match &error {
         SimulationError::UnknownWorld(_) => ErrorCode::UnknownWorld,
+        SimulationError::NotHeld(_) => {
+            return Failure::new(ErrorCode::AddressInvalid, doing, error)
+                .help("for example `--device sil:held=0.5`, or `--device sil:held=0.5@0.02:0:0.15`");
+        }
         SimulationError::WithoutMujoco => ErrorCode::WithoutMujoco,
         SimulationError::NoImage(_) => ErrorCode::NoQemuImage,
         SimulationError::NoQemu(_) => ErrorCode::NoQemu,

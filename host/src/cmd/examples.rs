@@ -5,7 +5,7 @@ pub(super) const ALL: &str = "\
 Devices:
   sil:   the application in this process, on a simulated arm   sim:   the firmware image under QEMU
   board: the emulated board   hand: a hand under QEMU   serial:/dev/ttyACM0  can:can0  tcp:HOST:PORT  unix:tactus.sock
-Options of simulated devices, behind the colon and separated by commas; world=mujoco|simple is the physics:
+Options of simulated devices, behind the colon, with commas; world=mujoco|simple is the physics, held=KG a weight held:
   seed=N    everything random     arm=N       masses and friction     line=serial|can  the line to the host
   bus=FILE  log of both buses     flash=FILE  keeps its primitives    faults=FILE[:N]  injected faults
 Examples:
@@ -86,8 +86,8 @@ Examples:
   tactus --device unix:tactus.sock calibrate show
   tactus --device sil:arm=9 calibrate gravity
   tactus --device sil:world=simple,arm=9 calibrate friction
-  tactus --device sil:world=simple,arm=9 calibrate load
-  tactus --device unix:tactus.sock calibrate payload hand";
+  tactus --device unix:tactus.sock calibrate payload hand
+  tactus --device sil:world=simple,arm=9,held=0.3 calibrate payload --measure";
 /// `hand`
 pub(super) const HAND: &str = "\
 Examples:

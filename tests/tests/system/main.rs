@@ -13,6 +13,8 @@ mod flood;
 mod hand;
 mod journey;
 mod metadata;
+#[cfg(feature = "mujoco")]
+mod payload;
 mod python;
 mod served_arm;
 mod sil_and_qemu;

@@ -3,14 +3,14 @@
 use std::time::Duration;
 
 use control::State;
-use link::HandStage;
+use link::{HandStage, Refusal};
 
 use super::ProcedureError;
 use super::hand::{HandReach, move_hand};
 use super::wait::{Ends, pass, wait_for};
 use crate::client::Client;
 use crate::device::Device;
-use crate::error::Capability;
+use crate::error::{Capability, HostError};
 use crate::primitive_file::Waypoint;
 
 /// Longest move to a posture, s: what `control` allows.
@@ -20,6 +20,30 @@ const LONGEST_TRAVEL: u64 = 125;
 /// a hand that still does would be worked against, and the torque for that would be too much a moment later.
 const LET_GO: Duration = Duration::from_secs(1);
 
+/// Longest time in which an arm that holds comes to rest: one that carries a kilogram of which its device does not know
+/// sinks until the integral of the hold bears it.
+const REST: Duration = Duration::from_secs(10);
+
+/// Time between two tries to begin a move, while the arm comes to rest.
+const REST_TRY: Duration = Duration::from_millis(200);
+
+/// Begins the move of the joints to `q` (rad) within `seconds`, or longer where the device asks for it; waits before
+/// until the arm has come to rest.
+///
+/// # Errors
+/// As [`travel`].
+pub(super) fn approach(client: &mut Client<Device>, q: [f32; 7], seconds: f32) -> Result<(), ProcedureError> {
+    let end = client.now() + REST;
+    loop {
+        match client.approach(q, seconds) {
+            Err(HostError::Refused { reason: Refusal::Moving, .. }) if client.now() < end => {
+                pass(client, REST_TRY, Ends::OnAnyStop)?;
+            }
+            begun => return Ok(begun?),
+        }
+    }
+}
+
 /// Moves the joints to `q` (rad) and waits until the arm holds there. `progress` hears the time since the start, s.
 ///
 /// # Errors
@@ -28,7 +52,7 @@ pub fn travel(client: &mut Client<Device>, q: [f32; 7], progress: impl FnMut(f64
     client.require(Capability::Arm)?;
     hold(client)?;
     client.take_events();
-    client.approach(q, 0.0)?;
+    approach(client, q, 0.0)?;
     wait_for("the move to the posture", LONGEST_TRAVEL, client, progress)
 }
 

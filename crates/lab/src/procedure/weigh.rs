@@ -6,7 +6,8 @@ use control::model::{LinkWeight, WeightCorrection};
 use control::{Payload, flags};
 use link::EventKind;
 
-use super::{ProcedureError, after, travel};
+use super::travel::{self, travel};
+use super::{ProcedureError, after};
 use crate::client::{Client, Incoming};
 use crate::demonstration::RATE;
 use crate::device::Device;
@@ -101,7 +102,7 @@ fn pass_posture(
 ) -> Result<Vec<Sample>, ProcedureError> {
     client.take_events();
     client.set_telemetry(EVERY)?;
-    client.approach(target, seconds)?;
+    travel::approach(client, target, seconds)?;
     let samples = watch(client, posture[0].into());
     client.set_telemetry(0)?;
     samples

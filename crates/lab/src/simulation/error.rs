@@ -12,6 +12,9 @@ pub enum SimulationError {
     /// No such world.
     #[error("there is no world '{0}'; there are world=mujoco and world=simple")]
     UnknownWorld(String),
+    /// No hand can hold it.
+    #[error(transparent)]
+    NotHeld(#[from] sim::NotHeld),
     /// This program was built without the feature `mujoco`.
     #[error("this tactus was built without the MuJoCo world; `cargo xtask build` makes one that has it")]
     WithoutMujoco,

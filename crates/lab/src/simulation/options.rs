@@ -8,7 +8,7 @@ use sim::teacher::TaughtMovement;
 use sim::world::HOME;
 #[cfg(feature = "mujoco")]
 use sim::world::mujoco::{Imperfections, MujocoWorld, Scene};
-use sim::{FingerObstacle, FreeJoints, PlantConfig, World};
+use sim::{FingerObstacle, FreeJoints, Held, PlantConfig, World};
 
 use super::SimulationError;
 use crate::transport::{ChipOptions, LineKind, SimulatorKind, SimulatorOptions};
@@ -123,6 +123,8 @@ pub struct SimulationOptions {
     /// Number of an arm whose masses and friction are not the model's ([`FreeJoints::drawn`]); `None` is the model's.
     /// [`WorldKind::Simple`] only, MuJoCo has imperfections.
     pub arm: Option<u64>,
+    /// A weight in its hand, of which the device knows nothing.
+    pub held: Option<Held>,
     /// Deviations of the arm from the controller's model.
     #[cfg(feature = "mujoco")]
     pub imperfections: Imperfections,
@@ -153,7 +155,8 @@ impl SimulationOptions {
     /// Reads the options of an address such as `sim:seed=7,world=simple`.
     ///
     /// # Errors
-    /// [`SimulationError`] for a world that is unknown or was not built in, and for a missing image.
+    /// [`SimulationError`] for a world that is unknown or was not built in, a weight that cannot be held, and a missing
+    /// image.
     pub fn from_address(kind: SimulatorKind, options: &SimulatorOptions) -> Result<Self, SimulationError> {
         let engine = match kind {
             SimulatorKind::InProcess => Engine::InProcess,
@@ -185,6 +188,7 @@ impl SimulationOptions {
             flash: options.flash.clone().map_or(FlashSource::New, FlashSource::File),
             faults: options.faults.clone(),
             arm: options.arm,
+            held: options.held.as_deref().map(str::parse).transpose()?,
             #[cfg(feature = "mujoco")]
             imperfections: options.arm.map_or(Imperfections::NONE, Imperfections::drawn),
             ..Self::new(engine, options.seed.unwrap_or(DEFAULT_SEED), world)
@@ -222,6 +226,7 @@ impl SimulationOptions {
             #[cfg(feature = "mujoco")]
             scene: Scene::default(),
             arm: None,
+            held: None,
             #[cfg(feature = "mujoco")]
             imperfections: Imperfections::NONE,
             #[cfg(feature = "mujoco")]
@@ -249,7 +254,7 @@ impl SimulationOptions {
         }
         match self.world {
             WorldKind::Simple => {
-                let nominal = FreeJoints::new(self.posture);
+                let nominal = FreeJoints::new(self.posture).with_held(self.held);
                 Ok(Box::new(match self.arm {
                     Some(number) => nominal.drawn(number),
                     None => nominal,
@@ -263,6 +268,7 @@ impl SimulationOptions {
                     posture: self.posture,
                     scene: self.scene,
                     imperfections: self.imperfections,
+                    held: self.held,
                     ..MujocoOptions::default()
                 })?;
                 Ok(match (self.teacher, self.wrap_world) {

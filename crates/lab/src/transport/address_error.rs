@@ -13,7 +13,7 @@ pub enum AddressError {
     Incomplete(String, &'static str),
     /// An option of a simulator that there is not.
     #[error(
-        "simulated devices have the options seed=NUMBER, arm=NUMBER, world=NAME, line=serial|can, bus=FILE, flash=FILE and faults=FILE, not '{0}'"
+        "simulated devices have the options seed=NUMBER, arm=NUMBER, held=KG@X:Y:Z, world=NAME, line=serial|can, bus=FILE, flash=FILE and faults=FILE, not '{0}'"
     )]
     Option(String),
     /// An option of the emulated board that there is not.

@@ -22,6 +22,8 @@ pub struct SimulatorOptions {
     pub seed: Option<u64>,
     /// Number of an arm whose masses and friction are not the model's; `None` is the model's.
     pub arm: Option<u64>,
+    /// A weight in the hand, `KG` or `KG@X:Y:Z`.
+    pub held: Option<String>,
     /// Name of the world; `None` is the best one that was built in.
     pub world: Option<String>,
     /// The line of the host link.
@@ -94,6 +96,7 @@ impl SimulatorOptions {
                 Some(("arm", value)) => {
                     options.arm = Some(value.parse().map_err(|_| AddressError::Number(format!("arm={value}")))?);
                 }
+                Some(("held", value)) => options.held = Some(value.to_owned()),
                 Some(("world", value)) => options.world = Some(value.to_owned()),
                 Some(("line", "serial")) => options.line = LineKind::Serial,
                 Some(("line", "can")) => options.line = LineKind::Can,
@@ -134,6 +137,7 @@ impl fmt::Display for SimulatorOptions {
         let chip = &self.board.chip;
         let seed = self.seed.map(|seed| format!("seed={seed}"));
         let arm = self.arm.map(|arm| format!("arm={arm}"));
+        let held = self.held.as_ref().map(|held| format!("held={held}"));
         let world = self.world.as_ref().map(|world| format!("world={world}"));
         let line = (self.line == LineKind::Can).then(|| "line=can".to_owned());
         let bus = self.bus.as_ref().map(|path| format!("bus={}", path.display()));
@@ -143,7 +147,7 @@ impl fmt::Display for SimulatorOptions {
         let cancellation = chip.cancellation.map(|reading| format!("cancellation={}", reading.name()));
         let revision = chip.revision.map(|revision| format!("revision={revision:#06x}"));
         let faults = chip.faults.iter().map(|fault| format!("fault={fault}"));
-        let single = [seed, arm, world, line, bus, flash, script, report, cancellation, revision];
+        let single = [seed, arm, held, world, line, bus, flash, script, report, cancellation, revision];
         let parts: Vec<String> = single.into_iter().flatten().chain(faults).collect();
         f.write_str(&parts.join(","))
     }

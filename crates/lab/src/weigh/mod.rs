@@ -20,7 +20,7 @@ use control::units::JointPositions;
 use nalgebra::{SMatrix, SVector};
 
 /// Numbers of a correction: share and shift (3) of each link.
-const NUMBERS: usize = 28;
+pub(crate) const NUMBERS: usize = 28;
 
 /// Deviation of a link's mass from the model's, as a share of it: the prior's.
 const SHARE: f32 = 0.1;
@@ -161,22 +161,23 @@ impl Weighing {
 }
 
 /// Torque and regressor of one posture, up and down in equal parts.
-struct Balance {
+pub(crate) struct Balance {
     torque: [f64; 7],
     /// Gravity torque of the model, N m.
     model: [f64; 7],
-    regressor: SMatrix<f64, 7, NUMBERS>,
+    /// Gravity torque of each number of a correction at its prior's deviation, N m.
+    pub(crate) regressor: SMatrix<f64, 7, NUMBERS>,
     friction: [f64; 7],
 }
 
 /// The model, and the model with one number of the correction at the prior's deviation.
-struct Arms {
+pub(crate) struct Arms {
     model: ArmModel<f64>,
     deviating: Vec<ArmModel<f64>>,
 }
 
 impl Arms {
-    fn new(payload: Payload) -> Result<Self, WeightError> {
+    pub(crate) fn new(payload: Payload) -> Result<Self, WeightError> {
         let deviating = (0..NUMBERS).map(|number| {
             let mut unit = SVector::<f64, NUMBERS>::zeros();
             unit[number] = 1.0;
@@ -208,7 +209,7 @@ impl Arms {
         (torque, model, regressor)
     }
 
-    fn row(&self, crossing: &Crossing) -> Balance {
+    pub(crate) fn row(&self, crossing: &Crossing) -> Balance {
         let ((up, model_up, regressor_up), (down, model_down, regressor_down)) =
             (self.mean(&crossing.up), self.mean(&crossing.down));
         let middle = |a: [f64; 7], b: [f64; 7]| std::array::from_fn(|joint| 0.5 * (a[joint] + b[joint]));

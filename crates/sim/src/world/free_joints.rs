@@ -11,7 +11,7 @@
 //! its sign, so that a joint at rest stays at rest whatever the step: `I` inertia, `b` viscous, `c` Coulomb friction,
 //! `h` step.
 
-use super::{ARM_STREAM, HandState, HandTargets, Pose, World};
+use super::{ARM_STREAM, HandState, HandTargets, Held, Pose, World};
 use crate::Noise;
 use crate::chain::{self, Frame, Vector, add, dot, subtract};
 use crate::rotation::cross;
@@ -93,6 +93,7 @@ pub struct FreeJoints {
     coulomb: [f64; 7],
     /// Factors on the masses of links 1 to 7, and of the hand.
     weights: ([f64; 7], f64),
+    held: Option<Held>,
     push_force: Vector,
     push_torque: Vector,
     hand: HandTargets,
@@ -111,6 +112,7 @@ impl FreeJoints {
             gravity: GRAVITY,
             coulomb: COULOMB,
             weights: ([1.0; 7], 1.0),
+            held: None,
             push_force: [0.0; 3],
             push_torque: [0.0; 3],
             hand: HandTargets::default(),
@@ -136,6 +138,17 @@ impl FreeJoints {
         let hand = around(0.03);
         let friction = std::array::from_fn(|_| around(0.3));
         self.with_factors(links, hand, friction)
+    }
+
+    /// The same arm with this weight in its hand; only its weight counts, not its inertia.
+    #[must_use]
+    pub fn with_held(self, held: Option<Held>) -> Self {
+        Self { held, ..self }
+    }
+
+    /// Mass (kg) of what is held, and its centre in frame 7 (m).
+    fn held_body(&self) -> (f64, Vector) {
+        self.held.map_or((0.0, SENSOR_ORIGIN), |held| (held.mass(), add(SENSOR_ORIGIN, held.centre())))
     }
 
     /// Torques that hold the arm still where it is, without friction, N m.
@@ -173,12 +186,14 @@ impl FreeJoints {
     fn external_torques(&self, frames: &[Frame; 8]) -> [f64; 7] {
         let weight = |mass: f64| self.gravity.map(|g| g * mass);
         let (links, hand) = self.weights;
-        // Seven links, then sensor and hand, what the hand weighs more, and the push: which link it acts on, where, and
-        // the force.
-        let forces: [(usize, Vector, Vector); 10] = std::array::from_fn(|part| match LINKS.get(part) {
+        let held = self.held_body();
+        // Seven links, then sensor and hand, what the hand weighs more, what it holds, and the push: which link it acts
+        // on, where, and the force.
+        let forces: [(usize, Vector, Vector); 11] = std::array::from_fn(|part| match LINKS.get(part) {
             Some((mass, centre)) => (part, frames[part + 1].point(*centre), weight(*mass * links[part])),
             None if part == LINKS.len() => (6, frames[7].point(PAYLOAD.1), weight(PAYLOAD.0)),
             None if part == LINKS.len() + 1 => (6, frames[7].point(HAND.1), weight(HAND.0 * (hand - 1.0))),
+            None if part == LINKS.len() + 2 => (6, frames[7].point(held.1), weight(held.0)),
             None => (6, chain::grasp_frame(&frames[7]).origin, self.push_force),
         });
         std::array::from_fn(|joint| {
@@ -220,10 +235,13 @@ impl World for FreeJoints {
     fn wrist_wrench(&self) -> [f64; 6] {
         let plate = chain::frames(&self.q)[7];
         let sensor = plate.point(SENSOR_ORIGIN);
+        let (held, held_centre) = self.held_body();
         let weight = self.gravity.map(|g| g * HAND.0 * self.weights.1);
-        let force = add(weight, self.push_force);
+        let held_weight = self.gravity.map(|g| g * held);
+        let force = add(add(weight, held_weight), self.push_force);
         let moments = [
             cross(subtract(plate.point(HAND.1), sensor), weight),
+            cross(subtract(plate.point(held_centre), sensor), held_weight),
             cross(subtract(chain::grasp_frame(&plate).origin, sensor), self.push_force),
             self.push_torque,
         ];
@@ -337,6 +355,25 @@ mod tests {
             world.step(&[0.0; 7]);
         }
         assert!(world.dq[0] > 0.1, "{}", world.dq[0]);
+    }
+
+    #[test]
+    fn a_held_weight_is_carried_by_joints_and_sensor_alike() {
+        let q = [0.3, 0.6, -0.4, 1.2, 0.5, -0.7, 0.9];
+        let (empty, held) = (FreeJoints::new(q), "0.5@0.02:-0.01:0.15".parse().ok());
+        let full = empty.clone().with_held(held);
+        let plate = chain::frames(&q)[7];
+        let place = plate.point([0.02, -0.01, 0.156]);
+        let weight = [0.0, 0.0, -0.5 * 9.81];
+        // The same weight as a push at the grasp point, with the moment that moves it there.
+        let mut pushed = empty.clone();
+        pushed.push(weight, cross(subtract(place, chain::grasp_frame(&plate).origin), weight));
+        for (a, b) in full.holding_torques().iter().zip(pushed.holding_torques()) {
+            assert!((a - b).abs() < 1e-9, "{a} and {b}");
+        }
+        for (a, b) in full.wrist_wrench().iter().zip(pushed.wrist_wrench()) {
+            assert!((a - b).abs() < 1e-9, "{a} and {b}");
+        }
     }
 
     #[test]

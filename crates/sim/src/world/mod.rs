@@ -6,12 +6,14 @@
 use std::any::Any;
 
 mod free_joints;
+mod held;
 #[cfg(feature = "mujoco")]
 pub mod mujoco;
 mod object;
 mod object_file;
 
 pub use free_joints::{FingerObstacle, FreeJoints, HOME};
+pub use held::{Held, NotHeld};
 pub use object::{ObjectKind, UnknownObject};
 pub use object_file::{Head, Material, ObjectFileError, ObjectRow, Ring};
 

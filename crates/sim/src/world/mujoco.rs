@@ -16,8 +16,8 @@ mod options;
 mod scene;
 
 use super::{HandState, HandTargets, Pose, World};
-use crate::STEP_SECONDS;
 use crate::rotation::{add_scaled, cross, from_matrix};
+use crate::{Held, STEP_SECONDS};
 use addresses::Addresses;
 use cables::Motors;
 use contacts::Parts;
@@ -32,6 +32,13 @@ pub use kinematics::{Kinematics, Unreachable};
 pub use object::{ObjectSpec, TABLE_TOP};
 pub use options::MujocoOptions;
 pub use scene::Scene;
+
+/// The line of the model in whose place a held weight goes, and its name there.
+const HELD_LINE: &str = "<!-- held weight -->";
+const HELD: &str = "held";
+
+/// Radius of a held weight as a ball, m: it gives it its inertia.
+const HELD_RADIUS: f64 = 0.03;
 
 /// Steps over which [`MujocoWorld::mean_contact_forces`] takes the mean: 10 ms, three cycles of control.
 const MEAN_STEPS: usize = 18;
@@ -291,8 +298,11 @@ type Loaded = (MjData<Box<MjModel>>, Addresses, Option<Motors>);
 fn load(options: &MujocoOptions) -> Result<Loaded, WorldError> {
     // A scene that cannot be is refused before it becomes part of the model's text.
     options.scene.check()?;
-    let mut model =
-        MjModel::from_xml_string(&options.scene.model(false)).map_err(|e| WorldError::Model(e.to_string()))?;
+    let mut text = options.scene.model(false);
+    if let Some(held) = &options.held {
+        text = text.replacen(HELD_LINE, &held_body(held), 1);
+    }
+    let mut model = MjModel::from_xml_string(&text).map_err(|e| WorldError::Model(e.to_string()))?;
     let addresses = Addresses::of(&model)?;
     options::check(options, &addresses)?;
     model.opt_mut().timestep = STEP_SECONDS;
@@ -309,6 +319,15 @@ fn load(options: &MujocoOptions) -> Result<Loaded, WorldError> {
         data.set_const();
     }
     Ok((data, addresses, motors))
+}
+
+/// The held weight as a body of the palm: a ball without a surface. The palm begins 6 mm beyond the sensor's
+/// origin, turned by pi about z.
+fn held_body(held: &Held) -> String {
+    let (mass, [x, y, z]) = (held.mass(), held.centre());
+    let (place, inertia) = (format!("{} {} {}", -x, -y, z - 0.006), 0.4 * mass * HELD_RADIUS * HELD_RADIUS);
+    let inertial = format!(r#"<inertial pos="0 0 0" mass="{mass}" diaginertia="{inertia} {inertia} {inertia}"/>"#);
+    format!(r#"<body name="{HELD}" pos="{place}">{inertial}</body>"#)
 }
 
 /// Puts arm, hand and object where the options say.

@@ -93,6 +93,8 @@ impl Imperfections {
         }
         // The sensor is a bought part of known mass: the hand begins at the palm.
         let palm = find("bh_palm".to_owned())?;
+        // What the hand holds is what it is said to be.
+        let held = model.name_to_id(MjtObjBase::mjOBJ_BODY, super::HELD);
         let parents = model.body_parentid();
         for body in palm..parents.len() {
             // Parents have smaller numbers than their children: the way up ends at the palm or passes it by.
@@ -100,7 +102,7 @@ impl Imperfections {
             while above > palm {
                 above = parents[above] as usize;
             }
-            if above == palm {
+            if above == palm && Some(body) != held {
                 scales.push((body, self.hand));
             }
         }

@@ -4,7 +4,7 @@ use super::addresses::Addresses;
 use super::error::WorldError;
 use super::imperfections::Imperfections;
 use super::scene::Scene;
-use crate::HOME;
+use crate::{HOME, Held};
 
 /// State of the world before the first step.
 #[derive(Clone, Debug)]
@@ -22,6 +22,8 @@ pub struct MujocoOptions {
     pub fingers: f64,
     /// Angle at which the spread is held until the hand is driven, rad: 0 puts F1 and F2 opposite to F3.
     pub spread: f64,
+    /// A weight in the hand.
+    pub held: Option<Held>,
     /// Gravity along world z, m/s^2.
     pub gravity: f64,
 }
@@ -37,6 +39,7 @@ impl Default for MujocoOptions {
             imperfections: Imperfections::NONE,
             fingers: 0.25,
             spread: 0.0,
+            held: None,
             gravity: -9.81,
         }
     }

@@ -1,4 +1,10 @@
-//! `tactus calibrate payload`: what the arm carries, declared by a person and compared with who answers on its bus.
+//! `tactus calibrate payload`: what the arm carries, declared by a person and compared with who answers on its bus, or
+//! measured.
+
+pub mod data;
+mod measure;
+
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use control::model::WeightCorrection;
@@ -17,6 +23,18 @@ pub struct Payload {
     /// Declare that the arm carries this; without it, what is declared is shown
     #[arg(value_enum)]
     pub carries: Option<Carries>,
+    /// Measure mass and centre of what hangs on the wrist, mounted or held, on a tour of slow moves; nothing is kept
+    #[arg(long, conflicts_with = "carries")]
+    pub measure: bool,
+    /// Tell what was taken up since this report of the same arm was made, with an empty hand
+    #[arg(long, value_name = "REPORT", requires = "measure")]
+    pub without: Option<PathBuf>,
+    /// I have brought the arm to its home pose: zero it there if need be
+    #[arg(long, requires = "measure")]
+    pub at_home: bool,
+    /// Write what was measured into a file too, JSON; in a folder it is named with serial number and time
+    #[arg(long, value_name = "FILE", requires = "measure")]
+    pub report: Option<PathBuf>,
 }
 
 /// Payload of an arm.
@@ -51,11 +69,15 @@ impl Carries {
 
 const DOING: &str = "calibrate payload";
 
-/// Shows, declares or takes back what the arm carries. A declaration is kept as a weight without corrections.
+/// Shows, declares, takes back or measures what the arm carries. A declaration is kept as a weight without corrections.
 ///
 /// # Errors
-/// The device refuses, or it keeps a weight that was measured with something else.
+/// The device refuses, it keeps a weight that was measured with something else, or what was measured contradicts
+/// itself.
 pub(super) fn run(command: &Payload, client: &mut Client<Device>, global: &Global) -> Result<(), Failure> {
+    if command.measure {
+        return measure::run(command, client, global);
+    }
     let failed = |error: lab::error::HostError| error.into_failure(DOING);
     let kept = client.weight().map_err(failed)?;
     if let Some(carries) = command.carries.filter(|carries| *carries != declared(&kept)) {
