@@ -306,7 +306,9 @@ impl Refusal {
             Self::NoArm => "ask the device that drives the arm",
             Self::HomeImplausible => "measure that joint again; angles are in rad, from J1 to J7",
             Self::HasTorque => "support the arm, press Shift+Idle on the pendant, then try again",
-            Self::Observing => "connect as the host that commands",
+            Self::Observing => {
+                "`tactus stop` stops the arm; commands that do more, like `tactus run`, connect as the host that commands"
+            }
             Self::NameTaken => "choose another name, or delete that primitive first: `tactus delete NAME`",
             Self::WeightImplausible => "empty the hand, free the arm, and calibrate again: `tactus calibrate gravity`",
             Self::Locked => "name the file with its secret: `--secret-file FILE`, or set TACTUS_SECRET_FILE",
