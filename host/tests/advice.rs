@@ -296,3 +296,48 @@ fn an_arm_that_is_served_fast_can_be_commanded() {
     std::thread::sleep(Duration::from_secs(1));
     assert!(cycle() - before > 10 * u64::from(control::RATE_HZ));
 }
+
+#[test]
+fn a_recording_of_an_arm_that_is_not_ready_says_what_is_in_its_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut arm = Served::start(at, &[]);
+    succeeds(at, &format!("{SERVED} hand init"));
+    let status =
+        || -> Value { serde_json::from_slice(&succeeds(at, &format!("{SERVED} --json status")).stdout).unwrap() };
+    let record = || refused(at, &format!("{SERVED} record --duration 1 --force"));
+    arm.press("estop");
+    wait_until("the arm has no torque", || status()["state"] == "idle");
+    succeeds(at, &format!("{SERVED} calibrate payload nothing"));
+    wait_until("the start-up waits for the pendant", || {
+        status()["startup"].as_str().is_some_and(|stage| stage.contains("Shift-Idle"))
+    });
+    let (code, help) = record();
+    assert!(code == "E590" && help.contains("Shift+Idle"), "{code}: {help}");
+    arm.press("release");
+    arm.press("idle");
+    wait_until("the start-up is blocked", || status()["blocked"].is_string());
+    // A start-up that is tried again each second has news of itself, but no cycles.
+    let begun = Instant::now();
+    let (code, help) = record();
+    assert!(code == "E590" && help.contains("`tactus calibrate payload hand`"), "{code}: {help}");
+    assert!(begun.elapsed() < Duration::from_secs(8), "it took {:?}", begun.elapsed());
+}
+
+#[test]
+fn whoever_only_looks_on_is_told_which_commands_do_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let explained = String::from_utf8(succeeds(folder.path(), "explain E547").stdout).unwrap();
+    assert!(explained.contains("`tactus stop`"), "{explained}");
+}
+
+#[test]
+fn a_simulated_arm_that_began_with_the_command_says_that_its_fault_memory_began_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let device = "--device sil:world=simple,flash=arm.flash --non-interactive";
+    let told = succeeds(at, &format!("{device} faults"));
+    assert!(String::from_utf8_lossy(&told.stdout).contains("`tactus sim`"), "{told:?}");
+    let (code, help) = refused(at, &format!("{device} faults --record fault.csv"));
+    assert!(code == "E690" && help.contains("`tactus sim`"), "{code}: {help}");
+}

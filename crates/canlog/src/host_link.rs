@@ -121,5 +121,6 @@ fn words(message: &Message) -> String {
         Message::Reply(Reply::Owner { .. }) => "owner".to_owned(),
         Message::Reply(Reply::Secret { .. }) => "secret".to_owned(),
         Message::Reply(Reply::Challenge { .. }) => "challenge".to_owned(),
+        Message::Reply(Reply::Storage { .. }) => "storage".to_owned(),
     }
 }

@@ -8,8 +8,8 @@
 use core::fmt;
 
 use control::model::WeightCorrection;
-use link::Secret;
 use link::frame::CRC;
+use link::{Secret, StorageReport};
 
 use crate::calibration::{Home, StoredHome};
 use crate::secret::StoredSecret;
@@ -36,6 +36,8 @@ pub enum StoreError {
     Busy,
     /// The medium has no room for another image.
     Full,
+    /// This sector of the medium cannot be erased or written.
+    Sector(u8),
 }
 
 impl StoreError {
@@ -49,6 +51,7 @@ impl StoreError {
             Self::Medium => 4,
             Self::Busy => 5,
             Self::Full => 6,
+            Self::Sector(_) => 7,
         }
     }
 }
@@ -62,6 +65,7 @@ impl fmt::Display for StoreError {
             Self::Medium => "the storage failed",
             Self::Busy => "the storage is being read, or still writing the last change",
             Self::Full => "the storage is full",
+            Self::Sector(_) => "a sector of the storage cannot be erased or written",
         })
     }
 }
@@ -161,6 +165,11 @@ pub trait Store {
     /// As [`Store::keep_home`].
     fn forget_secret(&mut self) -> Result<(), StoreError>;
 
+    /// Losses and condition of the medium, with the lost image of place `slot`.
+    fn report(&self, _slot: u8) -> StorageReport {
+        StorageReport::default()
+    }
+
     /// Returns the outcome of the change that was begun last, once, as soon as it is durable.
     fn finished(&mut self) -> Option<Result<(), StoreError>>;
 }
@@ -195,6 +204,10 @@ pub fn stage_copy(store: &mut impl Store, slot: u8, head: &[u8]) -> Result<(), S
 impl<S: Store + ?Sized> Store for &mut S {
     fn is_open(&self) -> bool {
         (**self).is_open()
+    }
+
+    fn report(&self, slot: u8) -> StorageReport {
+        (**self).report(slot)
     }
 
     fn finished(&mut self) -> Option<Result<(), StoreError>> {

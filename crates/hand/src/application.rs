@@ -6,7 +6,7 @@
 use control::LoadRefusal;
 use device::{Action, Application, HostSession, Refused, Saved, SessionPort, finite};
 use link::image::IMAGE_BYTES_LIMIT;
-use link::{Capabilities, Goal, Listing, Name, Refusal, Request};
+use link::{Capabilities, Goal, Listing, Name, Refusal, Reply, Request, StorageReport};
 
 use crate::command::{Command, RunOptions};
 use crate::device_controller::DeviceController;
@@ -136,7 +136,7 @@ impl Application for HandApplication<'_> {
 
     fn act(
         &mut self,
-        _of: u16,
+        of: u16,
         request: Request,
         calm: bool,
         port: &mut impl SessionPort<DeviceController>,
@@ -167,6 +167,10 @@ impl Application for HandApplication<'_> {
                 finite(&q)?;
                 finite(&[duration])?;
                 Command::Move { q: q.map(from_real), duration: from_real(duration) }
+            }
+            // What it keeps is gone with its power.
+            Request::Storage { .. } => {
+                return Ok(Action::Answer(Reply::Storage { of, storage: StorageReport::default() }));
             }
             Request::KeepSecret { .. } | Request::ForgetSecret => return Err((Refusal::SecretNotOffered, [0, 0])),
             // Everything else needs an arm. Of an image only the hand's part was kept, and that in other numbers.

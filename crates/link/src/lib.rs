@@ -36,8 +36,8 @@ pub use metadata::ImageMetadata;
 pub use name::{Name, NameError, Text};
 pub use refusal::Refusal;
 pub use report::{
-    Calibration, Event, EventKind, FaultRecord, HandStage, HomeSource, LinkCounters, Listing, SecretReport,
-    SecretState, SessionOwner, Statistics, Status, Weight,
+    Calibration, Event, EventKind, FaultRecord, HandStage, HomeSource, LinkCounters, Listing, LostImage, SecretReport,
+    SecretState, SessionOwner, Statistics, Status, StorageReport, Weight,
 };
 pub use schema::{LINK_VERSION, SCHEMA_HASH};
 pub use secret::Secret;

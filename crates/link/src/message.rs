@@ -12,7 +12,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::name::{Name, Text};
 use crate::refusal::Refusal;
-use crate::report::{Calibration, Event, FaultRecord, Listing, SecretReport, SessionOwner, Statistics, Status, Weight};
+use crate::report::{
+    Calibration, Event, FaultRecord, Listing, SecretReport, SessionOwner, Statistics, Status, StorageReport, Weight,
+};
 use crate::secret::Secret;
 use crate::telemetry::Telemetry;
 
@@ -313,6 +315,11 @@ pub enum Request {
     },
     /// Forgets the secret: whoever has the session may do everything again. Answered when it is durable.
     ForgetSecret,
+    /// Asks for [`Reply::Storage`].
+    Storage {
+        /// The place whose loss is told, 0 to `slots - 1`.
+        place: u8,
+    },
 }
 
 impl Request {
@@ -365,7 +372,8 @@ impl Request {
             | Self::Challenge
             | Self::Prove { .. }
             | Self::KeepSecret { .. }
-            | Self::ForgetSecret => false,
+            | Self::ForgetSecret
+            | Self::Storage { .. } => false,
         }
     }
 
@@ -437,6 +445,7 @@ impl Request {
             Self::Prove { .. } => "prove",
             Self::KeepSecret { .. } => "keep secret",
             Self::ForgetSecret => "forget secret",
+            Self::Storage { .. } => "storage",
         }
     }
 }
@@ -553,6 +562,13 @@ pub enum Reply {
         /// A number that the device has given to nobody since it started.
         nonce: u64,
     },
+    /// Answer to [`Request::Storage`].
+    Storage {
+        /// Request answered.
+        of: u16,
+        /// Losses and condition of the storage.
+        storage: StorageReport,
+    },
 }
 
 impl Reply {
@@ -573,7 +589,8 @@ impl Reply {
             | Self::Weight { of, .. }
             | Self::Owner { of, .. }
             | Self::Secret { of, .. }
-            | Self::Challenge { of, .. } => Some(*of),
+            | Self::Challenge { of, .. }
+            | Self::Storage { of, .. } => Some(*of),
             Self::Telemetry(_) | Self::Event(_) => None,
         }
     }

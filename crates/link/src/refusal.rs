@@ -124,11 +124,15 @@ pub enum Refusal {
     SecretUnreadable,
     /// The device has no place to keep a secret.
     SecretNotOffered,
+    /// The bus was started anew while the primitive was checked, and what hangs on the wrist is another now.
+    OtherTool,
+    /// A sector of the storage cannot be erased or written. `detail` = its number.
+    StoreWorn,
 }
 
 impl Refusal {
     /// Every refusal, in the order of its code.
-    pub const ALL: [Self; 56] = [
+    pub const ALL: [Self; 58] = [
         Self::LinkVersion,
         Self::Schema,
         Self::Model,
@@ -185,6 +189,8 @@ impl Refusal {
         Self::NoSecret,
         Self::SecretUnreadable,
         Self::SecretNotOffered,
+        Self::OtherTool,
+        Self::StoreWorn,
     ];
 
     /// Number on the wire.
@@ -253,6 +259,8 @@ impl Refusal {
             Self::NoSecret => "the device keeps no secret",
             Self::SecretUnreadable => "the device keeps a secret that it cannot read",
             Self::SecretNotOffered => "the device has no place to keep a secret",
+            Self::OtherTool => "the arm was found with another tool while the primitive was checked",
+            Self::StoreWorn => "a sector of the storage cannot be erased or written, so nothing more is kept",
         }
     }
 
@@ -306,7 +314,9 @@ impl Refusal {
             Self::NoArm => "ask the device that drives the arm",
             Self::HomeImplausible => "measure that joint again; angles are in rad, from J1 to J7",
             Self::HasTorque => "support the arm, press Shift+Idle on the pendant, then try again",
-            Self::Observing => "connect as the host that commands",
+            Self::Observing => {
+                "`tactus stop` stops the arm; commands that do more, like `tactus run`, connect as the host that commands"
+            }
             Self::NameTaken => "choose another name, or delete that primitive first: `tactus delete NAME`",
             Self::WeightImplausible => "empty the hand, free the arm, and calibrate again: `tactus calibrate gravity`",
             Self::Locked => "name the file with its secret: `--secret-file FILE`, or set TACTUS_SECRET_FILE",
@@ -317,6 +327,14 @@ impl Refusal {
             Self::NoSecret => "nothing has to be proven; `tactus secret set FILE` has it keep one",
             Self::SecretUnreadable => "`tactus secret set FILE` has it keep another one, `tactus secret clear` none",
             Self::SecretNotOffered => "keep those off its line who shall not command it",
+            Self::OtherTool => {
+                "enter the command again: it is then checked for what the arm carries now, which `tactus calibrate \
+                 payload` tells"
+            }
+            Self::StoreWorn => {
+                "save what it keeps with `tactus get NAME` and `tactus config dump`, then restart it once: where that \
+                 does not help its flash is worn out; what is in it still runs"
+            }
         }
     }
 }

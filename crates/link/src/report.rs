@@ -198,6 +198,37 @@ pub struct SecretReport {
     pub wrong_proofs: u32,
 }
 
+/// An image that the device once kept and cannot read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LostImage {
+    /// Its place.
+    pub place: u8,
+    /// Its name, if that can still be read.
+    pub name: Option<Name>,
+    /// The place holds an image of before; what is lost may have been a deletion.
+    pub older: bool,
+}
+
+/// The storage of a device: what was lost in it since it was written, and whether it still takes anything.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct StorageReport {
+    /// It was blank or foreign, or nothing in it could be read: it was erased at the start.
+    pub formatted: bool,
+    /// It does not work at all: nothing is kept over a restart.
+    pub failed: bool,
+    /// The sector that cannot be erased or written: no change is taken.
+    pub bad_sector: Option<u8>,
+    /// Number of places whose newest image is lost.
+    pub lost: u8,
+    /// Settings whose newest value is lost: bit 0 the home, bit 1 the weight, bit 2 the secret. One of before counts,
+    /// or none.
+    pub settings_lost: u8,
+    /// Damaged values that do not tell whose they are; they may be old ones that nobody misses.
+    pub unread: u8,
+    /// The lost image of the place that was asked for.
+    pub loss: Option<LostImage>,
+}
+
 /// Counters of the receiving end of a link. Every byte that arrived is accounted for in one of these.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct LinkCounters {

@@ -26,6 +26,14 @@ impl<M: Mutex<T = &'static mut ArmSession>, L: Log> LibraryAccess for SharedLibr
         self.session.lock(|session| session.store_mut().forget(slot));
     }
 
+    fn holds(&mut self, key: u8, bytes: &[u8]) -> bool {
+        self.session.lock(|session| session.store_mut().holds(key, bytes))
+    }
+
+    fn lose(&mut self, slot: u8, head: &[u8]) {
+        self.session.lock(|session| session.store_mut().lose(slot, head));
+    }
+
     fn open(&mut self, opening: Opening) {
         self.session.lock(|session| session.store_mut().open(opening));
         self.log.storage(&opening);

@@ -18,7 +18,7 @@ use lab::fault_guide::FaultGuide;
 use lab::procedure::{self, ProcedureError, Readiness, StartupLook};
 use lab::secret_file::{self, SecretFileError};
 use lab::simulation::{SimulationError, SimulationOptions};
-use lab::startup_guide::blocked_remedy;
+use lab::startup_guide::{blocked_remedy, stage_remedy};
 use lab::transport::Address;
 
 /// Two signals within this time are one.
@@ -217,7 +217,7 @@ fn watch(
         }
     });
     spinner.finish_and_clear();
-    let readiness = result.map_err(|error| explained(client, failure(error, doing)))?;
+    let readiness = result.map_err(|error| failed(client, error, doing))?;
     if let Some(source @ (HomeSource::Damaged | HomeSource::Foreign)) = readiness.zeroed_at {
         output.warn(format!(
             "the arm was zeroed at another home than its own: {}; `tactus calibrate show`",
@@ -232,12 +232,24 @@ pub(super) fn refused(client: &mut Client<Device>, error: HostError, doing: &str
     explained(client, error.into_failure(doing))
 }
 
-/// A failure of an arm that does not get ready helps with what blocks its start-up, if the device tells.
+/// The failure of a procedure of an arm that may not have got ready.
+pub(super) fn failed(client: &mut Client<Device>, error: ProcedureError, doing: &str) -> Failure {
+    explained(client, failure(error, doing))
+}
+
+/// A failure of an arm that does not get ready helps with what its start-up waits for or is blocked by, if the device
+/// tells.
 fn explained(client: &mut Client<Device>, failure: Failure) -> Failure {
     if !matches!(failure.code, ErrorCode::NotReady | ErrorCode::Refused(Refusal::NotReady)) {
         return failure;
     }
-    let Ok(Status { blocked: Some(reason), .. }) = client.status() else { return failure };
+    let Ok(status) = client.status() else { return failure };
+    let Status { blocked: Some(reason), .. } = status else {
+        return match Stage::from_code(status.startup_stage).and_then(stage_remedy) {
+            Some(remedy) => failure.help(remedy),
+            None => failure,
+        };
+    };
     match blocked_remedy(reason) {
         Some(remedy) if failure.cause.to_string().contains(&explain_blocked(reason)) => failure.help(remedy),
         Some(remedy) => failure.help(format!("{}; {remedy}", explain_blocked(reason))),

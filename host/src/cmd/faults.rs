@@ -24,6 +24,10 @@ pub struct Cmd {
 }
 
 const DOING: &str = "faults";
+/// The memory of a fault outlives a reset, not a loss of power (decision 0095), and a device in this process got its
+/// power with the command: a file of its flash keeps its library and settings only.
+const SWITCHED_ON: &str = "this simulated arm was switched on with the command, and its memory of a fault with it; \
+                           `tactus sim` serves one that stays";
 /// Cycles in the table: 67 ms.
 const SHOWN: usize = 20;
 /// Quantities that the safety module judges, in the order of its word.
@@ -41,7 +45,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let last = client.last_second().map_err(|error| error.into_failure(DOING))?;
     if let Some(file) = file {
         let Some(LastSecond { cycles, .. }) = &last else {
-            return Err(Failure::new(ErrorCode::NoFaultRecord, DOING, "there is nothing to write"));
+            let failure = Failure::new(ErrorCode::NoFaultRecord, DOING, "there is nothing to write");
+            return Err(if global.is_simulated_here() { failure.help(SWITCHED_ON) } else { failure });
         };
         let notes = format!("Tactus fault record, {} Hz\n{}", control::RATE_HZ, files::origin(&client, None));
         let text =
@@ -49,7 +54,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         files::fill(file, &text, DOING)?;
         output.say(format!("wrote {} cycles", cycles.len()));
     }
-    output.result(&data(&status, last.as_ref()), text(&status, last.as_ref()))
+    let mut words = text(&status, last.as_ref());
+    if last.is_none() && global.is_simulated_here() {
+        words += &format!("; {SWITCHED_ON}");
+    }
+    output.result(&data(&status, last.as_ref()), words)
 }
 
 /// The present fault, the last one with its cycles, and the pendant, for a script.

@@ -4,6 +4,7 @@ use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::storage::{self, Storage};
 use super::{Failure, Global, Table, connection};
 
 /// Options of `list`.
@@ -18,6 +19,7 @@ pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "list";
     let mut client = connection::observe(global, DOING)?;
     let stored = client.list().map_err(|error| error.into_failure(DOING))?;
+    let storage = storage::ask(&mut client).map_err(|error| error.into_failure(DOING))?;
     let mut table = Table::new(["name", "duration", "kernels", "bytes", "checksum", "expectation", "in use"]);
     for listing in &stored {
         table.row([
@@ -46,9 +48,11 @@ pub fn run(_command: &Cmd, global: &Global) -> Result<(), Failure> {
     let (taken, places) = (stored.len(), usize::from(client.hello().slots));
     let free = places.saturating_sub(taken);
     let help = if free == 0 { "; `tactus delete NAME` frees one" } else { "" };
+    let complaints = storage.as_ref().map(storage::complaints).unwrap_or_default();
+    let complaints: String = complaints.iter().map(|line| format!("\n{line}")).collect();
     global.output().result(
-        &Listed { primitives, places, free },
-        format!("{table}{taken} of {places} places taken, {free} free{help}"),
+        &Listed { primitives, places, free, storage },
+        format!("{table}{taken} of {places} places taken, {free} free{help}{complaints}"),
     )
 }
 
@@ -61,6 +65,8 @@ pub struct Listed {
     pub places: usize,
     /// Places that are free.
     pub free: usize,
+    /// Losses and condition of the storage; null while the device reads it.
+    pub storage: Option<Storage>,
 }
 
 /// A stored primitive.

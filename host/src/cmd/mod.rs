@@ -43,6 +43,7 @@ pub mod sim;
 pub mod statistics;
 pub mod status;
 pub mod stop;
+mod storage;
 pub mod teach;
 pub mod upload;
 mod weigh;

@@ -57,7 +57,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     bar.finish_and_clear();
     let gaps = client.gaps().telemetry;
     connection::tell_speed(&client, started, output);
-    let rows = file.end(recorded.map_err(|error| connection::failure(error, DOING)), output)?;
+    let rows = file.end(recorded.map_err(|error| connection::failed(&mut client, error, DOING)), output)?;
     output.result(
         &Recorded { file: files::text(&command.output), samples: rows, gaps },
         format!("{rows} samples, {gaps} lost"),

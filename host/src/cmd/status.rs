@@ -8,6 +8,7 @@ use device::Stage;
 use link::{HandStage, HomeSource, Status};
 use serde_json::json;
 
+use super::storage::{self, Storage};
 use super::{Failure, Global, Table, connection, weigh};
 use lab::error::{HostError, explain_blocked};
 use lab::line_health::{self, LineHealth};
@@ -47,6 +48,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Err(HostError::Refused { .. }) => None,
         Err(error) => return Err(error.into_failure(DOING)),
     };
+    let storage = storage::ask(&mut client).map_err(|error| error.into_failure(DOING))?;
     let line = command.line.map(|time| line_health::measure(&mut client, time)).transpose();
     let line = line.map_err(|error| error.into_failure(DOING))?;
     let hello = client.hello();
@@ -64,9 +66,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             "zeroed": status.zeroed, "home": source.map(HomeSource::name), "weight": weight,
             "safety_mode": status.safety_mode,
             "wrench_zeroed": status.wrench_zeroed, "hand": status.hand_stage.name(), "q_rad": status.q,
-            "line": line, "hand_rad": status.hand, "loaded": status.loaded.as_ref().map(|name| name.as_str()),
+            "storage": storage, "line": line, "hand_rad": status.hand, "loaded": status.loaded.as_ref().map(|name| name.as_str()),
         }),
-        text(&status, &board, stage, state, fault, (source, weight.as_deref())) + &words(line.as_ref()),
+        text(&status, &board, stage, state, fault, (source, weight.as_deref())) + &condition(storage.as_ref()) + &words(line.as_ref()),
     )
 }
 
@@ -101,6 +103,11 @@ fn text(
         table.row(["spread, F1 to F3, rad", &numbers(&status.hand)]);
     }
     table.to_string()
+}
+
+/// Complaints about the storage; empty where nothing is, or it is not known yet.
+fn condition(storage: Option<&Storage>) -> String {
+    storage.map(storage::complaints).unwrap_or_default().iter().map(|line| format!("storage: {line}\n")).collect()
 }
 
 /// The health of the line as a table of its own; empty where it was not asked for.

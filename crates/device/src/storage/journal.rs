@@ -79,16 +79,18 @@ impl Journal {
         }))
     }
 
-    /// Begins a journal, on sectors that are `blank` or must be erased first, and says that the region is ours; twice,
-    /// as one damaged word must not cost the library.
-    pub(super) async fn create<F: NorFlash>(flash: &mut F, base: u32, blank: bool) -> Result<Self, F::Error> {
-        if !blank {
-            flash.erase(base, base + SECTORS * sector_bytes::<F>()).await?;
-        }
+    /// Begins a journal, on sectors that are blank, and says that the region is ours; twice, as one damaged word must
+    /// not cost the library.
+    pub(super) async fn create<F: NorFlash>(flash: &mut F, base: u32) -> Result<Self, F::Error> {
         let mut journal = Self { base, half: 0, next: 0, number: 0 };
         journal.append(flash, Matter::Formatted).await?;
         journal.append(flash, Matter::Formatted).await?;
         Ok(journal)
+    }
+
+    /// Number of the sector that notes go to.
+    pub(super) fn sector<F: NorFlash>(&self) -> u8 {
+        u8::try_from(self.base / sector_bytes::<F>().max(1) + self.half).unwrap_or(u8::MAX)
     }
 
     /// This sector is going to be erased.

@@ -11,16 +11,17 @@
 
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 
+use super::header::{WORD_LIMIT, length_of};
 use super::journal::{Journal, JournalState, SECTORS, sector_bytes};
-
-/// Most bytes of a word.
-const WORD_LIMIT: usize = 32;
 
 /// Sectors the log needs: one is always blank, and while one is emptied its content must fit elsewhere.
 const LOG_SECTORS: u32 = 2;
 
 /// Bytes looked at in one go when a sector is tested for being blank.
 const BLANK_CHUNK: usize = 256;
+
+/// Times that an erase is tried: what fails once may do better the next time, and costs nothing but time.
+const ERASE_TRIES: u8 = 3;
 
 /// Bytes looked at before others have their turn.
 const PART_BYTES: u32 = 4096;
@@ -41,6 +42,8 @@ enum Marker {
 pub(super) enum JournaledError<E> {
     /// The flash does not work.
     Flash(E),
+    /// A sector cannot be erased or written.
+    Sector(u8),
     /// A word that was to be written is not blank.
     NotBlank,
 }
@@ -49,7 +52,7 @@ impl<E: NorFlashError> NorFlashError for JournaledError<E> {
     fn kind(&self) -> NorFlashErrorKind {
         match self {
             Self::Flash(error) => error.kind(),
-            Self::NotBlank => NorFlashErrorKind::Other,
+            Self::Sector(_) | Self::NotBlank => NorFlashErrorKind::Other,
         }
     }
 }
@@ -63,6 +66,8 @@ pub(super) struct JournaledFlash<F> {
     capacity: u32,
     /// Where a word was not blank that was to be written.
     blocked_at: Option<u32>,
+    /// A sector whose erase was begun and does not succeed: what it holds is nobody's, and it is read as blank.
+    blind: Option<u32>,
 }
 
 /// State of the region at start-up.
@@ -92,26 +97,72 @@ impl<F: NorFlash> JournaledFlash<F> {
     /// Opens a region whose log has this many bytes, and puts in order what a power failure left.
     ///
     /// # Errors
-    /// Those of the flash.
-    pub(super) async fn open(mut flash: F, capacity: u32) -> Result<(Self, Found), F::Error> {
-        match Journal::read(&mut flash, capacity).await? {
+    /// Those of the flash. A sector whose erase is repeated in vain is none: it is told by [`Self::bad_sector`].
+    pub(super) async fn open(mut flash: F, capacity: u32) -> Result<(Self, Found), JournaledError<F::Error>> {
+        match Journal::read(&mut flash, capacity).await.map_err(JournaledError::Flash)? {
             Some(JournalState { journal, unfinished }) => {
-                let mut sound = Self { flash, journal, capacity, blocked_at: None };
+                let mut sound = Self { flash, journal, capacity, blocked_at: None, blind: None };
                 let sector = unfinished.filter(|sector| u32::from(*sector) * sector_bytes::<F>() < capacity);
                 let Some(sector) = sector else { return Ok((sound, Found::Sound)) };
                 let from = u32::from(sector) * sector_bytes::<F>();
-                sound.flash.erase(from, from + sector_bytes::<F>()).await?;
-                sound.journal.erased(&mut sound.flash).await?;
+                if erase_sector(&mut sound.flash, from).await.is_err() {
+                    sound.blind = Some(from);
+                    return Ok((sound, Found::Sound));
+                }
+                sound.tick_off().await?;
                 Ok((sound, Found::Resumed))
             }
             None => {
                 let journal = make_ours(&mut flash, capacity).await?;
-                Ok((Self { flash, journal, capacity, blocked_at: None }, Found::Formatted))
+                Ok((Self { flash, journal, capacity, blocked_at: None, blind: None }, Found::Formatted))
             }
         }
     }
 
-    /// Erases every sector of the log that is blank but for a damaged first word. Returns how many there were.
+    /// The sector whose erase was begun and does not succeed.
+    pub(super) fn bad_sector(&self) -> Option<u8> {
+        self.blind.map(number_of::<F>)
+    }
+
+    /// Sectors of the log.
+    pub(super) fn sectors(&self) -> u32 {
+        self.capacity / sector_bytes::<F>().max(1)
+    }
+
+    /// Bytes of a word.
+    pub(super) fn word_size() -> u32 {
+        word_bytes::<F>()
+    }
+
+    /// True if the sector at this address is read as free.
+    ///
+    /// # Errors
+    /// Those of the flash.
+    pub(super) async fn is_free(&mut self, sector: u32) -> Result<bool, JournaledError<F::Error>> {
+        Ok(self.marker(sector).await? == Marker::Blank)
+    }
+
+    /// Number of the sector that was written last: the first that is in use and not closed, else the one before the
+    /// first that is free.
+    ///
+    /// # Errors
+    /// Those of the flash.
+    pub(super) async fn newest_sector(&mut self) -> Result<u32, JournaledError<F::Error>> {
+        let (mut free, sectors) = (None, self.sectors());
+        for number in 0..sectors {
+            let start = number * sector_bytes::<F>();
+            let end = start + sector_bytes::<F>() - word_bytes::<F>();
+            if self.is_free(start).await? {
+                free = free.or(Some(number));
+            } else if self.marker(end).await? == Marker::Blank {
+                return Ok(number);
+            }
+        }
+        Ok(free.map_or(0, |free| (free + sectors - 1) % sectors.max(1)))
+    }
+
+    /// Erases every sector of the log whose first word is damaged and that has no value. Returns how many there were.
+    /// In one that was blank other bits may have fallen over, too; in use it would have the older ones given up.
     ///
     /// # Errors
     /// Those of the flash.
@@ -119,14 +170,28 @@ impl<F: NorFlash> JournaledFlash<F> {
         let mut cleaned: u8 = 0;
         for sector in (0..self.capacity).step_by(F::ERASE_SIZE) {
             let marker = self.marker(sector).await?;
-            let rest = (sector + word_bytes::<F>(), sector + sector_bytes::<F>());
             // A marker that power failed in, with values behind it, counts as a whole one.
-            if marker == Marker::Damaged && is_blank(&mut self.flash, rest).await.map_err(JournaledError::Flash)? {
+            if marker == Marker::Damaged && !self.has_value(sector).await? {
                 self.erase(sector, sector + sector_bytes::<F>()).await?;
                 cleaned = cleaned.saturating_add(1);
             }
         }
         Ok(cleaned)
+    }
+
+    /// True if a word of the sector is the header of a value.
+    async fn has_value(&mut self, sector: u32) -> Result<bool, JournaledError<F::Error>> {
+        let word = word_bytes::<F>();
+        let end = sector + sector_bytes::<F>() - word;
+        for at in (sector + word..end).step_by(word.max(1) as usize) {
+            let mut header = [0xFF; WORD_LIMIT];
+            let part = header.get_mut(..word as usize).unwrap_or_default();
+            self.flash.read(at, part).await.map_err(JournaledError::Flash)?;
+            if length_of(&header).is_some_and(|length| at + word + u32::from(length) <= end) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Looks at the part of the log from `at` on, and erases its sector if that is one of nothing but damage: its first
@@ -138,7 +203,7 @@ impl<F: NorFlash> JournaledFlash<F> {
         let sector = at - at % sector_bytes::<F>();
         let next = sector + sector_bytes::<F>();
         let part = (at + PART_BYTES).min(next);
-        let after = if self.marker(sector).await? != Marker::Blank {
+        let after = if self.marker(sector).await? != Marker::Blank || self.is_blind(sector) {
             next
         } else if is_blank(&mut self.flash, (at, part)).await.map_err(JournaledError::Flash)? {
             part
@@ -152,6 +217,9 @@ impl<F: NorFlash> JournaledFlash<F> {
     async fn marker(&mut self, sector: u32) -> Result<Marker, JournaledError<F::Error>> {
         let mut marker = [0xFF; WORD_LIMIT];
         let marker = marker.get_mut(..word_bytes::<F>() as usize).unwrap_or_default();
+        if self.is_blind(sector) {
+            return Ok(Marker::Blank);
+        }
         self.flash.read(sector, marker).await.map_err(JournaledError::Flash)?;
         Ok(if marker.iter().all(|byte| *byte == 0xFF) {
             Marker::Blank
@@ -178,7 +246,8 @@ impl<F: NorFlash> JournaledFlash<F> {
         }
         let marker = [0; WORD_LIMIT];
         let end = sector + sector_bytes::<F>() - word;
-        self.flash.write(end, marker.get(..word as usize).unwrap_or_default()).await.map_err(JournaledError::Flash)?;
+        let written = self.flash.write(end, marker.get(..word as usize).unwrap_or_default()).await;
+        written.map_err(|_| JournaledError::Sector(number_of::<F>(end)))?;
         Ok(true)
     }
 
@@ -186,16 +255,29 @@ impl<F: NorFlash> JournaledFlash<F> {
     ///
     /// # Errors
     /// Those of the flash.
-    pub(super) async fn format(&mut self) -> Result<(), F::Error> {
+    pub(super) async fn format(&mut self) -> Result<(), JournaledError<F::Error>> {
         self.blocked_at = None;
         self.journal = make_ours(&mut self.flash, self.capacity).await?;
         Ok(())
     }
 
-    async fn erase_one(&mut self, sector: u16, start: u32) -> Result<(), F::Error> {
-        self.journal.erasing(&mut self.flash, sector).await?;
-        self.flash.erase(start, start + sector_bytes::<F>()).await?;
-        self.journal.erased(&mut self.flash).await
+    async fn erase_one(&mut self, sector: u16, start: u32) -> Result<(), JournaledError<F::Error>> {
+        let noted = self.journal.erasing(&mut self.flash, sector).await;
+        noted.map_err(|_| JournaledError::Sector(self.journal.sector::<F>()))?;
+        if erase_sector(&mut self.flash, start).await.is_err() {
+            self.blind = Some(start);
+            return Err(JournaledError::Sector(number_of::<F>(start)));
+        }
+        self.tick_off().await
+    }
+
+    async fn tick_off(&mut self) -> Result<(), JournaledError<F::Error>> {
+        let noted = self.journal.erased(&mut self.flash).await;
+        noted.map_err(|_| JournaledError::Sector(self.journal.sector::<F>()))
+    }
+
+    fn is_blind(&self, at: u32) -> bool {
+        self.blind == Some(at - at % sector_bytes::<F>().max(1))
     }
 
     /// True if these bytes are at a marker word, the first or last of a sector.
@@ -212,17 +294,30 @@ fn word_bytes<F: NorFlash>() -> u32 {
 }
 
 /// Erases what is not blank, the log first: a journal says that the region is ours only when all of it is.
-async fn make_ours<F: NorFlash>(flash: &mut F, log: u32) -> Result<Journal, F::Error> {
-    for sector in (0..log).step_by(F::ERASE_SIZE) {
-        if !is_blank(flash, (sector, sector + sector_bytes::<F>())).await? {
-            flash.erase(sector, sector + sector_bytes::<F>()).await?;
+async fn make_ours<F: NorFlash>(flash: &mut F, log: u32) -> Result<Journal, JournaledError<F::Error>> {
+    for sector in (0..log + SECTORS * sector_bytes::<F>()).step_by(F::ERASE_SIZE) {
+        let is_blank = is_blank(flash, (sector, sector + sector_bytes::<F>())).await.map_err(JournaledError::Flash)?;
+        if !is_blank && erase_sector(flash, sector).await.is_err() {
+            return Err(JournaledError::Sector(number_of::<F>(sector)));
         }
     }
-    let mut journal_blank = true;
-    for sector in (log..log + SECTORS * sector_bytes::<F>()).step_by(F::ERASE_SIZE) {
-        journal_blank &= is_blank(flash, (sector, sector + sector_bytes::<F>())).await?;
+    Journal::create(flash, log).await.map_err(|_| JournaledError::Sector(number_of::<F>(log)))
+}
+
+async fn erase_sector<F: NorFlash>(flash: &mut F, start: u32) -> Result<(), F::Error> {
+    let mut outcome = Ok(());
+    for _ in 0..ERASE_TRIES {
+        outcome = flash.erase(start, start + sector_bytes::<F>()).await;
+        if outcome.is_ok() {
+            break;
+        }
     }
-    Journal::create(flash, log, journal_blank).await
+    outcome
+}
+
+/// Number of the sector at an address.
+fn number_of<F: NorFlash>(at: u32) -> u8 {
+    u8::try_from(at / sector_bytes::<F>().max(1)).unwrap_or(u8::MAX)
 }
 
 async fn is_blank<F: NorFlash>(flash: &mut F, (from, to): (u32, u32)) -> Result<bool, F::Error> {
@@ -249,6 +344,10 @@ impl<F: NorFlash> ReadNorFlash for JournaledFlash<F> {
     const READ_SIZE: usize = F::READ_SIZE;
 
     async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+        if self.is_blind(offset) {
+            bytes.fill(0xFF);
+            return Ok(());
+        }
         if !Self::is_marker(offset, bytes.len()) {
             return self.flash.read(offset, bytes).await.map_err(JournaledError::Flash);
         }
@@ -274,7 +373,7 @@ impl<F: NorFlash> NorFlash for JournaledFlash<F> {
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
         for start in (from..to).step_by(F::ERASE_SIZE) {
             let sector = u16::try_from(start / sector_bytes::<F>()).unwrap_or(u16::MAX);
-            self.erase_one(sector, start).await.map_err(JournaledError::Flash)?;
+            self.erase_one(sector, start).await?;
         }
         Ok(())
     }
@@ -285,6 +384,6 @@ impl<F: NorFlash> NorFlash for JournaledFlash<F> {
             self.blocked_at = Some(offset);
             return Err(JournaledError::NotBlank);
         }
-        self.flash.write(offset, bytes).await.map_err(JournaledError::Flash)
+        self.flash.write(offset, bytes).await.map_err(|_| JournaledError::Sector(number_of::<F>(offset)))
     }
 }

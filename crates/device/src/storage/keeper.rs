@@ -1,8 +1,6 @@
 //! The one task that touches the flash.
 
 use core::convert::Infallible;
-use core::future::poll_fn;
-use core::task::Poll;
 
 use embedded_storage_async::nor_flash::NorFlash;
 use sequential_storage::Error;
@@ -11,6 +9,8 @@ use sequential_storage::map::{MapConfig, MapStorage};
 
 use super::journaled::{Found, JournaledError, JournaledFlash};
 use super::library::Work;
+use super::pause::pause;
+use super::survey::{PLACES, SETTINGS, Survey};
 use super::{HOME_KEY, Opening, SECRET_KEY, WEIGHT_KEY};
 use crate::calibration::StoredHome;
 use crate::store::StoreError;
@@ -53,6 +53,12 @@ pub trait LibraryAccess {
     /// Notes that the flash holds a deletion for this place.
     fn forget(&mut self, slot: u8);
 
+    /// True if the library has this under the key: an image, weight or secret, or nothing where it is empty.
+    fn holds(&mut self, key: u8, bytes: &[u8]) -> bool;
+
+    /// The newest image of a place cannot be read, or it was deleted and that cannot; `head` are its first bytes.
+    fn lose(&mut self, slot: u8, head: &[u8]);
+
     /// All of the flash has been read.
     fn open(&mut self, opening: Opening);
 
@@ -72,19 +78,20 @@ pub async fn keep<F: NorFlash, D: LibraryAccess, const IMAGE: usize, const VALUE
 ) -> Infallible {
     let Scratch { image, value } = room;
     let mut log = match open(flash, value, desk).await {
-        Some((log, opening)) => {
+        Ok((log, opening)) => {
             desk.open(opening);
-            Some(log)
+            opening.bad_sector.map_or(Ok(log), |sector| Err(StoreError::Sector(sector)))
         }
-        None => {
-            desk.open(Opening { failed: true, ..Opening::default() });
-            None
+        Err(error) => {
+            let bad_sector = if let StoreError::Sector(sector) = error { Some(sector) } else { None };
+            desk.open(Opening { failed: true, bad_sector, ..Opening::default() });
+            Err(error)
         }
     };
-    if let Some(open) = &mut log
-        && clean(open).await.is_err()
+    if let Ok(open) = &mut log
+        && let Err(error) = clean(open).await
     {
-        log = None;
+        log = Err(medium(error));
     }
     loop {
         let Some(work) = desk.take(image) else {
@@ -92,12 +99,12 @@ pub async fn keep<F: NorFlash, D: LibraryAccess, const IMAGE: usize, const VALUE
             continue;
         };
         let outcome = match &mut log {
-            Some(open) => change(open, image, value, work).await,
-            None => Err(StoreError::Medium),
+            Ok(open) => change(open, image, value, work).await,
+            Err(error) => Err(*error),
         };
-        if outcome == Err(StoreError::Medium) {
+        if let Err(error @ (StoreError::Medium | StoreError::Sector(_))) = outcome {
             // Nothing is known of a flash that failed once; only a new start may trust it again.
-            log = None;
+            log = Err(error);
         }
         desk.settle(outcome);
     }
@@ -114,25 +121,24 @@ async fn clean<F: NorFlash>(log: &mut Log<F>) -> Result<(), JournaledError<F::Er
     Ok(())
 }
 
-/// Lets the caller do something else.
-async fn pause() {
-    let mut paused = false;
-    poll_fn(|_| {
-        if paused {
-            return Poll::Ready(());
-        }
-        paused = true;
-        Poll::Pending
-    })
-    .await;
-}
-
-/// Reads everything, oldest first, into the library. `None`: the flash does not work.
-async fn open<F: NorFlash, D: LibraryAccess>(flash: F, value: &mut [u8], desk: &mut D) -> Option<(Log<F>, Opening)> {
-    let bytes = JournaledFlash::log_bytes(&flash)?;
-    let (mut sound, found) = JournaledFlash::open(flash, bytes).await.ok()?;
-    let cleaned = sound.clean_markers().await.ok()?;
-    let config = MapConfig::try_new(0..bytes).ok()?;
+/// Reads everything, oldest first, into the library, and tells what is lost.
+///
+/// # Errors
+/// The flash does not work.
+async fn open<F: NorFlash, D: LibraryAccess>(
+    flash: F,
+    value: &mut [u8],
+    desk: &mut D,
+) -> Result<(Log<F>, Opening), StoreError> {
+    let bytes = JournaledFlash::log_bytes(&flash).ok_or(StoreError::Medium)?;
+    let (mut sound, found) = JournaledFlash::open(flash, bytes).await.map_err(medium)?;
+    let cleaned = match sound.clean_markers().await {
+        Ok(cleaned) => cleaned,
+        // What can be read is read nevertheless.
+        Err(JournaledError::Sector(_)) if sound.bad_sector().is_some() => 0,
+        Err(error) => return Err(medium(error)),
+    };
+    let config = MapConfig::try_new(0..bytes).map_err(|_| StoreError::Medium)?;
     let mut log = Log::new(sound, config, Cache::new_uncached());
     let mut opening = Opening {
         resumed: found == Found::Resumed,
@@ -141,14 +147,54 @@ async fn open<F: NorFlash, D: LibraryAccess>(flash: F, value: &mut [u8], desk: &
         ..Opening::default()
     };
     match read_all(&mut log, value, desk).await {
-        Ok((found, home)) => (opening.found, opening.home) = (found, home),
-        Err(Error::Storage { .. }) => return None,
+        Ok((found, home)) => {
+            (opening.found, opening.home) = (found, home);
+            (opening.settings_lost, opening.unread) =
+                tell_lost(log.flash(), value, desk, home).await.map_err(medium)?;
+        }
+        Err(Error::Storage { value, .. }) => return Err(medium(value)),
         Err(_) => {
-            log.flash().format().await.ok()?;
+            log.flash().format().await.map_err(medium)?;
             opening.formatted = true;
         }
     }
-    Some((log, opening))
+    opening.bad_sector = log.flash().bad_sector();
+    Ok((log, opening))
+}
+
+/// Tells the library which images are lost; returns which settings are, and how many values do not tell whose they are.
+async fn tell_lost<F: NorFlash, D: LibraryAccess>(
+    flash: &mut JournaledFlash<F>,
+    value: &mut [u8],
+    desk: &mut D,
+    home: StoredHome,
+) -> Result<(u8, u8), JournaledError<F::Error>> {
+    let mut survey = Survey::EMPTY;
+    survey.look(flash).await?;
+    let mut settings_lost = 0;
+    for (key, bit) in SETTINGS.into_iter().zip([1, 2, 4]) {
+        let Some((bytes, is_whole)) = survey.newest(key, flash, value).await? else { continue };
+        let is_held = match key {
+            HOME_KEY => StoredHome::read(bytes) == home,
+            _ => desk.holds(key, bytes),
+        };
+        settings_lost |= if is_whole && is_held { 0 } else { bit };
+    }
+    for place in 0..PLACES {
+        let Some((bytes, is_whole)) = survey.newest(place, flash, value).await? else { continue };
+        if !(is_whole && desk.holds(place, bytes)) {
+            desk.lose(place, bytes);
+        }
+        pause().await;
+    }
+    Ok((settings_lost, survey.unread))
+}
+
+fn medium<E>(error: JournaledError<E>) -> StoreError {
+    match error {
+        JournaledError::Sector(sector) => StoreError::Sector(sector),
+        JournaledError::Flash(_) | JournaledError::NotBlank => StoreError::Medium,
+    }
 }
 
 /// Tells the library every image, and weight and secret like one; the last one of a place counts. Returns the number of
@@ -158,7 +204,8 @@ async fn read_all<F: NorFlash, D: LibraryAccess>(
     value: &mut [u8],
     desk: &mut D,
 ) -> Result<(u8, StoredHome), Error<JournaledError<F::Error>>> {
-    let mut holding = [false; 256];
+    // A bit for each key: this lies on the stack.
+    let mut holding = [0_u32; 8];
     let mut home = StoredHome::Nothing;
     let mut values = log.fetch_all_items(value).await?;
     while let Some((slot, image)) = values.next::<&[u8]>(value).await? {
@@ -166,8 +213,10 @@ async fn read_all<F: NorFlash, D: LibraryAccess>(
             home = StoredHome::read(image);
             continue;
         }
-        if let Some(holds) = holding.get_mut(usize::from(slot)).filter(|_| !matches!(slot, WEIGHT_KEY | SECRET_KEY)) {
-            *holds = !image.is_empty();
+        let group = holding.get_mut(usize::from(slot / 32)).filter(|_| !matches!(slot, WEIGHT_KEY | SECRET_KEY));
+        if let Some(group) = group {
+            let bit = 1 << (slot % 32);
+            *group = if image.is_empty() { *group & !bit } else { *group | bit };
         }
         if image.is_empty() {
             desk.forget(slot);
@@ -177,7 +226,7 @@ async fn read_all<F: NorFlash, D: LibraryAccess>(
         // A long flash is read in parts: others have work to do.
         pause().await;
     }
-    let found = u8::try_from(holding.iter().filter(|holds| **holds).count()).unwrap_or(u8::MAX);
+    let found = u8::try_from(holding.iter().map(|group| group.count_ones()).sum::<u32>()).unwrap_or(u8::MAX);
     Ok((found, home))
 }
 
@@ -200,8 +249,9 @@ async fn change<F: NorFlash>(log: &mut Log<F>, image: &[u8], value: &mut [u8], w
     if kept == Some(content) { Ok(()) } else { Err(StoreError::Medium) }
 }
 
-fn refusal<E>(error: Error<E>) -> StoreError {
+fn refusal<E>(error: Error<JournaledError<E>>) -> StoreError {
     match error {
+        Error::Storage { value, .. } => medium(value),
         Error::FullStorage => StoreError::Full,
         Error::ItemTooBig | Error::BufferTooSmall(_) => StoreError::TooLarge,
         _ => StoreError::Medium,

@@ -1,8 +1,10 @@
 //! The library in memory, and what is to be done about it on the flash.
 
 use control::model::WeightCorrection;
-use link::Secret;
+use link::image::{NAMED_HEAD_BYTES, legible_name};
+use link::{LostImage, Secret, StorageReport};
 
+use super::survey::SETTINGS;
 use crate::calibration::{HOME_BYTES, Home, StoredHome};
 use crate::secret::StoredSecret;
 use crate::storage::{HOME_KEY, Opening, SECRET_KEY, WEIGHT_KEY};
@@ -39,6 +41,18 @@ impl Work {
     }
 }
 
+/// Remains of a lost image; all zeros where none is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Loss {
+    is_lost: bool,
+    /// The first bytes of the image, as far as they are known.
+    head: [u8; NAMED_HEAD_BYTES],
+}
+
+impl Loss {
+    const NONE: Self = Self { is_lost: false, head: [0; NAMED_HEAD_BYTES] };
+}
+
 /// Progress of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Job {
@@ -65,6 +79,7 @@ pub struct Library<const SLOTS: usize, const BYTES: usize> {
     job: Job,
     is_open: bool,
     opening: Opening,
+    losses: [Loss; SLOTS],
 }
 
 impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
@@ -81,6 +96,7 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
             job: Job::None,
             is_open: false,
             opening: Opening::NOTHING,
+            losses: [Loss::NONE; SLOTS],
         }
     }
 
@@ -114,6 +130,27 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         }
         let _ = self.memory.delete(slot);
         let _ = self.memory.finished();
+    }
+
+    /// True if this is what was restored under the key; nothing, for an image that is empty.
+    #[must_use]
+    pub fn holds(&self, key: u8, bytes: &[u8]) -> bool {
+        match key {
+            WEIGHT_KEY if bytes.is_empty() => self.weight == StoredWeight::Nothing,
+            WEIGHT_KEY => self.weight == StoredWeight::read(bytes),
+            SECRET_KEY if bytes.is_empty() => self.secret == StoredSecret::Nothing,
+            SECRET_KEY => self.secret == StoredSecret::read(bytes),
+            // What is no place of this library cannot be lost to it.
+            _ => key >= self.slots() || self.memory.image(key).unwrap_or_default() == bytes,
+        }
+    }
+
+    /// The keeper found that the newest image of a place cannot be read; these are its first bytes.
+    pub fn lose(&mut self, slot: u8, head: &[u8]) {
+        if let Some(loss) = self.losses.get_mut(usize::from(slot)) {
+            loss.is_lost = true;
+            loss.head.iter_mut().zip(head).for_each(|(place, byte)| *place = *byte);
+        }
     }
 
     /// The keeper found everything there was.
@@ -163,11 +200,29 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
             Work::Save { slot, .. } => outcome.and_then(|()| self.memory.commit(slot)),
             Work::Delete { slot } => outcome.and_then(|()| self.memory.delete(slot)),
         };
+        match outcome {
+            Ok(()) => self.make_good(work),
+            Err(StoreError::Sector(sector)) => self.opening.bad_sector = Some(sector),
+            Err(_) => {}
+        }
         let _ = self.memory.finished();
         if outcome.is_err() && !work.is_of_setting() {
             self.memory.abort();
         }
         self.job = Job::Over(outcome);
+    }
+
+    /// Another value stands there now: nobody misses the lost one.
+    fn make_good(&mut self, work: Work) {
+        let (Work::Save { slot, .. } | Work::Delete { slot }) = work;
+        match SETTINGS.iter().position(|setting| *setting == slot) {
+            Some(place) => self.opening.settings_lost &= !(1 << place),
+            None => {
+                if let Some(loss) = self.losses.get_mut(usize::from(slot)) {
+                    *loss = Loss::NONE;
+                }
+            }
+        }
     }
 
     /// The setting that is being kept.
@@ -294,6 +349,24 @@ impl<const SLOTS: usize, const BYTES: usize> Store for Library<SLOTS, BYTES> {
 
     fn forget_secret(&mut self) -> Result<(), StoreError> {
         self.ask(Work::Delete { slot: SECRET_KEY })
+    }
+
+    fn report(&self, slot: u8) -> StorageReport {
+        let Opening { formatted, failed, bad_sector, settings_lost, unread, .. } = self.opening;
+        let loss = self.losses.get(usize::from(slot)).filter(|loss| loss.is_lost);
+        StorageReport {
+            formatted,
+            failed,
+            bad_sector,
+            lost: u8::try_from(self.losses.iter().filter(|loss| loss.is_lost).count()).unwrap_or(u8::MAX),
+            settings_lost,
+            unread,
+            loss: loss.map(|loss| LostImage {
+                place: slot,
+                name: legible_name(&loss.head),
+                older: self.memory.image(slot).is_some(),
+            }),
+        }
     }
 
     fn finished(&mut self) -> Option<Result<(), StoreError>> {

@@ -12,13 +12,16 @@
 //! of a key counts, an older one goes only when its sector is needed and all that still counts has been copied. Layout,
 //! guarantees and measurements: `docs/storage.md`.
 
+mod header;
 mod journal;
 mod journaled;
 mod keeper;
 mod library;
+mod pause;
+mod survey;
 
 pub use keeper::{LibraryAccess, Scratch, keep, value_bytes};
-pub use library::{Library, Work};
+pub use library::{Library, Loss, Work};
 
 use core::fmt;
 
@@ -48,6 +51,12 @@ pub struct Opening {
     pub cleaned: u8,
     /// The flash does not work: what is stored from now on is refused.
     pub failed: bool,
+    /// The sector that cannot be erased: what can be read is there, what is stored from now on is refused.
+    pub bad_sector: Option<u8>,
+    /// Settings of which the newest value is lost: 1 the home, 2 the weight, 4 the secret.
+    pub settings_lost: u8,
+    /// Damaged values, maybe old ones, that do not tell whose they are.
+    pub unread: u8,
     /// The home of the arm.
     pub home: StoredHome,
     /// Whose weight the arm's links are taken to have. The keeper leaves it to the library.
@@ -64,6 +73,9 @@ impl Opening {
         resumed: false,
         cleaned: 0,
         failed: false,
+        bad_sector: None,
+        settings_lost: 0,
+        unread: 0,
         home: StoredHome::Nothing,
         weight: HomeSource::Model,
         secret: SecretState::Nothing,
@@ -75,7 +87,7 @@ impl fmt::Display for Opening {
         match self {
             Self { failed: true, .. } => f.write_str("the storage does not work: nothing is kept over a restart"),
             Self { formatted: true, .. } => f.write_str("the storage was blank or foreign; it is empty now"),
-            Self { found, resumed, cleaned, home, weight, secret, .. } => {
+            Self { found, resumed, cleaned, home, weight, secret, bad_sector, .. } => {
                 write!(f, "{found} images in the storage")?;
                 match home {
                     StoredHome::Nothing => {}
@@ -103,7 +115,13 @@ impl fmt::Display for Opening {
                 if *resumed {
                     f.write_str("; an interrupted erase was finished")?;
                 }
-                if *cleaned > 0 { write!(f, "; {cleaned} damaged sectors were erased") } else { Ok(()) }
+                if *cleaned > 0 {
+                    write!(f, "; {cleaned} damaged sectors were erased")?;
+                }
+                match bad_sector {
+                    Some(sector) => write!(f, "; sector {sector} cannot be erased, so nothing more is kept"),
+                    None => Ok(()),
+                }
             }
         }
     }

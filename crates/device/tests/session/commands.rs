@@ -129,7 +129,7 @@ fn a_primitive_the_control_half_does_not_take_is_not_run() {
     let run = |text| Request::Run { name: name(text), options: RunOptions::default() };
     rig.commanded(run("reach"));
     rig.bench.load = Err(control::LoadRefusal::OtherTool);
-    assert_eq!(rig.refused(run("grasp")).0, Refusal::NotReady);
+    assert_eq!(rig.refused(run("grasp")).0, Refusal::OtherTool);
     assert_eq!(rig.bench.commands.len(), 1, "the old one would have run under the new name");
     rig.bench.load = Ok(());
     rig.commanded(run("grasp"));

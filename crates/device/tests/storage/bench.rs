@@ -34,6 +34,14 @@ impl<const SLOTS: usize> LibraryAccess for Shared<SLOTS> {
         self.library().forget(slot);
     }
 
+    fn holds(&mut self, key: u8, bytes: &[u8]) -> bool {
+        self.library().holds(key, bytes)
+    }
+
+    fn lose(&mut self, slot: u8, head: &[u8]) {
+        self.library().lose(slot, head);
+    }
+
     fn open(&mut self, opening: Opening) {
         self.library().open(opening);
     }
@@ -52,6 +60,8 @@ impl<const SLOTS: usize> LibraryAccess for Shared<SLOTS> {
 pub(crate) enum Wish {
     /// Store the image of this number at a place.
     Save(u8, u8),
+    /// Store the image of this number at a place, with the head of one that has a name.
+    Named(u8, u8),
     /// Store [`TINY`] at a place.
     Tiny(u8),
     Delete(u8),
@@ -93,6 +103,16 @@ pub(crate) fn image(number: u8) -> Vec<u8> {
     (0..length).map(|place| number ^ (place as u8).wrapping_mul(31)).collect()
 }
 
+/// An image whose head has the name "image-NUMBER".
+pub(crate) fn named(number: u8) -> Vec<u8> {
+    let mut image = image(number);
+    image[..16].copy_from_slice(b"TACP\x01\x00\x00\x00\x01\x02\x03\x04\x05\x06\x07\x08");
+    image[16..48].fill(0);
+    let name = format!("image-{number}");
+    image[16..16 + name.len()].copy_from_slice(name.as_bytes());
+    image
+}
+
 /// Starts the device on this flash, has it fulfil the wishes one after the other, and gives its library and the
 /// answers. `None` in place of an answer: power failed before it came.
 pub(crate) fn run<const SLOTS: usize, F: NorFlash>(
@@ -117,6 +137,7 @@ pub(crate) fn run<const SLOTS: usize, F: NorFlash>(
         }
         let asked = match *wish {
             Wish::Save(slot, number) => save(&mut shared.library(), slot, &image(number)),
+            Wish::Named(slot, number) => save(&mut shared.library(), slot, &named(number)),
             Wish::Tiny(slot) => save(&mut shared.library(), slot, &TINY),
             Wish::Delete(slot) => shared.library().delete(slot),
             Wish::Rename(slot, number) => rename(&mut shared.library(), slot, number),
@@ -176,6 +197,12 @@ impl LibraryAccess for Forger<'_> {
     fn restore(&mut self, _: u8, _: &[u8]) {}
 
     fn forget(&mut self, _: u8) {}
+
+    fn holds(&mut self, _: u8, _: &[u8]) -> bool {
+        true
+    }
+
+    fn lose(&mut self, _: u8, _: &[u8]) {}
 
     fn open(&mut self, _: Opening) {}
 

@@ -106,6 +106,7 @@ fn cut_everywhere(before: &[u8], wish: Wish) -> usize {
     // The place that is written to afterwards, to see that everything works on.
     let slot = match wish {
         Wish::Save(slot, number) => put(slot, Some(number)),
+        Wish::Named(slot, _) => put(slot, Some(b'T')),
         Wish::Tiny(slot) => put(slot, Some(TINY[0])),
         Wish::Delete(slot) => put(slot, None),
         Wish::Rename(slot, number) => put(slot, Some(number)),

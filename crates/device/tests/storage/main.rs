@@ -3,5 +3,6 @@
 mod bench;
 mod cuts;
 mod flipped;
+mod lost;
 mod refusals;
 mod without_journal;

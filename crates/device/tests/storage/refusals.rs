@@ -223,7 +223,8 @@ fn a_flash_that_fails_refuses_and_the_memory_stays_as_it_was() {
     run_on::<4>(&chip, &[Wish::Save(0, 1)]);
     let failing = failing::Failing { port: FlashPort::new(chip.clone(), VirtualClock::default()), writes_left: 40 };
     let (shared, answers) = run::<4, _>(failing, &[Wish::Save(0, 2), Wish::Save(1, 3), Wish::Delete(0)]);
-    assert_eq!(answers, [Some(Err(StoreError::Medium)); 3]);
+    assert_eq!(answers, [Some(Err(StoreError::Sector(0))); 3]);
+    assert_eq!(shared.library().report(0).bad_sector, Some(0));
     assert_eq!(shared.library().image(0), Some(image(1).as_slice()));
     assert_eq!(shared.library().image(1), None);
 }

@@ -12,6 +12,7 @@ mod interrupt;
 mod motion;
 mod observe;
 mod secret;
+mod storage;
 mod telemetry;
 mod transfer;
 mod upload;

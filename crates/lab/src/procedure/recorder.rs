@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::time::Duration;
 
+use device::Stage;
 use link::{Event, Telemetry};
 
 use super::ProcedureError;
@@ -11,9 +12,26 @@ use crate::client::{Client, Incoming};
 use crate::demonstration::RATE;
 use crate::demonstration::{RecordingRow, RecordingWriter};
 use crate::device::Device;
+use crate::error::{HostError, explain_blocked};
 
 /// Silence on the stream after which the device counts as lost.
 const SILENCE: Duration = Duration::from_secs(1);
+
+/// Time for what has come while nobody read it.
+const BEHIND: Duration = Duration::from_millis(100);
+
+/// Why no cycle comes.
+fn silence(client: &mut Client<Device>) -> ProcedureError {
+    let status = client.status().ok();
+    let stage = status.as_ref().and_then(|status| Stage::from_code(status.startup_stage));
+    match (status.and_then(|status| status.blocked), stage) {
+        (Some(reason), _) => ProcedureError::NotReady(explain_blocked(reason)),
+        (None, Some(stage)) if stage < Stage::WaitingForActive => {
+            ProcedureError::NotReady(stage.explanation().to_owned())
+        }
+        _ => HostError::NoAnswer { request: "telemetry", after: SILENCE }.into(),
+    }
+}
 
 /// One thing a recorder came by.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,6 +105,8 @@ impl<W: Write> CycleWriter<W> {
 /// A recording that is being made.
 pub struct Recorder<W: Write> {
     writer: CycleWriter<W>,
+    /// Time of the last cycle. Events do not count: a start-up that is tried again and again tells of nothing else.
+    heard: Duration,
 }
 
 impl<W: Write> Recorder<W> {
@@ -97,21 +117,29 @@ impl<W: Write> Recorder<W> {
     pub fn start(client: &mut Client<Device>, output: W, notes: &str) -> Result<Self, ProcedureError> {
         let writer = CycleWriter::new(output, notes)?;
         client.set_telemetry(1)?;
-        Ok(Self { writer })
+        Ok(Self { writer, heard: client.now() })
     }
 
     /// Waits for the next cycle or event, and writes a cycle down.
     ///
     /// # Errors
-    /// [`crate::error::HostError::NoAnswer`] after a second without either, and as [`Client::next`].
+    /// After a second without a cycle [`ProcedureError::NotReady`] if the start-up waits or is blocked, as there are no
+    /// cycles then, else [`crate::error::HostError::NoAnswer`]; and as [`Client::next`].
     pub fn take(&mut self, client: &mut Client<Device>) -> Result<Take, ProcedureError> {
-        match client.next(SILENCE)? {
+        let left = SILENCE.saturating_sub(client.now().saturating_sub(self.heard));
+        match client.next(left.max(BEHIND))? {
             Some(Incoming::Telemetry(telemetry)) => {
+                self.heard = client.now();
                 self.writer.write(&telemetry)?;
                 Ok(Take::Cycle(telemetry))
             }
-            Some(Incoming::Event(event)) => Ok(Take::Event(event)),
-            None => Err(crate::error::HostError::NoAnswer { request: "telemetry", after: SILENCE }.into()),
+            Some(Incoming::Event(event)) if !left.is_zero() => Ok(Take::Event(event)),
+            Some(Incoming::Event(event)) => match silence(client) {
+                // Cycles wait behind it: this program was kept from reading them.
+                ProcedureError::Host(_) => Ok(Take::Event(event)),
+                waits => Err(waits),
+            },
+            None => Err(silence(client)),
         }
     }
 

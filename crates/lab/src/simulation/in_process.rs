@@ -60,6 +60,14 @@ impl LibraryAccess for SharedSession {
         self.lock().store_mut().forget(slot);
     }
 
+    fn holds(&mut self, key: u8, bytes: &[u8]) -> bool {
+        self.lock().store_mut().holds(key, bytes)
+    }
+
+    fn lose(&mut self, slot: u8, head: &[u8]) {
+        self.lock().store_mut().lose(slot, head);
+    }
+
     fn open(&mut self, opening: Opening) {
         self.lock().store_mut().open(opening);
     }

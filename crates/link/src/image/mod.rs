@@ -25,5 +25,5 @@ pub use layout::{
     COUPLED_ROWS, EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_BYTES_LIMIT, IMAGE_SCHEMA, KERNEL_LIMIT, MAGIC,
     SENSOR_ROWS, STATISTICS_POINTS_LIMIT, STATISTICS_ROWS, WEIGHT_ROWS, image_bytes,
 };
-pub use read::{PrimitiveImage, Reals, stored_crc};
+pub use read::{PrimitiveImage, Reals, legible_name, stored_crc};
 pub use write::{NAMED_HEAD_BYTES, renamed_head};

@@ -9,6 +9,7 @@ use super::layout::{
     COUPLED_ROWS, CRC_BYTES, FLAG_NEAREST_HEMISPHERE, FLAG_ROTATION_VECTOR, HEADER_BYTES, IMAGE_SCHEMA, KNOWN_FLAGS,
     MAGIC, REAL_BYTES, SENSOR_ROWS, STATISTICS_ROWS, WEIGHT_ROWS,
 };
+use super::write::NAMED_HEAD_BYTES;
 use crate::frame::CRC;
 use crate::name::{NAME_BYTES, Name};
 
@@ -160,6 +161,14 @@ impl<'a> PrimitiveImage<'a> {
 #[must_use]
 pub fn stored_crc(image: &[u8]) -> u32 {
     image.split_last_chunk::<CRC_BYTES>().map_or(0, |(covered, _)| CRC.checksum(covered))
+}
+
+/// The name in the first bytes of an image that may be damaged; `None`: it cannot be one. A bit that has fallen over
+/// may have made another name of it.
+#[must_use]
+pub fn legible_name(head: &[u8]) -> Option<Name> {
+    let head = head.first_chunk::<NAMED_HEAD_BYTES>()?;
+    parse_name(head.last_chunk()?).ok()
 }
 
 fn parse_name(bytes: &[u8; NAME_BYTES]) -> Result<Name, ImageError> {

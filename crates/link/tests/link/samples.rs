@@ -7,8 +7,8 @@ use link::image::{
 use link::message::{AccelerationSource, ChunkData, PoseFeedback};
 use link::{
     Calibration, Capabilities, DeviceHello, Event, EventKind, FaultRecord, Goal, HandStage, HomeSource, HostHello,
-    LinkCounters, Listing, Name, Refusal, Reply, Request, RunOptions, Secret, SecretReport, SecretState, SessionOwner,
-    Statistics, Status, Telemetry, Text, Weight,
+    LinkCounters, Listing, LostImage, Name, Refusal, Reply, Request, RunOptions, Secret, SecretReport, SecretState,
+    SessionOwner, Statistics, Status, StorageReport, Telemetry, Text, Weight,
 };
 
 fn name() -> Name {
@@ -81,6 +81,7 @@ pub(crate) fn requests() -> Vec<Request> {
         Request::Prove { proof: 0xFEDC_BA98_7654_3210 },
         Request::KeepSecret { secret: Secret::new(core::array::from_fn(|index| 0xF0 + index as u8)) },
         Request::ForgetSecret,
+        Request::Storage { place: 3 },
     ]
 }
 
@@ -129,6 +130,7 @@ pub(crate) fn request_index(request: &Request) -> usize {
         Request::Prove { .. } => 39,
         Request::KeepSecret { .. } => 40,
         Request::ForgetSecret => 41,
+        Request::Storage { .. } => 42,
     }
 }
 
@@ -236,6 +238,18 @@ pub(crate) fn replies() -> Vec<Reply> {
         Reply::Owner { of: 13, owner: Some(SessionOwner { name: Text::new("eve@lab4"), since_ms: 95_000 }) },
         Reply::Secret { of: 14, secret: SecretReport { state: SecretState::Kept, proven: true, wrong_proofs: 300 } },
         Reply::Challenge { of: 15, nonce: 0x0123_4567_89AB_CDEF },
+        Reply::Storage {
+            of: 16,
+            storage: StorageReport {
+                formatted: false,
+                failed: true,
+                bad_sector: Some(5),
+                lost: 2,
+                settings_lost: 6,
+                unread: 7,
+                loss: Some(LostImage { place: 3, name: Some(name()), older: true }),
+            },
+        },
     ]
 }
 
@@ -258,6 +272,7 @@ pub(crate) fn reply_index(reply: &Reply) -> usize {
         Reply::Owner { .. } => 13,
         Reply::Secret { .. } => 14,
         Reply::Challenge { .. } => 15,
+        Reply::Storage { .. } => 16,
     }
 }
 

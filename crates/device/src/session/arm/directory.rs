@@ -2,7 +2,8 @@
 //!
 //! Checking an image costs a check sum over all its bytes; looking a name up must not.
 
-use link::{Listing, Name, PrimitiveImage};
+use link::image::legible_name;
+use link::{Listing, LostImage, Name, PrimitiveImage, StorageReport};
 
 use crate::store::Store;
 
@@ -91,6 +92,21 @@ impl Directory {
     /// A place to put an image of a new name: a free one. Its store may still hold an unsound image there.
     pub(crate) fn free(&self) -> Option<u8> {
         (0..self.places).find(|slot| self.get(*slot).is_none())
+    }
+
+    /// Adds to what the store reports about a place: an image that the store could read and that is not sound is lost,
+    /// and one whose name stands elsewhere by now is not missed.
+    pub(crate) fn complete(&self, store: &impl Store, place: u8) -> StorageReport {
+        let mut report = store.report(place);
+        if report.loss.is_none()
+            && self.get(place).is_none()
+            && let Some(image) = store.image(place)
+        {
+            report.loss = Some(LostImage { place, name: legible_name(image), older: false });
+        }
+        let is_back = |loss: &LostImage| loss.name.as_ref().is_some_and(|name| self.find(name).is_some());
+        report.loss = report.loss.filter(|loss| loss.older || !is_back(loss));
+        report
     }
 
     /// Notes what is at a place now.

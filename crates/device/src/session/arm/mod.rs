@@ -122,7 +122,7 @@ impl<S: Store> ArmApplication<S> {
         let entry = entry.clone();
         let health = port.health();
         self.follow_arm(&health);
-        let (state, stage) = (health.state, health.stage);
+        let state = health.state;
         if self.loaded.as_ref().is_some_and(|loaded| loaded.is_same(&entry)) {
             return Ok(());
         }
@@ -148,7 +148,7 @@ impl<S: Store> ArmApplication<S> {
         port.load(&fit).map_err(|refusal| match refusal {
             LoadRefusal::Running => (Refusal::State, [State::Run.code().into(), 0]),
             // The bus has been started anew since the check began.
-            LoadRefusal::OtherTool => (Refusal::NotReady, [stage.code().into(), 0]),
+            LoadRefusal::OtherTool => (Refusal::OtherTool, [0, 0]),
         })?;
         self.loaded = Some(entry);
         Ok(())
@@ -354,6 +354,7 @@ impl<S: Store> Application for ArmApplication<S> {
             Request::ForgetWeight => return self.forget_weight().map(|()| Action::Save),
             Request::KeepSecret { secret } => return self.keep_secret(&secret).map(|()| Action::Save),
             Request::ForgetSecret => return self.forget_secret().map(|()| Action::Save),
+            Request::Storage { place } => return self.storage(of, place).map(Action::Answer),
             // What every device does in the same way has not come here.
             Request::Hello(_)
             | Request::Goodbye

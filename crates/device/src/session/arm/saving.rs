@@ -1,6 +1,6 @@
 //! A change of the store on its way to being durable: the host is answered when it is.
 
-use link::{Name, Refusal};
+use link::{Name, Refusal, Reply};
 
 use crate::application::{Refused, Saved, SessionPort};
 use crate::controller::DeviceController;
@@ -86,6 +86,20 @@ impl<S: Store> ArmApplication<S> {
         }
     }
 
+    /// Losses of the storage; their number of lost images counts every place.
+    #[inline(never)]
+    pub(super) fn storage(&self, of: u16, place: u8) -> Result<Reply, Refused> {
+        self.need_open()?;
+        let places = self.directory.places();
+        if place >= places {
+            return Err((Refusal::NoSuchPrimitive, [places.into(), 0]));
+        }
+        let lost = (0..places).filter(|place| self.directory.complete(&self.store, *place).loss.is_some()).count();
+        let mut storage = self.directory.complete(&self.store, place);
+        storage.lost = u8::try_from(lost).unwrap_or(u8::MAX);
+        Ok(Reply::Storage { of, storage })
+    }
+
     /// Refuses what needs a store that is not open yet.
     pub(super) fn need_open(&self) -> Result<(), Refused> {
         if self.opened { Ok(()) } else { Err(StoreError::Busy.into()) }
@@ -96,6 +110,7 @@ impl From<StoreError> for Refused {
     fn from(error: StoreError) -> Self {
         match error {
             StoreError::Full => (Refusal::StoreFull, [0, 0]),
+            StoreError::Sector(sector) => (Refusal::StoreWorn, [sector.into(), 0]),
             other => (Refusal::StoreFailed, [other.code(), 0]),
         }
     }

@@ -197,7 +197,7 @@ impl<A: Application> HostSession<A> {
             Request::FaultRecord | Request::FaultCycle { .. } => return Ok(fault_record(of, &request, port)),
             Request::Owner => return Ok(self.owner_report(now_ms, of)),
             Request::Secret => return self.secret_report(of, false),
-            Request::Calibration | Request::Weight => {
+            Request::Calibration | Request::Weight | Request::Storage { .. } => {
                 let calm = self.pending.is_empty();
                 if let Action::Answer(reply) = self.application.act(of, request, calm, port)? {
                     return Ok(reply);
