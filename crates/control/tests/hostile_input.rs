@@ -238,8 +238,13 @@ fn any_state() -> impl Strategy<Value = State> {
     prop::sample::select(vec![State::Idle, State::Gravity, State::Hold, State::Approach, State::Run, State::SoftStop])
 }
 
+/// Cases of up to 60 cycles: 4 000, or as many as `TACTUS_FUZZ_CYCLES` says.
+fn cases() -> u32 {
+    std::env::var("TACTUS_FUZZ_CYCLES").ok().and_then(|number| number.parse().ok()).unwrap_or(4_000)
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 4_000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn b1_any_input_in_any_state_gives_finite_torques_within_limits(
