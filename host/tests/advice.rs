@@ -341,3 +341,19 @@ fn a_simulated_arm_that_began_with_the_command_says_that_its_fault_memory_began_
     let (code, help) = refused(at, &format!("{device} faults --record fault.csv"));
     assert!(code == "E690" && help.contains("`tactus sim`"), "{code}: {help}");
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_device_node_is_no_flash_and_a_file_that_is_too_long_does_not_make_a_full_disk() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for line in ["upload /dev/zero", "learn /dev/zero -o zero.toml", "compare /dev/zero /dev/zero"] {
+        let (code, help) = refused(at, &format!("{DEVICE} {line}"));
+        assert!(code != "E235" && !help.contains("make room"), "{line}: {code}: {help}");
+    }
+    for node in ["/dev/null", "/dev/zero"] {
+        let output = tactus(at, &format!("--device sil:world=simple,flash={node} list"));
+        let words = said(&output);
+        assert!(words.contains("E213") && words.contains("it is no regular file"), "{node}: {words}");
+    }
+}

@@ -120,6 +120,10 @@ impl Flash {
     /// # Errors
     /// The file cannot be opened or read, another device uses it, or it has another size than the flash.
     pub fn in_file(path: &Path, times: FlashTimes) -> io::Result<Self> {
+        // A node such as /dev/zero has no end, and one such as /dev/null keeps nothing.
+        if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is no regular file"));
+        }
         let mut file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
         // Two devices on one flash would each write what the other does not know.
         file.try_lock().map_err(|cause| match cause {

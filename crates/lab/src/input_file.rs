@@ -14,13 +14,13 @@ pub const LONGEST_TEXT: u64 = 16 << 20;
 /// Reads a file of at most so many bytes. A device that never ends, such as `/dev/zero`, would fill the memory.
 ///
 /// # Errors
-/// Those of the system; [`ErrorKind::FileTooLarge`] says the limit.
+/// Those of the system; [`ErrorKind::InvalidData`] says the limit.
 pub fn read(path: &Path, longest: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(longest + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > longest {
         let cause = format!("it has more than the {} MiB that such a file can have", longest >> 20);
-        return Err(Error::new(ErrorKind::FileTooLarge, cause));
+        return Err(Error::new(ErrorKind::InvalidData, cause));
     }
     Ok(bytes)
 }
@@ -44,8 +44,8 @@ mod tests {
         let file = folder.path().join("a");
         std::fs::write(&file, [7; 100]).unwrap();
         assert_eq!(read(&file, 100).unwrap(), [7; 100]);
-        assert_eq!(read(&file, 99).unwrap_err().kind(), ErrorKind::FileTooLarge);
-        assert_eq!(read(Path::new("/dev/zero"), LONGEST_TEXT).unwrap_err().kind(), ErrorKind::FileTooLarge);
+        assert_eq!(read(&file, 99).unwrap_err().kind(), ErrorKind::InvalidData);
+        assert_eq!(read(Path::new("/dev/zero"), LONGEST_TEXT).unwrap_err().kind(), ErrorKind::InvalidData);
         assert_eq!(read(&folder.path().join("b"), 1).unwrap_err().kind(), ErrorKind::NotFound);
         std::fs::write(&file, [0xFF]).unwrap();
         assert_eq!(read_text(&file).unwrap_err().kind(), ErrorKind::InvalidData);

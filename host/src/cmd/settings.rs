@@ -292,7 +292,7 @@ fn compared(client: &Client<Device>, changes: &[Change], missing: Vec<Key>) -> C
 fn read_text(path: &Path, doing: &str) -> Result<String, Failure> {
     input_file::read_text(path).map_err(|cause| {
         if cause.kind() == std::io::ErrorKind::InvalidData {
-            return invalid("it is not text", path, doing);
+            return invalid(cause, path, doing);
         }
         Failure::of_file(ErrorCode::FileFailed, format!("{doing}: {}", path.display()), cause)
     })
