@@ -1,5 +1,6 @@
 //! The outcome of a trial, and what happened to the object on the way.
 
+use control::Fault;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -211,7 +212,9 @@ pub fn judge(
     let touching: Vec<f64> = forces.iter().copied().filter(|force| *force > TOUCH).collect();
     let grasp_moved = run.last().map_or(0.0, moved);
     let tilt = run.iter().map(|sample| sample.tilt).fold(0.0, f64::max);
-    let outcome = if let Some(fault) = fault {
+    let outcome = if fault == Some(Fault::Shaking.explanation()) {
+        Outcome::Unstable
+    } else if let Some(fault) = fault {
         Outcome::Stopped(fault.to_owned())
     } else if observation.crushed {
         Outcome::Crushed
@@ -421,6 +424,8 @@ mod tests {
         observation.samples.iter_mut().for_each(|sample| sample.object[2] = 0.0);
         assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, conduct(0.4)).0, Outcome::Unstable);
         assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, conduct(0.25)).0, Outcome::Missed);
+        let stopped = ArmConduct { fault: Some(Fault::Shaking.explanation()), ..ArmConduct::default() };
+        assert_eq!(judge(&good(), &MILESTONES, UPRIGHT, stopped).0, Outcome::Unstable, "one that was stopped for it");
     }
 
     #[test]

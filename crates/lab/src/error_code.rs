@@ -330,6 +330,10 @@ error_codes! {
     LoadNotTold = 650: "what the wrist carries cannot be told",
         "there is no wrist sensor, messages were lost, or what is held moved in the hand",
         "hold it fast, keep it from touching anything, then again";
+    ImageInvalid = 651: "the image to be uploaded is not sound", "a defect of the tool",
+        "make the primitive again with `tactus learn`";
+    ReadBackDiffers = 652: "reading the primitive back gave other bytes", "the device's storage, or the line",
+        "upload again; if it persists the device's storage is worn out";
     PayloadContradicted = 653: "what the arm carries was measured and is not believed",
         "the wrist sensor and the joints tell different loads: one of them is wrong, something touches the arm or what it \
          carries, or something hangs on the arm before the sensor",
@@ -338,10 +342,6 @@ error_codes! {
     EmptyHandInvalid = 654: "the report of the empty hand cannot be used",
         "it is of another arm or of another calibration, or was not believed",
         "empty the hand, then `tactus calibrate payload --measure --report FILE` makes one";
-    ImageInvalid = 651: "the image to be uploaded is not sound", "a defect of the tool",
-        "make the primitive again with `tactus learn`";
-    ReadBackDiffers = 652: "reading the primitive back gave other bytes", "the device's storage, or the line",
-        "upload again; if it persists the device's storage is worn out";
     OutOfReach = 660: "the arm does not reach the object in every cell", "the grid is larger than the arm's reach",
         "leave these cells out, for example with `--grid 4x3` or a list of `--cells`";
     ResultsDamaged = 661: "the results in the folder cannot be read", "a line was changed or cut",
