@@ -38,7 +38,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ("run", "keep", "a folder that nobody had before: host/tests/keep.rs"),
     ("gravity", "report", "as that of `home`; minutes of motion: host/tests/weighing.rs"),
     ("friction", "report", "as that of `gravity`"),
-    ("load", "report", "as that of `gravity`"),
+    ("payload", "report", "as that of `gravity`"),
     ("experiment", "out", "needs MuJoCo; its files are replaced whole: crates/experiment/src/results.rs"),
     ("faults", "record", "written by the same function as `record`"),
     ("sim", "flash", "a flash, whose power may fail in any word: tests/tests/system/storage.rs"),
