@@ -21,6 +21,7 @@ mod weight;
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use device::StoreError;
 use link::frame::{self, Decoder, Envelope, FRAME_BYTES};
 use link::message::{DeviceHello, HostHello};
 use link::{
@@ -58,6 +59,12 @@ const FRESH: Duration = Duration::from_millis(200);
 
 /// Longest wait for another host to be gone. A killed one keeps its session for half a second.
 const BUSY_TIMEOUT: Duration = Duration::from_millis(1500);
+
+/// Longest time for which a device reads its storage.
+const STORE_BUSY: Duration = Duration::from_secs(3);
+
+/// Time between two tries meanwhile.
+const STORE_TRY: Duration = Duration::from_millis(20);
 
 /// Something the device sent unasked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -285,7 +292,7 @@ impl<T: Transport> Client<T> {
         if request.moves() && self.transport.now().saturating_sub(self.heard) > FRESH {
             self.exchange(&Request::Ping)?;
         }
-        let reply = self.exchange(request)?;
+        let reply = self.exchange_patiently(request)?;
         match request {
             Request::Gravity | Request::Approach { .. } | Request::Run { .. } => self.moving = true,
             Request::MoveHand { .. } | Request::InitialiseHand => self.hand_ordered = true,
@@ -301,6 +308,21 @@ impl<T: Transport> Client<T> {
         match self.request(request)? {
             Reply::Accepted { .. } => Ok(()),
             _ => Err(HostError::WrongAnswer { request: request.name() }),
+        }
+    }
+
+    /// As [`Client::exchange`]; a device that is still reading its storage, as it does after a start, is waited for.
+    fn exchange_patiently(&mut self, request: &Request) -> Result<Reply, HostError> {
+        let (end, busy) = (self.transport.now() + STORE_BUSY, StoreError::Busy.code());
+        loop {
+            match self.exchange(request) {
+                Err(HostError::Refused { reason: Refusal::StoreFailed, detail: [code, _], .. })
+                    if code == busy && self.transport.now() < end =>
+                {
+                    self.pump(STORE_TRY)?;
+                }
+                answered => return answered,
+            }
         }
     }
 
