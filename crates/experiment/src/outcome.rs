@@ -187,6 +187,11 @@ pub struct ArmConduct<'a> {
     pub shaking: f64,
 }
 
+/// Outcome of a trial in which the arm was stopped by this fault.
+fn stopped(fault: &str) -> Outcome {
+    if fault == Fault::Shaking.explanation() { Outcome::Unstable } else { Outcome::Stopped(fault.to_owned()) }
+}
+
 /// Judges a trial.
 pub fn judge(
     observation: &Observation,
@@ -212,10 +217,8 @@ pub fn judge(
     let touching: Vec<f64> = forces.iter().copied().filter(|force| *force > TOUCH).collect();
     let grasp_moved = run.last().map_or(0.0, moved);
     let tilt = run.iter().map(|sample| sample.tilt).fold(0.0, f64::max);
-    let outcome = if fault == Some(Fault::Shaking.explanation()) {
-        Outcome::Unstable
-    } else if let Some(fault) = fault {
-        Outcome::Stopped(fault.to_owned())
+    let outcome = if let Some(fault) = fault {
+        stopped(fault)
     } else if observation.crushed {
         Outcome::Crushed
     } else if rule.upright && tilt > TILT_LIMIT {
