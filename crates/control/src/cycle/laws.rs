@@ -52,9 +52,7 @@ pub(super) struct Demand<R: Real> {
 impl<R: Real, const N: usize> Cycle<R, N> {
     /// The law of the present state; `None` where no torque is sent.
     pub(super) fn demand(&mut self, measured: &Measured<'_, R>) -> Option<Demand<R>> {
-        let within = self.bounds.contain(&measured.state.q);
-        let mut repulsion = if within { JointTorques(Vector7::zeros()) } else { self.push_back(measured) };
-        let near = if repulsion.0.amax() > R::constant(0.0) { flags::NEAR_LIMIT } else { 0 };
+        let pushed = (!self.bounds.contain(&measured.state.q)).then(|| self.push_back(measured));
         let mut demand = match &self.law {
             Law::Off { .. } => return None,
             Law::Gravity => self.float(measured),
@@ -62,12 +60,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Law::Run(_) => self.run_primitive(measured),
             Law::SoftStop(_) | Law::Lower(_) => self.stop(measured),
         };
-        if let Law::Lower(lowering) = &self.law {
-            // The arm comes down to its stops, not to what pushes back before them.
-            repulsion.0 *= lowering.share;
+        if let Some(JointTorques(push)) = pushed {
+            // An arm that is lowered comes down to its stops, not to what pushes back before them.
+            let share = if let Law::Lower(lowering) = &self.law { lowering.share } else { R::constant(1.0) };
+            demand.torque.0 += push * share;
+            demand.flags |= flags::NEAR_LIMIT;
         }
-        demand.torque.0 += repulsion.0;
-        demand.flags |= near;
         Some(demand)
     }
 

@@ -67,7 +67,7 @@ pub mod flags {
     pub const WRENCH_STALE: u32 = 1 << 5;
     /// The desired joint position reached the anti-windup clamp.
     pub const CLAMPED: u32 = 1 << 6;
-    /// The repulsion of a joint limit acts.
+    /// A joint is beyond its bound: its soft limit, or the posture in which it was armed.
     pub const NEAR_LIMIT: u32 = 1 << 7;
     /// Sensory feedback bends the plan.
     pub const FEEDBACK: u32 = 1 << 8;

@@ -157,10 +157,11 @@ impl<R: Real> MotionObserver<R> {
         let nearer = R::constant(if trust != Trust::Compliant { (FARTHEST - least) / speed } else { 0.0 });
         let stands =
             R::constant(if trust == Trust::Approach { (FARTHEST - FARTHEST_AT_REST) / STANDS as f64 } else { 0.0 });
+        let swinging = self.swings.swinging();
         let mut velocity = state.dq.0;
         for (joint, ((velocity, observed), still)) in velocity.iter_mut().zip(ahead.iter()).zip(self.still).enumerate()
         {
-            if self.swings.swings(joint) {
+            if swinging >> joint & 1 != 0 {
                 // Nobody shoves a joint back and forth like that: near what is measured, its damping would drive it.
                 *velocity = *observed;
                 continue;

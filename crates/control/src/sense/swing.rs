@@ -70,33 +70,41 @@ impl<R: Real> Swing<R> {
 #[derive(Clone, Debug)]
 pub struct Swings<R: Real> {
     joints: [Swing<R>; JOINTS],
+    swinging: u8,
+    shakes: bool,
 }
 
 impl<R: Real> Swings<R> {
     /// Nothing has moved yet.
     pub fn new() -> Self {
         let zero = R::constant(0.0);
-        Swings { joints: [Swing { slow: zero, peak: zero, length: 0, counted: 0 }; JOINTS] }
+        let joints = [Swing { slow: zero, peak: zero, length: 0, counted: 0 }; JOINTS];
+        Swings { joints, swinging: 0, shakes: false }
     }
 
     /// Takes the measured velocities of one control period (rad/s). A joint that is bridged, a bit of `bridged` each,
     /// J1 lowest, waits.
     pub fn step(&mut self, velocity: &Vector7<R>, bridged: u8) {
+        (self.swinging, self.shakes) = (0, false);
         for (joint, (swing, velocity)) in self.joints.iter_mut().zip(velocity.iter()).enumerate() {
             if bridged >> joint & 1 == 0 {
                 swing.step(*velocity);
             }
+            if swing.counted >= BEGINS {
+                self.swinging |= 1 << joint;
+                self.shakes |= swing.counted >= LASTS;
+            }
         }
     }
 
-    /// True if this joint (0 to 6) swings.
-    pub fn swings(&self, joint: usize) -> bool {
-        self.joints.get(joint).is_some_and(|swing| swing.counted >= BEGINS)
+    /// Joints that swing, one bit each, J1 lowest.
+    pub fn swinging(&self) -> u8 {
+        self.swinging
     }
 
     /// True if a joint has swung for so long that it shakes.
     pub fn shakes(&self) -> bool {
-        self.joints.iter().any(|swing| swing.counted >= LASTS)
+        self.shakes
     }
 }
 
@@ -170,10 +178,10 @@ mod tests {
             let swing = (core::f64::consts::TAU * 45.0 * f64::from(at) * PERIOD).sin();
             swings.step(&Vector7::repeat(swing), 0);
         }
-        assert!(swings.swings(3) && swings.shakes());
+        assert!(swings.swinging() == 0x7F && swings.shakes());
         for _ in 0..30 {
             swings.step(&Vector7::zeros(), 0);
         }
-        assert!(!swings.swings(3) && !swings.shakes());
+        assert!(swings.swinging() == 0 && !swings.shakes());
     }
 }

@@ -9,7 +9,7 @@ use control::plan::primitive::{
     limits,
 };
 use control::units::{JointPositions, Vector7};
-use control::{BusSample, Cycle, CycleInput, Event, PERIOD, Payload, RATE, State};
+use control::{BusSample, Cycle, CycleInput, Event, PERIOD, Payload, RATE, State, flags};
 use dmp::{Hemisphere, OrientationError};
 use nalgebra::Vector3;
 use pinned_init::InPlaceWrite;
@@ -30,6 +30,12 @@ const KICK: f64 = 0.1;
 /// that before the kick (s).
 const BEFORE_LIMIT: f64 = 0.001;
 const PRESS: f64 = 1.5;
+
+/// Speed below which every arm may be cleared (rad/s).
+const STANDS: f64 = 0.04;
+
+/// Largest distance of a bound from the soft limit beside which the arm was armed (rad).
+const SLACK: f64 = 0.01;
 
 /// Time after the kick until its rest is measured, and for how long (s).
 const WAIT: f64 = 1.5;
@@ -108,15 +114,8 @@ pub(crate) fn kick(
     Some(rest(&kicked.iter().zip(&alone).map(|(kicked, alone)| kicked - alone).collect::<Vec<_>>()))
 }
 
-/// Speeds of the motors, some time after a kick.
-fn course(
-    gains: &Gains<f64>,
-    law: Law,
-    q: [f64; 7],
-    variation: Variation,
-    bias: Vector3<f64>,
-    kick: f64,
-) -> Option<Vec<Vector7<f64>>> {
+/// An arm that has come to rest under this law; from now on what varies acts. `None`: a monitor stopped it before.
+fn settled(gains: &Gains<f64>, law: Law, q: [f64; 7], variation: Variation, bias: Vector3<f64>) -> Option<Loop> {
     let q = at_limit(q, variation);
     // Rest comes first, with the nominal loop and time; then what varies is switched on.
     let plant = Plant::new(q, variation);
@@ -127,13 +126,18 @@ fn course(
         Law::Teach => arm.command(Command::Gravity),
         _ => arm.command(Command::Hold),
     }
-    arm.run_for(1.0);
+    if !arm.run_for(1.0) {
+        return None;
+    }
     match law {
         Law::Hold | Law::Teach => {}
         Law::SoftStop => arm.command(Command::Stop),
         Law::Run { compliant, feedback, force } => {
             arm.command(Command::Tare);
             while arm.number < 3000 && arm.tick(None).record.dq.iter().any(|v| v.abs() > 0.02) {}
+            if arm.cycle.fault() != control::Fault::None {
+                return None;
+            }
             let there: [f64; 7] = arm.tick(None).record.q.map(f64::from);
             // A joint that settled a little beyond its soft limit is taught at it: no movement may begin beyond.
             let taught = core::array::from_fn(|at| there[at].clamp(model::SOFT_MIN[at], model::SOFT_MAX[at]));
@@ -154,6 +158,19 @@ fn course(
     }
     arm.run_for(0.2);
     arm.plant.settle();
+    Some(arm)
+}
+
+/// Speeds of the motors, some time after a kick.
+fn course(
+    gains: &Gains<f64>,
+    law: Law,
+    q: [f64; 7],
+    variation: Variation,
+    bias: Vector3<f64>,
+    kick: f64,
+) -> Option<Vec<Vector7<f64>>> {
+    let mut arm = settled(gains, law, q, variation, bias)?;
     if variation.pressed.is_some() {
         arm.run_for(PRESS);
     }
@@ -175,6 +192,26 @@ fn course(
     (arm.cycle.state() == wanted && arm.plant.omega.amax().is_finite()).then_some(seen)
 }
 
+/// Presses a joint against its limit. Returns in how many control periods it was beyond, and in how many the flag that
+/// tells so was wrong.
+pub(crate) fn beyond_limit(law: Law, q: [f64; 7], variation: Variation) -> (u32, u32) {
+    let mut arm = settled(&Gains::tuned(), law, q, variation, Vector3::zeros()).expect("an arm at rest");
+    let (mut beyond, mut wrong) = (0, 0);
+    for _ in 0..(PRESS * RATE) as u32 {
+        let record = arm.tick(None).record;
+        let farthest = (0..7).map(|at| {
+            let q = f64::from(record.q[at]);
+            (q - model::SOFT_MAX[at]).max(model::SOFT_MIN[at] - q)
+        });
+        let farthest = farthest.fold(f64::NEG_INFINITY, f64::max);
+        let told = record.flags & flags::NEAR_LIMIT != 0;
+        // A bound lies up to the slack beyond where the arm was armed.
+        beyond += u32::from(farthest > SLACK);
+        wrong += u32::from(farthest > SLACK && !told || farthest < 0.0 && told);
+    }
+    (beyond, wrong)
+}
+
 /// End of an arm whose loop is not stable.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stopped {
@@ -183,6 +220,8 @@ pub(crate) struct Stopped {
     pub(crate) after: f64,
     /// Fastest motor one second later (rad/s).
     pub(crate) left: f64,
+    /// Faults afterwards: after clearing and a second of being led by hand, and after another three of holding.
+    pub(crate) then: [control::Fault; 2],
 }
 
 /// Holds `q` with gains that swing until the arm is stopped; `None` if it is not within 3 s. `strong` is the speed that
@@ -205,7 +244,18 @@ pub(crate) fn shake(gains: &Gains<f64>, q: [f64; 7], strong: f64) -> Option<Stop
         if arm.cycle.fault() != control::Fault::None {
             let (fault, after) = (arm.cycle.fault(), f64::from(tick - swinging.unwrap_or(tick)) * PERIOD);
             arm.run_for(1.0);
-            return Some(Stopped { fault, after, left: arm.plant.omega.amax() });
+            let left = arm.plant.omega.amax();
+            // Without friction an arm floats for a while; one that moves is not cleared.
+            while arm.plant.omega.amax() > STANDS && arm.number < 10_000 {
+                arm.tick(None);
+            }
+            arm.command(Command::ClearFault);
+            arm.command(Command::Gravity);
+            arm.run_for(1.0);
+            let led = arm.cycle.fault();
+            arm.command(Command::Hold);
+            arm.run_for(3.0);
+            return Some(Stopped { fault, after, left, then: [led, arm.cycle.fault()] });
         }
     }
     None

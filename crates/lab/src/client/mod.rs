@@ -292,7 +292,8 @@ impl<T: Transport> Client<T> {
         if request.moves() && self.transport.now().saturating_sub(self.heard) > FRESH {
             self.exchange(&Request::Ping)?;
         }
-        let reply = self.exchange_patiently(request)?;
+        // What moves is refused at once: it would begin when nobody expects it any more.
+        let reply = if request.moves() { self.exchange(request) } else { self.exchange_when_read(request) }?;
         match request {
             Request::Gravity | Request::Approach { .. } | Request::Run { .. } => self.moving = true,
             Request::MoveHand { .. } | Request::InitialiseHand => self.hand_ordered = true,
@@ -311,8 +312,8 @@ impl<T: Transport> Client<T> {
         }
     }
 
-    /// As [`Client::exchange`]; a device that is still reading its storage, as it does after a start, is waited for.
-    fn exchange_patiently(&mut self, request: &Request) -> Result<Reply, HostError> {
+    /// As [`Client::exchange`]; waits for a device that is still reading its storage, as it does after a start.
+    fn exchange_when_read(&mut self, request: &Request) -> Result<Reply, HostError> {
         let (end, busy) = (self.transport.now() + STORE_BUSY, StoreError::Busy.code());
         loop {
             match self.exchange(request) {

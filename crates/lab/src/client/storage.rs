@@ -10,7 +10,7 @@ impl<T: Transport> Client<T> {
     /// Returns how the storage of the device is, and the images that were lost in it.
     ///
     /// # Errors
-    /// As [`Client::request`]; the device refuses while it reads its storage.
+    /// As [`Client::request`].
     pub fn storage(&mut self) -> Result<(StorageReport, Vec<LostImage>), HostError> {
         let report = self.storage_of(0)?;
         let mut lost = Vec::from_iter(report.loss.clone());

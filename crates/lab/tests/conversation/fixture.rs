@@ -7,13 +7,13 @@ use control::model::ArmModel;
 use control::{CycleRecord, LoadRefusal, Payload, State};
 use device::{
     CheckedPrimitive, Command, Counters, DeviceController, Event, EventKind, Health, Identity, QueueFull, RamStore,
-    Session, SessionPort, Stage, StoredWeight, TimedRecord, Timing,
+    Session, SessionPort, Stage, StoreError, StoredWeight, TimedRecord, Timing,
 };
 use lab::client::Client;
 use lab::transport::{Transport, TransportError};
 use link::frame::{Decoder, FRAME_BYTES, Frame};
 use link::image::{FeedbackClamps, Hemisphere, ImageContent, OrientationError, Waypoint, WaypointVelocity};
-use link::{Name, Reply};
+use link::{Name, Refusal, Reply};
 use pinned_init::InPlaceWrite;
 
 /// One step of the virtual clock: a third of a control cycle.
@@ -108,6 +108,8 @@ pub(crate) struct Device {
     pub(crate) unplugged: bool,
     /// Its hello says that it drives no arm.
     pub(crate) armless: bool,
+    /// Answers that are still to be "the storage is being read".
+    pub(crate) reading: u32,
 }
 
 impl Device {
@@ -138,6 +140,7 @@ impl Device {
             dead: false,
             unplugged: false,
             armless: false,
+            reading: 0,
         }
     }
 
@@ -180,6 +183,9 @@ impl Transport for Device {
         if self.armless {
             bytes = without_arm(&bytes);
         }
+        if self.reading > 0 {
+            bytes = still_reading(&bytes, &mut self.reading);
+        }
         if !bytes.is_empty() && !is_lost(self.lose_answers_every, &mut self.answers) {
             out.extend_from_slice(&bytes);
         }
@@ -196,12 +202,28 @@ impl Transport for Device {
 }
 
 /// The same answers, but that a hello says that the device drives no arm.
-pub(crate) fn without_arm(mut bytes: &[u8]) -> Vec<u8> {
-    let (mut decoder, mut out) = (Decoder::<FRAME_BYTES>::new(), Vec::new());
-    while let Some(Frame { envelope, mut message }) = decoder.next::<Reply>(&mut bytes) {
-        if let Reply::Hello { hello, .. } = &mut message {
+pub(crate) fn without_arm(bytes: &[u8]) -> Vec<u8> {
+    changed(bytes, |message| {
+        if let Reply::Hello { hello, .. } = message {
             hello.capabilities.arm = false;
         }
+    })
+}
+
+/// The same answers, but that the first `count` of them refuse because the storage is being read.
+fn still_reading(bytes: &[u8], count: &mut u32) -> Vec<u8> {
+    changed(bytes, |message| {
+        if let (Some(of), true) = (message.answers(), *count > 0) {
+            *count -= 1;
+            *message = Reply::Refused { of, reason: Refusal::StoreFailed, detail: [StoreError::Busy.code(), 0] };
+        }
+    })
+}
+
+fn changed(mut bytes: &[u8], mut change: impl FnMut(&mut Reply)) -> Vec<u8> {
+    let (mut decoder, mut out) = (Decoder::<FRAME_BYTES>::new(), Vec::new());
+    while let Some(Frame { envelope, mut message }) = decoder.next::<Reply>(&mut bytes) {
+        change(&mut message);
         let mut buffer = [0; FRAME_BYTES];
         let length = link::frame::encode(envelope, &message, &mut buffer).unwrap();
         out.extend_from_slice(&buffer[..length]);

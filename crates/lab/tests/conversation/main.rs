@@ -190,6 +190,23 @@ fn lost_requests_and_answers_are_repeated_and_done_once() {
 }
 
 #[test]
+fn a_device_that_reads_its_storage_is_waited_for_but_not_with_what_moves() {
+    let mut client = connected();
+    client.transport().reading = 5;
+    assert!(client.list().unwrap().is_empty());
+    assert_eq!(client.transport().reading, 0);
+    client.transport().reading = 1;
+    let refused = client.gravity();
+    assert!(matches!(refused, Err(HostError::Refused { reason: Refusal::StoreFailed, .. })), "{refused:?}");
+    // One that never comes to an end is told as what it is.
+    client.transport().reading = u32::MAX;
+    let started = client.now();
+    let refused = client.list();
+    assert!(matches!(refused, Err(HostError::Refused { reason: Refusal::StoreFailed, .. })), "{refused:?}");
+    assert!(client.now() - started < Duration::from_secs(4));
+}
+
+#[test]
 fn noise_between_the_frames_is_counted_and_harmless() {
     let mut client = connected();
     client.transport().half.line.extend_from_slice(&[7, 7, 7, 0, 3, 9, 0]);
