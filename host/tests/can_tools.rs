@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
-use canlog::{Account, BusKind, Kind, LogLine, Reader};
+use canlog::{BusKind, InterfaceTotals, Kind, LogLine, Reader};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -124,14 +124,14 @@ fn a_lost_reply_is_counted_where_it_was_owed() {
     let (_, log) = recorded();
     // One of the positions of M4.
     let lost = log.lines().enumerate().filter(|(_, line)| line.contains(" can0 483#")).nth(1000).unwrap().0;
-    let (mut reader, mut account) = (Reader::default(), Account::default());
+    let (mut reader, mut totals) = (Reader::default(), InterfaceTotals::default());
     for (number, line) in lines(log).enumerate() {
         if &*line.interface == "can0" && number != lost {
             let (meaning, _) = reader.read(&line);
-            account.note(&line, &meaning);
+            totals.note(&line, &meaning);
         }
     }
-    let summary = account.sum("can0", &reader.interfaces()[0].decoder);
+    let summary = totals.sum("can0", &reader.interfaces()[0].decoder);
     let lost: Vec<(&str, u64)> =
         summary.nodes.iter().filter(|node| node.lost > 0).map(|node| (node.name.as_str(), node.lost)).collect();
     assert_eq!(lost, [("M4 elbow", 1)]);

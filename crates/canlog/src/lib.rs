@@ -15,7 +15,7 @@ pub use decoder::{Decoder, Kind, Meaning};
 pub use host_link::{HostLink, Message};
 pub use puck_state::{ASSUMED_FIRMWARE, PuckState};
 pub use reader::{BusKind, Interface, Reader};
-pub use summary::{Account, CycleSummary, KindSummary, NodeSummary, Summary};
+pub use summary::{CycleSummary, InterfaceTotals, KindSummary, NodeSummary, Summary};
 pub use value::Reading;
 
 /// The interface that stands for the arm's bus in the logs of simulated devices.

@@ -34,7 +34,7 @@ enum Answer {
 
 /// One node's part.
 #[derive(Debug, Clone, Default)]
-struct NodeAccount {
+struct NodeTotals {
     /// Questions that it should have answered.
     asked: u64,
     answered: u64,
@@ -60,7 +60,7 @@ struct Cycle {
 
 /// Adds up the frames of one interface.
 #[derive(Debug, Clone, Default)]
-pub struct Account {
+pub struct InterfaceTotals {
     first_us: Option<u64>,
     last_us: u64,
     kinds: BTreeMap<Kind, (u64, u64)>,
@@ -68,11 +68,11 @@ pub struct Account {
     bits: u64,
     window: (u64, u64),
     busiest_bits: u64,
-    nodes: BTreeMap<u8, NodeAccount>,
+    nodes: BTreeMap<u8, NodeTotals>,
     cycle: Cycle,
 }
 
-impl Account {
+impl InterfaceTotals {
     /// Takes a frame into account.
     pub fn note(&mut self, line: &LogLine, meaning: &Meaning) {
         let first = *self.first_us.get_or_insert(line.time_us);
@@ -121,9 +121,9 @@ impl Account {
     }
 
     fn ask(&mut self, now_us: u64, node: Node, property: PropertyId) {
-        let account = self.nodes.entry(node.number()).or_default();
+        let totals = self.nodes.entry(node.number()).or_default();
         for answer in answers_to(node, property).into_iter().flatten() {
-            account.ask(now_us, answer);
+            totals.ask(now_us, answer);
         }
     }
 
@@ -140,22 +140,22 @@ impl Account {
             let per_second = if duration_us == 0 { 0.0 } else { frames as f64 / seconds };
             Some(KindSummary { kind, frames, per_second, load: share(bits, duration_us) })
         });
-        let nodes = self.nodes.iter().filter_map(|(number, account)| {
+        let nodes = self.nodes.iter().filter_map(|(number, totals)| {
             let node = Node::new(*number)?;
             // Numbers that never answered belong to nobody: an enumeration asks them all.
-            (account.answered + account.unasked > 0).then(|| NodeSummary {
+            (totals.answered + totals.unasked > 0).then(|| NodeSummary {
                 name: names::node(node),
                 firmware: pucks.puck(node).version(),
-                asked: account.asked,
-                answered: account.answered,
-                lost: account.lost + account.overdue(self.last_us),
-                unasked: account.unasked,
-                delay_mean_us: if account.answered == 0 {
+                asked: totals.asked,
+                answered: totals.answered,
+                lost: totals.lost + totals.overdue(self.last_us),
+                unasked: totals.unasked,
+                delay_mean_us: if totals.answered == 0 {
                     0.0
                 } else {
-                    account.delay_sum_us as f64 / account.answered as f64
+                    totals.delay_sum_us as f64 / totals.answered as f64
                 },
-                delay_worst_us: account.delay_worst_us,
+                delay_worst_us: totals.delay_worst_us,
             })
         });
         Summary {
@@ -173,7 +173,7 @@ impl Account {
     }
 }
 
-impl NodeAccount {
+impl NodeTotals {
     fn ask(&mut self, now_us: u64, answer: Answer) {
         let owed = self.heard_us.is_some_and(|heard| now_us.saturating_sub(heard) < SILENCE_US);
         self.asked += u64::from(owed);

@@ -31,7 +31,7 @@ impl Spread {
 
 /// Failures of one kind, and how many of them the device told before the lift.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct Told {
+pub struct FailureCounts {
     /// Trials that failed in this way.
     pub failures: usize,
     /// Of these, how many were reported before the lift.
@@ -50,15 +50,15 @@ pub struct Detection {
     /// Of these, how many were reported before the lift.
     pub flagged_before_lift: usize,
     /// Those in which the object was knocked over.
-    pub knocked_over: Told,
+    pub knocked_over: FailureCounts,
     /// Those in which the fingers closed beside it.
-    pub missed: Told,
+    pub missed: FailureCounts,
     /// Those in which it was pushed away.
-    pub pushed_away: Told,
+    pub pushed_away: FailureCounts,
     /// Those in which it was raised and lost; what slips only then cannot be told before.
-    pub dropped: Told,
+    pub dropped: FailureCounts,
     /// Those in which it was crushed.
-    pub crushed: Told,
+    pub crushed: FailureCounts,
     /// Median time from the beginning of the failure in the world
     /// ([`failure_s`](super::outcome::Measures::failure_s)) to the report, s; negative: reported before. A failure
     /// that was not reported before the lift counts as reported at the lift, so that silence does not pass for speed.

@@ -99,7 +99,7 @@ fn round(arm: &mut Arm, seed: u64) -> Result<Verdict, Failure> {
         // Where the arm cannot be got back otherwise, a person presses the E-stop: its zero is lost, and given anew.
         plant(arm).press(PendantAction::PressEStop);
         arm.next(Duration::from_secs(1))?;
-        recovery::recover(arm, Recover::Either)
+        recovery::recover(arm, Recover::ZeroIfAsked)
             .map_err(|second| format!("seed {seed}: {failure}; after an E-stop: {second}"))?;
     }
     plant(arm).take_recorded();

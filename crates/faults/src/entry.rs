@@ -196,7 +196,7 @@ pub enum Recover {
     /// The same, and the device must demand zeroing before it lets the arm hold.
     Zero,
     /// The same, zeroing if the device demands it.
-    Either,
+    ZeroIfAsked,
     /// There is no way back in this scenario.
     None,
 }

@@ -40,7 +40,7 @@ pub fn recover(arm: &mut Arm, way: Recover) -> Result<(), Failure> {
     }
     rest(arm)?;
     let has_zeroed = start_up(arm, way)?;
-    if way != Recover::Either && has_zeroed != (way == Recover::Zero) {
+    if way != Recover::ZeroIfAsked && has_zeroed != (way == Recover::Zero) {
         let words = if has_zeroed { "zeroing was demanded" } else { "zeroing was not demanded" };
         return Err(words.into());
     }

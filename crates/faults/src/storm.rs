@@ -77,7 +77,7 @@ pub fn draw(seed: u64) -> Scenario {
         sweep: None,
         order,
         expect,
-        recover: Recover::Either,
+        recover: Recover::ZeroIfAsked,
     }
 }
 

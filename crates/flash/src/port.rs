@@ -32,7 +32,7 @@ impl VirtualClock {
         self.0.now.store(now, Ordering::Relaxed);
     }
 
-    /// When the flash the device waits for will be ready; `None` if it waits for something else. Told once.
+    /// When the flash the device waits for will be ready; `None` if it waits for something else. It is said once.
     #[must_use]
     pub fn take_alarm(&self) -> Option<Ticks> {
         Some(self.0.alarm.swap(0, Ordering::Relaxed)).filter(|alarm| *alarm > 0)

@@ -12,7 +12,7 @@ use system_tests::{Arm, expect, ready, simulation, taught};
 const NEAR_HOME: [f32; 7] = [0.05, -1.85, 0.05, 2.95, 0.05, 0.05, 0.05];
 
 /// Hash of the bus and bytes of the recording.
-type Account = (u64, Vec<u8>);
+type Execution = (u64, Vec<u8>);
 
 /// Holds for a second: the simulated operator lets go of the arm half a second after it became active, and an arm that
 /// is moved against his hand jumps when he does.
@@ -22,7 +22,7 @@ fn carry_itself(arm: &mut Arm) {
 }
 
 /// Start-up, hold, and a short move, recorded.
-fn short_movement(address: &str) -> Account {
+fn short_movement(address: &str) -> Execution {
     let mut arm = ready(address);
     carry_itself(&mut arm);
     let mut recorder = expect(Recorder::start(&mut arm, Vec::new(), "short movement"));
@@ -36,7 +36,7 @@ fn short_movement(address: &str) -> Account {
 }
 
 /// A whole run of the taught primitive.
-fn whole_run(address: &str) -> Account {
+fn whole_run(address: &str) -> Execution {
     let mut arm = ready(address);
     let execution = play(&mut arm, taught());
     (hash(&mut arm), execution.bytes)
@@ -48,10 +48,11 @@ fn hash(arm: &mut Arm) -> u64 {
 
 /// Asserts that two accounts are the same, and prints the first lines that differ when they are not.
 #[track_caller]
-fn assert_same(one: &Account, other: &Account, what: &str) {
+fn assert_same(one: &Execution, other: &Execution, what: &str) {
     println!("{what}: {:016x} and {:016x}", one.0, other.0);
     assert_eq!(one.0, other.0, "{what}: other frames, or other times of frames");
-    let lines = |account: &Account| String::from_utf8_lossy(&account.1).lines().map(str::to_owned).collect::<Vec<_>>();
+    let lines =
+        |execution: &Execution| String::from_utf8_lossy(&execution.1).lines().map(str::to_owned).collect::<Vec<_>>();
     let (one, other) = (lines(one), lines(other));
     let differ = one.iter().zip(&other).find(|(one, other)| one != other);
     assert!(differ.is_none(), "{what}: another recording, first in these lines: {differ:#?}");
@@ -59,7 +60,7 @@ fn assert_same(one: &Account, other: &Account, what: &str) {
 }
 
 #[track_caller]
-fn assert_different(one: &Account, other: &Account, what: &str) {
+fn assert_different(one: &Execution, other: &Execution, what: &str) {
     println!("{what}: {:016x} and {:016x}", one.0, other.0);
     assert_ne!(one.0, other.0, "{what}");
     assert!(one.1 != other.1, "{what}: the same recording");

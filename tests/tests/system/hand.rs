@@ -96,7 +96,7 @@ fn name() -> Name {
 }
 
 /// A run with the options of a mode, from power-up to a second behind its end.
-struct Account {
+struct Grip {
     telemetry: Vec<Telemetry>,
     statistics: Statistics,
     trace: BusTrace,
@@ -114,7 +114,7 @@ fn begin(address: &str) -> (Arm, Vec<HandStage>) {
     (hand, stages)
 }
 
-fn grip(address: &str, options: RunOptions) -> Account {
+fn take_grip(address: &str, options: RunOptions) -> Grip {
     let (mut hand, stages) = begin(address);
     expect(hand.run(&name(), options));
     let mut telemetry = Vec::new();
@@ -124,7 +124,7 @@ fn grip(address: &str, options: RunOptions) -> Account {
     let statistics = expect(hand.statistics());
     let simulation = simulation(hand.transport());
     let (trace, ticks) = (simulation.plant().trace(), simulation.ticks());
-    Account { telemetry, statistics, trace, ticks, stages }
+    Grip { telemetry, statistics, trace, ticks, stages }
 }
 
 fn adapt() -> RunOptions {
@@ -132,8 +132,8 @@ fn adapt() -> RunOptions {
 }
 
 /// Largest difference of measured and expected gauge torque over the last half second, N m.
-fn force_error(account: &Account) -> f32 {
-    let last = &account.telemetry[account.telemetry.len() - 150..];
+fn force_error(grip: &Grip) -> f32 {
+    let last = &grip.telemetry[grip.telemetry.len() - 150..];
     let errors =
         last.iter().flat_map(|cycle| (0..3).map(move |finger| (cycle.gauges[finger] - EXPECTED[finger]).abs()));
     errors.fold(0.0, f32::max)
@@ -141,15 +141,14 @@ fn force_error(account: &Account) -> f32 {
 
 #[test]
 fn hand_image_grips_with_the_expected_force_within_half_of_a_72_mhz_cycle() {
-    let account = grip("hand:seed=31", adapt());
-    assert_eq!(account.stages, [HandStage::Absent, HandStage::Ready]);
-    let last = account.telemetry.last().expect("telemetry");
+    let grip = take_grip("hand:seed=31", adapt());
+    assert_eq!(grip.stages, [HandStage::Absent, HandStage::Ready]);
+    let last = grip.telemetry.last().expect("telemetry");
     assert_eq!((State::from_code(last.state), last.fault), (Some(State::Hold), 0), "it holds what it gripped");
-    assert!(account.telemetry.windows(2).all(|pair| pair[1].cycle == pair[0].cycle + 1), "a cycle is missing");
-    let Statistics { cost_worst_ticks, cost_mean_ticks, missed_deadlines, latency_worst_ticks, .. } =
-        account.statistics;
+    assert!(grip.telemetry.windows(2).all(|pair| pair[1].cycle == pair[0].cycle + 1), "a cycle is missing");
+    let Statistics { cost_worst_ticks, cost_mean_ticks, missed_deadlines, latency_worst_ticks, .. } = grip.statistics;
     let worst = cost_worst_ticks * PER_TICK;
-    let Statistics { stack_free, stack_size, .. } = account.statistics;
+    let Statistics { stack_free, stack_size, .. } = grip.statistics;
     println!("control cycle, worst      {worst:>8} instructions (bound {BOUND})");
     println!("control cycle, mean       {:>8} instructions", cost_mean_ticks * PER_TICK);
     println!(
@@ -157,17 +156,17 @@ fn hand_image_grips_with_the_expected_force_within_half_of_a_72_mhz_cycle() {
         share(worst, 1.0),
         share(worst, 1.5)
     );
-    println!("control cycles            {:>8}", account.statistics.cycles);
+    println!("control cycles            {:>8}", grip.statistics.cycles);
     println!("missed deadlines          {missed_deadlines:>8}");
     println!("slot latency, worst       {:>8.2} us", f64::from(latency_worst_ticks) / 25.0);
     println!("stack, deepest use        {:>8} B of {stack_size}", stack_size - stack_free);
-    println!("bus load                  {:>8.1} %", 100.0 * account.trace.load(account.ticks));
+    println!("bus load                  {:>8.1} %", 100.0 * grip.trace.load(grip.ticks));
     assert!(worst > 1000, "the image did not measure its cycles");
     assert!(worst < BOUND, "a control cycle takes {worst} instructions");
-    assert_eq!((missed_deadlines, account.statistics.hand_lost_replies), (0, 0));
-    assert_eq!(account.trace.invalid, 0, "{:?}", account.trace.invalid_examples);
-    let blind = grip("hand:seed=31", RunOptions::default());
-    let (adapting, without) = (force_error(&account), force_error(&blind));
+    assert_eq!((missed_deadlines, grip.statistics.hand_lost_replies), (0, 0));
+    assert_eq!(grip.trace.invalid, 0, "{:?}", grip.trace.invalid_examples);
+    let blind = take_grip("hand:seed=31", RunOptions::default());
+    let (adapting, without) = (force_error(&grip), force_error(&blind));
     println!("force error at the end    {adapting:>8.3} N m with feedback and force control, {without:.3} without");
     assert!(adapting < 0.05 && adapting < 0.5 * without, "the force is not tracked: {adapting} N m, {without} without");
 }
@@ -179,12 +178,12 @@ fn share(instructions: u32, clocks: f64) -> f64 {
 
 #[test]
 fn hand_runs_are_equal_bit_by_bit_for_equal_seeds() {
-    let (once, again) = (grip("hand:seed=32", adapt()), grip("hand:seed=32", adapt()));
+    let (once, again) = (take_grip("hand:seed=32", adapt()), take_grip("hand:seed=32", adapt()));
     println!("hand: with one seed: {:016x} and {:016x}", once.trace.hash, again.trace.hash);
     assert_eq!(once.trace.hash, again.trace.hash, "other frames, or other times of frames");
     assert!(once.telemetry == again.telemetry, "other telemetry");
     assert_eq!(once.statistics, again.statistics);
-    assert_ne!(once.trace.hash, grip("hand:seed=33", adapt()).trace.hash, "the seed does nothing");
+    assert_ne!(once.trace.hash, take_grip("hand:seed=33", adapt()).trace.hash, "the seed does nothing");
 }
 
 #[test]

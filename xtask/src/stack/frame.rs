@@ -161,7 +161,7 @@ impl Walk<'_> {
         let after = self.after(index, before)?;
         ensure!(after.depth >= 0, "the stack pointer is above where it began after {at:#010x}");
         if let Some(condition) = condition.filter(|_| condition != is_true) {
-            // Either way; from here on only one of them, if the stack pointer depends on it.
+            // Both ways; from here on only one of them, if the stack pointer depends on it.
             let matters = after.depth != before.depth;
             self.go(at + instruction.bytes, before, at, matters.then(|| opposite(condition)))?;
             is_true = matters.then_some(condition);

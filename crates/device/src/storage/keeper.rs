@@ -74,17 +74,17 @@ pub trait LibraryAccess {
 pub async fn keep<F: NorFlash, D: LibraryAccess, const IMAGE: usize, const VALUE: usize>(
     flash: F,
     room: &mut Scratch<IMAGE, VALUE>,
-    desk: &mut D,
+    library: &mut D,
 ) -> Infallible {
     let Scratch { image, value } = room;
-    let mut log = match open(flash, value, desk).await {
+    let mut log = match open(flash, value, library).await {
         Ok((log, opening)) => {
-            desk.open(opening);
+            library.open(opening);
             opening.bad_sector.map_or(Ok(log), |sector| Err(StoreError::Sector(sector)))
         }
         Err(error) => {
             let bad_sector = if let StoreError::Sector(sector) = error { Some(sector) } else { None };
-            desk.open(Opening { failed: true, bad_sector, ..Opening::default() });
+            library.open(Opening { failed: true, bad_sector, ..Opening::default() });
             Err(error)
         }
     };
@@ -94,7 +94,7 @@ pub async fn keep<F: NorFlash, D: LibraryAccess, const IMAGE: usize, const VALUE
         log = Err(medium(error));
     }
     loop {
-        let Some(work) = desk.take(image) else {
+        let Some(work) = library.take(image) else {
             pause().await;
             continue;
         };
@@ -106,7 +106,7 @@ pub async fn keep<F: NorFlash, D: LibraryAccess, const IMAGE: usize, const VALUE
             // Nothing is known of a flash that failed once; only a new start may trust it again.
             log = Err(error);
         }
-        desk.settle(outcome);
+        library.settle(outcome);
     }
 }
 
@@ -128,7 +128,7 @@ async fn clean<F: NorFlash>(log: &mut Log<F>) -> Result<(), JournaledError<F::Er
 async fn open<F: NorFlash, D: LibraryAccess>(
     flash: F,
     value: &mut [u8],
-    desk: &mut D,
+    library: &mut D,
 ) -> Result<(Log<F>, Opening), StoreError> {
     let bytes = JournaledFlash::log_bytes(&flash).ok_or(StoreError::Medium)?;
     let (mut sound, found) = JournaledFlash::open(flash, bytes).await.map_err(medium)?;
@@ -146,11 +146,11 @@ async fn open<F: NorFlash, D: LibraryAccess>(
         formatted: found == Found::Formatted,
         ..Opening::default()
     };
-    match read_all(&mut log, value, desk).await {
+    match read_all(&mut log, value, library).await {
         Ok((found, home)) => {
             (opening.found, opening.home) = (found, home);
             (opening.settings_lost, opening.unread) =
-                tell_lost(log.flash(), value, desk, home).await.map_err(medium)?;
+                tell_lost(log.flash(), value, library, home).await.map_err(medium)?;
         }
         Err(Error::Storage { value, .. }) => return Err(medium(value)),
         Err(_) => {
@@ -166,7 +166,7 @@ async fn open<F: NorFlash, D: LibraryAccess>(
 async fn tell_lost<F: NorFlash, D: LibraryAccess>(
     flash: &mut JournaledFlash<F>,
     value: &mut [u8],
-    desk: &mut D,
+    library: &mut D,
     home: StoredHome,
 ) -> Result<(u8, u8), JournaledError<F::Error>> {
     let mut survey = Survey::EMPTY;
@@ -176,14 +176,14 @@ async fn tell_lost<F: NorFlash, D: LibraryAccess>(
         let Some((bytes, is_whole)) = survey.newest(key, flash, value).await? else { continue };
         let is_held = match key {
             HOME_KEY => StoredHome::read(bytes) == home,
-            _ => desk.holds(key, bytes),
+            _ => library.holds(key, bytes),
         };
         settings_lost |= if is_whole && is_held { 0 } else { bit };
     }
     for place in 0..PLACES {
         let Some((bytes, is_whole)) = survey.newest(place, flash, value).await? else { continue };
-        if !(is_whole && desk.holds(place, bytes)) {
-            desk.lose(place, bytes);
+        if !(is_whole && library.holds(place, bytes)) {
+            library.lose(place, bytes);
         }
         pause().await;
     }
@@ -202,7 +202,7 @@ fn medium<E>(error: JournaledError<E>) -> StoreError {
 async fn read_all<F: NorFlash, D: LibraryAccess>(
     log: &mut Log<F>,
     value: &mut [u8],
-    desk: &mut D,
+    library: &mut D,
 ) -> Result<(u8, StoredHome), Error<JournaledError<F::Error>>> {
     // A bit for each key: this lies on the stack.
     let mut holding = [0_u32; 8];
@@ -219,9 +219,9 @@ async fn read_all<F: NorFlash, D: LibraryAccess>(
             *group = if image.is_empty() { *group & !bit } else { *group | bit };
         }
         if image.is_empty() {
-            desk.forget(slot);
+            library.forget(slot);
         } else {
-            desk.restore(slot, image);
+            library.restore(slot, image);
         }
         // A long flash is read in parts: others have work to do.
         pause().await;

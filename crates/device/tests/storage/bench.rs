@@ -121,8 +121,8 @@ pub(crate) fn run<const SLOTS: usize, F: NorFlash>(
 ) -> (Shared<SLOTS>, Vec<Option<Result<(), StoreError>>>) {
     let shared = Shared(Arc::new(Mutex::new(Library::<SLOTS, IMAGE>::new())));
     let mut room = Box::new(Scratch::<IMAGE, VALUE>::new());
-    let mut desk = Shared(Arc::clone(&shared.0));
-    let mut keeper = pin!(keep(flash, &mut room, &mut desk));
+    let mut library = Shared(Arc::clone(&shared.0));
+    let mut keeper = pin!(keep(flash, &mut room, &mut library));
     let mut context = Context::from_waker(Waker::noop());
     let mut answers = Vec::new();
     let mut step = || {
@@ -190,7 +190,7 @@ pub(crate) fn chip(content: &[u8]) -> FlashChip {
     FlashChip::new(Flash::with_content(content.to_vec(), FlashTimes::NONE))
 }
 
-/// A keeper's desk that has it store these bytes as home, weight or secret, whatever they are.
+/// A library that has it store these bytes as home, weight or secret, whatever they are.
 struct Forger<'a>(Option<(u8, &'a [u8])>);
 
 impl LibraryAccess for Forger<'_> {

@@ -222,7 +222,7 @@ impl Means {
 }
 
 /// Weighted least squares of `N` unknowns.
-struct Fit<const N: usize> {
+struct LeastSquares<const N: usize> {
     normal: SMatrix<f64, N, N>,
     right: SVector<f64, N>,
     /// The assumption of the unknowns beforehand, as a share of `normal`.
@@ -237,7 +237,7 @@ struct Solution<const N: usize> {
     repeat: SMatrix<f64, N, N>,
 }
 
-impl<const N: usize> Fit<N> {
+impl<const N: usize> LeastSquares<N> {
     /// Unknowns from `known_from` on are zero but for one of their units.
     fn new(known_from: usize) -> Self {
         let mut prior = SMatrix::zeros();
@@ -313,7 +313,7 @@ fn noise_scale(left: &[f64], noise: &[f64], postures: f64, unknowns: f64) -> f64
 
 /// Load by the joints, and the residual of each, N m RMS.
 fn carried(rows: &[Means]) -> Option<(Extra, [f64; 7])> {
-    let mut fit = Fit::<CARRIED_NUMBERS>::new(4);
+    let mut fit = LeastSquares::<CARRIED_NUMBERS>::new(4);
     rows.iter().for_each(|row| fit.add(&row.carried(), &row.torque, &JOINT_NOISE));
     let (told, count) = (fit.solve()?, rows.len() as f64);
     let left = rows.iter().fold(SVector::<f64, 7>::zeros(), |sum, row| {
@@ -333,7 +333,7 @@ pub fn measure(weight: &WeightCorrection, crossings: &[Crossing]) -> Result<Load
     }
     let model = WeightCorrection::none(weight.payload());
     let rows_by_model = rows(&model, true, crossings)?;
-    let mut sensed = Fit::<10>::new(10);
+    let mut sensed = LeastSquares::<10>::new(10);
     rows_by_model.iter().for_each(|row| sensed.add(&row.sensed(), &row.wrench, &SENSOR_NOISE));
     let sensed = sensed.solve().ok_or(LoadError::Undetermined)?;
     let count = rows_by_model.len() as f64;

@@ -89,12 +89,12 @@ struct Keeper {
 }
 
 impl Keeper {
-    fn new(chip: FlashChip, mut desk: SharedSession) -> Self {
+    fn new(chip: FlashChip, mut library: SharedSession) -> Self {
         let clock = VirtualClock::default();
         let port = FlashPort::new(chip.clone(), clock.clone());
         let task = Box::pin(async move {
             let mut room = Box::new(Scratch::<IMAGE_BYTES_LIMIT, { value_bytes(IMAGE_BYTES_LIMIT) }>::new());
-            keep(port, &mut room, &mut desk).await
+            keep(port, &mut room, &mut library).await
         });
         Self { task, clock, chip }
     }

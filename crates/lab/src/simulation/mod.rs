@@ -2,7 +2,7 @@
 //!
 //! Three engines run the application. `InProcess` calls `device::DeviceController` and `device::Session` directly
 //! (`sil:`); `Qemu` runs the firmware image under QEMU and exchanges frames with it in lock step (`sim:`);
-//! `EmulatedBoard` does so with the image for the real board on an emulated STM32H743 (`board:`). Either way nothing
+//! `EmulatedBoard` does so with the image for the real board on an emulated STM32H743 (`board:`). With both nothing
 //! moves unless the host waits: virtual time advances only inside [`Transport::receive`], so a whole session is one
 //! deterministic sequence of events, whatever the load of the machine.
 

@@ -96,7 +96,7 @@ impl Default for TeacherConfig {
 pub enum Stage {
     /// Not touching the arm: [`Teacher::begin`] was not called yet.
     Watching,
-    /// Told to begin, not touching the arm yet.
+    /// Has to begin, not touching the arm yet.
     Pausing,
     /// Takes the hand and holds it at the start.
     Taking,

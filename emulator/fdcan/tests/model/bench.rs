@@ -58,7 +58,7 @@ pub(crate) const IMAGE: [(u32, u32); 6] =
 
 /// One line of what the wire was told: the identifiers offered, or that all are taken back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Told {
+pub(crate) enum Notice {
     Offer(u32),
     Withdraw,
 }
@@ -205,11 +205,11 @@ impl Bench {
     }
 
     /// Events that the wire was told since the last call.
-    pub(crate) fn told(&mut self) -> Vec<Told> {
+    pub(crate) fn told(&mut self) -> Vec<Notice> {
         let told = |event| match event {
-            WireEvent::Offer { frame: Frame { id: Id::Standard(id), .. }, .. } => Told::Offer(id.into()),
-            WireEvent::Offer { frame: Frame { id: Id::Extended(id), .. }, .. } => Told::Offer(id),
-            WireEvent::Withdraw { .. } => Told::Withdraw,
+            WireEvent::Offer { frame: Frame { id: Id::Standard(id), .. }, .. } => Notice::Offer(id.into()),
+            WireEvent::Offer { frame: Frame { id: Id::Extended(id), .. }, .. } => Notice::Offer(id),
+            WireEvent::Withdraw { .. } => Notice::Withdraw,
         };
         self.can.take_wire(Unit::One).into_iter().map(told).collect()
     }

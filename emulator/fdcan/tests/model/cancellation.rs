@@ -1,6 +1,6 @@
 //! Transmit cancellation: what the manual says, and both readings where it does not.
 
-use crate::bench::Told::{Offer, Withdraw};
+use crate::bench::Notice::{Offer, Withdraw};
 use crate::bench::*;
 use fdcan_model::Cancellation::{Skipped, Stuck};
 use fdcan_model::{BusError, Fault, Options, RemarkKind, Unit};

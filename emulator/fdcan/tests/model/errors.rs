@@ -1,6 +1,6 @@
 //! Error counters, error states, bus-off and its end, faults of the bus.
 
-use crate::bench::Told::{Offer, Withdraw};
+use crate::bench::Notice::{Offer, Withdraw};
 use crate::bench::*;
 use fdcan_model::{BusError, Fault, Frame, Unit};
 

@@ -211,9 +211,9 @@ fn interrupt_lines_follow_flags_enables_selection_and_acknowledgement() {
 fn a_reset_clears_the_registers_takes_frames_back_and_keeps_the_memory() {
     let mut bench = Bench::image(Default::default());
     bench.put(0x10);
-    assert_eq!(bench.told(), [Told::Offer(0x10)]);
+    assert_eq!(bench.told(), [Notice::Offer(0x10)]);
     bench.can.reset(bench.now);
-    assert_eq!(bench.told(), [Told::Withdraw]);
+    assert_eq!(bench.told(), [Notice::Withdraw]);
     assert_eq!([CCCR, NBTP, TXBRP, IE].map(|offset| bench.read(offset)), [1, 0x0600_0A03, 0, 0]);
     assert_eq!(bench.can.peek_memory(TRANSMIT_AT), 0x10 << 18);
     // A frame that the wire had begun before means nothing afterwards.

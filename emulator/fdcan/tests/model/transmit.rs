@@ -1,6 +1,6 @@
 //! Sending: FIFO, queue, dedicated buffers, what the wire is told, retransmission.
 
-use crate::bench::Told::{Offer, Withdraw};
+use crate::bench::Notice::{Offer, Withdraw};
 use crate::bench::*;
 use fdcan_model::{BusError, Frame, Id, Options, RemarkKind, Unit, WireEvent};
 

@@ -9,7 +9,7 @@ use serde_json::json;
 
 use super::source::Source;
 use super::{ErrorCode, Failure, Global, Output, connection};
-use canlog::{Account, BusKind, Interface, LogLine, Meaning, Reader, Summary};
+use canlog::{BusKind, Interface, InterfaceTotals, LogLine, Meaning, Reader, Summary};
 use lab::table::Table;
 
 /// Options of `can decode`.
@@ -56,24 +56,24 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let interrupt = connection::interrupt();
     let mut out = Printer::new(global.output(), !command.summary);
     let mut reader = Reader::default();
-    let mut accounts: Vec<Account> = Vec::new();
+    let mut totals: Vec<InterfaceTotals> = Vec::new();
     let garbage = source.read(&interrupt, DOING, |_, line| {
         if command.interface.as_deref().is_some_and(|only| *only != *line.interface) {
             return Ok(true);
         }
         let (meaning, _) = reader.read(&line);
         let place = reader.interfaces().iter().position(|interface| interface.name == line.interface).unwrap_or(0);
-        accounts.resize_with(reader.interfaces().len(), Account::default);
-        if let Some(account) = accounts.get_mut(place) {
-            account.note(&line, &meaning);
+        totals.resize_with(reader.interfaces().len(), InterfaceTotals::default);
+        if let Some(totals) = totals.get_mut(place) {
+            totals.note(&line, &meaning);
         }
         out.line(&line, &meaning)
     })?;
-    let mut seen: Vec<(&Interface, &Account)> = reader.interfaces().iter().zip(&accounts).collect();
+    let mut seen: Vec<(&Interface, &InterfaceTotals)> = reader.interfaces().iter().zip(&totals).collect();
     // What is looked for is the arm's.
     seen.sort_by_key(|(interface, _)| interface.kind() == BusKind::Host);
     let summaries: Vec<Summary> =
-        seen.iter().map(|(interface, account)| account.sum(&interface.name, &interface.decoder)).collect();
+        seen.iter().map(|(interface, totals)| totals.sum(&interface.name, &interface.decoder)).collect();
     let damage: Vec<(u32, u32)> = seen.iter().map(|(interface, _)| interface.link.damage()).collect();
     out.summaries(&summaries, &damage, garbage.lines)?;
     match garbage.first {

@@ -44,7 +44,7 @@ pub struct ExtraData {
 
 /// The figures that one of the two tells.
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
-pub struct ToldData {
+pub struct ReadingData {
     /// All that hangs on the sensor, the hand included.
     pub hanging: BodyData,
     /// The part beyond the model's hand, from 0.1 kg on; null where there is less.
@@ -102,9 +102,9 @@ pub struct Measured {
     /// The declared payload: `hand`, `nothing` or `undeclared`.
     pub declared: &'static str,
     /// By the wrist sensor.
-    pub sensor: ToldData,
+    pub sensor: ReadingData,
     /// By the joints, whose links may weigh otherwise than the model's.
-    pub joints: ToldData,
+    pub joints: ReadingData,
     /// Load of the joints beyond the weight that the device computes with; null on an arm that was never weighed.
     pub since_weighed: Option<ExtraData>,
     /// Sensor beyond joints.
@@ -150,7 +150,7 @@ fn extra_data(extra: &Extra) -> ExtraData {
     }
 }
 
-impl ToldData {
+impl ReadingData {
     fn new(extra: &Extra) -> Self {
         Self {
             hanging: body_data(extra, extra.hanging()),
@@ -188,8 +188,8 @@ impl Measured {
         };
         Self {
             declared: declared.name(),
-            sensor: ToldData::new(&load.sensor),
-            joints: ToldData::new(&load.joints),
+            sensor: ReadingData::new(&load.sensor),
+            joints: ReadingData::new(&load.joints),
             since_weighed: load.since_weighed.as_ref().map(extra_data),
             difference: DifferenceData { mass_kg, centre_m },
             object,

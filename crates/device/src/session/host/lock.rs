@@ -104,7 +104,7 @@ impl<A: Application> HostSession<A> {
         Ok(Reply::Challenge { of, nonce })
     }
 
-    /// Compares a proof with the one that is right. Either way its challenge is used up.
+    /// Compares a proof with the one that is right. Its challenge is used up, right or wrong.
     #[inline(never)]
     pub(super) fn prove(&mut self, now_ms: u32, proof: u64) -> Result<(), Refused> {
         let secret = self.secret_to_prove()?;
