@@ -194,17 +194,26 @@ fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
     }
 }
 
+fn status(at: &Path) -> Value {
+    serde_json::from_slice(&succeeds(at, &format!("{SERVED} --json status")).stdout).unwrap()
+}
+
+/// An arm with a hand, without torque, for which a bare arm is declared: its next start-up is blocked.
+fn wrongly_declared(at: &Path) -> Served {
+    let mut arm = Served::start(at, &[]);
+    succeeds(at, &format!("{SERVED} hand init"));
+    arm.press("estop");
+    wait_until("the arm has no torque", || status(at)["state"] == "idle");
+    succeeds(at, &format!("{SERVED} calibrate payload nothing"));
+    arm
+}
+
 #[test]
 fn g4_a_fault_that_a_wrong_declaration_keeps_from_being_cleared_is_answered_with_the_declaration() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let mut arm = Served::start(at, &[]);
-    succeeds(at, &format!("{SERVED} hand init"));
-    let status =
-        || -> Value { serde_json::from_slice(&succeeds(at, &format!("{SERVED} --json status")).stdout).unwrap() };
-    arm.press("estop");
-    wait_until("the arm has no torque", || status()["state"] == "idle");
-    succeeds(at, &format!("{SERVED} calibrate payload nothing"));
+    let mut arm = wrongly_declared(at);
+    let status = || status(at);
     arm.press("release");
     arm.press("idle");
     wait_until("the start-up is blocked", || status()["blocked"].is_string());
@@ -301,14 +310,9 @@ fn an_arm_that_is_served_fast_can_be_commanded() {
 fn a_recording_of_an_arm_that_is_not_ready_says_what_is_in_its_way() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let mut arm = Served::start(at, &[]);
-    succeeds(at, &format!("{SERVED} hand init"));
-    let status =
-        || -> Value { serde_json::from_slice(&succeeds(at, &format!("{SERVED} --json status")).stdout).unwrap() };
+    let mut arm = wrongly_declared(at);
+    let status = || status(at);
     let record = || refused(at, &format!("{SERVED} record --duration 1 --force"));
-    arm.press("estop");
-    wait_until("the arm has no torque", || status()["state"] == "idle");
-    succeeds(at, &format!("{SERVED} calibrate payload nothing"));
     wait_until("the start-up waits for the pendant", || {
         status()["startup"].as_str().is_some_and(|stage| stage.contains("Shift-Idle"))
     });
