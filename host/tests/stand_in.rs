@@ -3,7 +3,11 @@
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Output, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
+use lab::client::Client;
+use lab::transport::StreamTransport;
 use serde_json::Value;
 
 struct StandIn {
@@ -55,6 +59,13 @@ fn learn_reach(folder: &Path) {
     let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/examples/reach.csv");
     std::fs::copy(example, folder.join("reach.csv")).unwrap();
     assert!(tactus(folder, "learn reach.csv").status.success());
+}
+
+/// A program that looks on until it is ended.
+fn observer(folder: &Path, order: &str) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    command.current_dir(folder).env("TACTUS_DEVICE", "unix:tactus.sock").args(order.split(' '));
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
 /// The state of the arm once it is one of these; each question is a turn of the device's time as well.
@@ -150,9 +161,7 @@ fn an_interrupted_observer_does_not_say_that_the_arm_has_stopped() {
     let mut run = run.stderr(Stdio::null()).spawn().unwrap();
     until(at, &["approach"]);
     for order in ["record --duration 100 -o z.csv", "status --line 100"] {
-        let mut observer = Command::new(env!("CARGO_BIN_EXE_tactus"));
-        observer.current_dir(at).env("TACTUS_DEVICE", "unix:tactus.sock").args(order.split(' '));
-        let observer = observer.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        let observer = observer(at, order);
         // Two seconds of the device's time: the observer has said hello.
         let begun = cycle(at);
         while cycle(at) < begun + 600 {}
@@ -165,4 +174,37 @@ fn an_interrupted_observer_does_not_say_that_the_arm_has_stopped() {
     until(at, &["approach", "run"]);
     let _ = run.kill();
     let _ = run.wait();
+}
+
+#[test]
+fn two_may_look_on_a_third_is_told_so_and_the_places_of_killed_ones_are_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let _arm = StandIn::start(at);
+    let ended = AtomicBool::new(false);
+    std::thread::scope(|threads| {
+        for name in ["one", "two"] {
+            let socket = StreamTransport::unix(&at.join("tactus.sock")).unwrap();
+            let mut observer = Client::observe(socket, name).unwrap();
+            let ended = &ended;
+            threads.spawn(move || {
+                while !ended.load(Ordering::SeqCst) {
+                    observer.next(Duration::from_millis(50)).unwrap();
+                }
+                // As one that is killed: it says nothing.
+                std::mem::forget(observer);
+            });
+        }
+        let refused = tactus(at, "list");
+        // It needs no place among those who look on.
+        let stopped = tactus(at, "stop");
+        ended.store(true, Ordering::SeqCst);
+        let told: Value = serde_json::from_slice(&refused.stdout).unwrap();
+        assert_eq!(told["error"]["code"], "E504", "{told}");
+        assert!(told["error"]["message"].as_str().unwrap().contains("two other programs look on"), "{told}");
+        assert!(told["error"]["help"].as_str().unwrap().contains("tactus stop"), "{told}");
+        assert!(stopped.status.success(), "{}", String::from_utf8_lossy(&stopped.stdout));
+    });
+    let listed = tactus(at, "list");
+    assert!(listed.status.success(), "{}", String::from_utf8_lossy(&listed.stdout));
 }

@@ -93,6 +93,14 @@ pub enum HostError {
         /// Time after which the device can be had if that host has fallen silent, ms.
         wait_ms: u32,
     },
+    /// As many look on as the device has places for.
+    #[error(
+        "two other programs look on at the device already, as many as it has places for; one that has fallen silent gives way in {wait_ms} ms"
+    )]
+    Watched {
+        /// Time after which there is a place if one of them has fallen silent, ms.
+        wait_ms: u32,
+    },
     /// The device answered with something that is no answer to what was asked.
     #[error("the device answered '{request}' with another message")]
     WrongAnswer {
@@ -223,7 +231,7 @@ impl HostError {
             Self::Incompatible { .. } => ErrorCode::LinkVersion,
             Self::Lacks(_) => ErrorCode::CapabilityMissing,
             Self::Refused { reason, .. } => ErrorCode::Refused(*reason),
-            Self::InUse { .. } => ErrorCode::Refused(Refusal::Busy),
+            Self::InUse { .. } | Self::Watched { .. } => ErrorCode::Refused(Refusal::Busy),
             Self::Image(_) => ErrorCode::ImageInvalid,
             Self::ReadBack { .. } => ErrorCode::ReadBackDiffers,
             Self::Transport(TransportError::Closed | TransportError::Io(_)) => ErrorCode::LineClosed,
@@ -238,6 +246,9 @@ impl HostError {
     pub fn into_failure(self, doing: impl Into<String>) -> Failure {
         let help = match &self {
             Self::Transport(TransportError::Can(problem)) => problem.help(),
+            Self::Watched { .. } => {
+                Some("end one of them; `tactus stop` stops the arm from here, however many look on".to_owned())
+            }
             Self::Refused { reason: Refusal::NotReady, detail: [stage, _], .. } => {
                 let stage = u8::try_from(*stage).ok().and_then(Stage::from_code);
                 stage.and_then(stage_remedy).map(str::to_owned)

@@ -27,7 +27,8 @@ pub(super) struct Inbox {
 }
 
 impl Inbox {
-    /// Takes a request; false if one had to give way. A stop never does, and never waits behind anything else.
+    /// Takes a request; false if one had to give way. A stop never does, and never waits behind anything else; a
+    /// farewell gives way to a stop alone.
     pub(super) fn push(&mut self, frame: Frame<Request>, is_owner: bool) -> bool {
         if is_owner { push(&mut self.owner, frame) } else { push(&mut self.others, frame) }
     }
@@ -52,18 +53,30 @@ impl Inbox {
     }
 }
 
-/// Puts a stop to the front and everything else to the end; false if a request was lost.
+/// Puts a stop to the front and everything else to the end; false if a request was lost. What its host repeats gives
+/// way to a stop, and to a farewell: nobody repeats that, and the place of one who has left would be kept.
 fn push<const N: usize>(queue: &mut Deque<Frame<Request>, N>, frame: Frame<Request>) -> bool {
     let is_full = queue.is_full();
-    if frame.message == Request::Stop {
-        if is_full {
-            queue.pop_back();
+    let is_stop = frame.message == Request::Stop;
+    if is_full {
+        let repeated = queue.iter().rposition(|frame| !matches!(frame.message, Request::Stop | Request::Goodbye));
+        match repeated {
+            Some(place) if is_stop || frame.message == Request::Goodbye => remove(queue, place),
+            None if is_stop => drop(queue.pop_back()),
+            _ => return false,
         }
-        let _ = queue.push_front(frame);
-    } else if !is_full {
-        let _ = queue.push_back(frame);
     }
+    let _ = if is_stop { queue.push_front(frame) } else { queue.push_back(frame) };
     !is_full
+}
+
+/// Takes out what is at this place; the others keep their order.
+fn remove<const N: usize>(queue: &mut Deque<Frame<Request>, N>, place: usize) {
+    for other in 0..queue.len() {
+        if let Some(frame) = queue.pop_front().filter(|_| other != place) {
+            let _ = queue.push_back(frame);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -135,6 +148,31 @@ mod tests {
             assert!(inbox.push(frame(OWNER, Request::Ping), is_owner));
             assert!(inbox.push(frame(OWNER, Request::Stop), is_owner), "there was room for both");
         }
+    }
+
+    #[test]
+    fn a_goodbye_takes_the_place_of_what_will_be_repeated_and_keeps_its_turn() {
+        for (is_owner, places) in [(true, OWNER_REQUESTS), (false, OTHER_REQUESTS)] {
+            for stopping in [false, true] {
+                let mut inbox = Inbox::default();
+                let first = if stopping { Request::Stop } else { Request::Ping };
+                assert!(inbox.push(frame(OWNER, first.clone()), is_owner));
+                for _ in 1..places {
+                    assert!(inbox.push(frame(OWNER, Request::Status), is_owner));
+                }
+                assert!(!inbox.push(frame(OWNER, Request::Goodbye), is_owner), "a status is lost");
+                let words = core::iter::from_fn(|| inbox.pop(0, true, |_| false).map(|frame| frame.message));
+                let expected = [Request::Status, Request::Status, Request::Goodbye];
+                assert!(words.eq(core::iter::once(first).chain(expected.into_iter().skip(4 - places))));
+            }
+        }
+        // Only farewells and a stop: the newest farewell is lost, the stop never.
+        let mut inbox = Inbox::default();
+        for message in [Request::Goodbye, Request::Goodbye, Request::Goodbye, Request::Stop, Request::Goodbye] {
+            inbox.push(frame(99, message), false);
+        }
+        let words = core::iter::from_fn(|| inbox.pop(0, true, |_| false).map(|frame| frame.message));
+        assert!(words.eq([Request::Stop, Request::Goodbye]));
     }
 
     #[test]
