@@ -408,9 +408,8 @@ fn a_stop_is_heard_even_behind_a_flood() {
         rig.ask(Request::Status);
     }
     rig.ask(Request::Stop);
-    rig.bench.room = 4096;
-    rig.poll();
     assert_eq!(rig.bench.commands, [Command::Control(control::Command::Stop)]);
+    rig.bench.room = 4096;
     rig.event(EventKind::Accepted);
     rig.sent();
     let Some(Reply::Statistics { statistics, .. }) = rig.ask(Request::Statistics) else { panic!() };

@@ -2,7 +2,7 @@
 
 use control::State;
 use device::storage::{Library, Opening, Work};
-use device::{Store as _, StoreError};
+use device::{Command, Store as _, StoreError};
 use link::{Name, PrimitiveImage, Refusal, Reply, Request};
 
 use crate::rig::{SLOT_BYTES, SLOTS, hello, image, image_with};
@@ -16,6 +16,19 @@ fn rig() -> Rig {
     let mut rig = Rig::over(library);
     rig.greet();
     rig
+}
+
+#[test]
+fn h6_a_stop_does_not_wait_for_the_storage_that_is_read() {
+    // Younger than the second after which a session begins whatever the storage does.
+    let mut rig: Rig = Rig::over(Library::new());
+    rig.now_ms = 500;
+    assert_eq!(rig.ask(Request::Hello(hello())), None, "it waits");
+    assert_eq!(rig.ask(Request::Stop), None);
+    assert_eq!(rig.bench.commands, [Command::Control(control::Command::Stop)]);
+    rig.session.store_mut().open(Opening::default());
+    let replies = said(&mut rig);
+    assert!(matches!(replies[..], [Reply::Hello { .. }]), "{replies:?}");
 }
 
 fn name(text: &str) -> Name {

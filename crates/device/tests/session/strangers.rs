@@ -25,6 +25,33 @@ fn h7_a_stop_is_obeyed_whatever_its_number_and_whoever_sends_it() {
     }
 }
 
+/// A host that writes and does not read: its line is full, and so is the device's end of it.
+#[test]
+fn h6_a_stop_needs_no_room_on_the_line() {
+    for number in [77, 88, 500] {
+        let mut rig = Rig::greeted();
+        rig.number = 88;
+        assert!(matches!(rig.ask(Request::Observe(hello())), Some(Reply::Hello { .. })));
+        rig.bench.state = State::Run;
+        rig.bench.room = 0;
+        (rig.number, rig.sequence) = (number, 40);
+        for _ in 0..3 {
+            assert_eq!(rig.ask(Request::Status), None);
+        }
+        assert_eq!(rig.ask(Request::Stop), None);
+        assert_eq!(rig.bench.commands, [Command::Control(control::Command::Stop)], "session {number}");
+        let stop = rig.sequence;
+        rig.event(EventKind::Accepted);
+        assert!(rig.sent().is_empty(), "session {number}: there is no room");
+        // The answer is told to whoever asks again.
+        rig.bench.room = 4096;
+        rig.put(stop, 0, &Request::Stop);
+        rig.event(EventKind::Accepted);
+        let told = rig.sent().into_iter().any(|frame| frame.message == Reply::Accepted { of: stop });
+        assert!(told, "session {number}");
+    }
+}
+
 #[test]
 fn h7_a_stop_that_is_repeated_by_its_owner_stops_again() {
     let mut rig = Rig::greeted();

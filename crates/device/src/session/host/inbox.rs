@@ -33,6 +33,11 @@ impl Inbox {
         if is_owner { push(&mut self.owner, frame) } else { push(&mut self.others, frame) }
     }
 
+    /// A stop, if one waits.
+    pub(super) fn pop_stop(&mut self) -> Option<Frame<Request>> {
+        pop_stop(&mut self.owner).or_else(|| pop_stop(&mut self.others))
+    }
+
     /// The next request. `is_owner` tells by its session number whether a host has the session; a device without a
     /// session owes nobody anything, so that `is_free` lets every host pass.
     pub(super) fn pop(&mut self, now_ms: u32, is_free: bool, is_owner: impl Fn(u16) -> bool) -> Option<Frame<Request>> {
@@ -68,6 +73,11 @@ fn push<const N: usize>(queue: &mut Deque<Frame<Request>, N>, frame: Frame<Reque
     }
     let _ = if is_stop { queue.push_front(frame) } else { queue.push_back(frame) };
     !is_full
+}
+
+fn pop_stop<const N: usize>(queue: &mut Deque<Frame<Request>, N>) -> Option<Frame<Request>> {
+    // Every stop was put to the front.
+    queue.front().is_some_and(|frame| frame.message == Request::Stop).then(|| queue.pop_front())?
 }
 
 /// Takes out what is at this place; the others keep their order.
