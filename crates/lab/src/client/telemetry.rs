@@ -104,10 +104,11 @@ impl<T: Transport> TelemetryStream<'_, T> {
 impl<T: Transport> Iterator for TelemetryStream<'_, T> {
     type Item = Result<Telemetry, HostError>;
 
-    /// The next cycle; [`HostError::NoAnswer`] if none came for a second.
+    /// The next cycle; [`HostError::NoAnswer`] if none came for a second, whatever else did.
     fn next(&mut self) -> Option<Self::Item> {
+        let end = self.client.now() + self.silence;
         loop {
-            return Some(match self.client.next(self.silence) {
+            return Some(match self.client.next(end.saturating_sub(self.client.now())) {
                 Ok(Some(Incoming::Telemetry(telemetry))) => Ok(telemetry),
                 Ok(Some(Incoming::Event(event))) => {
                     self.events.push(event);

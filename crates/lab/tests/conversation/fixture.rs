@@ -108,6 +108,8 @@ pub(crate) struct Device {
     pub(crate) unplugged: bool,
     /// Its hello says that it drives no arm.
     pub(crate) armless: bool,
+    /// It tells an event in place of every control cycle.
+    pub(crate) without_cycles: bool,
     /// Answers that are still to be "the storage is being read".
     pub(crate) reading: u32,
 }
@@ -140,6 +142,7 @@ impl Device {
             dead: false,
             unplugged: false,
             armless: false,
+            without_cycles: false,
             reading: 0,
         }
     }
@@ -149,7 +152,11 @@ impl Device {
         if self.steps.is_multiple_of(3) {
             let cycle = u64::from(self.steps / 3);
             let record = CycleRecord { cycle, state: self.half.state, ..CycleRecord::EMPTY };
-            self.half.records.push_back(TimedRecord { record, cost_ticks: 7 });
+            if self.without_cycles {
+                self.half.events.push_back(Event { cycle, kind: EventKind::Arrived });
+            } else {
+                self.half.records.push_back(TimedRecord { record, cost_ticks: 7 });
+            }
         }
         if !self.dead {
             self.session.poll((STEP * self.steps).as_micros() as u64, &mut self.half);

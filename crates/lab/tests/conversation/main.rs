@@ -229,6 +229,20 @@ fn telemetry_arrives_whole_and_keeps_the_session_alive() {
 }
 
 #[test]
+fn a_stream_without_cycles_ends_after_a_second_whatever_else_is_told() {
+    let mut client = connected();
+    let mut stream = client.telemetry(1).unwrap();
+    stream.next().unwrap().unwrap();
+    stream.client().transport().without_cycles = true;
+    let begun = stream.client().now();
+    let ended = stream.find(Result::is_err);
+    assert!(matches!(ended, Some(Err(HostError::NoAnswer { request: "telemetry", .. }))), "{ended:?}");
+    let waited = stream.client().now() - begun;
+    assert!(waited > Duration::from_millis(990) && waited < Duration::from_millis(1020), "{waited:?}");
+    assert!(stream.events().len() > 250);
+}
+
+#[test]
 fn gaps_in_the_telemetry_are_counted() {
     let mut client = connected();
     client.set_telemetry(1).unwrap();
