@@ -2,8 +2,8 @@
 
 use crate::samples::Tables;
 use link::image::{
-    EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, IMAGE_BYTES_LIMIT, IMAGE_SCHEMA, KERNEL_LIMIT,
-    STATISTICS_POINTS_LIMIT, Waypoint, image_bytes, stored_crc,
+    EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, Hemisphere, IMAGE_BYTES_LIMIT, IMAGE_SCHEMA, ImageContent,
+    KERNEL_LIMIT, OrientationError, STATISTICS_POINTS_LIMIT, Waypoint, WaypointVelocity, image_bytes, stored_crc,
 };
 use link::{ImageError, Name, PrimitiveImage};
 use proptest::prelude::*;
@@ -186,6 +186,65 @@ fn bad_names_and_unknown_flags_are_refused() {
 }
 
 #[test]
+fn each_flag_has_its_documented_bit_and_is_read_as_it_was_written() {
+    let tables = Tables::new(2, 0, 0, 0);
+    let mut bytes = vec![0; 8192];
+    for (flags, orientation_error, hemisphere) in [
+        (0, OrientationError::Quaternion, Hemisphere::Demonstrated),
+        (1, OrientationError::RotationVector, Hemisphere::Demonstrated),
+        (2, OrientationError::Quaternion, Hemisphere::Nearest),
+        (3, OrientationError::RotationVector, Hemisphere::Nearest),
+    ] {
+        let content = ImageContent { orientation_error, hemisphere, ..tables.content() };
+        let length = content.encode(&Name::new("a").unwrap(), &mut bytes).unwrap();
+        assert_eq!(bytes[FLAGS..FLAGS + 2], [flags, 0]);
+        let read = PrimitiveImage::parse(&bytes[..length]).unwrap();
+        let read = read.content();
+        assert_eq!((read.orientation_error, read.hemisphere), (orientation_error, hemisphere));
+    }
+}
+
+#[test]
+fn a_moment_in_single_precision_is_the_same_moment() {
+    let moment =
+        Waypoint { position: [0.25, 0.5, 1.0], orientation: [1.0, 0.0, -0.5, 0.5], posture: [2.0; 7], hand: [3.0; 4] };
+    let there: Waypoint = moment.single();
+    assert_eq!((there.position, there.orientation), ([0.25, 0.5, 1.0], [1.0, 0.0, -0.5, 0.5]));
+    assert_eq!((there.posture, there.hand), ([2.0; 7], [3.0; 4]));
+    let speeds = WaypointVelocity {
+        position: [0.25, 0.5, 1.0],
+        orientation: [4.0, 5.0, 6.0],
+        posture: [2.0; 7],
+        hand: [3.0; 4],
+    };
+    let there: WaypointVelocity = speeds.single();
+    assert_eq!((there.position, there.orientation), ([0.25, 0.5, 1.0], [4.0, 5.0, 6.0]));
+    assert_eq!((there.posture, there.hand), ([2.0; 7], [3.0; 4]));
+}
+
+#[test]
+fn every_refusal_says_what_is_wrong_with_its_numbers() {
+    for (refusal, words) in [
+        (ImageError::TooShort { length: 7 }, &["7 bytes"][..]),
+        (ImageError::Magic, &["not a primitive"]),
+        (ImageError::Schema { found: 9 }, &["version 9", "version 3"]),
+        (ImageError::Length { expected: 70, found: 71 }, &["have 70", "has 71"]),
+        (ImageError::Crc { computed: 0xAB, stored: 0xCD }, &["0x000000ab", "0x000000cd"]),
+        (ImageError::Name, &["name"]),
+        (ImageError::Flags { found: 0x80 }, &["0x0080"]),
+        (ImageError::Kernels { found: 101 }, &["101", "100"]),
+        (ImageError::GainPoints { found: 33 }, &["33", "32"]),
+        (ImageError::ExpectationPoints { found: 129 }, &["129", "128"]),
+        (ImageError::StatisticsPoints { found: 65 }, &["65", "64"]),
+        (ImageError::NotFinite { real: 12 }, &["12", "not finite"]),
+        (ImageError::Shape, &["shape"]),
+    ] {
+        let text = refusal.to_string();
+        assert!(words.iter().all(|word| text.contains(word)), "{text}");
+    }
+}
+
+#[test]
 fn what_could_not_be_read_back_is_not_written() {
     let tables = Tables::new(4, 1, 2, 1);
     let mut out = vec![0; 8192];
@@ -195,15 +254,15 @@ fn what_could_not_be_read_back_is_not_written() {
     assert_eq!(good.encode(&name, &mut out[..length - 1]), Err(ImageError::Shape));
 
     let start = Waypoint { position: [0.0, f32::NAN, 0.0], ..good.start };
-    let bad = link::image::ImageContent { start, ..good };
+    let bad = ImageContent { start, ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::NotFinite { real: 12 }));
-    let bad = link::image::ImageContent { kernels: 5, ..good };
+    let bad = ImageContent { kernels: 5, ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
-    let bad = link::image::ImageContent { k1: &good.k1[1..], ..good };
+    let bad = ImageContent { k1: &good.k1[1..], ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
-    let bad = link::image::ImageContent { statistics_spread: &good.k1[..0], ..good };
+    let bad = ImageContent { statistics_spread: &good.k1[..0], ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::Shape));
-    let bad = link::image::ImageContent { k2: &good.k2[..0], ..good };
+    let bad = ImageContent { k2: &good.k2[..0], ..good };
     assert_eq!(bad.encode(&name, &mut out), Err(ImageError::GainPoints { found: 1 }));
 }
 
