@@ -3,7 +3,8 @@
 use crate::samples::Tables;
 use link::image::{
     EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, Hemisphere, IMAGE_BYTES_LIMIT, IMAGE_SCHEMA, ImageContent,
-    KERNEL_LIMIT, OrientationError, STATISTICS_POINTS_LIMIT, Waypoint, WaypointVelocity, image_bytes, stored_crc,
+    KERNEL_LIMIT, OrientationError, STATISTICS_POINTS_LIMIT, Waypoint, WaypointVelocity, image_bytes, legible_name,
+    stored_crc,
 };
 use link::{ImageError, Name, PrimitiveImage};
 use proptest::prelude::*;
@@ -242,6 +243,19 @@ fn every_refusal_says_what_is_wrong_with_its_numbers() {
         let text = refusal.to_string();
         assert!(words.iter().all(|word| text.contains(word)), "{text}");
     }
+}
+
+#[test]
+fn a_name_is_read_from_the_first_bytes_of_a_damaged_image() {
+    let mut image = Tables::new(2, 0, 0, 0).image();
+    image[FIRST_REAL] ^= 1;
+    assert!(matches!(refusal(&image), ImageError::Crc { .. }));
+    let head = &image[..NAME + 32];
+    assert_eq!(legible_name(head), Some(Name::new("side-grasp").unwrap()));
+    assert_eq!(legible_name(&image), legible_name(head), "what follows does not matter");
+    assert_eq!(legible_name(&head[..NAME + 31]), None, "not all of it");
+    image[NAME] = 0xFF;
+    assert_eq!(legible_name(&image), None);
 }
 
 #[test]
