@@ -4,7 +4,7 @@ use crate::samples::Tables;
 use link::image::{
     EXPECTATION_POINTS_LIMIT, GAIN_POINTS_LIMIT, Hemisphere, IMAGE_BYTES_LIMIT, IMAGE_SCHEMA, ImageContent,
     KERNEL_LIMIT, OrientationError, STATISTICS_POINTS_LIMIT, Waypoint, WaypointVelocity, image_bytes, legible_name,
-    stored_crc,
+    renamed_head, stored_crc,
 };
 use link::{ImageError, Name, PrimitiveImage};
 use proptest::prelude::*;
@@ -256,6 +256,15 @@ fn a_name_is_read_from_the_first_bytes_of_a_damaged_image() {
     assert_eq!(legible_name(&head[..NAME + 31]), None, "not all of it");
     image[NAME] = 0xFF;
     assert_eq!(legible_name(&image), None);
+}
+
+#[test]
+fn a_renamed_head_differs_in_nothing_but_the_whole_name() {
+    let image = Tables::new(2, 0, 0, 0).image();
+    let head = renamed_head(&image, &Name::new("b").unwrap()).unwrap();
+    assert_eq!((&head[..NAME], head.len()), (&image[..NAME], NAME + 32));
+    assert_eq!((head[NAME], &head[NAME + 1..]), (b'b', &[0; 31][..]), "nothing of the longer name is left");
+    assert_eq!(renamed_head(&image[..NAME + 31], &Name::new("b").unwrap()), None);
 }
 
 #[test]
