@@ -313,7 +313,11 @@ impl<S: device::Store> Rig<S> {
 
     /// Uploads all parts of an image.
     pub(crate) fn send_parts(&mut self, name: &str, image: &[u8]) {
-        let crc = link::image::stored_crc(image);
+        self.send_parts_as(name, link::image::stored_crc(image), image);
+    }
+
+    /// Uploads all parts of an image that was announced with this check sum.
+    pub(crate) fn send_parts_as(&mut self, name: &str, crc: u32, image: &[u8]) {
         self.done(Request::UploadBegin { name: Name::new(name).unwrap(), length: image.len() as u32, crc });
         for (index, part) in image.chunks(192).enumerate() {
             self.done(Request::UploadChunk { offset: 192 * index as u32, data: ChunkData::from_slice(part).unwrap() });

@@ -159,7 +159,12 @@ fn what_is_not_sound_or_not_fit_is_refused_with_its_reason() {
 
     let mut flipped = good.clone();
     flipped[500] ^= 4;
-    assert_eq!(refused(&mut rig, "reach", &flipped).0, Refusal::UploadCrc);
+    let announced = link::image::stored_crc(&flipped);
+    let stored = link::image::stored_crc(&good);
+    assert_eq!(refused(&mut rig, "reach", &flipped), (Refusal::UploadCrc, [announced, stored]), "wrong when it left");
+    rig.send_parts_as("reach", stored ^ 1, &flipped);
+    let on_the_way = rig.refused(Request::UploadCommit);
+    assert_eq!(on_the_way, (Refusal::UploadCrc, [announced, stored ^ 1]), "not as announced");
 
     let mut schema = good.clone();
     schema[4] = 9;
