@@ -166,7 +166,9 @@ fn a_hello_waits_for_the_library_a_second_and_is_then_answered_without_it() {
     let mut rig = Rig::over(Library::new());
     rig.now_ms = 10;
     assert_eq!(rig.ask(Request::Hello(hello())), None, "nobody knows yet what is stored");
-    rig.wait(1100);
+    rig.wait(989);
+    assert_eq!(rig.answer(), None, "999 ms after its start");
+    rig.wait(1);
     assert!(matches!(rig.answer(), Some(Reply::Hello { .. })));
     let refused = rig.ask(Request::List { index: 0 });
     assert!(matches!(refused, Some(Reply::Refused { reason: Refusal::StoreFailed, .. })), "{refused:?}");

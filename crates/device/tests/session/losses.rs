@@ -1,0 +1,40 @@
+//! Which images the store has lost, as a host is told.
+
+use device::storage::{Library, Opening};
+use link::{Refusal, Reply, Request};
+
+use crate::rig::{Rig, SLOT_BYTES, SLOTS, image};
+
+/// A session over a library of which these images were read.
+fn restored(images: &[Vec<u8>]) -> Rig<Library<SLOTS, SLOT_BYTES>> {
+    let mut library = Library::new();
+    for (slot, image) in images.iter().enumerate() {
+        library.restore(slot as u8, image);
+    }
+    library.open(Opening::default());
+    let mut rig = Rig::over(library);
+    rig.greet();
+    rig
+}
+
+/// The lost image of a place, if any, with its name, and the number of all that are lost.
+fn loss<S: device::Store>(rig: &mut Rig<S>, place: u8) -> (Option<Option<String>>, u8) {
+    match rig.ask(Request::Storage { place }) {
+        Some(Reply::Storage { storage, .. }) => {
+            (storage.loss.map(|loss| loss.name.map(|name| name.to_string())), storage.lost)
+        }
+        other => panic!("no report but {other:?}"),
+    }
+}
+
+#[test]
+fn h11_an_image_that_was_read_and_is_not_sound_is_missed_unless_its_name_stands_elsewhere() {
+    let mut damaged = image("reach", 3.0, 10);
+    damaged[500] ^= 4;
+    let mut rig = restored(&[damaged.clone(), image("push", 3.0, 10)]);
+    assert_eq!(loss(&mut rig, 0), (Some(Some("reach".to_owned())), 1));
+    assert_eq!((loss(&mut rig, 1), loss(&mut rig, 2)), ((None, 1), (None, 1)));
+    let mut rig = restored(&[damaged, image("reach", 3.0, 10)]);
+    assert_eq!((loss(&mut rig, 0), loss(&mut rig, 1)), ((None, 0), (None, 0)));
+    assert_eq!(rig.refused(Request::Storage { place: SLOTS as u8 }), (Refusal::NoSuchPrimitive, [SLOTS as u32, 0]));
+}
