@@ -85,6 +85,19 @@ fn h4_a_goal_that_is_changed_is_checked_with_the_run() {
 }
 
 #[test]
+fn h4_every_change_at_one_moment_is_checked_and_not_only_the_first() {
+    let primitive = reach(1.6);
+    assert!(checked(&primitive).passed());
+    let faster = Change { time: 0.2, kind: ChangeKind::Speed(2.0) };
+    let position = Some(primitive.goal.position.map(|part| part as f32));
+    let same_goal = Change { time: 0.2, kind: ChangeKind::Goal(Goal { position, orientation: None }) };
+    for changes in [vec![faster], vec![same_goal, faster], vec![faster, same_goal]] {
+        let report = check(&primitive, &Course { changes, ..Course::stored(1.0) }, |_| {}).unwrap();
+        assert!(!report.passed(), "{}", report.to_text());
+    }
+}
+
+#[test]
 fn the_same_movement_passes_at_half_speed_and_fails_at_double() {
     let primitive = reach(1.6);
     let slow = check(&primitive, &Course::stored(0.5), |_| {}).unwrap();

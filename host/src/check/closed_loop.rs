@@ -99,7 +99,7 @@ impl ClosedLoop {
         if course.goal != link::Goal::default() || !course.changes.is_empty() {
             last += u64::from(periods(GOAL_CHANGE)) + expected as u64;
         }
-        let due = |change: &&Change| SETTLING + 1 + (change.time / PERIOD) as u64;
+        let changes = schedule(&course.changes);
         for number in 0..last {
             let Some(counts) = plant.counts() else {
                 run.ending = Ending::Diverged;
@@ -111,10 +111,7 @@ impl ClosedLoop {
                     let (speed, goal) = (speed as f32, goal(&course.goal));
                     Some(Command::Run(RunOptions { speed, goal, ..RunOptions::default() }))
                 }
-                _ => course.changes.iter().find(|change| due(change) == number).map(|change| match change.kind {
-                    ChangeKind::Goal(new) => Command::SetGoal(goal(&new)),
-                    ChangeKind::Speed(factor) => Command::SetSpeed { factor },
-                }),
+                _ => changes.iter().find(|(due, _)| *due == number).map(|(_, command)| *command),
             };
             let output = cycle.step(&CycleInput {
                 cycle: number,
@@ -161,6 +158,26 @@ impl ClosedLoop {
         let cut = flags::JOINT_LIMITED | flags::MOTOR_LIMITED | flags::NOT_FINITE;
         self.samples.iter().filter(|sample| sample.record.flags & cut != 0).count()
     }
+}
+
+/// The changes with the cycle of each. A cycle takes one command, so of several at one moment the later ones come in
+/// the cycles behind it, in the order in which a run sends them: none is left out.
+fn schedule(changes: &[Change]) -> Vec<(u64, Command)> {
+    let mut changes = changes.to_vec();
+    changes.sort_by(|a, b| a.time.total_cmp(&b.time));
+    let mut free = SETTLING + 1;
+    changes
+        .into_iter()
+        .map(|change| {
+            let due = free.max(SETTLING + 1 + (change.time / PERIOD) as u64);
+            free = due + 1;
+            let command = match change.kind {
+                ChangeKind::Goal(new) => Command::SetGoal(goal(&new)),
+                ChangeKind::Speed(factor) => Command::SetSpeed { factor },
+            };
+            (due, command)
+        })
+        .collect()
 }
 
 fn sample(plant: &Plant, time: f64, record: CycleRecord) -> Sample {

@@ -209,7 +209,9 @@ fn follow(
     client.take_events();
     client.run(&request.name, request.options)?;
     let mut changes = request.changes.clone();
-    changes.sort_by(|a, b| b.time.total_cmp(&a.time));
+    // Taken from the end: of several at one moment the first one given goes first, as in the check.
+    changes.sort_by(|a, b| a.time.total_cmp(&b.time));
+    changes.reverse();
     let mut outcome = RunOutcome::default();
     let (mut first, mut arrived) = (None, None);
     loop {
