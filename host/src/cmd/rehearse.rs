@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
+use control::plan::bounds;
 use link::RunOptions;
 use serde::Serialize;
 
@@ -223,6 +224,7 @@ pub(super) fn memory_target(
 pub(super) fn write(file: &PrimitiveFile, output: OutputFile, target: &Path, doing: &str) -> Result<(), Failure> {
     let refused = |cause| super::check::failure(cause, target, doing);
     // What a device would refuse is not written.
+    file.to_primitive().map_err(refused)?;
     file.to_image().map_err(refused)?;
     files::fill(output, file.checked_text().map_err(refused)?.as_bytes(), doing)
 }
@@ -306,9 +308,24 @@ fn payload(text: &str) -> Result<Payload, String> {
         let [mass] = super::learn::numbers::<1>(text)?;
         Payload { mass, centre: [0.0; 3] }
     };
-    if (0.0..=10.0).contains(&payload.mass) {
-        Ok(payload)
-    } else {
-        Err("a mass from 0 to 10 kg is expected".to_owned())
+    // What a device would refuse must not be found out after all trials.
+    let centre = payload.centre.map(|value| value as f32);
+    bounds::check_marks(payload.mass as f32, &centre, 0.0, 0.0).map(|()| payload).map_err(|_| {
+        let (mass, metres) = (bounds::LOAD_MASS, bounds::LOAD_CENTRE);
+        format!("a mass from 0 to {mass} kg is expected, and a centre of at most {metres} m along each axis")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_payload_that_no_device_takes_is_refused_before_anything_moves() {
+        assert_eq!(payload("0.5,0,0,0.08"), Ok(Payload { mass: 0.5, centre: [0.0, 0.0, 0.08] }));
+        assert!(payload("4").is_ok());
+        for wrong in ["-0.1", "5", "0.5,0,0,80", "0.5,0,0", "nan"] {
+            assert!(payload(wrong).is_err(), "{wrong}");
+        }
     }
 }
