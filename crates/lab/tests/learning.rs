@@ -466,3 +466,36 @@ fn more_kernels_than_a_device_holds_are_refused() {
     assert!(matches!(primitive.to_image().unwrap_err(), PrimitiveFileError::Image { .. }));
     assert!(matches!(primitive.to_primitive().unwrap_err(), PrimitiveFileError::Invalid { .. }));
 }
+
+/// A movement whose last stretch was led with the greatest care: another 10 s, in which the hand sinks by 30 mm.
+fn careful() -> Recording {
+    let mut rows = common::rows(4.0);
+    let at_rest = rows.last().unwrap().clone();
+    for k in 1..=3300_u32 {
+        let mut row = at_rest.clone();
+        row.time += f64::from(k) / control::RATE;
+        row.telemetry.cycle += k;
+        row.telemetry.q[1] += 0.005 * k.min(3000) as f32 / control::RATE as f32;
+        let (position, orientation) = lab::arm::tool_pose(&row.telemetry.q.map(f64::from));
+        row.pose[..3].copy_from_slice(&position);
+        row.pose[3..].copy_from_slice(&orientation);
+        rows.push(row);
+    }
+    Recording::parse(Path::new("demo.csv"), common::text(&rows).as_bytes()).unwrap()
+}
+
+#[test]
+fn an_approach_so_slow_that_it_counts_as_rest_is_not_left_out_in_silence() {
+    let options = LearnOptions::named("reach");
+    let short = learned(&careful(), &options).unwrap();
+    let words = short.report.warnings.join("\n");
+    assert!(
+        words.contains("behind the movement the arm moved by another") && words.contains("--still-speed"),
+        "{words}"
+    );
+    // What it advises helps: the primitive ends where the hand was led.
+    let preparation = Preparation { still_speed: Some(0.001) };
+    let whole = learned(&careful(), &LearnOptions { preparation, ..options }).unwrap();
+    assert!((whole.primitive.goal.posture[1] - common::GOAL[1] - 0.05).abs() < 2e-3);
+    assert!(whole.report.warnings.iter().all(|warning| !warning.contains("left out")), "{:?}", whole.report.warnings);
+}

@@ -78,6 +78,9 @@ pub struct Demonstration {
     pub trimmed: (f64, f64),
     /// Distance by which the arm crept away at the end, once it was let go, m; that is cut off.
     pub crept: Option<f64>,
+    /// How far the arm moved in what was cut off before and behind the movement, m, turning counted at [`TURN_RADIUS`];
+    /// what [`crept`](Self::crept) tells is not counted.
+    pub left_out: (f64, f64),
     /// Where the pose comes from.
     pub pose_source: PoseSource,
 }
@@ -161,6 +164,7 @@ impl Demonstration {
             wrench,
             trimmed: (0.0, 0.0),
             crept: None,
+            left_out: (0.0, 0.0),
             pose_source,
         };
         whole.trim(recording, preparation)
@@ -193,6 +197,7 @@ impl Demonstration {
         }
         let (first, last) = (first.saturating_sub(REST), (last + REST).min(end));
         let trimmed = (self.time[first], self.time[self.time.len() - 1] - self.time[last]);
+        let left_out = (self.distance(0, first), self.distance(last, end));
         let range = first..=last;
         Ok(Demonstration {
             time: (0..=last - first).map(|index| index as f64 / RATE).collect(),
@@ -202,6 +207,7 @@ impl Demonstration {
             wrench: self.wrench.map(|values| values[range.clone()].to_vec()),
             trimmed,
             crept,
+            left_out,
             pose_source: self.pose_source,
         })
     }

@@ -32,6 +32,10 @@ use report::{FitReport, RowError, row_error, wrench_statistics};
 /// Distance by which an arm must creep to be told of, m: less is no reason to weigh it.
 const LEAST_CREPT: f64 = 0.5e-3;
 
+/// Distance that the arm may move slowly before or behind what is learned without being told of, m: what a run may end
+/// beside its goal.
+const LEAST_LEFT_OUT: f64 = 3e-3;
+
 /// Speed of the tool (turning counted, m/s) above which a demonstration does not begin or end at rest.
 const MOVING_END: f64 = 0.01;
 
@@ -172,7 +176,7 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
         });
     }
     demonstration.rest(options.dwell);
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<String> = slow_ends(&demonstration).collect();
     if let Some(crept) = demonstration.crept.filter(|crept| *crept >= LEAST_CREPT) {
         warnings.push(format!(
             "the arm crept away by {:.0} mm once it was let go, which is left out; `tactus calibrate gravity` weighs it",
@@ -240,6 +244,19 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
         tool: format!("tactus {}", env!("CARGO_PKG_VERSION")),
     });
     Ok(Learned { primitive, report, demonstration })
+}
+
+/// Warnings of a slow approach or departure that counted as rest: the primitive would end short of where it was led.
+fn slow_ends(demonstration: &Demonstration) -> impl Iterator<Item = String> {
+    let (before, behind) = demonstration.left_out;
+    [(before, "before"), (behind, "behind")].into_iter().filter(|(moved, _)| *moved > LEAST_LEFT_OUT).map(
+        |(moved, side)| {
+            format!(
+                "{side} the movement the arm moved by another {:.0} mm, so slowly that it counts as rest: that is left out; a lower `--still-speed` or `--no-trim` keeps it",
+                moved * 1e3
+            )
+        },
+    )
 }
 
 /// Refuses values that are out of range.
