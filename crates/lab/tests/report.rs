@@ -66,6 +66,36 @@ fn the_end_of_a_run_is_told_as_it_was() {
 }
 
 #[test]
+fn the_end_of_a_run_is_what_came_right_behind_it_whatever_else_was_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    // The recording begins with a fault that somebody clears, and goes on after the run.
+    let outcome = |end: Option<(State, Fault)>, afterwards: State| {
+        let text = std::fs::read_to_string(recorded(folder.path(), "run.csv", end)).unwrap();
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        let first = lines.iter().position(|line| line.starts_with("cycle,")).unwrap() + 1;
+        let count = lines.len();
+        for (at, line) in lines.iter_mut().enumerate().skip(first) {
+            let mut fields: Vec<&str> = line.split(',').collect();
+            if at < first + 50 {
+                (fields[2], fields[3]) = ("fault", "1");
+            } else if at + 50 > count {
+                (fields[2], fields[3]) = (afterwards.name(), "0");
+            }
+            *line = fields.join(",");
+        }
+        let file = folder.path().join("changed.csv");
+        std::fs::write(&file, lines.join("\n")).unwrap();
+        ReportedRun::read(&file, None).unwrap().outcome
+    };
+    assert_eq!(outcome(None, State::Hold), Outcome::ArrivedUnlike);
+    assert_eq!(outcome(None, State::Gravity), Outcome::ArrivedUnlike);
+    // A run that was stopped has not arrived because the arm was told to hold afterwards.
+    assert_eq!(outcome(Some((State::SoftStop, Fault::None)), State::Hold), Outcome::Stopped);
+    let touched = Some((State::SoftStop, Fault::ContactForce));
+    assert_eq!(outcome(touched, State::Hold), Outcome::Faulted(Fault::ContactForce));
+}
+
+#[test]
 fn a_failed_run_says_what_happened_when_and_how_far_it_came() {
     let folder = tempfile::tempdir().unwrap();
     let file = recorded(folder.path(), "run.csv", Some((State::SoftStop, Fault::ContactForce)));

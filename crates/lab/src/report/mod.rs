@@ -117,7 +117,7 @@ impl ReportedRun {
             name: file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
             notes,
             progress,
-            outcome: match outcome(&recording, &running) {
+            outcome: match outcome(&recording) {
                 Outcome::Arrived if is_unlike => Outcome::ArrivedUnlike,
                 outcome => outcome,
             },
@@ -162,22 +162,31 @@ fn progress(phase: f64, alpha: f64) -> f64 {
     if phase > 0.0 { (-phase.ln() / alpha).clamp(0.0, 1.0) + 0.0 } else { 0.0 }
 }
 
-fn outcome(recording: &Recording, running: &Recording) -> Outcome {
-    if running.is_empty() {
+/// The end of the last run in a recording: what came right behind it counts. A fault that was cleared before, and
+/// what the arm did afterwards, are other stories.
+fn outcome(recording: &Recording) -> Outcome {
+    let states: Vec<Option<State>> = recording.state.iter().flatten().map(|name| named(name)).collect();
+    let is_running = |state: &Option<State>| matches!(state, Some(State::Run | State::Coast));
+    let last = states.iter().rposition(is_running);
+    if last.is_none() && recording.state.is_some() {
         return Outcome::NeverBegan;
     }
-    let last = recording.state.as_ref().and_then(|states| states.last()).map(String::as_str);
-    let fault = recording
-        .fault
-        .iter()
-        .flatten()
-        .rev()
-        .find_map(|code| u8::try_from(*code).ok().and_then(Fault::from_code).filter(|fault| *fault != Fault::None));
-    match (fault, last) {
-        (Some(fault), _) => Outcome::Faulted(fault),
-        (None, Some(state)) if state == State::Hold.name() => Outcome::Arrived,
-        (None, Some(state)) if state == State::Run.name() || state == State::Coast.name() => Outcome::Unfinished,
-        (None, Some(_)) => Outcome::Stopped,
+    let behind = last.map_or(0, |last| last + 1);
+    // Until the arm is taken up again: that clears the fault.
+    let taken_up = |state: &Option<State>| matches!(state, Some(State::Hold | State::Gravity | State::Approach));
+    let end = states.iter().skip(behind).position(taken_up).map_or(recording.len(), |at| behind + at);
+    let codes = recording.fault.iter().flatten().take(end).skip(behind);
+    let fault = codes
+        .filter_map(|code| u8::try_from(*code).ok().and_then(Fault::from_code))
+        .find(|fault| *fault != Fault::None);
+    match (states.get(behind), fault) {
+        (Some(Some(State::Hold)), _) => Outcome::Arrived,
+        (_, Some(fault)) => Outcome::Faulted(fault),
+        (Some(_), None) => Outcome::Stopped,
         (None, None) => Outcome::Unfinished,
     }
+}
+
+fn named(name: &str) -> Option<State> {
+    State::ALL.into_iter().find(|state| state.name() == name)
 }
