@@ -5,7 +5,7 @@ mod common;
 
 use std::path::Path;
 
-use lab::demonstration::Recording;
+use lab::demonstration::{Preparation, Recording};
 use lab::learn::{LearnOptions, learn};
 use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
 use lab::procedure::{Change, ChangeKind};
@@ -95,6 +95,16 @@ fn h4_every_change_at_one_moment_is_checked_and_not_only_the_first() {
         let report = check(&primitive, &Course { changes, ..Course::stored(1.0) }, |_| {}).unwrap();
         assert!(!report.passed(), "{}", report.to_text());
     }
+}
+
+#[test]
+fn a_movement_of_more_than_a_minute_is_learned_with_gains_that_the_control_code_takes() {
+    let text = common::text(&common::rows(75.0));
+    let recording = Recording::parse(Path::new("demo.csv"), text.as_bytes()).unwrap();
+    let preparation = Preparation { still_speed: Some(0.0005) };
+    let options = LearnOptions { preparation, ..LearnOptions::named("slow") };
+    let report = checked(&learn(&recording, Path::new("slow.toml"), &options).unwrap().primitive);
+    assert!(report.duration_s > 60.0 && report.passed(), "{}", report.to_text());
 }
 
 #[test]

@@ -5,6 +5,7 @@
 //! tau/K1` and a spring `K/K1`. What gives way to a standing object before it topples is therefore fixed by `K/K1` (0.3
 //! N for 25 cm) and a virtual mass of at most 2 kg, and `K`, `K1` grow with the square of the duration.
 
+use control::plan::bounds::GAIN;
 use dmp::Gain;
 use serde::Serialize;
 
@@ -53,7 +54,8 @@ pub struct FeedbackOptions {
 /// K of position, orientation, posture and hand for a movement of this duration (s).
 pub fn stiffness(options: &FeedbackOptions, duration: f64) -> [f64; 4] {
     let scale = (duration / REFERENCE_DURATION).powi(2);
-    let scaled = |k: f64| (k * scale).max(SOFTEST);
+    // Beyond a minute the recommended gain would be more than any device takes.
+    let scaled = |k: f64| (k * scale).clamp(SOFTEST, GAIN);
     [
         options.stiffness.unwrap_or_else(|| scaled(POSITION_STIFFNESS)),
         options.orientation_stiffness.unwrap_or_else(|| scaled(ORIENTATION_STIFFNESS)),
@@ -226,6 +228,8 @@ mod tests {
         assert_eq!(stiffness(&options, 12.0), [400.0, 200.0, 200.0, 200.0]);
         assert_eq!(stiffness(&options, 24.0), [1600.0, 800.0, 200.0, 800.0]);
         assert_eq!(stiffness(&options, 5.0), [200.0; 4]);
+        // Two minutes, the longest movement: no gain that a device refuses.
+        assert_eq!(stiffness(&options, 120.0), [GAIN, GAIN, 200.0, GAIN]);
         let chosen = FeedbackOptions { stiffness: Some(300.0), ..options };
         assert_eq!(stiffness(&chosen, 24.0)[0], 300.0);
     }
