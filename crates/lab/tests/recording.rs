@@ -63,6 +63,21 @@ fn text_in_a_number_is_refused_with_its_place() {
 }
 
 #[test]
+fn a_column_that_is_nobodys_may_hold_text_and_gaps_and_is_ignored() {
+    let lines = good();
+    let with = |index: usize, line: &String| {
+        let field = ["# a note", "operator", "a, b", "nan", ""];
+        match line.starts_with('#') {
+            true => line.clone(),
+            false => format!("{line},\"{}\"", field[index.min(4)]),
+        }
+    };
+    let text: Vec<String> = lines.iter().enumerate().map(|(index, line)| with(index, line)).collect();
+    let (plain, noted) = (parse(&lines.join("\n")).unwrap(), parse(&text.join("\n")).unwrap());
+    assert_eq!((plain.time, plain.q), (noted.time, noted.q));
+}
+
+#[test]
 fn time_that_runs_backwards_or_stands_still_is_refused_with_its_place() {
     let before = good()[50].split(',').nth(column("t_s")).expect("a time").to_owned();
     for time in ["0.01", &before] {

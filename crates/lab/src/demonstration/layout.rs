@@ -178,6 +178,11 @@ pub fn header() -> Vec<&'static str> {
     LAYOUT.iter().flat_map(|quantity| quantity.columns).copied().collect()
 }
 
+/// True for a column that a recording is read by; others may hold anything.
+pub fn is_known(name: &str) -> bool {
+    LAYOUT.iter().flat_map(|quantity| quantity.columns).chain(&POSITION_ALIAS).any(|known| *known == name)
+}
+
 /// The name a column should have had, if `name` is a known quantity with another unit.
 pub fn intended(name: &str) -> Option<String> {
     let known =

@@ -283,6 +283,7 @@ struct Table<'a> {
     file: &'a Path,
     header_line: u64,
     names: Vec<String>,
+    known: Vec<bool>,
     lines: Vec<u64>,
     rows: Vec<Vec<f64>>,
     states: Option<Vec<String>>,
@@ -300,8 +301,8 @@ impl<'a> Table<'a> {
             .has_headers(false)
             .trim(csv::Trim::All)
             .from_reader(bytes);
-        let mut table =
-            Table { file, header_line: 0, names: Vec::new(), lines: Vec::new(), rows: Vec::new(), states: None };
+        let (names, known, lines, rows) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut table = Table { file, header_line: 0, names, known, lines, rows, states: None };
         let mut record = csv::ByteRecord::new();
         let mut newlines = Newlines::new(bytes);
         loop {
@@ -338,6 +339,7 @@ impl<'a> Table<'a> {
             if let Some(expected) = layout::intended(&name) {
                 return Err(RecordingError::WrongUnit { place, expected });
             }
+            self.known.push(layout::is_known(&name));
             self.names.push(name);
         }
         if self.names.iter().any(|name| name == layout::STATE) {
@@ -368,6 +370,11 @@ impl<'a> Table<'a> {
                     states.push(text.into_owned());
                 }
                 row.push(0.0);
+                continue;
+            }
+            if !self.known[column] {
+                // Whatever others note beside our columns: never looked at.
+                row.push(f64::NAN);
                 continue;
             }
             let value: f64 = text.parse().map_err(|_| RecordingError::NotANumber {
