@@ -78,6 +78,16 @@ fn a_column_that_is_nobodys_may_hold_text_and_gaps_and_is_ignored() {
 }
 
 #[test]
+fn a_mark_of_utf_8_and_blank_lines_do_not_hide_the_movement_that_a_recording_names() {
+    let text = format!("# Tactus recording\n# primitive: reach 0x0a1b2c3d\n{}", good()[1..].join("\n"));
+    let named = parse(&text).unwrap().origin;
+    assert_eq!(named.primitive.as_ref().unwrap().movement, 0x0a1b_2c3d);
+    for changed in [format!("\u{feff}{text}"), format!("\r\n{text}"), text.replace("# primitive", "\n# primitive")] {
+        assert_eq!(parse(&changed).unwrap().origin, named, "{}", &changed[..60]);
+    }
+}
+
+#[test]
 fn time_that_runs_backwards_or_stands_still_is_refused_with_its_place() {
     let before = good()[50].split(',').nth(column("t_s")).expect("a time").to_owned();
     for time in ["0.01", &before] {

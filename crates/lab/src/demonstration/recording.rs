@@ -127,7 +127,7 @@ impl Recording {
         Ok(Recording {
             file: file.to_owned(),
             checksum: checksum(bytes),
-            origin: origin(bytes),
+            origin: Origin::of_notes(notes(bytes).iter().map(String::as_str)),
             header_line: table.header_line,
             columns: table.names.len(),
             phase: table.numbers(layout::PHASE),
@@ -245,11 +245,13 @@ pub fn checksum(bytes: &[u8]) -> u32 {
     link::frame::CRC.checksum(bytes)
 }
 
-/// Where a recording comes from: the notes before its header.
-fn origin(bytes: &[u8]) -> Origin {
-    let lines = bytes.split(|byte| *byte == b'\n').take_while(|line| line.first() == Some(&b'#'));
-    let notes: Vec<String> = lines.map(|line| String::from_utf8_lossy(&line[1..]).trim().to_owned()).collect();
-    Origin::of_notes(notes.iter().map(String::as_str))
+/// The notes before the header, without their sign. A spreadsheet puts a mark of UTF-8 before the first one, and blank
+/// lines may stand between them.
+pub fn notes(bytes: &[u8]) -> Vec<String> {
+    let lines = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes).split(|byte| *byte == b'\n');
+    let filled = lines.filter(|line| !line.trim_ascii().is_empty());
+    let notes = filled.map_while(|line| line.strip_prefix(b"#"));
+    notes.map(|note| String::from_utf8_lossy(note).trim().to_owned()).collect()
 }
 
 /// Number of gaps, samples missing in them, and the longest step with the index of its later end.

@@ -11,7 +11,7 @@ use std::path::Path;
 use control::{Fault, State};
 use dmp::CanonicalSystem;
 
-use crate::demonstration::{Recording, RecordingError};
+use crate::demonstration::{Recording, RecordingError, recording};
 use crate::input_file;
 use crate::primitive_file::PrimitiveFile;
 use crate::procedure::FlagCounts;
@@ -94,8 +94,7 @@ impl ReportedRun {
         let bytes = input_file::read(file, input_file::LONGEST_RECORDING)
             .map_err(|cause| RecordingError::Unreadable { file: file.to_owned(), cause })?;
         let recording = Recording::parse(file, &bytes)?;
-        let text = String::from_utf8_lossy(&bytes);
-        let notes = text.lines().map_while(|line| line.strip_prefix('#')).map(|note| note.trim().to_owned()).collect();
+        let notes = recording::notes(&bytes);
         let alpha = primitive.map_or(CanonicalSystem::<f64>::DEFAULT_ALPHA, |primitive| primitive.movement.alpha);
         let running = recording.running();
         let mut flags = FlagCounts::default();
