@@ -236,6 +236,7 @@ fn notes(recording: &Recording) -> BTreeMap<String, String> {
         ("primitive", origin.primitive.as_ref().map(ToString::to_string)),
         ("speed", origin.speed.map(|speed| speed.to_string())),
         ("mode", origin.mode.clone()),
+        ("goal_m", origin.goal.map(|[x, y, z]| format!("{x},{y},{z}"))),
         ("device", origin.device.clone()),
         ("firmware", origin.firmware.clone()),
         ("date", origin.date.clone()),

@@ -67,3 +67,16 @@ fn a_quantity_that_was_not_recorded_is_left_out_and_no_schema_has_references_or_
         assert!(!text.contains("$ref") && !text.contains("null") && text.contains("timestamp"), "{text}");
     }
 }
+
+#[test]
+fn everything_that_the_notes_say_is_in_the_metadata() {
+    let notes = "# primitive: reach 0x0a1b2c3d\n# speed: 0.5\n# mode: adapt\n# goal_m: 0.5,-0.25,0.1\n\
+                 # device: board\n# firmware: 0.1.0\n# date: 2026-11-22T17:05:09Z\n";
+    let (recording, bytes) = exported(&format!("{notes}{}", common::foreign(1.0)));
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let metadata = mcap::read::metadata(&bytes, &summary.metadata_indexes[0]).unwrap().metadata;
+    let kept: Vec<String> = metadata.iter().map(|(key, value)| format!("{key}: {value}")).collect();
+    let mut expected: Vec<String> = recording.origin.to_string().lines().map(str::to_owned).collect();
+    expected.sort();
+    assert_eq!(kept, expected);
+}
