@@ -169,6 +169,22 @@ fn recordings_that_tell_nothing_are_refused_and_nothing_is_changed() {
 }
 
 #[test]
+fn a_recording_of_two_runs_is_not_taken_for_one() {
+    let mut file = primitive();
+    let before = file.clone();
+    let one = rows(file.movement.alpha, |_| 1.0);
+    let mut two = one.clone();
+    two.extend(one.into_iter().map(|mut row| {
+        row.telemetry.cycle += 1800;
+        row.time += 6.0;
+        row
+    }));
+    let refused = remember_successes(&mut file, &[recording(&two)]).unwrap_err();
+    assert!(matches!(refused, MemoryError::Several { line: 1953, .. }), "{refused}");
+    assert_eq!(file, before);
+}
+
+#[test]
 fn the_report_of_a_grasp_on_nothing_says_which_finger_nothing_stopped_and_is_not_called_good() {
     let mut file = primitive();
     let runs: Vec<_> =

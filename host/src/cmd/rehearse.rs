@@ -232,7 +232,7 @@ pub(super) fn write(file: &PrimitiveFile, output: OutputFile, target: &Path, doi
 /// The failure of what could not be remembered.
 pub(super) fn memory_failure(cause: MemoryError, doing: &str) -> Failure {
     let help = match &cause {
-        MemoryError::None | MemoryError::Incomplete { .. } => {
+        MemoryError::None | MemoryError::Incomplete { .. } | MemoryError::Several { .. } => {
             "record whole runs with `tactus run PRIMITIVE --record FILE`"
         }
         MemoryError::Twice { .. } => {

@@ -78,6 +78,14 @@ pub enum MemoryError {
         /// Where it ends, percent.
         to: f64,
     },
+    /// A recording holds more than one run: their mean is neither.
+    #[error("{file}: line {line}: another run begins here", file = file.display())]
+    Several {
+        /// The recording.
+        file: PathBuf,
+        /// Line of the first sample of the second run.
+        line: u64,
+    },
     /// The force sensor was saturated: its values are not the forces.
     #[error("{file}: the force sensor was saturated in {samples} samples", file = file.display())]
     Saturated {
@@ -239,6 +247,11 @@ fn progress(recording: &Recording, alpha: f64) -> Result<(Vec<(usize, f64)>, f64
     let phase = recording.phase.as_ref().ok_or_else(|| columns(recording, "phase"))?;
     let samples: Vec<(usize, f64)> =
         phase.iter().enumerate().filter(|(_, s)| **s > 0.0).map(|(index, s)| (index, -s.ln() / alpha)).collect();
+    // Progress never goes back but where a movement is begun anew.
+    if let Some(pair) = samples.windows(2).find(|pair| pair[1].1 < pair[0].1 - MARGIN) {
+        let line = recording.lines.get(pair[1].0).copied().unwrap_or_default();
+        return Err(MemoryError::Several { file: recording.file.clone(), line });
+    }
     let incomplete = |from: f64, to: f64| MemoryError::Incomplete {
         file: recording.file.clone(),
         from: percent(from),
