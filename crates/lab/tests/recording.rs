@@ -292,6 +292,27 @@ fn a_gap_that_hides_movement_is_refused_with_its_place() {
 }
 
 #[test]
+fn ten_samples_a_second_are_no_gap_and_the_place_of_one_is_told_wherever_the_time_stands() {
+    let lines: Vec<String> = common::rows(9.0)
+        .iter()
+        .step_by(30)
+        .enumerate()
+        .map(|(index, row)| {
+            let q: Vec<String> = row.telemetry.q.iter().map(ToString::to_string).collect();
+            format!("{},{}.{}", q.join(","), index / 10, index % 10)
+        })
+        .collect();
+    let header = "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,q7_rad,t_s";
+    let prepared = |lines: &[String]| {
+        let recording = parse(&format!("{header}\n{}", lines.join("\n"))).unwrap();
+        Demonstration::prepare(&recording, &Preparation::default())
+    };
+    assert!(prepared(&lines).is_ok(), "{:?}", prepared(&lines).err());
+    let error = prepared(&[&lines[..40], &lines[41..]].concat()).unwrap_err();
+    names(&error, 42, 8);
+}
+
+#[test]
 fn rest_before_and_behind_the_movement_is_cut_off() {
     let recording = parse(&common::text(&common::rows(3.0))).unwrap();
     let trimmed = Demonstration::prepare(&recording, &Preparation::default()).unwrap();

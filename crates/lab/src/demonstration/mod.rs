@@ -26,6 +26,9 @@ pub const RATE: f64 = control::RATE;
 /// happened in a longer gap is not known.
 pub const LONGEST_GAP: f64 = 0.1;
 
+/// Error of a difference of two times, s: those of a computer's clock, counted from 1970, are a quarter of it.
+const TIME_ROUNDING: f64 = 1e-6;
+
 /// Options for making a demonstration of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Preparation {
@@ -125,10 +128,10 @@ impl Demonstration {
     /// The recording has no pose, has a gap longer than [`LONGEST_GAP`], or the arm hardly moves in it.
     pub fn prepare(recording: &Recording, preparation: &Preparation) -> Result<Demonstration, DemonstrationError> {
         let (gap, behind) = recording.longest_gap;
-        if gap > LONGEST_GAP {
-            let column = 1 + usize::from(recording.cycle.is_some());
+        // Times of few digits: a tenth of a second of a recording at 10 Hz is not more than one.
+        if gap > LONGEST_GAP + TIME_ROUNDING {
             return Err(RecordingError::GapTooLong {
-                place: recording.place(behind, column, layout::TIME),
+                place: recording.place(behind, recording.time_column, layout::TIME),
                 gap,
                 longest: LONGEST_GAP,
             }

@@ -35,6 +35,8 @@ pub struct Recording {
     pub header_line: u64,
     /// Number of columns in the header.
     pub columns: usize,
+    /// Column of the time, from 1.
+    pub time_column: usize,
     /// Line of each sample in the file, from 1.
     pub lines: Vec<u64>,
     /// Time of each sample, s, strictly increasing.
@@ -130,6 +132,7 @@ impl Recording {
             origin: Origin::of_notes(notes(bytes).iter().map(String::as_str)),
             header_line: table.header_line,
             columns: table.names.len(),
+            time_column: table.column(layout::TIME).map_or(1, |column| column + 1),
             phase: table.numbers(layout::PHASE),
             surprise: table.numbers(layout::SURPRISE),
             flags: table.whole_numbers(layout::FLAGS)?,
@@ -192,6 +195,7 @@ impl Recording {
             origin: self.origin.clone(),
             header_line: self.header_line,
             columns: self.columns,
+            time_column: self.time_column,
             lines: pick(&self.lines, keep),
             state: self.state.as_ref().map(|values| pick(values, keep)),
             fault: self.fault.as_ref().map(|values| pick(values, keep)),
