@@ -142,6 +142,29 @@ fn a_turn_too_far_ends_with_6_and_the_command_that_helps() {
 }
 
 #[test]
+fn the_help_of_learn_tells_the_sensitivity_that_it_gives() {
+    let folder = tempfile::tempdir().unwrap();
+    common::demonstration(folder.path(), 3.0);
+    tactus(folder.path(), &["learn", "demo.csv"]).success();
+    let file = lab::primitive_file::PrimitiveFile::read(&folder.path().join("demo.toml")).unwrap();
+    let k1 = &file.feedback.as_ref().unwrap().k1[0];
+    let turn = k1[3..6].iter().copied().fold(0.0, f64::max);
+    let share = |k1: f64, k: f64| (k1 / k * 1e3).round() / 1e3;
+    let position = share(k1[0], file.gains.position.stiffness);
+    let fingers = share(k1[9], file.gains.hand.stiffness);
+    let help = String::from_utf8(tactus(folder.path(), &["learn", "--help"]).success().get_output().stdout.clone());
+    let help = help.unwrap().split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(help.contains(&format!("{position} K in the horizontal")), "{help}");
+    assert!(help.contains(&format!("fingers {fingers} K")), "{help}");
+    if turn > 0.0 {
+        assert!(
+            help.contains(&format!("{} K about the vertical", share(turn, file.gains.orientation.stiffness))),
+            "{help}"
+        );
+    }
+}
+
+#[test]
 fn cli_1_a_changed_primitive_ends_with_6_and_another_model_with_4() {
     let folder = tempfile::tempdir().unwrap();
     common::demonstration(folder.path(), 3.0);

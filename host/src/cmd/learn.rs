@@ -65,7 +65,7 @@ pub struct Cmd {
     #[arg(long, value_name = "K")]
     pub orientation_stiffness: Option<f64>,
     /// Sensitivity K1 to forces (position, world axes) and torques (rotation, hand axes), optionally spread and fingers
-    /// [default: 0.2 K in the horizontal, 1.5 K about the vertical at the goal, fingers 0.3 K]
+    /// [default: 0.8 K in the horizontal, 3.7 K about the vertical at the goal, fingers 0.3 K]
     #[arg(long, value_name = "X,Y,Z,RX,RY,RZ[,SPREAD,F1,F2,F3]", value_parser = sensitivity, allow_hyphen_values = true)]
     pub k1: Option<Sensitivity>,
     /// Farthest that feedback may move the plan: metres, degrees, and radians of the fingers
