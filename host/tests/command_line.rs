@@ -142,6 +142,16 @@ fn a_turn_too_far_ends_with_6_and_the_command_that_helps() {
 }
 
 #[test]
+fn the_command_that_helps_keeps_every_option_and_can_be_pasted() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a turn.csv"), common::foreign(4.5)).unwrap();
+    let line = ["learn", "a turn.csv", "-o", "turn.toml", "--dwell", "2", "--hand-goal", "0,1,1,1"];
+    let said = stderr(&tactus(folder.path(), &line).failure().code(6));
+    let help = "help: tactus learn --rotation-vector 'a turn.csv' -o turn.toml --dwell 2 --hand-goal 0,1,1,1\n";
+    assert!(said.ends_with(help), "{said}");
+}
+
+#[test]
 fn the_help_of_learn_tells_the_sensitivity_that_it_gives() {
     let folder = tempfile::tempdir().unwrap();
     common::demonstration(folder.path(), 3.0);

@@ -144,20 +144,15 @@ pub struct Fitted<'a> {
 }
 
 fn failure(error: LearnError, command: &Cmd) -> Failure {
-    let demonstration = command.demonstration.display();
     let help = match &error {
-        LearnError::TurnsTooFar { rotation_vector_helps: true, .. } => {
-            Some(format!("tactus learn --rotation-vector {demonstration}"))
-        }
+        LearnError::TurnsTooFar { rotation_vector_helps: true, .. } => Some(again("--rotation-vector")),
         LearnError::Demonstration(DemonstrationError::Still { .. }) if command.still_speed > STILL_SPEED => {
             Some(format!("a lower `--still-speed` ({STILL_SPEED} m/s is usual)"))
         }
         LearnError::Poor { .. } | LearnError::Fit { .. } if command.cutoff < CUTOFF => {
             Some(format!("a higher `--cutoff` ({CUTOFF} Hz is usual): the filter takes the movement away"))
         }
-        LearnError::Demonstration(DemonstrationError::Still { .. }) => {
-            Some(format!("tactus learn --no-trim {demonstration}"))
-        }
+        LearnError::Demonstration(DemonstrationError::Still { .. }) => Some(again("--no-trim")),
         _ => None,
     };
     let code = match &error {
@@ -173,6 +168,22 @@ fn failure(error: LearnError, command: &Cmd) -> Failure {
         Some(help) => failure.help(help),
         None => failure,
     }
+}
+
+/// The command line once more, with another option: what was asked for beside it must not be lost.
+fn again(option: &str) -> String {
+    let given = std::env::args_os().skip_while(|word| word != "learn").skip(1);
+    let words: Vec<String> = given.map(|word| for_shell(&word.to_string_lossy())).collect();
+    format!("tactus learn {option} {}", words.join(" "))
+}
+
+/// A word as a shell takes it for one.
+fn for_shell(word: &str) -> String {
+    let is_plain = |letter: char| letter.is_alphanumeric() || "-_./,=:+@%".contains(letter);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
 }
 
 /// Six or ten gains; without the last four force does not bend the fingers.
