@@ -18,7 +18,7 @@ pub struct Cmd {
     #[arg(value_name = "OTHER")]
     pub other: PathBuf,
     /// Force that counts as a contact, N
-    #[arg(long, default_value_t = 1.0, value_name = "NEWTON")]
+    #[arg(long, default_value_t = 1.0, value_name = "NEWTON", value_parser = force)]
     pub contact: f64,
 }
 
@@ -51,4 +51,21 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     let difference = Difference::between(&one, &other, command.contact).map_err(|cause| invalid(cause.into()))?;
     global.output().result(&difference, difference.to_string())
+}
+
+/// A force that can be exceeded: with NaN no contact would ever be found.
+fn force(text: &str) -> Result<f64, String> {
+    let force = text.parse::<f64>().ok().filter(|force| *force >= 0.0 && force.is_finite());
+    force.ok_or_else(|| "a force from 0 N on is expected".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn only_a_force_is_one() {
+        assert_eq!(super::force("2.5"), Ok(2.5));
+        for wrong in ["nan", "inf", "-1", "2,5", ""] {
+            assert!(super::force(wrong).is_err(), "{wrong}");
+        }
+    }
 }
