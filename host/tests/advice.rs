@@ -106,6 +106,15 @@ fn advised(help: &str, begins: &str) -> String {
 }
 
 #[test]
+fn fingers_out_of_their_range_are_put_right_where_they_came_from() {
+    let folder = tempfile::tempdir().unwrap();
+    common::demonstration(folder.path(), 3.0);
+    succeeds(folder.path(), "learn demo.csv --hand-goal 0,9,0,0");
+    let (code, help) = refused(folder.path(), "check demo.toml");
+    assert!(code == "E631" && help.contains("`--hand-goal`") && !help.contains("show the movement"), "{help}");
+}
+
+#[test]
 fn a_refused_run_advises_a_check_that_shows_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

@@ -29,7 +29,14 @@ impl CheckReport {
         if !advice.is_empty() {
             advice.push_str("or ");
         }
-        advice + "show the movement farther from the limits and learn it again"
+        // The fingers were not shown: options of `learn` gave their angles.
+        let of_hand = broken().next().is_some() && broken().all(|margin| margin.limit == Limit::HandPosition);
+        let last = if of_hand {
+            "learn it again with other angles of the hand (`--hand-start`, `--hand-goal`)"
+        } else {
+            "show the movement farther from the limits and learn it again"
+        };
+        advice + last
     }
 
     /// Moment of the first violation that has one, s.
