@@ -396,6 +396,14 @@ fn quaternions_of_either_sign_give_the_same_demonstration() {
 }
 
 #[test]
+fn the_layout_names_every_state_that_a_recording_can_hold() {
+    let quantity = layout::LAYOUT.iter().find(|quantity| quantity.columns.contains(&layout::STATE)).unwrap();
+    for state in control::State::ALL {
+        assert!(quantity.meaning.contains(&format!("`{}`", state.name())), "{state}");
+    }
+}
+
+#[test]
 fn the_table_of_the_document_is_the_layout() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/recording-format.md");
     let document = std::fs::read_to_string(&path).unwrap();

@@ -107,8 +107,8 @@ pub const LAYOUT: &[Quantity] = &[
     quantity(
         &[STATE],
         "word",
-        "state of the supervisor: `idle`, `gravity`, `hold`, `approach`, `run`, `coast`, `soft stop`, \
-         `fault`",
+        "state of the supervisor: `idle`, `gravity`, `hold`, `approach`, `run`, `coast`, `soft stop`, `fault`, \
+         `lowering`",
         |row| row.state().to_owned(),
     ),
     quantity(&[FAULT], "1", "code of the latched fault, 0 for none", |row| row.telemetry.fault.to_string()),
