@@ -139,6 +139,9 @@ fn a_turn_too_far_ends_with_6_and_the_command_that_helps() {
     assert!(text.ends_with("help: tactus learn --rotation-vector turn.csv\n"), "{text}");
     let learned = tactus(folder.path(), &["learn", "--rotation-vector", "turn.csv"]).success();
     assert!(stderr(&learned).contains("warning: the recording has no joint angles"));
+    // And what the warning says is so.
+    let checked = stderr(&tactus(folder.path(), &["check", "turn.toml"]).failure().code(6));
+    assert!(checked.contains("does not belong to the start posture"), "{checked}");
 }
 
 #[test]

@@ -188,7 +188,7 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
         Some(q) => q.clone(),
         None => {
             warnings.push(
-                "the recording has no joint angles: the posture rows hold a bent elbow, `tactus check` tells whether the arm can follow"
+                "the recording has no joint angles: the posture rows hold a bent elbow, which is not that of its poses, so that `tactus check` and the device refuse the primitive; record q1_rad to q7_rad as well"
                     .to_owned(),
             );
             vec![DEFAULT_POSTURE; demonstration.len()]
