@@ -78,6 +78,12 @@ fn a_column_that_is_nobodys_may_hold_text_and_gaps_and_is_ignored() {
 }
 
 #[test]
+fn commas_at_the_end_of_every_line_are_columns_of_nobody() {
+    let text: Vec<String> = good()[1..].iter().map(|line| format!("{line},,")).collect();
+    assert_eq!(parse(&text.join("\n")).unwrap().q, parse(&good().join("\n")).unwrap().q);
+}
+
+#[test]
 fn a_mark_of_utf_8_and_blank_lines_do_not_hide_the_movement_that_a_recording_names() {
     let text = format!("# Tactus recording\n# primitive: reach 0x0a1b2c3d\n{}", good()[1..].join("\n"));
     let named = parse(&text).unwrap().origin;
@@ -278,6 +284,14 @@ fn cli_8_lost_samples_are_counted_by_the_cycle_counter_and_by_time() {
     lines.drain(300..305);
     let recording = parse(&lines.join("\n")).unwrap();
     assert_eq!((recording.gaps, recording.missing_samples), (1, 5));
+}
+
+#[test]
+fn a_counter_that_begins_anew_is_no_gap_of_four_thousand_million_samples() {
+    let mut rows = common::rows(2.0);
+    rows.iter_mut().skip(300).enumerate().for_each(|(index, row)| row.telemetry.cycle = index as u32);
+    let recording = parse(&common::text(&rows)).unwrap();
+    assert_eq!((recording.gaps, recording.missing_samples), (0, 0));
 }
 
 #[test]

@@ -273,7 +273,11 @@ fn count_gaps(time: &[f64], cycle: Option<&[u32]>) -> (usize, usize, (f64, usize
     let lost = |index: usize| -> usize {
         match cycle {
             // The counter knows exactly what is missing; time only lets one guess.
-            Some(cycle) => (cycle[index + 1].wrapping_sub(cycle[index]) as usize).saturating_sub(1),
+            Some(cycle) => match cycle[index + 1].wrapping_sub(cycle[index]) {
+                // A counter that begins anew, of another device or after a restart, tells nothing.
+                steps if steps > u32::MAX / 2 => 0,
+                steps => (steps as usize).saturating_sub(1),
+            },
             None if steps[index] > GAP_FACTOR * typical => {
                 ((steps[index] / typical).round() as usize).saturating_sub(1)
             }
@@ -339,7 +343,8 @@ impl<'a> Table<'a> {
         for (index, field) in record.iter().enumerate() {
             let name = String::from_utf8_lossy(field).trim_start_matches('\u{feff}').to_owned();
             let place = Place { file: self.file.to_owned(), line, column: index + 1, name: name.clone() };
-            if self.names.contains(&name) {
+            // Spreadsheets end lines with commas: columns without a name are nobody's.
+            if !name.is_empty() && self.names.contains(&name) {
                 return Err(RecordingError::DuplicateColumn { place });
             }
             if let Some(expected) = layout::intended(&name) {
