@@ -302,6 +302,15 @@ fn a_log_that_begins_in_the_middle_is_refused() {
 }
 
 #[test]
+fn two_logs_in_one_file_are_told_as_such_and_not_as_another_version() {
+    let (_, log) = recorded();
+    let (folder, file) = log_file(&format!("{log}{log}"));
+    let said = stderr(&tactus(folder.path(), &["can", "replay", &file.to_string_lossy()]).failure().code(6));
+    let line = log.lines().count() + 1;
+    assert!(said.starts_with("error[E673]") && said.contains(&format!("line {line}: time leaps")), "{said}");
+}
+
+#[test]
 fn a_replay_that_is_interrupted_says_that_nothing_can_be_said() {
     use std::io::Write;
     use std::process::{Command, Stdio};

@@ -121,6 +121,9 @@ pub enum ReplayError {
 /// Longest silence in a log, us: a device asks its bus something all the time, and its slots in between are computed.
 const LONGEST_SILENCE_US: u64 = 60_000_000;
 
+/// Farthest that a line may lie before the latest one, us.
+const LONGEST_STEP_BACK_US: u64 = 1_000_000;
+
 /// A frame of the device in the log, to be matched.
 struct Logged {
     at: Ticks,
@@ -190,6 +193,10 @@ impl Replay {
         self.line = number;
         let from_us = self.first_us.map_or(line.time_us, |_| self.last_us);
         if line.time_us.saturating_sub(from_us) > LONGEST_SILENCE_US {
+            return Err(ReplayError::Leap { line: number, from_us, to_us: line.time_us });
+        }
+        // Frames of two buses may change places, not stories: a second log in the same file begins at an earlier time.
+        if from_us.saturating_sub(line.time_us) > LONGEST_STEP_BACK_US {
             return Err(ReplayError::Leap { line: number, from_us, to_us: line.time_us });
         }
         self.first_us.get_or_insert(line.time_us);
