@@ -499,3 +499,16 @@ fn an_approach_so_slow_that_it_counts_as_rest_is_not_left_out_in_silence() {
     assert!((whole.primitive.goal.posture[1] - common::GOAL[1] - 0.05).abs() < 2e-3);
     assert!(whole.report.warnings.iter().all(|warning| !warning.contains("left out")), "{:?}", whole.report.warnings);
 }
+
+#[test]
+fn a_file_says_truly_which_of_its_numbers_are_guarded() {
+    let text = learned(&taught(3.0), &LearnOptions::named("reach")).unwrap().primitive.to_text();
+    let changed = |from: &str, to: &str| {
+        let line = text.lines().find(|line| line.starts_with(from)).unwrap();
+        PrimitiveFile::parse(Path::new("reach.toml"), &text.replace(line, to))
+    };
+    assert!(matches!(changed("alpha = ", "alpha = 4.0"), Err(PrimitiveFileError::Checksum { .. })));
+    // Where it comes from is no part of the movement.
+    assert!(changed("samples = ", "samples = 7").is_ok());
+    assert!(text.contains("every number\n# but those of [provenance]."), "{}", &text[..300]);
+}

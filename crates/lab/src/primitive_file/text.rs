@@ -13,7 +13,8 @@ const LINE_WIDTH: usize = 118;
 /// The first lines of every file.
 const HEAD: &str = "\
 # Movement primitive of Tactus. SI units; quaternions are (w, x, y, z), tool to world; the position is that
-# of the grasp point in the world frame. Comments may be changed; every number is covered by content_crc32.";
+# of the grasp point in the world frame. Comments may be changed; content_crc32 covers every number
+# but those of [provenance].";
 
 /// Comments behind the lines that begin so.
 const COMMENTS: [(&str, &str); 12] = [
