@@ -11,7 +11,7 @@ use lab::demonstration::{Demonstration, Preparation, Recording};
 use lab::output_file::OutputFile;
 use lab::plan;
 use lab::plot::{self, Movement, movement::PosePath};
-use lab::primitive_file::PrimitiveFile;
+use lab::primitive_file::{PrimitiveFile, Provenance};
 use lab::tracking::{ComparisonError, Lack, Tracking};
 
 /// The action that fails.
@@ -83,9 +83,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     if let (Some(file), Some(recording)) = (&primitive, &execution) {
         same_movement(file, recording, "plot refused")?;
     }
-    if let (Some(file), Some(recording)) = (&primitive, &shown)
-        && file.provenance.as_ref().is_some_and(|from| from.demonstration_checksum != *recording)
-    {
+    let from = primitive.as_ref().and_then(|file| file.provenance.as_ref());
+    let learned = from.filter(|from| Some(from.demonstration_checksum) == shown);
+    if shown.is_some() && from.is_some() && learned.is_none() {
         output.warn("the primitive was learned from another demonstration than the one that is drawn");
     }
     let tracking = execution.as_ref().map(|recording| tracking(recording, output)).transpose()?.flatten();
@@ -100,7 +100,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         .unwrap_or_default();
     let movement = Movement {
         name,
-        demonstration: demonstration.as_ref().map(PosePath::of_demonstration),
+        demonstration: demonstration.as_ref().map(|demonstration| aligned(demonstration, learned)),
         plan,
         execution: execution.map(|recording| if tracking.is_some() { recording.running() } else { recording }),
     };
@@ -137,6 +137,17 @@ pub struct Drawn {
     pub picture: Option<String>,
     /// Distances of the arm from its plan; `null`: no run was given, or it has no poses.
     pub tracking: Option<Tracking>,
+}
+
+/// The demonstration in the time of the primitive that was learned from it, however much of its beginning each leaves
+/// out: otherwise the curves of a good primitive lie beside one another.
+fn aligned(demonstration: &Demonstration, learned: Option<&Provenance>) -> PosePath {
+    let mut path = PosePath::of_demonstration(demonstration);
+    if let Some(from) = learned {
+        let [before, _] = from.trimmed;
+        path.time.iter_mut().for_each(|time| *time += demonstration.trimmed.0 - before);
+    }
+    path
 }
 
 /// Fills the files of the figure.
@@ -217,4 +228,28 @@ fn picture(run: &Recording, file: &std::path::Path) -> Result<(), Failure> {
 fn picture(_run: &Recording, _file: &std::path::Path) -> Result<(), Failure> {
     Err(Failure::new(ErrorCode::WithoutMujoco, "plot: the picture", "this tactus was built without the MuJoCo world")
         .help("`cargo xtask build`"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_demonstration_lies_on_the_primitive_whatever_either_left_out_of_its_beginning() {
+        let count = 10;
+        let demonstration = Demonstration {
+            time: (0..count).map(|index| f64::from(index) / control::RATE).collect(),
+            position: vec![[0.0; 3]; 10],
+            orientation: vec![[1.0, 0.0, 0.0, 0.0]; 10],
+            q: None,
+            wrench: None,
+            trimmed: (0.75, 0.0),
+            crept: None,
+            left_out: (0.0, 0.0),
+            pose_source: lab::demonstration::PoseSource::PoseColumns,
+        };
+        assert_eq!(aligned(&demonstration, None).time[0], 0.0);
+        // Learned with `--no-trim`: its time counts from the first line of the recording.
+        assert_eq!(aligned(&demonstration, Some(&Provenance::default())).time[0], 0.75);
+    }
 }
