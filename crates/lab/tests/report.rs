@@ -140,3 +140,12 @@ fn the_page_needs_no_other_file_and_draws_several_runs_over_one_another() {
     // The band goes from 2 N - 2 x 3 N to 2 N + 2 x 3 N, and the axis shows all of it and the 31 N measured.
     assert_eq!(html.matches("<svg").count(), html.matches("viewBox").count());
 }
+
+#[test]
+fn every_run_is_named_in_the_legend_beside_its_look() {
+    let folder = tempfile::tempdir().unwrap();
+    let names = ["1.csv", "2.csv", "3.csv", "4.csv", "5.csv", "6.csv"];
+    let runs = names.map(|name| ReportedRun::read(&recorded(folder.path(), name, None), None).unwrap());
+    let html = page("reach", &runs, None);
+    assert!(html.contains(">1.csv, 5.csv<") && html.contains(">2.csv, 6.csv<") && html.contains(">3.csv<"));
+}

@@ -23,8 +23,10 @@ fn ink(run: usize) -> Ink {
 /// Every figure for which there are data, with its heading.
 pub(super) fn all(runs: &[ReportedRun], primitive: Option<&PrimitiveFile>) -> Vec<(&'static str, Page)> {
     let figures = Figures { runs, primitive };
+    // From the fifth run on looks are used again: every run is named beside its own.
+    let alike = |at: usize| runs.iter().skip(at).step_by(RUNS.len()).map(|run| run.name.as_str()).collect::<Vec<_>>();
     let mut legend: Vec<(Ink, String)> =
-        runs.iter().take(RUNS.len()).enumerate().map(|(at, run)| (ink(at), run.name.clone())).collect();
+        (0..RUNS.len().min(runs.len())).map(|at| (ink(at), alike(at).join(", "))).collect();
     legend.push((Ink::Plan, format!("plan{}", if runs.len() > 1 { " of the first" } else { "" })));
     legend.push((Ink::Band, "expected, \u{b1} 2 standard deviations".to_owned()));
     legend.push((Ink::Limit, "limit".to_owned()));
