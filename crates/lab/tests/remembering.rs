@@ -185,6 +185,15 @@ fn a_recording_of_two_runs_is_not_taken_for_one() {
 }
 
 #[test]
+fn a_run_of_an_hour_and_a_half_is_a_time_in_milliseconds_and_no_success() {
+    let mut file = primitive();
+    let mut rows = rows(file.movement.alpha, |_| 1.0);
+    rows.iter_mut().for_each(|row| row.time *= 1000.0);
+    let refused = remember_successes(&mut file, &[recording(&rows)]).unwrap_err();
+    assert!(matches!(refused, MemoryError::Duration { .. }), "{refused}");
+}
+
+#[test]
 fn the_report_of_a_grasp_on_nothing_says_which_finger_nothing_stopped_and_is_not_called_good() {
     let mut file = primitive();
     let runs: Vec<_> =

@@ -41,6 +41,11 @@ const MARGIN: f64 = 0.02;
 /// Largest deviation of the duration within the recordings that are averaged.
 const SAME_DURATION: f64 = 0.03;
 
+/// Durations that a success may have, relative to the taught one: speeds from 0.1 to 2, and what heat or contact delays.
+/// Another one is a time in other units, or none of this movement.
+const FASTEST: f64 = 2.2;
+const SLOWEST: f64 = 20.0;
+
 /// Largest share of samples without a fresh wrench.
 const MOST_STALE: f64 = 0.02;
 
@@ -218,6 +223,10 @@ pub fn remember_successes(
         }
     }
     let (_, duration) = progress(first, primitive.movement.alpha)?;
+    let taught = primitive.movement.duration;
+    if !(taught / FASTEST..=taught * SLOWEST).contains(&duration) {
+        return Err(MemoryError::Duration { file: first.file.clone(), found: duration, expected: taught });
+    }
     let runs = runs::<STATISTICS_CHANNELS>(primitive, recordings, duration, channels)?;
     let calibrated = calibrated(primitive, &runs, &STATISTICS_FLOOR)?;
     let gathered = &calibrated.statistics;
