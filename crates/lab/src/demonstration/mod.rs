@@ -81,8 +81,8 @@ pub struct Demonstration {
     pub trimmed: (f64, f64),
     /// Distance by which the arm crept away at the end, once it was let go, m; that is cut off.
     pub crept: Option<f64>,
-    /// How far the arm moved in what was cut off before and behind the movement, m, turning counted at [`TURN_RADIUS`];
-    /// what [`crept`](Self::crept) tells is not counted.
+    /// Distance by which the arm moved in what was cut off before and behind the movement, m, turning counted at
+    /// [`TURN_RADIUS`]; what [`crept`](Self::crept) tells is not counted.
     pub left_out: (f64, f64),
     /// Where the pose comes from.
     pub pose_source: PoseSource,

@@ -343,7 +343,7 @@ impl<'a> Table<'a> {
         for (index, field) in record.iter().enumerate() {
             let name = String::from_utf8_lossy(field).trim_start_matches('\u{feff}').to_owned();
             let place = Place { file: self.file.to_owned(), line, column: index + 1, name: name.clone() };
-            // Spreadsheets end lines with commas: columns without a name are nobody's.
+            // Spreadsheets end lines with commas: columns without a name mean nothing.
             if !name.is_empty() && self.names.contains(&name) {
                 return Err(RecordingError::DuplicateColumn { place });
             }

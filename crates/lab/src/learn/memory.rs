@@ -41,8 +41,8 @@ const MARGIN: f64 = 0.02;
 /// Largest deviation of the duration within the recordings that are averaged.
 const SAME_DURATION: f64 = 0.03;
 
-/// Durations that a success may have, relative to the taught one: speeds from 0.1 to 2, and what heat or contact delays.
-/// Another one is a time in other units, or none of this movement.
+/// Durations that a success may have, relative to the taught one: speeds from 0.1 to 2, and what heat or contact
+/// delays. Another one is a time in other units, or none of this movement.
 const FASTEST: f64 = 2.2;
 const SLOWEST: f64 = 20.0;
 

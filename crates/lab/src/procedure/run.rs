@@ -209,7 +209,7 @@ fn follow(
     client.take_events();
     client.run(&request.name, request.options)?;
     let mut changes = request.changes.clone();
-    // Taken from the end: of several at one moment the first one given goes first, as in the check.
+    // The end of the list goes first: of several at one moment the first one given goes first, as in the check.
     changes.sort_by(|a, b| a.time.total_cmp(&b.time));
     changes.reverse();
     let mut outcome = RunOutcome::default();
