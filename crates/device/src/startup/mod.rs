@@ -40,6 +40,9 @@ const IGNORED_AT_START: i32 = 5;
 const STOPPING_US: u64 = 500_000;
 /// Between two of these frames, us.
 const STOP_PACE_US: u64 = 3_000;
+/// Words that take its zero back from the safety module: it acknowledges none, one may be lost, and a device that is
+/// started anew believes it.
+const REVOCATIONS: u8 = 3;
 /// Transitions within one slot; more would mean a loop.
 const TRANSITIONS: usize = 8;
 /// First and last node that an enumeration asks.
@@ -79,8 +82,8 @@ enum Step {
     AskZero,
     /// Wait for a person; look at the safety module from this time on.
     AwaitZero { next_us: u64 },
-    /// Ask whether the arm is IDLE before its positions are rewritten.
-    ConfirmIdle,
+    /// Ask whether the arm is IDLE before its positions are rewritten, until this time.
+    ConfirmIdle { until_us: Option<u64> },
     /// IFAULT before positions are rewritten.
     IgnoreFaults,
     /// SET P of a puck.
@@ -91,8 +94,8 @@ enum Step {
     TellZero,
     /// GET ZERO.
     ConfirmZero,
-    /// SET ZERO = 0: what the safety module believes is no longer so.
-    RevokeZero,
+    /// SET ZERO = 0: what the safety module believes is no longer so. This word of several.
+    RevokeZero { word: u8 },
     /// Tare the force/torque sensor.
     Tare,
     /// IFAULT before polling begins.
@@ -150,8 +153,8 @@ pub(crate) struct Startup {
     tared: bool,
     /// Why the counts do not refer to the zero of the arm, whatever the safety module says, until a person zeroes.
     doubt: Option<StartupError>,
-    /// True while the safety module has not been told so.
-    owes_revocation: bool,
+    /// Words with which the safety module is still to be told so.
+    revocations: u8,
     /// Payload that a person has declared.
     declared: Option<Payload>,
     /// The posture that `targets` are the counts of (rad).
@@ -194,7 +197,7 @@ impl Startup {
             zeroed: false,
             tared: false,
             doubt: None,
-            owes_revocation: false,
+            revocations: 0,
             declared: None,
             home: [0.0; 7],
             zeroed_at: None,
@@ -239,7 +242,9 @@ impl Startup {
 
     #[cold]
     fn lose_zero_by(&mut self, reason: StartupError) {
-        self.owes_revocation |= self.doubt.is_none();
+        if self.doubt.is_none() {
+            self.revocations = REVOCATIONS;
+        }
         let doubt = *self.doubt.get_or_insert(reason);
         if self.is_done() {
             self.error = Some(doubt);
@@ -248,11 +253,14 @@ impl Startup {
         self.zeroed_at = None;
     }
 
-    /// Tells the safety module that the zero is lost, once; true if there was something to tell.
+    /// Tells the safety module that the zero is lost; true if a word has left.
     pub(crate) fn revoke_zero(&mut self, outlet: &mut impl Outlet) -> bool {
-        let Some(safety) = self.safety.filter(|_| self.owes_revocation) else { return false };
-        self.owes_revocation = !outlet.send(set(Node::SAFETY_MODULE, safety.zero, 0));
-        true
+        let (Some(safety), Some(left)) = (self.safety, self.revocations.checked_sub(1)) else { return false };
+        let sent = outlet.send(set(Node::SAFETY_MODULE, safety.zero, 0));
+        if sent {
+            self.revocations = left;
+        }
+        sent
     }
 
     /// Its stage.
@@ -264,7 +272,7 @@ impl Startup {
             Step::Identify { .. } | Step::Wake { .. } | Step::Silence { .. } => Stage::Waking,
             Step::Verify { .. } => Stage::Verifying,
             Step::Brake { .. } | Step::Read { .. } | Step::ReadHand { .. } | Step::AskZero => Stage::Reading,
-            Step::AwaitZero { .. } | Step::ConfirmIdle | Step::RevokeZero => Stage::WaitingForZero,
+            Step::AwaitZero { .. } | Step::ConfirmIdle { .. } | Step::RevokeZero { .. } => Stage::WaitingForZero,
             Step::IgnoreFaults
             | Step::WritePosition { .. }
             | Step::CheckPositions { .. }
@@ -452,13 +460,15 @@ impl Startup {
             Step::Read { joint, item } => self.read(joint, item, outlet),
             Step::ReadHand { digit, item } => Ok(self.read_digit(digit, item, outlet)),
             Step::AskZero => self.ask_zero(outlet),
-            Step::RevokeZero => {
+            Step::RevokeZero { word: REVOCATIONS.. } => {
+                Ok(Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US }))
+            }
+            Step::RevokeZero { word } => {
                 let frame = set(Node::SAFETY_MODULE, self.safety()?.zero, 0);
-                let next_us = outlet.now_us() + POLL_US;
-                Ok(after(outlet.send(frame), Step::AwaitZero { next_us }))
+                Ok(after(outlet.send(frame), Step::RevokeZero { word: word + 1 }))
             }
             Step::AwaitZero { next_us } => self.await_zero(next_us, outlet),
-            Step::ConfirmIdle => self.confirm_idle(outlet),
+            Step::ConfirmIdle { until_us } => self.confirm_idle(until_us, outlet),
             Step::IgnoreFaults => {
                 let frame = set(Node::SAFETY_MODULE, self.safety()?.ignore_faults, IGNORED_AT_ZERO);
                 Ok(after(outlet.send(frame), Step::WritePosition { joint: 0 }))
@@ -510,7 +520,7 @@ impl Startup {
             }
             Some(_) if self.doubt.is_some() => {
                 self.error = self.doubt;
-                Next::Go(Step::RevokeZero)
+                Next::Go(Step::RevokeZero { word: 0 })
             }
             Some(_) => {
                 self.zeroed = true;

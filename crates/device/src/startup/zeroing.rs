@@ -3,11 +3,14 @@
 use puck::{Group, Node, PropertyId, SafetyMode, get, set};
 
 use super::home::home_counts;
-use super::{Next, POLL_US, Startup, Step, ZeroRequest, after};
+use super::{Next, POLL_US, REVOCATIONS, Startup, Step, ZeroRequest, after};
 use crate::bus::Outlet;
 use crate::command::Refusal;
 use crate::stage::StartupError;
 
+/// Longest time for the word of the safety module before positions are rewritten, us: three questions. A host gives a
+/// command up after 200 ms, and an arm must not be zeroed by one that was given up.
+const CONFIRM_US: u64 = 170_000;
 /// Longest time for the seven replies to one position request, us.
 const POSITIONS_US: u64 = 10_000;
 /// Largest distance of a puck from the position just written, counts (0.3 rad of a motor, 7 mrad of J1): a braked arm
@@ -30,7 +33,7 @@ impl Startup {
         self.targets = home_counts(calibration, home)?;
         self.home = *home;
         self.exchange.abandon();
-        self.step = Step::ConfirmIdle;
+        self.step = Step::ConfirmIdle { until_us: None };
         Ok(())
     }
 
@@ -49,7 +52,17 @@ impl Startup {
     }
 
     /// The latest word of the safety module before positions are rewritten.
-    pub(super) fn confirm_idle(&mut self, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
+    pub(super) fn confirm_idle(
+        &mut self,
+        until_us: Option<u64>,
+        outlet: &mut impl Outlet,
+    ) -> Result<Next, StartupError> {
+        let until_us = until_us.unwrap_or(outlet.now_us() + CONFIRM_US);
+        self.step = Step::ConfirmIdle { until_us: Some(until_us) };
+        if outlet.now_us() >= until_us {
+            // Not even the question may have left.
+            return Err(StartupError::NoAnswer(Node::SAFETY_MODULE));
+        }
         let Some(mode) = self.ask_safety(PropertyId::MODE, outlet)? else {
             return Ok(Next::Stay);
         };
@@ -57,7 +70,9 @@ impl Startup {
             self.zero_request = ZeroRequest::Answered(Ok(()));
             // Broken off, it leaves a mixture of two zeros. Not even a board that restarts meanwhile may believe the
             // word of the safety module for it.
-            self.owes_revocation = self.zeroed;
+            if self.zeroed {
+                self.revocations = REVOCATIONS;
+            }
             self.doubt.get_or_insert(StartupError::ZeroUnfinished);
             self.zeroed = false;
             self.zeroed_at = None;
@@ -94,7 +109,8 @@ impl Startup {
     }
 
     pub(super) fn write_position(&mut self, joint: u8, outlet: &mut impl Outlet) -> Next {
-        if self.revoke_zero(outlet) {
+        if self.revocations > 0 {
+            self.revoke_zero(outlet);
             return Next::Stay;
         }
         let index = usize::from(joint);

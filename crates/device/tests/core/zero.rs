@@ -327,3 +327,65 @@ fn g2_a_zeroing_that_breaks_off_leaves_no_zero_that_anybody_believes() {
         assert_zeroing_leads_on(&mut core, &mut bus);
     }
 }
+
+/// G2: the words by which the safety module is to forget its zero have no acknowledge. One is lost, and the board
+/// restarts: whoever believes the module takes counts that began anew for those of a zeroed arm.
+#[test]
+fn g2_a_lost_word_to_the_safety_module_leaves_no_zero_that_a_board_that_restarts_believes() {
+    // Counts that jump in the loop, a puck that restarts, and a zeroing that breaks off: behind its IFAULT.
+    for (case, lost) in [("jump", 1), ("jump", 2), ("puck", 1), ("zeroing", 2), ("zeroing", 3)] {
+        let (mut core, mut bus) = started();
+        bus.run(&mut core, 0.2);
+        match case {
+            "jump" => {
+                bus.lose_safety_writes = lost;
+                // To where J4 can be: its posture tells nothing.
+                bus.pucks[3].position.0 += 8_000;
+                bus.run(&mut core, 0.3);
+            }
+            "puck" => {
+                core = silent_device();
+                bus.pucks[3].awake_at = None;
+                bus.run_until(&mut core, Stage::Reading);
+                bus.lose_safety_writes = lost;
+                bus.run_until(&mut core, Stage::WaitingForZero);
+                bus.run(&mut core, 0.3);
+            }
+            _ => {
+                bus.lose_safety_writes = lost;
+                bus.pucks[3].ignores_position_writes = true;
+                bus.commands.push_back(Command::Zero { home: [0.5, -2.0, 0.0, 2.8, 0.0, 0.0, 0.0] });
+                bus.run_until(&mut core, Stage::Blocked);
+                bus.pucks[3].ignores_position_writes = false;
+            }
+        }
+        let mut other = silent_device();
+        bus.run(&mut other, 4.0);
+        assert_eq!((other.stage(), other.health().zeroed), (Stage::WaitingForZero, false), "{case}, {lost} lost");
+        assert_eq!(bus.lose_safety_writes, 0, "{case}");
+        assert_zeroing_leads_on(&mut other, &mut bus);
+    }
+}
+
+/// G2: a zeroing whose question finds no room on the bus is refused before its host gives it up, and is not carried out
+/// when there is room again: the arm may stand elsewhere by then.
+#[test]
+fn g2_a_zeroing_that_the_bus_has_no_room_for_is_refused_and_never_carried_out_later() {
+    let (mut core, mut bus) = started();
+    bus.run(&mut core, 0.2);
+    let before = bus.pucks[0].position;
+    // The controller takes nothing: the cable is out.
+    bus.refuse = u32::MAX;
+    bus.commands.push_back(Command::Zero { home: [0.5, -2.0, 0.0, 2.8, 0.0, 0.0, 0.0] });
+    bus.run(&mut core, 0.19);
+    let answers = |bus: &Bus| {
+        let is_answer = |event: &&EventKind| matches!(event, EventKind::Accepted | EventKind::Refused(_));
+        bus.events.iter().filter(is_answer).copied().collect::<Vec<_>>()
+    };
+    assert!(matches!(answers(&bus)[..], [EventKind::Accepted, EventKind::Refused(_)]), "{:?}", answers(&bus));
+    bus.run(&mut core, 5.0);
+    bus.refuse = 0;
+    bus.run(&mut core, 5.0);
+    assert_eq!(bus.pucks[0].position, before, "zeroed after its host had given it up");
+    assert_eq!((core.stage(), core.health().zeroed), (Stage::WaitingForActive, true));
+}
