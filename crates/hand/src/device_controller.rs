@@ -189,7 +189,7 @@ impl DeviceController {
         if let Some(node) = suspect {
             self.asked = Some(node);
             outlet.send(get(node, PropertyId::STAT));
-        } else if self.tick.is_multiple_of(POLL_SLOTS) && self.stage != HandStage::Failed {
+        } else if self.tick.is_multiple_of(POLL_SLOTS) {
             let turn = self.tick / POLL_SLOTS;
             let property = if turn.is_multiple_of(5) { TEMPERATURE } else { PropertyId::MODE };
             let digit = if property == TEMPERATURE { turn / 5 } else { turn - turn / 5 };

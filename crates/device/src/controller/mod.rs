@@ -523,6 +523,7 @@ impl Controller for DeviceController {
         }
         self.tell_stage(io);
         if let Some((stage, cause)) = self.hand.news() {
+            self.hand_temperatures = if stage == HandStage::Failed { [None; 4] } else { self.hand_temperatures };
             self.tell(EventKind::Hand { stage, cause }, io);
         }
     }

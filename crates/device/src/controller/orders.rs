@@ -1,6 +1,7 @@
 //! Commands of the host in the cyclic loop: for the control cycle, the start-up, or the hand.
 
 use control::State;
+use link::HandStage;
 
 use super::DeviceController;
 use crate::application::ControllerIo;
@@ -33,8 +34,11 @@ impl DeviceController {
                 None
             }
             Command::Zero { home } => {
-                // Under a latched fault too: what has lost its zero cannot be cleared before.
-                if !self.cycle.state().has_torque() && self.safety_mode == Some(SafetyMode::Idle) {
+                if self.hand.stage() == HandStage::Initialising {
+                    // The bus would be zeroing's alone, and a stop would not reach the digits that move.
+                    self.tell(EventKind::Refused(Refusal::HandBusy), io);
+                } else if !self.cycle.state().has_torque() && self.safety_mode == Some(SafetyMode::Idle) {
+                    // Under a latched fault too: what has lost its zero cannot be cleared before.
                     self.startup.zero(&home);
                 } else {
                     self.tell(EventKind::Refused(Refusal::ZeroNeedsIdle), io);

@@ -77,12 +77,12 @@ impl Drive {
         self.astray = None;
     }
 
-    /// A puck has told its MODE.
+    /// A puck has told its MODE. One that is to rest and drives has not heard the word to brake.
     pub fn hear_mode(&mut self, node: Node, value: i32) {
-        let in_torque = MotorMode::from_value(value) == Some(MotorMode::Torque);
+        let mode = MotorMode::from_value(value);
         let right = match self.wanted {
-            Wanted::Torque => in_torque,
-            Wanted::Rest => !in_torque,
+            Wanted::Torque => mode == Some(MotorMode::Torque),
+            Wanted::Rest => matches!(mode, None | Some(MotorMode::Idle | MotorMode::Position)),
         };
         if !right {
             self.astray = Some(node);

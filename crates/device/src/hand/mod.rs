@@ -9,7 +9,7 @@
 //! | not initialised | questions for MODE and TEMP |
 //! | initialising | its command, and GET MODE every 100 ms |
 //! | ready | GET P and GET SG in every cycle, torques where the control cycle drives it, MODE as these need it |
-//! | failed | MODE IDLE once |
+//! | failed | MODE IDLE, questions for MODE and TEMP, and MODE IDLE again to a puck that tells another |
 
 mod drive;
 mod failure;
@@ -126,7 +126,7 @@ impl Hand {
 
     /// True if its pucks may be asked for MODE and TEMP.
     pub(crate) fn answers_questions(&self) -> bool {
-        matches!(self.stage, HandStage::NotInitialised | HandStage::Ready)
+        matches!(self.stage, HandStage::NotInitialised | HandStage::Ready | HandStage::Failed)
     }
 
     /// A reply has come in; whether it was for the hand.

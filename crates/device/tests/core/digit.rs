@@ -42,6 +42,10 @@ pub(crate) struct Digit {
     pub(crate) lose_commands: u32,
     /// SETs of MODE that are lost from now on.
     pub(crate) lose_modes: u32,
+    /// Words to brake that are lost from now on, also one that would end an initialisation.
+    pub(crate) lose_brakes: u32,
+    /// Its temperature, degrees C.
+    pub(crate) celsius: i32,
     /// Answers to position and gauge requests that are lost from now on.
     pub(crate) lose: u32,
 }
@@ -71,6 +75,8 @@ impl Digit {
             initialised: false,
             lose_commands: 0,
             lose_modes: 0,
+            lose_brakes: 0,
+            celsius: 41 + index as i32,
             lose: 0,
         }
     }
@@ -179,7 +185,7 @@ impl Digit {
             Property::Hold => i32::from(self.holds),
             Property::Mode => self.mode.value(),
             Property::Tstop => self.stall_ms,
-            Property::Temp => 40 + self.place,
+            Property::Temp if awake => self.celsius,
             Property::Sg => self.gauge,
             _ if !awake => return None,
             other => panic!("the core asked digit {} for {other:?}", self.place),
@@ -196,6 +202,11 @@ impl Digit {
                 }
                 self.mode = MotorMode::Velocity;
                 self.working_until = Some(now_us + self.work_us);
+            }
+            Some(Property::Mode) if value == MotorMode::Idle.value() && self.lose_brakes > 0 => {
+                self.lose_brakes -= 1;
+                // It works on, and may be asked what it does.
+                self.working_until = None;
             }
             Some(Property::Mode) => {
                 // Not the one that ends an initialisation: a new start of the bus asks it again, and must not be

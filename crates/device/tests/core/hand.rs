@@ -1,6 +1,6 @@
 //! The hand: found, woken, initialised by a person alone, read and driven in every cycle, and lost without the arm.
 
-use control::{Command as Control, State, flags};
+use control::{Command as Control, Fault, State, flags};
 use device::{Command, Controller, EventKind, HandFailure, Refusal, Slot, Stage};
 use link::HandStage;
 use puck::hand::angles;
@@ -9,7 +9,7 @@ use puck::{
     Request,
 };
 
-use crate::double::{Bus, floating, holding_with_hand, holding_with_ready_hand, silent_device, started};
+use crate::double::{Bus, HOME, floating, holding_with_hand, holding_with_ready_hand, silent_device, started};
 
 /// Slots of a control cycle.
 const CYCLE: usize = 3;
@@ -59,6 +59,13 @@ fn hand_torques(bus: &Bus, begin: usize) -> Vec<[PuckTorque; 4]> {
         _ => None,
     };
     to_hand(bus, begin).into_iter().filter_map(torque).collect()
+}
+
+/// The hand was asked for its modes and temperatures since then, and told nothing.
+fn only_questions(bus: &Bus, begin: usize) -> bool {
+    let asked = [PropertyId::MODE, id(Property::Temp)];
+    let is_question = |action| matches!(action, Action::Get { property } if asked.contains(&property));
+    to_hand(bus, begin).into_iter().all(|(_, _, action)| is_question(action))
 }
 
 fn move_hand(bus: &mut Bus) {
@@ -180,7 +187,7 @@ fn an_initialisation_that_does_not_end_fails_and_is_braked() {
     assert_eq!(bus.digits[2].mode, MotorMode::Idle, "a finger that still drives is stopped");
     let begin = bus.log.len();
     bus.run(&mut core, 1.0);
-    assert!(to_hand(&bus, begin).is_empty(), "and left alone");
+    assert!(only_questions(&bus, begin), "and left alone");
     assert_eq!(core.health().state, State::Hold);
     // A person may try again.
     bus.digits[2].work_us = 1_000_000;
@@ -367,7 +374,7 @@ fn a_hand_puck_that_resets_costs_the_hand_and_not_the_arm() {
     bus.run(&mut core, 0.02);
     let begin = bus.log.len();
     bus.run(&mut core, 1.0);
-    assert!(to_hand(&bus, begin).is_empty(), "the others are stopped and left alone");
+    assert!(only_questions(&bus, begin), "the others are stopped and left alone");
     assert_eq!(bus.digits[0].mode, MotorMode::Idle);
     let record = bus.records.last().expect("a record");
     assert_eq!((record.state, record.flags & flags::HAND_READY), (State::Hold, 0));
@@ -480,4 +487,68 @@ fn foreign_frames_from_the_hand_are_counted_and_change_nothing() {
     bus.run(&mut core, 0.1);
     assert_eq!(core.health().counters.foreign_frames - before, 1);
     assert_eq!(core.health().hand, HandStage::Ready, "nobody had asked for its STAT");
+}
+
+/// G11: a SET has no acknowledge. A digit that has missed the word to brake tells it by its MODE.
+#[test]
+fn g11_a_digit_that_misses_the_word_to_brake_of_a_stop_is_told_again() {
+    for digit in 0..3 {
+        let (mut core, mut bus) = holding_with_hand();
+        bus.commands.push_back(Command::InitialiseHand);
+        bus.run(&mut core, 0.5);
+        bus.digits[digit].lose_brakes = 1;
+        bus.commands.push_back(Control::Stop.into());
+        bus.run(&mut core, 0.3);
+        assert_eq!((core.health().hand, bus.digits[digit].lose_brakes), (HandStage::NotInitialised, 0));
+        assert_eq!(bus.digits[digit].mode, MotorMode::Idle, "digit {digit} drives on after a stop");
+    }
+}
+
+/// The same of a hand that fails under torque: pucks keep the last torque that they were sent.
+#[test]
+fn a_digit_that_misses_the_word_to_brake_of_a_hand_that_fails_is_told_again() {
+    let (mut core, mut bus) = holding_with_ready_hand();
+    move_hand(&mut bus);
+    bus.run(&mut core, 0.3);
+    assert_ne!(bus.digits[0].torque, PuckTorque::ZERO);
+    bus.digits[1].lose_power();
+    bus.digits[0].lose_brakes = 1;
+    bus.run(&mut core, 0.6);
+    assert_eq!(core.health().hand, HandStage::Failed);
+    assert_eq!(bus.digits[0].mode, MotorMode::Idle, "it keeps a torque of {:?}", bus.digits[0].torque);
+}
+
+/// G11: while the arm is being zeroed no frame goes to the hand, and a stop would be accepted and do nothing.
+#[test]
+fn g11_an_arm_is_not_zeroed_while_its_hand_is_initialised_so_that_a_stop_reaches_it() {
+    let (mut core, mut bus) = holding_with_hand();
+    bus.press_idle();
+    bus.run(&mut core, 0.5);
+    bus.commands.push_back(Command::InitialiseHand);
+    bus.run(&mut core, 0.5);
+    assert_eq!(core.health().hand, HandStage::Initialising);
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run_slots(&mut core, 3 * CYCLE);
+    bus.commands.push_back(Control::Stop.into());
+    bus.run(&mut core, 0.7);
+    assert_eq!(core.health().hand, HandStage::NotInitialised, "a stop was accepted: {:?}", bus.events);
+    assert!(bus.digits.iter().all(|digit| digit.mode == MotorMode::Idle));
+    assert!(bus.events.contains(&EventKind::Refused(Refusal::HandBusy)));
+}
+
+/// G14: a hot puck of the hand that resets is asked for its temperature no longer; what it told last is no reason to
+/// keep the arm from being cleared for ever.
+#[test]
+fn g14_a_hot_hand_that_fails_does_not_keep_the_arm_from_being_cleared() {
+    let (mut core, mut bus) = holding_with_ready_hand();
+    bus.digits[2].celsius = 85;
+    bus.run(&mut core, 1.5);
+    assert_eq!((core.health().state, core.health().fault), (State::SoftStop, Fault::MotorHot));
+    bus.digits[2].lose_power();
+    bus.run(&mut core, 0.1);
+    assert_eq!(core.health().hand, HandStage::Failed);
+    bus.run(&mut core, 2.0);
+    bus.commands.extend([Control::ClearFault, Control::Hold].map(Command::from));
+    bus.run(&mut core, 0.1);
+    assert_eq!((core.health().state, core.health().fault), (State::Hold, Fault::None), "{:?}", bus.events);
 }
