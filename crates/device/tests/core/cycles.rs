@@ -439,3 +439,15 @@ fn a12_while_torque_frames_cannot_leave_nothing_is_cleared_or_armed() {
     bus.run(&mut core, 0.1);
     assert_eq!(core.health().state, State::Idle, "{:?}", bus.events);
 }
+
+/// An answer goes before news. Two orders in a row must not leave the state that the second one led to untold, nor tell
+/// that of the first one after it.
+#[test]
+fn the_state_that_is_told_last_is_the_one_that_the_arm_is_in() {
+    let (mut core, mut bus) = floating();
+    bus.commands.extend([Command::Hold, Command::Stop].map(device::Command::from));
+    bus.run(&mut core, 0.1);
+    assert_eq!(core.health().state, State::SoftStop);
+    let told = bus.events.iter().rev().find(|event| matches!(event, EventKind::Entered(..)));
+    assert_eq!(told, Some(&EventKind::Entered(State::SoftStop, Fault::None)), "{:?}", bus.events);
+}
