@@ -442,3 +442,20 @@ fn noise_on_the_line_is_counted_and_changes_nothing() {
     assert!(link.bad_cobs + link.bad_crc + link.too_long > 10);
     assert_eq!((link.accepted, link.undecodable), (2, 0));
 }
+
+/// C9: a host that died and is started anew under the number that it had says hello with a number of a request that is
+/// behind.
+#[test]
+fn c9_a_host_that_is_started_anew_under_its_old_number_gets_its_session_after_half_a_second() {
+    let mut rig = Rig::greeted();
+    for _ in 0..300 {
+        rig.done(Request::Ping);
+    }
+    rig.wait(100);
+    rig.sequence = 0;
+    assert_eq!(rig.ask(Request::Hello(hello())), None, "it may be a replay");
+    rig.wait(400);
+    rig.sequence = 0;
+    rig.greet();
+    rig.done(Request::Ping);
+}

@@ -32,6 +32,10 @@ impl<A: Application> HostSession<A> {
             return self.send_to(envelope.session, now_ms, &reply, port);
         }
         let order = match &mut self.owner {
+            // A host that was started anew, under the number that it had.
+            Some(owner) if matches!(message, Request::Hello(_)) && owner.protected_for(now_ms) == 0 => {
+                RequestOrder::New
+            }
             Some(owner) if owner.session() == envelope.session => owner.order(of, now_ms),
             _ => RequestOrder::New,
         };
