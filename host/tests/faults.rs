@@ -137,3 +137,18 @@ fn cli_2_a_fault_of_a_run_is_told_unprompted_and_its_last_second_can_be_read_bef
     let words = String::from_utf8(tactus(folder, "faults").stdout).unwrap();
     assert!(words.contains("last fault, cleared: RepliesLost") && words.lines().count() == 29, "{words}");
 }
+
+/// A1: a single lost reply is bridged, in gravity as everywhere.
+#[test]
+fn a1_a_lost_reply_does_not_end_a_demonstration() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let lost = SCRIPT
+        .replace("from = \"run\"", "from = \"power-up\"")
+        .replace("at = 1.5, lasts = 0.05", "at = 12.0, lasts = 0.01");
+    std::fs::write(folder.join("one.toml"), lost.replace("from = [4] }", "from = [4], most = 1 }")).unwrap();
+    let taught = tactus(folder, "--device sil:world=simple,faults=one.toml teach --duration 10 -o demo.csv");
+    assert!(taught.status.success(), "{}", String::from_utf8_lossy(&taught.stderr));
+    let rows = std::fs::read_to_string(folder.join("demo.csv")).unwrap();
+    assert_eq!(rows.lines().filter(|row| row.contains(State::Coast.name())).count(), 1);
+}

@@ -208,3 +208,26 @@ fn two_may_look_on_a_third_is_told_so_and_the_places_of_killed_ones_are_waited_f
     let listed = tactus(at, "list");
     assert!(listed.status.success(), "{}", String::from_utf8_lossy(&listed.stdout));
 }
+
+/// A machine that was suspended, or a program that a debugger holds: the device stops the arm and lets go of its host,
+/// which must not wait for the end of the move.
+#[test]
+fn a_program_that_was_suspended_in_a_move_says_so_and_waits_for_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let _arm = StandIn::start(at);
+    let mut teach = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    teach.current_dir(at).env("TACTUS_DEVICE", "unix:tactus.sock").stdin(Stdio::null()).stdout(Stdio::null());
+    let order = "--non-interactive teach --at-home --from -0.8,0.3,-0.6,1,0.5,0.3,0 --duration 1";
+    let teach = teach.args(order.split(' ')).stderr(Stdio::piped()).spawn().unwrap();
+    until(at, &["approach"]);
+    let signal = |name: &str| Command::new("kill").args([name, &teach.id().to_string()]).status().unwrap().success();
+    assert!(signal("-STOP"));
+    until(at, &["soft stop"]);
+    assert!(signal("-CONT"));
+    let begun = std::time::Instant::now();
+    let output = teach.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("the device has no session with this host"), "{said}");
+    assert!(begun.elapsed() < Duration::from_secs(20), "after {:?}", begun.elapsed());
+}

@@ -454,7 +454,7 @@ impl<T: Transport> Client<T> {
     ///
     /// # Errors
     /// [`HostError::Interrupted`] after the arm has been stopped, [`HostError::NoAnswer`] if the device has fallen
-    /// silent, [`HostError::Transport`].
+    /// silent, [`HostError::Refused`] if it knows this host no longer, [`HostError::Transport`].
     pub fn next(&mut self, timeout: Duration) -> Result<Option<Incoming>, HostError> {
         let deadline = self.transport.now() + timeout;
         loop {
@@ -464,6 +464,7 @@ impl<T: Transport> Client<T> {
             if let Some(incoming) = self.incoming.pop_front() {
                 return Ok(Some(incoming));
             }
+            self.take_pongs()?;
             let now = self.transport.now();
             if now >= deadline {
                 return Ok(None);
@@ -480,8 +481,18 @@ impl<T: Transport> Client<T> {
             }
             let ping_due = (self.sent + KEEP_ALIVE).saturating_sub(now);
             self.pump(deadline.saturating_sub(now).min(ping_due))?;
-            self.answers.clear();
         }
+    }
+
+    /// Takes the answers to pings. A device that has let go of this host, or was started anew, answers them too: what
+    /// is waited for will not come.
+    fn take_pongs(&mut self) -> Result<(), HostError> {
+        while let Some(answer) = self.answers.pop_front() {
+            if let Reply::Refused { reason: reason @ Refusal::NoSession, detail, .. } = answer {
+                return Err(HostError::Refused { request: "ping", reason, detail });
+            }
+        }
+        Ok(())
     }
 
     /// The state of the device.

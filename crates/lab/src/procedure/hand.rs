@@ -72,10 +72,11 @@ pub fn initialise_hand(client: &mut Client<Device>) -> Result<HandStage, Procedu
             HandStage::Failed => {
                 return Err(ProcedureError::Hand("a finger did not come to its stop, or a puck fell silent"));
             }
-            HandStage::Initialising | HandStage::NotInitialised if client.now() > deadline => {
+            HandStage::NotInitialised => return Err(ProcedureError::Hand("its initialisation was stopped")),
+            HandStage::Initialising if client.now() > deadline => {
                 return Err(ProcedureError::TooLong { what: "initialising the hand", seconds: INITIALISATION });
             }
-            HandStage::Initialising | HandStage::NotInitialised => {}
+            HandStage::Initialising => {}
         }
     }
 }

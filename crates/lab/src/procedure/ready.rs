@@ -110,7 +110,8 @@ pub fn start_up(
             Some(Stage::WaitingForActive) if goal == Stage::WaitingForActive => {
                 return Ok(Readiness { wrench_zeroed: status.wrench_zeroed, ..readiness });
             }
-            Some(Stage::WaitingForZero) if simulated || at_home => {
+            // A person's word holds once: an arm that has lost its zero since may stand elsewhere.
+            Some(Stage::WaitingForZero) if simulated || (at_home && readiness.zeroed_at.is_none()) => {
                 readiness.zeroed_at = zero(client)?.or(readiness.zeroed_at);
             }
             Some(Stage::WaitingForZero) => return Err(ProcedureError::NotZeroed),

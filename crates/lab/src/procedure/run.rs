@@ -228,10 +228,12 @@ fn follow(
                 let state = State::from_code(telemetry.state);
                 let running = matches!(state, Some(State::Run | State::Coast));
                 if running {
-                    first.get_or_insert(telemetry.cycle);
+                    // What is bridged may still be the hold before.
+                    first = first.or((state == Some(State::Run)).then_some(telemetry.cycle));
                     outcome.flags.add(telemetry.flags);
-                } else if first.is_some() && arrived.is_none() && state != Some(State::Hold) {
-                    // Its event may have been lost; the state cannot.
+                } else if first.is_some() && arrived.is_none() {
+                    // The event may have been lost; the state cannot.
+                    arrived = (state == Some(State::Hold)).then_some(telemetry.cycle);
                     let fault = Fault::from_code(telemetry.fault).unwrap_or(Fault::None);
                     after(u16::from(telemetry.state), u32::from(fault.code()))?;
                 }

@@ -36,7 +36,8 @@ pub fn record_demonstration<W: Write>(
     let mut end = None;
     loop {
         let Take::Cycle(telemetry) = recorder.take(client)? else { continue };
-        if State::from_code(telemetry.state) != Some(State::Gravity) {
+        // A lost reply of a motor is bridged, and the person leads on.
+        if !matches!(State::from_code(telemetry.state), Some(State::Gravity | State::Coast)) {
             return Err(ProcedureError::Stopped(Fault::from_code(telemetry.fault).unwrap_or(Fault::None)));
         }
         let seconds = recorder.rows() as f64 / RATE;

@@ -36,6 +36,9 @@ pub fn pass(client: &mut Client<Device>, time: Duration, ends: Ends) -> Result<(
     Ok(())
 }
 
+/// A motion of whose end nothing is heard is looked at so often: the event may have been lost on the line.
+const LOOK: Duration = Duration::from_secs(5);
+
 /// Waits until a motion that was just commanded has arrived.
 ///
 /// # Errors
@@ -47,6 +50,7 @@ pub fn wait_for(
     mut progress: impl FnMut(f64),
 ) -> Result<(), ProcedureError> {
     let started = client.now();
+    let mut look_at = started + LOOK;
     loop {
         let passed = client.now().saturating_sub(started);
         if passed > Duration::from_secs(seconds) {
@@ -54,6 +58,14 @@ pub fn wait_for(
             return Err(ProcedureError::TooLong { what, seconds });
         }
         progress(passed.as_secs_f64());
+        if client.now() >= look_at {
+            look_at = client.now() + LOOK;
+            let status = client.status()?;
+            if State::from_code(status.state) == Some(State::Hold) {
+                return Ok(());
+            }
+            after(status.state.into(), status.fault.into())?;
+        }
         let Some(Incoming::Event(event)) = client.next(Duration::from_millis(100))? else {
             continue;
         };

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use control::model::{LinkWeight, WeightCorrection};
-use control::{Payload, flags};
+use control::{Payload, State, flags};
 use link::EventKind;
 
 use super::travel::{self, travel};
@@ -110,7 +110,7 @@ fn pass_posture(
 
 fn watch(client: &mut Client<Device>, first: f64) -> Result<Vec<Sample>, ProcedureError> {
     let started = client.now();
-    let (mut samples, mut first_cycle) = (Vec::new(), None);
+    let (mut samples, mut first_cycle, mut moves) = (Vec::new(), None, false);
     loop {
         if client.now().saturating_sub(started) > Duration::from_secs(TIMEOUT) {
             client.stop()?;
@@ -124,6 +124,12 @@ fn watch(client: &mut Client<Device>, first: f64) -> Result<Vec<Sample>, Procedu
                 let measured = cycle.flags & flags::POSITIONS_KNOWN != 0 && cycle.lost_replies == 0;
                 if measured && (sample.q[0] - first).abs() <= WINDOW {
                     samples.push(sample);
+                }
+                let state = State::from_code(cycle.state);
+                moves |= state == Some(State::Approach);
+                if moves && state == Some(State::Hold) {
+                    // The event may have been lost; the state cannot.
+                    return Ok(samples);
                 }
             }
             Some(Incoming::Event(event)) if event.kind == EventKind::Arrived => return Ok(samples),

@@ -416,3 +416,24 @@ fn a_second_client_waits_for_the_first_to_be_gone() {
     let waited = client.now();
     assert!(waited > Duration::from_millis(490) && waited < Duration::from_millis(800), "{waited:?}");
 }
+
+/// The device has let go of a host that was suspended: what that host waits for will never come, however many of its
+/// pings are answered.
+#[test]
+fn a_host_that_the_device_has_let_go_of_does_not_wait_on() {
+    let mut client = connected();
+    client.gravity().unwrap();
+    let device = client.transport();
+    (0..540).for_each(|_| device.step());
+    assert_eq!(device.half.state, State::SoftStop, "600 ms of silence");
+    let started = client.now();
+    let refused = loop {
+        match client.next(Duration::from_secs(10)) {
+            // The device has said that it stops the arm.
+            Ok(Some(_)) => {}
+            other => break other,
+        }
+    };
+    assert!(matches!(refused, Err(HostError::Refused { reason: Refusal::NoSession, .. })), "{refused:?}");
+    assert!(client.now() - started < Duration::from_millis(200), "{:?}", client.now() - started);
+}
