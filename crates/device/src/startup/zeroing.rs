@@ -8,7 +8,7 @@ use crate::bus::Outlet;
 use crate::command::Refusal;
 use crate::stage::StartupError;
 
-/// Longest time for the word of the safety module before positions are rewritten, us: three questions. A host gives a
+/// Longest wait for the answer of the safety module before positions are rewritten, us: three questions. A host gives a
 /// command up after 200 ms, and an arm must not be zeroed by one that was given up.
 const CONFIRM_US: u64 = 170_000;
 /// Longest time for the seven replies to one position request, us.
