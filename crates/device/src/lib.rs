@@ -45,7 +45,7 @@ pub mod weight;
 
 pub use port::{CheckedPrimitive, StoredPrimitive};
 pub use secret::StoredSecret;
-pub use session::{ArmApplication, HostSession, Identity, Session};
+pub use session::{ArmApplication, HostSession, Identity, PENDING_COMMANDS, Session};
 pub use store::{RamStore, STORE_SLOT_BYTES, STORE_SLOTS, Store, StoreError, stage_copy};
 pub use weight::StoredWeight;
 pub use wire::{PrimitiveDefect, StartupFailure};

@@ -23,7 +23,7 @@ mod storage;
 use core::mem::MaybeUninit;
 
 use device::storage::{Library, Scratch, value_bytes};
-use device::{Command, DeviceController, Event, FaultMemory, Identity, Session, TimedRecord};
+use device::{Command, DeviceController, Event, FaultMemory, Identity, PENDING_COMMANDS, Session, TimedRecord};
 use heapless::spsc::Queue;
 use link::image::IMAGE_BYTES_LIMIT;
 use puck::CanFrame;
@@ -44,8 +44,8 @@ pub use storage::{keep_library, rest};
 const OUTGOING: usize = 16 + 1;
 /// Frames on their way to the core. The bus carries at most 24 of the shortest in a slot, and each slot drains them.
 const INCOMING: usize = 32 + 1;
-/// Commands on their way to the core, which takes one per control cycle; a host waits for each answer.
-const COMMANDS: usize = 8 + 1;
+/// Commands on their way to the core, which takes one per control cycle: as many as the session keeps track of.
+const COMMANDS: usize = PENDING_COMMANDS + 1;
 /// Cycle records on their way to the session: 50 ms, longer than it ever works in one go (checking an image).
 const RECORDS: usize = 16 + 1;
 /// Events on their way to the session: a start-up tells about 10 of them, each in a slot of its own.

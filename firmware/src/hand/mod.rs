@@ -3,7 +3,7 @@
 
 use core::mem::MaybeUninit;
 
-use device::{HostSession, Identity, Message, TimedRecord};
+use device::{HostSession, Identity, Message, PENDING_COMMANDS, TimedRecord};
 use hand::{Command, DeviceController, HandApplication, Library, Record, Session};
 use heapless::spsc::Queue;
 use puck::CanFrame;
@@ -16,8 +16,8 @@ use crate::in_place;
 const OUTGOING: usize = 8 + 1;
 /// Frames on their way to the core: eight replies a cycle, and what a start-up brings.
 const INCOMING: usize = 24 + 1;
-/// Commands on their way to the core, which takes one per control cycle; a host waits for each answer.
-const COMMANDS: usize = 4 + 1;
+/// Commands on their way to the core, which takes one per control cycle: as many as the session keeps track of.
+const COMMANDS: usize = PENDING_COMMANDS + 1;
 /// Records on their way to the session: 27 ms.
 const RECORDS: usize = 8 + 1;
 /// Events on their way to the session.

@@ -4,4 +4,4 @@ mod arm;
 mod host;
 
 pub use arm::{ArmApplication, Session};
-pub use host::{HostSession, Identity};
+pub use host::{HostSession, Identity, PENDING_COMMANDS};

@@ -31,6 +31,7 @@ use inbox::Inbox;
 use lock::Lock;
 use observers::Observers;
 use owner::Owner;
+pub use pending::PENDING_COMMANDS;
 use pending::{Pending, Requester};
 use upload::Upload;
 

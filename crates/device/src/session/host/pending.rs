@@ -4,8 +4,9 @@
 
 use heapless::Deque;
 
-/// Commands that may be on their way at a time, the last place of them kept for a stop.
-const PENDING: usize = 8;
+/// Commands that may be on their way to the control half at a time, the last place of them kept for a stop. A queue that
+/// holds fewer would have no place for that.
+pub const PENDING_COMMANDS: usize = 8;
 
 /// A command that the control half does not answer within this time is given up, ms. It answers within two
 /// cycles, 7 ms, and to zeroing after its last question to the safety module, 150 ms; longer means that it is not
@@ -36,12 +37,12 @@ pub(super) enum Requester {
 
 /// Commands without an answer, oldest first.
 #[derive(Debug, Default)]
-pub(super) struct Pending(Deque<(Requester, u32), PENDING>);
+pub(super) struct Pending(Deque<(Requester, u32), PENDING_COMMANDS>);
 
 impl Pending {
     /// True if another command can be tracked.
     pub(super) fn has_room(&self, stop: bool) -> bool {
-        self.0.len() + usize::from(!stop) < PENDING
+        self.0.len() + usize::from(!stop) < PENDING_COMMANDS
     }
 
     /// True if the control half owes no answer.
