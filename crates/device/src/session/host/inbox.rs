@@ -33,18 +33,21 @@ impl Inbox {
         if is_owner { push(&mut self.owner, frame) } else { push(&mut self.others, frame) }
     }
 
-    /// A stop, if one waits.
-    pub(super) fn pop_stop(&mut self) -> Option<Frame<Request>> {
-        pop_stop(&mut self.owner).or_else(|| pop_stop(&mut self.others))
-    }
-
-    /// The next request. `is_owner` tells by its session number whether a host has the session; a device without a
-    /// session owes nobody anything, so that `is_free` lets every host pass.
-    pub(super) fn pop(&mut self, now_ms: u32, is_free: bool, is_owner: impl Fn(u16) -> bool) -> Option<Frame<Request>> {
-        if let Some(frame) = self.owner.pop_front() {
-            return Some(frame);
+    /// The next request; where `stops_only` is set only a stop. `is_owner` tells by its session number whether a host has the
+    /// session; a device without a session owes nobody anything, so that `is_free` lets every host pass.
+    pub(super) fn pop(
+        &mut self,
+        now_ms: u32,
+        is_free: bool,
+        stops_only: bool,
+        is_owner: impl Fn(u16) -> bool,
+    ) -> Option<Frame<Request>> {
+        // Every stop was put to the front.
+        let is_due = |frame: &&Frame<Request>| !stops_only || frame.message == Request::Stop;
+        if self.owner.front().filter(is_due).is_some() {
+            return self.owner.pop_front();
         }
-        let next = self.others.front()?;
+        let next = self.others.front().filter(is_due)?;
         if !(is_free || next.message == Request::Stop || is_owner(next.envelope.session)) {
             // The clock wraps. More than the largest debt lies behind now: long ago.
             let ahead = self.paid_until_ms.wrapping_sub(now_ms);
@@ -75,12 +78,8 @@ fn push<const N: usize>(queue: &mut Deque<Frame<Request>, N>, frame: Frame<Reque
     !is_full
 }
 
-fn pop_stop<const N: usize>(queue: &mut Deque<Frame<Request>, N>) -> Option<Frame<Request>> {
-    // Every stop was put to the front.
-    queue.front().is_some_and(|frame| frame.message == Request::Stop).then(|| queue.pop_front())?
-}
-
 /// Takes out what is at this place; the others keep their order.
+#[inline(never)]
 fn remove<const N: usize>(queue: &mut Deque<Frame<Request>, N>, place: usize) {
     for other in 0..queue.len() {
         if let Some(frame) = queue.pop_front().filter(|_| other != place) {
@@ -104,10 +103,10 @@ mod tests {
     /// A request of another host arrives and is asked for at once; true if it is handled.
     fn passes(inbox: &mut Inbox, now_ms: u32, session: u16, message: Request) -> bool {
         assert!(inbox.push(frame(session, message), false));
-        let passed = inbox.pop(now_ms, false, |session| session == OWNER).is_some();
+        let passed = inbox.pop(now_ms, false, false, |session| session == OWNER).is_some();
         if !passed {
             // Nobody has the session: it is not kept waiting.
-            assert!(inbox.pop(now_ms, true, |_| false).is_some());
+            assert!(inbox.pop(now_ms, true, false, |_| false).is_some());
         }
         passed
     }
@@ -148,7 +147,7 @@ mod tests {
             }
             assert!(!inbox.push(frame(OWNER, Request::Status), is_owner), "it is lost");
             assert!(!inbox.push(frame(OWNER, Request::Stop), is_owner), "another is lost");
-            let mut next = || inbox.pop(0, true, |_| false).map(|frame| frame.message);
+            let mut next = || inbox.pop(0, true, false, |_| false).map(|frame| frame.message);
             assert_eq!(next(), Some(Request::Stop));
             for _ in 1..places {
                 assert_eq!(next(), Some(Request::Ping));
@@ -171,7 +170,7 @@ mod tests {
                     assert!(inbox.push(frame(OWNER, Request::Status), is_owner));
                 }
                 assert!(!inbox.push(frame(OWNER, Request::Goodbye), is_owner), "a status is lost");
-                let words = core::iter::from_fn(|| inbox.pop(0, true, |_| false).map(|frame| frame.message));
+                let words = core::iter::from_fn(|| inbox.pop(0, true, false, |_| false).map(|frame| frame.message));
                 let expected = [Request::Status, Request::Status, Request::Goodbye];
                 assert!(words.eq(core::iter::once(first).chain(expected.into_iter().skip(4 - places))));
             }
@@ -181,7 +180,7 @@ mod tests {
         for message in [Request::Goodbye, Request::Goodbye, Request::Goodbye, Request::Stop, Request::Goodbye] {
             inbox.push(frame(99, message), false);
         }
-        let words = core::iter::from_fn(|| inbox.pop(0, true, |_| false).map(|frame| frame.message));
+        let words = core::iter::from_fn(|| inbox.pop(0, true, false, |_| false).map(|frame| frame.message));
         assert!(words.eq([Request::Stop, Request::Goodbye]));
     }
 
@@ -189,7 +188,7 @@ mod tests {
     fn the_owner_s_requests_come_before_those_of_others() {
         let mut inbox = Inbox::default();
         assert!(inbox.push(frame(99, Request::Status), false) && inbox.push(frame(OWNER, Request::Ping), true));
-        let mut next = || inbox.pop(0, false, |session| session == OWNER).map(|frame| frame.message);
+        let mut next = || inbox.pop(0, false, false, |session| session == OWNER).map(|frame| frame.message);
         assert_eq!((next(), next(), next()), (Some(Request::Ping), Some(Request::Status), None));
     }
 }

@@ -130,14 +130,11 @@ impl<A: Application> HostSession<A> {
         let open = self.application.is_open(now_ms);
         // The time-out is served before each request: no host inherits the motion of another.
         while self.watch_host(now_ms, port) {
+            let present = self.owner.as_ref().map(Owner::session);
             // A stop waits neither for the store nor for room: what is not answered its host repeats.
-            let frame = if open && port.room() >= 2 * ANSWER_ROOM {
-                let present = self.owner.as_ref().map(Owner::session);
-                self.inbox.pop(now_ms, present.is_none(), |session| present == Some(session))
-            } else {
-                self.inbox.pop_stop()
-            };
-            let Some(frame) = frame else { break };
+            let stops_only = !open || port.room() < 2 * ANSWER_ROOM;
+            let is_owner = |session| present == Some(session);
+            let Some(frame) = self.inbox.pop(now_ms, present.is_none(), stops_only, is_owner) else { break };
             self.handle(now_ms, frame, port);
         }
         // A store in memory is done at once.
