@@ -33,8 +33,8 @@ impl Inbox {
         if is_owner { push(&mut self.owner, frame) } else { push(&mut self.others, frame) }
     }
 
-    /// The next request; where `stops_only` is set only a stop. `is_owner` tells by its session number whether a host has the
-    /// session; a device without a session owes nobody anything, so that `is_free` lets every host pass.
+    /// The next request; where `stops_only` is set only a stop. `is_owner` tells by its session number whether a host
+    /// has the session; a device without a session owes nobody anything, so that `is_free` lets every host pass.
     pub(super) fn pop(
         &mut self,
         now_ms: u32,

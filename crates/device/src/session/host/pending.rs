@@ -4,8 +4,8 @@
 
 use heapless::Deque;
 
-/// Commands that may be on their way to the control half at a time, the last place of them kept for a stop. A queue that
-/// holds fewer would have no place for that.
+/// Commands that may be on their way to the control half at a time, the last place of them kept for a stop. A queue
+/// that holds fewer would have no place for that.
 pub const PENDING_COMMANDS: usize = 8;
 
 /// A command that the control half does not answer within this time is given up, ms. It answers within two
