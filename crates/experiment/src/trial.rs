@@ -250,7 +250,7 @@ fn wait_for_beat(client: &mut Client<Device>, beat: Ticks) -> Result<(), Procedu
     let phase = SLOT_TICKS + AFTER_BEAT;
     let next = (now.saturating_sub(phase) / beat + 1) * beat + phase;
     let until = Duration::from_nanos(next * NANOSECONDS_PER_TICK as u64);
-    procedure::pass(client, until.saturating_sub(client.now()), procedure::Ends::OnAnyStop)
+    procedure::pass(client, until.saturating_sub(client.now()), procedure::EndCondition::OnAnyStop)
 }
 
 /// The name of what stopped the arm, or the error that is none of the arm's.

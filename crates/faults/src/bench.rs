@@ -6,7 +6,7 @@ use std::time::Duration;
 use control::State;
 use lab::client::{Client, Incoming};
 use lab::device::Device;
-use lab::procedure::{self, Ends};
+use lab::procedure::{self, EndCondition};
 use lab::simulation::{Simulation, SimulationOptions};
 use lab::transport::{SimulatorKind, SimulatorOptions};
 use link::Name;
@@ -82,7 +82,7 @@ pub fn begin(arm: &mut Arm, scenario: &Scenario, with_faults: bool) -> Result<()
     arm.upload(&movement().to_image()?, |_, _, _| {})?;
     procedure::make_ready(arm, true, |_| {})?;
     procedure::go_to_start(arm, &movement().start, |_| {})?;
-    procedure::pass(arm, Duration::from_millis(300), Ends::OnAnyStop)?;
+    procedure::pass(arm, Duration::from_millis(300), EndCondition::OnAnyStop)?;
     match scenario.from {
         From::PowerUp | From::Hold => {}
         From::Gravity => arm.gravity()?,

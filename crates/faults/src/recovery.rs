@@ -5,7 +5,7 @@ use std::time::Duration;
 use control::{Fault, State};
 use device::Stage;
 use lab::error::HostError;
-use lab::procedure::{self, Ends, Mode, RunRequest};
+use lab::procedure::{self, EndCondition, Mode, RunRequest};
 use link::{Name, Refusal};
 use puck::SafetyMode;
 use sim::PendantAction;
@@ -53,7 +53,7 @@ pub fn recover(arm: &mut Arm, way: Recover) -> Result<(), Failure> {
     }
     arm.take_events();
     arm.hold().map_err(|error| format!("hold: {error}"))?;
-    procedure::pass(arm, Duration::from_millis(500), Ends::OnAnyStop)?;
+    procedure::pass(arm, Duration::from_millis(500), EndCondition::OnAnyStop)?;
     let told = arm.status()?.q.map(f64::from);
     let truth = plant(arm).world().joint_positions();
     if let Some(joint) = (0..7).find(|joint| (told[*joint] - truth[*joint]).abs() > BELIEVED) {

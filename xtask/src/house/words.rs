@@ -45,6 +45,7 @@ const OLD: &[Old] = &[
     (Name, "Fit", "a word for what was checked", &["crates/control", "crates/device"]),
     (Name, "FitPrimitive", "CheckedPrimitive", &[]),
     (Name, "Ends", "SlotQueues", &["firmware"]),
+    (Phrase, "ends::", "EndCondition", &[]),
     (Name, "Room", "Scratch", DEVICE),
     (Name, "WeightRoom", "WeightBuffer", &[]),
     (Name, "Desk", "LibraryAccess", &[]),

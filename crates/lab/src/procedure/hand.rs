@@ -6,7 +6,7 @@ use control::State;
 use link::HandStage;
 
 use super::ProcedureError;
-use super::wait::{Ends, pass};
+use super::wait::{EndCondition, pass};
 use crate::client::Client;
 use crate::device::Device;
 
@@ -65,7 +65,7 @@ pub fn initialise_hand(client: &mut Client<Device>) -> Result<HandStage, Procedu
     }
     let deadline = client.now() + Duration::from_secs(INITIALISATION);
     loop {
-        pass(client, LOOK, Ends::OnFault)?;
+        pass(client, LOOK, EndCondition::OnFault)?;
         match client.status()?.hand_stage {
             HandStage::Ready => return Ok(HandStage::Ready),
             HandStage::Absent => return Err(ProcedureError::Hand("a puck of it does not answer any more")),
@@ -91,7 +91,7 @@ pub fn move_hand(client: &mut Client<Device>, q: [f32; 4]) -> Result<HandReach, 
     let started = client.now();
     let (mut last, mut moved) = (client.status()?.hand, started);
     loop {
-        pass(client, LOOK, Ends::OnFault)?;
+        pass(client, LOOK, EndCondition::OnFault)?;
         let hand = client.status()?.hand;
         let distance = |to: &[f32; 4]| hand.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         if distance(&q) < NEAR {
@@ -120,6 +120,6 @@ pub fn move_hand_to_the_end(client: &mut Client<Device>, q: [f32; 4]) -> Result<
         HandReach::Reached => TAIL,
         HandReach::Stopped(_) => (started + LONGEST_PLAN).saturating_sub(client.now()),
     };
-    pass(client, rest, Ends::OnFault)?;
+    pass(client, rest, EndCondition::OnFault)?;
     Ok(reach)
 }

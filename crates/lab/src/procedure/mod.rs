@@ -22,7 +22,7 @@ pub use rehearse::play_once;
 pub use run::{CHANNELS, Change, ChangeKind, FlagCounts, RunOutcome, RunRequest, Surprise, planned, play};
 pub use teach::{Demonstrated, record_demonstration, teacher};
 pub use travel::{go_to_start, travel};
-pub use wait::{Ends, after, pass, wait_for};
+pub use wait::{EndCondition, after, pass, wait_for};
 pub use weigh::{Crossings, cross_postures, slide_postures, weight_in_use};
 
 use control::Fault;

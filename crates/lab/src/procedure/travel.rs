@@ -7,7 +7,7 @@ use link::{HandStage, Refusal};
 
 use super::ProcedureError;
 use super::hand::{HandReach, move_hand};
-use super::wait::{Ends, pass, wait_for};
+use super::wait::{EndCondition, pass, wait_for};
 use crate::client::Client;
 use crate::device::Device;
 use crate::error::{Capability, HostError};
@@ -37,7 +37,7 @@ pub(super) fn approach(client: &mut Client<Device>, q: [f32; 7], seconds: f32) -
     loop {
         match client.approach(q, seconds) {
             Err(HostError::Refused { reason: Refusal::Moving, .. }) if client.now() < end => {
-                pass(client, REST_TRY, Ends::OnAnyStop)?;
+                pass(client, REST_TRY, EndCondition::OnAnyStop)?;
             }
             begun => return Ok(begun?),
         }
@@ -99,7 +99,7 @@ pub fn go_to_start(
 fn hold(client: &mut Client<Device>) -> Result<(), ProcedureError> {
     if State::from_code(client.status()?.state) != Some(State::Hold) {
         client.hold()?;
-        pass(client, LET_GO, Ends::OnAnyStop)?;
+        pass(client, LET_GO, EndCondition::OnAnyStop)?;
     }
     Ok(())
 }

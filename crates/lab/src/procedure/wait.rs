@@ -9,9 +9,9 @@ use super::ProcedureError;
 use crate::client::{Client, Incoming};
 use crate::device::Device;
 
-/// Which changes of state end a wait.
+/// The changes of state that end a wait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ends {
+pub enum EndCondition {
     /// Every state in which the arm no longer does what it was told.
     OnAnyStop,
     /// A fault only: the arm may go from state to state meanwhile.
@@ -21,14 +21,14 @@ pub enum Ends {
 /// Lets `time` pass. Telemetry of that time is dropped.
 ///
 /// # Errors
-/// [`ProcedureError::Stopped`] or [`ProcedureError::Diverted`] when the arm leaves its state in a way that `ends` the
+/// [`ProcedureError::Stopped`] or [`ProcedureError::Diverted`] when the arm leaves its state in a way that ends the
 /// wait.
-pub fn pass(client: &mut Client<Device>, time: Duration, ends: Ends) -> Result<(), ProcedureError> {
+pub fn pass(client: &mut Client<Device>, time: Duration, condition: EndCondition) -> Result<(), ProcedureError> {
     let end = client.now() + time;
     while client.now() < end {
         if let Some(Incoming::Event(event)) = client.next(end.saturating_sub(client.now()))?
             && event.kind == EventKind::State
-            && (ends == Ends::OnAnyStop || event.detail != 0)
+            && (condition == EndCondition::OnAnyStop || event.detail != 0)
         {
             after(event.code, event.detail)?;
         }
