@@ -303,7 +303,7 @@ impl Refusal {
             Self::Moving => "let the arm come to rest",
             Self::WrenchMissing => "check the force sensor and its cable",
             Self::NoAnswer => "send the request again; if it persists restart the device",
-            Self::ZeroNeedsIdle => "press Shift+Idle on the pendant, then zero the arm",
+            Self::ZeroNeedsIdle => "press Shift+Idle on the pendant, hold the arm still, then zero it",
             Self::NoHand => "check the hand's cable; its four pucks are looked for when the arm's bus starts",
             Self::HandNotReady => "`tactus hand init`; its fingers will open",
             Self::HandOutOfRange => "choose a spread from 0 to 180 degrees and fingers from 0 to 140 degrees",

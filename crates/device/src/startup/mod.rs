@@ -12,6 +12,7 @@ mod angles;
 mod continuity;
 mod hand;
 mod home;
+mod rest;
 mod survey;
 mod waking;
 mod zeroing;
@@ -25,6 +26,7 @@ use crate::stage::{Stage, StartupError};
 use angles::MotorAngles;
 use continuity::Continuity;
 use hand::HandSurvey;
+use rest::Rest;
 pub(crate) use survey::SafetyProperties;
 use survey::Survey;
 
@@ -82,8 +84,11 @@ enum Step {
     AskZero,
     /// Wait for a person; look at the safety module from this time on.
     AwaitZero { next_us: u64 },
-    /// Ask whether the arm is IDLE before its positions are rewritten, until this time.
-    ConfirmIdle { until_us: Option<u64> },
+    /// Ask whether the arm is IDLE, until this time; before it is looked at, and again before its positions are
+    /// rewritten.
+    ConfirmIdle { until_us: Option<u64>, rests: bool },
+    /// Look whether the arm stands still.
+    AwaitRest(Rest),
     /// IFAULT before positions are rewritten.
     IgnoreFaults,
     /// SET P of a puck.
@@ -147,6 +152,8 @@ pub(crate) struct Startup {
     safety: Option<SafetyProperties>,
     calibration: Option<Calibration<f32>>,
     targets: [Counts; 7],
+    /// The counts at the first look before a zeroing.
+    first_look: [Option<Counts>; 7],
     positions: [Option<Counts>; 7],
     zeroed: bool,
     /// The sensor has been tared since it was woken. It is not tared again then: something may press on it.
@@ -193,6 +200,7 @@ impl Startup {
             safety: None,
             calibration: None,
             targets: [Counts(0); 7],
+            first_look: [None; 7],
             positions: [None; 7],
             zeroed: false,
             tared: false,
@@ -272,7 +280,9 @@ impl Startup {
             Step::Identify { .. } | Step::Wake { .. } | Step::Silence { .. } => Stage::Waking,
             Step::Verify { .. } => Stage::Verifying,
             Step::Brake { .. } | Step::Read { .. } | Step::ReadHand { .. } | Step::AskZero => Stage::Reading,
-            Step::AwaitZero { .. } | Step::ConfirmIdle { .. } | Step::RevokeZero { .. } => Stage::WaitingForZero,
+            Step::AwaitZero { .. } | Step::ConfirmIdle { .. } | Step::AwaitRest(_) | Step::RevokeZero { .. } => {
+                Stage::WaitingForZero
+            }
             Step::IgnoreFaults
             | Step::WritePosition { .. }
             | Step::CheckPositions { .. }
@@ -361,7 +371,8 @@ impl Startup {
             Reply::Position { node, primary, .. } => {
                 let asked = matches!(
                     self.step,
-                    Step::CheckPositions { until_us: Some(_) }
+                    Step::AwaitRest(Rest { until_us: Some(_), .. })
+                        | Step::CheckPositions { until_us: Some(_) }
                         | Step::FirstPositions { until_us: Some(_) }
                         | Step::LastPositions { until_us: Some(_) }
                 );
@@ -414,7 +425,10 @@ impl Startup {
     fn looks(&mut self, outlet: &mut impl Outlet) -> bool {
         match self.step {
             Step::ZeroTorques { .. } | Step::Wake { .. } | Step::Silence { .. } => false,
-            Step::CheckPositions { .. } | Step::FirstPositions { .. } | Step::LastPositions { .. } => false,
+            Step::AwaitRest(_)
+            | Step::CheckPositions { .. }
+            | Step::FirstPositions { .. }
+            | Step::LastPositions { .. } => false,
             Step::WritePosition { .. } => {
                 // From here on the counts are those that a person says.
                 self.continuity = None;
@@ -468,7 +482,8 @@ impl Startup {
                 Ok(after(outlet.send(frame), Step::RevokeZero { word: word + 1 }))
             }
             Step::AwaitZero { next_us } => self.await_zero(next_us, outlet),
-            Step::ConfirmIdle { until_us } => self.confirm_idle(until_us, outlet),
+            Step::ConfirmIdle { until_us, rests } => self.confirm_idle(until_us, rests, outlet),
+            Step::AwaitRest(rest) => self.await_rest(rest, outlet),
             Step::IgnoreFaults => {
                 let frame = set(Node::SAFETY_MODULE, self.safety()?.ignore_faults, IGNORED_AT_ZERO);
                 Ok(after(outlet.send(frame), Step::WritePosition { joint: 0 }))

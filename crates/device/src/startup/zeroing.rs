@@ -3,13 +3,15 @@
 use puck::{Group, Node, PropertyId, SafetyMode, get, set};
 
 use super::home::home_counts;
+use super::rest::Rest;
 use super::{Next, POLL_US, REVOCATIONS, Startup, Step, ZeroRequest, after};
 use crate::bus::Outlet;
 use crate::command::Refusal;
 use crate::stage::StartupError;
 
-/// Longest wait for the answer of the safety module before positions are rewritten, us: three questions. A host gives a
-/// command up after 200 ms, and an arm must not be zeroed by one that was given up.
+/// Longest time from a command to zero the arm until positions are rewritten, us: two questions to the safety module
+/// and two looks, of which some may be lost. A host gives a command up after 200 ms, and an arm must not be zeroed by
+/// one that was given up.
 const CONFIRM_US: u64 = 170_000;
 /// Longest time for the seven replies to one position request, us.
 const POSITIONS_US: u64 = 10_000;
@@ -33,7 +35,7 @@ impl Startup {
         self.targets = home_counts(calibration, home)?;
         self.home = *home;
         self.exchange.abandon();
-        self.step = Step::ConfirmIdle { until_us: None };
+        self.step = Step::ConfirmIdle { until_us: None, rests: false };
         Ok(())
     }
 
@@ -51,14 +53,16 @@ impl Startup {
         Some(answer)
     }
 
-    /// The latest word of the safety module before positions are rewritten.
+    /// Asks the safety module before the arm is looked at; then, if it `rests`, once more before positions are
+    /// rewritten.
     pub(super) fn confirm_idle(
         &mut self,
         until_us: Option<u64>,
+        rests: bool,
         outlet: &mut impl Outlet,
     ) -> Result<Next, StartupError> {
         let until_us = until_us.unwrap_or(outlet.now_us() + CONFIRM_US);
-        self.step = Step::ConfirmIdle { until_us: Some(until_us) };
+        self.step = Step::ConfirmIdle { until_us: Some(until_us), rests };
         if outlet.now_us() >= until_us {
             // Not even the question may have left.
             return Err(StartupError::NoAnswer(Node::SAFETY_MODULE));
@@ -67,6 +71,9 @@ impl Startup {
             return Ok(Next::Stay);
         };
         if SafetyMode::from_value(mode) == Some(SafetyMode::Idle) {
+            if !rests {
+                return Ok(Next::Go(Step::AwaitRest(Rest::new(until_us))));
+            }
             self.zero_request = ZeroRequest::Answered(Ok(()));
             // Broken off, it leaves a mixture of two zeros. Not even a board that restarts meanwhile may believe the
             // word of the safety module for it.
@@ -78,14 +85,20 @@ impl Startup {
             self.zeroed_at = None;
             return Ok(Next::Go(Step::IgnoreFaults));
         }
-        self.zero_request = ZeroRequest::Answered(Err(Refusal::ZeroNeedsIdle));
         if SafetyMode::from_value(mode) == Some(SafetyMode::EStop) {
+            self.zero_request = ZeroRequest::Answered(Err(Refusal::ZeroNeedsIdle));
             self.power_is_off();
             return Ok(Next::Stay);
         }
-        // Back to where the command came in: toward the loop if the arm is zeroed, else to the person.
+        Ok(self.refuse_zero(outlet))
+    }
+
+    /// The arm is not idle, or it moves. Back to where the command came in: toward the loop if the arm is zeroed, else
+    /// to the person.
+    pub(super) fn refuse_zero(&mut self, outlet: &mut impl Outlet) -> Next {
+        self.zero_request = ZeroRequest::Answered(Err(Refusal::ZeroNeedsIdle));
         let next_us = outlet.now_us() + POLL_US;
-        Ok(Next::Go(if self.zeroed { Step::AskZero } else { Step::AwaitZero { next_us } }))
+        Next::Go(if self.zeroed { Step::AskZero } else { Step::AwaitZero { next_us } })
     }
 
     pub(super) fn await_zero(&mut self, next_us: u64, outlet: &mut impl Outlet) -> Result<Next, StartupError> {

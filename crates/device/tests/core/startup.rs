@@ -345,8 +345,7 @@ fn a_running_arm_can_be_zeroed_again_at_rest() {
     bus.run(&mut core, 0.2);
     let home = [0.1, -1.9, 0.0, 3.0, 0.0, 0.0, 0.0];
     bus.commands.push_back(Command::Zero { home });
-    bus.run(&mut core, 0.01);
-    assert_eq!(core.stage(), Stage::Zeroing);
+    bus.run_until(&mut core, Stage::Zeroing);
     bus.run_until(&mut core, Stage::WaitingForActive);
     bus.run(&mut core, 0.1);
     let record = bus.records.last().expect("cycles run again");

@@ -2,7 +2,7 @@
 
 use control::{Command as Control, Fault, State};
 use device::{Command, Controller, DeviceController, EventKind, Refusal, Stage, StartupError};
-use puck::{Counts, Node, SafetyMode};
+use puck::{Counts, Node, PropertyId, SafetyMode};
 
 use crate::double::{Bus, HOME, Puck, floating, silent_device, started};
 
@@ -388,4 +388,35 @@ fn g2_a_zeroing_that_the_bus_has_no_room_for_is_refused_and_never_carried_out_la
     bus.run(&mut core, 5.0);
     assert_eq!(bus.pucks[0].position, before, "zeroed after its host had given it up");
     assert_eq!((core.stage(), core.health().zeroed), (Stage::WaitingForActive, true));
+}
+
+/// G2: what a person says of an arm that sinks is no longer so once it is written. `counts` of motor 4 in each slot.
+fn is_zeroed_while_turning(slots: usize, counts: i32, lose: u32) -> (bool, Vec<EventKind>) {
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.pucks[5].lose = lose;
+    for slot in 0..200 {
+        if slot % slots == 0 && core.stage() == Stage::WaitingForZero {
+            bus.pucks[3].position.0 += counts;
+        }
+        bus.run_slots(&mut core, 1);
+    }
+    let is_written = bus.sets().any(|(_, _, property, _)| property == PropertyId::POSITION);
+    assert_eq!(is_written, core.health().zeroed, "counts are written if the arm is zeroed, and not otherwise");
+    (core.health().zeroed, bus.events.iter().filter(|event| !matches!(event, EventKind::Startup(_))).copied().collect())
+}
+
+#[test]
+fn g2_an_arm_that_still_moves_is_not_zeroed_and_no_count_is_written() {
+    // A slot is 1.11 ms long: 1 rad/s of a motor is 0.72 counts in a slot.
+    for (slots, counts, stands) in [(1, 0, true), (2, 1, true), (1, 1, false), (1, -1, false), (1, 20, false)] {
+        let (zeroed, events) = is_zeroed_while_turning(slots, counts, 0);
+        assert_eq!(zeroed, stands, "{counts} counts in {slots} slots: {events:?}");
+        let refused = events.contains(&EventKind::Refused(Refusal::ZeroNeedsIdle));
+        assert_eq!(refused, !stands, "{counts} counts in {slots} slots: {events:?}");
+    }
+    // A look of which an answer is lost is repeated.
+    assert!(is_zeroed_while_turning(1, 0, 3).0);
+    assert!(!is_zeroed_while_turning(1, 1, 3).0);
 }
