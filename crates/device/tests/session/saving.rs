@@ -129,6 +129,44 @@ fn a_host_that_leaves_in_the_middle_of_a_commit_does_not_undo_it() {
 }
 
 #[test]
+fn a_commit_that_meets_a_busy_storage_can_be_asked_for_again() {
+    let mut rig = rig();
+    rig.send_parts("one", &image("one", 2.0, 10));
+    assert_eq!(rig.ask(Request::UploadCommit), None);
+    rig.session.store_mut().take(&mut [0; SLOT_BYTES]);
+    rig.session.store_mut().settle(Ok(()));
+    rig.poll();
+    rig.send_parts("two", &image("two", 2.0, 10));
+    assert_eq!(rig.ask(Request::Delete { name: name("one") }), None);
+    let refused = rig.ask(Request::UploadCommit);
+    let busy = [StoreError::Busy.code(), 0];
+    assert!(
+        matches!(refused, Some(Reply::Refused { reason: Refusal::StoreFailed, detail, .. }) if detail == busy),
+        "{refused:?}"
+    );
+    assert_eq!(rig.session.store_mut().take(&mut [0; SLOT_BYTES]), Some(Work::Delete { slot: 0 }));
+    rig.session.store_mut().settle(Ok(()));
+    rig.poll();
+    assert_eq!(rig.ask(Request::UploadCommit), None, "it waits for the flash");
+}
+
+#[test]
+fn c9_a_host_that_is_started_anew_is_not_answered_for_the_commit_of_its_predecessor() {
+    let mut rig = rig();
+    rig.send_parts("reach", &image("reach", 2.0, 10));
+    assert_eq!(rig.ask(Request::UploadCommit), None);
+    let commit = rig.sequence;
+    rig.session.store_mut().take(&mut [0; SLOT_BYTES]);
+    // It dies, and begins anew with the number that it had.
+    rig.wait(600);
+    rig.sequence = 0;
+    rig.greet();
+    rig.session.store_mut().settle(Ok(()));
+    let replies = said(&mut rig);
+    assert!(!replies.contains(&Reply::Accepted { of: commit }), "{replies:?}");
+}
+
+#[test]
 fn a_primitive_that_is_being_deleted_cannot_be_run() {
     let mut rig = rig();
     rig.send_parts("reach", &image("reach", 2.0, 10));

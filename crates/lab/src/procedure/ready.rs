@@ -54,8 +54,8 @@ impl StartupLook {
 
 /// Waits until the arm can be commanded, tells every stage, and initialises the hand where there is one.
 ///
-/// A simulated arm stands at home, so it is zeroed there; which home that is the device knows. For a real one
-/// `at_home` must come from a person.
+/// A simulated arm stands at home when it is switched on, so it is zeroed there; which home that is the device knows.
+/// For a real one, and for any whose zero was lost, `at_home` must come from a person.
 ///
 /// # Errors
 /// [`ProcedureError::NotZeroed`] if nobody vouches for the pose; [`ProcedureError::NotReady`] when the start-up is
@@ -98,6 +98,8 @@ pub fn start_up(
                 told = Some(look);
             }
         }
+        // One that has lost its zero, for a reason, lies wherever it sank to.
+        let stands_at_home = simulated && status.blocked.is_none();
         match stage {
             Some(Stage::Ready) => {
                 let since = *ready_since.get_or_insert(status.cycle);
@@ -111,7 +113,7 @@ pub fn start_up(
                 return Ok(Readiness { wrench_zeroed: status.wrench_zeroed, ..readiness });
             }
             // A person's word holds once: an arm that has lost its zero since may stand elsewhere.
-            Some(Stage::WaitingForZero) if simulated || (at_home && readiness.zeroed_at.is_none()) => {
+            Some(Stage::WaitingForZero) if stands_at_home || (at_home && readiness.zeroed_at.is_none()) => {
                 readiness.zeroed_at = zero(client)?.or(readiness.zeroed_at);
             }
             Some(Stage::WaitingForZero) => return Err(ProcedureError::NotZeroed),

@@ -264,6 +264,8 @@ impl<A: Application> HostSession<A> {
     /// Ends the session of the present host.
     fn close(&mut self) {
         self.owner = None;
+        // A host that comes after may have its number: it is not answered for what another asked.
+        self.saving = None;
         self.telemetry_every = 0;
         self.upload_abort();
     }

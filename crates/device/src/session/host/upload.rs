@@ -4,6 +4,7 @@ use link::{Name, Refusal};
 
 use crate::application::{Application, Refused, SessionPort};
 use crate::session::host::HostSession;
+use crate::store::StoreError;
 
 /// An upload under way.
 #[derive(Debug)]
@@ -63,7 +64,11 @@ impl<A: Application> HostSession<A> {
             return Err((Refusal::UploadIncomplete, [upload.received, upload.length]));
         }
         let committed = self.application.commit(&upload.name, upload.crc, port);
-        self.upload_abort();
+        let busy = StoreError::Busy.code();
+        // Not forgotten either while the storage is at work: the host asks again.
+        if !matches!(committed, Err((Refusal::StoreFailed, [code, _])) if code == busy) {
+            self.upload_abort();
+        }
         committed
     }
 }
