@@ -18,9 +18,11 @@ pub struct FaultGuide {
 /// For a fault whose cause only has to be removed.
 const CLEAR: &str = "`tactus stop --clear-fault`";
 /// For a fault after which the joint angles are not to be trusted.
-const ZERO: &str = "bring the arm home, zero it again, then `tactus stop --clear-fault`";
-/// For a fault after which the device starts the bus anew.
-const ACTIVATE: &str = "activate at the pendant, then `tactus stop --clear-fault`";
+const ZERO: &str = "bring the arm home, zero it again (`tactus run --at-home`), then `tactus stop --clear-fault`";
+/// For a fault after which the device starts the bus anew. Under a fault it would have the brakes set again.
+const CLEAR_AND_ACTIVATE: &str = "`tactus stop --clear-fault`, then activate at the pendant";
+/// For what was done at the pendant.
+const ACTIVATE: &str = "activate at the pendant; the next command ends the fault, or `tactus stop --clear-fault`";
 
 impl FaultGuide {
     /// The advice on a fault. A fault without advice does not compile.
@@ -147,7 +149,8 @@ const fn way_on(fault: Fault) -> &'static str {
         | Fault::MotorHot => CLEAR,
         Fault::JointLimit => "`tactus stop --clear-fault`, then lead the joint back by hand with `tactus teach`",
         Fault::ImplausiblePosition | Fault::EncoderStuck => ZERO,
-        Fault::SafetyDropped | Fault::BusFault => ACTIVATE,
+        Fault::SafetyDropped => ACTIVATE,
+        Fault::BusFault => CLEAR_AND_ACTIVATE,
         Fault::OtherPayload => "support the arm, release it: the bus is started anew and the fault ends with it",
     }
 }

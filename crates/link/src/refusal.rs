@@ -278,7 +278,9 @@ impl Refusal {
             Self::Busy => "end the program there; `tactus stop` stops the arm from here, `tactus monitor` looks on",
             Self::Stale => "send the request again",
             Self::BadValue => "correct the value",
-            Self::NotZeroed => "bring the arm to its home pose by hand and add `--at-home`",
+            Self::NotZeroed => {
+                "bring the arm to its home pose by hand; `tactus run`, `teach` and `hand` zero it there with `--at-home`"
+            }
             Self::NotReady => {
                 "wait for the start-up to finish; if it does not, `tactus status` tells what is in its way"
             }

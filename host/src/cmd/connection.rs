@@ -275,6 +275,7 @@ pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
         }
         ProcedureError::Host(error) => return error.into_failure(doing),
         ProcedureError::NotReady(_) => ErrorCode::NotReady,
+        ProcedureError::Faulted(_) => ErrorCode::Refused(Refusal::Faulted),
         ProcedureError::NotZeroed => ErrorCode::NotZeroed,
         ProcedureError::ZeroOfOthers => ErrorCode::ZeroUnknown,
         ProcedureError::Moves { .. } => ErrorCode::ArmMoves,

@@ -52,6 +52,9 @@ pub enum ProcedureError {
         /// The first joint that does, 0 for J1.
         joint: usize,
     },
+    /// A fault is latched.
+    #[error("fault: {0:?}: {0}")]
+    Faulted(Fault),
     /// The arm stopped by itself.
     #[error("the arm stopped: {0}")]
     Stopped(Fault),

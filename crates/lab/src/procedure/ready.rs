@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use control::State;
+use control::{Fault, State};
 use device::{Stage, StoreError};
 use link::{HomeSource, Refusal};
 
@@ -58,8 +58,9 @@ impl StartupLook {
 /// For a real one, and for any whose zero was lost, `at_home` must come from a person.
 ///
 /// # Errors
-/// [`ProcedureError::NotZeroed`] if nobody vouches for the pose; [`ProcedureError::NotReady`] when the start-up is
-/// blocked for longer than people need.
+/// [`ProcedureError::NotZeroed`] if nobody vouches for the pose; [`ProcedureError::Faulted`] if a fault is to be
+/// cleared before the arm is activated; [`ProcedureError::NotReady`] when the start-up is blocked for longer than
+/// people need.
 pub fn make_ready(
     client: &mut Client<Device>,
     at_home: bool,
@@ -112,6 +113,8 @@ pub fn start_up(
             Some(Stage::WaitingForActive) if goal == Stage::WaitingForActive => {
                 return Ok(Readiness { wrench_zeroed: status.wrench_zeroed, ..readiness });
             }
+            // A device under a fault asks for the brakes again as soon as it is activated.
+            Some(Stage::WaitingForActive) => refuse_fault(status.fault)?,
             // A person's word holds once: an arm that has lost its zero since may stand elsewhere.
             Some(Stage::WaitingForZero) if stands_at_home || (at_home && readiness.zeroed_at.is_none()) => {
                 readiness.zeroed_at = zero(client)?.or(readiness.zeroed_at);
@@ -125,6 +128,15 @@ pub fn start_up(
             return Err(ProcedureError::NotReady(blocked.unwrap_or_else(|| stage.to_owned())));
         }
         client.next(LOOK)?;
+    }
+}
+
+/// The fault that a person has to clear before the arm is activated. Activating ends what the pendant took, and a
+/// start-up that finds another payload goes on by itself.
+fn refuse_fault(code: u8) -> Result<(), ProcedureError> {
+    match Fault::from_code(code) {
+        None | Some(Fault::None | Fault::SafetyDropped | Fault::OtherPayload) => Ok(()),
+        Some(fault) => Err(ProcedureError::Faulted(fault)),
     }
 }
 
