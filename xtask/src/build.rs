@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
 use crate::board::{self, Board};
 use crate::elf::Sizes;
@@ -32,6 +32,17 @@ pub(crate) fn host() -> Result<PathBuf> {
     shell::step("building the tactus command");
     shell::run(optimised("build").args(["--bin", "tactus"]))?;
     Ok(shell::target_dir().join("release").join("tactus"))
+}
+
+/// Fails if the `tactus` command, which has just been built, would be built once more: a build script that names a file
+/// which is not there makes cargo do so in every call.
+pub(crate) fn nothing_twice() -> Result<()> {
+    shell::step("nothing is built twice");
+    let messages = shell::capture(optimised("build").args(["--quiet", "--bin", "tactus", "--message-format", "json"]))?;
+    match messages.lines().find(|message| message.contains("\"fresh\":false")) {
+        None => Ok(()),
+        Some(message) => bail!("built once more though nothing has changed: {message}"),
+    }
 }
 
 /// Builds the arm image for the emulated board; returns the path under which the host tools look for it.

@@ -42,6 +42,7 @@ fn checks() -> Result<()> {
     build::documentation()?;
     budget::run(&machine)?;
     hand::run(&machine)?;
+    build::nothing_twice()?;
     build::panics()
 }
 
