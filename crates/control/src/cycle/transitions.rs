@@ -97,7 +97,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             _ => measured.state.q,
         };
         self.force.restart(self.gains.tracking(options.compliant).force_window);
-        let handover = if options.compliant {
+        // What a limit has cut off is not to be taken over: after arming that is the gravity which has yet to build up.
+        let handover = if options.compliant && !self.cut.is_cut() {
             let load = if options.force_control { self.load_expected_first(measured) } else { Vector7::zeros() };
             Ramp::new(self.beyond - load, HANDOVER)
         } else {

@@ -1,7 +1,7 @@
 //! Who may have torque, and how it comes and goes.
 
 use control::act::limit::STEP_LIMIT;
-use control::command::{Command, Refusal, RunOptions};
+use control::command::{Command, PoseFeedback, Refusal, RunOptions};
 use control::time::periods;
 use control::units::{JointPositions, Vector7};
 use control::{Event, Fault, State};
@@ -68,6 +68,36 @@ fn the_first_torque_after_arming_is_gravity_with_a_limited_onset() {
     }
     // J2 carries most of it.
     assert!(gravity.0[1].abs() > 15.0 && (last[1] - gravity.0[1]).abs() < 6.0, "{last:?} {gravity:?}");
+}
+
+/// The change that makes it fail: a compliant run takes over what the rate limit has held back of gravity, and gives it
+/// back within a second.
+#[test]
+fn a_compliant_run_right_after_arming_does_not_inherit_the_gravity_that_has_yet_to_build_up() {
+    let sagged = |arm: Command, run: Option<RunOptions>| {
+        let mut rig = Rig::<f32>::new(START, 1);
+        rig.load(&primitive(&Design { duration: 3.0, ..Design::default() })).expect("loads");
+        rig.run_for(0.01);
+        // Another arm that was just activated, and has not begun to fall.
+        (rig.plant.q, rig.plant.dq) = (Vector7::from(START), Vector7::zeros());
+        rig.command(arm);
+        if let Some(options) = run {
+            rig.command(Command::Run(options));
+        }
+        let before = rig.plant.frames().tool_pose().position.z;
+        let lowest = (0..periods(0.5)).fold(before, |lowest: f64, _| {
+            rig.tick(None);
+            lowest.min(rig.plant.frames().tool_pose().position.z)
+        });
+        assert_eq!(rig.cycle.fault(), Fault::None, "{arm:?}, {run:?}");
+        before - lowest
+    };
+    let compliant = RunOptions { compliant: true, pose_feedback: PoseFeedback::Planned, ..RunOptions::default() };
+    for arm in [Command::Gravity, Command::Hold] {
+        let (held, run) = (sagged(arm, None), sagged(arm, Some(compliant)));
+        println!("{arm:?}: {held:.3} m, with a run {run:.3} m");
+        assert!(run < held + 0.05, "{arm:?}: {held} m, with a run {run} m");
+    }
 }
 
 #[test]
