@@ -115,6 +115,11 @@ impl<R: Real> Posture<R> {
         }
     }
 
+    /// The posture that is held (rad); `None` while it gives way.
+    pub(super) fn held(&self) -> Option<JointPositions<R>> {
+        (self.held == self.q).then_some(self.q)
+    }
+
     /// Takes another posture to hold (rad).
     pub(super) fn shift_to(&mut self, q: JointPositions<R>) {
         (self.q, self.held) = (q, q);

@@ -130,6 +130,45 @@ fn recovers(rig: &mut Rig<f32>) -> bool {
     zero_lost
 }
 
+/// The change that makes it fail: an approach begins where the arm was asked to be and not where the hold has given way
+/// to.
+#[test]
+fn g1_an_arm_that_was_led_aside_is_not_thrown_back_by_the_approach_that_follows() {
+    for (joint, way) in [(0, 0.4), (0, -0.4), (1, 0.3), (1, -0.3), (3, 0.4)] {
+        let mut rig = Rig::<f32>::new(GOAL, 1);
+        rig.command(Command::Hold);
+        rig.run_for(2.0);
+        // A person leads the joint aside within two seconds, and keeps it there until the approach has begun.
+        let cycles = periods(2.0);
+        let held = rig.plant.q;
+        let lead = |rig: &mut Rig<f32>, share: f64, command: Option<Command>| {
+            rig.plant.q = held;
+            rig.plant.q[joint] += way * share;
+            rig.plant.dq.fill(0.0);
+            rig.tick(command)
+        };
+        for cycle in 0..cycles {
+            lead(&mut rig, f64::from(cycle) / f64::from(cycles), None);
+        }
+        for _ in 0..periods(0.3) {
+            lead(&mut rig, 1.0, None);
+        }
+        let approach = Command::Approach { q: START.map(|q| q as f32), duration: 5.0 };
+        assert_eq!(lead(&mut rig, 1.0, Some(approach)).event, Some(Event::Accepted));
+        for _ in 0..periods(0.1) {
+            lead(&mut rig, 1.0, None);
+        }
+        let fastest = (0..periods(1.0)).fold(0.0, |fastest: f64, _| {
+            rig.tick(None);
+            fastest.max(hand_speed(&rig))
+        });
+        println!("J{} by {way}: {fastest:.2} m/s", joint + 1);
+        assert!(fastest < BRAKED, "J{} by {way}: {fastest} m/s", joint + 1);
+        rig.until(State::Hold, 20.0);
+        assert_eq!(rig.cycle.fault(), Fault::None);
+    }
+}
+
 /// 201 shoves from this number on; how many leave the hand too fast, how many cost the zero, and the fastest (m/s).
 fn shoves(from: usize) -> (usize, usize, f64) {
     let (mut late, mut zeros, mut worst) = (0, 0, 0.0f64);
