@@ -366,7 +366,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         record.fault = self.supervisor.fault();
         record.flags |= self.standing_flags();
         // A run's last transition is told as `Arrived` by `act`; every other change is told here.
-        if (self.supervisor.law(), record.fault) != before && !matches!(self.pending, Some(Event::Arrived)) {
+        if (self.supervisor.law(), record.fault) != before && record.flags & flags::ARRIVED == 0 {
             self.pending = Some(Event::Entered(self.supervisor.law(), record.fault));
         }
         let event = match answer {

@@ -309,3 +309,34 @@ fn a_bus_fault_takes_torque_off_and_asks_for_idle() {
     assert_eq!(rig.cycle.step(&hold).event, Some(Event::Refused(Refusal::CauseRemains)));
     rig.command(Command::Hold);
 }
+
+/// The change that makes it fail: an arrival that has yet to be told hides what comes after it.
+#[test]
+fn a_stop_right_behind_an_arrival_that_an_answer_has_delayed_is_told() {
+    let running = || {
+        let mut rig = Rig::<f32>::new(START, 1);
+        rig.load(&primitive(&Design { duration: 3.0, ..Design::default() })).expect("loads");
+        rig.command(Command::Hold);
+        rig.run_for(2.0);
+        rig.command(Command::Run(RunOptions::default()));
+        rig
+    };
+    let mut rig = running();
+    rig.until(State::Hold, 20.0);
+    let arrives = rig.number;
+    for external in [None, Some(Fault::Overrun)] {
+        let mut rig = running();
+        while rig.number + 1 < arrives {
+            rig.tick(None);
+        }
+        // Its answer goes before the news.
+        let output = rig.tick(Some(Command::SetSpeed { factor: 1.0 }));
+        assert_eq!((output.record.state, output.event), (State::Hold, Some(Event::Accepted)));
+        rig.external = external;
+        let first = rig.tick(Some(Command::Stop).filter(|_| external.is_none())).event;
+        rig.external = None;
+        let told = [first, rig.tick(None).event, rig.tick(None).event].into_iter().flatten().last();
+        let fault = external.unwrap_or(Fault::None);
+        assert_eq!(told, Some(Event::Entered(State::SoftStop, fault)), "{external:?}");
+    }
+}
