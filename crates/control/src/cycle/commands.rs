@@ -36,7 +36,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if self.supervisor.law() == State::Run {
             return Err(Refusal::WrongState);
         }
-        if self.wrench.tare() {
+        // What was measured long ago, perhaps in another posture, is no zero.
+        let present = self.wrench.age().is_some_and(|age| age <= WRENCH_AGE);
+        if present && self.wrench.tare() {
             self.hand.tare();
             Ok(())
         } else {

@@ -311,6 +311,29 @@ fn b5_an_offset_at_rest_is_tared_if_small_and_refused_if_large() {
     assert_eq!(start(20.0, true).0, refused);
 }
 
+/// The change that makes it fail: a sensor that has been silent while the arm was turned is tared by what it told before.
+#[test]
+fn b5_a_sensor_that_is_silent_is_not_tared() {
+    let mut rig = Rig::<f32>::new(START, 1);
+    rig.command(Command::Hold);
+    rig.run_for(2.0);
+    rig.command(Command::Gravity);
+    rig.plant.deaf = true;
+    for _ in 0..periods(3.0) {
+        rig.plant.q[5] += 1.0 / f64::from(periods(3.0));
+        rig.tick(None);
+    }
+    rig.run_for(0.5);
+    let refused = rig.tick(Some(Command::Tare)).event;
+    rig.plant.deaf = false;
+    rig.run_for(0.5);
+    let left = rig.last.expect("ran").record.wrench;
+    println!("{left:?}");
+    assert_eq!(refused, Some(Event::Refused(Refusal::WrenchMissing)));
+    assert!(left[..3].iter().all(|force| force.abs() < 0.1), "{left:?}");
+    rig.command(Command::Tare);
+}
+
 #[test]
 fn the_first_rest_after_start_up_is_the_zero_of_the_sensor() {
     let mut rig = Rig::<f32>::new(START, 1);
