@@ -29,6 +29,8 @@ pub enum Kind {
     Guard,
     /// The stack pointer is below the guard: nothing a fault handler could push to.
     BelowGuard,
+    /// The USB controller holds its interrupt line up for good, as for a packet that nobody takes.
+    UsbHeld,
     /// A reset of this kind.
     Reset(ResetKind),
 }
@@ -58,7 +60,7 @@ pub struct Fault {
 /// Forms that the command line takes.
 pub const SYNTAX: &str = "KIND@MICROSECONDS[:ARGUMENT], KIND one of bus-off, no-acknowledge[:US], dominant[:US], \
 power-cut:N, hse-dead, nmi, panic, hard-fault, hang, stall:US, guard, below-guard, \
-reset:pin|power|brown-out|probe";
+usb-held, reset:pin|power|brown-out|probe";
 
 /// A text that names no fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -87,6 +89,7 @@ impl FromStr for Fault {
             "stall" => Kind::Stall(number()?),
             "guard" => Kind::Guard,
             "below-guard" => Kind::BelowGuard,
+            "usb-held" => Kind::UsbHeld,
             "reset" => Kind::Reset(match argument {
                 Some("pin") => ResetKind::Pin,
                 Some("power") => ResetKind::Power,

@@ -95,6 +95,7 @@ impl Watcher {
             }
             Kind::Guard => self.overflow(self.image.stack.start + 16),
             Kind::BelowGuard => self.overflow(BELOW_MEMORY),
+            Kind::UsbHeld => session.board_mut().mcu.part.hold_usb(stop.at),
             Kind::Reset(ResetKind::Probe) => {
                 self.core.lock().orders.push(Order::Own(RESET_CONTROL, SYSTEM_RESET));
             }

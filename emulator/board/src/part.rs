@@ -26,6 +26,9 @@ const DEVICE: u64 = 0x6450;
 /// RCC.CR HSECSSON.
 const SECURITY: u64 = 1 << 19;
 
+/// Place of the line OTG_FS among those of the controller's global block.
+const USB_GLOBAL: usize = 3;
+
 /// FLASH.SR2 DBECCERR: a word with two errors was read.
 const DOUBLE_ERROR: u64 = 1 << 26;
 
@@ -39,6 +42,7 @@ struct Slots {
     flash: usize,
     clock: usize,
     usb: [usize; 2],
+    usb_line: usize,
 }
 
 /// Inputs of the part from the board.
@@ -91,6 +95,7 @@ impl Part {
             flash: bus.slot("Flash")?,
             clock: bus.slot("RCC")?,
             usb: [bus.slot("OTG2_HS_DEVICE")?, bus.slot("OTG2_HS_PWRCLK")?],
+            usb_line: bus.slot("OTG2_HS_GLOBAL")?,
         };
         let identity = DEVICE | u64::from(fitting.revision) << 16;
         chip.bus_mut().slot_mut(slots.debug).registers_mut().set(dbgmcu::Register::Idc, identity);
@@ -128,6 +133,12 @@ impl Part {
         tree.fail_hse(registers, &mut context);
         self.chip.rcc = tree;
         true
+    }
+
+    /// The USB controller interrupts from now on, whatever the image does.
+    pub fn hold_usb(&mut self, at: VirtualNanos) {
+        let (_, mut context) = self.chip.bus_mut().drive(at, self.slots.usb_line);
+        context.raise(USB_GLOBAL);
     }
 
     /// Says that the last reset had these causes, flags of RCC.RSR.

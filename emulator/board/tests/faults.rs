@@ -137,6 +137,17 @@ fn d3_a_core_that_stands_still_is_reset_by_the_watchdog() {
 }
 
 #[test]
+fn c3_a_usb_line_that_stays_up_keeps_the_session_from_nothing() {
+    let quiet = tell_with(3.1, &[]).learned.lock().answered;
+    let story = tell_with(3.1, &["usb-held@2100000"]);
+    assert!(story.resets().is_empty(), "{:?}", story.resets());
+    let learned = story.learned.lock();
+    assert!(learned.answered + 3 > quiet, "{} of {} questions, {quiet} without", learned.answered, learned.asked);
+    let statistics = learned.statistics.expect("statistics");
+    assert_eq!(statistics.missed_deadlines, 0);
+}
+
+#[test]
 fn after_bus_off_the_arm_is_started_up_again_and_nothing_stale_leaves() {
     both_readings(4.2, &["bus-off@2100000"], |story| {
         assert!(story.resets().is_empty(), "{:?}", story.resets());

@@ -2,8 +2,13 @@
 //!
 //! The device itself belongs to the interrupt; the session shares two queues with it. A host that does not read fills
 //! its queue and harms nobody: the other lines go on.
+//!
+//! The controller holds its line up for as long as it keeps a packet that nobody takes, and this interrupt stands
+//! above the session, which alone makes room. So it gives way when the queue is full, and after so many turns in any
+//! case; the session lets it in again at every visit.
 
 use core::cell::{RefCell, UnsafeCell};
+use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
 use cortex_m::singleton;
@@ -27,6 +32,12 @@ const PRIORITY: u8 = 3;
 
 /// Bytes of a full packet, and most bytes moved with interrupts masked in one go.
 const PORTION: usize = 64;
+
+/// Interrupts between two visits of the session; a full line makes about 40 of them.
+const TURNS: u32 = 64;
+
+/// Of these are left.
+static TURNS_LEFT: AtomicU32 = AtomicU32::new(TURNS);
 
 /// Rounds of waiting for the USB supply: about 1 ms. Without it there is no USB line, and everything else works.
 const SUPPLY_ROUNDS: u32 = 20_000;
@@ -120,10 +131,14 @@ extern "C" fn OTG_FS() {
     // SAFETY: see `Place`.
     let Some(Device { device, serial }) = (unsafe { &mut *DEVICE.0.get() }) else { return };
     device.poll(&mut [serial]);
+    let left = TURNS_LEFT.load(Ordering::Relaxed).saturating_sub(1);
+    TURNS_LEFT.store(left, Ordering::Relaxed);
+    let mut is_full;
     let mut portion = [0; PORTION];
     loop {
         // What does not fit stays with the host, which keeps it until there is room.
         let room = with(|queues| RECEIVE_BYTES - queues.received.len()).min(PORTION);
+        is_full = room == 0;
         let Some(place) = portion.get_mut(..room).filter(|place| !place.is_empty()) else { break };
         let Ok(count @ 1..) = serial.read(place) else { break };
         with(|queues| {
@@ -151,6 +166,9 @@ extern "C" fn OTG_FS() {
     }
     // Fails when a packet is under way: its end interrupts again.
     let _ = serial.flush();
+    if is_full || left == 0 {
+        NVIC::mask(Chip::OTG_FS);
+    }
 }
 
 /// The line as the selector sees it.
@@ -159,6 +177,7 @@ pub struct Usb;
 impl LinkPort for Usb {
     fn read(&mut self, buffer: &mut [u8]) -> usize {
         let mut count = 0;
+        TURNS_LEFT.store(TURNS, Ordering::Relaxed);
         for portion in buffer.chunks_mut(PORTION) {
             let wanted = portion.len();
             let found = with(|queues| {
@@ -179,6 +198,8 @@ impl LinkPort for Usb {
             // There is room again for what the host still holds.
             NVIC::pend(Chip::OTG_FS);
         }
+        // SAFETY: as in `start`.
+        unsafe { NVIC::unmask(Chip::OTG_FS) };
         count
     }
 
