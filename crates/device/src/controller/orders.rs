@@ -21,6 +21,11 @@ impl DeviceController {
         io: &mut impl ControllerIo<Self>,
     ) -> Option<control::Command> {
         match command {
+            Command::Control(control::Command::Run(_)) if self.hand.stage() == HandStage::Initialising => {
+                // The plan would go on without the digits, and they would be thrown after it.
+                self.tell(EventKind::Refused(Refusal::HandBusy), io);
+                None
+            }
             Command::Control(command) => {
                 if command == control::Command::Stop {
                     self.hand.stop();

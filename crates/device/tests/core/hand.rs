@@ -1,6 +1,6 @@
 //! The hand: found, woken, initialised by a person alone, read and driven in every cycle, and lost without the arm.
 
-use control::{Command as Control, Fault, State, flags};
+use control::{Command as Control, Fault, RunOptions, State, flags};
 use device::{Command, Controller, EventKind, HandFailure, Refusal, Slot, Stage};
 use link::HandStage;
 use puck::hand::angles;
@@ -534,6 +534,22 @@ fn g11_an_arm_is_not_zeroed_while_its_hand_is_initialised_so_that_a_stop_reaches
     assert_eq!(core.health().hand, HandStage::NotInitialised, "a stop was accepted: {:?}", bus.events);
     assert!(bus.digits.iter().all(|digit| digit.mode == MotorMode::Idle));
     assert!(bus.events.contains(&EventKind::Refused(Refusal::HandBusy)));
+}
+
+/// The change that makes it fail: a run is accepted. Its plan goes on without the digits, and they are driven to where
+/// it is then as fast as their drives can, once they answer.
+#[test]
+fn g11_no_run_begins_while_the_hand_is_initialised() {
+    let (mut core, mut bus) = holding_with_hand();
+    bus.commands.extend([Command::InitialiseHand, Control::Run(RunOptions::default()).into()]);
+    bus.run(&mut core, 0.1);
+    assert_eq!((core.health().hand, core.health().state), (HandStage::Initialising, State::Hold));
+    assert_eq!(bus.events.last(), Some(&EventKind::Refused(Refusal::HandBusy)), "{:?}", bus.events);
+    // The arm alone may be moved.
+    let up = Control::Approach { q: [0.0, 1.0, 0.0, 1.5, 0.0, 0.0, 0.0], duration: 0.0 };
+    bus.commands.push_back(up.into());
+    bus.run(&mut core, 0.1);
+    assert_eq!(core.health().state, State::Approach);
 }
 
 /// G14: a hot puck of the hand that resets is asked for its temperature no longer; what it told last is no reason to
