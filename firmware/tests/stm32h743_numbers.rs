@@ -270,6 +270,18 @@ fn brown_out_lies_between_what_the_flash_needs_and_what_the_supply_may_fall_to()
     assert!(wanted > 1_710 + 500 && wanted < 2_970 - 500, "{wanted}");
 }
 
+#[test]
+fn no_address_of_external_memory_is_normal_memory_that_the_processor_may_read_ahead() {
+    // The default map: normal memory from here to there, which this board has not.
+    let mut at = 0x6000_0000;
+    for region in &EXTERNAL {
+        assert_eq!(region.start, at, "a gap");
+        assert!(region.length.is_power_of_two() && region.start % region.length == 0, "{region:?}");
+        at = region.end();
+    }
+    assert_eq!(at, 0xA000_0000);
+}
+
 /// `NAME : ORIGIN = 0x.., LENGTH = ..K` of the linker script.
 fn regions_of_the_linker() -> BTreeMap<String, Region> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("memory/stm32h743.x");

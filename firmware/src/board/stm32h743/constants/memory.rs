@@ -71,3 +71,10 @@ pub const DATA: Region = Region { start: 0x2400_0000, length: 384 * 1024 };
 
 /// The last second before a fault, kept over a restart. Not cached: a reset loses what only the cache holds.
 pub const RETAINED: Region = Region { start: 0x2406_0000, length: 128 * 1024 };
+
+/// Addresses of external memory, of which the board has none. The default map calls them normal memory, which this
+/// processor reads ahead in: at a controller that has no clock such a read may never end.
+pub const EXTERNAL: [Region; 2] = [
+    Region { start: 0x6000_0000, length: 512 * 1024 * 1024 },
+    Region { start: 0x8000_0000, length: 512 * 1024 * 1024 },
+];

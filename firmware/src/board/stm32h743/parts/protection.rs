@@ -1,10 +1,11 @@
 //! Memory protection and caches, and which faults have a handler: set up before anything else runs.
 //!
-//! Four regions of the memory protection unit on top of the processor's default map. The guard below the stack and the
+//! Six regions of the memory protection unit on top of the processor's default map. The guard below the stack and the
 //! one at address 0 may not be touched by anybody. Bank 2 of the flash is *device* memory: the processor then neither
 //! caches it nor reads ahead in it, so it is only touched when the store asks, and a running erasure never holds up a
 //! read nobody meant. That holds at every priority (`docs/decisions/0026-bank-2-is-never-cached.md`).
-//! The retained memory is not cached: a reset loses what only the cache holds.
+//! The retained memory is not cached: a reset loses what only the cache holds. The addresses of external memory are
+//! device memory too: the board has none, and the processor reads ahead wherever the default map says normal memory.
 //!
 //! No peripheral reads or writes memory by itself (there is no direct memory access anywhere in the image), so the data
 //! cache needs no further rule.
@@ -15,7 +16,7 @@ use cortex_m::Peripherals;
 use cortex_m::peripheral::MPU;
 use cortex_m::peripheral::scb::Exception;
 
-use super::super::constants::memory::{IMAGE, NULL_GUARD, RETAINED, Region, STACK_GUARD, STORE};
+use super::super::constants::memory::{EXTERNAL, IMAGE, NULL_GUARD, RETAINED, Region, STACK_GUARD, STORE};
 
 /// Region attributes: nobody may read, write or execute.
 const NO_ACCESS: u32 = 1 << 28;
@@ -39,7 +40,10 @@ pub(super) fn start(core: &mut Peripherals) {
     region(&mut core.MPU, 1, &NULL_GUARD, NO_ACCESS);
     region(&mut core.MPU, 2, &STORE, DEVICE);
     region(&mut core.MPU, 3, &RETAINED, NOT_CACHED);
-    // SAFETY: the four regions above take nothing away that is used.
+    let [first, second] = &EXTERNAL;
+    region(&mut core.MPU, 4, first, DEVICE);
+    region(&mut core.MPU, 5, second, DEVICE);
+    // SAFETY: the six regions above take nothing away that is used.
     unsafe { core.MPU.ctrl.write(ENABLE) };
     cortex_m::asm::dsb();
     cortex_m::asm::isb();
