@@ -32,6 +32,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
+    /// The sensor has been tared by its own command, or has lost that: the zero of its wrench is to be found again.
+    #[cold]
+    pub fn forget_tare(&mut self) {
+        self.wrench.forget_tare();
+    }
+
     fn tare(&mut self) -> Result<(), Refusal> {
         if self.supervisor.law() == State::Run {
             return Err(Refusal::WrongState);

@@ -253,7 +253,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// Forgets positions and the mode of the safety module: the pucks were off. Ends in `Idle`.
     pub fn reset(&mut self) {
         self.joints.reset();
-        self.wrench = WrenchEstimator::new();
+        self.wrench.restart();
         self.safety = None;
         // Every state allows this trigger, so there is nothing to refuse.
         let _ = self.supervisor.take(Trigger::SafetyDropped, Fault::SafetyDropped);

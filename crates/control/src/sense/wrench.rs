@@ -122,6 +122,18 @@ impl<R: Real> WrenchEstimator<R> {
         }
     }
 
+    /// Forgets what was measured, and keeps the tare: something may press on the sensor when it is heard again.
+    pub fn restart(&mut self) {
+        let (tare, taken, tared) = (self.tare, self.taken, self.tared);
+        *self = WrenchEstimator { tare, taken, tared, ..WrenchEstimator::new() };
+    }
+
+    /// Forgets the tare: the next rest is the zero.
+    pub fn forget_tare(&mut self) {
+        self.tared = false;
+        (self.tare, self.taken) = (Vector6::zeros(), Vector6::zeros());
+    }
+
     /// Takes the sample of one cycle; a lost or bad one is bridged by the last.
     ///
     /// `weight` is what the hand alone does to the sensor in the present posture

@@ -277,11 +277,11 @@ impl DeviceController {
             Some(found) => self.hand.begin(found),
             None => self.hand.resume(),
         }
-        self.fault = None;
-        self.last_cycles = None;
-        self.fresh_safety = None;
-        self.braking = 0;
-        self.refused = 0;
+        if self.startup.take_tare() {
+            self.cycle.forget_tare();
+        }
+        (self.fault, self.last_cycles, self.fresh_safety) = (None, None, None);
+        (self.braking, self.refused) = (0, 0);
         self.lateness = Lateness::default();
         self.brakes = Brakes::default();
     }

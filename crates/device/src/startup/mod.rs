@@ -158,6 +158,8 @@ pub(crate) struct Startup {
     zeroed: bool,
     /// The sensor has been tared since it was woken. It is not tared again then: something may press on it.
     tared: bool,
+    /// It has been tared, and nobody has asked for that yet.
+    tared_anew: bool,
     /// Why the counts do not refer to the zero of the arm, whatever the safety module says, until a person zeroes.
     doubt: Option<StartupError>,
     /// Words with which the safety module is still to be told so.
@@ -204,6 +206,7 @@ impl Startup {
             positions: [None; 7],
             zeroed: false,
             tared: false,
+            tared_anew: false,
             doubt: None,
             revocations: 0,
             declared: None,
@@ -222,6 +225,7 @@ impl Startup {
         *self = Startup {
             doubt: self.doubt,
             tared: self.tared,
+            tared_anew: self.tared_anew,
             angles: self.angles,
             declared: self.declared,
             stopping: Some(Stopping::default()),
@@ -269,6 +273,11 @@ impl Startup {
             self.revocations = left;
         }
         sent
+    }
+
+    /// True, once, if the sensor has been tared: what was its zero is none any more.
+    pub(crate) fn take_tare(&mut self) -> bool {
+        core::mem::take(&mut self.tared_anew)
     }
 
     /// Its stage.
@@ -498,6 +507,7 @@ impl Startup {
             Step::Tare if !self.has_sensor() || self.tared => Ok(Next::Go(Step::IgnoreFirstFaults)),
             Step::Tare => {
                 self.tared = outlet.send(force_torque::tare());
+                self.tared_anew |= self.tared;
                 Ok(after(self.tared, Step::IgnoreFirstFaults))
             }
             Step::IgnoreFirstFaults => {
@@ -519,7 +529,9 @@ impl Startup {
             Step::Blocked { .. } => {
                 let (error, doubt, hand) = (self.error, self.doubt, self.hand.again());
                 let (continuity, tared, angles, declared) = (self.continuity, self.tared, self.angles, self.declared);
+                let tared_anew = self.tared_anew;
                 *self = Startup { error, doubt, hand, continuity, tared, angles, declared, ..Startup::new() };
+                self.tared_anew = tared_anew;
                 Ok(Next::Stay)
             }
         }

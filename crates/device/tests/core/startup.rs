@@ -311,6 +311,36 @@ fn the_wrench_has_its_zero_after_the_first_rest_and_none_after_a_new_start() {
     assert_eq!(core.health().zeroed_at, None, "and so were the encoders");
 }
 
+/// The change that makes it fail: every start forgets the zero of the wrench, and the first rest takes what presses for
+/// a new one. The sensor was awake and not tared by its own command, for that very reason.
+#[test]
+fn b5_what_presses_on_the_sensor_while_the_bus_is_started_anew_is_not_tared_away() {
+    let (mut core, mut bus) = started();
+    bus.run(&mut core, 1.0);
+    let force = |bus: &Bus| {
+        let [x, y, z, ..] = bus.records.last().expect("cycles").wrench;
+        (x * x + y * y + z * z).sqrt()
+    };
+    let before = force(&bus);
+    bus.sensor.force[0] += 20 * 256;
+    bus.run(&mut core, 0.5);
+    let pressed = force(&bus);
+    core.note_bus_error(true);
+    bus.run(&mut core, 0.1);
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    bus.run(&mut core, 1.0);
+    assert!(before < 0.1 && pressed > 10.0, "{before} N, {pressed} N");
+    assert_eq!(core.health().wrench_zeroed, Some(true));
+    println!("{before} N, {pressed} N, {} N after the start", force(&bus));
+    assert!((force(&bus) - pressed).abs() < 0.1, "{before} N, {pressed} N, {} N after the start", force(&bus));
+    // A person stands beside an arm that is zeroed, and nothing presses.
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run(&mut core, 0.05);
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    bus.run(&mut core, 1.0);
+    assert!(force(&bus) < 0.1, "{} N", force(&bus));
+}
+
 #[test]
 fn an_impossible_home_is_refused_by_its_joint() {
     let (mut core, mut bus) = (silent_device(), Bus::idle());
