@@ -331,7 +331,6 @@ fn b5_what_presses_on_the_sensor_while_the_bus_is_started_anew_is_not_tared_away
     bus.run(&mut core, 1.0);
     assert!(before < 0.1 && pressed > 10.0, "{before} N, {pressed} N");
     assert_eq!(core.health().wrench_zeroed, Some(true));
-    println!("{before} N, {pressed} N, {} N after the start", force(&bus));
     assert!((force(&bus) - pressed).abs() < 0.1, "{before} N, {pressed} N, {} N after the start", force(&bus));
     // A person stands beside an arm that is zeroed, and nothing presses.
     bus.commands.push_back(Command::Zero { home: HOME });
