@@ -311,7 +311,7 @@ fn b5_an_offset_at_rest_is_tared_if_small_and_refused_if_large() {
     assert_eq!(start(20.0, true).0, refused);
 }
 
-/// The change that makes it fail: a sensor that has been silent while the arm was turned is tared by what it told before.
+/// The change that makes it fail: a sensor that was silent while the arm was turned is tared by what it told before.
 #[test]
 fn b5_a_sensor_that_is_silent_is_not_tared() {
     let mut rig = Rig::<f32>::new(START, 1);
