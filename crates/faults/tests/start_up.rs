@@ -36,7 +36,26 @@ fn g2_a_simulated_arm_whose_counts_jumped_is_not_taken_to_stand_at_home() {
     wait(&mut arm, 20);
     let unasked = start_up(&mut arm, false, Stage::WaitingForActive, |_| {});
     assert!(matches!(unasked, Err(ProcedureError::NotZeroed)), "{unasked:?}");
-    start_up(&mut arm, true, Stage::WaitingForActive, |_| {}).unwrap();
+    // Emergency stop; a person carries it back and says where it stands, and then clears: it holds where it truly is.
+    plant(&mut arm).press(PendantAction::PressEStop);
+    plant(&mut arm).carry_home();
+    wait(&mut arm, 2);
+    plant(&mut arm).press(PendantAction::ReleaseEStop);
+    plant(&mut arm).press(PendantAction::ShiftIdle);
+    wait(&mut arm, 4);
+    let stands = plant(&mut arm).world().joint_positions().map(|angle| angle as f32);
+    arm.zero(stands).unwrap();
+    start_up(&mut arm, false, Stage::WaitingForActive, |_| {}).unwrap();
+    arm.clear_fault().unwrap();
+    plant(&mut arm).press(PendantAction::ShiftActivate);
+    start_up(&mut arm, false, Stage::Ready, |_| {}).unwrap();
+    arm.take_events();
+    arm.hold().unwrap();
+    pass(&mut arm, Duration::from_secs(1), EndCondition::OnAnyStop).unwrap();
+    let (told, truth) = (arm.status().unwrap().q, plant(&mut arm).world().joint_positions());
+    for (told, truth) in told.into_iter().zip(truth) {
+        assert!((f64::from(told) - truth).abs() < 0.005, "{told} rad, is {truth} rad");
+    }
 }
 
 /// Who activates an arm under a latched fault has its brakes set again, so nobody is told to.

@@ -94,8 +94,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 // From the posture that is held, so that the torque against friction stays; from where the arm is, if
                 // it was led aside: nothing throws it back.
                 let held = if let Law::Posture(posture) = &self.law { posture.held() } else { None };
-                let from = held.unwrap_or(*q);
-                let mut approach = Approach::new(&self.model, &from, &target, R::constant(f64::from(duration)));
+                let from = held.unwrap_or(q);
+                let mut approach = Approach::new(&self.model, from, &target, R::constant(f64::from(duration)));
                 if self.caution == Caution::Slowed {
                     approach = approach.slowed();
                 }

@@ -53,6 +53,8 @@ pub(super) struct Posture<R: Real> {
     pub(super) q: JointPositions<R>,
     /// Where that posture has given way to (rad).
     held: JointPositions<R>,
+    /// True while these two differ. Kept, because an order is to begin within its cycle.
+    gives_way: bool,
     /// The move in progress; `None` in `Hold`.
     pub(super) approach: Option<Approach<R>>,
     pub(super) integral: PostureIntegral<R>,
@@ -69,6 +71,7 @@ impl<R: Real> Posture<R> {
         Posture {
             q,
             held: q,
+            gives_way: false,
             approach: None,
             integral: PostureIntegral::new(),
             controller: JointController::new(),
@@ -116,13 +119,13 @@ impl<R: Real> Posture<R> {
     }
 
     /// The posture that is held (rad); `None` while it gives way.
-    pub(super) fn held(&self) -> Option<JointPositions<R>> {
-        (self.held == self.q).then_some(self.q)
+    pub(super) fn held(&self) -> Option<&JointPositions<R>> {
+        (!self.gives_way).then_some(&self.q)
     }
 
     /// Takes another posture to hold (rad).
     pub(super) fn shift_to(&mut self, q: JointPositions<R>) {
-        (self.q, self.held) = (q, q);
+        (self.q, self.held, self.gives_way) = (q, q, false);
     }
 
     /// Returns what the joints should do in this control period, at `q` (rad).
@@ -157,10 +160,14 @@ impl<R: Real> Posture<R> {
         }
         let held = q.0 + offset;
         // Exactly, where nobody pushes: a sum of differences is not.
+        let mut gives_way = false;
         self.held = JointPositions(held.zip_map(&self.q.0, |held, wanted| {
             let rest = held - wanted;
-            if rest < step && rest > -step { wanted } else { held }
+            let is_there = rest < step && rest > -step;
+            gives_way |= !is_there;
+            if is_there { wanted } else { held }
         }));
+        self.gives_way = gives_way;
     }
 }
 

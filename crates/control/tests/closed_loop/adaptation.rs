@@ -328,7 +328,6 @@ fn b5_a_sensor_that_is_silent_is_not_tared() {
     rig.plant.deaf = false;
     rig.run_for(0.5);
     let left = rig.last.expect("ran").record.wrench;
-    println!("{left:?}");
     assert_eq!(refused, Some(Event::Refused(Refusal::WrenchMissing)));
     assert!(left[..3].iter().all(|force| force.abs() < 0.1), "{left:?}");
     rig.command(Command::Tare);

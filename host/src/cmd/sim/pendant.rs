@@ -6,7 +6,8 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use sim::PendantAction;
 
 /// Words that the pendant takes, for people.
-pub(super) const WORDS: &str = "`idle` (Shift-Idle), `activate` (Shift-Activate), `estop` (emergency stop), `release` (it, and carry the arm home)";
+pub(super) const WORDS: &str = "`idle` (Shift-Idle), `activate` (Shift-Activate), `estop` (emergency stop), \
+                                `release` (it, and carry the arm home)";
 
 /// The action of a word.
 fn action(word: &str) -> Option<PendantAction> {
