@@ -27,7 +27,8 @@ const LET_GO: Ticks = 900 * TICKS_PER_MILLISECOND;
 /// Longest time for a movement to begin.
 const BEGIN: Duration = Duration::from_millis(200);
 
-/// The arm of a scenario, in the state where it begins, its telemetry on. Faults of a power-up are ordered already.
+/// The arm of a scenario, in the state where it begins, its telemetry on. Faults of a power-up are ordered already, all
+/// others are when the watch begins.
 /// `kind` says what executes the co-controller's application: this process, or its image under an emulator.
 ///
 /// # Errors
@@ -39,7 +40,7 @@ pub fn arm(scenario: &Scenario, with_faults: bool, kind: SimulatorKind) -> Resul
     }
     let mut arm = connected(simulation)?;
     if scenario.from != From::PowerUp {
-        begin(&mut arm, scenario, with_faults)?;
+        begin(&mut arm, scenario)?;
     }
     arm.set_telemetry(1)?;
     arm.take_events();
@@ -73,12 +74,11 @@ pub fn connected(simulation: Simulation) -> Result<Arm, Failure> {
     Ok(Client::connect(Device::Simulated(Box::new(simulation)), "fault catalogue")?)
 }
 
-/// From power-up, or from the way back of another scenario, to the state of this one; the faults are ordered at its
-/// first moment.
+/// From power-up, or from the way back of another scenario, to the first moment of the state of this one.
 ///
 /// # Errors
 /// The arm does not get there.
-pub fn begin(arm: &mut Arm, scenario: &Scenario, with_faults: bool) -> Result<(), Failure> {
+pub fn begin(arm: &mut Arm, scenario: &Scenario) -> Result<(), Failure> {
     arm.upload(&movement().to_image()?, |_, _, _| {})?;
     procedure::make_ready(arm, true, |_| {})?;
     procedure::go_to_start(arm, &movement().start, |_| {})?;
@@ -109,9 +109,6 @@ pub fn begin(arm: &mut Arm, scenario: &Scenario, with_faults: bool) -> Result<()
         if arm.now() > deadline {
             return Err(format!("the arm does not come to {}", wanted.name()).into());
         }
-    }
-    if with_faults {
-        plant(arm).inject(&scenario.inject);
     }
     Ok(())
 }

@@ -91,7 +91,7 @@ pub fn run(hours: f64, first: u64, mut tell: impl FnMut(f64, u64, usize, Process
 fn round(arm: &mut Arm, seed: u64) -> Result<Verdict, Failure> {
     let scenario = storm::draw(seed);
     let mut verdict = Verdict::open("endurance", &scenario);
-    let outcome = bench::begin(arm, &scenario, true)
+    let outcome = bench::begin(arm, &scenario)
         .and_then(|()| Ok(arm.set_telemetry(1)?))
         .and_then(|()| run::judged(arm, &scenario, None, &mut verdict));
     if let Err(failure) = outcome {

@@ -53,9 +53,9 @@ pub struct Scenario {
     /// The images of the co-controller go through it too: with `--device sim:` and `--device board:`.
     #[serde(default)]
     pub firmware: bool,
-    /// A defect that is known: the scenario must fail. A sentence that says what happens instead.
+    /// A defect that is known: the scenario must fail, by the figures in `misses` and nothing else.
     #[serde(default)]
-    pub known: Option<String>,
+    pub known: Option<Known>,
     /// Faults; their times count from time 0.
     #[serde(default)]
     pub inject: Vec<Injection>,
@@ -90,6 +90,16 @@ impl Scenario {
             shifted
         })
     }
+}
+
+/// A defect that is known.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Known {
+    /// A sentence that says what happens instead.
+    pub defect: String,
+    /// The figures that are out of their bars by it, and how far they may be; every other bar holds nevertheless.
+    pub misses: BTreeMap<Figure, f64>,
 }
 
 /// One fault at each of many moments, each on an arm of its own.
@@ -279,6 +289,9 @@ impl Entry {
             }
             if scenario.known.is_some() && self.today == "held" {
                 return Err(format!("{}: a known defect in an entry that is held", scenario.name));
+            }
+            if scenario.known.as_ref().is_some_and(|known| known.misses.is_empty()) {
+                return Err(format!("{}: a known defect by which nothing is out of its bar", scenario.name));
             }
         }
         Ok(())

@@ -39,6 +39,8 @@ pub enum Figure {
     HandSpeed,
     /// Largest true speed of the hand from 0.3 s after the end of the last fault on, m/s.
     LateSpeed,
+    /// Largest true speed of the hand from 0.3 s after the arm has left its motion on, whatever still befalls it, m/s.
+    StoppedSpeed,
     /// Way of the hand downwards from its place at time 0, mm.
     Fall,
     /// Replies that the device counts as lost.
@@ -73,6 +75,11 @@ pub const ALWAYS: [(Figure, f64); 6] = [
     (Figure::TorqueUnasked, 0.0),
 ];
 
+/// The largest of these, 0 at least; not a number if one of them is none: no bar lets that pass.
+pub(crate) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(0.0, |largest, value| if value > largest || value.is_nan() { value } else { largest })
+}
+
 impl Figure {
     /// Word and unit.
     #[must_use]
@@ -93,6 +100,7 @@ impl Figure {
             Self::Travel => ("way after the stop", "mrad"),
             Self::HandSpeed => ("hand speed", "m/s"),
             Self::LateSpeed => ("hand speed 0.3 s later", "m/s"),
+            Self::StoppedSpeed => ("hand speed 0.3 s after the stop", "m/s"),
             Self::Fall => ("hand falls", "mm"),
             Self::LostReplies => ("lost replies", ""),
             Self::OddFrames => ("odd frames", ""),

@@ -6,7 +6,7 @@ use sim::{TICKS_PER_MILLISECOND, Ticks};
 
 use crate::bus::{self, Sent};
 use crate::entry::{Given, Scenario};
-use crate::figure::{Figure, Figures};
+use crate::figure::{Figure, Figures, largest};
 use crate::watch::{Moment, Watched};
 
 /// A joint at rest is slower, rad/s.
@@ -24,6 +24,9 @@ const UNHEARD: Ticks = NOTICE + 100 * TICKS_PER_MILLISECOND;
 /// Longest time from the end of the torque until the motors brake, s.
 const BRAKES: f64 = 0.01;
 
+/// Behind the end of the faults, or a stop, the arm has so long to become slow, s.
+const SETTLED: f64 = 0.3;
+
 /// Speed of the hand is taken over so long a time, s.
 const SPEED_WINDOW: f64 = 0.01;
 
@@ -38,7 +41,7 @@ pub fn always(watched: &Watched) -> Figures {
         for (moment, speed) in &speeds {
             since = if moment.is_free { since.or(Some(moment.time)) } else { None };
             if since.is_some_and(|since| moment.time - since >= least) {
-                fastest = fastest.max(*speed);
+                fastest = largest([fastest, *speed]);
             }
         }
         fastest
@@ -52,7 +55,7 @@ pub fn always(watched: &Watched) -> Figures {
         (Figure::CausesLost, f64::from(causes_lost(watched))),
         (Figure::TorqueUnasked, f64::from(unasked(&sent, &watched.moments, NOTICE))),
         (Figure::TorqueUnheard, f64::from(unasked(&sent, &watched.moments, UNHEARD))),
-        (Figure::HandSpeed, speeds.iter().map(|(_, speed)| *speed).fold(0.0, f64::max)),
+        (Figure::HandSpeed, largest(speeds.iter().map(|(_, speed)| *speed))),
     ])
 }
 
@@ -69,13 +72,13 @@ pub fn all(scenario: &Scenario, watched: &Watched, nominal: Option<&Watched>) ->
         let behind: Vec<&Moment> = moments.iter().filter(|moment| moment.time >= stop.time).collect();
         figures.insert(Figure::Rest, 1e3 * (moved_until(moments) - stop.time).max(0.0));
         let ways = behind.iter().flat_map(|moment| (0..7).map(|joint| (moment.q[joint] - stop.q[joint]).abs()));
-        figures.insert(Figure::Travel, 1e3 * ways.fold(0.0, f64::max));
+        figures.insert(Figure::Travel, 1e3 * largest(ways));
+        figures.extend(fastest_from(moments, stop.time + SETTLED).map(|speed| (Figure::StoppedSpeed, speed)));
     }
     figures.insert(Figure::Still, 1e3 * (moved_until(moments) - first).max(0.0));
-    let late = hand_speeds(moments).into_iter().filter(|(moment, _)| moment.time > last + 0.3);
-    figures.insert(Figure::LateSpeed, late.map(|(_, speed)| speed).fold(0.0, f64::max));
+    figures.extend(fastest_from(moments, last + SETTLED).map(|speed| (Figure::LateSpeed, speed)));
     if let Some(start) = moments.first() {
-        let fall = moments.iter().map(|moment| start.hand[2] - moment.hand[2]).fold(0.0, f64::max);
+        let fall = largest(moments.iter().map(|moment| start.hand[2] - moment.hand[2]));
         figures.insert(Figure::Fall, 1e3 * fall);
     }
     let (before, after) = (&watched.before, &watched.after);
@@ -98,10 +101,21 @@ fn limited(moments: &[Moment]) -> f64 {
     100.0 * f64::from(cut) / f64::from(all.max(1))
 }
 
-/// Last moment at which a joint moved, s.
+/// Last moment at which a joint moved, s; infinite if one still does at the end: nobody knows until when.
 fn moved_until(moments: &[Moment]) -> f64 {
-    let moves = |moment: &&Moment| moment.dq.iter().any(|speed| speed.abs() > AT_REST);
-    moments.iter().rfind(moves).map_or(0.0, |moment| moment.time)
+    let rests = |moment: &Moment| moment.dq.iter().all(|speed| speed.abs() <= AT_REST);
+    match moments.iter().rposition(|moment| !rests(moment)) {
+        None => 0.0,
+        Some(index) if index + 1 == moments.len() => f64::INFINITY,
+        Some(index) => moments[index].time,
+    }
+}
+
+/// Largest speed of the hand from this time on, m/s; `None` if nobody looked for so long.
+fn fastest_from(moments: &[Moment], time: f64) -> Option<f64> {
+    let late: Vec<f64> =
+        hand_speeds(moments).into_iter().filter(|(moment, _)| moment.time > time).map(|(_, speed)| speed).collect();
+    (!late.is_empty()).then(|| largest(late))
 }
 
 /// First begin, and last end or begin, of faults and orders, s.
@@ -153,13 +167,13 @@ fn belief(moments: &[Moment]) -> f64 {
         let Some((q, _)) = moment.told else { continue };
         let off = |before: &Moment, behind: &Moment, share: f64| {
             let truth = |joint: usize| before.q[joint] + share * (behind.q[joint] - before.q[joint]);
-            (0..7).map(|joint| (q[joint] - truth(joint)).abs()).fold(0.0, f64::max)
+            largest((0..7).map(|joint| (q[joint] - truth(joint)).abs()))
         };
         let seen = &moments[from.saturating_sub(1)..=index];
         let pairs = seen.windows(2).flat_map(|pair| (0..8).map(move |step| (pair, f64::from(step) / 8.0)));
         let nearest =
             pairs.map(|(pair, share)| off(&pair[0], &pair[1], share)).fold(off(moment, moment, 0.0), f64::min);
-        worst = worst.max(nearest);
+        worst = largest([worst, nearest]);
     }
     worst
 }
@@ -199,7 +213,7 @@ fn against(moments: &[Moment], nominal: &[Moment]) -> Figures {
             let wanted = before.q[joint] + share * (behind.q[joint] - before.q[joint]);
             (moment.q[joint] - wanted).abs()
         });
-        deviation = deviation.max(off.fold(0.0, f64::max));
+        deviation = largest([deviation].into_iter().chain(off));
     }
     let plans = |moments: &[Moment]| -> Vec<(f64, [f64; 3], [f64; 3])> {
         moments.iter().filter_map(|moment| moment.told.map(|(_, plan)| (moment.time, plan, moment.hand))).collect()
@@ -217,7 +231,7 @@ fn against(moments: &[Moment], nominal: &[Moment]) -> Figures {
     Figures::from([
         (Figure::Deviation, 1e3 * deviation),
         (Figure::Tracking, rms(&planned) / rms(&wanted).max(1e-9)),
-        (Figure::Plan, 1e3 * apart.fold(0.0, f64::max)),
+        (Figure::Plan, 1e3 * largest(apart)),
     ])
 }
 

@@ -12,11 +12,11 @@ use crate::storm::Outcome;
 /// The lines of one scenario.
 #[must_use]
 pub fn lines(verdict: &Verdict, all: bool) -> String {
-    let word = match (verdict.holds(), &verdict.known) {
-        (true, None) => "ok",
-        (false, None) => "FAIL",
-        (false, Some(_)) => "known",
-        (true, Some(_)) => "FAIL: a known defect is gone",
+    let word = match (verdict.is_as_told(), verdict.holds()) {
+        (true, true) => "ok",
+        (true, false) => "known",
+        (false, false) => "FAIL",
+        (false, true) => "FAIL: a known defect is gone",
     };
     let Verdict { id, scenario, state, fault, .. } = verdict;
     let mut text = format!("{id:4} {scenario}: {state}, {fault}: {word}\n");
@@ -26,8 +26,11 @@ pub fn lines(verdict: &Verdict, all: bool) -> String {
     for failure in &verdict.failures {
         text += &format!("       {failure}\n");
     }
+    if let Some(time) = verdict.failed_at {
+        text += &format!("       with the last fault at {time:.4} s\n");
+    }
     if let Some(known) = &verdict.known {
-        text += &format!("       known: {known}\n");
+        text += &format!("       known: {}\n", known.defect);
     }
     text
 }

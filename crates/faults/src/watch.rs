@@ -13,7 +13,7 @@ use puck::SafetyMode;
 use sim::{Passage, Ticks};
 
 use crate::bench::{Arm, Failure, plant};
-use crate::entry::{Answer, Given, Order};
+use crate::entry::{Answer, From, Given, Scenario};
 use crate::movement::GOAL;
 
 /// Telemetry missing for so long makes the runner ask for the state.
@@ -63,25 +63,35 @@ pub struct Watched {
     pub clears: Vec<f64>,
 }
 
-/// Watches the arm for `length` seconds from now on and gives the orders on the way.
+/// Lets the faults of a scenario befall the arm from now on, watches it, and gives the orders on the way. Time 0 is the
+/// moment from which the faults count: asking for anything between the two would make every stop look sooner.
 ///
 /// # Errors
 /// The device does not answer.
-pub fn watch(arm: &mut Arm, length: f64, orders: &[Order]) -> Result<Watched, Failure> {
+pub fn watch(arm: &mut Arm, scenario: &Scenario, with_faults: bool) -> Result<Watched, Failure> {
     let before = arm.statistics()?;
     let status = arm.status()?;
+    // The faults of a power-up are ordered before it, and its frames are kept: the arm's clock begins there.
+    let zero = if scenario.from == From::PowerUp {
+        0
+    } else {
+        plant(arm).take_recorded();
+        if with_faults {
+            plant(arm).inject(&scenario.inject);
+        }
+        plant(arm).now()
+    };
     let mut observer = Observer {
-        zero: plant(arm).now(),
+        zero,
         state: State::from_code(status.state).ok_or("a state that is not documented")?,
         fault: Fault::from_code(status.fault).ok_or("a fault that is not documented")?,
         heard: 0.0,
         moments: Vec::new(),
     };
-    plant(arm).take_recorded();
     let (mut surprises, mut clears) = (Vec::new(), Vec::new());
-    let mut orders = orders.to_vec();
+    let mut orders = scenario.order.clone();
     orders.sort_by(|a, b| b.at.total_cmp(&a.at));
-    while observer.time(arm) < length {
+    while observer.time(arm) < scenario.watch {
         let now = observer.time(arm);
         if let Some(order) = orders.pop_if(|order| order.at <= now) {
             let answer = observer.give(arm, order.give)?;

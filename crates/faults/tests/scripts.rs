@@ -67,9 +67,17 @@ fn a_scenario_is_judged_by_its_bars_and_a_known_defect_has_to_fail() {
     assert_eq!(judged(SCRIPT), (true, true));
     assert_eq!(judged(&SCRIPT.replace("stop = 60", "stop = 1")), (false, false));
     assert_eq!(judged(&SCRIPT.replace("BusFault", "Overrun")), (false, false));
-    let known = SCRIPT.replace("recover", "known = \"nothing\"\nrecover");
+    let known = SCRIPT.replace("recover", "known = { defect = \"late\", misses = { stop = 60 } }\nrecover");
     assert_eq!(judged(&known), (true, false), "a defect that is gone must not stay in the list");
-    assert_eq!(judged(&known.replace("stop = 60", "stop = 1")), (false, true));
+    assert_eq!(judged(&known.replace("most = { stop = 60", "most = { stop = 1")), (false, true));
+    let other = known.replace("most = { stop = 60", "most = { travel = 0, stop = 1");
+    assert_eq!(judged(&other), (false, false), "a known defect excuses nothing else");
+    let worse = known.replace("stop = 60", "stop = 1");
+    assert_eq!(judged(&worse), (false, false), "nor more than it says");
+    let elsewhere = known.replace("most = { stop = 60", "most = { stop = 1").replace("BusFault", "Overrun");
+    assert_eq!(judged(&elsewhere), (false, false), "nor another end");
+    let nothing = read(&known.replace("{ stop = 60 }", "{}")).expect_err("it means nothing");
+    assert!(nothing.contains("nothing is out of its bar"), "{nothing}");
 }
 
 #[test]
@@ -86,7 +94,7 @@ fn a_sweep_is_as_good_as_the_worst_of_its_arms() {
     let stop = |verdict: &faults::run::Verdict| verdict.figures.last().and_then(|judged| judged.value);
     assert!(stop(&both) >= stop(&alone), "{both:?} {alone:?}");
     let third = judged(&text.replace("count = 2", "count = 3"));
-    assert!(!third.holds() && third.failures.iter().any(|words| words.contains("0.5000 s")), "{third:?}");
+    assert!(!third.holds() && third.failed_at == Some(0.5), "{third:?}");
     let refused = |to: &str| read(&text.replace("{ count = 2, by = 0.2 }", to)).expect_err("it means nothing");
     assert!(refused("{ count = 0, by = 0.2 }").contains("a sweep of no arms"));
     assert!(refused("{ count = 2, by = 0 }").contains("of no time"));

@@ -112,12 +112,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                     self.may_use_force(primitive, measured)?;
                 }
                 let hand = self.hand.answering();
-                Run::start(&mut self.run, primitive, q, &measured.pose, hand.as_ref(), options)?;
+                let begun = (options, self.caution == Caution::Slowed);
+                Run::start(&mut self.run, primitive, q, &measured.pose, hand.as_ref(), begun)?;
                 self.supervisor.take(Trigger::Run, Fault::None)?;
                 self.wrench.tare_drift();
                 self.hand.tare_drift();
                 self.begin_run(options, measured);
-                self.hold_back();
                 Ok(())
             }
             Command::SetGoal(goal) => match (&self.law, &mut self.run, self.loaded.get()) {

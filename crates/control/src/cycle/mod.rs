@@ -511,7 +511,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         let mut actuation = Actuation::torque(&torques, &self.calibration);
         let fault = self.supervisor.fault();
-        if fault == Fault::EncoderStuck || fault == Fault::UnseenContact && self.is_bare() {
+        if self.joints.has_lost_sight() || fault == Fault::UnseenContact && self.is_bare() {
             // Torque cannot damp a joint that nobody sees, nor carry what nobody knows of: brakes, as soon as the
             // safety module has them on.
             actuation = actuation.requesting_idle();

@@ -21,6 +21,10 @@ use crate::units::{JointPositions, Vector7, Wrench};
 impl<R: Real, const N: usize> Cycle<R, N> {
     /// Takes a trigger that no person caused.
     pub(super) fn trigger(&mut self, trigger: Trigger, fault: Fault, measured: Option<&Measured<'_, R>>) {
+        // Whatever the first cause was.
+        if fault == Fault::EncoderStuck {
+            self.joints.lose_sight();
+        }
         // Only commands can be refused.
         if let Ok(true) = self.supervisor.take(trigger, fault) {
             self.entered(measured);
@@ -91,14 +95,16 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     pub(super) fn begin_run(&mut self, options: RunOptions, measured: &Measured<'_, R>) {
         self.hand.begin_run();
         self.observer.postpone();
-        // From what the feedback is drawn to while holding, so that the torque against friction stays.
-        let start = match &self.law {
-            Law::Posture(posture) if !options.compliant => JointPositions(posture.q.0 + posture.integral.shift()),
+        // From what the feedback is drawn to while holding, so that the torque against friction stays. An arm that was
+        // led aside has nothing to hand over: it would be thrown back.
+        let held = if let Law::Posture(posture) = &self.law { posture.held() } else { Some(&measured.state.q) };
+        let start = match (&self.law, held) {
+            (Law::Posture(posture), Some(q)) if !options.compliant => JointPositions(q.0 + posture.integral.shift()),
             _ => measured.state.q,
         };
         self.force.restart(self.gains.tracking(options.compliant).force_window);
         // What a limit has cut off is not to be taken over: after arming that is the gravity which has yet to build up.
-        let handover = if options.compliant && !self.cut.is_cut() {
+        let handover = if options.compliant && held.is_some() && !self.cut.is_cut() {
             let load = if options.force_control { self.load_expected_first(measured) } else { Vector7::zeros() };
             Ramp::new(self.beyond - load, HANDOVER)
         } else {

@@ -39,6 +39,9 @@ const IN_CONTACT: f64 = 1.5;
 /// Force (N) that explains why a motor does not turn, whatever its torque does.
 const CONTACT: f64 = 10.0;
 
+/// Time behind such a force for which the arm swings back, and no swing means anything: 0.15 s, in control periods.
+const SWINGS_BACK: u8 = few_periods(0.15);
+
 /// Time without a count, before a swing means anything: 50 ms, in control periods.
 const STILL: u8 = few_periods(0.05);
 
@@ -92,6 +95,8 @@ pub(crate) struct Disagreement<R: Real> {
     still: [u8; JOINTS],
     /// Control periods for which the swing of each motor has been too large.
     beyond: [u8; JOINTS],
+    /// Control periods for which the arm still swings back from what has pushed it.
+    swings_back: u8,
     pushing: u8,
 }
 
@@ -106,6 +111,7 @@ impl<R: Real> Disagreement<R> {
             anchor: [(zero, zero, zero); JOINTS],
             still: [0; JOINTS],
             beyond: [0; JOINTS],
+            swings_back: 0,
             pushing: 0,
         }
     }
@@ -137,7 +143,9 @@ impl<R: Real> Disagreement<R> {
         force: R,
         unchanged: u8,
     ) -> bool {
-        if force > R::constant(CONTACT) {
+        let is_pushed = force > R::constant(CONTACT);
+        self.swings_back = if is_pushed { SWINGS_BACK } else { self.swings_back.saturating_sub(1) };
+        if self.swings_back > 0 {
             self.all_turn();
             return false;
         }
@@ -337,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn a_contact_explains_a_motor_that_stands_and_the_time_begins_anew_after_it() {
+    fn a_contact_explains_a_motor_that_stands_and_the_time_begins_anew_once_the_arm_has_swung_back() {
         for (force, expected) in [(CONTACT, true), (1.001 * CONTACT, false)] {
             let mut seen = new();
             take(&mut seen, &RUN, force, M4);
@@ -347,6 +355,9 @@ mod tests {
         let mut seen = new();
         take(&mut seen, &RUN, 0.0, M4);
         take(&mut seen, &swung(9.0, RUN), 2.0 * CONTACT, M4);
+        for _ in 1..SWINGS_BACK {
+            assert!(!take(&mut seen, &swung(9.0, RUN), 0.0, M4));
+        }
         take(&mut seen, &RUN, 0.0, M4);
         for _ in 1..STILL {
             assert!(!take(&mut seen, &swung(9.0, RUN), 0.0, M4));

@@ -93,15 +93,15 @@ impl<R: Real> Monitor<R> {
         if state.age > SILENCE_CYCLES {
             return Some((Trigger::HardFault, Fault::RepliesLostForLong));
         }
+        // An encoder that stands still is told even where the zero is lost already: it wants the brakes.
+        if state.age > COAST_CYCLES && state.stuck {
+            return Some((Trigger::SoftFault, Fault::EncoderStuck));
+        }
         if state.displaced && law != State::Lower {
             return Some((Trigger::SoftFault, Fault::ImplausiblePosition));
         }
         if state.age > COAST_CYCLES {
-            let fault = match (state.stuck, state.implausible) {
-                (true, _) => Fault::EncoderStuck,
-                (_, true) => Fault::ImplausiblePosition,
-                _ => Fault::RepliesLost,
-            };
+            let fault = if state.implausible { Fault::ImplausiblePosition } else { Fault::RepliesLost };
             return Some((Trigger::SoftFault, fault));
         }
         let (stuck, pushed) = self.disagrees(state, seen);

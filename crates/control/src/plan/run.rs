@@ -86,8 +86,8 @@ pub(crate) struct Run<R: Real, const N: usize> {
 
 impl<R: Real, const N: usize> Run<R, N> {
     /// Puts a run into its place that begins at the measured pose and posture, at rest; a refused one leaves the place
-    /// as it was. In place, because moving it out of a result costs thousands of instructions in the cycle that has
-    /// most to do.
+    /// as it was. `slow` holds it to half of the taught speed. In place, because moving it out of a result costs
+    /// thousands of instructions in the cycle that has most to do.
     ///
     /// # Errors
     /// [`Refusal`]: the arm or the hand is not where the primitive starts, or an option is out of range.
@@ -97,7 +97,7 @@ impl<R: Real, const N: usize> Run<R, N> {
         q: &JointPositions<R>,
         pose: &Pose<R>,
         hand: Option<&HandState<R>>,
-        options: RunOptions,
+        (options, slow): (RunOptions, bool),
     ) -> Result<(), Refusal> {
         let (taught_posture, taught_hand) = posture_and_hand(&primitive.movement().start().points);
         let far = |(q, start): (&R, &R)| {
@@ -136,11 +136,11 @@ impl<R: Real, const N: usize> Run<R, N> {
             load: R::constant(0.0),
             speed: (options.speed, false),
         };
-        let rollout = &mut run.rollout;
         // The first speed acts at once; later ones are approached at the rollout's slew rate.
-        rollout.set_speed_slew(None).map_err(reason)?;
-        set_speed(rollout, primitive, options.speed)?;
-        rollout.set_speed_slew(Some(R::constant(Rollout::<R, N>::DEFAULT_SLEW))).map_err(reason)?;
+        run.rollout.set_speed_slew(None).map_err(reason)?;
+        set_speed(&mut run.rollout, primitive, options.speed)?;
+        run.hold_back(primitive, slow);
+        run.rollout.set_speed_slew(Some(R::constant(Rollout::<R, N>::DEFAULT_SLEW))).map_err(reason)?;
         run.set_goal(primitive, &options.goal)?;
         *place = Some(run);
         Ok(())

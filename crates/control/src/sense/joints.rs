@@ -104,6 +104,7 @@ pub struct JointEstimator<R: Real> {
     gate: [i32; JOINTS],
     motors: Option<[Motor; JOINTS]>,
     displaced: bool,
+    unseen: bool,
     /// Counts per cycle of each motor, from the filtered velocity.
     rates: Vector7<R>,
     filter: LowPass<R, JOINTS>,
@@ -135,6 +136,7 @@ impl<R: Real> JointEstimator<R> {
             gate,
             motors: None,
             displaced: false,
+            unseen: false,
             rates: Vector7::zeros(),
             filter: LowPass::new(Butterworth::new(VELOCITY_CUT_OFF, RATE)),
         }
@@ -143,7 +145,7 @@ impl<R: Real> JointEstimator<R> {
     /// Forgets everything; the next complete set of replies starts anew.
     pub fn reset(&mut self) {
         self.motors = None;
-        self.displaced = false;
+        (self.displaced, self.unseen) = (false, false);
         self.rates = Vector7::zeros();
         self.filter.settle(&Vector7::zeros());
     }
@@ -163,6 +165,17 @@ impl<R: Real> JointEstimator<R> {
     /// The positions do not refer to the zero of the arm, as after a jump: until a reset.
     pub fn displace(&mut self) {
         self.displaced = true;
+    }
+
+    /// A joint moves and nobody sees how far: its encoder stands still. The positions do not refer to the zero of the
+    /// arm any longer, until a reset.
+    pub fn lose_sight(&mut self) {
+        (self.displaced, self.unseen) = (true, true);
+    }
+
+    /// True from [`JointEstimator::lose_sight`] on until a reset.
+    pub fn has_lost_sight(&self) -> bool {
+        self.unseen
     }
 
     /// Takes the replies of one cycle. `None` until all seven motors have answered once in the same cycle.

@@ -83,6 +83,25 @@ fn g14_a_warning_is_told_and_a_derated_run_goes_on_at_half_speed() {
     assert!((free / held - 3.6).abs() < 0.1, "{free} against {held}");
 }
 
+/// The change that makes it fail: a run begins as fast as was asked for, and slows down within half a second.
+#[test]
+fn g14_a_run_that_begins_derated_is_slow_from_its_first_cycle() {
+    let phases = |caution: Caution, speed: f32| {
+        let mut rig = holding();
+        rig.cycle.set_caution(caution);
+        rig.command(Command::Run(RunOptions { speed, ..RunOptions::default() }));
+        [1, 10, 60].map(|cycles| {
+            (0..cycles).for_each(|_| {
+                rig.tick(None);
+            });
+            rig.last.expect("ran").record.phase
+        })
+    };
+    let half = phases(Caution::None, 0.5);
+    assert_eq!(phases(Caution::Slowed, 2.0), half);
+    assert_ne!(phases(Caution::None, 2.0), half);
+}
+
 /// The change that makes it fail: an approach begins as if nothing had been found.
 #[test]
 fn g14_an_approach_that_begins_derated_takes_twice_the_time() {

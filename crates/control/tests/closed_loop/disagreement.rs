@@ -153,6 +153,32 @@ fn a8_a_stuck_encoder_is_not_cleared_while_its_joint_may_be_elsewhere() {
     assert_eq!(rig.cycle.fault(), Fault::EncoderStuck, "the first cause");
 }
 
+/// The change that makes it fail: only counts that jump cost the zero.
+#[test]
+fn a8_an_encoder_that_goes_on_standing_still_costs_the_zero() {
+    let mut rig = moving(false, 1.0, None);
+    freeze(&mut rig, 0);
+    stop(&mut rig);
+    rig.run_for(0.3);
+    assert_eq!(rig.tick(Some(Command::ClearFault)).event, Some(Event::Refused(Refusal::ZeroLost)));
+    assert!(rig.cycle.is_zero_lost());
+}
+
+/// The change that makes it fail: brakes are asked for by the first cause alone.
+#[test]
+fn a8_an_encoder_that_stands_still_while_the_arm_stops_for_another_cause_has_the_brakes_asked_for() {
+    let mut rig = moving(false, 1.0, None);
+    rig.cycle.lose_zero();
+    let requests = |rig: &Rig<f32>| rig.last.is_some_and(|output| output.actuation.requests_idle());
+    rig.tick(None);
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::SoftStop, Fault::ImplausiblePosition));
+    assert!(!requests(&rig));
+    freeze(&mut rig, 0);
+    rig.run_for(0.1);
+    assert_eq!(rig.cycle.fault(), Fault::ImplausiblePosition, "the first cause");
+    assert!(requests(&rig), "{:?}", rig.last);
+}
+
 /// A rig that holds, whose sensor has been silent for 0.3 s.
 fn deaf(posture: [f64; 7]) -> Rig<f32> {
     let mut rig = Rig::<f32>::new(posture, 1);
