@@ -80,6 +80,8 @@ pub struct Ratio {
 pub struct Comparison {
     /// Pairs of trials that are compared.
     pub pairs: usize,
+    /// Of these, those whose arm stopped by itself with adaptation: they count as above every bar, and have no ratio.
+    pub stopped: usize,
     /// Pairs that are left out because nothing is met in open loop.
     pub left_out: usize,
     /// Each quantity.
@@ -104,7 +106,9 @@ impl Comparison {
         if pairs.is_empty() || quantities.is_empty() {
             return None;
         }
-        let share = |count: usize| count as f64 / pairs.len() as f64;
+        let compared = pairs.len();
+        let share = |count: usize| count as f64 / compared as f64;
+        let pairs: Vec<_> = pairs.into_iter().filter(|(_, adapted)| !adapted.outcome.is_stopped()).collect();
         let ratio = |quantity: &Quantity, (open, adapted): &(&Report, &Report)| {
             (quantity.value)(&adapted.measures) / (quantity.value)(&open.measures).max(f64::MIN_POSITIVE)
         };
@@ -130,8 +134,9 @@ impl Comparison {
         });
         let below = |pair: &&(&Report, &Report)| quantities.iter().all(|quantity| ratio(quantity, pair) < quantity.bar);
         Some(Comparison {
-            pairs: pairs.len(),
-            left_out: all - pairs.len(),
+            pairs: compared,
+            stopped: compared - pairs.len(),
+            left_out: all - compared,
             ratios: ratios.collect(),
             all_below: share(pairs.iter().filter(below).count()),
         })
@@ -154,7 +159,9 @@ impl fmt::Display for Comparison {
             1 => "; 1 is left out because open loop meets nothing there".to_owned(),
             n => format!("; {n} are left out because open loop meets nothing there"),
         };
-        writeln!(formatter, "(c) relative to (a), {} pairs of trials{left_out}", self.pairs)?;
+        let stopped =
+            if self.stopped == 0 { String::new() } else { format!(", {} of them stopped in (c)", self.stopped) };
+        writeln!(formatter, "(c) relative to (a), {} pairs of trials{stopped}{left_out}", self.pairs)?;
         for ratio in &self.ratios {
             writeln!(
                 formatter,
@@ -177,6 +184,7 @@ impl fmt::Display for Comparison {
 mod tests {
     use super::*;
     use crate::fixtures;
+    use crate::outcome::Outcome;
 
     #[test]
     fn what_open_loop_does_not_meet_is_left_out_and_said_so() {
@@ -200,6 +208,23 @@ mod tests {
         assert!((comparison.all_below - 46.0 / 47.0).abs() < 1e-12, "one cell is touched too hard");
         let text = comparison.to_string();
         assert!(text.contains("1 is left out") && text.contains("median 0.40, largest 0.60"), "{text}");
+    }
+
+    /// The change that makes it fail: what an arm that stopped did not do any more counts as done gently.
+    #[test]
+    fn an_arm_that_stopped_was_not_gentle() {
+        let mut results = fixtures::results(&[1]);
+        for report in &mut results.reports {
+            report.measures.push_m = 0.04;
+            if report.key.mode == Mode::Adaptive {
+                report.outcome = Outcome::Stopped("JointSpeed".to_owned());
+                report.measures.push_m = 0.0;
+            }
+        }
+        let comparison = Comparison::of(&results, Scenario::Cup).unwrap();
+        assert_eq!((comparison.pairs, comparison.all_below), (48, 0.0));
+        assert_eq!((comparison.ratios[0].below, comparison.ratios[0].trials.len()), (0.0, 0));
+        assert!(comparison.to_string().contains("48 of them stopped"), "{comparison}");
     }
 
     #[test]

@@ -20,7 +20,7 @@ use lab::simulation::Engine;
 use lab::transport::ChipOptions;
 
 /// Version of what a trial is: results of another one cannot be continued.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// An experiment.
 #[derive(Debug, Clone)]

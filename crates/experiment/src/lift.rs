@@ -104,9 +104,9 @@ pub struct Carried {
     pub free_sag_max_m: f64,
 }
 
-/// The figures of a case, mode by mode.
-pub fn carried(case: Case, results: &Results) -> Vec<Carried> {
-    let usual = ObjectSpec::new(ObjectKind::Weight).mass;
+/// The figures of a case, mode by mode; `mass` is the factor on the usual mass in all cases.
+pub fn carried(case: Case, results: &Results, mass: f64) -> Vec<Carried> {
+    let usual = mass * ObjectSpec::new(ObjectKind::Weight).mass;
     let [remembered_kg, carried_kg] = case.factors().map(|factor| factor * usual);
     let of_mode = |mode| {
         let sags: Vec<f64> = results.of(mode).map(|report| report.sag_m).collect();

@@ -37,7 +37,7 @@ const GRIP: f64 = 0.05;
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "outcome", content = "fault", rename_all = "snake_case")]
 pub enum Outcome {
-    /// Grasped, lifted, and still in the hand at the end.
+    /// Grasped, lifted, and at the end still in the hand: by two fingers, or one against the palm.
     Held,
     /// Leaned over 30 degrees before the grasp closed.
     KnockedOver,
@@ -45,7 +45,7 @@ pub enum Outcome {
     Missed,
     /// Moved out of the fingers' reach.
     PushedAway,
-    /// Raised, but not in the hand at the end.
+    /// Raised, but not in the hand at the end, or hanging on one finger.
     Dropped,
     /// A finger pressed harder than the object bears.
     Crushed,
@@ -58,6 +58,11 @@ pub enum Outcome {
 }
 
 impl Outcome {
+    /// True if the arm stopped by itself: what it did not do any more is no merit.
+    pub fn is_stopped(&self) -> bool {
+        matches!(self, Outcome::Stopped(_))
+    }
+
     /// Its letter in a map.
     pub fn letter(&self) -> char {
         match self {
@@ -276,7 +281,7 @@ pub fn judge(
 
 fn is_lifted(sample: &Sample, first: &Sample) -> bool {
     let distance = (0..3).map(|axis| (sample.object[axis] - sample.hand[axis]).powi(2)).sum::<f64>().sqrt();
-    sample.object[2] - first.object[2] >= LIFTED && distance < IN_HAND && sample.contact.touches()
+    sample.object[2] - first.object[2] >= LIFTED && distance < IN_HAND && is_grasped(sample)
 }
 
 /// Two fingers or more on the object, or one against the palm.
@@ -345,6 +350,20 @@ mod tests {
         // The fingers have moved 0.05 rad a tenth of a second after they began.
         assert!((measures.closing_s - 8.1).abs() < 0.02, "{}", measures.closing_s);
         assert_eq!((measures.failure_s, measures.lift_s), (None, 12.0));
+    }
+
+    #[test]
+    fn an_object_that_hangs_on_one_finger_is_not_held() {
+        let mut observation = good();
+        let last = observation.samples.last_mut().unwrap();
+        (last.contact.fingers, last.contact.palm) = ([8.0, 0.0, 0.0], 0.0);
+        assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default()).0, Outcome::Dropped);
+        // One against the palm, or against another, holds.
+        for (fingers, palm) in [([8.0, 0.0, 0.0], 3.0), ([8.0, 0.0, 8.0], 0.0)] {
+            let last = observation.samples.last_mut().unwrap();
+            (last.contact.fingers, last.contact.palm) = (fingers, palm);
+            assert_eq!(judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default()).0, Outcome::Held);
+        }
     }
 
     #[test]

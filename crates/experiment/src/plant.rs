@@ -70,7 +70,7 @@ pub fn options(arm: &Arm, noise_seed: u64, posture: [f64; 7], scene: Scene) -> S
 /// The error that the force sensor comes to in a run, N and N m, sensor axes.
 pub fn bias(arm: &Arm) -> [f64; 6] {
     let usual = if arm.kind == PlantKind::Perturbed { PERTURBED_BIAS } else { 0.0 };
-    let size = if arm.variation.bias > 0.0 { arm.variation.bias } else { usual };
+    let size = arm.variation.bias.unwrap_or(usual);
     let [x, y, z] = seed::direction(arm.seed).map(|part| size * part);
     [x, y, z, 0.0, 0.0, 0.0]
 }
@@ -117,5 +117,6 @@ mod tests {
         assert!((ratio - 1.3).abs() < 1e-12 && varied.imperfections.links == usual.imperfections.links);
         assert_eq!((varied.plant.torque_delay, varied.plant.force_torque.noise_scale), (CYCLE_TICKS, 3.0));
         assert!((bias_of(PlantKind::Perturbed, "bias=0.2") - 0.2).abs() < 1e-12);
+        assert_eq!(bias_of(PlantKind::Perturbed, "bias=0"), 0.0, "none is less than the usual one");
     }
 }

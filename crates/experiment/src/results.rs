@@ -255,9 +255,10 @@ pub struct Results {
 }
 
 impl Results {
-    /// Sorts reports.
+    /// Sorts reports, and takes the first of each trial: two programs at one folder may both have carried it out.
     pub fn new(mut reports: Vec<Report>) -> Results {
         reports.sort_by_key(|report| report.key);
+        reports.dedup_by_key(|report| report.key);
         Results { reports }
     }
 
@@ -378,6 +379,14 @@ fn number(value: f64) -> String {
 mod tests {
     use super::*;
     use crate::fixtures;
+
+    /// The change that makes it fail: every line of the file is a trial of its own.
+    #[test]
+    fn a_trial_that_two_programs_carried_out_counts_once() {
+        let once = fixtures::results(&[1]);
+        let twice = Results::new(once.reports.iter().chain(&once.reports).cloned().collect());
+        assert_eq!(twice, Results::new(once.reports));
+    }
 
     fn header(object: &str) -> Header {
         Header {

@@ -151,8 +151,8 @@ pub struct Summary {
     pub adaptation_deg: f64,
     /// Peak force on the object before the fingers close, N.
     pub contact_peak_n: Spread,
-    /// Share of the trials in which that peak, averaged over 100 ms, stays below the tipping force; `None` where
-    /// nothing can tip.
+    /// Share of the trials in which that peak, averaged over 100 ms, stays below the tipping force, and the arm does
+    /// not stop by itself; `None` where nothing can tip.
     pub below_tipping: Option<f64>,
     /// Way the object was pushed before the fingers close, m.
     pub push_m: Spread,
@@ -162,7 +162,8 @@ pub struct Summary {
     pub finger_grip_n: Spread,
     /// Force that a finger is asked for, N.
     pub finger_asked_n: Spread,
-    /// Share of the trials in which no finger presses with more than 1.5 times that.
+    /// Share of the trials in which no finger presses with more than 1.5 times that, and the arm does not stop by
+    /// itself.
     pub grip_as_asked: f64,
     /// Content of the wrist's force above 3 Hz from closing to lift, RMS, N.
     pub chatter_n: Spread,
@@ -188,8 +189,9 @@ impl Summary {
         cells.dedup();
         let count = |test: &dyn Fn(&Report) -> bool| reports.iter().filter(|report| test(report)).count();
         let mean = |word: &str| count(&|report| report.outcome.name() == word) as f64 / seeds.len().max(1) as f64;
-        let spread =
-            |value: fn(&Report) -> f64| Spread::of(&reports.iter().map(|report| value(report)).collect::<Vec<_>>());
+        // What an arm that stopped did not do any more is neither gentle nor firm.
+        let went_on = || reports.iter().filter(|report| !report.outcome.is_stopped());
+        let spread = |value: fn(&Report) -> f64| Spread::of(&went_on().map(|report| value(report)).collect::<Vec<_>>());
         let successes = || reports.iter().filter(|report| report.outcome.is_success());
         let farthest = reports
             .iter()
@@ -217,20 +219,21 @@ impl Summary {
             adaptation_deg: successes().map(|report| report.adaptation_deg).fold(0.0, f64::max),
             contact_peak_n: spread(|report| report.measures.contact_peak_n),
             below_tipping: tipping.map(|limit| {
-                count(&|report| report.measures.contact_sustained_n < limit) as f64 / reports.len().max(1) as f64
+                let gentle = went_on().filter(|report| report.measures.contact_sustained_n < limit);
+                gentle.count() as f64 / reports.len().max(1) as f64
             }),
             push_m: spread(|report| report.measures.push_m),
             finger_peak_n: spread(|report| report.measures.finger_peak_n),
             finger_grip_n: spread(|report| report.measures.hardest_finger()),
             finger_asked_n: spread(|report| report.measures.finger_asked_n),
-            grip_as_asked: count(&|report| {
-                report.measures.hardest_finger() <= GRIP_BAR * report.measures.finger_asked_n
-            }) as f64
+            grip_as_asked: went_on()
+                .filter(|report| report.measures.hardest_finger() <= GRIP_BAR * report.measures.finger_asked_n)
+                .count() as f64
                 / reports.len().max(1) as f64,
             chatter_n: spread(|report| report.measures.chatter_n),
             table_peak_n: spread(|report| report.measures.table_peak_n),
             sag_m: spread(|report| report.sag_m),
-            free_sag_m: Spread::of(&reports.iter().filter_map(|r| r.free_sag_m).map(f64::abs).collect::<Vec<_>>()),
+            free_sag_m: Spread::of(&went_on().filter_map(|r| r.free_sag_m).map(f64::abs).collect::<Vec<_>>()),
             shaking_rad_s: spread(|report| report.measures.shaking_rad_s),
             detection: Detection::of(reports.iter().copied()),
         }
@@ -241,6 +244,7 @@ impl Summary {
 mod tests {
     use super::*;
     use crate::fixtures;
+    use crate::outcome::Measures;
     use crate::results::Surprise;
 
     #[test]
@@ -265,6 +269,24 @@ mod tests {
             + summary.stopped;
         assert!((all - 48.0).abs() < 1e-9);
         assert!((summary.farthest_success_m - 0.268).abs() < 1e-3);
+    }
+
+    /// The change that makes it fail: what an arm that stopped did not do any more counts as done as it should be.
+    #[test]
+    fn a_trial_that_stopped_shows_no_gentleness_and_no_grip() {
+        let mut results = fixtures::results(&[1]);
+        for report in results.reports.iter_mut().filter(|report| report.key.mode == Mode::Adaptive) {
+            let measures = &mut report.measures;
+            (measures.contact_sustained_n, measures.finger_grip_n) = (9.0, [30.0; 3]);
+            report.sag_m = 0.01;
+            if report.key.index % 2 == 0 {
+                report.outcome = Outcome::Stopped("JointSpeed".to_owned());
+                (report.measures, report.sag_m) = (Measures::default(), 0.0);
+            }
+        }
+        let summary = Summary::of(&results, Mode::Adaptive, Some(2.0));
+        assert_eq!((summary.stopped, summary.below_tipping, summary.grip_as_asked), (24.0, Some(0.0), 0.0));
+        assert_eq!((summary.sag_m.median, summary.contact_peak_n.median > 0.0), (0.01, true));
     }
 
     #[test]

@@ -48,14 +48,15 @@ pub struct Trace {
 impl Trace {
     /// Largest distance (m) and angle (degrees) of the plan from the taught one, up to `end` (s).
     ///
-    /// `taught` is the plan without feedback at the control rate from the start of the movement.
-    pub fn adaptation(&self, taught: &[([f64; 3], [f64; 4])], end: f64) -> (f64, f64) {
+    /// `taught` is the plan without feedback at the control rate from the start of the movement, `speed` that of the
+    /// run relative to it.
+    pub fn adaptation(&self, taught: &[([f64; 3], [f64; 4])], speed: f64, end: f64) -> (f64, f64) {
         let Some(last) = taught.last() else {
             return (0.0, 0.0);
         };
         let mut largest = (0.0_f64, 0.0_f64);
         for cycle in self.cycles.iter().filter(|cycle| (0.0..=end).contains(&cycle.time)) {
-            let (position, orientation) = taught.get((cycle.time * RATE).round() as usize).unwrap_or(last);
+            let (position, orientation) = taught.get((cycle.time * speed * RATE).round() as usize).unwrap_or(last);
             let distance = (0..3).map(|axis| (cycle.position_d[axis] - position[axis]).powi(2)).sum::<f64>().sqrt();
             let angle = lab::demonstration::angle_between(&cycle.orientation_d, orientation).to_degrees();
             largest = (largest.0.max(distance), largest.1.max(angle));
@@ -143,14 +144,25 @@ pub(crate) mod tests {
             cycle.position_d = taught[index.min(299)].0;
             cycle.position[0] = 0.1;
         }
-        assert_eq!(trace.adaptation(&taught, 9.0), (0.0, 0.0));
+        assert_eq!(trace.adaptation(&taught, 1.0, 9.0), (0.0, 0.0));
         trace.cycles[200].position_d[0] += 0.05;
         let half = 5.0_f64.to_radians();
         trace.cycles[550].orientation_d = [half.cos(), half.sin(), 0.0, 0.0];
-        let (distance, angle) = trace.adaptation(&taught, 9.0);
+        let (distance, angle) = trace.adaptation(&taught, 1.0, 9.0);
         assert!((distance - 0.05).abs() < 1e-12 && (angle - 10.0).abs() < 1e-6);
         // After the movement the plan is another one: the lift is no adaptation.
-        assert!(trace.adaptation(&taught, 1.0).1 < 1e-9);
+        assert!(trace.adaptation(&taught, 1.0, 1.0).1 < 1e-9);
+    }
+
+    /// The change that makes it fail: the plan of a run is compared with the taught place at the same time.
+    #[test]
+    fn a_run_at_another_speed_has_adapted_to_nothing() {
+        let taught: Vec<_> = (0..300).map(|k| ([0.7, 0.2 + f64::from(k) * 1e-3, 0.0], [1.0, 0.0, 0.0, 0.0])).collect();
+        let mut trace = Trace { cycles: (0..140).map(|k| cycle(f64::from(k) / RATE)).collect() };
+        for (index, cycle) in trace.cycles.iter_mut().enumerate() {
+            cycle.position_d = taught[2 * index].0;
+        }
+        assert_eq!(trace.adaptation(&taught, 2.0, 9.0), (0.0, 0.0));
     }
 
     #[test]

@@ -195,8 +195,8 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
     let conduct = ArmConduct { fault: fault.as_deref(), shaking: shaking::amplitude(&telemetry) };
     let (outcome, mut measures) = outcome::judge(&observation, &marks, config.rule(), conduct);
     (measures.finger_asked_n, measures.chatter_n) = (asked(config), trace.chatter(measures.closing_s, measures.lift_s));
-    let movement = config.primitive.movement.duration.min(measures.lift_s);
-    let (adaptation_m, adaptation_deg) = trace.adaptation(&prepared.taught, movement);
+    let movement = (config.primitive.movement.duration / config.variation.speed).min(measures.lift_s);
+    let (adaptation_m, adaptation_deg) = trace.adaptation(&prepared.taught, config.variation.speed, movement);
     let report = Report {
         key,
         trial_seed: config.trial_seed(&key),

@@ -24,8 +24,8 @@ pub struct Variation {
     /// Whole control cycles of delay beyond the usual one.
     pub delay: u8,
     /// Error that the force sensor comes to within 2 s after the run has started and been tared, N; its direction is
-    /// drawn from the seed. An error from before would be tared away.
-    pub bias: f64,
+    /// drawn from the seed. An error from before would be tared away. `None`: that of the plant; 0: none at all.
+    pub bias: Option<f64>,
     /// Speed of the run, relative to the taught one; the primitive and what it expects are those of the taught speed.
     pub speed: f64,
 }
@@ -40,7 +40,7 @@ impl Default for Variation {
             link_mass: 1.0,
             noise: 1.0,
             delay: 0,
-            bias: 0.0,
+            bias: None,
             speed: 1.0,
         }
     }
@@ -60,6 +60,7 @@ const PARTS: [(&str, f64, f64); 9] = [
 ];
 
 impl Variation {
+    /// The value of each part; not a number for one that is left to the plant.
     fn values(&self) -> [f64; 9] {
         [
             self.mass,
@@ -69,7 +70,7 @@ impl Variation {
             self.link_mass,
             self.noise,
             f64::from(self.delay),
-            self.bias,
+            self.bias.unwrap_or(f64::NAN),
             self.speed,
         ]
     }
@@ -89,7 +90,7 @@ impl Variation {
             4 => self.link_mass = value,
             5 => self.noise = value,
             6 => self.delay = value as u8,
-            7 => self.bias = value,
+            7 => self.bias = Some(value),
             _ => self.speed = value,
         }
     }
@@ -99,7 +100,8 @@ impl Variation {
 impl fmt::Display for Variation {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let usual = Variation::default().values();
-        let parts = PARTS.iter().zip(self.values()).zip(usual).filter(|((_, value), usual)| value != usual);
+        let parts =
+            PARTS.iter().zip(self.values()).zip(usual).filter(|((_, value), usual)| !value.is_nan() && value != usual);
         for (index, (((name, ..), value), _)) in parts.enumerate() {
             write!(formatter, "{}{name}={value}", if index > 0 { "," } else { "" })?;
         }
@@ -143,6 +145,7 @@ mod tests {
             "mass=1.3",
             "table-friction=0.7,delay=1",
             "noise=3,bias=0.2",
+            "bias=0",
             "joint-friction=1.3,link-mass=0.9",
             "speed=1.8",
         ] {
@@ -165,7 +168,7 @@ mod tests {
 
     #[test]
     fn results_from_before_a_part_existed_are_read_with_its_usual_value() {
-        let old = r#"{"mass":1.3,"table_friction":1.0,"finger_friction":1.0,"joint_friction":1.0,"link_mass":1.0,"noise":1.0,"delay":0,"bias":0.0}"#;
+        let old = r#"{"mass":1.3,"table_friction":1.0,"finger_friction":1.0,"joint_friction":1.0,"link_mass":1.0,"noise":1.0,"delay":0}"#;
         assert_eq!(serde_json::from_str::<Variation>(old).unwrap(), "mass=1.3".parse().unwrap());
     }
 }

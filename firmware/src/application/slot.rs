@@ -1,5 +1,6 @@
 //! A slot begins: one third of a control cycle.
 
+use control::State;
 use device::{Controller, ControllerIo, CycleReport, Slot, TimedRecord};
 use embedded_hal::digital::{OutputPin, PinState};
 use heapless::spsc::{Consumer, Producer};
@@ -17,6 +18,10 @@ pub(crate) struct SlotQueues<C: Controller> {
     pub(crate) records: Producer<'static, TimedRecord<C::Record>>,
     pub(crate) events: Producer<'static, C::Event>,
 }
+
+/// Control cycles whose records nobody has taken, from which on the session does not come back: 0.5 s beyond what the
+/// queue holds. Stops of a person and the silence of a host come through it, and the watchdog hears the slots alone.
+const UNHEARD: u8 = 150;
 
 /// Parts of a slot that count as the cost of a control cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +42,8 @@ pub struct SlotTask<B: Board, C: Controller> {
     slot: Slot,
     lost_frames: u32,
     bus_offs: u32,
+    /// Control cycles in a row whose records found no room.
+    unheard: u8,
     /// Ticks of the slots of this cycle so far.
     spent: u32,
 }
@@ -81,7 +88,18 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
         queues: SlotQueues<C>,
         measured: Cost,
     ) -> Self {
-        Self { clock, timer, light, queues, measured, slot: Slot::Request, lost_frames: 0, bus_offs: 0, spent: 0 }
+        Self {
+            clock,
+            timer,
+            light,
+            queues,
+            measured,
+            slot: Slot::Request,
+            lost_frames: 0,
+            bus_offs: 0,
+            unheard: 0,
+            spent: 0,
+        }
     }
 
     /// Computes one slot. Afterwards the transmitter and the session are due.
@@ -129,8 +147,13 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
             timed.cost_ticks = cost_ticks;
             // A light that cannot be switched must not stop the arm.
             let _ = self.light.set_state(PinState::from(timed.record.state().has_torque()));
-            // A session that lags some 30 ms behind loses telemetry, which its host sees by the cycle numbers.
-            let _ = self.queues.records.enqueue(*timed);
+            // A session that lags some 50 ms behind loses telemetry, which its host sees by the cycle numbers.
+            let is_heard = self.queues.records.enqueue(*timed).is_ok();
+            self.unheard = if is_heard { 0 } else { self.unheard.saturating_add(1) };
+            let moves = matches!(timed.record.state(), State::Gravity | State::Approach | State::Run);
+            if self.unheard >= UNHEARD && moves {
+                core.lock(|core| core.note_overrun());
+            }
         }
         self.slot = slot.next();
         if self.timer.is_due() {

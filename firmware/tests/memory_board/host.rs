@@ -10,7 +10,7 @@ use control::Payload;
 use control::model::{ArmModel, Frames};
 use control::units::JointPositions;
 use device::storage::Opening;
-use device::{DeviceController, FaultMemory, Store};
+use device::{Controller as _, DeviceController, FaultMemory, Store};
 use firmware::application::{
     self, Application, ArmSession, CorePlace, Log, LogTask, Memory, ReceiveTask, SessionTask, SlotTask, StackUse,
     StorageScratch, TransmitTask,
@@ -95,9 +95,22 @@ pub(crate) struct Host {
     sequence: u16,
     device_ms: u32,
     events: Vec<Event>,
+    /// The session's task does not come back: a defect that no test knows.
+    session_hangs: bool,
 }
 
 impl Host {
+    /// From now on the task of the session does not come back, or it does again.
+    pub(crate) fn hang(&mut self, session_hangs: bool) {
+        self.session_hangs = session_hangs;
+    }
+
+    /// State and fault of the control half, which nobody has to ask the session for.
+    pub(crate) fn core(&self) -> (control::State, control::Fault) {
+        let health = self.core.0.borrow().health();
+        (health.state, health.fault)
+    }
+
     /// Power on: an arm in its home posture, a device with this flash.
     pub(crate) fn new(chip: FlashChip) -> Self {
         set_now(0);
@@ -131,6 +144,7 @@ impl Host {
             sequence: 0,
             device_ms: 0,
             events: Vec::new(),
+            session_hangs: false,
         }
     }
 
@@ -169,10 +183,12 @@ impl Host {
                 self.silicon.borrow_mut().next_slot = Some(slot + SLOT_TICKS);
                 self.slot_task.run(self.core.clone(), self.can.clone(), &self.meters);
                 self.transmit();
-                let (task, core, meters) = (&mut self.session_task, self.core.clone(), &self.meters);
-                let news = self.session.lock(|session| task.run(session, core, meters, StackUse::default));
-                if news {
-                    self.log_task.run(&self.meters, &mut self.notes);
+                if !self.session_hangs {
+                    let (task, core, meters) = (&mut self.session_task, self.core.clone(), &self.meters);
+                    let news = self.session.lock(|session| task.run(session, core, meters, StackUse::default));
+                    if news {
+                        self.log_task.run(&self.meters, &mut self.notes);
+                    }
                 }
             }
         }

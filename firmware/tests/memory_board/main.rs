@@ -5,7 +5,7 @@ mod board;
 mod host;
 mod names;
 
-use control::State;
+use control::{Fault, State};
 use device::Stage;
 use flash::{Flash, FlashChip, FlashTimes};
 use host::Host;
@@ -74,6 +74,42 @@ fn the_application_starts_up_takes_an_upload_runs_it_and_stops() {
     assert_eq!(statistics.missed_deadlines, 0);
     assert_eq!(statistics.lost_replies, 0);
     assert!(host.log().events > 5, "the log heard nothing");
+}
+
+/// Nobody but the session hears a stop, or a host that falls silent, and the watchdog is fed by the slots alone. The
+/// change that makes it fail: records that nobody takes are counted by nobody.
+#[test]
+fn d2_a_session_that_hangs_stops_an_arm_that_moves_and_lets_one_that_holds_be() {
+    let mut host = Host::new(FlashChip::new(Flash::blank(FlashTimes::TYPICAL)));
+    host.greet();
+    start_up(&mut host);
+    host.wait(5.0);
+    host.greet();
+    host.accepted(Request::Hold);
+    host.stay(1.0);
+    host.hang(true);
+    host.wait(2.0);
+    assert_eq!(host.core(), (State::Hold, Fault::None));
+    host.hang(false);
+    host.greet();
+    host.accepted(Request::Approach { q: host::start_posture(), duration: 20.0 });
+    host.stay(1.0);
+    assert_eq!(host.core(), (State::Approach, Fault::None));
+    host.hang(true);
+    // A session that works for long in one go is none that hangs.
+    host.wait(0.4);
+    assert_eq!(host.core(), (State::Approach, Fault::None));
+    host.wait(0.3);
+    assert_eq!(host.core(), (State::SoftStop, Fault::Overrun));
+    // It comes back: cleared, the arm holds and moves again.
+    host.hang(false);
+    host.stay(1.0);
+    host.greet();
+    host.accepted(Request::ClearFault);
+    host.accepted(Request::Hold);
+    host.accepted(Request::Approach { q: host::start_posture(), duration: 0.0 });
+    host.wait_for("the approach", |event| event.kind == EventKind::Arrived);
+    assert_eq!(host.core(), (State::Hold, Fault::None));
 }
 
 #[test]

@@ -325,6 +325,7 @@ mod work {
         let out = config.out.clone().unwrap_or_default();
         let mut rows = Vec::new();
         let mut texts = Vec::new();
+        let usual = config.variation.mass;
         for case in Case::ALL {
             let shared = out.join(format!("{}-{}.toml", config.scenario, case.rehearsed_as().name()));
             let primitive = if shared.is_file() {
@@ -341,7 +342,7 @@ mod work {
             let folder = config.out.clone().unwrap_or_default();
             std::fs::create_dir_all(&folder).map_err(|cause| unwritable(&folder, cause))?;
             let (experiment, wall) = carry(&config, interrupt, output)?;
-            rows.extend(lift::carried(case, &experiment.results));
+            rows.extend(lift::carried(case, &experiment.results, usual));
             let (_, text) = report(&config, &experiment, &folder, render, output, wall)?;
             texts.push(text);
         }

@@ -128,7 +128,9 @@ impl Fault {
             Fault::SafetyDropped => "the safety module took torque away; see the pendant, activate again, then clear",
             Fault::WrenchLost => "the force sensor fell silent during a motion; check its cable",
             Fault::BusFault => "the CAN bus or a puck failed; torque was taken off, see the device log",
-            Fault::Overrun => "the control cycle missed its deadline too often; this is a defect, keep the record",
+            Fault::Overrun => {
+                "the control cycle missed its deadline too often, or the session did not come back; this is a defect, keep the record"
+            }
             Fault::EncoderStuck => {
                 "the counts of a motor stood still while it turned; check the encoder cable, then zero the arm again"
             }

@@ -108,8 +108,8 @@ pub struct Client<T: Transport> {
     took: VecDeque<Duration>,
     /// A motion of the arm that this host has ordered goes on.
     moving: bool,
-    /// This host has ordered a motion of the hand, which may go on.
-    hand_ordered: bool,
+    /// Until then a motion of the hand that this host has ordered may go on.
+    hand_moves_until: Duration,
     observing: bool,
     open: bool,
     timeout: Duration,
@@ -156,7 +156,7 @@ impl<T: Transport> Client<T> {
             round_trips: RoundTrips::default(),
             took: VecDeque::new(),
             moving: false,
-            hand_ordered: false,
+            hand_moves_until: Duration::ZERO,
             observing: false,
             open: false,
             timeout: ANSWER_TIMEOUT,
@@ -296,8 +296,9 @@ impl<T: Transport> Client<T> {
         let reply = if request.moves() { self.exchange(request) } else { self.exchange_when_read(request) }?;
         match request {
             Request::Gravity | Request::Approach { .. } | Request::Run { .. } => self.moving = true,
-            Request::MoveHand { .. } | Request::InitialiseHand => self.hand_ordered = true,
-            Request::Stop => (self.moving, self.hand_ordered) = (false, false),
+            Request::MoveHand { duration, .. } => self.hand_may_move_for(*duration),
+            Request::InitialiseHand => self.hand_may_move_for(0.0),
+            Request::Stop => (self.moving, self.hand_moves_until) = (false, Duration::ZERO),
             Request::Hold | Request::Release => self.moving = false,
             _ => {}
         }

@@ -13,6 +13,10 @@ use crate::transport::Transport;
 /// after the command; this leaves room for a slow line.
 const STOP_TIMEOUT: Duration = Duration::from_millis(200);
 
+/// Longest time that an initialisation of the hand takes, or a motion of it whose duration the device chooses; behind a
+/// motion of another duration it is more than enough.
+const HAND_CHOOSES: Duration = Duration::from_secs(10);
+
 impl<T: Transport> Client<T> {
     /// Tells the device at which joint angles (rad) the arm stands now.
     ///
@@ -122,12 +126,19 @@ impl<T: Transport> Client<T> {
         }
     }
 
+    /// A motion of the hand begins that takes so long, s; 0 is as long as the device chooses, or an initialisation
+    /// takes.
+    pub(super) fn hand_may_move_for(&mut self, seconds: f32) {
+        let asked = Duration::try_from_secs_f32(seconds).unwrap_or_default();
+        self.hand_moves_until = self.now() + asked + HAND_CHOOSES;
+    }
+
     /// Stops the arm because the user asked to; the error to end with.
     ///
     /// Nothing is stopped where this host has set nothing in motion: what moves is another's, and `tactus stop` is
     /// there for it.
     pub(super) fn interrupted(&mut self) -> HostError {
-        if !self.moving && !self.hand_ordered {
+        if !self.moving && self.now() >= self.hand_moves_until {
             return HostError::Left;
         }
         // Stopping waits for answers, and must not be interrupted by the wish to stop.

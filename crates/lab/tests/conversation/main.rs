@@ -287,6 +287,26 @@ fn an_interrupt_stops_the_arm_before_the_command_ends() {
     assert_eq!(client.transport().half.state, State::SoftStop);
 }
 
+/// The change that makes it fail: a motion of the hand counts as going on until somebody stops it.
+#[test]
+fn an_interrupt_long_after_a_motion_of_the_hand_lets_an_arm_that_holds_be() {
+    for (seconds, stops) in [(0.5, true), (20.0, false)] {
+        let mut client = connected();
+        let interrupt = Interrupt::never();
+        client.set_interrupt(interrupt.clone());
+        client.hold().unwrap();
+        client.move_hand([0.0, 0.5, 0.5, 0.5], 1.0).unwrap();
+        let end = client.now() + Duration::from_secs_f64(seconds);
+        while client.now() < end {
+            client.next(Duration::from_millis(100)).unwrap();
+        }
+        interrupt.raise();
+        let error = client.next(Duration::from_secs(10)).unwrap_err();
+        assert_eq!(matches!(error, HostError::Interrupted), stops, "{error:?} after {seconds} s");
+        assert_eq!(client.transport().half.state == State::SoftStop, stops, "after {seconds} s");
+    }
+}
+
 #[test]
 fn dropping_a_client_that_moved_the_arm_says_stop() {
     let mut seen = Vec::new();
