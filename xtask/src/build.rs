@@ -73,10 +73,17 @@ fn board_image(toolchain: Toolchain, board: Board, may_sleep: bool) -> Result<Pa
     let folder = shell::target_dir().join("images");
     fs::create_dir_all(&folder)?;
     let image = folder.join(board.file());
-    fs::copy(&built, &image).with_context(|| format!("cannot copy {}", built.display()))?;
+    place(&built, &image)?;
     shell::note(&format!("image: {}", image.display()));
     nothing_forbidden(&image, board)?;
     Ok(image)
+}
+
+/// Copies a file to where the tools look for it, in one step: somebody may be loading the one that is there.
+pub(crate) fn place(built: &Path, there: &Path) -> Result<()> {
+    let fresh = there.with_extension("new");
+    fs::copy(built, &fresh).with_context(|| format!("cannot copy {}", built.display()))?;
+    fs::rename(&fresh, there).with_context(|| format!("cannot write {}", there.display()))
 }
 
 /// Fails if an image contains what none may: an allocator, unknown panics, a path deeper than its stack.

@@ -3,6 +3,7 @@
 use anyhow::Result;
 
 use crate::board::Board;
+use crate::lane::Lane;
 use crate::setup::{self, ARM, HAND, Machine};
 use crate::{budget, build, docs, emulated, fuzz, hand, house, package, shell, test};
 
@@ -26,24 +27,44 @@ fn checks() -> Result<()> {
     docs::run()?;
     house::run(None)?;
     let machine = setup::all()?;
+    let images = Lane::begin(&["ci", "images"])?;
     lint_host()?;
-    lint_firmware(&machine)?;
-    emulated::lint()?;
-    libraries_without_std(&machine)?;
     plain_root()?;
     crate::faults(&[])?;
     crate::faults(&["storm", "--runs", "300"])?;
     crate::faults(&["endurance"])?;
     fuzz::run(fuzz::USUAL)?;
     package::run()?;
-    emulated::run(None)?;
-    test::run(&machine)?;
+    images.end()?;
+    build::host()?;
+    let board = Lane::begin(&["ci", "board"])?;
+    test::with_the_world()?;
+    test::firmware()?;
     crate::faults(&["--device", "sim:"])?;
     build::documentation()?;
+    board.end()?;
     budget::run(&machine)?;
     hand::run(&machine)?;
     build::nothing_twice()?;
     build::panics()
+}
+
+/// Lints and builds of the images and of the board's emulator: the part of the checks that builds nothing for this
+/// machine's folder, so that it can go on beside the others.
+pub(crate) fn images() -> Result<()> {
+    let machine = setup::all()?;
+    lint_firmware(&machine)?;
+    emulated::lint()?;
+    libraries_without_std(&machine)?;
+    build::image(&machine)?;
+    hand::image(&machine)?;
+    emulated::build(machine.toolchain).map(drop)
+}
+
+/// Trial of the image on the emulated board, and the tests of that emulator; the `tactus` command is there already.
+pub(crate) fn board() -> Result<()> {
+    emulated::run(None)?;
+    emulated::test()
 }
 
 fn lint_host() -> Result<()> {

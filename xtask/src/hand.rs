@@ -48,7 +48,7 @@ pub(crate) fn image(machine: &Machine) -> Result<PathBuf> {
     let folder = shell::target_dir().join("images");
     fs::create_dir_all(&folder)?;
     let image = folder.join(build::HAND);
-    fs::copy(&built, &image).with_context(|| format!("cannot copy {}", built.display()))?;
+    build::place(&built, &image)?;
     shell::note(&format!("image: {}", image.display()));
     check(&image)?;
     Ok(image)

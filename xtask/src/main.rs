@@ -15,6 +15,7 @@ mod fuzz;
 mod hand;
 mod hot;
 mod house;
+mod lane;
 mod mutants;
 mod origin;
 mod package;
@@ -46,7 +47,7 @@ cargo xtask <verb>
            --build: only make what `--device board:` needs; --image FILE: run that image
   demo     teach, learn, check, upload and run a movement on the simulated arm
   test     every test, whole-system tests under QEMU included
-  ci       what a change must pass: format, lints, builds, tests, budgets
+  ci       what a change must pass: format, lints, builds, tests, budgets; a part of it alone: ci images, ci board
   budget   instructions per control cycle, interrupt latency, stack, flash and RAM of the image
   stack    how deep the stack of every image that is there goes, function by function
            --image FILE: of one image
@@ -137,6 +138,8 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["demo", rest @ ..] => demo::run(rest)?,
         ["test"] => test::run(&setup::all()?)?,
         ["ci"] => ci::run()?,
+        ["ci", "images"] => ci::images()?,
+        ["ci", "board"] => ci::board()?,
         ["budget"] => budget::run(&setup::all()?)?,
         ["size"] => {
             let image = build::image(&setup::all()?)?;

@@ -30,10 +30,7 @@ pub(crate) fn emulator() -> Result<PathBuf> {
     let folder = shell::target_dir().join("images");
     fs::create_dir_all(&folder)?;
     let emulator = folder.join(FILE);
-    // A copy over a program that runs is refused; another file in its place is not.
-    let fresh = folder.join(format!("{FILE}.new"));
-    fs::copy(&built, &fresh).with_context(|| format!("cannot copy {}", built.display()))?;
-    fs::rename(&fresh, &emulator)?;
+    build::place(&built, &emulator)?;
     shell::note(&format!("emulator: {}", emulator.display()));
     Ok(emulator)
 }
