@@ -106,6 +106,26 @@ fn one_corrupt_reply_is_not_believed_and_two_that_agree_are() {
     assert!(state.dq[1].abs() < 1.0, "and it is no velocity: {:?}", state.dq);
 }
 
+/// The change that makes it fail: gauges that were measured once are good for a zero for ever.
+#[test]
+fn gauges_that_fell_silent_are_no_zero() {
+    let mut hand = HandEstimator::<f64>::new();
+    let mut settle = |counts: Option<u16>, cycles: u32, tare: bool| {
+        let replies = HandSample { gauges: [counts; 3], ..sample([0.5; 3], [0.1; 3], 0.0, [2000; 3]) };
+        (0..cycles).for_each(|_| drop(hand.update(Some(&replies))));
+        if tare {
+            hand.tare();
+        }
+        hand.state().expect("known").gauges[0]
+    };
+    assert!(settle(Some(2000), 300, true).abs() < 1e-9);
+    // It is pressed on, and then the gauges fall silent: what presses is no zero.
+    let pressed = settle(Some(2300), 300, false);
+    assert!(pressed.abs() > 0.05, "{pressed}");
+    assert!((settle(None, 300, true) - pressed).abs() < 0.01);
+    assert!(settle(Some(2000), 300, false).abs() < 0.01, "the zero of before");
+}
+
 #[test]
 fn a_gauge_is_the_torque_of_the_environment_on_the_finger_from_its_tared_zero() {
     // The curve at 1950 and 2500 counts: 0.0342 and 0.1885 N m with which the finger presses.

@@ -174,9 +174,9 @@ impl<R: Real> HandEstimator<R> {
         })
     }
 
-    /// Takes the present gauges as zero, if any have been measured.
+    /// Takes the present gauges as zero. Those that fell silent stay as they are: what pressed on them is no zero.
     pub fn tare(&mut self) {
-        if self.gauge_age.is_some() {
+        if self.gauge_age.is_some_and(|age| age <= LOST_CYCLES) {
             self.zero = (*self.gauge.output()).into();
             self.tared = true;
         }
@@ -187,6 +187,9 @@ impl<R: Real> HandEstimator<R> {
     pub fn tare_drift(&mut self) {
         if !self.tared {
             self.tare();
+            return;
+        }
+        if self.gauge_age.is_none_or(|age| age > LOST_CYCLES) {
             return;
         }
         for (zero, now) in self.zero.iter_mut().zip(self.gauge.output().iter()) {
