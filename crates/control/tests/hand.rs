@@ -112,7 +112,9 @@ fn gauges_that_fell_silent_are_no_zero() {
     let mut hand = HandEstimator::<f64>::new();
     let mut settle = |counts: Option<u16>, cycles: u32, tare: bool| {
         let replies = HandSample { gauges: [counts; 3], ..sample([0.5; 3], [0.1; 3], 0.0, [2000; 3]) };
-        (0..cycles).for_each(|_| drop(hand.update(Some(&replies))));
+        for _ in 0..cycles {
+            hand.update(Some(&replies));
+        }
         if tare {
             hand.tare();
         }
