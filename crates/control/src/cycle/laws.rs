@@ -198,7 +198,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.pending = Some(Event::Surprised { phase: surprise.progress, channel: surprise.channel });
             }
         }
-        let deviation = run.deviation().copied().filter(|_| options.force_control);
+        let deviation = run.steadied().filter(|_| options.force_control);
         self.hand.follow(
             &HandReference { q: posture_and_hand(&plan.points.x).1, dq: posture_and_hand(&plan.points.v).1 },
             deviation.map(|deviation| deviation.expected_gauges),

@@ -69,6 +69,8 @@ pub(crate) struct Run<R: Real, const N: usize> {
     deviation: Option<Deviation<R>>,
     /// The filtered deviation, by which a compliant run bends, and any run in which the hand grips.
     smoothed: SmoothedWrench<R>,
+    /// True while the hand holds something.
+    gripping: bool,
     watch: Watch<R>,
     /// Control periods of fading left: `FADE` in full, 0 gone.
     kept: u16,
@@ -127,6 +129,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             coupling: Coupling::NONE,
             deviation: None,
             smoothed: SmoothedWrench::new(),
+            gripping: false,
             watch: Watch::new(),
             kept: FADE,
             settled: false,
@@ -154,6 +157,12 @@ impl<R: Real, const N: usize> Run<R, N> {
             self.rested = 0;
         }
         Ok(())
+    }
+
+    /// The deviation as force control takes it: while the hand holds something, without what swings. The inertia of an
+    /// object behind the sensor would drive the cables.
+    pub(crate) fn steadied(&self) -> Option<Deviation<R>> {
+        self.deviation.map(|deviation| if self.gripping { deviation.smoothed(&self.smoothed) } else { deviation })
     }
 
     /// True while the goal is on its way to the one that was commanded.
@@ -221,6 +230,7 @@ impl<R: Real, const N: usize> Run<R, N> {
         gripping: bool,
         senses: Senses,
     ) -> Result<Reference<R>, RolloutError> {
+        self.gripping = gripping;
         self.kept = match senses {
             Senses::Lost => self.kept.saturating_sub(1),
             _ => FADE.min(self.kept + 1),

@@ -3,7 +3,7 @@
 use control::command::{Command, RunOptions};
 use control::sense::hand::LOST_CYCLES;
 use control::time::periods;
-use control::{Event, Refusal, State, flags};
+use control::{Event, PERIOD, Refusal, State, flags};
 
 use crate::hand_plant::Hand;
 use crate::primitives::{Design, START, primitive};
@@ -154,6 +154,40 @@ fn closing_on_an_object_reads_as_a_negative_gauge_whatever_its_zero() {
         assert!((gauges[1] + 0.3).abs() < 0.01, "{gauges:?}");
         assert!(gauges[0].abs() < 2e-3 && gauges[2].abs() < 2e-3, "{gauges:?}");
     }
+}
+
+/// Swing of the torque of J1 (N m) under force control while the sensor feels 2 N sideways that swing at 20 Hz; with
+/// something in the hand, or nothing.
+fn swing(held: bool) -> f64 {
+    let mut rig = holding();
+    if held {
+        rig.plant.hand.as_mut().expect("fitted").object = [Some((1.0, 30.0)); 3];
+    }
+    rig.load(&primitive(&closing(1.6, [0.0; 3]))).expect("loads");
+    let options = RunOptions { force_control: true, compliant: true, ..RunOptions::default() };
+    rig.command(Command::Run(options));
+    rig.run_for(2.0);
+    let mut torques = Vec::new();
+    for cycle in 0..periods(0.8) {
+        rig.plant.push[1] = 2.0 * (f64::from(cycle) * PERIOD * 20.0 * std::f64::consts::TAU).sin();
+        let record = rig.tick(None).record;
+        assert_eq!(record.state, State::Run);
+        // The first half second is for what is slow.
+        if f64::from(cycle) * PERIOD > 0.5 {
+            torques.push(f64::from(record.tau[0]));
+        }
+    }
+    let [low, high] = [f64::min, f64::max].map(|pick| torques.iter().copied().reduce(pick).expect("some"));
+    high - low
+}
+
+/// An object in the hand weighs more than a joint of the wrist: without friction, its inertia and Eq (12) swung J1 at
+/// 20 Hz. The change that makes it fail: Eq (12) takes what swings while something is gripped.
+#[test]
+fn g10_a_force_that_swings_in_a_grip_is_not_pressed_against() {
+    let (held, free) = (swing(true), swing(false));
+    println!("{held} N m, {free} N m with nothing in the hand");
+    assert!(free > 0.5 && held < 0.3 * free, "{held} N m, {free} N m with nothing in the hand");
 }
 
 /// Torque with which F2 presses on an object at the end of a run that closes on it.

@@ -45,6 +45,8 @@ const WINDOW: f64 = 0.35;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Law {
     Hold,
+    /// Moves to another posture.
+    Approach,
     /// Led by hand.
     Teach,
     SoftStop,
@@ -132,6 +134,16 @@ fn settled(gains: &Gains<f64>, law: Law, q: [f64; 7], variation: Variation, bias
     match law {
         Law::Hold | Law::Teach => {}
         Law::SoftStop => arm.command(Command::Stop),
+        Law::Approach => {
+            // Slowly, and away from the nearer limit; the trial of the motors with which it begins is over by then.
+            let there = arm.tick(None).record.q;
+            let target = core::array::from_fn(|at| {
+                let middle = 0.5 * (model::SOFT_MIN[at] + model::SOFT_MAX[at]);
+                there[at] + if f64::from(there[at]) < middle { 0.05 } else { -0.05 }
+            });
+            arm.command(Command::Approach { q: target, duration: 30.0 });
+            arm.run_for(3.0);
+        }
         Law::Run { compliant, feedback, force } => {
             arm.command(Command::Tare);
             while arm.number < 3000 && arm.tick(None).record.dq.iter().any(|v| v.abs() > 0.02) {}
@@ -185,6 +197,7 @@ fn course(
     }
     let wanted = match law {
         Law::Hold => State::Hold,
+        Law::Approach => State::Approach,
         Law::Teach => State::Gravity,
         Law::SoftStop => State::SoftStop,
         Law::Run { .. } => State::Run,
