@@ -1,5 +1,6 @@
 //! `Law`: what acts in the present state, with all that the state remembers. Leaving a state drops what it remembered.
 
+use nalgebra::Vector3;
 use puck::Transmission;
 
 use crate::guard::disagreement::{Effort, Plan};
@@ -7,10 +8,11 @@ use crate::law::breakaway::Breakaway;
 use crate::law::integral::PostureIntegral;
 use crate::law::joint::JointController;
 use crate::law::operational::OperationalController;
+use crate::law::settling::Settling;
 use crate::model::friction;
 use crate::plan::approach::Approach;
 use crate::plan::reference::JointReference;
-use crate::real::{Real, at_least, at_most, within};
+use crate::real::{Real, at_least, at_most, sqrt, within};
 use crate::sense::drift::Drift;
 use crate::sense::joints::JointState;
 use crate::time::{PERIOD, periods};
@@ -183,6 +185,8 @@ pub(super) struct Running<R: Real> {
     pub(super) drift: Drift<R>,
     /// Torque of Eq (12) in the last cycle (N m).
     pub(super) pressing: Vector7<R>,
+    /// Keeps a compliant arm that touches nothing on its plan, against friction and the error of the model.
+    pub(super) settling: Settling<R>,
 }
 
 /// The tool against the plan in the last cycle.
@@ -195,6 +199,11 @@ pub(super) struct Lag<R: Real> {
 }
 
 impl<R: Real> Lag<R> {
+    /// From the way to the plan (m) and the speed against it (m/s).
+    pub(super) fn new(way: &Vector3<R>, speed: R) -> Self {
+        Lag { distance: sqrt(way.dot(way)), speed }
+    }
+
     /// The tool is where the plan is.
     pub(super) fn none() -> Self {
         Lag { distance: R::constant(0.0), speed: R::constant(0.0) }
@@ -220,6 +229,12 @@ impl<R: Real> Ramp<R> {
     /// Nothing to take away.
     pub(super) fn none() -> Self {
         Ramp { torque: Vector7::zeros(), left: 0, slope: R::constant(0.0) }
+    }
+
+    /// Returns the torque of a joint that is taken away in this control period (N m).
+    pub(super) fn fall(&self, joint: usize) -> R {
+        let torque = if self.left > 0 { self.torque.get(joint) } else { None };
+        torque.map_or(R::constant(0.0), |torque| *torque * self.slope)
     }
 
     /// Returns the torque of this control period (N m).

@@ -170,22 +170,26 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         Demand { torque, q_d: reference.q, pose_d, explained, ..self.plain(measured, Vector7::zeros()) }
     }
 
+    /// Returns the age of the sensor's values; all of a tick in which a position is missing are old.
+    fn senses(&self, measured: &Measured<'_, R>) -> Senses {
+        match self.wrench.age() {
+            Some(0) if measured.state.missing == 0 => Senses::Fresh,
+            Some(age) if age <= WRENCH_AGE => Senses::Frozen,
+            _ => Senses::Lost,
+        }
+    }
+
     /// Eqs (8), (9), (11), (10), (12), (13), and the hand's part for Eq (14).
     ///
     /// Not inlined: the memory map of a board names it.
     #[inline(never)]
     fn run_primitive(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
+        let senses = self.senses(measured);
         let (Law::Run(running), Some(run), Some(primitive)) = (&mut self.law, &mut self.run, self.loaded.get()) else {
             // A run begins with a primitive, and no other is loaded meanwhile; else the arm floats.
             return self.float(measured);
         };
-        let Running { operational, controller, handover, lag, drift, pressing } = running;
-        let frozen = measured.state.missing > 0;
-        let senses = match self.wrench.age() {
-            Some(0) if !frozen => Senses::Fresh,
-            Some(age) if age <= WRENCH_AGE => Senses::Frozen,
-            _ => Senses::Lost,
-        };
+        let Running { operational, controller, handover, lag, drift, pressing, settling } = running;
         let (options, tracking) = (run.options, self.gains.tracking(run.options.compliant));
         let hand = self.hand.answering().filter(HandState::feels);
         let gauges = hand.as_ref().map(|hand| &hand.gauges);
@@ -217,8 +221,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             let behind = lag.distance * R::constant(1.0 / TRACKING_LIMIT);
             run.crowd(at_least(speed_load(measured.frames, &reference.dq), behind));
         }
-        let trust = if options.compliant { Trust::Compliant } else { Trust::Stiff };
-        let velocity = self.observer.velocity(measured.state, trust);
+        let velocity = self.observer.velocity(measured.state, Trust::of_run(options.compliant));
         let mut torque =
             controller.torque(&self.model, tracking, measured.frames, measured.state, &velocity, &reference);
         let explained = (torque.0 - controller.feedback(), reference.ddq.0);
@@ -242,15 +245,14 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         let surprise = run.surprise();
         set |= if surprise > R::constant(1.0) { flags::SURPRISE } else { 0 };
-        if run.is_faded(primitive) {
-            set |= flags::FEEDBACK_FADED;
+        set |= if run.is_faded(primitive) { flags::FEEDBACK_FADED } else { 0 };
+        set |= if operational.is_clamped() { flags::CLAMPED } else { 0 };
+        let free = senses == Senses::Fresh && drift.is_free() && !self.hand.is_gripping() && !self.cut.is_cut();
+        if options.compliant && free {
+            settling.step(&tracking.stiffness, measured.state, &reference, |joint| handover.fall(joint));
         }
-        if operational.is_clamped() {
-            set |= flags::CLAMPED;
-        }
-        torque.0 += handover.step();
-        let offset = task.pose.position - measured.pose.position;
-        *lag = Lag { distance: sqrt(offset.dot(&offset)), speed: operational.lag() };
+        torque.0 += handover.step() + settling.torque();
+        *lag = Lag::new(&(task.pose.position - measured.pose.position), operational.lag());
         Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, surprise, flags: set, explained }
     }
 }

@@ -10,6 +10,7 @@ use crate::guard::supervisor::{State, Trigger};
 use crate::law::force::ForceController;
 use crate::law::joint::JointController;
 use crate::law::operational::OperationalController;
+use crate::law::settling::Settling;
 use crate::plan::approach::Approach;
 use crate::plan::primitive::Primitive;
 use crate::real::{Real, within};
@@ -117,6 +118,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             lag: Lag::none(),
             drift: Drift::new(),
             pressing: Vector7::zeros(),
+            settling: Settling::new(),
         });
     }
 

@@ -8,6 +8,7 @@ pub mod hand;
 pub mod integral;
 pub mod joint;
 pub mod operational;
+pub mod settling;
 pub mod window;
 
 pub use force::ForceController;
@@ -16,4 +17,5 @@ pub use hand::HandController;
 pub use integral::PostureIntegral;
 pub use joint::JointController;
 pub use operational::OperationalController;
+pub use settling::Settling;
 pub use window::Window;

@@ -64,6 +64,13 @@ pub enum Trust {
     Approach,
 }
 
+impl Trust {
+    /// That of a run.
+    pub fn of_run(compliant: bool) -> Self {
+        if compliant { Trust::Compliant } else { Trust::Stiff }
+    }
+}
+
 /// Gains of the correction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Correction<R: Real> {

@@ -13,6 +13,7 @@ mod lowering;
 mod postures;
 mod primitives;
 mod rig;
+mod settling;
 mod shoves;
 mod tracking;
 mod weight;

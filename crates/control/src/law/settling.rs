@@ -1,0 +1,162 @@
+//! `Settling`: the integral of a compliant run, which keeps an arm that touches nothing on its plan.
+//!
+//! The soft spring of a compliant run rests up to 0.04 rad beside its plan for friction, and as far for what the model
+//! lacks in gravity: 1 to 3 cm at the hand. While nothing is touched a torque per joint is therefore moved towards the
+//! error:
+//!
+//! * in proportion to what the error exceeds half of [`TOLERANCE`] by, at most all of [`CLAMP`] in [`RISE`]. Slower
+//!   than the spring and its damping, so that an arm without friction does not swing about its plan;
+//! * not where a joint closes its error at that rate already: more torque would only carry it past;
+//! * within 1.5 times the friction of the model: an obstacle that no sensor feels is pressed with that much more, and
+//!   no more with time.
+//!
+//! The caller leaves it as it is while something is touched: there the feedback decides how hard.
+
+use crate::law::integral::TOLERANCE;
+use crate::model::wam7;
+use crate::plan::reference::JointReference;
+use crate::real::{Real, within};
+use crate::sense::joints::JointState;
+use crate::time::PERIOD;
+use crate::units::{JOINTS, Vector7};
+
+/// Largest torque (N m): enough for friction that is 30 % more than the model's, with 20 % to spare.
+const CLAMP: [f64; JOINTS] = {
+    let mut clamp = wam7::FRICTION_COULOMB;
+    let mut joint = 0;
+    while joint < JOINTS {
+        clamp[joint] *= 1.5;
+        joint += 1;
+    }
+    clamp
+};
+
+/// Time from zero to the clamp at the full rate (s).
+const RISE: f64 = 2.0;
+
+/// Error beyond the tolerance from which on the rate is the full one (rad). At J2 the time constant is 0.7 s, three
+/// times that of the spring against its damping.
+const FULL: f64 = 0.02;
+
+/// Control periods between two turns of a joint: in a run there is no time for all joints in one.
+const TURNS: f64 = JOINTS as f64;
+
+/// Torque of a compliant run against friction and the error of the model.
+#[derive(Clone, Debug)]
+pub struct Settling<R: Real> {
+    torque: Vector7<R>,
+    /// The joint whose turn it is.
+    turn: u8,
+}
+
+impl<R: Real> Settling<R> {
+    /// No torque.
+    pub fn new() -> Self {
+        Settling { torque: Vector7::zeros(), turn: 0 }
+    }
+
+    /// The torque (N m).
+    pub fn torque(&self) -> &Vector7<R> {
+        &self.torque
+    }
+
+    /// One control period. The joint whose turn it is moves for all periods since its last one, and takes over what
+    /// another law gives away in each of them, `given` joint by joint (N m).
+    ///
+    /// Not inlined: it runs from flash on a board whose fast memory is full.
+    #[inline(never)]
+    pub fn step(
+        &mut self,
+        stiffness: &Vector7<R>,
+        state: &JointState<R>,
+        reference: &JointReference<R>,
+        given: impl FnOnce(usize) -> R,
+    ) {
+        let joint = usize::from(self.turn) % JOINTS;
+        self.turn = joint as u8 + 1;
+        let error = reference.q.0[joint] - state.q.0[joint];
+        let closing = state.dq.0[joint] - reference.dq.0[joint];
+        let [clamp, full] = [CLAMP[joint], CLAMP[joint] / RISE].map(R::constant);
+        let beyond = error - within(error, R::constant(0.5 * TOLERANCE[joint]));
+        let mut rate = within(beyond * R::constant(1.0 / FULL), R::constant(1.0)) * full;
+        let zero = R::constant(0.0);
+        let closes = closing * stiffness[joint];
+        if (rate > zero && closes > full) || (rate < zero && closes < -full) {
+            rate = zero;
+        }
+        let moved = self.torque[joint] + rate * R::constant(TURNS * PERIOD) + given(joint) * R::constant(TURNS);
+        self.torque[joint] = within(moved, clamp);
+    }
+}
+
+impl<R: Real> Default for Settling<R> {
+    fn default() -> Self {
+        Settling::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::{JointPositions, JointVelocities};
+
+    /// The torque after so many seconds of this error (rad), closing at this speed (rad/s), and of this torque that is
+    /// given away in each control period (N m).
+    fn after(seconds: f64, error: f64, speed: f64, given: f64) -> Vector7<f64> {
+        let state = JointState {
+            q: JointPositions(Vector7::repeat(0.3)),
+            dq: JointVelocities(Vector7::repeat(speed)),
+            missing: 0,
+            extrapolated: 0,
+            age: 0,
+            implausible: false,
+            stuck: false,
+            still: 0,
+            displaced: false,
+        };
+        let reference = JointReference::at_rest(JointPositions(Vector7::repeat(0.3 + error)));
+        let mut settling = Settling::new();
+        for _ in 0..(seconds / PERIOD) as u32 {
+            settling.step(&Vector7::repeat(50.0), &state, &reference, |_| given);
+        }
+        *settling.torque()
+    }
+
+    #[test]
+    fn a_large_error_moves_the_torque_to_its_clamp_within_two_seconds_and_no_farther() {
+        for sign in [1.0, -1.0] {
+            for (joint, clamp) in CLAMP.into_iter().enumerate() {
+                let (half, end) = (after(0.5 * RISE, 0.1 * sign, 0.0, 0.0), after(3.0 * RISE, 0.1 * sign, 0.0, 0.0));
+                assert!((half[joint] * sign / clamp - 0.5).abs() < 0.02, "J{}: {}", joint + 1, half[joint]);
+                assert!((end[joint] * sign - clamp).abs() < 1e-9, "J{}: {}", joint + 1, end[joint]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_small_error_is_closed_slowly_and_half_of_the_tolerance_is_none() {
+        for (joint, (clamp, tolerance)) in CLAMP.into_iter().zip(TOLERANCE).enumerate() {
+            assert_eq!(after(RISE, 0.49 * tolerance, 0.0, 0.0)[joint], 0.0, "J{}", joint + 1);
+            let quarter = after(RISE, 0.5 * tolerance + 0.25 * FULL, 0.0, 0.0)[joint] / clamp;
+            assert!((quarter - 0.25).abs() < 0.02, "J{}: {quarter}", joint + 1);
+        }
+    }
+
+    #[test]
+    fn a_joint_that_closes_its_error_is_left_alone_and_one_that_leaves_its_plan_is_not() {
+        for sign in [1.0, -1.0] {
+            let closing = after(1.0, 0.1 * sign, 0.5 * sign, 0.0);
+            assert_eq!(closing, Vector7::zeros());
+            let leaving = after(1.0, 0.1 * sign, -0.5 * sign, 0.0);
+            assert!(leaving.iter().all(|torque| torque * sign > 0.0), "{leaving}");
+        }
+    }
+
+    #[test]
+    fn what_another_law_gives_away_is_taken_over_by_every_joint_within_its_clamp() {
+        let taken = after(1.0, 0.0, 0.0, 0.1 * PERIOD);
+        assert!(taken.iter().all(|torque| (torque - 0.1).abs() < 0.003), "{taken}");
+        let bounded = after(1.0, 0.0, 0.0, 100.0 * PERIOD);
+        assert_eq!(bounded, Vector7::from(CLAMP));
+    }
+}
