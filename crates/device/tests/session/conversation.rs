@@ -395,7 +395,7 @@ fn answers_wait_for_room_on_the_line() {
     // An answer and an event may come of a request.
     rig.bench.room = 2 * FRAME_BYTES - 1;
     assert_eq!(rig.ask(Request::Ping), None);
-    rig.bench.room = 4096;
+    rig.bench.room = 2 * FRAME_BYTES;
     rig.poll();
     assert!(matches!(rig.answer(), Some(Reply::Accepted { .. })));
 }

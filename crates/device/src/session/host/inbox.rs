@@ -160,6 +160,21 @@ mod tests {
     }
 
     #[test]
+    fn what_finds_no_place_is_lost_and_nothing_that_waits_gives_way_to_it() {
+        for (is_owner, places) in [(true, OWNER_REQUESTS), (false, OTHER_REQUESTS)] {
+            for waiting in [Request::Ping, Request::Goodbye, Request::Stop] {
+                let mut inbox = Inbox::default();
+                for _ in 0..places {
+                    assert!(inbox.push(frame(OWNER, waiting.clone()), is_owner));
+                }
+                assert!(!inbox.push(frame(OWNER, Request::Status), is_owner), "behind {waiting:?}");
+                let words = core::iter::from_fn(|| inbox.pop(0, true, false, |_| false).map(|frame| frame.message));
+                assert!(words.eq(core::iter::repeat_n(waiting, places)));
+            }
+        }
+    }
+
+    #[test]
     fn a_goodbye_takes_the_place_of_what_will_be_repeated_and_keeps_its_turn() {
         for (is_owner, places) in [(true, OWNER_REQUESTS), (false, OTHER_REQUESTS)] {
             for stopping in [false, true] {
