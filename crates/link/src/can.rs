@@ -100,12 +100,11 @@ impl Heading {
     /// Decodes an identifier; `None` if it is not that of a segment.
     #[must_use]
     pub const fn parse(id: u16) -> Option<Self> {
-        if id & !(DIRECTION_BIT | FOUR_BITS << DEVICE_SHIFT | FOUR_BITS) != SEGMENT_BIT {
-            return None;
-        }
         let direction = if id & DIRECTION_BIT == 0 { Direction::ToDevice } else { Direction::ToHost };
         let device = DeviceNumber((id >> DEVICE_SHIFT & FOUR_BITS) as u8);
-        Some(Self { direction, device, sequence: (id & FOUR_BITS) as u8 })
+        let heading = Self { direction, device, sequence: (id & FOUR_BITS) as u8 };
+        // Every other bit is as it is in the identifier of a segment.
+        if heading.id() == id { Some(heading) } else { None }
     }
 }
 

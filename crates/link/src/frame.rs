@@ -40,7 +40,7 @@ const CRC_BYTES: usize = 4;
 pub const PAYLOAD_BYTES: usize = ENVELOPE_BYTES + MESSAGE_BYTES + CRC_BYTES;
 
 /// Most bytes of a frame on the wire, its zero byte included.
-pub const FRAME_BYTES: usize = PAYLOAD_BYTES + PAYLOAD_BYTES / 254 + 1 + 1;
+pub const FRAME_BYTES: usize = cobs::max_encoding_length(PAYLOAD_BYTES) + 1;
 
 /// A request that can move the arm is refused when it comes more than so many ms (device time) after the
 /// moment its envelope names. Shorter would refuse honest requests over slow lines.

@@ -89,10 +89,11 @@ impl Telemetry {
     /// The short form: values rounded to their step and cut at 32767 of them, flags to 24 bits.
     #[must_use]
     pub fn shortened(mut self) -> ShortTelemetry {
+        let [low, middle, high, _] = self.flags.to_le_bytes();
         let first = [
             self.cycle,
-            self.flags & 0x00FF_FFFF | u32::from(self.lost_replies) << 24,
-            u32::from(self.state) | u32::from(self.fault) << 8,
+            u32::from_le_bytes([low, middle, high, self.lost_replies]),
+            u32::from_le_bytes([self.state, self.fault, 0, 0]),
             self.cost_ticks,
         ];
         let mut halves = self.values().zip(steps()).map(|(value, steps)| {
@@ -113,13 +114,14 @@ impl Telemetry {
     #[must_use]
     pub fn from_short(words: &ShortTelemetry) -> Telemetry {
         let [cycle, flags, codes, cost_ticks, pairs @ ..] = words;
+        let [low, middle, high, lost_replies] = flags.to_le_bytes();
         let [state, fault, ..] = codes.to_le_bytes();
         let mut telemetry = Telemetry {
             cycle: *cycle,
             state,
             fault,
-            flags: flags & 0x00FF_FFFF,
-            lost_replies: (flags >> 24) as u8,
+            flags: u32::from_le_bytes([low, middle, high, 0]),
+            lost_replies,
             cost_ticks: *cost_ticks,
             ..Telemetry::default()
         };
