@@ -254,6 +254,21 @@ fn a_hello_of_another_version_with_fewer_fields_still_tells_its_version() {
 }
 
 #[test]
+fn only_a_hello_may_be_followed_by_bytes_that_this_version_does_not_know() {
+    /// True if the message is read although a byte follows it.
+    fn is_read<M: Message>(message: &M) -> bool {
+        let frame = frame_with(message, |payload| payload.push(1));
+        Decoder::<FRAME_BYTES>::new().next::<M>(&mut frame.as_slice()).is_some()
+    }
+    for reply in replies() {
+        assert_eq!(is_read(&reply), matches!(reply, Reply::Hello { .. }), "{reply:?}");
+    }
+    for request in requests() {
+        assert_eq!(is_read(&request), matches!(request, Request::Hello(_)), "{request:?}");
+    }
+}
+
+#[test]
 fn a_hello_that_is_cut_is_of_another_version_if_the_link_s_or_the_schema_s_differs() {
     let Request::Hello(sample) = &requests()[0] else { panic!("no hello") };
     for (link_version, schema_hash) in [(LINK_VERSION, SCHEMA_HASH ^ 1), (LINK_VERSION + 1, SCHEMA_HASH)] {
