@@ -68,9 +68,14 @@ fn hand_angles_equal_the_vectors() {
 }
 
 #[test]
-fn a_simulated_finger_reads_back_its_angle() {
-    let (motor, worm) = finger_counts(1.0_f64);
-    let read = angles::<f64>(&[motor; 4], &[Some(worm); 3]);
-    assert!((read.inner[0] - 1.0).abs() < 4e-5);
-    assert!((read.outer[0] - 1.0 / 3.0).abs() < 4e-5);
+fn a_simulated_finger_reads_back_its_angle_with_a_secondary_encoder_and_without() {
+    for angle in [0.1, 1.0, 2.3_f64] {
+        let (motor, worm) = finger_counts(angle);
+        for secondary in [Some(worm), None] {
+            let read = angles::<f64>(&[motor; 4], &[secondary; 3]);
+            for (inner, outer) in read.inner.into_iter().zip(read.outer) {
+                assert!((inner - angle).abs() < 4e-5 && (outer - angle / 3.0).abs() < 4e-5, "{angle}: {read:?}");
+            }
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use puck::hand::HandError;
 use puck::{Property, PropertyId, PropertyTable, UnknownFirmware};
 
 /// The list of a vector column such as `Motor_132`; `None` for motors that are too old to be driven.
@@ -83,6 +84,8 @@ fn unknown_firmware_is_refused() {
         assert_eq!(PropertyTable::motor(version), Err(UnknownFirmware { version }));
         assert_eq!(PropertyTable::safety(version), Err(UnknownFirmware { version }));
     }
+    assert_eq!(UnknownFirmware { version: 256 }.to_string(), "no property table for firmware version 256");
+    assert_eq!(HandError::Property(Property::Cmd).to_string(), "the hand has no property CMD");
 }
 
 #[test]
