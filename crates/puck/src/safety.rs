@@ -178,15 +178,14 @@ impl PendantState {
             Button::Idle => 2,
             Button::None => 3,
         };
-        (self.velocity.bits()
+        let health = self.velocity.bits()
             | self.torque.bits() << 3
             | self.voltage.bits() << 6
             | self.heartbeat.bits() << 9
-            | self.other.bits() << 12
-            | (self.segments as u32) << 16
-            | (self.idle_light as u32) << 24
-            | (self.activate_light as u32) << 25
-            | button << 26) as i32
+            | self.other.bits() << 12;
+        let [low, high, ..] = health.to_le_bytes();
+        let lights = self.idle_light as u8 | (self.activate_light as u8) << 1 | button << 2;
+        i32::from_le_bytes([low, high, self.segments, lights])
     }
 
     /// The character on the seven-segment display; `None` for a pattern that no document names.

@@ -3,11 +3,11 @@
 
 use puck::device::{force_frame, safety_broadcast};
 use puck::force_torque::{get_acceleration, get_wrench, tare};
-use puck::safety::SafetyMode;
+use puck::safety::{PendantState, SafetyMode, velocity_limits};
 use puck::tactile::TactileFormat;
 use puck::{
-    CanFrame, GaugeStatus, Group, MotorMode, Node, PropertyId, PuckTorque, Role, Status, packed_torques, set,
-    set_short, zero_torques,
+    CanFrame, GaugeStatus, Group, MotorMode, Node, PropertyId, PropertyTable, PuckTorque, Role, Status, packed_torques,
+    set, set_short, zero_torques,
 };
 
 fn raw(frame: &CanFrame) -> (u16, Vec<u8>) {
@@ -144,4 +144,27 @@ fn a_set_is_two_bytes_of_head_and_a_little_endian_value() {
     assert_eq!(raw(&set_short(node, PropertyId::MODE, 0x0102)), (0x003, vec![0x88, 0, 0x02, 0x01]));
     // The sensor's own frames: from node 8 to group 10.
     assert_eq!(raw(&force_frame([1, -2, 0x0304])), (0x50A, vec![1, 0, 0xFE, 0xFF, 4, 3]));
+}
+
+#[test]
+fn every_pattern_of_the_pendant_s_display_that_a_document_names_has_its_character() {
+    let all_safe = 0o11111;
+    let shown: String = (0..=255_i32)
+        .filter_map(|segments| PendantState::from_value(segments << 16 | all_safe).expect("one-hot").display())
+        .collect();
+    // In the order of the patterns: 0x06, 0x07, 0x38, 0x3F, 0x4F, 0x5B, 0x66, 0x6D, 0x76, 0x77, 0x79, 0x7D.
+    assert_eq!(shown, "17L03245HAE6");
+    let words = PendantState::from_value(0).map_err(|error| error.to_string());
+    assert_eq!(words, Err("pendant word with a field that is not one-hot".to_owned()));
+}
+
+#[test]
+fn a_warning_may_be_at_its_fault_and_a_fault_at_the_last_number_of_16_bits() {
+    let table = PropertyTable::safety(200).expect("known");
+    let last = f64::from(i16::MAX) / 4096.0;
+    for (fault, is_sent) in [(0.5, true), (last, true), (last + 1.0 / 4096.0, false)] {
+        assert_eq!(velocity_limits(&table, fault, fault).is_ok(), is_sent, "{fault} m/s");
+    }
+    let words = velocity_limits(&table, 8.0, 0.5).map_err(|error| error.to_string());
+    assert_eq!(words, Err("limit does not fit into 16 bits".to_owned()));
 }
