@@ -140,6 +140,9 @@ impl Controller {
         }
         let mask = cccr::PROTECTED | cccr::SET_PROTECTED | cccr::CSR;
         self.set_value(CCCR, new & mask);
+        if (old ^ new) & cccr::ASM != 0 {
+            self.refresh_wire();
+        }
         let wants_init = value & cccr::INIT != 0;
         let wants_cce = value & cccr::CCE != 0;
         if wants_cce && !self.cce {

@@ -277,7 +277,9 @@ impl Controller {
     /// The bus has been dominant for another while.
     fn stuck_step(&mut self, time: Nanoseconds) {
         let Some((_, was_sending)) = self.stuck else { return };
-        let flags = if was_sending {
+        let flags = if self.is_restricted() {
+            0
+        } else if was_sending {
             self.errors.send_failed(BusError::Bit1)
         } else {
             let step = if self.stuck_steps == 0 { 1 } else { 8 };
@@ -291,12 +293,15 @@ impl Controller {
         self.leave_if_bus_off();
     }
 
-    /// Bus-off sets INIT by itself, at once. Tells whether that happened.
+    /// Bus-off sets INIT by itself and ends all activity at once. INIT is read later than that and than the flag:
+    /// it goes from one clock domain to the other as a written value does; how long that takes nobody says. [M] Tells
+    /// whether that happened.
     pub(crate) fn leave_if_bus_off(&mut self) -> bool {
-        if !self.errors.is_bus_off() || self.init.seen {
+        if !self.errors.is_bus_off() || self.init.written {
             return false;
         }
-        self.init = Init { written: true, seen: true, settles: None };
+        let settles = self.settling_time().map(|time| time + self.link.init_lag);
+        self.init = Init { written: true, seen: false, settles };
         self.stop();
         true
     }

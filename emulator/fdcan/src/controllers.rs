@@ -1,7 +1,7 @@
 //! Both controllers and the memory they share: the model's public face.
 
 use crate::Nanoseconds;
-use crate::controller::wire::{Fault, WireEvent};
+use crate::controller::wire::{Fault, Handler, WireEvent};
 use crate::controller::{Bus, Controller};
 use crate::errors::BusError;
 use crate::frame::Frame;
@@ -248,6 +248,17 @@ impl Controllers {
     pub fn set_fault(&mut self, unit: Unit, fault: Option<Fault>, now: Nanoseconds) {
         self.advance(now);
         self.unit(unit).set_fault(fault);
+    }
+
+    /// The message memory answers one handler of a controller too late, at its next access.
+    pub fn starve(&mut self, unit: Unit, handler: Handler, now: Nanoseconds) {
+        self.advance(now);
+        self.unit(unit).starve(handler);
+    }
+
+    /// From now on, where bus-off sets CCCR.INIT, it can be read so much later than a written one would be.
+    pub fn set_init_lag(&mut self, unit: Unit, lag: Nanoseconds) {
+        self.unit(unit).link.init_lag = lag;
     }
 
     /// The state of a controller.

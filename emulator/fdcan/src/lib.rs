@@ -16,7 +16,7 @@ mod timing;
 mod transmit;
 mod unit;
 
-pub use controller::wire::{Fault, WireEvent};
+pub use controller::wire::{Fault, Handler, WireEvent};
 pub use controllers::{Controllers, Line, Options, Status};
 pub use errors::BusError;
 pub use frame::{Frame, Id};

@@ -158,7 +158,7 @@ pub(crate) mod cccr {
     /// Can be set only while INIT and CCE are set, and cleared at any time.
     pub(crate) const SET_PROTECTED: u32 = ASM | MON | TEST;
     /// The model stores these bits and does nothing more.
-    pub(crate) const UNMODELLED: u32 = ASM | CSR | MON | TEST | FLEXIBLE;
+    pub(crate) const UNMODELLED: u32 = CSR | MON | TEST | FLEXIBLE;
 }
 
 /// Bits of IR, IE and ILS.
@@ -172,6 +172,7 @@ pub(crate) mod ir {
     pub(crate) const TC: u32 = 1 << 9;
     pub(crate) const TCF: u32 = 1 << 10;
     pub(crate) const TFE: u32 = 1 << 11;
+    pub(crate) const MRAF: u32 = 1 << 17;
     pub(crate) const ELO: u32 = 1 << 22;
     pub(crate) const EP: u32 = 1 << 23;
     pub(crate) const EW: u32 = 1 << 24;

@@ -55,6 +55,15 @@ pub enum Fault {
     StuckDominant,
 }
 
+/// Who reads and writes the message memory within a controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Handler {
+    /// Reads the frames to be sent.
+    Transmit,
+    /// Reads the filters, writes received frames.
+    Receive,
+}
+
 /// An attempt that will fail.
 #[derive(Clone, Copy, Debug)]
 struct Attempt {
@@ -76,6 +85,10 @@ pub(crate) struct Link {
     undo: Option<(Transmit, u32, u32)>,
     attempt: Option<Attempt>,
     pub(crate) fault: Option<Fault>,
+    /// The next access of each handler to the message memory comes too late: transmit, receive.
+    pub(crate) starved: [bool; 2],
+    /// Time by which INIT can be read later than by synchronisation alone, where bus-off has set it.
+    pub(crate) init_lag: Nanoseconds,
     pub(crate) events: Vec<WireEvent>,
 }
 
@@ -111,6 +124,14 @@ impl Controller {
     pub(crate) fn refresh_wire(&mut self) -> bool {
         let is_active = matches!(self.bus, Bus::Active { .. });
         let mut plan = if is_active { self.transmit.plan(&self.transmit_layout()) } else { Vec::new() };
+        if !plan.is_empty() && !self.link.begun && std::mem::take(&mut self.link.starved[Handler::Transmit as usize]) {
+            self.raise(ir::MRAF);
+            self.set_value(registers::CCCR, self.value(registers::CCCR) | cccr::ASM);
+        }
+        if self.is_restricted() {
+            // What waits still waits: the manual says that sending is aborted, not that the request is gone. [M]
+            plan.clear();
+        }
         if self.link.fault.is_some() {
             self.begin_attempt(plan.first().copied());
             plan.clear();
@@ -137,6 +158,17 @@ impl Controller {
             self.link.events.push(WireEvent::Offer { at: self.now, buffer, frame });
         }
         takes_back
+    }
+
+    /// Restricted operation: receives and acknowledges, sends nothing, counts no errors.
+    pub(crate) fn is_restricted(&self) -> bool {
+        self.value(registers::CCCR) & cccr::ASM != 0
+    }
+
+    /// The next access of this handler to the message memory comes too late.
+    pub(crate) fn starve(&mut self, handler: Handler) {
+        self.link.starved[handler as usize] = true;
+        self.refresh_wire();
     }
 
     /// The oldest offered frame is on the wire.
@@ -313,8 +345,10 @@ impl Controller {
 
     /// Filters and stores a frame.
     fn store(&mut self, memory: &mut Memory, frame: &Frame) {
-        let flags = self.errors.received();
-        self.raise(flags);
+        if !self.is_restricted() {
+            let flags = self.errors.received();
+            self.raise(flags);
+        }
         let verdict = verdict(|offset| self.value(offset), memory, frame);
         if let Some(offset) = verdict.unwritten {
             self.memory_remark(RemarkKind::Unwritten, offset, memory.get(offset / 4), "filter element never written");
@@ -325,6 +359,11 @@ impl Controller {
         }
         let mut index = None;
         if let Some(fifo) = verdict.fifo {
+            if std::mem::take(&mut self.link.starved[Handler::Receive as usize]) {
+                // The put index stays: the next frame is written over what was written of this one.
+                self.raise(ir::MRAF);
+                return;
+            }
             let layout = self.receive_layout(fifo);
             let stored = self.fifos[fifo].store(&layout, memory, frame, &verdict);
             self.raise(stored.flags << (4 * fifo));
@@ -352,7 +391,7 @@ impl Controller {
 
     /// A frame of somebody else could not be received.
     pub(crate) fn receive_failed(&mut self, error: BusError) {
-        if matches!(self.bus, Bus::Active { .. }) {
+        if matches!(self.bus, Bus::Active { .. }) && !self.is_restricted() {
             let flags = self.errors.receive_failed(error, 1);
             self.raise(flags);
         }

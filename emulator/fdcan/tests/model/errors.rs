@@ -85,6 +85,7 @@ fn a_passive_transmitter_still_counts_other_errors_and_leaves_the_bus() {
     // 16 attempts of 30 bits while active, 16 of 38 while passive; the first passive one is the 17th.
     assert!((1080 * BIT..1110 * BIT).contains(&(bench.now - 11 * BIT)), "{}", bench.now);
     assert_eq!((bench.counters().0, psr_state(&mut bench)), (248, 0b111));
+    bench.pass_ns(100);
     assert_eq!((bench.read(CCCR), bench.read(TXBRP)), (INIT, 0b11), "INIT is set, the requests wait");
     assert_eq!(bench.read(IR) & (BO | EW | EP), BO | EW | EP);
     assert_eq!(bench.lines(), (true, false));

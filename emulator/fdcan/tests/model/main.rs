@@ -9,4 +9,5 @@ mod image;
 mod memory;
 mod receive;
 mod registers;
+mod restricted;
 mod transmit;
