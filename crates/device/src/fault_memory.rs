@@ -6,7 +6,11 @@
 //!
 //! All of it is plain words, each content of which is a valid value: a board may place it in memory that nobody clears.
 //! [`FaultMemory::resume`] then finds what is whole. A cycle carries its running number and a check sum, so that one
-//! whose writing was cut by a reset is left out, and the place of the newest follows from the cycles alone.
+//! whose writing was cut by a reset is left out, and the place of the newest follows from the cycles alone. What says
+//! which half runs and where the record lies is kept twice, each with its own check sum: a bit that falls over, or a
+//! reset between the two, costs nothing. If both are damaged the record is lost, and no cycle is taken for a new one.
+
+use core::sync::atomic::{Ordering, compiler_fence};
 
 use link::{FaultRecord, ShortTelemetry, Telemetry};
 
@@ -17,8 +21,8 @@ pub const FAULT_CYCLES: usize = control::RATE_HZ as usize;
 const CYCLE_WORDS: usize = 2 + size_of::<ShortTelemetry>() / 4 + 1;
 /// Magic number, content, check sum.
 const HEAD_WORDS: usize = 10;
-/// "TaF1" and the schema of the link: a program with another telemetry does not read the cycles of this one.
-const MAGIC: u32 = u32::from_le_bytes(*b"TaF1") ^ link::SCHEMA_HASH;
+/// "TaF2" and the schema of the link: a program with another telemetry does not read the cycles of this one.
+const MAGIC: u32 = u32::from_le_bytes(*b"TaF2") ^ link::SCHEMA_HASH;
 
 type Cycle = [u32; CYCLE_WORDS];
 
@@ -60,8 +64,8 @@ impl Head {
 /// The last second before a fault; 74 kB.
 #[derive(Debug)]
 pub struct FaultMemory {
-    /// [`Head`], or anything before [`FaultMemory::resume`].
-    head: [u32; HEAD_WORDS],
+    /// [`Head`], twice, or anything before [`FaultMemory::resume`]. The first is written first.
+    heads: [[u32; HEAD_WORDS]; 2],
     /// Running number of the next cycle. Found anew by [`FaultMemory::resume`].
     next: u64,
     /// Cycles in the running half.
@@ -72,22 +76,16 @@ pub struct FaultMemory {
 impl FaultMemory {
     /// All zeros, as a static begins that is never cleared. Not to be used before [`FaultMemory::resume`].
     pub const BLANK: FaultMemory =
-        FaultMemory { head: [0; HEAD_WORDS], next: 0, filled: 0, halves: [[[0; CYCLE_WORDS]; FAULT_CYCLES]; 2] };
+        FaultMemory { heads: [[0; HEAD_WORDS]; 2], next: 0, filled: 0, halves: [[[0; CYCLE_WORDS]; FAULT_CYCLES]; 2] };
 
     /// Begins a run of the device with whatever the memory holds. A record of a fault is kept; one that a person has
     /// cleared, or none, makes room for the last second before the restart. Foreign and torn content is forgotten.
     pub fn resume(&mut self) {
-        let Some(head) = Head::from_words(&self.head) else {
-            // The cycles may hold anything, whole ones of an earlier life too: none may be taken for a new one.
-            (self.next, self.filled) = (0, 0);
-            for half in &mut self.halves {
-                half.fill([0; CYCLE_WORDS]);
-            }
-            return self.write(Head::default());
-        };
+        let Some(head) = self.whole_head() else { return self.forget() };
         let newest = self.half(head.running).iter().enumerate().filter_map(whole).max();
         self.next = newest.map_or(0, |number| number.wrapping_add(1)).max(head.until);
         self.filled = self.next.saturating_sub(head.until).min(FAULT_CYCLES as u64);
+        self.write(head);
         if head.latched == 0 && self.filled > 0 {
             self.keep(head, 0);
         }
@@ -96,6 +94,12 @@ impl FaultMemory {
 
     /// Takes a control cycle: writes it down, unless a fault is latched since an earlier one.
     pub fn take(&mut self, cycle: &Telemetry) {
+        match self.whole_head() {
+            // Together again before the other one is damaged as well.
+            Some(head) if self.is_damaged() => self.write(head),
+            Some(_) => {}
+            None => self.forget(),
+        }
         if self.head().latched == 1 {
             if cycle.fault != 0 {
                 return;
@@ -139,11 +143,31 @@ impl FaultMemory {
 
     /// Every word that a restart may leave as it likes: to be spoiled in tests.
     pub fn words(&mut self) -> impl Iterator<Item = &mut u32> {
-        self.head.iter_mut().chain(self.halves.iter_mut().flatten().flatten())
+        self.heads.iter_mut().flatten().chain(self.halves.iter_mut().flatten().flatten())
     }
 
     fn head(&self) -> Head {
-        Head::from_words(&self.head).unwrap_or_default()
+        self.whole_head().unwrap_or_default()
+    }
+
+    /// The newer one of those that are whole.
+    fn whole_head(&self) -> Option<Head> {
+        self.heads.iter().find_map(Head::from_words)
+    }
+
+    /// True if one of the two is damaged.
+    fn is_damaged(&self) -> bool {
+        let [first, second] = &self.heads;
+        first != second
+    }
+
+    /// Nothing is known of the cycles: they may be whole ones of an earlier life, and none may be taken for a new one.
+    fn forget(&mut self) {
+        (self.next, self.filled) = (0, 0);
+        for half in &mut self.halves {
+            half.fill([0; CYCLE_WORDS]);
+        }
+        self.write(Head::default());
     }
 
     fn half(&self, which: u32) -> &[Cycle] {
@@ -170,7 +194,12 @@ impl FaultMemory {
     }
 
     fn write(&mut self, head: Head) {
-        self.head = head.to_words();
+        let words = head.to_words();
+        for place in &mut self.heads {
+            *place = words;
+            // One after the other, so that a reset finds one of them whole.
+            compiler_fence(Ordering::SeqCst);
+        }
     }
 }
 

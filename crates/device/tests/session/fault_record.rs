@@ -189,3 +189,96 @@ fn a_session_takes_every_record_even_while_the_line_is_full() {
     let seen = record(&mut rig).expect("a record");
     assert_eq!(cycles(&mut rig, seen), Vec::from_iter(0..=16));
 }
+
+/// Everything a host can learn of the record: itself, and each of its cycles.
+fn told(memory: &FaultMemory) -> Option<(FaultRecord, Vec<Option<u32>>)> {
+    let record = memory.record()?;
+    let cycle = |index| memory.cycle(record.number, index).map(|cycle| cycle.cycle);
+    Some((record, (0..record.cycles).map(cycle).collect()))
+}
+
+/// Words that say which half runs and where the record lies; the cycles of the halves come behind them.
+fn head_words() -> usize {
+    cleared(0).words().count() - 2 * FAULT_CYCLES * (cleared(0).words().count() / (2 * FAULT_CYCLES))
+}
+
+/// The change that makes it fail: the head is kept once. A single bit of it took the record away, and of a fault that
+/// was still latched made another one, with a later cycle in place of the fault's.
+#[test]
+fn no_single_bit_of_the_head_costs_the_record_or_changes_it() {
+    for after in [0, 20, 777] {
+        for restart in [false, true] {
+            let mut sound = cleared(after);
+            if restart {
+                sound.resume();
+            }
+            let expected = told(&sound).expect("a record");
+            for word in 0..head_words() {
+                for bit in 0..32 {
+                    let mut memory = cleared(after);
+                    *memory.words().nth(word).expect("of the head") ^= 1 << bit;
+                    if restart {
+                        memory.resume();
+                    }
+                    assert_eq!(told(&memory).as_ref(), Some(&expected), "{after} {restart} {word}.{bit}");
+                    // A fault that is latched goes on, and the next one has the next number.
+                    if after == 0 && !restart {
+                        memory.take(&Telemetry { fault: 9, ..full(FAULTY + 1) });
+                        assert_eq!(told(&memory).as_ref(), Some(&expected), "{word}.{bit}: of the fault's next cycle");
+                    }
+                    memory.take(&full(5000));
+                    memory.take(&Telemetry { fault: 3, ..full(5001) });
+                    let next = memory.record().expect("a record");
+                    assert_eq!((next.number, next.fault), (expected.0.number + 1, 3), "{after} {restart} {word}.{bit}");
+                    let last = memory.cycle(next.number, next.cycles - 1);
+                    assert_eq!(last.map(|cycle| cycle.cycle), Some(5001), "{after} {restart} {word}.{bit}");
+                }
+            }
+        }
+    }
+}
+
+/// Each bit flips while the memory goes on; the damage of one does not wait for that of the next.
+#[test]
+fn bits_of_the_head_that_flip_one_after_the_other_cost_nothing() {
+    let mut memory = cleared(20);
+    let expected = told(&memory);
+    for turn in 0..32 * head_words() {
+        let word = turn / 32;
+        *memory.words().nth(word).expect("of the head") ^= 1 << (turn % 32);
+        memory.take(&full(2000 + turn as u32));
+        assert_eq!(told(&memory), expected, "{turn}");
+    }
+}
+
+/// The change that makes it fail: the head is kept once.
+#[test]
+fn a_reset_while_the_head_is_written_costs_nothing() {
+    let before: Vec<u32> = cleared(20).words().map(|word| *word).take(head_words()).collect();
+    for written in 0..=head_words() {
+        let mut memory = cleared(20);
+        memory.take(&Telemetry { fault: 3, ..full(5000) });
+        for (word, before) in memory.words().zip(&before).skip(written) {
+            *word = *before;
+        }
+        memory.resume();
+        let (record, cycles) = told(&memory).expect("a record");
+        // The head of before: then it is the second before the restart, which ends with the same cycle.
+        assert!(record.number == 2 && matches!(record.fault, 0 | 3) && record.cycles == 21, "{written}: {record:?}");
+        assert_eq!((cycles.first(), cycles.last()), (Some(&Some(1000)), Some(&Some(5000))), "{written}");
+    }
+}
+
+/// The change that makes it fail: what a head that is lost leaves behind is taken for cycles of the new record.
+#[test]
+fn a_head_that_is_lost_beyond_repair_leaves_no_record_and_no_cycles() {
+    for after in [0, 20, 777] {
+        let mut memory = cleared(after);
+        memory.words().take(head_words()).for_each(|word| *word ^= 0x10);
+        assert_eq!(memory.record(), None);
+        memory.take(&full(5000));
+        memory.take(&Telemetry { fault: 3, ..full(5001) });
+        let record = FaultRecord { number: 1, fault: 3, latched: true, cycles: 2 };
+        assert_eq!(told(&memory), Some((record, vec![Some(5000), Some(5001)])), "{after}");
+    }
+}
