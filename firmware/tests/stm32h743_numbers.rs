@@ -120,7 +120,7 @@ fn the_end_waits_long_enough_for_the_last_frames_and_ends_before_the_watchdog() 
     assert!(LAST_LEFT_US > (1 + (ARM.transmit - last) + last) * frame_us);
     let fastest = WATCHDOG_US * 100 / (100 + LSI_TOLERANCE_PERCENT);
     // Two milliseconds for writing down the reason.
-    assert!(LAST_ROOM_US + LAST_STOP_US + LAST_LEFT_US + 2_000 < fastest, "the watchdog would cut the last frames off");
+    assert!(LAST_ROOM_US + 2 * INIT_US + LAST_LEFT_US + 2_000 < fastest, "the watchdog would cut the last frames off");
 }
 
 #[test]

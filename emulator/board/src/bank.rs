@@ -67,6 +67,13 @@ impl BankWatch {
     }
 }
 
+/// True if an access waits for as long as an operation of bank 2 runs: to the bank, and to its control register, which
+/// takes nothing meanwhile. [assumed: the manual of the chip before this one says it of the register]
+pub fn stalls(access: &Access) -> bool {
+    let is_bank = (u64::from(BANK.start)..u64::from(BANK.end)).contains(&access.address);
+    is_bank || access.address == CONTROL && access.kind == AccessKind::Write
+}
+
 /// Leaves an operation half done: bits on their way are where chance has them. The words whose check bits cannot fit.
 pub fn tear(operation: &Operation, seed: u64, host: &mut dyn Host) -> Vec<u32> {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;

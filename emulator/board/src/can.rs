@@ -5,7 +5,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use fdcan_model::{Controllers, Fault, Frame, Id, Line, Options, Remark, Status, Unit, WireEvent};
+use fdcan_model::{Controllers, Fault, Frame, Handler, Id, Line, Options, Remark, Status, Unit, WireEvent};
 use puck::{CanFrame, CanId};
 use rigless::chip::parallel::Peer;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile};
@@ -159,6 +159,17 @@ impl Can {
     pub fn set_fault(&mut self, unit: Unit, fault: Option<Fault>, now: u64) {
         self.controllers.set_fault(unit, fault, now);
         self.settle(now);
+    }
+
+    /// The message memory answers one handler of a controller too late, at its next access.
+    pub fn starve(&mut self, unit: Unit, handler: Handler, now: u64) {
+        self.controllers.starve(unit, handler, now);
+        self.settle(now);
+    }
+
+    /// Where bus-off sets INIT of a controller, it is read so many nanoseconds later.
+    pub fn set_init_lag(&mut self, unit: Unit, lag: u64) {
+        self.controllers.set_init_lag(unit, lag);
     }
 
     /// The chip is reset: both controllers are, and what had not begun on the wire never leaves.

@@ -91,6 +91,8 @@ pub struct CoreState {
     pub faults: Vec<FaultNote>,
     /// A damaged word was read, for the flash controller's status.
     pub double_error: bool,
+    /// An operation of bank 2 does not end.
+    pub bank_hangs: bool,
 }
 
 /// [`CoreState`], shared.

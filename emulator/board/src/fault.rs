@@ -5,14 +5,21 @@ use std::str::FromStr;
 /// Which fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Bit errors until the arm's controller leaves the bus.
-    BusOff,
+    /// Bit errors until the arm's controller leaves the bus; its INIT is read so many microseconds later than the flag.
+    BusOff(u64),
+    /// The message memory answers the arm's controller too late, as it reads the next frame to be sent: it goes over to
+    /// restricted operation.
+    TransmitStarved,
+    /// Likewise as it stores the next received frame, which is lost.
+    ReceiveStarved,
     /// Nobody acknowledges on the arm's bus, for these microseconds; 0: for ever.
     NoAcknowledge(u64),
     /// The arm's bus is held dominant, likewise.
     Dominant(u64),
     /// Power fails in the middle of this operation of bank 2, counted from the given time; 0 is the next.
     PowerCut(u64),
+    /// This operation of bank 2, counted likewise, never ends; until a reset the bank answers nobody.
+    FlashHangs(u64),
     /// The oscillator's input has no clock from this time on.
     HseDead,
     /// A debugger makes a non-maskable interrupt pending.
@@ -58,8 +65,8 @@ pub struct Fault {
 }
 
 /// Forms that the command line takes.
-pub const SYNTAX: &str = "KIND@MICROSECONDS[:ARGUMENT], KIND one of bus-off, no-acknowledge[:US], dominant[:US], \
-power-cut:N, hse-dead, nmi, panic, hard-fault, hang, stall:US, guard, below-guard, \
+pub const SYNTAX: &str = "KIND@MICROSECONDS[:ARGUMENT], KIND one of bus-off[:US], transmit-starved, receive-starved, no-acknowledge[:US], dominant[:US], \
+power-cut:N, flash-hangs:N, hse-dead, nmi, panic, hard-fault, hang, stall:US, guard, below-guard, \
 usb-held, reset:pin|power|brown-out|probe";
 
 /// A text that names no fault.
@@ -77,10 +84,13 @@ impl FromStr for Fault {
         let at = time.parse::<u64>().ok().and_then(|us| us.checked_mul(1000)).ok_or_else(wrong)?;
         let number = || argument.map_or(Ok(0), |argument| argument.parse::<u64>().map_err(|_| wrong()));
         let kind = match kind {
-            "bus-off" => Kind::BusOff,
+            "bus-off" => Kind::BusOff(number()?),
+            "transmit-starved" => Kind::TransmitStarved,
+            "receive-starved" => Kind::ReceiveStarved,
             "no-acknowledge" => Kind::NoAcknowledge(number()?),
             "dominant" => Kind::Dominant(number()?),
             "power-cut" => Kind::PowerCut(number()?),
+            "flash-hangs" => Kind::FlashHangs(number()?),
             "hse-dead" => Kind::HseDead,
             "nmi" => Kind::Nmi,
             "panic" => Kind::Panic,
@@ -110,7 +120,8 @@ mod tests {
     #[test]
     fn faults_are_read_from_text() {
         let at = 2_000_000_000;
-        assert_eq!("bus-off@2000000".parse(), Ok(Fault { kind: Kind::BusOff, at }));
+        assert_eq!("bus-off@2000000".parse(), Ok(Fault { kind: Kind::BusOff(0), at }));
+        assert_eq!("bus-off@2000000:50".parse(), Ok(Fault { kind: Kind::BusOff(50), at }));
         assert_eq!("power-cut@2000000:7".parse(), Ok(Fault { kind: Kind::PowerCut(7), at }));
         let kind = Kind::Reset(ResetKind::BrownOut);
         assert_eq!("reset@2000000:brown-out".parse(), Ok(Fault { kind, at }));

@@ -4,7 +4,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use link::frame::{Decoder, Envelope, FRAME_BYTES, encode};
 use link::message::{DeviceHello, HostHello};
-use link::{FaultRecord, LINK_VERSION, Refusal, Reply, Request, SCHEMA_HASH, Statistics, Status, Telemetry, Text};
+use link::{
+    FaultRecord, LINK_VERSION, Refusal, Reply, Request, SCHEMA_HASH, Statistics, Status, StorageReport, Telemetry, Text,
+};
 use puck::{CanFrame, Node};
 use sim::{HOME, TICKS_PER_MILLISECOND, Ticks};
 
@@ -12,10 +14,15 @@ use crate::world::Host;
 
 /// Stages of the start-up, as they travel over the link.
 const WAITING_FOR_ZERO: u8 = 6;
+/// Everything is there but the person at the pendant.
+const WAITING_FOR_ACTIVE: u8 = 9;
 /// The arm can be commanded.
 pub const READY: u8 = 10;
-/// State of an arm without torque.
+/// State of an arm without torque, and of one whose fault a person must clear.
 const IDLE: u8 = 0;
+const FAULT: u8 = 7;
+/// State of an arm that holds.
+pub const HOLD: u8 = 2;
 
 /// Time between two questions.
 const PACE: Ticks = 20 * TICKS_PER_MILLISECOND;
@@ -41,6 +48,10 @@ pub struct Learned {
     pub fault_record: Option<FaultRecord>,
     /// The newest cycle of it.
     pub fault_cycle: Option<Telemetry>,
+    /// Answers to the order to keep a weight: `None` for yes, or the refusal with its first detail.
+    pub kept: Vec<Option<(Refusal, u32)>>,
+    /// The storage as the device last told it.
+    pub storage: Option<StorageReport>,
     /// Questions, and those that were answered.
     pub asked: u64,
     /// See above.
@@ -76,6 +87,9 @@ pub struct Inquirer {
     waiting: bool,
     turn: u32,
     holds: bool,
+    keeps: bool,
+    /// Orders to keep a weight, whose answers may come long after other questions.
+    orders: Vec<u16>,
 }
 
 impl Inquirer {
@@ -91,13 +105,21 @@ impl Inquirer {
             waiting: false,
             turn: 0,
             holds: false,
+            keeps: false,
+            orders: Vec::new(),
         }
     }
 
-    /// The same, which orders an arm to hold that is ready and idle.
+    /// The same, which orders an arm to hold that is ready and idle, and clears its fault once the bus is up again.
     #[must_use]
     pub fn holding(self) -> Self {
         Self { holds: true, ..self }
+    }
+
+    /// The same, which has a weight kept again and again, and asks how the storage is.
+    #[must_use]
+    pub fn keeping(self) -> Self {
+        Self { keeps: true, ..self.holding() }
     }
 
     /// The next question.
@@ -113,10 +135,18 @@ impl Inquirer {
             });
         }
         let stage = learned.status.as_ref().map(|status| status.startup_stage);
-        let is_idle = learned.status.as_ref().is_some_and(|status| status.state == IDLE);
+        let is_in = |state| learned.status.as_ref().is_some_and(|status| status.state == state);
         self.turn += 1;
+        if self.keeps && matches!(stage, Some(WAITING_FOR_ACTIVE | READY)) {
+            match self.turn % 16 {
+                3 => return Request::KeepWeight { hand: true, links: [[0.0; 4]; 7] },
+                11 => return Request::Storage { place: 0 },
+                _ => {}
+            }
+        }
         match self.turn % 4 {
-            0 if self.holds && is_idle && stage == Some(READY) => Request::Hold,
+            0 if self.holds && is_in(IDLE) && stage == Some(READY) => Request::Hold,
+            0 if self.holds && is_in(FAULT) && stage == Some(WAITING_FOR_ACTIVE) => Request::ClearFault,
             0 if stage == Some(WAITING_FOR_ZERO) => Request::Zero { home: HOME.map(|angle| angle as f32) },
             1 => Request::Statistics,
             2 => match learned.fault_record {
@@ -137,7 +167,15 @@ impl Inquirer {
             learned.answered += 1;
             learned.slowest = learned.slowest.max(now - self.asked_at);
         }
+        if let Some(place) = reply.answers().and_then(|of| self.orders.iter().position(|order| *order == of)) {
+            self.orders.remove(place);
+            learned.kept.push(match reply {
+                Reply::Refused { reason, detail: [first, _], .. } => Some((reason, first)),
+                _ => None,
+            });
+        }
         match reply {
+            Reply::Storage { storage, .. } => learned.storage = Some(storage),
             Reply::Hello { hello, .. } => learned.hello = Some(hello),
             Reply::Status { status, .. } => {
                 if status.startup_stage == READY {
@@ -171,6 +209,9 @@ impl Host for Inquirer {
         }
         let question = self.question();
         self.envelope.sequence = self.envelope.sequence.wrapping_add(1);
+        if matches!(question, Request::KeepWeight { .. }) {
+            self.orders.push(self.envelope.sequence);
+        }
         self.asked_at = now;
         self.waiting = true;
         self.learned.lock().asked += 1;

@@ -1,6 +1,6 @@
 //! Puts faults in from outside while a run goes on.
 
-use fdcan_model::{Fault as WireFault, Unit};
+use fdcan_model::{Fault as WireFault, Handler, Unit};
 use rigless::emulator::{Host, Stop};
 use rigless::session::Session;
 use rigless::soc::Width;
@@ -70,10 +70,16 @@ impl Watcher {
         };
         let jump = |pc: u32, arguments: [u32; 4]| Order::Jump { pc, arguments, masked: false };
         match kind {
-            Kind::BusOff => wire(WireFault::BitErrors { attempts: 32 }, 0),
+            Kind::BusOff(lag) => {
+                wire(WireFault::BitErrors { attempts: 32 }, 0);
+                self.can.lock().set_init_lag(Unit::One, lag * 1000);
+            }
+            Kind::TransmitStarved => self.can.lock().starve(Unit::One, Handler::Transmit, now),
+            Kind::ReceiveStarved => self.can.lock().starve(Unit::One, Handler::Receive, now),
             Kind::NoAcknowledge(us) => wire(WireFault::NoAcknowledge, us),
             Kind::Dominant(us) => wire(WireFault::StuckDominant, us),
             Kind::PowerCut(operation) => self.cut_at = Some(self.bank_watch.operations + operation + 1),
+            Kind::FlashHangs(operation) => self.hang_at = Some(self.bank_watch.operations + operation + 1),
             Kind::HseDead => self.kill_crystal(session, now, host),
             Kind::Nmi => self.core.lock().orders.push(Order::Own(INTERRUPT_CONTROL, PEND_NMI)),
             Kind::Panic => match self.image.function_named("core::option::unwrap_failed") {
@@ -134,7 +140,7 @@ impl Watcher {
             self.core.lock().orders.push(Order::Own(INTERRUPT_CONTROL, PEND_NMI));
         } else {
             host.hold(true);
-            self.stopped_by_crystal = true;
+            self.held = true;
         }
     }
 }

@@ -161,6 +161,7 @@ impl Mcu for Part {
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
         self.chip.reset(at, cause);
         self.can.lock().reset(at.0);
+        self.core.lock().bank_hangs = false;
         for slot in self.slots.can.into_iter().chain([self.slots.watchdog, self.slots.serial]) {
             if let (_, Some(model)) = self.split(slot) {
                 model.reset();

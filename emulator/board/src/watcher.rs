@@ -11,7 +11,7 @@ use rigless::soc::Width;
 use rigless::soc::stm32h743::generated::rcc;
 use rigless::time::VirtualNanos;
 
-use crate::bank::{BankWatch, Operation, tear};
+use crate::bank::{BankWatch, Operation, stalls, tear};
 use crate::board::Board;
 use crate::cache::BANK;
 use crate::can::SharedCan;
@@ -54,13 +54,14 @@ pub struct Watcher {
     /// Faults not yet put in, the earliest first.
     pub(crate) faults: Vec<Fault>,
     pub(crate) hse_dead: bool,
-    pub(crate) stopped_by_crystal: bool,
+    pub(crate) held: bool,
     first_slot: Option<u64>,
     power_cut: Option<String>,
     /// The wire or the core is to be let go at this time.
     pub(crate) release_wire: Option<u64>,
     pub(crate) release_core: Option<u64>,
     pub(crate) cut_at: Option<u64>,
+    pub(crate) hang_at: Option<u64>,
     pub(crate) bank_watch: BankWatch,
     clock_control: u64,
     findings: Findings,
@@ -104,12 +105,13 @@ impl Watcher {
             tells: setup.tells,
             faults,
             hse_dead,
-            stopped_by_crystal: false,
+            held: false,
             first_slot: None,
             power_cut: None,
             release_wire: None,
             release_core: None,
             cut_at: None,
+            hang_at: None,
             bank_watch: BankWatch::default(),
             clock_control: 0,
             findings: Findings::default(),
@@ -153,7 +155,7 @@ impl Watcher {
         let offered = self.can.lock().frames_offered();
         if session.resets().len() != self.resets_seen {
             self.resets_seen = session.resets().len();
-            if std::mem::take(&mut self.stopped_by_crystal) {
+            if std::mem::take(&mut self.held) {
                 host.hold(false);
             }
             self.frames_at_reset = offered;
@@ -241,7 +243,24 @@ impl Watcher {
     }
 
     fn check_bank(&mut self, access: &Access, host: &mut dyn Host) {
+        if self.core.lock().bank_hangs && stalls(access) {
+            // The bus waits for the bank, and the core for the bus.
+            host.hold(true);
+            self.held = true;
+            self.findings.add(Finding {
+                grade: Grade::Refused,
+                register: "bank 2".into(),
+                address: Some(access.address),
+                function: access.program_counter.map(|pc| self.image.function_at(pc as u32)),
+                text: "an access to a bank whose operation does not end: the core waits for it".into(),
+                at: access.virtual_time.0,
+            });
+            return;
+        }
         let Some(operation) = self.bank_watch.see(access) else { return };
+        if self.hang_at == Some(self.bank_watch.operations) {
+            self.core.lock().bank_hangs = true;
+        }
         if let Operation::Erase { address } = operation {
             let sector = address as u32..address as u32 + 0x2_0000;
             self.core.lock().damaged.retain(|word| !sector.contains(word));

@@ -2,10 +2,10 @@
 
 mod common;
 
-use common::{Story, safe_frames, tell, tell_holding, tell_with};
+use common::{Story, is_torque, safe_frames, tell, tell_holding, tell_with};
 use emulated_board::setup::Setup;
 use fdcan_model::Cancellation;
-use puck::{Action, CanFrame, PuckTorque, Request};
+use puck::CanFrame;
 use sim::HOME;
 
 /// In service: the arm is ready long before.
@@ -67,6 +67,13 @@ fn d4_a_panic_with_frames_queued_sends_the_last_frames_and_the_next_start_tells_
 }
 
 #[test]
+fn d4_a_panic_whose_last_frames_cannot_be_read_in_time_sends_them_again() {
+    let faults = [format!("transmit-starved@{SERVICE_US}"), format!("panic@{SERVICE_US}")];
+    let story = tell_with(SERVICE_US as f64 / 1e6 + 0.1, &faults.each_ref().map(String::as_str));
+    ended_in_order(&story, SERVICE_US, "called `Option::unwrap()` on a `None` value");
+}
+
+#[test]
 fn d4_a_hard_fault_sends_the_last_frames_and_records_its_cause() {
     let story = tell_with(2.2, &["hard-fault@2100000"]);
     ended_in_order(&story, SERVICE_US, "hard fault");
@@ -83,14 +90,6 @@ fn d5_a_stack_at_its_guard_sends_the_last_frames() {
 fn d4_a_non_maskable_interrupt_sends_the_last_frames() {
     let story = tell_with(2.2, &["nmi@2100000"]);
     ended_in_order(&story, SERVICE_US, "non-maskable interrupt");
-}
-
-/// True if the frame gives a motor torque.
-fn is_torque(frame: &CanFrame) -> bool {
-    let Ok(Request { action: Action::PackedTorques { torques, .. }, .. }) = Request::decode(frame) else {
-        return false;
-    };
-    torques.iter().any(|torque| *torque != PuckTorque::ZERO)
 }
 
 #[test]

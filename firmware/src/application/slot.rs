@@ -110,7 +110,10 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
         let (mut late, mut lost, mut off) = (false, false, false);
         if self.slot == Slot::Slow {
             // The torques of the control slot must have left before another frame is queued behind them.
-            let (waiting, overruns, offs) = can.lock(|can| (can.waiting(), can.overruns(), can.bus_offs()));
+            let (waiting, overruns, offs) = can.lock(|can| {
+                can.tend();
+                (can.waiting(), can.overruns(), can.bus_offs())
+            });
             late = waiting > 0 || !self.queues.to_bus.is_empty();
             (lost, off) = (overruns != self.lost_frames, offs != self.bus_offs);
             (self.lost_frames, self.bus_offs) = (overruns, offs);

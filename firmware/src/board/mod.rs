@@ -114,15 +114,21 @@ pub trait SlotTimer {
     fn is_due(&self) -> bool;
 }
 
-/// Counts of a CAN controller about its frames.
+/// The state of a CAN controller, and its counts of frames.
 pub trait CanStatus {
+    /// Once a control cycle: brings a controller back that takes no part in the bus, and counts that as leaving it.
+    fn tend(&mut self) {
+        // A controller that cannot leave the bus needs nobody.
+    }
+
     /// Frames handed over that have not been on the wire yet.
     fn waiting(&self) -> usize;
 
     /// Received frames lost because nobody fetched them in time, since start-up.
     fn overruns(&self) -> u32;
 
-    /// Times the controller left the bus because of errors, since start-up. It comes back by itself.
+    /// Times the controller left the bus because of errors, or took no part in it any more, since start-up. It comes
+    /// back by itself.
     fn bus_offs(&self) -> u32 {
         // A controller that cannot leave the bus never does.
         0

@@ -34,6 +34,10 @@ const MEMORIES: [(u64, u64); 9] = [
     (0x3880_0000, 0x3880_0FFF),
 ];
 
+/// Address of FLASH.SR2, and its bits BSY and QW: an operation runs.
+const BANK_STATUS: u64 = 0x5200_2110;
+const BUSY: u64 = 0b101;
+
 /// The peripherals, and the processor's own space.
 const PERIPHERALS: [(u64, u64); 2] = [(0x4000_0000, 0x5FFF_FFFF), (0xE000_0000, 0xE00F_FFFF)];
 
@@ -126,7 +130,9 @@ impl CoreBus for CacheBus<'_> {
             });
             return None;
         }
-        self.inner.access(access, from_code)
+        let value = self.inner.access(access, from_code)?;
+        let is_status = access.kind == AccessKind::Read && access.address == BANK_STATUS;
+        Some(if is_status && self.shared.lock().bank_hangs { value | BUSY } else { value })
     }
 
     fn time(&self, instructions: u64) -> VirtualNanos {

@@ -10,9 +10,10 @@ use emulated_board::image::Image;
 use emulated_board::run::run;
 use emulated_board::setup::{Outcome, Setup};
 use emulated_board::world::{Host, InProcess};
-use puck::{CanFrame, Group, MotorMode, Node, PropertyId, set, zero_torques};
+use puck::{Action, CanFrame, Group, MotorMode, Node, PropertyId, PuckTorque, Request, set, zero_torques};
 use sim::{
-    FreeJoints, HOME, Lockstep, Passage, PlainLine, Plant, PlantConfig, Served, TICKS_PER_MICROSECOND, TICKS_PER_SECOND,
+    FreeJoints, HOME, Lockstep, OperatorConfig, Passage, PendantAction, PlainLine, Plant, PlantConfig, Served,
+    TICKS_PER_MICROSECOND, TICKS_PER_SECOND,
 };
 
 /// The image under test: `TACTUS_BOARD_IMAGE`, or the one that `cargo xtask build --board stm32h743` makes.
@@ -30,7 +31,12 @@ pub(crate) fn image() -> Arc<Image> {
 
 /// An arm that somebody switches on and activates, in the simplest world.
 pub(crate) fn plant() -> Plant {
-    Plant::new(PlantConfig::default(), Box::new(FreeJoints::new(HOME)))
+    with_operator(OperatorConfig::default())
+}
+
+/// The same with a person who does this.
+fn with_operator(operator: OperatorConfig) -> Plant {
+    Plant::new(PlantConfig { operator, ..PlantConfig::default() }, Box::new(FreeJoints::new(HOME)))
 }
 
 /// A host that asks, and keeps every frame of the arm's bus.
@@ -94,22 +100,45 @@ const WAITING_FOR_ACTIVE: u8 = 9;
 
 /// Runs the image for these seconds.
 pub(crate) fn tell(seconds: f64, setup: Setup) -> Story {
-    tell_to(seconds, setup, |inquirer| inquirer)
+    tell_to(seconds, setup, plant(), |inquirer| inquirer)
 }
 
 /// The same with faults, and with a host that has the arm hold as soon as it can.
 pub(crate) fn tell_holding(seconds: f64, faults: &[String]) -> Story {
     let faults = faults.iter().map(|text| text.parse().expect("a fault")).collect();
-    tell_to(seconds, Setup { faults, ..Setup::default() }, Inquirer::holding)
+    tell_to(seconds, Setup { faults, ..Setup::default() }, plant(), Inquirer::holding)
+}
+
+/// The same, and the host has weights kept.
+pub(crate) fn tell_keeping(seconds: f64, faults: &[String]) -> Story {
+    let faults = faults.iter().map(|text| text.parse().expect("a fault")).collect();
+    tell_to(seconds, Setup { faults, ..Setup::default() }, plant(), Inquirer::keeping)
+}
+
+/// The same, and a person presses Shift-Idle and Shift-Activate again at this time.
+pub(crate) fn tell_armed_again(seconds: f64, setup: Setup, again_us: u64) -> Story {
+    let at = again_us * TICKS_PER_MICROSECOND;
+    let later = at + TICKS_PER_SECOND / 10;
+    let script = vec![(at, PendantAction::ShiftIdle), (later, PendantAction::ShiftActivate)];
+    let plant = with_operator(OperatorConfig { script, ..OperatorConfig::default() });
+    tell_to(seconds, setup, plant, Inquirer::holding)
+}
+
+/// True if the frame makes a joint pull.
+pub(crate) fn is_torque(frame: &CanFrame) -> bool {
+    let Ok(Request { action: Action::PackedTorques { torques, .. }, .. }) = Request::decode(frame) else {
+        return false;
+    };
+    torques.iter().any(|torque| *torque != PuckTorque::ZERO)
 }
 
 /// The same for any host.
-fn tell_to(seconds: f64, setup: Setup, host: impl Fn(Inquirer) -> Inquirer) -> Story {
+fn tell_to(seconds: f64, setup: Setup, plant: Plant, host: impl Fn(Inquirer) -> Inquirer) -> Story {
     let image = image();
     let learned = SharedLearned::default();
     let passages = Arc::new(Mutex::new(Vec::new()));
     let inquirer = host(Inquirer::new(image.model_hash, learned.clone()));
-    let world = InProcess::new(plant(), Box::new(Recorder { inquirer, passages: passages.clone() }));
+    let world = InProcess::new(plant, Box::new(Recorder { inquirer, passages: passages.clone() }));
     let setup = Setup { until: Some((seconds * 1e9) as u64), ..setup };
     let outcome = run(&image, &setup, Box::new(world)).expect("the emulation runs");
     assert_eq!(outcome.cut_short, None, "the run ended early");

@@ -45,6 +45,11 @@ pub const BIT_TIMING: BitTiming = BitTiming { prescaler: 10, before_sample: 5, a
 /// Bits per second of both buses.
 pub const BITS_PER_SECOND: u32 = 1_000_000;
 
+/// Bits of CCCR that name a mode, none of which is set while a controller sends and receives as it should:
+/// initialisation, configuration, restricted operation, clock stop and its answer, bus monitoring, no repetition, test,
+/// flexible data rate and what belongs to it. The bits between and above them are reserved.
+pub const MODE_BITS: u32 = 0xF3FF;
+
 /// Words of a queue element: two of head, two for the eight bytes.
 pub const ELEMENT_WORDS: u32 = 4;
 

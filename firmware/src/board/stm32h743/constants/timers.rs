@@ -45,9 +45,9 @@ const fn watchdog_us(ticks: u32) -> u32 {
 /// At the end, the longest wait for room for the last frames, us: four full frames of ours and one of another node.
 pub const LAST_ROOM_US: u32 = 1_500;
 
-/// At the end, the longest wait until a controller whose queue does not move has left the bus, us: a few ticks of its
-/// clock.
-pub const LAST_STOP_US: u32 = 100;
+/// Longest wait until a CAN controller says that it has stopped, or that it has not any more, us: a few ticks of its
+/// clock. One that comes back late is asked again in the next control cycle; the control slot never waits for it.
+pub const INIT_US: u32 = 20;
 
 /// At the end, the longest wait for the last frames to leave, us: either the bus has to be joined again, which takes
 /// 129 times eleven bits, or a frame of another node and four that waited come first.

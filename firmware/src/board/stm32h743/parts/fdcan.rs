@@ -6,26 +6,33 @@
 //! answered here and passed on as `CAN_TRANSMIT`, because the application does not touch the controller when it has
 //! nothing to send, and the line would never come down.
 //!
-//! Bus-off: the controller rejoins by itself after 128 times eleven recessive bits (1.4 ms), but whatever waited to be
-//! sent is thrown away first: a torque of the past must not come out later. That motion does not resume is the
-//! application's business ([`CanStatus::bus_offs`]).
+//! A controller that has left the bus by itself comes back: after bus-off, when it could not read a frame in time and
+//! went into restricted operation, in which it sends nothing, and out of any other mode that nobody asked for. What
+//! waited to be sent is thrown away first: a torque of the past must not come out later. After bus-off it then waits
+//! for 129 times eleven recessive bits (1.4 ms). That motion does not resume is the application's business
+//! ([`CanStatus::bus_offs`]).
+//!
+//! The two interrupt flags tell it at once. The mode is read once a control cycle as well ([`CanStatus::tend`]): INIT
+//! goes from one clock domain to the other and may be read later than the flag of bus-off, and a mode without a flag is
+//! seen too.
 
 use core::convert::Infallible;
 
 use cortex_m::peripheral::NVIC;
 use embassy_stm32::pac::can::Fdcan;
-use embassy_stm32::pac::can::regs::{Ir, Txbar};
+use embassy_stm32::pac::can::regs::{Cccr, Ir, Txbar};
 use embassy_stm32::pac::can::vals::Tfqm;
 use embassy_stm32::pac::{FDCAN1, FDCAN2, FDCANRAM, RCC};
 use embedded_can::{Frame as _, Id};
 use puck::{CanFrame, CanId};
 
-use super::super::constants::can::{ARM, BIT_TIMING, ELEMENT_WORDS, HOST, MessageMemory};
+use super::super::constants::can::{ARM, BIT_TIMING, ELEMENT_WORDS, HOST, MODE_BITS, MessageMemory};
 use super::super::constants::filters::{ARM_FILTERS, HOST_FILTERS};
-use super::super::constants::timers::{LAST_LEFT_US, LAST_ROOM_US, LAST_STOP_US};
+use super::super::constants::timers::{INIT_US, LAST_LEFT_US, LAST_ROOM_US};
+use super::SelectedBoard;
 use super::clock;
 use super::device::{Chip, Interrupt, level};
-use crate::board::CanStatus;
+use crate::board::{CanStatus, panic_stop};
 
 /// Logical priority of the answer to "a frame has left": above every task, it takes a dozen instructions.
 const SENT_PRIORITY: u8 = 14;
@@ -57,17 +64,10 @@ impl Controller {
     /// Bit timing, filters, queues, no interrupts; then onto the bus.
     fn start(&self, filters: &[u32]) {
         let r = self.registers;
-        r.cccr().modify(|w| w.set_init(true));
-        while !r.cccr().read().init() {}
-        r.cccr().modify(|w| w.set_cce(true));
-        r.cccr().modify(|w| {
-            w.set_fdoe(false);
-            w.set_bse(false);
-            w.set_dar(false);
-            w.set_txp(false);
-            w.set_mon(false);
-            w.set_asm(false);
-        });
+        if !self.stop() {
+            panic_stop::stop::<SelectedBoard>(format_args!("a CAN controller does not stop: it has no clock"));
+        }
+        self.configure();
         r.nbtp().write(|w| {
             w.set_nbrp((BIT_TIMING.prescaler - 1) as u16);
             w.set_ntseg1((BIT_TIMING.before_sample - 1) as u8);
@@ -112,10 +112,38 @@ impl Controller {
         r.ir().write_value(Ir(u32::MAX));
     }
 
-    /// Leaves configuration; the controller joins the bus after eleven recessive bits.
-    fn join(&self) {
-        self.registers.cccr().modify(|w| w.set_cce(false));
-        self.registers.cccr().modify(|w| w.set_init(false));
+    /// Takes the controller off the bus, if it is on it. Tells whether it has stopped: the bit goes through another
+    /// clock domain, and without that clock it never does.
+    fn stop(&self) -> bool {
+        let mode = self.registers.cccr();
+        mode.modify(|w| w.set_init(true));
+        clock::within(INIT_US, || mode.read().init())
+    }
+
+    /// Opens the configuration of a controller that has stopped. It sends and receives classic frames, repeats what
+    /// fails, and tests nothing: no other mode stays.
+    fn configure(&self) {
+        let mut open = Cccr(0);
+        open.set_init(true);
+        open.set_cce(true);
+        // The first makes it possible, the second does it.
+        self.registers.cccr().write_value(open);
+        self.registers.cccr().write_value(open);
+    }
+
+    /// Leaves configuration; the controller joins the bus after eleven recessive bits. Tells whether it is on its way.
+    fn join(&self) -> bool {
+        let mode = self.registers.cccr();
+        let mut closed = Cccr(0);
+        closed.set_init(true);
+        mode.write_value(closed);
+        mode.write_value(Cccr(0));
+        clock::within(INIT_US, || !mode.read().init())
+    }
+
+    /// True if the controller takes part in the bus as it was told to.
+    fn takes_part(&self) -> bool {
+        self.registers.cccr().read().0 & MODE_BITS == 0
     }
 
     /// Puts a frame behind those that wait; `false` if there is no room.
@@ -176,23 +204,29 @@ impl Controller {
         usize::from(self.registers.txfqs().read().tffl())
     }
 
-    /// If the controller has left the bus: forgets what waited and lets it come back. Tells whether it had left.
-    pub(super) fn rejoin(&self) -> bool {
-        if !(self.registers.psr().read().bo() && self.registers.cccr().read().init()) {
-            return false;
-        }
-        self.forget_and_join();
-        true
+    /// Brings a controller back that does not take part. Tells whether it is on its way; if not, what is handed over
+    /// does not leave, and this wants to be called again.
+    #[cold]
+    #[inline(never)]
+    fn bring_back(&self) -> bool {
+        self.stop() && self.forget_and_join()
     }
 
-    /// Empties both queues and joins the bus. Only for a controller that is off the bus (INIT).
+    /// The same, if it is necessary, for somebody who comes by often.
+    pub(super) fn tend(&self) {
+        if !self.takes_part() {
+            self.bring_back();
+        }
+    }
+
+    /// Empties both queues and joins the bus. Only for a controller that has stopped.
     ///
     /// Not by cancelling: that is for dedicated buffers and queues, and the controller's manual does not say that its
     /// FIFO skips a cancelled frame. Opening the configuration (CCE) makes the controller forget what waits and what it
     /// has received (TXBRP, TXFQS, RXF0S) and keeps its settings.
-    fn forget_and_join(&self) {
-        self.registers.cccr().modify(|w| w.set_cce(true));
-        self.join();
+    fn forget_and_join(&self) -> bool {
+        self.configure();
+        self.join()
     }
 }
 
@@ -207,6 +241,7 @@ pub(super) fn start(nvic: &mut NVIC, host: bool) {
         w.set_rfne(0, true);
         w.set_rfle(0, true);
         w.set_boe(true);
+        w.set_mrafe(true);
         w.set_tce(true);
     });
     r.ils().write(|w| w.set_tcl(true));
@@ -241,12 +276,14 @@ extern "C" fn FDCAN1_IT1() {
 pub struct ArmBus {
     overruns: u32,
     bus_offs: u32,
+    /// The controller does not take part, and has not come back yet.
+    is_away: bool,
 }
 
 impl ArmBus {
     /// The one there is; called once.
     pub(super) const fn take() -> Self {
-        Self { overruns: 0, bus_offs: 0 }
+        Self { overruns: 0, bus_offs: 0, is_away: false }
     }
 
     /// Answers the flags of line 0.
@@ -257,12 +294,36 @@ impl ArmBus {
         seen.set_rfn(0, flags.rfn(0));
         seen.set_rfl(0, flags.rfl(0));
         seen.set_bo(flags.bo());
+        seen.set_mraf(flags.mraf());
         // Before the queue is looked at: a frame that comes in between interrupts again.
         r.ir().write_value(seen);
         if flags.rfl(0) {
             self.overruns = self.overruns.wrapping_add(1);
         }
-        if flags.bo() && ARM_CONTROLLER.rejoin() {
+        if flags.bo() || flags.mraf() {
+            self.answer_trouble(flags);
+        }
+    }
+
+    /// Bus-off, whose flag tells its end as well; or a frame that could not be read or stored in time.
+    #[cold]
+    #[inline(never)]
+    fn answer_trouble(&mut self, flags: Ir) {
+        let takes_part = ARM_CONTROLLER.takes_part();
+        if flags.mraf() && takes_part {
+            self.overruns = self.overruns.wrapping_add(1);
+        }
+        if !takes_part || flags.bo() && ARM_CONTROLLER.registers.psr().read().bo() {
+            self.bring_back();
+        }
+    }
+
+    /// It is counted when the controller is back: what the application sends then is not thrown away.
+    #[cold]
+    #[inline(never)]
+    fn bring_back(&mut self) {
+        self.is_away = !ARM_CONTROLLER.bring_back();
+        if !self.is_away {
             self.bus_offs = self.bus_offs.wrapping_add(1);
         }
     }
@@ -278,6 +339,10 @@ impl embedded_can::nb::Can for ArmBus {
             // `CanFrame` has eleven bits by construction; a frame that cannot exist needs no place.
             return Ok(None);
         };
+        if self.is_away {
+            // It would be thrown away with what waits.
+            return Ok(None);
+        }
         if ARM_CONTROLLER.send(id.as_raw(), frame.data(), frame.is_remote_frame()) {
             Ok(None)
         } else {
@@ -298,6 +363,12 @@ impl embedded_can::nb::Can for ArmBus {
 }
 
 impl CanStatus for ArmBus {
+    fn tend(&mut self) {
+        if self.is_away || !ARM_CONTROLLER.takes_part() {
+            self.bring_back();
+        }
+    }
+
     fn waiting(&self) -> usize {
         ARM_CONTROLLER.waiting()
     }
@@ -318,26 +389,37 @@ pub(super) fn hand_over_last(frames: &[CanFrame]) {
         return;
     }
     let controller = &ARM_CONTROLLER;
-    let control = controller.registers.cccr();
-    let on_the_bus = !control.read().init();
-    if !(on_the_bus && clock::within(LAST_ROOM_US, || controller.room() >= frames.len())) {
-        control.modify(|w| w.set_init(true));
-        clock::within(LAST_STOP_US, || control.read().init());
-        controller.forget_and_join();
+    if !(controller.takes_part() && clock::within(LAST_ROOM_US, || controller.room() >= frames.len())) {
+        // If it does not stop or does not come back there is nothing left to try.
+        let _ = controller.bring_back();
     }
+    send_last(frames);
+}
+
+/// There is room, unless the bus is dead.
+fn send_last(frames: &[CanFrame]) {
     for frame in frames {
         if let Id::Standard(id) = frame.id() {
-            // There is room after the above; if the bus is dead there is nothing left to try.
-            let _ = controller.send(id.as_raw(), frame.data(), frame.is_remote_frame());
+            let _ = ARM_CONTROLLER.send(id.as_raw(), frame.data(), frame.is_remote_frame());
         }
     }
 }
 
-/// Waits until the last frames have left, at most a few milliseconds.
-pub(super) fn wait_for_last() {
-    if is_started() {
-        clock::within(LAST_LEFT_US, || ARM_CONTROLLER.waiting() == 0);
+/// Waits until the last frames have left, at most a few milliseconds. A controller that stops taking part over them is
+/// brought back once and given them again.
+pub(super) fn wait_for_last(frames: &[CanFrame]) {
+    if !is_started() {
+        return;
     }
+    let mut may_repeat = true;
+    clock::within(LAST_LEFT_US, || {
+        if may_repeat && !ARM_CONTROLLER.takes_part() {
+            may_repeat = false;
+            let _ = ARM_CONTROLLER.bring_back();
+            send_last(frames);
+        }
+        ARM_CONTROLLER.waiting() == 0
+    });
 }
 
 /// True if the controllers have their clocks: the end may come before the start-up got here, or because the clock

@@ -55,8 +55,8 @@ impl LinkPort for HostCan {
         if !self.runs {
             return 0;
         }
-        // A controller that has left the bus (nobody answers on it) comes back by itself.
-        HOST_CONTROLLER.rejoin();
+        // A controller that has left the bus, because nobody answers on it or for any other reason, comes back.
+        HOST_CONTROLLER.tend();
         self.pump();
         let mut count = 0;
         // A segment is taken only if all it may bring fits: a segment and the mark of a loss before it.

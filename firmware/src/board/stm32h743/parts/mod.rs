@@ -121,7 +121,7 @@ impl crate::board::Board for SelectedBoard {
             fdcan::hand_over_last(frames);
             panic_reason::write(reason);
         }
-        fdcan::wait_for_last();
+        fdcan::wait_for_last(frames);
         reset::restart()
     }
 }
