@@ -203,6 +203,8 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         match outcome {
             Ok(()) => self.make_good(work),
             Err(StoreError::Sector(sector)) => self.opening.bad_sector = Some(sector),
+            // The keeper asks it nothing more before a restart.
+            Err(StoreError::Medium) => self.opening.failed = true,
             Err(_) => {}
         }
         let _ = self.memory.finished();

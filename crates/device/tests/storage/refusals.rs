@@ -6,6 +6,7 @@ use device::secret::encode as encode_secret;
 use device::storage::{HOME_KEY, SECRET_KEY, WEIGHT_KEY};
 use device::weight::{WEIGHT_BYTES, encode};
 use device::{Store, StoreError, StoredHome, StoredSecret, StoredWeight};
+use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use flash::{FLASH_BYTES, FlashPort, VirtualClock};
 use link::SecretState;
 
@@ -271,4 +272,101 @@ mod failing {
             Ok(())
         }
     }
+}
+
+/// A flash that hangs in the write or erasure after so many, or in the read after them, and then answers nothing.
+struct Hanging {
+    port: FlashPort,
+    operations_left: u32,
+    in_a_read: bool,
+    hangs: bool,
+}
+
+/// It hangs.
+#[derive(Debug)]
+struct Hangs;
+
+impl NorFlashError for Hangs {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
+impl Hanging {
+    fn operation(&mut self) -> Result<(), Hangs> {
+        self.hangs |= self.operations_left == 0;
+        if self.hangs {
+            return Err(Hangs);
+        }
+        self.operations_left -= 1;
+        Ok(())
+    }
+}
+
+impl ErrorType for Hanging {
+    type Error = Hangs;
+}
+
+impl ReadNorFlash for Hanging {
+    const READ_SIZE: usize = FlashPort::READ_SIZE;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Hangs> {
+        self.hangs |= self.in_a_read && self.operations_left == 0;
+        if self.hangs {
+            return Err(Hangs);
+        }
+        self.port.read(offset, bytes).await.map_err(|_| Hangs)
+    }
+
+    fn capacity(&self) -> usize {
+        self.port.capacity()
+    }
+}
+
+impl NorFlash for Hanging {
+    const WRITE_SIZE: usize = FlashPort::WRITE_SIZE;
+    const ERASE_SIZE: usize = FlashPort::ERASE_SIZE;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), Hangs> {
+        self.operation()?;
+        self.port.erase(from, to).await.map_err(|_| Hangs)
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Hangs> {
+        self.operation()?;
+        self.port.write(offset, bytes).await.map_err(|_| Hangs)
+    }
+}
+
+#[test]
+fn c5_a_flash_that_hangs_in_any_operation_is_told_as_failed_and_a_new_start_trusts_it_again() {
+    let blank = vec![0xFF; FLASH_BYTES];
+    let mut told = [0; 2];
+    for (operations_left, in_a_read) in (1..60).flat_map(|left| [(left, false), (left, true)]) {
+        let chip = chip(&blank);
+        let port = FlashPort::new(chip.clone(), VirtualClock::default());
+        let flash = Hanging { port, operations_left, in_a_read, hangs: false };
+        let (shared, answers) = run::<4, _>(flash, &[Wish::Save(0, 7), Wish::Home(3), Wish::Save(1, 8)]);
+        let words = format!("{operations_left} {in_a_read}: {answers:?}");
+        let library = shared.library();
+        assert!(answers.iter().all(Option::is_some), "one is never answered, {words}");
+        assert!(answers.is_sorted_by_key(|answer| *answer != Some(Ok(()))), "{words}");
+        let refused = answers.iter().flatten().find_map(|answer| answer.err());
+        let report = library.report(0);
+        match refused {
+            None => assert!(!report.failed && report.bad_sector.is_none(), "{words}"),
+            Some(StoreError::Sector(sector)) => assert_eq!(report.bad_sector, Some(sector), "{words}"),
+            Some(StoreError::Medium) => assert!(report.failed, "{words}"),
+            Some(_) => panic!("{words}"),
+        }
+        told[usize::from(in_a_read)] += u32::from(refused.is_some());
+        drop(library);
+        let (shared, again) = run_on::<4>(&chip, &[Wish::Save(2, 9)]);
+        let report = shared.library().report(0);
+        assert_eq!((again, report.failed, report.bad_sector), (vec![Some(Ok(()))], false, None), "{words}");
+        if answers.first() == Some(&Some(Ok(()))) {
+            assert_eq!(shared.library().image(0), Some(image(7).as_slice()), "{words}");
+        }
+    }
+    assert!(told.iter().all(|count| *count > 5), "{told:?}");
 }

@@ -37,6 +37,13 @@ pub const SECTOR_BYTES: u32 = 128 * 1024;
 /// Bytes that are written at a time, once each between erasures: a flash word with its check bits.
 pub const FLASH_WORD_BYTES: u32 = 32;
 
+/// Longest wait for a flash word to be written, us: a hundred times what the maker gives at this width (0.2 ms).
+pub const WRITE_US: u32 = 20_000;
+
+/// Longest wait for a sector to be erased, us: five times what the maker gives at this width (2 s). A worn sector takes
+/// its time; the host gives up after 15 s.
+pub const ERASE_US: u32 = 10_000_000;
+
 /// All of the tightly coupled code memory.
 pub const ITCM: Region = Region { start: 0, length: 64 * 1024 };
 

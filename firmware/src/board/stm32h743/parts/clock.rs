@@ -12,7 +12,7 @@ use super::super::constants::timers::CLOCK_HZ;
 static LAST: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 
 /// Ticks of a microsecond; whole, so that no fraction is lost.
-const TICKS_PER_US: u64 = CLOCK_HZ as u64 / 1_000_000;
+pub(super) const TICKS_PER_US: u64 = CLOCK_HZ as u64 / 1_000_000;
 
 /// Time since start-up in ticks of 5 ns.
 #[derive(Clone, Copy)]

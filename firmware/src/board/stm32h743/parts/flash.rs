@@ -8,6 +8,9 @@
 //! A flash word of 32 bytes carries check bits. One that was being written when power went may be damaged beyond
 //! repair: reading it is then a bus fault, which [`read_word`] turns into 32 zero bytes. The storage above tells from
 //! its own check sums that this is nothing it wrote.
+//!
+//! An operation that does not end is an error after a while. A bank that is busy is not touched any more: whoever reads
+//! it waits in the middle of an instruction, the control slot behind it, until the watchdog ends that.
 
 use core::arch::asm;
 use core::future::poll_fn;
@@ -18,7 +21,8 @@ use embassy_stm32::pac::flash::Bank;
 use embassy_stm32::pac::flash::regs::{Ccr, Sr};
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 
-use super::super::constants::memory::{FLASH_WORD_BYTES, SECTOR_BYTES, STORE};
+use super::super::constants::memory::{ERASE_US, FLASH_WORD_BYTES, SECTOR_BYTES, STORE, WRITE_US};
+use super::clock;
 
 /// Number of the bank, counted from 0.
 const BANK: usize = 1;
@@ -55,6 +59,9 @@ pub enum Error {
     Sequence,
     /// The chip could not write or erase: worn out, or its supply is too low.
     Operation,
+    /// An operation has not ended in many times the time it may take. Until a restart nothing in the bank is touched:
+    /// the processor would wait for it.
+    Hangs,
 }
 
 impl NorFlashError for Error {
@@ -97,6 +104,10 @@ impl Open {
 
 impl Drop for Open {
     fn drop(&mut self) {
+        if is_busy(bank().sr().read()) {
+            // It hangs: the register takes nothing before a restart.
+            return;
+        }
         bank().cr().modify(|w| {
             w.set_pg(false);
             w.set_ser(false);
@@ -119,20 +130,36 @@ fn every_flag() -> Ccr {
     flags
 }
 
-/// Waits for the end of the operation: asked again whenever the task is polled.
-async fn ended() -> Result<(), Error> {
-    let status = poll_fn(|context| {
+/// True while an operation runs, waits, or has begun to be written.
+fn is_busy(status: Sr) -> bool {
+    status.bsy() || status.qw() || status.wbne()
+}
+
+/// Whatever touches the bank asks this first.
+fn need_idle() -> Result<(), Error> {
+    if is_busy(bank().sr().read()) { Err(Error::Hangs) } else { Ok(()) }
+}
+
+/// Waits for the end of the operation, for at most this long: asked again whenever the task is polled.
+async fn ended(limit_us: u32) -> Result<(), Error> {
+    let begin = clock::now();
+    let limit = u64::from(limit_us) * clock::TICKS_PER_US;
+    poll_fn(|context| {
+        // The time is taken before the flash is looked at: a task that was kept waiting blames nobody.
+        let is_over = clock::now().wrapping_sub(begin) >= limit;
         for _ in 0..LOOKS {
             let status = bank().sr().read();
-            if !(status.bsy() || status.qw() || status.wbne()) {
-                return Poll::Ready(status);
+            if !is_busy(status) {
+                return Poll::Ready(judge(status));
             }
+        }
+        if is_over {
+            return Poll::Ready(Err(Error::Hangs));
         }
         context.waker().wake_by_ref();
         Poll::Pending
     })
-    .await;
-    judge(status)
+    .await
 }
 
 fn judge(status: Sr) -> Result<(), Error> {
@@ -206,6 +233,7 @@ impl ReadNorFlash for Bank2 {
 
     async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
         check(offset, bytes.len(), 1)?;
+        need_idle()?;
         let mut at = offset;
         let mut rest = bytes;
         while !rest.is_empty() {
@@ -235,6 +263,7 @@ impl NorFlash for Bank2 {
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
         check(from, to.saturating_sub(from) as usize, SECTOR_BYTES)?;
         for sector in from / SECTOR_BYTES..to / SECTOR_BYTES {
+            need_idle()?;
             let _open = Open::new();
             bank().cr().modify(|w| {
                 w.set_ser(true);
@@ -242,7 +271,7 @@ impl NorFlash for Bank2 {
                 w.set_snb(sector as u8);
             });
             bank().cr().modify(|w| w.set_start(true));
-            ended().await?;
+            ended(ERASE_US).await?;
         }
         Ok(())
     }
@@ -251,6 +280,7 @@ impl NorFlash for Bank2 {
         check(offset, bytes.len(), FLASH_WORD_BYTES)?;
         let words = bytes.chunks_exact(WORD_BYTES);
         for (word, at) in words.zip((STORE.start + offset..).step_by(WORD_BYTES)) {
+            need_idle()?;
             let _open = Open::new();
             bank().cr().modify(|w| {
                 w.set_psize(PARALLELISM);
@@ -265,7 +295,7 @@ impl NorFlash for Bank2 {
                 unsafe { ((at + offset) as *mut u32).write_volatile(value) };
             }
             cortex_m::asm::dsb();
-            ended().await?;
+            ended(WRITE_US).await?;
         }
         Ok(())
     }
