@@ -44,7 +44,7 @@ pub struct Can {
     host_bus: HostBus,
     /// When the world was last asked.
     asked: Ticks,
-    /// A frame of the time before a reset is still on the wire.
+    /// A frame of the time before a reset or a stop of the controller is still on the wire.
     orphan: bool,
     /// The first frame the chip has sent, ns.
     first_frame: Option<u64>,
@@ -193,6 +193,8 @@ impl Can {
                     WireEvent::Withdraw { .. } => {
                         if self.world.withdraw(ticks(now)) && !self.orphan {
                             self.controllers.still_on_wire(Unit::One, now);
+                            // The end of what a stopped controller has left on the wire is not that of its next frame.
+                            self.orphan = !self.controllers.status(Unit::One).on_bus;
                         }
                     }
                 }

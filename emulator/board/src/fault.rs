@@ -36,6 +36,10 @@ pub enum Kind {
     Guard,
     /// The stack pointer is below the guard: nothing a fault handler could push to.
     BelowGuard,
+    /// Timer 5, the time since start-up, stands still from this time on.
+    TimeStands,
+    /// From this time on the watchdog loses what is written to its registers.
+    WatchdogDeaf,
     /// The USB controller holds its interrupt line up for good, as for a packet that nobody takes.
     UsbHeld,
     /// A reset of this kind.
@@ -67,7 +71,7 @@ pub struct Fault {
 /// Forms that the command line takes.
 pub const SYNTAX: &str = "KIND@MICROSECONDS[:ARGUMENT], KIND one of bus-off[:US], transmit-starved, receive-starved, no-acknowledge[:US], dominant[:US], \
 power-cut:N, flash-hangs:N, hse-dead, nmi, panic, hard-fault, hang, stall:US, guard, below-guard, \
-usb-held, reset:pin|power|brown-out|probe";
+watchdog-deaf, time-stands, usb-held, reset:pin|power|brown-out|probe";
 
 /// A text that names no fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -99,6 +103,8 @@ impl FromStr for Fault {
             "stall" => Kind::Stall(number()?),
             "guard" => Kind::Guard,
             "below-guard" => Kind::BelowGuard,
+            "time-stands" => Kind::TimeStands,
+            "watchdog-deaf" => Kind::WatchdogDeaf,
             "usb-held" => Kind::UsbHeld,
             "reset" => Kind::Reset(match argument {
                 Some("pin") => ResetKind::Pin,

@@ -33,6 +33,9 @@ const RECURSION: u32 = 0xE7FD_B5FF;
 const INTERRUPT_CONTROL: u32 = 0xE000_ED04;
 const PEND_NMI: u32 = 1 << 31;
 
+/// TIM5_CR1.
+const TIME_CONTROL: u32 = 0x4000_0C00;
+
 /// An address below the guard of the stack, where nothing is.
 const BELOW_MEMORY: u32 = 0x1FFF_F000;
 
@@ -101,6 +104,9 @@ impl Watcher {
             }
             Kind::Guard => self.overflow(self.image.stack.start + 16),
             Kind::BelowGuard => self.overflow(BELOW_MEMORY),
+            // CEN goes, and nothing else of the register was set.
+            Kind::TimeStands => self.core.lock().orders.push(Order::Poke(TIME_CONTROL, vec![0])),
+            Kind::WatchdogDeaf => self.watch.deafen(),
             Kind::UsbHeld => session.board_mut().mcu.part.hold_usb(stop.at),
             Kind::Reset(ResetKind::Probe) => {
                 self.core.lock().orders.push(Order::Own(RESET_CONTROL, SYSTEM_RESET));

@@ -43,6 +43,8 @@ pub struct Watched {
     pub changed_at: u64,
     /// When it was started, ns.
     pub started_at: Option<u64>,
+    /// A fault: what is written to PR, RLR and WINR is lost.
+    pub deaf: bool,
 }
 
 /// [`Watched`], shared with who reports it.
@@ -58,6 +60,11 @@ impl SharedWatch {
     #[must_use]
     pub fn get(&self) -> Watched {
         *self.lock()
+    }
+
+    /// From now on it takes no value: what is written to its registers is lost, and no flag tells.
+    pub fn deafen(&self) {
+        self.lock().deaf = true;
     }
 
     /// From now on the nearest feeding is a new one: service has begun.
@@ -169,6 +176,9 @@ impl Watchdog {
             );
             return;
         }
+        if self.watch.lock().deaf {
+            return;
+        }
         // Without its oscillator nothing passes.
         let crossing = (CROSSING * 1_000_000_000).checked_div(self.hz);
         let at = crossing.map_or(u64::MAX, |time| context.now().0 + time);
@@ -184,12 +194,18 @@ impl Device for Watchdog {
 
     fn read(
         &mut self,
-        _register: Register,
+        register: Register,
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) -> Option<u64> {
         self.settle(registers, context);
-        None
+        // Read back from the oscillator's side, and valid once the update flag has gone (RM0433 45.4.2, 45.4.3).
+        match register {
+            Register::Pr => Some(u64::from(self.prescaler.trailing_zeros()) - 2),
+            Register::Rlr => Some(self.reload),
+            Register::Winr => Some(self.window),
+            Register::Kr | Register::Sr => None,
+        }
     }
 
     fn write(&mut self, register: Register, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {

@@ -45,7 +45,7 @@ pub struct Watcher {
     pub(crate) image: Arc<Image>,
     pub(crate) can: SharedCan,
     pub(crate) core: SharedCore,
-    watch: SharedWatch,
+    pub(crate) watch: SharedWatch,
     log: Log,
     interrupt: Arc<AtomicBool>,
     until: Option<u64>,

@@ -68,9 +68,12 @@ fn d4_a_panic_with_frames_queued_sends_the_last_frames_and_the_next_start_tells_
 
 #[test]
 fn d4_a_panic_whose_last_frames_cannot_be_read_in_time_sends_them_again() {
-    let faults = [format!("transmit-starved@{SERVICE_US}"), format!("panic@{SERVICE_US}")];
-    let story = tell_with(SERVICE_US as f64 / 1e6 + 0.1, &faults.each_ref().map(String::as_str));
-    ended_in_order(&story, SERVICE_US, "called `Option::unwrap()` on a `None` value");
+    // Before they are handed over, and with none to three of them on the bus; they begin after 0.8 ms.
+    for after_us in [0, 820, 950, 1_100] {
+        let faults = [format!("panic@{SERVICE_US}"), format!("transmit-starved@{}", SERVICE_US + after_us)];
+        let story = tell_with(SERVICE_US as f64 / 1e6 + 0.1, &faults.each_ref().map(String::as_str));
+        ended_in_order(&story, SERVICE_US, "called `Option::unwrap()` on a `None` value");
+    }
 }
 
 #[test]
@@ -133,6 +136,15 @@ fn d3_a_hang_before_the_first_slot_ends_by_the_watchdog_as_fast() {
 #[test]
 fn d3_a_core_that_stands_still_is_reset_by_the_watchdog() {
     ended_by_watchdog(&tell_with(2.2, &["stall@2100000:20000"]), SERVICE_US);
+}
+
+#[test]
+fn d3_a_watchdog_that_does_not_take_its_window_lets_nothing_move() {
+    let story = tell_with(0.5, &["watchdog-deaf@1000"]);
+    let resets = story.resets();
+    assert!(resets.len() > 3 && resets.iter().all(|(_, cause)| *cause == "Core"), "{resets:?}");
+    assert!(story.log_says("the watchdog does not take its window"), "{:#?}", story.log());
+    assert!(!story.sent_since(0).iter().any(|(_, frame)| is_torque(frame)));
 }
 
 #[test]
