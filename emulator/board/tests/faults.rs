@@ -148,6 +148,16 @@ fn d3_a_watchdog_that_does_not_take_its_window_lets_nothing_move() {
 }
 
 #[test]
+fn d8_a_time_that_stands_still_stops_the_arm() {
+    let story = tell_holding(4.0, &["time-stands@3000000".into()]);
+    assert!(story.resets().is_empty(), "{:?}", story.resets());
+    let learned = story.learned.lock();
+    let status = learned.status.as_ref().expect("a status");
+    // Soft stop, for cycles that are late.
+    assert_eq!((status.state, status.fault), (6, 13), "{status:?}");
+}
+
+#[test]
 fn c3_a_usb_line_that_stays_up_keeps_the_session_from_nothing() {
     let quiet = tell_with(3.1, &[]).learned.lock().answered;
     let story = tell_with(3.1, &["usb-held@2100000"]);

@@ -46,6 +46,8 @@ pub struct SlotTask<B: Board, C: Controller> {
     unheard: u8,
     /// Ticks of the slots of this cycle so far.
     spent: u32,
+    /// The clock at the begin of the slot before.
+    begin: u32,
 }
 
 /// The world of the core during one slot.
@@ -99,6 +101,8 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
             bus_offs: 0,
             unheard: 0,
             spent: 0,
+            // Not the time of the first slot, which may be 0.
+            begin: u32::MAX,
         }
     }
 
@@ -106,6 +110,9 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
     pub fn run(&mut self, mut core: impl Mutex<T = &'static mut C>, mut can: impl Mutex<T = B::Can>, meters: &Meters) {
         meters.slot(self.timer.acknowledge());
         let begin = self.clock.short_ticks();
+        // Slots have a timer of their own. By a clock that stands still no host is ever silent.
+        let stands_still = begin == self.begin;
+        self.begin = begin;
         let now = self.clock.now_us();
         let (mut late, mut lost, mut off) = (false, false, false);
         if self.slot == Slot::Slow {
@@ -159,7 +166,7 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
             }
         }
         self.slot = slot.next();
-        if self.timer.is_due() {
+        if stands_still || self.timer.is_due() {
             core.lock(|core| core.note_overrun());
         }
     }
