@@ -91,6 +91,8 @@ pub struct CoreState {
     pub faults: Vec<FaultNote>,
     /// A damaged word was read, for the flash controller's status.
     pub double_error: bool,
+    /// The USB controller has no clock from its transceiver: a reset of it does not end.
+    pub usb_dead: bool,
     /// An operation of bank 2 does not end.
     pub bank_hangs: bool,
 }

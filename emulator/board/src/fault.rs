@@ -42,6 +42,8 @@ pub enum Kind {
     WatchdogDeaf,
     /// The USB controller holds its interrupt line up for good, as for a packet that nobody takes.
     UsbHeld,
+    /// The USB controller has no clock: a reset of it never ends.
+    UsbDead,
     /// A reset of this kind.
     Reset(ResetKind),
 }
@@ -71,7 +73,7 @@ pub struct Fault {
 /// Forms that the command line takes.
 pub const SYNTAX: &str = "KIND@MICROSECONDS[:ARGUMENT], KIND one of bus-off[:US], transmit-starved, receive-starved, no-acknowledge[:US], dominant[:US], \
 power-cut:N, flash-hangs:N, hse-dead, nmi, panic, hard-fault, hang, stall:US, guard, below-guard, \
-watchdog-deaf, time-stands, usb-held, reset:pin|power|brown-out|probe";
+watchdog-deaf, time-stands, usb-held, usb-dead, reset:pin|power|brown-out|probe";
 
 /// A text that names no fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -105,6 +107,7 @@ impl FromStr for Fault {
             "below-guard" => Kind::BelowGuard,
             "time-stands" => Kind::TimeStands,
             "watchdog-deaf" => Kind::WatchdogDeaf,
+            "usb-dead" => Kind::UsbDead,
             "usb-held" => Kind::UsbHeld,
             "reset" => Kind::Reset(match argument {
                 Some("pin") => ResetKind::Pin,

@@ -107,6 +107,7 @@ impl Watcher {
             // CEN goes, and nothing else of the register was set.
             Kind::TimeStands => self.core.lock().orders.push(Order::Poke(TIME_CONTROL, vec![0])),
             Kind::WatchdogDeaf => self.watch.deafen(),
+            Kind::UsbDead => self.core.lock().usb_dead = true,
             Kind::UsbHeld => session.board_mut().mcu.part.hold_usb(stop.at),
             Kind::Reset(ResetKind::Probe) => {
                 self.core.lock().orders.push(Order::Own(RESET_CONTROL, SYSTEM_RESET));

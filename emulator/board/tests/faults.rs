@@ -158,6 +158,13 @@ fn d8_a_time_that_stands_still_stops_the_arm() {
 }
 
 #[test]
+fn a_usb_controller_without_a_clock_costs_the_usb_line_and_nothing_else() {
+    let story = tell_with(2.6, &["usb-dead@0"]);
+    assert!(story.resets().is_empty(), "{:?}", story.resets());
+    assert!(story.is_up(), "{:?}", story.learned.lock().status);
+}
+
+#[test]
 fn c3_a_usb_line_that_stays_up_keeps_the_session_from_nothing() {
     let quiet = tell_with(3.1, &[]).learned.lock().answered;
     let story = tell_with(3.1, &["usb-held@2100000"]);

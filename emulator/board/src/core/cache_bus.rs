@@ -38,6 +38,10 @@ const MEMORIES: [(u64, u64); 9] = [
 const BANK_STATUS: u64 = 0x5200_2110;
 const BUSY: u64 = 0b101;
 
+/// Address of GRSTCTL of the USB controller, and its bit CSRST: it is being reset.
+const USB_RESET: u64 = 0x4008_0010;
+const USB_RESETS: u64 = 1;
+
 /// The peripherals, and the processor's own space.
 const PERIPHERALS: [(u64, u64); 2] = [(0x4000_0000, 0x5FFF_FFFF), (0xE000_0000, 0xE00F_FFFF)];
 
@@ -131,8 +135,14 @@ impl CoreBus for CacheBus<'_> {
             return None;
         }
         let value = self.inner.access(access, from_code)?;
-        let is_status = access.kind == AccessKind::Read && access.address == BANK_STATUS;
-        Some(if is_status && self.shared.lock().bank_hangs { value | BUSY } else { value })
+        if access.kind != AccessKind::Read {
+            return Some(value);
+        }
+        Some(match access.address {
+            BANK_STATUS if self.shared.lock().bank_hangs => value | BUSY,
+            USB_RESET if self.shared.lock().usb_dead => value | USB_RESETS,
+            _ => value,
+        })
     }
 
     fn time(&self, instructions: u64) -> VirtualNanos {

@@ -24,6 +24,7 @@ use super::super::constants::clocks::AHB_HZ;
 use super::super::constants::lines::{
     RECEIVE_BYTES, TRANSMIT_BYTES, USB_ENDPOINTS, USB_FIFO_WORDS, USB_PRODUCT, USB_VENDOR,
 };
+use super::clock;
 use super::device::{Chip, level};
 use crate::board::LinkPort;
 
@@ -39,8 +40,14 @@ const TURNS: u32 = 64;
 /// Of these are left.
 static TURNS_LEFT: AtomicU32 = AtomicU32::new(TURNS);
 
-/// Rounds of waiting for the USB supply: about 1 ms. Without it there is no USB line, and everything else works.
-const SUPPLY_ROUNDS: u32 = 20_000;
+/// Longest wait for the USB supply, and for the controller to be idle and to be reset, us. Without them there is no USB
+/// line, and everything else works.
+const READY_US: u32 = 1_000;
+
+/// The reset register of the controller, and its bits: reset, and idle.
+const RESET: *mut u32 = 0x4008_0010 as *mut u32;
+const CORE_RESET: u32 = 1;
+const IDLE: u32 = 1 << 31;
 
 /// The chip's second USB controller, on PA11 and PA12.
 struct Peripheral;
@@ -54,11 +61,7 @@ unsafe impl UsbPeripheral for Peripheral {
 
     fn enable() {
         PWR.cr3().modify(|w| w.set_usb33den(true));
-        for _ in 0..SUPPLY_ROUNDS {
-            if PWR.cr3().read().usb33rdy() {
-                break;
-            }
-        }
+        clock::within(READY_US, || PWR.cr3().read().usb33rdy());
         RCC.ahb1enr().modify(|w| w.set_usb_otg_fsen(true));
         RCC.ahb1enr().read();
         RCC.ahb1rstr().modify(|w| w.set_usb_otg_fsrst(true));
@@ -103,6 +106,19 @@ fn with<T>(action: impl FnOnce(&mut Queues) -> T) -> T {
     critical_section::with(|section| action(&mut QUEUES.borrow_ref_mut(section)))
 }
 
+/// True if the controller can be reset. It needs the clock of its transceiver for that, and the driver waits for it
+/// without a bound.
+fn can_be_reset() -> bool {
+    // SAFETY: a register of the controller, which is clocked and which nobody else uses yet.
+    let read = || unsafe { RESET.read_volatile() };
+    if !clock::within(READY_US, || read() & IDLE != 0) {
+        return false;
+    }
+    // SAFETY: as above.
+    unsafe { RESET.write_volatile(read() | CORE_RESET) };
+    clock::within(READY_US, || read() & CORE_RESET == 0)
+}
+
 /// Attaches to the host, if there is one.
 pub(super) fn start(nvic: &mut NVIC, number: &'static str) {
     let (Some(memory), Some(place)) =
@@ -110,6 +126,11 @@ pub(super) fn start(nvic: &mut NVIC, number: &'static str) {
     else {
         return;
     };
+    Peripheral::enable();
+    if !can_be_reset() {
+        defmt::warn!("no USB line: its controller has no clock");
+        return;
+    }
     let allocator: &'static UsbBusAllocator<Bus> = place.insert(UsbBus::new(Peripheral, memory));
     let serial = SerialPort::new(allocator);
     let names =
