@@ -102,6 +102,61 @@ fn poses_alone_can_be_learned_and_a_wide_turn_is_followed_in_every_axis() {
 }
 
 #[test]
+fn an_outlier_or_a_wrapped_angle_is_told_with_its_line_and_is_no_turn_of_the_movement() {
+    let text = common::text(&common::rows(3.0));
+    let lines: Vec<&str> = text.lines().collect();
+    let q7 = lines[1].split(',').position(|name| name == "q7_rad").unwrap();
+    let with = |from: usize, to: usize, leap: f64| {
+        let change = |(index, line): (usize, &&str)| {
+            let mut fields: Vec<String> = line.split(',').map(String::from).collect();
+            if (from..to).contains(&index) {
+                fields[q7] = (fields[q7].parse::<f64>().unwrap() + leap).to_string();
+            }
+            fields.join(",") + "\n"
+        };
+        let text: String = lines.iter().enumerate().map(change).collect();
+        Recording::parse(Path::new("demo.csv"), text.as_bytes()).unwrap()
+    };
+    assert!(learned(&with(0, 0, 0.0), &LearnOptions::named("reach")).is_ok());
+    let cases = [
+        (600, 601, 3.1),
+        (600, 601, 0.3),
+        (600, lines.len(), std::f64::consts::TAU),
+        (600, 620, -std::f64::consts::TAU),
+    ];
+    for (from, to, leap) in cases {
+        let error = learned(&with(from, to, leap), &LearnOptions::named("reach")).unwrap_err().to_string();
+        assert!(error.contains("demo.csv: line 601, column ") && error.contains("(q7_rad)"), "{error}");
+        assert_eq!(error.contains("a whole turn"), leap.abs() > 6.0, "{error}");
+    }
+    let degrees = |line: &&str| {
+        let change = |(index, field): (usize, &str)| match field.parse::<f64>() {
+            Ok(angle) if (q7 - 6..=q7).contains(&index) => angle.to_degrees().to_string(),
+            _ => field.to_owned(),
+        };
+        line.split(',').enumerate().map(change).collect::<Vec<_>>().join(",") + "\n"
+    };
+    let text: String = lines.iter().map(degrees).collect();
+    let recording = Recording::parse(Path::new("demo.csv"), text.as_bytes()).unwrap();
+    let error = learned(&recording, &LearnOptions::named("reach")).unwrap_err().to_string();
+    assert!(error.contains("are these degrees?") && error.contains("line 4, "), "{error}");
+    let mut rows: Vec<String> = common::foreign(2.0).lines().map(String::from).collect();
+    for (line, column, name) in [(400, 1, "px_m"), (500, 4, "qw")] {
+        let before = rows.clone();
+        let mut fields: Vec<String> = rows[line - 1].split(',').map(String::from).collect();
+        match name {
+            "qw" => fields.splice(4..8, ["0", "0", "0", "1"].map(String::from)).for_each(drop),
+            _ => fields[column] = "2".to_owned(),
+        }
+        rows[line - 1] = fields.join(",");
+        let recording = Recording::parse(Path::new("other.csv"), (rows.join("\n") + "\n").as_bytes()).unwrap();
+        let error = learned(&recording, &LearnOptions::named("turn")).unwrap_err().to_string();
+        assert!(error.contains(&format!("other.csv: line {line}, column ")) && error.contains(name), "{error}");
+        rows = before;
+    }
+}
+
+#[test]
 fn a_turn_beyond_150_degrees_is_warned_of_and_beyond_175_refused_with_its_line() {
     let recording = foreign(2.75); // 158 degrees, a little more with the ripples
     let report = learned(&recording, &LearnOptions::named("turn")).unwrap().report;

@@ -9,8 +9,9 @@ use lab::demonstration::{Demonstration, DemonstrationError, Preparation, Recordi
 
 const FILE: &str = "folder/demo.csv";
 
+/// Reads a file of these lines, the last one with its end.
 fn parse(text: &str) -> Result<Recording, RecordingError> {
-    Recording::parse(Path::new(FILE), text.as_bytes())
+    Recording::parse(Path::new(FILE), format!("{text}\n").as_bytes())
 }
 
 /// The lines of a good recording; line numbers in the tests count from 1, the header is line 2.
@@ -164,6 +165,43 @@ fn ragged_lines_are_refused_with_their_place() {
     let cut = lines[10].rfind(',').expect("several fields");
     lines[10].truncate(cut);
     names(&parse(&lines.join("\n")).unwrap_err(), 11, columns);
+}
+
+#[test]
+fn a_file_that_was_cut_within_its_last_number_is_told_and_not_read_with_another_value() {
+    let (whole, last) = (good().join("\n"), good().len() as u64);
+    let cut = [(whole.clone(), last), (whole[..whole.len() - 1].to_owned(), last), (format!("{whole}\n0"), last + 1)];
+    for (text, line) in cut {
+        let error = Recording::parse(Path::new(FILE), text.as_bytes()).unwrap_err();
+        assert!(matches!(error, RecordingError::Unfinished { line: found, .. } if found == line), "{error}");
+        assert!(error.to_string().contains(&format!("{FILE}: line {line}")), "{error}");
+    }
+    for end in ["\r\n", "\r"] {
+        let whole = good()[1..].join(end) + end;
+        assert!(Recording::parse(Path::new(FILE), whole.as_bytes()).is_ok(), "{end:?}");
+    }
+}
+
+#[test]
+fn a_file_with_other_separators_is_told_which_it_has() {
+    for (separator, name) in [(";", "semicolons"), ("\t", "tabs")] {
+        let error = parse(&good().join("\n").replace(',', separator)).unwrap_err();
+        assert!(matches!(error, RecordingError::Separator { line: 2, .. }), "{error}");
+        assert!(error.to_string().contains(name) && error.to_string().contains(FILE), "{error}");
+    }
+    // A column of nobody may have any name.
+    let noted = good().join("\n").replacen("cycle,", "a;b,", 1);
+    assert!(parse(&noted).is_ok());
+}
+
+#[test]
+fn a_file_of_another_kind_is_told_as_such_and_not_by_its_second_line() {
+    for text in ["schema = \"tactus-primitive/1\"\nname = \"reach\"\n[a]\nb = [1, 2]", "{\"a\": 1}", "time,speed\n0,1"]
+    {
+        let error = parse(text).unwrap_err();
+        assert!(matches!(error, RecordingError::NoColumns { line: 1, .. }), "{error}");
+        assert!(error.to_string().contains("no recording"), "{error}");
+    }
 }
 
 #[test]

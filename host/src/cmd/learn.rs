@@ -35,13 +35,13 @@ pub struct Cmd {
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u16).range(2..=100))]
     pub kernels: u16,
     /// Cut-off of the zero-phase filter on the demonstration, Hz
-    #[arg(long, default_value_t = CUTOFF, value_name = "HZ")]
+    #[arg(long, default_value_t = CUTOFF, value_name = "HZ", allow_hyphen_values = true)]
     pub cutoff: f64,
     /// Use the rotation vector as orientation error: for movements that turn more than 150 degrees
     #[arg(long)]
     pub rotation_vector: bool,
     /// Speed below which the arm counts as still before and behind the movement, m/s
-    #[arg(long, default_value_t = STILL_SPEED, value_name = "M_PER_S")]
+    #[arg(long, default_value_t = STILL_SPEED, value_name = "M_PER_S", allow_hyphen_values = true)]
     pub still_speed: f64,
     /// Learn the whole recording, with the time in which the arm stands still
     #[arg(long)]
@@ -53,7 +53,7 @@ pub struct Cmd {
     #[arg(long, value_name = "S,F1,F2,F3", default_value = "0,0,0,0", value_parser = numbers::<4>, allow_hyphen_values = true)]
     pub hand_goal: [f64; 4],
     /// Rest at the goal behind the movement, s: time for the fingers to close
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_hyphen_values = true)]
     pub dwell: f64,
     /// Fractions of the duration, the dwell included, between which the fingers move
     #[arg(long, value_name = "BEGIN,END", default_value = "0.6,1", value_parser = numbers::<2>)]

@@ -50,6 +50,39 @@ pub enum RecordingError {
         /// Line of the first such byte.
         line: u64,
     },
+    /// The last line has no end: nobody knows whether its last number is whole.
+    #[error(
+        "{file}: line {line}: the last line has no end: the file was cut, maybe within a number; \
+         `sed -i '$d'` takes the line from a file, `echo >>` ends it where it is whole",
+        file = file.display()
+    )]
+    Unfinished {
+        /// The file.
+        file: PathBuf,
+        /// The last line.
+        line: u64,
+    },
+    /// The header names nothing that a recording is read by.
+    #[error("{file}: line {line}: this is no recording: none of the names in its first line is that of a column", file = file.display())]
+    NoColumns {
+        /// The file.
+        file: PathBuf,
+        /// Line of what should be the header.
+        line: u64,
+    },
+    /// The columns are separated by something else than commas.
+    #[error(
+        "{file}: line {line}: the columns are separated by {found}, commas are expected, and points in the numbers",
+        file = file.display()
+    )]
+    Separator {
+        /// The file.
+        file: PathBuf,
+        /// Line of the header.
+        line: u64,
+        /// The separator, in words.
+        found: &'static str,
+    },
     /// The header names the same column twice.
     #[error("{place}: the column appears a second time")]
     DuplicateColumn {
@@ -141,6 +174,28 @@ pub enum RecordingError {
         gap: f64,
         /// The longest gap that is bridged, s.
         longest: f64,
+    },
+    /// A joint angle of several turns.
+    #[error("{place}: no joint turns as far as {angle:.1} rad: are these degrees? Radians are expected")]
+    NoRadians {
+        /// Where.
+        place: Place,
+        /// The angle that is given.
+        angle: f64,
+    },
+    /// A value that no arm reaches in the time since the line before.
+    #[error("{place}: a leap by {leap:.2} {unit} within {seconds:.3} s, which no arm makes: {guess}")]
+    Leap {
+        /// The first line behind it.
+        place: Place,
+        /// Distance of the leap.
+        leap: f64,
+        /// Its unit.
+        unit: &'static str,
+        /// Time since the line before, s.
+        seconds: f64,
+        /// Its probable nature.
+        guess: &'static str,
     },
 }
 

@@ -6,6 +6,7 @@
 
 pub mod error;
 pub mod layout;
+mod leap;
 pub mod origin;
 pub mod recording;
 pub mod resample;
@@ -131,12 +132,13 @@ impl Demonstration {
         // Times of few digits: a tenth of a second of a recording at 10 Hz is not more than one.
         if gap > LONGEST_GAP + TIME_ROUNDING {
             return Err(RecordingError::GapTooLong {
-                place: recording.place(behind, recording.time_column, layout::TIME),
+                place: recording.place(behind, layout::TIME),
                 gap,
                 longest: LONGEST_GAP,
             }
             .into());
         }
+        leap::refuse(recording)?;
         let grid = resample::grid(&recording.time, 1.0 / RATE);
         let q = recording.q.as_ref().map(|values| resample::vectors(&recording.time, values, &grid));
         let (position, orientation, pose_source) = match (&q, &recording.position, &recording.orientation) {
@@ -154,7 +156,7 @@ impl Demonstration {
                 return Err(DemonstrationError::NoPose {
                     file: recording.file.clone(),
                     line: recording.header_line,
-                    column: recording.columns + 1,
+                    column: recording.names.len() + 1,
                 });
             }
         };

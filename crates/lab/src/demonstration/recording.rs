@@ -33,10 +33,8 @@ pub struct Recording {
     pub origin: Origin,
     /// Line of the header in the file, from 1.
     pub header_line: u64,
-    /// Number of columns in the header.
-    pub columns: usize,
-    /// Column of the time, from 1.
-    pub time_column: usize,
+    /// Names of the columns, as the header has them.
+    pub names: Vec<String>,
     /// Line of each sample in the file, from 1.
     pub lines: Vec<u64>,
     /// Time of each sample, s, strictly increasing.
@@ -131,8 +129,6 @@ impl Recording {
             checksum: checksum(bytes),
             origin: Origin::of_notes(notes(bytes).iter().map(String::as_str)),
             header_line: table.header_line,
-            columns: table.names.len(),
-            time_column: table.column(layout::TIME).map_or(1, |column| column + 1),
             phase: table.numbers(layout::PHASE),
             surprise: table.numbers(layout::SURPRISE),
             flags: table.whole_numbers(layout::FLAGS)?,
@@ -141,6 +137,7 @@ impl Recording {
             orientation_d: table.unit_quaternions(orientation_d, layout::ORIENTATION_D[0])?,
             state: table.states,
             lines: table.lines,
+            names: table.names,
             q,
             dq,
             tau,
@@ -194,8 +191,7 @@ impl Recording {
             checksum: self.checksum,
             origin: self.origin.clone(),
             header_line: self.header_line,
-            columns: self.columns,
-            time_column: self.time_column,
+            names: self.names.clone(),
             lines: pick(&self.lines, keep),
             state: self.state.as_ref().map(|values| pick(values, keep)),
             fault: self.fault.as_ref().map(|values| pick(values, keep)),
@@ -221,12 +217,12 @@ impl Recording {
         }
     }
 
-    /// The place of one sample in the file.
-    pub fn place(&self, sample: usize, column: usize, name: &str) -> Place {
+    /// The place of one sample in the file, in the column of this name.
+    pub fn place(&self, sample: usize, name: &str) -> Place {
         Place {
             file: self.file.clone(),
             line: self.lines.get(sample).copied().unwrap_or_default(),
-            column,
+            column: self.names.iter().position(|known| known == name).map_or(1, |column| column + 1),
             name: name.to_owned(),
         }
     }
@@ -305,6 +301,9 @@ impl<'a> Table<'a> {
             let before = bytes.iter().take(zero).filter(|byte| **byte == b'\n').count();
             return Err(RecordingError::NotText { file: file.to_owned(), line: before as u64 + 1 });
         }
+        let is_cut = !matches!(bytes.last(), Some(b'\n' | b'\r'));
+        let cut = is_cut.then(|| bytes.iter().filter(|byte| **byte == b'\n').count() as u64 + 1);
+        let unfinished = |line| RecordingError::Unfinished { file: file.to_owned(), line };
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .flexible(true)
@@ -329,17 +328,24 @@ impl<'a> Table<'a> {
             if table.names.is_empty() {
                 table.read_header(line, &record)?;
             } else {
-                table.read_row(line, &record)?;
+                // What is wrong with a line that was cut is that.
+                table.read_row(line, &record).map_err(|wrong| match cut {
+                    Some(cut) if cut == line => unfinished(cut),
+                    _ => wrong,
+                })?;
             }
         }
         if table.names.is_empty() {
             return Err(RecordingError::Empty { file: file.to_owned() });
         }
-        Ok(table)
+        cut.map_or(Ok(table), |line| Err(unfinished(line)))
     }
 
     fn read_header(&mut self, line: u64, record: &csv::ByteRecord) -> Result<(), RecordingError> {
         self.header_line = line;
+        if let Some(found) = other_separator(record) {
+            return Err(RecordingError::Separator { file: self.file.to_owned(), line, found });
+        }
         for (index, field) in record.iter().enumerate() {
             let name = String::from_utf8_lossy(field).trim_start_matches('\u{feff}').to_owned();
             let place = Place { file: self.file.to_owned(), line, column: index + 1, name: name.clone() };
@@ -352,6 +358,9 @@ impl<'a> Table<'a> {
             }
             self.known.push(layout::is_known(&name));
             self.names.push(name);
+        }
+        if !self.known.contains(&true) {
+            return Err(RecordingError::NoColumns { file: self.file.to_owned(), line });
         }
         if self.names.iter().any(|name| name == layout::STATE) {
             self.states = Some(Vec::new());
@@ -498,6 +507,18 @@ impl<'a> Table<'a> {
             name: self.names[column].clone(),
         }
     }
+}
+
+/// The separator of the columns of a header that is no comma, in words.
+fn other_separator(header: &csv::ByteRecord) -> Option<&'static str> {
+    let known = |name: &str| layout::is_known(name.trim_start_matches('\u{feff}').trim());
+    let fields: Vec<_> = header.iter().map(String::from_utf8_lossy).collect();
+    if fields.iter().any(|field| known(field)) {
+        return None;
+    }
+    let separates = |separator: char| fields.iter().any(|field| field.split(separator).any(known));
+    let names = [(';', "semicolons"), ('\t', "tabs"), (' ', "spaces")];
+    names.into_iter().find(|(separator, _)| separates(*separator)).map(|(_, name)| name)
 }
 
 /// Turns each quaternion to the side of the one before it: q and -q are the same orientation, a jump between them

@@ -39,6 +39,9 @@ const LEAST_LEFT_OUT: f64 = 3e-3;
 /// Speed of the tool (turning counted, m/s) above which a demonstration does not begin or end at rest.
 const MOVING_END: f64 = 0.01;
 
+/// Fastest speed that may count as standing still, m/s: no movement that is shown by hand is faster all along.
+const FASTEST_STILL: f64 = 1.0;
+
 /// Longest rest at the goal, s.
 const LONGEST_DWELL: f64 = 60.0;
 
@@ -267,6 +270,12 @@ fn check_options(options: &LearnOptions) -> Result<(), LearnError> {
     }
     if !(0.0..=LONGEST_DWELL).contains(&options.dwell) {
         return wrong("--dwell", &format!("a time between 0 and {LONGEST_DWELL} s is expected"));
+    }
+    if options.preparation.still_speed.is_some_and(|speed| !(speed > 0.0 && speed <= FASTEST_STILL)) {
+        return wrong(
+            "--still-speed",
+            &format!("a speed between 0 and {FASTEST_STILL} m/s is expected; 0.005 is usual"),
+        );
     }
     let highest = RATE / 2.0;
     if !(options.cutoff > 0.0 && options.cutoff < highest) {
