@@ -23,6 +23,8 @@ pub enum Device {
     Serial(SerialTransport),
     /// On a CAN bus.
     Can(Box<CanTransport<SocketCan>>),
+    /// Over a line of the caller's own.
+    Own(Box<dyn Transport + Send>),
 }
 
 /// Why a device cannot be opened.
@@ -82,6 +84,7 @@ impl Device {
             Self::Stream(device) => device,
             Self::Serial(device) => device,
             Self::Can(device) => &**device,
+            Self::Own(device) => &**device,
         }
     }
 
@@ -93,6 +96,7 @@ impl Device {
             Self::Stream(device) => device,
             Self::Serial(device) => device,
             Self::Can(device) => &mut **device,
+            Self::Own(device) => &mut **device,
         }
     }
 
@@ -102,7 +106,7 @@ impl Device {
             Self::Simulated(simulation) => Some(simulation),
             Self::SimulatedCan(device) => Some(device.port().simulation()),
             Self::BoardCan(device) => Some(device.port().simulation()),
-            Self::Stream(_) | Self::Serial(_) | Self::Can(_) => None,
+            Self::Stream(_) | Self::Serial(_) | Self::Can(_) | Self::Own(_) => None,
         }
     }
 }
